@@ -1,0 +1,117 @@
+"""The lines that come out: rails and track centerlines, with the figures that go into their fields."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .points import LocalFrame
+
+
+def length_along(vertices: np.ndarray) -> np.ndarray:
+    """Distance of each vertex from the first, along the line.
+
+    Parameters
+    ----------
+    vertices : (n, 2) or (n, 3) array
+        A polyline; plan length for two columns, true length for three.
+
+    Returns
+    -------
+    (n,) float array, starting at 0
+    """
+    steps = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+@dataclass(frozen=True)
+class RailLine:
+    """The top of one railhead on the head's own axis.
+
+    Attributes
+    ----------
+    xyz : (n, 3) array
+        Vertices in local metres, from the western end (the southern end where the line runs within one degree of
+        north); z is NaN everywhere when there were no points to give height.
+    rail_id, class_code : int
+    points : int
+        Rail points that support the line.
+    resid_mm : float
+        Root mean square of the supporting points' offsets across the line.
+    sigma_mm : float
+        Standard error of the line's lateral position.
+    bridged_m : float
+        Plan length without supporting points.
+    """
+
+    xyz: np.ndarray
+    rail_id: int
+    class_code: int
+    points: int
+    resid_mm: float
+    sigma_mm: float
+    bridged_m: float
+
+    @property
+    def length_m(self) -> float:
+        """Length in space; in plan where the line has no height."""
+        flat = np.isnan(self.xyz[:, 2]).any()
+        return float(length_along(self.xyz[:, :2] if flat else self.xyz)[-1])
+
+
+@dataclass(frozen=True)
+class Centerline:
+    """The line midway between the two rails of a track.
+
+    Attributes
+    ----------
+    xyz : (n, 3) array
+        Vertices in local metres, directed like `RailLine.xyz`.
+    track_id, class_code : int
+    left_ids, right_ids : tuple of int
+        Rails on either side, seen along the line, in the order they are met.
+    gauge_mm, gaugesd_mm : float
+        Mean and standard deviation of the distance between the rail lines less the head width.
+    cant_mm, cantmax_mm : float
+        Left minus right height: its mean, and its largest value in size with its sign.
+    bridged_m : float
+        Plan length along which at least one rail has no supporting points.
+    """
+
+    xyz: np.ndarray
+    track_id: int
+    class_code: int
+    left_ids: tuple[int, ...]
+    right_ids: tuple[int, ...]
+    gauge_mm: float
+    gaugesd_mm: float
+    cant_mm: float
+    cantmax_mm: float
+    bridged_m: float
+
+    @property
+    def length_m(self) -> float:
+        """Length in space; in plan where the line has no height."""
+        flat = np.isnan(self.xyz[:, 2]).any()
+        return float(length_along(self.xyz[:, :2] if flat else self.xyz)[-1])
+
+
+@dataclass(frozen=True)
+class RailNetwork:
+    """Everything extracted from one cloud.
+
+    Attributes
+    ----------
+    rails : tuple of RailLine
+    centerlines : tuple of Centerline
+    frame : LocalFrame
+        Turns the lines' local metres into the cloud's coordinates.
+    engine : str
+        Engine and device that ran the network, for ENGINE_USED.
+    """
+
+    rails: tuple[RailLine, ...]
+    centerlines: tuple[Centerline, ...]
+    frame: LocalFrame
+    engine: str = field(default="")

@@ -1,0 +1,174 @@
+"""Sparse, tiled, georeferenced rasters of rail cells.
+
+A railway is long and thin: the bounding box of a 10 km diagonal holds a thousand times the cells of its corridor.
+A `RailRaster` therefore keeps only the tiles that hold a rail cell, and nothing here allocates by bounding box.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .progress import SILENT, Progress
+
+TILE = 256
+"""Cells along the side of a tile: small enough to follow a track, large enough to keep Python out of the way."""
+
+CENTRE_SPACING_CELLS = 37.78
+"""Cells between the two railhead centres: 1511.2 mm at 40 mm, 132RE in the paper; the same for every model."""
+
+
+def cell_size(gauge_m: float, head_width_m: float) -> float:
+    """Cell size in metres at which the two rails lie `CENTRE_SPACING_CELLS` apart (ALGORITHMS.md section 5.7)."""
+    return (gauge_m + head_width_m) / CENTRE_SPACING_CELLS
+
+
+@dataclass(frozen=True)
+class RailRaster:
+    """Rail cells on a square grid, kept by tile.
+
+    Row numbers grow to the south, column numbers to the east; both may be negative. Cell (0, 0) has its north-west
+    corner at (`x0`, `y0`).
+
+    Attributes
+    ----------
+    tiles : mapping of (tile row, tile column) to (TILE, TILE) bool array
+        Tiles that are missing hold no rail cell.
+    cell_m : float
+        Side of a cell, metres.
+    x0, y0 : float
+        North-west corner of cell (0, 0), local metres.
+    """
+
+    tiles: Mapping[tuple[int, int], np.ndarray]
+    cell_m: float
+    x0: float
+    y0: float
+
+    def read(self, row: int, column: int, height: int, width: int) -> np.ndarray:
+        """Copy a window of cells; outside the kept tiles it is False.
+
+        Returns
+        -------
+        (height, width) bool array
+        """
+        window = np.zeros((height, width), dtype=bool)
+        for tile_row in range(row // TILE, (row + height - 1) // TILE + 1):
+            for tile_column in range(column // TILE, (column + width - 1) // TILE + 1):
+                tile = self.tiles.get((tile_row, tile_column))
+                if tile is None:
+                    continue
+                top, left = tile_row * TILE - row, tile_column * TILE - column
+                rows = slice(max(top, 0), min(top + TILE, height))
+                columns = slice(max(left, 0), min(left + TILE, width))
+                window[rows, columns] = tile[
+                    rows.start - top : rows.stop - top, columns.start - left : columns.stop - left
+                ]
+        return window
+
+    def cells(self) -> np.ndarray:
+        """Rows and columns of every rail cell, sorted by tile.
+
+        Returns
+        -------
+        (n, 2) int64 array
+        """
+        found = [
+            np.argwhere(tile) + np.array(index, dtype=np.int64) * TILE for index, tile in sorted(self.tiles.items())
+        ]
+        return np.concatenate(found) if found else np.empty((0, 2), dtype=np.int64)
+
+    def count(self) -> int:
+        """Number of rail cells."""
+        return int(sum(np.count_nonzero(tile) for tile in self.tiles.values()))
+
+    def to_local(self, rows_columns: np.ndarray) -> np.ndarray:
+        """Local x, y in metres of cell positions; (0, 0) is the centre of cell (0, 0), fractions are allowed.
+
+        Parameters
+        ----------
+        rows_columns : (n, 2) array
+        """
+        rows_columns = np.asarray(rows_columns, dtype=float)
+        x = self.x0 + (rows_columns[:, 1] + 0.5) * self.cell_m
+        y = self.y0 - (rows_columns[:, 0] + 0.5) * self.cell_m
+        return np.column_stack([x, y])
+
+    def with_cells(self, cells: np.ndarray) -> RailRaster:
+        """Make a raster on the same grid that holds just these cells, (n, 2) rows and columns."""
+        return replace(self, tiles=_tiles_of(cells))
+
+    def map_tiles(
+        self,
+        function: Callable[[np.ndarray], np.ndarray],
+        margin: int,
+        grow: bool = False,
+        progress: Progress = SILENT,
+    ) -> RailRaster:
+        """Apply `function` to every tile seen with `margin` cells around it, and keep the tile's own cells.
+
+        Parameters
+        ----------
+        function : callable
+            (TILE + 2 margin) square bool array to bool array of the same shape.
+        margin : int
+            How far, in cells, the function looks around a cell.
+        grow : bool
+            Visit the eight neighbours of kept tiles too: for functions that set cells outside the kept tiles.
+        """
+        tiles = {}
+        for index in progress.follow(sorted(self.tile_neighbourhood() if grow else self.tiles)):
+            row, column = index[0] * TILE - margin, index[1] * TILE - margin
+            result = function(self.read(row, column, TILE + 2 * margin, TILE + 2 * margin))
+            inner = result[margin : margin + TILE, margin : margin + TILE]
+            if inner.any():
+                tiles[index] = np.array(inner, dtype=bool)
+        return replace(self, tiles=tiles)
+
+    def tile_neighbourhood(self) -> set[tuple[int, int]]:
+        """Indices of the kept tiles and of their eight neighbours."""
+        return set(_neighbourhood(self.tiles))
+
+
+def _neighbourhood(indices: Mapping[tuple[int, int], np.ndarray]) -> Iterator[tuple[int, int]]:
+    for row, column in indices:
+        for down in (-1, 0, 1):
+            for right in (-1, 0, 1):
+                yield row + down, column + right
+
+
+def rasterize(xy: np.ndarray, cell_m: float) -> RailRaster:
+    """Rasterize rail points: a cell is set where it holds at least one point (paper, section 7).
+
+    Cell borders lie on multiples of `cell_m`, so that clouds of one local origin share one grid.
+
+    Parameters
+    ----------
+    xy : (n, 2) or (n, 3) array
+        Points in local metres.
+    cell_m : float
+        Side of a cell, metres; see `cell_size`.
+    """
+    rows = np.floor(-np.asarray(xy)[:, 1] / cell_m).astype(np.int64)
+    columns = np.floor(np.asarray(xy)[:, 0] / cell_m).astype(np.int64)
+    return RailRaster(_tiles_of(np.column_stack([rows, columns])), cell_m, 0.0, 0.0)
+
+
+def _tiles_of(cells: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
+    """Sort cells, (n, 2) rows and columns, into tiles."""
+    if len(cells) == 0:
+        return {}
+    cells = np.asarray(cells, dtype=np.int64)
+    tile_indices, tile_of_cell = np.unique(cells // TILE, axis=0, return_inverse=True)
+    tile_of_cell = tile_of_cell.ravel()
+    order = np.argsort(tile_of_cell, kind="stable")
+    borders = np.searchsorted(tile_of_cell[order], np.arange(len(tile_indices) + 1))
+    tiles = {}
+    for number, (tile_row, tile_column) in enumerate(tile_indices.tolist()):
+        inside = cells[order[borders[number] : borders[number + 1]]] % TILE
+        tile = np.zeros((TILE, TILE), dtype=bool)
+        tile[inside[:, 0], inside[:, 1]] = True
+        tiles[tile_row, tile_column] = tile
+    return tiles

@@ -1,0 +1,1 @@
+"""Track layouts, their corruption into training rasters, and 3D scenes with exact truth."""

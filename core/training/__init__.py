@@ -1,0 +1,1 @@
+"""Training of FRPDF on synthetic rasters, and its evaluation."""
