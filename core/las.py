@@ -1,0 +1,212 @@
+"""LAS, LAZ and COPC files: checked headers, and points of wanted classes in chunks."""
+
+from __future__ import annotations
+
+import struct
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .crs import crs_of_geokeys, import_pyproj
+from .errors import CloudError
+from .progress import SILENT, Progress
+
+with warnings.catch_warnings():
+    # laspy imports pyproj, which in a virtual environment warns about a data folder that PROJ finds by itself.
+    warnings.simplefilter("ignore", UserWarning)
+    import laspy
+
+CHUNK = 250_000
+"""Points read at once: some 10 MB, and well below the half second in which a cancel must be heard."""
+
+SUFFIXES = (".las", ".laz")
+"""What a folder is searched for; COPC files end in .copc.laz."""
+
+SHORTEST_HEADER, VLR_HEADER = 227, 54
+"""Bytes, by the LAS 1.2 specification."""
+
+LARGEST_SCALE = 1000.0
+"""Coarser steps between neighbouring coordinates are no survey but a damaged header."""
+
+GEO_KEYS_RECORD = "GeoKeyDirectoryVlr"
+
+
+@dataclass(frozen=True)
+class CloudHeader:
+    """What a file says of itself.
+
+    Attributes
+    ----------
+    path : Path
+    point_count : int
+    extent : tuple of float
+        Smallest x, smallest y, largest x, largest y in units of the CRS, as the header states them.
+    crs_wkt : str or None
+        Coordinate system as WKT 2; None where the file has none that is understood.
+    """
+
+    path: Path
+    point_count: int
+    extent: tuple[float, float, float, float]
+    crs_wkt: str | None
+
+
+def list_files(paths: str | Path | Sequence[str | Path]) -> tuple[Path, ...]:
+    """Name the files of one path or several; a folder stands for the LAS and LAZ files in it, by name.
+
+    Raises
+    ------
+    CloudError
+        A path does not exist, or a folder holds no such file.
+    """
+    files: list[Path] = []
+    for path in [paths] if isinstance(paths, (str, Path)) else paths:
+        path = Path(path)
+        if not path.exists():
+            raise CloudError(f"{path} does not exist: check the path.")
+        found = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES) if path.is_dir() else [path]
+        if not found:
+            raise CloudError(f"The folder {path} holds no .las or .laz file.")
+        files.extend(found)
+    if not files:
+        raise CloudError("No point cloud was given: name a LAS or LAZ file or a folder of them.")
+    return tuple(files)
+
+
+def read_header(path: Path) -> CloudHeader:
+    """Read and check the header of one file, without its points.
+
+    Raises
+    ------
+    CloudError
+        The file is no LAS or LAZ file, is damaged, cut off or has no points.
+    """
+    with _open(path) as reader:
+        header = reader.header
+        extent = (*header.mins[:2], *header.maxs[:2])
+        return CloudHeader(path, int(header.point_count), tuple(float(value) for value in extent), _crs_wkt(header))
+
+
+def read_classes(
+    path: Path, class_codes: Sequence[int], progress: Progress = SILENT
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Read a file chunk by chunk and keep the points of the wanted classes; withheld points are left out.
+
+    Yields
+    ------
+    xyz : (n, 3) array
+        Kept points of a chunk, in units of the CRS.
+    codes : (n,) uint8 array
+        Their classes.
+    census : (256,) int array
+        Points in the chunk by class, wanted or not.
+
+    Raises
+    ------
+    CloudError
+        The file turns out to be cut off or damaged.
+    """
+    wanted = np.zeros(256, dtype=bool)
+    wanted[list(class_codes)] = True
+    with _open(path) as reader:
+        total = reader.header.point_count
+        done = 0
+        for chunk in reader.chunk_iterator(CHUNK):
+            progress.check()
+            codes = np.asarray(chunk.classification)
+            keep = np.flatnonzero(wanted[codes])
+            keep = keep[np.asarray(chunk.withheld)[keep] == 0]
+            raw = np.column_stack([chunk.X[keep], chunk.Y[keep], chunk.Z[keep]])
+            yield raw * reader.header.scales + reader.header.offsets, codes[keep], np.bincount(codes, minlength=256)
+            done += len(codes)
+            progress.set_fraction(done / total)
+    if done < total:
+        raise CloudError(f"{path.name} is cut off: it holds {done} of the {total} points that its header announces.")
+
+
+@contextmanager
+def _open(path: Path) -> Iterator[laspy.LasReader]:
+    """Open a checked file; whatever goes wrong in reading it becomes a `CloudError`."""
+    _check_start(path)
+    fields = laspy.DecompressionSelection
+    selection = fields.XY_RETURNS_CHANNEL | fields.Z | fields.CLASSIFICATION | fields.FLAGS
+    try:
+        with laspy.open(path, decompression_selection=selection) as reader:
+            _check_header(path, reader.header)
+            yield reader
+    except _READING_ERRORS as error:
+        raise CloudError(f"{path.name} is cut off or damaged ({error}): copy or export it again.") from error
+
+
+_READING_ERRORS = (laspy.errors.LaspyException, ValueError, OSError, EOFError, struct.error, IndexError, KeyError)
+"""What laspy and its backends raise on damaged files."""
+
+
+def _check_start(path: Path) -> None:
+    """Refuse what is no LAS file by its first bytes, before laspy trusts the numbers in them."""
+    size = path.stat().st_size
+    if size == 0:
+        raise CloudError(f"{path.name} is empty (0 bytes): copy or export it again.")
+    with path.open("rb") as file:
+        start = file.read(SHORTEST_HEADER)
+    if start[:4] != b"LASF":
+        raise CloudError(f"{path.name} is no LAS or LAZ file: it does not begin with LASF.")
+    if len(start) < SHORTEST_HEADER:
+        raise CloudError(f"{path.name} is cut off within its header: copy or export it again.")
+    if start[24] != 1 or start[25] > 4:
+        raise CloudError(f"{path.name} is LAS {start[24]}.{start[25]}: export it as LAS 1.2 to 1.4.")
+    points_at, records = struct.unpack("<II", start[96:104])
+    if points_at > size:
+        raise CloudError(f"{path.name} is cut off before its first point: copy or export it again.")
+    if records * VLR_HEADER > points_at:
+        raise CloudError(f"{path.name} has a damaged header ({records} records announced): export it again.")
+
+
+def _check_header(path: Path, header: laspy.LasHeader) -> None:
+    """Refuse counts and scales that can't be true, and compressed files nothing here can read."""
+    if header.point_count == 0:
+        raise CloudError(f"{path.name} holds no points.")
+    scales_fit = np.isfinite(header.scales).all() and (header.scales > 0).all()
+    if not scales_fit or (header.scales > LARGEST_SCALE).any() or not np.isfinite(header.offsets).all():
+        raise CloudError(f"{path.name} has a damaged header (coordinate scale or offset): export it again.")
+    if header.are_points_compressed:
+        if not laspy.LazBackend.detect_available():
+            raise CloudError(
+                f"{path.name} is compressed and the Python package lazrs, which reads LAZ, is missing: "
+                "run pip install lazrs, or export the cloud as LAS."
+            )
+        return
+    held = (path.stat().st_size - header.offset_to_point_data) // header.point_format.size
+    if held < header.point_count:
+        raise CloudError(
+            f"{path.name} is cut off: it has room for {held} of the {header.point_count} points that its header "
+            "announces; copy or export it again."
+        )
+
+
+def _crs_wkt(header: laspy.LasHeader) -> str | None:
+    """Coordinate system of a header as WKT 2; None where there is none or PROJ does not understand it."""
+    if not header.vlrs.get_by_id("LASF_Projection") and not (header.evlrs or []):
+        return None
+    pyproj = import_pyproj()
+    try:
+        crs = header.parse_crs()
+        if crs is not None and not header.global_encoding.wkt:
+            crs = crs_of_geokeys(crs, _geo_keys(header))
+    except (pyproj.exceptions.CRSError, UnicodeDecodeError):
+        return None
+    return None if crs is None else crs.to_wkt()
+
+
+def _geo_keys(header: laspy.LasHeader) -> dict[int, int]:
+    """GeoTIFF keys of a header that carry their value themselves."""
+    return {
+        key.id: key.value_offset
+        for record in header.vlrs.get(GEO_KEYS_RECORD)
+        for key in record.geo_keys
+        if key.tiff_tag_location == 0
+    }
