@@ -1,0 +1,99 @@
+"""The upper boundary of a union of equal discs, and the surface a disc rolls along (ALGORITHMS.md section 3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """The points whose discs make the upper boundary, from left to right.
+
+    A disc of the same radius that rests on the points from above touches just these points, one after the other.
+
+    Attributes
+    ----------
+    x, y : (m,) arrays
+        The points, x increasing.
+    start : (m,) array
+        Abscissa at which the upper boundary passes over to each point's disc, increasing.
+    radius : float
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    start: np.ndarray
+    radius: float
+
+    def upper(self, x: np.ndarray) -> np.ndarray:
+        """Height of the upper boundary at `x`, (k,); -inf where no disc reaches."""
+        number = np.clip(np.searchsorted(self.start, x, side="right") - 1, 0, None)
+        return self._disc(number, x)
+
+    def closing(self, x: np.ndarray) -> np.ndarray:
+        """Height of the rolling disc's lower side at `x`, (k,), for `x` between the first and the last point.
+
+        Between two neighbours of the boundary the disc rests on both, its centre where their discs hand over.
+        """
+        if len(self.x) == 1:
+            return np.full(len(x), self.y[0])
+        left = np.clip(np.searchsorted(self.x, x, side="right") - 1, 0, len(self.x) - 2)
+        centre_x = self.start[left + 1]
+        # Where one point stands more than a radius above its neighbour, the disc drops along it down to the lower one.
+        centre_y = np.minimum(self._disc(left, centre_x), self._disc(left + 1, centre_x))
+        return centre_y - np.sqrt(np.maximum(self.radius**2 - (x - centre_x) ** 2, 0.0))
+
+    def _disc(self, number: np.ndarray, x: np.ndarray) -> np.ndarray:
+        beside = self.radius**2 - (x - self.x[number]) ** 2
+        tolerance = 1e-9 * self.radius**2
+        return np.where(beside < -tolerance, -np.inf, self.y[number] + np.sqrt(np.maximum(beside, 0.0)))
+
+
+def extremal_boundary(x: np.ndarray, y: np.ndarray, radius: float) -> Boundary:
+    """Upper boundary of the union of discs of one radius around points, in one pass from left to right.
+
+    Of two discs the one further left lies higher on the left of a single change-over and lower on its right. A stack
+    of the discs on the boundary therefore suffices: each new disc removes those from the top that it covers from
+    before their own start. Every point is pushed once and popped at most once, so the pass is linear after sorting
+    (the paper's directional extremal boundary; Gribov, arXiv 2503.21711).
+
+    Parameters
+    ----------
+    x, y : (n,) arrays
+        Centres, in any order; n at least 1.
+    radius : float
+        In the unit of x and y.
+    """
+    order = np.lexsort((-y, x))
+    stack_x: list[float] = []
+    stack_y: list[float] = []
+    starts: list[float] = []
+    for x_new, y_new in zip(x[order].tolist(), y[order].tolist()):
+        if stack_x and x_new == stack_x[-1]:
+            continue
+        start = x_new - radius
+        while stack_x:
+            start = _handover(stack_x[-1], stack_y[-1], x_new, y_new, radius)
+            if start > starts[-1]:
+                break
+            stack_x.pop()
+            stack_y.pop()
+            starts.pop()
+        stack_x.append(x_new)
+        stack_y.append(y_new)
+        starts.append(start)
+    return Boundary(np.array(stack_x), np.array(stack_y), np.array(starts), radius)
+
+
+def _handover(x_left: float, y_left: float, x_right: float, y_right: float, radius: float) -> float:
+    """Abscissa at which the boundary passes from the left disc's upper half to the right one's."""
+    dx, dy = x_right - x_left, y_right - y_left
+    if dx >= 2 * radius:
+        return x_right - radius
+    squared = dx * dx + dy * dy
+    if squared >= 2 * radius * dx:  # one upper half lies above the other wherever both exist
+        return x_right - radius if dy > 0 else x_left + radius
+    return 0.5 * (x_left + x_right) - dy * sqrt(radius * radius / squared - 0.25)
