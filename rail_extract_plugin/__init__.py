@@ -1,0 +1,1 @@
+"""The QGIS side of Rail Extract: the only package that imports qgis."""

@@ -1,0 +1,146 @@
+"""What all algorithms of Rail Extract share: how they appear, check, prepare, run and fail."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from qgis.core import (
+    QgsPointCloudLayer,
+    QgsProcessingAlgorithm,
+    QgsProcessingContext,
+    QgsProcessingException,
+    QgsProcessingFeedback,
+    QgsProcessingParameterPointCloudLayer,
+)
+from qgis.PyQt.QtGui import QIcon
+
+from ...core.errors import Cancelled, RailExtractError
+from ...core.progress import Progress
+from ..dependencies import explain_missing, missing_packages
+from ..feedback import QgisProgress
+from ..i18n import tr
+from ..layers import check_writable
+from ..paths import ICON
+
+HOMEPAGE = "https://example.org/rail-extract"
+
+
+class RailAlgorithm(QgsProcessingAlgorithm):
+    """A step of Rail Extract in the toolbox.
+
+    A subclass says in the attributes what it is called and needs, declares its parameters in `initAlgorithm`, reads
+    them in `read` and computes in `compute`, the only method that may import what needs `MODULES`.
+    """
+
+    NAME = ""
+    LABEL = ""
+    GROUP = "Rails and tracks"
+    GROUP_ID = "railsandtracks"
+    TAGS: tuple[str, ...] = ()
+    HELP = ""
+    MODULES: tuple[str, ...] = ()
+    """Python modules, beyond QGIS's own, without which it can't run."""
+
+    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Any:
+        """Turn the parameters into what `compute` needs, and check them; runs in the main thread.
+
+        Raises
+        ------
+        RailExtractError
+            A value is wrong or contradicts another.
+        """
+        raise NotImplementedError
+
+    def compute(self, job: Any, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress) -> dict:
+        """Do the work, then write the outputs, and return the results by name."""
+        raise NotImplementedError
+
+    def checkParameterValues(self, parameters: dict[str, Any], context: QgsProcessingContext) -> tuple[bool, str]:
+        """Check all values before a run: as QGIS does, then whether outputs can be written, then as `read` does."""
+        accepted, message = super().checkParameterValues(self._with_paths_accepted(parameters), context)
+        if not accepted:
+            return False, message
+        try:
+            for output in self.destinationParameterDefinitions():
+                check_writable(parameters.get(output.name()), context)
+            self.read(parameters, context)
+        except RailExtractError as error:
+            return False, str(error)
+        return True, ""
+
+    def prepareAlgorithm(
+        self, parameters: dict[str, Any], context: QgsProcessingContext, feedback: QgsProcessingFeedback
+    ) -> bool:
+        """Read the parameters in the main thread."""
+        try:
+            self._job = self.read(parameters, context)
+        except RailExtractError as error:
+            raise QgsProcessingException(str(error)) from None
+        return True
+
+    def processAlgorithm(
+        self, parameters: dict[str, Any], context: QgsProcessingContext, feedback: QgsProcessingFeedback
+    ) -> dict:
+        """Compute in any thread; every failure that a user can remedy is one sentence."""
+        try:
+            return self.compute(self._job, parameters, context, QgisProgress(feedback))
+        except RailExtractError as error:
+            raise QgsProcessingException(str(error)) from None
+        except Cancelled:
+            raise QgsProcessingException(tr("Cancelled; nothing was written.")) from None
+        except MemoryError:
+            raise QgsProcessingException(tr("The memory does not suffice: choose a smaller extent.")) from None
+
+    def _with_paths_accepted(self, parameters: dict[str, Any]) -> dict[str, Any]:
+        """Put a layer object in place of paths of clouds: QGIS refuses all that its build can't open; `read` checks."""
+        stand_ins = {
+            definition.name(): QgsPointCloudLayer("", "", "")
+            for definition in self.parameterDefinitions()
+            if isinstance(definition, QgsProcessingParameterPointCloudLayer) and parameters.get(definition.name())
+        }
+        return {**parameters, **stand_ins}
+
+    def canExecute(self) -> tuple[bool, str]:
+        """Tell whether the needed packages are there; the algorithm stands in the toolbox in any case."""
+        missing = missing_packages(self.MODULES)
+        return (False, explain_missing(missing)) if missing else (True, "")
+
+    def createInstance(self) -> RailAlgorithm:
+        """Make another one, for a run of its own."""
+        return type(self)()
+
+    def name(self) -> str:
+        """Give the identifier that scripts and models use; it never changes."""
+        return self.NAME
+
+    def displayName(self) -> str:
+        """Give the name shown in the toolbox."""
+        return tr(self.LABEL)
+
+    def group(self) -> str:
+        """Give the group shown in the toolbox."""
+        return tr(self.GROUP)
+
+    def groupId(self) -> str:
+        """Give the group's identifier."""
+        return self.GROUP_ID
+
+    def tags(self) -> list[str]:
+        """Give words that the toolbox search finds it by."""
+        return [tr(tag) for tag in self.TAGS]
+
+    def shortHelpString(self) -> str:
+        """Give the text beside the dialog."""
+        return tr(self.HELP)
+
+    def helpUrl(self) -> str:
+        """Give the address of the guide."""
+        return HOMEPAGE
+
+    def icon(self) -> QIcon:
+        """Give the icon shown in the toolbox."""
+        return QIcon(str(ICON))
+
+    def svgIconPath(self) -> str:
+        """Give the same icon for places that draw it themselves."""
+        return str(ICON)

@@ -1,0 +1,22 @@
+"""What differs between QGIS 3.22 and 4, in one place.
+
+Everything else writes enums with their scope (``QgsProcessing.SourceType.TypeVectorLine``), which all of them know.
+"""
+
+from __future__ import annotations
+
+from qgis.core import Qgis, QgsField
+
+if Qgis.QGIS_VERSION_INT >= 33800:
+    from qgis.PyQt.QtCore import QMetaType
+
+    INTEGER, REAL, TEXT = QMetaType.Type.Int, QMetaType.Type.Double, QMetaType.Type.QString
+else:
+    from qgis.PyQt.QtCore import QVariant
+
+    INTEGER, REAL, TEXT = QVariant.Int, QVariant.Double, QVariant.String
+
+
+def field(name: str, kind) -> QgsField:
+    """Make a field; `kind` is `INTEGER`, `REAL` or `TEXT`."""
+    return QgsField(name, kind)

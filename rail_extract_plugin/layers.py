@@ -1,0 +1,137 @@
+"""From the core's lines to QGIS features, in the fields of the interface, and to the outputs that take them."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from qgis.core import (
+    QgsCoordinateReferenceSystem,
+    QgsDataSourceUri,
+    QgsFeature,
+    QgsFeatureSink,
+    QgsFields,
+    QgsGeometry,
+    QgsLineString,
+    QgsProcessing,
+    QgsProcessingContext,
+    QgsProcessingOutputLayerDefinition,
+    QgsProperty,
+)
+
+from ..core.errors import RailExtractError
+from .compat import INTEGER, REAL, TEXT, field
+
+if TYPE_CHECKING:
+    from ..core.points import LocalFrame
+    from ..core.rails import Centerline, RailLine
+
+RAIL_FIELDS = (
+    ("rail_id", INTEGER),
+    ("class_code", INTEGER),
+    ("length_m", REAL),
+    ("points", INTEGER),
+    ("resid_mm", REAL),
+    ("sigma_mm", REAL),
+    ("bridged_m", REAL),
+)
+CENTERLINE_FIELDS = (
+    ("track_id", INTEGER),
+    ("class_code", INTEGER),
+    ("left_ids", TEXT),
+    ("right_ids", TEXT),
+    ("length_m", REAL),
+    ("gauge_mm", REAL),
+    ("gaugesd_mm", REAL),
+    ("cant_mm", REAL),
+    ("cantmax_mm", REAL),
+    ("bridged_m", REAL),
+)
+"""Names and types, each name that of the attribute of `RailLine` or `Centerline` it holds."""
+
+
+def fields(columns: Sequence[tuple[str, Any]]) -> QgsFields:
+    """Make the fields of a layer from `RAIL_FIELDS` or `CENTERLINE_FIELDS`."""
+    made = QgsFields()
+    for name, kind in columns:
+        made.append(field(name, kind))
+    return made
+
+
+def features(
+    lines: Sequence[RailLine | Centerline], columns: Sequence[tuple[str, Any]], frame: LocalFrame
+) -> Iterator[QgsFeature]:
+    """Turn lines into features with heights, in the cloud's coordinates."""
+    for line in lines:
+        x, y, z = frame.to_crs(line.xyz).T
+        feature = QgsFeature()
+        feature.setGeometry(QgsGeometry(QgsLineString(x.tolist(), y.tolist(), z.tolist())))
+        feature.setAttributes([_attribute(getattr(line, name), kind) for name, kind in columns])
+        yield feature
+
+
+def add_features(sink: QgsFeatureSink, made: Iterator[QgsFeature]) -> None:
+    """Write features into a sink.
+
+    Raises
+    ------
+    RailExtractError
+        The output does not take one, as on a full disk.
+    """
+    for feature in made:
+        if not sink.addFeature(feature, QgsFeatureSink.Flag.FastInsert):
+            raise RailExtractError(f"The output can't be written ({sink.lastError()}): check the disk's free space.")
+
+
+def crs_of(wkt: str | None) -> QgsCoordinateReferenceSystem:
+    """Coordinate system for an output; invalid, as QGIS calls none at all, for None."""
+    return QgsCoordinateReferenceSystem() if wkt is None else QgsCoordinateReferenceSystem.fromWkt(wkt)
+
+
+def check_writable(value: Any, context: QgsProcessingContext) -> None:
+    """Refuse an output that could not be written, before the work begins.
+
+    Parameters
+    ----------
+    value : str, QgsProperty, QgsProcessingOutputLayerDefinition or None
+        Value of a destination parameter.
+    context : QgsProcessingContext
+
+    Raises
+    ------
+    RailExtractError
+        The file or its folder does not let itself be written.
+    """
+    path = _output_file(value, context)
+    if path is None:
+        return
+    if path.is_dir():
+        raise RailExtractError(f"The output {path} is a folder: give the name of a file in it.")
+    target = path if path.exists() else next(parent for parent in path.absolute().parents if parent.exists())
+    if not os.access(target, os.W_OK) or (target != path and not target.is_dir()):
+        raise RailExtractError(f"The output {path} can't be written, because {target} can't: choose another place.")
+
+
+def _attribute(value: Any, kind: Any) -> Any:
+    if kind == TEXT:
+        return ",".join(str(item) for item in value)
+    if kind == INTEGER:
+        return int(value)
+    return float(value) if np.isfinite(value) else None
+
+
+def _output_file(value: Any, context: QgsProcessingContext) -> Path | None:
+    """File behind a destination; None for memory layers and databases."""
+    if isinstance(value, QgsProcessingOutputLayerDefinition):
+        value = value.sink
+    if isinstance(value, QgsProperty):
+        value = value.valueAsString(context.expressionContext())[0]
+    text = value or ""
+    if text.startswith("ogr:"):
+        text = QgsDataSourceUri(text[len("ogr:") :]).database()
+    is_file = text and text != QgsProcessing.TEMPORARY_OUTPUT and not re.match(r"\w{2,}:", text)
+    return Path(text) if is_file else None
