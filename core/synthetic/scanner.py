@@ -46,12 +46,12 @@ class Scanner:
     """
 
     profile_step_m: float = 0.05
-    ray_step_rad: float = 0.004
-    height_m: float = 3.2
+    ray_step_rad: float = 0.002
+    height_m: float = 4.0
     left_m: float = 0.4
     noise_m: float = 0.003
     half_range_m: float = 12.0
-    face_share: float = 0.4
+    face_share: float = 0.3
 
 
 def head_outline(head_width_m: float) -> tuple[np.ndarray, np.ndarray]:

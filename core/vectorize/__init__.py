@@ -1,1 +1,66 @@
 """Rasters of rail cells become polylines: closing, parity fix, veinerization, pruning, tracing, joining."""
+
+from __future__ import annotations
+
+from ..progress import SILENT, Progress
+from ..raster import RailRaster
+from .closing import close
+from .joining import join_gaps
+from .junctions import clean_junctions, run_through, weld_pairs
+from .network import LineNetwork
+from .pixels import chamfer_distance, parity_fix, pixel_set
+from .tracing import trace
+from .veinerization import prune, veinerize
+
+__all__ = ["LineNetwork", "vectorize"]
+
+
+def vectorize(
+    raster: RailRaster,
+    head_width_m: float,
+    max_gap_m: float = 5.0,
+    gap_angle_deg: float = 10.0,
+    min_length_m: float = 1.0,
+    progress: Progress = SILENT,
+) -> LineNetwork:
+    """Turn rail cells into lines: one line a rail, straight through junctions and across gaps (paper, section 8).
+
+    Parameters
+    ----------
+    raster : RailRaster
+        Cells of rail, as the network cleaned them.
+    head_width_m : float
+        Railhead width; smaller detail at junctions is taken for noise.
+    max_gap_m, gap_angle_deg : float
+        Ends at most this far apart are joined if both point at each other within this angle.
+    min_length_m : float
+        Shorter lines are dropped unless they link two junctions.
+
+    Returns
+    -------
+    LineNetwork
+        Raw lines with the stairs of the raster in them, in local metres; smooth them next.
+    """
+    closed = close(raster, progress.span(0.0, 0.4))
+    pixels = parity_fix(pixel_set(closed.cells()))
+    progress.check()
+    distance = chamfer_distance(pixels)
+    edges = prune(veinerize(pixels, distance), distance)
+    progress.set_fraction(0.7)
+    progress.check()
+    network = clean_junctions(trace(closed, pixels, distance, edges), head_width_m)
+    progress.set_fraction(0.8)
+    progress.check()
+    network = join_gaps(run_through(network), max_gap_m, gap_angle_deg)
+    progress.set_fraction(1.0)
+    return _drop_short(network, min_length_m)
+
+
+def _drop_short(network: LineNetwork, min_length_m: float) -> LineNetwork:
+    """Drop short lines with a free end, then weld what only they kept apart."""
+    while True:
+        loose = (network.degrees()[network.ends] == 1).any(axis=1)
+        keep = ~loose | (network.lengths() >= min_length_m)
+        if keep.all():
+            return network
+        network = weld_pairs(network.select(keep))

@@ -1,0 +1,187 @@
+"""Dynamic time warping of two polylines: the stretches that run within a tolerance of each other.
+
+The paper's matching (section "Matching Pairs of Polylines"): a vertex of one polyline paired with a segment of the
+other is an edge of the lattice of vertex pairs (i, j); a match is a path along edges, each step advancing on one of
+the polylines.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+ADVANCE_SECOND, ADVANCE_FIRST = 0, 1
+"""Kinds of edges: vertex of the first with segment of the second, (i, j) to (i, j + 1), and the other way round."""
+
+TIE = 1e-9
+"""Lengths that differ by less, relative to their size (or to a metre), are summed from the same segments."""
+
+
+@dataclass(frozen=True)
+class Match:
+    """A stretch of one polyline and the stretch of another that it matches.
+
+    Attributes
+    ----------
+    first, second : (k,) int arrays
+        Vertices met in turn; from one entry to the next, just one of the two advances by one.
+    length : float
+        Sum of both stretches' lengths.
+    penalty : float
+        Squared distance between vertices and their segments, integrated over the segments.
+    """
+
+    first: np.ndarray
+    second: np.ndarray
+    length: float
+    penalty: float
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Valid pairs of a vertex and a segment as edges of the lattice, sorted by first, second and kind.
+
+    Attributes
+    ----------
+    first, second : (n,) int arrays
+        Lattice node at which the edge begins.
+    kind : (n,) int array
+        ADVANCE_SECOND or ADVANCE_FIRST.
+    length : (n,) array
+        Length of the segment.
+    penalty : (n,) array
+    """
+
+    first: np.ndarray
+    second: np.ndarray
+    kind: np.ndarray
+    length: np.ndarray
+    penalty: np.ndarray
+
+
+def match_polylines(first: np.ndarray, second: np.ndarray, tolerance: float) -> list[Match]:
+    """Find the matches of two polylines, both taken in the direction given; the longest comes first.
+
+    Of several paths the longest wins, of equally long ones that of the lowest penalty. Paths that share or continue
+    an edge form a cluster, and each cluster gives one match. The paper says a pair does not "follow" one that lies
+    further along; any order in which pairs precede their continuations serves, here that of the lattice nodes.
+
+    Parameters
+    ----------
+    first, second : (m, 2), (n, 2) arrays
+        Vertices, at steps of at most half the tolerance: a longer segment has neighbours out of everything's reach.
+    tolerance : float
+        Largest distance between a vertex and a segment, exclusive, in the unit of the vertices.
+
+    Returns
+    -------
+    list of Match
+    """
+    edges = lattice_edges(first, second, tolerance)
+    if not len(edges.first):
+        return []
+    begin, end, node_count = _lattice_nodes(edges)
+    cluster = _clusters(begin, end, node_count)
+    best_length, best_penalty, arrival = _best_arrivals(edges, begin, end, node_count)
+    length, penalty = best_length[begin] + edges.length, best_penalty[begin] + edges.penalty
+    predecessor = arrival[begin]
+    order = np.lexsort((penalty, -length))
+    _, best = np.unique(cluster[order], return_index=True)
+    return [_trace(edges, predecessor, edge, length[edge], penalty[edge]) for edge in order[np.sort(best)].tolist()]
+
+
+def lattice_edges(first: np.ndarray, second: np.ndarray, tolerance: float) -> Edges:
+    """Pair every vertex with every segment of the other polyline nearer than the tolerance."""
+    i, j, length, penalty = _near_pairs(first, second, tolerance)
+    j_turned, i_turned, length_turned, penalty_turned = _near_pairs(second, first, tolerance)
+    kind = np.repeat([ADVANCE_SECOND, ADVANCE_FIRST], [len(i), len(i_turned)])
+    nodes_first, nodes_second = np.concatenate([i, i_turned]), np.concatenate([j, j_turned])
+    order = np.lexsort((kind, nodes_second, nodes_first))
+    columns = (nodes_first, nodes_second, kind, (length, length_turned), (penalty, penalty_turned))
+    return Edges(*(np.concatenate(column)[order] if isinstance(column, tuple) else column[order] for column in columns))
+
+
+def _near_pairs(points: np.ndarray, line: np.ndarray, tolerance: float) -> tuple[np.ndarray, ...]:
+    """Vertices of `points` and segments of `line` in reach of each other: both numbers, segment length, penalty."""
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    reach = tolerance + 0.5 * steps.max(initial=0.0)  # a segment in reach has an end this near
+    near = cKDTree(points).sparse_distance_matrix(cKDTree(line), reach, output_type="ndarray")
+    vertex = np.concatenate([near["i"], near["i"]])
+    segment = np.concatenate([near["j"], near["j"] - 1])
+    inside = (segment >= 0) & (segment < len(line) - 1)
+    vertex, segment = np.divmod(np.unique(vertex[inside] * len(line) + segment[inside]), len(line))
+    p, q = line[segment] - points[vertex], line[segment + 1] - points[vertex]
+    close = distance_to_segment(p, q) < tolerance
+    return vertex[close], segment[close], steps[segment[close]], squared_distance_integral(p[close], q[close])
+
+
+def distance_to_segment(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Smallest distance of the segments p to q, (n, 2) each, from the origin; (n,)."""
+    along = q - p
+    squared = np.einsum("ij,ij->i", along, along)
+    share = np.clip(-np.einsum("ij,ij->i", p, along) / np.maximum(squared, np.finfo(float).tiny), 0.0, 1.0)
+    return np.linalg.norm(p + share[:, None] * along, axis=1)
+
+
+def squared_distance_integral(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Squared distance from the origin, integrated along the segments p to q, (n, 2) each (paper, appendix); (n,)."""
+    length = np.linalg.norm(q - p, axis=1)
+    return length / 3 * np.einsum("ij,ij->i", p, p + q) + length / 3 * np.einsum("ij,ij->i", q, q)
+
+
+def _lattice_nodes(edges: Edges) -> tuple[np.ndarray, np.ndarray, int]:
+    """Number the lattice nodes in use: those at which edges begin, those at which they end, (n,) each, and the count."""
+    width = int(edges.second.max()) + 2
+    begin = edges.first * width + edges.second
+    end = begin + np.where(edges.kind == ADVANCE_FIRST, width, 1)
+    used, number = np.unique(np.concatenate([begin, end]), return_inverse=True)
+    begin, end = number.reshape(2, -1)
+    return begin, end, len(used)
+
+
+def _clusters(begin: np.ndarray, end: np.ndarray, node_count: int) -> np.ndarray:
+    """Number the sets of edges linked by continuation, (n,).
+
+    Edges that only begin, or only end, in one node do not continue each other: a node links them where it does both.
+    """
+    continued = np.zeros((2, node_count), dtype=bool)
+    continued[0, end] = continued[1, begin] = True
+    through = continued.all(axis=0)
+    arriving, leaving = np.flatnonzero(through[end]), np.flatnonzero(through[begin])
+    edge = np.concatenate([arriving, leaving])
+    node = len(begin) + np.concatenate([end[arriving], begin[leaving]])
+    size = len(begin) + node_count
+    links = coo_matrix((np.ones(len(edge), dtype=bool), (edge, node)), shape=(size, size))
+    return connected_components(links, directed=False)[1][: len(begin)]
+
+
+def _best_arrivals(edges: Edges, begin: np.ndarray, end: np.ndarray, node_count: int) -> tuple[np.ndarray, ...]:
+    """Length and penalty of the best path to each node and the edge it arrives by, -1 where none does; (k,) each.
+
+    Plain lists: the edges have to be taken one after the other, where numpy would cost ten times as much.
+    """
+    best_length, best_penalty, arrival = [0.0] * node_count, [0.0] * node_count, [-1] * node_count
+    steps = zip(begin.tolist(), end.tolist(), edges.length.tolist(), edges.penalty.tolist())
+    for edge, (here, there, length, penalty) in enumerate(steps):
+        length += best_length[here]
+        penalty += best_penalty[here]
+        gain = length - best_length[there]
+        tie = TIE * length if length > 1.0 else TIE
+        if gain > tie or (gain >= -tie and penalty < best_penalty[there]):
+            best_length[there], best_penalty[there], arrival[there] = length, penalty, edge
+    return np.array(best_length), np.array(best_penalty), np.array(arrival)
+
+
+def _trace(edges: Edges, predecessor: np.ndarray, last: int, length: float, penalty: float) -> Match:
+    """Follow the predecessors from a path's last edge to its first."""
+    path = [last]
+    while predecessor[path[-1]] >= 0:
+        path.append(int(predecessor[path[-1]]))
+    path = np.array(path[::-1])
+    first = np.append(edges.first[path], edges.first[last] + (edges.kind[last] == ADVANCE_FIRST))
+    second = np.append(edges.second[path], edges.second[last] + (edges.kind[last] == ADVANCE_SECOND))
+    return Match(first, second, float(length), float(penalty))

@@ -1,0 +1,41 @@
+"""Weights of FRPDF on disk: plain arrays in an .npz file, named as in the network's state."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import ModelError
+
+
+def load_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Read weights; nothing but plain arrays is accepted.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    dict of str to float32 array
+
+    Raises
+    ------
+    ModelError
+        The file is missing or damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return {name: archive[name].astype(np.float32) for name in archive.files}
+    except FileNotFoundError:
+        raise ModelError(f"The network's weights {path} are missing: install the plugin again.") from None
+    except Exception as error:
+        # A damaged archive raises any of a dozen errors, from zipfile, zlib, numpy and struct.
+        raise ModelError(f"The network's weights {path} can't be read ({error}): install the plugin again.") from error
+
+
+def save_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
+    """Write weights, compressed."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    np.savez_compressed(path, **arrays)

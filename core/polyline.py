@@ -1,0 +1,155 @@
+"""Geometry along plan polylines: stations, normals, feet of points, and which end is the start."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .progress import SILENT, Progress
+from .rails import length_along
+
+STATION_M = 0.05
+"""Spacing of the stations at which points look for their line; of two lines this close, either may be taken."""
+
+POINTS_AT_ONCE = 500_000
+"""Points projected in one go: bounds the memory, and lets a cancel through several times a second."""
+
+NORTH_TANGENT = np.tan(np.radians(1.0))
+"""A line within one degree of north starts at its southern end, not at its western one."""
+
+
+def resample(vertices: np.ndarray, step_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Place stations at equal distances of at most `step_m` along a polyline, both ends among them.
+
+    Parameters
+    ----------
+    vertices : (n, d) array
+        A polyline of some length; distances are measured in the first two columns.
+    step_m : float
+
+    Returns
+    -------
+    stations : (m, d) array
+    t : (m,) array
+        Plan distance from the start.
+    """
+    along = length_along(vertices[:, :2])
+    t = np.linspace(0.0, along[-1], max(int(np.ceil(along[-1] / step_m)), 1) + 1)
+    return interpolate(vertices, along, t), t
+
+
+def interpolate(values: np.ndarray, along: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Interpolate the columns of `values`, (n, d) given at `along`, linearly at `t`; returns (m, d)."""
+    return np.column_stack([np.interp(t, along, column) for column in values.T])
+
+
+def unit_tangents(vertices: np.ndarray) -> np.ndarray:
+    """Directions of a polyline at its vertices, (n, 2) unit vectors; of (n, d) vertices the first two columns count."""
+    ahead = np.diff(vertices[:, :2], axis=0)
+    both = np.concatenate([ahead[:1], ahead[:-1] + ahead[1:], ahead[-1:]])
+    return both / np.maximum(np.linalg.norm(both, axis=1, keepdims=True), np.finfo(float).tiny)
+
+
+def left_normals(vertices: np.ndarray) -> np.ndarray:
+    """Unit vectors to the left of a polyline at its vertices, (n, 2)."""
+    tangents = unit_tangents(vertices)
+    return np.column_stack([-tangents[:, 1], tangents[:, 0]])
+
+
+def starts_at_its_end(vertices: np.ndarray) -> bool:
+    """Tell whether a line has to be turned around to start in the west, or in the south when it runs north."""
+    dx, dy = vertices[-1, :2] - vertices[0, :2]
+    if abs(dx) <= NORTH_TANGENT * abs(dy):
+        return bool(dy < 0)
+    return bool(dx < 0)
+
+
+@dataclass(frozen=True)
+class Feet:
+    """Points and where they project perpendicularly onto the nearest of several lines.
+
+    Attributes
+    ----------
+    point, line : (n,) int arrays
+        Numbers of the points and of the lines; sorted by line, then by `t`.
+    t : (n,) array
+        Distance of the foot from the line's start, metres.
+    across : (n,) array
+        Distance of the point from its foot, metres, positive to the left of the line.
+    """
+
+    point: np.ndarray
+    line: np.ndarray
+    t: np.ndarray
+    across: np.ndarray
+
+    def of(self, line: int) -> Feet:
+        """Pick those on one line."""
+        mine = slice(*np.searchsorted(self.line, [line, line + 1]))
+        return self[mine]
+
+    def __getitem__(self, which: slice | np.ndarray) -> Feet:
+        return Feet(self.point[which], self.line[which], self.t[which], self.across[which])
+
+
+def project(lines: Sequence[np.ndarray], xy: np.ndarray, reach_m: float, progress: Progress = SILENT) -> Feet:
+    """Project points onto the nearest line; points further away than `reach_m` or past a line's end are left out.
+
+    Parameters
+    ----------
+    lines : sequence of (n, 2) arrays
+    xy : (k, 2) array
+    reach_m : float
+    progress : Progress
+    """
+    if not len(lines) or not len(xy):
+        nothing = np.empty(0)
+        return Feet(nothing.astype(np.int64), nothing.astype(np.int32), nothing, nothing)
+    target = _Stations.along(lines)
+    starts = range(0, len(xy), POINTS_AT_ONCE)
+    found = [target.feet(xy[start : start + POINTS_AT_ONCE], start, reach_m) for start in progress.follow(starts)]
+    point, line, t, across = (np.concatenate(column) for column in zip(*found))
+    order = np.lexsort((t, line))
+    return Feet(point[order], line[order], t[order], across[order])
+
+
+@dataclass(frozen=True)
+class _Stations:
+    """Stations of several lines in one row; piece k runs from station k to station k + 1."""
+
+    tree: cKDTree
+    line: np.ndarray
+    t: np.ndarray
+
+    @classmethod
+    def along(cls, lines: Sequence[np.ndarray]) -> _Stations:
+        stations, t = zip(*(resample(line, STATION_M) for line in lines))
+        number = np.repeat(np.arange(len(lines), dtype=np.int32), [len(one) for one in t])
+        return cls(cKDTree(np.concatenate(stations)), number, np.concatenate(t))
+
+    def feet(self, xy: np.ndarray, first: int, reach_m: float) -> Iterator[np.ndarray]:
+        """Numbers of the points in reach (the first of `xy` is number `first`), their lines, t and across."""
+        distance, nearest = self.tree.query(xy, distance_upper_bound=reach_m + STATION_M, workers=-1)
+        near = np.flatnonzero(np.isfinite(distance))
+        xy, nearest = xy[near], nearest[near]
+        before, after = self._foot(xy, nearest - 1), self._foot(xy, nearest)
+        t, across = np.where(np.abs(before[1]) < np.abs(after[1]), before, after)
+        inside = np.abs(across) <= reach_m
+        return near[inside] + first, self.line[nearest[inside]], t[inside], across[inside]
+
+    def _foot(self, xy: np.ndarray, piece: np.ndarray) -> np.ndarray:
+        """Place and signed distance of the feet on one piece for each point, (2, k); inf where there is no such foot.
+
+        Feet up to a hundredth of a piece past its ends count, so that none is lost outside a bend.
+        """
+        start, end = np.maximum(piece, 0), np.minimum(piece + 1, len(self.t) - 1)
+        a, b = self.tree.data[start], self.tree.data[end]
+        length = np.where((piece == start) & (self.line[start] == self.line[end]), self.t[end] - self.t[start], 0.0)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            direction = (b - a) / length[:, None]
+            share = np.einsum("ij,ij->i", xy - a, direction) / length
+            across = direction[:, 0] * (xy[:, 1] - a[:, 1]) - direction[:, 1] * (xy[:, 0] - a[:, 0])
+        return np.where((share > -0.01) & (share < 1.01), [self.t[start] + share * length, across], np.inf)

@@ -1,0 +1,115 @@
+"""Rails drawn into a square window of cells: as the ideal label, and as what a scanner hits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+LATERAL_STEP_M = 0.01
+"""Spacing across a rail of the points that stand for complete coverage: a quarter of a cell."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """A square of `size` cells of `cell_m`, with its north-west corner at (`x0`, `y0`)."""
+
+    size: int
+    cell_m: float
+    x0: float
+    y0: float
+
+    def near(self, xy: np.ndarray, margin_m: float) -> np.ndarray:
+        """Tell which points lie in the window or within a margin of it, (n,) bool."""
+        extent = self.size * self.cell_m
+        x, y = xy[:, 0] - self.x0, self.y0 - xy[:, 1]
+        return (x > -margin_m) & (x < extent + margin_m) & (y > -margin_m) & (y < extent + margin_m)
+
+    def cells_of(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rows and columns of the points that lie in the window."""
+        rows = np.floor((self.y0 - xy[:, 1]) / self.cell_m).astype(int)
+        columns = np.floor((xy[:, 0] - self.x0) / self.cell_m).astype(int)
+        inside = (rows >= 0) & (rows < self.size) & (columns >= 0) & (columns < self.size)
+        return rows[inside], columns[inside]
+
+
+def draw_label(target: np.ndarray, window: Window, xy: np.ndarray, normal: np.ndarray, width_m: float) -> None:
+    """Set the cells whose centre lies within half a railhead of the line.
+
+    Parameters
+    ----------
+    target : (size, size) bool array, changed
+    window : Window
+    xy, normal : (n, 2) arrays
+        Samples of the line no farther apart than a cell, and unit normals.
+    width_m : float
+        Railhead width.
+    """
+    kept = window.near(xy, width_m)
+    if np.count_nonzero(kept) < 2:
+        return
+    step = float(np.median(np.linalg.norm(np.diff(xy, axis=0), axis=1)))
+    xy, normal = xy[kept], normal[kept]
+    reach = int(np.ceil(width_m / window.cell_m))
+    offsets = np.arange(-reach, reach + 1)
+    rows = np.floor((window.y0 - xy[:, 1]) / window.cell_m).astype(int)[:, None, None] + offsets[:, None]
+    columns = np.floor((xy[:, 0] - window.x0) / window.cell_m).astype(int)[:, None, None] + offsets
+    dx = window.x0 + (columns + 0.5) * window.cell_m - xy[:, 0, None, None]
+    dy = window.y0 - (rows + 0.5) * window.cell_m - xy[:, 1, None, None]
+    across = dx * normal[:, 0, None, None] + dy * normal[:, 1, None, None]
+    along = dx * normal[:, 1, None, None] - dy * normal[:, 0, None, None]
+    near = (np.abs(across) <= width_m / 2) & (np.abs(along) <= step)
+    near &= (rows >= 0) & (rows < window.size) & (columns >= 0) & (columns < window.size)
+    rows, columns = np.broadcast_arrays(rows, columns)
+    target[rows[near], columns[near]] = True
+
+
+def scan_coverage(xy: np.ndarray, normal: np.ndarray, right_m: np.ndarray, left_m: np.ndarray) -> np.ndarray:
+    """Points that cover a rail completely, `LATERAL_STEP_M` apart across it.
+
+    Parameters
+    ----------
+    xy, normal : (n, 2) arrays
+    right_m, left_m : (n,) arrays
+        Offsets of the head's two edges along the normal; the right one is negative.
+
+    Returns
+    -------
+    (m, 2) array
+    """
+    if len(xy) == 0:
+        return np.empty((0, 2))
+    count = int(np.ceil((left_m - right_m).max() / LATERAL_STEP_M)) + 1
+    share = np.linspace(0, 1, max(count, 2))
+    across = right_m[:, None] + (left_m - right_m)[:, None] * share
+    return (xy[:, None, :] + across[:, :, None] * normal[:, None, :]).reshape(-1, 2)
+
+
+def scan_profiles(
+    rng: np.random.Generator,
+    xy: np.ndarray,
+    normal: np.ndarray,
+    right_m: np.ndarray,
+    left_m: np.ndarray,
+    seen: np.ndarray,
+    density: float,
+    profile_m: float,
+) -> np.ndarray:
+    """Points that a scanner finds on a rail: profiles `profile_m` apart, `density` points a metre where `seen`.
+
+    Returns
+    -------
+    (m, 2) array
+    """
+    if len(xy) < 2:
+        return np.empty((0, 2))
+    step = float(np.median(np.linalg.norm(np.diff(xy, axis=0), axis=1)))
+    profiles = np.arange(rng.uniform(0, profile_m), step * len(xy), profile_m)
+    hits = rng.poisson(density * profile_m, size=len(profiles))
+    position = np.repeat(profiles, hits) + rng.normal(0, 0.1 * profile_m, size=hits.sum())
+    sample = np.clip((position / step).astype(int), 0, len(xy) - 1)
+    position, sample = position[seen[sample]], sample[seen[sample]]
+    across = right_m[sample] + (left_m - right_m)[sample] * rng.random(len(sample))
+    along = np.column_stack([normal[:, 1], -normal[:, 0]])[sample]
+    rest = (position - sample * step)[:, None]
+    return xy[sample] + across[:, None] * normal[sample] + np.clip(rest, -step, step) * along

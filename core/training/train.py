@@ -1,0 +1,217 @@
+"""Train FRPDF on synthetic pairs, on the CPU in bfloat16 or on CUDA; resumable, seeded, logged.
+
+Loss on every pass, no gradient through the feedback, shared weights, batch statistics per pass (ALGORITHMS.md
+section 5.5).
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from ..frpdf.network import DEFAULT_PASSES, FRPDF, OUTPUT_THRESHOLD, START, PassBatchNorm2d, feedback
+from ..frpdf.weights import save_arrays
+from ..synthetic.pairs import random_pair
+from .gradients import train_on_cpu
+from .scores import Scores, score
+
+CROPS = ((256, 4), (384, 2), (512, 1))
+"""Side and number of a step's crops: of like cost; the large ones train the outer taps of the widest dilation."""
+CROP_SHARES = (0.4, 0.3, 0.3)
+PASS_WEIGHTS = (0.5, 1.0)
+"""Weight of each pass's loss: the last one makes the result."""
+HEAD_BIAS = -4.0
+"""Start near the share of rail cells in a raster, or the first hundred steps only learn that there are few."""
+WEIGHT_DECAY = 1e-5
+LARGEST_GRADIENT = 1.0
+WARM_UP_STEPS = 40
+STATISTICS_STEPS = 60
+"""Steps over which the batch statistics of the final weights are averaged."""
+CHECKPOINT_STEPS = 50
+DATA, STATISTICS_DATA = 0, 1
+"""Streams of random numbers; evaluation has streams of its own."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A training: the same settings give the same weights on the same machine."""
+
+    steps: int
+    rate: float
+    seed: int
+    device: str
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("folder", type=Path, help="keeps checkpoint.pt, log.csv and weights.npz; resumes from there")
+    parser.add_argument("--steps", type=int, default=1000, help="steps of the whole training (default 1000)")
+    parser.add_argument("--minutes", type=float, default=math.inf, help="stop after so long; the next call goes on")
+    parser.add_argument("--rate", type=float, default=3e-3, help="largest learning rate (default 0.003)")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Train, go on with a training, or export one that is complete."""
+    settings = Settings(arguments.steps, arguments.rate, arguments.seed, arguments.device)
+    arguments.folder.mkdir(parents=True, exist_ok=True)
+    network = train(settings, arguments.folder, arguments.minutes)
+    if network is None:
+        print(f"Stopped before the end; the same command goes on from {arguments.folder / 'checkpoint.pt'}.")
+        return 0
+    recompute_statistics(network, settings)
+    save_arrays(arguments.folder / "weights.npz", export(network))
+    print(f"Wrote {arguments.folder / 'weights.npz'}.")
+    return 0
+
+
+def train(settings: Settings, folder: Path, minutes: float) -> FRPDF | None:
+    """Train up to the last step, or for so many minutes.
+
+    Returns
+    -------
+    FRPDF or None
+        None where the time was up before the last step.
+    """
+    torch.manual_seed(settings.seed)
+    network = new_network(settings.device)
+    optimizer = torch.optim.AdamW(network.parameters(), lr=settings.rate, weight_decay=WEIGHT_DECAY)
+    first = _resume(folder / "checkpoint.pt", network, optimizer)
+    until = time.monotonic() + 60 * minutes
+    for step in range(first, settings.steps):
+        started = time.monotonic()
+        for group in optimizer.param_groups:
+            group["lr"] = learning_rate(step, settings)
+        observed, label = batch(settings, DATA, step)
+        losses, scores = _learn(network, optimizer, observed, label)
+        _log(folder / "log.csv", step, learning_rate(step, settings), losses, scores, time.monotonic() - started)
+        done = step + 1
+        out_of_time = time.monotonic() > until
+        if done % CHECKPOINT_STEPS == 0 or out_of_time or done == settings.steps:
+            state = {"network": network.state_dict(), "optimizer": optimizer.state_dict(), "step": done}
+            torch.save(state, folder / "checkpoint.new")
+            (folder / "checkpoint.new").replace(folder / "checkpoint.pt")
+        if out_of_time and done < settings.steps:
+            return None
+    return network
+
+
+def new_network(device: str) -> FRPDF:
+    """Build an untrained network, prepared for its device."""
+    network = FRPDF()
+    torch.nn.init.constant_(network.layer[-1].bias, HEAD_BIAS)
+    if device == "cpu":
+        train_on_cpu(network)
+    return network.to(device, memory_format=torch.channels_last)
+
+
+def learning_rate(step: int, settings: Settings) -> float:
+    """Rise over the warm-up, then fall as a cosine to a thousandth."""
+    rise = min((step + 1) / WARM_UP_STEPS, 1.0)
+    fall = 0.5 * (1 + math.cos(math.pi * step / settings.steps))
+    return settings.rate * rise * max(fall, 1e-3)
+
+
+def batch(settings: Settings, stream: int, step: int) -> tuple[Tensor, Tensor]:
+    """Draw the pairs of a step: observed rasters and labels, (n, 1, side, side) float tensors."""
+    rng = np.random.default_rng([settings.seed, stream, step])
+    side, count = CROPS[rng.choice(len(CROPS), p=CROP_SHARES)]
+    pairs = [random_pair(rng, side) for _ in range(count)]
+    return tuple(
+        torch.from_numpy(np.stack(rasters)[:, None].astype(np.float32))
+        .to(settings.device)
+        .contiguous(memory_format=torch.channels_last)
+        for rasters in ([pair.observed for pair in pairs], [pair.label for pair in pairs])
+    )
+
+
+def run_passes(network: FRPDF, observed: Tensor, passes: int = DEFAULT_PASSES) -> Iterator[Tensor]:
+    """Run pass after pass in bfloat16 and yield the float logits of each; the caller may go backward in between."""
+    state = torch.full_like(observed, START)
+    for number in range(passes):
+        with torch.autocast(observed.device.type, torch.bfloat16):
+            logits = network.logits(observed, state, number)
+        yield logits.float()
+        state = feedback(logits.float()).to(observed.dtype)
+
+
+def loss_of(logits: Tensor, label: Tensor) -> Tensor:
+    """Binary cross entropy, plus soft Dice: rail cells are so few that entropy alone starts slowly."""
+    probability = torch.sigmoid(logits)
+    dice = 1 - (2 * (probability * label).sum() + 1) / (probability.sum() + label.sum() + 1)
+    return functional.binary_cross_entropy_with_logits(logits, label) * ENTROPY_WEIGHT + dice
+
+
+ENTROPY_WEIGHT = 5.0
+"""Makes the entropy, some hundredths a cell, about as large as Dice."""
+
+
+def _learn(
+    network: FRPDF, optimizer: torch.optim.Optimizer, observed: Tensor, label: Tensor
+) -> tuple[list[float], list[Scores]]:
+    network.train()
+    optimizer.zero_grad(set_to_none=True)
+    losses, scores = [], []
+    for weight, logits in zip(PASS_WEIGHTS, run_passes(network, observed)):
+        loss = loss_of(logits, label)
+        (weight * loss).backward()
+        losses.append(float(loss.detach()))
+        found = torch.sigmoid(logits.detach()) >= OUTPUT_THRESHOLD
+        scores.append(score(found.cpu().numpy(), label.cpu().numpy() > 0.5))
+    torch.nn.utils.clip_grad_norm_(network.parameters(), LARGEST_GRADIENT)
+    optimizer.step()
+    return losses, scores
+
+
+@torch.no_grad()
+def recompute_statistics(network: FRPDF, settings: Settings) -> None:
+    """Average the batch statistics of every pass anew over many batches: running averages trail the weights."""
+    network.train()
+    layers = [module for module in network.modules() if isinstance(module, PassBatchNorm2d)]
+    for step in range(STATISTICS_STEPS):
+        for layer in layers:
+            layer.momentum = 1.0 / (step + 1)
+        observed, _ = batch(settings, STATISTICS_DATA, step)
+        for _ in run_passes(network, observed):
+            pass
+
+
+def export(network: FRPDF) -> dict[str, np.ndarray]:
+    """Parameters and batch statistics as plain arrays, without the counters of batches."""
+    return {
+        name: value.detach().cpu().float().contiguous().numpy()
+        for name, value in network.state_dict().items()
+        if "num_batches" not in name
+    }
+
+
+def _resume(path: Path, network: FRPDF, optimizer: torch.optim.Optimizer) -> int:
+    """Load a checkpoint where there is one, and give the number of the next step."""
+    if not path.exists():
+        return 0
+    state = torch.load(path, weights_only=True)
+    network.load_state_dict(state["network"])
+    optimizer.load_state_dict(state["optimizer"])
+    return state["step"]
+
+
+def _log(path: Path, step: int, rate: float, losses: list[float], scores: list[Scores], seconds: float) -> None:
+    new = not path.exists()
+    with path.open("a", newline="") as file:
+        writer = csv.writer(file)
+        if new:
+            names = [f"{name}_{number + 1}" for name in ("loss", "f1") for number in range(len(losses))]
+            writer.writerow(["step", "rate", *names, "seconds"])
+        figures = [f"{loss:.4f}" for loss in losses] + [f"{s.f1:.4f}" for s in scores]
+        writer.writerow([step, f"{rate:.2e}", *figures, f"{seconds:.2f}"])

@@ -1,0 +1,127 @@
+"""What the raster does to junctions is undone: spurs go, clusters become one node, rails run straight through."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from .ends import stretch, way_out
+from .network import LineNetwork
+
+SPUR_HEADS = 2.0
+SPUR_M = 0.15
+"""A branch shorter than two railheads, and than this, is a bump on the rail's flank."""
+
+BUBBLE_M = 1.0
+"""A loop with sides shorter than this is a hole in a blot, not two rails."""
+
+DEFLECTION_DEG = 15.0
+"""A rail runs on through a node if it turns by less; the steepest turnouts in use branch off at about 14 degrees."""
+
+DIRECTION_M = 2.5
+"""Length over which directions at a node are compared: longer than the stretch in which rails of a 1:9 frog merge."""
+
+
+def clean_junctions(network: LineNetwork, head_width_m: float) -> LineNetwork:
+    """Remove spurs and small loops, contract short links between junctions, and weld what is left of degree 2."""
+    network = contract_links(weld_pairs(network), head_width_m)
+    network = weld_pairs(drop_bubbles(network))
+    return drop_spurs(network, max(SPUR_HEADS * head_width_m, SPUR_M))
+
+
+def weld_pairs(network: LineNetwork) -> LineNetwork:
+    """Weld lines at nodes in which exactly two different lines end and none passes."""
+    plain = network.degrees() == 2
+    plain[network.passes[:, 0]] = False
+    partner = {}
+    for one, other in (ends for node, ends in _ends_by_node(network) if plain[node]):
+        if one // 2 != other // 2:
+            partner[one], partner[other] = other, one
+    return network.weld(partner) if partner else network
+
+
+def drop_spurs(network: LineNetwork, length_m: float) -> LineNetwork:
+    """Remove branches shorter than `length_m` that end free; of several at one junction the shortest goes first.
+
+    Removing it may turn the next one into the rail's own end, which must stay.
+    """
+    while True:
+        degrees, lengths = network.degrees()[network.ends], network.lengths()
+        spur = (degrees.min(axis=1, initial=9) == 1) & (degrees.max(axis=1, initial=0) > 2) & (lengths < length_m)
+        if not spur.any():
+            return network
+        rows = np.flatnonzero(spur)
+        rows = rows[np.argsort(lengths[rows], kind="stable")]
+        junction = network.ends[rows, degrees[rows].argmax(axis=1)]
+        _, first = np.unique(junction, return_index=True)
+        keep = np.ones(len(network.lines), dtype=bool)
+        keep[rows[first]] = False
+        network = weld_pairs(network.select(keep))
+
+
+def contract_links(network: LineNetwork, length_m: float) -> LineNetwork:
+    """Draw junctions together that are linked by a line shorter than `length_m`; the new node lies in their mean."""
+    short = (network.degrees()[network.ends] > 2).all(axis=1) & (network.lengths() < length_m)
+    if not short.any():
+        return network
+    count = len(network.nodes)
+    links = coo_matrix((np.ones(np.count_nonzero(short)), network.ends[short].T), shape=(count, count))
+    clusters, cluster = connected_components(links, directed=False)
+    members = np.bincount(cluster, minlength=clusters)
+    nodes = np.column_stack([np.bincount(cluster, axis, minlength=clusters) / members for axis in network.nodes.T])
+    ends = cluster[network.ends]
+    lines = tuple(
+        np.concatenate([nodes[start : start + 1], line[1:-1], nodes[end : end + 1]])
+        for line, (start, end) in zip(network.lines, ends)
+    )
+    return LineNetwork(lines, nodes, ends).select(~short)
+
+
+def drop_bubbles(network: LineNetwork) -> LineNetwork:
+    """Of several short lines between the same two junctions keep the shortest, and no short loop at a junction."""
+    lengths = network.lengths()
+    degrees = network.degrees()
+    keep = np.ones(len(network.lines), dtype=bool)
+    seen = set()
+    for number in np.argsort(lengths, kind="stable").tolist():
+        if lengths[number] >= BUBBLE_M:
+            break
+        link = tuple(sorted(network.ends[number].tolist()))
+        if degrees[list(link)].min() > 2:
+            keep[number] = link[0] != link[1] and link not in seen
+            seen.add(link)
+    return network.select(keep)
+
+
+def run_through(network: LineNetwork) -> LineNetwork:
+    """Weld lines through nodes of degree 3 and more, the straightest continuation first; what is left ends there."""
+    partner: dict[int, int] = {}
+    for _, ends in _ends_by_node(network):
+        if len(ends) > 2:
+            partner.update(_straightest(network, ends))
+    return network.weld(partner) if partner else network
+
+
+def _straightest(network: LineNetwork, ends: list[int]) -> dict[int, int]:
+    """Couple the line ends of one node by smallest deflection."""
+    outward = np.array([way_out(stretch(network.from_end(end), DIRECTION_M))[1] for end in ends])
+    deflection = np.degrees(np.arccos(np.clip(-outward @ outward.T, -1.0, 1.0)))
+    coupled: dict[int, int] = {}
+    for first, second in np.argwhere(np.triu(deflection < DEFLECTION_DEG, 1))[
+        np.argsort(deflection[np.triu(deflection < DEFLECTION_DEG, 1)])
+    ].tolist():
+        one, other = ends[first], ends[second]
+        if one not in coupled and other not in coupled and one // 2 != other // 2:
+            coupled[one], coupled[other] = other, one
+    return coupled
+
+
+def _ends_by_node(network: LineNetwork) -> Iterable[tuple[int, list[int]]]:
+    """Pair each node with the line ends in it."""
+    flat = network.ends.ravel()
+    order = np.argsort(flat, kind="stable")
+    nodes, first = np.unique(flat[order], return_index=True)
+    return zip(nodes.tolist(), (group.tolist() for group in np.split(order, first[1:])))

@@ -1,0 +1,116 @@
+"""Lines that meet in nodes: what vectorization makes and smoothing keeps together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class LineNetwork:
+    """Polylines in the plane and the nodes in which they meet.
+
+    A line end is addressed by the number 2 i for the start of line i and 2 i + 1 for its end.
+
+    Attributes
+    ----------
+    lines : tuple of (n, 2) arrays
+        Vertices in local metres; the first and the last are copies of their nodes.
+    nodes : (k, 2) array
+    ends : (m, 2) int array
+        Node at the start and at the end of each line. Every line end is a node; a node of degree 1 is a free end; a
+        closed loop starts and ends in one node.
+    passes : (p, 3) int array
+        Node, line and vertex number wherever a line runs through a node in which others end or which others cross.
+    """
+
+    lines: tuple[np.ndarray, ...]
+    nodes: np.ndarray
+    ends: np.ndarray
+    passes: np.ndarray = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
+
+    def degrees(self) -> np.ndarray:
+        """Count the line ends at each node, a passing line counting as two, (k,)."""
+        ending = np.bincount(self.ends.ravel(), minlength=len(self.nodes))
+        passing = np.bincount(self.passes[:, 0], minlength=len(self.nodes))
+        return ending + 2 * passing
+
+    def lengths(self) -> np.ndarray:
+        """Measure each line, (m,) metres."""
+        return np.array([np.hypot(*np.diff(line, axis=0).T).sum() for line in self.lines], dtype=float)
+
+    def from_end(self, end: int) -> np.ndarray:
+        """Vertices of the line seen from one of its ends."""
+        line = self.lines[end // 2]
+        return line[::-1] if end % 2 else line
+
+    def select(self, keep: np.ndarray) -> LineNetwork:
+        """Keep the lines marked in `keep`, (m,) bool, and forget nodes and passes that nothing else touches."""
+        number = np.cumsum(keep) - 1
+        passes = self.passes[keep[self.passes[:, 1]]]
+        passes = np.column_stack([passes[:, 0], number[passes[:, 1]], passes[:, 2]])
+        lines = tuple(line for line, kept in zip(self.lines, keep) if kept)
+        return LineNetwork(lines, self.nodes, self.ends[keep], passes)._tidy()
+
+    def weld(self, partner: Mapping[int, int], bridges: Mapping[int, np.ndarray] | None = None) -> LineNetwork:
+        """Make one line of lines that continue each other.
+
+        Parameters
+        ----------
+        partner : mapping of end to end
+            Which line end continues in which; holds both directions. Ends that share a node are welded in it.
+        bridges : mapping of end to (n, 2) array, optional
+            Points between an end and its partner, in this direction, for ends that lie apart; both directions.
+        """
+        bridges = bridges or {}
+        lines, ends, passes = [], [], []
+        place: dict[int, tuple[int, int, bool]] = {}
+        for start in _starts(partner, len(self.lines)):
+            if start // 2 in place:
+                continue
+            pieces, count, end = [], 0, start
+            while end is not None and end // 2 not in place:
+                vertices = self.from_end(end)
+                shared = count > 0 and end not in bridges
+                if shared:
+                    vertices = vertices[1:]
+                    passes.append((self.ends.flat[end], len(lines), count - 1))
+                place[end // 2] = (len(lines), count - shared, bool(end % 2))
+                last, end = end ^ 1, partner.get(end ^ 1)
+                new = [vertices, bridges[last]] if last in bridges else [vertices]
+                pieces, count = pieces + new, count + sum(map(len, new))
+            closed = end is not None
+            if closed and last in bridges:
+                pieces.append(pieces[0][:1])
+            lines.append(np.concatenate(pieces))
+            ends.append((self.ends.flat[start], self.ends.flat[start if closed else last]))
+        passes += self._moved_passes(place)
+        welded_ends, welded_passes = np.array(ends, dtype=np.int64), np.array(passes, dtype=np.int64)
+        return LineNetwork(tuple(lines), self.nodes, welded_ends.reshape(-1, 2), welded_passes.reshape(-1, 3))._tidy()
+
+    def _moved_passes(self, place: Mapping[int, tuple[int, int, bool]]) -> list[tuple[int, int, int]]:
+        """Say where the passes of welded lines are now, given each line's new number, first vertex and sense."""
+        moved = []
+        for node, line, vertex in self.passes.tolist():
+            number, first, turned = place[line]
+            moved.append((node, number, first + (len(self.lines[line]) - 1 - vertex if turned else vertex)))
+        return moved
+
+    def _tidy(self) -> LineNetwork:
+        """Forget passes in which no second line takes part, and nodes that no line touches; number the rest anew."""
+        keep = self.degrees()[self.passes[:, 0]] > 2
+        used = np.zeros(len(self.nodes), dtype=bool)
+        used[self.ends.ravel()] = True
+        used[self.passes[keep, 0]] = True
+        number = np.cumsum(used) - 1
+        passes = self.passes[keep].copy()
+        passes[:, 0] = number[passes[:, 0]]
+        return LineNetwork(self.lines, self.nodes[used], number[self.ends], passes)
+
+
+def _starts(partner: Mapping[int, int], count: int) -> list[int]:
+    """List ends to begin welding at: first the loose ones, then any, so that only closed loops are left for these."""
+    loose = [end for end in range(2 * count) if end not in partner]
+    return loose + list(range(0, 2 * count, 2))
