@@ -71,7 +71,7 @@ def parity_fix(pixels: Pixels) -> Pixels:
     """Double the grid so that every run of n pixels becomes one of 2 n - 1, whose middle is a pixel.
 
     A skeleton is made of pixels, so the axis of a line of even width would lie half a pixel off. Pixel (i, j) becomes
-    (2 i, 2 j); between neighbours, diagonal ones included, a new pixel is set. Components and holes stay what they were.
+    (2 i, 2 j); between neighbours, diagonal ones included, a new pixel is set. Components and holes stay as they are.
     """
     doubled = 2 * pixels.cells
     between = [
