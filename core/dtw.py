@@ -89,20 +89,19 @@ def match_polylines(first: np.ndarray, second: np.ndarray, tolerance: float) -> 
     best_length, best_penalty, arrival = _best_arrivals(edges, begin, end, node_count)
     length, penalty = best_length[begin] + edges.length, best_penalty[begin] + edges.penalty
     predecessor = arrival[begin]
-    order = np.lexsort((penalty, -length))
+    order = _longest_then_cheapest(length, penalty)
     _, best = np.unique(cluster[order], return_index=True)
     return [_trace(edges, predecessor, edge, length[edge], penalty[edge]) for edge in order[np.sort(best)].tolist()]
 
 
 def lattice_edges(first: np.ndarray, second: np.ndarray, tolerance: float) -> Edges:
     """Pair every vertex with every segment of the other polyline nearer than the tolerance."""
-    i, j, length, penalty = _near_pairs(first, second, tolerance)
-    j_turned, i_turned, length_turned, penalty_turned = _near_pairs(second, first, tolerance)
-    kind = np.repeat([ADVANCE_SECOND, ADVANCE_FIRST], [len(i), len(i_turned)])
-    nodes_first, nodes_second = np.concatenate([i, i_turned]), np.concatenate([j, j_turned])
-    order = np.lexsort((kind, nodes_second, nodes_first))
-    columns = (nodes_first, nodes_second, kind, (length, length_turned), (penalty, penalty_turned))
-    return Edges(*(np.concatenate(column)[order] if isinstance(column, tuple) else column[order] for column in columns))
+    ahead, turned = _near_pairs(first, second, tolerance), _near_pairs(second, first, tolerance)
+    turned = (turned[1], turned[0], *turned[2:])
+    kind = np.repeat([ADVANCE_SECOND, ADVANCE_FIRST], [len(ahead[0]), len(turned[0])])
+    i, j, length, penalty = (np.concatenate(columns) for columns in zip(ahead, turned))
+    order = np.lexsort((kind, j, i))
+    return Edges(i[order], j[order], kind[order], length[order], penalty[order])
 
 
 def _near_pairs(points: np.ndarray, line: np.ndarray, tolerance: float) -> tuple[np.ndarray, ...]:
@@ -134,7 +133,7 @@ def squared_distance_integral(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def _lattice_nodes(edges: Edges) -> tuple[np.ndarray, np.ndarray, int]:
-    """Number the lattice nodes in use: those at which edges begin, those at which they end, (n,) each, and the count."""
+    """Find numbers for the lattice nodes that edges begin in, (n,), and end in, (n,); the third item is their count."""
     width = int(edges.second.max()) + 2
     begin = edges.first * width + edges.second
     end = begin + np.where(edges.kind == ADVANCE_FIRST, width, 1)
@@ -144,7 +143,7 @@ def _lattice_nodes(edges: Edges) -> tuple[np.ndarray, np.ndarray, int]:
 
 
 def _clusters(begin: np.ndarray, end: np.ndarray, node_count: int) -> np.ndarray:
-    """Number the sets of edges linked by continuation, (n,).
+    """Give each edge the number of its cluster, the edges linked by continuation, (n,).
 
     Edges that only begin, or only end, in one node do not continue each other: a node links them where it does both.
     """
@@ -174,6 +173,14 @@ def _best_arrivals(edges: Edges, begin: np.ndarray, end: np.ndarray, node_count:
         if gain > tie or (gain >= -tie and penalty < best_penalty[there]):
             best_length[there], best_penalty[there], arrival[there] = length, penalty, edge
     return np.array(best_length), np.array(best_penalty), np.array(arrival)
+
+
+def _longest_then_cheapest(length: np.ndarray, penalty: np.ndarray) -> np.ndarray:
+    """Sort by falling length, and by rising penalty where lengths tie; returns numbers, (n,)."""
+    falling = np.argsort(-length, kind="stable")
+    shorter = -np.diff(length[falling]) > TIE * np.maximum(length[falling][1:], 1.0)
+    rank = np.concatenate([[0], np.cumsum(shorter)])
+    return falling[np.lexsort((penalty[falling], rank))]
 
 
 def _trace(edges: Edges, predecessor: np.ndarray, last: int, length: float, penalty: float) -> Match:

@@ -54,7 +54,7 @@ def unit_tangents(vertices: np.ndarray) -> np.ndarray:
 
 
 def left_normals(vertices: np.ndarray) -> np.ndarray:
-    """Unit vectors to the left of a polyline at its vertices, (n, 2)."""
+    """Point to the left of a polyline at its vertices; (n, 2) unit vectors."""
     tangents = unit_tangents(vertices)
     return np.column_stack([-tangents[:, 1], tangents[:, 0]])
 
