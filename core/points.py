@@ -33,7 +33,7 @@ class LocalFrame:
     horizontal_unit_m, vertical_unit_m : float
         Metres in one unit of the CRS, in plan and in height.
     crs_wkt : str or None
-        Coordinate system of the cloud; None where it is unknown.
+        Coordinate system of the cloud, as WKT or a code like EPSG:32643; None where it is unknown.
     """
 
     origin: np.ndarray

@@ -107,6 +107,13 @@ class Plan:
     frame: LocalFrame = LocalFrame(np.zeros(3))
 
 
+INDIA = LocalFrame(np.array([578200.0, 2494300.0, 500.0]), crs_wkt="EPSG:32643")
+"""South of Indore, where a metre-gauge line ran until it was rebuilt."""
+
+PAPER_TRACKS = ((0.0, 0.0), (4.0, 0.03), (8.0, -0.02))
+"""Axis to the left of the ridden track's and height above it, metres: right, centre and left track."""
+
+
 def build(name: str, plan: Plan, random: np.random.RandomState) -> Scene:
     """Scan the rails of a plan and strew its clutter."""
     truths = [track.truth() for track in plan.tracks]
@@ -182,24 +189,12 @@ def paper_like(seed: int = 3) -> Scene:
     plan = Plan(
         tracks,
         standard,
-        Scanner(ray_step_rad=0.00207),
+        Scanner(ray_step_rad=0.002115),
         gaps=_random_gaps(random, 2, curve.length_m, 30) | _random_gaps(random, 1, curve.length_m, 4),
         clutter=Clutter(weeds_near=30, weeds_between=40, stones=400, other_weeds=120, ground_step_m=0.25),
         frame=INDIA,
     )
     return build("paper_like", plan, random)
-
-
-PAPER_TRACKS = ((0.0, 0.0), (4.0, 0.03), (8.0, -0.02))
-"""Axis to the left of the ridden track's and height above it, metres: right, centre and left track."""
-
-
-def _india() -> LocalFrame:
-    """South of Indore, where a metre-gauge line ran until it was rebuilt."""
-    return LocalFrame(np.array([578200.0, 2494300.0, 500.0]), crs_wkt="EPSG:32643")
-
-
-INDIA = _india()
 
 
 def noisy(seed: int = 4) -> Scene:
