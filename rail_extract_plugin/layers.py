@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -111,9 +111,15 @@ def check_writable(value: Any, context: QgsProcessingContext) -> None:
         return
     if path.is_dir():
         raise RailExtractError(f"The output {path} is a folder: give the name of a file in it.")
-    target = path if path.exists() else next(parent for parent in path.absolute().parents if parent.exists())
-    if not os.access(target, os.W_OK) or (target != path and not target.is_dir()):
-        raise RailExtractError(f"The output {path} can't be written, because {target} can't: choose another place.")
+    try:
+        if path.exists():
+            path.open("r+b").close()
+        else:
+            TemporaryFile(dir=path.absolute().parent).close()
+    except OSError as error:
+        raise RailExtractError(
+            f"The output {path} can't be written ({error.strerror}): choose another place."
+        ) from error
 
 
 def _attribute(value: Any, kind: Any) -> Any:

@@ -71,7 +71,10 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     def prepareAlgorithm(
         self, parameters: dict[str, Any], context: QgsProcessingContext, feedback: QgsProcessingFeedback
     ) -> bool:
-        """Read the parameters in the main thread."""
+        """Read the parameters in the main thread; older ``qgis_process`` asks no `canExecute` before."""
+        executable, reason = self.canExecute()
+        if not executable:
+            raise QgsProcessingException(reason)
         try:
             self._job = self.read(parameters, context)
         except RailExtractError as error:

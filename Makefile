@@ -1,0 +1,77 @@
+# Rail Extract on Debian 12 and Ubuntu. `make demo` and `make test` set up all they need; `make` lists the targets.
+
+SYSTEM_PYTHON ?= /usr/bin/python3
+TORCH ?= torch==2.13.0
+SUDO = $(if $(filter 0,$(shell id -u)),,sudo)
+PYTHON = .venv/bin/python
+ENVIRONMENT = build/environment.sh
+
+APT_PACKAGES = git qgis python3-qgis python3-venv python3-pip python3-numpy python3-scipy python3-matplotlib python3-pyproj
+SYSTEM_MODULES = qgis.core numpy scipy matplotlib pyproj ensurepip
+
+.PHONY: help
+help:  ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## /make \1 - /p' Makefile
+
+.PHONY: demo
+demo: plugin  ## extract the sample's rails through qgis_process; lines and map go into build/demo
+	@. ./$(ENVIRONMENT) && $(PYTHON) tools/demo.py
+
+.PHONY: test
+test: lint plugin  ## run every test: core, plugin and, through qgis_process, the whole
+	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest tests/core
+	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest tests/plugin tests/e2e
+
+.PHONY: lint
+lint: .venv/installed  ## check the code's style
+	@$(PYTHON) -m ruff check . && $(PYTHON) -m ruff format --check .
+
+.PHONY: env
+env: plugin  ## print export lines for `$QGIS_PROCESS run railextract:extractrails`: eval "$(make -s env)"
+	@cat $(ENVIRONMENT)
+
+.PHONY: package
+package: .venv/installed  ## build the plugin's zip, build/rail_extract.zip
+	@$(PYTHON) tools/package.py
+
+.PHONY: scan
+scan: package  ## apply the plugin site's rules to the zip
+	@$(PYTHON) tools/scan.py
+
+.PHONY: clean
+clean:  ## remove what was built; .venv stays
+	rm -rf build
+
+# The plugin as a user gets it, unpacked from the zip and enabled in a profile of its own.
+.PHONY: plugin
+plugin: package build/profile/enabled
+
+build/profile/enabled: $(ENVIRONMENT) | package
+	@. ./$(ENVIRONMENT) && "$$QGIS_PROCESS" plugins enable rail_extract >/dev/null 2>&1
+	@touch $@
+
+$(ENVIRONMENT): tools/environment.py .venv/installed
+	@$(PYTHON) tools/environment.py > $@
+
+# Packages over QGIS's own Python: numpy and scipy stay at the system's versions, which GDAL's bridge is built against.
+.venv/installed: .venv/constraints.txt requirements.txt tools/requirements.txt pyproject.toml
+	@echo "Installing Python packages into .venv" >&2
+	@$(PYTHON) -m pip install --quiet --constraint $< -r requirements.txt -r tools/requirements.txt >&2
+	@$(PYTHON) -m pip install --quiet --no-deps --editable . >&2
+	@touch $@
+
+# Made anew when the system's Python, numpy or scipy changes.
+.venv/constraints.txt: system
+	@mkdir -p build
+	@$(SYSTEM_PYTHON) tools/constraints.py '$(TORCH)' > build/constraints.txt
+	@cmp -s build/constraints.txt $@ || { \
+		$(SYSTEM_PYTHON) -m venv --clear --system-site-packages .venv && cp build/constraints.txt $@; \
+	}
+
+.PHONY: system
+system:
+	@$(SYSTEM_PYTHON) tools/find_modules.py $(SYSTEM_MODULES) 2>/dev/null || { \
+		echo "Installing QGIS from the distribution's packages$(if $(SUDO), with sudo): $(APT_PACKAGES)" >&2; \
+		$(SUDO) apt-get update -q >&2; \
+		$(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $(APT_PACKAGES) >&2; \
+	}

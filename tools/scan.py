@@ -1,0 +1,83 @@
+"""Apply the plugin site's rules to the zip: its layout, size and metadata, and what bandit and detect-secrets find."""
+
+from __future__ import annotations
+
+import configparser
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from package import ARCHIVE, PLUGIN, unpack
+
+LARGEST = 25_000_000
+"""Bytes the site takes, read strictly."""
+
+KEYS = (
+    "name",
+    "qgisMinimumVersion",
+    "description",
+    "about",
+    "version",
+    "author",
+    "email",
+    "repository",
+    "tracker",
+    "homepage",
+    "icon",
+    "tags",
+)
+
+
+def layout_findings(plugin: Path) -> list[str]:
+    """Tell what the site refuses before it looks at the code."""
+    metadata = configparser.ConfigParser(interpolation=None)
+    metadata.read(plugin / "metadata.txt", encoding="utf-8")
+    findings = [f"metadata.txt lacks {key}" for key in KEYS if not metadata.get("general", key, fallback="")]
+    findings += [f"{name} is missing" for name in ("__init__.py", "LICENSE") if not (plugin / name).is_file()]
+    if not (plugin / metadata.get("general", "icon", fallback="-")).is_file():
+        findings.append("the icon that metadata.txt names is missing")
+    findings += [f"{path} does not belong in a zip" for path in plugin.rglob("*") if path.suffix in (".pyc", ".so")]
+    if ARCHIVE.stat().st_size > LARGEST:
+        findings.append(f"the zip has {ARCHIVE.stat().st_size} bytes, more than {LARGEST}")
+    return findings
+
+
+def bandit_findings(plugin: Path) -> list[str]:
+    """Tell what bandit says of the code."""
+    report = _json_of("bandit", "--recursive", "--format", "json", "--quiet", str(plugin))
+    return [
+        f"{issue['filename']}:{issue['line_number']} {issue['test_id']} {issue['issue_text']}"
+        for issue in report["results"]
+    ]
+
+
+def secret_findings(plugin: Path) -> list[str]:
+    """Tell what detect-secrets takes for a password or key."""
+    report = _json_of("detect_secrets", "scan", "--all-files", str(plugin))
+    return [
+        f"{path}:{item['line_number']} {item['type']}" for path, items in report["results"].items() for item in items
+    ]
+
+
+def _json_of(module: str, *options: str) -> dict:
+    """Run a Python tool that prints JSON; bandit exits with 1 where it finds something."""
+    run = subprocess.run([sys.executable, "-m", module, *options], capture_output=True, text=True)
+    if run.returncode not in (0, 1):
+        sys.exit(f"{module} failed: {run.stderr}")
+    return json.loads(run.stdout)
+
+
+def main() -> None:
+    """Print the findings and exit with 1 if there are any."""
+    with tempfile.TemporaryDirectory() as folder:
+        unpack(ARCHIVE, Path(folder))
+        plugin = Path(folder) / PLUGIN
+        findings = layout_findings(plugin) + bandit_findings(plugin) + secret_findings(plugin)
+    print(*findings, f"{ARCHIVE.name}: {ARCHIVE.stat().st_size} bytes, {len(findings)} findings", sep="\n")
+    sys.exit(bool(findings))
+
+
+if __name__ == "__main__":
+    main()
