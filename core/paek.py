@@ -1,0 +1,125 @@
+"""PAEK: polynomial approximation with an exponential kernel, in closed form along a polyline.
+
+At a station s of a piecewise linear P(t) the quadratic a + b u + e u² that fits P(s + u) best under the weight
+exp(-|u| / sigma) gives the smoothed position a. The needed moments are integrated exactly segment by segment, and the
+moments of a longer stretch follow from those of its two halves. That operation is associative, so all vertices are
+served at once by doubling scans. Idea: Bodansky, Gribov and Pilouk, "Smoothing and compression of lines obtained by
+raster-to-vector conversion", 2002; formulas: ALGORITHMS.md section 2.
+"""
+
+from __future__ import annotations
+
+from math import comb
+
+import numpy as np
+from scipy.special import factorial, gammainc
+
+REACH_SIGMAS = 30.0
+"""Beyond this the kernel weighs less than 1e-11: far enough to look, in standard lengths."""
+
+_MOMENTS = 5
+"""Orders 0 to 4 of the kernel's own moments; those of the line are needed to order 2 only."""
+
+_SHORTEST_SIGMAS = 1e-2
+"""On shorter pieces the quadratic is ill-conditioned and pointless; they are replaced by their mean."""
+
+
+def local_fit(t: np.ndarray, values: np.ndarray, stations: np.ndarray, sigma: float) -> np.ndarray:
+    """Fit a quadratic around each station and evaluate it there.
+
+    Parameters
+    ----------
+    t : (n,) array
+        Position along the line, strictly increasing.
+    values : (n, d) array
+        Linear between the positions; nothing is assumed beyond the ends.
+    stations : (m,) array
+        Within t[0] and t[-1], in any order.
+    sigma : float
+        Length of the kernel exp(-|u| / sigma), in the unit of t.
+
+    Returns
+    -------
+    (m, d) array
+    """
+    centre = values.mean(axis=0)
+    if len(t) < 2 or t[-1] - t[0] < _SHORTEST_SIGMAS * sigma:
+        return np.tile(centre, (len(stations), 1))
+    inserted = np.union1d(t, stations)
+    line = np.column_stack([np.interp(inserted, t, column) for column in (values - centre).T])
+    at_station = np.searchsorted(inserted, stations)
+    scaled = inserted / sigma
+    left = [moments[at_station] for moments in _left_moments(scaled, line)]
+    right = [moments[::-1][at_station] for moments in _left_moments(-scaled[::-1], line[::-1])]
+    sign = (-1.0) ** np.arange(_MOMENTS)
+    kernel = right[0][:, :, 0] + sign * left[0][:, :, 0]
+    weighted = right[1] + sign[:3, None] * left[1]
+    matrix = kernel[:, np.arange(3)[:, None] + np.arange(3)]
+    return centre + np.linalg.solve(matrix, weighted)[:, 0, :]
+
+
+def filled(t: np.ndarray, spacing: float) -> np.ndarray:
+    """Insert even stations so that none lie more than `spacing` apart."""
+    parts = np.maximum(np.ceil(np.diff(t) / spacing - 1e-9), 1).astype(int)
+    return np.interp(np.arange(parts.sum() + 1), np.concatenate([[0], np.cumsum(parts)]), t)
+
+
+def reflected(t: np.ndarray, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Continue a line beyond its end by its point reflection there, once."""
+    mirrored = 2 * vertices[-1] - vertices[-2::-1]
+    return np.concatenate([t, 2 * t[-1] - t[-2::-1]]), np.concatenate([vertices, mirrored])
+
+
+def repeated(t: np.ndarray, vertices: np.ndarray, end: float, sigma_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Set copies of a line end to end until they cover the kernel's reach around 0 to `end`.
+
+    A closed line repeats in place; a line with its reflection repeats with a shift, which reflects it at both ends.
+    """
+    reach = REACH_SIGMAS * sigma_m
+    period, shift = t[-1], vertices[-1] - vertices[0]
+    if period == 0:
+        return t, vertices
+    copies = np.arange(-np.ceil(reach / period), np.ceil((end + reach) / period))
+    long_t = np.append((copies[:, None] * period + t[:-1]).ravel(), (copies[-1] + 1) * period)
+    moved = copies[:, None, None] * shift + vertices[:-1]
+    long_line = np.concatenate([moved.reshape(-1, vertices.shape[1]), [(copies[-1] + 1) * shift + vertices[0]]])
+    near = (long_t >= -reach) & (long_t <= end + reach)
+    return long_t[near], long_line[near]
+
+
+def _left_moments(t: np.ndarray, line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Integrate u^k exp(-u) over the distance u back from each vertex: alone, (n, 5, 1), and times P, (n, 3, d)."""
+    steps = np.diff(t)
+    ends, slopes = line[1:], np.diff(line, axis=0) / steps[:, None]
+    orders = np.arange(_MOMENTS)
+    integral = factorial(orders) * gammainc(orders + 1.0, steps[:, None])
+    alone = integral[:, :, None]
+    times_line = integral[:, :3, None] * ends[:, None, :] - integral[:, 1:4, None] * slopes[:, None, :]
+    return _scan(steps, alone), _scan(steps, times_line)
+
+
+def _scan(steps: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """Add up the moments of all segments before each vertex, (n segments, k, d) to (n + 1, k, d).
+
+    In every round each vertex takes in a stretch as long as all it has, until the stretches exceed the kernel's reach.
+    """
+    span, total = steps.copy(), moments.copy()
+    offset = 1
+    while offset < len(span) and span[offset:].min() < REACH_SIGMAS:
+        total[offset:] += _shifted(total[:-offset], span[offset:])
+        span[offset:] = span[offset:] + span[:-offset]
+        offset *= 2
+    return np.concatenate([np.zeros((1, *total.shape[1:])), total])
+
+
+def _shifted(moments: np.ndarray, by: np.ndarray) -> np.ndarray:
+    """Moments seen from a vertex that lies `by`, (n,), further on: (u + by)^k by the binomial theorem."""
+    powers = [np.ones_like(by)]
+    for _ in range(moments.shape[1] - 1):
+        powers.append(powers[-1] * by)
+    shifted = np.empty_like(moments)
+    for order in range(moments.shape[1]):
+        shifted[:, order] = sum(
+            (comb(order, lower) * powers[order - lower])[:, None] * moments[:, lower] for lower in range(order + 1)
+        )
+    return shifted * np.exp(-by)[:, None, None]
