@@ -147,9 +147,10 @@ class _Stations:
         """
         start, end = np.maximum(piece, 0), np.minimum(piece + 1, len(self.t) - 1)
         a, b = self.tree.data[start], self.tree.data[end]
-        length = np.where((piece == start) & (self.line[start] == self.line[end]), self.t[end] - self.t[start], 0.0)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            direction = (b - a) / length[:, None]
-            share = np.einsum("ij,ij->i", xy - a, direction) / length
-            across = direction[:, 0] * (xy[:, 1] - a[:, 1]) - direction[:, 1] * (xy[:, 0] - a[:, 0])
-        return np.where((share > -0.01) & (share < 1.01), [self.t[start] + share * length, across], np.inf)
+        length = self.t[end] - self.t[start]
+        is_piece = (piece == start) & (self.line[start] == self.line[end]) & (length > 0)
+        direction = (b - a) / np.where(is_piece, length, 1.0)[:, None]
+        ahead = np.einsum("ij,ij->i", xy - a, direction)
+        across = direction[:, 0] * (xy[:, 1] - a[:, 1]) - direction[:, 1] * (xy[:, 0] - a[:, 0])
+        is_foot = is_piece & (ahead > -0.01 * length) & (ahead < 1.01 * length)
+        return np.where(is_foot, [self.t[start] + ahead, across], np.inf)

@@ -1,0 +1,200 @@
+"""Which stretch of which rail makes a track with which: the paper's matching on offset curves."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .dtw import match_polylines
+from .parallels import REACH_M, Parallels, find_parallels
+from .polyline import interpolate, left_normals
+from .progress import SILENT, Progress
+from .rails import RailLine, length_along
+
+MIN_LENGTH_M = 3.0
+"""Shorter stretches at gauge are chance meetings in a switch."""
+
+OVERLAP_M = 0.5
+"""Two matches may both claim this much of a rail's side: where a match ends is no sharper than that."""
+
+CHUNK_M = 1000.0
+"""Longest stretch matched in one go: bounds the memory."""
+
+MARGIN_M = 1.0
+"""Length added to a stretch found at stations, so that the exact matching finds its ends."""
+
+SPLIT_M = 5.0
+"""Stations abreast that lie further apart than this begin a new stretch: gaps in a rail are at most about as long."""
+
+LEFT, RIGHT = 1, -1
+
+
+@dataclass(frozen=True)
+class RailPair:
+    """A stretch of track: two rails at gauge, seen in a direction in which `left` lies on the left.
+
+    Attributes
+    ----------
+    left, right : int
+        Numbers of the rails in the sequence that was paired.
+    left_span, right_span : tuple of float
+        Plan chainage along each rail, in its own direction, at the start and at the end of the stretch; the second is
+        the smaller where the rail runs against the stretch.
+    """
+
+    left: int
+    right: int
+    left_span: tuple[float, float]
+    right_span: tuple[float, float]
+
+    @property
+    def length_m(self) -> float:
+        """Mean plan length of both sides."""
+        return 0.5 * (abs(np.subtract(*self.left_span)) + abs(np.subtract(*self.right_span)))
+
+    def reversed(self) -> RailPair:
+        """Look at the same stretch from its other end."""
+        return RailPair(self.right, self.left, self.right_span[::-1], self.left_span[::-1])
+
+
+def pair_rails(
+    rails: Sequence[RailLine],
+    gauge_m: float,
+    head_width_m: float,
+    tolerance_m: float = 0.05,
+    min_length_m: float = MIN_LENGTH_M,
+    progress: Progress = SILENT,
+) -> tuple[RailPair, ...]:
+    """Find the stretches along which two rails of one class lie a gauge apart (ALGORITHMS.md sections 4.2 and 4.3).
+
+    Each rail is moved half the spacing towards the other, and the moved curves are matched. Every rail has two sides;
+    a stretch of a side serves one track, that of the longest match.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+    gauge_m, head_width_m : float
+        Their sum is the distance between the rail lines.
+    tolerance_m : float
+        Largest deviation from that distance.
+    min_length_m : float
+        Shortest stretch to keep.
+    progress : Progress
+
+    Returns
+    -------
+    tuple of RailPair
+        The longest first. A stretch longer than CHUNK_M comes in pieces.
+    """
+    if len(rails) < 2:
+        return ()
+    spacing = gauge_m + head_width_m
+    parallels = find_parallels(rails, max(REACH_M, spacing + 2 * tolerance_m))
+    # Chords of stations and rails not quite abreast hide a little of the true distance, hence the doubled tolerance.
+    at_gauge = parallels[np.abs(np.abs(parallels.left_m) - spacing) < 2 * tolerance_m]
+    candidates = [stretch for group in at_gauge.groups() for stretch in _stretches(group)]
+    matches = []
+    for stretch in progress.follow(candidates):
+        matches.extend(_match(rails, stretch, spacing, tolerance_m, min_length_m))
+    return _select(matches, min_length_m)
+
+
+@dataclass(frozen=True)
+class _Match:
+    """Chainages of rails a and b at the nodes of one match, in the direction of a; side as in `LEFT`, `RIGHT`."""
+
+    a: int
+    b: int
+    t_a: np.ndarray
+    t_b: np.ndarray
+    side_a: int
+    side_b: int
+    mean_penalty: float
+
+    @property
+    def length_m(self) -> float:
+        return min(abs(self.t_a[-1] - self.t_a[0]), abs(self.t_b[-1] - self.t_b[0]))
+
+    def __getitem__(self, which: slice) -> _Match:
+        t_a, t_b = self.t_a[which], self.t_b[which]
+        return _Match(self.a, self.b, t_a, t_b, self.side_a, self.side_b, self.mean_penalty)
+
+    def pair(self) -> RailPair:
+        span_a, span_b = ((float(t[0]), float(t[-1])) for t in (self.t_a, self.t_b))
+        if self.side_a == LEFT:  # the partner lies on the left of a
+            return RailPair(self.b, self.a, span_b, span_a)
+        return RailPair(self.a, self.b, span_a, span_b)
+
+
+def _stretches(group: Parallels) -> Iterator[Parallels]:
+    """Cut the stations of two rails, sorted by t_a, where they leave a gap, and into chunks."""
+    gap = np.diff(group.t_a) > SPLIT_M
+    run = np.concatenate([[0], np.cumsum(gap)])
+    starts = group.t_a[np.concatenate([[True], gap])][run]
+    piece = ((group.t_a - starts) / CHUNK_M).astype(int)
+    borders = np.flatnonzero((np.diff(run) != 0) | (np.diff(piece) != 0)) + 1
+    for mine in np.split(np.arange(len(run)), borders):
+        yield group[mine]
+
+
+def _match(
+    rails: Sequence[RailLine], stretch: Parallels, spacing: float, tolerance_m: float, min_length_m: float
+) -> Iterator[_Match]:
+    """Match the offset curves of two rails along one stretch."""
+    a, b, same = int(stretch.a[0]), int(stretch.b[0]), bool(stretch.same[0])
+    side_a = LEFT if stretch.left_m[0] > 0 else RIGHT
+    side_b = -side_a if same else side_a
+    step = tolerance_m / 2
+    curve_a, t_a = _offset_curve(rails[a].xyz[:, :2], stretch.t_a, side_a * spacing / 2, step)
+    curve_b, t_b = _offset_curve(rails[b].xyz[:, :2], stretch.t_b, side_b * spacing / 2, step)
+    if not same:
+        curve_b, t_b = curve_b[::-1], t_b[::-1]
+    for found in match_polylines(curve_a, curve_b, tolerance_m):
+        match = _Match(a, b, t_a[found.first], t_b[found.second], side_a, side_b, found.penalty / found.length)
+        if match.length_m >= min_length_m:
+            yield match
+
+
+def _offset_curve(xy: np.ndarray, t: np.ndarray, left_m: float, step_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Move the stretch of a rail around the chainages `t` to the left; stations, (m, 2), and their chainages."""
+    along = length_along(xy)
+    start, end = max(t.min() - MARGIN_M, 0.0), min(t.max() + MARGIN_M, along[-1])
+    # The outer of two curves is longer than the rail: a tenth covers the tightest tram curve.
+    count = int(np.ceil(1.1 * (end - start) / step_m)) + 1
+    stations = np.linspace(start, end, count)
+    curve = interpolate(xy, along, stations)
+    return curve + left_m * left_normals(curve), stations
+
+
+def _select(matches: Sequence[_Match], min_length_m: float) -> tuple[RailPair, ...]:
+    """Give every stretch of a rail's side to the longest match that claims it."""
+    used: dict[tuple[int, int], list[tuple[float, float]]] = defaultdict(list)
+    pairs = []
+    for match in sorted(matches, key=lambda match: (-match.length_m, match.mean_penalty)):
+        taken = _inside(match.t_a, used[match.a, match.side_a]) | _inside(match.t_b, used[match.b, match.side_b])
+        for part in _free_runs(match, taken):
+            if part.length_m < min_length_m:
+                continue
+            used[match.a, match.side_a].append(tuple(np.sort(part.t_a[[0, -1]])))
+            used[match.b, match.side_b].append(tuple(np.sort(part.t_b[[0, -1]])))
+            pairs.append(part.pair())
+    return tuple(pairs)
+
+
+def _inside(t: np.ndarray, intervals: Sequence[tuple[float, float]]) -> np.ndarray:
+    """Tell which chainages lie within the intervals by more than the tolerated overlap, (n,) bool."""
+    inside = np.zeros(len(t), dtype=bool)
+    for start, end in intervals:
+        inside |= (t > start + OVERLAP_M) & (t < end - OVERLAP_M)
+    return inside
+
+
+def _free_runs(match: _Match, taken: np.ndarray) -> Iterator[_Match]:
+    """Split a match into the parts between taken nodes."""
+    borders = np.flatnonzero(np.diff(taken)) + 1
+    for run in np.split(np.arange(len(taken)), borders):
+        if not taken[run[0]]:
+            yield match[run[0] : run[-1] + 1]

@@ -1,0 +1,114 @@
+"""Where rails run beside each other: a cheap look at stations before any exact matching."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .polyline import left_normals, resample, unit_tangents
+from .rails import RailLine
+
+STEP_M = 0.5
+"""Spacing of the stations: six on the shortest match, and a railway curve stays within 2 mm of their chords."""
+
+REACH_M = 2.2
+"""Rails further apart than this are of two tracks: the widest gauge in use is 1676 mm."""
+
+NEAREST_M = 0.45
+"""Lines nearer than this are no track: the narrowest gauge is 500 mm, less what it may vary."""
+
+SINE_PARALLEL = np.sin(np.radians(10.0))
+"""Rails of a track run in one direction; beyond ten degrees they cross."""
+
+BIN_M = 0.01
+"""Width of the bins in which the commonest spacing is sought: rails of one track vary by less."""
+
+
+@dataclass(frozen=True)
+class Parallels:
+    """Pairs of stations that lie abreast on two rails, (n,) arrays each.
+
+    Attributes
+    ----------
+    a, b : int
+        Numbers of the rails, a before b.
+    t_a, t_b : float
+        Plan chainages of the stations, each along its own rail.
+    left_m : float
+        Distance of the second rail, positive where it lies to the left of the first.
+    same : bool
+        Whether both rails run the same way.
+    """
+
+    a: np.ndarray
+    b: np.ndarray
+    t_a: np.ndarray
+    t_b: np.ndarray
+    left_m: np.ndarray
+    same: np.ndarray
+
+    def __getitem__(self, which: np.ndarray) -> Parallels:
+        return Parallels(*(column[which] for column in vars(self).values()))
+
+    def groups(self) -> Iterator[Parallels]:
+        """Split by rails, side and sense."""
+        if not len(self.a):
+            return
+        key = np.column_stack([self.a, self.b, self.left_m > 0, self.same])
+        order = np.lexsort((self.t_a, *key.T[::-1]))
+        borders = np.flatnonzero(np.any(np.diff(key[order], axis=0) != 0, axis=1)) + 1
+        for mine in np.split(order, borders):
+            yield self[mine]
+
+
+def find_parallels(rails: Sequence[RailLine], reach_m: float = REACH_M) -> Parallels:
+    """Find stations that lie abreast on two rails of one class, up to `reach_m` apart."""
+    number, stations, t, tangents, normals = _stations(rails)
+    pairs = cKDTree(stations).query_pairs(reach_m + STEP_M, output_type="ndarray")
+    p, q = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].T
+    between = stations[q] - stations[p]
+    along = np.einsum("ij,ij->i", between, tangents[p])
+    left = np.einsum("ij,ij->i", between, normals[p])
+    turn = tangents[p, 0] * tangents[q, 1] - tangents[p, 1] * tangents[q, 0]
+    codes = np.array([rail.class_code for rail in rails])[number]
+    abreast = (number[p] != number[q]) & (codes[p] == codes[q])
+    abreast &= (np.abs(along) <= STEP_M / 2) & (np.abs(left) <= reach_m) & (np.abs(turn) < SINE_PARALLEL)
+    p, q = p[abreast], q[abreast]
+    same = np.einsum("ij,ij->i", tangents[p], tangents[q]) > 0
+    return Parallels(number[p], number[q], t[p], t[q], left[abreast], same)
+
+
+def _stations(rails: Sequence[RailLine]) -> tuple[np.ndarray, ...]:
+    """Rail number, place, chainage, direction and left normal of stations along all rails."""
+    sampled = [resample(rail.xyz[:, :2], STEP_M) for rail in rails]
+    number = np.repeat(np.arange(len(rails)), [len(t) for _, t in sampled])
+    columns = zip(*((xy, t, unit_tangents(xy), left_normals(xy)) for xy, t in sampled))
+    return (number, *(np.concatenate(column) for column in columns))
+
+
+def commonest_spacing(rails: Sequence[RailLine], least_length_m: float) -> float | None:
+    """Measure the distance at which most length of neighbouring rails runs parallel.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+    least_length_m : float
+        Length that has to run at this distance.
+
+    Returns
+    -------
+    float or None
+        Metres between the rail lines; None if no rails run parallel for long enough.
+    """
+    if len(rails) < 2:
+        return None
+    spacing = np.abs(find_parallels(rails).left_m)
+    spacing = spacing[spacing >= NEAREST_M]
+    counts = np.convolve(np.bincount((spacing / BIN_M).astype(int)), np.ones(3), mode="same")
+    if not len(spacing) or counts.max() * STEP_M < least_length_m:
+        return None
+    middle = (np.argmax(counts) + 0.5) * BIN_M
+    return float(np.median(spacing[np.abs(spacing - middle) <= 2 * BIN_M]))
