@@ -10,11 +10,11 @@ from ..raster import RailRaster
 from .network import LineNetwork
 from .pixels import Pixels
 
-TANGENT_PIXELS = 12
-"""Length over which the direction of a line end is taken to prolong it by the few pixels that pruning took."""
+TANGENT_PIXELS = 25
+"""Length over which the direction of a line end is taken, to prolong it by the pixels that pruning took."""
 
 
-def trace(raster: RailRaster, pixels: Pixels, distance: np.ndarray, edges: np.ndarray) -> LineNetwork:
+def trace(raster: RailRaster, pixels: Pixels, edges: np.ndarray, tips: np.ndarray) -> LineNetwork:
     """Make polylines of the edges of a graph on doubled pixels.
 
     Parameters
@@ -22,25 +22,24 @@ def trace(raster: RailRaster, pixels: Pixels, distance: np.ndarray, edges: np.nd
     raster : RailRaster
         Grid whose doubled pixels these are.
     pixels : Pixels
-    distance : (n,) int array
-        Chamfer distance; free ends are prolonged by it, since pruning stops about that much before a line's end.
     edges : (e, 2) int array
+    tips : (n,) int array
+        Pixel as far as which a line that ends at a pixel is to be prolonged.
     """
     if len(edges) == 0:
         return LineNetwork((), np.empty((0, 2)), np.empty((0, 2), dtype=np.int64))
     vertices, borders = chains(edges, len(pixels))
     corners, borders = _corners(vertices, borders, pixels.cells)
     lines = np.split(corners, borders[1:-1])
-    tips = np.array([(line[0], line[-1]) for line in lines])
-    used, ends = np.unique(tips, return_inverse=True)
+    used, ends = np.unique([(line[0], line[-1]) for line in lines], return_inverse=True)
     ends = ends.reshape(-1, 2)
     degree = np.bincount(ends.ravel())
     nodes = pixels.cells[used].astype(float)
     positions = [pixels.cells[line].astype(float) for line in lines]
-    for line, tip in zip(positions, ends):
-        for inward, node in ((line, tip[0]), (line[::-1], tip[1])):
+    for line, (start, end) in zip(positions, ends):
+        for inward, node in ((line, start), (line[::-1], end)):
             if degree[node] == 1:
-                inward[0] += _prolongation(inward, distance[used[node]] / 2)
+                inward[0] += _prolongation(inward, pixels.cells[tips[used[node]]])
                 nodes[node] = inward[0]
     return LineNetwork(tuple(raster.to_local(line / 2) for line in positions), raster.to_local(nodes / 2), ends)
 
@@ -108,9 +107,9 @@ def _corners(vertices: np.ndarray, borders: np.ndarray, cells: np.ndarray) -> tu
     return vertices[keep], np.concatenate([[0], np.cumsum(keep)])[borders]
 
 
-def _prolongation(inward: np.ndarray, length: float) -> np.ndarray:
-    """Step of `length` out of a line given from its end inward, along its direction there."""
+def _prolongation(inward: np.ndarray, tip: np.ndarray) -> np.ndarray:
+    """Step out of a line, given from its end inward, along its direction there until it is level with `tip`."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(inward, axis=0).T))])
     back = [np.interp(min(TANGENT_PIXELS, along[-1]), along, axis) for axis in inward.T]
-    outward = inward[0] - back
-    return outward * (length / np.hypot(*outward))
+    outward = (inward[0] - back) / np.hypot(*(inward[0] - back))
+    return max(np.dot(tip - inward[0], outward), 0.0) * outward

@@ -49,7 +49,7 @@ def veinerize(pixels: Pixels, distance: np.ndarray) -> np.ndarray:
     return np.concatenate(edges)
 
 
-def prune(edges: np.ndarray, distance: np.ndarray) -> np.ndarray:
+def prune(edges: np.ndarray, distance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Peel leaves off the graph until every leaf drains enough area to be the end of a line.
 
     Parameters
@@ -60,8 +60,11 @@ def prune(edges: np.ndarray, distance: np.ndarray) -> np.ndarray:
 
     Returns
     -------
-    (f, 2) int array
-        Edges left.
+    edges : (f, 2) int array
+        Those left.
+    tips : (n,) int array
+        For each pixel the far end of the longest peeled branch that hung on it, itself if none did: where a line
+        really ends.
     """
     count = len(distance)
     needed = np.maximum(AREA_PIXELS, SECTOR_ANGLE / 8 * distance.astype(float) ** 2)
@@ -70,6 +73,7 @@ def prune(edges: np.ndarray, distance: np.ndarray) -> np.ndarray:
     # The sum of the neighbours left is, for a leaf, its only neighbour.
     neighbour_sum = np.bincount(tail, weights=head, minlength=count).astype(np.int64)
     area = np.ones(count, dtype=np.int64)
+    longest = np.arange(count)  # steps * count + tip, so that the larger number is the longer branch
     gone = np.zeros(count, dtype=bool)
     leaves = np.flatnonzero(degree == 1)
     while len(leaves):
@@ -80,10 +84,11 @@ def prune(edges: np.ndarray, distance: np.ndarray) -> np.ndarray:
         leaves = leaves[~facing]
         inner = neighbour_sum[leaves]
         np.add.at(area, inner, area[leaves])
+        np.maximum.at(longest, inner, longest[leaves] + count)
         np.subtract.at(degree, inner, 1)
         np.subtract.at(neighbour_sum, inner, leaves)
         leaves = np.unique(inner[degree[inner] == 1])
-    return edges[~gone[edges].any(axis=1)]
+    return edges[~gone[edges].any(axis=1)], longest % count
 
 
 def _score(pixels: Pixels, depth: np.ndarray) -> np.ndarray:
