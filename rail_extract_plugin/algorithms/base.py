@@ -37,6 +37,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     GROUP = "Rails and tracks"
     GROUP_ID = "railsandtracks"
     TAGS: tuple[str, ...] = ()
+    SUMMARY = ""
     HELP = ""
     MODULES: tuple[str, ...] = ()
     """Python modules, beyond QGIS's own, without which it can't run."""
@@ -132,9 +133,13 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         """Give words that the toolbox search finds it by."""
         return [tr(tag) for tag in self.TAGS]
 
+    def shortDescription(self) -> str:
+        """Give the sentence shown under the mouse."""
+        return tr(self.SUMMARY)
+
     def shortHelpString(self) -> str:
         """Give the text beside the dialog."""
-        return tr(self.HELP)
+        return f"{tr(self.SUMMARY)}\n\n{tr(self.HELP)}"
 
     def helpUrl(self) -> str:
         """Give the address of the guide."""

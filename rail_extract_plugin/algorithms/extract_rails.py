@@ -51,8 +51,8 @@ class ExtractRails(RailAlgorithm):
     LABEL = "Extract rails"
     TAGS = ("lidar", "las", "laz", "point cloud", "railway", "rail", "track", "centerline", "vectorize")
     MODULES = ("numpy", "scipy", "laspy", "lazrs", "cv2", "pyproj", "skimage", "torch")
+    SUMMARY = "Turns lidar points classified as rail into the 3D lines of the railheads and of the track centerlines."
     HELP = (
-        "Turns lidar points classified as rail into the 3D lines of the railheads and of the track centerlines.\n\n"
         "A rail line is the top of the railhead on the head's own axis. The gauge in the results is the distance in "
         "space between the two rail lines less the railhead width; it is not measured 14 mm below the top.\n\n"
         "Choose the rail standard, or fill gauge and railhead width. Results have the coordinate system of the cloud, "
