@@ -1,1 +1,19 @@
-"""FRPDF, the network that cleans rail rasters: its layers, its weights, its engines and its two passes."""
+"""FRPDF, the network that cleans rail rasters: its layers, its weights, its engines and its passes.
+
+The constants here are the paper's (section 5); they stand apart from `network`, which needs PyTorch.
+"""
+
+CHANNELS = 24
+KERNEL_RADIUS = 3
+DILATIONS = (1, 3, 7, 15, 31, 63, 127)
+
+START = 0.5
+"""State before the first pass: undecided."""
+FEEDBACK_THRESHOLD = 0.75
+"""Probability from which a pass hands a cell on as rail to the next."""
+OUTPUT_THRESHOLD = 0.5
+"""Probability from which the last pass calls a cell rail."""
+
+DEFAULT_PASSES = 2
+STATISTICS = 2
+"""Sets of batch statistics: the first pass sees a constant state, all later passes see a decided one."""

@@ -8,22 +8,10 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-CHANNELS = 24
-KERNEL_RADIUS = 3
-DILATIONS = (1, 3, 7, 15, 31, 63, 127)
+from . import CHANNELS, DEFAULT_PASSES, DILATIONS, FEEDBACK_THRESHOLD, KERNEL_RADIUS, START, STATISTICS
+
 RECEPTIVE_RADIUS = 753
 """Farthest cell that can influence a cell in one pass: 3 for each of 4 plain convolutions, 3 d for each dilated one."""
-
-START = 0.5
-"""State before the first pass: undecided."""
-FEEDBACK_THRESHOLD = 0.75
-"""Probability from which a pass hands a cell on as rail to the next."""
-OUTPUT_THRESHOLD = 0.5
-"""Probability from which the last pass calls a cell rail."""
-
-DEFAULT_PASSES = 2
-STATISTICS = 2
-"""Sets of running batch statistics: the first pass sees a constant state, all later passes see a decided one."""
 
 
 class PassBatchNorm2d(nn.BatchNorm2d):

@@ -21,6 +21,9 @@ FACE_DEPTH_M = 0.035
 FACE_TURN = np.pi / 4
 """Surface that looks this far away from the head's axis, or farther, counts as side face."""
 
+SPEED_SWING, SPEED_SWING_M = 0.2, 10.0
+"""How much the train's speed, and with it the distance of profiles, swings, and over which length (per radian)."""
+
 PROFILE_SAMPLES = 24
 """Samples on the crown, and half as many on either corner and face: below 0.1 mm from the true outline."""
 
@@ -32,7 +35,7 @@ class Scanner:
     Attributes
     ----------
     profile_step_m : float
-        Distance between profiles, 0.03 to 0.10 m by the train's speed; it swings by a fifth along the way.
+        Mean distance between profiles, 0.03 to 0.10 m by the train's speed.
     ray_step_rad : float
         Angle between neighbouring rays of a profile.
     height_m, left_m : float
@@ -50,7 +53,7 @@ class Scanner:
     height_m: float = 4.0
     left_m: float = 0.4
     noise_m: float = 0.003
-    half_range_m: float = 12.0
+    half_range_m: float = 18.0
     face_share: float = 0.3
 
 
@@ -147,14 +150,14 @@ def _stations(
 ) -> np.ndarray:
     """Choose the samples of the head at which profiles cross it."""
     chainage = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(head.top, axis=0), axis=1))])
-    count = int(chainage[-1] / scanner.profile_step_m)
+    count = int(chainage[-1] / scanner.profile_step_m / (1 - SPEED_SWING)) + 1
     phase = random.random_sample() * 2 * np.pi
-    swing = 1 + 0.2 * np.sin(phase + np.arange(count) * scanner.profile_step_m / 10)
+    swing = 1 + SPEED_SWING * np.sin(phase + np.arange(count) * scanner.profile_step_m / SPEED_SWING_M)
     wanted = np.cumsum(scanner.profile_step_m * swing)
+    wanted = wanted[wanted < chainage[-1]]
     for start, end in missing:
         wanted = wanted[(wanted < start) | (wanted > end)]
-    stations = np.searchsorted(chainage, wanted)
-    return stations[stations < len(chainage)]
+    return np.searchsorted(chainage, wanted)
 
 
 def _scanner_positions(top: np.ndarray, path: np.ndarray, scanner: Scanner) -> np.ndarray:

@@ -19,7 +19,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from ..frpdf.network import DEFAULT_PASSES, FRPDF, OUTPUT_THRESHOLD, START, PassBatchNorm2d, feedback
+from ..frpdf import DEFAULT_PASSES, OUTPUT_THRESHOLD, START
+from ..frpdf.network import FRPDF, PassBatchNorm2d, feedback
 from ..frpdf.weights import save_arrays
 from ..synthetic.pairs import random_pair
 from .gradients import train_on_cpu

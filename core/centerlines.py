@@ -1,0 +1,179 @@
+"""Track centerlines: the line midway between the two rails of a track (paper, "Railroad Track Centerline ...")."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .chaining import chain_pairs
+from .errors import NoTrackError
+from .midline import Side, midway
+from .pairing import MIN_LENGTH_M, RailPair, pair_rails
+from .parallels import commonest_spacing
+from .polyline import interpolate, left_normals, resample, starts_at_its_end
+from .progress import SILENT, Progress
+from .rails import Centerline, RailLine, length_along
+from .smoothing import simplify, smooth_line
+from .standards import STANDARDS
+
+STEP_M = 0.5
+"""Distance of the stations at which both rails are met: PAEK at 0.8 m needs no denser ones."""
+
+SAME_GAUGE_M = 0.04
+"""Gauges in use lie further apart than this, so that a measured spacing this near to one suggests it."""
+
+
+@dataclass(frozen=True)
+class CenterlineParameters:
+    """How centerlines are made; metres throughout.
+
+    Attributes
+    ----------
+    tolerance_m : float
+        Greatest deviation of the rails from the gauge.
+    max_gap_m : float
+        Longest stretch without a pair of rails that does not end a track.
+    smoothing_m : float
+        Sigma of PAEK in plan.
+    simplify_xy_m, simplify_z_m : float
+        Tolerances within which vertices are left out.
+    min_length_m : float
+        Shorter centerlines are dropped.
+    """
+
+    tolerance_m: float = 0.05
+    max_gap_m: float = 5.0
+    smoothing_m: float = 0.8
+    simplify_xy_m: float = 0.002
+    simplify_z_m: float = 0.002
+    min_length_m: float = 1.0
+
+
+def build_centerlines(
+    rails: Sequence[RailLine],
+    gauge_m: float,
+    head_width_m: float,
+    parameters: CenterlineParameters = CenterlineParameters(),  # noqa: B008 - frozen
+    progress: Progress = SILENT,
+) -> tuple[Centerline, ...]:
+    """Draw the centerlines of all tracks of one gauge.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+        Their ids name them in the result; rails without heights give centerlines without heights.
+    gauge_m, head_width_m : float
+        The rail lines of a track lie their sum apart.
+    parameters : CenterlineParameters
+    progress : Progress
+
+    Returns
+    -------
+    tuple of Centerline
+        By place of their starts from west to east, numbered from 1; none where no rails run parallel.
+
+    Raises
+    ------
+    NoTrackError
+        Rails run parallel, but at another spacing.
+    """
+    pairs = pair_rails(rails, gauge_m, head_width_m, parameters.tolerance_m, progress=progress.span(0.0, 0.8))
+    if not pairs:
+        _refuse_other_spacing(rails, gauge_m, head_width_m, parameters.tolerance_m)
+    chains = chain_pairs(rails, pairs, parameters.max_gap_m)
+    drawn = [_draw(rails, chain, gauge_m, head_width_m, parameters) for chain in progress.span(0.8, 1.0).follow(chains)]
+    kept = [line for line in drawn if line.length_m >= parameters.min_length_m]
+    ordered = sorted(kept, key=lambda line: tuple(line.xyz[0, :2]))
+    return tuple(replace(line, track_id=number) for number, line in enumerate(ordered, start=1))
+
+
+def _refuse_other_spacing(rails: Sequence[RailLine], gauge_m: float, head_width_m: float, tolerance_m: float) -> None:
+    """Raise NoTrackError if the rails lie at a spacing that is clearly another one than that asked for."""
+    spacing = commonest_spacing(rails, MIN_LENGTH_M)
+    if spacing is None or abs(spacing - gauge_m - head_width_m) < tolerance_m:
+        return
+    message = f"No track of {1000 * gauge_m:.0f} mm gauge found: rails lie {1000 * spacing:.0f} mm apart"
+    gauges = {standard.gauge_m for standard in STANDARDS.values()}
+    likely = min(gauges, key=lambda gauge: abs(gauge - (spacing - head_width_m)))
+    if abs(likely - (spacing - head_width_m)) < SAME_GAUGE_M and abs(likely - gauge_m) > 1e-9:
+        message += f", is the gauge {1000 * likely:.0f} mm?"
+    raise NoTrackError(message if message.endswith("?") else message + ".")
+
+
+def _draw(
+    rails: Sequence[RailLine],
+    chain: Sequence[RailPair],
+    gauge_m: float,
+    head_width_m: float,
+    parameters: CenterlineParameters,
+) -> Centerline:
+    """Draw the centerline of one track."""
+    half = 0.5 * (gauge_m + head_width_m)
+    guide, _ = resample(_guide(rails, chain, half), STEP_M)
+    normals = left_normals(guide)
+    reach = parameters.max_gap_m
+    left = Side.of(rails, [(pair.left, pair.left_span) for pair in chain], reach).meet(guide, normals, half)
+    right = Side.of(rails, [(pair.right, pair.right_span) for pair in chain], reach).meet(guide, -normals, half)
+    xyz = midway(guide, normals, left, right, 2 * half)
+    both = ~np.isnan(left[0] + right[0])
+    cant = (left[1] - right[1])[both]
+    gauge = np.hypot((left[0] + right[0])[both], np.nan_to_num(cant)) - head_width_m
+    xyz = _finished(xyz, parameters)
+    flip = starts_at_its_end(xyz)
+    sides = [_ids(rails, (pair.left for pair in chain)), _ids(rails, (pair.right for pair in chain))]
+    return Centerline(
+        xyz=xyz[::-1] if flip else xyz,
+        track_id=0,
+        class_code=rails[chain[0].left].class_code,
+        left_ids=sides[1][::-1] if flip else sides[0],
+        right_ids=sides[0][::-1] if flip else sides[1],
+        gauge_mm=1000 * float(gauge.mean()),
+        gaugesd_mm=1000 * float(gauge.std()),
+        cant_mm=(-1000 if flip else 1000) * float(cant.mean()),
+        cantmax_mm=(-1000 if flip else 1000) * float(cant[np.argmax(np.abs(cant))]),
+        bridged_m=_bridged(rails, chain, np.count_nonzero(~both) * STEP_M),
+    )
+
+
+def _ids(rails: Sequence[RailLine], numbers: Sequence[int]) -> tuple[int, ...]:
+    """Ids of rails, each once, in the order they are met."""
+    return tuple(dict.fromkeys(rails[number].rail_id for number in numbers))
+
+
+def _bridged(rails: Sequence[RailLine], chain: Sequence[RailPair], unpaired_m: float) -> float:
+    """Length without support: what the rails say of themselves, in proportion to what the track uses of them."""
+    bridged, whole = unpaired_m, unpaired_m
+    for pair in chain:
+        whole += pair.length_m
+        for number, span in ((pair.left, pair.left_span), (pair.right, pair.right_span)):
+            rail = rails[number]
+            bridged += rail.bridged_m * abs(span[1] - span[0]) / length_along(rail.xyz[:, :2])[-1]
+    return float(min(bridged, whole))
+
+
+def _guide(rails: Sequence[RailLine], chain: Sequence[RailPair], half_spacing_m: float) -> np.ndarray:
+    """Follow the left rails of a track half a spacing inside, straight across gaps; (n, 2)."""
+    pieces: list[np.ndarray] = []
+    for pair in chain:
+        line = rails[pair.left].xyz[:, :2]
+        along = length_along(line)
+        count = max(int(np.ceil(abs(pair.left_span[1] - pair.left_span[0]) / STEP_M)), 2)
+        piece = interpolate(line, along, np.linspace(*pair.left_span, count + 1))
+        piece = piece - half_spacing_m * left_normals(piece)
+        if pieces:
+            before, last = pieces[-1][-2:]
+            beyond = (piece - last) @ (last - before) > 0
+            piece = piece[np.argmax(beyond) :]  # stretches may overlap where they meet
+        pieces.append(piece)
+    return np.concatenate(pieces)
+
+
+def _finished(xyz: np.ndarray, parameters: CenterlineParameters) -> np.ndarray:
+    """Smooth in plan and leave out needless vertices."""
+    along = length_along(xyz[:, :2])
+    _, t = resample(xyz, parameters.smoothing_m / 4)
+    plan = smooth_line(xyz[:, :2], parameters.smoothing_m, stations=t)
+    z = np.interp(t, along, xyz[:, 2])
+    return simplify(np.column_stack([plan, z]), parameters.simplify_xy_m, parameters.simplify_z_m)

@@ -1,0 +1,110 @@
+"""FRPDF over a whole raster: overlapping windows, each pass stitched before the next."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..progress import SILENT, Progress
+from ..raster import TILE, RailRaster
+from . import DEFAULT_PASSES, FEEDBACK_THRESHOLD, OUTPUT_THRESHOLD, START
+from .engine import Engine
+
+WINDOW = 512
+"""Cells along the side of what the network sees at once: a pass over it takes well below a second on two cores, so
+that a cancel is heard in time."""
+MARGIN = 64
+"""Cells around a window's core that only give context; a wider margin changes fewer than 0.5 % of the rail cells."""
+CORE = WINDOW - 2 * MARGIN
+REACH = 64
+"""How far from a rail cell, in cells, the network may set another: half of a gap of 5 m at 4 cm."""
+
+UNTIL_STABLE = 0
+MOST_PASSES = 5
+STABLE_SHARE = 0.001
+"""Passes end once fewer than this share of the rail cells change."""
+
+
+def clean(raster: RailRaster, engine: Engine, passes: int = DEFAULT_PASSES, progress: Progress = SILENT) -> RailRaster:
+    """Remove noise and bridge gaps with the network (paper, sections 5 and 7).
+
+    Parameters
+    ----------
+    raster : RailRaster
+    engine : Engine
+    passes : int
+        Number of passes; 0 runs until the result is stable, five at most.
+    progress : Progress
+
+    Returns
+    -------
+    RailRaster
+        On the same grid.
+    """
+    places = windows(raster)
+    most = MOST_PASSES if passes == UNTIL_STABLE else passes
+    state, output = None, raster
+    for number in range(most):
+        step = progress.span(number / most, (number + 1) / most)
+        before = output
+        state, output = _run_pass(raster, state, engine, number, places, step)
+        if passes == UNTIL_STABLE and number > 0 and _change(before, output) < STABLE_SHARE:
+            break
+    return output
+
+
+def windows(raster: RailRaster) -> list[tuple[int, int]]:
+    """North-west corners (row, column) of the cores to compute: all within `REACH` of a rail cell."""
+    cells = raster.cells()
+    shifts = np.array([(down, right) for down in (-REACH, 0, REACH) for right in (-REACH, 0, REACH)])
+    found: set[tuple[int, int]] = set()
+    for shift in shifts:
+        found.update(map(tuple, np.unique((cells + shift) // CORE, axis=0).tolist()))
+    return sorted((row * CORE, column * CORE) for row, column in found)
+
+
+def _run_pass(
+    raster: RailRaster,
+    state: RailRaster | None,
+    engine: Engine,
+    number: int,
+    places: list[tuple[int, int]],
+    progress: Progress,
+) -> tuple[RailRaster, RailRaster]:
+    """Compute one pass at all places; give what the next pass is told, and what the user would get."""
+    told, output = _Canvas(raster), _Canvas(raster)
+    for row, column in progress.follow(places):
+        frame = (row - MARGIN, column - MARGIN, WINDOW, WINDOW)
+        seen = raster.read(*frame).astype(np.float32)
+        known = np.full_like(seen, START) if state is None else state.read(*frame).astype(np.float32)
+        probability = engine.probabilities(seen, known, number)[MARGIN : MARGIN + CORE, MARGIN : MARGIN + CORE]
+        told.paint(row, column, probability >= FEEDBACK_THRESHOLD)
+        output.paint(row, column, probability >= OUTPUT_THRESHOLD)
+    return told.raster(), output.raster()
+
+
+def _change(before: RailRaster, after: RailRaster) -> float:
+    """Share of the rail cells that differ."""
+    differing = sum(
+        np.count_nonzero(
+            before.read(*(TILE * np.array(index)), TILE, TILE) != after.read(*(TILE * np.array(index)), TILE, TILE)
+        )
+        for index in set(before.tiles) | set(after.tiles)
+    )
+    return differing / max(after.count(), 1)
+
+
+class _Canvas:
+    """A raster under construction, on another one's grid."""
+
+    def __init__(self, grid: RailRaster) -> None:
+        self._grid = grid
+        self._cells: list[np.ndarray] = []
+
+    def paint(self, row: int, column: int, block: np.ndarray) -> None:
+        """Set the cells of a block whose north-west corner is given."""
+        self._cells.append(np.argwhere(block) + np.array([row, column]))
+
+    def raster(self) -> RailRaster:
+        """Finish."""
+        cells = np.concatenate(self._cells) if self._cells else np.empty((0, 2), dtype=np.int64)
+        return self._grid.with_cells(cells)

@@ -1,0 +1,63 @@
+"""Which trained weights serve which rail standard."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import ModelError
+
+FOLDER = Path(__file__).resolve().parents[2] / "models"
+
+LEAST_RATIO, GREATEST_RATIO = 13.4, 26.7
+"""Ratios of gauge to railhead the training covers (14.2 to 25.2), and 6 % beyond, which a model bears."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """Trained weights and the rail standard they were trained on.
+
+    Attributes
+    ----------
+    name : str
+        As shown in MODEL enums and written into raster tags.
+    gauge_m, head_width_m : float
+    file : str
+        Name of the .npz file in the folder `models`.
+    """
+
+    name: str
+    gauge_m: float
+    head_width_m: float
+    file: str
+
+    @property
+    def ratio(self) -> float:
+        """Gauge over railhead width: all that tells one standard from another at equal cell counts."""
+        return self.gauge_m / self.head_width_m
+
+    @property
+    def path(self) -> Path:
+        """Where the weights are."""
+        return FOLDER / self.file
+
+
+MODELS = (Model("base", 1.435, 0.0762, "frpdf_base.npz"),)
+
+
+def choose(gauge_m: float, head_width_m: float) -> Model:
+    """Choose the model whose ratio of gauge to railhead is nearest (paper, section 7).
+
+    Raises
+    ------
+    ModelError
+        No model was trained for such a ratio.
+    """
+    ratio = gauge_m / head_width_m
+    if not LEAST_RATIO <= ratio <= GREATEST_RATIO:
+        raise ModelError(
+            f"A gauge of {1000 * gauge_m:.0f} mm is {ratio:.1f} times a railhead of {1000 * head_width_m:.1f} mm, and"
+            f" the models cover {LEAST_RATIO} to {GREATEST_RATIO} times: check GAUGE and HEAD_WIDTH."
+        )
+    return min(MODELS, key=lambda model: abs(math.log(ratio / model.ratio)))

@@ -1,0 +1,171 @@
+"""The whole walk: classified points to 3D rails and track centerlines, in the order of the paper's abstract."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from .centerlines import CenterlineParameters, build_centerlines
+from .elevation import ElevationParameters, elevate
+from .errors import NoRailPointsError, NoTrackError
+from .frpdf import DEFAULT_PASSES
+from .frpdf.cleanup import clean
+from .frpdf.engine import Engine, make_engine
+from .frpdf.weights import load_arrays
+from .frpdf.zoo import choose
+from .points import RailPoints
+from .progress import SILENT, Progress
+from .rails import Centerline, RailLine, RailNetwork
+from .raster import cell_size, rasterize
+from .smoothing import smooth_network
+from .vectorize import vectorize
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """What Extract Rails can be told, with its defaults; metres, but for GAP_ANGLE's degrees.
+
+    Attributes
+    ----------
+    gauge_m, head_width_m : float
+        Gauge between the rails' inner faces, and width of the railhead.
+    passes : int
+        Passes of the network; 0 runs until the result is stable.
+    engine, device : str
+        See `frpdf.engine`.
+    smoothing_xy_m, smoothing_z_m : float
+        Sigma of PAEK in plan and in height.
+    tolerance_xy_m, tolerance_z_m : float
+        How far from a line, and how deep below the top surface, a point still gives height.
+    crown_radius_m : float
+        Radius of the disc that rolls along the rail's top.
+    max_gap_m, gap_angle_deg : float
+        Gaps that are closed.
+    simplify_xy_m, simplify_z_m : float
+        Tolerances within which vertices are left out.
+    min_length_m : float
+        Shorter lines are dropped.
+    other_gauges_m : tuple of float
+        Further gauges to pair, for mixed and dual gauge.
+    centerline_tolerance_m : float
+        Deviation from the gauge at which two rails still make a track.
+    """
+
+    gauge_m: float
+    head_width_m: float
+    passes: int = DEFAULT_PASSES
+    engine: str = "AUTO"
+    device: str = "AUTO"
+    smoothing_xy_m: float = 0.8
+    smoothing_z_m: float = 3.0
+    tolerance_xy_m: float = 0.10
+    tolerance_z_m: float = 0.03
+    crown_radius_m: float = 20.0
+    max_gap_m: float = 5.0
+    gap_angle_deg: float = 10.0
+    simplify_xy_m: float = 0.002
+    simplify_z_m: float = 0.002
+    min_length_m: float = 1.0
+    other_gauges_m: tuple[float, ...] = ()
+    centerline_tolerance_m: float = 0.05
+
+
+def extract_rails(clouds: Sequence[RailPoints], parameters: Parameters, progress: Progress = SILENT) -> RailNetwork:
+    """Extract rails and centerlines from classified points.
+
+    Each class is processed on its own, and its lines carry its code; ids count through all classes.
+
+    Parameters
+    ----------
+    clouds : sequence of RailPoints
+        From `points.read_rail_points`: one for each class, in one frame.
+    parameters : Parameters
+    progress : Progress
+
+    Returns
+    -------
+    RailNetwork
+
+    Raises
+    ------
+    NoRailPointsError
+        There is no cloud.
+    ModelError
+        No weights fit the standard, or the engine is not there.
+    NoTrackError
+        Rails run parallel, but none at a gauge that was given.
+    Cancelled
+        The user cancelled.
+    """
+    if not clouds:
+        raise NoRailPointsError("There is no point to extract rails from.")
+    engine = make_engine(
+        load_arrays(choose(parameters.gauge_m, parameters.head_width_m).path), parameters.engine, parameters.device
+    )
+    rails: list[RailLine] = []
+    centerlines: list[Centerline] = []
+    for number, points in enumerate(clouds):
+        step = progress.span(number / len(clouds), (number + 1) / len(clouds))
+        found = rails_of(points, parameters, engine, step.span(0.0, 0.9), first_id=len(rails) + 1)
+        rails += found
+        centerlines += tracks_of(found, parameters, step.span(0.9, 1.0), first_id=len(centerlines) + 1)
+    return RailNetwork(tuple(rails), tuple(centerlines), clouds[0].frame, engine.description)
+
+
+def rails_of(
+    points: RailPoints, parameters: Parameters, engine: Engine, progress: Progress = SILENT, first_id: int = 1
+) -> list[RailLine]:
+    """Extract the rails of one class: rasterize, clean, vectorize, smooth, give height."""
+    raster = rasterize(points.xyz, cell_size(parameters.gauge_m, parameters.head_width_m))
+    cleaned = clean(raster, engine, parameters.passes, progress.span(0.0, 0.8))
+    network = vectorize(
+        cleaned,
+        parameters.head_width_m,
+        parameters.max_gap_m,
+        parameters.gap_angle_deg,
+        parameters.min_length_m,
+        progress.span(0.8, 0.9),
+    )
+    network = smooth_network(network, parameters.smoothing_xy_m)
+    progress.check()
+    elevation = ElevationParameters(
+        head_width_m=parameters.head_width_m,
+        tolerance_xy_m=parameters.tolerance_xy_m,
+        tolerance_z_m=parameters.tolerance_z_m,
+        crown_radius_m=parameters.crown_radius_m,
+        smoothing_xy_m=parameters.smoothing_xy_m,
+        smoothing_z_m=parameters.smoothing_z_m,
+        simplify_xy_m=parameters.simplify_xy_m,
+        simplify_z_m=parameters.simplify_z_m,
+        min_length_m=parameters.min_length_m,
+    )
+    rails = elevate(network, points, elevation, progress.span(0.9, 1.0))
+    return [replace(rail, rail_id=number) for number, rail in enumerate(rails, start=first_id)]
+
+
+def tracks_of(
+    rails: Sequence[RailLine], parameters: Parameters, progress: Progress = SILENT, first_id: int = 1
+) -> list[Centerline]:
+    """Pair the rails of one class by every gauge, and draw the centerlines."""
+    settings = CenterlineParameters(
+        tolerance_m=parameters.centerline_tolerance_m,
+        max_gap_m=parameters.max_gap_m,
+        smoothing_m=parameters.smoothing_xy_m,
+        simplify_xy_m=parameters.simplify_xy_m,
+        simplify_z_m=parameters.simplify_z_m,
+        min_length_m=parameters.min_length_m,
+    )
+    gauges = (parameters.gauge_m, *parameters.other_gauges_m)
+    centerlines: list[Centerline] = []
+    refusals: list[NoTrackError] = []
+    for number, gauge_m in enumerate(gauges):
+        step = progress.span(number / len(gauges), (number + 1) / len(gauges))
+        try:
+            centerlines += build_centerlines(rails, gauge_m, parameters.head_width_m, settings, step)
+        except NoTrackError as refusal:
+            refusals.append(refusal)
+    if refusals and not centerlines:
+        raise refusals[0]
+    if rails and not centerlines:
+        progress.warning("No two rails run parallel: there are rails but no track centerlines.")
+    return [replace(line, track_id=number) for number, line in enumerate(centerlines, start=first_id)]
