@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from qgis.core import (
     QgsCoordinateReferenceSystem,
     QgsDataSourceUri,
@@ -127,7 +127,7 @@ def _attribute(value: Any, kind: Any) -> Any:
         return ",".join(str(item) for item in value)
     if kind == INTEGER:
         return int(value)
-    return float(value) if np.isfinite(value) else None
+    return float(value) if math.isfinite(value) else None
 
 
 def _output_file(value: Any, context: QgsProcessingContext) -> Path | None:

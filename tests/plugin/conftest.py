@@ -1,0 +1,153 @@
+"""A real QGIS, without windows on a screen, in which the plugin is registered."""
+
+from __future__ import annotations
+
+import os
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+import pytest
+from rail_extract.core.crs import import_pyproj
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+from qgis.core import QgsApplication, QgsProcessingContext, QgsProcessingFeedback, QgsProject  # noqa: E402
+
+EXTRACT_RAILS = "railextract:extractrails"
+ROOT = Path(__file__).resolve().parents[2]
+SAMPLE = ROOT / "resources" / "sample" / "sample.laz"
+
+
+@pytest.fixture(scope="session")
+def qgis(tmp_path_factory):
+    """QGIS with its processing framework, in a profile of its own."""
+    os.environ["QGIS_CUSTOM_CONFIG_PATH"] = str(tmp_path_factory.mktemp("profile"))
+    application = QgsApplication([], True)
+    application.initQgis()
+    sys.path.append(str(Path(application.pkgDataPath()) / "python" / "plugins"))
+    from processing.core.Processing import Processing
+
+    Processing.initialize()
+    yield application
+    Processing.deinitialize()
+    application.exitQgis()
+
+
+@pytest.fixture(scope="session")
+def plugin(qgis):
+    """The plugin, as QGIS starts it."""
+    from rail_extract import classFactory
+
+    plugin = classFactory(None)
+    plugin.initProcessing()
+    yield plugin
+    plugin.unload()
+
+
+@pytest.fixture
+def algorithm(qgis, plugin):
+    return qgis.processingRegistry().createAlgorithmById(EXTRACT_RAILS)
+
+
+@pytest.fixture
+def context(qgis):
+    context = QgsProcessingContext()
+    context.setProject(QgsProject.instance())
+    yield context
+    QgsProject.instance().clear()
+
+
+class Feedback(QgsProcessingFeedback):
+    """Remembers what it is told, and cancels once the progress reaches a share."""
+
+    def __init__(self, cancel_at: float | None = None) -> None:
+        super().__init__(False)
+        self.errors: list[str] = []
+        self.warnings: list[str] = []
+        self.progress: list[float] = []
+        self._cancel_at = cancel_at
+        self.progressChanged.connect(self._follow)
+
+    def reportError(self, error, fatalError=False):
+        self.errors.append(error)
+
+    def pushWarning(self, warning):
+        self.warnings.append(warning)
+
+    def _follow(self, percent: float) -> None:
+        self.progress.append(percent)
+        if self._cancel_at is not None and percent >= self._cancel_at:
+            self.cancel()
+
+
+@pytest.fixture
+def new_feedback(qgis):
+    return Feedback
+
+
+@dataclass
+class Outcome:
+    """What a run came to."""
+
+    ok: bool
+    results: dict[str, Any] = field(default_factory=dict)
+    error: str = ""
+
+
+@pytest.fixture
+def run(algorithm, context):
+    """Check the parameters and run Extract Rails, as every front end of QGIS does."""
+
+    def run(parameters: dict[str, Any], feedback: Feedback | None = None) -> Outcome:
+        feedback = feedback or Feedback()
+        parameters = {name: str(value) if isinstance(value, Path) else value for name, value in parameters.items()}
+        accepted, message = algorithm.checkParameterValues(parameters, context)
+        if not accepted:
+            return Outcome(False, error=message)
+        results, ok = algorithm.run(parameters, context, feedback)
+        return Outcome(ok, results, "\n".join(feedback.errors))
+
+    return run
+
+
+@pytest.fixture
+def write_cloud(tmp_path):
+    """Write a LAS or LAZ file of points, (n, 3), and give its path."""
+
+    def write(
+        xyz: np.ndarray,
+        name: str = "cloud.las",
+        class_code: int = 10,
+        epsg: int | None = 32643,
+        folder: Path = tmp_path,
+    ) -> Path:
+        header = laspy.LasHeader(point_format=6, version="1.4")
+        header.scales = [1e-7, 1e-7, 1e-3] if epsg == 4326 else [0.001] * 3
+        header.offsets = xyz[0]
+        if epsg is not None:
+            header.add_crs(import_pyproj().CRS.from_epsg(epsg))
+        cloud = laspy.LasData(header)
+        cloud.xyz = xyz
+        cloud.classification = np.full(len(xyz), class_code, dtype=np.uint8)
+        cloud.write(folder / name)
+        return folder / name
+
+    return write
+
+
+@pytest.fixture
+def track():
+    """Points, (n, 3), on two straight railheads in UTM coordinates; the spacing is that of their axes."""
+
+    def points(spacing_m: float = 1.507, length_m: float = 12.0) -> np.ndarray:
+        rng = np.random.default_rng(1)
+        count = int(300 * length_m)
+        along, across = rng.uniform(0, length_m, 2 * count), rng.uniform(-0.036, 0.036, 2 * count)
+        across += np.repeat([-spacing_m / 2, spacing_m / 2], count)
+        return np.column_stack([500_000 + along, 3_000_000 + across, 100 + rng.normal(0, 0.002, 2 * count)])
+
+    return points

@@ -1,0 +1,101 @@
+import numpy as np
+import pytest
+from qgis.core import NULL, QgsProcessing, QgsProcessingOutputLayerDefinition, QgsProperty, QgsVectorLayer
+from rail_extract.core.errors import RailExtractError
+from rail_extract.core.points import LocalFrame
+from rail_extract.core.rails import Centerline, RailLine
+from rail_extract.rail_extract_plugin.layers import (
+    CENTERLINE_FIELDS,
+    RAIL_FIELDS,
+    check_writable,
+    crs_of,
+    features,
+    fields,
+)
+
+FEET = LocalFrame(np.array([1000.0, 2000.0, 10.0]), horizontal_unit_m=0.3048, vertical_unit_m=0.3048)
+XYZ = np.array([[0.0, 0.0, 0.0], [3.048, 0.0, 0.3048]])
+
+
+def test_rail_becomes_a_feature_in_the_units_of_the_cloud(qgis):
+    rail = RailLine(XYZ, rail_id=3, class_code=10, points=812, resid_mm=4.5, sigma_mm=np.float64(0.7), bridged_m=0.0)
+    (feature,) = features([rail], RAIL_FIELDS, FEET)
+    vertices = [(point.x(), point.y(), point.z()) for point in feature.geometry().vertices()]
+    assert np.allclose(vertices, [(1000, 2000, 10), (1010, 2000, 11)])
+    assert feature.attributes() == pytest.approx([3, 10, np.hypot(3.048, 0.3048), 812, 4.5, 0.7, 0.0])
+
+
+def test_centerline_becomes_a_feature(qgis):
+    line = Centerline(XYZ, 1, 10, (1, 4), (2,), 1435.2, float("nan"), -20.0, -41.0, 0.5)
+    (feature,) = features([line], CENTERLINE_FIELDS, FEET)
+    attributes = dict(zip((name for name, _ in CENTERLINE_FIELDS), feature.attributes()))
+    assert (attributes["left_ids"], attributes["right_ids"]) == ("1,4", "2")
+    assert attributes["cantmax_mm"] == -41.0
+    assert attributes["gaugesd_mm"] == NULL
+
+
+@pytest.mark.parametrize("columns", [RAIL_FIELDS, CENTERLINE_FIELDS])
+def test_shapefiles_keep_the_field_names(qgis, columns):
+    assert fields(columns).names() == [name for name, _ in columns]
+    assert max(map(len, fields(columns).names())) <= 10
+
+
+@pytest.mark.parametrize("columns", [RAIL_FIELDS, CENTERLINE_FIELDS])
+def test_fields_have_their_types(qgis, columns):
+    layer = QgsVectorLayer("LineStringZ", "lines", "memory")
+    assert layer.dataProvider().addAttributes(fields(columns).toList())
+    kinds = {name: layer.dataProvider().fields().field(name).isNumeric() for name, _ in columns}
+    assert [name for name, numeric in kinds.items() if not numeric] == [
+        name for name, _ in columns if name in ("left_ids", "right_ids")
+    ]
+
+
+def test_unknown_coordinate_system_is_none(qgis):
+    assert not crs_of(None).isValid()
+
+
+@pytest.mark.parametrize(
+    "value", [None, "", "memory:", QgsProcessing.TEMPORARY_OUTPUT, "postgres:dbname='x' table=\"y\" (geom)"]
+)
+def test_outputs_that_are_no_files_are_let_through(context, value):
+    check_writable(value, context)
+
+
+def as_text(path):
+    return str(path)
+
+
+def as_table(path):
+    return f"ogr:dbname='{path}' table=\"rails\" (geom)"
+
+
+def as_definition(path):
+    return QgsProcessingOutputLayerDefinition(str(path))
+
+
+def as_property(path):
+    return QgsProperty.fromValue(str(path))
+
+
+@pytest.mark.parametrize("form", [as_text, as_table, as_definition, as_property])
+def test_writable_output(tmp_path, context, form):
+    check_writable(form(tmp_path / "räils 1.gpkg"), context)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("form", [as_text, as_table, as_definition, as_property])
+def test_folder_of_the_output_is_missing(tmp_path, context, form):
+    with pytest.raises(RailExtractError, match="can't be written"):
+        check_writable(form(tmp_path / "gone" / "rails.gpkg"), context)
+
+
+def test_output_is_a_folder(tmp_path, context):
+    with pytest.raises(RailExtractError, match="is a folder"):
+        check_writable(str(tmp_path), context)
+
+
+def test_existing_output_stays_as_it_is(tmp_path, context):
+    path = tmp_path / "rails.gpkg"
+    path.write_bytes(b"old")
+    check_writable(str(path), context)
+    assert path.read_bytes() == b"old"
