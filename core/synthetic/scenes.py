@@ -189,7 +189,7 @@ def paper_like(seed: int = 3) -> Scene:
     plan = Plan(
         tracks,
         standard,
-        Scanner(profile_step_m=0.04, ray_step_rad=0.0031, height_m=5.0, left_m=1.2, half_range_m=40),
+        Scanner(profile_step_m=0.04, ray_step_rad=0.00278, height_m=4.5, left_m=0.8, noise_m=0.005, half_range_m=40),
         gaps=_random_gaps(random, 2, curve.length_m, 10) | _random_gaps(random, 1, curve.length_m, 4),
         clutter=Clutter(weeds_near=30, weeds_between=40, stones=400, other_weeds=120, ground_step_m=0.25),
         frame=INDIA,
@@ -205,7 +205,7 @@ def noisy(seed: int = 4) -> Scene:
     plan = Plan(
         [Track(curve, _spacing(standard), _rolling(curve), _canted(curve, 0.05))],
         standard,
-        Scanner(profile_step_m=0.04, ray_step_rad=0.0031, height_m=5.0, left_m=1.2, half_range_m=40),
+        Scanner(profile_step_m=0.1, ray_step_rad=0.003, noise_m=0.008, face_share=0.6),
         gaps=_random_gaps(random, 0, curve.length_m, 15, longest_m=4.0),
         clutter=Clutter(weeds_near=80, weeds_between=80, stones=1500),
     )
