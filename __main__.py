@@ -8,6 +8,8 @@ import sys
 from collections.abc import Sequence
 
 COMMANDS = {
+    "train": ("core.training.train", "train FRPDF on synthetic rasters"),
+    "evaluate": ("core.training.evaluate", "compare weights on a fixed set of synthetic rasters"),
     "scenes": ("core.synthetic.write", "write synthetic clouds with their true lines"),
 }
 """Module and help of each command; a module offers `add_arguments(parser)` and `run(args)`."""

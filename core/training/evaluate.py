@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--count", type=int, default=COUNT, help=f"rasters of the set to use (default {COUNT})")
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> None:
     """Print the table."""
     pairs = evaluation_pairs(arguments.count)
     print(f"{len(pairs)} rasters of {SIDE} x {SIDE}, severity {SEVERITIES[0]} to {SEVERITIES[1]}, strict by cell")
@@ -68,7 +68,6 @@ def run(arguments: argparse.Namespace) -> int:
             flush=True,
         )
     print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
-    return 0
 
 
 def evaluation_pairs(count: int = COUNT) -> list[Pair]:

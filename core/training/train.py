@@ -63,18 +63,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> None:
     """Train, go on with a training, or export one that is complete."""
     settings = Settings(arguments.steps, arguments.rate, arguments.seed, arguments.device)
     arguments.folder.mkdir(parents=True, exist_ok=True)
     network = train(settings, arguments.folder, arguments.minutes)
     if network is None:
         print(f"Stopped before the end; the same command goes on from {arguments.folder / 'checkpoint.pt'}.")
-        return 0
+        return
     recompute_statistics(network, settings)
     save_arrays(arguments.folder / "weights.npz", export(network))
     print(f"Wrote {arguments.folder / 'weights.npz'}.")
-    return 0
 
 
 def train(settings: Settings, folder: Path, minutes: float) -> FRPDF | None:
