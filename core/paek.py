@@ -30,7 +30,7 @@ def local_fit(t: np.ndarray, values: np.ndarray, stations: np.ndarray, sigma: fl
     Parameters
     ----------
     t : (n,) array
-        Position along the line, strictly increasing.
+        Position along the line, increasing; of equal positions one counts.
     values : (n, d) array
         Linear between the positions; nothing is assumed beyond the ends.
     stations : (m,) array
@@ -45,12 +45,12 @@ def local_fit(t: np.ndarray, values: np.ndarray, stations: np.ndarray, sigma: fl
     centre = values.mean(axis=0)
     if len(t) < 2 or t[-1] - t[0] < _SHORTEST_SIGMAS * sigma:
         return np.tile(centre, (len(stations), 1))
+    t, stations = np.asarray(t) / sigma, np.asarray(stations) / sigma
     inserted = np.union1d(t, stations)
     line = np.column_stack([np.interp(inserted, t, column) for column in (values - centre).T])
     at_station = np.searchsorted(inserted, stations)
-    scaled = inserted / sigma
-    left = [moments[at_station] for moments in _left_moments(scaled, line)]
-    right = [moments[::-1][at_station] for moments in _left_moments(-scaled[::-1], line[::-1])]
+    left = [moments[at_station] for moments in _left_moments(inserted, line)]
+    right = [moments[::-1][at_station] for moments in _left_moments(-inserted[::-1], line[::-1])]
     sign = (-1.0) ** np.arange(_MOMENTS)
     kernel = right[0][:, :, 0] + sign * left[0][:, :, 0]
     weighted = right[1] + sign[:3, None] * left[1]
