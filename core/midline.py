@@ -26,7 +26,7 @@ class Side:
     rail: np.ndarray
 
     @classmethod
-    def of(cls, rails: Sequence[RailLine], spans: Sequence[tuple[int, tuple[float, float]]], margin_m: float) -> _Side:
+    def of(cls, rails: Sequence[RailLine], spans: Sequence[tuple[int, tuple[float, float]]], margin_m: float) -> Side:
         """Cut the spans out of their rails, with a margin that shows a rail on while its partner is broken."""
         pieces = []
         for number, span in spans:
@@ -54,8 +54,8 @@ class Side:
             ahead_a, ahead_b = (self._ahead(point, stations, directions) for point in (a, b))
             passed = ahead_a - ahead_b
             share = np.divide(ahead_a, passed, out=np.full(len(passed), np.inf), where=passed != 0)
-            # A tenth more: at the very end of a rail the normal may pass just beside it.
-            met = np.isfinite(off) & (self.rail[a] == self.rail[b]) & (share >= -0.1) & (share <= 1.1)
+            # A rail is prolonged by a piece: two rails of a track hardly end abreast to the centimetre.
+            met = np.isfinite(off) & (self.rail[a] == self.rail[b]) & (share >= -1) & (share <= 2)
             point = self.xyz[a] + np.where(met, share, 0.0)[:, None] * (self.xyz[b] - self.xyz[a])
             distance = np.einsum("ij,ij->i", point[:, :2] - stations, directions)
             found = np.where(met, [distance, point[:, 2]], found)

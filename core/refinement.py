@@ -1,0 +1,224 @@
+"""Lateral refinement: lines move to the middle between both edges of their railhead.
+
+The raster leaves a line up to half a cell beside its rail, for long stretches where the rail runs along the grid. The
+points know better: where most of them lie within one head width, there the head is (ALGORITHMS.md section 1.9).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d, uniform_filter1d
+
+from .points import RailPoints
+from .polyline import left_normals, project
+from .progress import SILENT, Progress
+from .railhead import cross_slope, rough_level, spread
+from .rails import length_along
+from .smoothing import smooth_profile
+from .vectorize.network import LineNetwork
+
+ROUNDS = 2
+"""The second round sees the head upright and whole; a third moves lines by less than 0.1 mm."""
+
+STATION_M = 0.25
+"""Spacing of the windows' middles, a third of the smoothing's length."""
+
+WINDOWS = (5, 9, 17, 33)
+"""Lengths of windows in stations, 1.25 to 8.25 m: the shortest with enough points is taken."""
+
+ENOUGH_POINTS = 80
+"""Points on top that a window should hold: they give the middle to 2 mm before smoothing."""
+
+DEPTH_M = 0.008
+"""Points further below the top are on a side face, or where the corners round off."""
+
+TOP_SIGMAS = 2.5
+"""The same in standard deviations of the noise, for noisy clouds."""
+
+HALF_HEAD = 18
+"""Bins across half a head: about 2 mm each, finer than any cloud's noise."""
+
+BLUR_BINS = 1.5
+"""Sigma of the blur across: with fewer points than bins the best place would jump; the edges stay sharp to 3 mm."""
+
+FURTHEST = 15
+"""Largest shift in bins, about 3 cm: half a cell of the raster and a little noise."""
+
+NEAR_EDGE, RIM = 3, 9
+"""Bins from the edge that its blur covers, and bins beyond these that tell the density on either side of it."""
+
+CLEAR_EDGE = 0.4
+"""Density outside of an edge over that inside, at most: with more there is no edge to be seen."""
+
+LEAST_ON_RIM = 6
+"""Points that have to lie inside of each edge: with fewer the head is seen from one side, or hardly."""
+
+HALF_RANGE = HALF_HEAD + FURTHEST + 2 + NEAR_EDGE + RIM
+"""Bins to either side of a line that all of this can reach."""
+
+LEAST_SHARE = 0.25
+"""Share of a line's stations that have to show both edges; otherwise the line stays as it is."""
+
+JUNCTION_M = 1.5
+"""Two heads are one within this distance of a node: lines stay there, and move fully at twice the distance."""
+
+
+def refine(
+    network: LineNetwork,
+    points: RailPoints,
+    head_width_m: float,
+    smoothing_m: float = 0.8,
+    progress: Progress = SILENT,
+) -> LineNetwork:
+    """Move smoothed lines onto the axes of their railheads.
+
+    Parameters
+    ----------
+    network : LineNetwork
+        Smoothed lines within 3 cm of their rails.
+    points : RailPoints
+    head_width_m : float
+    smoothing_m : float
+        Sigma of PAEK for the shifts along a line.
+    progress : Progress
+
+    Returns
+    -------
+    LineNetwork
+        Lines stay as they are at nodes in which several meet, and where points show no two edges of a head.
+    """
+    for number in range(ROUNDS):
+        share = progress.span(number / ROUNDS, (number + 1) / ROUNDS)
+        network = _refine_once(network, points, head_width_m, smoothing_m, share)
+    return network
+
+
+def _refine_once(
+    network: LineNetwork, points: RailPoints, head_width_m: float, smoothing_m: float, progress: Progress
+) -> LineNetwork:
+    reach = HALF_RANGE * head_width_m / (2 * HALF_HEAD)
+    feet = project(network.lines, points.xyz[:, :2], reach, progress.span(0.0, 0.7))
+    freedom = _freedom(network)
+    lines = []
+    for number, line in enumerate(progress.span(0.7, 1.0).follow(network.lines)):
+        mine = feet.of(number)
+        on_top = _on_top(mine.t, mine.across, points.xyz[mine.point, 2], head_width_m)
+        along = length_along(line)
+        shift = _shifts(mine.t[on_top], mine.across[on_top], along, head_width_m, smoothing_m)
+        lines.append(line + (shift * freedom[number])[:, None] * left_normals(line))
+    nodes = network.nodes.copy()
+    for (start, end), line in zip(network.ends, lines):
+        nodes[start], nodes[end] = line[0], line[-1]
+    return replace(network, lines=tuple(lines), nodes=nodes)
+
+
+def _freedom(network: LineNetwork) -> list[np.ndarray]:
+    """Say how much each vertex of each line may move: from 0 near shared nodes to 1."""
+    shared = network.degrees() > 1
+    along = [length_along(line) for line in network.lines]
+    freedom = [np.ones(len(t)) for t in along]
+    fixed = [
+        (number, along[number][-side])
+        for number, ends in enumerate(network.ends)
+        for side in (0, 1)
+        if shared[ends[side]]
+    ]
+    fixed += [(line, along[line][vertex]) for _, line, vertex in network.passes.tolist()]
+    for number, t in fixed:
+        freedom[number] = np.minimum(freedom[number], np.clip(np.abs(along[number] - t) / JUNCTION_M - 1, 0, 1))
+    return freedom
+
+
+def _on_top(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> np.ndarray:
+    """Tell which points lie on the top of the head, its slope across considered, (n,) bool."""
+    head = np.abs(across) <= 0.5 * head_width_m
+    if head.sum() < ENOUGH_POINTS:
+        return np.zeros(len(t), dtype=bool)
+    above = z - np.interp(t, t[head], rough_level(t[head], z[head]))
+    slope = np.interp(t, t[head], cross_slope(t[head], across[head], above[head], head_width_m))
+    flat = above - slope * across
+    flat -= np.interp(t, t[head], rough_level(t[head], flat[head]))
+    limit = max(DEPTH_M, TOP_SIGMAS * spread(flat[head & (np.abs(flat) < 2 * DEPTH_M)]))
+    return np.abs(flat) <= limit
+
+
+def _shifts(
+    t: np.ndarray, across: np.ndarray, along: np.ndarray, head_width_m: float, smoothing_m: float
+) -> np.ndarray:
+    """How far to the left a line has to move at its vertices, (m,); 0 where the points do not tell."""
+    stations, counts = _histograms(t, across, along[-1], head_width_m)
+    middle = _middles(counts) * head_width_m / (2 * HALF_HEAD)
+    known = np.isfinite(middle)
+    if known.sum() < max(LEAST_SHARE * len(stations), 2):
+        return np.zeros(len(along))
+    return smooth_profile(stations[known], middle[known], smoothing_m, along)
+
+
+def _histograms(
+    t: np.ndarray, across: np.ndarray, length_m: float, head_width_m: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Count points by offset in windows along the line.
+
+    Returns
+    -------
+    stations : (s,) array
+        Middles of the windows, metres.
+    counts : (s, 2 HALF_RANGE) array
+        Bins of 1 / (2 HALF_HEAD) of a head, the first half to the right of the line.
+    """
+    rows = int(length_m / STATION_M) + 1
+    row = np.minimum((t / STATION_M).astype(int), rows - 1)
+    column = np.floor(across * (2 * HALF_HEAD / head_width_m)).astype(int) + HALF_RANGE
+    inside = (column >= 0) & (column < 2 * HALF_RANGE)
+    counts = np.bincount(row[inside] * 2 * HALF_RANGE + column[inside], minlength=rows * 2 * HALF_RANGE)
+    counts = counts.reshape(rows, 2 * HALF_RANGE).astype(np.float32)
+    chosen = np.zeros_like(counts)
+    for size in reversed(WINDOWS):
+        window = uniform_filter1d(counts, size, axis=0, mode="constant") * size
+        enough = (window.sum(axis=1) >= ENOUGH_POINTS) | (size == WINDOWS[-1])
+        chosen[enough] = window[enough]
+    return (np.arange(rows) + 0.5) * STATION_M, chosen
+
+
+def _middles(counts: np.ndarray) -> np.ndarray:
+    """Offset of the head's middle in each window, in bins to the left; NaN where not both edges are to be seen."""
+    sums = np.cumsum(gaussian_filter1d(counts, BLUR_BINS, axis=1, mode="constant"), axis=1)
+    sums = np.column_stack([np.zeros(len(sums), dtype=sums.dtype), sums])
+    heads = _Heads(sums, np.arange(len(sums)))
+    first = heads.best(np.ones(len(sums)), np.ones(len(sums)))
+    rims = [heads.density(first, side, NEAR_EDGE) for side in (-1, 1)]
+    middle = heads.best(*(np.maximum(rim, np.max(rims, axis=0) / 3) for rim in rims))
+    outside = [heads.density(first, side, -NEAR_EDGE - RIM) for side in (-1, 1)]
+    clear = [(rim * RIM >= LEAST_ON_RIM) & (beyond <= CLEAR_EDGE * rim) for rim, beyond in zip(rims, outside)]
+    return np.where(clear[0] & clear[1] & (np.abs(middle) < FURTHEST), middle, np.nan)
+
+
+@dataclass(frozen=True)
+class _Heads:
+    """Windows' cumulative counts across, (s, 2 HALF_RANGE + 1), at the borders of the bins; `rows` numbers the windows."""
+
+    sums: np.ndarray
+    rows: np.ndarray
+
+    def best(self, right_density: np.ndarray, left_density: np.ndarray) -> np.ndarray:
+        """Place of the head that holds the most points, (s,) in bins to the left of the line.
+
+        The edges are weighed by the density inside of them: where the scanner sees one side of the head better, the
+        heads' fuller edge would pull.
+        """
+        shifts = np.arange(-FURTHEST - 1, FURTHEST + 2)
+        ahead = self.sums[:, HALF_RANGE + shifts + HALF_HEAD] / np.maximum(left_density, 1e-6)[:, None]
+        behind = self.sums[:, HALF_RANGE + shifts - HALF_HEAD] / np.maximum(right_density, 1e-6)[:, None]
+        held = ahead - behind
+        top = np.clip(np.argmax(held, axis=1), 1, len(shifts) - 2)
+        before, at, after = (held[self.rows, top + step] for step in (-1, 0, 1))
+        bend = np.maximum(2 * at - before - after, 1e-9)
+        return shifts[top] + np.clip(0.5 * (after - before) / bend, -1, 1)
+
+    def density(self, middle: np.ndarray, side: int, inside: int) -> np.ndarray:
+        """Points a bin, (s,), on the RIM bins that begin `inside` bins inside of one edge of heads at `middle`."""
+        edge = HALF_RANGE + np.round(middle).astype(int) + side * HALF_HEAD
+        near, far = edge - side * inside, edge - side * (inside + RIM)
+        return np.abs(self.sums[self.rows, near] - self.sums[self.rows, far]) / RIM
