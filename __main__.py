@@ -10,6 +10,7 @@ from collections.abc import Sequence
 COMMANDS = {
     "train": ("core.training.train", "train FRPDF on synthetic rasters"),
     "evaluate": ("core.training.evaluate", "compare weights on a fixed set of synthetic rasters"),
+    "onnx": ("core.frpdf.onnx", "write the network for other runtimes"),
     "scenes": ("core.synthetic.write", "write synthetic clouds with their true lines"),
 }
 """Module and help of each command; a module offers `add_arguments(parser)` and `run(args)`."""

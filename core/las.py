@@ -20,17 +20,37 @@ with warnings.catch_warnings():
     warnings.simplefilter("ignore", UserWarning)
     import laspy
 
+try:
+    import lazrs
+except ImportError:
+    lazrs = None
+
 CHUNK = 250_000
 """Points read at once: some 10 MB, and well below the half second in which a cancel must be heard."""
 
 SUFFIXES = (".las", ".laz")
 """What a folder is searched for; COPC files end in .copc.laz."""
 
-SHORTEST_HEADER, VLR_HEADER = 227, 54
-"""Bytes, by the LAS 1.2 specification."""
+SHORTEST_HEADER, HEADER_14, VLR_HEADER, EVLR_HEADER = 227, 375, 54, 60
+"""Bytes, by the LAS 1.2 and 1.4 specifications."""
 
 LARGEST_SCALE = 1000.0
 """Coarser steps between neighbouring coordinates are no survey but a damaged header."""
+
+LARGEST_LAZ_CHUNK = 2**30
+"""Bytes of a chunk when unpacked; writers use 50,000 points, some 2 MB."""
+
+READING_ERRORS = (
+    laspy.errors.LaspyException,
+    ValueError,
+    OSError,
+    LookupError,
+    EOFError,
+    RuntimeError,
+    MemoryError,
+    struct.error,
+)
+"""What laspy and its backends raise on damaged files; lazrs' own error is a RuntimeError."""
 
 GEO_KEYS_RECORD = "GeoKeyDirectoryVlr"
 
@@ -138,12 +158,8 @@ def _open(path: Path) -> Iterator[laspy.LasReader]:
         with laspy.open(path, decompression_selection=selection) as reader:
             _check_header(path, reader.header)
             yield reader
-    except _READING_ERRORS as error:
+    except READING_ERRORS as error:
         raise CloudError(f"{path.name} is cut off or damaged ({error}): copy or export it again.") from error
-
-
-_READING_ERRORS = (laspy.errors.LaspyException, ValueError, OSError, EOFError, struct.error, IndexError, KeyError)
-"""What laspy and its backends raise on damaged files."""
 
 
 def _check_start(path: Path) -> None:
@@ -152,10 +168,10 @@ def _check_start(path: Path) -> None:
     if size == 0:
         raise CloudError(f"{path.name} is empty (0 bytes): copy or export it again.")
     with path.open("rb") as file:
-        start = file.read(SHORTEST_HEADER)
+        start = file.read(HEADER_14)
     if start[:4] != b"LASF":
         raise CloudError(f"{path.name} is no LAS or LAZ file: it does not begin with LASF.")
-    if len(start) < SHORTEST_HEADER:
+    if len(start) < (HEADER_14 if start[25:26] == b"\x04" else SHORTEST_HEADER):
         raise CloudError(f"{path.name} is cut off within its header: copy or export it again.")
     if start[24] != 1 or start[25] > 4:
         raise CloudError(f"{path.name} is LAS {start[24]}.{start[25]}: export it as LAS 1.2 to 1.4.")
@@ -164,6 +180,9 @@ def _check_start(path: Path) -> None:
         raise CloudError(f"{path.name} is cut off before its first point: copy or export it again.")
     if records * VLR_HEADER > points_at:
         raise CloudError(f"{path.name} has a damaged header ({records} records announced): export it again.")
+    late_at, late = struct.unpack("<QI", start[235:247]) if start[25] == 4 else (0, 0)
+    if late and late_at + late * EVLR_HEADER > size:
+        raise CloudError(f"{path.name} is cut off: the records behind its points are missing; copy or export it again.")
 
 
 def _check_header(path: Path, header: laspy.LasHeader) -> None:
@@ -174,11 +193,7 @@ def _check_header(path: Path, header: laspy.LasHeader) -> None:
     if not scales_fit or (header.scales > LARGEST_SCALE).any() or not np.isfinite(header.offsets).all():
         raise CloudError(f"{path.name} has a damaged header (coordinate scale or offset): export it again.")
     if header.are_points_compressed:
-        if not laspy.LazBackend.detect_available():
-            raise CloudError(
-                f"{path.name} is compressed and the Python package lazrs, which reads LAZ, is missing: "
-                "run pip install lazrs, or export the cloud as LAS."
-            )
+        _check_compressed(path, header)
         return
     held = (path.stat().st_size - header.offset_to_point_data) // header.point_format.size
     if held < header.point_count:
@@ -186,6 +201,32 @@ def _check_header(path: Path, header: laspy.LasHeader) -> None:
             f"{path.name} is cut off: it has room for {held} of the {header.point_count} points that its header "
             "announces; copy or export it again."
         )
+
+
+def _check_compressed(path: Path, header: laspy.LasHeader) -> None:
+    """Refuse LAZ files whose chunks can't be: the decompressor would ask for their memory and end the program."""
+    if lazrs is None:
+        raise CloudError(
+            f"{path.name} is compressed and the Python package lazrs, which reads LAZ, is missing: "
+            "run pip install lazrs, or export the cloud as LAS."
+        )
+    size = path.stat().st_size
+    vlr = lazrs.LazVlr(header.vlrs.get("LasZipVlr")[0].record_data)
+    fits = vlr.item_size() == header.point_format.size
+    fits &= vlr.uses_variable_size_chunks() or vlr.chunk_size() * vlr.item_size() <= LARGEST_LAZ_CHUNK
+    with path.open("rb") as file:
+        file.seek(header.offset_to_point_data)
+        (table_at,) = struct.unpack("<q", file.read(8))
+        if not header.offset_to_point_data < table_at <= size - 8:
+            raise CloudError(f"{path.name} is cut off: its table of chunks is missing; copy or export it again.")
+        file.seek(table_at)
+        _, chunks = struct.unpack("<II", file.read(8))
+        if fits and chunks <= size:
+            file.seek(header.offset_to_point_data)
+            table = lazrs.read_chunk_table(file, vlr)
+            fits = sum(held for _, held in table) <= size and sum(count for count, _ in table) >= header.point_count
+        if not fits or chunks > size:
+            raise CloudError(f"{path.name} is damaged: its compressed chunks don't fit the file; export it again.")
 
 
 def _crs_wkt(header: laspy.LasHeader) -> str | None:

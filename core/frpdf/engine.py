@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from importlib.util import find_spec
 from typing import Protocol
 
 import numpy as np
 
 from ..errors import ModelError
-from .folding import Convolution, FoldedLayer, fold
 
 ENGINES = ("AUTO", "TORCH", "OPENCV")
 DEVICES = ("AUTO", "CPU", "CUDA")
@@ -43,84 +42,34 @@ class Engine(Protocol):
 
 
 def make_engine(arrays: dict[str, np.ndarray], engine: str = "AUTO", device: str = "AUTO") -> Engine:
-    """Set up the engine that the user chose, or the best one there is.
+    """Set up the engine that the user chose, or PyTorch where it is installed and OpenCV elsewhere.
 
     Parameters
     ----------
     arrays : dict
         Weights, from `weights.load_arrays`.
-    engine : {"AUTO", "TORCH"}
+    engine : {"AUTO", "TORCH", "OPENCV"}
     device : {"AUTO", "CPU", "CUDA"}
 
     Raises
     ------
     ModelError
-        The engine's package or device is not there.
+        The engine's package or device is not there, or the weights are not FRPDF's.
     """
-    if engine not in ("AUTO", "TORCH"):
-        raise ModelError(f"There is no engine {engine} in this version: choose AUTO or TORCH.")
-    return TorchEngine(arrays, device)
+    if engine == "AUTO":
+        engine = "TORCH" if find_spec("torch") else "OPENCV"
+    module, package = _PACKAGES[engine]
+    if not find_spec(module):
+        raise ModelError(f"The engine {engine} needs the package {package}: install it, or set ENGINE to AUTO.")
+    if engine == "TORCH":
+        from .torch_engine import TorchEngine
+
+        return TorchEngine(arrays, device)
+    if device == "CUDA":
+        raise ModelError("The engine OPENCV computes on the processor alone: set DEVICE to AUTO, or ENGINE to TORCH.")
+    from .opencv_engine import OpenCvEngine
+
+    return OpenCvEngine(arrays)
 
 
-class TorchEngine:
-    """PyTorch on the CPU or on CUDA; in bfloat16 where the processor computes with it."""
-
-    def __init__(self, arrays: dict[str, np.ndarray], device: str = "AUTO", exact: bool = False) -> None:
-        """Move the weights to the device; `exact` computes in float32 everywhere."""
-        import torch
-
-        has_cuda = torch.cuda.is_available()
-        if device == "CUDA" and not has_cuda:
-            raise ModelError("There is no CUDA device that PyTorch can use: choose AUTO or CPU.")
-        self._torch = torch
-        self._device = "cuda" if has_cuda and device != "CPU" else "cpu"
-        self._dtype = torch.float32 if exact else _fast_type(torch, self._device)
-        self._passes = [self._move(layer) for layer in fold(arrays)]
-        self.description = f"PyTorch {torch.__version__}, {self._device.upper()}, {str(self._dtype).split('.')[-1]}"
-
-    def probabilities(self, raster: np.ndarray, state: np.ndarray, number: int) -> np.ndarray:
-        """Run one pass; see `Engine.probabilities`."""
-        torch = self._torch
-        x = torch.from_numpy(np.stack([raster, state])[None] * 2 - 1)
-        x = x.to(self._device, self._dtype).contiguous(memory_format=torch.channels_last)
-        with torch.inference_mode():
-            logits = self._passes[min(number, len(self._passes) - 1)](x)
-            return torch.sigmoid(logits.float())[0, 0].cpu().numpy()
-
-    def _move(self, layer: FoldedLayer) -> Callable:
-        """Make a function of (1, 2, height, width) tensors from a folded layer."""
-        torch = self._torch
-        convolve = torch.nn.functional.conv2d
-
-        def moved(convolution: Convolution) -> Callable:
-            weight = torch.from_numpy(convolution.weight).to(self._device, self._dtype)
-            weight = weight.contiguous(memory_format=torch.channels_last)
-            bias = torch.from_numpy(convolution.bias).to(self._device, self._dtype)
-            dilation = convolution.dilation
-            padding = convolution.weight.shape[-1] // 2 * dilation
-            return lambda x: convolve(x, weight, bias, padding=padding, dilation=dilation)
-
-        encoder = [moved(convolution) for convolution in layer.encoder]
-        bridge = [(moved(dilated), moved(reduce)) for dilated, reduce in layer.bridge]
-        decoder = [moved(convolution) for convolution in layer.decoder]
-        head = moved(layer.head)
-
-        def run(x):
-            for convolution in encoder:
-                x = convolution(x).relu_()
-            for dilated, reduce in bridge:
-                x = reduce(torch.cat([dilated(x).relu_(), x], dim=1)).relu_()
-            for convolution in decoder:
-                x = convolution(x).relu_()
-            return head(x)
-
-        return run
-
-
-def _fast_type(torch, device: str):
-    """Bfloat16 where it is native: elsewhere it is emulated, and slower than float32."""
-    if device == "cuda":
-        return torch.bfloat16 if torch.cuda.is_bf16_supported(including_emulation=False) else torch.float32
-    probes = ("_is_avx512_bf16_supported", "_is_amx_tile_supported")
-    native = any(getattr(torch.cpu, probe, lambda: False)() for probe in probes)
-    return torch.bfloat16 if native else torch.float32
+_PACKAGES = {"TORCH": ("torch", "torch"), "OPENCV": ("cv2", "opencv-python-headless")}

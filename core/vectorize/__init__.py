@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from ..progress import SILENT, Progress
 from ..raster import RailRaster
 from .closing import close
+from .crossings import resolve_crossings
+from .ends import stretch, way_out
 from .joining import join_gaps
 from .junctions import clean_junctions, run_through, weld_pairs
 from .network import LineNetwork
@@ -13,6 +19,9 @@ from .tracing import trace
 from .veinerization import prune, veinerize
 
 __all__ = ["LineNetwork", "vectorize"]
+
+SETTLING_M = 1.0
+"""A free end is led to the middle of this last stretch: shorter ones show the raster, longer ones a bend."""
 
 
 def vectorize(
@@ -51,9 +60,9 @@ def vectorize(
     network = clean_junctions(trace(closed, pixels, edges, tips), head_width_m)
     progress.set_fraction(0.8)
     progress.check()
-    network = join_gaps(run_through(network), max_gap_m, gap_angle_deg)
+    network = join_gaps(run_through(resolve_crossings(network)), max_gap_m, gap_angle_deg)
     progress.set_fraction(1.0)
-    return _drop_short(network, min_length_m)
+    return _settle_ends(_drop_short(network, min_length_m))
 
 
 def _drop_short(network: LineNetwork, min_length_m: float) -> LineNetwork:
@@ -64,3 +73,12 @@ def _drop_short(network: LineNetwork, min_length_m: float) -> LineNetwork:
         if keep.all():
             return network
         network = weld_pairs(network.select(keep))
+
+
+def _settle_ends(network: LineNetwork) -> LineNetwork:
+    """Move free ends sideways onto the straight line through their last stretch, for smoothing will hold them there."""
+    lines, nodes = [line.copy() for line in network.lines], network.nodes.copy()
+    for end in np.flatnonzero(network.degrees()[network.ends.ravel()] == 1).tolist():
+        tip, _ = way_out(stretch(network.from_end(end), SETTLING_M))
+        lines[end // 2][-1 if end % 2 else 0] = nodes[network.ends.flat[end]] = tip
+    return replace(network, lines=tuple(lines), nodes=nodes)

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..rails import length_along
+
 STEP_M = 0.1
 """Distance between the points that stand for a stretch; raster vertices are spaced by corners, not by length."""
 
 
 def stretch(from_end: np.ndarray, length_m: float) -> np.ndarray:
     """Points every `STEP_M` along the first `length_m` of a line given from its end, (n, 2), at least two."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(from_end, axis=0).T))])
+    along = length_along(from_end)
     length_m = min(length_m, along[-1])
     stations = np.linspace(0.0, length_m, max(int(length_m / STEP_M), 1) + 1)
     return np.column_stack([np.interp(stations, along, axis) for axis in from_end.T])
+
+
+def cut_back(from_end: np.ndarray, length_m: float) -> np.ndarray:
+    """Take the first `length_m` off a longer line given from its end."""
+    along = length_along(from_end)
+    first = [[np.interp(length_m, along, axis) for axis in from_end.T]]
+    return np.concatenate([first, from_end[along > length_m]])
 
 
 def way_out(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from ..rails import length_along
 from ..raster import RailRaster
 from .network import LineNetwork
 from .pixels import Pixels
@@ -109,7 +110,7 @@ def _corners(vertices: np.ndarray, borders: np.ndarray, cells: np.ndarray) -> tu
 
 def _prolongation(inward: np.ndarray, tip: np.ndarray) -> np.ndarray:
     """Step out of a line, given from its end inward, along its direction there until it is level with `tip`."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(inward, axis=0).T))])
+    along = length_along(inward)
     back = [np.interp(min(TANGENT_PIXELS, along[-1]), along, axis) for axis in inward.T]
     outward = (inward[0] - back) / np.hypot(*(inward[0] - back))
     return max(np.dot(tip - inward[0], outward), 0.0) * outward

@@ -1,0 +1,142 @@
+"""Engines compute what the network computes; cleanup stitches windows and passes."""
+
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+import torch
+from rail_extract.core.errors import Cancelled, ModelError
+from rail_extract.core.frpdf import cleanup
+from rail_extract.core.frpdf import engine as engine_module
+from rail_extract.core.frpdf.engine import make_engine
+from rail_extract.core.frpdf.network import FRPDF, feedback
+from rail_extract.core.frpdf.opencv_engine import OpenCvEngine
+from rail_extract.core.frpdf.torch_engine import TorchEngine
+from rail_extract.core.frpdf.weights import load_arrays, save_arrays
+from rail_extract.core.frpdf.zoo import MODELS, choose
+from rail_extract.core.progress import Progress
+from rail_extract.core.raster import RailRaster, rasterize
+from rail_extract.core.training.train import export
+
+
+@pytest.fixture(scope="module")
+def network():
+    torch.manual_seed(3)
+    network = FRPDF()
+    for name, buffer in network.named_buffers():
+        if "running_mean" in name:
+            buffer.normal_(0, 0.3)
+        if "running_var" in name:
+            buffer.uniform_(0.5, 2.0)
+    return network.eval()
+
+
+class Copy:
+    """An engine that finds what it sees, and takes note of the states it is told."""
+
+    description = "copy"
+
+    def __init__(self):
+        self.states = []
+
+    def probabilities(self, raster, state, number):
+        self.states.append((number, state))
+        return raster
+
+
+def line_of_cells(length):
+    """A raster with one straight diagonal of cells."""
+    return RailRaster({}, 0.04, 0.0, 0.0).with_cells(np.column_stack([np.arange(length), 2 * np.arange(length)]))
+
+
+@pytest.mark.parametrize("make", [lambda arrays: TorchEngine(arrays, "CPU", exact=True), OpenCvEngine])
+def test_the_folded_engines_equal_the_network(network, make):
+    engine = make(export(network))
+    raster = (np.random.default_rng(0).random((40, 57)) < 0.2).astype(np.float32)
+    state = np.full_like(raster, 0.5)
+    with torch.no_grad():
+        for number, logits in enumerate(network(torch.from_numpy(raster)[None, None], passes=3)):
+            found = engine.probabilities(raster, state, number)
+            assert np.abs(found - torch.sigmoid(logits)[0, 0].numpy()).max() < 1e-6
+            state = feedback(logits)[0, 0].numpy().astype(np.float32)
+
+
+def test_weights_survive_the_file(network, tmp_path):
+    arrays = export(network)
+    save_arrays(tmp_path / "weights.npz", arrays)
+    loaded = load_arrays(tmp_path / "weights.npz")
+    assert loaded.keys() == arrays.keys()
+    assert all(np.array_equal(loaded[name], arrays[name]) for name in arrays)
+
+
+def test_missing_and_damaged_weights_are_named(tmp_path):
+    with pytest.raises(ModelError, match="gone.npz are missing"):
+        load_arrays(tmp_path / "gone.npz")
+    (tmp_path / "cut.npz").write_bytes(b"PK\x03\x04 cut")
+    with pytest.raises(ModelError, match="can't be read"):
+        load_arrays(tmp_path / "cut.npz")
+
+
+def test_arrays_of_another_network_are_refused():
+    with pytest.raises(ModelError, match="no weights of FRPDF"):
+        make_engine({"layer.0.weight": np.zeros(3, np.float32)})
+
+
+def test_engines_are_chosen_by_name_and_by_what_is_installed(network, monkeypatch):
+    arrays = export(network)
+    assert make_engine(arrays, "OPENCV").description.startswith("OpenCV")
+    assert make_engine(arrays).description.startswith("PyTorch")
+    monkeypatch.setattr(engine_module, "find_spec", lambda name: None if name == "torch" else find_spec(name))
+    assert make_engine(arrays).description.startswith("OpenCV")
+    with pytest.raises(ModelError, match="package torch"):
+        make_engine(arrays, "TORCH")
+    with pytest.raises(ModelError, match="processor alone"):
+        make_engine(arrays, "OPENCV", "CUDA")
+
+
+@pytest.mark.parametrize("standard", [(1.435, 0.0762), (1.0, 0.06191), (1.676, 0.0667)])
+def test_the_zoo_serves_the_worlds_standards(standard):
+    nearest = min(MODELS, key=lambda model: abs(np.log(model.ratio * standard[1] / standard[0])))
+    assert choose(*standard) == nearest
+    assert nearest.path.exists()
+
+
+def test_a_ratio_that_no_model_covers_is_refused():
+    with pytest.raises(ModelError, match="GAUGE and HEAD_WIDTH"):
+        choose(1.435, 0.150)
+
+
+def test_every_cell_is_computed_once_whatever_the_windows():
+    raster = line_of_cells(3000)
+    assert set(map(tuple, cleanup.clean(raster, Copy()).cells().tolist())) == set(map(tuple, raster.cells().tolist()))
+
+
+def test_windows_follow_the_cells_and_leave_the_rest_alone():
+    along, area = len(cleanup.windows(line_of_cells(3000))), (3000 / cleanup.CORE) * (6000 / cleanup.CORE)
+    assert along < 0.4 * area
+    assert len(cleanup.windows(rasterize(np.array([[0.0, 0.0], [1e6, 1e6]]), 0.04))) <= 8
+
+
+def test_the_first_pass_is_told_nothing_and_later_ones_what_was_found():
+    engine, raster = Copy(), line_of_cells(100)
+    cleanup.clean(raster, engine, passes=3)
+    assert all((state == 0.5).all() for number, state in engine.states if number == 0)
+    assert all(set(np.unique(state)) <= {0.0, 1.0} for number, state in engine.states if number > 0)
+    assert {number for number, _ in engine.states} == {0, 1, 2}
+    told = sum(state.any() for number, state in engine.states if number == 2)
+    assert told > 0
+
+
+def test_passes_end_when_nothing_changes():
+    engine = Copy()
+    cleanup.clean(line_of_cells(100), engine, passes=cleanup.UNTIL_STABLE)
+    assert max(number for number, _ in engine.states) == 1
+
+
+def test_a_cancel_ends_the_pass():
+    class Impatient(Progress):
+        def is_cancelled(self):
+            return True
+
+    with pytest.raises(Cancelled):
+        cleanup.clean(line_of_cells(100), Copy(), progress=Impatient())

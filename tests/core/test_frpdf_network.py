@@ -1,0 +1,63 @@
+"""The network as the paper draws it."""
+
+import numpy as np
+import pytest
+import torch
+from rail_extract.core.frpdf.network import FRPDF, RECEPTIVE_RADIUS, feedback
+
+
+@pytest.fixture(scope="module")
+def network():
+    """An untrained network with odd batch statistics, so that folding and passes have something to get wrong."""
+    torch.manual_seed(3)
+    network = FRPDF()
+    for name, buffer in network.named_buffers():
+        if "running_mean" in name:
+            buffer.normal_(0, 0.3)
+        if "running_var" in name:
+            buffer.uniform_(0.5, 2.0)
+    return network.eval()
+
+
+def test_it_has_the_papers_number_of_parameters(network):
+    assert sum(parameter.numel() for parameter in network.parameters()) == 293_545
+
+
+def test_any_shape_goes_in_and_comes_out(network):
+    with torch.no_grad():
+        for shape in ((1, 1, 8, 13), (2, 1, 31, 5)):
+            assert [tuple(logits.shape) for logits in network(torch.zeros(shape), passes=3)] == [shape] * 3
+
+
+def test_undecided_input_is_the_value_of_padding(network):
+    raster = torch.full((1, 1, 20, 20), 0.5)
+    with torch.no_grad():
+        logits = network.logits(raster, raster, 0)
+        assert torch.equal(logits, network.layer(torch.zeros(1, 2, 20, 20)))
+
+
+def test_a_cell_sees_753_cells_far_and_no_farther():
+    torch.manual_seed(0)
+    network = FRPDF().eval()
+    for name, parameter in network.named_parameters():
+        if name.endswith("0.weight") and parameter.dim() == 4:
+            parameter.data.abs_()  # nothing cancels, no ReLU closes
+    length = 2 * RECEPTIVE_RADIUS + 21
+    strip = torch.ones(1, 2, 1, length, requires_grad=True)
+    network.layer(strip)[0, 0, 0, length // 2].backward()
+    seen = np.flatnonzero(strip.grad.abs().sum(dim=(0, 1, 2)).numpy()) - length // 2
+    assert (seen.min(), seen.max()) == (-RECEPTIVE_RADIUS, RECEPTIVE_RADIUS)
+
+
+def test_the_first_pass_has_batch_statistics_of_its_own(network):
+    raster = torch.full((1, 1, 16, 16), 1.0)
+    with torch.no_grad():
+        first, second, third = (network.logits(raster, raster, number) for number in range(3))
+    assert not torch.allclose(first, second)
+    assert torch.equal(second, third)
+
+
+def test_feedback_is_decided_at_three_quarters_and_has_no_gradient():
+    logits = torch.logit(torch.tensor([0.2, 0.5, 0.74, 0.76])).requires_grad_()
+    assert feedback(logits).tolist() == [False, False, False, True]
+    assert not feedback(logits).requires_grad

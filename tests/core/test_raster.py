@@ -1,0 +1,52 @@
+"""The sparse raster: windows, cells, georeference."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rail_extract.core.raster import TILE, RailRaster, cell_size, rasterize
+from scipy import ndimage
+
+CELLS = st.lists(st.tuples(st.integers(-600, 600), st.integers(-600, 600)), min_size=1, max_size=40)
+
+
+def test_cell_size_of_the_papers_standard_is_4_cm():
+    assert cell_size(1.435, 0.0762) == pytest.approx(0.04, abs=1e-5)
+
+
+def test_a_point_sets_the_cell_it_lies_in():
+    raster = rasterize(np.array([[0.05, 0.03, 7.0], [0.07, 0.01, 7.0], [-0.01, -0.01, 7.0]]), 0.04)
+    assert sorted(map(tuple, raster.cells().tolist())) == [(-1, 1), (0, -1)]
+
+
+def test_cell_centres_come_back_in_local_metres():
+    raster = rasterize(np.array([[12.345, -6.789, 0.0]]), 0.04)
+    assert np.abs(raster.to_local(raster.cells()) - [[12.345, -6.789]]).max() <= 0.02
+
+
+@given(CELLS)
+def test_cells_survive_tiling(cells):
+    raster = RailRaster({}, 0.04, 0.0, 0.0).with_cells(np.array(cells))
+    assert set(map(tuple, raster.cells().tolist())) == set(cells)
+    assert raster.count() == len(set(cells))
+
+
+@given(CELLS, st.integers(-700, 500), st.integers(-700, 500), st.integers(1, 700), st.integers(1, 300))
+def test_a_window_holds_the_cells_in_it(cells, row, column, height, width):
+    window = RailRaster({}, 0.04, 0.0, 0.0).with_cells(np.array(cells)).read(row, column, height, width)
+    inside = {(r - row, c - column) for r, c in cells if row <= r < row + height and column <= c < column + width}
+    assert set(map(tuple, np.argwhere(window).tolist())) == inside
+
+
+def test_mapping_tiles_equals_mapping_the_whole():
+    rng = np.random.default_rng(1)
+    cells = rng.integers(-TILE, 2 * TILE, size=(4000, 2))
+    raster = RailRaster({}, 0.04, 0.0, 0.0).with_cells(cells)
+    dilated = raster.map_tiles(lambda window: ndimage.binary_dilation(window, np.ones((5, 5))), margin=2, grow=True)
+    whole = ndimage.binary_dilation(raster.read(-2 * TILE, -2 * TILE, 5 * TILE, 5 * TILE), np.ones((5, 5)))
+    assert np.array_equal(dilated.read(-2 * TILE, -2 * TILE, 5 * TILE, 5 * TILE), whole)
+
+
+def test_a_stray_point_a_thousand_kilometres_away_costs_one_tile():
+    raster = rasterize(np.array([[0.0, 0.0], [1e6, 1e6]]), 0.04)
+    assert len(raster.tiles) == 2
