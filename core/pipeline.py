@@ -17,6 +17,7 @@ from .points import RailPoints
 from .progress import SILENT, Progress
 from .rails import Centerline, RailLine, RailNetwork
 from .raster import cell_size, rasterize
+from .refinement import refine
 from .smoothing import smooth_network
 from .vectorize import vectorize
 
@@ -115,7 +116,7 @@ def extract_rails(clouds: Sequence[RailPoints], parameters: Parameters, progress
 def rails_of(
     points: RailPoints, parameters: Parameters, engine: Engine, progress: Progress = SILENT, first_id: int = 1
 ) -> list[RailLine]:
-    """Extract the rails of one class: rasterize, clean, vectorize, smooth, give height."""
+    """Extract the rails of one class: rasterize, clean, vectorize, smooth, move onto the heads, give height."""
     raster = rasterize(points.xyz, cell_size(parameters.gauge_m, parameters.head_width_m))
     cleaned = clean(raster, engine, parameters.passes, progress.span(0.0, 0.8))
     network = vectorize(
@@ -127,7 +128,7 @@ def rails_of(
         progress.span(0.8, 0.9),
     )
     network = smooth_network(network, parameters.smoothing_xy_m)
-    progress.check()
+    network = refine(network, points, parameters.head_width_m, parameters.smoothing_xy_m, progress.span(0.9, 0.95))
     elevation = ElevationParameters(
         head_width_m=parameters.head_width_m,
         tolerance_xy_m=parameters.tolerance_xy_m,
@@ -139,7 +140,7 @@ def rails_of(
         simplify_z_m=parameters.simplify_z_m,
         min_length_m=parameters.min_length_m,
     )
-    rails = elevate(network, points, elevation, progress.span(0.9, 1.0))
+    rails = elevate(network, points, elevation, progress.span(0.95, 1.0))
     return [replace(rail, rail_id=number) for number, rail in enumerate(rails, start=first_id)]
 
 
