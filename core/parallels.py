@@ -107,8 +107,10 @@ def commonest_spacing(rails: Sequence[RailLine], least_length_m: float) -> float
         return None
     spacing = np.abs(find_parallels(rails).left_m)
     spacing = spacing[spacing >= NEAREST_M]
+    if len(spacing) * STEP_M < least_length_m:
+        return None
     counts = np.convolve(np.bincount((spacing / BIN_M).astype(int)), np.ones(3), mode="same")
-    if not len(spacing) or counts.max() * STEP_M < least_length_m:
+    if counts.max() * STEP_M < least_length_m:
         return None
     middle = (np.argmax(counts) + 0.5) * BIN_M
     return float(np.median(spacing[np.abs(spacing - middle) <= 2 * BIN_M]))
