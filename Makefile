@@ -46,8 +46,8 @@ clean:  ## remove what was built; .venv stays
 .PHONY: plugin
 plugin: package build/profile/enabled
 
-build/profile/enabled: $(ENVIRONMENT) | package
-	@. ./$(ENVIRONMENT) && "$$QGIS_PROCESS" plugins enable rail_extract >/dev/null 2>&1
+build/profile/enabled: | $(ENVIRONMENT) package
+	@. ./$(ENVIRONMENT) && "$$QGIS_PROCESS" plugins enable rail_extract > build/enable.log 2>&1 || { cat build/enable.log >&2; exit 1; }
 	@touch $@
 
 $(ENVIRONMENT): tools/environment.py .venv/installed

@@ -25,7 +25,6 @@ PACKAGES = (
     Package("lazrs", "laspy[lazrs]"),
     Package("cv2", "opencv-python-headless"),
     Package("pyproj", "pyproj"),
-    Package("skimage", "scikit-image"),
     Package("torch", "torch"),
 )
 """All that an algorithm may need; requirements.txt lists the same without what belongs to QGIS."""
@@ -34,9 +33,21 @@ OWNED_BY_QGIS = ("numpy", "scipy")
 """Held at the version QGIS came with, since its own parts are built against them."""
 
 
-def missing_packages(modules: tuple[str, ...]) -> tuple[Package, ...]:
-    """Those of the wanted modules that Python can't find; nothing is imported."""
-    return tuple(package for package in PACKAGES if package.module in modules and find_spec(package.module) is None)
+def missing_packages(needs: tuple[tuple[str, ...], ...]) -> tuple[Package, ...]:
+    """Look for modules without importing them.
+
+    Parameters
+    ----------
+    needs : tuple of tuple of str
+        Modules of `PACKAGES`; each need is met by any one of its modules.
+
+    Returns
+    -------
+    tuple of Package
+        The first choice of every need that is not met.
+    """
+    unmet = {modules[0] for modules in needs if all(find_spec(module) is None for module in modules)}
+    return tuple(package for package in PACKAGES if package.module in unmet)
 
 
 def install_command(packages: tuple[Package, ...]) -> str:

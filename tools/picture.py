@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rail_extract.core.points import read_rail_points
-from rail_extract.core.rails import length_along
 
 RAIL_CLASS = 10
 DETAIL_M = 12.0
@@ -42,13 +41,14 @@ def draw_map(cloud: Path, rails: Sequence[np.ndarray], centerlines: Sequence[np.
         axes.set_aspect("equal")
         axes.set(xlabel="x [m]", ylabel="y [m]")
     whole.set_title(f"{cloud.name}: {len(points.xyz)} rail points, {len(rails)} rails, {len(centerlines)} tracks")
-    whole.legend(loc="upper right", markerscale=20)
+    whole.legend(loc="lower right", markerscale=20)
     _zoom(detail, centerlines or rails)
     detail.set_title("Detail")
+    direction = _direction(points.xyz)
     for color, lines in ((RAIL, rails), (TRACK, centerlines)):
         for line in lines:
-            heights.plot(length_along(line[:, :2]), line[:, 2] + frame.origin[2], color=color, linewidth=1)
-    heights.set(xlabel="distance along the line [m]", ylabel="z [m]", title="Heights of rails and track centerlines")
+            heights.plot(line[:, :2] @ direction, line[:, 2] + frame.origin[2], color=color, linewidth=1)
+    heights.set(xlabel="distance along the scene [m]", ylabel="z [m]", title="Heights of rails and track centerlines")
     heights.grid(alpha=0.3)
     figure.tight_layout()
     figure.savefig(picture, dpi=110)
@@ -57,6 +57,12 @@ def draw_map(cloud: Path, rails: Sequence[np.ndarray], centerlines: Sequence[np.
 def _draw(axes: Axes, lines: Sequence[np.ndarray], color: str, label: str, linestyle: str = "-") -> None:
     for number, line in enumerate(lines):
         axes.plot(*line[:, :2].T, linestyle, color=color, linewidth=1, label=label if number == 0 else None)
+
+
+def _direction(xyz: np.ndarray) -> np.ndarray:
+    """Find the plan direction, (2,), in which points, (n, 3), reach farthest."""
+    _, axes = np.linalg.eigh(np.cov(xyz[:, :2].T))
+    return axes[:, 1] * np.sign(axes[0, 1])
 
 
 def _zoom(axes: Axes, lines: Sequence[np.ndarray]) -> None:

@@ -29,7 +29,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     """A step of Rail Extract in the toolbox.
 
     A subclass says in the attributes what it is called and needs, declares its parameters in `initAlgorithm`, reads
-    them in `read` and computes in `compute`, the only method that may import what needs `MODULES`.
+    them in `read` and computes in `compute`, the only method that may import what depends on `NEEDS`.
     """
 
     NAME = ""
@@ -39,8 +39,8 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     TAGS: tuple[str, ...] = ()
     SUMMARY = ""
     HELP = ""
-    MODULES: tuple[str, ...] = ()
-    """Python modules, beyond QGIS's own, without which it can't run."""
+    NEEDS: tuple[tuple[str, ...], ...] = ()
+    """Python modules without which it can't run; any one of those in a need meets it, the first is recommended."""
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Any:
         """Turn the parameters into what `compute` needs, and check them; runs in the main thread.
@@ -106,7 +106,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     def canExecute(self) -> tuple[bool, str]:
         """Tell whether the needed packages are there; the algorithm stands in the toolbox in any case."""
-        missing = missing_packages(self.MODULES)
+        missing = missing_packages(self.NEEDS)
         return (False, explain_missing(missing)) if missing else (True, "")
 
     def createInstance(self) -> RailAlgorithm:

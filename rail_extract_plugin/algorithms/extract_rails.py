@@ -15,6 +15,7 @@ from qgis.core import (
     QgsWkbTypes,
 )
 
+from ...core.frpdf.zoo import choose as choose_model
 from ...core.progress import Progress
 from ...core.standards import RailStandard, resolve
 from .. import parameters as groups
@@ -50,7 +51,7 @@ class ExtractRails(RailAlgorithm):
     NAME = "extractrails"
     LABEL = "Extract rails"
     TAGS = ("lidar", "las", "laz", "point cloud", "railway", "rail", "track", "centerline", "vectorize")
-    MODULES = ("numpy", "scipy", "laspy", "lazrs", "cv2", "pyproj", "skimage", "torch")
+    NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",), ("cv2", "torch"))
     SUMMARY = "Turns lidar points classified as rail into the 3D lines of the railheads and of the track centerlines."
     HELP = (
         "A rail line is the top of the railhead on the head's own axis. The gauge in the results is the distance in "
@@ -85,16 +86,18 @@ class ExtractRails(RailAlgorithm):
         """Read what has to be read in the main thread, and check it all."""
         cloud = cloud_source(parameters.get("INPUT"), context)
         crs = self.parameterAsCrs(parameters, "CRS", context)
+        standard = resolve(
+            self.parameterAsEnumString(parameters, "STANDARD", context),
+            self._optional_number(parameters, "GAUGE", context),
+            self._optional_number(parameters, "HEAD_WIDTH", context),
+        )
+        choose_model(standard.gauge_m, standard.head_width_m)
         return Job(
             cloud=cloud,
             class_codes=groups.whole_numbers(
                 self.parameterAsString(parameters, "RAIL_CLASSES", context), "RAIL_CLASSES"
             ),
-            standard=resolve(
-                self.parameterAsEnumString(parameters, "STANDARD", context),
-                self._optional_number(parameters, "GAUGE", context),
-                self._optional_number(parameters, "HEAD_WIDTH", context),
-            ),
+            standard=standard,
             other_gauges_m=groups.gauges_m(self.parameterAsString(parameters, "OTHER_GAUGES", context), "OTHER_GAUGES"),
             crs_wkt=crs.toWkt() if crs.isValid() else cloud.crs_wkt,
         )

@@ -1,0 +1,187 @@
+import numpy as np
+import pytest
+from qgis.core import QgsVectorLayer
+
+
+@pytest.fixture
+def scene(write_cloud, track):
+    """A short track, and one pass of the network: quick."""
+    return {"INPUT": write_cloud(track()), "ITERATIONS": 1}
+
+
+@pytest.fixture
+def outputs(tmp_path):
+    return {"RAILS": tmp_path / "räils out.gpkg", "CENTERLINES": tmp_path / "tracks.gpkg"}
+
+
+def lines_of(path):
+    layer = QgsVectorLayer(str(path), "lines", "ogr")
+    assert layer.isValid()
+    return layer, list(layer.getFeatures())
+
+
+def test_rails_and_centerlines_are_written_as_reported(run, scene, outputs):
+    outcome = run({**scene, **outputs})
+    assert outcome.ok, outcome.error
+    for name, figure in (("RAILS", "RAIL"), ("CENTERLINES", "CENTERLINE")):
+        layer, features = lines_of(outputs[name])
+        assert layer.crs().authid() == "EPSG:32643"
+        assert layer.wkbType() == 1002  # LineStringZ
+        assert outcome.results[f"{figure}_COUNT"] == len(features) > 0
+        assert outcome.results[f"{figure}_LENGTH"] == pytest.approx(sum(feature["length_m"] for feature in features))
+    assert outcome.results["ENGINE_USED"].startswith("PyTorch")
+
+
+def test_extent_in_another_coordinate_system(run, scene):
+    outcome = run({**scene, "EXTENT": "74.9,74.99,27,27.2 [EPSG:4326]"})
+    assert not outcome.ok
+    assert "inside the extent" in outcome.error
+
+
+def test_outputs_may_be_skipped(run, scene):
+    outcome = run(scene)
+    assert outcome.ok, outcome.error
+    assert "RAILS" not in outcome.results
+    assert outcome.results["CENTERLINE_COUNT"] > 0
+
+
+def test_memory_layers(run, scene, context):
+    outcome = run({**scene, "RAILS": "TEMPORARY_OUTPUT", "CENTERLINES": "memory:tracks"})
+    assert outcome.ok, outcome.error
+    rails = context.getMapLayer(outcome.results["RAILS"])
+    assert rails.featureCount() == outcome.results["RAIL_COUNT"]
+
+
+def test_progress_advances_to_the_end(run, scene, new_feedback):
+    feedback = new_feedback()
+    assert run(scene, feedback).ok
+    assert feedback.progress == sorted(feedback.progress)
+    assert len(feedback.progress) > 10
+    assert feedback.progress[-1] == pytest.approx(100)
+
+
+@pytest.mark.parametrize("share", [0, 20, 50, 90])
+def test_cancelled_run_writes_nothing(run, scene, outputs, new_feedback, share):
+    outcome = run({**scene, **outputs}, new_feedback(cancel_at=share))
+    assert not outcome.ok
+    assert outcome.error == "Cancelled; nothing was written."
+    assert not any(path.exists() for path in outputs.values())
+
+
+def test_failed_run_leaves_the_old_output(run, outputs, write_cloud, track):
+    outputs["RAILS"].write_bytes(b"old")
+    outcome = run({"INPUT": write_cloud(track(), class_code=2), **outputs})
+    assert not outcome.ok
+    assert outputs["RAILS"].read_bytes() == b"old"
+
+
+def wrong_magic(path):
+    path.write_bytes(b"PK" + bytes(400))
+
+
+def empty(path):
+    path.write_bytes(b"")
+
+
+def cut_in_header(path):
+    path.write_bytes(path.read_bytes()[:100])
+
+
+def cut_in_points(path):
+    path.write_bytes(path.read_bytes()[:-1000])
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (wrong_magic, "is no LAS or LAZ file"),
+        (empty, "is empty"),
+        (cut_in_header, "is cut off"),
+        (cut_in_points, "is cut off"),
+    ],
+)
+@pytest.mark.parametrize("suffix", [".las", ".laz"])
+def test_damaged_file(run, outputs, write_cloud, track, damage, message, suffix):
+    path = write_cloud(track(), f"cloud{suffix}")
+    damage(path)
+    assert_refused(run({"INPUT": path, **outputs}), message, outputs)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"RAIL_CLASSES": "ten"}, "RAIL_CLASSES"),
+        ({"RAIL_CLASSES": "300"}, "from 0 to 255"),
+        ({"RAIL_CLASSES": "11"}, "its classes and their counts are 10 (7200)"),
+        ({"STANDARD": "CUSTOM"}, "CUSTOM needs both"),
+        ({"STANDARD": "EN_99"}, "STANDARD"),
+        ({"GAUGE": 300}, "A gauge of 300 mm is not possible"),
+        ({"HEAD_WIDTH": 100}, "A railhead width of 100 mm is not possible"),
+        ({"GAUGE": 600, "HEAD_WIDTH": 75}, "models cover"),
+        ({"OTHER_GAUGES": "wide"}, "OTHER_GAUGES"),
+        ({"EXTENT": "0,1,0,1"}, "inside the extent"),
+        ({"ITERATIONS": 9}, "ITERATIONS"),
+        ({"SMOOTHING_XY": -1}, "SMOOTHING_XY"),
+        ({"DEVICE": "CUDA"}, "CUDA"),
+        ({"INPUT": "gone.laz"}, "gone.laz does not exist"),
+        ({"INPUT": None}, "INPUT"),
+        ({"RAILS": "/nowhere/rails.gpkg"}, "can't be written"),
+    ],
+)
+def test_bad_parameter(run, outputs, write_cloud, track, parameters, message):
+    outcome = run({"INPUT": write_cloud(track()), **outputs, **parameters})
+    assert_refused(outcome, message, outputs)
+
+
+def test_no_track_of_the_gauge(run, outputs, write_cloud, track):
+    outcome = run({"INPUT": write_cloud(track(spacing_m=1.592)), "STANDARD": "EN_60E1_1435", **outputs})
+    assert_refused(outcome, "is the gauge 15", outputs)
+
+
+def test_degrees_are_refused_with_a_zone(run, outputs, write_cloud, track):
+    degrees = track() * [1e-5, 1e-6, 1] + [70, 20, 0]
+    assert_refused(run({"INPUT": write_cloud(degrees, epsg=4326), **outputs}), "UTM zone 43N", outputs)
+
+
+def test_stray_point_far_away_changes_nothing(run, write_cloud, track):
+    points = track()
+    stray = points[:1] + [1_000_000, 0, 0]
+    outcome = run({"INPUT": write_cloud(np.vstack([points, stray])), "ITERATIONS": 1})
+    assert outcome.ok, outcome.error
+    assert (outcome.results["RAIL_COUNT"], outcome.results["CENTERLINE_COUNT"]) == (2, 1)
+
+
+def test_cloud_without_coordinate_system_is_taken_in_metres(run, outputs, write_cloud, track, new_feedback):
+    feedback = new_feedback()
+    outcome = run({"INPUT": write_cloud(track(), epsg=None), "ITERATIONS": 1, **outputs}, feedback)
+    assert outcome.ok, outcome.error
+    assert "no coordinate system" in feedback.warnings[0]
+    assert not lines_of(outputs["RAILS"])[0].crs().isValid()
+
+
+def test_coordinate_system_can_be_given(run, outputs, write_cloud, track):
+    outcome = run({"INPUT": write_cloud(track(), epsg=None), "CRS": "EPSG:32643", "ITERATIONS": 1, **outputs})
+    assert outcome.ok, outcome.error
+    assert lines_of(outputs["RAILS"])[0].crs().authid() == "EPSG:32643"
+
+
+def test_folder_of_tiles_is_one_cloud(run, tmp_path, write_cloud, track):
+    points = track()
+    west = points[:, 0] < 500_006
+    folder = tmp_path / "Kacheln östlich"
+    folder.mkdir()
+    write_cloud(points[west], "west.las", folder=folder)
+    write_cloud(points[~west], "east.laz", folder=folder)
+    outcome = run({"INPUT": folder, "ITERATIONS": 1})
+    assert outcome.ok, outcome.error
+    assert outcome.results["RAIL_COUNT"] == 2
+    assert outcome.results["CENTERLINE_LENGTH"] == pytest.approx(12, abs=1)
+
+
+def assert_refused(outcome, message, outputs):
+    """The run ended with one sentence, and nothing was written."""
+    assert not outcome.ok
+    assert message in outcome.error
+    assert "Traceback" not in outcome.error
+    assert "\n" not in outcome.error.strip()
+    assert not any(path.exists() for path in outputs.values())
