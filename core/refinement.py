@@ -31,11 +31,12 @@ WINDOWS = (5, 9, 17, 33)
 ENOUGH_POINTS = 80
 """Points on top that a window should hold: they give the middle to 2 mm before smoothing."""
 
-DEPTH_M = 0.008
-"""Points further below the top are on a side face, or where the corners round off."""
+DEPTH_M, DEPTH_SIGMAS = 0.006, 1.5
+"""Points further below the top, in metres and in standard deviations of the noise, may be of a side face or a corner.
+Tighter than noise would ask for: what it costs in points on top it costs across the whole head alike."""
 
-TOP_SIGMAS = 2.5
-"""The same in standard deviations of the noise, for noisy clouds."""
+ABOVE_SIGMAS = 3.0
+"""Points further above the top, in standard deviations of the noise, are weeds."""
 
 HALF_HEAD = 18
 """Bins across half a head: about 2 mm each, finer than any cloud's noise."""
@@ -147,8 +148,8 @@ def _on_top(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: floa
     slope = np.interp(t, t[head], cross_slope(t[head], across[head], above[head], head_width_m))
     flat = above - slope * across
     flat -= np.interp(t, t[head], rough_level(t[head], flat[head]))
-    limit = max(DEPTH_M, TOP_SIGMAS * spread(flat[head & (np.abs(flat) < 2 * DEPTH_M)]))
-    return np.abs(flat) <= limit
+    noise = spread(flat[head & (np.abs(flat) < 2 * DEPTH_M)])
+    return (flat >= -max(DEPTH_M, DEPTH_SIGMAS * noise)) & (flat <= max(DEPTH_M, ABOVE_SIGMAS * noise))
 
 
 def _shifts(
