@@ -11,11 +11,17 @@ from .ends import STEP_M, stretch
 FIT_M = 4.0
 """Stretch on either side that the curve is fitted to."""
 
-SLACK_M = 0.03
-"""How far a raster line may lie beside its rail: three quarters of a cell."""
+STAIRS_M = 0.02
+"""How far a raster line strays from its rail: half a cell. What strays further is a weed or a hook."""
 
-TIGHTEST_RADIUS_M = 20.0
-"""No rail of a tram or railway is bent more sharply, turnouts included."""
+MISFIT_M = 0.01
+"""Half of either line may lie this far beside the curve, no more. Across 4 m a shift of 0.2 m just passes."""
+
+TIGHTEST_RADIUS_M = 15.0
+"""No rail of a tram or railway is bent more sharply, turnouts included; 18 m is the least in use."""
+
+ROUNDS = 5
+"""Rounds of reweighting, in which what strays loses its say."""
 
 TRANSITION_M = 5.0
 """Within this length the curvature may change from none to the tightest; a short clothoid of a tramway."""
@@ -40,20 +46,20 @@ class Bridge:
 def bridge(one: np.ndarray, other: np.ndarray) -> Bridge | None:
     """Fit one smooth curve to two lines, each given from the end to be joined, and cut out what lies between them.
 
-    The curve is a cubic over the way across, its curvature held to what rails do. None if it misses either line by more
-    than `SLACK_M`, or bends more than a rail. That rules out the neighbouring rail, for it takes a double bend.
+    The curve is a cubic over the way across, its curvature held to what rails do. None if it misses either line, or
+    bends more than a rail. That rules out the neighbouring rail, for it takes a double bend.
     """
     before, after = stretch(one, FIT_M)[::-1], stretch(other, FIT_M)
     origin, axes = _frame(before, after)
     before, after = (before - origin) @ axes.T, (after - origin) @ axes.T
     gap = after[0, 0] - before[-1, 0]
     cubic = _fit(np.concatenate([before, after]))
-    misfit = max(np.sqrt(np.mean((points[:, 1] - _basis(points[:, 0]) @ cubic) ** 2)) for points in (before, after))
+    misfit = max(np.median(np.abs(points[:, 1] - _basis(points[:, 0]) @ cubic)) for points in (before, after))
     bend = np.abs(cubic[2] + cubic[3] * np.array([before[0, 0], after[-1, 0]])).max() * TIGHTEST_RADIUS_M
-    if gap <= 0 or misfit > SLACK_M or bend > 1:
+    if gap <= 0 or misfit > MISFIT_M or bend > 1:
         return None
     x = np.linspace(before[-1, 0], after[0, 0], int(gap / STEP_M) + 2)[1:-1]
-    return Bridge(gap * (1 + misfit / SLACK_M + bend), origin + np.column_stack([x, _basis(x) @ cubic]) @ axes)
+    return Bridge(gap * (1 + misfit / MISFIT_M + bend), origin + np.column_stack([x, _basis(x) @ cubic]) @ axes)
 
 
 def _frame(before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -64,11 +70,15 @@ def _frame(before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _fit(points: np.ndarray) -> np.ndarray:
-    """Cubic y(x) as value, slope, curvature and its change at 0, least squares with the habits of rails as prior."""
-    curvature = SLACK_M * TIGHTEST_RADIUS_M
-    prior = np.diag([0.0, 0.0, curvature, curvature * TRANSITION_M])
-    design = np.concatenate([_basis(points[:, 0]), prior])
-    return np.linalg.lstsq(design, np.concatenate([points[:, 1], np.zeros(4)]), rcond=None)[0]
+    """Fit y(x) robustly, the habits of rails as prior: value, slope, curvature and its change at x = 0."""
+    basis, y = _basis(points[:, 0]), points[:, 1]
+    prior = np.diag([0.0, 0.0, 1.0, TRANSITION_M]) * STAIRS_M * TIGHTEST_RADIUS_M
+    weight = np.ones(len(points))
+    for _ in range(ROUNDS):
+        design = np.concatenate([weight[:, None] * basis, prior])
+        cubic = np.linalg.lstsq(design, np.concatenate([weight * y, np.zeros(4)]), rcond=None)[0]
+        weight = 1 / np.sqrt(1 + ((y - basis @ cubic) / STAIRS_M) ** 2)
+    return cubic
 
 
 def _basis(x: np.ndarray) -> np.ndarray:

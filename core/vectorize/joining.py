@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .bridges import SLACK_M, Bridge, bridge
+from .bridges import STAIRS_M, Bridge, bridge
 from .ends import stretch, way_out
 from .network import LineNetwork
 
@@ -71,4 +71,4 @@ def faces(tips: np.ndarray, outward: np.ndarray, pairs: np.ndarray, angle_deg: f
     way = outward[pairs[:, 0]]
     ahead = (across * way).sum(axis=1)
     aside = np.abs(across[:, 0] * way[:, 1] - across[:, 1] * way[:, 0])
-    return (ahead > 0) & (aside <= ahead * np.tan(np.radians(angle_deg)) + SLACK_M)
+    return (ahead > 0) & (aside <= ahead * np.tan(np.radians(angle_deg)) + STAIRS_M)
