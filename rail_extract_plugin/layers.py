@@ -30,6 +30,9 @@ if TYPE_CHECKING:
     from ..core.points import LocalFrame
     from ..core.rails import Centerline, RailLine
 
+UNKNOWN_IN_METRES = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1]]'
+"""Stated in outputs without a coordinate system, because GDAL else calls a GeoPackage's coordinates degrees."""
+
 RAIL_FIELDS = (
     ("rail_id", INTEGER),
     ("class_code", INTEGER),
@@ -87,9 +90,9 @@ def add_features(sink: QgsFeatureSink, made: Iterator[QgsFeature]) -> None:
             raise RailExtractError(f"The output can't be written ({sink.lastError()}): check the disk's free space.")
 
 
-def crs_of(wkt: str | None) -> QgsCoordinateReferenceSystem:
-    """Coordinate system for an output; invalid, as QGIS calls none at all, for None."""
-    return QgsCoordinateReferenceSystem() if wkt is None else QgsCoordinateReferenceSystem.fromWkt(wkt)
+def output_crs(wkt: str | None) -> QgsCoordinateReferenceSystem:
+    """Coordinate system for an output, `UNKNOWN_IN_METRES` where the cloud has none."""
+    return QgsCoordinateReferenceSystem.fromWkt(wkt or UNKNOWN_IN_METRES)
 
 
 def check_writable(value: Any, context: QgsProcessingContext) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
+    QgsCoordinateReferenceSystem,
     QgsProcessing,
     QgsProcessingContext,
     QgsProcessingOutputNumber,
@@ -21,7 +22,7 @@ from ...core.standards import RailStandard, resolve
 from .. import parameters as groups
 from ..clouds import CloudSource, cloud_source
 from ..i18n import tr
-from ..layers import CENTERLINE_FIELDS, RAIL_FIELDS, add_features, crs_of, features, fields
+from ..layers import CENTERLINE_FIELDS, RAIL_FIELDS, add_features, features, fields, output_crs
 from ..styling import style_on_load
 from .base import RailAlgorithm
 
@@ -118,7 +119,7 @@ class ExtractRails(RailAlgorithm):
     ) -> tuple[RailPoints, ...]:
         from ...core.points import read_headers, read_rail_points
 
-        crs = crs_of(read_headers(job.cloud.paths)[0].crs_wkt or job.crs_wkt)
+        crs = QgsCoordinateReferenceSystem(read_headers(job.cloud.paths)[0].crs_wkt or job.crs_wkt or "")
         extent = _bounds(self.parameterAsExtent(parameters, "EXTENT", context, crs))
         return read_rail_points(job.cloud.paths, job.class_codes, job.crs_wkt, extent, progress)
 
@@ -156,7 +157,12 @@ class ExtractRails(RailAlgorithm):
         written = {}
         for name, style, lines, columns in outputs:
             sink, layer_id = self.parameterAsSink(
-                parameters, name, context, fields(columns), QgsWkbTypes.Type.LineStringZ, crs_of(network.frame.crs_wkt)
+                parameters,
+                name,
+                context,
+                fields(columns),
+                QgsWkbTypes.Type.LineStringZ,
+                output_crs(network.frame.crs_wkt),
             )
             if sink is None:
                 continue

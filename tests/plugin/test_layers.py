@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from qgis.core import NULL, QgsProcessing, QgsProcessingOutputLayerDefinition, QgsProperty, QgsVectorLayer
+from qgis.core import NULL, QgsProcessing, QgsProcessingOutputLayerDefinition, QgsProperty, QgsUnitTypes, QgsVectorLayer
 from rail_extract.core.errors import RailExtractError
 from rail_extract.core.points import LocalFrame
 from rail_extract.core.rails import Centerline, RailLine
@@ -8,9 +8,9 @@ from rail_extract.rail_extract_plugin.layers import (
     CENTERLINE_FIELDS,
     RAIL_FIELDS,
     check_writable,
-    crs_of,
     features,
     fields,
+    output_crs,
 )
 
 FEET = LocalFrame(np.array([1000.0, 2000.0, 10.0]), horizontal_unit_m=0.3048, vertical_unit_m=0.3048)
@@ -50,8 +50,11 @@ def test_fields_have_their_types(qgis, columns):
     ]
 
 
-def test_unknown_coordinate_system_is_none(qgis):
-    assert not crs_of(None).isValid()
+def test_unknown_coordinate_system_is_cartesian_metres(qgis):
+    crs = output_crs(None)
+    assert crs.isValid()
+    assert not crs.isGeographic()
+    assert crs.mapUnits() == QgsUnitTypes.DistanceUnit.DistanceMeters
 
 
 @pytest.mark.parametrize(

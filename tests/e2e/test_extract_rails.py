@@ -1,0 +1,109 @@
+import json
+import shutil
+import signal
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from lines import read_features, read_lines
+from rail_extract.core.synthetic.compare import compare_lines
+
+STANDARD = "IN_75R_1000"
+TRUE_GAUGE_MM, GAUGE_TOLERANCE_MM = 1000, 5
+TRACKS = 3
+
+
+@dataclass
+class Run:
+    """A run over the sample and where it wrote."""
+
+    results: dict
+    rails: Path
+    centerlines: Path
+
+
+@pytest.fixture(scope="module")
+def extracted(qgis_process, sample, tmp_path_factory):
+    """The sample, in a folder and with outputs whose names have a blank and umlauts."""
+    folder = tmp_path_factory.mktemp("Größe östlich 1")
+    cloud = shutil.copy(sample / "sample.laz", folder / "Schienen 1.laz")
+    rails, centerlines = folder / "Schiënen.gpkg", folder / "Gleis achsen.shp"
+    parameters = {"INPUT": cloud, "STANDARD": STANDARD, "RAILS": rails, "CENTERLINES": centerlines}
+    run = qgis_process(parameters, "--json")
+    assert run.returncode == 0, run.stdout + run.stderr
+    return Run(json.loads(run.stdout[run.stdout.index("{") :])["results"], rails, centerlines)
+
+
+@pytest.fixture
+def truth(sample):
+    return lambda kind: read_lines(sample / "sample_truth.geojson", where=f"kind = '{kind}'")
+
+
+def test_results_are_those_of_the_files(extracted):
+    for path, figure in ((extracted.rails, "RAIL"), (extracted.centerlines, "CENTERLINE")):
+        features = read_features(path)
+        assert extracted.results[f"{figure}_COUNT"] == len(features)
+        length_m = sum(items["length_m"] for _, items in features)
+        assert extracted.results[f"{figure}_LENGTH"] == pytest.approx(length_m, abs=0.01)
+    assert extracted.results["ENGINE_USED"].startswith("PyTorch")
+
+
+def test_rails_against_truth(extracted, truth):
+    comparison = compare_lines(read_lines(extracted.rails), truth("rail"))
+    assert comparison.completeness >= 0.97
+    assert comparison.correctness >= 0.99
+    assert comparison.lateral_rmse_m <= 0.010
+    assert comparison.height_rmse_m <= 0.006
+    assert comparison.line_count <= 2 * comparison.truth_count
+
+
+def test_centerlines_against_truth(extracted, truth):
+    comparison = compare_lines(read_lines(extracted.centerlines), truth("centerline"))
+    assert comparison.completeness >= 0.97
+    assert comparison.correctness >= 0.99
+    for true_line in truth("centerline"):
+        assert compare_lines(read_lines(extracted.centerlines), [true_line]).completeness >= 0.95
+    for _, items in read_features(extracted.centerlines):
+        assert items["gauge_mm"] == pytest.approx(TRUE_GAUGE_MM, abs=GAUGE_TOLERANCE_MM)
+
+
+def test_centerlines_name_their_rails(extracted):
+    rail_ids = {items["rail_id"] for _, items in read_features(extracted.rails)}
+    for _, items in read_features(extracted.centerlines):
+        left, right = ({int(word) for word in items[side].split(",")} for side in ("left_ids", "right_ids"))
+        assert left | right <= rail_ids
+        assert not left & right
+
+
+def test_lines_start_in_the_west(extracted):
+    for line in read_lines(extracted.rails) + read_lines(extracted.centerlines):
+        assert line[0, 0] < line[-1, 0]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "sentence"),
+    [
+        ({"INPUT": "gone.laz"}, "gone.laz does not exist"),
+        ({"RAIL_CLASSES": "40"}, "has no point of class 40; its classes and their counts are 1 ("),
+        ({"GAUGE": "600", "HEAD_WIDTH": "75"}, "check GAUGE and HEAD_WIDTH"),
+        ({"CENTERLINES": "/nowhere/tracks.gpkg"}, "can't be written"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_an_exit_code(qgis_process, sample, tmp_path, parameters, sentence):
+    rails = tmp_path / "rails.gpkg"
+    run = qgis_process({"INPUT": sample / "sample.laz", "STANDARD": STANDARD, "RAILS": rails, **parameters})
+    assert run.returncode == 1
+    assert sentence in run.stdout + run.stderr
+    assert "Traceback" not in run.stdout + run.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_interrupted_run_leaves_nothing(start_qgis_process, sample, tmp_path):
+    parameters = {"INPUT": sample / "sample.laz", "STANDARD": STANDARD, "RAILS": tmp_path / "rails.gpkg"}
+    with start_qgis_process(parameters) as process:
+        shown = b""
+        while b"20" not in shown.split(b"Inputs")[-1].split(b"RAILS")[-1]:
+            shown += process.stdout.read(1)
+        process.send_signal(signal.SIGINT)
+    assert process.returncode != 0
+    assert not list(tmp_path.iterdir())
