@@ -6,11 +6,11 @@ points know better: where most of them lie within one head width, there the head
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 
+from .head_edges import ENOUGH_POINTS, HALF_HEAD, HALF_RANGE, histograms, middles
 from .points import RailPoints
 from .polyline import left_normals, project
 from .progress import SILENT, Progress
@@ -22,49 +22,12 @@ from .vectorize.network import LineNetwork
 ROUNDS = 2
 """The second round sees the head upright and whole; a third moves lines by less than 0.1 mm."""
 
-STATION_M = 0.25
-"""Spacing of the windows' middles, a third of the smoothing's length."""
-
-WINDOWS = (5, 9, 17, 33)
-"""Lengths of windows in stations, 1.25 to 8.25 m: the shortest with enough points is taken."""
-
-ENOUGH_POINTS = 80
-"""Points on top that a window should hold: they give the middle to 2 mm before smoothing."""
-
 DEPTH_M, DEPTH_SIGMAS = 0.006, 1.5
 """Points further below the top, in metres and in standard deviations of the noise, may be of a side face or a corner.
 Tighter than noise would ask for: what it costs in points on top it costs across the whole head alike."""
 
 ABOVE_SIGMAS = 3.0
 """Points further above the top, in standard deviations of the noise, are weeds."""
-
-HALF_HEAD = 18
-"""Bins across half a head: about 2 mm each, finer than any cloud's noise."""
-
-BLUR_BINS = 1.5
-"""Sigma of the blur across: with fewer points than bins the best place would jump; the edges stay sharp to 3 mm."""
-
-FURTHEST = 15
-"""Largest shift in bins, about 3 cm: half a cell of the raster and a little noise."""
-
-NEAR_EDGE, RIM = 3, 9
-"""Bins from the edge that its blur covers, and bins beyond these that tell the density on either side of it."""
-
-CLEAR_EDGE = 0.4
-"""Density outside of an edge over that inside, at most: with more there is no edge to be seen."""
-
-LEAST_ON_RIM = 6
-"""Points that have to lie just inside of an edge."""
-
-LEAST_RIM = 0.5
-"""Density just inside of an edge over that on the crown, at least: a shadow on the head has edges of its own."""
-
-EVEN_EXCESS, ASKEW_EXCESS = 0.1, 0.3
-"""Relative excess of density at one edge over the other from which the other counts less, and no longer: a scanner
-abreast of the rail sees the corners alike, one at 45 degrees sees half a corner on the far side."""
-
-HALF_RANGE = HALF_HEAD + FURTHEST + 2 + NEAR_EDGE + RIM
-"""Bins to either side of a line that all of this can reach."""
 
 LEAST_SHARE = 0.25
 """Share of a line's stations that have to show both edges; otherwise the line stays as it is."""
@@ -156,119 +119,9 @@ def _shifts(
     t: np.ndarray, across: np.ndarray, along: np.ndarray, head_width_m: float, smoothing_m: float
 ) -> np.ndarray:
     """How far to the left a line has to move at its vertices, (m,); 0 where the points do not tell."""
-    stations, counts, wide_counts = _histograms(t, across, along[-1], head_width_m)
-    middle = _middles(counts, wide_counts) * head_width_m / (2 * HALF_HEAD)
+    stations, counts, wide_counts = histograms(t, across, along[-1], head_width_m)
+    middle = middles(counts, wide_counts) * head_width_m / (2 * HALF_HEAD)
     known = np.isfinite(middle)
     if known.sum() < max(LEAST_SHARE * len(stations), 2):
         return np.zeros(len(along))
     return smooth_profile(stations[known], middle[known], smoothing_m, along)
-
-
-def _histograms(
-    t: np.ndarray, across: np.ndarray, length_m: float, head_width_m: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Count points by offset in windows along the line.
-
-    Returns
-    -------
-    stations : (s,) array
-        Middles of the windows, metres.
-    counts, wide_counts : (s, 2 HALF_RANGE) arrays
-        In the shortest window with enough points and in the longest. Bins of 1 / (2 HALF_HEAD) of a head, the first
-        half to the right of the line.
-    """
-    rows = int(length_m / STATION_M) + 1
-    row = np.minimum((t / STATION_M).astype(int), rows - 1)
-    column = np.floor(across * (2 * HALF_HEAD / head_width_m)).astype(int) + HALF_RANGE
-    inside = (column >= 0) & (column < 2 * HALF_RANGE)
-    counts = np.bincount(row[inside] * 2 * HALF_RANGE + column[inside], minlength=rows * 2 * HALF_RANGE)
-    counts = gaussian_filter1d(counts.reshape(rows, -1).astype(np.float32), BLUR_BINS, axis=1, mode="constant")
-    windows = [uniform_filter1d(counts, size, axis=0, mode="constant") * size for size in WINDOWS]
-    chosen = windows[-1].copy()
-    for window in windows[-2::-1]:
-        enough = window.sum(axis=1) >= ENOUGH_POINTS
-        chosen[enough] = window[enough]
-    return (np.arange(rows) + 0.5) * STATION_M, chosen, windows[-1]
-
-
-def _middles(counts: np.ndarray, wide_counts: np.ndarray) -> np.ndarray:
-    """Offset of the head's middle in each window, in bins to the left; NaN where its edges are not to be seen.
-
-    How the scanner looks at the head does not change from window to window, so the wide ones tell the densities.
-    """
-    wide = _Heads.of(wide_counts)
-    edges = _Edges.evenly(len(counts))
-    for _ in range(ROUNDS):
-        middle = wide.best(edges)
-        edges = wide.edges(middle)
-    share = counts.sum(axis=1) / np.maximum(wide_counts.sum(axis=1), 1)
-    middle = _Heads.of(counts).best(replace(edges, density=edges.density * share))
-    return np.where(edges.seen & (np.abs(middle) < FURTHEST), middle, np.nan)
-
-
-@dataclass(frozen=True)
-class _Edges:
-    """Right and left edge of the heads in s windows.
-
-    Attributes
-    ----------
-    density : (2, s) array
-        Points a bin just inside of the edge.
-    weight : (2, s) array
-        From 0 to 1: the edge that the scanner looks at counts fully; of the other one the corner is hardly seen.
-    seen : (s,) bool array
-        Whether the edges that count are there.
-    """
-
-    density: np.ndarray
-    weight: np.ndarray
-    seen: np.ndarray
-
-    @classmethod
-    def evenly(cls, windows: int) -> _Edges:
-        """Take both edges alike, for a first look."""
-        return cls(np.ones((2, windows)), np.ones((2, windows)), np.ones(windows, dtype=bool))
-
-
-@dataclass(frozen=True)
-class _Heads:
-    """Cumulative counts across at the borders of the bins, (s, 2 HALF_RANGE + 1)."""
-
-    sums: np.ndarray
-
-    @classmethod
-    def of(cls, counts: np.ndarray) -> _Heads:
-        return cls(np.pad(np.cumsum(counts, axis=1), ((0, 0), (1, 0))))
-
-    def best(self, edges: _Edges) -> np.ndarray:
-        """Offset of the head whose edges lie where the density falls to half, (s,) in bins to the left of the line.
-
-        Found as the best of all places at once, by the integral over the place of what each edge lacks of its half.
-        """
-        shifts = np.arange(-FURTHEST - 1, FURTHEST + 2)
-        held = np.zeros((len(self.sums), len(shifts)))
-        for side, density, weight in zip((-1, 1), edges.density, edges.weight):
-            within = self.sums[:, HALF_RANGE + shifts + side * HALF_HEAD] / np.maximum(density, 1e-6)[:, None]
-            held += side * weight[:, None] * (within - shifts / 2)
-        rows = np.arange(len(held))
-        top = np.clip(np.argmax(held, axis=1), 1, len(shifts) - 2)
-        before, at, after = (held[rows, top + step] for step in (-1, 0, 1))
-        bend = np.maximum(2 * at - before - after, 1e-9)
-        return shifts[top] + np.clip(0.5 * (after - before) / bend, -1, 1)
-
-    def edges(self, middle: np.ndarray) -> _Edges:
-        """Look at the edges of heads at `middle`, (s,)."""
-        centre = np.round(middle).astype(int)
-        inside = np.array([self._density(centre + side * (HALF_HEAD - NEAR_EDGE), -side) for side in (-1, 1)])
-        beyond = np.array([self._density(centre + side * (HALF_HEAD + NEAR_EDGE), side) for side in (-1, 1)])
-        crown = self._density(centre - RIM // 2, 1)
-        excess = inside[::-1] / np.maximum(inside, 1e-6) - 1
-        weight = 1 - np.clip((excess - EVEN_EXCESS) / (ASKEW_EXCESS - EVEN_EXCESS), 0, 1)
-        clear = (inside >= LEAST_RIM * crown) & (beyond <= CLEAR_EDGE * inside) & (inside * RIM >= LEAST_ON_RIM)
-        return _Edges(inside, weight, np.all(clear | (weight == 0), axis=0))
-
-    def _density(self, start: np.ndarray, direction: int) -> np.ndarray:
-        """Points a bin on the RIM bins that begin at `start`, (s,), and go to the left (1) or right (-1)."""
-        rows = np.arange(len(start))
-        start = start + HALF_RANGE
-        return np.abs(self.sums[rows, start + direction * RIM] - self.sums[rows, start]) / RIM
