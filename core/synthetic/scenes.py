@@ -110,7 +110,7 @@ class Plan:
 INDIA = LocalFrame(np.array([578200.0, 2494300.0, 500.0]), crs_wkt="EPSG:32643")
 """South of Indore, where a metre-gauge line ran until it was rebuilt."""
 
-PAPER_TRACKS = ((0.0, 0.0), (4.0, 0.03), (8.0, -0.02))
+PAPER_TRACKS = ((0.0, 0.0), (3.96, 0.03), (7.92, -0.02))
 """Axis to the left of the ridden track's and height above it, metres: right, centre and left track."""
 
 
@@ -189,8 +189,8 @@ def paper_like(seed: int = 3) -> Scene:
     plan = Plan(
         tracks,
         standard,
-        Scanner(profile_step_m=0.04, ray_step_rad=0.00278, height_m=4.5, left_m=0.8, noise_m=0.005, half_range_m=40),
-        gaps=_random_gaps(random, 2, curve.length_m, 10) | _random_gaps(random, 1, curve.length_m, 4),
+        Scanner(profile_step_m=0.03, ray_step_rad=0.00385, height_m=4.5, left_m=1.5, noise_m=0.005, half_range_m=40),
+        gaps=_random_gaps(random, 2, curve.length_m, 8) | _random_gaps(random, 1, curve.length_m, 4),
         clutter=Clutter(weeds_near=30, weeds_between=40, stones=400, other_weeds=120, ground_step_m=0.25),
         frame=INDIA,
     )
@@ -205,9 +205,9 @@ def noisy(seed: int = 4) -> Scene:
     plan = Plan(
         [Track(curve, _spacing(standard), _rolling(curve), _canted(curve, 0.05))],
         standard,
-        Scanner(profile_step_m=0.1, ray_step_rad=0.003, noise_m=0.008, face_share=0.6),
-        gaps=_random_gaps(random, 0, curve.length_m, 15, longest_m=4.0),
-        clutter=Clutter(weeds_near=80, weeds_between=80, stones=1500),
+        Scanner(profile_step_m=0.06, ray_step_rad=0.0022, noise_m=0.008, face_share=0.6),
+        gaps=_random_gaps(random, 0, curve.length_m, 12, longest_m=4.0),
+        clutter=Clutter(weeds_near=50, weeds_between=80, stones=1000),
     )
     return build("noisy", plan, random)
 
