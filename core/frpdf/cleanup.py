@@ -15,6 +15,8 @@ that a cancel is heard in time."""
 MARGIN = 64
 """Cells around a window's core that only give context; a wider margin changes fewer than 0.5 % of the rail cells."""
 CORE = WINDOW - 2 * MARGIN
+BLOCK = 32
+"""Windows are placed to so many cells."""
 REACH = 64
 """How far from a rail cell, in cells, the network may set another: half of a gap of 5 m at 4 cm."""
 
@@ -53,13 +55,34 @@ def clean(raster: RailRaster, engine: Engine, passes: int = DEFAULT_PASSES, prog
 
 
 def windows(raster: RailRaster) -> list[tuple[int, int]]:
-    """North-west corners (row, column) of the cores to compute: all within `REACH` of a rail cell."""
+    """North-west corners (row, column) of the cores to compute: together they hold all within `REACH` of a rail cell.
+
+    The cores lie in bands along the rows or along the columns, whichever takes fewer; within a band each begins where
+    there is something to compute.
+    """
     cells = raster.cells()
-    shifts = np.array([(down, right) for down in (-REACH, 0, REACH) for right in (-REACH, 0, REACH)])
-    found: set[tuple[int, int]] = set()
-    for shift in shifts:
-        found.update(map(tuple, np.unique((cells + shift) // CORE, axis=0).tolist()))
-    return sorted((row * CORE, column * CORE) for row, column in found)
+    shifts = [np.array([down, right]) for down in (-REACH, 0, REACH) for right in (-REACH, 0, REACH)]
+    blocks = np.unique(np.concatenate([np.unique((cells + shift) // BLOCK, axis=0) for shift in shifts]), axis=0)
+    along_rows = _cover(blocks)
+    along_columns = [(row, column) for column, row in _cover(blocks[:, ::-1])]
+    return sorted(min(along_rows, along_columns, key=len))
+
+
+def _cover(blocks: np.ndarray) -> list[tuple[int, int]]:
+    """Cover blocks, (n, 2), by cores in bands of equal first coordinate; give the corners of the cores in cells."""
+    if len(blocks) == 0:
+        return []
+    side = CORE // BLOCK
+    band = (blocks[:, 0] - blocks[:, 0].min()) // side
+    corners = []
+    for number in np.unique(band):
+        places = np.unique(blocks[band == number, 1])
+        first = (int(number) * side + int(blocks[:, 0].min())) * BLOCK
+        index = 0
+        while index < len(places):
+            corners.append((first, int(places[index]) * BLOCK))
+            index = int(np.searchsorted(places, places[index] + side))
+    return corners
 
 
 def _run_pass(

@@ -5,6 +5,8 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
 from rail_extract.core.errors import Cancelled, ModelError
 from rail_extract.core.frpdf import cleanup
 from rail_extract.core.frpdf import engine as engine_module
@@ -112,9 +114,20 @@ def test_every_cell_is_computed_once_whatever_the_windows():
 
 
 def test_windows_follow_the_cells_and_leave_the_rest_alone():
-    along, area = len(cleanup.windows(line_of_cells(3000))), (3000 / cleanup.CORE) * (6000 / cleanup.CORE)
-    assert along < 0.4 * area
+    assert len(cleanup.windows(line_of_cells(3000))) <= 2 * 6000 / cleanup.CORE
     assert len(cleanup.windows(rasterize(np.array([[0.0, 0.0], [1e6, 1e6]]), 0.04))) <= 8
+
+
+@given(st.lists(st.tuples(st.integers(-3000, 3000), st.integers(-3000, 3000)), min_size=1, max_size=12))
+def test_cores_hold_all_within_reach_and_do_not_overlap(cells):
+    raster = RailRaster({}, 0.04, 0.0, 0.0).with_cells(np.array(cells))
+    corners = np.array(cleanup.windows(raster))
+    for cell in cells:
+        for shift in ((0, 0), (-cleanup.REACH, cleanup.REACH), (cleanup.REACH, cleanup.REACH)):
+            inside = ((np.array(cell) + shift >= corners) & (np.array(cell) + shift < corners + cleanup.CORE)).all(
+                axis=1
+            )
+            assert inside.sum() == 1
 
 
 def test_the_first_pass_is_told_nothing_and_later_ones_what_was_found():
