@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 EXTRACT_RAILS = "railextract:extractrails"
-LONGEST_RUN_S = 300
 
 
 def command(parameters: dict[str, object], *options: str) -> list[str]:
@@ -27,7 +26,7 @@ def environment():
 @pytest.fixture(scope="session")
 def qgis_process():
     def run(parameters: dict[str, object], *options: str) -> subprocess.CompletedProcess:
-        return subprocess.run(command(parameters, *options), capture_output=True, text=True, timeout=LONGEST_RUN_S)
+        return subprocess.run(command(parameters, *options), capture_output=True, text=True)
 
     return run
 
