@@ -13,7 +13,7 @@ import numpy as np
 
 from .envelope import extremal_boundary
 from .points import RailPoints
-from .polyline import Feet, project, starts_at_its_end
+from .polyline import Feet, interpolate, project, starts_at_its_end
 from .progress import SILENT, Progress
 from .railhead import cross_slope, rough_level, spread
 from .rails import RailLine, length_along
@@ -49,6 +49,12 @@ END_M = 1.0
 
 BRIDGE_M = 0.5
 """A longer stretch without points counts as bridged: five profiles of the fastest train's scanner."""
+
+UNSUPPORTED_END_M = 0.15
+"""A free end that runs on further than this without points is cut: the raster's lines curl where a rail ends."""
+
+END_POINTS = 3
+"""Points that mark the end of support; one alone may be a weed."""
 
 VARIANCE_FACTOR = 0.33375
 """Of independent points `spacing` apart, PAEK's result has this variance times spacing / sigma (section 2.4)."""
@@ -107,10 +113,11 @@ def elevate(
         By place of their starts from west to east, numbered from 1. Lines without points and short ones are left out.
     """
     feet = project(network.lines, points.xyz[:, :2], parameters.tolerance_xy_m, progress.span(0.0, 0.6))
+    free_ends = (network.degrees() == 1)[network.ends]
     rails = []
     for number, line in enumerate(progress.span(0.6, 1.0).follow(network.lines)):
         mine = feet.of(number)
-        rail = _raise_line(line, mine, points.xyz[mine.point, 2], parameters)
+        rail = _raise_line(line, free_ends[number], mine, points.xyz[mine.point, 2], parameters)
         if rail is not None and rail.length_m >= parameters.min_length_m:
             rails.append(replace(rail, class_code=points.class_code))
     return _numbered(rails)
@@ -138,33 +145,48 @@ def _finished(xyz: np.ndarray, parameters: ElevationParameters) -> np.ndarray:
     return xyz[::-1] if starts_at_its_end(xyz) else xyz
 
 
-def _raise_line(line: np.ndarray, feet: Feet, z: np.ndarray, parameters: ElevationParameters) -> RailLine | None:
+def _raise_line(
+    line: np.ndarray, free_ends: np.ndarray, feet: Feet, z: np.ndarray, parameters: ElevationParameters
+) -> RailLine | None:
     """Give one line its heights; None where hardly a point supports it."""
     head = np.abs(feet.across) <= 0.5 * parameters.head_width_m
     feet, z = feet[head], z[head]
     if len(z) < LEAST_POINTS:
         return None
-    along = length_along(line)
-    height, top = _top(feet.t, feet.across, z, along, parameters)
+    found = _top(feet.t, feet.across, z, parameters)
+    if found is None:
+        return None
+    profile, top = found
     supporting = feet[top]
+    along = length_along(line)
+    start, end = _supported(supporting.t, along[-1], free_ends)
+    stations = np.concatenate([[start], along[(along > start) & (along < end)], [end]])
+    bridged = bridged_length(supporting.t, start, end)
+    spacing = max(end - start - bridged, BRIDGE_M) / len(supporting.t)
     resid = float(np.sqrt(np.mean(supporting.across**2)))
-    bridged = bridged_length(supporting.t, along[-1])
-    spacing = max(along[-1] - bridged, BRIDGE_M) / len(supporting.t)
     sigma = resid * np.sqrt(min(VARIANCE_FACTOR * spacing / parameters.smoothing_xy_m, 1.0))
-    xyz = _finished(np.column_stack([line, height]), parameters)
+    xyz = _finished(np.column_stack([interpolate(line, along, stations), profile.at(stations)]), parameters)
     return RailLine(xyz, 0, 0, len(supporting.t), 1000 * resid, 1000 * float(sigma), bridged)
 
 
-def bridged_length(t: np.ndarray, length_m: float) -> float:
-    """Length of a line without points: of the stretches longer than BRIDGE_M between chainages `t`, ends included."""
-    gaps = np.diff(np.concatenate([[0.0], np.sort(t), [length_m]]))
+def _supported(t: np.ndarray, length_m: float, free_ends: np.ndarray) -> tuple[float, float]:
+    """Chainages between which a line is kept: all of it, but for free ends without points."""
+    start, end = t[END_POINTS - 1], t[-END_POINTS]
+    keep_start = not free_ends[0] or start <= UNSUPPORTED_END_M
+    keep_end = not free_ends[1] or length_m - end <= UNSUPPORTED_END_M
+    return 0.0 if keep_start else float(start), length_m if keep_end else float(end)
+
+
+def bridged_length(t: np.ndarray, start: float, end: float) -> float:
+    """Length without points from `start` to `end`: of the stretches longer than BRIDGE_M between chainages `t`."""
+    gaps = np.diff(np.concatenate([[start], np.clip(np.sort(t), start, end), [end]]))
     return float(gaps[gaps > BRIDGE_M].sum())
 
 
 def _top(
-    t: np.ndarray, across: np.ndarray, z: np.ndarray, stations: np.ndarray, parameters: ElevationParameters
-) -> tuple[np.ndarray, np.ndarray]:
-    """Find the height of a head's top on its axis.
+    t: np.ndarray, across: np.ndarray, z: np.ndarray, parameters: ElevationParameters
+) -> tuple[_Profile, np.ndarray] | None:
+    """Find the height of a head's top on its axis; None where too few points agree on one.
 
     The points are laid flat first, as if the head stood upright. The disc then tells the top from the faces, but it
     rests on the highest points, three standard deviations above it; a band around their own smoothed height,
@@ -174,12 +196,10 @@ def _top(
     ----------
     t, across, z : (n,) arrays
         Points on the head, t increasing.
-    stations : (m,) array
-        Chainages at which the height is wanted.
 
     Returns
     -------
-    height : (m,) array
+    profile : _Profile
     top : (n,) bool array
         Points that lie on the top.
     """
@@ -191,7 +211,9 @@ def _top(
         chosen = top & central if (top & central).sum() >= LEAST_POINTS else top
         profile = _Profile.through(t[chosen], flat[chosen], parameters.smoothing_z_m)
         top = np.abs(flat - profile.at(t)) <= band
-    return profile.at(stations), top
+        if top.sum() < LEAST_POINTS:
+            return None
+    return profile, top
 
 
 def _under_disc(t: np.ndarray, z: np.ndarray, parameters: ElevationParameters) -> tuple[np.ndarray, float]:

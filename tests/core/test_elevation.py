@@ -119,8 +119,8 @@ def test_heights_run_on_across_a_gap_which_counts_as_bridged(gap):
 
 def test_bridged_length_counts_long_gaps_and_unsupported_ends():
     t = np.concatenate([np.arange(2.0, 5.01, 0.1), np.arange(5.4, 8.01, 0.1), [9.0]])
-    assert bridged_length(t, 10.0) == pytest.approx(2.0 + 1.0 + 1.0)
-    assert bridged_length(np.arange(0, 10.01, 0.1), 10.0) == 0.0
+    assert bridged_length(t, 0.0, 10.0) == pytest.approx(2.0 + 1.0 + 1.0)
+    assert bridged_length(np.arange(0, 10.01, 0.1), 0.0, 10.0) == 0.0
 
 
 def test_lines_are_directed_numbered_and_carry_their_class():
@@ -163,3 +163,28 @@ def test_rails_without_points_are_flat():
     assert rail.length_m == pytest.approx(10.0)
     assert rail.xyz[0, 0] == 0.0
     assert rail.rail_id == 1
+
+
+def test_free_ends_without_points_are_cut_and_shared_ones_kept():
+    line = straight_line(40)
+    points = cloud(head(30, 100) + [4.0, 0.0, 0.0])
+    (rail,) = elevate(network_of(line), points, PARAMETERS)
+    np.testing.assert_allclose(rail.xyz[[0, -1], 0], [4.0, 34.0], atol=0.1)
+    assert rail.bridged_m == 0.0
+    meeting = network_of(line, straight_line(30) + [40.0, 0.0], straight_line(30) + [40.0, 1.0])
+    meeting = LineNetwork(meeting.lines, meeting.nodes, np.array([[0, 1], [1, 3], [1, 5]]))
+    (rail,) = elevate(meeting, points, PARAMETERS)
+    np.testing.assert_allclose(rail.xyz[[0, -1], 0], [4.0, 40.0], atol=0.1)
+    assert rail.bridged_m == pytest.approx(6.0, abs=0.1)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("count", [0, 1, 3, 9, 10, 12, 30, 100])
+@pytest.mark.parametrize("height", [0.01, 0.1, 1.0])
+def test_scattered_points_give_a_finite_line_or_none(count, height):
+    random = np.random.default_rng(count)
+    xyz = random.uniform([0, -0.1, -height], [5, 0.1, height], (count, 3))
+    for rail in elevate(network_of(straight_line(5)), cloud(xyz), PARAMETERS):
+        assert np.isfinite(rail.xyz).all()
+        assert rail.points >= 10
+        assert np.abs(rail.xyz[:, 2]).max() < 3 * height
