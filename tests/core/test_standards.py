@@ -1,0 +1,88 @@
+"""Rail standards: the table, and numbers that override it."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from rail_extract.core.errors import ParameterError
+from rail_extract.core.standards import DEFAULT, STANDARDS, UNCONFIRMED, resolve
+
+INTERFACE = """
+US_90ARAA_1435 US_100ARAA_1435 US_100RE_1435 US_115RE_1435 US_119RE_1435 US_132RE_1435 US_133RE_1435 US_136RE_1435
+US_141RE_1435 EN_45E1_1435 EN_46E2_1435 EN_49E1_1435 EN_50E2_1435 EN_50E4_1435 EN_50E6_1435 EN_54E1_1435 EN_60E1_1435
+BS_113A_1435 GB_50_1435 GB_60_1435 GB_75_1435 AS_60_1435 AS_68_1435 JIS_60_1435 JIS_60_1067 JIS_40N_1067 JIS_37A_1067
+AS_60_1067 AS_41_1067 AS_60_1600 EN_54E1_1600 EN_54E1_1668 EN_60E1_1668 IN_52KG_1676 IN_60KG_1676 IN_90R_1676
+IN_90R_1000 IN_75R_1000 IN_60R_1000 RU_R50_1520 RU_R65_1520 S33_1000 S41_1000 EN_46E1_1000 EN_49E1_1000 EN_54E1_1000
+"""
+
+
+def test_names_are_the_static_strings_of_the_interface():
+    assert set(STANDARDS) == set(INTERFACE.split())
+    assert DEFAULT in STANDARDS
+
+
+@pytest.mark.parametrize(
+    ("name", "gauge_m", "head_width_m"),
+    [
+        ("US_132RE_1435", 1.435, 0.0762),
+        ("US_115RE_1435", 1.435, 0.06906),
+        ("EN_60E1_1435", 1.435, 0.072),
+        ("JIS_37A_1067", 1.067, 0.06271),
+        ("IN_75R_1000", 1.0, 0.06191),
+        ("IN_52KG_1676", 1.676, 0.067),
+        ("RU_R65_1520", 1.520, 0.075),
+    ],
+)
+def test_gauge_and_width(name, gauge_m, head_width_m):
+    standard = resolve(name)
+    assert standard.name == name
+    assert standard.gauge_m == pytest.approx(gauge_m, abs=1e-12)
+    assert standard.head_width_m == pytest.approx(head_width_m, abs=1e-12)
+
+
+def test_each_gauge_is_the_one_in_the_name():
+    for name, standard in STANDARDS.items():
+        assert 1000 * standard.gauge_m == pytest.approx(float(name.rsplit("_", 1)[1]))
+        assert 57 <= 1000 * standard.head_width_m <= 78
+
+
+def test_labels_are_for_people_and_own_up_to_unconfirmed_widths():
+    assert STANDARDS["EN_60E1_1435"].label == "EN 60E1 (UIC 60), 1435 mm"
+    unconfirmed = {name for name, standard in STANDARDS.items() if standard.label.endswith(UNCONFIRMED)}
+    assert unconfirmed == {
+        *("BS_113A_1435", "GB_60_1435", "IN_60R_1000", "RU_R50_1520", "RU_R65_1520"),
+        *("S33_1000", "S41_1000", "EN_46E1_1000"),
+    }
+    assert len({standard.label for standard in STANDARDS.values()}) == len(STANDARDS)
+
+
+def test_numbers_override_the_standard():
+    assert resolve("EN_60E1_1435", gauge_mm=1440).gauge_m == 1.44
+    assert resolve("EN_60E1_1435", gauge_mm=1440).head_width_m == 0.072
+    assert resolve("EN_60E1_1435", head_width_mm=70).head_width_m == pytest.approx(0.07)
+    custom = resolve("CUSTOM", 1000, 61.91)
+    assert (custom.gauge_m, custom.head_width_m) == (1.0, pytest.approx(0.06191))
+
+
+@pytest.mark.parametrize(("gauge_mm", "head_width_mm"), [(None, None), (1435, None), (None, 72)])
+def test_custom_needs_both_numbers(gauge_mm, head_width_mm):
+    with pytest.raises(ParameterError, match="both"):
+        resolve("CUSTOM", gauge_mm, head_width_mm)
+
+
+@pytest.mark.parametrize("gauge_mm", [-1435, 0, 499, 2001, 1.435, math.nan, math.inf])
+def test_impossible_gauges_are_refused(gauge_mm):
+    with pytest.raises(ParameterError, match="gauge"):
+        resolve(DEFAULT, gauge_mm=gauge_mm)
+
+
+@pytest.mark.parametrize("head_width_mm", [-72, 0, 39, 91, 0.072, math.nan, math.inf])
+def test_impossible_widths_are_refused(head_width_mm):
+    with pytest.raises(ParameterError, match="railhead width"):
+        resolve(DEFAULT, head_width_mm=head_width_mm)
+
+
+def test_an_unknown_name_is_refused():
+    with pytest.raises(ParameterError, match="unknown"):
+        resolve("EN_61E1_1435")
