@@ -104,7 +104,7 @@ def scan(
     head_width_m: float,
     path: np.ndarray,
     scanner: Scanner,
-    random: np.random.RandomState,
+    rng: np.random.RandomState,
     missing: tuple[tuple[float, float], ...] = (),
 ) -> np.ndarray:
     """Scan one railhead from a train that passes by.
@@ -119,7 +119,7 @@ def scan(
     path : (k, 3) array
         Way of the track that the scanner rides on, metres.
     scanner : Scanner
-    random : RandomState
+    rng : RandomState
     missing : tuple of (start, end)
         Stretches without points, metres along the head.
 
@@ -127,31 +127,31 @@ def scan(
     -------
     (n, 3) array
     """
-    stations = _stations(head, scanner, random, missing)
+    stations = _stations(head, scanner, rng, missing)
     source = _scanner_positions(head.top[stations], path, scanner)
     ray = source - head.top[stations]
     across = np.sum(ray * head.across[stations], axis=1)
     above = np.sum(ray * head.axis[stations], axis=1)
-    profile, position = _hits(head_width_m, across, above, scanner.ray_step_rad, random)
+    profile, position = _hits(head_width_m, across, above, scanner.ray_step_rad, rng)
     outline, turn = head_outline(head_width_m)
     samples = np.arange(len(outline))
-    kept = random.random_sample(len(profile)) < _chance(
+    kept = rng.random_sample(len(profile)) < _chance(
         np.hypot(across, above)[profile], np.interp(position, samples, turn), scanner
     )
     profile, position = profile[kept], position[kept]
     u, v = np.interp(position, samples, outline[:, 0]), np.interp(position, samples, outline[:, 1])
     at = stations[profile]
     points = head.top[at] + u[:, None] * head.across[at] + v[:, None] * head.axis[at]
-    return points + scanner.noise_m * random.standard_normal(points.shape)
+    return points + scanner.noise_m * rng.standard_normal(points.shape)
 
 
 def _stations(
-    head: Railhead, scanner: Scanner, random: np.random.RandomState, missing: tuple[tuple[float, float], ...]
+    head: Railhead, scanner: Scanner, rng: np.random.RandomState, missing: tuple[tuple[float, float], ...]
 ) -> np.ndarray:
     """Choose the samples of the head at which profiles cross it."""
     chainage = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(head.top, axis=0), axis=1))])
     count = int(chainage[-1] / scanner.profile_step_m / (1 - SPEED_SWING)) + 1
-    phase = random.random_sample() * 2 * np.pi
+    phase = rng.random_sample() * 2 * np.pi
     swing = 1 + SPEED_SWING * np.sin(phase + np.arange(count) * scanner.profile_step_m / SPEED_SWING_M)
     wanted = np.cumsum(scanner.profile_step_m * swing)
     wanted = wanted[wanted < chainage[-1]]
@@ -170,7 +170,7 @@ def _scanner_positions(top: np.ndarray, path: np.ndarray, scanner: Scanner) -> n
 
 
 def _hits(
-    head_width_m: float, across: np.ndarray, above: np.ndarray, ray_step_rad: float, random: np.random.RandomState
+    head_width_m: float, across: np.ndarray, above: np.ndarray, ray_step_rad: float, rng: np.random.RandomState
 ) -> tuple[np.ndarray, np.ndarray]:
     """Send rays from scanners at (`across`, `above`) of the head's frame and find where they meet the outline.
 
@@ -190,7 +190,7 @@ def _hits(
     samples = np.arange(len(outline))
     angle = np.where(samples < first[:, None], lowest[:, None], angle)
     angle = np.where(samples > last[:, None], highest[:, None], angle)
-    phase = random.random_sample(len(across))
+    phase = rng.random_sample(len(across))
     start = np.ceil(lowest / ray_step_rad - phase)
     count = np.maximum(np.floor(highest / ray_step_rad - phase) - start + 1, 0).astype(int)
     profile = np.repeat(rows, count)

@@ -20,7 +20,8 @@ from .tracks import Track
 UNCLASSIFIED, GROUND, RAIL = 1, 2, 10
 """Classes of the LAS specification."""
 
-Gaps = tuple  # of (start, end) in metres: stretches of one rail without points
+Gaps = tuple[tuple[float, float], ...]
+"""Stretches of one rail without points: start and end along it, metres."""
 
 WHOLE_ENDS_M = 3.0
 """Rails have no gap within this distance of their ends: nothing could tell how far they go on."""
@@ -92,7 +93,7 @@ class Plan:
     scanner : Scanner
     ridden : int
         Track that the scanner rides on.
-    gaps : mapping of (track, side) to stretches
+    gaps : dict of (track, side) to Gaps
         Where rails have no points; side is +1 for the left rail and -1 for the right one.
     clutter : Clutter
     frame : LocalFrame
@@ -114,19 +115,19 @@ PAPER_TRACKS = ((0.0, 0.0), (3.96, 0.03), (7.92, -0.02))
 """Axis to the left of the ridden track's and height above it, metres: right, centre and left track."""
 
 
-def build(name: str, plan: Plan, random: np.random.RandomState) -> Scene:
+def build(name: str, plan: Plan, rng: np.random.RandomState) -> Scene:
     """Scan the rails of a plan and strew its clutter."""
     truths = [track.truth() for track in plan.tracks]
     rails = tuple(rail for left, right, _ in truths for rail in (left, right))
     centerlines = tuple(centerline for _, _, centerline in truths)
-    clouds = _clouds(plan, rails, centerlines, random)
+    clouds = _clouds(plan, rails, centerlines, rng)
     classification = np.repeat([code for code, _ in clouds], [len(points) for _, points in clouds])
     xyz = np.concatenate([points for _, points in clouds])
     return Scene(name, xyz, classification.astype(np.uint8), rails, centerlines, plan.standard, plan.frame)
 
 
 def _clouds(
-    plan: Plan, rails: Sequence[np.ndarray], centerlines: Sequence[np.ndarray], random: np.random.RandomState
+    plan: Plan, rails: Sequence[np.ndarray], centerlines: Sequence[np.ndarray], rng: np.random.RandomState
 ) -> list[tuple[int, np.ndarray]]:
     """Make the scene's points, by class."""
     path = plan.tracks[plan.ridden].centerline
@@ -135,16 +136,16 @@ def _clouds(
     for number, track in enumerate(plan.tracks):
         for side in (1, -1):
             gaps = plan.gaps.get((number, side), ())
-            points = scan(track.railhead(side), head_width_m, path, plan.scanner, random, gaps)
+            points = scan(track.railhead(side), head_width_m, path, plan.scanner, rng, gaps)
             clouds.append((RAIL, points))
     amount = plan.clutter
     weed_height = (-clutter.HEAD_ABOVE_GROUND_M, 0.06)
-    clouds.append((RAIL, clutter.weeds(random, rails, amount.weeds_near, 0.3, weed_height)))
-    clouds.append((RAIL, clutter.weeds(random, centerlines, amount.weeds_between, 2.0, weed_height)))
-    clouds.append((RAIL, clutter.stones(random, rails, amount.stones, 0.2)))
-    clouds.append((UNCLASSIFIED, clutter.weeds(random, centerlines, amount.other_weeds, 4.0, (-0.15, 0.4))))
+    clouds.append((RAIL, clutter.weeds(rng, rails, amount.weeds_near, 0.3, weed_height)))
+    clouds.append((RAIL, clutter.weeds(rng, centerlines, amount.weeds_between, 2.0, weed_height)))
+    clouds.append((RAIL, clutter.stones(rng, rails, amount.stones, 0.2)))
+    clouds.append((UNCLASSIFIED, clutter.weeds(rng, centerlines, amount.other_weeds, 4.0, (-0.15, 0.4))))
     if amount.ground_step_m is not None:
-        clouds.append((GROUND, clutter.ground(random, centerlines, 3.0, amount.ground_step_m)))
+        clouds.append((GROUND, clutter.ground(rng, centerlines, 3.0, amount.ground_step_m)))
     return clouds
 
 
@@ -182,7 +183,7 @@ def curved(seed: int = 2) -> Scene:
 def paper_like(seed: int = 3) -> Scene:
     """Three metre-gauge tracks like the paper's example: 160 m, the left one far from the scanner and full of gaps."""
     standard = STANDARDS["IN_75R_1000"]
-    random = np.random.RandomState(seed)
+    rng = np.random.RandomState(seed)
     curve = trace([Element(40), Element(40, 0, 1 / 1500), Element(80, 1 / 1500, 1 / 1500)], heading=0.42)
     heights, cant = _rolling(curve), _canted(curve, 0.02)
     tracks = [Track(curve, _spacing(standard), heights + lift, cant, left) for left, lift in PAPER_TRACKS]
@@ -190,37 +191,37 @@ def paper_like(seed: int = 3) -> Scene:
         tracks,
         standard,
         Scanner(profile_step_m=0.03, ray_step_rad=0.00385, height_m=4.5, left_m=1.5, noise_m=0.005, half_range_m=40),
-        gaps=_random_gaps(random, 2, curve.length_m, 8) | _random_gaps(random, 1, curve.length_m, 4),
+        gaps=_random_gaps(rng, 2, curve.length_m, 8) | _random_gaps(rng, 1, curve.length_m, 4),
         clutter=Clutter(weeds_near=30, weeds_between=40, stones=400, other_weeds=120, ground_step_m=0.25),
         frame=INDIA,
     )
-    return build("paper_like", plan, random)
+    return build("paper_like", plan, rng)
 
 
 def noisy(seed: int = 4) -> Scene:
     """Heavy noise: 8 mm in each direction, gaps up to 4 m, weeds and ballast everywhere along one 60E1 track."""
     standard = STANDARDS["EN_60E1_1435"]
-    random = np.random.RandomState(seed)
+    rng = np.random.RandomState(seed)
     curve = trace([Element(150, 1 / 900, 1 / 900)], heading=0.2)
     plan = Plan(
         [Track(curve, _spacing(standard), _rolling(curve), _canted(curve, 0.05))],
         standard,
         Scanner(profile_step_m=0.06, ray_step_rad=0.0022, noise_m=0.008, face_share=0.6),
-        gaps=_random_gaps(random, 0, curve.length_m, 12, longest_m=4.0),
+        gaps=_random_gaps(rng, 0, curve.length_m, 12, longest_m=4.0),
         clutter=Clutter(weeds_near=50, weeds_between=80, stones=1000),
     )
-    return build("noisy", plan, random)
+    return build("noisy", plan, rng)
 
 
 def _random_gaps(
-    random: np.random.RandomState, track: int, length_m: float, count: int, longest_m: float = 3.0
+    rng: np.random.RandomState, track: int, length_m: float, count: int, longest_m: float = 3.0
 ) -> dict[tuple[int, int], Gaps]:
     """Draw stretches without points for either rail of a track: one somewhere in each of `count` equal parts."""
     gaps = {}
     part_m = (length_m - 2 * WHOLE_ENDS_M) / count
     for side in (1, -1):
-        gap_m = random.uniform(0.3, min(longest_m, part_m), count)
-        starts = WHOLE_ENDS_M + part_m * np.arange(count) + random.random_sample(count) * (part_m - gap_m)
+        gap_m = rng.uniform(0.3, min(longest_m, part_m), count)
+        starts = WHOLE_ENDS_M + part_m * np.arange(count) + rng.random_sample(count) * (part_m - gap_m)
         gaps[track, side] = tuple(zip(starts, starts + gap_m))
     return gaps
 
