@@ -1,0 +1,43 @@
+import re
+import zipfile
+
+import package
+import pytest
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    path = tmp_path_factory.mktemp("package") / "rail_extract.zip"
+    package.build(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def names(archive):
+    with zipfile.ZipFile(archive) as file:
+        return file.namelist()
+
+
+def test_same_files_give_the_same_bytes(archive, tmp_path):
+    package.build(tmp_path / "again.zip")
+    assert (tmp_path / "again.zip").read_bytes() == archive.read_bytes()
+
+
+def test_zip_is_one_folder_that_qgis_knows(names):
+    assert {name.split("/")[0] for name in names} == {"rail_extract"}
+    assert {f"rail_extract/{name}" for name in ("__init__.py", "metadata.txt", "LICENSE")} <= set(names)
+
+
+def test_zip_holds_what_runs_and_no_more(names):
+    assert any(re.fullmatch(r"rail_extract/models/.*\.npz", name) for name in names)
+    assert {"rail_extract/core/pipeline.py", "rail_extract/resources/styles/rails.qml"} <= set(names)
+    assert not [name for name in names if re.search(r"/(tests|tools|benchmarks|\.ci)/|\.pyc$", name)]
+
+
+def test_versions_agree(request):
+    root = request.config.rootpath
+    stated = {
+        re.search(r'^version ?= ?"?([\d.]+)', (root / name).read_text(encoding="utf-8"), re.MULTILINE).group(1)
+        for name in ("metadata.txt", "pyproject.toml")
+    }
+    assert len(stated) == 1
