@@ -17,7 +17,7 @@ DEFAULT = "EN_60E1_1435"
 CUSTOM = "CUSTOM"
 
 GAUGE_RANGE_MM = (500.0, 2000.0)
-"""From park railways (500 mm, 15 inch is 381 mm and no lidar survey's matter) to beyond the widest in use (1676 mm)."""
+"""From below the narrowest public railways (600 mm) to beyond the widest gauge in use (1676 mm)."""
 
 HEAD_WIDTH_RANGE_MM = (40.0, 90.0)
 """From the lightest mine rails to beyond the widest heads of tables (77.79 mm, 141RE); crane rails are wider."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Union
 
 import numpy as np
 
@@ -57,8 +56,8 @@ class Track:
 
     curve: Curve
     spacing_m: float
-    height_m: Union[float, np.ndarray] = 0.0
-    cant_m: Union[float, np.ndarray] = 0.0
+    height_m: float | np.ndarray = 0.0
+    cant_m: float | np.ndarray = 0.0
     left_m: float = 0.0
     inclination: float = 1 / 20
 

@@ -8,6 +8,7 @@ import pyproj
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from laspy._compression import lazrsbackend
 from rail_extract.core import las
 from rail_extract.core.errors import (
     Cancelled,
@@ -108,6 +109,24 @@ def test_chunks_join_without_loss(tmp_path, monkeypatch):
     xyz, codes = make_cloud(tmp_path / "a.laz")
     monkeypatch.setattr(las, "CHUNK", 700)
     (points,) = read_rail_points(tmp_path / "a.laz", [RAIL])
+    np.testing.assert_allclose(points.frame.to_crs(points.xyz), xyz[codes == RAIL], rtol=0, atol=1e-9)
+
+
+def test_chunks_of_any_size_as_in_copc(tmp_path, monkeypatch):
+    class Writer(lazrsbackend.LazrsPointWriter):
+        def __init__(self, dest, point_format, parallel):
+            super().__init__(dest, point_format, parallel=False)
+            self.vlr = lazrsbackend.lazrs.LazVlr.new_for_compression(point_format.id, 0, True)
+
+        def write_points(self, points):
+            for part in (points[:70], points[70:2000], points[2000:]):
+                super().write_points(part)
+                self.compressor.finish_current_chunk()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(lazrsbackend, "LazrsPointWriter", Writer)
+        xyz, codes = make_cloud(tmp_path / "a.copc.laz")
+    (points,) = read_rail_points(tmp_path / "a.copc.laz", [RAIL])
     np.testing.assert_allclose(points.frame.to_crs(points.xyz), xyz[codes == RAIL], rtol=0, atol=1e-9)
 
 
