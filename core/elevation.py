@@ -11,41 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .envelope import extremal_boundary
 from .points import RailPoints
 from .polyline import Feet, interpolate, project, starts_at_its_end
 from .progress import SILENT, Progress
-from .railhead import cross_slope, rough_level, spread
 from .rails import RailLine, length_along
-from .smoothing import simplify, smooth_profile
+from .railtop import LEAST_POINTS, find_top
+from .smoothing import simplify
 from .vectorize.network import LineNetwork
-
-LEAST_POINTS = 10
-"""A line that fewer points support is none of a rail: 1 m of the sparsest rail has more."""
-
-OUTLIER_M = 0.03
-"""Points this far above the level of most, such as weeds, would lift the disc; a head's slope makes 5 mm at most."""
-
-LEAST_DEPTH_M = 0.01
-"""Depth below the disc that is searched even in the cleanest cloud: the disc sags 6 mm into a gap of 1 m."""
-
-DEPTH_SIGMAS = 6.0
-"""Depth in standard deviations of the noise: the disc lies about three above the top, the points reach as far below."""
-
-TOP_SIGMAS = 3.0
-"""Half height of the band around the top, in standard deviations of the noise."""
-
-TOP_ROUNDS = 3
-"""Rounds of smoothing and choosing anew; the fourth moves the top by less than 0.1 mm."""
-
-AXIS_SHARE = 0.25
-"""Part of the head width, to either side of the axis, that gives the height: its crown is 0.5 mm lower at most."""
-
-BIN_M = 0.25
-"""Points this close together along the line count as one of mean height: a twelfth of the smoothing's length."""
-
-END_M = 1.0
-"""A profile goes on as it slopes at its end for this length, and level from there."""
 
 BRIDGE_M = 0.5
 """A longer stretch without points counts as bridged: five profiles of the fastest train's scanner."""
@@ -153,7 +125,15 @@ def _raise_line(
     feet, z = feet[head], z[head]
     if len(z) < LEAST_POINTS:
         return None
-    found = _top(feet.t, feet.across, z, parameters)
+    found = find_top(
+        feet.t,
+        feet.across,
+        z,
+        parameters.head_width_m,
+        parameters.crown_radius_m,
+        parameters.tolerance_z_m,
+        parameters.smoothing_z_m,
+    )
     if found is None:
         return None
     profile, top = found
@@ -181,73 +161,3 @@ def bridged_length(t: np.ndarray, start: float, end: float) -> float:
     """Length without points from `start` to `end`: of the stretches longer than BRIDGE_M between chainages `t`."""
     gaps = np.diff(np.concatenate([[start], np.clip(np.sort(t), start, end), [end]]))
     return float(gaps[gaps > BRIDGE_M].sum())
-
-
-def _top(
-    t: np.ndarray, across: np.ndarray, z: np.ndarray, parameters: ElevationParameters
-) -> tuple[_Profile, np.ndarray] | None:
-    """Find the height of a head's top on its axis; None where too few points agree on one.
-
-    The points are laid flat first, as if the head stood upright. The disc then tells the top from the faces, but it
-    rests on the highest points, three standard deviations above it; a band around their own smoothed height,
-    chosen anew a few times, takes that lift away.
-
-    Parameters
-    ----------
-    t, across, z : (n,) arrays
-        Points on the head, t increasing.
-
-    Returns
-    -------
-    profile : _Profile
-    top : (n,) bool array
-        Points that lie on the top.
-    """
-    flat = z - cross_slope(t, across, z - rough_level(t, z), parameters.head_width_m) * across
-    top, noise = _under_disc(t, flat, parameters)
-    central = np.abs(across) <= AXIS_SHARE * parameters.head_width_m
-    band = min(parameters.tolerance_z_m, max(LEAST_DEPTH_M, TOP_SIGMAS * noise))
-    for _ in range(TOP_ROUNDS):
-        chosen = top & central if (top & central).sum() >= LEAST_POINTS else top
-        profile = _Profile.through(t[chosen], flat[chosen], parameters.smoothing_z_m)
-        top = np.abs(flat - profile.at(t)) <= band
-        if top.sum() < LEAST_POINTS:
-            return None
-    return profile, top
-
-
-def _under_disc(t: np.ndarray, z: np.ndarray, parameters: ElevationParameters) -> tuple[np.ndarray, float]:
-    """Tell which points lie just under the disc that rolls along the top, (n,) bool, and how noisy these are."""
-    above = z - rough_level(t, z)
-    ordinary = above <= OUTLIER_M
-    surface = extremal_boundary(t[ordinary], z[ordinary], parameters.crown_radius_m)
-    inside = ordinary & (t >= surface.x[0]) & (t <= surface.x[-1])
-    depth = np.full(len(z), np.inf)
-    depth[inside] = surface.closing(t[inside]) - z[inside]
-    noise = spread(above[depth <= parameters.tolerance_z_m])
-    return depth <= min(parameters.tolerance_z_m, max(LEAST_DEPTH_M, DEPTH_SIGMAS * noise)), noise
-
-
-@dataclass(frozen=True)
-class _Profile:
-    """A smoothed height profile: heights `z` at chainages `t`, (n,) each."""
-
-    t: np.ndarray
-    z: np.ndarray
-
-    @classmethod
-    def through(cls, t: np.ndarray, z: np.ndarray, sigma_m: float) -> _Profile:
-        """Smooth the heights of points; those of one bin count as one, so that none alone marks the edge of a gap."""
-        _, number, count = np.unique(np.floor(t / BIN_M), return_inverse=True, return_counts=True)
-        t, z = np.bincount(number, t) / count, np.bincount(number, z) / count
-        return cls(t, smooth_profile(t, z, sigma_m, t))
-
-    def at(self, stations: np.ndarray) -> np.ndarray:
-        """Height at any chainage, (m,)."""
-        height = np.interp(stations, self.t, self.z)
-        if self.t[-1] - self.t[0] < END_M:
-            return height
-        before = np.clip(self.t[0] - stations, 0.0, END_M)
-        after = np.clip(stations - self.t[-1], 0.0, END_M)
-        inner_start, inner_end = np.interp([self.t[0] + END_M, self.t[-1] - END_M], self.t, self.z)
-        return height + (self.z[0] - inner_start) / END_M * before + (self.z[-1] - inner_end) / END_M * after
