@@ -8,6 +8,7 @@ import numpy as np
 
 from ..progress import SILENT, Progress
 from ..raster import RailRaster
+from .branches import resolve_branches
 from .closing import close
 from .crossings import resolve_crossings
 from .ends import stretch, way_out
@@ -60,7 +61,8 @@ def vectorize(
     network = clean_junctions(trace(closed, pixels, edges, tips), head_width_m)
     progress.set_fraction(0.8)
     progress.check()
-    network = join_gaps(run_through(resolve_crossings(network)), max_gap_m, gap_angle_deg)
+    network = resolve_branches(resolve_crossings(network), head_width_m + raster.cell_m)
+    network = join_gaps(run_through(network), max_gap_m, gap_angle_deg)
     progress.set_fraction(1.0)
     return _settle_ends(_drop_short(network, min_length_m))
 

@@ -35,11 +35,14 @@ class Bridge:
     ----------
     cost : float
         Its length in metres, made larger by what it misses and how it bends; 1 to 3 times the length.
+    curvature : float
+        In the middle, 1/m, positive to the left.
     points : (n, 2) array
         Between the ends, every `STEP_M`, from the first end to the second.
     """
 
     cost: float
+    curvature: float
     points: np.ndarray
 
 
@@ -59,7 +62,15 @@ def bridge(one: np.ndarray, other: np.ndarray) -> Bridge | None:
     if gap <= 0 or misfit > MISFIT_M or bend > 1:
         return None
     x = np.linspace(before[-1, 0], after[0, 0], int(gap / STEP_M) + 2)[1:-1]
-    return Bridge(gap * (1 + misfit / MISFIT_M + bend), origin + np.column_stack([x, _basis(x) @ cubic]) @ axes)
+    points = origin + np.column_stack([x, _basis(x) @ cubic]) @ axes
+    return Bridge(gap * (1 + misfit / MISFIT_M + bend), cubic[2], points)
+
+
+def curvature(points: np.ndarray) -> float:
+    """Measure the curvature of a stretch in its middle, 1/m, positive to the left of (n, 2) points in order."""
+    half = len(points) // 2
+    origin, axes = _frame(points[: half + 1], points[half:])
+    return float(_fit((points - origin) @ axes.T)[2])
 
 
 def _frame(before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

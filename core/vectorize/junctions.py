@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -11,9 +11,12 @@ from scipy.sparse.csgraph import connected_components
 from .ends import stretch, way_out
 from .network import LineNetwork
 
-SPUR_HEADS = 2.0
-SPUR_M = 0.15
-"""A branch shorter than two railheads, and than this, is a bump on the rail's flank."""
+SPUR_M = 1.0
+"""A branch that ends free after less than this is a weed on the rail's flank; longer ones may go on beyond a gap."""
+
+RUNG_HEADS = 3.0
+RUNG_DEG = 30.0
+"""A link shorter and steeper than this between two rails is a bridge of raster over the flangeway."""
 
 BUBBLE_M = 1.0
 """A loop with sides shorter than this is a hole in a blot, not two rails."""
@@ -26,10 +29,11 @@ DIRECTION_M = 2.5
 
 
 def clean_junctions(network: LineNetwork, head_width_m: float) -> LineNetwork:
-    """Remove spurs and small loops, contract short links between junctions, and weld what is left of degree 2."""
+    """Remove spurs, small loops and rungs between rails, contract short links, and weld what is left of degree 2."""
     network = contract_links(weld_pairs(network), head_width_m)
     network = weld_pairs(drop_bubbles(network))
-    return drop_spurs(network, max(SPUR_HEADS * head_width_m, SPUR_M))
+    network = weld_pairs(drop_rungs(network, RUNG_HEADS * head_width_m))
+    return drop_spurs(network, SPUR_M)
 
 
 def weld_pairs(network: LineNetwork) -> LineNetwork:
@@ -37,7 +41,7 @@ def weld_pairs(network: LineNetwork) -> LineNetwork:
     plain = network.degrees() == 2
     plain[network.passes[:, 0]] = False
     partner = {}
-    for one, other in (ends for node, ends in _ends_by_node(network) if plain[node]):
+    for one, other in (ends for node, ends in ends_by_node(network) if plain[node]):
         if one // 2 != other // 2:
             partner[one], partner[other] = other, one
     return network.weld(partner) if partner else network
@@ -96,30 +100,47 @@ def drop_bubbles(network: LineNetwork) -> LineNetwork:
     return network.select(keep)
 
 
+def drop_rungs(network: LineNetwork, length_m: float) -> LineNetwork:
+    """Remove links shorter than `length_m` that continue no other line at either of their nodes."""
+    ends_at = dict(ends_by_node(network))
+    keep = np.ones(len(network.lines), dtype=bool)
+    short = (network.degrees()[network.ends] > 2).all(axis=1) & (network.lengths() < length_m)
+    for line in np.flatnonzero(short).tolist():
+        for end in (2 * line, 2 * line + 1):
+            others = [end, *(other for other in ends_at[network.ends.flat[end]] if other != end)]
+            keep[line] &= deflections(network, others)[0, 1:].min() > RUNG_DEG
+        keep[line] = not keep[line]
+    return network.select(keep)
+
+
 def run_through(network: LineNetwork) -> LineNetwork:
     """Weld lines through nodes of degree 3 and more, the straightest continuation first; what is left ends there."""
     partner: dict[int, int] = {}
-    for _, ends in _ends_by_node(network):
+    for _, ends in ends_by_node(network):
         if len(ends) > 2:
             partner.update(_straightest(network, ends))
     return network.weld(partner) if partner else network
 
 
-def _straightest(network: LineNetwork, ends: list[int]) -> dict[int, int]:
-    """Couple the line ends of one node by smallest deflection."""
+def deflections(network: LineNetwork, ends: Sequence[int]) -> np.ndarray:
+    """Angles in degrees by which a line that comes in at one end would turn to run on at another, (k, k)."""
     outward = np.array([way_out(stretch(network.from_end(end), DIRECTION_M))[1] for end in ends])
-    deflection = np.degrees(np.arccos(np.clip(-outward @ outward.T, -1.0, 1.0)))
+    return np.degrees(np.arccos(np.clip(-outward @ outward.T, -1.0, 1.0)))
+
+
+def _straightest(network: LineNetwork, ends: Sequence[int]) -> dict[int, int]:
+    """Couple the line ends of one node by smallest deflection."""
+    turn = deflections(network, ends)
+    pairs = np.argwhere(np.triu(turn < DEFLECTION_DEG, 1))
     coupled: dict[int, int] = {}
-    for first, second in np.argwhere(np.triu(deflection < DEFLECTION_DEG, 1))[
-        np.argsort(deflection[np.triu(deflection < DEFLECTION_DEG, 1)])
-    ].tolist():
+    for first, second in pairs[np.argsort(turn[tuple(pairs.T)])].tolist():
         one, other = ends[first], ends[second]
         if one not in coupled and other not in coupled and one // 2 != other // 2:
             coupled[one], coupled[other] = other, one
     return coupled
 
 
-def _ends_by_node(network: LineNetwork) -> Iterable[tuple[int, list[int]]]:
+def ends_by_node(network: LineNetwork) -> Iterable[tuple[int, list[int]]]:
     """Pair each node with the line ends in it."""
     flat = network.ends.ravel()
     order = np.argsort(flat, kind="stable")

@@ -53,7 +53,7 @@ def pixel_set(cells: np.ndarray) -> Pixels:
 def _link(keys: np.ndarray, stride: int) -> np.ndarray:
     """Neighbour numbers of pixels with sorted `keys` = row * stride + column, an empty column at the row's end."""
     count = len(keys)
-    neighbours = np.full((count, len(RING)), count)
+    neighbours = np.full((count, len(RING)), count, dtype=np.int32)
     padded = np.append(keys, np.full(3, np.iinfo(np.int64).max))
     place = np.searchsorted(keys, keys + stride - 1)
     for direction, offset in ((SOUTH_WEST, stride - 1), (SOUTH, stride), (SOUTH_EAST, stride + 1), (EAST, 1)):
