@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -137,7 +137,7 @@ def _draw(
     )
 
 
-def _ids(rails: Sequence[RailLine], numbers: Sequence[int]) -> tuple[int, ...]:
+def _ids(rails: Sequence[RailLine], numbers: Iterable[int]) -> tuple[int, ...]:
     """Ids of rails, each once, in the order they are met."""
     return tuple(dict.fromkeys(rails[number].rail_id for number in numbers))
 
