@@ -9,13 +9,12 @@ import numpy as np
 from ..rails import length_along
 from .bridges import bridge, curvature
 from .crossings import SKIP_M
-from .ends import cut_back, stretch, way_out
+from .ends import cut_back, stretch, turned, way_out
 from .junctions import DEFLECTION_DEG, DIRECTION_M, deflections, ends_by_node
 from .network import LineNetwork
 
 FARTHEST_M = 25.0
 """Farthest that a branch is drawn back: a switch blade of 1:26.5 touches its stock rail for about so long."""
-
 
 STEADY_M = 8.0
 """Stretch over which the curvature of the stem is measured: the rail that keeps it is the main one."""
@@ -37,18 +36,18 @@ def resolve_branches(network: LineNetwork, apart_m: float) -> LineNetwork:
     """
     lines, nodes, partner = list(network.lines), network.nodes.copy(), {}
     for node, stem, legs in _branchings(network):
-        now = LineNetwork(tuple(lines), nodes, network.ends)
-        if now.lengths()[[leg // 2 for leg in legs]].min() < SKIP_M + DIRECTION_M:
+        trunk, *rails = (turned(lines[end // 2], end) for end in (stem, *legs))
+        if min(length_along(rail)[-1] for rail in rails) < SKIP_M + DIRECTION_M:
             continue
-        free = [cut_back(now.from_end(leg), SKIP_M) for leg in legs]
-        trunk = _trunk(now.from_end(stem), free, apart_m)
+        free = [cut_back(rail, SKIP_M) for rail in rails]
+        trunk = _trunk(trunk, free, apart_m)
         curves = [bridge(trunk, rail) for rail in free] if len(trunk) > 1 else [None]
         if None in curves:
             continue
         nodes[node] = trunk[0]
-        _set_from_end(lines, stem, trunk)
+        lines[stem // 2] = turned(trunk, stem)
         for leg, curve, rail in zip(legs, curves, free):
-            _set_from_end(lines, leg, np.concatenate([trunk[:1], curve.points, rail]))
+            lines[leg // 2] = turned(np.concatenate([trunk[:1], curve.points, rail]), leg)
         own = curvature(stretch(trunk, STEADY_M)[::-1])
         steady = legs[int(np.argmin([abs(curve.curvature - own) for curve in curves]))]
         partner[stem], partner[steady] = steady, stem
@@ -77,7 +76,3 @@ def _trunk(stem: np.ndarray, free: list[np.ndarray], apart_m: float) -> np.ndarr
     back_m = (apart_m + np.sqrt(apart_m**2 + 2 * apart_m * further_m * angle)) / angle
     too_short = length_along(stem)[-1] < back_m + DIRECTION_M
     return stem[:0] if too_short or back_m > FARTHEST_M else cut_back(stem, back_m)
-
-
-def _set_from_end(lines: list[np.ndarray], end: int, vertices: np.ndarray) -> None:
-    lines[end // 2] = vertices[::-1] if end % 2 else vertices

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from .bridges import Bridge, bridge
-from .ends import cut_back
+from .ends import cut_back, turned
 from .junctions import ends_by_node
 from .network import LineNetwork
 
@@ -36,9 +36,10 @@ def resolve_crossings(network: LineNetwork) -> LineNetwork:
         joins.update(pairing)
         keep[shared] = False
         for end in legs:
-            lines[end // 2] = cut_back(lines[end // 2][:: -1 if end % 2 else 1], SKIP_M)[:: -1 if end % 2 else 1]
+            free = cut_back(turned(lines[end // 2], end), SKIP_M)
+            lines[end // 2] = turned(free, end)
             ends.flat[end] = len(nodes)
-            nodes.append(lines[end // 2][-1 if end % 2 else 0])
+            nodes.append(free[0])
     if not joins:
         return network
     number = np.cumsum(keep) - 1

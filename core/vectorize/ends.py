@@ -10,6 +10,11 @@ STEP_M = 0.1
 """Distance between the points that stand for a stretch; raster vertices are spaced by corners, not by length."""
 
 
+def turned(vertices: np.ndarray, end: int) -> np.ndarray:
+    """Turn a line around if it is seen from its end, or is to be stored as seen from there."""
+    return vertices[::-1] if end % 2 else vertices
+
+
 def stretch(from_end: np.ndarray, length_m: float) -> np.ndarray:
     """Points every `STEP_M` along the first `length_m` of a line given from its end, (n, 2), at least two."""
     along = length_along(from_end)

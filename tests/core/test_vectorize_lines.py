@@ -1,5 +1,7 @@
 """From drawn rails to lines and back: accuracy, junctions, gaps, and what must never be joined."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,9 +12,10 @@ from rail_extract.core.rails import length_along
 from rail_extract.core.raster import RailRaster
 from rail_extract.core.smoothing import smooth_network
 from rail_extract.core.synthetic.curves import Element, trace
+from rail_extract.core.synthetic.turnouts import FORMS, branch
 from rail_extract.core.vectorize import vectorize
 from rail_extract.core.vectorize.joining import join_gaps
-from rail_extract.core.vectorize.junctions import contract_links, drop_spurs, run_through, weld_pairs
+from rail_extract.core.vectorize.junctions import contract_links, drop_rungs, drop_spurs, run_through, weld_pairs
 from rail_extract.core.vectorize.network import LineNetwork
 from scipy.spatial import cKDTree
 
@@ -29,7 +32,7 @@ def dense(line, step_m=0.005):
 def draw(lines, x0=0.0, y0=0.0):
     """Set the cells whose centre lies within half a railhead of a line."""
     raster = RailRaster({}, CELL_M, x0, y0)
-    points = np.concatenate([dense(line) for line in lines])
+    points = np.concatenate([dense(line, 0.01) for line in lines])
     at = np.unique(np.floor(np.column_stack([y0 - points[:, 1], points[:, 0] - x0]) / CELL_M).astype(int), axis=0)
     around = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), -1).reshape(-1, 2)
     cells = np.unique((at[:, None] + around).reshape(-1, 2), axis=0)
@@ -98,6 +101,7 @@ def three_tracks(length=160):
     return [curve.offset(track + side) for track in (0.0, 4.0, 8.0) for side in (-0.531, 0.531)]
 
 
+@cache
 def scene(seed):
     """Six rails with gaps, ragged flanks and weeds."""
     random = np.random.default_rng(seed)
@@ -135,7 +139,7 @@ def test_three_noisy_tracks_with_gaps_give_one_line_a_rail(seed):
 
 
 def test_the_place_in_the_grid_of_tiles_does_not_matter():
-    raster, _ = scene(3)
+    raster, _ = scene(1)
     moved = RailRaster({}, CELL_M, raster.x0 - 77 * CELL_M, raster.y0 + 131 * CELL_M).with_cells(
         raster.cells() + [131, 77]
     )
@@ -162,6 +166,12 @@ def test_a_gap_in_a_reverse_curve_is_bridged():
     truth = trace([Element(20, 1 / 190, 1 / 190), Element(20, -1 / 190, -1 / 190)], (0.0, 0.0), 0.4).xy
     (line,) = smoothed(draw(with_gap(truth, 18, 4)))
     assert offsets(line, truth).max() < 0.02
+
+
+def test_a_gap_where_a_tram_enters_a_sharp_curve_is_bridged():
+    truth = trace([Element(20), Element(20, -1 / 30, -1 / 30)], (0.0, 0.0), 0.4).xy
+    (line,) = smoothed(draw(with_gap(truth, 18, 4)))
+    assert offsets(line, truth).max() < 0.05
 
 
 def test_gaps_longer_than_allowed_stay():
@@ -219,6 +229,29 @@ def test_rails_that_cross_are_two_straight_lines(slope):
         assert min(offsets(line, rail).max() for rail in rails) < 0.015
 
 
+@pytest.mark.parametrize(
+    ("name", "curvature"), [("tram 25", 0.0), ("190-1:9", 0.0), ("300-1:9", 1 / 400), ("500-1:12", 0.0)]
+)
+def test_a_turnout_has_two_rails_through_and_two_that_begin_where_they_part(name, curvature):
+    form = next(form for form in FORMS if form.name == name)
+    main = trace([Element(65 + form.arc_m, curvature, curvature)], heading=0.35)
+    side = branch(main, 25.0, form, -1, 20.0)
+    rails = [curve.offset(left) for curve in (main, side) for left in (-0.7556, 0.7556)]
+    network = vectorize(draw(rails), HEAD_M)
+    check_invariants(network)
+    assert len(network.lines) == 4
+    assert sorted(network.degrees()) == [1] * 6 + [3] * 2
+    lines = smooth_network(network, 0.8).lines
+    truth = cKDTree(np.concatenate([dense(rail, 0.005) for rail in rails]))
+    found = cKDTree(np.concatenate([dense(line, 0.02) for line in lines]))
+    assert max(found.query(dense(rail, 0.05))[0].max() for rail in rails) < 0.05
+    astray = np.concatenate([truth.query(line)[0] for line in lines])
+    assert astray.max() < 0.05
+    assert np.sqrt(np.mean(astray**2)) < 0.006
+    longest = sorted(length_along(line)[-1] for line in lines)[-2:]
+    np.testing.assert_allclose(longest, main.length_m, rtol=0.02)
+
+
 def test_no_cells_no_lines():
     network = vectorize(RailRaster({}, CELL_M, 0.0, 0.0), HEAD_M)
     assert network.lines == ()
@@ -269,6 +302,23 @@ def test_junctions_close_to_each_other_become_one():
     check_invariants(network)
     assert sorted(network.degrees()) == [1, 1, 1, 1, 4]
     np.testing.assert_allclose(network.nodes[network.degrees() == 4], [[0.025, 0]])
+
+
+def test_a_rung_between_two_rails_is_dropped():
+    x = np.array([-5.0, 0.0, 5.0])
+    nodes = np.array([(side, y) for y in (0.0, 0.13) for side in x])
+    lines = [nodes[[0, 1]], nodes[[1, 2]], nodes[[3, 4]], nodes[[4, 5]], nodes[[1, 4]]]
+    network = LineNetwork(tuple(lines), nodes, np.array([[0, 1], [1, 2], [3, 4], [4, 5], [1, 4]]))
+    assert len(drop_rungs(network, 0.1).lines) == 5
+    rails = weld_pairs(drop_rungs(network, 0.2))
+    assert len(rails.lines) == 2
+    np.testing.assert_allclose(rails.lengths(), 10)
+
+
+def test_a_weed_on_the_flank_is_no_branch():
+    rail = straight(20, 0.3)
+    weed = rail.mean(axis=0) + np.outer([0.0, 0.8], [0.0, 1.0])
+    assert len(vectorize(draw([rail, weed]), HEAD_M, min_length_m=0.3).lines) == 1
 
 
 @given(st.permutations(range(6)), st.lists(st.booleans(), min_size=6, max_size=6), st.booleans())
