@@ -81,7 +81,7 @@ class RailRaster:
         return np.concatenate(found) if found else np.empty((0, 2), dtype=np.int64)
 
     def count(self) -> int:
-        """Number of rail cells."""
+        """Count the rail cells."""
         return int(sum(np.count_nonzero(tile) for tile in self.tiles.values()))
 
     def to_local(self, rows_columns: np.ndarray) -> np.ndarray:
@@ -128,7 +128,7 @@ class RailRaster:
         return replace(self, tiles=tiles)
 
     def tile_neighbourhood(self) -> set[tuple[int, int]]:
-        """Indices of the kept tiles and of their eight neighbours."""
+        """Give the indices of the kept tiles and of their eight neighbours."""
         return set(_neighbourhood(self.tiles))
 
 
