@@ -9,13 +9,13 @@ import numpy as np
 
 from .chaining import chain_pairs
 from .errors import NoTrackError
-from .midline import Side, midway
+from .midline import Meeting, Side, midway
 from .pairing import MIN_LENGTH_M, RailPair, pair_rails
 from .parallels import commonest_spacing
 from .polyline import interpolate, left_normals, resample, starts_at_its_end
 from .progress import SILENT, Progress
 from .rails import Centerline, RailLine, length_along
-from .smoothing import simplify, smooth_line
+from .smoothing import smooth_line
 from .standards import STANDARDS
 
 STEP_M = 0.25
@@ -37,8 +37,6 @@ class CenterlineParameters:
         Longest stretch without a pair of rails that does not end a track.
     smoothing_m : float
         Sigma of PAEK in plan.
-    simplify_xy_m, simplify_z_m : float
-        Tolerances within which vertices are left out.
     min_length_m : float
         Shorter centerlines are dropped.
     """
@@ -46,8 +44,6 @@ class CenterlineParameters:
     tolerance_m: float = 0.05
     max_gap_m: float = 5.0
     smoothing_m: float = 0.8
-    simplify_xy_m: float = 0.002
-    simplify_z_m: float = 0.002
     min_length_m: float = 1.0
 
 
@@ -117,10 +113,11 @@ def _draw(
     left = Side.of(rails, [(pair.left, pair.left_span) for pair in chain], reach).meet(guide, normals, half)
     right = Side.of(rails, [(pair.right, pair.right_span) for pair in chain], reach).meet(guide, -normals, half)
     xyz = midway(guide, normals, left, right, 2 * half)
-    both = ~np.isnan(left[0] + right[0])
-    cant = (left[1] - right[1])[both]
-    gauge = np.hypot((left[0] + right[0])[both], np.nan_to_num(cant)) - head_width_m
-    xyz = _finished(xyz, parameters)
+    apart = left.distance_m + right.distance_m
+    both = ~np.isnan(apart)
+    cant = (left.height_m - right.height_m)[both]
+    gauge = np.hypot(apart[both], np.nan_to_num(cant)) - head_width_m
+    xyz = _smoothed(xyz, parameters.smoothing_m)
     flip = starts_at_its_end(xyz)
     sides = [_ids(rails, (pair.left for pair in chain)), _ids(rails, (pair.right for pair in chain))]
     return Centerline(
@@ -133,7 +130,7 @@ def _draw(
         gaugesd_mm=1000 * float(gauge.std()),
         cant_mm=(-1000 if flip else 1000) * float(cant.mean()),
         cantmax_mm=(-1000 if flip else 1000) * float(cant[np.argmax(np.abs(cant))]),
-        bridged_m=_bridged(rails, chain, np.count_nonzero(~both) * STEP_M),
+        bridged_m=_bridged(rails, left, right, length_along(guide)),
     )
 
 
@@ -142,15 +139,23 @@ def _ids(rails: Sequence[RailLine], numbers: Iterable[int]) -> tuple[int, ...]:
     return tuple(dict.fromkeys(rails[number].rail_id for number in numbers))
 
 
-def _bridged(rails: Sequence[RailLine], chain: Sequence[RailPair], unpaired_m: float) -> float:
-    """Length without support: what the rails say of themselves, in proportion to what the track uses of them."""
-    bridged, whole = unpaired_m, unpaired_m
-    for pair in chain:
-        whole += pair.length_m
-        for number, span in ((pair.left, pair.left_span), (pair.right, pair.right_span)):
-            rail = rails[number]
-            bridged += rail.bridged_m * abs(span[1] - span[0]) / length_along(rail.xyz[:, :2])[-1]
-    return float(min(bridged, whole))
+def _bridged(rails: Sequence[RailLine], left: Meeting, right: Meeting, along: np.ndarray) -> float:
+    """Length on which a rail has no points or is not there, given where stations at `along` meet the rails."""
+    steps = np.diff(along)
+    bridged = np.maximum(_bridged_steps(rails, left, steps), _bridged_steps(rails, right, steps))
+    return float(bridged.sum())
+
+
+def _bridged_steps(rails: Sequence[RailLine], side: Meeting, steps: np.ndarray) -> np.ndarray:
+    """Length bridged on one side between each two stations, (n - 1,); `steps` are the distances of the stations."""
+    before = np.full(len(side.t), np.nan)
+    for number in np.unique(side.rail):
+        mine = side.rail == number
+        before[mine] = rails[number].bridged_before(side.t[mine])
+    on_one = np.diff(side.rail) == 0
+    bridged = np.where(on_one, np.minimum(np.abs(np.diff(before)), steps), 0.0)
+    unmet = np.isnan(before)
+    return np.where(unmet[1:] | unmet[:-1], 0.5 * steps * (unmet[1:] + unmet[:-1].astype(int)), bridged)
 
 
 def _guide(rails: Sequence[RailLine], chain: Sequence[RailPair], half_spacing_m: float) -> np.ndarray:
@@ -170,11 +175,11 @@ def _guide(rails: Sequence[RailLine], chain: Sequence[RailPair], half_spacing_m:
     return np.concatenate(pieces)
 
 
-def _finished(xyz: np.ndarray, parameters: CenterlineParameters) -> np.ndarray:
-    """Smooth in plan and leave out needless vertices."""
+def _smoothed(xyz: np.ndarray, smoothing_m: float) -> np.ndarray:
+    """Smooth in plan, and place vertices as close as the shape asks for."""
     along = length_along(xyz[:, :2])
-    _, t = resample(xyz, parameters.smoothing_m / 4)
+    _, t = resample(xyz, smoothing_m / 4)
     # Free ends: rails are smooth already, and a fixed end would straighten a curve.
-    plan = smooth_line(xyz[:, :2], parameters.smoothing_m, stations=t, ends="free")
+    plan = smooth_line(xyz[:, :2], smoothing_m, stations=t, ends="free")
     z = np.interp(t, along, xyz[:, 2])
-    return simplify(np.column_stack([plan, z]), parameters.simplify_xy_m, parameters.simplify_z_m)
+    return np.column_stack([plan, z])

@@ -16,7 +16,6 @@ from .polyline import Feet, interpolate, project, starts_at_its_end
 from .progress import SILENT, Progress
 from .rails import RailLine, length_along
 from .railtop import LEAST_POINTS, find_top
-from .smoothing import simplify
 from .vectorize.network import LineNetwork
 
 BRIDGE_M = 0.5
@@ -48,8 +47,6 @@ class ElevationParameters:
         Radius of the disc that rolls along the top.
     smoothing_xy_m, smoothing_z_m : float
         Sigma of PAEK that smoothed the line in plan, and the one for its heights.
-    simplify_xy_m, simplify_z_m : float
-        Tolerances within which vertices are left out.
     min_length_m : float
         Shorter lines are dropped.
     """
@@ -60,8 +57,6 @@ class ElevationParameters:
     crown_radius_m: float = 20.0
     smoothing_xy_m: float = 0.8
     smoothing_z_m: float = 3.0
-    simplify_xy_m: float = 0.002
-    simplify_z_m: float = 0.002
     min_length_m: float = 1.0
 
 
@@ -99,7 +94,7 @@ def flat_rails(network: LineNetwork, class_code: int, parameters: ElevationParam
     """Make rails without heights of the lines of a network, for want of points; figures of support are 0 or NaN."""
     rails = []
     for line in network.lines:
-        xyz = _finished(np.column_stack([line, np.full(len(line), np.nan)]), parameters)
+        xyz = np.column_stack([line, np.full(len(line), np.nan)])
         rail = RailLine(xyz, 0, class_code, points=0, resid_mm=np.nan, sigma_mm=np.nan, bridged_m=0.0)
         if rail.length_m >= parameters.min_length_m:
             rails.append(rail)
@@ -107,14 +102,10 @@ def flat_rails(network: LineNetwork, class_code: int, parameters: ElevationParam
 
 
 def _numbered(rails: Sequence[RailLine]) -> tuple[RailLine, ...]:
-    ordered = sorted(rails, key=lambda rail: tuple(rail.xyz[0, :2]))
+    """Let rails start at the right end, and number them from west to east."""
+    directed = (rail.reversed() if starts_at_its_end(rail.xyz) else rail for rail in rails)
+    ordered = sorted(directed, key=lambda rail: tuple(rail.xyz[0, :2]))
     return tuple(replace(rail, rail_id=number) for number, rail in enumerate(ordered, start=1))
-
-
-def _finished(xyz: np.ndarray, parameters: ElevationParameters) -> np.ndarray:
-    """Leave out needless vertices and start at the right end."""
-    xyz = simplify(xyz, parameters.simplify_xy_m, parameters.simplify_z_m)
-    return xyz[::-1] if starts_at_its_end(xyz) else xyz
 
 
 def _raise_line(
@@ -141,12 +132,13 @@ def _raise_line(
     along = length_along(line)
     start, end = _supported(supporting.t, along[-1], free_ends)
     stations = np.concatenate([[start], along[(along > start) & (along < end)], [end]])
-    bridged = bridged_length(supporting.t, start, end)
+    gaps = find_gaps(supporting.t, start, end)
+    bridged = float(np.sum(gaps[:, 1] - gaps[:, 0]))
     spacing = max(end - start - bridged, BRIDGE_M) / len(supporting.t)
     resid = float(np.sqrt(np.mean(supporting.across**2)))
     sigma = resid * np.sqrt(min(VARIANCE_FACTOR * spacing / parameters.smoothing_xy_m, 1.0))
-    xyz = _finished(np.column_stack([interpolate(line, along, stations), profile.at(stations)]), parameters)
-    return RailLine(xyz, 0, 0, len(supporting.t), 1000 * resid, 1000 * float(sigma), bridged)
+    xyz = np.column_stack([interpolate(line, along, stations), profile.at(stations)])
+    return RailLine(xyz, 0, 0, len(supporting.t), 1000 * resid, 1000 * float(sigma), bridged, gaps - start)
 
 
 def _supported(t: np.ndarray, length_m: float, free_ends: np.ndarray) -> tuple[float, float]:
@@ -157,7 +149,14 @@ def _supported(t: np.ndarray, length_m: float, free_ends: np.ndarray) -> tuple[f
     return 0.0 if keep_start else float(start), length_m if keep_end else float(end)
 
 
-def bridged_length(t: np.ndarray, start: float, end: float) -> float:
-    """Length without points from `start` to `end`: of the stretches longer than BRIDGE_M between chainages `t`."""
-    gaps = np.diff(np.concatenate([[start], np.clip(np.sort(t), start, end), [end]]))
-    return float(gaps[gaps > BRIDGE_M].sum())
+def find_gaps(t: np.ndarray, start: float, end: float) -> np.ndarray:
+    """Find the stretches longer than BRIDGE_M without points from `start` to `end`, given the points' chainages.
+
+    Returns
+    -------
+    (k, 2) array
+        Start and end of each.
+    """
+    borders = np.concatenate([[start], np.clip(np.sort(t), start, end), [end]])
+    wide = np.flatnonzero(np.diff(borders) > BRIDGE_M)
+    return np.column_stack([borders[wide], borders[wide + 1]])

@@ -19,47 +19,78 @@ ASTRAY_M = 0.2
 
 
 @dataclass(frozen=True)
+class Meeting:
+    """Where normals meet the rails of one side, (n,) arrays.
+
+    Attributes
+    ----------
+    distance_m, height_m : float
+        How far the rail is and how high; NaN where there is none near the expected distance.
+    rail : int
+        Number of the rail that was met.
+    t : float
+        Plan chainage along it.
+    """
+
+    distance_m: np.ndarray
+    height_m: np.ndarray
+    rail: np.ndarray
+    t: np.ndarray
+
+
+@dataclass(frozen=True)
 class Side:
-    """The rails on one side of a track, in short pieces; piece k runs from point k to point k + 1 of one rail."""
+    """The rails on one side of a track, in short pieces; piece k runs from point k to point k + 1 of one stretch.
+
+    Attributes
+    ----------
+    xyz : (n, 3) array
+    stretch : (n,) int array
+        Number of the stretch that each point belongs to.
+    rail : (n,) int array
+    t : (n,) array
+        Rail of each point, and plan chainage along it.
+    """
 
     xyz: np.ndarray
+    stretch: np.ndarray
     rail: np.ndarray
+    t: np.ndarray
 
     @classmethod
     def of(cls, rails: Sequence[RailLine], spans: Sequence[tuple[int, tuple[float, float]]], margin_m: float) -> Side:
         """Cut the spans out of their rails, with a margin that shows a rail on while its partner is broken."""
-        pieces = []
+        pieces, chainages = [], []
         for number, span in spans:
             line = rails[number].xyz
             along = length_along(line[:, :2])
             start, end = max(min(span) - margin_m, 0.0), min(max(span) + margin_m, along[-1])
-            t = np.linspace(start, end, int(np.ceil((end - start) / PIECE_M)) + 1)
-            pieces.append(interpolate(line, along, t))
-        return cls(np.concatenate(pieces), np.repeat(np.arange(len(pieces)), [len(piece) for piece in pieces]))
+            chainages.append(np.linspace(start, end, int(np.ceil((end - start) / PIECE_M)) + 1))
+            pieces.append(interpolate(line, along, chainages[-1]))
+        counts = [len(piece) for piece in pieces]
+        rail = np.repeat([number for number, _ in spans], counts)
+        return cls(np.concatenate(pieces), np.repeat(np.arange(len(pieces)), counts), rail, np.concatenate(chainages))
 
-    def meet(self, stations: np.ndarray, directions: np.ndarray, expected_m: float) -> tuple[np.ndarray, np.ndarray]:
-        """Go from stations in their directions, (n, 2) unit vectors, to the rail.
-
-        Returns
-        -------
-        distance, height : (n,) arrays
-            How far the rail is and how high; NaN where there is none near the expected distance.
-        """
+    def meet(self, stations: np.ndarray, directions: np.ndarray, expected_m: float) -> Meeting:
+        """Go from stations in their directions, (n, 2) unit vectors, to the rail."""
         tree = cKDTree(self.xyz[:, :2])
         off, nearest = tree.query(stations + expected_m * directions, distance_upper_bound=ASTRAY_M)
         nearest = np.where(np.isfinite(off), nearest, 0)
-        found = np.full((2, len(stations)), np.nan)
+        found = np.full((3, len(stations)), np.nan)
         for first in (nearest - 1, nearest):
             a, b = np.maximum(first, 0), np.minimum(first + 1, len(self.xyz) - 1)
             ahead_a, ahead_b = (self._ahead(point, stations, directions) for point in (a, b))
             passed = ahead_a - ahead_b
             share = np.divide(ahead_a, passed, out=np.full(len(passed), np.inf), where=passed != 0)
             # A rail is prolonged by a piece: two rails of a track hardly end abreast to the centimetre.
-            met = np.isfinite(off) & (self.rail[a] == self.rail[b]) & (share >= -1) & (share <= 2)
-            point = self.xyz[a] + np.where(met, share, 0.0)[:, None] * (self.xyz[b] - self.xyz[a])
+            met = np.isfinite(off) & (self.stretch[a] == self.stretch[b]) & (share >= -1) & (share <= 2)
+            share = np.where(met, share, 0.0)
+            point = self.xyz[a] + share[:, None] * (self.xyz[b] - self.xyz[a])
             distance = np.einsum("ij,ij->i", point[:, :2] - stations, directions)
-            found = np.where(met, [distance, point[:, 2]], found)
-        return found[0], found[1]
+            t = self.t[a] + share * (self.t[b] - self.t[a])
+            found = np.where(met, [distance, point[:, 2], t], found)
+        distance, height, t = found
+        return Meeting(distance, height, self.rail[nearest], t)
 
     def _ahead(self, point: np.ndarray, stations: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """How far points lie to the left of the way from the stations in their directions, (n,)."""
@@ -70,8 +101,8 @@ class Side:
 def midway(
     guide: np.ndarray,
     normals: np.ndarray,
-    left: tuple[np.ndarray, np.ndarray],
-    right: tuple[np.ndarray, np.ndarray],
+    left: Meeting,
+    right: Meeting,
     spacing_m: float,
 ) -> np.ndarray:
     """Find the middle between both rails at stations.
@@ -82,8 +113,7 @@ def midway(
     ----------
     guide, normals : (n, 2) arrays
         Stations between the rails and unit vectors to the left.
-    left, right : tuple of (n,) arrays
-        Distance and height of the rails, as `Side.meet` gives them.
+    left, right : Meeting
     spacing_m : float
         Spacing to assume where no station meets both rails.
 
@@ -91,13 +121,13 @@ def midway(
     -------
     (k, 3) array
     """
-    (to_left, left_z), (to_right, right_z) = left, right
+    to_left, to_right = left.distance_m, right.distance_m
     both = to_left + to_right
     usual = np.nanmedian(both) if np.isfinite(both).any() else spacing_m
     shift = np.where(np.isnan(both), np.where(np.isnan(to_left), usual / 2 - to_right, to_left - usual / 2), 0.0)
     shift = np.where(np.isnan(both), shift, (to_left - to_right) / 2)
     known = ~np.isnan(shift)
-    z = (_filled(left_z) + _filled(right_z)) / 2
+    z = (_filled(left.height_m) + _filled(right.height_m)) / 2
     return np.column_stack([guide + shift[:, None] * normals, z])[known]
 
 

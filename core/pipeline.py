@@ -19,6 +19,7 @@ from .rails import Centerline, RailLine, RailNetwork
 from .raster import cell_size, rasterize
 from .refinement import refine
 from .smoothing import smooth_network
+from .thinning import thin
 from .vectorize import vectorize
 
 
@@ -110,7 +111,8 @@ def extract_rails(clouds: Sequence[RailPoints], parameters: Parameters, progress
         found = rails_of(points, parameters, engine, step.span(0.0, 0.9), first_id=len(rails) + 1)
         rails += found
         centerlines += tracks_of(found, parameters, step.span(0.9, 1.0), first_id=len(centerlines) + 1)
-    return RailNetwork(tuple(rails), tuple(centerlines), clouds[0].frame, engine.description)
+    lines = thin([*rails, *centerlines], parameters.simplify_xy_m, parameters.simplify_z_m)
+    return RailNetwork(lines[: len(rails)], lines[len(rails) :], clouds[0].frame, engine.description)
 
 
 def rails_of(
@@ -136,8 +138,6 @@ def rails_of(
         crown_radius_m=parameters.crown_radius_m,
         smoothing_xy_m=parameters.smoothing_xy_m,
         smoothing_z_m=parameters.smoothing_z_m,
-        simplify_xy_m=parameters.simplify_xy_m,
-        simplify_z_m=parameters.simplify_z_m,
         min_length_m=parameters.min_length_m,
     )
     rails = elevate(network, points, elevation, progress.span(0.95, 1.0))
@@ -152,8 +152,6 @@ def tracks_of(
         tolerance_m=parameters.centerline_tolerance_m,
         max_gap_m=parameters.max_gap_m,
         smoothing_m=parameters.smoothing_xy_m,
-        simplify_xy_m=parameters.simplify_xy_m,
-        simplify_z_m=parameters.simplify_z_m,
         min_length_m=parameters.min_length_m,
     )
     gauges = (parameters.gauge_m, *parameters.other_gauges_m)

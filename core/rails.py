@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -25,6 +25,9 @@ def length_along(vertices: np.ndarray) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
+NO_GAPS = np.empty((0, 2))
+
+
 @dataclass(frozen=True)
 class RailLine:
     """The top of one railhead on the head's own axis.
@@ -43,6 +46,8 @@ class RailLine:
         Standard error of the line's lateral position.
     bridged_m : float
         Plan length without supporting points.
+    gaps : (k, 2) array
+        Where these stretches start and end, in plan chainage along the line; none are known of lines read from files.
     """
 
     xyz: np.ndarray
@@ -52,12 +57,25 @@ class RailLine:
     resid_mm: float
     sigma_mm: float
     bridged_m: float
+    gaps: np.ndarray = field(default_factory=NO_GAPS.copy)
 
     @property
     def length_m(self) -> float:
         """Length in space; in plan where the line has no height."""
         flat = np.isnan(self.xyz[:, 2]).any()
         return float(length_along(self.xyz[:, :2] if flat else self.xyz)[-1])
+
+    def bridged_before(self, t: np.ndarray) -> np.ndarray:
+        """Length of gaps between the start and the chainages `t`, (n,) metres."""
+        if not len(self.gaps):
+            return 0.0 * t  # unknown chainages stay NaN
+        passed = np.cumsum(self.gaps[:, 1] - self.gaps[:, 0])
+        return np.interp(t, self.gaps.ravel(), np.repeat(np.append(0.0, passed), 2)[1:-1])
+
+    def reversed(self) -> RailLine:
+        """Run the same line the other way."""
+        plan_length = length_along(self.xyz[:, :2])[-1]
+        return replace(self, xyz=self.xyz[::-1], gaps=plan_length - self.gaps[::-1, ::-1])
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
-from rail_extract.core.elevation import ElevationParameters, bridged_length, elevate, flat_rails
+from rail_extract.core.elevation import ElevationParameters, elevate, find_gaps, flat_rails
 from rail_extract.core.points import LocalFrame, RailPoints
-from rail_extract.core.rails import length_along
 from rail_extract.core.vectorize.network import LineNetwork
 
 WIDTH = 0.072
@@ -117,10 +116,19 @@ def test_heights_run_on_across_a_gap_which_counts_as_bridged(gap):
     assert rail.bridged_m == pytest.approx(gap, abs=0.2)
 
 
-def test_bridged_length_counts_long_gaps_and_unsupported_ends():
+def test_gaps_are_long_stretches_without_points_and_unsupported_ends():
     t = np.concatenate([np.arange(2.0, 5.01, 0.1), np.arange(5.4, 8.01, 0.1), [9.0]])
-    assert bridged_length(t, 0.0, 10.0) == pytest.approx(2.0 + 1.0 + 1.0)
-    assert bridged_length(np.arange(0, 10.01, 0.1), 0.0, 10.0) == 0.0
+    np.testing.assert_allclose(find_gaps(t, 0.0, 10.0), [[0, 2], [8, 9], [9, 10]])
+    assert find_gaps(np.arange(0, 10.01, 0.1), 0.0, 10.0).shape == (0, 2)
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_gaps_lie_where_the_finished_line_has_no_points(turn):
+    points = cloud(head(40, 80) + [5.0, 0.0, 0.0])
+    points = RailPoints(points.xyz[np.abs(points.xyz[:, 0] - 21.0) > 1.5], points.frame, points.class_code)
+    (rail,) = elevate(network_of(straight_line(60)[::turn]), points, PARAMETERS)
+    np.testing.assert_allclose(rail.xyz[0, 0], 5.0, atol=0.1)
+    np.testing.assert_allclose(rail.gaps, [[14.5, 17.5]], atol=0.2)
 
 
 def test_lines_are_directed_numbered_and_carry_their_class():
@@ -141,12 +149,6 @@ def test_lines_without_points_and_short_lines_are_left_out():
     rails = elevate(network_of(*lines), points, PARAMETERS)
     assert len(rails) == 1
     assert rails[0].xyz[0, 1] == 0.0
-
-
-def test_vertices_are_thinned_to_what_the_shape_needs():
-    (rail,) = elevate(network_of(straight_line(100)), cloud(head(100, 100)), PARAMETERS)
-    assert len(rail.xyz) < 15
-    assert length_along(rail.xyz)[-1] == pytest.approx(100.0, abs=1e-3)
 
 
 def test_figures_of_support():
