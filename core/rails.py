@@ -66,11 +66,12 @@ class RailLine:
         return float(length_along(self.xyz[:, :2] if flat else self.xyz)[-1])
 
     def bridged_before(self, t: np.ndarray) -> np.ndarray:
-        """Length of gaps between the start and the chainages `t`, (n,) metres."""
+        """Length of gaps between the start and the chainages `t`, (n,) metres; beyond the line's ends all is gap."""
+        beyond = t - np.clip(t, 0.0, length_along(self.xyz[:, :2])[-1])
         if not len(self.gaps):
-            return 0.0 * t  # unknown chainages stay NaN
+            return beyond
         passed = np.cumsum(self.gaps[:, 1] - self.gaps[:, 0])
-        return np.interp(t, self.gaps.ravel(), np.repeat(np.append(0.0, passed), 2)[1:-1])
+        return beyond + np.interp(t, self.gaps.ravel(), np.repeat(np.append(0.0, passed), 2)[1:-1])
 
     def reversed(self) -> RailLine:
         """Run the same line the other way."""
