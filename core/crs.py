@@ -21,6 +21,9 @@ EPSG_CODES = range(1024, 32767)
 LENGTH_UNITS = {9001: ("metre", 1.0), 9002: ("foot", 0.3048), 9003: ("US survey foot", 1200 / 3937)}
 """EPSG's codes for units of length: name and metres."""
 
+SAME_PLACE = 1e-3
+"""Units of a coordinate system by which a place may differ between two descriptions of it."""
+
 
 def import_pyproj():
     """Import pyproj on first need.
@@ -155,6 +158,20 @@ def common_crs(systems: Sequence[tuple[str, pyproj.CRS | None]]) -> pyproj.CRS |
                 "bring all tiles into one coordinate system first."
             )
     return first
+
+
+def same_plane(first_wkt: str, second_wkt: str, xy: tuple[float, float]) -> bool:
+    """Tell whether two systems mean the same place by plan coordinates, tried at `xy`; heights do not matter.
+
+    Descriptions of one system differ from file to file, and what counts is where they put the rails.
+    """
+    pyproj = import_pyproj()
+    plane = [_unbound((_unbound(crs).sub_crs_list or [crs])[0]) for crs in map(parse_crs, (first_wkt, second_wkt))]
+    try:
+        there = pyproj.Transformer.from_crs(*plane, always_xy=True).transform(*xy)
+    except pyproj.exceptions.ProjError:
+        return plane[0].equals(plane[1], True)
+    return max(abs(there[0] - xy[0]), abs(there[1] - xy[1])) < SAME_PLACE
 
 
 def _name(crs: pyproj.CRS | None) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from .centerlines import CenterlineParameters, build_centerlines
-from .elevation import ElevationParameters, elevate
+from .elevation import ElevationParameters, elevate, flat_rails
 from .errors import NoRailPointsError, NoTrackError
 from .frpdf import DEFAULT_PASSES
 from .frpdf.cleanup import clean
@@ -16,9 +16,10 @@ from .frpdf.zoo import choose
 from .points import RailPoints
 from .progress import SILENT, Progress
 from .rails import Centerline, RailLine, RailNetwork
-from .raster import cell_size, rasterize
+from .raster import RailRaster, cell_size, rasterize
 from .refinement import refine
 from .smoothing import smooth_network
+from .standards import distinct_gauges
 from .thinning import thin
 from .vectorize import vectorize
 
@@ -118,19 +119,33 @@ def extract_rails(clouds: Sequence[RailPoints], parameters: Parameters, progress
 def rails_of(
     points: RailPoints, parameters: Parameters, engine: Engine, progress: Progress = SILENT, first_id: int = 1
 ) -> list[RailLine]:
-    """Extract the rails of one class: rasterize, clean, vectorize, smooth, move onto the heads, give height."""
+    """Extract the rails of one class: rasterize, clean, make lines."""
     raster = rasterize(points.xyz, cell_size(parameters.gauge_m, parameters.head_width_m))
     cleaned = clean(raster, engine, parameters.passes, progress.span(0.0, 0.8))
+    return lines_of(cleaned, points.class_code, points, parameters, progress.span(0.8, 1.0), first_id)
+
+
+def lines_of(
+    raster: RailRaster,
+    class_code: int,
+    points: RailPoints | None,
+    parameters: Parameters,
+    progress: Progress = SILENT,
+    first_id: int = 1,
+) -> list[RailLine]:
+    """Turn the cleaned raster of one class into rails: vectorize, smooth, move onto the heads, give height.
+
+    Without points the rails stay where the raster shows them, and have no heights.
+    """
     network = vectorize(
-        cleaned,
+        raster,
         parameters.head_width_m,
         parameters.max_gap_m,
         parameters.gap_angle_deg,
         parameters.min_length_m,
-        progress.span(0.8, 0.9),
+        progress.span(0.0, 0.5),
     )
     network = smooth_network(network, parameters.smoothing_xy_m)
-    network = refine(network, points, parameters.head_width_m, parameters.smoothing_xy_m, progress.span(0.9, 0.95))
     elevation = ElevationParameters(
         head_width_m=parameters.head_width_m,
         tolerance_xy_m=parameters.tolerance_xy_m,
@@ -140,7 +155,11 @@ def rails_of(
         smoothing_z_m=parameters.smoothing_z_m,
         min_length_m=parameters.min_length_m,
     )
-    rails = elevate(network, points, elevation, progress.span(0.95, 1.0))
+    if points is None:
+        rails = flat_rails(network, class_code, elevation)
+    else:
+        network = refine(network, points, parameters.head_width_m, parameters.smoothing_xy_m, progress.span(0.5, 0.75))
+        rails = elevate(network, points, elevation, progress.span(0.75, 1.0))
     return [replace(rail, rail_id=number) for number, rail in enumerate(rails, start=first_id)]
 
 
@@ -154,7 +173,7 @@ def tracks_of(
         smoothing_m=parameters.smoothing_xy_m,
         min_length_m=parameters.min_length_m,
     )
-    gauges = (parameters.gauge_m, *parameters.other_gauges_m)
+    gauges = distinct_gauges((parameters.gauge_m, *parameters.other_gauges_m), parameters.centerline_tolerance_m)
     centerlines: list[Centerline] = []
     refusals: list[NoTrackError] = []
     for number, gauge_m in enumerate(gauges):

@@ -9,6 +9,7 @@ example. Tables differ by 1 to 3 mm, by where on the head they measure. Widths f
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .errors import ParameterError
@@ -129,6 +130,32 @@ def resolve(name: str, gauge_mm: float | None = None, head_width_mm: float | Non
     gauge_m = base.gauge_m if gauge_mm is None else gauge_mm / 1000
     head_width_m = base.head_width_m if head_width_mm is None else head_width_mm / 1000
     return RailStandard(CUSTOM, f"{head_width_m * 1000:g} mm head, {gauge_m * 1000:g} mm", gauge_m, head_width_m)
+
+
+def distinct_gauges(gauges_m: Sequence[float], tolerance_m: float) -> tuple[float, ...]:
+    """Gauges to pair rails by, each once.
+
+    Parameters
+    ----------
+    gauges_m : sequence of float
+    tolerance_m : float
+        Deviation from its gauge at which a track is still one.
+
+    Raises
+    ------
+    ParameterError
+        One is none a railway has, or two are too near to each other to be told apart: tracks would come twice.
+    """
+    distinct = tuple(dict.fromkeys(gauges_m))
+    for gauge_m in distinct:
+        _check("gauge", 1000 * gauge_m, GAUGE_RANGE_MM)
+    for low, high in zip(sorted(distinct), sorted(distinct)[1:]):
+        if high - low < tolerance_m:
+            raise ParameterError(
+                f"Gauges of {1000 * low:g} and {1000 * high:g} mm can't be told apart within CENTERLINE_TOLERANCE "
+                f"({tolerance_m:g} m): give one of them, or a smaller tolerance."
+            )
+    return distinct
 
 
 def _check(quantity: str, value_mm: float, allowed_mm: tuple[float, float]) -> None:

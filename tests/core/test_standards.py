@@ -6,7 +6,7 @@ import math
 
 import pytest
 from rail_extract.core.errors import ParameterError
-from rail_extract.core.standards import DEFAULT, STANDARDS, UNCONFIRMED, resolve
+from rail_extract.core.standards import DEFAULT, STANDARDS, UNCONFIRMED, distinct_gauges, resolve
 
 INTERFACE = """
 US_90ARAA_1435 US_100ARAA_1435 US_100RE_1435 US_115RE_1435 US_119RE_1435 US_132RE_1435 US_133RE_1435 US_136RE_1435
@@ -86,3 +86,18 @@ def test_impossible_widths_are_refused(head_width_mm):
 def test_an_unknown_name_is_refused():
     with pytest.raises(ParameterError, match="unknown"):
         resolve("EN_61E1_1435")
+
+
+def test_gauges_to_pair_by_are_each_taken_once():
+    assert distinct_gauges((1.435, 1.0, 1.435), 0.05) == (1.435, 1.0)
+
+
+@pytest.mark.parametrize("gauges", [(1.520, 1.524), (1.435, 1.0, 1.48)])
+def test_gauges_that_the_tolerance_mixes_up_are_refused(gauges):
+    with pytest.raises(ParameterError, match="CENTERLINE_TOLERANCE"):
+        distinct_gauges(gauges, 0.05)
+
+
+def test_impossible_other_gauges_are_refused():
+    with pytest.raises(ParameterError, match="A gauge of 1 mm"):
+        distinct_gauges((1.435, 0.001), 0.05)

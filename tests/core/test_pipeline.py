@@ -1,0 +1,66 @@
+"""The steps of the walk: what each gives alone, and several gauges in one run."""
+
+import numpy as np
+import pytest
+from rail_extract.core.errors import NoTrackError
+from rail_extract.core.pipeline import Parameters, lines_of, tracks_of
+from rail_extract.core.points import LocalFrame, RailPoints
+from rail_extract.core.rails import RailLine
+from rail_extract.core.raster import cell_size, rasterize
+from rail_extract.core.synthetic.curves import Element, trace, transition_curve
+
+WIDTH = 0.072
+CURVES = [trace([Element(40.0)], heading=0.4), trace(transition_curve(15, 20, 15, 1 / 300), heading=-0.6)]
+
+
+def rails_at(curve, *lefts):
+    """Exact rails at distances to the left of a curve."""
+    lines = [np.column_stack([curve.offset(left), np.full(len(curve.xy), 100.0)]) for left in lefts]
+    return [RailLine(line, number, 10, 100, 1.0, 0.1, 0.0) for number, line in enumerate(lines, start=1)]
+
+
+@pytest.mark.parametrize("curve", CURVES)
+@pytest.mark.parametrize("narrow", [1.0, 1.067])
+def test_the_shared_rail_of_a_three_rail_track_serves_both_gauges(curve, narrow):
+    rails = rails_at(curve, 0.0, narrow + WIDTH, 1.435 + WIDTH)
+    wide, small = tracks_of(rails, Parameters(1.435, WIDTH, other_gauges_m=(narrow,)))
+    assert (wide.track_id, small.track_id) == (1, 2)
+    assert {wide.left_ids + wide.right_ids, small.left_ids + small.right_ids} == {(3, 1), (2, 1)}
+    assert wide.gauge_mm == pytest.approx(1435, abs=0.2)
+    assert small.gauge_mm == pytest.approx(1000 * narrow, abs=0.2)
+    assert wide.length_m == pytest.approx(small.length_m, rel=0.02)
+
+
+def test_four_rails_of_two_gauges_on_one_axis_make_two_tracks():
+    rails = rails_at(CURVES[0], *((side * (gauge + WIDTH) / 2) for gauge in (1.435, 1.0) for side in (-1, 1)))
+    tracks = tracks_of(rails, Parameters(1.435, WIDTH, other_gauges_m=(1.0,)))
+    assert [round(track.gauge_mm) for track in tracks] == [1435, 1000]
+    assert [sorted(track.left_ids + track.right_ids) for track in tracks] == [[1, 2], [3, 4]]
+
+
+def test_tracks_of_two_gauges_side_by_side_are_numbered_through():
+    lefts = (0.0, 1.435 + WIDTH, 5.0, 5.0 + 1.0 + WIDTH)
+    tracks = tracks_of(rails_at(CURVES[0], *lefts), Parameters(1.435, WIDTH, other_gauges_m=(1.0, 1.435)), first_id=7)
+    assert [(track.track_id, round(track.gauge_mm)) for track in tracks] == [(7, 1435), (8, 1000)]
+
+
+def test_a_gauge_that_nothing_has_is_no_error_beside_one_that_something_has():
+    rails = rails_at(CURVES[0], 0.0, 1.0 + WIDTH)
+    assert len(tracks_of(rails, Parameters(1.435, WIDTH, other_gauges_m=(1.0,)))) == 1
+    with pytest.raises(NoTrackError):
+        tracks_of(rails, Parameters(1.435, WIDTH))
+
+
+def test_lines_without_points_stay_where_the_raster_shows_them():
+    along = np.arange(0, 20, 0.005)
+    xyz = np.column_stack([along, 0.3 * along, np.full(len(along), 100.0)])
+    raster = rasterize(xyz, cell_size(1.435, WIDTH))
+    (flat,) = lines_of(raster, 11, None, Parameters(1.435, WIDTH), first_id=4)
+    (high,) = lines_of(raster, 11, RailPoints(xyz, LocalFrame(np.zeros(3)), 11), Parameters(1.435, WIDTH), first_id=4)
+    assert (
+        (flat.rail_id, flat.class_code, flat.points) == (4, 11, 0) == (high.rail_id, high.class_code, 0 * high.points)
+    )
+    assert np.isnan(flat.xyz[:, 2]).all()
+    assert flat.length_m == pytest.approx(20 * np.hypot(1, 0.3), abs=0.1)
+    assert np.abs(flat.xyz[:, 1] - 0.3 * flat.xyz[:, 0]).max() < raster.cell_m
+    np.testing.assert_allclose(high.xyz[:, 2], 100, atol=1e-6)
