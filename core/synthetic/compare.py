@@ -32,7 +32,7 @@ class Comparison:
         Share of the lines' length within the tolerance of a true line, in plan.
     lateral_rmse_m, lateral_p95_m, lateral_bias_m : float
         Offset of the line in plan, positive to the left of the truth.
-    height_rmse_m, height_bias_m : float
+    height_rmse_m, height_p95_m, height_bias_m : float
         Height of the line above the truth.
     line_count, truth_count : int
     length_ratio : float
@@ -45,6 +45,7 @@ class Comparison:
     lateral_p95_m: float
     lateral_bias_m: float
     height_rmse_m: float
+    height_p95_m: float
     height_bias_m: float
     line_count: int
     truth_count: int
@@ -52,14 +53,84 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class _Pieces:
-    """Short straight pieces of polylines: (n, 3) starts and ends, metres."""
+class Offsets:
+    """Offsets of lines from the truth at many places, (n,) each; `weight` is the length a place stands for."""
+
+    distance: np.ndarray
+    lateral: np.ndarray
+    height: np.ndarray
+    weight: np.ndarray
+
+    @property
+    def length_m(self) -> float:
+        """Length of all places together."""
+        return float(self.weight.sum())
+
+    @classmethod
+    def between(cls, true: np.ndarray, line: np.ndarray, left: np.ndarray, weight: np.ndarray) -> Offsets:
+        """Offsets from true places to places on lines, (n, 3) each, where `left` is the truth's left."""
+        step = line - true
+        return cls(np.hypot(step[:, 0], step[:, 1]), np.sum(step[:, :2] * left, axis=1), step[:, 2], weight)
+
+    def within(self, tolerance_m: float) -> Offsets:
+        """Those whose line is near the truth."""
+        near = self.distance <= tolerance_m
+        return Offsets(self.distance[near], self.lateral[near], self.height[near], self.weight[near])
+
+
+@dataclass(frozen=True)
+class Match:
+    """Offsets between lines and truth, found once and judged by any tolerance.
+
+    Attributes
+    ----------
+    there, back : Offsets
+        Along the truth, and along the lines.
+    line : (n,) int array
+        Line that each place of `back` lies on.
+    line_count, truth_count : int
+    """
+
+    there: Offsets
+    back: Offsets
+    line: np.ndarray
+    line_count: int
+    truth_count: int
+
+    def within(self, tolerance_m: float) -> Comparison:
+        """Compare, taking for the same thing what is at most this far apart in plan."""
+        there, back = self.there.within(tolerance_m), self.back.within(tolerance_m)
+        return Comparison(
+            completeness=there.length_m / self.there.length_m,
+            correctness=back.length_m / self.back.length_m if len(self.line) else 0.0,
+            lateral_rmse_m=_worse(_rms(there.lateral), _rms(back.lateral)),
+            lateral_p95_m=_worse(_p95(there.lateral), _p95(back.lateral)),
+            lateral_bias_m=_worse(_mean(there.lateral), _mean(back.lateral)),
+            height_rmse_m=_worse(_rms(there.height), _rms(back.height)),
+            height_p95_m=_worse(_p95(there.height), _p95(back.height)),
+            height_bias_m=_worse(_mean(there.height), _mean(back.height)),
+            line_count=self.line_count,
+            truth_count=self.truth_count,
+            length_ratio=self.back.length_m / self.there.length_m,
+        )
+
+    def share_within(self, sigmas_m: np.ndarray, tolerance_m: float = 0.05) -> float:
+        """Share of the lateral errors along the lines that are at most each line's standard error, (m,) metres."""
+        near = self.back.distance <= tolerance_m
+        return float(_mean(np.abs(self.back.lateral[near]) <= np.asarray(sigmas_m)[self.line[near]]))
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Short straight pieces of polylines: (n, 3) starts and ends, metres, and (n,) numbers of their lines."""
 
     start: np.ndarray
     end: np.ndarray
+    number: np.ndarray
 
     @property
     def middle(self) -> np.ndarray:
+        """Points midway between the ends, (n, 3)."""
         return 0.5 * (self.start + self.end)
 
     @property
@@ -70,6 +141,7 @@ class _Pieces:
 
     @property
     def lengths(self) -> np.ndarray:
+        """Lengths in space, (n,)."""
         return np.linalg.norm(self.end - self.start, axis=1)
 
 
@@ -89,52 +161,32 @@ def compare_lines(
     -------
     Comparison
     """
-    lines, true = _cut(extracted), _cut(truth)
+    return match(extracted, truth).within(tolerance_m)
+
+
+def match(extracted: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> Match:
+    """Find for every place of the truth the nearest line, and for every place of the lines the nearest truth.
+
+    Parameters
+    ----------
+    extracted, truth : sequence of (n, 3) array
+        Polylines in metres.
+    """
+    lines, true = cut(extracted), cut(truth)
     if not len(lines.start):
-        return Comparison(0.0, 0.0, *[np.nan] * 5, len(extracted), len(truth), 0.0)
-    feet, _ = _nearest(true.middle, lines)
-    there = _Offsets.between(true.middle, feet, true.left, true.lengths)
-    feet, piece = _nearest(lines.middle, true)
-    back = _Offsets.between(feet, lines.middle, true.left[piece], lines.lengths)
-    near_there, near_back = there.within(tolerance_m), back.within(tolerance_m)
-    return Comparison(
-        completeness=near_there.weight.sum() / there.weight.sum(),
-        correctness=near_back.weight.sum() / back.weight.sum(),
-        lateral_rmse_m=_worse(_rms(near_there.lateral), _rms(near_back.lateral)),
-        lateral_p95_m=_worse(_p95(near_there.lateral), _p95(near_back.lateral)),
-        lateral_bias_m=_worse(_mean(near_there.lateral), _mean(near_back.lateral)),
-        height_rmse_m=_worse(_rms(near_there.height), _rms(near_back.height)),
-        height_bias_m=_worse(_mean(near_there.height), _mean(near_back.height)),
-        line_count=len(extracted),
-        truth_count=len(truth),
-        length_ratio=back.weight.sum() / there.weight.sum(),
-    )
+        nothing = np.full(len(true.start), np.inf)
+        there = Offsets(nothing, nothing, nothing, true.lengths)
+        return Match(there, there.within(0.0), lines.number, len(extracted), len(truth))
+    feet, _ = nearest(true.middle, lines)
+    there = Offsets.between(true.middle, feet, true.left, true.lengths)
+    feet, piece = nearest(lines.middle, true)
+    back = Offsets.between(feet, lines.middle, true.left[piece], lines.lengths)
+    return Match(there, back, lines.number, len(extracted), len(truth))
 
 
-@dataclass(frozen=True)
-class _Offsets:
-    """Offsets of lines from the truth at many places, (n,) each; `weight` is the length a place stands for."""
-
-    distance: np.ndarray
-    lateral: np.ndarray
-    height: np.ndarray
-    weight: np.ndarray
-
-    @classmethod
-    def between(cls, true: np.ndarray, line: np.ndarray, left: np.ndarray, weight: np.ndarray) -> _Offsets:
-        """Offsets from true places to places on lines, (n, 3) each, where `left` is the truth's left."""
-        step = line - true
-        return cls(np.hypot(step[:, 0], step[:, 1]), np.sum(step[:, :2] * left, axis=1), step[:, 2], weight)
-
-    def within(self, tolerance_m: float) -> _Offsets:
-        """Those whose line is near the truth."""
-        near = self.distance <= tolerance_m
-        return _Offsets(self.distance[near], self.lateral[near], self.height[near], self.weight[near])
-
-
-def _cut(lines: Sequence[np.ndarray]) -> _Pieces:
+def cut(lines: Sequence[np.ndarray]) -> Pieces:
     """Cut polylines into pieces of equal length, `STEP_M` at most."""
-    starts, ends = [np.empty((0, 3))], [np.empty((0, 3))]
+    starts, ends, counts = [np.empty((0, 3))], [np.empty((0, 3))], []
     for line in lines:
         chainage = length_along(np.asarray(line)[:, :2])
         count = int(np.ceil(chainage[-1] / STEP_M))
@@ -142,10 +194,11 @@ def _cut(lines: Sequence[np.ndarray]) -> _Pieces:
         places = np.column_stack([np.interp(at, chainage, column) for column in np.asarray(line, dtype=float).T])
         starts.append(places[:-1])
         ends.append(places[1:])
-    return _Pieces(np.concatenate(starts), np.concatenate(ends))
+        counts.append(count)
+    return Pieces(np.concatenate(starts), np.concatenate(ends), np.repeat(np.arange(len(lines)), counts))
 
 
-def _nearest(places: np.ndarray, pieces: _Pieces) -> tuple[np.ndarray, np.ndarray]:
+def nearest(places: np.ndarray, pieces: Pieces) -> tuple[np.ndarray, np.ndarray]:
     """Find the nearest point, in plan, on any piece.
 
     Parameters

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,6 +52,8 @@ class Track:
         How far to the left of the curve the track's axis runs.
     inclination : float
         Inward lean of the heads: 1/20 in most countries, 1/40 in some.
+    sides : tuple of int
+        Rails that are the track's own, +1 left and -1 right; a third rail beside another track has one.
     """
 
     curve: Curve
@@ -60,6 +62,7 @@ class Track:
     cant_m: float | np.ndarray = 0.0
     left_m: float = 0.0
     inclination: float = 1 / 20
+    sides: tuple[int, ...] = (1, -1)
 
     @property
     def centerline(self) -> np.ndarray:
@@ -77,14 +80,29 @@ class Track:
         axis = _turned(left, lean + np.pi / 2)
         return Railhead(top, axis, across)
 
-    def truth(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Left rail, right rail and centerline, each (k, 3), with as few vertices as the curvature allows."""
+    def rails(self) -> tuple[np.ndarray, ...]:
+        """Tops of the track's own rails, each (k, 3), with as few vertices as the curvature allows."""
+        return tuple(self.thinned(self.railhead(side).top) for side in self.sides)
+
+    def thinned(self, line: np.ndarray) -> np.ndarray:
+        """Keep as many of a line's (n, 3) vertices, one at each of the curve's samples, as the curvature asks for."""
         sharpest = max(float(np.abs(self.curve.curvature).max()), 1e-9)
         chord_m = min(np.sqrt(8 * TRUTH_SAGITTA_M / sharpest), LONGEST_CHORD_M)
         stride = max(int(chord_m / self.curve.step_m), 1)
         last = len(self.curve.xy) - 1
-        kept = np.unique(np.append(np.arange(0, last, stride), last))
-        return self.railhead(1).top[kept], self.railhead(-1).top[kept], self.centerline[kept]
+        return line[np.unique(np.append(np.arange(0, last, stride), last))]
+
+    def piece(self, start_m: float, end_m: float) -> Track:
+        """Cut out the part between two chainages of the curve, to the nearest samples."""
+        height, cant = (np.broadcast_to(value, len(self.curve.xy)) for value in (self.height_m, self.cant_m))
+        first = max(int(round(start_m / self.curve.step_m)), 0)
+        curve = self.curve.piece(start_m, end_m)
+        part = slice(first, first + len(curve.xy))
+        return replace(self, curve=curve, height_m=height[part], cant_m=cant[part])
+
+    def inset(self, narrower_m: float) -> Track:
+        """Bring the two heads closer together, as guard rails lie inside running rails."""
+        return replace(self, spacing_m=self.spacing_m - narrower_m)
 
 
 def _turned(left: np.ndarray, angle: np.ndarray) -> np.ndarray:

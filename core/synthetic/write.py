@@ -13,7 +13,8 @@ import numpy as np
 from ..crs import parse_crs
 from ..errors import CloudError, ParameterError
 from ..las import laspy
-from .scenes import SCENES, Scene
+from .scene import Scene
+from .scenes import SCENES
 
 SCALE_M = 0.001
 """Step of the coordinates in the file: a millimetre, as scanners write."""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rail_extract.core.synthetic.compare import compare_lines
+from rail_extract.core.rails import Centerline, RailLine
+from rail_extract.core.synthetic.compare import compare_lines, match
+from rail_extract.core.synthetic.compare_tracks import compare_tracks
 
 
 def straight(start=0.0, end=100.0, left=0.0, up=0.0, heading=0.3, count=11):
@@ -90,3 +92,23 @@ def test_lines_without_height_still_compare_in_plan():
     assert result.completeness == 1.0
     assert result.lateral_bias_m == pytest.approx(0.01, abs=1e-9)
     assert np.isnan(result.height_rmse_m)
+
+
+def test_the_share_within_sigma_weighs_each_line_by_its_own():
+    found = match([straight(left=0.004), straight(left=2.012, end=50)], [straight(), straight(left=2)])
+    assert found.share_within(np.array([0.005, 0.005])) == pytest.approx(2 / 3, abs=0.001)
+    assert found.share_within(np.array([0.005, 0.015])) == 1.0
+    assert found.share_within(np.array([0.001, 0.001])) == 0.0
+
+
+def test_gauge_and_cant_are_measured_along_the_track():
+    truth = [straight(left=0.75), straight(left=-0.75)]
+    lines = [straight(left=0.753, up=0.004), straight(left=-0.75)]
+    rails = [RailLine(line, number, 10, 0, 0.0, 0.0, 0.0) for number, line in enumerate(lines, start=1)]
+    middle = straight(left=0.0015, up=0.002)
+    track = Centerline(middle, 1, 10, (1,), (2,), 1431.0, 0.0, 0.0, 0.0, 0.0)
+    errors = compare_tracks([track], rails, truth, 0.072)
+    assert errors.gauge_bias_m == pytest.approx(0.003, abs=1e-4)
+    assert errors.cant_bias_m == pytest.approx(0.004, abs=1e-6)
+    assert errors.cant_rmse_m == pytest.approx(0.004, abs=1e-6)
+    assert np.isnan(compare_tracks([], rails, truth, 0.072).gauge_bias_m)

@@ -11,8 +11,10 @@ from rail_extract.core.las import laspy
 from rail_extract.core.points import read_rail_points
 from rail_extract.core.rails import length_along
 from rail_extract.core.synthetic.curves import Element, trace, transition_curve
+from rail_extract.core.synthetic.frogs import FLANGEWAY_M, frog_guards, laid_together
 from rail_extract.core.synthetic.scanner import CROWN_RADIUS_M, FACE_DEPTH_M, Scanner, head_outline, scan
-from rail_extract.core.synthetic.scenes import GROUND, RAIL, SCENES, UNCLASSIFIED
+from rail_extract.core.synthetic.scene import GROUND, RAIL, UNCLASSIFIED
+from rail_extract.core.synthetic.scenes import SCENES
 from rail_extract.core.synthetic.tracks import Track
 from rail_extract.core.synthetic.write import read_truth
 from scipy.spatial import cKDTree
@@ -22,9 +24,20 @@ SPACING_M = 1.507
 WIDTH_M = 0.072
 
 
+PLAIN = ("straight", "curved", "main_line", "paper_like", "tram", "noisy", "sparse", "feet")
+
+
+class Built(dict):
+    """Scenes by name, built when first asked for."""
+
+    def __missing__(self, name):
+        self[name] = SCENES[name]()
+        return self[name]
+
+
 @pytest.fixture(scope="module")
 def scenes():
-    return {name: make() for name, make in SCENES.items()}
+    return Built()
 
 
 def canted_curve():
@@ -62,7 +75,9 @@ def test_parallel_tracks_keep_their_distance():
 
 def test_truth_lines_stay_on_the_curve():
     track = Track(trace([Element(40, 1 / 30, 1 / 30)]), SPACING_M)
-    for line, radius_m in zip(track.truth(), (30 - SPACING_M / 2, 30 + SPACING_M / 2, 30)):
+    for line, radius_m in zip(
+        (*track.rails(), track.thinned(track.centerline)), (30 - SPACING_M / 2, 30 + SPACING_M / 2, 30)
+    ):
         middles = 0.5 * (line[1:] + line[:-1])
         off = radius_m - np.linalg.norm(middles[:, :2] - [0, 30], axis=1)
         assert 0 <= off.min() <= off.max() < 5e-5
@@ -135,7 +150,7 @@ def test_gaps_hold_no_point():
     assert ((x > 13.05) & (x < 39.95)).any()
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", ["paper_like", "noisy", "turnout_9", "diamond"])
 def test_scenes_repeat_exactly(scenes, name):
     again = SCENES[name]()
     # Sums may differ in the last bit by where arrays happen to lie in memory.
@@ -143,13 +158,88 @@ def test_scenes_repeat_exactly(scenes, name):
     np.testing.assert_array_equal(again.classification, scenes[name].classification)
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", PLAIN)
 def test_gauge_of_the_truth_is_the_standards(scenes, name):
     scene = scenes[name]
     for left, right, middle in zip(scene.rails[::2], scene.rails[1::2], scene.centerlines):
         gauge = np.linalg.norm(left - right, axis=1) - scene.standard.head_width_m
         np.testing.assert_allclose(gauge, scene.standard.gauge_m, rtol=0, atol=1e-9)
         np.testing.assert_allclose(middle, 0.5 * (left + right), rtol=0, atol=1e-9)
+
+
+def nearest(points, line, step=0.05):
+    """Distance in plan of points to a line."""
+    t = length_along(line)
+    dense = np.column_stack([np.interp(np.arange(0, t[-1], step), t, column) for column in line[:, :2].T])
+    return cKDTree(dense).query(points[:, :2])[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "rails", "tracks"),
+    [("turnout_7", 4, 2), ("turnout_26", 4, 2), ("crossover", 6, 3), ("diamond", 4, 2), ("dual_gauge", 3, 2)],
+)
+def test_scenes_of_several_tracks_have_each_rail_once(scenes, name, rails, tracks):
+    scene = scenes[name]
+    assert (len(scene.rails), len(scene.centerlines)) == (rails, tracks)
+    for number, rail in enumerate(scene.rails):
+        for other in scene.rails[:number]:
+            assert nearest(rail, other).max() > 0.4
+
+
+@pytest.mark.parametrize("name", ["turnout_7", "turnout_9", "turnout_26"])
+def test_branch_rails_leave_their_stock_rails_tangentially(scenes, name):
+    *stock, left, right = scenes[name].rails
+    for rail, beside in zip((left, right), stock):
+        off = nearest(rail, beside)
+        along = length_along(rail)
+        assert off[along < 3].max() < 0.03
+        assert (np.diff(off[along > 12]) > 0).all()
+
+
+def test_the_throat_leads_to_ten_parallel_tracks(scenes):
+    scene = scenes["throat"]
+    assert (len(scene.rails), len(scene.centerlines)) == (20, 10)
+    ends = np.array([line[-1, :2] for line in scene.centerlines])
+    main = scene.centerlines[0][:, :2]
+    along = (main[-1] - main[0]) / np.linalg.norm(main[-1] - main[0])
+    beside = np.sort((ends - main[0]) @ [-along[1], along[0]])
+    np.testing.assert_allclose(np.diff(beside), 4.5, atol=0.02)
+    np.testing.assert_allclose((ends - main[0]) @ along, 270, atol=1.5)
+
+
+def test_rails_that_meet_share_their_points_and_frogs_have_flangeways():
+    tracks = [Track(trace([Element(40)], (-20 * np.cos(a), -20 * np.sin(a)), a), SPACING_M) for a in (0.0, 0.15)]
+    head = tracks[0].railhead(1)
+    ridden = tracks[0].centerline
+    clouds = [
+        scan(track.railhead(side), WIDTH_M, ridden, Scanner(noise_m=0.0), np.random.RandomState(1))
+        for track in tracks
+        for side in (1, -1)
+    ]
+    laid = laid_together(tracks, clouds, WIDTH_M)
+    left = [points[np.abs(points[:, 0]) < 18, 1] - head.top[0, 1] for points in laid[2:]]
+    for offsets in left:
+        assert not (np.abs(offsets) < WIDTH_M / 2 - 1e-4).any(), "the first rail's head gives these points"
+        assert not ((offsets < -WIDTH_M / 2 - 2e-3) & (offsets > -WIDTH_M / 2 - FLANGEWAY_M + 2e-3)).any()
+        assert (np.abs(offsets) < 0.15).any()
+    assert len(laid[0]) < len(clouds[0]), "the other track's flangeways cut it too"
+
+
+def test_a_diamond_has_check_and_wing_rails_inside_its_acute_frogs():
+    tracks = [Track(trace([Element(60)], (-30 * np.cos(a), -30 * np.sin(a)), a), SPACING_M) for a in (0.0, 0.15)]
+    guards = frog_guards(tracks, WIDTH_M)
+    assert len(guards) == 8
+    apart = SPACING_M / 2 - WIDTH_M - FLANGEWAY_M
+    flat = [guard.top[:, :2] for guard in guards]
+    beside = [np.abs(xy @ np.array([-np.sin(a), np.cos(a)])) for xy in flat for a in (0.0, 0.15)]
+    assert sum(np.allclose(offset, apart, atol=1e-4) for offset in beside) == 8
+    far = SPACING_M / 2 / np.sin(0.075)
+    middles = np.array([np.linalg.norm(xy.mean(axis=0)) for xy in flat])
+    assert (np.abs(middles - far) < 2).all()
+    checks = np.array([np.ptp(xy, axis=0).max() > 3 for xy in flat])
+    assert checks.sum() == 4
+    assert (middles[checks] < far).all(), "two thirds of a check rail lie ahead of the nose"
+    assert (middles[~checks] > far).all(), "wing rails lie around it"
 
 
 def near_rail(scene, rail, reach_m=0.045):
