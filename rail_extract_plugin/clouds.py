@@ -3,13 +3,27 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsMapLayer, QgsPointCloudLayer, QgsProcessingContext, QgsProcessingUtils, QgsProperty
+from qgis.core import (
+    QgsCoordinateReferenceSystem,
+    QgsMapLayer,
+    QgsPointCloudLayer,
+    QgsProcessingContext,
+    QgsProcessingUtils,
+    QgsProperty,
+)
 
 from ..core.errors import CloudError
+from ..core.progress import Progress
+
+if TYPE_CHECKING:
+    from ..core.points import RailPoints
+
+Bounds = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -21,7 +35,7 @@ class CloudSource:
     paths : tuple of Path
         Files, or folders of them.
     crs_wkt : str or None
-        What the user set on the loaded layer; None for a path.
+        What the user set, for files that state none.
     """
 
     paths: tuple[Path, ...]
@@ -55,6 +69,19 @@ def cloud_source(value: Any, context: QgsProcessingContext) -> CloudSource:
     return CloudSource(_files(Path(layer.source())), crs_wkt)
 
 
+def read_points(
+    source: CloudSource,
+    class_codes: Sequence[int],
+    bounds: Callable[[QgsCoordinateReferenceSystem], Bounds | None],
+    progress: Progress,
+) -> tuple[RailPoints, ...]:
+    """Read the points of the wanted classes; `bounds` says in the cloud's coordinate system where to look."""
+    from ..core.points import read_headers, read_rail_points
+
+    crs = QgsCoordinateReferenceSystem(read_headers(source.paths)[0].crs_wkt or source.crs_wkt or "")
+    return read_rail_points(source.paths, class_codes, source.crs_wkt, bounds(crs), progress)
+
+
 def _loaded_layer(name: str, context: QgsProcessingContext) -> QgsMapLayer | None:
     return QgsProcessingUtils.mapLayerFromString(name, context, allowLoadingNewLayers=False)
 
@@ -69,7 +96,8 @@ def _tiles(catalogue: Path) -> tuple[Path, ...]:
     """Tiles of a virtual point cloud, which is a STAC collection in JSON that names a file for each item."""
     try:
         items = json.loads(catalogue.read_text(encoding="utf-8"))["features"]
-        tiles = tuple(catalogue.parent / asset["href"] for item in items for asset in item["assets"].values())
+        # Other assets, such as the overview, repeat points of the tiles.
+        tiles = tuple(catalogue.parent / item["assets"]["data"]["href"] for item in items)
     except (ValueError, TypeError, KeyError, AttributeError, OSError) as error:
         raise CloudError(f"{catalogue.name} is no virtual point cloud: build it again from its tiles.") from error
     absent = next((tile for tile in tiles if not tile.exists()), None)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
@@ -18,13 +19,16 @@ from qgis.core import (
     QgsGeometry,
     QgsLineString,
     QgsProcessing,
+    QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingOutputLayerDefinition,
     QgsProperty,
+    QgsWkbTypes,
 )
 
 from ..core.errors import RailExtractError
 from .compat import INTEGER, REAL, TEXT, field
+from .styling import style_on_load
 
 if TYPE_CHECKING:
     from ..core.points import LocalFrame
@@ -57,6 +61,17 @@ CENTERLINE_FIELDS = (
 """Names and types, each name that of the attribute of `RailLine` or `Centerline` it holds."""
 
 
+@dataclass(frozen=True)
+class LineKind:
+    """Fields of a layer of lines, and the style it gets when QGIS loads it."""
+
+    columns: tuple[tuple[str, Any], ...]
+    style: str
+
+
+RAILS, CENTERLINES = LineKind(RAIL_FIELDS, "rails"), LineKind(CENTERLINE_FIELDS, "centerlines")
+
+
 def fields(columns: Sequence[tuple[str, Any]]) -> QgsFields:
     """Make the fields of a layer from `RAIL_FIELDS` or `CENTERLINE_FIELDS`."""
     made = QgsFields()
@@ -68,13 +83,19 @@ def fields(columns: Sequence[tuple[str, Any]]) -> QgsFields:
 def features(
     lines: Sequence[RailLine | Centerline], columns: Sequence[tuple[str, Any]], frame: LocalFrame
 ) -> Iterator[QgsFeature]:
-    """Turn lines into features with heights, in the cloud's coordinates."""
+    """Turn lines into features in the cloud's coordinates, with heights unless no line has any."""
+    flat = is_flat(lines)
     for line in lines:
-        x, y, z = frame.to_crs(line.xyz).T
+        coordinates = frame.to_crs(line.xyz).T[: 2 if flat else 3].tolist()
         feature = QgsFeature()
-        feature.setGeometry(QgsGeometry(QgsLineString(x.tolist(), y.tolist(), z.tolist())))
+        feature.setGeometry(QgsGeometry(QgsLineString(*coordinates)))
         feature.setAttributes([_attribute(getattr(line, name), kind) for name, kind in columns])
         yield feature
+
+
+def is_flat(lines: Sequence[RailLine | Centerline]) -> bool:
+    """Tell whether there are lines, but none with heights."""
+    return bool(lines) and all(any(map(math.isnan, line.xyz[:, 2])) for line in lines)
 
 
 def add_features(sink: QgsFeatureSink, made: Iterator[QgsFeature]) -> None:
@@ -88,6 +109,43 @@ def add_features(sink: QgsFeatureSink, made: Iterator[QgsFeature]) -> None:
     for feature in made:
         if not sink.addFeature(feature, QgsFeatureSink.Flag.FastInsert):
             raise RailExtractError(f"The output can't be written ({sink.lastError()}): check the disk's free space.")
+
+
+def write_lines(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    kind: LineKind,
+    lines: Sequence[RailLine | Centerline],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write lines into the output called `name`.
+
+    Returns
+    -------
+    dict of str to str
+        The layer's id by the output's name; empty where the user skipped the output.
+
+    Raises
+    ------
+    RailExtractError
+        The output can't be written.
+    """
+    shape = QgsWkbTypes.Type.LineString if is_flat(lines) else QgsWkbTypes.Type.LineStringZ
+    sink, layer_id = algorithm.parameterAsSink(
+        parameters, name, context, fields(kind.columns), shape, output_crs(frame.crs_wkt)
+    )
+    if sink is None:
+        return {}
+    add_features(sink, features(lines, kind.columns, frame))
+    style_on_load(layer_id, kind.style, context)
+    return {name: layer_id}
+
+
+def figures_of(lines: Sequence[RailLine | Centerline], what: str) -> dict[str, float]:
+    """Count lines and measure them, as the outputs RAIL_COUNT and RAIL_LENGTH for RAIL."""
+    return {f"{what}_COUNT": len(lines), f"{what}_LENGTH": float(sum(line.length_m for line in lines))}
 
 
 def output_crs(wkt: str | None) -> QgsCoordinateReferenceSystem:

@@ -1,0 +1,231 @@
+"""Files of rail rasters: GeoTIFFs with one band a class, of which only blocks that hold rail cells are touched."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from osgeo import gdal
+
+from ..core.crs import parse_crs, units
+from ..core.errors import RasterError
+from ..core.points import LocalFrame
+from ..core.progress import SILENT, Progress
+from ..core.raster import TILE, RailRaster
+from .rasters import BLOCK, GAUGE_TAG, HEAD_TAG, MODEL_TAG, RasterHeader
+
+CREATION = (
+    "TILED=YES",
+    f"BLOCKXSIZE={BLOCK}",
+    f"BLOCKYSIZE={BLOCK}",
+    "SPARSE_OK=TRUE",
+    "INTERLEAVE=BAND",
+    "COMPRESS=DEFLATE",
+    "BIGTIFF=IF_SAFER",
+)
+
+ALIKE = 1e-6
+"""Two sides of a cell may differ by this share: writers round."""
+
+HIGHEST_CLASS = 255
+
+UNTOLD_CLASS = 10
+"""Class of a single band that does not say: RAIL_CLASSES' default, rail in the LAS specification."""
+
+
+def read_header(path: Path) -> RasterHeader:
+    """Read and check all but the cells.
+
+    Raises
+    ------
+    RasterError
+        It is no raster, is turned, has cells that are not square, or bands of which it is not known what they hold.
+    CrsError
+        Its coordinates are no lengths.
+    """
+    dataset = _open(path)
+    x, width, skew_x, y, skew_y, height = dataset.GetGeoTransform()
+    if skew_x or skew_y or not math.isclose(width, -height, rel_tol=ALIKE) or width <= 0:
+        raise RasterError(f"{path.name} is turned or its cells are not square: warp it to square cells, north up.")
+    wkt = dataset.GetProjection() or None
+    unit_m = units(parse_crs(wkt))[0] if wkt else 1.0
+    return RasterHeader(
+        class_codes=_class_codes(dataset, path.name),
+        frame=LocalFrame(np.array([x, y, 0.0]), unit_m, unit_m, wkt),
+        cell_m=width * unit_m,
+        window=(0, 0, dataset.RasterYSize, dataset.RasterXSize),
+        gauge_m=_tag_m(dataset, GAUGE_TAG, path.name),
+        head_width_m=_tag_m(dataset, HEAD_TAG, path.name),
+        model=dataset.GetMetadataItem(MODEL_TAG),
+    )
+
+
+def read_rasters(path: Path, header: RasterHeader, progress: Progress = SILENT) -> tuple[RailRaster, ...]:
+    """Read the cells of every band, block by block and only where the file holds any.
+
+    A cell is rail where its value is neither 0 nor the band's value for no data.
+    """
+    dataset = _open(path)
+    grid = RailRaster({}, header.cell_m, 0.0, 0.0)
+    rasters = []
+    for number in range(1, dataset.RasterCount + 1):
+        band = dataset.GetRasterBand(number)
+        share = progress.span((number - 1) / dataset.RasterCount, number / dataset.RasterCount)
+        cells = [np.empty((0, 2), dtype=np.int64)]
+        for row, column, height, width in share.follow(list(filled_blocks(band))):
+            block = _read(band, row, column, height, width, path.name)
+            cells.append(np.argwhere(block) + np.array([row, column]))
+        rasters.append(grid.with_cells(np.concatenate(cells)))
+    return tuple(rasters)
+
+
+def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress = SILENT) -> None:
+    """Write rasters of the header's grid; cells outside its window are left out. A failed file is taken away again.
+
+    Raises
+    ------
+    RasterError
+        The file can't be written.
+    Cancelled
+        The user cancelled.
+    """
+    gdal.ErrorReset()
+    try:
+        _write(path, header, rasters, progress)
+        if gdal.GetLastErrorType() >= gdal.CE_Failure:
+            raise RuntimeError(gdal.GetLastErrorMsg())
+    except RuntimeError as error:
+        path.unlink(missing_ok=True)
+        raise RasterError(f"{path} can't be written ({error}): choose another place.") from error
+    except BaseException:
+        path.unlink(missing_ok=True)
+        raise
+
+
+def filled_blocks(band: gdal.Band) -> Iterator[tuple[int, int, int, int]]:
+    """Find the blocks of a band that its file holds: row, column, height and width of each, in cells."""
+    return _filled(band, 0, 0, band.YSize, band.XSize)
+
+
+def _filled(band: gdal.Band, row: int, column: int, height: int, width: int) -> Iterator[tuple[int, int, int, int]]:
+    status, _ = band.GetDataCoverageStatus(column, row, width, height, gdal.GDAL_DATA_COVERAGE_STATUS_DATA)
+    if not status & gdal.GDAL_DATA_COVERAGE_STATUS_DATA:
+        return
+    if height <= BLOCK and width <= BLOCK:
+        yield row, column, height, width
+        return
+    for top, rows in _halves(row, height):
+        for left, columns in _halves(column, width):
+            yield from _filled(band, top, left, rows, columns)
+
+
+def _halves(start: int, length: int) -> tuple[tuple[int, int], ...]:
+    """Split a stretch of cells between two blocks, near its middle."""
+    if length <= BLOCK:
+        return ((start, length),)
+    first = BLOCK * math.ceil(length / BLOCK / 2)
+    return (start, first), (start + first, length - first)
+
+
+def _open(path: Path) -> gdal.Dataset:
+    try:
+        dataset = gdal.OpenEx(str(path), gdal.OF_RASTER | gdal.OF_READONLY)
+    except RuntimeError:  # where another plugin switched GDAL's exceptions on
+        dataset = None
+    if dataset is None or dataset.RasterCount == 0:
+        raise RasterError(f"{path} is no raster that can be read: give the output of Rasterize Rail Points.")
+    return dataset
+
+
+def _class_codes(dataset: gdal.Dataset, name: str) -> tuple[int, ...]:
+    """Class of each band, by its description."""
+    texts = [dataset.GetRasterBand(number).GetDescription() for number in range(1, dataset.RasterCount + 1)]
+    if texts and all(text.isdecimal() and int(text) <= HIGHEST_CLASS for text in texts):
+        return tuple(int(text) for text in texts)
+    if len(texts) == 1:
+        return (UNTOLD_CLASS,)
+    raise RasterError(
+        f"{name} has {len(texts)} bands, and not every description is a class code: give a raster with one band, or "
+        "with one band a class like those of Rasterize Rail Points."
+    )
+
+
+def _tag_m(dataset: gdal.Dataset, tag: str, name: str) -> float | None:
+    """Length of a tag in millimetres; None where it is missing."""
+    text = dataset.GetMetadataItem(tag)
+    if text is None:
+        return None
+    try:
+        return float(text) / 1000
+    except ValueError:
+        raise RasterError(f"The tag {tag} of {name} is no number but {text!r}: make the raster again.") from None
+
+
+def _read(band: gdal.Band, row: int, column: int, height: int, width: int, name: str) -> np.ndarray:
+    """Rail cells of a block, (height, width) bool."""
+    try:
+        data = band.ReadRaster(column, row, width, height, buf_type=gdal.GDT_Byte)
+    except RuntimeError:
+        data = None
+    if data is None:
+        raise RasterError(f"{name} is damaged at row {row}, column {column}: make it again.")
+    block = np.frombuffer(data, dtype=np.uint8).reshape(height, width)
+    empty = band.GetNoDataValue() or 0
+    return (block != 0) & (block != empty)
+
+
+def _write(path: Path, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress) -> None:
+    dataset = _create(path, header)
+    if dataset is None:
+        return
+    blocks = [
+        (number, block)
+        for number, raster in enumerate(rasters, start=1)
+        for block in sorted(_blocks_of(raster, header.window))
+    ]
+    for number, (top, left) in progress.follow(blocks):
+        row, column, height, width = header.window
+        size = min(BLOCK, height - top), min(BLOCK, width - left)
+        cells = rasters[number - 1].read(row + top, column + left, *size)
+        dataset.GetRasterBand(number).WriteRaster(left, top, size[1], size[0], cells.astype(np.uint8).tobytes())
+    dataset.FlushCache()
+
+
+def _blocks_of(raster: RailRaster, window: tuple[int, int, int, int]) -> set[tuple[int, int]]:
+    """North-west corners of the file's blocks, counted from that of the window, that a raster has tiles in."""
+    row, column, height, width = window
+    corners = {
+        ((down * TILE - row) // BLOCK * BLOCK, (right * TILE - column) // BLOCK * BLOCK) for down, right in raster.tiles
+    }
+    return {(top, left) for top, left in corners if 0 <= top < height and 0 <= left < width}
+
+
+def _create(path: Path, header: RasterHeader) -> gdal.Dataset | None:
+    """Make an empty file; None, with GDAL's error set, where that fails."""
+    row, column, height, width = header.window
+    driver = gdal.GetDriverByName("GTiff")
+    dataset = driver.Create(str(path), width, height, len(header.class_codes), gdal.GDT_Byte, list(CREATION))
+    if dataset is None:
+        return None
+    x, y, _ = header.frame.to_crs(np.array([column * header.cell_m, -row * header.cell_m, 0.0]))
+    side = header.cell_m / header.frame.horizontal_unit_m
+    dataset.SetGeoTransform((float(x), side, 0.0, float(y), 0.0, -side))
+    if header.frame.crs_wkt:
+        dataset.SetProjection(header.frame.crs_wkt)
+    tags = {
+        GAUGE_TAG: _millimetres(header.gauge_m),
+        HEAD_TAG: _millimetres(header.head_width_m),
+        MODEL_TAG: header.model,
+    }
+    dataset.SetMetadata({tag: text for tag, text in tags.items() if text})
+    for number, code in enumerate(header.class_codes, start=1):
+        band = dataset.GetRasterBand(number)
+        band.SetDescription(str(code))
+        band.SetNoDataValue(0)
+    return dataset
+
+
+def _millimetres(length_m: float | None) -> str:
+    return "" if length_m is None else f"{1000 * length_m:.6g}"

@@ -1,0 +1,100 @@
+"""What a file of rail rasters says besides its cells: grid, classes, coordinate system, and the rails it is of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..core.errors import ParameterError, RasterError
+from ..core.frpdf.zoo import choose
+from ..core.points import LocalFrame
+from ..core.raster import TILE, RailRaster
+from ..core.standards import CUSTOM, RailStandard, resolve
+
+BLOCK = 4 * TILE
+"""Cells along the side of a block in the file. Its table lists the empty ones too: at 4 cm, 30,000 for 10 km."""
+
+MOST_BLOCKS = 2**24
+"""Blocks in a band, at most: their table then takes 0.3 GB; a square of 167 km at 4 cm."""
+
+GAUGE_TAG, HEAD_TAG, MODEL_TAG = "RAIL_GAUGE_MM", "RAIL_HEAD_MM", "RAIL_MODEL"
+
+
+@dataclass(frozen=True)
+class RasterHeader:
+    """What a file of rail rasters says besides its cells.
+
+    Attributes
+    ----------
+    class_codes : tuple of int
+        One for each band.
+    frame : LocalFrame
+        Its origin is the corner of cell (0, 0) of the `RailRaster`s.
+    cell_m : float
+    window : tuple of int
+        First row, first column, height and width of the file's part of the grid, in cells.
+    gauge_m, head_width_m : float or None
+        Of the rails that the raster was made for.
+    model : str or None
+        Name of the network's weights that fit it.
+    """
+
+    class_codes: tuple[int, ...]
+    frame: LocalFrame
+    cell_m: float
+    window: tuple[int, int, int, int]
+    gauge_m: float | None = None
+    head_width_m: float | None = None
+    model: str | None = None
+
+    def standard(self, gauge_mm: float | None, head_width_mm: float | None) -> RailStandard:
+        """Find gauge and head width: what the user gives, else what the file says.
+
+        Raises
+        ------
+        ParameterError
+            Neither says, or the number is impossible.
+        """
+        gauge_mm = gauge_mm if gauge_mm is not None or self.gauge_m is None else 1000 * self.gauge_m
+        head_width_mm = (
+            head_width_mm if head_width_mm is not None or self.head_width_m is None else 1000 * self.head_width_m
+        )
+        if gauge_mm is None or head_width_mm is None:
+            raise ParameterError(
+                f"The raster does not say for which rails it was made (tags {GAUGE_TAG} and {HEAD_TAG}): "
+                "fill GAUGE and HEAD_WIDTH."
+            )
+        return resolve(CUSTOM, gauge_mm, head_width_mm)
+
+
+def header_for(
+    rasters: Sequence[RailRaster], class_codes: Sequence[int], frame: LocalFrame, standard: RailStandard
+) -> RasterHeader:
+    """Lay out a file that holds rasters of one grid and a margin of a tile, in which the network may close gaps.
+
+    Raises
+    ------
+    RasterError
+        The cells lie too far apart for a file.
+    """
+    tiles = np.array([tile for raster in rasters for tile in raster.tiles])
+    first, last = tiles.min(axis=0) - 1, tiles.max(axis=0) + 2
+    height, width = ((last - first) * TILE).tolist()
+    cell_m = rasters[0].cell_m
+    if math.ceil(height / BLOCK) * math.ceil(width / BLOCK) > MOST_BLOCKS:
+        raise RasterError(
+            f"The rail points are spread over {width * cell_m / 1000:.0f} by {height * cell_m / 1000:.0f} km, too far "
+            "for a raster: set EXTENT, which also leaves out stray points."
+        )
+    window = (*(first * TILE).tolist(), height, width)
+    model = choose(standard.gauge_m, standard.head_width_m).name
+    return RasterHeader(tuple(class_codes), frame, cell_m, window, standard.gauge_m, standard.head_width_m, model)
+
+
+def moved(raster: RailRaster, frame: LocalFrame, other: LocalFrame) -> RailRaster:
+    """Give a raster's place in another local frame of the same coordinate system."""
+    x0, y0, _ = other.to_local(frame.to_crs(np.array([raster.x0, raster.y0, 0.0])))
+    return replace(raster, x0=float(x0), y0=float(y0))

@@ -1,0 +1,108 @@
+"""What the user filled in: the values of an algorithm's parameters, as the core takes them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from qgis.core import QgsCoordinateReferenceSystem, QgsProcessingAlgorithm, QgsProcessingContext
+
+from ..core.standards import RailStandard, distinct_gauges, resolve
+from .clouds import CloudSource, cloud_source
+from .parameters import gauges_m, whole_numbers
+
+if TYPE_CHECKING:
+    from ..core.pipeline import Parameters
+
+NUMBERS = {
+    "SMOOTHING_XY": "smoothing_xy_m",
+    "SMOOTHING_Z": "smoothing_z_m",
+    "TOLERANCE_XY": "tolerance_xy_m",
+    "TOLERANCE_Z": "tolerance_z_m",
+    "CROWN_RADIUS": "crown_radius_m",
+    "MAX_GAP": "max_gap_m",
+    "GAP_ANGLE": "gap_angle_deg",
+    "SIMPLIFY_XY": "simplify_xy_m",
+    "SIMPLIFY_Z": "simplify_z_m",
+    "MIN_LENGTH": "min_length_m",
+    "CENTERLINE_TOLERANCE": "centerline_tolerance_m",
+}
+"""Attribute of the core's `Parameters` that a number of the interface goes into."""
+
+CHOICES = {"ENGINE": "engine", "DEVICE": "device"}
+
+
+class Values:
+    """Values of the parameters of one run.
+
+    Parameters
+    ----------
+    algorithm : QgsProcessingAlgorithm
+    parameters : dict
+        Values by name, as QGIS hands them over.
+    context : QgsProcessingContext
+    """
+
+    def __init__(
+        self, algorithm: QgsProcessingAlgorithm, parameters: dict[str, Any], context: QgsProcessingContext
+    ) -> None:
+        self._algorithm, self._parameters, self._context = algorithm, parameters, context
+
+    def number(self, name: str) -> float:
+        """Read a number."""
+        return self._algorithm.parameterAsDouble(self._parameters, name, self._context)
+
+    def optional_number(self, name: str) -> float | None:
+        """Read a number that may be left empty."""
+        return self.number(name) if self.filled(name) else None
+
+    def text(self, name: str) -> str:
+        """Read a text."""
+        return self._algorithm.parameterAsString(self._parameters, name, self._context)
+
+    def choice(self, name: str) -> str:
+        """Read the static string of an enum."""
+        return self._algorithm.parameterAsEnumString(self._parameters, name, self._context)
+
+    def filled(self, name: str) -> bool:
+        """Tell whether there is a value."""
+        return self._parameters.get(name) not in (None, "")
+
+    def cloud(self, name: str) -> CloudSource:
+        """Find the files of a cloud; CRS, where the algorithm has it, stands in for theirs."""
+        source = cloud_source(self._parameters.get(name), self._context)
+        crs = self._algorithm.parameterAsCrs(self._parameters, "CRS", self._context)
+        return replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
+
+    def extent(self, crs: QgsCoordinateReferenceSystem) -> tuple[float, float, float, float] | None:
+        """Read EXTENT in `crs`: smallest x, smallest y, largest x, largest y."""
+        extent = self._algorithm.parameterAsExtent(self._parameters, "EXTENT", self._context, crs)
+        if extent.isNull():
+            return None
+        return extent.xMinimum(), extent.yMinimum(), extent.xMaximum(), extent.yMaximum()
+
+    def class_codes(self) -> tuple[int, ...]:
+        """Read RAIL_CLASSES."""
+        return whole_numbers(self.text("RAIL_CLASSES"), "RAIL_CLASSES")
+
+    def standard(self) -> RailStandard:
+        """Read STANDARD, with GAUGE and HEAD_WIDTH in place of its own."""
+        return resolve(self.choice("STANDARD"), self.optional_number("GAUGE"), self.optional_number("HEAD_WIDTH"))
+
+    def other_gauges_m(self, standard: RailStandard) -> tuple[float, ...]:
+        """Read OTHER_GAUGES, and check them beside the standard's gauge."""
+        others = gauges_m(self.text("OTHER_GAUGES"), "OTHER_GAUGES")
+        return distinct_gauges((standard.gauge_m, *others), self.number("CENTERLINE_TOLERANCE"))[1:]
+
+    def settings(self, standard: RailStandard, other_gauges_m: tuple[float, ...] = ()) -> Parameters:
+        """Gather what the algorithm's parameters tell the core; the core's defaults stand for the rest."""
+        from ..core.pipeline import Parameters
+
+        told: dict[str, Any] = {field: self.number(name) for name, field in NUMBERS.items() if self._has(name)}
+        told.update({field: self.choice(name) for name, field in CHOICES.items() if self._has(name)})
+        if self._has("ITERATIONS"):
+            told["passes"] = int(self.number("ITERATIONS"))
+        return Parameters(standard.gauge_m, standard.head_width_m, other_gauges_m=other_gauges_m, **told)
+
+    def _has(self, name: str) -> bool:
+        return self._algorithm.parameterDefinition(name) is not None
