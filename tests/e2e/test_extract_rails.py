@@ -98,12 +98,19 @@ def test_bad_input_is_one_sentence_and_an_exit_code(qgis_process, sample, tmp_pa
     assert not list(tmp_path.iterdir())
 
 
+def wait_for(stream, text):
+    """Read until `text` has been printed."""
+    shown = b""
+    while text not in shown:
+        letter = stream.read(1)
+        assert letter, f"the run ended without printing {text}: {shown}"
+        shown += letter
+
+
 def test_interrupted_run_leaves_nothing(start_qgis_process, sample, tmp_path):
     parameters = {"INPUT": sample / "sample.laz", "STANDARD": STANDARD, "RAILS": tmp_path / "rails.gpkg"}
     with start_qgis_process(parameters) as process:
-        shown = b""
-        while b"20" not in shown.split(b"Inputs")[-1].split(b"RAILS")[-1]:
-            shown += process.stdout.read(1)
+        wait_for(process.stdout, b"...20")
         process.send_signal(signal.SIGINT)
     assert process.returncode != 0
     assert not list(tmp_path.iterdir())

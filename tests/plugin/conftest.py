@@ -25,9 +25,10 @@ SAMPLE = ROOT / "resources" / "sample" / "sample.laz"
 @pytest.fixture(scope="session")
 def qgis(tmp_path_factory):
     """QGIS with its processing framework, in a profile of its own."""
-    os.environ["QGIS_CUSTOM_CONFIG_PATH"] = str(tmp_path_factory.mktemp("profile"))
-    application = QgsApplication([], True)
-    application.initQgis()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("QGIS_CUSTOM_CONFIG_PATH", str(tmp_path_factory.mktemp("profile")))
+        application = QgsApplication([], True)
+        application.initQgis()
     sys.path.append(str(Path(application.pkgDataPath()) / "python" / "plugins"))
     from processing.core.Processing import Processing
 
@@ -103,15 +104,29 @@ def run(algorithm, context):
     """Check the parameters and run Extract Rails, as every front end of QGIS does."""
 
     def run(parameters: dict[str, Any], feedback: Feedback | None = None) -> Outcome:
-        feedback = feedback or Feedback()
-        parameters = {name: str(value) if isinstance(value, Path) else value for name, value in parameters.items()}
-        accepted, message = algorithm.checkParameterValues(parameters, context)
-        if not accepted:
-            return Outcome(False, error=message)
-        results, ok = algorithm.run(parameters, context, feedback)
-        return Outcome(ok, results, "\n".join(feedback.errors))
+        return outcome_of(algorithm, parameters, context, feedback or Feedback())
 
     return run
+
+
+@pytest.fixture
+def run_step(qgis, plugin, context):
+    """The same for any algorithm of the plugin, by its name."""
+
+    def run(name: str, parameters: dict[str, Any], feedback: Feedback | None = None) -> Outcome:
+        algorithm = qgis.processingRegistry().createAlgorithmById(f"railextract:{name}")
+        return outcome_of(algorithm, parameters, context, feedback or Feedback())
+
+    return run
+
+
+def outcome_of(algorithm, parameters: dict[str, Any], context: QgsProcessingContext, feedback: Feedback) -> Outcome:
+    parameters = {name: str(value) if isinstance(value, Path) else value for name, value in parameters.items()}
+    accepted, message = algorithm.checkParameterValues(parameters, context)
+    if not accepted:
+        return Outcome(False, error=message)
+    results, ok = algorithm.run(parameters, context, feedback)
+    return Outcome(ok, results, "\n".join(feedback.errors))
 
 
 @pytest.fixture
