@@ -11,11 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .head_edges import widest_reach
 from .points import RailPoints
 from .polyline import Feet, interpolate, project, starts_at_its_end
 from .progress import SILENT, Progress
 from .rails import RailLine, length_along
 from .railtop import LEAST_POINTS, find_top
+from .uncertainty import measure_support
 from .vectorize.network import LineNetwork
 
 BRIDGE_M = 0.5
@@ -26,9 +28,6 @@ UNSUPPORTED_END_M = 0.15
 
 END_POINTS = 3
 """Points that mark the end of support; one alone may be a weed."""
-
-VARIANCE_FACTOR = 0.33375
-"""Of independent points `spacing` apart, PAEK's result has this variance times spacing / sigma (section 2.4)."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +46,8 @@ class ElevationParameters:
         Radius of the disc that rolls along the top.
     smoothing_xy_m, smoothing_z_m : float
         Sigma of PAEK that smoothed the line in plan, and the one for its heights.
+    cell_m : float
+        Cell of the raster that the line was drawn from.
     min_length_m : float
         Shorter lines are dropped.
     """
@@ -57,6 +58,7 @@ class ElevationParameters:
     crown_radius_m: float = 20.0
     smoothing_xy_m: float = 0.8
     smoothing_z_m: float = 3.0
+    cell_m: float = 0.04
     min_length_m: float = 1.0
 
 
@@ -79,7 +81,8 @@ def elevate(
     tuple of RailLine
         By place of their starts from west to east, numbered from 1. Lines without points and short ones are left out.
     """
-    feet = project(network.lines, points.xyz[:, :2], parameters.tolerance_xy_m, progress.span(0.0, 0.6))
+    reach = max(parameters.tolerance_xy_m, widest_reach(parameters.head_width_m))
+    feet = project(network.lines, points.xyz[:, :2], reach, progress.span(0.0, 0.6))
     free_ends = (network.degrees() == 1)[network.ends]
     rails = []
     for number, line in enumerate(progress.span(0.6, 1.0).follow(network.lines)):
@@ -112,14 +115,13 @@ def _raise_line(
     line: np.ndarray, free_ends: np.ndarray, feet: Feet, z: np.ndarray, parameters: ElevationParameters
 ) -> RailLine | None:
     """Give one line its heights; None where hardly a point supports it."""
-    head = np.abs(feet.across) <= 0.5 * parameters.head_width_m
-    feet, z = feet[head], z[head]
-    if len(z) < LEAST_POINTS:
+    head = np.abs(feet.across) <= min(0.5 * parameters.head_width_m, parameters.tolerance_xy_m)
+    if head.sum() < LEAST_POINTS:
         return None
     found = find_top(
-        feet.t,
-        feet.across,
-        z,
+        feet.t[head],
+        feet.across[head],
+        z[head],
         parameters.head_width_m,
         parameters.crown_radius_m,
         parameters.tolerance_z_m,
@@ -128,17 +130,25 @@ def _raise_line(
     if found is None:
         return None
     profile, top = found
-    supporting = feet[top]
+    supporting = feet[head][top]
     along = length_along(line)
     start, end = _supported(supporting.t, along[-1], free_ends)
     stations = np.concatenate([[start], along[(along > start) & (along < end)], [end]])
     gaps = find_gaps(supporting.t, start, end)
     bridged = float(np.sum(gaps[:, 1] - gaps[:, 0]))
-    spacing = max(end - start - bridged, BRIDGE_M) / len(supporting.t)
     resid = float(np.sqrt(np.mean(supporting.across**2)))
-    sigma = resid * np.sqrt(min(VARIANCE_FACTOR * spacing / parameters.smoothing_xy_m, 1.0))
+    support = measure_support(
+        feet.t,
+        feet.across,
+        z,
+        along[-1],
+        parameters.head_width_m,
+        parameters.smoothing_xy_m,
+        unseen_m=parameters.cell_m / np.sqrt(12),
+    ).between(start, end)
     xyz = np.column_stack([interpolate(line, along, stations), profile.at(stations)])
-    return RailLine(xyz, 0, 0, len(supporting.t), 1000 * resid, 1000 * float(sigma), bridged, gaps - start)
+    figures = (len(supporting.t), 1000 * resid, 1000 * support.rms_m, bridged)
+    return RailLine(xyz, 0, 0, *figures, gaps - start, support)
 
 
 def _supported(t: np.ndarray, length_m: float, free_ends: np.ndarray) -> tuple[float, float]:

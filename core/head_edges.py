@@ -37,15 +37,26 @@ LEAST_ON_RIM = 6
 LEAST_RIM = 0.5
 """Density just inside of an edge over that on the crown, at least: a shadow on the head has edges of its own."""
 
-EVEN_EXCESS, ASKEW_EXCESS = 0.1, 0.3
+EVEN_EXCESS, ASKEW_EXCESS = 0.05, 0.3
 """Relative excess of density at one edge over the other from which the other counts less, and no longer: a scanner
 abreast of the rail sees the corners alike, one at 45 degrees sees half a corner on the far side."""
+
+VIEW = 161
+"""Stations, 40 m, that share the excess: a scanner on a train keeps its view, and 60 points tell it to 20 % only."""
+
+SURE_SIGMAS = 2.0
+"""Standard deviations by which an excess has to stand out from chance, to count without its neighbours."""
 
 HALF_RANGE = HALF_HEAD + FURTHEST + 2 + NEAR_EDGE + RIM
 """Bins to either side of a line that all of this can reach."""
 
 EDGE_ROUNDS = 2
 """Once to see how the scanner looks at the head, and once more at the edges that count."""
+
+
+def widest_reach(head_width_m: float) -> float:
+    """Distance from a line up to which points take part, metres."""
+    return HALF_RANGE * head_width_m / (2 * HALF_HEAD)
 
 
 def histograms(
@@ -80,18 +91,11 @@ def middles(counts: np.ndarray, wide_counts: np.ndarray) -> np.ndarray:
 
     How the scanner looks at the head does not change from window to window, so the wide ones tell the densities.
     """
-    wide = _Heads.of(wide_counts)
-    edges = _Edges.evenly(len(counts))
-    for _ in range(EDGE_ROUNDS):
-        middle = wide.best(edges)
-        edges = wide.edges(middle)
-    share = counts.sum(axis=1) / np.maximum(wide_counts.sum(axis=1), 1)
-    middle = _Heads.of(counts).best(replace(edges, density=edges.density * share))
-    return np.where(edges.seen & (np.abs(middle) < FURTHEST), middle, np.nan)
+    return Heads.of(wide_counts).seen_edges().narrowed(counts, wide_counts)
 
 
 @dataclass(frozen=True)
-class _Edges:
+class Edges:
     """Right and left edge of the heads in s windows.
 
     Attributes
@@ -109,22 +113,33 @@ class _Edges:
     seen: np.ndarray
 
     @classmethod
-    def evenly(cls, windows: int) -> _Edges:
+    def evenly(cls, windows: int) -> Edges:
         """Take both edges alike, for a first look."""
         return cls(np.ones((2, windows)), np.ones((2, windows)), np.ones(windows, dtype=bool))
 
+    def alike(self) -> Edges:
+        """Trust both edges alike, whatever is seen of them."""
+        return replace(self, weight=np.ones_like(self.weight))
+
+    def narrowed(self, counts: np.ndarray, wide_counts: np.ndarray) -> np.ndarray:
+        """Find the middle in narrower windows than those the edges were seen in, (s,); NaN where they were not."""
+        share = counts.sum(axis=1) / np.maximum(wide_counts.sum(axis=1), 1)
+        middle = Heads.of(counts).best(replace(self, density=self.density * share))
+        return np.where(self.seen & (np.abs(middle) < FURTHEST), middle, np.nan)
+
 
 @dataclass(frozen=True)
-class _Heads:
+class Heads:
     """Cumulative counts across at the borders of the bins, (s, 2 HALF_RANGE + 1)."""
 
     sums: np.ndarray
 
     @classmethod
-    def of(cls, counts: np.ndarray) -> _Heads:
+    def of(cls, counts: np.ndarray) -> Heads:
+        """Sum the (s, 2 HALF_RANGE) counts of windows."""
         return cls(np.pad(np.cumsum(counts, axis=1), ((0, 0), (1, 0))))
 
-    def best(self, edges: _Edges) -> np.ndarray:
+    def best(self, edges: Edges) -> np.ndarray:
         """Offset of the head whose edges lie where the density falls to half, (s,) in bins to the left of the line.
 
         Found as the best of all places at once, by the integral over the place of what each edge lacks of its half.
@@ -140,19 +155,37 @@ class _Heads:
         bend = np.maximum(2 * at - before - after, 1e-9)
         return shifts[top] + np.clip(0.5 * (after - before) / bend, -1, 1)
 
-    def edges(self, middle: np.ndarray) -> _Edges:
+    def seen_edges(self) -> Edges:
+        """Find the edges and what they are worth."""
+        edges = Edges.evenly(len(self.sums))
+        for _ in range(EDGE_ROUNDS):
+            edges = self.edges(self.best(edges))
+        return edges
+
+    def edges(self, middle: np.ndarray) -> Edges:
         """Look at the edges of heads at `middle`, (s,)."""
         centre = np.round(middle).astype(int)
         inside = np.array([self._density(centre + side * (HALF_HEAD - NEAR_EDGE), -side) for side in (-1, 1)])
         beyond = np.array([self._density(centre + side * (HALF_HEAD + NEAR_EDGE), side) for side in (-1, 1)])
         crown = self._density(centre - RIM // 2, 1)
-        excess = inside[::-1] / np.maximum(inside, 1e-6) - 1
+        excess = np.maximum(_sure_excess(inside * RIM), _excess(uniform_filter1d(inside, VIEW, axis=1, mode="nearest")))
         weight = 1 - np.clip((excess - EVEN_EXCESS) / (ASKEW_EXCESS - EVEN_EXCESS), 0, 1)
         clear = (inside >= LEAST_RIM * crown) & (beyond <= CLEAR_EDGE * inside) & (inside * RIM >= LEAST_ON_RIM)
-        return _Edges(inside, weight, np.all(clear | (weight == 0), axis=0))
+        return Edges(inside, weight, np.all(clear | (weight == 0), axis=0))
 
     def _density(self, start: np.ndarray, direction: int) -> np.ndarray:
         """Points a bin on the RIM bins that begin at `start`, (s,), and go to the left (1) or right (-1)."""
         rows = np.arange(len(start))
         start = start + HALF_RANGE
         return np.abs(self.sums[rows, start + direction * RIM] - self.sums[rows, start]) / RIM
+
+
+def _excess(density: np.ndarray) -> np.ndarray:
+    """How much more is seen at the other edge, in proportion, (2, s)."""
+    return density[::-1] / np.maximum(density, 1e-6) - 1
+
+
+def _sure_excess(points: np.ndarray) -> np.ndarray:
+    """Excess that points just inside of the edges, (2, s), show beyond chance: shadows come and go along the line."""
+    chance = SURE_SIGMAS * np.sqrt(points[0] + points[1])
+    return (points[::-1] - points - chance) / np.maximum(points, 1e-6)

@@ -153,6 +153,7 @@ def lines_of(
         crown_radius_m=parameters.crown_radius_m,
         smoothing_xy_m=parameters.smoothing_xy_m,
         smoothing_z_m=parameters.smoothing_z_m,
+        cell_m=raster.cell_m,
         min_length_m=parameters.min_length_m,
     )
     if points is None:

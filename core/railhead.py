@@ -29,6 +29,16 @@ OFF_TOP_SIGMAS = 2.5
 LEAST_NOISE_M = 0.001
 """No scanner's points are better; keeps the limits open where heights are rounded or made up."""
 
+LEAST_ON_HEAD = 80
+"""Points on a head from which its top can be told: fewer give no slope."""
+
+DEPTH_M, DEPTH_SIGMAS = 0.006, 1.5
+"""Points further below the top, in metres and in standard deviations of the noise, may be of a side face or a corner.
+Tighter than noise would ask for: what it costs in points on top it costs across the whole head alike."""
+
+ABOVE_SIGMAS = 3.0
+"""Points further above the top, in standard deviations of the noise, are weeds."""
+
 
 def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Height of most points around each point's chainage: medians of short bins, themselves filtered by a median.
@@ -89,6 +99,33 @@ def cross_slope(t: np.ndarray, across: np.ndarray, height: np.ndarray, head_widt
         on_top = crown & (np.abs(height - level - slope * across) <= limit)
         slope, level = _moving_fit(number, on_top, across, height, limit / OFF_TOP_SIGMAS)
     return slope
+
+
+def on_top(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> tuple[np.ndarray, float]:
+    """Tell which points lie on the top of the head, its slope across considered, and how noisy these are.
+
+    Parameters
+    ----------
+    t, across, z : (n,) arrays
+        Points near the line: chainage, increasing, offset to its left, and height; metres.
+    head_width_m : float
+
+    Returns
+    -------
+    top : (n,) bool array
+    noise_m : float
+        Standard deviation of their heights.
+    """
+    head = np.abs(across) <= 0.5 * head_width_m
+    if head.sum() < LEAST_ON_HEAD:
+        return np.zeros(len(t), dtype=bool), LEAST_NOISE_M
+    above = z - np.interp(t, t[head], rough_level(t[head], z[head]))
+    slope = np.interp(t, t[head], cross_slope(t[head], across[head], above[head], head_width_m))
+    flat = above - slope * across
+    flat -= np.interp(t, t[head], rough_level(t[head], flat[head]))
+    noise = spread(flat[head & (np.abs(flat) < 2 * DEPTH_M)])
+    noise = spread(flat[head & (np.abs(flat) < max(2 * DEPTH_M, OFF_TOP_SIGMAS * noise))])
+    return (flat >= -max(DEPTH_M, DEPTH_SIGMAS * noise)) & (flat <= max(DEPTH_M, ABOVE_SIGMAS * noise)), noise
 
 
 def _moving_fit(

@@ -29,6 +29,40 @@ NO_GAPS = np.empty((0, 2))
 
 
 @dataclass(frozen=True)
+class Support:
+    """How well points support a line, at stations of equal distance along it; (n,) arrays.
+
+    Attributes
+    ----------
+    t : float
+        Plan chainage of the stations, metres.
+    points : int
+        Points on top of the head that are nearest to the station.
+    sigma_m : float
+        Standard deviation of the line's lateral position.
+    """
+
+    t: np.ndarray
+    points: np.ndarray
+    sigma_m: np.ndarray
+
+    @property
+    def rms_m(self) -> float:
+        """Standard deviation of the line as a whole."""
+        return float(np.sqrt(np.mean(self.sigma_m**2)))
+
+    def between(self, start: float, end: float) -> Support:
+        """Cut out the stretch from `start` to `end`, with one station at least; chainages then count from `start`."""
+        inside = (self.t >= start) & (self.t <= end)
+        inside[np.argmin(np.abs(self.t - 0.5 * (start + end)))] = True
+        return Support(self.t[inside] - start, self.points[inside], self.sigma_m[inside])
+
+    def reversed(self, length_m: float) -> Support:
+        """Run the line, of this length, the other way."""
+        return Support(length_m - self.t[::-1], self.points[::-1], self.sigma_m[::-1])
+
+
+@dataclass(frozen=True)
 class RailLine:
     """The top of one railhead on the head's own axis.
 
@@ -43,11 +77,13 @@ class RailLine:
     resid_mm : float
         Root mean square of the supporting points' offsets across the line.
     sigma_mm : float
-        Standard error of the line's lateral position.
+        Standard deviation of the line's lateral position: two thirds of the line lie within it.
     bridged_m : float
         Plan length without supporting points.
     gaps : (k, 2) array
         Where these stretches start and end, in plan chainage along the line; none are known of lines read from files.
+    support : Support or None
+        Support along the line; None for lines read from files.
     """
 
     xyz: np.ndarray
@@ -58,6 +94,7 @@ class RailLine:
     sigma_mm: float
     bridged_m: float
     gaps: np.ndarray = field(default_factory=NO_GAPS.copy)
+    support: Support | None = None
 
     @property
     def length_m(self) -> float:
@@ -76,7 +113,8 @@ class RailLine:
     def reversed(self) -> RailLine:
         """Run the same line the other way."""
         plan_length = length_along(self.xyz[:, :2])[-1]
-        return replace(self, xyz=self.xyz[::-1], gaps=plan_length - self.gaps[::-1, ::-1])
+        support = None if self.support is None else self.support.reversed(plan_length)
+        return replace(self, xyz=self.xyz[::-1], gaps=plan_length - self.gaps[::-1, ::-1], support=support)
 
 
 @dataclass(frozen=True)

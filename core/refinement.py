@@ -10,24 +10,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from .head_edges import ENOUGH_POINTS, HALF_HEAD, HALF_RANGE, histograms, middles
+from .head_edges import HALF_HEAD, histograms, middles, widest_reach
 from .points import RailPoints
 from .polyline import left_normals, project
 from .progress import SILENT, Progress
-from .railhead import cross_slope, rough_level, spread
+from .railhead import on_top
 from .rails import length_along
 from .smoothing import smooth_profile
 from .vectorize.network import LineNetwork
 
 ROUNDS = 2
 """The second round sees the head upright and whole; a third moves lines by less than 0.1 mm."""
-
-DEPTH_M, DEPTH_SIGMAS = 0.006, 1.5
-"""Points further below the top, in metres and in standard deviations of the noise, may be of a side face or a corner.
-Tighter than noise would ask for: what it costs in points on top it costs across the whole head alike."""
-
-ABOVE_SIGMAS = 3.0
-"""Points further above the top, in standard deviations of the noise, are weeds."""
 
 LEAST_SHARE = 0.25
 """Share of a line's stations that have to show both edges; otherwise the line stays as it is."""
@@ -69,15 +62,14 @@ def refine(
 def _refine_once(
     network: LineNetwork, points: RailPoints, head_width_m: float, smoothing_m: float, progress: Progress
 ) -> LineNetwork:
-    reach = HALF_RANGE * head_width_m / (2 * HALF_HEAD)
-    feet = project(network.lines, points.xyz[:, :2], reach, progress.span(0.0, 0.7))
+    feet = project(network.lines, points.xyz[:, :2], widest_reach(head_width_m), progress.span(0.0, 0.7))
     freedom = _freedom(network)
     lines = []
     for number, line in enumerate(progress.span(0.7, 1.0).follow(network.lines)):
         mine = feet.of(number)
-        on_top = _on_top(mine.t, mine.across, points.xyz[mine.point, 2], head_width_m)
+        top, _ = on_top(mine.t, mine.across, points.xyz[mine.point, 2], head_width_m)
         along = length_along(line)
-        shift = _shifts(mine.t[on_top], mine.across[on_top], along, head_width_m, smoothing_m)
+        shift = _shifts(mine.t[top], mine.across[top], along, head_width_m, smoothing_m)
         lines.append(line + (shift * freedom[number])[:, None] * left_normals(line))
     nodes = network.nodes.copy()
     for (start, end), line in zip(network.ends, lines):
@@ -100,19 +92,6 @@ def _freedom(network: LineNetwork) -> list[np.ndarray]:
     for number, t in fixed:
         freedom[number] = np.minimum(freedom[number], np.clip(np.abs(along[number] - t) / JUNCTION_M - 1, 0, 1))
     return freedom
-
-
-def _on_top(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> np.ndarray:
-    """Tell which points lie on the top of the head, its slope across considered, (n,) bool."""
-    head = np.abs(across) <= 0.5 * head_width_m
-    if head.sum() < ENOUGH_POINTS:
-        return np.zeros(len(t), dtype=bool)
-    above = z - np.interp(t, t[head], rough_level(t[head], z[head]))
-    slope = np.interp(t, t[head], cross_slope(t[head], across[head], above[head], head_width_m))
-    flat = above - slope * across
-    flat -= np.interp(t, t[head], rough_level(t[head], flat[head]))
-    noise = spread(flat[head & (np.abs(flat) < 2 * DEPTH_M)])
-    return (flat >= -max(DEPTH_M, DEPTH_SIGMAS * noise)) & (flat <= max(DEPTH_M, ABOVE_SIGMAS * noise))
 
 
 def _shifts(

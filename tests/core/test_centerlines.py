@@ -27,7 +27,8 @@ def flat(xy):
 
 def track(curve, left_m=0.0, spacing=SPACING, height=0.0, cant=0.0):
     """Left rail, right rail and centerline."""
-    return Track(curve, spacing, height, cant, left_m).truth()
+    laid = Track(curve, spacing, height, cant, left_m)
+    return (*laid.rails(), laid.thinned(laid.centerline))
 
 
 def without(line, start, end):
