@@ -38,6 +38,10 @@ class Progress:
         """Give a step its share of this progress, from fraction `start` to fraction `end`."""
         return _Span(self, start, end)
 
+    def split(self, count: int) -> list[Progress]:
+        """Give each of `count` equal steps its share of this progress."""
+        return [self.span(number / count, (number + 1) / count) for number in range(count)]
+
     def follow(self, items: Sequence[Item] | Iterable[Item], total: int | None = None) -> Iterator[Item]:
         """Yield `items`, checking for a cancel before each and advancing the fraction after each."""
         count = len(items) if total is None else total  # type: ignore[arg-type]

@@ -66,6 +66,11 @@ def read_rasters(path: Path, header: RasterHeader, progress: Progress = SILENT) 
     """Read the cells of every band, block by block and only where the file holds any.
 
     A cell is rail where its value is neither 0 nor the band's value for no data.
+
+    Raises
+    ------
+    RasterError
+        The file is damaged, or has no rail at all.
     """
     dataset = _open(path)
     grid = RailRaster({}, header.cell_m, 0.0, 0.0)
@@ -74,10 +79,12 @@ def read_rasters(path: Path, header: RasterHeader, progress: Progress = SILENT) 
         band = dataset.GetRasterBand(number)
         share = progress.span((number - 1) / dataset.RasterCount, number / dataset.RasterCount)
         cells = [np.empty((0, 2), dtype=np.int64)]
-        for row, column, height, width in share.follow(list(filled_blocks(band))):
+        for row, column, height, width in share.follow(filled_blocks(dataset, number)):
             block = _read(band, row, column, height, width, path.name)
             cells.append(np.argwhere(block) + np.array([row, column]))
         rasters.append(grid.with_cells(np.concatenate(cells)))
+    if not any(raster.tiles for raster in rasters):
+        raise RasterError(f"{path.name} holds no rail cell: give a raster with 1 where there is rail.")
     return tuple(rasters)
 
 
@@ -104,9 +111,9 @@ def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster
         raise
 
 
-def filled_blocks(band: gdal.Band) -> Iterator[tuple[int, int, int, int]]:
+def filled_blocks(dataset: gdal.Dataset, number: int) -> list[tuple[int, int, int, int]]:
     """Find the blocks of a band that its file holds: row, column, height and width of each, in cells."""
-    return _filled(band, 0, 0, band.YSize, band.XSize)
+    return list(_filled(dataset.GetRasterBand(number), 0, 0, dataset.RasterYSize, dataset.RasterXSize))
 
 
 def _filled(band: gdal.Band, row: int, column: int, height: int, width: int) -> Iterator[tuple[int, int, int, int]]:

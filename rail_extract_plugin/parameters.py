@@ -1,28 +1,30 @@
-"""The parameters of the algorithms, in the groups in which several algorithms share them, and how their values read.
+"""The parameters of the algorithms, in the groups in which several algorithms share them.
 
 Labels carry the unit; numbers are plain numbers, so that no layer's unit is put in their place.
 """
 
 from __future__ import annotations
 
-import re
-
 from qgis.core import (
+    QgsProcessing,
     QgsProcessingParameterCrs,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterEnum,
     QgsProcessingParameterExtent,
+    QgsProcessingParameterFeatureSource,
     QgsProcessingParameterNumber,
     QgsProcessingParameterPointCloudLayer,
+    QgsProcessingParameterRasterLayer,
     QgsProcessingParameterString,
 )
 
-from ..core.errors import ParameterError
+from ..core.frpdf.zoo import MODELS
 from ..core.standards import CUSTOM, DEFAULT, STANDARDS
 from .i18n import tr
 
-ENGINES = ("AUTO", "TORCH", "OPENCV")
-DEVICES = ("AUTO", "CPU", "CUDA")
+AUTO = "AUTO"
+ENGINES = (AUTO, "TORCH", "OPENCV")
+DEVICES = (AUTO, "CPU", "CUDA")
 
 Definitions = tuple[QgsProcessingParameterDefinition, ...]
 
@@ -62,6 +64,53 @@ def rail() -> Definitions:
     )
 
 
+def raster() -> QgsProcessingParameterDefinition:
+    """Which raster of rails."""
+    return _helped(
+        QgsProcessingParameterRasterLayer("INPUT", tr("Rail raster")),
+        tr("One band a class, 1 where there is rail, as Rasterize Rail Points makes it. North up, square cells."),
+    )
+
+
+def raster_rail() -> Definitions:
+    """Which rails a raster is of that does not say so itself."""
+    return (
+        _advanced(
+            _number("GAUGE", tr("Gauge [mm]"), minimum=1.0, optional=True),
+            tr("For a raster made elsewhere, which does not say its gauge; if filled, instead of what it says."),
+        ),
+        _advanced(
+            _number("HEAD_WIDTH", tr("Railhead width [mm]"), minimum=1.0, optional=True),
+            tr("For a raster made elsewhere, which does not say its width; if filled, instead of what it says."),
+        ),
+    )
+
+
+def model() -> QgsProcessingParameterDefinition:
+    """Which weights the network has."""
+    return _helped(
+        _choice("MODEL", tr("Model"), (AUTO, *(one.name for one in MODELS)), AUTO),
+        tr("Trained weights; AUTO takes those that fit the gauge and the railhead width of the raster."),
+    )
+
+
+def points() -> QgsProcessingParameterDefinition:
+    """Which points give lines their heights."""
+    return _helped(
+        QgsProcessingParameterPointCloudLayer("POINTS", tr("Point cloud (layer, file or folder)"), optional=True),
+        tr("The cloud that the raster was made from: it moves lines onto their railheads and gives them heights."),
+    )
+
+
+def rails() -> QgsProcessingParameterDefinition:
+    """Which lines are rails."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return _helped(
+        QgsProcessingParameterFeatureSource("INPUT", tr("Rails"), [line]),
+        tr("Lines of railheads, from Vectorize Rails or drawn by hand."),
+    )
+
+
 def area() -> Definitions:
     """Where to look, and in which coordinates."""
     return (
@@ -84,11 +133,11 @@ def cleanup() -> Definitions:
             tr("0 repeats until nothing changes, at most five times."),
         ),
         _advanced(
-            _choice("ENGINE", tr("Engine"), ENGINES, "AUTO"),
+            _choice("ENGINE", tr("Engine"), ENGINES, AUTO),
             tr("Library that runs the network; AUTO takes the fastest one installed."),
         ),
         _advanced(
-            _choice("DEVICE", tr("Device"), DEVICES, "AUTO"),
+            _choice("DEVICE", tr("Device"), DEVICES, AUTO),
             tr("Processor that runs the network; AUTO takes a GPU where there is one."),
         ),
     )
@@ -122,16 +171,21 @@ def lines() -> Definitions:
             _number("CROWN_RADIUS", tr("Radius that finds the top [m]"), 20.0, minimum=1.0),
             tr("The disc that is rolled along the height profile from above; smaller follows sharper dips."),
         ),
-        _helped(
-            _number("MAX_GAP", tr("Longest gap to close [m]"), 5.0),
-            tr("Line ends up to this far apart are joined if they point at each other."),
-        ),
+        max_gap(),
         _advanced(
             _number("GAP_ANGLE", tr("Largest bend across a gap [°]"), 10.0, maximum=90.0),
             tr("Line ends that meet at a larger angle stay apart."),
         ),
         *simplification(),
         min_length(),
+    )
+
+
+def max_gap() -> QgsProcessingParameterDefinition:
+    """Which gaps are closed."""
+    return _helped(
+        _number("MAX_GAP", tr("Longest gap to close [m]"), 5.0),
+        tr("Line ends up to this far apart are joined if they point at each other."),
     )
 
 
@@ -166,38 +220,6 @@ def pairing() -> Definitions:
             tr("Rails whose distance is off by more than this make no track."),
         ),
     )
-
-
-def whole_numbers(text: str, what: str) -> tuple[int, ...]:
-    """Numbers from a text such as "10,11"; `what` names the parameter in the error.
-
-    Raises
-    ------
-    ParameterError
-        The text is no list of whole numbers, or has none.
-    """
-    words = _words(text)
-    if not words or not all(word.isdecimal() for word in words):
-        raise ParameterError(f'{what} "{text}" should be whole numbers such as 10 or 10,11.')
-    return tuple(dict.fromkeys(int(word) for word in words))
-
-
-def gauges_m(text: str, what: str) -> tuple[float, ...]:
-    """Metres from a text of millimetres such as "1000;1067"; `what` names the parameter in the error.
-
-    Raises
-    ------
-    ParameterError
-        The text holds something else than positive numbers.
-    """
-    words = _words(text)
-    if not all(re.fullmatch(r"\d+(\.\d+)?", word) and float(word) > 0 for word in words):
-        raise ParameterError(f'{what} "{text}" should be millimetres such as 1000;1067.')
-    return tuple(float(word) / 1000 for word in words)
-
-
-def _words(text: str) -> list[str]:
-    return [word for word in re.split(r"[;,\s]+", text) if word]
 
 
 def _number(

@@ -28,6 +28,10 @@ class RailExtractProvider(QgsProcessingProvider):
         """Give the same icon, for places that draw it themselves."""
         return str(ICON)
 
+    def supportedOutputRasterLayerExtensions(self) -> list[str]:
+        """Give the one format that rail rasters are written in."""
+        return ["tif", "tiff"]
+
     def loadAlgorithms(self) -> None:
         """Create the algorithms."""
         for algorithm in ALGORITHMS:

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.errors import ParameterError, RasterError
-from ..core.frpdf.zoo import choose
+from ..core.frpdf.zoo import MODELS, Model, choose
 from ..core.points import LocalFrame
-from ..core.raster import TILE, RailRaster
+from ..core.raster import TILE, RailRaster, cell_size
 from ..core.standards import CUSTOM, RailStandard, resolve
 
 BLOCK = 4 * TILE
@@ -19,6 +19,9 @@ BLOCK = 4 * TILE
 
 MOST_BLOCKS = 2**24
 """Blocks in a band, at most: their table then takes 0.3 GB; a square of 167 km at 4 cm."""
+
+CELL_TOLERANCE = 0.03
+"""Share by which cells may differ from what the network expects: between tracks that training gave it."""
 
 GAUGE_TAG, HEAD_TAG, MODEL_TAG = "RAIL_GAUGE_MM", "RAIL_HEAD_MM", "RAIL_MODEL"
 
@@ -49,6 +52,14 @@ class RasterHeader:
     gauge_m: float | None = None
     head_width_m: float | None = None
     model: str | None = None
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Smallest x, smallest y, largest x, largest y, in units of the coordinate system."""
+        row, column, height, width = self.window
+        corners = np.array([[column, -row - height, 0], [column + width, -row, 0]]) * self.cell_m
+        (west, south, _), (east, north, _) = self.frame.to_crs(corners).tolist()
+        return west, south, east, north
 
     def standard(self, gauge_mm: float | None, head_width_mm: float | None) -> RailStandard:
         """Find gauge and head width: what the user gives, else what the file says.
@@ -92,6 +103,27 @@ def header_for(
     window = (*(first * TILE).tolist(), height, width)
     model = choose(standard.gauge_m, standard.head_width_m).name
     return RasterHeader(tuple(class_codes), frame, cell_m, window, standard.gauge_m, standard.head_width_m, model)
+
+
+def choose_model(header: RasterHeader, name: str) -> Model:
+    """Find the model that the user named, or that fits what the raster says, and check the cell size.
+
+    Raises
+    ------
+    ModelError
+        No model fits.
+    RasterError
+        The cells are not as large as the network expects for such rails.
+    """
+    expected_m = cell_size(header.gauge_m, header.head_width_m)
+    if not math.isclose(header.cell_m, expected_m, rel_tol=CELL_TOLERANCE):
+        raise RasterError(
+            f"The raster's cells are {1000 * header.cell_m:.1f} mm wide, but a gauge of {1000 * header.gauge_m:.0f} mm "
+            f"with a railhead of {1000 * header.head_width_m:.1f} mm needs {1000 * expected_m:.1f} mm: rasterize the "
+            "points for these rails, or correct GAUGE and HEAD_WIDTH."
+        )
+    named = {model.name: model for model in MODELS}
+    return named.get(name) or named.get(header.model or "") or choose(header.gauge_m, header.head_width_m)
 
 
 def moved(raster: RailRaster, frame: LocalFrame, other: LocalFrame) -> RailRaster:

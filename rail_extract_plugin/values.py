@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsCoordinateReferenceSystem, QgsProcessingAlgorithm, QgsProcessingContext
 
+from ..core.errors import ParameterError, RasterError
 from ..core.standards import RailStandard, distinct_gauges, resolve
 from .clouds import CloudSource, cloud_source
-from .parameters import gauges_m, whole_numbers
 
 if TYPE_CHECKING:
     from ..core.pipeline import Parameters
+    from .rasters import RasterHeader
 
 NUMBERS = {
     "SMOOTHING_XY": "smoothing_xy_m",
@@ -68,6 +71,22 @@ class Values:
         """Tell whether there is a value."""
         return self._parameters.get(name) not in (None, "")
 
+    def raster(self, name: str) -> tuple[Path, RasterHeader]:
+        """Find the file of a raster, and read its header.
+
+        Raises
+        ------
+        RasterError
+            It is no rail raster in a file.
+        """
+        from .geotiff import read_header
+
+        layer = self._algorithm.parameterAsRasterLayer(self._parameters, name, self._context)
+        if layer is None:
+            raise RasterError(f"{name} is no raster that can be read: give the output of Rasterize Rail Points.")
+        path = Path(layer.source())
+        return path, read_header(path)
+
     def cloud(self, name: str) -> CloudSource:
         """Find the files of a cloud; CRS, where the algorithm has it, stands in for theirs."""
         source = cloud_source(self._parameters.get(name), self._context)
@@ -106,3 +125,35 @@ class Values:
 
     def _has(self, name: str) -> bool:
         return self._algorithm.parameterDefinition(name) is not None
+
+
+def whole_numbers(text: str, what: str) -> tuple[int, ...]:
+    """Numbers from a text such as "10,11"; `what` names the parameter in the error.
+
+    Raises
+    ------
+    ParameterError
+        The text is no list of whole numbers, or has none.
+    """
+    words = _words(text)
+    if not words or not all(word.isdecimal() for word in words):
+        raise ParameterError(f'{what} "{text}" should be whole numbers such as 10 or 10,11.')
+    return tuple(dict.fromkeys(int(word) for word in words))
+
+
+def gauges_m(text: str, what: str) -> tuple[float, ...]:
+    """Metres from a text of millimetres such as "1000;1067"; `what` names the parameter in the error.
+
+    Raises
+    ------
+    ParameterError
+        The text holds something else than positive numbers.
+    """
+    words = _words(text)
+    if not all(re.fullmatch(r"\d+(\.\d+)?", word) and float(word) > 0 for word in words):
+        raise ParameterError(f'{what} "{text}" should be millimetres such as 1000;1067.')
+    return tuple(float(word) / 1000 for word in words)
+
+
+def _words(text: str) -> list[str]:
+    return [word for word in re.split(r"[;,\s]+", text) if word]

@@ -1,6 +1,10 @@
 """The algorithms of the toolbox, one module each."""
 
+from .build_track_centerlines import BuildTrackCenterlines
 from .extract_rails import ExtractRails
+from .frpdf_cleanup import FrpdfCleanup
+from .rasterize_rail_points import RasterizeRailPoints
+from .vectorize_rails import VectorizeRails
 
-ALGORITHMS = (ExtractRails,)
-"""In the order of the walk from points to tracks."""
+ALGORITHMS = (ExtractRails, RasterizeRailPoints, FrpdfCleanup, VectorizeRails, BuildTrackCenterlines)
+"""The whole walk first, then its steps in their order."""

@@ -59,6 +59,8 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     def checkParameterValues(self, parameters: dict[str, Any], context: QgsProcessingContext) -> tuple[bool, str]:
         """Check all values before a run: as QGIS does, then whether outputs can be written, then as `read` does."""
         accepted, message = super().checkParameterValues(self._with_paths_accepted(parameters), context)
+        if accepted:
+            accepted, message = self.canExecute()
         if not accepted:
             return False, message
         try:

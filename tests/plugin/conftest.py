@@ -59,6 +59,7 @@ def context(qgis):
     context = QgsProcessingContext()
     context.setProject(QgsProject.instance())
     yield context
+    context.temporaryLayerStore().removeAllMapLayers()  # before QGIS itself may end
     QgsProject.instance().clear()
 
 

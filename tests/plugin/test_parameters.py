@@ -2,7 +2,7 @@ import pytest
 from qgis.core import QgsProcessingParameterDefinition
 from rail_extract.core.errors import ParameterError
 from rail_extract.core.standards import STANDARDS
-from rail_extract.rail_extract_plugin.parameters import gauges_m, whole_numbers
+from rail_extract.rail_extract_plugin.values import gauges_m, whole_numbers
 
 PARAMETERS = [
     ("INPUT", "pointcloud", None),

@@ -6,7 +6,16 @@ from qgis.PyQt.QtGui import QIcon
 def test_toolbox_offers_the_algorithms(qgis, plugin):
     provider = qgis.processingRegistry().providerById("railextract")
     assert provider.name() == "Rail Extract"
-    assert [algorithm.id() for algorithm in provider.algorithms()] == ["railextract:extractrails"]
+    assert {algorithm.id() for algorithm in provider.algorithms()} == {
+        f"railextract:{name}"
+        for name in (
+            "extractrails",
+            "rasterizerailpoints",
+            "frpdfcleanup",
+            "vectorizerails",
+            "buildtrackcenterlines",
+        )
+    }
 
 
 def test_icon_can_be_drawn(plugin):
@@ -18,7 +27,13 @@ def test_algorithm_explains_itself(algorithm):
     assert algorithm.displayName() == "Extract rails"
     assert algorithm.group() == "Rails and tracks"
     assert "14 mm" in algorithm.shortHelpString()
-    assert all(definition.help() for definition in algorithm.parameterDefinitions() if not definition.isDestination())
+
+
+def test_every_parameter_explains_itself(plugin):
+    for algorithm in plugin.provider.algorithms():
+        assert algorithm.group() == "Rails and tracks"
+        for definition in algorithm.parameterDefinitions():
+            assert definition.isDestination() or definition.help(), (algorithm.id(), definition.name())
 
 
 def test_unloading_takes_the_provider_away(qgis, plugin):

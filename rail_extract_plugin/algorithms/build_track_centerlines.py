@@ -1,0 +1,95 @@
+"""Build Track Centerlines: from the lines of rails to the lines midway between the two rails of each track."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from qgis.core import (
+    QgsProcessing,
+    QgsProcessingContext,
+    QgsProcessingOutputNumber,
+    QgsProcessingParameterFeatureSink,
+)
+
+from ...core.errors import RailExtractError
+from ...core.progress import Progress
+from ...core.standards import RailStandard
+from .. import parameters as groups
+from ..i18n import tr
+from ..layers import CENTERLINES, figures_of, write_lines
+from ..values import Values
+from .base import RailAlgorithm
+
+READING = 0.1
+"""Share of the progress bar for reading the lines."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What the parameters say."""
+
+    standard: RailStandard
+    other_gauges_m: tuple[float, ...]
+
+
+class BuildTrackCenterlines(RailAlgorithm):
+    """The algorithm ``railextract:buildtrackcenterlines``."""
+
+    NAME = "buildtrackcenterlines"
+    LABEL = "Build track centerlines"
+    TAGS = ("railway", "rail", "track", "centerline", "axis", "gauge", "cant")
+    NEEDS = (("numpy",), ("scipy",), ("pyproj",))
+    SUMMARY = "Pairs rails that lie a gauge apart and draws the line midway between the two rails of each track."
+    HELP = (
+        "Takes the lines of Vectorize Rails, or rails drawn by hand: multi-part and curved lines, in any direction. "
+        "Fields rail_id and class_code are used where they are there; only rails of one class make a track.\n\n"
+        "Fill other gauges for mixed traffic: on track with three rails, the shared one serves both. Lines without "
+        "heights give centerlines without heights."
+    )
+
+    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
+        """Declare the parameters and outputs of the interface, in its order."""
+        line = QgsProcessing.SourceType.TypeVectorLine
+        for definition in (
+            groups.rails(),
+            *groups.rail(),
+            *groups.pairing(),
+            groups.max_gap(),
+            groups.smoothing_xy(),
+            *groups.simplification(),
+            groups.min_length(),
+        ):
+            self.addParameter(definition)
+        self.addParameter(QgsProcessingParameterFeatureSink("OUTPUT", tr("Track centerlines"), line))
+        self.addOutput(QgsProcessingOutputNumber("CENTERLINE_COUNT", tr("Number of track centerlines")))
+        self.addOutput(QgsProcessingOutputNumber("CENTERLINE_LENGTH", tr("Length of the track centerlines [m]")))
+
+    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+        """Read what has to be read in the main thread, and check it all."""
+        values = Values(self, parameters, context)
+        standard = values.standard()
+        if self.parameterAsSource(parameters, "INPUT", context) is None:
+            raise RailExtractError(self.invalidSourceError(parameters, "INPUT"))
+        return Job(standard, values.other_gauges_m(standard))
+
+    def compute(
+        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
+    ) -> dict[str, Any]:
+        """Pair the rails of every class, then write the centerlines."""
+        from ...core.pipeline import tracks_of
+        from ...core.thinning import thin
+        from ..drawn_rails import read_rails
+
+        source = self.parameterAsSource(parameters, "INPUT", context)
+        rails, frame = read_rails(source, progress.span(0, READING))
+        settings = Values(self, parameters, context).settings(job.standard, job.other_gauges_m)
+        classes = sorted({rail.class_code for rail in rails})
+        tracks = []
+        for code, share in zip(classes, progress.span(READING, 1).split(len(classes))):
+            mine = [rail for rail in rails if rail.class_code == code]
+            tracks += tracks_of(mine, settings, share, first_id=len(tracks) + 1)
+        progress.check()
+        thinned = thin(tracks, settings.simplify_xy_m, settings.simplify_z_m)
+        written = write_lines(self, "OUTPUT", CENTERLINES, thinned, frame, parameters, context)
+        return {**written, **figures_of(thinned, "CENTERLINE")}

@@ -1,0 +1,85 @@
+"""FRPDF Cleanup: the network closes gaps in a rail raster and takes noise out of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from qgis.core import QgsProcessingContext, QgsProcessingOutputString, QgsProcessingParameterRasterDestination
+
+from ...core.frpdf.zoo import Model
+from ...core.progress import Progress
+from .. import parameters as groups
+from ..i18n import tr
+from ..styling import style_on_load
+from ..values import Values
+from .base import RailAlgorithm
+
+if TYPE_CHECKING:
+    from ..rasters import RasterHeader
+
+READING, WRITING = 0.05, 0.95
+"""Shares of the progress bar at which the network begins and ends."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What the parameters say."""
+
+    path: Path
+    header: RasterHeader
+    model: Model
+
+
+class FrpdfCleanup(RailAlgorithm):
+    """The algorithm ``railextract:frpdfcleanup``."""
+
+    NAME = "frpdfcleanup"
+    LABEL = "FRPDF cleanup"
+    TAGS = ("railway", "rail", "raster", "neural network", "deep learning", "clean", "repair", "gaps")
+    NEEDS = (("numpy",), ("pyproj",), ("cv2", "torch"))
+    SUMMARY = "Closes gaps in a rail raster and removes what is no rail, with the neural network FRPDF."
+    HELP = (
+        "Takes the raster of Rasterize Rail Points, or one like it; the result has the same grid, bands and tags. The "
+        "network looks at the raster again and again, each time at what it found before.\n\n"
+        "A raster made elsewhere does not say for which rails it was made: fill the gauge and the railhead width then."
+    )
+
+    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
+        """Declare the parameters and outputs of the interface, in its order."""
+        for definition in (groups.raster(), groups.model(), *groups.cleanup(), *groups.raster_rail()):
+            self.addParameter(definition)
+        self.addParameter(QgsProcessingParameterRasterDestination("OUTPUT", tr("Cleaned rail raster")))
+        self.addOutput(QgsProcessingOutputString("ENGINE_USED", tr("Engine that ran the network")))
+
+    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+        """Read the raster's header, and check that a model fits it."""
+        from ..rasters import choose_model
+
+        values = Values(self, parameters, context)
+        path, header = values.raster("INPUT")
+        standard = header.standard(values.optional_number("GAUGE"), values.optional_number("HEAD_WIDTH"))
+        header = replace(header, gauge_m=standard.gauge_m, head_width_m=standard.head_width_m)
+        model = choose_model(header, values.choice("MODEL"))
+        return Job(path, replace(header, model=model.name), model)
+
+    def compute(
+        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
+    ) -> dict[str, Any]:
+        """Clean every band, then write the file."""
+        from ...core.frpdf.cleanup import clean
+        from ...core.frpdf.engine import make_engine
+        from ...core.frpdf.weights import load_arrays
+        from ..geotiff import read_rasters, write_rasters
+
+        values = Values(self, parameters, context)
+        engine = make_engine(load_arrays(job.model.path), values.choice("ENGINE"), values.choice("DEVICE"))
+        rasters = read_rasters(job.path, job.header, progress.span(0, READING))
+        passes = int(values.number("ITERATIONS"))
+        shares = progress.span(READING, WRITING).split(len(rasters))
+        cleaned = [clean(raster, engine, passes, share) for raster, share in zip(rasters, shares)]
+        output = self.parameterAsOutputLayer(parameters, "OUTPUT", context)
+        write_rasters(Path(output), job.header, cleaned, progress.span(WRITING, 1))
+        style_on_load(output, "raster", context)
+        return {"OUTPUT": output, "ENGINE_USED": engine.description}

@@ -1,0 +1,77 @@
+"""Rasterize Rail Points: from a classified cloud to a raster of cells that hold rail points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from qgis.core import QgsProcessingContext, QgsProcessingParameterRasterDestination
+
+from ...core.frpdf.zoo import choose as choose_model
+from ...core.progress import Progress
+from ...core.standards import RailStandard
+from .. import parameters as groups
+from ..clouds import CloudSource, read_points
+from ..i18n import tr
+from ..styling import style_on_load
+from ..values import Values
+from .base import RailAlgorithm
+
+READING = 0.8
+"""Share of the progress bar for reading the cloud."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What the parameters say."""
+
+    cloud: CloudSource
+    class_codes: tuple[int, ...]
+    standard: RailStandard
+
+
+class RasterizeRailPoints(RailAlgorithm):
+    """The algorithm ``railextract:rasterizerailpoints``."""
+
+    NAME = "rasterizerailpoints"
+    LABEL = "Rasterize rail points"
+    TAGS = ("lidar", "las", "laz", "point cloud", "railway", "rail", "raster")
+    NEEDS = (("numpy",), ("laspy",), ("lazrs",), ("pyproj",))
+    SUMMARY = "Marks the cells of a raster in which lidar points classified as rail lie."
+    HELP = (
+        "The raster has one band a class and 1 where there is rail. Its cells are as large as the network expects for "
+        "the gauge and railhead width, 4 cm for the commonest rails, and it says in its tags which those are.\n\n"
+        "Empty parts take no room in the file, so that it may span a whole line."
+    )
+
+    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
+        """Declare the parameters and outputs of the interface, in its order."""
+        for definition in (*groups.cloud(), *groups.rail(), *groups.area()):
+            self.addParameter(definition)
+        self.addParameter(QgsProcessingParameterRasterDestination("OUTPUT", tr("Rail raster")))
+
+    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+        """Read what has to be read in the main thread, and check it all."""
+        values = Values(self, parameters, context)
+        standard = values.standard()
+        choose_model(standard.gauge_m, standard.head_width_m)
+        return Job(values.cloud("INPUT"), values.class_codes(), standard)
+
+    def compute(
+        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
+    ) -> dict[str, Any]:
+        """Rasterize every class, then write the file."""
+        from ...core.raster import cell_size, rasterize
+        from ..geotiff import write_rasters
+        from ..rasters import header_for
+
+        bounds = Values(self, parameters, context).extent
+        clouds = read_points(job.cloud, job.class_codes, bounds, progress.span(0, READING))
+        cell_m = cell_size(job.standard.gauge_m, job.standard.head_width_m)
+        rasters = [rasterize(points.xyz, cell_m) for points in clouds]
+        header = header_for(rasters, [points.class_code for points in clouds], clouds[0].frame, job.standard)
+        output = self.parameterAsOutputLayer(parameters, "OUTPUT", context)
+        write_rasters(Path(output), header, rasters, progress.span(READING, 1))
+        style_on_load(output, "raster", context)
+        return {"OUTPUT": output}
