@@ -1,54 +1,75 @@
-"""What goes wrong between rail and raster, by one severity from 0 (clean) to 1 (hardly a track left).
+"""From a layout to a pair of rasters: as a scanner shows it at one severity from 0 to 1, and as it is.
 
-The paper names the kinds of distortion (section 4.4); ALGORITHMS.md section 6.5 gives them numbers, and this module
-applies them. A label follows its rail's own shift at wavelengths above `LABEL_WAVELENGTH_M`: the network is to smooth
-noise, not to straighten track.
+The paper names the kinds of distortion (section 4.4), ALGORITHMS.md section 6.5 gives them numbers, and
+docs/synthetic.md lists what each severity does. A label follows its rail's own shift at wavelengths above
+`LABEL_WAVELENGTH_M`: the network is to smooth noise, not to straighten track.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import ndimage
 
 from .drawing import Window, draw_label, scan_coverage, scan_profiles
-from .layouts import NO_TRACK, STEP_M, Layout, RailPath
+from .noise import flip, gravity, lone_lines, scatter_blobs, shadows
+from .paths import STEP_M, Layout, RailPath
 
 LABEL_WAVELENGTH_M = 5.0
 LONGEST_WAVELENGTH_M = 20.0
 SHORTEST_WAVELENGTH_M = 1.0
 REGISTRATION_M = 0.010
-"""Largest constant error of a whole rail, as between two passes of the scanner."""
+"""Largest constant error of a whole rail."""
 
 LONGEST_GAP_M = 8.0
+LEAST_GAP_M = 0.2
+"""Shorter stretches without points are told from sparse scanning by nobody, and do not count as gaps."""
 GAPPED_SHARE = 0.3
 """Largest share of a rail that is missing at full severity."""
 
+COVERED_SHARE = 0.3
+"""Share of rasters that are drawn from complete coverage instead of a scanner's points."""
 DENSITY = (20.0, 400.0)
 """Points a metre of rail."""
+GRAVE_DENSITY = 0.3
+"""Factor on the densest scan at the top of the scale."""
 PROFILE_M = (0.03, 0.10)
-LONE_LINE_M = 5.0
-"""Lines shorter than this beside the tracks are no rails."""
-BALLAST_M = 1.5
-"""Farthest scale on which ballast and feet beside a rail are taken for rail."""
-BLOBS = 300.0
-"""Patches on 1024 x 1024 cells at full severity, at most on average."""
-SHADOW_SHARE = 0.25
-"""Share of patches that hide rail instead of feigning it."""
+NOISE_M, GRAVE_NOISE_M = 0.012, 0.008
+"""Largest scatter of points in plan, and what the top of the scale adds."""
+TWO_PASSES_M = 0.03
+"""Scatter of half the offset between two passes of the scanner at full severity: each rail then shows twice."""
+
+FASTENING_SPACING_M = 0.6
+FASTENING_REACH_M = 0.09
+"""How far from a rail's edge rail foot and fastenings are found."""
+FASTENING_LENGTH_M = 0.15
 
 
 @dataclass(frozen=True)
 class Pair:
-    """A corrupted raster and the ideal one, both (size, size) bool arrays."""
+    """A corrupted raster and the ideal one, and what happened to it.
+
+    Attributes
+    ----------
+    observed, label : (size, size) bool arrays
+    distractor : (size, size) bool array
+        Cells of the observed raster set by guard rails and lone lines and not in the label.
+    gap : (size, size) int array
+        Number of the gap that a cell of the label lies in, from 1; 0 elsewhere.
+    gap_lengths_m : tuple of float
+        Length of each gap.
+    """
 
     observed: np.ndarray
     label: np.ndarray
+    distractor: np.ndarray
+    gap: np.ndarray
+    gap_lengths_m: tuple[float, ...]
 
 
 def draw_pair(rng: np.random.Generator, layout: Layout, window: Window, head_width_m: float, severity: float) -> Pair:
-    """Draw a layout twice: as a scanner of this severity shows it, and as it is.
+    """Draw a layout twice.
 
     Parameters
     ----------
@@ -59,53 +80,80 @@ def draw_pair(rng: np.random.Generator, layout: Layout, window: Window, head_wid
     severity : float
         0 to 1.
     """
-    label = np.zeros((window.size, window.size), dtype=bool)
-    observed = np.zeros_like(label)
+    observed, label, distractor = np.zeros((3, window.size, window.size), dtype=bool)
+    gap, lengths = np.zeros((window.size, window.size), dtype=np.int16), []
     scanner = _random_scanner(rng, severity)
+    hidden = shadows(rng, window, severity)
     shared_gaps: dict[int, list[tuple[float, float]]] = {}
     for rail in layout.rails:
         rail = _crop(rail, window)
         if len(rail.xy) < 2:
             continue
+        length_m = STEP_M * len(rail.xy)
+        gaps = shared_gaps.setdefault(rail.track, _random_gaps(rng, length_m, 0.5 * severity))
         wave = _shift(rng, len(rail.xy), severity)
-        if rail.track not in shared_gaps:
-            shared_gaps[rail.track] = _gaps(rng, len(rail.xy) * STEP_M, 0.5 * severity)
-        draw_label(label, window, rail.xy + wave.long[:, None] * rail.normal, rail.normal, head_width_m)
-        points = _scan(rng, rail, wave.long + wave.short, head_width_m, severity, scanner, shared_gaps[rail.track])
-        observed[window.cells_of(points)] = True
-    for line in layout.distractors:
+        seen = _seen(rail, window, hidden, gaps + _random_gaps(rng, length_m, severity))
+        ideal = replace(rail, xy=rail.xy + wave.long[:, None] * rail.normal)
+        draw_label(label, window, ideal.xy, ideal.normal, head_width_m)
+        for first, last in _runs(~seen):
+            lengths.append(STEP_M * (last - first))
+            draw_label(gap, window, ideal.xy[first:last], ideal.normal[first:last], head_width_m, len(lengths))
+        for centre, opening_m in layout.openings:
+            seen &= np.linalg.norm(rail.xy - centre, axis=1) > 0.5 * opening_m
+        shown = replace(ideal, xy=ideal.xy + wave.short[:, None] * rail.normal)
+        observed[window.cells_of(_scan(rng, shown, seen, head_width_m, severity, scanner))] = True
+    for line in [*layout.distractors, *lone_lines(rng, window, severity)]:
         line = _crop(line, window)
-        points = _scan(rng, line, np.zeros(len(line.xy)), head_width_m, severity, scanner, [])
-        observed[window.cells_of(points)] = True
-    for line in _lone_lines(rng, window, severity):
-        points = _scan(rng, line, np.zeros(len(line.xy)), head_width_m, severity, scanner, [])
-        observed[window.cells_of(points)] = True
-    observed = _flip(rng, observed, label, severity, window.cell_m)
-    return Pair(_blobs(rng, observed, severity), label)
+        seen = _seen(line, window, hidden, _random_gaps(rng, STEP_M * len(line.xy), severity))
+        distractor[window.cells_of(_scan(rng, line, seen, head_width_m, severity, scanner))] = True
+    noisy = scatter_blobs(rng, flip(rng, observed | distractor, label, severity, window.cell_m), severity) & ~hidden
+    return Pair(noisy, label, distractor & noisy & ~label, gap, tuple(lengths))
 
 
 @dataclass(frozen=True)
 class _Scanner:
-    """How the points of one raster were taken; `density` None stands for complete coverage."""
+    """How the points of one raster were taken.
+
+    Attributes
+    ----------
+    density : float or None
+        Points a metre of rail; None stands for complete coverage.
+    profile_m, noise_m : float
+        Distance of profiles, scatter of points.
+    offset_m : (2,) array
+        Half of what lies between two passes; zero where there was one.
+    fastenings : float
+        Points on each fastening that are taken for rail, on average.
+    """
 
     density: float | None
     profile_m: float
     noise_m: float
+    offset_m: np.ndarray
+    fastenings: float
 
 
 def _random_scanner(rng: np.random.Generator, severity: float) -> _Scanner:
     density = None
-    if rng.random() < 0.7:
+    if rng.random() >= COVERED_SHARE:
         thinnest = DENSITY[1] * (DENSITY[0] / DENSITY[1]) ** severity
-        density = math.exp(rng.uniform(math.log(thinnest), math.log(DENSITY[1])))
-    return _Scanner(density, rng.uniform(*PROFILE_M), severity * rng.uniform(0.0, 0.012))
+        densest = DENSITY[1] * GRAVE_DENSITY ** gravity(severity)
+        density = math.exp(rng.uniform(math.log(thinnest), math.log(densest)))
+    twice = rng.random() < severity**2
+    return _Scanner(
+        density,
+        rng.uniform(*PROFILE_M),
+        rng.random() * (NOISE_M * severity + GRAVE_NOISE_M * gravity(severity)),
+        twice * rng.normal(0.0, TWO_PASSES_M * severity, size=2),
+        rng.random() ** 2 * 6.0 * severity**2,
+    )
 
 
 def _crop(rail: RailPath, window: Window) -> RailPath:
     """Keep the samples from the first to the last near the window."""
     near = np.flatnonzero(window.near(rail.xy, 1.0))
     kept = slice(near[0], near[-1] + 1) if len(near) else slice(0)
-    return RailPath(rail.xy[kept], rail.normal[kept], rail.track)
+    return replace(rail, xy=rail.xy[kept], normal=rail.normal[kept])
 
 
 @dataclass(frozen=True)
@@ -132,7 +180,7 @@ def _waves(rng: np.random.Generator, count: int, shortest_m: float, longest_m: f
     return (weight * np.cos(2 * math.pi * STEP_M * np.arange(count) / wavelength + phase)).sum(axis=0)
 
 
-def _gaps(rng: np.random.Generator, length_m: float, severity: float) -> list[tuple[float, float]]:
+def _random_gaps(rng: np.random.Generator, length_m: float, severity: float) -> list[tuple[float, float]]:
     """Missing stretches, lognormal in length, as (from, to) in metres along the rail."""
     missing = GAPPED_SHARE * severity * rng.random() * length_m
     gaps = []
@@ -144,21 +192,30 @@ def _gaps(rng: np.random.Generator, length_m: float, severity: float) -> list[tu
     return gaps
 
 
-def _scan(
-    rng: np.random.Generator,
-    rail: RailPath,
-    shift_m: np.ndarray,
-    width_m: float,
-    severity: float,
-    scanner: _Scanner,
-    shared_gaps: list[tuple[float, float]],
-) -> np.ndarray:
-    """Points found on one rail: its head thicker or thinner, one side lost at times, stretches missing; (m, 2)."""
-    count = len(rail.xy)
-    position = STEP_M * np.arange(count)
-    seen = np.ones(count, dtype=bool)
-    for start, end in shared_gaps + _gaps(rng, count * STEP_M, severity):
+def _seen(rail: RailPath, window: Window, hidden: np.ndarray, gaps: list[tuple[float, float]]) -> np.ndarray:
+    """Tell which samples lie in no gap and in no shadow, (n,) bool; what lies outside the window is in no shadow."""
+    position = STEP_M * np.arange(len(rail.xy))
+    seen = np.ones(len(rail.xy), dtype=bool)
+    for start, end in gaps:
         seen &= (position < start) | (position > end)
+    inside = np.flatnonzero(window.near(rail.xy, 0.0))
+    seen[inside] &= ~hidden[window.cells_of(rail.xy[inside])]
+    return seen
+
+
+def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Find runs of true flags as (first, last + 1): those of `LEAST_GAP_M` or more that have both ends in sight."""
+    borders = np.flatnonzero(np.diff(flags)) + 1
+    starts, ends = borders[flags[borders - 1] == 0], borders[flags[borders - 1] == 1]
+    ends = ends[ends > starts[0]] if len(starts) else ends[:0]
+    return [(a, b) for a, b in zip(starts.tolist(), ends.tolist()) if STEP_M * (b - a) >= LEAST_GAP_M]
+
+
+def _scan(
+    rng: np.random.Generator, rail: RailPath, seen: np.ndarray, width_m: float, severity: float, scanner: _Scanner
+) -> np.ndarray:
+    """Points found on one rail: its head thicker or thinner, one side lost at times, its foot now and then; (m, 2)."""
+    count = len(rail.xy)
     half = 0.5 * width_m * np.clip(1 + 0.35 * severity * _waves(rng, count, 0.5, 5.0), 0.5, 1.7)
     left, right = half.copy(), -half
     if rng.random() < 0.5 * severity:
@@ -167,66 +224,28 @@ def _scan(
             left -= lost
         else:
             right += lost
-    seen &= left > right
-    xy = rail.xy + shift_m[:, None] * rail.normal
+    seen = seen & (left > right)
     if scanner.density is None:
-        points = scan_coverage(xy[seen], rail.normal[seen], right[seen], left[seen])
+        points = scan_coverage(rail.xy[seen], rail.normal[seen], right[seen], left[seen])
     else:
         density = scanner.density * rng.uniform(0.5, 1.0)
-        points = scan_profiles(rng, xy, rail.normal, right, left, seen, density, scanner.profile_m)
-    return points + rng.normal(0.0, 1.0, size=points.shape) * scanner.noise_m
+        points = scan_profiles(rng, rail.xy, rail.normal, right, left, seen, density, scanner.profile_m)
+    points = np.concatenate([points, _fastenings(rng, rail, seen, width_m, scanner.fastenings)])
+    offset = rng.choice([-1.0, 1.0], size=(len(points), 1)) * scanner.offset_m
+    return points + offset + rng.normal(0.0, 1.0, size=points.shape) * scanner.noise_m
 
 
-def _lone_lines(rng: np.random.Generator, window: Window, severity: float) -> list[RailPath]:
-    """Short straight lines that belong to no track: cables, sleepers' ends, edges of platforms."""
-    lines = []
-    for _ in range(rng.poisson(1.5 * severity)):
-        heading = rng.uniform(-math.pi, math.pi)
-        direction = np.array([math.cos(heading), math.sin(heading)])
-        extent = window.size * window.cell_m
-        middle = np.array([window.x0, window.y0]) + rng.random(2) * [extent, -extent]
-        along = np.arange(0.0, rng.uniform(0.5, LONE_LINE_M), STEP_M)
-        xy = middle + along[:, None] * direction
-        lines.append(RailPath(xy, np.tile([-direction[1], direction[0]], (len(xy), 1)), NO_TRACK))
-    return lines
-
-
-def _flip(
-    rng: np.random.Generator, observed: np.ndarray, label: np.ndarray, severity: float, cell_m: float
+def _fastenings(
+    rng: np.random.Generator, rail: RailPath, seen: np.ndarray, width_m: float, points: float
 ) -> np.ndarray:
-    """Lose set cells, and set empty ones, more of them near the tracks where ballast is taken for rail."""
-    lost = rng.random() * 0.4 * severity
-    spread = rng.random() ** 3 * 0.02 * severity
-    beside = rng.random() ** 2 * 0.06 * severity
-    kept = observed & (rng.random(observed.shape) >= lost)
-    chance = np.full(observed.shape, spread)
-    if beside > 0 and label.any():
-        distance = ndimage.distance_transform_edt(~label) * cell_m
-        chance += beside * np.exp(-distance / rng.uniform(0.1, BALLAST_M))
-    return kept | (rng.random(observed.shape) < chance)
-
-
-def _blobs(rng: np.random.Generator, observed: np.ndarray, severity: float) -> np.ndarray:
-    """Scatter elliptic patches, their number after `BLOBS`.
-
-    Most are vegetation taken for rail and set cells; some are shadows and clear them.
-    """
-    size = len(observed)
-    result = observed.copy()
-    for _ in range(rng.poisson(BLOBS * severity * rng.random() * (size / 1024) ** 2)):
-        axes = np.exp(rng.uniform(0.0, math.log(12.0), size=2))
-        tilt = rng.uniform(0, math.pi)
-        row, column = rng.integers(0, size, size=2)
-        reach = int(axes.max()) + 1
-        rows = np.arange(max(row - reach, 0), min(row + reach + 1, size))
-        columns = np.arange(max(column - reach, 0), min(column + reach + 1, size))
-        down, right = rows[:, None] - row, columns[None, :] - column
-        u = (right * math.cos(tilt) + down * math.sin(tilt)) / axes[0]
-        v = (down * math.cos(tilt) - right * math.sin(tilt)) / axes[1]
-        patch = u**2 + v**2 <= rng.uniform(0.5, 1.0, size=u.shape)
-        area = result[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        if rng.random() < SHADOW_SHARE:
-            area &= ~patch
-        else:
-            area |= patch & (rng.random(u.shape) < rng.uniform(0.3, 1.0))
-    return result
+    """Points beside the head at every sleeper, on foot, clips and bolts, (m, 2)."""
+    stride = int(FASTENING_SPACING_M / STEP_M)
+    sleepers = np.arange(rng.integers(stride), len(rail.xy), stride)
+    sleepers = np.repeat(sleepers, rng.poisson(points, size=len(sleepers)))
+    reach = int(0.5 * FASTENING_LENGTH_M / STEP_M)
+    sleepers = np.clip(sleepers + rng.integers(-reach, reach + 1, size=len(sleepers)), 0, len(rail.xy) - 1)
+    sleepers = sleepers[seen[sleepers]]
+    across = rng.choice([-1.0, 1.0], size=len(sleepers)) * (
+        0.5 * width_m + rng.uniform(0.0, FASTENING_REACH_M, size=len(sleepers))
+    )
+    return rail.xy[sleepers] + across[:, None] * rail.normal[sleepers]

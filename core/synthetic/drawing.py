@@ -19,11 +19,15 @@ class Window:
     x0: float
     y0: float
 
+    @property
+    def extent_m(self) -> float:
+        """Length of the side."""
+        return self.size * self.cell_m
+
     def near(self, xy: np.ndarray, margin_m: float) -> np.ndarray:
         """Tell which points lie in the window or within a margin of it, (n,) bool."""
-        extent = self.size * self.cell_m
         x, y = xy[:, 0] - self.x0, self.y0 - xy[:, 1]
-        return (x > -margin_m) & (x < extent + margin_m) & (y > -margin_m) & (y < extent + margin_m)
+        return (np.minimum(x, y) > -margin_m) & (np.maximum(x, y) < self.extent_m + margin_m)
 
     def cells_of(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rows and columns of the points that lie in the window."""
@@ -33,17 +37,20 @@ class Window:
         return rows[inside], columns[inside]
 
 
-def draw_label(target: np.ndarray, window: Window, xy: np.ndarray, normal: np.ndarray, width_m: float) -> None:
-    """Set the cells whose centre lies within half a railhead of the line.
+def draw_label(
+    target: np.ndarray, window: Window, xy: np.ndarray, normal: np.ndarray, width_m: float, value: int = 1
+) -> None:
+    """Set the cells whose centre lies within half a railhead of the line to a value.
 
     Parameters
     ----------
-    target : (size, size) bool array, changed
+    target : (size, size) array of bool or int, changed
     window : Window
     xy, normal : (n, 2) arrays
         Samples of the line no farther apart than a cell, and unit normals.
     width_m : float
         Railhead width.
+    value : int
     """
     kept = window.near(xy, width_m)
     if np.count_nonzero(kept) < 2:
@@ -61,7 +68,7 @@ def draw_label(target: np.ndarray, window: Window, xy: np.ndarray, normal: np.nd
     near = (np.abs(across) <= width_m / 2) & (np.abs(along) <= step)
     near &= (rows >= 0) & (rows < window.size) & (columns >= 0) & (columns < window.size)
     rows, columns = np.broadcast_arrays(rows, columns)
-    target[rows[near], columns[near]] = True
+    target[rows[near], columns[near]] = value
 
 
 def scan_coverage(xy: np.ndarray, normal: np.ndarray, right_m: np.ndarray, left_m: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 from .distortion import Pair, draw_pair
 from .drawing import Window
 from .layouts import random_layout
+from .paths import TrackSize
 
 SPACING_M = 1.5112
 """Distance between railhead centres at which layouts are drawn: 132RE."""
@@ -25,6 +26,8 @@ ODD_SHARE = 0.4
 
 EMPTY_SHARE = 0.05
 CLEAN_SHARE = 0.05
+FAR_M = 1e5
+"""Where no track is."""
 
 
 def random_ratio(rng: np.random.Generator) -> float:
@@ -34,7 +37,13 @@ def random_ratio(rng: np.random.Generator) -> float:
     return BASE_RATIO * math.exp(rng.uniform(-RATIO_TOLERANCE, RATIO_TOLERANCE))
 
 
-def random_pair(rng: np.random.Generator, size: int, severity: float | None = None, ratio: float | None = None) -> Pair:
+def random_pair(
+    rng: np.random.Generator,
+    size: int,
+    severity: float | None = None,
+    ratio: float | None = None,
+    family: str | None = None,
+) -> Pair:
     """Draw one training pair.
 
     Parameters
@@ -47,14 +56,16 @@ def random_pair(rng: np.random.Generator, size: int, severity: float | None = No
         0 (clean) to 1; drawn evenly where it is not given, with some tiles clean.
     ratio : float, optional
         Gauge over railhead width; see `random_ratio`.
+    family : str, optional
+        One of `layouts.FAMILIES`, shown for certain; where it is not given, one is drawn, and some tiles are empty.
     """
     if severity is None:
         severity = 0.0 if rng.random() < CLEAN_SHARE else rng.random()
-    head_width_m = SPACING_M / (1 + (random_ratio(rng) if ratio is None else ratio))
-    layout = random_layout(rng, SPACING_M, head_width_m)
-    extent = size * CELL_M
-    spot = layout.spots[rng.integers(len(layout.spots))] + rng.uniform(-0.45, 0.45, size=2) * extent
-    if rng.random() < EMPTY_SHARE:
-        spot = spot + 1e5
-    window = Window(size, CELL_M, spot[0] - extent / 2, spot[1] + extent / 2)
-    return draw_pair(rng, layout, window, head_width_m, severity)
+    track_size = TrackSize(SPACING_M, SPACING_M / (1 + (random_ratio(rng) if ratio is None else ratio)))
+    layout = random_layout(rng, track_size, family)
+    extent_m = size * CELL_M
+    middle = layout.spots[rng.integers(len(layout.spots))] + rng.uniform(-0.45, 0.45, size=2) * extent_m
+    if family is None and rng.random() < EMPTY_SHARE:
+        middle = middle + FAR_M
+    window = Window(size, CELL_M, middle[0] - 0.5 * extent_m, middle[1] + 0.5 * extent_m)
+    return draw_pair(rng, layout, window, track_size.head_width_m, severity)

@@ -5,8 +5,10 @@ import pytest
 from rail_extract.core.synthetic.curves import Element, trace
 from rail_extract.core.synthetic.distortion import LABEL_WAVELENGTH_M, draw_pair
 from rail_extract.core.synthetic.drawing import Window, draw_label, scan_coverage, scan_profiles
-from rail_extract.core.synthetic.layouts import Layout, RailPath
+from rail_extract.core.synthetic.layouts import FAMILIES
+from rail_extract.core.synthetic.noise import flip, shadows
 from rail_extract.core.synthetic.pairs import BASE_RATIO, random_pair
+from rail_extract.core.synthetic.paths import Layout, RailPath
 from rail_extract.core.training.scores import Scores, score
 from scipy import ndimage
 
@@ -20,7 +22,7 @@ def straight(heading=0.3, track=0, left_m=0.0):
 
 
 def track_layout():
-    return Layout((straight(left_m=0.7556), straight(left_m=-0.7556)), (), np.zeros((1, 2)))
+    return Layout((straight(left_m=0.7556), straight(left_m=-0.7556)))
 
 
 def test_a_label_is_the_cells_whose_centre_lies_within_half_a_railhead():
@@ -78,15 +80,80 @@ def test_a_pair_is_a_function_of_its_seed():
 
 
 def test_the_label_follows_the_long_waves_of_a_rail_alone():
-    """The label's centre strays from the ideal line, but smoothly: no power below the label's wavelength."""
-    rail = straight(heading=0.0)
-    pair = draw_pair(np.random.default_rng(5), Layout((rail,), (), np.zeros((1, 2))), WINDOW, WIDTH, 1.0)
-    rows = np.arange(256)[:, None]
-    centre = (pair.label * rows).sum(axis=0) / pair.label.sum(axis=0)
-    assert np.ptp(centre) > 0
-    spectrum = np.abs(np.fft.rfft((centre - centre.mean()) * np.hanning(len(centre))))
-    wavelength = 256 * 0.04 / np.maximum(np.arange(len(spectrum)), 1)
-    assert spectrum[wavelength < 0.5 * LABEL_WAVELENGTH_M].max() < spectrum.max()
+    """In fine cells the label's centre strays from the ideal line, and has no power below the label's wavelength."""
+    window = Window(1024, 0.01, 0.0, 10.24)
+    layout, rows = Layout((straight(heading=0.0),)), np.arange(1024)[:, None]
+    labels = [draw_pair(np.random.default_rng(seed), layout, window, WIDTH, 1.0).label for seed in range(5)]
+    centres = [(label * rows).sum(axis=0) / label.sum(axis=0) * window.cell_m for label in labels]
+    assert np.ptp(centres) > 0.02
+    spectrum = sum(np.abs(np.fft.rfft((centre - centre.mean()) * np.hanning(1024))) ** 2 for centre in centres)
+    wavelength = window.extent_m / np.maximum(np.arange(len(spectrum)), 1)
+    assert spectrum[wavelength < 0.5 * LABEL_WAVELENGTH_M].sum() < 0.05 * spectrum.sum()
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_masks_agree_with_the_rasters(family):
+    pair = random_pair(np.random.default_rng([6, 1]), 384, 0.6, BASE_RATIO, family)
+    assert pair.label.any()
+    assert pair.observed.any()
+    assert not (pair.distractor & ~pair.observed).any()
+    assert not (pair.distractor & pair.label).any()
+    assert not ((pair.gap > 0) & ~pair.label).any()
+    assert pair.gap.max() <= len(pair.gap_lengths_m)
+    assert all(length >= 0.2 for length in pair.gap_lengths_m)
+
+
+def test_a_gap_has_as_many_cells_as_its_length_asks_for():
+    layout = Layout((straight(),))
+    cells, expected, unseen = [], [], []
+    for seed in range(12):
+        pair = draw_pair(np.random.default_rng(seed), layout, WINDOW, WIDTH, 0.5)
+        inside = [n + 1 for n in range(len(pair.gap_lengths_m)) if not _at_border(pair.gap == n + 1)]
+        cells += [np.count_nonzero(pair.gap == number) for number in inside]
+        expected += [pair.gap_lengths_m[number - 1] * WIDTH / 0.04**2 for number in inside]
+        unseen += [pair.observed[pair.gap == number].mean() for number in inside]
+    assert len(cells) > 5
+    assert np.abs(np.array(cells) - expected).max() < 15
+    assert np.mean(unseen) < 0.1
+
+
+def _at_border(mask):
+    return mask[[0, -1]].any() or mask[:, [0, -1]].any() or not mask.any()
+
+
+def test_distractors_are_seen_and_not_in_the_label():
+    guard = straight(left_m=0.6)
+    pair = draw_pair(np.random.default_rng(0), Layout((straight(left_m=0.75),), (guard,)), WINDOW, WIDTH, 0.0)
+    ideal = np.zeros_like(pair.label)
+    draw_label(ideal, WINDOW, guard.xy, guard.normal, WIDTH)
+    assert not pair.label[ideal].any()
+    assert pair.distractor[ideal].mean() > 0.8
+
+
+def test_rails_are_open_at_frogs_in_what_is_seen_alone():
+    rail = straight()
+    layout = Layout((rail,), openings=((rail.xy[600], 0.3),))
+    pair = draw_pair(np.random.default_rng(3), layout, WINDOW, WIDTH, 0.0)
+    place = WINDOW.cells_of(rail.xy[[600]])
+    assert not pair.observed[place].any()
+    assert pair.label[place].all()
+    assert pair.gap_lengths_m == ()
+
+
+def test_nothing_is_seen_in_a_shadow():
+    window = Window(256, 0.04, 0.0, 10.24)
+    areas = [shadows(np.random.default_rng(seed), window, 1.0).mean() for seed in range(40)]
+    assert 0.0 < np.mean(areas) < 0.2
+    assert not shadows(np.random.default_rng(0), window, 0.0).any()
+
+
+def test_ballast_lies_beside_the_rails():
+    label = np.zeros((256, 256), dtype=bool)
+    label[:, 128:130] = True
+    strays = np.mean(
+        [flip(np.random.default_rng(seed), label, label, 1.0, 0.04) & ~label for seed in range(30)], axis=0
+    )
+    assert strays[:, 120:138].mean() > 2 * strays[:, :60].mean()
 
 
 def test_scores_count_by_cell():
