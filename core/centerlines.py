@@ -9,7 +9,7 @@ import numpy as np
 
 from .chaining import chain_pairs
 from .errors import NoTrackError
-from .midline import Meeting, Side, midway
+from .midline import Side, bridged_steps, midway
 from .pairing import MIN_LENGTH_M, RailPair, pair_rails
 from .parallels import commonest_spacing
 from .polyline import interpolate, left_normals, resample, starts_at_its_end
@@ -130,32 +130,13 @@ def _draw(
         gaugesd_mm=1000 * float(gauge.std()),
         cant_mm=(-1000 if flip else 1000) * float(cant.mean()),
         cantmax_mm=(-1000 if flip else 1000) * float(cant[np.argmax(np.abs(cant))]),
-        bridged_m=_bridged(rails, left, right, length_along(guide)),
+        bridged_m=float(bridged_steps(rails, left, right, length_along(guide)).sum()),
     )
 
 
 def _ids(rails: Sequence[RailLine], numbers: Iterable[int]) -> tuple[int, ...]:
     """Ids of rails, each once, in the order they are met."""
     return tuple(dict.fromkeys(rails[number].rail_id for number in numbers))
-
-
-def _bridged(rails: Sequence[RailLine], left: Meeting, right: Meeting, along: np.ndarray) -> float:
-    """Length on which a rail has no points or is not there, given where stations at `along` meet the rails."""
-    steps = np.diff(along)
-    bridged = np.maximum(_bridged_steps(rails, left, steps), _bridged_steps(rails, right, steps))
-    return float(bridged.sum())
-
-
-def _bridged_steps(rails: Sequence[RailLine], side: Meeting, steps: np.ndarray) -> np.ndarray:
-    """Length bridged on one side between each two stations, (n - 1,); `steps` are the distances of the stations."""
-    before = np.full(len(side.t), np.nan)
-    for number in np.unique(side.rail):
-        mine = side.rail == number
-        before[mine] = rails[number].bridged_before(side.t[mine])
-    on_one = np.diff(side.rail) == 0
-    bridged = np.where(on_one, np.minimum(np.abs(np.diff(before)), steps), 0.0)
-    unmet = np.isnan(before)
-    return np.where(unmet[1:] | unmet[:-1], 0.5 * steps * (unmet[1:] + unmet[:-1].astype(int)), bridged)
 
 
 def _guide(rails: Sequence[RailLine], chain: Sequence[RailPair], half_spacing_m: float) -> np.ndarray:

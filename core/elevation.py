@@ -13,7 +13,7 @@ import numpy as np
 
 from .head_edges import widest_reach
 from .points import RailPoints
-from .polyline import Feet, interpolate, project, starts_at_its_end
+from .polyline import Feet, interpolate, project, resample, starts_at_its_end
 from .progress import SILENT, Progress
 from .rails import RailLine, length_along
 from .railtop import LEAST_POINTS, find_top
@@ -25,6 +25,9 @@ BRIDGE_M = 0.5
 
 UNSUPPORTED_END_M = 0.15
 """A free end that runs on further than this without points is cut: the raster's lines curl where a rail ends."""
+
+FIXED_ENDS = np.zeros(2, dtype=bool)
+"""Marks ends of a line that are kept whether points support them or not."""
 
 END_POINTS = 3
 """Points that mark the end of support; one alone may be a weed."""
@@ -149,6 +152,43 @@ def _raise_line(
     xyz = np.column_stack([interpolate(line, along, stations), profile.at(stations)])
     figures = (len(supporting.t), 1000 * resid, 1000 * support.rms_m, bridged)
     return RailLine(xyz, 0, 0, *figures, gaps - start, support)
+
+
+def measure_again(
+    rails: Sequence[RailLine],
+    points: RailPoints,
+    head_width_m: float,
+    smoothing_z_m: float,
+    progress: Progress = SILENT,
+) -> list[RailLine]:
+    """Give finished rails heights of another smoothing, and those read from files their support.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+    points : RailPoints
+    head_width_m : float
+    smoothing_z_m : float
+        Sigma of PAEK for the heights.
+    progress : Progress
+
+    Returns
+    -------
+    list of RailLine
+        In their order; rails without points stay as they are.
+    """
+    plans = [resample(rail.xyz[:, :2], smoothing_z_m / 4)[0] for rail in rails]
+    feet = project(plans, points.xyz[:, :2], widest_reach(head_width_m), progress.span(0.0, 0.7))
+    measured = []
+    for number, rail in enumerate(progress.span(0.7, 1.0).follow(rails)):
+        mine = feet.of(number)
+        parameters = ElevationParameters(head_width_m, smoothing_z_m=smoothing_z_m)
+        again = _raise_line(plans[number], FIXED_ENDS, mine, points.xyz[mine.point, 2], parameters)
+        if again is not None:
+            support = again.support if rail.support is None else rail.support
+            rail = replace(rail, xyz=again.xyz, gaps=again.gaps, support=support)
+        measured.append(rail)
+    return measured
 
 
 def _supported(t: np.ndarray, length_m: float, free_ends: np.ndarray) -> tuple[float, float]:

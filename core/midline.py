@@ -131,6 +131,38 @@ def midway(
     return np.column_stack([guide + shift[:, None] * normals, z])[known]
 
 
+def bridged_steps(rails: Sequence[RailLine], left: Meeting, right: Meeting, along: np.ndarray) -> np.ndarray:
+    """Measure on how much of each step a rail has no points or is not there.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+        The rails that the meetings number.
+    left, right : Meeting
+    along : (n,) array
+        Chainage of the stations from which rails are met.
+
+    Returns
+    -------
+    (n - 1,) array
+        Metres between each two stations.
+    """
+    steps = np.diff(along)
+    return np.maximum(_bridged_on(rails, left, steps), _bridged_on(rails, right, steps))
+
+
+def _bridged_on(rails: Sequence[RailLine], side: Meeting, steps: np.ndarray) -> np.ndarray:
+    """Measure the same on one side only."""
+    before = np.full(len(side.t), np.nan)
+    for number in np.unique(side.rail):
+        mine = side.rail == number
+        before[mine] = rails[number].bridged_before(side.t[mine])
+    on_one = np.diff(side.rail) == 0
+    bridged = np.where(on_one, np.minimum(np.abs(np.diff(before)), steps), 0.0)
+    unmet = np.isnan(before)
+    return np.where(unmet[1:] | unmet[:-1], 0.5 * steps * (unmet[1:] + unmet[:-1].astype(int)), bridged)
+
+
 def _filled(values: np.ndarray) -> np.ndarray:
     """Interpolate what is missing from its neighbours; all NaN stays so."""
     known = np.flatnonzero(~np.isnan(values))

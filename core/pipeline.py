@@ -13,9 +13,10 @@ from .frpdf.cleanup import clean
 from .frpdf.engine import Engine, make_engine
 from .frpdf.weights import load_arrays
 from .frpdf.zoo import choose
+from .geometry import measure_track_geometry
 from .points import RailPoints
 from .progress import SILENT, Progress
-from .rails import Centerline, RailLine, RailNetwork
+from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from .raster import RailRaster, cell_size, rasterize
 from .refinement import refine
 from .smoothing import smooth_network
@@ -52,6 +53,8 @@ class Parameters:
         Further gauges to pair, for mixed and dual gauge.
     centerline_tolerance_m : float
         Deviation from the gauge at which two rails still make a track.
+    quality_step_m : float or None
+        Distance of the stations at which the tracks' geometry is measured; None leaves it out.
     """
 
     gauge_m: float
@@ -71,6 +74,7 @@ class Parameters:
     min_length_m: float = 1.0
     other_gauges_m: tuple[float, ...] = ()
     centerline_tolerance_m: float = 0.05
+    quality_step_m: float | None = None
 
 
 def extract_rails(clouds: Sequence[RailPoints], parameters: Parameters, progress: Progress = SILENT) -> RailNetwork:
@@ -107,13 +111,17 @@ def extract_rails(clouds: Sequence[RailPoints], parameters: Parameters, progress
     )
     rails: list[RailLine] = []
     centerlines: list[Centerline] = []
+    geometry: list[TrackGeometry] = []
     for number, points in enumerate(clouds):
         step = progress.span(number / len(clouds), (number + 1) / len(clouds))
         found = rails_of(points, parameters, engine, step.span(0.0, 0.9), first_id=len(rails) + 1)
+        tracks = tracks_of(found, parameters, step.span(0.9, 0.95), first_id=len(centerlines) + 1)
+        geometry += geometry_of(tracks, found, points, parameters, step.span(0.95, 1.0))
         rails += found
-        centerlines += tracks_of(found, parameters, step.span(0.9, 1.0), first_id=len(centerlines) + 1)
+        centerlines += tracks
     lines = thin([*rails, *centerlines], parameters.simplify_xy_m, parameters.simplify_z_m)
-    return RailNetwork(lines[: len(rails)], lines[len(rails) :], clouds[0].frame, engine.description)
+    frame = clouds[0].frame
+    return RailNetwork(lines[: len(rails)], lines[len(rails) :], frame, engine.description, tuple(geometry))
 
 
 def rails_of(
@@ -188,3 +196,18 @@ def tracks_of(
     if rails and not centerlines:
         progress.warning("No two rails run parallel: there are rails but no track centerlines.")
     return [replace(line, track_id=number) for number, line in enumerate(centerlines, start=first_id)]
+
+
+def geometry_of(
+    centerlines: Sequence[Centerline],
+    rails: Sequence[RailLine],
+    points: RailPoints,
+    parameters: Parameters,
+    progress: Progress = SILENT,
+) -> tuple[TrackGeometry, ...]:
+    """Measure the tracks of one class, if asked for, on lines that are not thinned yet."""
+    if parameters.quality_step_m is None:
+        return ()
+    return measure_track_geometry(
+        centerlines, rails, parameters.head_width_m, points, parameters.quality_step_m, progress
+    )

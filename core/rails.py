@@ -155,6 +155,48 @@ class Centerline:
 
 
 @dataclass(frozen=True)
+class TrackGeometry:
+    """Geometry of one track at stations along its centerline, (n,) arrays; NaN where it can't be known.
+
+    Attributes
+    ----------
+    track_id : int
+    xyz : (n, 3) array
+        Stations on the centerline, local metres.
+    chainage_m : float
+        Plan distance from the centerline's start.
+    gauge_mm : float
+        Distance between the rail lines less the head width.
+    cant_mm : float
+        Left minus right height.
+    twist_mm : float
+        Change of cant over 3 m, ahead minus behind; NaN where the track does not reach as far.
+    radius_m : float
+        Positive to the left, NaN above 10 km.
+    grade_pm : float
+        Rise in per mille.
+    sigma_mm : float
+        Standard deviation of the centerline's lateral position.
+    points : int
+        Points on both rails that are nearest to the station.
+    bridged : bool
+        Whether for most of the station's length a rail has no points or is not there.
+    """
+
+    track_id: int
+    xyz: np.ndarray
+    chainage_m: np.ndarray
+    gauge_mm: np.ndarray
+    cant_mm: np.ndarray
+    twist_mm: np.ndarray
+    radius_m: np.ndarray
+    grade_pm: np.ndarray
+    sigma_mm: np.ndarray
+    points: np.ndarray
+    bridged: np.ndarray
+
+
+@dataclass(frozen=True)
 class RailNetwork:
     """Everything extracted from one cloud.
 
@@ -166,9 +208,12 @@ class RailNetwork:
         Turns the lines' local metres into the cloud's coordinates.
     engine : str
         Engine and device that ran the network, for ENGINE_USED.
+    geometry : tuple of TrackGeometry
+        Of each centerline in turn; none unless asked for.
     """
 
     rails: tuple[RailLine, ...]
     centerlines: tuple[Centerline, ...]
     frame: LocalFrame
     engine: str = field(default="")
+    geometry: tuple[TrackGeometry, ...] = ()
