@@ -9,6 +9,7 @@ import numpy as np
 
 from .chaining import chain_pairs
 from .errors import NoTrackError
+from .forking import fork_centerlines
 from .midline import Side, bridged_steps, midway
 from .pairing import MIN_LENGTH_M, RailPair, pair_rails
 from .parallels import commonest_spacing
@@ -81,7 +82,7 @@ def build_centerlines(
     chains = chain_pairs(rails, pairs, parameters.max_gap_m)
     drawn = [_draw(rails, chain, gauge_m, head_width_m, parameters) for chain in progress.span(0.8, 1.0).follow(chains)]
     kept = [line for line in drawn if line.length_m >= parameters.min_length_m]
-    ordered = sorted(kept, key=lambda line: tuple(line.xyz[0, :2]))
+    ordered = sorted(fork_centerlines(kept), key=lambda line: tuple(line.xyz[0, :2]))
     return tuple(replace(line, track_id=number) for number, line in enumerate(ordered, start=1))
 
 

@@ -141,7 +141,7 @@ def test_turnouts_fork_into_two_centerlines(form, hand):
     assert len(found) == 2
     result = compare_lines([line.xyz for line in found], [through, diverging])
     assert result.correctness > 0.995
-    assert result.completeness > 0.88
+    assert result.completeness > 0.995
     assert max(line.length_m for line in found) == pytest.approx(110.0, abs=1.0)
 
 
