@@ -65,7 +65,11 @@ class RailAlgorithm(QgsProcessingAlgorithm):
             return False, message
         try:
             for output in self.destinationParameterDefinitions():
-                check_writable(parameters.get(output.name()), context)
+                value = parameters.get(output.name())
+                supported, message = self.provider().isSupportedOutputValue(value, output, context)
+                if not supported:
+                    return False, message
+                check_writable(value, context)
             self.read(parameters, context)
         except RailExtractError as error:
             return False, str(error)

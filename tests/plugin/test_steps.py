@@ -1,7 +1,17 @@
 """The four steps, alone and chained by hand."""
 
+import json
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from lines import read_features, read_lines
+from osgeo import gdal
+from qgis.core import QgsRasterLayer, QgsVectorLayer
+from rail_extract.core.frpdf import engine
+from rail_extract.core.raster import cell_size
+from rail_extract.rail_extract_plugin.geotiff import read_header, read_rasters
+from rail_extract.rail_extract_plugin.paths import STYLES
 
 
 @pytest.fixture
@@ -37,3 +47,198 @@ def test_chained_by_hand_the_steps_give_the_lines_of_extract_rails(chain, run, c
         assert distance_of_lines(read_lines(mine), read_lines(theirs)) < 0.001
     for mine, theirs in zip(read_features(rails), read_features(whole["RAILS"])):
         assert mine[1] == pytest.approx(theirs[1], rel=1e-6)
+
+
+INTERFACE = {
+    "rasterizerailpoints": (
+        "INPUT RAIL_CLASSES=10 STANDARD=EN_60E1_1435 GAUGE HEAD_WIDTH EXTENT CRS OUTPUT",
+        {"OUTPUT": "outputRaster"},
+    ),
+    "frpdfcleanup": (
+        "INPUT MODEL=AUTO ITERATIONS=2 ENGINE=AUTO DEVICE=AUTO GAUGE HEAD_WIDTH OUTPUT",
+        {"OUTPUT": "outputRaster", "ENGINE_USED": "outputString"},
+    ),
+    "vectorizerails": (
+        "INPUT POINTS SMOOTHING_XY=0.8 SMOOTHING_Z=3.0 TOLERANCE_XY=0.1 TOLERANCE_Z=0.03 CROWN_RADIUS=20.0 MAX_GAP=5.0 "
+        "GAP_ANGLE=10.0 SIMPLIFY_XY=0.002 SIMPLIFY_Z=0.002 MIN_LENGTH=1.0 GAUGE HEAD_WIDTH OUTPUT",
+        {"OUTPUT": "outputVector", "RAIL_COUNT": "outputNumber", "RAIL_LENGTH": "outputNumber"},
+    ),
+    "buildtrackcenterlines": (
+        "INPUT STANDARD=EN_60E1_1435 GAUGE HEAD_WIDTH OTHER_GAUGES CENTERLINE_TOLERANCE=0.05 MAX_GAP=5.0 "
+        "SMOOTHING_XY=0.8 SIMPLIFY_XY=0.002 SIMPLIFY_Z=0.002 MIN_LENGTH=1.0 OUTPUT",
+        {"OUTPUT": "outputVector", "CENTERLINE_COUNT": "outputNumber", "CENTERLINE_LENGTH": "outputNumber"},
+    ),
+}
+"""Parameters with their defaults, and outputs: the interface, which other people's scripts depend on."""
+
+
+@pytest.mark.parametrize("name", INTERFACE)
+def test_parameters_and_outputs_are_those_of_the_interface(qgis, plugin, name):
+    algorithm = qgis.processingRegistry().createAlgorithmById(f"railextract:{name}")
+    parameters, outputs = INTERFACE[name]
+    found = [(one.name(), one.defaultValue()) for one in algorithm.parameterDefinitions()]
+    assert " ".join(one if default is None else f"{one}={default}" for one, default in found) == parameters
+    assert {output.name(): output.type() for output in algorithm.outputDefinitions()} == outputs
+
+
+@pytest.fixture
+def raster(run_step, cloud, tmp_path):
+    """The raster of a dense short track, fit to be vectorized as it is."""
+    outcome = run_step("rasterizerailpoints", {"INPUT": cloud, "OUTPUT": tmp_path / "raster.tif"})
+    assert outcome.ok, outcome.error
+    return tmp_path / "raster.tif"
+
+
+def test_rasterize_alone(raster, track):
+    header = read_header(raster)
+    assert (header.class_codes, header.cell_m) == ((10,), pytest.approx(cell_size(1.435, 0.072)))
+    (found,) = read_rasters(raster, header)
+    cells = np.floor((track()[:, :2] - header.frame.origin[:2]) / header.cell_m)
+    # Coordinates in the file are rounded to millimetres, so that a point may change its cell.
+    assert found.count() == pytest.approx(len(np.unique(cells, axis=0)), rel=0.02)
+    layer = QgsRasterLayer(str(raster), "raster")
+    assert layer.crs().authid() == "EPSG:32643"
+    assert layer.width() * layer.height() == header.window[2] * header.window[3]
+
+
+def test_rasterize_makes_a_band_a_class(run_step, write_cloud, track, tmp_path):
+    for code in (11, 10):
+        write_cloud(track() + [0, 0.2 * code, 0], f"{code}.las", class_code=code)
+    outcome = run_step(
+        "rasterizerailpoints", {"INPUT": tmp_path, "RAIL_CLASSES": "10,11", "OUTPUT": tmp_path / "both.tif"}
+    )
+    assert outcome.ok, outcome.error
+    header = read_header(tmp_path / "both.tif")
+    rasters = read_rasters(tmp_path / "both.tif", header)
+    assert header.class_codes == (10, 11)
+    y = [raster.to_local(raster.cells())[:, 1].mean() for raster in rasters]
+    assert y[1] - y[0] == pytest.approx(0.2, abs=0.01)
+
+
+def test_cleanup_without_torch_keeps_grid_and_tags(run_step, raster, tmp_path, monkeypatch):
+    find_spec = engine.find_spec
+    monkeypatch.setattr(engine, "find_spec", lambda name: None if name == "torch" else find_spec(name))
+    outcome = run_step("frpdfcleanup", {"INPUT": raster, "ITERATIONS": 1, "OUTPUT": tmp_path / "cleaned.tif"})
+    assert outcome.ok, outcome.error
+    assert outcome.results["ENGINE_USED"].startswith("OpenCV")
+    before, after = read_header(raster), read_header(tmp_path / "cleaned.tif")
+    assert after.frame.origin.tolist() == before.frame.origin.tolist()
+    assert replace(after, frame=before.frame) == before
+    dirty, clean = (read_rasters(path, before)[0] for path in (raster, tmp_path / "cleaned.tif"))
+    assert clean.count() == pytest.approx(dirty.count(), rel=0.3)
+
+
+def test_vectorize_without_points_gives_flat_lines_with_a_warning(run_step, raster, context, new_feedback):
+    feedback = new_feedback()
+    outcome = run_step("vectorizerails", {"INPUT": raster, "OUTPUT": "memory:rails"}, feedback)
+    assert outcome.ok, outcome.error
+    assert "no heights" in feedback.warnings[0]
+    rails = list(context.getMapLayer(outcome.results["OUTPUT"]).getFeatures())
+    assert outcome.results["RAIL_COUNT"] == len(rails) == 2
+    assert outcome.results["RAIL_LENGTH"] == pytest.approx(24, abs=0.5)
+    assert not any(rail.geometry().constGet().is3D() for rail in rails)
+    sides = sorted(rail.geometry().centroid().asPoint().y() - 3_000_000 for rail in rails)
+    assert sides == pytest.approx([-0.7535, 0.7535], abs=0.02)
+
+
+@pytest.mark.parametrize(("epsg", "unit_m"), [(32643, 1.0), (2263, 1200 / 3937)])
+def test_vectorize_with_points_is_on_the_heads_in_every_unit(run_step, write_cloud, track, tmp_path, epsg, unit_m):
+    cloud, raster, rails = write_cloud(track() / unit_m, epsg=epsg), tmp_path / "r.tif", tmp_path / "r.gpkg"
+    assert run_step("rasterizerailpoints", {"INPUT": cloud, "OUTPUT": raster}).ok
+    outcome = run_step("vectorizerails", {"INPUT": raster, "POINTS": cloud, "OUTPUT": rails})
+    assert outcome.ok, outcome.error
+    assert outcome.results["RAIL_LENGTH"] == pytest.approx(24, abs=0.5)
+    lines = sorted((line * unit_m for line in read_lines(rails)), key=lambda line: line[0, 1])
+    for line, side in zip(lines, (-0.7535, 0.7535)):
+        assert np.abs(line[:, 1] - 3_000_000 - side).max() < 0.004
+        assert np.abs(line[:, 2] - 100).max() < 0.004
+    assert all(items["class_code"] == 10 and items["points"] > 1000 for _, items in read_features(rails))
+
+
+def test_raster_made_elsewhere_asks_for_its_rails(run_step, raster, cloud, tmp_path):
+    other = tmp_path / "other.tif"
+    gdal.Translate(
+        str(other),
+        str(raster),
+        metadataOptions=["RAIL_GAUGE_MM=", "RAIL_HEAD_MM="],
+        creationOptions=["PROFILE=GeoTIFF"],
+    )
+    for name in ("frpdfcleanup", "vectorizerails"):
+        outcome = run_step(name, {"INPUT": other, "OUTPUT": tmp_path / "o.tif"})
+        assert "fill GAUGE and HEAD_WIDTH" in outcome.error
+    outcome = run_step("vectorizerails", {"INPUT": other, "GAUGE": 1435, "HEAD_WIDTH": 72, "OUTPUT": "memory:"})
+    assert outcome.ok, outcome.error
+    assert outcome.results["RAIL_COUNT"] == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "sentence"),
+    [
+        ("frpdfcleanup", {"GAUGE": 1000, "HEAD_WIDTH": 61.91}, "cells are 39.9 mm wide, but a gauge of 1000 mm"),
+        ("frpdfcleanup", {"ENGINE": "OPENCV", "DEVICE": "CUDA"}, "processor alone"),
+        ("frpdfcleanup", {"INPUT": "gone.tif"}, "gone.tif"),
+        ("frpdfcleanup", {"OUTPUT": "cleaned.jpg"}, "jpg"),
+        ("frpdfcleanup", {"OUTPUT": "/nowhere/cleaned.tif"}, "can't be written"),
+        ("vectorizerails", {"POINTS": "gone.laz"}, "gone.laz does not exist"),
+    ],
+)
+def test_bad_input_is_one_sentence(run_step, raster, tmp_path, name, parameters, sentence):
+    suffix = "tif" if name == "frpdfcleanup" else "gpkg"
+    outcome = run_step(name, {"INPUT": raster, "OUTPUT": tmp_path / f"output.{suffix}", **parameters})
+    assert not outcome.ok
+    assert sentence in outcome.error
+    assert "Traceback" not in outcome.error
+    assert not (tmp_path / f"output.{suffix}").exists()
+
+
+def test_points_that_do_not_belong_to_the_raster_are_refused(run_step, raster, write_cloud, track, tmp_path):
+    for points, given, sentence in (
+        (track(), {"epsg": 32644}, "POINTS are in WGS 84 / UTM zone 44N but the raster is in WGS 84 / UTM zone 43N"),
+        (track() + [5000, 0, 0], {}, "POINTS have no point of class 10 in the raster's area"),
+        (track(), {"class_code": 11}, "POINTS have no point of class 10"),
+    ):
+        other = write_cloud(points, "other.las", **given)
+        outcome = run_step("vectorizerails", {"INPUT": raster, "POINTS": other, "OUTPUT": tmp_path / "r.gpkg"})
+        assert sentence in outcome.error
+        assert not (tmp_path / "r.gpkg").exists()
+
+
+def test_points_without_a_coordinate_system_are_taken_in_that_of_the_raster(
+    run_step, raster, write_cloud, track, tmp_path
+):
+    untold = write_cloud(track(), "untold.las", epsg=None)
+    outcome = run_step("vectorizerails", {"INPUT": raster, "POINTS": untold, "OUTPUT": tmp_path / "r.gpkg"})
+    assert outcome.ok, outcome.error
+    assert QgsVectorLayer(str(tmp_path / "r.gpkg"), "rails").crs().authid() == "EPSG:32643"
+
+
+@pytest.mark.parametrize("name", ["rasterizerailpoints", "vectorizerails"])
+def test_tiles_in_different_coordinate_systems_are_refused_with_their_names(
+    run_step, raster, write_cloud, track, tmp_path, name
+):
+    folder = tmp_path / "tiles"
+    folder.mkdir()
+    for number, epsg in enumerate((32643, 32644)):
+        write_cloud(track(), f"tile{number}.las", epsg=epsg, folder=folder)
+    catalogue = folder / "all.vpc"
+    catalogue.write_text(json.dumps({"features": [{"assets": {"data": {"href": f"./tile{n}.las"}}} for n in (0, 1)]}))
+    for source in (folder, catalogue):
+        given = {"INPUT": source} if name == "rasterizerailpoints" else {"INPUT": raster, "POINTS": source}
+        outcome = run_step(name, {**given, "OUTPUT": tmp_path / "none.tif"})
+        assert "tile0.las" in outcome.error
+        assert "tile1.las" in outcome.error
+
+
+@pytest.mark.parametrize("name", ["rasterizerailpoints", "frpdfcleanup", "vectorizerails"])
+def test_cancelled_step_writes_nothing(run_step, raster, cloud, tmp_path, new_feedback, name):
+    output = tmp_path / ("o.gpkg" if name == "vectorizerails" else "o.tif")
+    source = {"INPUT": cloud} if name == "rasterizerailpoints" else {"INPUT": raster, "POINTS": cloud}
+    outcome = run_step(name, {**source, "OUTPUT": output}, new_feedback(cancel_at=1))
+    assert outcome.error == "Cancelled; nothing was written."
+    assert not output.exists()
+
+
+def test_raster_has_a_style(raster):
+    layer = QgsRasterLayer(str(raster), "raster")
+    layer.loadNamedStyle(str(STYLES / "raster.qml"))
+    assert [entry.value for entry in layer.renderer().classes()] == [1]
