@@ -11,7 +11,7 @@ SYSTEM_MODULES = qgis.core numpy scipy matplotlib pyproj ensurepip
 
 .PHONY: help
 help:  ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## /make \1 - /p' Makefile
+	@sed -n 's/^\([a-z-]*\):.*## /make \1 - /p' Makefile
 
 .PHONY: demo
 demo: plugin  ## extract the sample's rails through qgis_process; lines and map go into build/demo
@@ -37,6 +37,10 @@ package: .venv/installed  ## build the plugin's zip, build/rail_extract.zip
 .PHONY: scan
 scan: package  ## apply the plugin site's rules to the zip
 	@$(PYTHON) tools/scan.py
+
+.PHONY: contact-sheet
+contact-sheet: .venv/installed  ## draw synthetic training pairs by family and severity, docs/contact_sheet.png
+	@$(PYTHON) tools/contact_sheet.py
 
 .PHONY: clean
 clean:  ## remove what was built; .venv stays
