@@ -25,14 +25,20 @@ FURTHEST_M = 0.3
 TOUCH_M = 0.002
 """Ends this close to a track lie on it, within what thinning leaves of a line."""
 
-FIT_M = 5.0
-"""Stretch of the branch that tells how it comes closer: even a tram's branch bends evenly for as long."""
+FIT_WITHIN_M = 0.8
+"""A branch bends evenly at least until it is this far off, after 6 m of a tram's and 63 m of the widest branch."""
+
+LEAST_M = 3.0
+"""Shorter branches tell too little."""
+
+MISFIT_M = 0.01
+"""A branch may lie this far beside the parabola: a lead that is straight first does, and the raster's stairs do."""
+
+ROUNDS = 5
+"""Rounds of reweighting."""
 
 LONGEST_M = 40.0
 """Longest way back: a branch of 2500 m radius, the widest in use, is 0.3 m off after 39 m."""
-
-LEAST_VERTICES = 4
-"""Vertices that a parabola is fitted to."""
 
 STEP_M = 0.2
 """Vertex distance on the way back, that of smoothed centerlines."""
@@ -78,32 +84,53 @@ def _near_ends(lines: Sequence[Centerline]) -> Iterator[tuple[int, int, int]]:
 
 def _led_back(branch: np.ndarray, through: np.ndarray) -> np.ndarray | None:
     """Lead the start of a branch back onto a through track, both (n, 3); None where it does not come closer in time."""
-    first = branch[length_along(branch[:, :2]) <= FIT_M]
-    feet = project([through[:, :2]], first[:, :2], reach_m=FIT_M)
+    s = length_along(branch[:, :2])
+    feet = project([through[:, :2]], branch[:, :2], FIT_WITHIN_M)
     order = np.argsort(feet.point)
-    t, off = feet.t[order], feet.across[order]
-    if len(first) < LEAST_VERTICES or len(t) < len(first) or abs(off[0]) > FURTHEST_M:
+    count = int(np.argmin(np.append(feet.point[order] == np.arange(len(order)), False)))
+    s, t, off = s[:count], feet.t[order][:count], feet.across[order][:count]
+    if not count or s[-1] < LEAST_M or abs(off[0]) > FURTHEST_M:
         return None
-    touches = abs(off[0]) <= TOUCH_M
-    length = 0.0 if touches else _length_back(length_along(first[:, :2]), off)
+    back, misfit = _parabola(s, off)
+    joins = int(np.max(np.flatnonzero(misfit > MISFIT_M), initial=-1)) + 1
+    if joins > len(s) // 2 or not -TOUCH_M <= back <= LONGEST_M:
+        return None
+    length = back + s[joins] if back + s[joins] > STEP_M else 0.0
     along = length_along(through[:, :2])
-    ahead = np.sign(t[-1] - t[0])
-    if not 0 <= length <= LONGEST_M or not 0 <= t[0] - ahead * length <= along[-1]:
+    parting = t[joins] - np.sign(t[-1] - t[0]) * length
+    if not 0 <= parting <= along[-1]:
         return None
     share = np.linspace(0.0, 1.0, int(np.ceil(length / STEP_M)) + 1)
-    chainage = t[0] + ahead * (share - 1) * length
+    chainage = parting + share * (t[joins] - parting)
     lead = interpolate(through, along, chainage)
-    rise = branch[0, 2] - np.interp(t[0], along, through[:, 2])
-    grown = 0.0 * share if touches else share**2
-    lead[:, :2] += (grown * off[0])[:, None] * interpolate(left_normals(through), along, chainage)
+    grown = share**2 * (length > 0)
+    rise = branch[joins, 2] - np.interp(t[joins], along, through[:, 2])
+    lead[:, :2] += (grown * off[joins])[:, None] * interpolate(left_normals(through), along, chainage)
     lead[:, 2] += grown * rise
-    return np.concatenate([lead, branch[1:]])
+    return np.concatenate([lead, branch[joins + 1 :]])
 
 
-def _length_back(along: np.ndarray, off: np.ndarray) -> float:
-    """Length of the parabola that touches the through track and has the distance and slope that `off` starts with."""
-    _, slope, start = np.polyfit(along, off, 2)
-    return 2 * start / slope if slope else np.inf
+def _parabola(s: np.ndarray, off: np.ndarray) -> tuple[float, np.ndarray]:
+    """Fit the parabola that touches the through track to a branch's distances from it, (n,), at `s` along the branch.
+
+    The root of the distance grows evenly. What the raster bent where rails merge loses its say in a few rounds.
+
+    Returns
+    -------
+    back : float
+        How far before the branch's start the parabola touches the through track; infinite where there is no growth.
+    misfit : (n,) array
+        How far the branch lies beside the parabola.
+    """
+    side = np.sign(off[-1])
+    root = np.sqrt(np.maximum(side * off, 0.0))
+    weight = root + np.sqrt(TOUCH_M)  # a distance's root is the less certain the smaller it is
+    trust = np.ones_like(s)
+    for _ in range(ROUNDS):
+        growth, start = np.polyfit(s, root, 1, w=weight * trust)
+        misfit = np.abs(off - side * (growth * s + start) ** 2)
+        trust = 1 / np.sqrt(1 + (misfit / MISFIT_M) ** 2)
+    return start / growth if growth > 0 else np.inf, misfit
 
 
 def _prolonged(line: Centerline, xyz: np.ndarray) -> Centerline:
