@@ -1,10 +1,16 @@
-"""Confusion counts of cleaned rasters, as in the paper's table."""
+"""Figures of cleaned rasters: the counts of the paper's table, gaps bridged, lines removed."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
+
+BRIDGED_SHARE = 0.9
+"""A gap is bridged where so many of its cells are found, or have a neighbour that is."""
+
+_NEIGHBOURS = np.ones((3, 3), dtype=bool)
 
 
 @dataclass(frozen=True)
@@ -40,10 +46,38 @@ class Scores:
         return 2 * self.tp / max(2 * self.tp + self.fp + self.fn, 1)
 
 
-def score(found: np.ndarray, label: np.ndarray) -> Scores:
-    """Count strictly, cell by cell; both are bool arrays of one shape."""
+def score(found: np.ndarray, label: np.ndarray, tolerance: int = 0) -> Scores:
+    """Count cells.
+
+    Parameters
+    ----------
+    found, label : bool arrays of one shape
+    tolerance : int
+        Cells by which what is found may miss its place: a cell of the label is found if one so near it is, and a cell
+        found is invented if no cell of the label is so near. Strict at 0.
+    """
+    around_found, around_label = (_grown(cells, tolerance) for cells in (found, label))
     return Scores(
-        fn=int(np.count_nonzero(~found & label)),
-        fp=int(np.count_nonzero(found & ~label)),
-        tp=int(np.count_nonzero(found & label)),
+        fn=int(np.count_nonzero(~around_found & label)),
+        fp=int(np.count_nonzero(found & ~around_label)),
+        tp=int(np.count_nonzero(around_found & label)),
     )
+
+
+def bridged(found: np.ndarray, gap: np.ndarray) -> dict[int, bool]:
+    """Tell of each gap whether it is bridged, by its number.
+
+    Parameters
+    ----------
+    found : bool array
+    gap : int array of the same shape
+        Number of the gap that a cell lies in, 0 for none. Gaps at the border are left out: half of them is not shown.
+    """
+    cells = np.bincount(gap.ravel())
+    met = np.bincount(gap[_grown(found, 1)], minlength=len(cells))
+    cut = {0, *np.unique(np.concatenate([gap[0], gap[-1], gap[:, 0], gap[:, -1]])).tolist()}
+    return {n: bool(met[n] >= BRIDGED_SHARE * cells[n]) for n in np.flatnonzero(cells).tolist() if n not in cut}
+
+
+def _grown(cells: np.ndarray, reach: int) -> np.ndarray:
+    return ndimage.binary_dilation(cells, _NEIGHBOURS, iterations=reach) if reach else cells
