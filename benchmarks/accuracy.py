@@ -125,7 +125,7 @@ def _local(scene: Scene, network: RailNetwork, xyz: np.ndarray) -> np.ndarray:
 
 
 def _mean_error(scene: Scene) -> float:
-    """Standard error w / sqrt(12 n) for the n points in the smoothing length of an average rail."""
+    """Compute w / sqrt(12 n) for the n points in the smoothing length of an average rail."""
     length_m = sum(length_along(rail)[-1] for rail in scene.rails)
     count = SMOOTHING_M * len(scene.rail_points().xyz) / length_m
     return scene.standard.head_width_m / np.sqrt(12 * count)

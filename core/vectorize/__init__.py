@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..progress import SILENT, Progress
 from ..raster import RailRaster
+from .attaching import attach_branches, drop_guards
+from .blots import cut_kinks, straighten_blots
 from .branches import resolve_branches
 from .closing import close
 from .crossings import resolve_crossings
@@ -59,12 +62,16 @@ def vectorize(
     progress.set_fraction(0.7)
     progress.check()
     network = clean_junctions(trace(closed, pixels, edges, tips), head_width_m)
+    places, widths_m = closed.to_local(pixels.cells / 2), raster.cell_m * distance / 2
+    network = cut_kinks(straighten_blots(network, places, widths_m, head_width_m))
     progress.set_fraction(0.8)
     progress.check()
     network = resolve_branches(resolve_crossings(network), head_width_m + raster.cell_m)
+    seen = cKDTree(places)
     network = join_gaps(run_through(network), max_gap_m, gap_angle_deg)
+    network = attach_branches(network, seen, max_gap_m)
     progress.set_fraction(1.0)
-    return _settle_ends(_drop_short(network, min_length_m))
+    return _settle_ends(_drop_short(drop_guards(network, head_width_m), min_length_m))
 
 
 def _drop_short(network: LineNetwork, min_length_m: float) -> LineNetwork:

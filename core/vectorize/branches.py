@@ -41,12 +41,13 @@ def resolve_branches(network: LineNetwork, apart_m: float) -> LineNetwork:
             continue
         free = [cut_back(rail, SKIP_M) for rail in rails]
         trunk = _trunk(trunk, free, apart_m)
-        curves = [bridge(trunk, rail) for rail in free] if len(trunk) > 1 else [None]
+        curves = [bridge(trunk, rail, held=True) for rail in free] if len(trunk) > 1 else [None]
         if None in curves:
             continue
         nodes[node] = trunk[0]
         lines[stem // 2] = turned(trunk, stem)
         for leg, curve, rail in zip(legs, curves, free):
+            rail = cut_back(rail, curve.cuts_m[1])
             lines[leg // 2] = turned(np.concatenate([trunk[:1], curve.points, rail]), leg)
         own = curvature(stretch(trunk, STEADY_M)[::-1])
         steady = legs[int(np.argmin([abs(curve.curvature - own) for curve in curves]))]

@@ -37,33 +37,44 @@ class Bridge:
         Its length in metres, made larger by what it misses and how it bends; 1 to 3 times the length.
     curvature : float
         In the middle, 1/m, positive to the left.
+    cuts_m : tuple of float
+        Lengths at the two ends that stray from the curve, as rails seem to beside weeds and other rails.
     points : (n, 2) array
-        Between the ends, every `STEP_M`, from the first end to the second.
+        Between the ends so cut back, every `STEP_M`, from the first end to the second.
     """
 
     cost: float
     curvature: float
+    cuts_m: tuple[float, float]
     points: np.ndarray
 
 
-def bridge(one: np.ndarray, other: np.ndarray) -> Bridge | None:
+def bridge(one: np.ndarray, other: np.ndarray, held: bool = False) -> Bridge | None:
     """Fit one smooth curve to two lines, each given from the end to be joined, and cut out what lies between them.
 
     The curve is a cubic over the way across, its curvature held to what rails do. None if it misses either line, or
-    bends more than a rail. That rules out the neighbouring rail, for it takes a double bend.
+    bends more than a rail. That rules out the neighbouring rail, for it takes a double bend. With `held` nothing is cut
+    off the first line.
     """
     before, after = stretch(one, FIT_M)[::-1], stretch(other, FIT_M)
     origin, axes = _frame(before, after)
     before, after = (before - origin) @ axes.T, (after - origin) @ axes.T
     gap = after[0, 0] - before[-1, 0]
     cubic = _fit(np.concatenate([before, after]))
-    misfit = max(np.median(np.abs(points[:, 1] - _basis(points[:, 0]) @ cubic)) for points in (before, after))
+    off = [np.abs(points[:, 1] - _basis(points[:, 0]) @ cubic) for points in (before, after)]
+    misfit = max(np.median(off[0]), np.median(off[1]))
     bend = np.abs(cubic[2] + cubic[3] * np.array([before[0, 0], after[-1, 0]])).max() * TIGHTEST_RADIUS_M
     if gap <= 0 or misfit > MISFIT_M or bend > 1:
         return None
-    x = np.linspace(before[-1, 0], after[0, 0], int(gap / STEP_M) + 2)[1:-1]
+    astray = 0 if held else _astray(off[0][::-1]), _astray(off[1])
+    first, last = before[-1 - astray[0], 0], after[astray[1], 0]
+    x = np.linspace(first, last, int((last - first) / STEP_M) + 2)[1:-1]
     points = origin + np.column_stack([x, _basis(x) @ cubic]) @ axes
-    return Bridge(gap * (1 + misfit / MISFIT_M + bend), cubic[2], points)
+    cuts_m = tuple(
+        float(np.hypot(*np.diff(side[: count + 1], axis=0).T).sum())
+        for side, count in zip((before[::-1], after), astray)
+    )
+    return Bridge(gap * (1 + misfit / MISFIT_M + bend), cubic[2], cuts_m, points)
 
 
 def curvature(points: np.ndarray) -> float:
@@ -71,6 +82,13 @@ def curvature(points: np.ndarray) -> float:
     half = len(points) // 2
     origin, axes = _frame(points[: half + 1], points[half:])
     return float(_fit((points - origin) @ axes.T)[2])
+
+
+def _astray(off_m: np.ndarray) -> int:
+    """Count the points from the end inward that stray from the curve; no more than half, for the rest bears it."""
+    half = len(off_m) // 2
+    far = np.flatnonzero(off_m[:half] > STAIRS_M)
+    return int(far[-1]) + 1 if len(far) else 0
 
 
 def _frame(before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -35,8 +35,9 @@ def resolve_crossings(network: LineNetwork) -> LineNetwork:
             continue
         joins.update(pairing)
         keep[shared] = False
+        more_m = {end: cut for ends, found in pairing.items() for end, cut in zip(ends, found.cuts_m)}
         for end in legs:
-            free = cut_back(turned(lines[end // 2], end), SKIP_M)
+            free = cut_back(turned(lines[end // 2], end), SKIP_M + more_m[end])
             lines[end // 2] = turned(free, end)
             ends.flat[end] = len(nodes)
             nodes.append(free[0])

@@ -25,6 +25,8 @@ def stretch(from_end: np.ndarray, length_m: float) -> np.ndarray:
 
 def cut_back(from_end: np.ndarray, length_m: float) -> np.ndarray:
     """Take the first `length_m` off a longer line given from its end."""
+    if length_m <= 0:
+        return from_end
     along = length_along(from_end)
     first = [[np.interp(length_m, along, axis) for axis in from_end.T]]
     return np.concatenate([first, from_end[along > length_m]])

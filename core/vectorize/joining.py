@@ -26,13 +26,14 @@ def join_gaps(network: LineNetwork, max_gap_m: float, gap_angle_deg: float) -> L
         best: dict[int, tuple[int, int]] = {}
         for ends in sorted(joins, key=lambda ends: (joins[ends].cost, ends), reverse=True):
             best[ends[0]] = best[ends[1]] = ends
-        partner, bridges = {}, {}
+        partner, bridges, cuts_m = {}, {}, {}
         for one, other in (ends for ends in joins if best[ends[0]] == best[ends[1]] == ends):
             partner[one], partner[other] = other, one
+            cuts_m[one], cuts_m[other] = joins[one, other].cuts_m
             bridges[one], bridges[other] = joins[one, other].points, joins[one, other].points[::-1]
         if not partner:
             return network
-        network = network.weld(partner, bridges)
+        network = network.cut_back(cuts_m).weld(partner, bridges)
 
 
 def _possible_joins(network: LineNetwork, max_gap_m: float, gap_angle_deg: float) -> dict[tuple[int, int], Bridge]:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .ends import cut_back, turned
+
 
 @dataclass(frozen=True)
 class LineNetwork:
@@ -53,6 +55,21 @@ class LineNetwork:
         passes = np.column_stack([passes[:, 0], number[passes[:, 1]], passes[:, 2]])
         lines = tuple(line for line, kept in zip(self.lines, keep) if kept)
         return LineNetwork(lines, self.nodes, self.ends[keep], passes)._tidy()
+
+    def cut_back(self, cuts_m: Mapping[int, float]) -> LineNetwork:
+        """Take lengths off line ends; such an end becomes a node of its own."""
+        lines, nodes, ends, passes = list(self.lines), list(self.nodes), self.ends.copy(), self.passes.copy()
+        for end, length_m in cuts_m.items():
+            if length_m > 0:
+                line = lines[end // 2]
+                lines[end // 2] = turned(cut_back(turned(line, end), length_m), end)
+                ends.flat[end] = len(nodes)
+                nodes.append(lines[end // 2][-1 if end % 2 else 0])
+                if end % 2 == 0:
+                    passes[passes[:, 1] == end // 2, 2] -= len(line) - len(lines[end // 2])
+        last = np.array([len(lines[number]) - 1 for number in passes[:, 1]], dtype=np.int64)
+        passes = passes[(passes[:, 2] > 0) & (passes[:, 2] < last)]
+        return LineNetwork(tuple(lines), np.array(nodes).reshape(-1, 2), ends, passes)
 
     def weld(self, partner: Mapping[int, int], bridges: Mapping[int, np.ndarray] | None = None) -> LineNetwork:
         """Make one line of lines that continue each other.

@@ -1,0 +1,118 @@
+"""A rail that ends beside another one and bends towards it branches off it; one that only runs along it is a guard."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..rails import length_along
+from .branches import FARTHEST_M
+from .bridges import FIT_M, STAIRS_M, bridge
+from .ends import STEP_M, cut_back, stretch, turned, way_out
+from .junctions import DIRECTION_M
+from .network import LineNetwork
+
+BESIDE_M = 1.0
+"""A branch that is no nearer to its stock rail is not led back to it: nothing of the switch was seen."""
+
+SLOPE_M = 4.0
+"""Stretch of the stock rail whose direction is compared with the branch's."""
+
+UNSEEN_M = 0.10
+"""A place this far from any cell has no points of its rail, nor of one that it is merged with."""
+
+GUARD_APART_M = 0.13
+"""Farthest that a guard or wing rail's axis lies beside a running rail's: a head, and a flangeway of 50 mm."""
+
+GUARD_M = 8.0
+"""Longer lines so near another are no guards, but two rails of a very flat switch."""
+
+
+def attach_branches(network: LineNetwork, seen: cKDTree, max_gap_m: float) -> LineNetwork:
+    """Lead free ends back to the rails that they branch off, by curves that both lines explain.
+
+    A branch that leaves on an arc and is y beside its stock rail, at an angle to it, touched it 2 y / angle before.
+
+    Parameters
+    ----------
+    network : LineNetwork
+    seen : cKDTree
+        Places of rail cells.
+    max_gap_m : float
+        The curve may run no further than this where there are none.
+    """
+    lines, nodes, ends, passes = list(network.lines), list(network.nodes), network.ends.copy(), network.passes.tolist()
+    for end in np.flatnonzero(network.degrees()[network.ends.ravel()] == 1).tolist():
+        own = end // 2
+        from_end = turned(lines[own], end)
+        if length_along(from_end)[-1] < FIT_M:
+            continue
+        best = None
+        for stock, vertex, onward in _touching(from_end, lines, own):
+            found = bridge(from_end, onward)
+            if found is None or found.cuts_m[1] > STEP_M or _unseen_m(found.points, seen) > max_gap_m:
+                continue
+            if best is None or found.cost < best[0].cost:
+                best = found, stock, vertex
+        if best is None:
+            continue
+        found, stock, vertex = best
+        first = len(lines[own])
+        free = cut_back(from_end, found.cuts_m[0])
+        lines[own] = turned(np.concatenate([lines[stock][[vertex]], found.points[::-1], free]), end)
+        if end % 2 == 0:
+            passes = [[n, i, v + (len(lines[own]) - first) * (i == own)] for n, i, v in passes]
+        ends.flat[end] = len(nodes)
+        nodes.append(lines[stock][vertex])
+        passes.append([ends.flat[end], stock, vertex])
+    return LineNetwork(
+        tuple(lines), np.array(nodes).reshape(-1, 2), ends, np.array(passes, dtype=np.int64).reshape(-1, 3)
+    ).select(np.ones(len(lines), dtype=bool))
+
+
+def _touching(from_end: np.ndarray, lines: list[np.ndarray], own: int) -> Iterator[tuple[int, int, np.ndarray]]:
+    """List the lines that a line may branch off: number, vertex where they would touch, and the way on from there."""
+    tip, outward = way_out(stretch(from_end, DIRECTION_M))
+    axes = np.array([outward, [-outward[1], outward[0]]])
+    for number, line in enumerate(lines):
+        x, y = axes @ (line - tip).T
+        near = (x > -SLOPE_M) & (x < FARTHEST_M + SLOPE_M) & (np.abs(y) < BESIDE_M)
+        if number == own or np.count_nonzero(near) < 2:
+            continue
+        first, last = np.flatnonzero(near)[[0, -1]]
+        way = line[first : last + 1] if x[last] > x[first] else line[first : last + 1][::-1]
+        x, y = axes @ (way - tip).T
+        if x[0] > 0 or x[-1] < SLOPE_M or (np.diff(x) <= 0).any():
+            continue
+        beside, later = np.interp([0.0, SLOPE_M], x, y)
+        angle = (beside - later) / SLOPE_M * np.sign(beside)
+        touch_m = 2 * abs(beside) / max(angle, abs(beside) / FARTHEST_M)
+        vertex = int(np.argmin(np.abs(axes[0] @ (line - tip).T - touch_m) + 1e9 * ~near))
+        if angle <= 0 or touch_m > FARTHEST_M or not 0 < vertex < len(line) - 1:
+            continue
+        along = axes[0] @ (line[vertex + 1] - line[vertex])
+        onward = line[vertex:] if along > 0 else line[vertex::-1]
+        if length_along(onward)[-1] >= DIRECTION_M:
+            yield number, vertex, onward
+
+
+def _unseen_m(points: np.ndarray, seen: cKDTree) -> float:
+    """Length of a curve's points that lie far from all cells."""
+    return STEP_M * np.count_nonzero(seen.query(points)[0] > UNSEEN_M) if len(points) else 0.0
+
+
+def drop_guards(network: LineNetwork, head_width_m: float) -> LineNetwork:
+    """Remove short lines that lie beside a longer one over their whole length: guard and wing rails, and doubles."""
+    lengths = network.lengths()
+    keep = np.ones(len(lengths), dtype=bool)
+    reach_m = GUARD_APART_M + STAIRS_M
+    dense = [stretch(line, np.inf) for line in network.lines]
+    for number in np.flatnonzero(lengths < GUARD_M).tolist():
+        low, high = dense[number].min(axis=0) - reach_m, dense[number].max(axis=0) + reach_m
+        for other, line in enumerate(dense):
+            inside = line[((line > low) & (line < high)).all(axis=1)]
+            if lengths[other] > lengths[number] and keep[other] and len(inside):
+                keep[number] &= cKDTree(inside).query(dense[number])[0].max() > reach_m
+    return network if keep.all() else network.select(keep)
