@@ -14,7 +14,7 @@ from ..core.errors import RasterError
 from ..core.points import LocalFrame
 from ..core.progress import SILENT, Progress
 from ..core.raster import TILE, RailRaster
-from .rasters import BLOCK, GAUGE_TAG, HEAD_TAG, MODEL_TAG, RasterHeader
+from .rasters import BLOCK, EXTENT_TAG, GAUGE_TAG, HEAD_TAG, MODEL_TAG, RasterHeader
 
 CREATION = (
     "TILED=YES",
@@ -56,9 +56,10 @@ def read_header(path: Path) -> RasterHeader:
         frame=LocalFrame(np.array([x, y, 0.0]), unit_m, unit_m, wkt),
         cell_m=width * unit_m,
         window=(0, 0, dataset.RasterYSize, dataset.RasterXSize),
-        gauge_m=_tag_m(dataset, GAUGE_TAG, path.name),
-        head_width_m=_tag_m(dataset, HEAD_TAG, path.name),
+        gauge_m=_length_m(dataset, GAUGE_TAG),
+        head_width_m=_length_m(dataset, HEAD_TAG),
         model=dataset.GetMetadataItem(MODEL_TAG),
+        extent=_numbers(dataset, EXTENT_TAG, 4),
     )
 
 
@@ -159,15 +160,24 @@ def _class_codes(dataset: gdal.Dataset, name: str) -> tuple[int, ...]:
     )
 
 
-def _tag_m(dataset: gdal.Dataset, tag: str, name: str) -> float | None:
-    """Length of a tag in millimetres; None where it is missing."""
+def _numbers(dataset: gdal.Dataset, tag: str, count: int) -> tuple[float, ...] | None:
+    """Numbers of a tag; None where it is missing."""
     text = dataset.GetMetadataItem(tag)
-    if text is None:
+    if not text:
         return None
     try:
-        return float(text) / 1000
+        numbers = tuple(float(word) for word in text.split(","))
     except ValueError:
-        raise RasterError(f"The tag {tag} of {name} is no number but {text!r}: make the raster again.") from None
+        numbers = ()
+    if len(numbers) != count:
+        raise RasterError(f"The tag {tag} of the raster can't be {text!r}: rasterize the points again.")
+    return numbers
+
+
+def _length_m(dataset: gdal.Dataset, tag: str) -> float | None:
+    """Length of a tag in millimetres; None where it is missing."""
+    numbers = _numbers(dataset, tag, 1)
+    return None if numbers is None else numbers[0] / 1000
 
 
 def _read(band: gdal.Band, row: int, column: int, height: int, width: int, name: str) -> np.ndarray:
@@ -225,6 +235,7 @@ def _create(path: Path, header: RasterHeader) -> gdal.Dataset | None:
         GAUGE_TAG: _millimetres(header.gauge_m),
         HEAD_TAG: _millimetres(header.head_width_m),
         MODEL_TAG: header.model,
+        EXTENT_TAG: ",".join(map(repr, header.extent or ())),
     }
     dataset.SetMetadata({tag: text for tag, text in tags.items() if text})
     for number, code in enumerate(header.class_codes, start=1):

@@ -23,7 +23,7 @@ MOST_BLOCKS = 2**24
 CELL_TOLERANCE = 0.03
 """Share by which cells may differ from what the network expects: between tracks that training gave it."""
 
-GAUGE_TAG, HEAD_TAG, MODEL_TAG = "RAIL_GAUGE_MM", "RAIL_HEAD_MM", "RAIL_MODEL"
+GAUGE_TAG, HEAD_TAG, MODEL_TAG, EXTENT_TAG = "RAIL_GAUGE_MM", "RAIL_HEAD_MM", "RAIL_MODEL", "RAIL_EXTENT"
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,9 @@ class RasterHeader:
         Of the rails that the raster was made for.
     model : str or None
         Name of the network's weights that fit it.
+    extent : tuple of float or None
+        Smallest x, smallest y, largest x, largest y of the points that were taken, in units of the coordinate system,
+        where not all were: lines end there, and take no account of what lies beyond.
     """
 
     class_codes: tuple[int, ...]
@@ -52,10 +55,13 @@ class RasterHeader:
     gauge_m: float | None = None
     head_width_m: float | None = None
     model: str | None = None
+    extent: tuple[float, float, float, float] | None = None
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Smallest x, smallest y, largest x, largest y, in units of the coordinate system."""
+        """Smallest x, smallest y, largest x, largest y of what the raster may show, in units of its coordinates."""
+        if self.extent is not None:
+            return self.extent
         row, column, height, width = self.window
         corners = np.array([[column, -row - height, 0], [column + width, -row, 0]]) * self.cell_m
         (west, south, _), (east, north, _) = self.frame.to_crs(corners).tolist()
@@ -82,7 +88,11 @@ class RasterHeader:
 
 
 def header_for(
-    rasters: Sequence[RailRaster], class_codes: Sequence[int], frame: LocalFrame, standard: RailStandard
+    rasters: Sequence[RailRaster],
+    class_codes: Sequence[int],
+    frame: LocalFrame,
+    standard: RailStandard,
+    extent: tuple[float, float, float, float] | None = None,
 ) -> RasterHeader:
     """Lay out a file that holds rasters of one grid and a margin of a tile, in which the network may close gaps.
 
@@ -102,7 +112,9 @@ def header_for(
         )
     window = (*(first * TILE).tolist(), height, width)
     model = choose(standard.gauge_m, standard.head_width_m).name
-    return RasterHeader(tuple(class_codes), frame, cell_m, window, standard.gauge_m, standard.head_width_m, model)
+    return RasterHeader(
+        tuple(class_codes), frame, cell_m, window, standard.gauge_m, standard.head_width_m, model, extent
+    )
 
 
 def choose_model(header: RasterHeader, name: str) -> Model:

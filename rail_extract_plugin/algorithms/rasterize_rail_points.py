@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from qgis.core import QgsProcessingContext, QgsProcessingParameterRasterDestination
+from qgis.core import QgsCoordinateReferenceSystem, QgsProcessingContext, QgsProcessingParameterRasterDestination
 
 from ...core.frpdf.zoo import choose as choose_model
 from ...core.progress import Progress
@@ -66,11 +66,13 @@ class RasterizeRailPoints(RailAlgorithm):
         from ..geotiff import write_rasters
         from ..rasters import header_for
 
-        bounds = Values(self, parameters, context).extent
-        clouds = read_points(job.cloud, job.class_codes, bounds, progress.span(0, READING))
+        values = Values(self, parameters, context)
+        clouds = read_points(job.cloud, job.class_codes, values.extent, progress.span(0, READING))
         cell_m = cell_size(job.standard.gauge_m, job.standard.head_width_m)
         rasters = [rasterize(points.xyz, cell_m) for points in clouds]
-        header = header_for(rasters, [points.class_code for points in clouds], clouds[0].frame, job.standard)
+        frame, codes = clouds[0].frame, [points.class_code for points in clouds]
+        extent = values.extent(QgsCoordinateReferenceSystem(frame.crs_wkt or ""))
+        header = header_for(rasters, codes, frame, job.standard, extent)
         output = self.parameterAsOutputLayer(parameters, "OUTPUT", context)
         write_rasters(Path(output), header, rasters, progress.span(READING, 1))
         style_on_load(output, "raster", context)

@@ -42,9 +42,11 @@ def places(raster, frame):
 def test_cells_come_back_where_they_were(tmp_path, code, unit_m):
     frame, path = frame_in(code, unit_m), tmp_path / "räster 1.tif"
     rasters = [rasterize(strokes(seed=seed), CELL_M) for seed in (1, 2)]
-    header = header_for(rasters, (10, 11), frame, STANDARD)
+    extent = (500_000.1, 3_000_100.0, 500_200.123456789, 3_000_300.0)
+    header = header_for(rasters, (10, 11), frame, STANDARD, extent)
     write_rasters(path, header, rasters)
     found = read_header(path)
+    assert found.bounds == extent
     assert (found.class_codes, found.model) == ((10, 11), "base")
     assert (found.gauge_m, found.head_width_m) == pytest.approx((1.435, 0.072), abs=1e-9)
     assert found.cell_m == pytest.approx(CELL_M, rel=1e-12)
@@ -80,6 +82,17 @@ def corridor(tmp_path):
     path = tmp_path / "corridor.tif"
     write_rasters(path, header_for([raster], (10,), frame_in("EPSG:32643"), STANDARD), [raster])
     return raster, path
+
+
+def test_bounds_are_those_of_the_file_where_all_points_were_taken(tmp_path):
+    raster = rasterize(strokes(), CELL_M)
+    header = header_for([raster], (10,), frame_in("EPSG:2263", 1200 / 3937), STANDARD)
+    write_rasters(tmp_path / "r.tif", header, [raster])
+    dataset = gdal.Open(str(tmp_path / "r.tif"))
+    x, width, _, y, _, height = dataset.GetGeoTransform()
+    expected = (x, y + height * dataset.RasterYSize, x + width * dataset.RasterXSize, y)
+    for bounds in (header.bounds, read_header(tmp_path / "r.tif").bounds):
+        np.testing.assert_allclose(bounds, expected, atol=1e-6)
 
 
 def test_corridor_takes_no_room_and_no_time_for_what_is_empty(corridor):
@@ -165,7 +178,7 @@ def test_raster_made_elsewhere(geotiff, nodata):
         ({"bands": 3}, RasterError, "has 3 bands"),
         ({"bands": 2, "descriptions": ("10", "red")}, RasterError, "has 2 bands"),
         ({"epsg": 4326}, CrsError, "Lengths can't be computed"),
-        ({"tags": {"RAIL_GAUGE_MM": "wide"}}, RasterError, "RAIL_GAUGE_MM of other.tif is no number"),
+        ({"tags": {"RAIL_GAUGE_MM": "wide"}}, RasterError, "RAIL_GAUGE_MM of the raster can't be 'wide'"),
     ],
 )
 def test_unfit_raster_is_refused(geotiff, made, error, sentence):
