@@ -56,8 +56,8 @@ def measure_track_geometry(
         As extracted, or read from files.
     head_width_m : float
     points : RailPoints, optional
-        Points of the rails. With them heights are found anew, smoothed over 1 m only, and support is known of lines
-        read from files as well; without, heights are those of the lines.
+        Points of the rails, in the frame of the lines. With them heights are found anew, smoothed over 1 m only, and
+        support is known of lines read from files as well; without, heights are those of the lines.
     step_m : float
         Distance of the stations.
     progress : Progress

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rail_extract.core import pipeline
 from rail_extract.core.centerlines import build_centerlines
 from rail_extract.core.elevation import ElevationParameters, elevate
 from rail_extract.core.geometry import measure_track_geometry
@@ -135,3 +136,29 @@ def test_short_and_lonely_lines_give_what_can_be_known():
     assert np.isnan(alone.gauge_mm).all()
     assert alone.bridged.all()
     assert measure_track_geometry([], rail_lines(left, right), WIDTH) == ()
+
+
+class RawRaster:
+    """An engine that leaves the raster as it is."""
+
+    description = "none"
+
+    def probabilities(self, raster, *_):
+        return raster
+
+
+def test_one_run_measures_every_track_of_every_class_if_asked(monkeypatch):
+    monkeypatch.setattr(pipeline, "load_arrays", lambda path: {})
+    monkeypatch.setattr(pipeline, "make_engine", lambda *_: RawRaster())
+    track = Track(trace([Element(30.0)], heading=0.3), GAUGE + WIDTH, cant_m=0.02)
+    random = np.random.RandomState(1)
+    heads = [scan(track.railhead(side), WIDTH, track.centerline, Scanner(), random) for side in (1, -1)]
+    xyz, frame = np.concatenate(heads), LocalFrame(np.zeros(3))
+    clouds = [RailPoints(xyz, frame, 10), RailPoints(xyz + [0.0, 20.0, 0.0], frame, 11)]
+    network = pipeline.extract_rails(clouds, pipeline.Parameters(GAUGE, WIDTH, quality_step_m=2.0))
+    assert [found.track_id for found in network.geometry] == [line.track_id for line in network.centerlines] == [1, 2]
+    for found, line in zip(network.geometry, network.centerlines):
+        np.testing.assert_allclose(np.diff(found.chainage_m), 2.0)
+        assert rms(found.cant_mm - 20.0) < 1.0
+        np.testing.assert_allclose(found.xyz[0], line.xyz[0])
+    assert pipeline.extract_rails(clouds[:1], pipeline.Parameters(GAUGE, WIDTH)).geometry == ()
