@@ -94,7 +94,7 @@ def set_size() -> int:
     return len(FAMILIES) * len(SEVERITIES)
 
 
-def test_pair(number: int) -> tuple[str, float, Pair]:
+def benchmark_pair(number: int) -> tuple[str, float, Pair]:
     """Draw a raster of the set, with its family and severity; any first few of the set are spread over both."""
     family, severity = list(FAMILIES)[number % len(FAMILIES)], SEVERITIES[number % len(SEVERITIES)]
     return family, severity, random_pair(np.random.default_rng([SEED, number]), SIDE, severity, BASE_RATIO, family)
@@ -115,7 +115,7 @@ def measure(row: str, count: int) -> Tally:
     cleaner(np.zeros((SIDE, SIDE), dtype=bool))
     tally = Tally(_title(row), parameters=parameters)
     for number in range(count):
-        family, severity, pair = test_pair(number)
+        family, severity, pair = benchmark_pair(number)
         start = time.perf_counter()
         found = np.asarray(cleaner(pair.observed)) >= 0.5
         tally.seconds += (time.perf_counter() - start) / count

@@ -154,9 +154,3 @@ def test_ballast_lies_beside_the_rails():
         [flip(np.random.default_rng(seed), label, label, 1.0, 0.04) & ~label for seed in range(30)], axis=0
     )
     assert strays[:, 120:138].mean() > 2 * strays[:, :60].mean()
-
-
-def test_scores_count_by_cell():
-    found, label = np.array([[1, 1, 0, 0]], bool), np.array([[1, 0, 1, 0]], bool)
-    assert score(found, label) + Scores(1, 1, 1) == Scores(2, 2, 2)
-    assert (Scores(1, 3, 3).precision, Scores(1, 3, 3).recall, Scores(1, 3, 3).f1) == (0.5, 0.75, 0.6)
