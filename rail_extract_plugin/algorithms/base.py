@@ -92,14 +92,17 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         self, parameters: dict[str, Any], context: QgsProcessingContext, feedback: QgsProcessingFeedback
     ) -> dict:
         """Compute in any thread; every failure that a user can remedy is one sentence."""
+        progress = QgisProgress(feedback)
         try:
-            return self.compute(self._job, parameters, context, QgisProgress(feedback))
+            results = self.compute(self._job, parameters, context, progress)
         except RailExtractError as error:
             raise QgsProcessingException(str(error)) from None
         except Cancelled:
             raise QgsProcessingException(tr("Cancelled; nothing was written.")) from None
         except MemoryError:
             raise QgsProcessingException(tr("The memory does not suffice: choose a smaller extent.")) from None
+        progress.set_fraction(1)
+        return results
 
     def _with_paths_accepted(self, parameters: dict[str, Any]) -> dict[str, Any]:
         """Put a layer object in place of paths of clouds: QGIS refuses all that its build can't open; `read` checks."""
