@@ -179,10 +179,11 @@ def measure_again(
     """
     plans = [resample(rail.xyz[:, :2], smoothing_z_m / 4)[0] for rail in rails]
     feet = project(plans, points.xyz[:, :2], widest_reach(head_width_m), progress.span(0.0, 0.7))
+    # Of lines from anywhere nothing else is known than that they lie on their heads: these take the cell's place.
+    parameters = ElevationParameters(head_width_m, smoothing_z_m=smoothing_z_m, cell_m=head_width_m)
     measured = []
     for number, rail in enumerate(progress.span(0.7, 1.0).follow(rails)):
         mine = feet.of(number)
-        parameters = ElevationParameters(head_width_m, smoothing_z_m=smoothing_z_m)
         again = _raise_line(plans[number], FIXED_ENDS, mine, points.xyz[mine.point, 2], parameters)
         if again is not None:
             support = again.support if rail.support is None else rail.support
