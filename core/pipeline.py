@@ -141,7 +141,7 @@ def lines_of(
     progress: Progress = SILENT,
     first_id: int = 1,
 ) -> list[RailLine]:
-    """Turn the cleaned raster of one class into rails: vectorize, smooth, move onto the heads, give height.
+    """Turn the cleaned raster of one class into rails: vectorize, smooth, move onto the heads, give height, thin.
 
     Without points the rails stay where the raster shows them, and have no heights.
     """
@@ -169,13 +169,17 @@ def lines_of(
     else:
         network = refine(network, points, parameters.head_width_m, parameters.smoothing_xy_m, progress.span(0.5, 0.75))
         rails = elevate(network, points, elevation, progress.span(0.75, 1.0))
-    return [replace(rail, rail_id=number) for number, rail in enumerate(rails, start=first_id)]
+    thinned = thin(rails, parameters.simplify_xy_m, parameters.simplify_z_m)
+    return [replace(rail, rail_id=number) for number, rail in enumerate(thinned, start=first_id)]
 
 
 def tracks_of(
     rails: Sequence[RailLine], parameters: Parameters, progress: Progress = SILENT, first_id: int = 1
 ) -> list[Centerline]:
-    """Pair the rails of one class by every gauge, and draw the centerlines."""
+    """Pair the rails of one class by every gauge, draw the centerlines and thin them.
+
+    The rails come as users get them, so that rails from a file give the same tracks.
+    """
     settings = CenterlineParameters(
         tolerance_m=parameters.centerline_tolerance_m,
         max_gap_m=parameters.max_gap_m,
@@ -195,7 +199,8 @@ def tracks_of(
         raise refusals[0]
     if rails and not centerlines:
         progress.warning("No two rails run parallel: there are rails but no track centerlines.")
-    return [replace(line, track_id=number) for number, line in enumerate(centerlines, start=first_id)]
+    thinned = thin(centerlines, parameters.simplify_xy_m, parameters.simplify_z_m)
+    return [replace(line, track_id=number) for number, line in enumerate(thinned, start=first_id)]
 
 
 def geometry_of(

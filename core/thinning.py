@@ -1,4 +1,4 @@
-"""Thinning of finished lines: the last step, after all that is measured on them."""
+"""Thinning of finished lines: the last step of making them."""
 
 from __future__ import annotations
 

@@ -21,3 +21,26 @@ def read_features(path: Path, layer: str | None = None, where: str | None = None
 def read_lines(path: Path, layer: str | None = None, where: str | None = None) -> list[np.ndarray]:
     """Read the vertices alone."""
     return [line for line, _ in read_features(path, layer, where)]
+
+
+def farthest(lines: list[np.ndarray], others: list[np.ndarray]) -> float:
+    """Measure how far lines, (n, 3) each, lie from others in the same order, at most, in plan or in height.
+
+    Where one of two lines runs on beyond the other, the shorter one counts.
+    """
+    if len(lines) != len(others):
+        return np.inf
+    return max(max(_offset(line, other), _offset(other, line)) for line, other in zip(lines, others))
+
+
+def _offset(line: np.ndarray, other: np.ndarray) -> float:
+    """Greatest distance of the vertices of a line from another line beside them, in plan or in height."""
+    start, step = other[:-1], np.diff(other, axis=0)
+    share = np.einsum("nij,ij->ni", (line[:, None] - start)[..., :2], step[:, :2]) / (step[:, :2] ** 2).sum(axis=1)
+    away = line[:, None] - start - np.clip(share, 0, 1)[..., None] * step
+    beside = np.hypot(away[..., 0], away[..., 1])
+    nearest = beside.argmin(axis=1)
+    number = np.arange(len(line))
+    beyond = ((nearest == 0) & (share[:, 0] < 0)) | ((nearest == len(step) - 1) & (share[:, -1] > 1))
+    offsets = np.maximum(beside[number, nearest], np.abs(away[number, nearest, 2]))
+    return float(offsets[~beyond].max(initial=0.0))

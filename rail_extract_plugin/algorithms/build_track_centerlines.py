@@ -78,7 +78,6 @@ class BuildTrackCenterlines(RailAlgorithm):
     ) -> dict[str, Any]:
         """Pair the rails of every class, then write the centerlines."""
         from ...core.pipeline import tracks_of
-        from ...core.thinning import thin
         from ..drawn_rails import read_rails
 
         source = self.parameterAsSource(parameters, "INPUT", context)
@@ -90,6 +89,5 @@ class BuildTrackCenterlines(RailAlgorithm):
             mine = [rail for rail in rails if rail.class_code == code]
             tracks += tracks_of(mine, settings, share, first_id=len(tracks) + 1)
         progress.check()
-        thinned = thin(tracks, settings.simplify_xy_m, settings.simplify_z_m)
-        written = write_lines(self, "OUTPUT", CENTERLINES, thinned, frame, parameters, context)
-        return {**written, **figures_of(thinned, "CENTERLINE")}
+        written = write_lines(self, "OUTPUT", CENTERLINES, tracks, frame, parameters, context)
+        return {**written, **figures_of(tracks, "CENTERLINE")}

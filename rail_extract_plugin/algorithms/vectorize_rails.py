@@ -74,7 +74,6 @@ class VectorizeRails(RailAlgorithm):
     ) -> dict[str, Any]:
         """Make the lines of every class, then write them."""
         from ...core.pipeline import lines_of
-        from ...core.thinning import thin
         from ..geotiff import read_rasters
         from ..raster_points import read_points_on
         from ..rasters import moved
@@ -93,6 +92,5 @@ class VectorizeRails(RailAlgorithm):
         for raster, code, share in zip(rasters, job.header.class_codes, shares):
             rails += lines_of(raster, code, clouds.get(code), settings, share, first_id=len(rails) + 1)
         progress.check()
-        thinned = thin(rails, settings.simplify_xy_m, settings.simplify_z_m)
-        written = write_lines(self, "OUTPUT", RAILS, thinned, frame, parameters, context)
-        return {**written, **figures_of(thinned, "RAIL")}
+        written = write_lines(self, "OUTPUT", RAILS, rails, frame, parameters, context)
+        return {**written, **figures_of(rails, "RAIL")}

@@ -11,10 +11,10 @@ import pytest
 EXTRACT_RAILS = "railextract:extractrails"
 
 
-def command(parameters: dict[str, object], *options: str) -> list[str]:
-    """Words of a qgis_process call."""
+def command(parameters: dict[str, object], *options: str, algorithm: object = EXTRACT_RAILS) -> list[str]:
+    """Words of a qgis_process call; the algorithm is an id, or the file of a model."""
     words = [f"{name}={value}" for name, value in parameters.items()]
-    return [os.environ["QGIS_PROCESS"], *options, "run", EXTRACT_RAILS, "--", *words]
+    return [os.environ["QGIS_PROCESS"], *options, "run", str(algorithm), "--", *words]
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -25,8 +25,10 @@ def environment():
 
 @pytest.fixture(scope="session")
 def qgis_process():
-    def run(parameters: dict[str, object], *options: str) -> subprocess.CompletedProcess:
-        return subprocess.run(command(parameters, *options), capture_output=True, text=True)
+    def run(
+        parameters: dict[str, object], *options: str, algorithm: object = EXTRACT_RAILS
+    ) -> subprocess.CompletedProcess:
+        return subprocess.run(command(parameters, *options, algorithm=algorithm), capture_output=True, text=True)
 
     return run
 

@@ -177,25 +177,3 @@ def track():
         return np.column_stack([500_000 + along, 3_000_000 + across, 100 + rng.normal(0, 0.002, 2 * count)])
 
     return points
-
-
-@pytest.fixture
-def distance_of_lines():
-    """Measure how far lines, (n, 3) each, lie from others in the same order, at most, in plan or in height."""
-
-    def distance(lines: list[np.ndarray], others: list[np.ndarray]) -> float:
-        assert len(lines) == len(others) > 0
-        return max(max(offset(a, b), offset(b, a)) for a, b in zip(lines, others))
-
-    return distance
-
-
-def offset(line: np.ndarray, other: np.ndarray) -> float:
-    """Greatest distance of the vertices of a line from another line, in plan or in height."""
-    start, step = other[:-1], np.diff(other, axis=0)
-    share = np.einsum("nij,ij->ni", (line[:, None] - start)[..., :2], step[:, :2]) / (step[:, :2] ** 2).sum(axis=1)
-    away = line[:, None] - start - np.clip(share, 0, 1)[..., None] * step
-    beside = np.hypot(away[..., 0], away[..., 1])
-    nearest = beside.argmin(axis=1)
-    above = away[np.arange(len(line)), nearest, 2]
-    return float(max(beside.min(axis=1).max(), np.abs(above).max()))

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import make_model
 import pytest
-from lines import read_lines
+from lines import farthest, read_lines
 from qgis.core import QgsProcessingModelAlgorithm
 
 MODEL = Path(__file__).resolve().parents[2] / "models" / "extract_rails.model3"
@@ -49,7 +49,7 @@ def test_graphical_modeler_opens_it(model):
     dialog.close()
 
 
-def test_model_gives_the_lines_of_extract_rails(model, run, outcome, write_cloud, track, tmp_path, distance_of_lines):
+def test_model_gives_the_lines_of_extract_rails(model, run, outcome, write_cloud, track, tmp_path):
     inputs = {"INPUT": write_cloud(track()), "ITERATIONS": 1}
     whole = {"RAILS": tmp_path / "rails.gpkg", "CENTERLINES": tmp_path / "tracks.gpkg"}
     steps = {"rails:RAILS": tmp_path / "r.gpkg", "centerlines:CENTERLINES": tmp_path / "t.gpkg"}
@@ -57,4 +57,4 @@ def test_model_gives_the_lines_of_extract_rails(model, run, outcome, write_cloud
     for made in (run({**inputs, **whole}), outcome(model, {**inputs, **steps})):
         assert made.ok, made.error
     for mine, theirs in zip(steps.values(), whole.values()):
-        assert distance_of_lines(read_lines(mine), read_lines(theirs)) < 0.001
+        assert farthest(read_lines(mine), read_lines(theirs)) < 0.001

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lines import read_features, read_lines
+from lines import farthest, read_features, read_lines
 from osgeo import gdal
 from qgis.core import QgsRasterLayer, QgsVectorLayer
 from rail_extract.core.frpdf import engine
@@ -39,12 +39,12 @@ def chain(run_step, tmp_path):
     return run
 
 
-def test_chained_by_hand_the_steps_give_the_lines_of_extract_rails(chain, run, cloud, tmp_path, distance_of_lines):
+def test_chained_by_hand_the_steps_give_the_lines_of_extract_rails(chain, run, cloud, tmp_path):
     whole = {"RAILS": tmp_path / "rails.gpkg", "CENTERLINES": tmp_path / "tracks.gpkg"}
     assert run({"INPUT": cloud, "ITERATIONS": 1, **whole}).ok
     _, _, rails, tracks = chain(cloud)
     for mine, theirs in ((rails, whole["RAILS"]), (tracks, whole["CENTERLINES"])):
-        assert distance_of_lines(read_lines(mine), read_lines(theirs)) < 0.001
+        assert farthest(read_lines(mine), read_lines(theirs)) < 0.001
     for mine, theirs in zip(read_features(rails), read_features(whole["RAILS"])):
         assert mine[1] == pytest.approx(theirs[1], rel=1e-6)
 
