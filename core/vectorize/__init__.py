@@ -68,7 +68,7 @@ def vectorize(
     progress.check()
     network = resolve_branches(resolve_crossings(network), head_width_m + raster.cell_m)
     seen = cKDTree(places)
-    network = join_gaps(run_through(network), max_gap_m, gap_angle_deg)
+    network = join_gaps(run_through(network), max_gap_m, gap_angle_deg, seen)
     network = attach_branches(network, seen, max_gap_m)
     progress.set_fraction(1.0)
     return _settle_ends(_drop_short(drop_guards(network, head_width_m), min_length_m))

@@ -8,9 +8,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..rails import length_along
-from .branches import FARTHEST_M
-from .bridges import FIT_M, STAIRS_M, bridge
+from .branches import FARTHEST_M, STEADY_M
+from .bridges import FIT_M, STAIRS_M, bridge, curvature
 from .ends import STEP_M, cut_back, stretch, turned, way_out
+from .joining import unseen_m
 from .junctions import DIRECTION_M
 from .network import LineNetwork
 
@@ -20,8 +21,10 @@ BESIDE_M = 1.0
 SLOPE_M = 4.0
 """Stretch of the stock rail whose direction is compared with the branch's."""
 
-UNSEEN_M = 0.10
-"""A place this far from any cell has no points of its rail, nor of one that it is merged with."""
+SHARPER = 2.0
+UNSURE_CURVATURE = 16 * STAIRS_M / STEADY_M**2
+"""A branch begins on the arc that it goes on with: no more bent than so many times what is seen of it, and what stairs
+at both ends of that stretch may hide. This tells switches from frogs."""
 
 GUARD_APART_M = 0.13
 """Farthest that a guard or wing rail's axis lies beside a running rail's: a head, and a flangeway of 50 mm."""
@@ -52,7 +55,7 @@ def attach_branches(network: LineNetwork, seen: cKDTree, max_gap_m: float) -> Li
         best = None
         for stock, vertex, onward in _touching(from_end, lines, own):
             found = bridge(from_end, onward)
-            if found is None or found.cuts_m[1] > STEP_M or _unseen_m(found.points, seen) > max_gap_m:
+            if found is None or found.cuts_m[1] > STEP_M or unseen_m(found.points, seen) > max_gap_m:
                 continue
             if best is None or found.cost < best[0].cost:
                 best = found, stock, vertex
@@ -76,6 +79,7 @@ def _touching(from_end: np.ndarray, lines: list[np.ndarray], own: int) -> Iterat
     """List the lines that a line may branch off: number, vertex where they would touch, and the way on from there."""
     tip, outward = way_out(stretch(from_end, DIRECTION_M))
     axes = np.array([outward, [-outward[1], outward[0]]])
+    sharpest = SHARPER * abs(curvature(stretch(from_end, STEADY_M))) + UNSURE_CURVATURE
     for number, line in enumerate(lines):
         x, y = axes @ (line - tip).T
         near = (x > -SLOPE_M) & (x < FARTHEST_M + SLOPE_M) & (np.abs(y) < BESIDE_M)
@@ -90,17 +94,12 @@ def _touching(from_end: np.ndarray, lines: list[np.ndarray], own: int) -> Iterat
         angle = (beside - later) / SLOPE_M * np.sign(beside)
         touch_m = 2 * abs(beside) / max(angle, abs(beside) / FARTHEST_M)
         vertex = int(np.argmin(np.abs(axes[0] @ (line - tip).T - touch_m) + 1e9 * ~near))
-        if angle <= 0 or touch_m > FARTHEST_M or not 0 < vertex < len(line) - 1:
+        if angle <= 0 or angle > sharpest * touch_m or touch_m > FARTHEST_M or not 0 < vertex < len(line) - 1:
             continue
         along = axes[0] @ (line[vertex + 1] - line[vertex])
         onward = line[vertex:] if along > 0 else line[vertex::-1]
         if length_along(onward)[-1] >= DIRECTION_M:
             yield number, vertex, onward
-
-
-def _unseen_m(points: np.ndarray, seen: cKDTree) -> float:
-    """Length of a curve's points that lie far from all cells."""
-    return STEP_M * np.count_nonzero(seen.query(points)[0] > UNSEEN_M) if len(points) else 0.0
 
 
 def drop_guards(network: LineNetwork, head_width_m: float) -> LineNetwork:

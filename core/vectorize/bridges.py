@@ -49,12 +49,12 @@ class Bridge:
     points: np.ndarray
 
 
-def bridge(one: np.ndarray, other: np.ndarray, held: bool = False) -> Bridge | None:
+def bridge(one: np.ndarray, other: np.ndarray, held: bool = False, misfit_m: float = MISFIT_M) -> Bridge | None:
     """Fit one smooth curve to two lines, each given from the end to be joined, and cut out what lies between them.
 
     The curve is a cubic over the way across, its curvature held to what rails do. None if it misses either line, or
     bends more than a rail. That rules out the neighbouring rail, for it takes a double bend. With `held` nothing is cut
-    off the first line.
+    off the first line; `misfit_m` is how far half of either line may lie beside the curve.
     """
     before, after = stretch(one, FIT_M)[::-1], stretch(other, FIT_M)
     origin, axes = _frame(before, after)
@@ -64,7 +64,7 @@ def bridge(one: np.ndarray, other: np.ndarray, held: bool = False) -> Bridge | N
     off = [np.abs(points[:, 1] - _basis(points[:, 0]) @ cubic) for points in (before, after)]
     misfit = max(np.median(off[0]), np.median(off[1]))
     bend = np.abs(cubic[2] + cubic[3] * np.array([before[0, 0], after[-1, 0]])).max() * TIGHTEST_RADIUS_M
-    if gap <= 0 or misfit > MISFIT_M or bend > 1:
+    if gap <= 0 or misfit > misfit_m or bend > 1:
         return None
     astray = 0 if held else _astray(off[0][::-1]), _astray(off[1])
     first, last = before[-1 - astray[0], 0], after[astray[1], 0]

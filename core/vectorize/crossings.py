@@ -17,6 +17,10 @@ MERGED_M = 12.0
 SKIP_M = 0.5
 """Length of a rail next to the shared stretch that is still drawn aside by the other one."""
 
+MISFIT_M = 0.015
+"""Legs of a crossing may stray further from a curve than ends across a gap: wing rails widen them, and four of them
+that meet are known to belong together."""
+
 _PAIRINGS = (((0, 2), (1, 3)), ((0, 3), (1, 2)), ((0, 1), (2, 3)))
 
 
@@ -70,7 +74,7 @@ def _best_pairing(network: LineNetwork, legs: Sequence[int]) -> dict[tuple[int, 
     options = []
     for pairing in _PAIRINGS:
         ends = [(legs[first], legs[second]) for first, second in pairing]
-        found = {(one, other): bridge(cut[one], cut[other]) for one, other in ends}
+        found = {(one, other): bridge(cut[one], cut[other], misfit_m=MISFIT_M) for one, other in ends}
         if None not in found.values():
             options.append(found)
     return min(options, key=lambda found: sum(join.cost for join in found.values()), default={})
