@@ -29,6 +29,9 @@ TABLE_STEPS, POLISH_STEPS = 8, 2
 UNSOLVED = 1e6
 """Stands in the table where Newton's method finds no curve worth having: too sharp to be drawn."""
 
+CLOSED = 1e-9
+"""How far, in lengths of the curve, a combination may end beside its point."""
+
 SOFT_ENERGY = 0.1
 """Added to the bending energy before it is inverted, so that straight lines are not all that is ever drawn."""
 
@@ -105,7 +108,7 @@ def join(start: Pose, end: Pose, share: int = 1) -> list[Element] | None:
     known = table()
     skew = _solve(SHARES[share], first, last, known.look_up(known.skew, share, first, last), POLISH_STEPS)
     length, before, after = (float(value) for value in _shape(SHARES[share], first, last, skew))
-    if not 0 < length < LONGEST:
+    if not 0 < length < LONGEST or abs(_miss(SHARES[share], first, last, skew)) > CLOSED:
         return None
     outer, inner = SHARES[share] * length * chord, (1 - 2 * SHARES[share]) * length * chord
     before, after = before / chord, after / chord
@@ -190,9 +193,15 @@ def _solve(share: float, first: np.ndarray, last: np.ndarray, skew: np.ndarray, 
     """Improve the skew by Newton's method until the curve ends on its chord."""
     _, odd, weights = _basis(share)
     for _ in range(steps):
-        angle = _directions(share, first, last, skew)
-        skew = skew - (np.sin(angle) @ weights) / (np.cos(angle) @ (weights * odd))
+        slope = np.cos(_directions(share, first, last, skew)) @ (weights * odd)
+        skew = skew - _miss(share, first, last, skew) / slope
     return skew
+
+
+def _miss(share: float, first: np.ndarray, last: np.ndarray, skew: np.ndarray) -> np.ndarray:
+    """How far beside its chord a curve ends, in lengths of the curve."""
+    _, _, weights = _basis(share)
+    return np.sin(_directions(share, first, last, skew)) @ weights
 
 
 def _directions(share: float, first: np.ndarray, last: np.ndarray, skew: np.ndarray) -> np.ndarray:
