@@ -101,6 +101,19 @@ def test_rasterize_alone(raster, track):
     assert layer.width() * layer.height() == header.window[2] * header.window[3]
 
 
+def test_one_algorithm_serves_a_batch_over_a_folder(qgis, plugin, outcome, write_cloud, track, tmp_path):
+    algorithm = qgis.processingRegistry().createAlgorithmById("railextract:rasterizerailpoints")
+    counts = []
+    for number in range(3):
+        tile = write_cloud(track(length_m=4.0 * (number + 1)), f"tile {number}.las")
+        made = outcome(algorithm, {"INPUT": tile, "OUTPUT": tmp_path / f"tile {number}.tif"})
+        assert made.ok, made.error
+        path = tmp_path / f"tile {number}.tif"
+        counts.append(read_rasters(path, read_header(path))[0].count())
+    assert counts[1] / counts[0] == pytest.approx(2, rel=0.1)
+    assert counts[2] / counts[0] == pytest.approx(3, rel=0.1)
+
+
 def test_rasterize_makes_a_band_a_class(run_step, write_cloud, track, tmp_path):
     for code in (11, 10):
         write_cloud(track() + [0, 0.2 * code, 0], f"{code}.las", class_code=code)
@@ -224,7 +237,7 @@ def test_tiles_in_different_coordinate_systems_are_refused_with_their_names(
     catalogue.write_text(json.dumps({"features": [{"assets": {"data": {"href": f"./tile{n}.las"}}} for n in (0, 1)]}))
     for source in (folder, catalogue):
         given = {"INPUT": source} if name == "rasterizerailpoints" else {"INPUT": raster, "POINTS": source}
-        outcome = run_step(name, {**given, "OUTPUT": tmp_path / "none.tif"})
+        outcome = run_step(name, {**given, "OUTPUT": "TEMPORARY_OUTPUT"})
         assert "tile0.las" in outcome.error
         assert "tile1.las" in outcome.error
 
