@@ -15,7 +15,8 @@ STAIRS_M = 0.02
 """How far a raster line strays from its rail: half a cell. What strays further is a weed or a hook."""
 
 MISFIT_M = 0.01
-"""Half of either line may lie this far beside the curve, no more. Across 4 m a shift of 0.2 m just passes."""
+"""Half of either line may lie this far beside the curve, no more. Across 4 m a shift of 0.2 m just passes; towards
+narrower gaps, where no other rail has room, twice as much is allowed, as far as the stairs go."""
 
 TIGHTEST_RADIUS_M = 15.0
 """No rail of a tram or railway is bent more sharply, turnouts included; 18 m is the least in use."""
@@ -64,7 +65,8 @@ def bridge(one: np.ndarray, other: np.ndarray, held: bool = False, misfit_m: flo
     off = [np.abs(points[:, 1] - _basis(points[:, 0]) @ cubic) for points in (before, after)]
     misfit = max(np.median(off[0]), np.median(off[1]))
     bend = np.abs(cubic[2] + cubic[3] * np.array([before[0, 0], after[-1, 0]])).max() * TIGHTEST_RADIUS_M
-    if gap <= 0 or misfit > misfit_m or bend > 1:
+    allowed = max(misfit_m, STAIRS_M * (1 - gap / (2 * FIT_M)))
+    if gap <= 0 or misfit > allowed or bend > 1:
         return None
     astray = 0 if held else _astray(off[0][::-1]), _astray(off[1])
     first, last = before[-1 - astray[0], 0], after[astray[1], 0]
