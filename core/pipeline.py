@@ -119,9 +119,7 @@ def extract_rails(clouds: Sequence[RailPoints], parameters: Parameters, progress
         geometry += geometry_of(tracks, found, points, parameters, step.span(0.95, 1.0))
         rails += found
         centerlines += tracks
-    lines = thin([*rails, *centerlines], parameters.simplify_xy_m, parameters.simplify_z_m)
-    frame = clouds[0].frame
-    return RailNetwork(lines[: len(rails)], lines[len(rails) :], frame, engine.description, tuple(geometry))
+    return RailNetwork(tuple(rails), tuple(centerlines), clouds[0].frame, engine.description, tuple(geometry))
 
 
 def rails_of(
@@ -210,7 +208,7 @@ def geometry_of(
     parameters: Parameters,
     progress: Progress = SILENT,
 ) -> tuple[TrackGeometry, ...]:
-    """Measure the tracks of one class, if asked for, on lines that are not thinned yet."""
+    """Measure the tracks of one class, if asked for."""
     if parameters.quality_step_m is None:
         return ()
     return measure_track_geometry(

@@ -21,7 +21,7 @@ from torch.nn import functional
 
 from ..frpdf import DEFAULT_PASSES, OUTPUT_THRESHOLD, START
 from ..frpdf.network import FRPDF, PassBatchNorm2d, feedback
-from ..frpdf.weights import save_arrays
+from ..frpdf.weights import load_arrays, save_arrays
 from ..synthetic.pairs import random_pair
 from .gradients import train_on_cpu
 from .scores import Scores, score
@@ -51,6 +51,7 @@ class Settings:
     rate: float
     seed: int
     device: str
+    start: Path | None = None
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -60,12 +61,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--minutes", type=float, default=math.inf, help="stop after so long; the next call goes on")
     parser.add_argument("--rate", type=float, default=3e-3, help="largest learning rate (default 0.003)")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--start", type=Path, help="weights (.npz) to start from")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Train, go on with a training, or export one that is complete."""
-    settings = Settings(arguments.steps, arguments.rate, arguments.seed, arguments.device)
+    settings = Settings(arguments.steps, arguments.rate, arguments.seed, arguments.device, arguments.start)
     arguments.folder.mkdir(parents=True, exist_ok=True)
     network = train(settings, arguments.folder, arguments.minutes)
     if network is None:
@@ -85,7 +87,7 @@ def train(settings: Settings, folder: Path, minutes: float) -> FRPDF | None:
         None where the time was up before the last step.
     """
     torch.manual_seed(settings.seed)
-    network = new_network(settings.device)
+    network = new_network(settings.device, settings.start)
     optimizer = torch.optim.AdamW(network.parameters(), lr=settings.rate, weight_decay=WEIGHT_DECAY)
     first = _resume(folder / "checkpoint.pt", network, optimizer)
     until = time.monotonic() + 60 * minutes
@@ -107,10 +109,13 @@ def train(settings: Settings, folder: Path, minutes: float) -> FRPDF | None:
     return network
 
 
-def new_network(device: str) -> FRPDF:
-    """Build an untrained network, prepared for its device."""
+def new_network(device: str, start: Path | None = None) -> FRPDF:
+    """Build a network, untrained or with the weights of a file, prepared for its device."""
     network = FRPDF()
     torch.nn.init.constant_(network.layer[-1].bias, HEAD_BIAS)
+    if start is not None:
+        arrays = {name: torch.from_numpy(array) for name, array in load_arrays(start).items()}
+        network.load_state_dict({**network.state_dict(), **arrays})
     if device == "cpu":
         train_on_cpu(network)
     return network.to(device, memory_format=torch.channels_last)
