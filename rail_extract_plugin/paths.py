@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-RESOURCES = Path(__file__).resolve().parent.parent / "resources"
+ROOT = Path(__file__).resolve().parent.parent
+RESOURCES = ROOT / "resources"
+MODEL = ROOT / "models" / "extract_rails.model3"
 ICON = RESOURCES / "icons" / "rail_extract.svg"
 STYLES = RESOURCES / "styles"

@@ -19,6 +19,7 @@ class RailExtractPlugin:
     def __init__(self, iface) -> None:
         self.iface = iface
         self.provider: RailExtractProvider | None = None
+        self.action = None
 
     def initProcessing(self) -> None:
         """Offer the algorithms; all that ``qgis_process`` calls."""
@@ -27,10 +28,17 @@ class RailExtractPlugin:
 
     def initGui(self) -> None:
         """Start in QGIS with windows."""
+        from .model_action import OpenModelAction
+
         self.initProcessing()
+        self.action = OpenModelAction()
+        self.action.register()
 
     def unload(self) -> None:
         """Take the algorithms away again."""
+        if self.action is not None:
+            self.action.deregister()
+            self.action = None
         if self.provider is not None:
             QgsApplication.processingRegistry().removeProvider(self.provider)
             self.provider = None

@@ -49,6 +49,26 @@ def test_graphical_modeler_opens_it(model):
     dialog.close()
 
 
+def test_context_menu_of_extract_rails_opens_a_copy(qgis, plugin, model):
+    from processing.gui.ProviderActions import ProviderContextMenuActions
+
+    plugin.unload()
+    plugin.initGui()
+    (action,) = [one for one in ProviderContextMenuActions.actions if one.name == "Open as Model…"]
+    for algorithm in qgis.processingRegistry().providerById("railextract").algorithms():
+        action.setData(algorithm, None)
+        assert action.isEnabled() == (algorithm.name() == "extractrails")
+    action.execute()
+    dialog = action.dialog
+    assert dialog.model().childAlgorithms().keys() == model.childAlgorithms().keys()
+    assert dialog.model().sourceFilePath() == ""
+    dialog.setDirty(False)
+    dialog.close()
+    plugin.unload()
+    assert action not in ProviderContextMenuActions.actions
+    plugin.initProcessing()
+
+
 def test_model_gives_the_lines_of_extract_rails(model, run, outcome, write_cloud, track, tmp_path):
     inputs = {"INPUT": write_cloud(track()), "ITERATIONS": 1}
     whole = {"RAILS": tmp_path / "rails.gpkg", "CENTERLINES": tmp_path / "tracks.gpkg"}
