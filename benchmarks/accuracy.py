@@ -1,6 +1,6 @@
 """Print how far extracted lines lie from the truth on synthetic scenes, beside what a plain script reaches.
 
-Run `python benchmarks/accuracy.py [SCENE ...]`; `--plots FOLDER` draws errors against what makes them instead.
+Run `python benchmarks/accuracy.py [SCENE ...]`.
 """
 
 from __future__ import annotations
@@ -63,16 +63,10 @@ class Result:
 
 
 def main() -> None:
-    """Print the tables for the scenes named on the command line, or all; or draw the plots."""
+    """Print the tables for the scenes named on the command line, or all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scenes", nargs="*", choices=[*SCENES, []], metavar="SCENE", help=f"of {', '.join(SCENES)}")
-    parser.add_argument("--plots", type=Path, metavar="FOLDER", help="draw PNG files into this folder")
     arguments = parser.parse_args()
-    if arguments.plots:
-        from plots import draw_plots
-
-        draw_plots(arguments.plots)
-        return
     results = [_measured(name) for name in arguments.scenes or SCENES]
     print(found_table(results), error_table(results), sep="\n\n")
 

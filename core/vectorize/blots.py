@@ -123,7 +123,7 @@ def _passed_by(line: np.ndarray, start: float, end: float) -> np.ndarray | None:
         return None
     before, behind = _between(line, t, 0.0, start)[::-1], _between(line, t, end, t[-1])
     found = bridge(before, behind)
-    if found is None:
+    if found is None or max(found.cuts_m) > SKIP_M:
         return None
     before, behind = (cut_back(side, cut_m) for side, cut_m in zip((before, behind), found.cuts_m))
     return np.concatenate([before[::-1], found.points, behind])

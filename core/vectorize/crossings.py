@@ -11,8 +11,9 @@ from .ends import cut_back, turned
 from .junctions import ends_by_node
 from .network import LineNetwork
 
-MERGED_M = 12.0
-"""Longest stretch that two crossing rails share: heads of 76 mm in cells of 40 mm do so for 9 m at 1:26.5."""
+MERGED_M = 14.0
+"""Longest stretch that two crossing rails share: heads of 76 mm in cells of 40 mm do so for 9 m at 1:26.5, and wing
+rails lengthen it at both ends."""
 
 SKIP_M = 0.5
 """Length of a rail next to the shared stretch that is still drawn aside by the other one."""

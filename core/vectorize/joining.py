@@ -24,11 +24,14 @@ UNSEEN_M = 0.10
 """A place this far from any cell has no points of its rail, nor of one that it is merged with."""
 
 
-def join_gaps(network: LineNetwork, max_gap_m: float, gap_angle_deg: float, seen: cKDTree | None = None) -> LineNetwork:
+def join_gaps(
+    network: LineNetwork, max_gap_m: float, gap_angle_deg: float, seen: cKDTree | None = None, at_nodes: bool = True
+) -> LineNetwork:
     """Join ends that face each other, both within `gap_angle_deg` of the way across, at most `max_gap_m` apart.
 
-    At least one of the two is free; the other may end in a node, as at a frog that was taken for a branching. Joins
-    happen in rounds, each end with the partner that costs least, for a joined line shows better where it leads.
+    At least one of the two is free; the other may end in a node, as at a frog that was taken for a branching, unless
+    `at_nodes` is false. Joins happen in rounds, each end with the partner that costs least, for a joined line shows
+    better where it leads.
 
     Parameters
     ----------
@@ -37,9 +40,10 @@ def join_gaps(network: LineNetwork, max_gap_m: float, gap_angle_deg: float, seen
     seen : cKDTree, optional
         Places of rail cells. Ends up to `MERGED_M` apart are joined too, if no more than `max_gap_m` of the way lies
         far from these: where rails merge, an end is not a gap.
+    at_nodes : bool
     """
     while True:
-        joins = _possible_joins(network, max_gap_m, gap_angle_deg, seen)
+        joins = _possible_joins(network, max_gap_m, gap_angle_deg, seen, at_nodes)
         best: dict[int, tuple[int, int]] = {}
         for ends in sorted(joins, key=lambda ends: (joins[ends].cost, ends), reverse=True):
             best[ends[0]] = best[ends[1]] = ends
@@ -54,11 +58,11 @@ def join_gaps(network: LineNetwork, max_gap_m: float, gap_angle_deg: float, seen
 
 
 def _possible_joins(
-    network: LineNetwork, max_gap_m: float, gap_angle_deg: float, seen: cKDTree | None
+    network: LineNetwork, max_gap_m: float, gap_angle_deg: float, seen: cKDTree | None, at_nodes: bool
 ) -> dict[tuple[int, int], Bridge]:
     """Find every pair of ends that could be joined."""
     degrees = network.degrees()[network.ends.ravel()]
-    free = np.flatnonzero(degrees != 2)
+    free = np.flatnonzero(degrees != 2) if at_nodes else np.flatnonzero(degrees == 1)
     free = free[network.lengths()[free // 2] >= SHORTEST_M]
     if len(free) < 2:
         return {}
