@@ -22,6 +22,9 @@ GAP_SIGMAS = 3.0
 SAME_STATION_M = 1e-6
 """Points of a profile that lie closer along the line than this are averaged."""
 
+EXACT_M = 1e-9
+"""A vertex nearer than this to the chord says nothing, even at a tolerance of zero."""
+
 
 def smooth_line(
     vertices: np.ndarray,
@@ -115,7 +118,7 @@ def simplify(xyz: np.ndarray, tolerance_xy_m: float, tolerance_z_m: float) -> np
         if last - first < 2:
             continue
         beside, above = _deviation(xyz[first : last + 1])
-        excess = np.fmax(beside / tolerance_xy_m, above / tolerance_z_m)
+        excess = np.fmax(beside / max(tolerance_xy_m, EXACT_M), above / max(tolerance_z_m, EXACT_M))
         worst = int(excess.argmax())
         if excess[worst] > 1:
             keep[first + 1 + worst] = True

@@ -13,7 +13,8 @@ WINDOW = 512
 """Cells along the side of what the network sees at once: a pass over it takes well below a second on two cores, so
 that a cancel is heard in time."""
 MARGIN = 64
-"""Cells around a window's core that only give context; a wider margin changes fewer than 0.5 % of the rail cells."""
+"""Cells around a window's core that only give context. Twice the margin changes 1.5 % of the sample's rail cells, at
+their edges, and no line by more than 0.7 mm rms, for more than twice the work."""
 CORE = WINDOW - 2 * MARGIN
 BLOCK = 32
 """Windows are placed to so many cells."""

@@ -43,7 +43,8 @@ def test_engines_differ_in_few_cells(rasters):
 
 
 def test_lines_of_the_engines_lie_together(rasters, points):
-    parameters = Parameters(GAUGE_M, HEAD_WIDTH_M)
+    # Thinning by 2 mm may keep other vertices of the same curve, so lines are compared whole.
+    parameters = Parameters(GAUGE_M, HEAD_WIDTH_M, simplify_xy_m=0.0, simplify_z_m=0.0)
     torch, opencv = (lines_of(raster, 10, points, parameters) for raster in rasters.values())
     assert len(torch) == len(opencv) == 2
     for line, other in zip(torch, opencv):

@@ -264,3 +264,10 @@ def test_simplify_keeps_a_closed_line_closed():
     np.testing.assert_array_equal(thin[0], thin[-1])
     fewest = 2 * np.pi * 25 / np.sqrt(8 * 25 * 0.002)
     assert fewest <= len(thin) <= 2.1 * fewest
+
+
+def test_simplify_by_nothing_drops_only_what_lies_on_the_line():
+    arc = np.column_stack([circle(25, 50)[:30], np.zeros(30)])
+    np.testing.assert_array_equal(simplify(arc, 0.0, 0.0), arc)
+    straight = np.column_stack([np.arange(9.0), np.zeros(9), np.zeros(9)])
+    assert len(simplify(straight, 0.0, 0.0)) == 2
