@@ -1,14 +1,16 @@
 """Engines compute what the network computes; cleanup stitches windows and passes."""
 
+import argparse
 from importlib.util import find_spec
 
+import cv2
 import numpy as np
 import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
 from rail_extract.core.errors import Cancelled, ModelError
-from rail_extract.core.frpdf import cleanup
+from rail_extract.core.frpdf import STATISTICS, cleanup, onnx
 from rail_extract.core.frpdf import engine as engine_module
 from rail_extract.core.frpdf.engine import make_engine
 from rail_extract.core.frpdf.network import FRPDF, feedback
@@ -61,6 +63,21 @@ def test_the_folded_engines_equal_the_network(network, make):
             found = engine.probabilities(raster, state, number)
             assert np.abs(found - torch.sigmoid(logits)[0, 0].numpy()).max() < 1e-6
             state = feedback(logits)[0, 0].numpy().astype(np.float32)
+
+
+def test_the_onnx_command_writes_the_shipped_weights(tmp_path):
+    parser = argparse.ArgumentParser()
+    onnx.add_arguments(parser)
+    onnx.run(parser.parse_args([str(tmp_path), "--side", "48"]))
+    raster = (np.random.default_rng(1).random((48, 48)) < 0.2).astype(np.float32)
+    state = np.zeros_like(raster)
+    for model in MODELS:
+        engine = TorchEngine(load_arrays(model.path), "CPU", exact=True)
+        for number in range(STATISTICS):
+            net = cv2.dnn.readNetFromONNX(str(tmp_path / f"{model.name}_pass{number + 1}.onnx"))
+            net.setInput(np.stack([raster, state])[None] * 2 - 1)
+            found = 1 / (1 + np.exp(-net.forward()[0, 0]))
+            assert np.abs(found - engine.probabilities(raster, state, number)).max() < 1e-5
 
 
 def test_weights_survive_the_file(network, tmp_path):
