@@ -13,7 +13,7 @@ from rail_extract.core.errors import Cancelled, ModelError
 from rail_extract.core.frpdf import STATISTICS, cleanup, onnx
 from rail_extract.core.frpdf import engine as engine_module
 from rail_extract.core.frpdf.engine import make_engine
-from rail_extract.core.frpdf.network import FRPDF, feedback
+from rail_extract.core.frpdf.network import feedback
 from rail_extract.core.frpdf.opencv_engine import OpenCvEngine
 from rail_extract.core.frpdf.torch_engine import TorchEngine
 from rail_extract.core.frpdf.weights import load_arrays, save_arrays
@@ -21,18 +21,6 @@ from rail_extract.core.frpdf.zoo import MODELS, choose
 from rail_extract.core.progress import Progress
 from rail_extract.core.raster import RailRaster, rasterize
 from rail_extract.core.training.train import export
-
-
-@pytest.fixture(scope="module")
-def network():
-    torch.manual_seed(3)
-    network = FRPDF()
-    for name, buffer in network.named_buffers():
-        if "running_mean" in name:
-            buffer.normal_(0, 0.3)
-        if "running_var" in name:
-            buffer.uniform_(0.5, 2.0)
-    return network.eval()
 
 
 class Copy:

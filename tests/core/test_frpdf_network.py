@@ -1,22 +1,8 @@
 """The network as the paper draws it."""
 
 import numpy as np
-import pytest
 import torch
 from rail_extract.core.frpdf.network import FRPDF, RECEPTIVE_RADIUS, feedback
-
-
-@pytest.fixture(scope="module")
-def network():
-    """An untrained network with odd batch statistics, so that folding and passes have something to get wrong."""
-    torch.manual_seed(3)
-    network = FRPDF()
-    for name, buffer in network.named_buffers():
-        if "running_mean" in name:
-            buffer.normal_(0, 0.3)
-        if "running_var" in name:
-            buffer.uniform_(0.5, 2.0)
-    return network.eval()
 
 
 def test_it_has_the_papers_number_of_parameters(network):
