@@ -6,7 +6,7 @@ A `RailRaster` therefore keeps only the tiles that hold a rail cell, and nothing
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -104,10 +104,9 @@ class RailRaster:
         self,
         function: Callable[[np.ndarray], np.ndarray],
         margin: int,
-        grow: bool = False,
         progress: Progress = SILENT,
     ) -> RailRaster:
-        """Apply `function` to every tile seen with `margin` cells around it, and keep the tile's own cells.
+        """Apply `function` to every kept tile and its eight neighbours, seen with `margin` cells around them.
 
         Parameters
         ----------
@@ -115,11 +114,9 @@ class RailRaster:
             (TILE + 2 margin) square bool array to bool array of the same shape.
         margin : int
             How far, in cells, the function looks around a cell.
-        grow : bool
-            Visit the eight neighbours of kept tiles too: for functions that set cells outside the kept tiles.
         """
         tiles = {}
-        for index in progress.follow(sorted(self.tile_neighbourhood() if grow else self.tiles)):
+        for index in progress.follow(sorted(self._neighbourhood())):
             row, column = index[0] * TILE - margin, index[1] * TILE - margin
             result = function(self.read(row, column, TILE + 2 * margin, TILE + 2 * margin))
             inner = result[margin : margin + TILE, margin : margin + TILE]
@@ -127,16 +124,10 @@ class RailRaster:
                 tiles[index] = np.array(inner, dtype=bool)
         return replace(self, tiles=tiles)
 
-    def tile_neighbourhood(self) -> set[tuple[int, int]]:
+    def _neighbourhood(self) -> set[tuple[int, int]]:
         """Give the indices of the kept tiles and of their eight neighbours."""
-        return set(_neighbourhood(self.tiles))
-
-
-def _neighbourhood(indices: Mapping[tuple[int, int], np.ndarray]) -> Iterator[tuple[int, int]]:
-    for row, column in indices:
-        for down in (-1, 0, 1):
-            for right in (-1, 0, 1):
-                yield row + down, column + right
+        steps = (-1, 0, 1)
+        return {(row + down, column + right) for row, column in self.tiles for down in steps for right in steps}
 
 
 def rasterize(xy: np.ndarray, cell_m: float) -> RailRaster:

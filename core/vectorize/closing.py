@@ -22,7 +22,7 @@ def close(raster: RailRaster, progress: Progress = SILENT) -> RailRaster:
 
     The result does not depend on how the raster is tiled: every tile is seen with a margin wider than the largest hole.
     """
-    return raster.map_tiles(_close_window, _MARGIN, grow=True, progress=progress)
+    return raster.map_tiles(_close_window, _MARGIN, progress=progress)
 
 
 def _close_window(window: np.ndarray) -> np.ndarray:

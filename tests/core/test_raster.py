@@ -42,7 +42,7 @@ def test_mapping_tiles_equals_mapping_the_whole():
     rng = np.random.default_rng(1)
     cells = rng.integers(-TILE, 2 * TILE, size=(4000, 2))
     raster = RailRaster({}, 0.04, 0.0, 0.0).with_cells(cells)
-    dilated = raster.map_tiles(lambda window: ndimage.binary_dilation(window, np.ones((5, 5))), margin=2, grow=True)
+    dilated = raster.map_tiles(lambda window: ndimage.binary_dilation(window, np.ones((5, 5))), margin=2)
     whole = ndimage.binary_dilation(raster.read(-2 * TILE, -2 * TILE, 5 * TILE, 5 * TILE), np.ones((5, 5)))
     assert np.array_equal(dilated.read(-2 * TILE, -2 * TILE, 5 * TILE, 5 * TILE), whole)
 
