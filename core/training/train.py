@@ -23,17 +23,23 @@ from ..frpdf import DEFAULT_PASSES, OUTPUT_THRESHOLD, START
 from ..frpdf.network import FRPDF, PassBatchNorm2d, feedback
 from ..frpdf.weights import load_arrays, save_arrays
 from ..synthetic.pairs import random_pair
+from .curves import draw_curves
 from .gradients import train_on_cpu
+from .optimizers import Optimizers
 from .scores import Scores, score
 
 CROPS = ((256, 4), (384, 2), (512, 1))
 """Side and number of a step's crops: of like cost; the large ones train the outer taps of the widest dilation."""
 CROP_SHARES = (0.4, 0.3, 0.3)
+LAST_CROP = 1024
+"""Side of the one crop of each of the last steps: the widest dilation reaches 381 cells each way, so that only here
+most cells see all of it."""
+LAST_SHARE = 0.04
+"""Share of the steps with the last crop; such a step costs four of the others."""
 PASS_WEIGHTS = (0.5, 1.0)
 """Weight of each pass's loss: the last one makes the result."""
 HEAD_BIAS = -4.0
 """Start near the share of rail cells in a raster, or the first hundred steps only learn that there are few."""
-WEIGHT_DECAY = 1e-5
 LARGEST_GRADIENT = 1.0
 WARM_UP_STEPS = 40
 STATISTICS_STEPS = 60
@@ -56,7 +62,7 @@ class Settings:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("folder", type=Path, help="keeps checkpoint.pt, log.csv and weights.npz; resumes from there")
+    parser.add_argument("folder", type=Path, help="keeps checkpoint.pt, log.csv, curves.png and weights.npz")
     parser.add_argument("--steps", type=int, default=1000, help="steps of the whole training (default 1000)")
     parser.add_argument("--minutes", type=float, default=math.inf, help="stop after so long; the next call goes on")
     parser.add_argument("--rate", type=float, default=3e-3, help="largest learning rate (default 0.003)")
@@ -88,22 +94,21 @@ def train(settings: Settings, folder: Path, minutes: float) -> FRPDF | None:
     """
     torch.manual_seed(settings.seed)
     network = new_network(settings.device, settings.start)
-    optimizer = torch.optim.AdamW(network.parameters(), lr=settings.rate, weight_decay=WEIGHT_DECAY)
+    optimizer = Optimizers(network)
     first = _resume(folder / "checkpoint.pt", network, optimizer)
     until = time.monotonic() + 60 * minutes
     for step in range(first, settings.steps):
         started = time.monotonic()
-        for group in optimizer.param_groups:
-            group["lr"] = learning_rate(step, settings)
-        observed, label = batch(settings, DATA, step)
-        losses, scores = _learn(network, optimizer, observed, label)
-        _log(folder / "log.csv", step, learning_rate(step, settings), losses, scores, time.monotonic() - started)
+        rate = learning_rate(step, settings)
+        losses, scores = _learn(network, optimizer, rate, *batch(settings, DATA, step))
+        _log(folder / "log.csv", step, rate, losses, scores, time.monotonic() - started)
         done = step + 1
         out_of_time = time.monotonic() > until
         if done % CHECKPOINT_STEPS == 0 or out_of_time or done == settings.steps:
             state = {"network": network.state_dict(), "optimizer": optimizer.state_dict(), "step": done}
             torch.save(state, folder / "checkpoint.new")
             (folder / "checkpoint.new").replace(folder / "checkpoint.pt")
+            draw_curves(folder / "log.csv", folder / "curves.png")
         if out_of_time and done < settings.steps:
             return None
     return network
@@ -132,6 +137,8 @@ def batch(settings: Settings, stream: int, step: int) -> tuple[Tensor, Tensor]:
     """Draw the pairs of a step: observed rasters and labels, (n, 1, side, side) float tensors."""
     rng = np.random.default_rng([settings.seed, stream, step])
     side, count = CROPS[rng.choice(len(CROPS), p=CROP_SHARES)]
+    if stream == DATA and step >= (1 - LAST_SHARE) * settings.steps:
+        side, count = LAST_CROP, 1
     pairs = [random_pair(rng, side) for _ in range(count)]
     return tuple(
         torch.from_numpy(np.stack(rasters)[:, None].astype(np.float32))
@@ -163,10 +170,10 @@ ENTROPY_WEIGHT = 5.0
 
 
 def _learn(
-    network: FRPDF, optimizer: torch.optim.Optimizer, observed: Tensor, label: Tensor
+    network: FRPDF, optimizer: Optimizers, rate: float, observed: Tensor, label: Tensor
 ) -> tuple[list[float], list[Scores]]:
     network.train()
-    optimizer.zero_grad(set_to_none=True)
+    optimizer.zero_grad()
     losses, scores = [], []
     for weight, logits in zip(PASS_WEIGHTS, run_passes(network, observed)):
         loss = loss_of(logits, label)
@@ -175,7 +182,7 @@ def _learn(
         found = torch.sigmoid(logits.detach()) >= OUTPUT_THRESHOLD
         scores.append(score(found.cpu().numpy(), label.cpu().numpy() > 0.5))
     torch.nn.utils.clip_grad_norm_(network.parameters(), LARGEST_GRADIENT)
-    optimizer.step()
+    optimizer.step(rate)
     return losses, scores
 
 
@@ -201,7 +208,7 @@ def export(network: FRPDF) -> dict[str, np.ndarray]:
     }
 
 
-def _resume(path: Path, network: FRPDF, optimizer: torch.optim.Optimizer) -> int:
+def _resume(path: Path, network: FRPDF, optimizer: Optimizers) -> int:
     """Load a checkpoint where there is one, and give the number of the next step."""
     if not path.exists():
         return 0

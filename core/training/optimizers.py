@@ -1,0 +1,61 @@
+"""What moves the weights: Muon for the kernels, AdamW for batch norm and the head.
+
+Muon makes each step of a kernel, seen as a matrix, orthogonal (Jordan 2024, "Muon: an optimizer for hidden layers in
+neural networks"). Its steps are scaled to the size of AdamW's, so that one learning rate serves both.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+WEIGHT_DECAY = 1e-5
+
+
+class Optimizers:
+    """Muon and AdamW as one optimizer.
+
+    Parameters
+    ----------
+    network : nn.Module
+        In channels-last memory, where a kernel is a matrix without copying.
+    """
+
+    def __init__(self, network: nn.Module) -> None:
+        parameters = list(network.parameters())
+        self._parameters = parameters
+        self._kernels = [parameter for parameter in parameters if parameter.ndim == 4 and len(parameter) > 1]
+        self._matrices = [nn.Parameter(_matrix(kernel.detach())) for kernel in self._kernels]
+        rest = [parameter for parameter in parameters if not (parameter.ndim == 4 and len(parameter) > 1)]
+        self._parts = (
+            torch.optim.Muon(self._matrices, weight_decay=WEIGHT_DECAY, adjust_lr_fn="match_rms_adamw"),
+            torch.optim.AdamW(rest, weight_decay=WEIGHT_DECAY),
+        )
+
+    def zero_grad(self) -> None:
+        """Forget the gradients."""
+        for parameter in self._parameters:
+            parameter.grad = None
+
+    def step(self, rate: float) -> None:
+        """Move the weights along their gradients at a learning rate."""
+        for matrix, kernel in zip(self._matrices, self._kernels):
+            matrix.grad = _matrix(kernel.grad)
+        for part in self._parts:
+            for group in part.param_groups:
+                group["lr"] = rate
+            part.step()
+
+    def state_dict(self) -> list[dict]:
+        """Give what a checkpoint keeps."""
+        return [part.state_dict() for part in self._parts]
+
+    def load_state_dict(self, states: list[dict]) -> None:
+        """Go on from a checkpoint."""
+        for part, state in zip(self._parts, states):
+            part.load_state_dict(state)
+
+
+def _matrix(kernel: Tensor) -> Tensor:
+    """See (out, in, side, side) as (out, side x side x in), one row a filter; a view where memory is channels-last."""
+    return kernel.permute(0, 2, 3, 1).flatten(1)
