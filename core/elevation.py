@@ -161,7 +161,7 @@ def measure_again(
     smoothing_z_m: float,
     progress: Progress = SILENT,
 ) -> list[RailLine]:
-    """Give finished rails heights of another smoothing, and those read from files their support.
+    """Give finished rails heights of another smoothing and support anew: the same for rails read from files.
 
     Parameters
     ----------
@@ -186,8 +186,7 @@ def measure_again(
         mine = feet.of(number)
         again = _raise_line(plans[number], FIXED_ENDS, mine, points.xyz[mine.point, 2], parameters)
         if again is not None:
-            support = again.support if rail.support is None else rail.support
-            rail = replace(rail, xyz=again.xyz, gaps=again.gaps, support=support)
+            rail = replace(rail, xyz=again.xyz, gaps=again.gaps, support=again.support)
         measured.append(rail)
     return measured
 

@@ -55,6 +55,8 @@ class Parameters:
         Deviation from the gauge at which two rails still make a track.
     quality_step_m : float or None
         Distance of the stations at which the tracks' geometry is measured; None leaves it out.
+    keep_cleaned : bool
+        Whether the rasters that the network made are handed out as well.
     """
 
     gauge_m: float
@@ -75,6 +77,7 @@ class Parameters:
     other_gauges_m: tuple[float, ...] = ()
     centerline_tolerance_m: float = 0.05
     quality_step_m: float | None = None
+    keep_cleaned: bool = False
 
 
 def extract_rails(clouds: Sequence[RailPoints], parameters: Parameters, progress: Progress = SILENT) -> RailNetwork:
@@ -112,23 +115,25 @@ def extract_rails(clouds: Sequence[RailPoints], parameters: Parameters, progress
     rails: list[RailLine] = []
     centerlines: list[Centerline] = []
     geometry: list[TrackGeometry] = []
+    cleaned: list[RailRaster] = []
     for number, points in enumerate(clouds):
         step = progress.span(number / len(clouds), (number + 1) / len(clouds))
-        found = rails_of(points, parameters, engine, step.span(0.0, 0.9), first_id=len(rails) + 1)
+        raster = raster_of(points, parameters, engine, step.span(0.0, 0.7))
+        found = lines_of(raster, points.class_code, points, parameters, step.span(0.7, 0.9), first_id=len(rails) + 1)
         tracks = tracks_of(found, parameters, step.span(0.9, 0.95), first_id=len(centerlines) + 1)
         geometry += geometry_of(tracks, found, points, parameters, step.span(0.95, 1.0))
         rails += found
         centerlines += tracks
-    return RailNetwork(tuple(rails), tuple(centerlines), clouds[0].frame, engine.description, tuple(geometry))
+        cleaned += [raster] if parameters.keep_cleaned else []
+    return RailNetwork(
+        tuple(rails), tuple(centerlines), clouds[0].frame, engine.description, tuple(geometry), tuple(cleaned)
+    )
 
 
-def rails_of(
-    points: RailPoints, parameters: Parameters, engine: Engine, progress: Progress = SILENT, first_id: int = 1
-) -> list[RailLine]:
-    """Extract the rails of one class: rasterize, clean, make lines."""
+def raster_of(points: RailPoints, parameters: Parameters, engine: Engine, progress: Progress = SILENT) -> RailRaster:
+    """Rasterize the points of one class, and have the network clean the raster."""
     raster = rasterize(points.xyz, cell_size(parameters.gauge_m, parameters.head_width_m))
-    cleaned = clean(raster, engine, parameters.passes, progress.span(0.0, 0.8))
-    return lines_of(cleaned, points.class_code, points, parameters, progress.span(0.8, 1.0), first_id)
+    return clean(raster, engine, parameters.passes, progress)
 
 
 def lines_of(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .points import LocalFrame
+from .raster import RailRaster
 
 
 def length_along(vertices: np.ndarray) -> np.ndarray:
@@ -210,6 +211,8 @@ class RailNetwork:
         Engine and device that ran the network, for ENGINE_USED.
     geometry : tuple of TrackGeometry
         Of each centerline in turn; none unless asked for.
+    cleaned : tuple of RailRaster
+        What the network made of each class in turn; none unless asked for.
     """
 
     rails: tuple[RailLine, ...]
@@ -217,3 +220,4 @@ class RailNetwork:
     frame: LocalFrame
     engine: str = field(default="")
     geometry: tuple[TrackGeometry, ...] = ()
+    cleaned: tuple[RailRaster, ...] = ()
