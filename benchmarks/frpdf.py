@@ -2,7 +2,8 @@
 
 Run `python benchmarks/frpdf.py [NETWORK ...]`. A network is one of
 
-- `weights.npz`: weights of FRPDF, after one pass and after two;
+- `weights.npz`: weights of FRPDF, after one pass and after two (`weights.npz@3`: after three alone);
+- `unet=weights.npz`: weights of a rival, from `python -m rail_extract train FOLDER --network unet`;
 - `network.onnx`: from `(1, 1, height, width)`, 0 or 1, to the same shape, probability of rail;
 - `pass1.onnx+pass2.onnx`: passes of FRPDF as `python -m rail_extract onnx` writes them (with `--side 1024`);
 - `module:function`: a Python function from a `(height, width)` bool array to one of bools or probabilities; its
@@ -34,6 +35,7 @@ from rail_extract.core.synthetic.distortion import Pair
 from rail_extract.core.synthetic.layouts import FAMILIES
 from rail_extract.core.synthetic.pairs import BASE_RATIO, random_pair
 from rail_extract.core.training.evaluate import Cleaner, classical, cleaner_of
+from rail_extract.core.training.rivals import NETWORKS, TrainedNetwork, parameter_count
 from rail_extract.core.training.scores import Scores, bridged, score
 
 SEED = 1024_2026
@@ -140,6 +142,10 @@ def make_cleaner(row: str) -> tuple[Cleaner, int | None]:
         return (lambda observed: observed), 0
     if row == "closing":
         return classical, 0
+    if "=" in row:
+        name, rest = row.split("=", 1)
+        path, passes = rest.rsplit("@", 1)
+        return cleaner_of(TrainedNetwork(name, Path(path)), int(passes)), parameter_count(NETWORKS[name]())
     if ".npz@" in row:
         path, passes = row.rsplit("@", 1)
         arrays = load_arrays(Path(path))
@@ -194,7 +200,7 @@ def _title(row: str) -> str:
     if ".npz@" not in row:
         return " + ".join(Path(part).name for part in row.split("+"))
     path, passes = row.rsplit("@", 1)
-    return f"{Path(path).stem}, {passes} pass{'es' if int(passes) > 1 else ''}"
+    return f"{path.split('=')[0] if '=' in path else Path(path).stem}, {passes} pass{'es' if int(passes) > 1 else ''}"
 
 
 def report(tallies: Sequence[Tally], count: int) -> Iterable[str]:

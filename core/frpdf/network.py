@@ -97,12 +97,18 @@ class FRPDFLayer(nn.Sequential):
         )
 
 
-class FRPDF(nn.Module):
-    """The recurrent network: the same layer passes over the raster again and again, fed with what it found before."""
+class Recurrent(nn.Module):
+    """The same layer passes over the raster again and again, fed with what it found before.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    layer : nn.Module
+        From two channels, raster and state, each in -1 to 1, to one channel of logits of the same height and width.
+    """
+
+    def __init__(self, layer: nn.Module) -> None:
         super().__init__()
-        self.layer = FRPDFLayer()
+        self.layer = layer
 
     def logits(self, raster: Tensor, state: Tensor, number: int) -> Tensor:
         """Run one pass.
@@ -133,6 +139,13 @@ class FRPDF(nn.Module):
             found.append(self.logits(raster, state, number))
             state = feedback(found[-1]).to(raster.dtype)
         return found
+
+
+class FRPDF(Recurrent):
+    """The paper's recurrent network."""
+
+    def __init__(self) -> None:
+        super().__init__(FRPDFLayer())
 
 
 def feedback(logits: Tensor) -> Tensor:

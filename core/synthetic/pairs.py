@@ -34,7 +34,12 @@ def random_ratio(rng: np.random.Generator) -> float:
     """Draw a ratio of gauge to railhead width."""
     if rng.random() < ODD_SHARE:
         return math.exp(rng.uniform(math.log(RATIOS[0]), math.log(RATIOS[1])))
-    return BASE_RATIO * math.exp(rng.uniform(-RATIO_TOLERANCE, RATIO_TOLERANCE))
+    return ratio_near(rng, BASE_RATIO)
+
+
+def ratio_near(rng: np.random.Generator, ratio: float) -> float:
+    """Draw a ratio that a model for `ratio` must bear."""
+    return ratio * math.exp(rng.uniform(-RATIO_TOLERANCE, RATIO_TOLERANCE))
 
 
 def random_pair(

@@ -1,4 +1,4 @@
-"""Train FRPDF on synthetic pairs, on the CPU in bfloat16 or on CUDA; resumable, seeded, logged.
+"""Train FRPDF, or a network to compare it with, on synthetic pairs; on the CPU or CUDA, resumable, seeded, logged.
 
 Loss on every pass, no gradient through the feedback, shared weights, batch statistics per pass (ALGORITHMS.md
 section 5.5).
@@ -11,7 +11,7 @@ import csv
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -19,13 +19,14 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from ..frpdf import DEFAULT_PASSES, OUTPUT_THRESHOLD, START
-from ..frpdf.network import FRPDF, PassBatchNorm2d, feedback
+from ..frpdf import DEFAULT_PASSES, OUTPUT_THRESHOLD, START, STATISTICS
+from ..frpdf.network import PassBatchNorm2d, Recurrent, feedback
 from ..frpdf.weights import load_arrays, save_arrays
-from ..synthetic.pairs import random_pair
+from ..synthetic.pairs import random_pair, ratio_near
 from .curves import draw_curves
 from .gradients import train_on_cpu
 from .optimizers import Optimizers
+from .rivals import NETWORKS, head_of
 from .scores import Scores, score
 
 CROPS = ((256, 4), (384, 2), (512, 1))
@@ -36,8 +37,8 @@ LAST_CROP = 1024
 most cells see all of it."""
 LAST_SHARE = 0.04
 """Share of the steps with the last crop; such a step costs four of the others."""
-PASS_WEIGHTS = (0.5, 1.0)
-"""Weight of each pass's loss: the last one makes the result."""
+EARLY_PASS_WEIGHT = 0.5
+"""Weight of the loss of a pass that is not the last one, which makes the result."""
 HEAD_BIAS = -4.0
 """Start near the share of rail cells in a raster, or the first hundred steps only learn that there are few."""
 LARGEST_GRADIENT = 1.0
@@ -58,6 +59,9 @@ class Settings:
     seed: int
     device: str
     start: Path | None = None
+    network: str = "frpdf"
+    passes: int = DEFAULT_PASSES
+    ratio: float | None = None
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -68,12 +72,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rate", type=float, default=3e-3, help="largest learning rate (default 0.003)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--start", type=Path, help="weights (.npz) to start from")
+    parser.add_argument("--ratio", type=float, help="gauge over railhead width to specialize in (default: all)")
+    parser.add_argument("--network", choices=NETWORKS, default="frpdf", help="what to train (default frpdf)")
+    parser.add_argument("--passes", type=int, default=DEFAULT_PASSES, help=f"passes (default {DEFAULT_PASSES})")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Train, go on with a training, or export one that is complete."""
-    settings = Settings(arguments.steps, arguments.rate, arguments.seed, arguments.device, arguments.start)
+    settings = Settings(**{field.name: getattr(arguments, field.name) for field in fields(Settings)})
     arguments.folder.mkdir(parents=True, exist_ok=True)
     network = train(settings, arguments.folder, arguments.minutes)
     if network is None:
@@ -84,23 +91,23 @@ def run(arguments: argparse.Namespace) -> None:
     print(f"Wrote {arguments.folder / 'weights.npz'}.")
 
 
-def train(settings: Settings, folder: Path, minutes: float) -> FRPDF | None:
+def train(settings: Settings, folder: Path, minutes: float) -> Recurrent | None:
     """Train up to the last step, or for so many minutes.
 
     Returns
     -------
-    FRPDF or None
+    Recurrent or None
         None where the time was up before the last step.
     """
     torch.manual_seed(settings.seed)
-    network = new_network(settings.device, settings.start)
+    network = new_network(settings)
     optimizer = Optimizers(network)
     first = _resume(folder / "checkpoint.pt", network, optimizer)
     until = time.monotonic() + 60 * minutes
     for step in range(first, settings.steps):
         started = time.monotonic()
         rate = learning_rate(step, settings)
-        losses, scores = _learn(network, optimizer, rate, *batch(settings, DATA, step))
+        losses, scores = _learn(network, optimizer, rate, settings.passes, *batch(settings, DATA, step))
         _log(folder / "log.csv", step, rate, losses, scores, time.monotonic() - started)
         done = step + 1
         out_of_time = time.monotonic() > until
@@ -114,16 +121,16 @@ def train(settings: Settings, folder: Path, minutes: float) -> FRPDF | None:
     return network
 
 
-def new_network(device: str, start: Path | None = None) -> FRPDF:
-    """Build a network, untrained or with the weights of a file, prepared for its device."""
-    network = FRPDF()
-    torch.nn.init.constant_(network.layer[-1].bias, HEAD_BIAS)
-    if start is not None:
-        arrays = {name: torch.from_numpy(array) for name, array in load_arrays(start).items()}
+def new_network(settings: Settings) -> Recurrent:
+    """Build the network, untrained or with the weights of a file, prepared for its device."""
+    network = NETWORKS[settings.network]()
+    torch.nn.init.constant_(head_of(network).bias, HEAD_BIAS)
+    if settings.start is not None:
+        arrays = {name: torch.from_numpy(array) for name, array in load_arrays(settings.start).items()}
         network.load_state_dict({**network.state_dict(), **arrays})
-    if device == "cpu":
+    if settings.device == "cpu":
         train_on_cpu(network)
-    return network.to(device, memory_format=torch.channels_last)
+    return network.to(settings.device, memory_format=torch.channels_last)
 
 
 def learning_rate(step: int, settings: Settings) -> float:
@@ -139,7 +146,8 @@ def batch(settings: Settings, stream: int, step: int) -> tuple[Tensor, Tensor]:
     side, count = CROPS[rng.choice(len(CROPS), p=CROP_SHARES)]
     if stream == DATA and step >= (1 - LAST_SHARE) * settings.steps:
         side, count = LAST_CROP, 1
-    pairs = [random_pair(rng, side) for _ in range(count)]
+    ratios = [None if settings.ratio is None else ratio_near(rng, settings.ratio) for _ in range(count)]
+    pairs = [random_pair(rng, side, ratio=ratio) for ratio in ratios]
     return tuple(
         torch.from_numpy(np.stack(rasters)[:, None].astype(np.float32))
         .to(settings.device)
@@ -148,7 +156,7 @@ def batch(settings: Settings, stream: int, step: int) -> tuple[Tensor, Tensor]:
     )
 
 
-def run_passes(network: FRPDF, observed: Tensor, passes: int = DEFAULT_PASSES) -> Iterator[Tensor]:
+def run_passes(network: Recurrent, observed: Tensor, passes: int) -> Iterator[Tensor]:
     """Run pass after pass in bfloat16 and yield the float logits of each; the caller may go backward in between."""
     state = torch.full_like(observed, START)
     for number in range(passes):
@@ -170,14 +178,14 @@ ENTROPY_WEIGHT = 5.0
 
 
 def _learn(
-    network: FRPDF, optimizer: Optimizers, rate: float, observed: Tensor, label: Tensor
+    network: Recurrent, optimizer: Optimizers, rate: float, passes: int, observed: Tensor, label: Tensor
 ) -> tuple[list[float], list[Scores]]:
     network.train()
     optimizer.zero_grad()
     losses, scores = [], []
-    for weight, logits in zip(PASS_WEIGHTS, run_passes(network, observed)):
+    for number, logits in enumerate(run_passes(network, observed, passes), start=1):
         loss = loss_of(logits, label)
-        (weight * loss).backward()
+        (loss if number == passes else EARLY_PASS_WEIGHT * loss).backward()
         losses.append(float(loss.detach()))
         found = torch.sigmoid(logits.detach()) >= OUTPUT_THRESHOLD
         scores.append(score(found.cpu().numpy(), label.cpu().numpy() > 0.5))
@@ -187,7 +195,7 @@ def _learn(
 
 
 @torch.no_grad()
-def recompute_statistics(network: FRPDF, settings: Settings) -> None:
+def recompute_statistics(network: Recurrent, settings: Settings) -> None:
     """Average the batch statistics of every pass anew over many batches: running averages trail the weights."""
     network.train()
     layers = [module for module in network.modules() if isinstance(module, PassBatchNorm2d)]
@@ -195,11 +203,11 @@ def recompute_statistics(network: FRPDF, settings: Settings) -> None:
         for layer in layers:
             layer.momentum = 1.0 / (step + 1)
         observed, _ = batch(settings, STATISTICS_DATA, step)
-        for _ in run_passes(network, observed):
+        for _ in run_passes(network, observed, max(settings.passes, STATISTICS)):
             pass
 
 
-def export(network: FRPDF) -> dict[str, np.ndarray]:
+def export(network: Recurrent) -> dict[str, np.ndarray]:
     """Parameters and batch statistics as plain arrays, without the counters of batches."""
     return {
         name: value.detach().cpu().float().contiguous().numpy()
@@ -208,7 +216,7 @@ def export(network: FRPDF) -> dict[str, np.ndarray]:
     }
 
 
-def _resume(path: Path, network: FRPDF, optimizer: Optimizers) -> int:
+def _resume(path: Path, network: Recurrent, optimizer: Optimizers) -> int:
     """Load a checkpoint where there is one, and give the number of the next step."""
     if not path.exists():
         return 0

@@ -8,7 +8,9 @@ import torch
 from rail_extract.core.frpdf import STATISTICS
 from rail_extract.core.frpdf.torch_engine import TorchEngine
 from rail_extract.core.frpdf.weights import load_arrays
-from rail_extract.core.training import evaluate, gradients, train
+from rail_extract.core.training import curves, evaluate, gradients, train
+from rail_extract.core.training.optimizers import Optimizers
+from rail_extract.core.training.rivals import NETWORKS, TrainedNetwork, parameter_count
 
 
 @pytest.fixture
@@ -71,6 +73,62 @@ def test_the_command_leaves_weights_that_the_engine_takes(small, tmp_path):
     assert engine.probabilities(raster, raster, 0).shape == (32, 32)
     means = [arrays["layer.0.0.1.running_mean" + (f"_{n}" if n else "")] for n in range(STATISTICS)]
     assert not np.allclose(means[0], means[1])
+
+
+@pytest.mark.parametrize("name", NETWORKS)
+def test_networks_to_compare_are_of_one_size(name):
+    assert parameter_count(NETWORKS[name]()) == pytest.approx(parameter_count(NETWORKS["frpdf"]()), rel=0.05)
+
+
+@pytest.mark.parametrize("name", ["unet", "acnn", "pooled", "skipping"])
+def test_a_rival_is_trained_and_run_like_frpdf(small, tmp_path, name, monkeypatch):
+    monkeypatch.setattr(train, "CROPS", ((128, 1),))
+    settings = train.Settings(1, 0.003, 3, "cpu", network=name, passes=1)
+    before = train.new_network(settings).state_dict()
+    network = train.train(settings, tmp_path, np.inf)
+    moved = [key for key, value in network.named_parameters() if not torch.equal(value, before[key])]
+    assert len(moved) == len(list(network.parameters()))
+    train.recompute_statistics(network, settings)
+    train.save_arrays(tmp_path / "weights.npz", train.export(network))
+    raster = np.eye(128, dtype=np.float32)
+    probability = TrainedNetwork(name, tmp_path / "weights.npz").probabilities(raster, 0 * raster + 0.5, 0)
+    assert probability.shape == (128, 128)
+    assert 0 < probability.mean() < 0.5
+
+
+def test_muon_moves_every_direction_of_a_kernel_alike():
+    torch.manual_seed(0)
+    kernel = torch.nn.Conv2d(8, 6, 3, bias=False)
+    network = torch.nn.Sequential(kernel, torch.nn.BatchNorm2d(6)).to(memory_format=torch.channels_last)
+    before = kernel.weight.detach().clone()
+    optimizer = Optimizers(network)
+    (network(torch.randn(1, 8, 16, 16)) ** 3).sum().backward()
+    optimizer.step(rate=0.01)
+    moved = (kernel.weight.detach() - before).reshape(6, -1)
+    sizes = torch.linalg.svdvals(moved) / (0.01 * 0.2 * 72**0.5)
+    assert sizes.min() > 0.4
+    assert sizes.max() < 1.3
+
+
+def test_curves_average_neighbouring_steps_and_count_repeated_ones_once(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("step,loss_1,f1_1\n" + "".join(f"{n},{n},0.5\n" for n in [*range(250), 248, 249]))
+    columns = curves.read_log(log)
+    assert len(columns["step"]) == 250
+    steps, means = curves.binned(columns["step"], columns["loss_1"])
+    assert len(steps) == curves.MOST_BINS
+    assert np.allclose(steps, means)
+    curves.draw_curves(log, tmp_path / "curves.png")
+    assert (tmp_path / "curves.png").stat().st_size > 10_000
+
+
+def test_a_training_for_a_ratio_draws_rails_of_that_width(small, monkeypatch):
+    drawn, draw = [], train.random_pair
+    monkeypatch.setattr(train, "random_pair", lambda rng, side, ratio: drawn.append(ratio) or draw(rng, side))
+    for step in range(5):
+        train.batch(train.Settings(5, 0.003, 0, "cpu", ratio=22.2), train.DATA, step)
+    assert all(abs(np.log(ratio / 22.2)) <= 0.06 for ratio in drawn)
+    assert len(set(drawn)) == 5
 
 
 def test_the_evaluation_set_is_fixed_and_its_input_poor():
