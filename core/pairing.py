@@ -10,7 +10,7 @@ import numpy as np
 
 from .dtw import match_polylines
 from .parallels import REACH_M, Parallels, find_parallels
-from .polyline import interpolate, left_normals
+from .polyline import interpolate, left_normals, project
 from .progress import SILENT, Progress
 from .rails import RailLine, length_along
 
@@ -25,6 +25,12 @@ CHUNK_M = 1000.0
 
 MARGIN_M = 1.0
 """Length added to a stretch found at stations, so that the exact matching finds its ends."""
+
+COARSE_M = 0.5
+"""Spacing of the matched stations; on a tram's curve of 25 m their chords deviate by 1 mm."""
+
+FINE_M = 0.025
+"""Their spacing where rails come within the tolerance or leave it: where a match ends is known to this."""
 
 SPLIT_M = 5.0
 """Stations abreast that lie further apart than this begin a new stretch: gaps in a rail are at most about as long."""
@@ -92,12 +98,13 @@ def pair_rails(
     if len(rails) < 2:
         return ()
     spacing = gauge_m + head_width_m
-    parallels = find_parallels(rails, max(REACH_M, spacing + 2 * tolerance_m))
+    reach_m = max(REACH_M, spacing + 2 * tolerance_m)
+    parallels = find_parallels(rails, reach_m, progress.span(0.0, 0.3))
     # Chords of stations and rails not quite abreast hide a little of the true distance, hence the doubled tolerance.
     at_gauge = parallels[np.abs(np.abs(parallels.left_m) - spacing) < 2 * tolerance_m]
     candidates = [stretch for group in at_gauge.groups() for stretch in _stretches(group)]
     matches = []
-    for stretch in progress.follow(candidates):
+    for stretch in progress.span(0.3, 1.0).follow(candidates):
         matches.extend(_match(rails, stretch, spacing, tolerance_m, min_length_m))
     return _select(matches, min_length_m)
 
@@ -147,26 +154,67 @@ def _match(
     a, b, same = int(stretch.a[0]), int(stretch.b[0]), bool(stretch.same[0])
     side_a = LEFT if stretch.left_m[0] > 0 else RIGHT
     side_b = -side_a if same else side_a
-    step = tolerance_m / 2
-    curve_a, t_a = _offset_curve(rails[a].xyz[:, :2], stretch.t_a, side_a * spacing / 2, step)
-    curve_b, t_b = _offset_curve(rails[b].xyz[:, :2], stretch.t_b, side_b * spacing / 2, step)
+    curve_a = _OffsetCurve.along(rails[a].xyz[:, :2], stretch.t_a, side_a * spacing / 2)
+    curve_b = _OffsetCurve.along(rails[b].xyz[:, :2], stretch.t_b, side_b * spacing / 2)
     if not same:
-        curve_b, t_b = curve_b[::-1], t_b[::-1]
-    for found in match_polylines(curve_a, curve_b, tolerance_m):
-        match = _Match(a, b, t_a[found.first], t_b[found.second], side_a, side_b, found.penalty / found.length)
-        if match.length_m >= min_length_m:
-            yield match
+        curve_b = curve_b.reversed()
+    for s_a, s_b in _abreast(curve_a, curve_b, tolerance_m):
+        for found in match_polylines(curve_a.at(s_a), curve_b.at(s_b), tolerance_m):
+            t_a, t_b = curve_a.t_at(s_a[found.first]), curve_b.t_at(s_b[found.second])
+            match = _Match(a, b, t_a, t_b, side_a, side_b, found.penalty / found.length)
+            if match.length_m >= min_length_m:
+                yield match
 
 
-def _offset_curve(xy: np.ndarray, t: np.ndarray, left_m: float, step_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Move the stretch of a rail around the chainages `t` to the left; stations, (m, 2), and their chainages."""
-    along = length_along(xy)
-    start, end = max(t.min() - MARGIN_M, 0.0), min(t.max() + MARGIN_M, along[-1])
-    # The outer of two curves is longer than the rail: a tenth covers the tightest tram curve.
-    count = int(np.ceil(1.1 * (end - start) / step_m)) + 1
-    stations = np.linspace(start, end, count)
-    curve = interpolate(xy, along, stations)
-    return curve + left_m * left_normals(curve), stations
+@dataclass(frozen=True)
+class _OffsetCurve:
+    """A stretch of a rail moved to its left: vertices, (m, 2), chainage along itself and along the rail, (m,) each."""
+
+    xy: np.ndarray
+    s: np.ndarray
+    t: np.ndarray
+
+    @classmethod
+    def along(cls, rail: np.ndarray, t: np.ndarray, left_m: float) -> _OffsetCurve:
+        """Move the stretch around the chainages `t` of a rail, (n, 2)."""
+        along = length_along(rail)
+        start, end = max(t.min() - MARGIN_M, 0.0), min(t.max() + MARGIN_M, along[-1])
+        stations = np.linspace(start, end, int(np.ceil((end - start) / COARSE_M)) + 1)
+        curve = interpolate(rail, along, stations)
+        curve = curve + left_m * left_normals(curve)
+        return cls(curve, length_along(curve), stations)
+
+    def reversed(self) -> _OffsetCurve:
+        """Run along the same curve the other way."""
+        return _OffsetCurve(self.xy[::-1], self.s[-1] - self.s[::-1], self.t[::-1])
+
+    def at(self, s: np.ndarray) -> np.ndarray:
+        """Places at chainages along the curve, (n, 2)."""
+        return interpolate(self.xy, self.s, s)
+
+    def t_at(self, s: np.ndarray) -> np.ndarray:
+        """Chainages along the rail at chainages along the curve, (n,)."""
+        return np.interp(s, self.s, self.t)
+
+
+def _abreast(a: _OffsetCurve, b: _OffsetCurve, tolerance_m: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Place stations abreast of each other along stretches of two curves within the tolerance; chainages along both.
+
+    Vertices that lie abreast leave no segment without a neighbour, however long it is, and thus need not lie denser
+    than the shape of the curves asks for. Only where a stretch may end they do.
+    """
+    near = np.zeros(len(a.s), dtype=bool)
+    near[project([b.xy], a.xy, tolerance_m).point] = True
+    changes = np.flatnonzero(np.diff(near))
+    share = np.arange(FINE_M / COARSE_M, 1.0, FINE_M / COARSE_M)
+    s = np.sort(np.append(a.s, a.s[changes, None] + share * np.diff(a.s)[changes, None]))
+    feet = project([b.xy], a.at(s), tolerance_m)
+    order = np.argsort(feet.point)
+    point, t = feet.point[order], feet.t[order]
+    runs = np.split(np.arange(len(point)), np.flatnonzero(np.diff(point) > 1) + 1)
+    for run in runs:
+        if len(run) > 1:
+            yield s[point[run]], t[run]
 
 
 def _select(matches: Sequence[_Match], min_length_m: float) -> tuple[RailPair, ...]:

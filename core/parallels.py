@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .polyline import left_normals, resample, unit_tangents
+from .progress import SILENT, Progress
 from .rails import RailLine
 
 STEP_M = 0.5
@@ -25,6 +26,9 @@ SINE_PARALLEL = np.sin(np.radians(10.0))
 
 BIN_M = 0.01
 """Width of the bins in which the commonest spacing is sought: rails of one track vary by less."""
+
+STATIONS_AT_ONCE = 20_000
+"""Stations whose neighbours are sought in one go, a few hundred thousand: bounds the memory."""
 
 
 @dataclass(frozen=True)
@@ -64,21 +68,27 @@ class Parallels:
             yield self[mine]
 
 
-def find_parallels(rails: Sequence[RailLine], reach_m: float = REACH_M) -> Parallels:
+def find_parallels(rails: Sequence[RailLine], reach_m: float = REACH_M, progress: Progress = SILENT) -> Parallels:
     """Find stations that lie abreast on two rails of one class, up to `reach_m` apart."""
+    codes = np.array([rail.class_code for rail in rails])
     number, stations, t, tangents, normals = _stations(rails)
-    pairs = cKDTree(stations).query_pairs(reach_m + STEP_M, output_type="ndarray")
-    p, q = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].T
-    between = stations[q] - stations[p]
-    along = np.einsum("ij,ij->i", between, tangents[p])
-    left = np.einsum("ij,ij->i", between, normals[p])
-    turn = tangents[p, 0] * tangents[q, 1] - tangents[p, 1] * tangents[q, 0]
-    codes = np.array([rail.class_code for rail in rails])[number]
-    abreast = (number[p] != number[q]) & (codes[p] == codes[q])
-    abreast &= (np.abs(along) <= STEP_M / 2) & (np.abs(left) <= reach_m) & (np.abs(turn) < SINE_PARALLEL)
-    p, q = p[abreast], q[abreast]
-    same = np.einsum("ij,ij->i", tangents[p], tangents[q]) > 0
-    return Parallels(number[p], number[q], t[p], t[q], left[abreast], same)
+    tree = cKDTree(stations)
+    found = []
+    for start in progress.follow(range(0, len(stations), STATIONS_AT_ONCE)):
+        block = cKDTree(stations[start : start + STATIONS_AT_ONCE])
+        near = block.sparse_distance_matrix(tree, reach_m + STEP_M, output_type="ndarray")
+        p, q = near["i"] + start, near["j"]
+        other = (number[p] < number[q]) & (codes[number[p]] == codes[number[q]])
+        p, q = p[other], q[other]
+        between = stations[q] - stations[p]
+        along = np.einsum("ij,ij->i", between, tangents[p])
+        left = np.einsum("ij,ij->i", between, normals[p])
+        turn = tangents[p, 0] * tangents[q, 1] - tangents[p, 1] * tangents[q, 0]
+        abreast = (np.abs(along) <= STEP_M / 2) & (np.abs(left) <= reach_m) & (np.abs(turn) < SINE_PARALLEL)
+        p, q = p[abreast], q[abreast]
+        same = np.einsum("ij,ij->i", tangents[p], tangents[q]) > 0
+        found.append((number[p], number[q], t[p], t[q], left[abreast], same))
+    return Parallels(*(np.concatenate(column) for column in zip(*found)))
 
 
 def _stations(rails: Sequence[RailLine]) -> tuple[np.ndarray, ...]:
