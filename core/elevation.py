@@ -93,7 +93,7 @@ def elevate(
         rail = _raise_line(line, free_ends[number], mine, points.xyz[mine.point, 2], parameters)
         if rail is not None and rail.length_m >= parameters.min_length_m:
             rails.append(replace(rail, class_code=points.class_code))
-    return _numbered(rails)
+    return numbered(rails)
 
 
 def flat_rails(network: LineNetwork, class_code: int, parameters: ElevationParameters) -> tuple[RailLine, ...]:
@@ -104,10 +104,10 @@ def flat_rails(network: LineNetwork, class_code: int, parameters: ElevationParam
         rail = RailLine(xyz, 0, class_code, points=0, resid_mm=np.nan, sigma_mm=np.nan, bridged_m=0.0)
         if rail.length_m >= parameters.min_length_m:
             rails.append(rail)
-    return _numbered(rails)
+    return numbered(rails)
 
 
-def _numbered(rails: Sequence[RailLine]) -> tuple[RailLine, ...]:
+def numbered(rails: Sequence[RailLine]) -> tuple[RailLine, ...]:
     """Let rails start at the right end, and number them from west to east."""
     directed = (rail.reversed() if starts_at_its_end(rail.xyz) else rail for rail in rails)
     ordered = sorted(directed, key=lambda rail: tuple(rail.xyz[0, :2]))

@@ -35,5 +35,9 @@ class NoTrackError(RailExtractError):
     """Rails were found but no two of them make a track of the given gauge."""
 
 
+class DiskError(RailExtractError):
+    """A file can't be written, as on a full disk."""
+
+
 class Cancelled(Exception):  # noqa: N818 - not an error: the user asked for it
     """The user cancelled the run."""

@@ -2,27 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from .centerlines import CenterlineParameters, build_centerlines
-from .elevation import ElevationParameters, elevate, flat_rails
+from .elevation import ElevationParameters, elevate, flat_rails, numbered
 from .errors import NoRailPointsError, NoTrackError
 from .frpdf import DEFAULT_PASSES
-from .frpdf.cleanup import clean
+from .frpdf.cleanup import MARGIN, MOST_PASSES, UNTIL_STABLE, clean
 from .frpdf.engine import Engine, make_engine
 from .frpdf.weights import load_arrays
 from .frpdf.zoo import choose
 from .geometry import measure_track_geometry
-from .points import RailPoints
+from .measuring import measure_in_stretches
+from .points import LocalFrame, RailPoints
 from .progress import SILENT, Progress
 from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
-from .raster import RailRaster, cell_size, rasterize
+from .raster import TILE, RailRaster, cell_size, rasterize
 from .refinement import refine
+from .seams import StretchRails, join, trim
 from .smoothing import smooth_network
 from .standards import distinct_gauges
+from .stretches import (
+    OVERLAP_TILES,
+    STRETCH_TILES,
+    Key,
+    MemorySource,
+    PointSource,
+    Stretch,
+    assembled,
+    in_turn,
+    lay_out,
+    mosaic,
+    own_tiles,
+)
 from .thinning import thin
 from .vectorize import vectorize
+
+NETWORK_SHARE = 0.7
+"""Part of a stretch's time that the network takes, for the progress."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +73,8 @@ class Parameters:
         Deviation from the gauge at which two rails still make a track.
     quality_step_m : float or None
         Distance of the stations at which the tracks' geometry is measured; None leaves it out.
+    stretch_tiles : int
+        Side, in raster tiles, of the squares that are worked on one after another; results don't hang on it.
     keep_cleaned : bool
         Whether the rasters that the network made are handed out as well.
     """
@@ -77,18 +97,22 @@ class Parameters:
     other_gauges_m: tuple[float, ...] = ()
     centerline_tolerance_m: float = 0.05
     quality_step_m: float | None = None
+    stretch_tiles: int = STRETCH_TILES
     keep_cleaned: bool = False
 
 
-def extract_rails(clouds: Sequence[RailPoints], parameters: Parameters, progress: Progress = SILENT) -> RailNetwork:
+def extract_rails(
+    clouds: Sequence[RailPoints | PointSource], parameters: Parameters, progress: Progress = SILENT
+) -> RailNetwork:
     """Extract rails and centerlines from classified points.
 
-    Each class is processed on its own, and its lines carry its code; ids count through all classes.
+    Each class is processed on its own, and its lines carry its code; ids count through all classes. What is longer than
+    a stretch is worked on by stretches, so that points are needed in memory for one of them at a time.
 
     Parameters
     ----------
-    clouds : sequence of RailPoints
-        From `points.read_rail_points`: one for each class, in one frame.
+    clouds : sequence of RailPoints or PointSource
+        From `points.read_rail_points` or `spool.spool`: one for each class, in one frame.
     parameters : Parameters
     progress : Progress
 
@@ -109,31 +133,89 @@ def extract_rails(clouds: Sequence[RailPoints], parameters: Parameters, progress
     """
     if not clouds:
         raise NoRailPointsError("There is no point to extract rails from.")
-    engine = make_engine(
-        load_arrays(choose(parameters.gauge_m, parameters.head_width_m).path), parameters.engine, parameters.device
-    )
+    engine = engine_for(parameters)
+    side_m = stretch_side(parameters)
+    sources = [MemorySource(cloud, side_m) if isinstance(cloud, RailPoints) else cloud for cloud in clouds]
     rails: list[RailLine] = []
     centerlines: list[Centerline] = []
     geometry: list[TrackGeometry] = []
     cleaned: list[RailRaster] = []
-    for number, points in enumerate(clouds):
-        step = progress.span(number / len(clouds), (number + 1) / len(clouds))
-        raster = raster_of(points, parameters, engine, step.span(0.0, 0.7))
-        found = lines_of(raster, points.class_code, points, parameters, step.span(0.7, 0.9), first_id=len(rails) + 1)
+    for source, step in zip(sources, progress.split(len(sources))):
+        stretches = lay_out(sources, source)
+        results, rasters = _walk(source, stretches, parameters, engine, step.span(0.0, 0.9))
+        found = whole_rails(results, source.frame, parameters, first_id=len(rails) + 1)
         tracks = tracks_of(found, parameters, step.span(0.9, 0.95), first_id=len(centerlines) + 1)
-        geometry += geometry_of(tracks, found, points, parameters, step.span(0.95, 1.0))
+        geometry += geometry_of(tracks, found, source, stretches, parameters, step.span(0.95, 1.0))
         rails += found
         centerlines += tracks
-        cleaned += [raster] if parameters.keep_cleaned else []
+        cleaned += rasters
     return RailNetwork(
-        tuple(rails), tuple(centerlines), clouds[0].frame, engine.description, tuple(geometry), tuple(cleaned)
+        tuple(rails), tuple(centerlines), sources[0].frame, engine.description, tuple(geometry), tuple(cleaned)
     )
 
 
-def raster_of(points: RailPoints, parameters: Parameters, engine: Engine, progress: Progress = SILENT) -> RailRaster:
-    """Rasterize the points of one class, and have the network clean the raster."""
-    raster = rasterize(points.xyz, cell_size(parameters.gauge_m, parameters.head_width_m))
-    return clean(raster, engine, parameters.passes, progress)
+def stretch_side(parameters: Parameters) -> float:
+    """Side of the stretches in metres."""
+    return parameters.stretch_tiles * TILE * cell_size(parameters.gauge_m, parameters.head_width_m)
+
+
+def engine_for(parameters: Parameters) -> Engine:
+    """Set up what runs the network that fits the gauge and the railhead."""
+    arrays = load_arrays(choose(parameters.gauge_m, parameters.head_width_m).path)
+    return make_engine(arrays, parameters.engine, parameters.device)
+
+
+def _walk(
+    source: PointSource, stretches: Sequence[Stretch], parameters: Parameters, engine: Engine, progress: Progress
+) -> tuple[list[StretchRails], list[RailRaster]]:
+    """Clean all stretches of one class, and draw the lines of each as soon as its neighbours are clean as well."""
+    by_key = {stretch.key: stretch for stretch in stretches}
+    total = sum(source.counts.values())
+    rasters: dict[Key, RailRaster] = {}
+    results: list[StretchRails] = []
+    done = 0.0
+    for key, ready in in_turn(by_key):
+        weight = source.counts[key] / total if len(by_key) > 1 else 1.0
+        rasters[key] = clean_stretch(
+            source, by_key[key], parameters, engine, progress.span(done, done + NETWORK_SHARE * weight)
+        )
+        done += NETWORK_SHARE * weight
+        for one in ready:
+            weight = source.counts[one] / total if len(by_key) > 1 else 1.0
+            step = progress.span(done, done + (1 - NETWORK_SHARE) * weight)
+            results.append(rails_of_stretch(source, by_key[one], rasters, parameters, step))
+            done += (1 - NETWORK_SHARE) * weight
+    return results, [assembled(rasters, by_key, source.frame)] if parameters.keep_cleaned else []
+
+
+def clean_stretch(
+    source: PointSource, stretch: Stretch, parameters: Parameters, engine: Engine, progress: Progress = SILENT
+) -> RailRaster:
+    """Rasterize the points of a stretch, have the network clean the raster, and keep what lies inside."""
+    cell_m = cell_size(parameters.gauge_m, parameters.head_width_m)
+    passes = MOST_PASSES if parameters.passes == UNTIL_STABLE else parameters.passes
+    points = source.near(stretch, passes * MARGIN * cell_m)
+    return own_tiles(clean(rasterize(points.xyz, cell_m), engine, parameters.passes, progress), stretch)
+
+
+def rails_of_stretch(
+    source: PointSource,
+    stretch: Stretch,
+    rasters: Mapping[Key, RailRaster],
+    parameters: Parameters,
+    progress: Progress = SILENT,
+) -> StretchRails:
+    """Draw the rails of a stretch, given its own cleaned raster and those of its neighbours."""
+    raster = mosaic(rasters, stretch)
+    points = source.near(stretch, OVERLAP_TILES * TILE * raster.cell_m)
+    return trim(_all_vertices(raster, source.class_code, points, parameters, progress), stretch)
+
+
+def whole_rails(
+    results: Sequence[StretchRails], frame: LocalFrame, parameters: Parameters, first_id: int = 1
+) -> list[RailLine]:
+    """Join the rails of all stretches, thin and number them."""
+    return _finished(numbered(join(results, frame)), parameters, first_id)
 
 
 def lines_of(
@@ -148,6 +230,13 @@ def lines_of(
 
     Without points the rails stay where the raster shows them, and have no heights.
     """
+    return _finished(_all_vertices(raster, class_code, points, parameters, progress), parameters, first_id)
+
+
+def _all_vertices(
+    raster: RailRaster, class_code: int, points: RailPoints | None, parameters: Parameters, progress: Progress
+) -> tuple[RailLine, ...]:
+    """Turn the cleaned raster of one class into rails that have all their vertices."""
     network = vectorize(
         raster,
         parameters.head_width_m,
@@ -168,10 +257,13 @@ def lines_of(
         min_length_m=parameters.min_length_m,
     )
     if points is None:
-        rails = flat_rails(network, class_code, elevation)
-    else:
-        network = refine(network, points, parameters.head_width_m, parameters.smoothing_xy_m, progress.span(0.5, 0.75))
-        rails = elevate(network, points, elevation, progress.span(0.75, 1.0))
+        return flat_rails(network, class_code, elevation)
+    network = refine(network, points, parameters.head_width_m, parameters.smoothing_xy_m, progress.span(0.5, 0.75))
+    return elevate(network, points, elevation, progress.span(0.75, 1.0))
+
+
+def _finished(rails: Sequence[RailLine], parameters: Parameters, first_id: int) -> list[RailLine]:
+    """Thin rails and number them on."""
     thinned = thin(rails, parameters.simplify_xy_m, parameters.simplify_z_m)
     return [replace(rail, rail_id=number) for number, rail in enumerate(thinned, start=first_id)]
 
@@ -209,13 +301,15 @@ def tracks_of(
 def geometry_of(
     centerlines: Sequence[Centerline],
     rails: Sequence[RailLine],
-    points: RailPoints,
+    source: PointSource,
+    stretches: Sequence[Stretch],
     parameters: Parameters,
     progress: Progress = SILENT,
 ) -> tuple[TrackGeometry, ...]:
     """Measure the tracks of one class, if asked for."""
     if parameters.quality_step_m is None:
         return ()
+    measured = measure_in_stretches(rails, source, stretches, parameters.head_width_m, progress.span(0.0, 0.8))
     return measure_track_geometry(
-        centerlines, rails, parameters.head_width_m, points, parameters.quality_step_m, progress
+        centerlines, measured, parameters.head_width_m, None, parameters.quality_step_m, progress.span(0.8, 1.0)
     )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -126,15 +126,89 @@ def read_rail_points(
     ParameterError
         A class code is none, or the extent is turned around.
     """
+    request = ask(paths, class_codes, crs_wkt, extent, progress)
+    xyz, codes = _collect(request, progress)
+    frame = request.frame_at([np.unique(column, return_counts=True) for column in origin_steps(xyz).T])
+    local = frame.to_local(xyz)
+    return tuple(RailPoints(local[codes == code], frame, int(code)) for code in np.unique(codes))
+
+
+@dataclass(frozen=True)
+class Request:
+    """Which points of which files are wanted.
+
+    Attributes
+    ----------
+    headers : tuple of CloudHeader
+    class_codes : tuple of int
+    extent : tuple of float or None
+        In units of the CRS.
+    zero : LocalFrame
+        Metres from the zero of the files' coordinate system.
+    """
+
+    headers: tuple[CloudHeader, ...]
+    class_codes: tuple[int, ...]
+    extent: tuple[float, float, float, float] | None
+    zero: LocalFrame
+
+    def read(
+        self, header: CloudHeader, progress: Progress = SILENT
+    ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Read the wanted points of one file chunk by chunk: coordinates, classes and census; see `las.read_classes`."""
+        from .las import read_classes
+
+        if self.extent is not None and not _overlap(header.extent, self.extent):
+            return
+        for xyz, codes, census in read_classes(header.path, self.class_codes, progress):
+            inside = slice(None) if self.extent is None else _inside(xyz, self.extent)
+            yield xyz[inside], codes[inside], census
+
+    def shares(self, progress: Progress) -> list[Progress]:
+        """Give each file the share of the progress that its points have."""
+        counts = np.array([header.point_count for header in self.headers], dtype=float)
+        after = np.cumsum(counts) / counts.sum()
+        return [progress.span(end - count / counts.sum(), end) for end, count in zip(after, counts)]
+
+    def frame_at(self, steps: Sequence[tuple[np.ndarray, np.ndarray]]) -> LocalFrame:
+        """Make the frame whose origin lies amid the points, given values and counts of their `origin_steps` by axis."""
+        middle = [values[np.searchsorted(np.cumsum(counts), counts.sum() / 2)] for values, counts in steps]
+        return replace(self.zero, origin=np.array(middle) * ORIGIN_STEP)
+
+    def explain_none(self, census: np.ndarray) -> NoRailPointsError:
+        """Say in one sentence which classes there are, (256,) counts, instead of the wanted ones."""
+        wanted = ", ".join(str(code) for code in sorted(set(self.class_codes)))
+        if self.extent is not None and (census.sum() == 0 or census[list(self.class_codes)].any()):
+            return NoRailPointsError(f"No point of class {wanted} lies inside the extent: choose a larger one.")
+        there = ", ".join(f"{code} ({census[code]})" for code in np.flatnonzero(census))
+        return NoRailPointsError(
+            f"The cloud has no point of class {wanted}; its classes and their counts are {there}: set the rail classes."
+        )
+
+
+def ask(
+    paths: str | Path | Sequence[str | Path],
+    class_codes: Sequence[int],
+    crs_wkt: str | None = None,
+    extent: tuple[float, float, float, float] | None = None,
+    progress: Progress = SILENT,
+) -> Request:
+    """Check what is wanted, and read the headers; parameters and errors as those of `read_rail_points`."""
     _check_request(class_codes, extent)
     headers = read_headers(paths)
     crs = _shared_crs(headers, crs_wkt, progress)
-    horizontal_unit_m, vertical_unit_m = (1.0, 1.0) if crs is None else units(crs)
-    xyz, codes = _collect(headers, class_codes, extent, progress)
-    origin = np.round(np.median(xyz, axis=0) / ORIGIN_STEP) * ORIGIN_STEP
-    frame = LocalFrame(origin, horizontal_unit_m, vertical_unit_m, None if crs is None else crs.to_wkt())
-    local = frame.to_local(xyz)
-    return tuple(RailPoints(local[codes == code], frame, int(code)) for code in np.unique(codes))
+    units_m = (1.0, 1.0) if crs is None else units(crs)
+    return Request(
+        headers, tuple(class_codes), extent, LocalFrame(np.zeros(3), *units_m, None if crs is None else crs.to_wkt())
+    )
+
+
+def origin_steps(xyz_crs: np.ndarray) -> np.ndarray:
+    """Round coordinates, (n, 3) in units of the CRS, to multiples of `ORIGIN_STEP`, (n, 3) numbers of steps.
+
+    The middle one of these is the middle point's: it can be told from their counts alone, file by file.
+    """
+    return np.round(xyz_crs / ORIGIN_STEP)
 
 
 def _check_request(class_codes: Sequence[int], extent: tuple[float, float, float, float] | None) -> None:
@@ -167,30 +241,16 @@ def _fitting_zone(header: CloudHeader) -> str:
     return utm_zone(longitude, latitude) if fits else "the UTM zone of the place"
 
 
-def _collect(
-    headers: Sequence[CloudHeader],
-    class_codes: Sequence[int],
-    extent: tuple[float, float, float, float] | None,
-    progress: Progress,
-) -> tuple[np.ndarray, np.ndarray]:
+def _collect(request: Request, progress: Progress) -> tuple[np.ndarray, np.ndarray]:
     """Gather coordinates, (n, 3) in CRS units, and classes, (n,), of the wanted points of all files."""
-    from .las import read_classes
-
     kept_xyz, kept_codes, census = [], [], np.zeros(256, dtype=np.int64)
-    total = sum(header.point_count for header in headers)
-    before = 0
-    for header in headers:
-        share = progress.span(before / total, (before + header.point_count) / total)
-        before += header.point_count
-        if extent is not None and not _overlap(header.extent, extent):
-            continue
-        for xyz, codes, counts in read_classes(header.path, class_codes, share):
+    for header, share in zip(request.headers, request.shares(progress)):
+        for xyz, codes, counts in request.read(header, share):
             census += counts
-            inside = slice(None) if extent is None else _inside(xyz, extent)
-            kept_xyz.append(xyz[inside])
-            kept_codes.append(codes[inside])
+            kept_xyz.append(xyz)
+            kept_codes.append(codes)
     if not sum(map(len, kept_codes)):
-        raise NoRailPointsError(_explain_none(class_codes, census, extent))
+        raise request.explain_none(census)
     return np.concatenate(kept_xyz), np.concatenate(kept_codes)
 
 
@@ -201,14 +261,3 @@ def _overlap(a: tuple[float, float, float, float], b: tuple[float, float, float,
 def _inside(xyz: np.ndarray, extent: tuple[float, float, float, float]) -> np.ndarray:
     xmin, ymin, xmax, ymax = extent
     return (xyz[:, 0] >= xmin) & (xyz[:, 0] <= xmax) & (xyz[:, 1] >= ymin) & (xyz[:, 1] <= ymax)
-
-
-def _explain_none(
-    class_codes: Sequence[int], census: np.ndarray, extent: tuple[float, float, float, float] | None
-) -> str:
-    """Say in one sentence which classes there are instead of the wanted ones."""
-    wanted = ", ".join(str(code) for code in sorted(set(class_codes)))
-    if extent is not None and (census.sum() == 0 or census[list(class_codes)].any()):
-        return f"No point of class {wanted} lies inside the extent: choose a larger one."
-    there = ", ".join(f"{code} ({census[code]})" for code in np.flatnonzero(census))
-    return f"The cloud has no point of class {wanted}; its classes and their counts are {there}: set the rail classes."

@@ -26,6 +26,9 @@ def length_along(vertices: np.ndarray) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
+SAME_PLACE_M = 1e-9
+"""Vertices closer together than this along a line are one."""
+
 NO_GAPS = np.empty((0, 2))
 
 
@@ -56,7 +59,11 @@ class Support:
         """Cut out the stretch from `start` to `end`, with one station at least; chainages then count from `start`."""
         inside = (self.t >= start) & (self.t <= end)
         inside[np.argmin(np.abs(self.t - 0.5 * (start + end)))] = True
-        return Support(self.t[inside] - start, self.points[inside], self.sigma_m[inside])
+        return self.select(inside, start)
+
+    def select(self, which: np.ndarray, start: float) -> Support:
+        """Keep the stations marked in `which`, (n,) bool; chainages then count from `start`."""
+        return Support(self.t[which] - start, self.points[which], self.sigma_m[which])
 
     def reversed(self, length_m: float) -> Support:
         """Run the line, of this length, the other way."""
@@ -110,6 +117,24 @@ class RailLine:
             return beyond
         passed = np.cumsum(self.gaps[:, 1] - self.gaps[:, 0])
         return beyond + np.interp(t, self.gaps.ravel(), np.repeat(np.append(0.0, passed), 2)[1:-1])
+
+    def between(self, start: float, end: float) -> RailLine:
+        """Cut out the stretch between two plan chainages; it gets that share of the points that its stations count."""
+        along = length_along(self.xyz[:, :2])
+        if start <= 0.0 and end >= along[-1]:
+            return self
+        start, end = max(start, 0.0), min(end, float(along[-1]))
+        inner = (along > start + SAME_PLACE_M) & (along < end - SAME_PLACE_M)
+        t = np.concatenate([[start], along[inner], [end]])
+        xyz = np.column_stack([np.interp(t, along, column) for column in self.xyz.T])
+        gaps = np.clip(self.gaps, start, end)
+        gaps = gaps[gaps[:, 1] > gaps[:, 0]] - start
+        support, share = None, (end - start) / along[-1]
+        if self.support is not None:
+            last = np.inf if end >= self.support.t[-1] else end
+            support = self.support.select((self.support.t >= start) & (self.support.t < last), start)
+            share = support.points.sum() / max(self.support.points.sum(), 1)
+        return replace(self, xyz=xyz, points=self.points * share, gaps=gaps, support=support)
 
     def reversed(self) -> RailLine:
         """Run the same line the other way."""

@@ -19,6 +19,9 @@ TILE = 256
 CENTRE_SPACING_CELLS = 37.78
 """Cells between the two railhead centres: 1511.2 mm at 40 mm, 132RE in the paper; the same for every model."""
 
+BORDER_CELLS = 1e-6
+"""A point this close to a border lies beyond it: files count in millimetres, and rounding must not choose the cell."""
+
 
 def cell_size(gauge_m: float, head_width_m: float) -> float:
     """Cell size in metres at which the two rails lie `CENTRE_SPACING_CELLS` apart (ALGORITHMS.md section 5.7)."""
@@ -142,8 +145,8 @@ def rasterize(xy: np.ndarray, cell_m: float) -> RailRaster:
     cell_m : float
         Side of a cell, metres; see `cell_size`.
     """
-    rows = np.floor(-np.asarray(xy)[:, 1] / cell_m).astype(np.int64)
-    columns = np.floor(np.asarray(xy)[:, 0] / cell_m).astype(np.int64)
+    rows = np.floor(-np.asarray(xy)[:, 1] / cell_m + BORDER_CELLS).astype(np.int64)
+    columns = np.floor(np.asarray(xy)[:, 0] / cell_m + BORDER_CELLS).astype(np.int64)
     return RailRaster(_tiles_of(np.column_stack([rows, columns])), cell_m, 0.0, 0.0)
 
 

@@ -1,0 +1,91 @@
+"""Heights and support of finished rails, found anew stretch by stretch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .elevation import measure_again
+from .geometry import PROFILE_SIGMA_M
+from .polyline import resample
+from .progress import SILENT, Progress
+from .rails import RailLine
+from .seams import runs, united
+from .stretches import Key, PointSource, Stretch, unique_keys
+
+CONTEXT_M = 10.0
+"""How far beyond a stretch its rails are measured: the disc reaches 1 m, the smoothing of heights over 1 m no more
+than 3 m, and that of the lateral figures 2.4 m."""
+
+STATION_M = 1.0
+"""Spacing of the stations whose stretch is looked up."""
+
+
+def measure_in_stretches(
+    rails: Sequence[RailLine],
+    source: PointSource,
+    stretches: Sequence[Stretch],
+    head_width_m: float,
+    progress: Progress = SILENT,
+) -> list[RailLine]:
+    """Do what `elevation.measure_again` does, for track geometry, with the points of one stretch at a time.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+        In the frame of the source.
+    source : PointSource
+    stretches : sequence of Stretch
+        All that have points.
+    head_width_m : float
+    progress : Progress
+
+    Returns
+    -------
+    list of RailLine
+        In their order.
+    """
+    if not np.isfinite(stretches[0].side_m):
+        points = source.near(stretches[0], 0.0)
+        return measure_again(rails, points, head_width_m, PROFILE_SIGMA_M, progress)
+    zero = Stretch.square((0, 0), source.side_m, source.frame).shift_to(source.frame)
+    wanted: dict[Key, list[tuple[int, float, float]]] = {}
+    for number, rail in enumerate(rails):
+        for key, start, end in _by_stretch(rail, zero, source.side_m):
+            wanted.setdefault(key, []).append((number, start, end))
+    by_key = {stretch.key: stretch for stretch in stretches}
+    measured: list[list[tuple[float, RailLine]]] = [[] for _ in rails]
+    for key in progress.follow(sorted(wanted)):
+        stretch = by_key.get(key) or Stretch.square(key, source.side_m, source.frame)
+        shift = stretch.shift_to(source.frame)
+        points = source.near(stretch, CONTEXT_M)
+        pieces = [
+            replace(piece, xyz=piece.xyz - shift)
+            for piece in (
+                rails[number].between(start - CONTEXT_M, end + CONTEXT_M) for number, start, end in wanted[key]
+            )
+        ]
+        again = measure_again(pieces, points, head_width_m, PROFILE_SIGMA_M) if len(points.xyz) else pieces
+        for (number, start, end), piece in zip(wanted[key], again):
+            lead = min(start, CONTEXT_M)
+            part = piece.between(lead, lead + end - start)
+            measured[number].append((start, replace(part, xyz=part.xyz + shift)))
+    return [
+        united([part for _, part in sorted(parts, key=lambda part: part[0])]) if parts else rail
+        for parts, rail in zip(measured, rails)
+    ]
+
+
+def _by_stretch(rail: RailLine, zero: np.ndarray, side_m: float) -> list[tuple[Key, float, float]]:
+    """Cut a rail up by the squares it runs through: square, and chainages from and to, without a gap between them."""
+    stations, t = resample(rail.xyz[:, :2], STATION_M)
+    keys, number = unique_keys(stations - zero[:2], side_m)
+    parts = []
+    for place, key in enumerate(keys):
+        for first, last in runs(number == place):
+            start = 0.0 if first == 0 else 0.5 * (t[first - 1] + t[first])
+            end = t[-1] if last == len(t) - 1 else 0.5 * (t[last] + t[last + 1])
+            parts.append((key, float(start), float(end)))
+    return parts
