@@ -7,20 +7,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .chaining import chain_pairs
+from .chaining import Chain, chain_pairs, reach_beyond
 from .errors import NoTrackError
 from .forking import fork_centerlines
-from .midline import Side, bridged_steps, midway
-from .pairing import MIN_LENGTH_M, RailPair, pair_rails
+from .guide import STEP_M, guide_line
+from .leads import runs_on
+from .midline import Side, at_gauge, bridged_steps, midway
+from .pairing import MIN_LENGTH_M, pair_rails
 from .parallels import commonest_spacing
-from .polyline import interpolate, left_normals, resample, starts_at_its_end
+from .polyline import left_normals, resample, starts_at_its_end
 from .progress import SILENT, Progress
 from .rails import Centerline, RailLine, length_along
 from .smoothing import smooth_line
 from .standards import STANDARDS
-
-STEP_M = 0.25
-"""Distance of the stations at which both rails are met: chords of a tram's curve of 25 m keep to 0.3 mm."""
 
 SAME_GAUGE_M = 0.04
 """Gauges in use lie further apart than this, so that a measured spacing this near to one suggests it."""
@@ -101,18 +100,21 @@ def _refuse_other_spacing(rails: Sequence[RailLine], gauge_m: float, head_width_
 
 def _draw(
     rails: Sequence[RailLine],
-    chain: Sequence[RailPair],
+    chain: Chain,
     gauge_m: float,
     head_width_m: float,
     parameters: CenterlineParameters,
 ) -> Centerline:
     """Draw the centerline of one track."""
     half = 0.5 * (gauge_m + head_width_m)
-    guide, _ = resample(_guide(rails, chain, half), STEP_M)
+    reach = reach_beyond(parameters.max_gap_m)
+    guide, _ = resample(guide_line(rails, chain, half, reach), STEP_M)
     normals = left_normals(guide)
-    reach = parameters.max_gap_m
-    left = Side.of(rails, [(pair.left, pair.left_span) for pair in chain], reach).meet(guide, normals, half)
-    right = Side.of(rails, [(pair.right, pair.right_span) for pair in chain], reach).meet(guide, -normals, half)
+    lefts = _spans([pair.left for pair in chain.pairs], [pair.left_span for pair in chain.pairs])
+    rights = _spans([pair.right for pair in chain.pairs], [pair.right_span for pair in chain.pairs])
+    left = Side.of(rails, lefts, reach).meet(guide, normals, half)
+    right = Side.of(rails, rights, reach).meet(guide, -normals, half)
+    left, right = at_gauge(left, right, 2 * half, parameters.tolerance_m)
     xyz = midway(guide, normals, left, right, 2 * half)
     apart = left.distance_m + right.distance_m
     both = ~np.isnan(apart)
@@ -120,11 +122,11 @@ def _draw(
     gauge = np.hypot(apart[both], np.nan_to_num(cant)) - head_width_m
     xyz = _smoothed(xyz, parameters.smoothing_m)
     flip = starts_at_its_end(xyz)
-    sides = [_ids(rails, (pair.left for pair in chain)), _ids(rails, (pair.right for pair in chain))]
+    sides = [_ids(rails, (pair.left for pair in chain.pairs)), _ids(rails, (pair.right for pair in chain.pairs))]
     return Centerline(
         xyz=xyz[::-1] if flip else xyz,
         track_id=0,
-        class_code=rails[chain[0].left].class_code,
+        class_code=rails[chain.pairs[0].left].class_code,
         left_ids=sides[1][::-1] if flip else sides[0],
         right_ids=sides[0][::-1] if flip else sides[1],
         gauge_mm=1000 * float(gauge.mean()),
@@ -140,21 +142,15 @@ def _ids(rails: Sequence[RailLine], numbers: Iterable[int]) -> tuple[int, ...]:
     return tuple(dict.fromkeys(rails[number].rail_id for number in numbers))
 
 
-def _guide(rails: Sequence[RailLine], chain: Sequence[RailPair], half_spacing_m: float) -> np.ndarray:
-    """Follow the left rails of a track half a spacing inside, straight across gaps; (n, 2)."""
-    pieces: list[np.ndarray] = []
-    for pair in chain:
-        line = rails[pair.left].xyz[:, :2]
-        along = length_along(line)
-        count = max(int(np.ceil(abs(pair.left_span[1] - pair.left_span[0]) / STEP_M)), 2)
-        piece = interpolate(line, along, np.linspace(*pair.left_span, count + 1))
-        piece = piece - half_spacing_m * left_normals(piece)
-        if pieces:
-            before, last = pieces[-1][-2:]
-            beyond = (piece - last) @ (last - before) > 0
-            piece = piece[np.argmax(beyond) :]  # stretches may overlap where they meet
-        pieces.append(piece)
-    return np.concatenate(pieces)
+def _spans(rails: Sequence[int], spans: Sequence[tuple[float, float]]) -> list[tuple[int, tuple[float, float]]]:
+    """List a track's rails on one side and the stretches of them, through to the next where a rail leads there."""
+    merged = [(rails[0], spans[0])]
+    for rail, span in zip(rails[1:], spans[1:]):
+        if rail == merged[-1][0] and runs_on(merged[-1][1], span):
+            merged[-1] = (rail, (merged[-1][1][0], span[1]))
+        else:
+            merged.append((rail, span))
+    return merged
 
 
 def _smoothed(xyz: np.ndarray, smoothing_m: float) -> np.ndarray:

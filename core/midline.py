@@ -30,12 +30,20 @@ class Meeting:
         Number of the rail that was met.
     t : float
         Plan chainage along it.
+    matched : bool
+        Whether it was matched there.
     """
 
     distance_m: np.ndarray
     height_m: np.ndarray
     rail: np.ndarray
     t: np.ndarray
+    matched: np.ndarray
+
+    def without(self, which: np.ndarray) -> Meeting:
+        """Forget the rails met from some stations, (n,) bool."""
+        values = [np.where(which, np.nan, column) for column in (self.distance_m, self.height_m, self.t)]
+        return Meeting(values[0], values[1], self.rail, values[2], self.matched)
 
 
 @dataclass(frozen=True)
@@ -50,26 +58,31 @@ class Side:
     rail : (n,) int array
     t : (n,) array
         Rail of each point, and plan chainage along it.
+    matched : (n,) bool array
+        Whether the point lies within the stretch, not in the margin.
     """
 
     xyz: np.ndarray
     stretch: np.ndarray
     rail: np.ndarray
     t: np.ndarray
+    matched: np.ndarray
 
     @classmethod
     def of(cls, rails: Sequence[RailLine], spans: Sequence[tuple[int, tuple[float, float]]], margin_m: float) -> Side:
         """Cut the spans out of their rails, with a margin that shows a rail on while its partner is broken."""
-        pieces, chainages = [], []
+        pieces, chainages, matched = [], [], []
         for number, span in spans:
             line = rails[number].xyz
             along = length_along(line[:, :2])
             start, end = max(min(span) - margin_m, 0.0), min(max(span) + margin_m, along[-1])
             chainages.append(np.linspace(start, end, int(np.ceil((end - start) / PIECE_M)) + 1))
             pieces.append(interpolate(line, along, chainages[-1]))
+            matched.append((chainages[-1] >= min(span)) & (chainages[-1] <= max(span)))
         counts = [len(piece) for piece in pieces]
         rail = np.repeat([number for number, _ in spans], counts)
-        return cls(np.concatenate(pieces), np.repeat(np.arange(len(pieces)), counts), rail, np.concatenate(chainages))
+        stretch = np.repeat(np.arange(len(pieces)), counts)
+        return cls(np.concatenate(pieces), stretch, rail, np.concatenate(chainages), np.concatenate(matched))
 
     def meet(self, stations: np.ndarray, directions: np.ndarray, expected_m: float) -> Meeting:
         """Go from stations in their directions, (n, 2) unit vectors, to the rail."""
@@ -90,12 +103,21 @@ class Side:
             t = self.t[a] + share * (self.t[b] - self.t[a])
             found = np.where(met, [distance, point[:, 2], t], found)
         distance, height, t = found
-        return Meeting(distance, height, self.rail[nearest], t)
+        return Meeting(distance, height, self.rail[nearest], t, self.matched[nearest])
 
     def _ahead(self, point: np.ndarray, stations: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """How far points lie to the left of the way from the stations in their directions, (n,)."""
         step = self.xyz[point, :2] - stations
         return directions[:, 0] * step[:, 1] - directions[:, 1] * step[:, 0]
+
+
+def at_gauge(left: Meeting, right: Meeting, spacing_m: float, tolerance_m: float) -> tuple[Meeting, Meeting]:
+    """Believe in a rail beyond the stretch in which it was matched only where it keeps the distance to the other one.
+
+    A stock rail that runs on into the branch soon leaves the through track.
+    """
+    astray = np.abs(left.distance_m + right.distance_m - spacing_m) > tolerance_m
+    return left.without(astray & ~left.matched), right.without(astray & ~right.matched)
 
 
 def midway(
