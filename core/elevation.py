@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .head_edges import widest_reach
+from .neighbours import free_edges
 from .points import RailPoints
 from .polyline import Feet, interpolate, project, resample, starts_at_its_end
 from .progress import SILENT, Progress
@@ -87,10 +88,11 @@ def elevate(
     reach = max(parameters.tolerance_xy_m, widest_reach(parameters.head_width_m))
     feet = project(network.lines, points.xyz[:, :2], reach, progress.span(0.0, 0.6))
     free_ends = (network.degrees() == 1)[network.ends]
+    edges = free_edges(network.lines, parameters.head_width_m)
     rails = []
     for number, line in enumerate(progress.span(0.6, 1.0).follow(network.lines)):
         mine = feet.of(number)
-        rail = _raise_line(line, free_ends[number], mine, points.xyz[mine.point, 2], parameters)
+        rail = _raise_line(line, free_ends[number], edges[number], mine, points.xyz[mine.point, 2], parameters)
         if rail is not None and rail.length_m >= parameters.min_length_m:
             rails.append(replace(rail, class_code=points.class_code))
     return numbered(rails)
@@ -115,7 +117,12 @@ def numbered(rails: Sequence[RailLine]) -> tuple[RailLine, ...]:
 
 
 def _raise_line(
-    line: np.ndarray, free_ends: np.ndarray, feet: Feet, z: np.ndarray, parameters: ElevationParameters
+    line: np.ndarray,
+    free_ends: np.ndarray,
+    edges: np.ndarray,
+    feet: Feet,
+    z: np.ndarray,
+    parameters: ElevationParameters,
 ) -> RailLine | None:
     """Give one line its heights; None where hardly a point supports it."""
     head = np.abs(feet.across) <= min(0.5 * parameters.head_width_m, parameters.tolerance_xy_m)
@@ -148,6 +155,7 @@ def _raise_line(
         parameters.head_width_m,
         parameters.smoothing_xy_m,
         unseen_m=parameters.cell_m / np.sqrt(12),
+        free=edges,
     ).between(start, end)
     xyz = np.column_stack([interpolate(line, along, stations), profile.at(stations)])
     figures = (len(supporting.t), 1000 * resid, 1000 * support.rms_m, bridged)
@@ -181,10 +189,11 @@ def measure_again(
     feet = project(plans, points.xyz[:, :2], widest_reach(head_width_m), progress.span(0.0, 0.7))
     # Of lines from anywhere nothing else is known than that they lie on their heads: these take the cell's place.
     parameters = ElevationParameters(head_width_m, smoothing_z_m=smoothing_z_m, cell_m=head_width_m)
+    edges = free_edges(plans, head_width_m)
     measured = []
     for number, rail in enumerate(progress.span(0.7, 1.0).follow(rails)):
         mine = feet.of(number)
-        again = _raise_line(plans[number], FIXED_ENDS, mine, points.xyz[mine.point, 2], parameters)
+        again = _raise_line(plans[number], FIXED_ENDS, edges[number], mine, points.xyz[mine.point, 2], parameters)
         if again is not None:
             rail = replace(rail, xyz=again.xyz, gaps=again.gaps, support=again.support)
         measured.append(rail)

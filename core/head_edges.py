@@ -59,6 +59,11 @@ def widest_reach(head_width_m: float) -> float:
     return HALF_RANGE * head_width_m / (2 * HALF_HEAD)
 
 
+def station_count(length_m: float) -> int:
+    """Count the stations along a line."""
+    return int(length_m / STATION_M) + 1
+
+
 def histograms(
     t: np.ndarray, across: np.ndarray, length_m: float, head_width_m: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -72,7 +77,7 @@ def histograms(
         In the shortest window with enough points and in the longest. Bins of 1 / (2 HALF_HEAD) of a head, the first
         half to the right of the line.
     """
-    rows = int(length_m / STATION_M) + 1
+    rows = station_count(length_m)
     row = np.minimum((t / STATION_M).astype(int), rows - 1)
     column = np.floor(across * (2 * HALF_HEAD / head_width_m)).astype(int) + HALF_RANGE
     inside = (column >= 0) & (column < 2 * HALF_RANGE)
@@ -86,12 +91,12 @@ def histograms(
     return (np.arange(rows) + 0.5) * STATION_M, chosen, windows[-1]
 
 
-def middles(counts: np.ndarray, wide_counts: np.ndarray) -> np.ndarray:
+def middles(counts: np.ndarray, wide_counts: np.ndarray, free: np.ndarray) -> np.ndarray:
     """Offset of the head's middle in each window, in bins to the left; NaN where its edges are not to be seen.
 
     How the scanner looks at the head does not change from window to window, so the wide ones tell the densities.
     """
-    return Heads.of(wide_counts).seen_edges().narrowed(counts, wide_counts)
+    return Heads.of(wide_counts).seen_edges(free).narrowed(counts, wide_counts)
 
 
 @dataclass(frozen=True)
@@ -106,25 +111,28 @@ class Edges:
         From 0 to 1: the edge that the scanner looks at counts fully; of the other one the corner is hardly seen.
     seen : (s,) bool array
         Whether the edges that count are there.
+    inset : (s,) array
+        What a single edge lacks of half a head, in bins to the left: its corner is round.
     """
 
     density: np.ndarray
     weight: np.ndarray
     seen: np.ndarray
+    inset: np.ndarray
 
     @classmethod
-    def evenly(cls, windows: int) -> Edges:
-        """Take both edges alike, for a first look."""
-        return cls(np.ones((2, windows)), np.ones((2, windows)), np.ones(windows, dtype=bool))
+    def evenly(cls, free: np.ndarray) -> Edges:
+        """Take both edges alike where they are `free`, (2, s) bool, for a first look."""
+        return cls(np.ones(free.shape), free.astype(float), free.any(axis=0), np.zeros(free.shape[1]))
 
-    def alike(self) -> Edges:
-        """Trust both edges alike, whatever is seen of them."""
-        return replace(self, weight=np.ones_like(self.weight))
+    def alike(self, free: np.ndarray) -> Edges:
+        """Trust both edges alike, whatever is seen of them, where both are free."""
+        return replace(self, weight=np.where(free.all(axis=0), 1.0, self.weight))
 
     def narrowed(self, counts: np.ndarray, wide_counts: np.ndarray) -> np.ndarray:
         """Find the middle in narrower windows than those the edges were seen in, (s,); NaN where they were not."""
         share = counts.sum(axis=1) / np.maximum(wide_counts.sum(axis=1), 1)
-        middle = Heads.of(counts).best(replace(self, density=self.density * share))
+        middle = Heads.of(counts).best(replace(self, density=self.density * share)) + self.inset
         return np.where(self.seen & (np.abs(middle) < FURTHEST), middle, np.nan)
 
 
@@ -155,25 +163,39 @@ class Heads:
         bend = np.maximum(2 * at - before - after, 1e-9)
         return shifts[top] + np.clip(0.5 * (after - before) / bend, -1, 1)
 
-    def seen_edges(self) -> Edges:
-        """Find the edges and what they are worth."""
-        edges = Edges.evenly(len(self.sums))
+    def seen_edges(self, free: np.ndarray) -> Edges:
+        """Find the edges and what they are worth; only those that are `free`, (2, s) bool, are looked at."""
+        edges = Edges.evenly(free)
         for _ in range(EDGE_ROUNDS):
-            edges = self.edges(self.best(edges))
-        return edges
+            edges = self.edges(self.best(edges), free)
+        return replace(edges, inset=self._inset(edges, free))
 
-    def edges(self, middle: np.ndarray) -> Edges:
+    def _inset(self, edges: Edges, free: np.ndarray) -> np.ndarray:
+        """Correct the place of heads of which one edge is free by what that edge alone tells where both are, (s,)."""
+        whole = edges.seen & free.all(axis=0)
+        inset = np.zeros(len(whole))
+        if not whole.any():
+            return inset
+        middle = self.best(edges)
+        for side in (0, 1):
+            alone = replace(edges, weight=np.eye(2)[side][:, None] * np.ones(len(whole)))
+            inset[free[side] & ~free[1 - side]] = np.median((middle - self.best(alone))[whole])
+        return inset
+
+    def edges(self, middle: np.ndarray, free: np.ndarray) -> Edges:
         """Look at the edges of heads at `middle`, (s,)."""
         centre = np.round(middle).astype(int)
         inside = np.array([self._density(centre + side * (HALF_HEAD - NEAR_EDGE), -side) for side in (-1, 1)])
         beyond = np.array([self._density(centre + side * (HALF_HEAD + NEAR_EDGE), side) for side in (-1, 1)])
         crown = self._density(centre - RIM // 2, 1)
+        both = free.all(axis=0)
         shadow = _sure_excess(inside * RIM)
-        view = _excess(uniform_filter1d(inside, VIEW, axis=1, mode="nearest"))
+        view = _excess(uniform_filter1d(inside * both, VIEW, axis=1, mode="nearest"))
         excess = np.where(shadow.max(axis=0) > ASKEW_EXCESS, shadow, view)
         weight = 1 - np.clip((excess - EVEN_EXCESS) / (ASKEW_EXCESS - EVEN_EXCESS), 0, 1)
+        weight = np.where(both, weight, free)  # of a single edge that is free nothing else is known than where it is
         clear = (inside >= LEAST_RIM * crown) & (beyond <= CLEAR_EDGE * inside) & (inside * RIM >= LEAST_ON_RIM)
-        return Edges(inside, weight, np.all(clear | (weight == 0), axis=0))
+        return Edges(inside, weight, np.all(clear | (weight == 0), axis=0) & free.any(axis=0), np.zeros(len(centre)))
 
     def _density(self, start: np.ndarray, direction: int) -> np.ndarray:
         """Points a bin on the RIM bins that begin at `start`, (s,), and go to the left (1) or right (-1)."""

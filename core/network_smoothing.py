@@ -50,7 +50,7 @@ def smooth_network(network: LineNetwork, sigma_m: float) -> LineNetwork:
     proposed = np.array([lines[i][place] for i, place in zip(anchor_line, places)]).reshape(-1, 2)
     nodes = _moved_nodes(network.nodes, anchor_node, anchor_rank, proposed)
     for line, t, own in zip(lines, stations, anchors_of):
-        _lead(line, t / sigma_m, places[own], nodes[anchor_node[own]])
+        lead(line, t / sigma_m, places[own], nodes[anchor_node[own]])
     passes = network.passes.copy()
     passes[:, 2] = places[2 * len(along) :]
     return LineNetwork(tuple(lines), nodes, network.ends, passes)
@@ -126,7 +126,7 @@ def _moved_nodes(nodes: np.ndarray, anchor_node: np.ndarray, rank: np.ndarray, p
     return moved
 
 
-def _lead(line: np.ndarray, t: np.ndarray, places: np.ndarray, targets: np.ndarray) -> None:
+def lead(line: np.ndarray, t: np.ndarray, places: np.ndarray, targets: np.ndarray) -> None:
     """Bend a line in place so that its vertices at `places` come to `targets`; t in sigma."""
     fading = _fading(t[places][:, None] - t[places])
     weights = np.linalg.lstsq(fading, targets - line[places], rcond=1e-9)[0]

@@ -27,6 +27,7 @@ def measure_support(
     head_width_m: float,
     smoothing_m: float,
     unseen_m: float,
+    free: np.ndarray,
 ) -> Support:
     """Measure how well points support a line.
 
@@ -41,6 +42,8 @@ def measure_support(
         Sigma of PAEK that smoothed the line in plan.
     unseen_m : float
         Standard deviation of the line where the points show no edges of a head.
+    free : (2, s) bool array
+        Where its right and left edge stand free of other heads; see `neighbours.free_edges`.
 
     Returns
     -------
@@ -50,7 +53,7 @@ def measure_support(
     stations, counts, wide_counts = histograms(t[top], across[top], length_m, head_width_m)
     points = np.bincount(np.minimum((t[top] / STATION_M).astype(int), len(stations) - 1), minlength=len(stations))
     heads, bin_m = Heads.of(wide_counts), head_width_m / (2 * HALF_HEAD)
-    edges = heads.seen_edges()
+    edges = heads.seen_edges(free)
     middle = edges.narrowed(counts, wide_counts)
     known = np.isfinite(middle)
     if known.sum() < 2:
@@ -58,7 +61,7 @@ def measure_support(
     averaged = np.maximum(_averaged(points, smoothing_m), counts.sum(axis=1))
     share = averaged / np.maximum(wide_counts.sum(axis=1), 1)
     sampling = _sampling(edges.density * share / bin_m, edges.weight, noise_m, BLUR_BINS * bin_m)
-    view = (heads.best(edges) - heads.best(edges.alike())) * bin_m / np.sqrt(3)
+    view = (heads.best(edges) - heads.best(edges.alike(free))) * bin_m / np.sqrt(3)
     bridging = sampling * _distance_to(t[top], stations) / smoothing_m
     remainder = smooth_profile(stations[known], middle[known] * bin_m, smoothing_m, stations)
     sigma = np.sqrt(sampling**2 + view**2 + bridging**2 + remainder**2)
@@ -79,7 +82,7 @@ def _sampling(density: np.ndarray, weight: np.ndarray, noise_m: float, blur_m: f
     """
     spread_m = np.hypot(blur_m, noise_m)
     variance = np.sqrt(np.pi) * spread_m**2 / (2 * blur_m * np.maximum(density, 1e-9))
-    return np.sqrt(np.sum(weight**2 * variance, axis=0)) / np.sum(weight, axis=0)
+    return np.sqrt(np.sum(weight**2 * variance, axis=0)) / np.maximum(np.sum(weight, axis=0), 1e-9)
 
 
 def _distance_to(t: np.ndarray, stations: np.ndarray) -> np.ndarray:

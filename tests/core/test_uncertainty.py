@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.elevation import ElevationParameters, elevate
+from rail_extract.core.head_edges import station_count
 from rail_extract.core.points import LocalFrame, RailPoints
 from rail_extract.core.polyline import interpolate, project
 from rail_extract.core.rails import Support, length_along
@@ -27,7 +28,8 @@ def head(length, density, noise=0.003, seed=0):
 
 
 def support(t, across, z, length=60.0):
-    return measure_support(t, across, z, length, WIDTH, smoothing_m=0.8, unseen_m=UNSEEN)
+    free = np.ones((2, station_count(length)), dtype=bool)
+    return measure_support(t, across, z, length, WIDTH, smoothing_m=0.8, unseen_m=UNSEEN, free=free)
 
 
 @pytest.mark.parametrize(("left_m", "noise_m"), [(0.0, 0.003), (0.0, 0.008), (4.0, 0.005), (8.0, 0.005)])

@@ -1,0 +1,51 @@
+import numpy as np
+from rail_extract.core.neighbours import free_edges
+
+WIDTH = 0.072
+RIGHT, LEFT = 0, 1
+
+
+def line(y, length=40.0):
+    x = np.arange(0, length + 0.05, 0.1)
+    return np.column_stack([x, y(x)])
+
+
+def stations(free):
+    return (np.arange(free.shape[1]) + 0.5) * 0.25
+
+
+def test_edges_are_free_of_heads_at_gauge():
+    for free in free_edges([line(lambda x: 0 * x), line(lambda x: 0 * x + 1.5)], WIDTH):
+        assert free.all()
+
+
+def test_a_branch_hides_the_inner_edges_up_to_where_the_heads_stand_apart():
+    stock, branch = free_edges([line(lambda x: 0 * x), line(lambda x: x**2 / 600)], WIDTH)
+    apart = stations(stock) ** 2 / 600
+    np.testing.assert_array_equal(stock[LEFT], apart > 1.5 * WIDTH)
+    assert stock[RIGHT].all()
+    assert branch[LEFT].all()
+    assert np.abs(np.argmin(~branch[RIGHT]) - np.argmin(~stock[LEFT])) <= 1
+
+
+def test_turned_lines_swap_their_edges():
+    _, branch = free_edges([line(lambda x: 0 * x), line(lambda x: x**2 / 600)[::-1]], WIDTH)
+    assert branch[RIGHT].all()
+    assert not branch[LEFT].all()
+
+
+def test_crossing_heads_hide_all_where_they_overlap_and_one_edge_beside():
+    first, second = free_edges([line(lambda x: 0 * x), line(lambda x: (x - 20) / 9)], WIDTH)
+    offset = (stations(first) - 20) / 9
+    overlap = np.abs(offset) < 0.5 * WIDTH
+    assert not first[:, overlap].any()
+    before, after = (offset < -0.5 * WIDTH) & (offset > -1.4 * WIDTH), (offset > 0.5 * WIDTH) & (offset < 1.4 * WIDTH)
+    assert first[LEFT, before].all()
+    assert not first[RIGHT, before].any()
+    assert first[RIGHT, after].all()
+    assert not first[LEFT, after].any()
+    assert not second[:, overlap].any()
+
+
+def test_no_lines_have_no_edges():
+    assert free_edges([], WIDTH) == []
