@@ -14,7 +14,7 @@ from ..rails import length_along
 from .bridges import STAIRS_M, TIGHTEST_RADIUS_M, bridge
 from .crossings import SKIP_M
 from .ends import STEP_M, cut_back, stretch
-from .junctions import DIRECTION_M
+from .junctions import DIRECTION_M, weld_pairs
 from .network import LineNetwork
 
 WIDE_HEADS = 2.0
@@ -79,7 +79,7 @@ def cut_kinks(network: LineNetwork) -> LineNetwork:
                 ends[-1].append(node if (was == now).all() else len(nodes))
                 nodes += [] if (was == now).all() else [now]
     whole = LineNetwork(tuple(lines), np.array(nodes).reshape(-1, 2), np.array(ends, dtype=int).reshape(-1, 2))
-    return whole.select(np.ones(len(lines), dtype=bool))
+    return weld_pairs(whole.select(np.ones(len(lines), dtype=bool)))
 
 
 def _without_kinks(line: np.ndarray) -> list[np.ndarray]:

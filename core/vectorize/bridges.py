@@ -27,6 +27,9 @@ ROUNDS = 5
 TRANSITION_M = 5.0
 """Within this length the curvature may change from none to the tightest; a short clothoid of a tramway."""
 
+STEADY_TRANSITION_M = 500.0
+"""The same for curves that keep their bend as a main line does, which rules out a swerve to a neighbour."""
+
 
 @dataclass(frozen=True)
 class Bridge:
@@ -50,18 +53,25 @@ class Bridge:
     points: np.ndarray
 
 
-def bridge(one: np.ndarray, other: np.ndarray, held: bool = False, misfit_m: float = MISFIT_M) -> Bridge | None:
+def bridge(
+    one: np.ndarray,
+    other: np.ndarray,
+    held: bool = False,
+    misfit_m: float = MISFIT_M,
+    transition_m: float = TRANSITION_M,
+) -> Bridge | None:
     """Fit one smooth curve to two lines, each given from the end to be joined, and cut out what lies between them.
 
     The curve is a cubic over the way across, its curvature held to what rails do. None if it misses either line, or
     bends more than a rail. That rules out the neighbouring rail, for it takes a double bend. With `held` nothing is cut
-    off the first line; `misfit_m` is how far half of either line may lie beside the curve.
+    off the first line; `misfit_m` is how far half of either line may lie beside the curve, and `transition_m` the
+    length in which its curvature may change from none to the tightest.
     """
     before, after = stretch(one, FIT_M)[::-1], stretch(other, FIT_M)
     origin, axes = _frame(before, after)
     before, after = (before - origin) @ axes.T, (after - origin) @ axes.T
     gap = after[0, 0] - before[-1, 0]
-    cubic = _fit(np.concatenate([before, after]))
+    cubic = _fit(np.concatenate([before, after]), transition_m)
     off = [np.abs(points[:, 1] - _basis(points[:, 0]) @ cubic) for points in (before, after)]
     misfit = max(np.median(off[0]), np.median(off[1]))
     bend = np.abs(cubic[2] + cubic[3] * np.array([before[0, 0], after[-1, 0]])).max() * TIGHTEST_RADIUS_M
@@ -100,10 +110,10 @@ def _frame(before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return (before[-1] + after[0]) / 2, np.array([along, [-along[1], along[0]]])
 
 
-def _fit(points: np.ndarray) -> np.ndarray:
+def _fit(points: np.ndarray, transition_m: float = TRANSITION_M) -> np.ndarray:
     """Fit y(x) robustly, the habits of rails as prior: value, slope, curvature and its change at x = 0."""
     basis, y = _basis(points[:, 0]), points[:, 1]
-    prior = np.diag([0.0, 0.0, 1.0, TRANSITION_M]) * STAIRS_M * TIGHTEST_RADIUS_M
+    prior = np.diag([0.0, 0.0, 1.0, transition_m]) * STAIRS_M * TIGHTEST_RADIUS_M
     weight = np.ones(len(points))
     for _ in range(ROUNDS):
         design = np.concatenate([weight[:, None] * basis, prior])

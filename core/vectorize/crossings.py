@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from .bridges import Bridge, bridge
 from .ends import cut_back, turned
@@ -28,8 +29,9 @@ _PAIRINGS = (((0, 2), (1, 3)), ((0, 3), (1, 2)), ((0, 1), (2, 3)))
 def resolve_crossings(network: LineNetwork) -> LineNetwork:
     """Draw two rails through every stretch shared by two crossing ones, each a smooth curve between its own free parts.
 
-    A crossing is a node of four lines, or a short line between two nodes of three. It is resolved if its four legs make
-    two pairs that rails could follow; the rails then cross without a node.
+    A crossing is a node of four lines, or a short line between two nodes of three, or a node of three whose fourth leg
+    ends free before it, as flangeways of frogs cut it off. It is resolved if its four legs make two pairs that rails
+    could follow; the rails then cross without a node.
     """
     lines, ends, nodes = list(network.lines), network.ends.copy(), list(network.nodes)
     keep = np.ones(len(lines), dtype=bool)
@@ -58,15 +60,37 @@ def resolve_crossings(network: LineNetwork) -> LineNetwork:
 
 
 def _crossings(network: LineNetwork) -> Iterator[tuple[list[int], list[int]]]:
-    """List the shared lines (one or none) and the four legs of every possible crossing, shortest shared line first."""
+    """List the shared lines (one or none) and the four legs of every possible crossing, the most certain ones first."""
     lengths, degrees, at_node = network.lengths(), network.degrees(), dict(ends_by_node(network))
     places = [([], [node]) for node in np.flatnonzero(degrees == 4).tolist()]
     shared = np.flatnonzero((degrees[network.ends] == 3).all(axis=1) & (lengths < MERGED_M))
     places += [([line], network.ends[line].tolist()) for line in shared[np.argsort(lengths[shared])].tolist()]
-    for lines, nodes in places:
-        legs = [end for node in nodes for end in at_node[node] if end // 2 not in lines]
+    candidates = [
+        (lines, [end for node in nodes for end in at_node[node] if end // 2 not in lines]) for lines, nodes in places
+    ]
+    candidates += [([], [*at_node[node], free]) for node, free in _cut_off(network)]
+    for lines, legs in candidates:
         if len({end // 2 for end in legs}) == 4 and lengths[[end // 2 for end in legs]].min() > 3 * SKIP_M:
             yield lines, legs
+
+
+def _cut_off(network: LineNetwork) -> list[tuple[int, int]]:
+    """List the nodes of three lines and the free ends near them, nearest first, that all three lines reach beyond."""
+    lengths, degrees, at_node = network.lengths(), network.degrees(), dict(ends_by_node(network))
+    free, forks = np.flatnonzero(degrees == 1), np.flatnonzero(degrees == 3)
+    if not len(free) or not len(forks):
+        return []
+    near = cKDTree(network.nodes[forks]).sparse_distance_matrix(
+        cKDTree(network.nodes[free]), MERGED_M, output_type="coo_matrix"
+    )
+    found = []
+    for fork, tip, distance_m in sorted(
+        zip(near.row.tolist(), near.col.tolist(), near.data.tolist()), key=lambda f: f[2]
+    ):
+        node = int(forks[fork])
+        if min(lengths[end // 2] for end in at_node[node]) > distance_m:
+            found.append((node, at_node[int(free[tip])][0]))
+    return found
 
 
 def _best_pairing(network: LineNetwork, legs: Sequence[int]) -> dict[tuple[int, int], Bridge]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .bridges import STAIRS_M, Bridge, bridge
+from .bridges import STAIRS_M, STEADY_TRANSITION_M, TRANSITION_M, Bridge, bridge
 from .crossings import MERGED_M
 from .ends import STEP_M, cut_back, stretch, way_out
 from .network import LineNetwork
@@ -13,8 +15,9 @@ from .network import LineNetwork
 DIRECTION_M = 2.0
 """Stretch over which an end's direction is measured; the stairs of a raster line are up to this long."""
 
-HOOK_M = 1.0
-"""Length over which weeds and other rails bend the end of a line aside; its direction is tried with and without."""
+HOOKS_M = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (2.0, 0.0), (0.0, 2.0))
+"""Lengths at two ends that weeds, guard and wing rails may have bent aside, so that the ends even lie beside each
+other; joins are tried without them, the shortest first."""
 
 SHORTEST_M = 0.25
 """Shorter pieces have no direction and join nothing."""
@@ -66,36 +69,30 @@ def _possible_joins(
     free = free[network.lengths()[free // 2] >= SHORTEST_M]
     if len(free) < 2:
         return {}
-    tips, outward = _ways(network, free, 0.0)
-    straight_tips, straight = _ways(network, free, HOOK_M)
+    ways = {hook_m: _ways(network, free, hook_m) for hook_m in sorted({hook_m for both in HOOKS_M for hook_m in both})}
     reach_m = max_gap_m if seen is None else max(max_gap_m, MERGED_M)
-    pairs = cKDTree(tips).query_pairs(reach_m, output_type="ndarray")
+    pairs = cKDTree(ways[0.0][0]).query_pairs(reach_m, output_type="ndarray")
     pairs = pairs[(degrees[free[pairs]] == 1).any(axis=1)]
-    facing = np.ones(len(pairs), dtype=bool)
-    for order in (pairs, pairs[:, ::-1]):
-        facing &= faces(tips, outward, order, gap_angle_deg) | faces(straight_tips, straight, order, gap_angle_deg)
-    tried = {
-        (one, other): bridge(network.from_end(one), network.from_end(other))
-        for one, other in free[pairs[facing]].tolist()
-    }
-    return {
-        ends: found
-        for ends, found in tried.items()
-        if found is not None and (seen is None or unseen_m(found.points, seen) <= max_gap_m)
-    }
+    joins: dict[tuple[int, int], Bridge] = {}
+    for hooks_m in HOOKS_M:
+        one, other = (tuple(part[pairs[:, side]] for part in ways[hook_m]) for side, hook_m in enumerate(hooks_m))
+        facing = _faces(*one, other[0], gap_angle_deg) & _faces(*other, one[0], gap_angle_deg)
+        for one, other in free[pairs[facing]].tolist():
+            if (one, other) in joins:
+                continue
+            found = _across(network, (one, other), hooks_m)
+            if found is not None and (seen is None or unseen_m(found.points, seen) <= max_gap_m):
+                joins[one, other] = found
+    return joins
 
 
-def _ways(network: LineNetwork, ends: np.ndarray, hook_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Tips and unit vectors out of line ends, (k, 2) each, the last `hook_m` of longer lines left out of account."""
-    tips, outward = [], []
-    lengths = network.lengths()
-    for end in ends.tolist():
-        line = network.from_end(end)
-        cut_m = hook_m if lengths[end // 2] > hook_m + DIRECTION_M else 0.0
-        tip, way = way_out(stretch(cut_back(line, cut_m), DIRECTION_M))
-        tips.append(tip + cut_m * way)
-        outward.append(way)
-    return np.array(tips), np.array(outward)
+def _across(network: LineNetwork, ends: tuple[int, int], hooks_m: tuple[float, float]) -> Bridge | None:
+    """Find the curve from one line end to another once their hooks are off; such a one may not swerve."""
+    one, other = (cut_back(network.from_end(end), hook_m) for end, hook_m in zip(ends, hooks_m))
+    found = bridge(one, other, transition_m=STEADY_TRANSITION_M if any(hooks_m) else TRANSITION_M)
+    if found is None:
+        return None
+    return replace(found, cuts_m=tuple(cut_m + hook_m for cut_m, hook_m in zip(found.cuts_m, hooks_m)))
 
 
 def unseen_m(points: np.ndarray, seen: cKDTree) -> float:
@@ -103,23 +100,23 @@ def unseen_m(points: np.ndarray, seen: cKDTree) -> float:
     return STEP_M * np.count_nonzero(seen.query(points)[0] > UNSEEN_M) if len(points) else 0.0
 
 
-def faces(tips: np.ndarray, outward: np.ndarray, pairs: np.ndarray, angle_deg: float) -> np.ndarray:
-    """Tell for which pairs the second tip lies within the fan before the first.
+def _ways(network: LineNetwork, ends: np.ndarray, hook_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Tips and unit vectors out of line ends whose last `hook_m` are off, (k, 2) each; NaN for lines too short."""
+    lengths = network.lengths()
+    tips, outward = np.full((2, len(ends), 2), np.nan)
+    for number, end in enumerate(ends.tolist()):
+        if hook_m == 0 or lengths[end // 2] > hook_m + DIRECTION_M:
+            seen = stretch(cut_back(network.from_end(end), hook_m), DIRECTION_M)
+            tips[number], outward[number] = way_out(seen)
+    return tips, outward
 
-    Parameters
-    ----------
-    tips, outward : (k, 2) arrays
-        Line ends and the unit vectors out of the lines there.
-    pairs : (n, 2) int array
-    angle_deg : float
-        Half of the fan's opening.
 
-    Returns
-    -------
-    (n,) bool array
+def _faces(tips: np.ndarray, outward: np.ndarray, others: np.ndarray, angle_deg: float) -> np.ndarray:
+    """Tell which other points lie within the fan of half opening `angle_deg` before line ends, (n,) bool; NaN does not.
+
+    All are (n, 2) arrays: line ends, unit vectors out of the lines there, and the other points.
     """
-    across = tips[pairs[:, 1]] - tips[pairs[:, 0]]
-    way = outward[pairs[:, 0]]
-    ahead = (across * way).sum(axis=1)
-    aside = np.abs(across[:, 0] * way[:, 1] - across[:, 1] * way[:, 0])
+    across = others - tips
+    ahead = (across * outward).sum(axis=1)
+    aside = np.abs(across[:, 0] * outward[:, 1] - across[:, 1] * outward[:, 0])
     return (ahead > 0) & (aside <= ahead * np.tan(np.radians(angle_deg)) + STAIRS_M)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -24,6 +25,9 @@ BUBBLE_M = 1.0
 DEFLECTION_DEG = 15.0
 """A rail runs on through a node if it turns by less; the steepest turnouts in use branch off at about 14 degrees."""
 
+TURNED_BACK_DEG = 90.0
+"""Two lines that meet more sharply are the legs of a switch that lost its stem, not one rail."""
+
 DIRECTION_M = 2.5
 """Length over which directions at a node are compared: longer than the stretch in which rails of a 1:9 frog merge."""
 
@@ -37,13 +41,20 @@ def clean_junctions(network: LineNetwork, head_width_m: float) -> LineNetwork:
 
 
 def weld_pairs(network: LineNetwork) -> LineNetwork:
-    """Weld lines at nodes in which exactly two different lines end and none passes."""
+    """Weld lines at nodes in which exactly two different lines end and none passes; part them if they turn back."""
     plain = network.degrees() == 2
     plain[network.passes[:, 0]] = False
-    partner = {}
-    for one, other in (ends for node, ends in ends_by_node(network) if plain[node]):
-        if one // 2 != other // 2:
+    partner: dict[int, int] = {}
+    ends, nodes = network.ends.copy(), list(network.nodes)
+    for one, other in (pair for node, pair in ends_by_node(network) if plain[node]):
+        if one // 2 == other // 2:
+            continue
+        if deflections(network, [one, other])[0, 1] > TURNED_BACK_DEG:
+            ends.flat[other] = len(nodes)
+            nodes.append(network.nodes[network.ends.flat[other]])
+        else:
             partner[one], partner[other] = other, one
+    network = replace(network, nodes=np.array(nodes).reshape(-1, 2), ends=ends)
     return network.weld(partner) if partner else network
 
 
