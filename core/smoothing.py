@@ -110,6 +110,11 @@ def simplify(xyz: np.ndarray, tolerance_xy_m: float, tolerance_z_m: float) -> np
     (k, 3) array
         Some of the vertices, the first and the last among them.
     """
+    return xyz[essential_vertices(xyz, tolerance_xy_m, tolerance_z_m)]
+
+
+def essential_vertices(xyz: np.ndarray, tolerance_xy_m: float, tolerance_z_m: float) -> np.ndarray:
+    """Mark the vertices that `simplify` keeps, (n,) bool."""
     keep = np.zeros(len(xyz), dtype=bool)
     keep[[0, -1]] = True
     spans = [(0, len(xyz) - 1)]
@@ -123,7 +128,7 @@ def simplify(xyz: np.ndarray, tolerance_xy_m: float, tolerance_z_m: float) -> np
         if excess[worst] > 1:
             keep[first + 1 + worst] = True
             spans += [(first, first + 1 + worst), (first + 1 + worst, last)]
-    return xyz[keep]
+    return keep
 
 
 def _averaged(t: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
