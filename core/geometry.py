@@ -42,7 +42,7 @@ def measure_track_geometry(
     centerlines: Sequence[Centerline],
     rails: Sequence[RailLine],
     head_width_m: float,
-    points: RailPoints | None = None,
+    clouds: Sequence[RailPoints] = (),
     step_m: float = 1.0,
     progress: Progress = SILENT,
 ) -> tuple[TrackGeometry, ...]:
@@ -55,9 +55,11 @@ def measure_track_geometry(
     rails : sequence of RailLine
         As extracted, or read from files.
     head_width_m : float
-    points : RailPoints, optional
-        Points of the rails, in the frame of the lines. With them heights are found anew, smoothed over 1 m only, and
-        support is known of lines read from files as well; without, heights are those of the lines.
+    clouds : sequence of RailPoints
+        Points of the rails' classes, in the frame of the lines. With them heights are found anew, smoothed over 1 m
+        only, and support is known by chainage. Of a class without, heights are those of the lines, a rail's `sigma_mm`
+        holds for all of it, its `points` count as evenly spread, and only where it is missing it counts as bridged,
+        unless its gaps are known.
     step_m : float
         Distance of the stations.
     progress : Progress
@@ -67,10 +69,22 @@ def measure_track_geometry(
     tuple of TrackGeometry
         One a centerline, in their order.
     """
-    if points is not None:
-        rails = measure_again(rails, points, head_width_m, PROFILE_SIGMA_M, progress.span(0.0, 0.8))
+    rails = _measured_again(rails, clouds, head_width_m, progress.span(0.0, 0.8))
     tracks = progress.span(0.8, 1.0).follow(centerlines)
     return tuple(_measure(line, rails, head_width_m, step_m) for line in tracks)
+
+
+def _measured_again(
+    rails: Sequence[RailLine], clouds: Sequence[RailPoints], head_width_m: float, progress: Progress
+) -> list[RailLine]:
+    """Give the rails of each class heights and support from its points."""
+    measured = list(rails)
+    for points, share in zip(clouds, progress.split(len(clouds))):
+        mine = [number for number, rail in enumerate(rails) if rail.class_code == points.class_code]
+        again = measure_again([rails[number] for number in mine], points, head_width_m, PROFILE_SIGMA_M, share)
+        for number, rail in zip(mine, again):
+            measured[number] = rail
+    return measured
 
 
 def _measure(line: Centerline, rails: Sequence[RailLine], head_width_m: float, step_m: float) -> TrackGeometry:
@@ -166,9 +180,17 @@ def _points(rails: Sequence[RailLine], side: Meeting, along: np.ndarray, cells: 
     """Count the points on the rails of one side in cells along the track, given their (2, n) borders."""
     total = np.zeros(cells.shape[1])
     for number in np.unique(side.rail):
-        mine, support = (side.rail == number) & np.isfinite(side.t), rails[number].support
-        if support is None or mine.sum() < 2:
+        mine = (side.rail == number) & np.isfinite(side.t)
+        if mine.sum() < 2:
             continue
-        passed = np.interp(side.t[mine], support.t, np.cumsum(support.points) - 0.5 * support.points)
+        passed = _points_before(rails[number], side.t[mine])
         total += np.abs(np.diff(np.interp(cells, along[mine], passed), axis=0)[0])
     return np.round(total).astype(int)
+
+
+def _points_before(rail: RailLine, t: np.ndarray) -> np.ndarray:
+    """Count the points between the start of a rail and the chainages `t`, (n,); unknown support counts as even."""
+    support = rail.support
+    if support is None:
+        return rail.points * np.clip(t / length_along(rail.xyz[:, :2])[-1], 0.0, 1.0)
+    return np.interp(t, support.t, np.cumsum(support.points) - 0.5 * support.points)

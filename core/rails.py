@@ -221,6 +221,17 @@ class TrackGeometry:
     points: np.ndarray
     bridged: np.ndarray
 
+    @property
+    def cells_m(self) -> np.ndarray:
+        """Length that each station stands for, (n,): half way to its neighbours."""
+        borders = 0.5 * (self.chainage_m[1:] + self.chainage_m[:-1])
+        return np.diff(np.concatenate([self.chainage_m[:1], borders, self.chainage_m[-1:]]))
+
+    @property
+    def bridged_m(self) -> float:
+        """Length of the stations that are bridged."""
+        return float(self.cells_m[self.bridged].sum())
+
 
 @dataclass(frozen=True)
 class RailNetwork:

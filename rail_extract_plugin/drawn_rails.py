@@ -1,8 +1,10 @@
-"""Rails read from a vector layer: those of Vectorize Rails, or lines drawn by hand."""
+"""Rails and centerlines read from vector layers: those of Rail Extract, or lines drawn by hand."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from qgis.core import (
@@ -19,27 +21,50 @@ from ..core.crs import is_geographic, parse_crs, units
 from ..core.errors import CrsError, RailExtractError
 from ..core.points import ORIGIN_STEP, LocalFrame
 from ..core.progress import SILENT, Progress
-from ..core.rails import RailLine
+from ..core.rails import Centerline, RailLine
 
 CHORD_M = 0.0005
 """How far the straight pieces that stand for a curved line may lie beside it: well below what a survey sees."""
 
 
 def read_rails(
-    source: QgsProcessingFeatureSource, progress: Progress = SILENT
+    source: QgsProcessingFeatureSource, progress: Progress = SILENT, name: str = "INPUT", untold_class: int = 0
 ) -> tuple[tuple[RailLine, ...], LocalFrame]:
     """Read every part of every line, and find the local frame for them.
 
-    Lines without a `rail_id` are numbered by their feature; those without a `class_code` have class 0; other fields
-    of rails are used where they are there.
+    Lines without a `rail_id` are numbered by their feature; those without a `class_code` have `untold_class`; other
+    fields of rails are used where they are there.
 
     Raises
     ------
     CrsError
         The lines are in degrees.
     RailExtractError
-        There is no line.
+        There is no line; the message calls the layer `name`.
     """
+    found, frame = _read(source, progress, name)
+    rails = tuple(_rail(feature, xyz, untold_class) for feature, xyz in found)
+    flat = sum(bool(np.isnan(rail.xyz[0, 2])) for rail in rails)
+    if flat:
+        progress.warning(f"{flat} of {len(rails)} lines have no heights: what is made of them has none either.")
+    return rails, frame
+
+
+def read_centerlines(
+    source: QgsProcessingFeatureSource, progress: Progress = SILENT, name: str = "INPUT"
+) -> tuple[tuple[Centerline, ...], LocalFrame]:
+    """Read every part of every line, as `read_rails` does; figures that are in no field are NaN.
+
+    Lines without a `track_id` are numbered by their feature; those without `left_ids` or `right_ids` name no rails.
+    """
+    found, frame = _read(source, progress, name)
+    return tuple(_centerline(feature, xyz) for feature, xyz in found), frame
+
+
+def _read(
+    source: QgsProcessingFeatureSource, progress: Progress, name: str
+) -> tuple[list[tuple[QgsFeature, np.ndarray]], LocalFrame]:
+    """Read features and the vertices, (n, 3) local metres, of each of their parts."""
     crs_wkt, horizontal_unit_m, vertical_unit_m = _system(source.sourceCrs(), progress)
     request = QgsFeatureRequest()
     flags = QgsProcessingFeatureSource.Flag.FlagSkipGeometryValidityChecks
@@ -49,15 +74,11 @@ def read_rails(
         for vertices in _parts(feature.geometry(), CHORD_M / horizontal_unit_m)
     ]
     if not found:
-        raise RailExtractError("INPUT holds no line: give a layer of rails.")
+        raise RailExtractError(f"{name} holds no line: give a layer of lines.")
     middle = np.median(np.concatenate([vertices for _, vertices in found]), axis=0)
     origin = np.round(np.nan_to_num(middle) / ORIGIN_STEP) * ORIGIN_STEP
     frame = LocalFrame(origin, horizontal_unit_m, vertical_unit_m, crs_wkt)
-    rails = tuple(_rail(feature, frame.to_local(vertices)) for feature, vertices in found)
-    flat = sum(bool(np.isnan(rail.xyz[0, 2])) for rail in rails)
-    if flat:
-        progress.warning(f"{flat} of {len(rails)} lines have no heights: their centerlines have none either.")
-    return rails, frame
+    return [(feature, frame.to_local(vertices)) for feature, vertices in found], frame
 
 
 def _system(crs: QgsCoordinateReferenceSystem, progress: Progress) -> tuple[str | None, float, float]:
@@ -90,11 +111,11 @@ def _parts(geometry: QgsGeometry, chord: float) -> Iterator[np.ndarray]:
             yield xyz[moves]
 
 
-def _rail(feature: QgsFeature, xyz: np.ndarray) -> RailLine:
+def _rail(feature: QgsFeature, xyz: np.ndarray, untold_class: int) -> RailLine:
     return RailLine(
         xyz,
         rail_id=int(_number(feature, "rail_id", feature.id())),
-        class_code=int(_number(feature, "class_code", 0)),
+        class_code=int(_number(feature, "class_code", untold_class)),
         points=int(_number(feature, "points", 0)),
         resid_mm=_number(feature, "resid_mm", np.nan),
         sigma_mm=_number(feature, "sigma_mm", np.nan),
@@ -102,11 +123,38 @@ def _rail(feature: QgsFeature, xyz: np.ndarray) -> RailLine:
     )
 
 
+def _centerline(feature: QgsFeature, xyz: np.ndarray) -> Centerline:
+    return Centerline(
+        xyz,
+        track_id=int(_number(feature, "track_id", feature.id())),
+        class_code=int(_number(feature, "class_code", 0)),
+        left_ids=_ids(feature, "left_ids"),
+        right_ids=_ids(feature, "right_ids"),
+        gauge_mm=_number(feature, "gauge_mm", np.nan),
+        gaugesd_mm=_number(feature, "gaugesd_mm", np.nan),
+        cant_mm=_number(feature, "cant_mm", np.nan),
+        cantmax_mm=_number(feature, "cantmax_mm", np.nan),
+        bridged_m=_number(feature, "bridged_m", 0.0),
+    )
+
+
 def _number(feature: QgsFeature, name: str, default: float) -> float:
-    """Value of a field; `default` where there is no such field, or no number in it."""
-    index = feature.fields().lookupField(name)
-    value = feature.attribute(index) if index >= 0 else NULL
+    """Value of a field; `default` where there is no such field, or no finite number in it."""
     try:
-        return default if value == NULL else float(value)
+        value = float(_value(feature, name))
     except (TypeError, ValueError):
         return default
+    return value if math.isfinite(value) else default
+
+
+def _ids(feature: QgsFeature, name: str) -> tuple[int, ...]:
+    """Ids in a field such as "3,5"; none where there is no such field, or something else in it."""
+    words = str(_value(feature, name) or "").split(",")
+    return tuple(int(word) for word in words) if all(word.strip().isdecimal() for word in words) else ()
+
+
+def _value(feature: QgsFeature, name: str) -> Any:
+    """Value of a field; None where there is no such field, or no value in it."""
+    index = feature.fields().lookupField(name)
+    value = feature.attribute(index) if index >= 0 else NULL
+    return None if value == NULL else value

@@ -14,6 +14,7 @@ from ..core.errors import RasterError
 from ..core.points import LocalFrame
 from ..core.progress import SILENT, Progress
 from ..core.raster import TILE, RailRaster
+from ..core.standards import RAIL_CLASS
 from .rasters import BLOCK, EXTENT_TAG, GAUGE_TAG, HEAD_TAG, MODEL_TAG, RasterHeader
 
 CREATION = (
@@ -30,9 +31,6 @@ ALIKE = 1e-6
 """Two sides of a cell may differ by this share: writers round."""
 
 HIGHEST_CLASS = 255
-
-UNTOLD_CLASS = 10
-"""Class of a single band that does not say: RAIL_CLASSES' default, rail in the LAS specification."""
 
 
 def read_header(path: Path) -> RasterHeader:
@@ -153,7 +151,7 @@ def _class_codes(dataset: gdal.Dataset, name: str) -> tuple[int, ...]:
     if texts and all(text.isdecimal() and int(text) <= HIGHEST_CLASS for text in texts):
         return tuple(int(text) for text in texts)
     if len(texts) == 1:
-        return (UNTOLD_CLASS,)
+        return (RAIL_CLASS,)
     raise RasterError(
         f"{name} has {len(texts)} bands, and not every description is a class code: give a raster with one band, or "
         "with one band a class like those of Rasterize Rail Points."

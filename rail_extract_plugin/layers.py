@@ -3,36 +3,35 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import repeat
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
     QgsCoordinateReferenceSystem,
-    QgsDataSourceUri,
     QgsFeature,
     QgsFeatureSink,
     QgsFields,
     QgsGeometry,
     QgsLineString,
-    QgsProcessing,
+    QgsPoint,
     QgsProcessingAlgorithm,
     QgsProcessingContext,
-    QgsProcessingOutputLayerDefinition,
-    QgsProperty,
     QgsWkbTypes,
 )
 
 from ..core.errors import RailExtractError
+from ..core.progress import SILENT, Progress
 from .compat import INTEGER, REAL, TEXT, field
 from .styling import style_on_load
 
 if TYPE_CHECKING:
     from ..core.points import LocalFrame
-    from ..core.rails import Centerline, RailLine
+    from ..core.rails import Centerline, RailLine, TrackGeometry
+    from ..core.raster import RailRaster
+    from .rasters import RasterHeader
 
 UNKNOWN_IN_METRES = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1]]'
 """Stated in outputs without a coordinate system, because GDAL else calls a GeoPackage's coordinates degrees."""
@@ -58,18 +57,34 @@ CENTERLINE_FIELDS = (
     ("cantmax_mm", REAL),
     ("bridged_m", REAL),
 )
-"""Names and types, each name that of the attribute of `RailLine` or `Centerline` it holds."""
+QUALITY_FIELDS = (
+    ("track_id", INTEGER),
+    ("chainage_m", REAL),
+    ("gauge_mm", REAL),
+    ("cant_mm", REAL),
+    ("twist_mm", REAL),
+    ("radius_m", REAL),
+    ("grade_pm", REAL),
+    ("sigma_mm", REAL),
+    ("points", INTEGER),
+    ("bridged", INTEGER),
+)
+"""Names and types, each name that of the attribute of `RailLine`, `Centerline` or `TrackGeometry` it holds.
+
+Of a `TrackGeometry` the first is one value and the others are profiles.
+"""
 
 
 @dataclass(frozen=True)
-class LineKind:
-    """Fields of a layer of lines, and the style it gets when QGIS loads it."""
+class LayerKind:
+    """Fields of a layer, and the style it gets when QGIS loads it."""
 
     columns: tuple[tuple[str, Any], ...]
     style: str
 
 
-RAILS, CENTERLINES = LineKind(RAIL_FIELDS, "rails"), LineKind(CENTERLINE_FIELDS, "centerlines")
+RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELDS, "centerlines")
+QUALITY = LayerKind(QUALITY_FIELDS, "quality")
 
 
 def fields(columns: Sequence[tuple[str, Any]]) -> QgsFields:
@@ -87,13 +102,20 @@ def features(
     flat = is_flat(lines)
     for line in lines:
         coordinates = frame.to_crs(line.xyz).T[: 2 if flat else 3].tolist()
-        feature = QgsFeature()
-        feature.setGeometry(QgsGeometry(QgsLineString(*coordinates)))
-        feature.setAttributes([_attribute(getattr(line, name), kind) for name, kind in columns])
-        yield feature
+        values = [getattr(line, name) for name, _ in columns]
+        yield _feature(QgsGeometry(QgsLineString(*coordinates)), values, columns)
 
 
-def is_flat(lines: Sequence[RailLine | Centerline]) -> bool:
+def stations(tracks: Sequence[TrackGeometry], frame: LocalFrame) -> Iterator[QgsFeature]:
+    """Turn the stations of measured tracks into point features in the cloud's coordinates."""
+    for track in tracks:
+        places = frame.to_crs(track.xyz).tolist()
+        profiles = (getattr(track, name) for name, _ in QUALITY.columns[1:])
+        for (x, y, z), *row in zip(places, repeat(track.track_id), *profiles):
+            yield _feature(QgsGeometry(QgsPoint(x, y) if math.isnan(z) else QgsPoint(x, y, z)), row, QUALITY.columns)
+
+
+def is_flat(lines: Sequence[RailLine | Centerline | TrackGeometry]) -> bool:
     """Tell whether there are lines, but none with heights."""
     return bool(lines) and all(any(map(math.isnan, line.xyz[:, 2])) for line in lines)
 
@@ -114,7 +136,7 @@ def add_features(sink: QgsFeatureSink, made: Iterator[QgsFeature]) -> None:
 def write_lines(
     algorithm: QgsProcessingAlgorithm,
     name: str,
-    kind: LineKind,
+    kind: LayerKind,
     lines: Sequence[RailLine | Centerline],
     frame: LocalFrame,
     parameters: dict[str, Any],
@@ -133,14 +155,39 @@ def write_lines(
         The output can't be written.
     """
     shape = QgsWkbTypes.Type.LineString if is_flat(lines) else QgsWkbTypes.Type.LineStringZ
-    sink, layer_id = algorithm.parameterAsSink(
-        parameters, name, context, fields(kind.columns), shape, output_crs(frame.crs_wkt)
-    )
-    if sink is None:
-        return {}
-    add_features(sink, features(lines, kind.columns, frame))
-    style_on_load(layer_id, kind.style, context)
-    return {name: layer_id}
+    return _write(algorithm, name, kind, shape, features(lines, kind.columns, frame), frame, parameters, context)
+
+
+def write_stations(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    tracks: Sequence[TrackGeometry],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the stations of measured tracks as points, like `write_lines`."""
+    shape = QgsWkbTypes.Type.Point if is_flat(tracks) else QgsWkbTypes.Type.PointZ
+    made = stations(tracks, frame)
+    return _write(algorithm, name, QUALITY, shape, made, frame, parameters, context)
+
+
+def write_raster(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    header: RasterHeader,
+    rasters: Sequence[RailRaster],
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+    progress: Progress = SILENT,
+) -> dict[str, str]:
+    """Write rasters of rails, one a class, into the output called `name`; gives the file's path by that name."""
+    from .geotiff import write_rasters
+
+    path = algorithm.parameterAsOutputLayer(parameters, name, context)
+    write_rasters(Path(path), header, rasters, progress)
+    style_on_load(path, "raster", context)
+    return {name: path}
 
 
 def figures_of(lines: Sequence[RailLine | Centerline], what: str) -> dict[str, float]:
@@ -148,39 +195,47 @@ def figures_of(lines: Sequence[RailLine | Centerline], what: str) -> dict[str, f
     return {f"{what}_COUNT": len(lines), f"{what}_LENGTH": float(sum(line.length_m for line in lines))}
 
 
+def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, float | None]:
+    """Count stations, and tell how well the points support the tracks."""
+    sigma = [value for track in tracks for value in track.sigma_mm if math.isfinite(value)]
+    return {
+        "STATION_COUNT": sum(len(track.chainage_m) for track in tracks),
+        "SIGMA": math.sqrt(sum(value**2 for value in sigma) / len(sigma)) if sigma else None,
+        "BRIDGED_LENGTH": float(sum(track.bridged_m for track in tracks)),
+    }
+
+
 def output_crs(wkt: str | None) -> QgsCoordinateReferenceSystem:
     """Coordinate system for an output, `UNKNOWN_IN_METRES` where the cloud has none."""
     return QgsCoordinateReferenceSystem.fromWkt(wkt or UNKNOWN_IN_METRES)
 
 
-def check_writable(value: Any, context: QgsProcessingContext) -> None:
-    """Refuse an output that could not be written, before the work begins.
+def _write(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    kind: LayerKind,
+    shape: QgsWkbTypes.Type,
+    made: Iterator[QgsFeature],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write features into the output called `name`, if the user wants it."""
+    sink, layer_id = algorithm.parameterAsSink(
+        parameters, name, context, fields(kind.columns), shape, output_crs(frame.crs_wkt)
+    )
+    if sink is None:
+        return {}
+    add_features(sink, made)
+    style_on_load(layer_id, kind.style, context)
+    return {name: layer_id}
 
-    Parameters
-    ----------
-    value : str, QgsProperty, QgsProcessingOutputLayerDefinition or None
-        Value of a destination parameter.
-    context : QgsProcessingContext
 
-    Raises
-    ------
-    RailExtractError
-        The file or its folder does not let itself be written.
-    """
-    path = _output_file(value, context)
-    if path is None:
-        return
-    if path.is_dir():
-        raise RailExtractError(f"The output {path} is a folder: give the name of a file in it.")
-    try:
-        if path.exists():
-            path.open("r+b").close()
-        else:
-            TemporaryFile(dir=path.absolute().parent).close()
-    except OSError as error:
-        raise RailExtractError(
-            f"The output {path} can't be written ({error.strerror}): choose another place."
-        ) from error
+def _feature(geometry: QgsGeometry, values: Sequence[Any], columns: Sequence[tuple[str, Any]]) -> QgsFeature:
+    feature = QgsFeature()
+    feature.setGeometry(geometry)
+    feature.setAttributes([_attribute(value, kind) for value, (_, kind) in zip(values, columns)])
+    return feature
 
 
 def _attribute(value: Any, kind: Any) -> Any:
@@ -189,16 +244,3 @@ def _attribute(value: Any, kind: Any) -> Any:
     if kind == INTEGER:
         return int(value)
     return float(value) if math.isfinite(value) else None
-
-
-def _output_file(value: Any, context: QgsProcessingContext) -> Path | None:
-    """File behind a destination; None for memory layers and databases."""
-    if isinstance(value, QgsProcessingOutputLayerDefinition):
-        value = value.sink
-    if isinstance(value, QgsProperty):
-        value = value.valueAsString(context.expressionContext())[0]
-    text = value or ""
-    if text.startswith("ogr:"):
-        text = QgsDataSourceUri(text[len("ogr:") :]).database()
-    is_file = text and text != QgsProcessing.TEMPORARY_OUTPUT and not re.match(r"\w{2,}:", text)
-    return Path(text) if is_file else None

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from qgis.core import (
     QgsProcessing,
+    QgsProcessingOutputNumber,
     QgsProcessingParameterCrs,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterEnum,
@@ -19,7 +20,7 @@ from qgis.core import (
 )
 
 from ..core.frpdf.zoo import MODELS
-from ..core.standards import CUSTOM, DEFAULT, STANDARDS
+from ..core.standards import CUSTOM, DEFAULT, RAIL_CLASS, STANDARDS
 from .i18n import tr
 
 AUTO = "AUTO"
@@ -40,7 +41,7 @@ def cloud() -> Definitions:
             tr("A loaded point cloud, or the path of a LAS, LAZ or COPC file, of a folder of them or of a .vpc file."),
         ),
         _helped(
-            QgsProcessingParameterString("RAIL_CLASSES", tr("Rail classes"), defaultValue="10"),
+            QgsProcessingParameterString("RAIL_CLASSES", tr("Rail classes"), defaultValue=str(RAIL_CLASS)),
             tr("Classes whose points lie on rails, such as 10 or 10,11. Each class is extracted on its own."),
         ),
     )
@@ -109,6 +110,47 @@ def rails() -> QgsProcessingParameterDefinition:
         QgsProcessingParameterFeatureSource("INPUT", tr("Rails"), [line]),
         tr("Lines of railheads, from Vectorize Rails or drawn by hand."),
     )
+
+
+def centerlines() -> QgsProcessingParameterDefinition:
+    """Which lines are track centerlines."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return _helped(
+        QgsProcessingParameterFeatureSource("INPUT", tr("Track centerlines"), [line]),
+        tr("Lines midway between rails, from Build Track Centerlines or drawn by hand; chainage counts along them."),
+    )
+
+
+def rails_of_tracks() -> QgsProcessingParameterDefinition:
+    """Which rails lie beside the centerlines."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return _helped(
+        QgsProcessingParameterFeatureSource("RAILS", tr("Rails"), [line]),
+        tr("The lines that the centerlines were built from; those that left_ids and right_ids name, else the nearest."),
+    )
+
+
+def points_of_rails() -> QgsProcessingParameterDefinition:
+    """Which points support the rails."""
+    return _helped(
+        QgsProcessingParameterPointCloudLayer("POINTS", tr("Point cloud (layer, file or folder)"), optional=True),
+        tr("The cloud that the rails came from: it tells heights, sigma_mm and points metre by metre."),
+    )
+
+
+def step() -> QgsProcessingParameterDefinition:
+    """How often tracks are measured."""
+    return _advanced(
+        _number("STEP", tr("Distance of the measurements [m]"), 1.0, minimum=0.1),
+        tr("Gauge, cant, twist, radius and gradient are stated at these distances along each track."),
+    )
+
+
+def head() -> Definitions:
+    """How wide the railheads are."""
+    standard, _, head_width = rail()
+    standard.setHelp(tr("Rail profile, which says how wide the railhead is."))
+    return standard, head_width
 
 
 def area() -> Definitions:
@@ -219,6 +261,15 @@ def pairing() -> Definitions:
             _number("CENTERLINE_TOLERANCE", tr("Tolerance of the gauge [m]"), 0.05, minimum=0.001),
             tr("Rails whose distance is off by more than this make no track."),
         ),
+    )
+
+
+def quality_figures() -> tuple[QgsProcessingOutputNumber, ...]:
+    """Numbers that tell how well tracks are measured."""
+    return (
+        QgsProcessingOutputNumber("STATION_COUNT", tr("Number of measured places")),
+        QgsProcessingOutputNumber("SIGMA", tr("Standard error of the centerlines [mm]")),
+        QgsProcessingOutputNumber("BRIDGED_LENGTH", tr("Length without points on a rail [m]")),
     )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from qgis.core import QgsCoordinateReferenceSystem, QgsProcessingAlgorithm, QgsProcessingContext
 
 from ..core.errors import ParameterError, RasterError
-from ..core.standards import RailStandard, distinct_gauges, resolve
+from ..core.standards import CUSTOM, DEFAULT, RailStandard, distinct_gauges, resolve
 from .clouds import CloudSource, cloud_source
 
 if TYPE_CHECKING:
@@ -107,6 +107,13 @@ class Values:
     def standard(self) -> RailStandard:
         """Read STANDARD, with GAUGE and HEAD_WIDTH in place of its own."""
         return resolve(self.choice("STANDARD"), self.optional_number("GAUGE"), self.optional_number("HEAD_WIDTH"))
+
+    def head_width_m(self) -> float:
+        """Read HEAD_WIDTH, or what STANDARD says of it."""
+        head_width_mm = self.optional_number("HEAD_WIDTH")
+        if head_width_mm is None and self.choice("STANDARD") == CUSTOM:
+            raise ParameterError("The standard CUSTOM needs the railhead width, in millimetres: fill HEAD_WIDTH.")
+        return resolve(DEFAULT if head_width_mm else self.choice("STANDARD"), None, head_width_mm).head_width_m
 
     def other_gauges_m(self, standard: RailStandard) -> tuple[float, ...]:
         """Read OTHER_GAUGES, and check them beside the standard's gauge."""

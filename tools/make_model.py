@@ -31,13 +31,15 @@ STEPS = {
     "cleaned": "frpdfcleanup",
     "rails": "vectorizerails",
     "centerlines": "buildtrackcenterlines",
+    "quality": "measuretrackgeometry",
 }
 """What each step makes, which is its id in the model, and the algorithm that makes it."""
 
-CLOUDS = {("raster", "INPUT"), ("rails", "POINTS")}
+CLOUDS = {("raster", "INPUT"), ("rails", "POINTS"), ("quality", "POINTS")}
+RAILS = ("quality", "RAILS")
 TOLD_BY_RASTER = {(step, name) for step in ("cleaned", "rails") for name in ("GAUGE", "HEAD_WIDTH")}
 
-LINES = {"rails": "RAILS", "centerlines": "CENTERLINES"}
+RESULTS = {"rails": "RAILS", "centerlines": "CENTERLINES", "quality": "QUALITY"}
 
 COLUMN, ROW = 260, 130
 """Distances in the designer's picture."""
@@ -72,8 +74,8 @@ def build() -> QgsProcessingModelAlgorithm:
             source = _source(step, definition, names, before)
             if source is not None:
                 child.addParameterSources(definition.name(), [source])
-        if step in LINES:
-            child.setModelOutputs({LINES[step]: _output(step, number)})
+        if step in RESULTS:
+            child.setModelOutputs({RESULTS[step]: _output(step, number)})
         model.addChildAlgorithm(child)
         before = step
     return model
@@ -91,6 +93,8 @@ def _source(step: str, definition, inputs: set[str], before: str | None):
     name = definition.name()
     if (step, name) in CLOUDS:
         return QgsProcessingModelChildParameterSource.fromModelParameter("INPUT")
+    if (step, name) == RAILS:
+        return QgsProcessingModelChildParameterSource.fromChildOutput("rails", "OUTPUT")
     if name == "INPUT":
         return QgsProcessingModelChildParameterSource.fromChildOutput(before, "OUTPUT")
     if (step, name) in TOLD_BY_RASTER or definition.isDestination():
@@ -101,8 +105,8 @@ def _source(step: str, definition, inputs: set[str], before: str | None):
 
 
 def _output(step: str, number: int) -> QgsProcessingModelOutput:
-    """Make the lines of a step an output of the model."""
-    output = QgsProcessingModelOutput(LINES[step], LINES[step].capitalize())
+    """Make what a step gives an output of the model."""
+    output = QgsProcessingModelOutput(RESULTS[step], RESULTS[step].capitalize())
     output.setChildId(step)
     output.setChildOutputName("OUTPUT")
     output.setPosition(QPointF((number + 0.5) * COLUMN, 6 * ROW))

@@ -3,8 +3,16 @@
 from .build_track_centerlines import BuildTrackCenterlines
 from .extract_rails import ExtractRails
 from .frpdf_cleanup import FrpdfCleanup
+from .measure_track_geometry import MeasureTrackGeometry
 from .rasterize_rail_points import RasterizeRailPoints
 from .vectorize_rails import VectorizeRails
 
-ALGORITHMS = (ExtractRails, RasterizeRailPoints, FrpdfCleanup, VectorizeRails, BuildTrackCenterlines)
+ALGORITHMS = (
+    ExtractRails,
+    RasterizeRailPoints,
+    FrpdfCleanup,
+    VectorizeRails,
+    BuildTrackCenterlines,
+    MeasureTrackGeometry,
+)
 """The whole walk first, then its steps in their order."""

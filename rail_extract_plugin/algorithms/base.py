@@ -17,9 +17,9 @@ from qgis.PyQt.QtGui import QIcon
 from ...core.errors import Cancelled, RailExtractError
 from ...core.progress import Progress
 from ..dependencies import explain_missing, missing_packages
+from ..destinations import check_writable
 from ..feedback import QgisProgress
 from ..i18n import tr
-from ..layers import check_writable
 from ..paths import ICON
 
 HOMEPAGE = "https://example.org/rail-extract"

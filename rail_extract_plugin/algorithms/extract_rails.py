@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
+    QgsCoordinateReferenceSystem,
     QgsProcessing,
     QgsProcessingContext,
     QgsProcessingOutputNumber,
     QgsProcessingOutputString,
     QgsProcessingParameterFeatureSink,
+    QgsProcessingParameterRasterDestination,
 )
 
 from ...core.frpdf.zoo import choose as choose_model
@@ -19,9 +22,12 @@ from ...core.standards import RailStandard
 from .. import parameters as groups
 from ..clouds import CloudSource, read_points
 from ..i18n import tr
-from ..layers import CENTERLINES, RAILS, figures_of, write_lines
+from ..layers import CENTERLINES, RAILS, figures_of, figures_of_stations, write_lines, write_raster, write_stations
 from ..values import Values
 from .base import RailAlgorithm
+
+if TYPE_CHECKING:
+    from ...core.rails import RailNetwork
 
 READING = 0.2
 """Share of the progress bar for reading the cloud."""
@@ -61,6 +67,7 @@ class ExtractRails(RailAlgorithm):
             *groups.cleanup(),
             *groups.lines(),
             *groups.pairing(),
+            groups.step(),
         ):
             self.addParameter(definition)
         line = QgsProcessing.SourceType.TypeVectorLine
@@ -68,10 +75,19 @@ class ExtractRails(RailAlgorithm):
         self.addParameter(
             QgsProcessingParameterFeatureSink("CENTERLINES", tr("Track centerlines"), line, optional=True)
         )
+        point = QgsProcessing.SourceType.TypeVectorPoint
+        for optional in (
+            QgsProcessingParameterFeatureSink("QUALITY", tr("Track geometry"), point, optional=True),
+            QgsProcessingParameterRasterDestination("CLEANED", tr("Cleaned rail raster"), optional=True),
+        ):
+            optional.setCreateByDefault(False)
+            self.addParameter(optional)
         self.addOutput(QgsProcessingOutputNumber("RAIL_COUNT", tr("Number of rails")))
         self.addOutput(QgsProcessingOutputNumber("RAIL_LENGTH", tr("Length of the rails [m]")))
         self.addOutput(QgsProcessingOutputNumber("CENTERLINE_COUNT", tr("Number of track centerlines")))
         self.addOutput(QgsProcessingOutputNumber("CENTERLINE_LENGTH", tr("Length of the track centerlines [m]")))
+        for output in groups.quality_figures():
+            self.addOutput(output)
         self.addOutput(QgsProcessingOutputString("ENGINE_USED", tr("Engine that ran the network")))
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
@@ -90,11 +106,37 @@ class ExtractRails(RailAlgorithm):
         values = Values(self, parameters, context)
         clouds = read_points(job.cloud, job.class_codes, values.extent, progress.span(0, READING))
         settings = values.settings(job.standard, job.other_gauges_m)
+        settings = replace(
+            settings,
+            quality_step_m=values.number("STEP") if values.filled("QUALITY") else None,
+            keep_cleaned=values.filled("CLEANED"),
+        )
         network = extract_rails(clouds, settings, progress.span(READING, 1))
         progress.check()
         written = {
+            **self._write_cleaned(job, network, [one.class_code for one in clouds], parameters, context),
             **write_lines(self, "RAILS", RAILS, network.rails, network.frame, parameters, context),
             **write_lines(self, "CENTERLINES", CENTERLINES, network.centerlines, network.frame, parameters, context),
+            **write_stations(self, "QUALITY", network.geometry, network.frame, parameters, context),
         }
         figures = {**figures_of(network.rails, "RAIL"), **figures_of(network.centerlines, "CENTERLINE")}
-        return {**written, **figures, "ENGINE_USED": network.engine}
+        measured = figures_of_stations(network.geometry) if settings.quality_step_m else {}
+        return {**written, **figures, **measured, "ENGINE_USED": network.engine}
+
+    def _write_cleaned(
+        self,
+        job: Job,
+        network: RailNetwork,
+        class_codes: Sequence[int],
+        parameters: dict[str, Any],
+        context: QgsProcessingContext,
+    ) -> dict[str, str]:
+        """Write what the network made, in a file like that of FRPDF Cleanup; no file where it left nothing."""
+        from ..rasters import header_for, on_one_grid
+
+        if not any(raster.tiles for raster in network.cleaned):
+            return {}
+        rasters, frame = on_one_grid(network.cleaned, network.frame)
+        extent = Values(self, parameters, context).extent(QgsCoordinateReferenceSystem(network.frame.crs_wkt or ""))
+        header = header_for(rasters, class_codes, frame, job.standard, extent)
+        return write_raster(self, "CLEANED", header, rasters, parameters, context)

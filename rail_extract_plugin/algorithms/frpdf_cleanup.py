@@ -12,7 +12,7 @@ from ...core.frpdf.zoo import Model
 from ...core.progress import Progress
 from .. import parameters as groups
 from ..i18n import tr
-from ..styling import style_on_load
+from ..layers import write_raster
 from ..values import Values
 from .base import RailAlgorithm
 
@@ -71,7 +71,7 @@ class FrpdfCleanup(RailAlgorithm):
         from ...core.frpdf.cleanup import clean
         from ...core.frpdf.engine import make_engine
         from ...core.frpdf.weights import load_arrays
-        from ..geotiff import read_rasters, write_rasters
+        from ..geotiff import read_rasters
 
         values = Values(self, parameters, context)
         engine = make_engine(load_arrays(job.model.path), values.choice("ENGINE"), values.choice("DEVICE"))
@@ -79,7 +79,5 @@ class FrpdfCleanup(RailAlgorithm):
         passes = int(values.number("ITERATIONS"))
         shares = progress.span(READING, WRITING).split(len(rasters))
         cleaned = [clean(raster, engine, passes, share) for raster, share in zip(rasters, shares)]
-        output = self.parameterAsOutputLayer(parameters, "OUTPUT", context)
-        write_rasters(Path(output), job.header, cleaned, progress.span(WRITING, 1))
-        style_on_load(output, "raster", context)
-        return {"OUTPUT": output, "ENGINE_USED": engine.description}
+        written = write_raster(self, "OUTPUT", job.header, cleaned, parameters, context, progress.span(WRITING, 1))
+        return {**written, "ENGINE_USED": engine.description}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from qgis.core import QgsCoordinateReferenceSystem, QgsProcessingContext, QgsProcessingParameterRasterDestination
@@ -14,7 +13,7 @@ from ...core.standards import RailStandard
 from .. import parameters as groups
 from ..clouds import CloudSource, read_points
 from ..i18n import tr
-from ..styling import style_on_load
+from ..layers import write_raster
 from ..values import Values
 from .base import RailAlgorithm
 
@@ -63,7 +62,6 @@ class RasterizeRailPoints(RailAlgorithm):
     ) -> dict[str, Any]:
         """Rasterize every class, then write the file."""
         from ...core.raster import cell_size, rasterize
-        from ..geotiff import write_rasters
         from ..rasters import header_for
 
         values = Values(self, parameters, context)
@@ -73,7 +71,4 @@ class RasterizeRailPoints(RailAlgorithm):
         frame, codes = clouds[0].frame, [points.class_code for points in clouds]
         extent = values.extent(QgsCoordinateReferenceSystem(frame.crs_wkt or ""))
         header = header_for(rasters, codes, frame, job.standard, extent)
-        output = self.parameterAsOutputLayer(parameters, "OUTPUT", context)
-        write_rasters(Path(output), header, rasters, progress.span(READING, 1))
-        style_on_load(output, "raster", context)
-        return {"OUTPUT": output}
+        return write_raster(self, "OUTPUT", header, rasters, parameters, context, progress.span(READING, 1))

@@ -74,8 +74,8 @@ class VectorizeRails(RailAlgorithm):
     ) -> dict[str, Any]:
         """Make the lines of every class, then write them."""
         from ...core.pipeline import lines_of
+        from ..area_points import Area, read_points_in
         from ..geotiff import read_rasters
-        from ..raster_points import read_points_on
         from ..rasters import moved
 
         rasters = read_rasters(job.path, job.header, progress.span(0, READING / 2))
@@ -83,7 +83,8 @@ class VectorizeRails(RailAlgorithm):
             progress.warning("Without POINTS the rails have no heights and lie where the raster shows them.")
             frame, clouds = job.header.frame, {}
         else:
-            clouds = read_points_on(job.header, job.cloud, progress.span(READING / 2, READING))
+            area = Area("raster", job.header.class_codes, job.header.bounds, job.header.frame)
+            clouds = read_points_in(area, job.cloud, progress.span(READING / 2, READING))
             frame = clouds[job.header.class_codes[0]].frame
             rasters = tuple(moved(raster, job.header.frame, frame) for raster in rasters)
         settings = Values(self, parameters, context).settings(job.standard)

@@ -81,7 +81,7 @@ def test_scanned_track_is_measured_to_millimetres(stored):
     if stored:
         rails, lines = thin(rails, 0.002, 0.002), thin(lines, 0.002, 0.002)
         rails = [replace(rail, support=None, gaps=NO_GAPS) for rail in rails]
-    (found,) = measure_track_geometry(lines, rails, WIDTH, points)
+    (found,) = measure_track_geometry(lines, rails, WIDTH, [points])
     t = found.chainage_m
     assert rms(found.gauge_mm - 1435.0) < 2.0
     assert rms(found.cant_mm - ramp(t, -CANT_MM)) < 1.0

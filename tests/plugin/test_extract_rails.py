@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
+from osgeo import gdal
 from qgis.core import QgsVectorLayer
+from rail_extract.rail_extract_plugin.geotiff import read_header
 
 
 @pytest.fixture
@@ -43,6 +45,27 @@ def test_outputs_may_be_skipped(run, scene):
     assert outcome.ok, outcome.error
     assert "RAILS" not in outcome.results
     assert outcome.results["CENTERLINE_COUNT"] > 0
+
+
+def test_cleaned_raster_is_what_the_steps_make(run, run_step, scene, tmp_path):
+    raster, cleaned, whole = (tmp_path / name for name in ("raster.tif", "cleaned.tif", "whole.tif"))
+    assert run({**scene, "CLEANED": whole}).ok
+    assert run_step("rasterizerailpoints", {"INPUT": scene["INPUT"], "OUTPUT": raster}).ok
+    assert run_step("frpdfcleanup", {"INPUT": raster, "ITERATIONS": 1, "OUTPUT": cleaned}).ok
+    for path in (whole, cleaned):
+        assert read_header(path).class_codes == (10,)
+        assert gdal.Open(str(path)).GetMetadataItem("RAIL_HEAD_MM") == "72"
+    cells = [set(map(tuple, places_of(path).round(3))) for path in (whole, cleaned)]
+    assert len(cells[0]) > 500
+    assert cells[0] == cells[1]
+
+
+def places_of(path):
+    """Centres of the rail cells of a file in its coordinates, (n, 2)."""
+    dataset = gdal.Open(str(path))
+    x, side, _, y, _, _ = dataset.GetGeoTransform()
+    rows, columns = np.nonzero(dataset.ReadAsArray())
+    return np.column_stack([x + (columns + 0.5) * side, y - (rows + 0.5) * side])
 
 
 def test_memory_layers(run, scene, context):

@@ -4,10 +4,10 @@ from qgis.core import NULL, QgsProcessing, QgsProcessingOutputLayerDefinition, Q
 from rail_extract.core.errors import RailExtractError
 from rail_extract.core.points import LocalFrame
 from rail_extract.core.rails import Centerline, RailLine
+from rail_extract.rail_extract_plugin.destinations import check_writable
 from rail_extract.rail_extract_plugin.layers import (
     CENTERLINE_FIELDS,
     RAIL_FIELDS,
-    check_writable,
     features,
     fields,
     output_crs,

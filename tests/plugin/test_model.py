@@ -3,9 +3,10 @@
 from pathlib import Path
 
 import make_model
+import numpy as np
 import pytest
-from lines import farthest, read_lines
-from qgis.core import QgsProcessingModelAlgorithm
+from lines import farthest, read_features, read_lines
+from qgis.core import QgsProcessingModelAlgorithm, QgsProcessingParameterDefinition
 
 MODEL = Path(__file__).resolve().parents[2] / "models" / "extract_rails.model3"
 
@@ -70,11 +71,19 @@ def test_context_menu_of_extract_rails_opens_a_copy(qgis, plugin, model):
 
 
 def test_model_gives_the_lines_of_extract_rails(model, run, outcome, write_cloud, track, tmp_path):
-    inputs = {"INPUT": write_cloud(track()), "ITERATIONS": 1}
-    whole = {"RAILS": tmp_path / "rails.gpkg", "CENTERLINES": tmp_path / "tracks.gpkg"}
-    steps = {"rails:RAILS": tmp_path / "r.gpkg", "centerlines:CENTERLINES": tmp_path / "t.gpkg"}
+    inputs = {"INPUT": write_cloud(track()), "ITERATIONS": 1, "STEP": 0.5}
+    whole = {name: tmp_path / f"{name}.gpkg" for name in ("RAILS", "CENTERLINES", "QUALITY")}
+    names = ("rails:RAILS", "centerlines:CENTERLINES", "quality:QUALITY")
+    steps = {name: tmp_path / f"{number}.gpkg" for number, name in enumerate(names)}
     assert {definition.name() for definition in model.destinationParameterDefinitions()} == set(steps)
+    assert model.parameterDefinition("quality:QUALITY").flags() & QgsProcessingParameterDefinition.Flag.FlagOptional
     for made in (run({**inputs, **whole}), outcome(model, {**inputs, **steps})):
         assert made.ok, made.error
-    for mine, theirs in zip(steps.values(), whole.values()):
+    for mine, theirs in list(zip(steps.values(), whole.values()))[:2]:
         assert farthest(read_lines(mine), read_lines(theirs)) < 0.001
+    measured = [read_features(paths[name]) for paths, name in ((steps, names[2]), (whole, "QUALITY"))]
+    assert len(measured[0]) == len(measured[1]) > 20
+    for (mine, _), (theirs, _) in zip(*measured):
+        np.testing.assert_allclose(mine, theirs, atol=1e-4)
+    for name in ("gauge_mm", "cant_mm", "sigma_mm", "points"):
+        np.testing.assert_allclose(*([items[name] for _, items in rows] for rows in measured), rtol=1e-3, atol=0.01)

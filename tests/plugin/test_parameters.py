@@ -27,23 +27,32 @@ PARAMETERS = [
     ("MIN_LENGTH", "number", 1.0),
     ("OTHER_GAUGES", "string", None),
     ("CENTERLINE_TOLERANCE", "number", 0.05),
+    ("STEP", "number", 1.0),
     ("RAILS", "sink", None),
     ("CENTERLINES", "sink", None),
+    ("QUALITY", "sink", None),
+    ("CLEANED", "rasterDestination", None),
 ]
 """The interface, which other people's scripts depend on."""
 
 OUTPUTS = {
     "RAILS": "outputVector",
     "CENTERLINES": "outputVector",
+    "QUALITY": "outputVector",
+    "CLEANED": "outputRaster",
     "RAIL_COUNT": "outputNumber",
     "RAIL_LENGTH": "outputNumber",
     "CENTERLINE_COUNT": "outputNumber",
     "CENTERLINE_LENGTH": "outputNumber",
+    "STATION_COUNT": "outputNumber",
+    "SIGMA": "outputNumber",
+    "BRIDGED_LENGTH": "outputNumber",
     "ENGINE_USED": "outputString",
 }
 
-ESSENTIAL = {"INPUT", "RAIL_CLASSES", "STANDARD", "GAUGE", "HEAD_WIDTH", "EXTENT", "MAX_GAP", "RAILS", "CENTERLINES"}
-OPTIONAL = {"GAUGE", "HEAD_WIDTH", "EXTENT", "CRS", "OTHER_GAUGES", "RAILS", "CENTERLINES"}
+RESULTS = {"RAILS", "CENTERLINES", "QUALITY", "CLEANED"}
+ESSENTIAL = {"INPUT", "RAIL_CLASSES", "STANDARD", "GAUGE", "HEAD_WIDTH", "EXTENT", "MAX_GAP"} | RESULTS
+OPTIONAL = {"GAUGE", "HEAD_WIDTH", "EXTENT", "CRS", "OTHER_GAUGES"} | RESULTS
 
 
 def having(algorithm, flag):

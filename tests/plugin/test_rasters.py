@@ -1,5 +1,7 @@
 """Rail rasters in files: what comes back, what is touched, and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from osgeo import gdal
@@ -13,7 +15,7 @@ from rail_extract.core.standards import STANDARDS
 from rail_extract.core.vectorize import vectorize
 from rail_extract.rail_extract_plugin import rasters as rasters_module
 from rail_extract.rail_extract_plugin.geotiff import filled_blocks, read_header, read_rasters, write_rasters
-from rail_extract.rail_extract_plugin.rasters import BLOCK, choose_model, header_for, moved
+from rail_extract.rail_extract_plugin.rasters import BLOCK, choose_model, header_for, moved, on_one_grid
 
 STANDARD = STANDARDS["EN_60E1_1435"]
 CELL_M = cell_size(STANDARD.gauge_m, STANDARD.head_width_m)
@@ -248,3 +250,15 @@ def test_limit_counts_blocks(monkeypatch):
     monkeypatch.setattr(rasters_module, "MOST_BLOCKS", 3)
     with pytest.raises(RasterError, match="set EXTENT"):
         header_for([raster], (10,), frame_in("EPSG:32643"), STANDARD)
+
+
+def test_rasters_of_stretches_come_onto_one_grid():
+    """Two rasters that begin tiles apart, as those of classes with other stretches do."""
+    side_m = TILE * CELL_M
+    frame = frame_in("EPSG:32643")
+    first = replace(rasterize(strokes(), CELL_M), x0=3 * side_m, y0=-2 * side_m)
+    second = replace(rasterize(strokes(seed=1), CELL_M), x0=-side_m, y0=5 * side_m)
+    aligned, common = on_one_grid([first, second], frame)
+    assert {(raster.x0, raster.y0) for raster in aligned} == {(0.0, 0.0)}
+    for raster, before in zip(aligned, (first, second)):
+        np.testing.assert_allclose(places(raster, common), places(before, frame), atol=1e-6)

@@ -68,6 +68,15 @@ INTERFACE = {
         "SMOOTHING_XY=0.8 SIMPLIFY_XY=0.002 SIMPLIFY_Z=0.002 MIN_LENGTH=1.0 OUTPUT",
         {"OUTPUT": "outputVector", "CENTERLINE_COUNT": "outputNumber", "CENTERLINE_LENGTH": "outputNumber"},
     ),
+    "measuretrackgeometry": (
+        "INPUT RAILS POINTS STEP=1.0 STANDARD=EN_60E1_1435 HEAD_WIDTH OUTPUT",
+        {
+            "OUTPUT": "outputVector",
+            "STATION_COUNT": "outputNumber",
+            "SIGMA": "outputNumber",
+            "BRIDGED_LENGTH": "outputNumber",
+        },
+    ),
 }
 """Parameters with their defaults, and outputs: the interface, which other people's scripts depend on."""
 
@@ -206,8 +215,8 @@ def test_bad_input_is_one_sentence(run_step, raster, tmp_path, name, parameters,
 
 def test_points_that_do_not_belong_to_the_raster_are_refused(run_step, raster, write_cloud, track, tmp_path):
     for points, given, sentence in (
-        (track(), {"epsg": 32644}, "POINTS are in WGS 84 / UTM zone 44N but the raster is in WGS 84 / UTM zone 43N"),
-        (track() + [5000, 0, 0], {}, "POINTS have no point of class 10 in the raster's area"),
+        (track(), {"epsg": 32644}, "POINTS are in WGS 84 / UTM zone 44N but the raster in WGS 84 / UTM zone 43N"),
+        (track() + [5000, 0, 0], {}, "POINTS have no point of class 10 in the area of the raster"),
         (track(), {"class_code": 11}, "POINTS have no point of class 10"),
     ):
         other = write_cloud(points, "other.las", **given)

@@ -1,0 +1,102 @@
+"""Measure Track Geometry: gauge, cant, twist, radius and gradient of tracks by chainage, and their support."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from qgis.core import (
+    QgsProcessing,
+    QgsProcessingContext,
+    QgsProcessingParameterFeatureSink,
+)
+
+from ...core.errors import RailExtractError
+from ...core.progress import Progress
+from .. import parameters as groups
+from ..clouds import CloudSource
+from ..i18n import tr
+from ..layers import figures_of_stations, write_stations
+from ..values import Values
+from .base import RailAlgorithm
+
+READING = 0.3
+"""Share of the progress bar for reading lines and cloud."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What the parameters say."""
+
+    head_width_m: float
+    cloud: CloudSource | None
+
+
+class MeasureTrackGeometry(RailAlgorithm):
+    """The algorithm ``railextract:measuretrackgeometry``."""
+
+    NAME = "measuretrackgeometry"
+    LABEL = "Measure track geometry"
+    TAGS = (
+        "railway",
+        "track",
+        "gauge",
+        "cant",
+        "superelevation",
+        "twist",
+        "radius",
+        "curvature",
+        "gradient",
+        "quality",
+    )
+    NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
+    SUMMARY = "Measures gauge, cant, twist, radius and gradient along tracks, and how well the points support them."
+    HELP = (
+        "Takes the lines of Extract Rails, or lines drawn by hand, and gives points along each centerline.\n\n"
+        "chainage_m: distance from the start of the line, in plan. gauge_mm: distance in space between the rail lines "
+        "less the railhead width; it is not measured 14 mm below the top. cant_mm: left rail minus right rail, seen "
+        "along the line. twist_mm: change of cant over 3 m, ahead minus behind. radius_m: on a chord of 20 m, positive "
+        "in curves to the left, empty above 10 km. grade_pm: rise in per mille over 10 m. sigma_mm: standard error of "
+        "the centerline across. points: those on both rails that are nearest. bridged: 1 where a rail has no points or "
+        "is not there.\n\n"
+        "With POINTS, heights are measured anew and smoothed over 1 m only, and sigma_mm, points and bridged are those "
+        "of the place. Without, heights are those of the rails, each rail's sigma_mm and points are taken as even "
+        "along it, and bridged is 1 only where a rail is not there."
+    )
+
+    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
+        """Declare the parameters and outputs of the interface, in its order."""
+        inputs = (groups.centerlines(), groups.rails_of_tracks(), groups.points_of_rails())
+        for definition in (*inputs, groups.step(), *groups.head()):
+            self.addParameter(definition)
+        point = QgsProcessing.SourceType.TypeVectorPoint
+        self.addParameter(QgsProcessingParameterFeatureSink("OUTPUT", tr("Track geometry"), point, optional=True))
+        for output in groups.quality_figures():
+            self.addOutput(output)
+
+    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+        """Read what has to be read in the main thread, and check it all."""
+        values = Values(self, parameters, context)
+        for name in ("INPUT", "RAILS"):
+            if self.parameterAsSource(parameters, name, context) is None:
+                raise RailExtractError(self.invalidSourceError(parameters, name))
+        return Job(values.head_width_m(), values.cloud("POINTS") if values.filled("POINTS") else None)
+
+    def compute(
+        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
+    ) -> dict[str, Any]:
+        """Measure every track, then write the points."""
+        from ...core.geometry import measure_track_geometry
+        from ..track_inputs import check_gauges, read_inputs
+
+        sources = (self.parameterAsSource(parameters, name, context) for name in ("INPUT", "RAILS"))
+        tracks = read_inputs(*sources, job.cloud, progress.span(0, READING))
+        step_m = Values(self, parameters, context).number("STEP")
+        share = progress.span(READING, 1)
+        measured = measure_track_geometry(
+            tracks.centerlines, tracks.rails, job.head_width_m, tracks.clouds, step_m, share
+        )
+        check_gauges(tracks, measured, progress)
+        progress.check()
+        written = write_stations(self, "OUTPUT", measured, tracks.frame, parameters, context)
+        return {**written, **figures_of_stations(measured)}

@@ -1,0 +1,84 @@
+"""Points of a cloud in the area of a raster or of lines that were made from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from qgis.core import QgsCoordinateReferenceSystem
+
+from ..core.crs import same_plane
+from ..core.errors import CrsError, NoRailPointsError
+from ..core.points import LocalFrame, RailPoints, read_headers
+from ..core.progress import Progress
+from .clouds import Bounds, CloudSource, read_points
+
+
+@dataclass(frozen=True)
+class Area:
+    """Where points of which classes are looked for.
+
+    Attributes
+    ----------
+    what : str
+        What lies there, for messages: raster or rails.
+    class_codes : tuple of int
+    bounds : tuple of float
+        Smallest x, smallest y, largest x, largest y, in units of the coordinate system.
+    frame : LocalFrame
+    """
+
+    what: str
+    class_codes: tuple[int, ...]
+    bounds: Bounds
+    frame: LocalFrame
+
+
+def read_points_in(area: Area, cloud: CloudSource, progress: Progress) -> dict[int, RailPoints]:
+    """Read the points of an area's classes, by class, all in one local frame.
+
+    A cloud or an area that states no coordinate system is taken to be in that of the other.
+
+    Raises
+    ------
+    CrsError
+        Cloud and area are in different coordinate systems.
+    NoRailPointsError
+        The cloud has no points of a class there.
+    """
+    crs_wkt = read_headers(cloud.paths)[0].crs_wkt or cloud.crs_wkt
+    check_same_plane("POINTS", crs_wkt, f"the {area.what}", area.frame)
+
+    def bounds(crs: QgsCoordinateReferenceSystem) -> Bounds:
+        return area.bounds
+
+    source = replace(cloud, crs_wkt=cloud.crs_wkt or area.frame.crs_wkt)
+    try:
+        clouds = {points.class_code: points for points in read_points(source, area.class_codes, bounds, progress)}
+    except NoRailPointsError:
+        clouds = {}
+    missing = [str(code) for code in area.class_codes if code not in clouds]
+    if missing:
+        raise NoRailPointsError(
+            f"POINTS have no point of class {', '.join(missing)} in the area of the {area.what}: "
+            f"give the cloud that the {area.what} came from."
+        )
+    return clouds
+
+
+def check_same_plane(name: str, crs_wkt: str | None, other_name: str, other: LocalFrame) -> None:
+    """Refuse two coordinate systems that mean different places; an unknown one is taken to be the other.
+
+    Raises
+    ------
+    CrsError
+        They are known and differ; both are named.
+    """
+    if crs_wkt and other.crs_wkt and not same_plane(crs_wkt, other.crs_wkt, tuple(other.origin[:2])):
+        raise CrsError(
+            f"{name} are in {_title(crs_wkt)} but {other_name} in {_title(other.crs_wkt)}: give both in one "
+            "coordinate system."
+        )
+
+
+def _title(wkt: str) -> str:
+    return QgsCoordinateReferenceSystem(wkt).description()

@@ -1,0 +1,242 @@
+"""Track geometry of lines in layers: numbers, signs, units, and inputs that do not fit each other."""
+
+import numpy as np
+import pytest
+from qgis.core import NULL, QgsFeature, QgsGeometry, QgsLineString, QgsVectorLayer
+
+SPACING_MM = 1507.0
+RADIUS_M = 300.0
+CANT_MM = 60.0
+PLACE = np.array([500_000.0, 3_000_000.0, 100.0])
+
+
+def layer_of(lines, kind="LineStringZ", crs="EPSG:32643", fields="", values=()):
+    """A layer in memory of lines, (n, 3) each, with the fields and values given."""
+    layer = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "lines", "memory")
+    for number, line in enumerate(lines):
+        feature = QgsFeature(layer.fields())
+        feature.setGeometry(QgsGeometry(QgsLineString(*np.asarray(line).T.tolist())))
+        if values:
+            feature.setAttributes(list(values[number]))
+        assert layer.dataProvider().addFeature(feature)
+    return layer
+
+
+def curve(offset_m, rise_m, radius_m=RADIUS_M, length_m=60.0, unit_m=1.0):
+    """Line beside a curve to the left, further left by the offset and higher by the rise; 4 per mille uphill."""
+    angle = np.linspace(0, length_m / radius_m, 121)
+    r = radius_m - offset_m
+    xyz = np.column_stack([r * np.sin(angle), radius_m - r * np.cos(angle), 0.004 * radius_m * angle + rise_m])
+    return xyz / unit_m + PLACE
+
+
+def curved_track(**kind):
+    """Centerline, left rail, right rail of a curve to the left, whose left rail is the lower one."""
+    half = 0.5 * np.sqrt((SPACING_MM / 1000) ** 2 - (CANT_MM / 1000) ** 2)
+    rise = CANT_MM / 2000
+    return curve(0, 0, **kind), curve(half, -rise, **kind), curve(-half, rise, **kind)
+
+
+@pytest.fixture
+def measure(qgis, run_step, context):
+    """Measure tracks, and give the outcome and the values of the points by field."""
+
+    def run(centerlines, rails, feedback=None, **parameters):
+        given = {"INPUT": centerlines, "RAILS": rails, "OUTPUT": "memory:", **parameters}
+        outcome = run_step("measuretrackgeometry", given, *([feedback] if feedback else []))
+        assert outcome.ok, outcome.error
+        layer = context.getMapLayer(outcome.results["OUTPUT"])
+        features = list(layer.getFeatures())
+        values = {
+            name: np.array([np.nan if feature[name] == NULL else feature[name] for feature in features], dtype=float)
+            for name in layer.fields().names()
+        }
+        return outcome.results, layer, values
+
+    return run
+
+
+def test_points_have_the_fields_of_the_interface_and_the_numbers_of_the_track(measure):
+    middle, left, right = curved_track()
+    results, layer, values = measure(layer_of([middle]), layer_of([left, right]))
+    assert " ".join(values) == (
+        "track_id chainage_m gauge_mm cant_mm twist_mm radius_m grade_pm sigma_mm points bridged"
+    )
+    assert layer.wkbType() == 1001  # PointZ
+    assert layer.crs().authid() == "EPSG:32643"
+    assert results["STATION_COUNT"] == len(values["track_id"]) == 60  # the chords are a little shorter than the arc
+    np.testing.assert_allclose(values["chainage_m"], np.arange(60))
+    np.testing.assert_allclose(values["gauge_mm"], SPACING_MM - 72.0, atol=0.2)
+    np.testing.assert_allclose(values["cant_mm"], -CANT_MM, atol=0.01)
+    np.testing.assert_allclose(values["radius_m"], RADIUS_M, rtol=0.002)
+    np.testing.assert_allclose(values["grade_pm"], 4.0, atol=0.01)
+    np.testing.assert_allclose(values["twist_mm"][2:-2], 0.0, atol=0.01)
+    assert np.isnan(values["twist_mm"][[0, 1, -1]]).all()
+    assert not values["bridged"].any()
+    assert results["BRIDGED_LENGTH"] == 0
+    first = next(layer.getFeatures()).geometry().constGet()
+    np.testing.assert_allclose([first.x(), first.y(), first.z()], middle[0], atol=1e-6)
+
+
+def test_signs_follow_the_direction_of_the_centerline(measure):
+    middle, left, right = curved_track()
+    _, _, values = measure(layer_of([middle[::-1]]), layer_of([left, right[::-1]]))
+    np.testing.assert_allclose(values["cant_mm"], CANT_MM, atol=0.01)
+    np.testing.assert_allclose(values["radius_m"], -RADIUS_M, rtol=0.002)
+    np.testing.assert_allclose(values["grade_pm"], -4.0, atol=0.01)
+
+
+@pytest.mark.parametrize(("radius_m", "known"), [(9_000.0, True), (12_000.0, False)])
+def test_radius_is_empty_above_ten_kilometres(measure, radius_m, known):
+    middle, left, right = curved_track(radius_m=radius_m)
+    _, _, values = measure(layer_of([middle]), layer_of([left, right]))
+    assert np.isfinite(values["radius_m"]).all() == known
+    assert np.isfinite(values["radius_m"]).any() == known
+
+
+def test_feet_give_the_same_millimetres(measure):
+    lines = curved_track(unit_m=1200 / 3937)
+    _, layer, values = measure(layer_of(lines[:1], crs="EPSG:2263"), layer_of(lines[1:], crs="EPSG:2263"))
+    np.testing.assert_allclose(values["gauge_mm"], SPACING_MM - 72.0, atol=0.2)
+    np.testing.assert_allclose(values["cant_mm"], -CANT_MM, atol=0.01)
+    np.testing.assert_allclose(values["radius_m"], RADIUS_M, rtol=0.002)
+    assert layer.crs().authid() == "EPSG:2263"
+
+
+def test_step_and_head_width(measure):
+    middle, left, right = curved_track()
+    rails = layer_of([left, right])
+    _, _, values = measure(layer_of([middle]), rails, STEP=2.5, HEAD_WIDTH=65)
+    np.testing.assert_allclose(np.diff(values["chainage_m"]), 2.5)
+    np.testing.assert_allclose(values["gauge_mm"], SPACING_MM - 65.0, atol=0.2)
+    _, _, values = measure(layer_of([middle]), rails, STANDARD="IN_75R_1000")
+    np.testing.assert_allclose(values["gauge_mm"], SPACING_MM - 61.91, atol=0.2)
+
+
+def test_lines_without_heights_have_gauge_and_radius_only(measure):
+    middle, left, right = (line[:, :2] for line in curved_track())
+    _, layer, values = measure(layer_of([middle], "LineString"), layer_of([left, right], "LineString"))
+    assert layer.wkbType() == 1  # Point
+    np.testing.assert_allclose(values["gauge_mm"], SPACING_MM - 72.0, atol=2)
+    np.testing.assert_allclose(values["radius_m"], RADIUS_M, rtol=0.002)
+    for name in ("cant_mm", "twist_mm", "grade_pm"):
+        assert np.isnan(values[name]).all()
+
+
+def test_without_a_cloud_support_is_that_of_the_rails_fields(measure):
+    middle, left, right = curved_track()
+    fields = "&field=rail_id:integer&field=class_code:integer&field=points:integer&field=sigma_mm:double"
+    rails = layer_of([left, right], fields=fields, values=[(4, 10, 600, 3.0), (9, 10, 1200, 4.0)])
+    fields = "&field=track_id:integer&field=left_ids:string(20)&field=right_ids:string(20)&field=gauge_mm:double"
+    lines = layer_of([middle], fields=fields, values=[(12, "4", "9", 1435.0)])
+    results, _, values = measure(lines, rails)
+    assert set(values["track_id"]) == {12}
+    np.testing.assert_allclose(values["sigma_mm"], 2.5, rtol=1e-6)
+    assert results["SIGMA"] == pytest.approx(2.5)
+    np.testing.assert_allclose(values["points"][1:-1], 30, atol=1)
+
+
+def test_rails_that_end_early_leave_the_rest_bridged(measure):
+    middle, left, right = curved_track()
+    results, _, values = measure(layer_of([middle]), layer_of([left, right[:61]]))
+    half_way = values["chainage_m"] < 30
+    assert not values["bridged"][half_way].any()
+    assert values["bridged"][~half_way][1:].all()
+    assert results["BRIDGED_LENGTH"] == pytest.approx(29, abs=1)
+
+
+def test_layers_and_cloud_give_the_numbers_of_extract_rails(run, measure, write_cloud, track, tmp_path):
+    cloud = write_cloud(track())
+    paths = {name: tmp_path / f"{name}.gpkg" for name in ("RAILS", "CENTERLINES", "QUALITY")}
+    outcome = run({"INPUT": cloud, "ITERATIONS": 1, "STEP": 0.5, **paths})
+    assert outcome.ok, outcome.error
+    results, _, values = measure(str(paths["CENTERLINES"]), str(paths["RAILS"]), POINTS=str(cloud), STEP=0.5)
+    features = list(QgsVectorLayer(str(paths["QUALITY"]), "quality").getFeatures())
+    assert len(features) == outcome.results["STATION_COUNT"] == results["STATION_COUNT"] > 20
+    for name, found in values.items():
+        expected = [np.nan if feature[name] == NULL else feature[name] for feature in features]
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-4, err_msg=name)
+    assert outcome.results["SIGMA"] == pytest.approx(results["SIGMA"], rel=1e-6)
+    assert values["points"].sum() > 3000
+
+
+def test_another_head_width_than_before_is_warned_of(measure, new_feedback):
+    middle, left, right = curved_track()
+    lines = layer_of([middle], fields="&field=gauge_mm:double", values=[(1435.0,)])
+    feedback = new_feedback()
+    measure(lines, layer_of([left, right]), feedback, HEAD_WIDTH=66)
+    assert "+6.0 mm off" in feedback.warnings[0]
+    assert "check HEAD_WIDTH" in feedback.warnings[0]
+
+
+def test_a_line_away_from_rails_is_warned_of(measure, new_feedback):
+    middle, left, right = curved_track()
+    feedback = new_feedback()
+    _, _, values = measure(layer_of([middle, middle + [0, 50, 0]]), layer_of([left, right]), feedback)
+    assert "Tracks 2 have no rails on both sides" in feedback.warnings[0]
+    away = values["track_id"] == 2
+    assert np.isnan(values["gauge_mm"][away]).all()
+    assert values["bridged"][away].all()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "sentence"),
+    [
+        ({"INPUT": "gone.gpkg"}, "gone.gpkg"),
+        ({"RAILS": "gone.gpkg"}, "gone.gpkg"),
+        ({"RAILS": None}, "RAILS"),
+        ({"POINTS": "gone.laz"}, "gone.laz does not exist"),
+        ({"STANDARD": "CUSTOM"}, "fill HEAD_WIDTH"),
+        ({"HEAD_WIDTH": 100}, "A railhead width of 100 mm is not possible"),
+        ({"STEP": 0}, "STEP"),
+        ({"OUTPUT": "/nowhere/q.gpkg"}, "can't be written"),
+    ],
+)
+def test_bad_parameter_is_one_sentence(qgis, run_step, parameters, sentence):
+    middle, left, right = curved_track()
+    given = {"INPUT": layer_of([middle]), "RAILS": layer_of([left, right]), "OUTPUT": "memory:", **parameters}
+    assert_refused(run_step("measuretrackgeometry", given), sentence)
+
+
+def test_inputs_that_do_not_fit_each_other_are_refused(qgis, run_step, write_cloud):
+    middle, left, right = curved_track()
+    lines, rails = layer_of([middle]), layer_of([left, right])
+    degrees = layer_of([[[75, 27, 0], [75.1, 27, 0]]], crs="EPSG:4326")
+    on_rails = np.concatenate([left, right])
+    for parameters, sentence in (
+        ({"INPUT": degrees}, "The lines are in degrees"),
+        ({"INPUT": layer_of([])}, "INPUT holds no line"),
+        ({"RAILS": layer_of([])}, "RAILS holds no line"),
+        ({"RAILS": layer_of([left], crs="EPSG:32644")}, "RAILS are in WGS 84 / UTM zone 44N but INPUT in WGS 84 / UTM"),
+        ({"RAILS": layer_of([left + [0, 90, 0]])}, "RAILS lie beside none of the lines of INPUT"),
+        (
+            {"POINTS": write_cloud(on_rails, "zone.las", epsg=32644)},
+            "zone 44N but the rails in WGS 84",
+        ),
+        (
+            {"POINTS": write_cloud(on_rails, "class.las", class_code=11)},
+            "no point of class 10 in the area of the rails",
+        ),
+        (
+            {"POINTS": write_cloud(on_rails + [9000, 0, 0], "away.las")},
+            "no point of class 10 in the area of the rails",
+        ),
+    ):
+        given = {"INPUT": lines, "RAILS": rails, "OUTPUT": "memory:", **parameters}
+        assert_refused(run_step("measuretrackgeometry", given), sentence)
+
+
+def test_output_may_be_skipped(qgis, run_step):
+    middle, left, right = curved_track()
+    outcome = run_step("measuretrackgeometry", {"INPUT": layer_of([middle]), "RAILS": layer_of([left, right])})
+    assert outcome.ok, outcome.error
+    assert "OUTPUT" not in outcome.results
+    assert outcome.results["STATION_COUNT"] == 60
+
+
+def assert_refused(outcome, sentence):
+    """The run ended with one sentence."""
+    assert not outcome.ok
+    assert sentence in outcome.error
+    assert "Traceback" not in outcome.error
+    assert "\n" not in outcome.error.strip()
