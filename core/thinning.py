@@ -81,7 +81,6 @@ def _least_squares(values: np.ndarray, span: np.ndarray, share: np.ndarray, weig
         np.bincount(span, before * column, count) + np.bincount(span + 1, after * column, count)
         for column in np.nan_to_num(values).T
     ]
-    banded = np.stack([np.concatenate([[0.0], beside[1 : count - 2]]), diagonal[1:-1]])
-    vertices = np.zeros((count, values.shape[1]))
-    vertices[1:-1] = solveh_banded(banded, np.stack(right, axis=1)[1:-1])
-    return vertices
+    sums, beside = np.stack(right, axis=1), np.concatenate([[0.0], beside[:-1]])
+    diagonal[[0, -1]], beside[[1, -1]], sums[[0, -1]] = 1.0, 0.0, 0.0
+    return solveh_banded(np.stack([beside, diagonal]), sums)

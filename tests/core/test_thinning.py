@@ -60,3 +60,10 @@ def test_lines_without_height_are_thinned_in_plan():
     (thinned,), (expected,) = thin([rail(flat)], 0.002, 0.002), thin([rail(level)], 0.002, 0.002)
     np.testing.assert_allclose(thinned.xyz[:, :2], expected.xyz[:, :2], atol=1e-9)
     assert np.isnan(thinned.xyz[:, 2]).all()
+
+
+def test_of_a_bend_with_one_vertex_only_that_one_moves():
+    bend = np.array([[0.0, 0, 0], [1, 0.001, 0], [2, 0.1, 0], [3, 0.051, 0], [4, 0, 0]])
+    (line,) = thin([rail(bend)], 0.002, 0.002)
+    np.testing.assert_array_equal(line.xyz[[0, -1]], bend[[0, -1]])
+    assert len(line.xyz) >= 3
