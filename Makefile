@@ -1,6 +1,7 @@
 # Rail Extract on Debian 12 and Ubuntu. `make demo` and `make test` set up all they need; `make` lists the targets.
 
 SYSTEM_PYTHON ?= /usr/bin/python3
+# Empty: without PyTorch.
 TORCH ?= torch==2.13.0
 SUDO = $(if $(filter 0,$(shell id -u)),,sudo)
 PYTHON = .venv/bin/python
@@ -11,7 +12,7 @@ SYSTEM_MODULES = qgis.core numpy scipy matplotlib pyproj ensurepip
 
 .PHONY: help
 help:  ## list the targets
-	@sed -n 's/^\([a-z-]*\):.*## /make \1 - /p' Makefile
+	@sed -n 's/^\([a-z0-9. -]*\):.*## /make \1 - /p' Makefile
 
 .PHONY: demo
 demo: plugin  ## extract the sample's rails through qgis_process; lines and map go into build/demo
@@ -21,6 +22,15 @@ demo: plugin  ## extract the sample's rails through qgis_process; lines and map 
 test: lint plugin  ## run every test: core, plugin and, through qgis_process, the whole
 	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest tests/core
 	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest tests/plugin tests/e2e
+
+.PHONY: test-qgis
+test-qgis: plugin  ## run the tests that need QGIS: plugin and, through qgis_process, the whole
+	@. ./$(ENVIRONMENT) && "$$QGIS_PROCESS" --version | head -n 1 && $(PYTHON) -m pytest tests/plugin tests/e2e
+
+.PHONY: test-latest test-3.40
+test-latest test-3.40: test-%:  ## run the same with Debian testing's QGIS, or with the backports' 3.40, in a chroot
+	@command -v mmdebstrap > /dev/null || $(SUDO) apt-get install -q -y mmdebstrap debian-archive-keyring >&2
+	@$(SUDO) $(SYSTEM_PYTHON) tools/chroot.py $* '$(TORCH)' $(filter-out git,$(APT_PACKAGES))
 
 .PHONY: lint
 lint: .venv/installed  ## check the code's style
@@ -46,6 +56,10 @@ contact-sheet: .venv/installed  ## draw synthetic training pairs by family and s
 clean:  ## remove what was built; .venv stays
 	rm -rf build
 
+.PHONY: clean-chroots
+clean-chroots:  ## remove the other systems that test-latest and test-3.40 built
+	$(SUDO) rm -rf .chroots
+
 # The plugin as a user gets it, unpacked from the zip and enabled in a profile of its own.
 .PHONY: plugin
 plugin: package build/profile/enabled
@@ -60,7 +74,8 @@ $(ENVIRONMENT): tools/environment.py .venv/installed
 # Packages over QGIS's own Python: numpy and scipy stay at the system's versions, which GDAL's bridge is built against.
 .venv/installed: .venv/constraints.txt requirements.txt tools/requirements.txt pyproject.toml
 	@echo "Installing Python packages into .venv" >&2
-	@$(PYTHON) -m pip install --quiet --constraint $< -r requirements.txt -r tools/requirements.txt >&2
+	@$(if $(TORCH),cat,grep -v '^torch') requirements.txt > build/requirements.txt
+	@$(PYTHON) -m pip install --quiet --constraint $< -r build/requirements.txt -r tools/requirements.txt >&2
 	@$(PYTHON) -m pip install --quiet --no-deps --editable . >&2
 	@touch $@
 

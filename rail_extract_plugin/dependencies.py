@@ -1,13 +1,11 @@
-"""The Python packages that Rail Extract needs beyond QGIS: which are missing, and how to install them."""
+"""The Python packages that Rail Extract needs beyond QGIS: which are missing, and what to do about it."""
 
 from __future__ import annotations
 
-import sys
-import sysconfig
+from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import metadata
+from importlib import import_module
 from importlib.util import find_spec
-from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -32,6 +30,9 @@ PACKAGES = (
 OWNED_BY_QGIS = ("numpy", "scipy")
 """Held at the version QGIS came with, since its own parts are built against them."""
 
+OPTIONAL = ("torch",)
+"""Modules in whose place another one serves."""
+
 
 def missing_packages(needs: tuple[tuple[str, ...], ...]) -> tuple[Package, ...]:
     """Look for modules without importing them.
@@ -46,39 +47,47 @@ def missing_packages(needs: tuple[tuple[str, ...], ...]) -> tuple[Package, ...]:
     tuple of Package
         The first choice of every need that is not met.
     """
-    unmet = {modules[0] for modules in needs if all(find_spec(module) is None for module in modules)}
+    unmet = {modules[0] for modules in needs if not any(map(is_installed, modules))}
     return tuple(package for package in PACKAGES if package.module in unmet)
 
 
-def install_command(packages: tuple[Package, ...]) -> str:
-    """Command line that installs `packages` for the Python of this QGIS and leaves QGIS's own packages alone."""
-    options = ["--user"]
-    if (Path(sysconfig.get_path("stdlib")) / "EXTERNALLY-MANAGED").exists():
-        options.append("--break-system-packages")
-    requirements = list(dict.fromkeys(package.requirement for package in packages))
-    words = [_interpreter(), "-m", "pip", "install", *options, *_pins(), *requirements]
-    return " ".join(f'"{word}"' if set(word) & set(" [") else word for word in words)
+def is_installed(module: str) -> bool:
+    """Tell whether Python finds a module; it is not imported."""
+    try:
+        return find_spec(module) is not None
+    except (ImportError, ValueError):
+        return False
 
 
-def explain_missing(packages: tuple[Package, ...]) -> str:
-    """One sentence that names the missing packages and the command that installs them."""
+def explain_missing(label: str, packages: Sequence[Package], usable: Sequence[str]) -> str:
+    """Say what an algorithm lacks, what to do, and what works without it.
+
+    Parameters
+    ----------
+    label : str
+        Name of the algorithm.
+    packages : sequence of Package
+    usable : sequence of str
+        Names of the algorithms that lack nothing.
+    """
     names = ", ".join(package.module for package in packages)
-    noun = "package" if len(packages) == 1 else "packages"
-    return f"Missing Python {noun} {names}: run {install_command(packages)} and restart QGIS."
+    nouns = "Python package" if len(packages) == 1 else "Python packages"
+    others = f" {_listed(usable)} can be used without." if usable else ""
+    return (
+        f"{label} needs the {nouns} {names}, which this QGIS does not have: run Install packages in the toolbox under "
+        f"Rail Extract, or qgis_process run railextract:installpackages in a shell.{others}"
+    )
 
 
-def _interpreter() -> str:
-    """Python program of this QGIS: `sys.executable` may be QGIS itself, or another Python that comes first on PATH."""
-    prefix = Path(sys.prefix)
-    candidates = (prefix / "python.exe", Path(sys.executable).parent / "bin" / "python3", prefix / "bin" / "python3")
-    return next((str(path) for path in candidates if path.exists()), "python3")
+def version_of(module: str) -> str | None:
+    """Give the version of a module, which is imported; None where it is not there."""
+    return str(getattr(import_module(module), "__version__", "")) if is_installed(module) else None
 
 
-def _pins() -> list[str]:
-    pins = []
-    for name in OWNED_BY_QGIS:
-        try:
-            pins.append(f"{name}=={metadata.version(name)}")
-        except metadata.PackageNotFoundError:
-            continue
-    return pins
+def pins() -> list[str]:
+    """Requirements that hold what belongs to QGIS at the versions it has."""
+    return [f"{name}=={version_of(name)}" for name in OWNED_BY_QGIS if is_installed(name)]
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))

@@ -103,7 +103,7 @@ def _parts(geometry: QgsGeometry, chord: float) -> Iterator[np.ndarray]:
     straight = QgsGeometry(geometry)
     straight.convertToStraightSegment(chord, QgsAbstractGeometry.SegmentationToleranceType.MaximumDifference)
     for part in straight.constParts():
-        xyz = np.array([(vertex.x(), vertex.y(), vertex.z()) for vertex in part.vertices()], dtype=float)
+        xyz = np.array([(vertex.x(), vertex.y(), vertex.z()) for vertex in part.vertices()], dtype=float).reshape(-1, 3)
         if np.isnan(xyz[:, 2]).any():
             xyz[:, 2] = np.nan
         moves = np.append(True, np.any(np.diff(xyz[:, :2], axis=0) != 0, axis=1))

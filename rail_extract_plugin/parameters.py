@@ -26,6 +26,7 @@ from .i18n import tr
 AUTO = "AUTO"
 ENGINES = (AUTO, "TORCH", "OPENCV")
 DEVICES = (AUTO, "CPU", "CUDA")
+TORCH_BUILDS = ("NONE", "CPU", "CUDA")
 
 Definitions = tuple[QgsProcessingParameterDefinition, ...]
 
@@ -182,6 +183,14 @@ def cleanup() -> Definitions:
             _choice("DEVICE", tr("Device"), DEVICES, AUTO),
             tr("Processor that runs the network; AUTO takes a GPU where there is one."),
         ),
+    )
+
+
+def torch() -> QgsProcessingParameterDefinition:
+    """Which PyTorch to install."""
+    return _helped(
+        _choice("TORCH", tr("PyTorch"), TORCH_BUILDS, "NONE"),
+        tr("NONE leaves PyTorch out, and OpenCV runs the network; CPU suits every computer; CUDA needs an Nvidia GPU."),
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from qgis.core import QgsApplication
 
+from . import package_folders
 from .provider import RailExtractProvider
 
 
@@ -23,20 +24,26 @@ class RailExtractPlugin:
 
     def initProcessing(self) -> None:
         """Offer the algorithms; all that ``qgis_process`` calls."""
+        package_folders.use()
         self.provider = RailExtractProvider()
         QgsApplication.processingRegistry().addProvider(self.provider)
 
     def initGui(self) -> None:
         """Start in QGIS with windows."""
+        from . import package_setting
         from .model_action import OpenModelAction
 
         self.initProcessing()
         self.action = OpenModelAction()
         self.action.register()
+        package_setting.register()
 
     def unload(self) -> None:
         """Take the algorithms away again."""
         if self.action is not None:
+            from . import package_setting
+
+            package_setting.deregister()
             self.action.deregister()
             self.action = None
         if self.provider is not None:

@@ -29,6 +29,8 @@ def environment() -> dict[str, str]:
         "QGIS_PLUGINPATH": str(BUILD / "plugins"),
         "QGIS_CUSTOM_CONFIG_PATH": str(BUILD / "profile"),
         "PYTHONPATH": sysconfig.get_path("purelib"),
+        # pyproj looks for PROJ's data beside its Python, which in a virtual environment is the wrong place.
+        "PROJ_DATA": str(Path(sys.base_prefix) / "share" / "proj"),
         "QT_QPA_PLATFORM": "offscreen",
         "XDG_RUNTIME_DIR": str(BUILD / "runtime"),
     }

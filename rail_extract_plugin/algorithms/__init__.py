@@ -1,8 +1,10 @@
 """The algorithms of the toolbox, one module each."""
 
 from .build_track_centerlines import BuildTrackCenterlines
+from .check_installation import CheckInstallation
 from .extract_rails import ExtractRails
 from .frpdf_cleanup import FrpdfCleanup
+from .install_packages import InstallPackages
 from .measure_track_geometry import MeasureTrackGeometry
 from .rasterize_rail_points import RasterizeRailPoints
 from .vectorize_rails import VectorizeRails
@@ -14,5 +16,7 @@ ALGORITHMS = (
     VectorizeRails,
     BuildTrackCenterlines,
     MeasureTrackGeometry,
+    InstallPackages,
+    CheckInstallation,
 )
-"""The whole walk first, then its steps in their order."""
+"""The whole walk first, then its steps in their order, then what sets it up."""

@@ -116,7 +116,14 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     def canExecute(self) -> tuple[bool, str]:
         """Tell whether the needed packages are there; the algorithm stands in the toolbox in any case."""
         missing = missing_packages(self.NEEDS)
-        return (False, explain_missing(missing)) if missing else (True, "")
+        return (False, explain_missing(self.displayName(), missing, self._usable_labels())) if missing else (True, "")
+
+    def _usable_labels(self) -> list[str]:
+        """Names of the provider's algorithms in this one's group that lack no package."""
+        mates = self.provider().algorithms() if self.provider() else ()
+        return [
+            mate.displayName() for mate in mates if mate.GROUP_ID == self.GROUP_ID and not missing_packages(mate.NEEDS)
+        ]
 
     def createInstance(self) -> RailAlgorithm:
         """Make another one, for a run of its own."""

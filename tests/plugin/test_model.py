@@ -22,9 +22,17 @@ def model(plugin):
     return load(MODEL)
 
 
+def content(model):
+    """What a model holds, but for the format's number and the outputs' names, which newer QGIS writes otherwise."""
+    content = model.toVariant()
+    content.pop("internal_version", None)
+    definitions = content.pop("parameterDefinitions")
+    return content, {name.split(":")[0]: {**one, "name": ""} for name, one in definitions.items()}
+
+
 def test_model_is_what_its_command_writes(model, tmp_path):
     assert make_model.build().toFile(str(tmp_path / "made.model3"))
-    assert load(tmp_path / "made.model3").toVariant() == model.toVariant()
+    assert content(load(tmp_path / "made.model3")) == content(model)
 
 
 def test_model_is_sound_and_takes_what_extract_rails_takes(model, algorithm):

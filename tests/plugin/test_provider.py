@@ -15,6 +15,8 @@ def test_toolbox_offers_the_algorithms(qgis, plugin):
             "vectorizerails",
             "buildtrackcenterlines",
             "measuretrackgeometry",
+            "installpackages",
+            "checkinstallation",
         )
     }
 
@@ -32,7 +34,7 @@ def test_algorithm_explains_itself(algorithm):
 
 def test_every_parameter_explains_itself(plugin):
     for algorithm in plugin.provider.algorithms():
-        assert algorithm.group() == "Rails and tracks"
+        assert algorithm.group() in ("Rails and tracks", "Setup")
         for definition in algorithm.parameterDefinitions():
             assert definition.isDestination() or definition.help(), (algorithm.id(), definition.name())
 

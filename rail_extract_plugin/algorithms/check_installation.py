@@ -1,0 +1,95 @@
+"""Check Installation: versions, engine, models, and a short test of it all."""
+
+from __future__ import annotations
+
+import platform
+import sys
+from typing import Any
+
+from qgis.core import (
+    Qgis,
+    QgsProcessingContext,
+    QgsProcessingOutputBoolean,
+    QgsProcessingOutputString,
+)
+
+from ...core.errors import RailExtractError
+from ...core.progress import Progress
+from ..dependencies import missing_packages
+from ..i18n import tr
+from .base import RailAlgorithm
+from .extract_rails import ExtractRails
+
+
+class CheckInstallation(RailAlgorithm):
+    """The algorithm ``railextract:checkinstallation``."""
+
+    NAME = "checkinstallation"
+    LABEL = "Check installation"
+    GROUP = "Setup"
+    GROUP_ID = "setup"
+    TAGS = ("version", "versions", "test", "diagnose", "support", "gpu", "cuda", "engine")
+    SUMMARY = "Tells which versions, engine and models are there, and tests them on a short track."
+    HELP = (
+        "Takes less than a minute. It extracts a straight track of 20 m, made on the spot, and compares it with the "
+        "truth. Put what it prints into every report of an error."
+    )
+
+    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
+        """Declare the outputs; there is nothing to fill in."""
+        for name, label in (
+            ("VERSIONS", tr("Versions of QGIS, Python and packages")),
+            ("MODELS", tr("State of the models")),
+            ("ENGINE_USED", tr("Engine and device that run the network")),
+            ("SELF_TEST", tr("What the test came to")),
+        ):
+            self.addOutput(QgsProcessingOutputString(name, label))
+        self.addOutput(QgsProcessingOutputBoolean("PASSED", tr("Whether all is well")))
+
+    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> None:
+        """Nothing is to be read."""
+
+    def compute(
+        self, job: None, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
+    ) -> dict[str, Any]:
+        """Look at everything, and say it line by line."""
+        from .. import self_test
+
+        versions = {
+            "QGIS": Qgis.QGIS_VERSION,
+            "Python": f"{platform.python_version()} ({sys.executable})",
+            "system": platform.platform(),
+            **{module: self_test.version(module) for module in self_test.MODULES},
+        }
+        models = self_test.model_states()
+        for name, text in {**versions, **{f"model {name}": state for name, state in models.items()}}.items():
+            progress.info(f"{name}: {text}")
+        passed, words, engine = self._test(progress)
+        if passed and set(models.values()) != {"ok"}:
+            passed, words = False, tr("{}, but with weights that are not those of the release").format(words)
+        verdict = tr("passed") if passed else tr("failed")
+        (progress.info if passed else progress.warning)(f"Self test {verdict}: {words}.")
+        return {
+            "VERSIONS": _joined(versions),
+            "MODELS": _joined(models),
+            "ENGINE_USED": engine,
+            "SELF_TEST": f"{verdict}: {words}",
+            "PASSED": passed,
+        }
+
+    def _test(self, progress: Progress) -> tuple[bool, str, str]:
+        """Extract a track where nothing is missing for that."""
+        from .. import self_test
+
+        missing = missing_packages(ExtractRails.NEEDS)
+        if missing:
+            names = ", ".join(package.module for package in missing)
+            return False, tr("{} missing, run Install packages").format(names), ""
+        try:
+            return self_test.extract_straight(progress)
+        except (RailExtractError, ImportError) as error:
+            return False, str(error).rstrip("."), ""
+
+
+def _joined(texts: dict[str, str]) -> str:
+    return ", ".join(f"{name} {text}" for name, text in texts.items())
