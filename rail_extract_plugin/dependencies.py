@@ -85,7 +85,7 @@ def version_of(module: str) -> str | None:
 
 
 def pins() -> list[str]:
-    """Requirements that hold what belongs to QGIS at the versions it has."""
+    """Give requirements that hold what belongs to QGIS at the versions it has."""
     return [f"{name}=={version_of(name)}" for name in OWNED_BY_QGIS if is_installed(name)]
 
 

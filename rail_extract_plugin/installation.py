@@ -35,7 +35,9 @@ PIP_ENVIRONMENT = {
 BINARIES = "--only-binary=:all:"
 """Nobody should need a compiler."""
 
-IMPORT = "import sys; count = int(sys.argv[1]); sys.path += sys.argv[2:count]; [__import__(m) for m in sys.argv[count:]]"
+IMPORT = (
+    "import sys; end = int(sys.argv[1]); sys.path += sys.argv[2:end]; [__import__(name) for name in sys.argv[end:]]"
+)
 
 
 @dataclass(frozen=True)

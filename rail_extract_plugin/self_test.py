@@ -1,4 +1,4 @@
-"""Does it work here? Versions of packages, the weights' checksums, and a short track extracted and held to its truth."""
+"""Does it work here? Versions of packages, checksums of the weights, and a short track held to its truth."""
 
 from __future__ import annotations
 
