@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from measuring import Result
 from rail_extract.core.synthetic.compare import Match
-
-if TYPE_CHECKING:
-    from accuracy import Result
 
 TOLERANCES_M = (0.01, 0.02, 0.05, 0.10)
 JUDGED_M = 0.05
@@ -32,21 +29,28 @@ def found_table(results: Sequence[Result]) -> str:
 
 
 def error_table(results: Sequence[Result]) -> str:
-    """Errors across and in height, of gauge and cant, and how honest sigma_mm is."""
+    """Errors across and in height, of gauge, cant and radius, and how honest the standard error is."""
     lines = [
-        "Errors within 5 cm, in millimetres, the worse of truth to lines and lines to truth.",
-        f"{'':<27}{'across':>18}{'height':>18}{'in':>6}{'gauge':>12}{'cant':>12}{'w/':>9}",
-        f"{'scene':<13}{'lines of':<14}" + 2 * f"{'rms':>6}{'p95':>6}{'bias':>6}" + f"{'sigma':>6}"
-        f"{'bias':>6}{'rms':>6}" + f"{'bias':>6}{'rms':>6}" + f"{'sqrt 12n':>9}",
+        "Errors within 5 cm, in millimetres, the worse of truth to lines and lines to truth; measured: track geometry.",
+        f"{'':<27}{'across':>18}{'height':>18}{'within':>12}{'gauge':>12}{'cant':>12}{'measured rms':>18}{'w/':>9}",
+        f"{'scene':<13}{'lines of':<14}" + 2 * f"{'rms':>6}{'p95':>6}{'bias':>6}" + f"{'sigma':>6}{'2 s.':>6}"
+        f"{'bias':>6}{'rms':>6}" + f"{'bias':>6}{'rms':>6}" + f"{'gauge':>6}{'cant':>6}{'rad.':>6}{'sqrt 12n':>9}",
     ]
     for result in results:
         tracks = result.tracks
         lines.append(
             _errors(result.scene, "rails", result.rails)
-            + f"{100 * result.within_sigma:>5.0f}%{'':>24}{1000 * result.mean_error_m:>9.1f}"
+            + f"{100 * result.within_sigma:>5.0f}%{100 * result.within_two_sigma:>5.0f}%{'':>42}"
+            f"{1000 * result.mean_error_m:>9.1f}"
         )
         gauge_and_cant = tracks.gauge_bias_m, tracks.gauge_rmse_m, tracks.cant_bias_m, tracks.cant_rmse_m
-        lines.append(_errors("", "centerlines", result.centerlines) + f"{'':>6}" + _millimetres(gauge_and_cant))
+        measured = result.geometry
+        lines.append(
+            _errors("", "centerlines", result.centerlines)
+            + f"{'':>12}"
+            + _millimetres((*gauge_and_cant, measured.gauge_m, measured.cant_m))
+            + (f"{100 * measured.radius:>5.1f}%" if np.isfinite(measured.radius) else f"{'-':>6}")
+        )
         lines.append(_errors("", "plain script", result.peer))
     return "\n".join(lines)
 

@@ -88,12 +88,15 @@ class Match:
         Along the truth, and along the lines.
     line : (n,) int array
         Line that each place of `back` lies on.
+    t : (n,) array
+        Plan distance of each place of `back` from the start of its line, metres.
     line_count, truth_count : int
     """
 
     there: Offsets
     back: Offsets
     line: np.ndarray
+    t: np.ndarray
     line_count: int
     truth_count: int
 
@@ -114,19 +117,30 @@ class Match:
             length_ratio=self.back.length_m / self.there.length_m,
         )
 
-    def share_within(self, sigmas_m: np.ndarray, tolerance_m: float = 0.05) -> float:
-        """Share of the lateral errors along the lines that are at most each line's standard error, (m,) metres."""
+    def share_within(self, sigma_m: np.ndarray, tolerance_m: float = 0.05) -> float:
+        """Share of the lateral errors along the lines that are at most the standard error at each place, (n,) m."""
         near = self.back.distance <= tolerance_m
-        return float(_mean(np.abs(self.back.lateral[near]) <= np.asarray(sigmas_m)[self.line[near]]))
+        return float(_mean(np.abs(self.back.lateral[near]) <= sigma_m[near]))
 
 
 @dataclass(frozen=True)
 class Pieces:
-    """Short straight pieces of polylines: (n, 3) starts and ends, metres, and (n,) numbers of their lines."""
+    """Short straight pieces of polylines.
+
+    Attributes
+    ----------
+    start, end : (n, 3) array
+        Metres.
+    number : (n,) int array
+        Of their lines.
+    t : (n,) array
+        Plan distance of their middles from the starts of their lines.
+    """
 
     start: np.ndarray
     end: np.ndarray
     number: np.ndarray
+    t: np.ndarray
 
     @property
     def middle(self) -> np.ndarray:
@@ -176,17 +190,17 @@ def match(extracted: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> Match
     if not len(lines.start):
         nothing = np.full(len(true.start), np.inf)
         there = Offsets(nothing, nothing, nothing, true.lengths)
-        return Match(there, there.within(0.0), lines.number, len(extracted), len(truth))
+        return Match(there, there.within(0.0), lines.number, lines.t, len(extracted), len(truth))
     feet, _ = nearest(true.middle, lines)
     there = Offsets.between(true.middle, feet, true.left, true.lengths)
     feet, piece = nearest(lines.middle, true)
     back = Offsets.between(feet, lines.middle, true.left[piece], lines.lengths)
-    return Match(there, back, lines.number, len(extracted), len(truth))
+    return Match(there, back, lines.number, lines.t, len(extracted), len(truth))
 
 
 def cut(lines: Sequence[np.ndarray]) -> Pieces:
     """Cut polylines into pieces of equal length, `STEP_M` at most."""
-    starts, ends, counts = [np.empty((0, 3))], [np.empty((0, 3))], []
+    starts, ends, middles, counts = [np.empty((0, 3))], [np.empty((0, 3))], [np.empty(0)], []
     for line in lines:
         chainage = length_along(np.asarray(line)[:, :2])
         count = int(np.ceil(chainage[-1] / STEP_M))
@@ -194,8 +208,10 @@ def cut(lines: Sequence[np.ndarray]) -> Pieces:
         places = np.column_stack([np.interp(at, chainage, column) for column in np.asarray(line, dtype=float).T])
         starts.append(places[:-1])
         ends.append(places[1:])
+        middles.append(0.5 * (at[:-1] + at[1:]))
         counts.append(count)
-    return Pieces(np.concatenate(starts), np.concatenate(ends), np.repeat(np.arange(len(lines)), counts))
+    numbers = np.repeat(np.arange(len(lines)), counts)
+    return Pieces(np.concatenate(starts), np.concatenate(ends), numbers, np.concatenate(middles))
 
 
 def nearest(places: np.ndarray, pieces: Pieces) -> tuple[np.ndarray, np.ndarray]:

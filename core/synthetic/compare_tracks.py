@@ -7,12 +7,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..polyline import left_normals
-from ..rails import Centerline, RailLine, length_along
+from ..polyline import interpolate, left_normals, project
+from ..rails import Centerline, RailLine, TrackGeometry, length_along
 from .compare import cut, nearest
 
 ASTRAY_M = 0.10
 """A rail this far from where the centerline has it is another one, or none."""
+
+CURVED_M = 1500.0
+"""Radii above this are not judged: their versine on a chord of 20 m is below 35 mm."""
+
+CHORD_M = 20.0
+STEADY = 0.02
+"""Radii are judged where the true curvature changes by less than this share within so much to either side: on arcs, the
+chord that measures them wholly among them."""
 
 STEP_M = 0.5
 """Distance between the places at which tracks are measured."""
@@ -55,6 +63,78 @@ def compare_tracks(
         return TrackErrors(*[float("nan")] * 4)
     bias, rmse = error.mean(axis=0), np.sqrt(np.mean(error**2, axis=0))
     return TrackErrors(float(bias[0]), float(rmse[0]), float(bias[1]), float(rmse[1]))
+
+
+@dataclass(frozen=True)
+class GeometryErrors:
+    """Errors of measured track geometry at its stations, root mean squares; NaN where the truth has nothing of a kind.
+
+    Attributes
+    ----------
+    gauge_m, cant_m : float
+    radius : float
+        In proportion to the true radius, where that is constant and below `CURVED_M`.
+    """
+
+    gauge_m: float
+    cant_m: float
+    radius: float
+
+
+def compare_geometry(
+    geometry: Sequence[TrackGeometry],
+    rails: Sequence[np.ndarray],
+    centerlines: Sequence[np.ndarray],
+    head_width_m: float,
+) -> GeometryErrors:
+    """Compare measured gauge, cant and radius with the truth.
+
+    Parameters
+    ----------
+    geometry : sequence of TrackGeometry
+    rails, centerlines : sequence of (n, 3) array
+        True lines, metres, in the same frame.
+    head_width_m : float
+    """
+    plain, curved = [np.empty((0, 2))], [np.empty(0)]
+    for track in geometry:
+        half_m = (np.nanmedian(track.gauge_mm) / 1000 + head_width_m) / 2
+        true = _gauge_and_cant(track.xyz[:, :2], half_m * left_normals(track.xyz), rails)
+        measured = np.column_stack([track.gauge_mm / 1000 + head_width_m, track.cant_mm / 1000])
+        plain.append(measured - true)
+        radius = _true_radius(track.xyz[:, :2], centerlines)
+        curved.append(np.abs(track.radius_m) / radius - 1)
+    errors, ratios = np.concatenate(plain), np.concatenate(curved)
+    gauge, cant = (_rms(column[np.isfinite(column)]) for column in errors.T)
+    return GeometryErrors(gauge, cant, _rms(ratios[np.isfinite(ratios)]))
+
+
+def _true_radius(places: np.ndarray, centerlines: Sequence[np.ndarray]) -> np.ndarray:
+    """Radius of the true centerlines beside places, (n,); NaN where it changes within a chord, or is large."""
+    radius = np.full(len(places), np.nan)
+    feet = project([line[:, :2] for line in centerlines], places, ASTRAY_M)
+    for number in np.unique(feet.line):
+        mine = feet.of(int(number))
+        line = centerlines[number][:, :2]
+        along = length_along(line)
+        mine = mine[(mine.t >= CHORD_M) & (mine.t <= along[-1] - CHORD_M)]
+        t = mine.t[:, None] + CHORD_M * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+        around = interpolate(line, along, t.ravel()).reshape(-1, 5, 2)
+        bends = np.array([_curvature(around[:, [k, k + 1, k + 2]]) for k in range(3)])
+        steady = (np.ptp(bends, axis=0) < STEADY * np.abs(bends[1])) & (np.abs(bends[1]) > 1 / CURVED_M)
+        radius[mine.point[steady]] = 1 / np.abs(bends[1][steady])
+    return radius
+
+
+def _curvature(places: np.ndarray) -> np.ndarray:
+    """Curvature of the circles through three places each, (n, 3, 2) to (n,), positive to the left."""
+    one, two, chord = places[:, 1] - places[:, 0], places[:, 2] - places[:, 1], places[:, 2] - places[:, 0]
+    area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+    return 2 * area / np.prod([np.hypot(*side.T) for side in (one, two, chord)], axis=0)
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
 
 
 def _places(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

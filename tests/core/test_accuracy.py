@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from rail_extract.core.rails import Centerline, RailLine
+from rail_extract.core.rails import Centerline, RailLine, TrackGeometry
 from rail_extract.core.synthetic.compare import compare_lines, match
-from rail_extract.core.synthetic.compare_tracks import compare_tracks
+from rail_extract.core.synthetic.compare_tracks import compare_geometry, compare_tracks
+from rail_extract.core.synthetic.curves import Element, trace
 
 
 def straight(start=0.0, end=100.0, left=0.0, up=0.0, heading=0.3, count=11):
@@ -94,11 +97,12 @@ def test_lines_without_height_still_compare_in_plan():
     assert np.isnan(result.height_rmse_m)
 
 
-def test_the_share_within_sigma_weighs_each_line_by_its_own():
+def test_the_share_within_sigma_takes_each_place_by_its_own():
     found = match([straight(left=0.004), straight(left=2.012, end=50)], [straight(), straight(left=2)])
-    assert found.share_within(np.array([0.005, 0.005])) == pytest.approx(2 / 3, abs=0.001)
-    assert found.share_within(np.array([0.005, 0.015])) == 1.0
-    assert found.share_within(np.array([0.001, 0.001])) == 0.0
+    assert found.share_within(np.array([0.005, 0.005])[found.line]) == pytest.approx(2 / 3, abs=0.001)
+    assert found.share_within(np.array([0.005, 0.015])[found.line]) == 1.0
+    assert found.share_within(np.array([0.001, 0.001])[found.line]) == 0.0
+    assert found.share_within(np.where(found.t < 25, 0.013, 0.0)) == pytest.approx(1 / 3, abs=0.001)
 
 
 def test_gauge_and_cant_are_measured_along_the_track():
@@ -112,3 +116,32 @@ def test_gauge_and_cant_are_measured_along_the_track():
     assert errors.cant_bias_m == pytest.approx(0.004, abs=1e-6)
     assert errors.cant_rmse_m == pytest.approx(0.004, abs=1e-6)
     assert np.isnan(compare_tracks([], rails, truth, 0.072).gauge_bias_m)
+
+
+def test_measured_geometry_is_held_against_the_truth():
+    """A straight of 60 m into an arc of 600 m, measured with known errors."""
+    curve = trace([Element(60.0), Element(80.0, 1 / 600, 1 / 600)])
+    rails = [np.column_stack([curve.offset(left), np.full(len(curve.xy), left / 100)]) for left in (0.75, -0.75)]
+    middle = np.column_stack([curve.xy, np.zeros(len(curve.xy))])
+    at = np.searchsorted(curve.chainage, np.arange(1.0, 139.0))
+    track = TrackGeometry(
+        track_id=1,
+        xyz=middle[at],
+        chainage_m=curve.chainage[at],
+        gauge_mm=np.full(len(at), 1.5e3 - 72 + 2.0),
+        cant_mm=np.full(len(at), 15.0 - 1.0),
+        twist_mm=np.zeros(len(at)),
+        radius_m=np.where(curve.chainage[at] > 60, 606.0, np.nan),
+        grade_pm=np.zeros(len(at)),
+        sigma_mm=np.ones(len(at)),
+        points=np.ones(len(at), dtype=int),
+        bridged=np.zeros(len(at), dtype=bool),
+    )
+    errors = compare_geometry([track], rails, [middle], 0.072)
+    assert errors.gauge_m == pytest.approx(0.002, abs=1e-4)
+    assert errors.cant_m == pytest.approx(0.001, abs=1e-4)
+    assert errors.radius == pytest.approx(0.01, abs=2e-4)
+    straight_track = replace(track, xyz=track.xyz[:30], gauge_mm=track.gauge_mm[:30], cant_mm=track.cant_mm[:30])
+    straight_track = replace(straight_track, radius_m=track.radius_m[:30])
+    assert np.isnan(compare_geometry([straight_track], rails, [middle], 0.072).radius)
+    assert np.isnan(compare_geometry([], rails, [middle], 0.072).gauge_m)
