@@ -12,7 +12,7 @@ from .errors import NoTrackError
 from .forking import fork_centerlines
 from .guide import STEP_M, guide_line
 from .leads import runs_on
-from .midline import Side, at_gauge, bridged_steps, midway
+from .midline import Meeting, Side, at_gauge, bridged_steps, midway
 from .pairing import MIN_LENGTH_M, pair_rails
 from .parallels import commonest_spacing
 from .polyline import left_normals, resample, starts_at_its_end
@@ -20,6 +20,12 @@ from .progress import SILENT, Progress
 from .rails import Centerline, RailLine, length_along
 from .smoothing import smooth_line
 from .standards import STANDARDS
+
+STATIONS_AT_ONCE = 8192
+"""Stations drawn in one go, 2 km of track: lets a cancel through several times a second."""
+
+MARGIN_SIGMAS = 40.0
+"""The smoothing's kernel falls off exponentially, to nothing in double precision this far away."""
 
 SAME_GAUGE_M = 0.04
 """Gauges in use lie further apart than this, so that a measured spacing this near to one suggests it."""
@@ -75,14 +81,23 @@ def build_centerlines(
     NoTrackError
         Rails run parallel, but at another spacing.
     """
-    pairs = pair_rails(rails, gauge_m, head_width_m, parameters.tolerance_m, progress=progress.span(0.0, 0.8))
+    rails = _in_order(rails)
+    pairs = pair_rails(rails, gauge_m, head_width_m, parameters.tolerance_m, progress=progress.span(0.0, 0.5))
     if not pairs:
         _refuse_other_spacing(rails, gauge_m, head_width_m, parameters.tolerance_m)
     chains = chain_pairs(rails, pairs, parameters.max_gap_m)
-    drawn = [_draw(rails, chain, gauge_m, head_width_m, parameters) for chain in progress.span(0.8, 1.0).follow(chains)]
+    steps = progress.span(0.5, 0.95).split(len(chains))
+    drawn = [_draw(rails, chain, gauge_m, head_width_m, parameters, step) for chain, step in zip(chains, steps)]
     kept = [line for line in drawn if line.length_m >= parameters.min_length_m]
-    ordered = sorted(fork_centerlines(kept), key=lambda line: tuple(line.xyz[0, :2]))
+    forked = fork_centerlines(kept, progress.span(0.95, 1.0))
+    ordered = sorted(forked, key=lambda line: tuple(line.xyz[0, :2]))
     return tuple(replace(line, track_id=number) for number, line in enumerate(ordered, start=1))
+
+
+def _in_order(rails: Sequence[RailLine]) -> list[RailLine]:
+    """Sort rails by place, and let all start in the west: the tracks must not depend on how rails come."""
+    turned = [rail.reversed() if starts_at_its_end(rail.xyz) else rail for rail in rails]
+    return sorted(turned, key=lambda rail: (*rail.xyz[0, :2], *rail.xyz[-1, :2], rail.length_m))
 
 
 def _refuse_other_spacing(rails: Sequence[RailLine], gauge_m: float, head_width_m: float, tolerance_m: float) -> None:
@@ -104,6 +119,7 @@ def _draw(
     gauge_m: float,
     head_width_m: float,
     parameters: CenterlineParameters,
+    progress: Progress,
 ) -> Centerline:
     """Draw the centerline of one track."""
     half = 0.5 * (gauge_m + head_width_m)
@@ -112,15 +128,16 @@ def _draw(
     normals = left_normals(guide)
     lefts = _spans([pair.left for pair in chain.pairs], [pair.left_span for pair in chain.pairs])
     rights = _spans([pair.right for pair in chain.pairs], [pair.right_span for pair in chain.pairs])
-    left = Side.of(rails, lefts, reach).meet(guide, normals, half)
-    right = Side.of(rails, rights, reach).meet(guide, -normals, half)
+    to_left, to_right, smoothing = progress.split(3)
+    left = _met(Side.of(rails, lefts, reach), guide, normals, half, to_left)
+    right = _met(Side.of(rails, rights, reach), guide, -normals, half, to_right)
     left, right = at_gauge(left, right, 2 * half, parameters.tolerance_m)
     xyz = midway(guide, normals, left, right, 2 * half)
     apart = left.distance_m + right.distance_m
     both = ~np.isnan(apart)
     cant = (left.height_m - right.height_m)[both]
     gauge = np.hypot(apart[both], np.nan_to_num(cant)) - head_width_m
-    xyz = _smoothed(xyz, parameters.smoothing_m)
+    xyz = _smoothed(xyz, parameters.smoothing_m, smoothing)
     flip = starts_at_its_end(xyz)
     sides = [_ids(rails, (pair.left for pair in chain.pairs)), _ids(rails, (pair.right for pair in chain.pairs))]
     return Centerline(
@@ -153,11 +170,23 @@ def _spans(rails: Sequence[int], spans: Sequence[tuple[float, float]]) -> list[t
     return merged
 
 
-def _smoothed(xyz: np.ndarray, smoothing_m: float) -> np.ndarray:
+def _met(side: Side, guide: np.ndarray, directions: np.ndarray, half_m: float, progress: Progress) -> Meeting:
+    """Meet the rails of one side from the stations of a guide."""
+    parts = range(0, len(guide), STATIONS_AT_ONCE)
+    pieces = (slice(start, start + STATIONS_AT_ONCE) for start in progress.follow(parts))
+    return Meeting.joined([side.meet(guide[piece], directions[piece], half_m) for piece in pieces])
+
+
+def _smoothed(xyz: np.ndarray, smoothing_m: float, progress: Progress) -> np.ndarray:
     """Smooth in plan, and place vertices as close as the shape asks for."""
     along = length_along(xyz[:, :2])
     _, t = resample(xyz, smoothing_m / 4)
-    # Free ends: rails are smooth already, and a fixed end would straighten a curve.
-    plan = smooth_line(xyz[:, :2], smoothing_m, stations=t, ends="free")
-    z = np.interp(t, along, xyz[:, 2])
-    return np.column_stack([plan, z])
+    margin_m = MARGIN_SIGMAS * smoothing_m
+    plan = []
+    for part in progress.follow(np.array_split(t, int(np.ceil(len(t) / STATIONS_AT_ONCE)))):
+        first, last = np.searchsorted(along, [part[0] - margin_m, part[-1] + margin_m])
+        first = max(first - 1, 0)
+        # Free ends: rails are smooth already, and a fixed end would straighten a curve.
+        near = xyz[first : last + 1, :2]
+        plan.append(smooth_line(near, smoothing_m, stations=part - along[first], ends="free"))
+    return np.column_stack([np.concatenate(plan), np.interp(t, along, xyz[:, 2])])

@@ -40,6 +40,11 @@ class Meeting:
     t: np.ndarray
     matched: np.ndarray
 
+    @classmethod
+    def joined(cls, parts: Sequence[Meeting]) -> Meeting:
+        """Put meetings in a row."""
+        return cls(*(np.concatenate(columns) for columns in zip(*(vars(part).values() for part in parts))))
+
     def without(self, which: np.ndarray) -> Meeting:
         """Forget the rails met from some stations, (n,) bool."""
         values = [np.where(which, np.nan, column) for column in (self.distance_m, self.height_m, self.t)]
@@ -60,6 +65,8 @@ class Side:
         Rail of each point, and plan chainage along it.
     matched : (n,) bool array
         Whether the point lies within the stretch, not in the margin.
+    tree : cKDTree
+        Of the points in plan.
     """
 
     xyz: np.ndarray
@@ -67,6 +74,7 @@ class Side:
     rail: np.ndarray
     t: np.ndarray
     matched: np.ndarray
+    tree: cKDTree
 
     @classmethod
     def of(cls, rails: Sequence[RailLine], spans: Sequence[tuple[int, tuple[float, float]]], margin_m: float) -> Side:
@@ -82,12 +90,12 @@ class Side:
         counts = [len(piece) for piece in pieces]
         rail = np.repeat([number for number, _ in spans], counts)
         stretch = np.repeat(np.arange(len(pieces)), counts)
-        return cls(np.concatenate(pieces), stretch, rail, np.concatenate(chainages), np.concatenate(matched))
+        xyz, t, matched = (np.concatenate(parts) for parts in (pieces, chainages, matched))
+        return cls(xyz, stretch, rail, t, matched, cKDTree(xyz[:, :2]))
 
     def meet(self, stations: np.ndarray, directions: np.ndarray, expected_m: float) -> Meeting:
         """Go from stations in their directions, (n, 2) unit vectors, to the rail."""
-        tree = cKDTree(self.xyz[:, :2])
-        off, nearest = tree.query(stations + expected_m * directions, distance_upper_bound=ASTRAY_M)
+        off, nearest = self.tree.query(stations + expected_m * directions, distance_upper_bound=ASTRAY_M)
         nearest = np.where(np.isfinite(off), nearest, 0)
         found = np.full((3, len(stations)), np.nan)
         for first in (nearest - 1, nearest):
