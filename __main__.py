@@ -8,12 +8,13 @@ import sys
 from collections.abc import Sequence
 
 COMMANDS = {
+    "extract": ("core.cluster.extract", "extract rails and track centerlines on many workers"),
     "train": ("core.training.train", "train FRPDF on synthetic rasters"),
     "evaluate": ("core.training.evaluate", "compare weights on a fixed set of synthetic rasters"),
     "onnx": ("core.frpdf.onnx", "write the network for other runtimes"),
     "scenes": ("core.synthetic.write", "write synthetic clouds with their true lines"),
 }
-"""Module and help of each command; a module offers `add_arguments(parser)` and `run(args)`."""
+"""Module and help of each command; a module offers `add_arguments(parser)` and `run(args)`, with or without exit code."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -34,11 +35,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(module, args: argparse.Namespace) -> int:
     errors = importlib.import_module(".core.errors", __package__)
     try:
-        module.run(args)
+        return module.run(args) or 0
     except errors.RailExtractError as error:
         print(error, file=sys.stderr)
         return 1
-    return 0
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .crs import common_crs, is_geographic, parse_crs, units, utm_zone
-from .errors import CrsError, NoRailPointsError, ParameterError
+from .errors import CloudError, CrsError, NoRailPointsError, ParameterError
 from .progress import SILENT, Progress
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ class Request:
     def read(
         self, header: CloudHeader, progress: Progress = SILENT
     ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Read the wanted points of one file chunk by chunk: coordinates, classes and census; see `las.read_classes`."""
+        """Read the wanted points of a file chunk by chunk: coordinates, classes and census; see `las.read_classes`."""
         from .las import read_classes
 
         if self.extent is not None and not _overlap(header.extent, self.extent):
@@ -192,15 +192,35 @@ def ask(
     crs_wkt: str | None = None,
     extent: tuple[float, float, float, float] | None = None,
     progress: Progress = SILENT,
+    unreadable: list[str] | None = None,
 ) -> Request:
-    """Check what is wanted, and read the headers; parameters and errors as those of `read_rail_points`."""
+    """Check what is wanted, and read the headers; parameters and errors as those of `read_rail_points`.
+
+    With a list `unreadable`, files that can't be read are left out as long as there is another; what is wrong with
+    them is added to the list.
+    """
     _check_request(class_codes, extent)
-    headers = read_headers(paths)
+    headers = read_headers(paths) if unreadable is None else _readable_headers(paths, unreadable)
     crs = _shared_crs(headers, crs_wkt, progress)
     units_m = (1.0, 1.0) if crs is None else units(crs)
     return Request(
         headers, tuple(class_codes), extent, LocalFrame(np.zeros(3), *units_m, None if crs is None else crs.to_wkt())
     )
+
+
+def _readable_headers(paths: str | Path | Sequence[str | Path], unreadable: list[str]) -> tuple[CloudHeader, ...]:
+    from .las import list_files, read_header
+
+    headers, last = [], None
+    for path in list_files(paths):
+        try:
+            headers.append(read_header(path))
+        except CloudError as error:
+            unreadable.append(str(error))
+            last = error
+    if not headers and last is not None:
+        raise last
+    return tuple(headers)
 
 
 def origin_steps(xyz_crs: np.ndarray) -> np.ndarray:

@@ -1,0 +1,107 @@
+"""Lines into GeoPackages, with the fields of the interface, without QGIS."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pyogrio
+import shapely
+
+from ..errors import DiskError
+from ..points import LocalFrame
+from ..rails import Centerline, RailLine
+from ..spool import writing
+
+RAIL_FIELDS = {
+    "rail_id": np.int32,
+    "class_code": np.int32,
+    "length_m": float,
+    "points": np.int32,
+    "resid_mm": float,
+    "sigma_mm": float,
+    "bridged_m": float,
+}
+CENTERLINE_FIELDS = {
+    "track_id": np.int32,
+    "class_code": np.int32,
+    "left_ids": str,
+    "right_ids": str,
+    "length_m": float,
+    "gauge_mm": float,
+    "gaugesd_mm": float,
+    "cant_mm": float,
+    "cantmax_mm": float,
+    "bridged_m": float,
+}
+"""Names and types, each name that of the attribute of `RailLine` or `Centerline` it holds."""
+
+UNKNOWN_IN_METRES = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1]]'
+"""Stated where the cloud has no coordinate system, because GDAL else calls a GeoPackage's coordinates degrees."""
+
+
+def write(layers: dict[str, tuple[Path, Sequence[RailLine | Centerline], dict]], frame: LocalFrame) -> None:
+    """Write layers into GeoPackages; those that are there are replaced once the new ones are whole.
+
+    Parameters
+    ----------
+    layers : dict
+        By the layer's name its file, its lines and their fields. Several layers may share a file.
+    frame : LocalFrame
+        Of the lines.
+
+    Raises
+    ------
+    DiskError
+        A file can't be written, as on a full disk; what was there before is left as it was.
+    """
+    unfinished = {path: path.with_name(f".{uuid.uuid4().hex}.gpkg") for path, _, _ in layers.values()}
+    try:
+        for name, (path, lines, fields) in layers.items():
+            with writing(path.parent):
+                path.parent.mkdir(parents=True, exist_ok=True)
+            _write_layer(unfinished[path], name, lines, fields, frame, path)
+        for path, whole in unfinished.items():
+            with writing(path.parent):
+                whole.replace(path)
+    finally:
+        for leftover in unfinished.values():
+            for file in leftover.parent.glob(f"{leftover.name}*"):
+                file.unlink()
+
+
+def _write_layer(
+    file: Path, name: str, lines: Sequence[RailLine | Centerline], fields: dict, frame: LocalFrame, path: Path
+) -> None:
+    """Write one layer; `path` is the name that the file will have."""
+    try:
+        pyogrio.raw.write(
+            str(file),
+            layer=name,
+            driver="GPKG",
+            geometry=_geometry(lines, frame),
+            geometry_type="LineString Z",
+            field_data=[_column(lines, field, kind) for field, kind in fields.items()],
+            fields=list(fields),
+            crs=frame.crs_wkt or UNKNOWN_IN_METRES,
+            append=file.exists(),
+            nan_as_null=True,
+        )
+    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, RuntimeError) as error:
+        raise DiskError(f"{path} can't be written ({error}): make room on this disk, or choose another.") from error
+
+
+def _geometry(lines: Sequence[RailLine | Centerline], frame: LocalFrame) -> np.ndarray:
+    """Lines in the cloud's coordinates as well-known binary, (n,)."""
+    shapes = [shapely.linestrings(frame.to_crs(line.xyz)) for line in lines]
+    return np.array([shapely.to_wkb(shape, output_dimension=3) for shape in shapes], dtype=object)
+
+
+def _column(lines: Sequence[RailLine | Centerline], field: str, kind: type) -> np.ndarray:
+    """Values of one field, (n,)."""
+    values = [getattr(line, field) for line in lines]
+    if kind is str:
+        return np.array([",".join(map(str, value)) for value in values], dtype=object)
+    return np.array(values, dtype=kind)

@@ -1,0 +1,197 @@
+"""A whole extraction on a Dask cluster: files are sorted, stretches cleaned and drawn, and what they give is joined."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import dask
+from distributed import Client, Future, LocalCluster, as_completed
+
+from ..errors import CloudError, NoTrackError, RailExtractError
+from ..frpdf.zoo import choose
+from ..pipeline import Parameters, stretch_side, tracks_of, whole_rails
+from ..points import LocalFrame, Request, ask
+from ..progress import SILENT, Progress
+from ..rails import Centerline, RailLine
+from ..spool import SpooledFile, SpooledPoints, gather
+from ..stretches import lay_out
+from .tasks import Failure, StretchTask, clean, draw, sort_points
+from .work import fingerprint, load_rails
+
+DEATHS = 10
+"""Workers that may die over one stretch, of whatever else, before it is given up."""
+
+READING, STRETCHES = 0.25, 0.7
+"""Shares of the progress; joining, pairing and writing have the rest."""
+
+ONE_THREAD = {"OMP_NUM_THREADS": 1, "MKL_NUM_THREADS": 1, "OPENBLAS_NUM_THREADS": 1, "OPENCV_FOR_THREADS_NUM": 1}
+"""What local workers are told: as many of them as there are cores, each on one."""
+
+
+@dataclass(frozen=True)
+class Extraction:
+    """What a run gives.
+
+    Attributes
+    ----------
+    rails : tuple of RailLine
+    centerlines : tuple of Centerline
+    frame : LocalFrame
+    failures : tuple of str
+        A sentence for each file or stretch that is missing.
+    """
+
+    rails: tuple[RailLine, ...]
+    centerlines: tuple[Centerline, ...]
+    frame: LocalFrame
+    failures: tuple[str, ...]
+
+
+@contextmanager
+def connect(scheduler: str | None, workers: int) -> Iterator[Client]:
+    """Use an existing Dask scheduler, or start workers of one thread each on this computer.
+
+    Raises
+    ------
+    RailExtractError
+        There is no scheduler at this address.
+    """
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout="20s")
+        except (OSError, ValueError) as error:
+            raise RailExtractError(f"No Dask scheduler answers at {scheduler} ({error}): check the address.") from error
+        with client:
+            yield client
+        return
+    settings = {
+        "distributed.scheduler.allowed-failures": DEATHS,
+        "distributed.nanny.pre-spawn-environ": ONE_THREAD,
+    }
+    with dask.config.set(settings):
+        cluster = LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
+    with cluster, Client(cluster) as client:
+        yield client
+
+
+def extract(
+    client: Client,
+    paths: Sequence[Path],
+    class_codes: Sequence[int],
+    parameters: Parameters,
+    folder: Path,
+    crs_wkt: str | None = None,
+    progress: Progress = SILENT,
+) -> Extraction:
+    """Extract rails and centerlines; files and stretches that fail are left out and named.
+
+    Parameters
+    ----------
+    client : Client
+    paths : sequence of Path
+        LAS, LAZ or COPC files, or folders of them; workers have to reach them under the same names.
+    class_codes : sequence of int
+    parameters : Parameters
+    folder : Path
+        Where what is finished stays, for workers and for the next run; workers have to reach it too.
+    crs_wkt : str, optional
+        Coordinate system of files that state none.
+    progress : Progress
+
+    Raises
+    ------
+    CloudError
+        Not one file can be read.
+    DiskError
+        The disk is full.
+    NoRailPointsError
+        The files hold no point of the wanted classes.
+    """
+    failures: list[str] = []
+    request = ask(paths, class_codes, crs_wkt, progress=progress, unreadable=failures)
+    folder = folder.resolve()
+    side_m = stretch_side(parameters)
+    found = _sorted_points(client, request, side_m, folder, failures, progress.span(0.0, READING))
+    sources = gather(request, side_m, found)
+    weights = fingerprint(choose(parameters.gauge_m, parameters.head_width_m).path.read_bytes())
+    drawn = progress.span(READING, READING + STRETCHES)
+    results = _stretches(client, sources, parameters, weights, folder, failures, drawn)
+    if not any(results):
+        raise RailExtractError(f"Not one stretch could be extracted; the first error was: {failures[0]}")
+    rails: list[RailLine] = []
+    centerlines: list[Centerline] = []
+    for source, tasks in zip(sources, results):
+        parts = [load_rails(file, task.stretch) for task, file in tasks]
+        mine = whole_rails(parts, source.frame, parameters, len(rails) + 1) if parts else []
+        rails += mine
+        try:
+            centerlines += tracks_of(mine, parameters, first_id=len(centerlines) + 1)
+        except NoTrackError as error:
+            failures.append(str(error))
+    progress.set_fraction(1.0)
+    return Extraction(tuple(rails), tuple(centerlines), sources[0].frame, tuple(failures))
+
+
+def _sorted_points(
+    client: Client, request: Request, side_m: float, folder: Path, failures: list[str], progress: Progress
+) -> list[SpooledFile]:
+    """Sort the points of all files into squares; gives what was found in those that could be read, in their order."""
+    futures = {
+        client.submit(sort_points, replace(request, headers=()), header, side_m, str(folder), pure=False): number
+        for number, header in enumerate(request.headers)
+    }
+    found = {futures[future]: result for future, result in _finished(futures, progress, failures)}
+    if not found:
+        raise CloudError(f"Not one file could be read; the first error was: {failures[0]}")
+    return [found[number] for number in sorted(found)]
+
+
+def _stretches(
+    client: Client,
+    sources: Sequence[SpooledPoints],
+    parameters: Parameters,
+    weights: str,
+    folder: Path,
+    failures: list[str],
+    progress: Progress,
+) -> list[list[tuple[StretchTask, Path]]]:
+    """Clean and draw the stretches of all classes; gives the files of the rails of each."""
+    drawing: dict[Future, tuple[int, StretchTask]] = {}
+    for number, source in enumerate(sources):
+        tasks = {
+            stretch.key: StretchTask(source.part(stretch), stretch, parameters, weights, str(folder))
+            for stretch in lay_out(sources, source)
+        }
+        cleaned = {key: client.submit(clean, task, pure=False) for key, task in tasks.items()}
+        for task in tasks.values():
+            rasters = [cleaned[near] for near in task.neighbours()]
+            drawing[client.submit(draw, task, rasters, pure=False)] = (number, task)
+    results: list[list[tuple[StretchTask, Path]]] = [[] for _ in sources]
+    for future, file in _finished(drawing, progress, failures):
+        number, task = drawing[future]
+        results[number].append((task, Path(file)))
+    return results
+
+
+def _finished(futures: Iterable[Future], progress: Progress, failures: list[str]) -> Iterator[tuple[Future, object]]:
+    """Yield futures and their results as they come; failures are noted instead.
+
+    Raises
+    ------
+    DiskError
+        A worker could not write.
+    """
+    waiting = list(futures)
+    for future in progress.follow(as_completed(waiting), total=len(waiting)):
+        error = future.exception() if future.status == "error" else None
+        if isinstance(error, RailExtractError):
+            raise error
+        result = Failure(f"A task was given up ({error}).") if error is not None else future.result()
+        if isinstance(result, Failure):
+            failures.append(result.reason)
+            progress.warning(result.reason)
+        else:
+            yield future, result

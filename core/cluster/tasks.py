@@ -1,0 +1,120 @@
+"""What workers do: each task is a pure function of files and parameters, and what it finds is a file again."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import DiskError, RailExtractError
+from ..frpdf.engine import Engine
+from ..las import CloudHeader
+from ..pipeline import Parameters, clean_stretch, engine_for, rails_of_stretch
+from ..points import Request
+from ..spool import SpooledFile, SpooledPoints, spool_file
+from ..stretches import Key, Stretch, around
+from .work import fingerprint, load_raster, save_rails, save_raster
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a file or a stretch is missing from the result; one sentence."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
+class StretchTask:
+    """One stretch of one class.
+
+    Attributes
+    ----------
+    source : SpooledPoints
+        Of the stretch and its neighbours.
+    stretch : Stretch
+    parameters : Parameters
+    weights : str
+        Fingerprint of the network's weights.
+    folder : str
+        Where results go.
+    """
+
+    source: SpooledPoints
+    stretch: Stretch
+    parameters: Parameters
+    weights: str
+    folder: str
+
+    @property
+    def name(self) -> str:
+        """Fingerprint of the points around, whose files name themselves by size and time, and of the parameters."""
+        settings = replace(self.parameters, quality_step_m=None, keep_cleaned=False)
+        files = sorted(Path(file).parts[-2:] for files in self.source.files.values() for file in files)
+        return fingerprint(self.stretch.key, self.stretch.side_m, files, settings, self.weights)
+
+    def neighbours(self) -> list[Key]:
+        """Name the stretch and those around it, by their squares."""
+        if not np.isfinite(self.stretch.side_m):
+            return [self.stretch.key]
+        return [key for key in around(self.stretch.key) if key in self.source.counts]
+
+    def file(self, kind: str, name: str) -> Path:
+        """Place of a result."""
+        return Path(self.folder) / f"{kind}_{name}.npz"
+
+
+def sort_points(request: Request, header: CloudHeader, side_m: float, folder: str) -> SpooledFile | Failure:
+    """Sort the rail points of one file into squares."""
+    try:
+        return spool_file(request, header, side_m, Path(folder))
+    except DiskError:
+        raise
+    except RailExtractError as error:
+        return Failure(str(error))
+    except OSError as error:
+        return Failure(f"{header.path.name} can't be read ({error.strerror}): check the disk or the network drive.")
+
+
+def clean(task: StretchTask) -> str | Failure:
+    """Clean the raster of a stretch, unless that is done; gives the file."""
+    path = task.file("raster", task.name)
+    if not path.exists():
+        try:
+            save_raster(path, clean_stretch(task.source, task.stretch, task.parameters, _engine(task.parameters)))
+        except DiskError:
+            raise
+        except Exception as error:  # noqa: BLE001 - whatever a stretch dies of, the others shall live
+            return Failure(f"Stretch {task.stretch.key} could not be cleaned ({error}).")
+    return str(path)
+
+
+def draw(task: StretchTask, rasters: Sequence[str | Failure]) -> str | Failure:
+    """Draw the rails of a stretch, unless that is done, from what was cleaned of its `neighbours`; gives the file."""
+    files = {key: file for key, file in zip(task.neighbours(), rasters) if isinstance(file, str)}
+    if task.stretch.key not in files:
+        return rasters[task.neighbours().index(task.stretch.key)]
+    path = task.file("rails", fingerprint(task.name, sorted(Path(file).name for file in files.values())))
+    if not path.exists():
+        try:
+            cleaned = {key: load_raster(Path(file)) for key, file in files.items()}
+            save_rails(path, rails_of_stretch(task.source, task.stretch, cleaned, task.parameters))
+        except DiskError:
+            raise
+        except Exception as error:  # noqa: BLE001 - as above
+            return Failure(f"The rails of stretch {task.stretch.key} could not be drawn ({error}).")
+    return str(path)
+
+
+_OF_THREAD = threading.local()
+"""Engines of this worker's threads; OpenCV's can't be shared among them."""
+
+
+def _engine(parameters: Parameters) -> Engine:
+    """Set the engine up once for each thread of a worker."""
+    wanted = (parameters.gauge_m, parameters.head_width_m, parameters.engine, parameters.device)
+    if getattr(_OF_THREAD, "wanted", None) != wanted:
+        _OF_THREAD.engine, _OF_THREAD.wanted = engine_for(parameters), wanted
+    return _OF_THREAD.engine
