@@ -68,7 +68,7 @@ def vectorize(
     progress.check()
     seen = cKDTree(places)
     network = join_gaps(network, max_gap_m, gap_angle_deg, seen, at_nodes=False)
-    network = resolve_branches(resolve_crossings(network), head_width_m + raster.cell_m)
+    network = resolve_branches(resolve_crossings(network))
     network = join_gaps(run_through(network), max_gap_m, gap_angle_deg, seen)
     network = attach_branches(network, seen, max_gap_m)
     progress.set_fraction(1.0)

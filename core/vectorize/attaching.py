@@ -8,9 +8,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..rails import length_along
-from .branches import FARTHEST_M, STEADY_M
+from .branches import FARTHEST_M, STEADY_M, parting, sharpest
 from .bridges import FIT_M, STAIRS_M, bridge, curvature
-from .ends import STEP_M, cut_back, stretch, turned, way_out
+from .ends import cut_back, stretch, turned, way_out
 from .joining import unseen_m
 from .junctions import DIRECTION_M
 from .network import LineNetwork
@@ -20,11 +20,6 @@ BESIDE_M = 1.0
 
 SLOPE_M = 4.0
 """Stretch of the stock rail whose direction is compared with the branch's."""
-
-SHARPER = 2.0
-UNSURE_CURVATURE = 16 * STAIRS_M / STEADY_M**2
-"""A branch begins on the arc that it goes on with: no more bent than so many times what is seen of it, and what stairs
-at both ends of that stretch may hide. This tells switches from frogs."""
 
 GUARD_APART_M = 0.13
 """Farthest that a guard or wing rail's axis lies beside a running rail's: a head, and a flangeway of 50 mm."""
@@ -55,10 +50,11 @@ def attach_branches(network: LineNetwork, seen: cKDTree, max_gap_m: float) -> Li
         best = None
         for stock, vertex, onward in _touching(from_end, lines, own):
             found = bridge(from_end, onward)
-            if found is None or found.cuts_m[1] > STEP_M or unseen_m(found.points, seen) > max_gap_m:
+            if found is None or unseen_m(found.points, seen) > max_gap_m:
                 continue
             if best is None or found.cost < best[0].cost:
-                best = found, stock, vertex
+                sense = 1 if (onward[1] == lines[stock][vertex + 1]).all() else -1
+                best = found, stock, vertex + sense * int(np.searchsorted(length_along(onward), found.cuts_m[1]))
         if best is None:
             continue
         found, stock, vertex = best
@@ -79,10 +75,11 @@ def _touching(from_end: np.ndarray, lines: list[np.ndarray], own: int) -> Iterat
     """List the lines that a line may branch off: number, vertex where they would touch, and the way on from there."""
     tip, outward = way_out(stretch(from_end, DIRECTION_M))
     axes = np.array([outward, [-outward[1], outward[0]]])
-    sharpest = SHARPER * abs(curvature(stretch(from_end, STEADY_M))) + UNSURE_CURVATURE
+    own_stretch = stretch(from_end, STEADY_M)
+    allowed = sharpest(curvature(own_stretch))
     for number, line in enumerate(lines):
         x, y = axes @ (line - tip).T
-        near = (x > -SLOPE_M) & (x < FARTHEST_M + SLOPE_M) & (np.abs(y) < BESIDE_M)
+        near = (x > -STEADY_M) & (x < FARTHEST_M + SLOPE_M) & (np.abs(y) < BESIDE_M)
         if number == own or np.count_nonzero(near) < 2:
             continue
         first, last = np.flatnonzero(near)[[0, -1]]
@@ -90,11 +87,16 @@ def _touching(from_end: np.ndarray, lines: list[np.ndarray], own: int) -> Iterat
         x, y = axes @ (way - tip).T
         if x[0] > 0 or x[-1] < SLOPE_M or (np.diff(x) <= 0).any():
             continue
-        beside, later = np.interp([0.0, SLOPE_M], x, y)
-        angle = (beside - later) / SLOPE_M * np.sign(beside)
-        touch_m = 2 * abs(beside) / max(angle, abs(beside) / FARTHEST_M)
+        own_x, own_y = axes @ (own_stretch - tip).T
+        beside = own_x >= x[0]
+        apart = np.interp(own_x, x, y) - own_y
+        if np.count_nonzero(beside) < 2 or len(set(np.sign(apart[beside]))) > 1:
+            continue
+        touch_m, bend = parting(-own_x[beside], np.abs(apart[beside]))
+        if bend > allowed or not 0 < touch_m < FARTHEST_M:
+            continue
         vertex = int(np.argmin(np.abs(axes[0] @ (line - tip).T - touch_m) + 1e9 * ~near))
-        if angle <= 0 or angle > sharpest * touch_m or touch_m > FARTHEST_M or not 0 < vertex < len(line) - 1:
+        if not 0 < vertex < len(line) - 1:
             continue
         along = axes[0] @ (line[vertex + 1] - line[vertex])
         onward = line[vertex:] if along > 0 else line[vertex::-1]

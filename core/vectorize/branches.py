@@ -7,27 +7,27 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..rails import length_along
-from .bridges import bridge, curvature
+from .bridges import MISFIT_M, STAIRS_M, bridge, curvature
+from .crossings import MISFIT_M as KNOWN_MISFIT_M
 from .crossings import SKIP_M
-from .ends import cut_back, stretch, turned, way_out
+from .ends import STEP_M, cut_back, stretch, turned
 from .junctions import DEFLECTION_DEG, DIRECTION_M, deflections, ends_by_node
 from .network import LineNetwork
 
-FARTHEST_M = 25.0
-"""Farthest that a branch is drawn back: a switch blade of 1:26.5 touches its stock rail for about so long."""
+FARTHEST_M = 32.0
+"""Farthest that a branch is drawn back: on 2500 m of radius, as at 1:26.5, two rails are 0.2 m apart after so long."""
 
 STEADY_M = 8.0
 """Stretch over which the curvature of the stem is measured: the rail that keeps it is the main one."""
 
+SHARPER = 2.0
+UNSURE_CURVATURE = 16 * STAIRS_M / STEADY_M**2
+"""A branch begins on the arc that it goes on with: no more bent than so many times what is seen of it, and what stairs
+at both ends of that stretch may hide. This tells switches from frogs."""
 
-def resolve_branches(network: LineNetwork, apart_m: float) -> LineNetwork:
+
+def resolve_branches(network: LineNetwork) -> LineNetwork:
     """Draw the rails of every branching as smooth curves from the common stem, and weld the steadier one to it.
-
-    Parameters
-    ----------
-    network : LineNetwork
-    apart_m : float
-        Distance between two rails at which the raster shows them apart: railhead and cell together.
 
     Returns
     -------
@@ -40,8 +40,10 @@ def resolve_branches(network: LineNetwork, apart_m: float) -> LineNetwork:
         if min(length_along(rail)[-1] for rail in rails) < SKIP_M + DIRECTION_M:
             continue
         free = [cut_back(rail, SKIP_M) for rail in rails]
-        trunk = _trunk(trunk, free, apart_m)
-        curves = [bridge(trunk, rail, held=True) for rail in free] if len(trunk) > 1 else [None]
+        trunk = _trunk(trunk, rails)
+        curves = (
+            [bridge(trunk, rail, held=True, misfit_m=KNOWN_MISFIT_M) for rail in free] if len(trunk) > 1 else [None]
+        )
         if None in curves:
             continue
         nodes[node] = trunk[0]
@@ -65,15 +67,35 @@ def _branchings(network: LineNetwork) -> Iterator[tuple[int, int, list[int]]]:
                 yield node, ends[stem], ends[:stem] + ends[stem + 1 :]
 
 
-def _trunk(stem: np.ndarray, free: list[np.ndarray], apart_m: float) -> np.ndarray:
-    """Cut the stem back to where the legs begin to part; nothing is left if it is too short for that.
-
-    The distance between rails that part on an arc grows with the square of the way x from there. At the node it is
-    d = `apart_m`; their angle is seen m further on, so that angle x² = 2 d (x + m).
-    """
-    ways = [way_out(stretch(rail, DIRECTION_M))[1] for rail in free]
-    angle = max(abs(ways[0][0] * ways[1][1] - ways[0][1] * ways[1][0]), apart_m / FARTHEST_M)
-    further_m = SKIP_M + DIRECTION_M / 2
-    back_m = (apart_m + np.sqrt(apart_m**2 + 2 * apart_m * further_m * angle)) / angle
+def _trunk(stem: np.ndarray, rails: list[np.ndarray]) -> np.ndarray:
+    """Cut the stem back to where the legs begin to part; nothing is left if that is too far, or the stem too short."""
+    one, other = (stretch(cut_back(rail, SKIP_M), STEADY_M) for rail in rails)
+    count = min(len(one), len(other))
+    apart_m = np.hypot(*(one[:count] - other[:count]).T)
+    back_m, bend = parting(SKIP_M + STEP_M * np.arange(count), apart_m)
     too_short = length_along(stem)[-1] < back_m + DIRECTION_M
-    return stem[:0] if too_short or back_m > FARTHEST_M else cut_back(stem, back_m)
+    if too_short or not 0 < back_m < FARTHEST_M or bend > sharpest(curvature(one) - curvature(other)):
+        return stem[:0]
+    return cut_back(stem, back_m)
+
+
+def sharpest(seen: float) -> float:
+    """Tell how sharply rails may bend apart where they merge if beyond they bend apart by `seen`, 1/m both."""
+    return SHARPER * abs(seen) + UNSURE_CURVATURE
+
+
+def parting(along_m: np.ndarray, apart_m: np.ndarray) -> tuple[float, float]:
+    """Tell how far back of chainage 0 two rails begin to part, metres, and how they bend apart, 1/m.
+
+    Rails that part on an arc are k x² / 2 apart x after they touched. They begin to part where that is more than a
+    line tells, `MISFIT_M`. Infinitely far back if they do not part.
+
+    Parameters
+    ----------
+    along_m, apart_m : (n,) arrays
+        Chainages and the distances between the rails there.
+    """
+    slope, root = np.polyfit(along_m, np.sqrt(2 * apart_m), 1)
+    if slope <= 0:
+        return np.inf, 0.0
+    return float((root - np.sqrt(2 * MISFIT_M)) / slope), float(slope**2)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from .bridges import Bridge, bridge
-from .ends import cut_back, turned
+from .ends import cut_back, stretch, turned
 from .junctions import ends_by_node
 from .network import LineNetwork
 
@@ -44,7 +44,7 @@ def resolve_crossings(network: LineNetwork) -> LineNetwork:
         keep[shared] = False
         more_m = {end: cut for ends, found in pairing.items() for end, cut in zip(ends, found.cuts_m)}
         for end in legs:
-            free = cut_back(turned(lines[end // 2], end), SKIP_M + more_m[end])
+            free = cut_back(turned(lines[end // 2], end), legs[end] + more_m[end])
             lines[end // 2] = turned(free, end)
             ends.flat[end] = len(nodes)
             nodes.append(free[0])
@@ -59,24 +59,34 @@ def resolve_crossings(network: LineNetwork) -> LineNetwork:
     return LineNetwork(tuple(lines), np.array(nodes), ends).select(keep).weld(partner, bridges)
 
 
-def _crossings(network: LineNetwork) -> Iterator[tuple[list[int], list[int]]]:
-    """List the shared lines (one or none) and the four legs of every possible crossing, the most certain ones first."""
+def _crossings(network: LineNetwork) -> Iterator[tuple[list[int], dict[int, float]]]:
+    """List the shared lines (one or none) and the four legs of every possible crossing, the most certain ones first.
+
+    With each leg stands the length of it next to the crossing that is not its rail's alone.
+    """
     lengths, degrees, at_node = network.lengths(), network.degrees(), dict(ends_by_node(network))
     places = [([], [node]) for node in np.flatnonzero(degrees == 4).tolist()]
     shared = np.flatnonzero((degrees[network.ends] == 3).all(axis=1) & (lengths < MERGED_M))
     places += [([line], network.ends[line].tolist()) for line in shared[np.argsort(lengths[shared])].tolist()]
-    candidates = [
-        (lines, [end for node in nodes for end in at_node[node] if end // 2 not in lines]) for lines, nodes in places
+    crossings = [
+        (lines, {end: SKIP_M for node in nodes for end in at_node[node] if end // 2 not in lines})
+        for lines, nodes in places
     ]
-    candidates += [([], [*at_node[node], free]) for node, free in _cut_off(network)]
-    for lines, legs in candidates:
-        if len({end // 2 for end in legs}) == 4 and lengths[[end // 2 for end in legs]].min() > 3 * SKIP_M:
+    crossings += [([], legs) for legs in _cut_off(network)]
+    for lines, legs in crossings:
+        long = all(
+            lengths[end // 2] > 3 * SKIP_M and lengths[end // 2] > skip_m + SKIP_M for end, skip_m in legs.items()
+        )
+        if len({end // 2 for end in legs}) == 4 and long:
             yield lines, legs
 
 
-def _cut_off(network: LineNetwork) -> list[tuple[int, int]]:
-    """List the nodes of three lines and the free ends near them, nearest first, that all three lines reach beyond."""
-    lengths, degrees, at_node = network.lengths(), network.degrees(), dict(ends_by_node(network))
+def _cut_off(network: LineNetwork) -> list[dict[int, float]]:
+    """List the crossings that a flangeway leaves only three legs, with every free end that may be the fourth.
+
+    The leg on the side of the free end is shared as far as there. Nearer ends come first.
+    """
+    degrees, at_node = network.degrees(), dict(ends_by_node(network))
     free, forks = np.flatnonzero(degrees == 1), np.flatnonzero(degrees == 3)
     if not len(free) or not len(forks):
         return []
@@ -84,21 +94,21 @@ def _cut_off(network: LineNetwork) -> list[tuple[int, int]]:
         cKDTree(network.nodes[free]), MERGED_M, output_type="coo_matrix"
     )
     found = []
-    for fork, tip, distance_m in sorted(
-        zip(near.row.tolist(), near.col.tolist(), near.data.tolist()), key=lambda f: f[2]
-    ):
-        node = int(forks[fork])
-        if min(lengths[end // 2] for end in at_node[node]) > distance_m:
-            found.append((node, at_node[int(free[tip])][0]))
+    for fork, tip in np.column_stack([near.row, near.col])[np.argsort(near.data, kind="stable")].tolist():
+        legs, across = at_node[int(forks[fork])], network.nodes[free[tip]] - network.nodes[forks[fork]]
+        reach_m = float(np.hypot(*across))
+        ways = [stretch(network.from_end(end), max(reach_m, SKIP_M))[-1] - network.nodes[forks[fork]] for end in legs]
+        stem = legs[int(np.argmax([way @ across for way in ways]))]
+        found.append({**dict.fromkeys(legs, SKIP_M), stem: reach_m + SKIP_M, at_node[int(free[tip])][0]: SKIP_M})
     return found
 
 
-def _best_pairing(network: LineNetwork, legs: Sequence[int]) -> dict[tuple[int, int], Bridge]:
+def _best_pairing(network: LineNetwork, legs: Mapping[int, float]) -> dict[tuple[int, int], Bridge]:
     """Find the cheapest way of running two rails through four legs; empty if there is none."""
-    cut = {end: cut_back(network.from_end(end), SKIP_M) for end in legs}
+    cut = {end: cut_back(network.from_end(end), skip_m) for end, skip_m in legs.items()}
     options = []
     for pairing in _PAIRINGS:
-        ends = [(legs[first], legs[second]) for first, second in pairing]
+        ends = [tuple(list(legs)[place] for place in pair) for pair in pairing]
         found = {(one, other): bridge(cut[one], cut[other], misfit_m=MISFIT_M) for one, other in ends}
         if None not in found.values():
             options.append(found)

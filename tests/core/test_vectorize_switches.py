@@ -7,7 +7,11 @@ import pytest
 from rail_extract.core.synthetic.curves import Element, trace
 from rail_extract.core.vectorize.attaching import attach_branches, drop_guards
 from rail_extract.core.vectorize.blots import cut_kinks, straighten_blots
+from rail_extract.core.vectorize.branches import parting, resolve_branches
+from rail_extract.core.vectorize.bridges import MISFIT_M
+from rail_extract.core.vectorize.crossings import resolve_crossings
 from rail_extract.core.vectorize.joining import join_gaps
+from rail_extract.core.vectorize.junctions import weld_pairs
 from rail_extract.core.vectorize.network import LineNetwork
 from scipy.spatial import cKDTree
 
@@ -66,7 +70,8 @@ def test_a_branch_is_led_back_tangentially_to_its_stock_rail(radius):
     assert sorted(network.degrees()) == [1, 1, 1, 3]
     (node, line, vertex) = network.passes[0]
     np.testing.assert_array_equal(network.lines[line][vertex], network.nodes[node])
-    assert abs(network.nodes[node][0] - 10) < 0.25 * np.sqrt(2 * radius * 0.12)
+    seen_from_m = 10 + np.sqrt(2 * radius * MISFIT_M)
+    assert network.nodes[node][0] == pytest.approx(seen_from_m, abs=0.2)
     assert cKDTree(np.concatenate([stock, arc])).query(network.lines[1])[0].max() < 0.06
 
 
@@ -87,3 +92,61 @@ def test_a_guard_rail_goes_and_a_rail_of_its_own_stays():
     rail, guard, other = along_x(0, 40), along_x(10, 14, 0.116), along_x(20, 24, 0.3)
     network = drop_guards(loose(rail, guard, other), HEAD_M)
     np.testing.assert_allclose(np.sort(network.lengths()), [3.9, 39.9], atol=0.11)
+
+
+@pytest.mark.parametrize("radius", [190, 500, 2500])
+def test_rails_that_part_on_an_arc_begin_where_a_line_tells_them_apart(radius):
+    x = np.arange(20.0, 28.0, 0.1)
+    back_m, bend = parting(x - 20, x**2 / (2 * radius))
+    assert back_m == pytest.approx(20 - np.sqrt(2 * radius * MISFIT_M))
+    assert bend == pytest.approx(1 / radius)
+    assert parting(x, x[::-1])[0] == np.inf
+
+
+@pytest.mark.parametrize("radius", [190, 2500])
+def test_a_merged_stretch_is_resolved_into_two_rails(radius):
+    stock = along_x(0, 120)
+    arc = trace([Element(80, 1 / radius, 1 / radius)], (40.0, 0.0)).xy[::5]
+    apart_m = 40 + np.sqrt(2 * radius * 0.2)
+    fork = np.array([[apart_m, 0.1]])
+    stem = np.concatenate([stock[stock[:, 0] < apart_m], fork])
+    legs = (np.concatenate([fork, rail[rail[:, 0] > apart_m + 0.1]]) for rail in (stock, arc))
+    lines = (stem, *legs)
+    nodes = np.concatenate([fork, stem[:1], *(line[-1:] for line in lines[1:])])
+    network = resolve_branches(LineNetwork(lines, nodes, np.array([[1, 0], [0, 2], [0, 3]])))
+    through, branch = sorted(network.lines, key=len, reverse=True)
+    assert np.abs(through[:, 1]).max() < 0.02
+    assert branch[0, 0] == pytest.approx(40 + np.sqrt(2 * radius * MISFIT_M), abs=0.7)
+    assert cKDTree(trace([Element(80, 1 / radius, 1 / radius)], (40.0, 0.0)).xy).query(branch)[0].max() < 0.02
+
+
+@pytest.mark.parametrize("missing_m", [1.0, 3.0])
+def test_rails_cross_at_a_frog_whose_flangeway_cuts_one_leg_off(missing_m):
+    slope = np.arctan(1 / 9)
+    way, other = np.array([1.0, 0.0]), np.array([np.cos(slope), np.sin(slope)])
+    near, t = np.arange(0, 25, 0.1)[:, None], np.arange(missing_m, 25, 0.1)[:, None]
+    fork = np.zeros((1, 2))
+    shared = np.concatenate([fork, (missing_m / 2 + 0.1) * (way + other)[None] / 2, (t[1:] + 0.3) * other])
+    lines = (np.concatenate([fork, -near[5:] * way]), np.concatenate([fork, -near[5:] * other]), shared, t * way)
+    nodes = np.concatenate([fork, *(line[-1:] for line in lines), lines[3][:1]])
+    network = resolve_crossings(LineNetwork(lines, nodes, np.array([[0, 1], [0, 2], [0, 3], [5, 4]])))
+    assert len(network.lines) == 2
+    for line in network.lines:
+        off = [np.abs(line @ [-along[1], along[0]]).max() for along in (way, other)]
+        assert min(off) < 0.02
+
+
+def test_the_legs_of_a_switch_that_lost_its_stem_are_not_one_rail():
+    lines = tuple(np.array([[0.0, 0.0], [10.0, y]]) for y in (0.5, -0.5))
+    network = weld_pairs(LineNetwork(lines, np.array([[0.0, 0], [10, 0.5], [10, -0.5]]), np.array([[0, 1], [0, 2]])))
+    assert len(network.lines) == 2
+    assert (network.degrees() == 1).all()
+
+
+def test_ends_bent_aside_beside_each_other_are_joined_without_their_hooks():
+    rail, wing = along_x(0, 20), along_x(20.2, 40)
+    rail[-15:, 1] += 0.1 * np.linspace(0, 1.5, 15)
+    (line,) = join_gaps(loose(rail, wing[:-1]), 5.0, 10.0, cKDTree(np.concatenate([rail, wing]))).lines
+    assert np.abs(line[:, 1]).max() < 0.05
+    beside = along_x(18, 40, 0.3)
+    assert len(join_gaps(loose(along_x(0, 20), beside), 5.0, 10.0).lines) == 2
