@@ -14,7 +14,7 @@ COMMANDS = {
     "onnx": ("core.frpdf.onnx", "write the network for other runtimes"),
     "scenes": ("core.synthetic.write", "write synthetic clouds with their true lines"),
 }
-"""Module and help of each command; a module offers `add_arguments(parser)` and `run(args)`, with or without exit code."""
+"""Module and help of each command; a module offers `add_arguments(parser)` and `run(args)`, that may give a code."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

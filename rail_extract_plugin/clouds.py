@@ -22,6 +22,7 @@ from ..core.progress import Progress
 
 if TYPE_CHECKING:
     from ..core.points import RailPoints
+    from ..core.spool import SpooledPoints
 
 Bounds = tuple[float, float, float, float]
 
@@ -80,6 +81,23 @@ def read_points(
 
     crs = QgsCoordinateReferenceSystem(read_headers(source.paths)[0].crs_wkt or source.crs_wkt or "")
     return read_rail_points(source.paths, class_codes, source.crs_wkt, bounds(crs), progress)
+
+
+def spool_points(
+    source: CloudSource,
+    class_codes: Sequence[int],
+    bounds: Callable[[QgsCoordinateReferenceSystem], Bounds | None],
+    side_m: float,
+    folder: Path,
+    progress: Progress,
+) -> tuple[SpooledPoints, ...]:
+    """Do as `read_points`, but leave the points on disk, sorted into squares: a cloud of any size fits."""
+    from ..core.points import ask, read_headers
+    from ..core.spool import spool
+
+    crs = QgsCoordinateReferenceSystem(read_headers(source.paths)[0].crs_wkt or source.crs_wkt or "")
+    request = ask(source.paths, class_codes, source.crs_wkt, bounds(crs), progress)
+    return spool(request, side_m, folder, progress)
 
 
 def _loaded_layer(name: str, context: QgsProcessingContext) -> QgsMapLayer | None:

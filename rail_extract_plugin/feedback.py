@@ -22,6 +22,10 @@ class QgisProgress(Progress):
         """Move the progress bar."""
         self._feedback.setProgress(100 * fraction)
 
+    def status(self, text: str) -> None:
+        """Show a line above the progress bar."""
+        self._feedback.setProgressText(text)
+
     def info(self, text: str) -> None:
         """Write a line into the log."""
         self._feedback.pushInfo(text)

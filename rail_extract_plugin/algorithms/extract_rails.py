@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
@@ -14,13 +16,14 @@ from qgis.core import (
     QgsProcessingOutputString,
     QgsProcessingParameterFeatureSink,
     QgsProcessingParameterRasterDestination,
+    QgsProcessingUtils,
 )
 
 from ...core.frpdf.zoo import choose as choose_model
-from ...core.progress import Progress
+from ...core.progress import Estimating, Progress
 from ...core.standards import RailStandard
 from .. import parameters as groups
-from ..clouds import CloudSource, read_points
+from ..clouds import CloudSource, spool_points
 from ..i18n import tr
 from ..layers import CENTERLINES, RAILS, figures_of, figures_of_stations, write_lines, write_raster, write_stations
 from ..values import Values
@@ -101,17 +104,20 @@ class ExtractRails(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Extract everything, then write it."""
-        from ...core.pipeline import extract_rails
+        from ...core.pipeline import extract_rails, stretch_side
 
-        values = Values(self, parameters, context)
-        clouds = read_points(job.cloud, job.class_codes, values.extent, progress.span(0, READING))
+        values, progress = Values(self, parameters, context), Estimating(progress)
         settings = values.settings(job.standard, job.other_gauges_m)
         settings = replace(
             settings,
             quality_step_m=values.number("STEP") if values.filled("QUALITY") else None,
             keep_cleaned=values.filled("CLEANED"),
         )
-        network = extract_rails(clouds, settings, progress.span(READING, 1))
+        side_m = stretch_side(settings)
+        with TemporaryDirectory(dir=QgsProcessingUtils.tempFolder()) as folder:
+            reading = progress.span(0, READING)
+            clouds = spool_points(job.cloud, job.class_codes, values.extent, side_m, Path(folder), reading)
+            network = extract_rails(clouds, settings, progress.span(READING, 1))
         progress.check()
         written = {
             **self._write_cleaned(job, network, [one.class_code for one in clouds], parameters, context),
