@@ -15,6 +15,7 @@ from qgis.core import (
     QgsProcessingOutputNumber,
     QgsProcessingOutputString,
     QgsProcessingParameterFeatureSink,
+    QgsProcessingParameterFileDestination,
     QgsProcessingParameterRasterDestination,
     QgsProcessingUtils,
 )
@@ -26,6 +27,7 @@ from .. import parameters as groups
 from ..clouds import CloudSource, spool_points
 from ..i18n import tr
 from ..layers import CENTERLINES, RAILS, figures_of, figures_of_stations, write_lines, write_raster, write_stations
+from ..reports import Origin, write_report
 from ..values import Values
 from .base import RailAlgorithm
 
@@ -44,6 +46,7 @@ class Job:
     class_codes: tuple[int, ...]
     standard: RailStandard
     other_gauges_m: tuple[float, ...]
+    command: str
 
 
 class ExtractRails(RailAlgorithm):
@@ -85,6 +88,8 @@ class ExtractRails(RailAlgorithm):
         ):
             optional.setCreateByDefault(False)
             self.addParameter(optional)
+        html = tr("Web pages (*.html)")
+        self.addParameter(QgsProcessingParameterFileDestination("REPORT", tr("Report"), html, optional=True))
         self.addOutput(QgsProcessingOutputNumber("RAIL_COUNT", tr("Number of rails")))
         self.addOutput(QgsProcessingOutputNumber("RAIL_LENGTH", tr("Length of the rails [m]")))
         self.addOutput(QgsProcessingOutputNumber("CENTERLINE_COUNT", tr("Number of track centerlines")))
@@ -98,7 +103,13 @@ class ExtractRails(RailAlgorithm):
         values = Values(self, parameters, context)
         standard = values.standard()
         choose_model(standard.gauge_m, standard.head_width_m)
-        return Job(values.cloud("INPUT"), values.class_codes(), standard, values.other_gauges_m(standard))
+        return Job(
+            values.cloud("INPUT"),
+            values.class_codes(),
+            standard,
+            values.other_gauges_m(standard),
+            self.asPythonCommand(parameters, context),
+        )
 
     def compute(
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
@@ -110,7 +121,7 @@ class ExtractRails(RailAlgorithm):
         settings = values.settings(job.standard, job.other_gauges_m)
         settings = replace(
             settings,
-            quality_step_m=values.number("STEP") if values.filled("QUALITY") else None,
+            quality_step_m=values.number("STEP") if values.filled("QUALITY") or values.filled("REPORT") else None,
             keep_cleaned=values.filled("CLEANED"),
         )
         side_m = stretch_side(settings)
@@ -119,11 +130,13 @@ class ExtractRails(RailAlgorithm):
             clouds = spool_points(job.cloud, job.class_codes, values.extent, side_m, Path(folder), reading)
             network = extract_rails(clouds, settings, progress.span(READING, 1))
         progress.check()
+        origin = Origin(job.cloud.paths, job.standard, job.other_gauges_m, job.command)
         written = {
             **self._write_cleaned(job, network, [one.class_code for one in clouds], parameters, context),
             **write_lines(self, "RAILS", RAILS, network.rails, network.frame, parameters, context),
             **write_lines(self, "CENTERLINES", CENTERLINES, network.centerlines, network.frame, parameters, context),
             **write_stations(self, "QUALITY", network.geometry, network.frame, parameters, context),
+            **write_report(self, "REPORT", network, origin, parameters, context),
         }
         figures = {**figures_of(network.rails, "RAIL"), **figures_of(network.centerlines, "CENTERLINE")}
         measured = figures_of_stations(network.geometry) if settings.quality_step_m else {}

@@ -70,6 +70,28 @@ def places_of(path):
     return np.column_stack([x + (columns + 0.5) * side, y - (rows + 0.5) * side])
 
 
+def test_report_and_its_figures(run, scene, tmp_path):
+    path = tmp_path / "Bericht östlich.html"
+    outcome = run({**scene, "REPORT": path})
+    assert outcome.ok, outcome.error
+    assert outcome.results["REPORT"] == str(path)
+    html = path.read_text(encoding="utf-8")
+    assert "<h1>Rail Extract report</h1>" in html
+    for words in ("cloud.las", "EN 60E1", "1435 mm", "72 mm", "EPSG:32643", "Track 1", outcome.results["ENGINE_USED"]):
+        assert words in html, words
+    assert "railextract:extractrails" in html  # the command that repeats the run
+    assert "QUALITY" not in outcome.results
+    assert outcome.results["STATION_COUNT"] > 10
+    assert 0 < outcome.results["SIGMA"] < 5
+    assert outcome.results["BRIDGED_LENGTH"] == 0
+
+
+def test_without_quality_and_report_nothing_is_measured(run, scene):
+    outcome = run(scene)
+    assert outcome.ok, outcome.error
+    assert "STATION_COUNT" not in outcome.results
+
+
 def test_memory_layers(run, scene, context):
     outcome = run({**scene, "RAILS": "TEMPORARY_OUTPUT", "CENTERLINES": "memory:tracks"})
     assert outcome.ok, outcome.error

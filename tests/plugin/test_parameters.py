@@ -32,6 +32,7 @@ PARAMETERS = [
     ("CENTERLINES", "sink", None),
     ("QUALITY", "sink", None),
     ("CLEANED", "rasterDestination", None),
+    ("REPORT", "fileDestination", None),
 ]
 """The interface, which other people's scripts depend on."""
 
@@ -40,6 +41,7 @@ OUTPUTS = {
     "CENTERLINES": "outputVector",
     "QUALITY": "outputVector",
     "CLEANED": "outputRaster",
+    "REPORT": "outputHtml",
     "RAIL_COUNT": "outputNumber",
     "RAIL_LENGTH": "outputNumber",
     "CENTERLINE_COUNT": "outputNumber",
@@ -50,7 +52,7 @@ OUTPUTS = {
     "ENGINE_USED": "outputString",
 }
 
-RESULTS = {"RAILS", "CENTERLINES", "QUALITY", "CLEANED"}
+RESULTS = {"RAILS", "CENTERLINES", "QUALITY", "CLEANED", "REPORT"}
 ESSENTIAL = {"INPUT", "RAIL_CLASSES", "STANDARD", "GAUGE", "HEAD_WIDTH", "EXTENT", "MAX_GAP"} | RESULTS
 OPTIONAL = {"GAUGE", "HEAD_WIDTH", "EXTENT", "CRS", "OTHER_GAUGES"} | RESULTS
 

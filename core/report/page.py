@@ -1,0 +1,208 @@
+"""The report as one page of HTML that needs nothing else: no network, no other file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..rails import RailNetwork
+from .findings import DOUBTS, FEW, GAUGE_OFF_MM, MANY, UNSUPPORTED, Doubt, Findings, TrackFindings, examine
+from .markup import metres, table, tag, text
+from .plan import draw_plan
+from .plots import draw_profiles
+from .style import STYLE
+
+MOST_PLACES = 8
+"""Rows of the list of places to look at; the pictures show all."""
+
+VERDICTS = (
+    (0.0, "good", "Good throughout: points support every metre, at gauge and with a small error."),
+    (FEW, "good", "Good, but for a few places to look at."),
+    (MANY, "fair", "Usable, but look at the places below before you rely on them."),
+    (np.inf, "poor", "Poor: large parts are in doubt. Check class, gauge and railhead width, and the cloud's density."),
+)
+"""What is said up to which share of the length in doubt, and the colour it gets."""
+
+NOTES = (
+    "A rail line is the top of the railhead on the head's own axis. Gauge is the distance in space between the two "
+    "rail lines less the railhead width; it is not measured 14 mm below the top. Cant is the left rail minus the "
+    "right one, seen along the track; curvature is positive to the left. Chainage counts in plan from the western end "
+    "of the line, or from the southern one where it runs north.",
+    "The standard error is that of the centerline across the track: two thirds of the true positions should lie "
+    "within it. The report judges what was found. Whether a track was missed, only a look at the map and the cloud "
+    "can tell.",
+)
+
+
+def build_page(
+    network: RailNetwork, gauges_m: Sequence[float], source: str, facts: Mapping[str, str] | None = None
+) -> str:
+    """Write the report on a network.
+
+    Parameters
+    ----------
+    network : RailNetwork
+        With the geometry of its tracks.
+    gauges_m : sequence of float
+        Gauges that tracks may have.
+    source : str
+        What the rails were extracted from.
+    facts : mapping of str to str
+        What else to state, such as parameters, by name.
+
+    Returns
+    -------
+    str
+        A whole HTML document.
+    """
+    findings = examine(network, gauges_m)
+    heights = [_heights(network, track) for track in findings.tracks]
+    body = [
+        tag("h1", text("Rail Extract report")),
+        tag("p", text(source), class_="source"),
+        _verdict(findings, len(network.rails)),
+        _tiles(network, findings),
+        *([_map(findings), _places(findings), _tracks(findings)] if findings.tracks else []),
+        *(_profiles(track, height) for track, height in zip(findings.tracks, heights)),
+        _facts({**(facts or {}), "Engine": network.engine}),
+    ]
+    head = (
+        '<meta charset="utf-8">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        tag("title", text(f"Rail Extract: {source}")),
+        f"<style>{STYLE}</style>",
+    )
+    return f"<!DOCTYPE html>\n{tag('html', tag('head', *head), tag('body', tag('main', *body)), lang='en')}\n"
+
+
+def _verdict(findings: Findings, rail_count: int) -> str:
+    """Say in words how good the result is, and what is in doubt."""
+    if not findings.tracks:
+        words = f"No track was found. There are {rail_count} rails, but no two of them run side by side at a gauge."
+        return tag("div", tag("strong", text(words)), class_="verdict poor")
+    kind, headline = next((kind, words) for most, kind, words in VERDICTS if findings.share <= most)
+    reasons = [tag("li", text(_reason(findings, doubt))) for doubt in DOUBTS if findings.length_of(doubt) > 0]
+    if findings.lonely_rails:
+        count = findings.lonely_rails
+        belong = "1 rail belongs" if count == 1 else f"{count} rails belong"
+        reasons.append(tag("li", text(f"{belong} to no track ({metres(findings.lonely_m)}).")))
+    listed = [tag("ul", *reasons)] if reasons else []
+    return tag("div", tag("strong", text(headline)), *listed, class_=f"verdict {kind}")
+
+
+def _reason(findings: Findings, doubt: Doubt) -> str:
+    """Say how much is in doubt for a reason, and where most."""
+    length_m, place = findings.length_of(doubt), next(one for one in findings.places() if one.doubt == doubt)
+    share = f"{metres(length_m)} of {metres(findings.length_m)} ({100 * length_m / findings.length_m:.1f} %)"
+    where = f"track {place.track_id}, {place.start_m:,.0f} to {place.end_m:,.0f} m"
+    return f"{share}: {doubt.label}. Longest: {where}."
+
+
+def _tiles(network: RailNetwork, findings: Findings) -> str:
+    """State the figures that matter most."""
+    sigma = np.concatenate([track.geometry.sigma_mm for track in findings.tracks] or [np.empty(0)])
+    known = sigma[np.isfinite(sigma)]
+    tiles = [
+        (str(len(findings.tracks)), "tracks"),
+        (metres(findings.length_m), "of track"),
+        (str(len(network.rails)), f"rails, {metres(sum(rail.length_m for rail in network.rails))}"),
+        (f"{np.median(known):.1f} mm" if len(known) else "unknown", "standard error, median"),
+        (f"{100 * (1 - findings.share):.1f} %", "of it without any doubt"),
+        (f"{_density(findings):.0f}", "points a metre of track, median"),
+    ]
+    return tag(
+        "div",
+        *(tag("div", tag("b", text(figure)), tag("span", text(what)), class_="tile") for figure, what in tiles),
+        class_="tiles",
+    )
+
+
+def _density(findings: Findings) -> float:
+    """Points on both rails that are nearest to a metre of track, median; 0 without tracks."""
+    density = [track.geometry.points / track.geometry.cells_m for track in findings.tracks]
+    return float(np.median(np.concatenate(density))) if density else 0.0
+
+
+def _map(findings: Findings) -> str:
+    return _section("Map", draw_plan(findings), _legend())
+
+
+def _legend(*more: str) -> str:
+    keys = [tag("span", tag("i", class_="fine"), text("supported, at gauge, small error"))]
+    keys += [tag("span", tag("i", class_=doubt.name), text(doubt.label)) for doubt in DOUBTS]
+    return tag("div", *keys, *more, class_="legend")
+
+
+def _places(findings: Findings) -> str:
+    """List where to look."""
+    places = findings.places()
+    if not places:
+        return ""
+    rows = [
+        (place.track_id, f"{place.start_m:,.1f} to {place.end_m:,.1f} m", metres(place.length_m), place.doubt.label)
+        for place in places[:MOST_PLACES]
+    ]
+    listed = tag("div", table(("Track", "Chainage", "In doubt", "Why"), rows), class_="scroll")
+    more = len(places) - len(rows)
+    rest = [tag("p", text(f"{more} more places are marked below."), class_="notes")] if more else []
+    return _section("Where to look", listed.replace("<table>", '<table class="words">'), *rest)
+
+
+def _tracks(findings: Findings) -> str:
+    """Sum the tracks up."""
+    headings = ("Track", "Length", "Gauge", "Cant", "Tightest radius", "Gradient", "Standard error", "No points")
+    rows = [_row(track) for track in findings.tracks]
+    return _section("Tracks", tag("div", table(headings, rows), class_="scroll"))
+
+
+def _row(track: TrackFindings) -> tuple[str, ...]:
+    line, geometry = track.line, track.geometry
+    return (
+        str(line.track_id),
+        metres(track.length_m),
+        f"{line.gauge_mm:.1f} ± {line.gaugesd_mm:.1f} mm",
+        _span(geometry.cant_mm, "mm"),
+        _tightest(geometry.radius_m),
+        _span(geometry.grade_pm, "‰"),
+        _median(geometry.sigma_mm),
+        metres(track.length_of(UNSUPPORTED)),
+    )
+
+
+def _span(values: np.ndarray, unit: str) -> str:
+    known = values[np.isfinite(values)]
+    return f"{known.min():.1f} to {known.max():.1f} {unit}" if len(known) else "unknown"
+
+
+def _median(values: np.ndarray) -> str:
+    known = values[np.isfinite(values)]
+    return f"{np.median(known):.1f} mm" if len(known) else "unknown"
+
+
+def _tightest(radius_m: np.ndarray) -> str:
+    known = radius_m[np.isfinite(radius_m)]
+    if not len(known):
+        return "straight"
+    tightest = known[np.argmin(np.abs(known))]
+    return f"{abs(tightest):,.0f} m {'left' if tightest > 0 else 'right'}"
+
+
+def _profiles(track: TrackFindings, height_m: np.ndarray) -> str:
+    band = tag("span", tag("i", class_="band"), text(f"gauge within {GAUGE_OFF_MM:g} mm of nominal"))
+    return _section(f"Track {track.line.track_id}", draw_profiles(track, height_m), _legend(band))
+
+
+def _facts(facts: Mapping[str, str]) -> str:
+    listed = "".join(tag("dt", text(name)) + tag("dd", text(value)) for name, value in facts.items() if value)
+    return _section("How it was made", tag("dl", listed), *(tag("p", text(note), class_="notes") for note in NOTES))
+
+
+def _section(heading: str, *content: str) -> str:
+    return tag("section", tag("h2", text(heading)), *content)
+
+
+def _heights(network: RailNetwork, track: TrackFindings) -> np.ndarray:
+    """Heights of stations above the datum of the cloud, metres."""
+    frame = network.frame
+    return frame.to_crs(track.geometry.xyz)[:, 2] * frame.vertical_unit_m

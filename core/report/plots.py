@@ -1,0 +1,163 @@
+"""Pictures of a track by chainage: one panel a quantity, all over one axis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .findings import DOUBTS, GAUGE_OFF_MM, TrackFindings
+from .markup import tag, text
+
+WIDTH, LEFT, RIGHT = 1040.0, 76.0, 12.0
+"""Units of a picture across, and its margins for labels."""
+
+PANEL, SPACE, AXIS = 92.0, 26.0, 38.0
+"""Heights of a panel, of its heading, and of the axis below the last."""
+
+TICKS_ACROSS, TICKS_UP = 10, 4
+"""About how many marks an axis gets."""
+
+ROOM = 0.08
+"""Part of a panel that stays free above and below the curve."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A quantity along the track.
+
+    Attributes
+    ----------
+    heading, unit : str
+    values : (n,) array
+    least_span : float
+        The panel shows at least so much, so that noise does not look like an alarm.
+    band : tuple of float or None
+        From where to where values are as they should be.
+    floor : float or None
+        Lowest value shown.
+    """
+
+    heading: str
+    unit: str
+    values: np.ndarray
+    least_span: float
+    band: tuple[float, float] | None = None
+    floor: float | None = None
+
+    def limits(self) -> tuple[float, float]:
+        """Lowest and highest value to show; the middle of the band, or of the values, when there is little to see."""
+        known = self.values[np.isfinite(self.values)]
+        low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
+        if self.band:
+            low, high = min(low, self.band[0]), max(high, self.band[1])
+        lacking = max(self.least_span - (high - low), 0.0) / 2
+        room = ROOM * max(high - low, self.least_span)
+        low, high = low - lacking - room, high + lacking + room
+        return (self.floor, high) if self.floor is not None else (low, high)
+
+
+def draw_profiles(track: TrackFindings, height_m: np.ndarray) -> str:
+    """Draw height, gauge, cant, curvature and standard error of a track by chainage, as SVG.
+
+    Parameters
+    ----------
+    track : TrackFindings
+    height_m : (n,) array
+        Of the stations, above the datum of the cloud.
+    """
+    along = track.geometry.chainage_m
+    panels = _panels(track, height_m)
+    bottom = len(panels) * (PANEL + SPACE)
+    drawn = [_draw_panel(panel, track, number * (PANEL + SPACE) + SPACE) for number, panel in enumerate(panels)]
+    axis = [
+        tag("text", text(f"{chainage:,g}"), x=_across(chainage, along), y=bottom + 16, class_="tick middle")
+        for chainage in ticks(along[0], along[-1], TICKS_ACROSS)
+    ]
+    name = tag("text", text("chainage [m]"), x=WIDTH - RIGHT, y=bottom + 32, class_="tick end")
+    label = f"Profiles of track {track.line.track_id}"
+    return tag("svg", *drawn, *axis, name, viewBox=f"0 0 {WIDTH:g} {bottom + AXIS:g}", role="img", aria_label=label)
+
+
+def ticks(low: float, high: float, count: int) -> np.ndarray:
+    """Round numbers from `low` to `high`, about `count` of them."""
+    step = round_up(max(high - low, 1e-9) / count)
+    return np.round(np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step, 9) + 0.0
+
+
+def round_up(value: float) -> float:
+    """Find the least of 1, 2 and 5, and these times powers of ten, that is not smaller."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * next(factor for factor in (1, 2, 5, 10) if value <= power * factor))
+
+
+def curve(x: np.ndarray, y: np.ndarray) -> str:
+    """Write the path through points, (n,) each, broken where one is NaN; no more than a picture can show."""
+    x, y = _thinned(x, y)
+    known = np.isfinite(y)
+    moves = known & ~np.concatenate([[False], known[:-1]])
+    return "".join(f"{'M' if move else 'L'}{a:.1f} {b:.1f}" for a, b, ok, move in zip(x, y, known, moves) if ok)
+
+
+def _panels(track: TrackFindings, height_m: np.ndarray) -> list[Panel]:
+    geometry, gauge = track.geometry, track.nominal_mm
+    curvature = np.where(np.isnan(geometry.radius_m), 0.0, 1000 / geometry.radius_m)
+    return [
+        Panel("Height", "m", height_m, 0.2),
+        Panel(f"Gauge, nominal {gauge:g}", "mm", geometry.gauge_mm, 20, (gauge - GAUGE_OFF_MM, gauge + GAUGE_OFF_MM)),
+        Panel("Cant, left minus right", "mm", geometry.cant_mm, 20),
+        Panel("Curvature, positive to the left", "1/km", curvature, 0.4),
+        Panel("Standard error", "mm", geometry.sigma_mm, 4, floor=0.0),
+    ]
+
+
+def _draw_panel(panel: Panel, track: TrackFindings, top: float) -> str:
+    along, (low, high) = track.geometry.chainage_m, panel.limits()
+    scale = PANEL / (high - low)
+
+    def up(value):
+        return top + PANEL - (value - low) * scale
+
+    parts = [tag("rect", x=LEFT, y=top, width=WIDTH - LEFT - RIGHT, height=PANEL, class_="panel")]
+    if panel.band:
+        span = {"y": up(panel.band[1]), "height": (panel.band[1] - panel.band[0]) * scale}
+        parts.append(tag("rect", x=LEFT, width=WIDTH - LEFT - RIGHT, class_="band", **span))
+    parts += _shades(track, top)
+    for value in ticks(low, high, TICKS_UP):
+        parts.append(tag("line", x1=LEFT, x2=WIDTH - RIGHT, y1=up(value), y2=up(value), class_="grid"))
+        parts.append(tag("text", text(f"{value:,.10g}"), x=LEFT - 8, y=up(value) + 4, class_="tick end"))
+    parts.append(tag("path", d=curve(_across(along, along), up(panel.values)), class_="curve"))
+    heading = tag("tspan", text(panel.heading), class_="name") + text(f"  [{panel.unit}]")
+    parts.append(tag("text", heading, x=LEFT, y=top - 8, class_="heading"))
+    return "".join(parts)
+
+
+def _shades(track: TrackFindings, top: float) -> Iterator[str]:
+    """Mark what is in doubt, to a unit of the picture; a mark is at least as wide, so that it can be seen."""
+    along = track.geometry.chainage_m
+    for doubt in DOUBTS:
+        for place in track.places(doubt, merge_m=track.length_m / WIDTH):
+            start, end = _across(place.start_m, along), _across(place.end_m, along)
+            title = tag("title", text(f"{doubt.label}: {place.start_m:.1f} to {place.end_m:.1f} m"))
+            yield tag("rect", title, x=start, y=top, width=max(end - start, 1.0), height=PANEL, class_=doubt.name)
+
+
+def _across(chainage, along: np.ndarray):
+    return LEFT + (chainage - along[0]) / (along[-1] - along[0]) * (WIDTH - LEFT - RIGHT)
+
+
+def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Keep the lowest and the highest point of each unit across: the curve looks the same."""
+    columns = int(WIDTH)
+    if len(x) <= 4 * columns:
+        return x, y
+    kept = []
+    for part in np.array_split(np.arange(len(x)), columns):
+        unknown = np.isnan(y[part])
+        if unknown.all():
+            kept.append(part[:1])
+        else:
+            kept.append(np.unique([part[np.nanargmin(y[part])], part[np.nanargmax(y[part])]]))
+    numbers = np.concatenate(kept)
+    return x[numbers], y[numbers]
