@@ -59,9 +59,9 @@ def _between(
     """Follow a rail that leads from one stretch to the next, or one out of the first and one into the second."""
     left, right = leads(rails, before, 1)
     if before.left == after.left and runs_on(before.left_span, after.left_span):
-        yield left.at(_steps(0.0, abs(after.left_span[0] - before.left_span[1])), -half_m)
+        yield _followed(left, -half_m, abs(after.left_span[0] - before.left_span[1]))
     elif before.right == after.right and runs_on(before.right_span, after.right_span):
-        yield right.at(_steps(0.0, abs(after.right_span[0] - before.right_span[1])), half_m)
+        yield _followed(right, half_m, abs(after.right_span[0] - before.right_span[1]))
     else:
         back_left, back_right = leads(rails, after, 0)
         apart = np.hypot(*(_middle(left, right) - _middle(back_left, back_right)))
@@ -72,8 +72,12 @@ def _between(
 def _longer(left: Lead, right: Lead, half_m: float, reach_m: float) -> np.ndarray:
     """Follow the one of two rails, left and right as seen outwards, that reaches further."""
     lead, beside = (left, -half_m) if left.beyond_m >= right.beyond_m else (right, half_m)
-    length = min(lead.beyond_m, reach_m)
-    return lead.at(_steps(0.0, length), beside) if length > STEP_M else np.empty((0, 2))
+    return _followed(lead, beside, min(lead.beyond_m, reach_m))
+
+
+def _followed(lead: Lead, left_m: float, length_m: float) -> np.ndarray:
+    """Follow a rail outwards on its left; what is shorter than a step has no direction, and is left out."""
+    return lead.at(_steps(0.0, length_m), left_m) if length_m > STEP_M else np.empty((0, 2))
 
 
 def _middle(left: Lead, right: Lead) -> np.ndarray:
