@@ -30,6 +30,10 @@ LONGEST_UNSEEN_M = 6.0
 """Longest stretch drawn anew between what is seen at both its ends, for other rails lead the raster astray there: heads
 that cross at 1:26.5 cover each other for so long. Where an arc of 190 m begins abruptly it strays by 3 mm."""
 
+CURL_M, STEADY_M = 0.8, 3.5
+"""Length of a free end that is drawn anew, and of the stretch before it that it goes on from: the raster curls over two
+head widths or more, which half a window of 1.25 m makes longer, and the bend of a tram's rail takes metres to tell."""
+
 CROSSING_M = 3.0
 """Where two lines cross moves this far at most when they move by half a head: at 1:26.5 by 1 m each."""
 
@@ -78,6 +82,7 @@ def _shifted(
     """Move every line to the middle of its head, and nodes with them."""
     feet = project(network.lines, points.xyz[:, :2], widest_reach(head_width_m), progress.span(0.0, 0.7))
     edges = free_edges(network.lines, head_width_m)
+    free_ends = (network.degrees() == 1)[network.ends]
     lines = []
     for number, line in enumerate(progress.span(0.7, 1.0).follow(network.lines)):
         mine = feet.of(number)
@@ -90,8 +95,21 @@ def _shifted(
             continue
         shift = smooth_profile(stations[known], middle[known], smoothing_m, along)
         moved = line + shift[:, None] * left_normals(line)
-        lines.append(_drawn_across(moved, along, _unseen(stations, known)))
+        moved = _drawn_across(moved, along, _unseen(stations, known))
+        lines.append(_with_straight_ends(moved, along, free_ends[number]))
     return _joined(network, lines, smoothing_m)
+
+
+def _with_straight_ends(line: np.ndarray, along: np.ndarray, free_ends: np.ndarray) -> np.ndarray:
+    """Let a line run on at its free ends as it does before them: the raster's lines curl where a rail ends."""
+    line = line.copy()
+    for from_end, t, free in ((line, along, free_ends[0]), (line[::-1], along[-1] - along[::-1], free_ends[1])):
+        steady = (t >= CURL_M) & (t <= CURL_M + STEADY_M)
+        if free and steady.sum() > 3 and along[-1] > 2 * (CURL_M + STEADY_M):
+            curled = t < CURL_M
+            curve = np.polynomial.polynomial.polyfit(t[steady], from_end[steady], 2)
+            from_end[curled] = np.polynomial.polynomial.polyval(t[curled], curve).T
+    return line
 
 
 def _joined(network: LineNetwork, lines: list[np.ndarray], smoothing_m: float) -> LineNetwork:
