@@ -33,8 +33,8 @@ test-latest test-3.40: test-%:  ## run the same with Debian testing's QGIS, or w
 	@$(SUDO) $(SYSTEM_PYTHON) tools/chroot.py $* '$(TORCH)' $(filter-out git,$(APT_PACKAGES))
 
 .PHONY: lint
-lint: .venv/installed  ## check the code's style
-	@$(PYTHON) -m ruff check . && $(PYTHON) -m ruff format --check .
+lint: .venv/installed  ## check style, and that nothing is used that QGIS 4 lacks
+	@$(PYTHON) -m ruff check . && $(PYTHON) -m ruff format --check . && $(PYTHON) tools/qt6.py
 
 .PHONY: env
 env: plugin  ## print export lines for `$QGIS_PROCESS run railextract:extractrails`: eval "$(make -s env)"

@@ -77,7 +77,9 @@ class _Log:
         self._rest = b""
 
     def add(self, data: bytes, last: bool = False) -> None:
-        *lines, self._rest = (self._rest + data + (b"\n" if last else b"")).split(b"\n")
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        if last and self._rest:
+            lines.append(self._rest)
         for line in lines:
             text = line.decode("utf-8", "replace").rstrip()
             self.text += f"{text}\n"
