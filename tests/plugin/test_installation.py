@@ -96,7 +96,7 @@ def test_other_packages_of_qgis_stay(put, add_wheel, folder):
         (
             (),
             "import railmissing",
-            "railfirst does not work in the Python of this QGIS .*No module named 'railmissing'",
+            "does not work in the Python of this QGIS .*No module named 'railmissing'",
         ),
         ((), "import os; os.abort()", "does not work in the Python of this QGIS"),
     ],
