@@ -123,9 +123,11 @@ def _joined(network: LineNetwork, lines: list[np.ndarray], smoothing_m: float) -
         places[node] += lines[number][vertex]
         votes[node] += 1
     nodes = places / votes[:, None]
-    for number, line in enumerate(lines):
-        anchors = [(node, vertex % len(line)) for node, own, vertex in ending + passing if own == number]
-        own_nodes, vertices = np.array(anchors).T
+    anchors: list[list[tuple[int, int]]] = [[] for _ in lines]
+    for node, number, vertex in ending + passing:
+        anchors[number].append((node, vertex % len(lines[number])))
+    for line, own in zip(lines, anchors):
+        own_nodes, vertices = np.array(own).T
         lead(line, length_along(line) / smoothing_m, vertices, nodes[own_nodes])
     return replace(network, lines=tuple(lines), nodes=nodes, passes=passes)
 
