@@ -5,7 +5,7 @@ Everything else writes enums with their scope (``QgsProcessing.SourceType.TypeVe
 
 from __future__ import annotations
 
-from qgis.core import Qgis, QgsField
+from qgis.core import Qgis, QgsField, QgsProcessingContext
 
 if Qgis.QGIS_VERSION_INT >= 33800:
     from qgis.PyQt.QtCore import QMetaType
@@ -20,3 +20,10 @@ else:
 def field(name: str, kind) -> QgsField:
     """Make a field; `kind` is `INTEGER`, `REAL` or `TEXT`."""
     return QgsField(name, kind)
+
+
+def group_layer(details: QgsProcessingContext.LayerDetails, group: str, place: int) -> None:
+    """Have a layer loaded into a group, above those with a lower `place`; before QGIS 3.32 it stands by itself."""
+    if Qgis.QGIS_VERSION_INT >= 33200:
+        details.groupName = group
+        details.layerSortKey = place

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 from qgis.core import (
     QgsMapLayer,
     QgsProcessingContext,
     QgsProcessingFeedback,
     QgsProcessingLayerPostProcessorInterface,
 )
+from qgis.PyQt import sip
 
+from .compat import group_layer
+from .i18n import tr
 from .paths import STYLES
+
+BOTTOM_TO_TOP = ("raster", "rails", "centerlines", "quality")
+"""Order of the layers, by their styles."""
 
 
 class _Styler(QgsProcessingLayerPostProcessorInterface):
@@ -26,13 +30,23 @@ class _Styler(QgsProcessingLayerPostProcessorInterface):
         layer.triggerRepaint()
 
 
-@cache
+_kept: list[_Styler] = []
+"""QGIS calls these after the algorithm is gone, without holding a reference, and deletes them with its context."""
+
+
 def _styler(style: str) -> _Styler:
-    """Make one object a style and keep it: QGIS calls it after the algorithm is gone, and holds no reference."""
-    return _Styler(style)
+    """Make an object for one layer, and keep it until QGIS has deleted it."""
+    _kept[:] = [one for one in _kept if not sip.isdeleted(one)]
+    _kept.append(_Styler(style))
+    return _kept[-1]
 
 
 def style_on_load(layer_id: str, style: str, context: QgsProcessingContext) -> None:
-    """Have QGIS apply `style` (a .qml file of the plugin) if it loads the layer when the run is done."""
+    """Have QGIS apply `style` (a .qml file of the plugin) if it loads the layer when the run is done.
+
+    All layers of a run go into one group, points above lines above rasters, where QGIS has groups for results.
+    """
     if context.willLoadLayerOnCompletion(layer_id):
-        context.layerToLoadOnCompletionDetails(layer_id).setPostProcessor(_styler(style))
+        details = context.layerToLoadOnCompletionDetails(layer_id)
+        details.setPostProcessor(_styler(style))
+        group_layer(details, tr("Rail Extract"), BOTTOM_TO_TOP.index(style))

@@ -1,12 +1,54 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
-<qgis styleCategories="Symbology" version="3.22.0">
-  <renderer-v2 type="singleSymbol">
+<qgis styleCategories="Symbology|Symbology3D|Elevation" version="3.22.0">
+  <renderer-v2 type="graduatedSymbol" attr="coalesce(&quot;sigma_mm&quot;, 999999)" graduatedMethod="GraduatedColor">
+    <ranges>
+      <range lower="0" upper="2" symbol="0" label="standard error up to 2 mm" render="true"/>
+      <range lower="2" upper="5" symbol="1" label="2 to 5 mm" render="true"/>
+      <range lower="5" upper="10" symbol="2" label="5 to 10 mm" render="true"/>
+      <range lower="10" upper="1000000" symbol="3" label="above 10 mm, or unknown" render="true"/>
+    </ranges>
     <symbols>
       <symbol name="0" type="line" alpha="1">
         <layer class="SimpleLine" enabled="1" pass="0" locked="0">
           <Option type="Map">
             <Option name="line_color" type="QString" value="21,101,192,255"/>
-            <Option name="line_width" type="QString" value="0.5"/>
+            <Option name="line_width" type="QString" value="0.6"/>
+            <Option name="line_width_unit" type="QString" value="MM"/>
+            <Option name="line_style" type="QString" value="solid"/>
+            <Option name="capstyle" type="QString" value="round"/>
+            <Option name="joinstyle" type="QString" value="round"/>
+          </Option>
+        </layer>
+      </symbol>
+      <symbol name="1" type="line" alpha="1">
+        <layer class="SimpleLine" enabled="1" pass="0" locked="0">
+          <Option type="Map">
+            <Option name="line_color" type="QString" value="79,179,191,255"/>
+            <Option name="line_width" type="QString" value="0.6"/>
+            <Option name="line_width_unit" type="QString" value="MM"/>
+            <Option name="line_style" type="QString" value="solid"/>
+            <Option name="capstyle" type="QString" value="round"/>
+            <Option name="joinstyle" type="QString" value="round"/>
+          </Option>
+        </layer>
+      </symbol>
+      <symbol name="2" type="line" alpha="1">
+        <layer class="SimpleLine" enabled="1" pass="0" locked="0">
+          <Option type="Map">
+            <Option name="line_color" type="QString" value="242,142,43,255"/>
+            <Option name="line_width" type="QString" value="0.6"/>
+            <Option name="line_width_unit" type="QString" value="MM"/>
+            <Option name="line_style" type="QString" value="solid"/>
+            <Option name="capstyle" type="QString" value="round"/>
+            <Option name="joinstyle" type="QString" value="round"/>
+          </Option>
+        </layer>
+      </symbol>
+      <symbol name="3" type="line" alpha="1">
+        <layer class="SimpleLine" enabled="1" pass="0" locked="0">
+          <Option type="Map">
+            <Option name="line_color" type="QString" value="214,40,57,255"/>
+            <Option name="line_width" type="QString" value="0.6"/>
             <Option name="line_width_unit" type="QString" value="MM"/>
             <Option name="line_style" type="QString" value="solid"/>
             <Option name="capstyle" type="QString" value="round"/>
@@ -15,6 +57,14 @@
         </layer>
       </symbol>
     </symbols>
+    <classificationMethod id="Custom"/>
   </renderer-v2>
+  <renderer-3d type="vector" layer="">
+    <symbol type="line" material_type="simpleline">
+      <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" simple-lines="1" width="3"/>
+      <material ambient="21,101,192,255"/>
+    </symbol>
+  </renderer-3d>
+  <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>
   <layerGeometryType>1</layerGeometryType>
 </qgis>

@@ -3,7 +3,7 @@
   <pipe>
     <rasterrenderer type="paletted" band="1" opacity="1" alphaBand="-1" nodataColor="">
       <colorPalette>
-        <paletteEntry value="1" color="#455a64" alpha="255" label="rail"/>
+        <paletteEntry value="1" color="#000000" alpha="255" label="rail"/>
       </colorPalette>
     </rasterrenderer>
   </pipe>
