@@ -37,6 +37,12 @@ SHORTEST_HEADER, HEADER_14, VLR_HEADER, EVLR_HEADER = 227, 375, 54, 60
 LARGEST_SCALE = 1000.0
 """Coarser steps between neighbouring coordinates are no survey but a damaged header."""
 
+LARGEST_OFFSET = 1e10
+"""No place on earth has larger coordinates, even in centimetres: its girth is 4e9 of them."""
+
+LAST_POINT_FORMAT, FORMAT_BITS = 10, 0x3F
+"""Of LAS 1.4; the other bits of the byte mark compressed points."""
+
 LARGEST_LAZ_CHUNK = 2**30
 """Bytes of a chunk when unpacked; writers use 50,000 points, some 2 MB."""
 
@@ -90,7 +96,7 @@ def list_files(paths: str | Path | Sequence[str | Path]) -> tuple[Path, ...]:
             raise CloudError(f"{path} does not exist: check the path.")
         found = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES) if path.is_dir() else [path]
         if not found:
-            raise CloudError(f"The folder {path} holds no .las or .laz file.")
+            raise CloudError(f"The folder {path} holds no .las or .laz file: choose another one.")
         files.extend(found)
     if not files:
         raise CloudError("No point cloud was given: name a LAS or LAZ file or a folder of them.")
@@ -170,16 +176,24 @@ def _check_start(path: Path) -> None:
     with path.open("rb") as file:
         start = file.read(HEADER_14)
     if start[:4] != b"LASF":
-        raise CloudError(f"{path.name} is no LAS or LAZ file: it does not begin with LASF.")
+        raise CloudError(f"{path.name} is no LAS or LAZ file, which begins with LASF: export the cloud as one.")
     if len(start) < (HEADER_14 if start[25:26] == b"\x04" else SHORTEST_HEADER):
         raise CloudError(f"{path.name} is cut off within its header: copy or export it again.")
     if start[24] != 1 or start[25] > 4:
         raise CloudError(f"{path.name} is LAS {start[24]}.{start[25]}: export it as LAS 1.2 to 1.4.")
-    points_at, records = struct.unpack("<II", start[96:104])
+    if start[104] & FORMAT_BITS > LAST_POINT_FORMAT:
+        raise CloudError(
+            f"{path.name} has a damaged header (point format {start[104] & FORMAT_BITS}): export it with a format from "
+            f"0 to {LAST_POINT_FORMAT}."
+        )
+    header_size, points_at, records = struct.unpack("<HII", start[94:104])
     if points_at > size:
         raise CloudError(f"{path.name} is cut off before its first point: copy or export it again.")
-    if records * VLR_HEADER > points_at:
-        raise CloudError(f"{path.name} has a damaged header ({records} records announced): export it again.")
+    if header_size + records * VLR_HEADER > points_at:
+        raise CloudError(
+            f"{path.name} has a damaged header ({header_size} bytes and {records} records announced before the "
+            "points): export it again."
+        )
     late_at, late = struct.unpack("<QI", start[235:247]) if start[25] == 4 else (0, 0)
     if late and late_at + late * EVLR_HEADER > size:
         raise CloudError(f"{path.name} is cut off: the records behind its points are missing; copy or export it again.")
@@ -188,9 +202,10 @@ def _check_start(path: Path) -> None:
 def _check_header(path: Path, header: laspy.LasHeader) -> None:
     """Refuse counts and scales that can't be true, and compressed files nothing here can read."""
     if header.point_count == 0:
-        raise CloudError(f"{path.name} holds no points.")
+        raise CloudError(f"{path.name} holds no points: leave it out, or export it again.")
     scales_fit = np.isfinite(header.scales).all() and (header.scales > 0).all()
-    if not scales_fit or (header.scales > LARGEST_SCALE).any() or not np.isfinite(header.offsets).all():
+    offsets_fit = (np.abs(header.offsets) <= LARGEST_OFFSET).all()
+    if not scales_fit or (header.scales > LARGEST_SCALE).any() or not offsets_fit:
         raise CloudError(f"{path.name} has a damaged header (coordinate scale or offset): export it again.")
     if header.are_points_compressed:
         _check_compressed(path, header)

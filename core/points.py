@@ -275,7 +275,8 @@ def _collect(request: Request, progress: Progress) -> tuple[np.ndarray, np.ndarr
 
 
 def _overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> bool:
-    return a[0] <= b[2] and b[0] <= a[2] and a[1] <= b[3] and b[1] <= a[3]
+    """Tell whether two extents have a place in common; one that a header states as NaN may be anywhere."""
+    return not (a[0] > b[2] or b[0] > a[2] or a[1] > b[3] or b[1] > a[3])
 
 
 def _inside(xyz: np.ndarray, extent: tuple[float, float, float, float]) -> np.ndarray:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
+import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,7 @@ from typing import Any
 import laspy
 import numpy as np
 import pytest
+from faults import FAILED, FINE, REFUSED, WARNED, Fault
 from rail_extract.core.crs import import_pyproj
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -177,3 +180,54 @@ def track():
         return np.column_stack([500_000 + along, 3_000_000 + across, 100 + rng.normal(0, 0.002, 2 * count)])
 
     return points
+
+
+@dataclass
+class Bench:
+    """Where faults are made: a folder, and what makes clouds and changes the environment."""
+
+    folder: Path
+    cloud: Callable[..., Path]
+    track: Callable[..., np.ndarray]
+    patch: pytest.MonkeyPatch
+
+
+OUTPUTS = {
+    "extractrails": ("RAILS.gpkg", "CENTERLINES.shp", "QUALITY.gpkg", "CLEANED.tif"),
+    "rasterizerailpoints": ("OUTPUT.tif",),
+    "frpdfcleanup": ("OUTPUT.tif",),
+    "vectorizerails": ("OUTPUT.gpkg",),
+    "buildtrackcenterlines": ("OUTPUT.gpkg",),
+    "measuretrackgeometry": ("OUTPUT.gpkg",),
+}
+"""Outputs of the algorithms, each a file in the folder of the test."""
+
+
+@pytest.fixture
+def bench(tmp_path, write_cloud, track, monkeypatch):
+    return Bench(tmp_path, write_cloud, track, monkeypatch)
+
+
+@pytest.fixture
+def meet(bench, run_step, monkeypatch):
+    """Run into a fault: what comes of it must be what its row says, and no file may be left behind."""
+
+    def meet(fault: Fault, algorithm: str, feedback: Feedback | None = None) -> Outcome:
+        algorithm, feedback = fault.run or algorithm, feedback or Feedback()
+        temporary, out = bench.folder / "temporary", bench.folder / "out"
+        temporary.mkdir(), out.mkdir()
+        monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+        outputs = {Path(name).stem: out / name for name in OUTPUTS[algorithm]}
+        outcome = run_step(algorithm, {**outputs, **fault.prepare(bench)}, feedback)
+        said = outcome.error.strip() or " ".join(feedback.warnings)
+        good = WARNED if feedback.warnings else FINE
+        found = good if outcome.ok else FAILED if feedback.errors else REFUSED
+        assert (found, said) == (fault.ends, said if fault.matches(said) else fault.says)
+        assert "Traceback" not in said
+        assert {name: outcome.results.get(name) for name in fault.gives} == fault.gives
+        assert not list(temporary.iterdir())
+        left = {path.stem for path in out.iterdir()}
+        assert left <= set(outputs) if outcome.ok else not left
+        return outcome
+
+    return meet

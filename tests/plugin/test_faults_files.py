@@ -1,0 +1,387 @@
+"""Point cloud files that are not what they should be."""
+
+import json
+import shutil
+import struct
+
+import laspy
+import numpy as np
+import pytest
+from faults import FAILED, FINE, REFUSED, Fault
+from osgeo import gdal
+from rail_extract.rail_extract_plugin import dependencies
+
+TITLE = "Point cloud files"
+
+HEADER, RECORDS_AT, SCALE_AT, OFFSET_AT, COUNT_AT, LATE_AT = 375, 100, 131, 155, 247, 235
+"""Bytes of a LAS 1.4 header, and where in it is what."""
+
+
+def holding(data, name="cloud.las"):
+    """A file of these bytes."""
+
+    def prepare(bench):
+        (bench.folder / name).write_bytes(data)
+        return {"INPUT": bench.folder / name}
+
+    return prepare
+
+
+def damaged(change, name="cloud.las"):
+    """A good file whose bytes are changed."""
+
+    def prepare(bench):
+        path = bench.cloud(bench.track(length_m=6.0), name)
+        path.write_bytes(change(path.read_bytes()))
+        return {"INPUT": path}
+
+    return prepare
+
+
+def cut(length):
+    return lambda data: data[:length]
+
+
+def overwritten(at, value):
+    return lambda data: data[:at] + value + data[at + len(value) :]
+
+
+def among_records(data):
+    """Within the record of the coordinate system."""
+    return data[: HEADER + 54 + 100]
+
+
+def in_chunk_table(data):
+    (table_at,) = struct.unpack("<q", data[points_at(data) : points_at(data) + 8])
+    return data[: table_at + 5]
+
+
+def in_chunks(data):
+    return data[: points_at(data) + 200]
+
+
+def at_points(data):
+    return data[: points_at(data)]
+
+
+def points_at(data):
+    return struct.unpack("<I", data[96:100])[0]
+
+
+def with_late_record_cut(data):
+    """Announce a record behind the points, of which half is there."""
+    late = struct.pack("<QI", len(data), 1)
+    return data[:LATE_AT] + late + data[LATE_AT + 12 :] + bytes(30)
+
+
+def rewritten(change, name="cloud.las", version=None, point_format=None):
+    """A cloud changed by laspy and written again."""
+
+    def prepare(bench):
+        path = bench.cloud(bench.track(length_m=6.0), name)
+        cloud = laspy.read(path)
+        if version:
+            cloud = laspy.convert(cloud, file_version=version, point_format_id=point_format)
+        change(cloud)
+        cloud.write(path)
+        return {"INPUT": path}
+
+    return prepare
+
+
+def add_extra_bytes(cloud):
+    cloud.add_extra_dim(laspy.ExtraBytesParams(name="quality", type=np.float64))
+    cloud["quality"] = np.full(len(cloud), np.nan)
+
+
+def unchanged(cloud):
+    pass
+
+
+def without_backend(bench):
+    find_spec = dependencies.find_spec
+    bench.patch.setattr(dependencies, "find_spec", lambda name: None if name == "lazrs" else find_spec(name))
+    return {"INPUT": bench.cloud(bench.track(length_m=6.0), "cloud.laz")}
+
+
+def folder_without_clouds(bench):
+    (bench.folder / "tiles").mkdir()
+    (bench.folder / "tiles" / "notes.txt").write_text("nothing")
+    return {"INPUT": bench.folder / "tiles"}
+
+
+def one_bad_tile(bench):
+    folder = bench.folder / "tiles"
+    folder.mkdir()
+    bench.cloud(bench.track(length_m=6.0), "good.las", folder=folder)
+    shutil.copy(folder / "good.las", folder / "bad.las")
+    (folder / "bad.las").write_bytes((folder / "bad.las").read_bytes()[:-100])
+    return {"INPUT": folder}
+
+
+def odd_names(bench):
+    folder = bench.folder / "Größe östlich 1 & 'zwei'"
+    folder.mkdir()
+    return {"INPUT": bench.cloud(bench.track(length_m=6.0), "Schienen – 線路.LAS", folder=folder)}
+
+
+def catalogue(text):
+    def prepare(bench):
+        (bench.folder / "all.vpc").write_text(text)
+        return {"INPUT": bench.folder / "all.vpc"}
+
+    return prepare
+
+
+NAN, INFINITE = struct.pack("<d", np.nan), struct.pack("<d", np.inf)
+ITEM = {"assets": {"data": {"href": "gone.laz"}}}
+
+FAULTS = [
+    Fault("empty file", holding(b""), FAILED, "cloud.las is empty (0 bytes): copy or export it again."),
+    Fault(
+        "text file called .las",
+        holding(b"x,y,z\n1,2,3\n"),
+        FAILED,
+        "cloud.las is no LAS or LAZ file, which begins with LASF: export the cloud as one.",
+    ),
+    Fault(
+        "PDF called .las (wrong magic)",
+        holding(b"%PDF-1.4 " * 100),
+        FAILED,
+        "cloud.las is no LAS or LAZ file, which begins with LASF: export the cloud as one.",
+    ),
+    Fault(
+        "folder called .las",
+        lambda bench: (bench.folder / "a.las").mkdir() or {"INPUT": bench.folder / "a.las"},
+        FAILED,
+        "The folder …/a.las holds no .las or .laz file: choose another one.",
+    ),
+    Fault(
+        "missing file",
+        lambda bench: {"INPUT": bench.folder / "gone.laz"},
+        REFUSED,
+        "…/gone.laz does not exist: give a LAS or LAZ file, or a folder of them, on this computer.",
+    ),
+    Fault(
+        "web address",
+        lambda bench: {"INPUT": "https://example.org/cloud.laz"},
+        REFUSED,
+        "https:/example.org/cloud.laz does not exist: give a LAS or LAZ file, or a folder of them, on this computer.",
+    ),
+    Fault(
+        "folder without clouds",
+        folder_without_clouds,
+        FAILED,
+        "The folder …/tiles holds no .las or .laz file: choose another one.",
+    ),
+    Fault(
+        "folder with one bad tile",
+        one_bad_tile,
+        FAILED,
+        "bad.las is cut off: it has room for 3596 of the 3600 points that its header announces; copy or "
+        "export it again.",
+    ),
+    Fault(
+        "virtual point cloud that is no JSON",
+        catalogue("{"),
+        REFUSED,
+        "all.vpc is no virtual point cloud: build it again from its tiles.",
+    ),
+    Fault(
+        "virtual point cloud without tiles",
+        catalogue('{"features": []}'),
+        REFUSED,
+        "all.vpc names no tile at all: build it again from tiles that exist.",
+    ),
+    Fault(
+        "virtual point cloud of a missing tile",
+        catalogue(json.dumps({"features": [ITEM]})),
+        REFUSED,
+        "all.vpc names …/gone.laz: build it again from tiles that exist.",
+    ),
+    Fault(
+        "cut in the header",
+        damaged(cut(200)),
+        FAILED,
+        "cloud.las is cut off within its header: copy or export it again.",
+    ),
+    Fault(
+        "cut in the records",
+        damaged(among_records),
+        FAILED,
+        "cloud.las is cut off before its first point: copy or export it again.",
+    ),
+    Fault(
+        "cut before the points",
+        damaged(at_points),
+        FAILED,
+        "cloud.las is cut off: it has room for 0 of the 3600 points that its header announces; copy or "
+        "export it again.",
+    ),
+    Fault(
+        "cut in the points",
+        damaged(cut(-1000)),
+        FAILED,
+        "cloud.las is cut off: it has room for 3566 of the 3600 points that its header announces; copy or "
+        "export it again.",
+    ),
+    Fault(
+        "cut in the records behind the points",
+        damaged(with_late_record_cut),
+        FAILED,
+        "cloud.las is cut off: the records behind its points are missing; copy or export it again.",
+    ),
+    Fault(
+        "LAZ cut in the header",
+        damaged(cut(200), "cloud.laz"),
+        FAILED,
+        "cloud.laz is cut off within its header: copy or export it again.",
+    ),
+    Fault(
+        "LAZ cut before the points",
+        damaged(at_points, "cloud.laz"),
+        FAILED,
+        "cloud.laz is cut off or damaged (unpack requires a buffer of 8 bytes): copy or export it again.",
+    ),
+    Fault(
+        "LAZ cut in the chunks",
+        damaged(in_chunks, "cloud.laz"),
+        FAILED,
+        "cloud.laz is cut off: its table of chunks is missing; copy or export it again.",
+    ),
+    Fault(
+        "LAZ cut in the table of chunks",
+        damaged(in_chunk_table, "cloud.laz"),
+        FAILED,
+        "cloud.laz is cut off: its table of chunks is missing; copy or export it again.",
+    ),
+    Fault(
+        "zero points",
+        damaged(overwritten(COUNT_AT, bytes(8))),
+        FAILED,
+        "cloud.las holds no points: leave it out, or export it again.",
+    ),
+    Fault(
+        "absurd number of points",
+        damaged(overwritten(COUNT_AT, b"\xff" * 6)),
+        FAILED,
+        "cloud.las is cut off: it has room for 3600 of the 281474976710655 points that its header announces; "
+        "copy or export it again.",
+    ),
+    Fault(
+        "LAZ with an absurd number of points",
+        damaged(overwritten(COUNT_AT, b"\xff" * 6), "cloud.laz"),
+        FAILED,
+        "cloud.laz is damaged: its compressed chunks don't fit the file; export it again.",
+    ),
+    Fault(
+        "absurd number of records",
+        damaged(overwritten(RECORDS_AT, b"\xff" * 4)),
+        FAILED,
+        "cloud.las has a damaged header (375 bytes and 4294967295 records announced before the points): "
+        "export it again.",
+    ),
+    Fault(
+        "points said to lie beyond the end",
+        damaged(overwritten(96, b"\xff\xff\xff\x7f")),
+        FAILED,
+        "cloud.las is cut off before its first point: copy or export it again.",
+    ),
+    Fault(
+        "points said to lie in the header",
+        damaged(overwritten(96, struct.pack("<I", 10))),
+        FAILED,
+        "cloud.las has a damaged header (375 bytes and 1 records announced before the points): export it again.",
+    ),
+    Fault(
+        "header said to be too short",
+        damaged(overwritten(94, struct.pack("<H", 0))),
+        FAILED,
+        "cloud.las is cut off or damaged (Incoherent header size): copy or export it again.",
+    ),
+    Fault(
+        "header said to be longer than the file",
+        damaged(overwritten(94, b"\xff\xff")),
+        FAILED,
+        "cloud.las has a damaged header (65535 bytes and 1 records announced before the points): export it again.",
+    ),
+    Fault("record said to reach into the points", damaged(overwritten(HEADER + 20, b"\xff\xff"))),
+    Fault(
+        "point said to have no bytes",
+        damaged(overwritten(105, bytes(2))),
+        FAILED,
+        "cloud.las is cut off or damaged (Incoherent point size, header says 0 point_format created says "
+        "30): copy or export it again.",
+    ),
+    Fault(
+        "unknown point format",
+        damaged(overwritten(104, b"\x3f")),
+        FAILED,
+        "cloud.las has a damaged header (point format 63): export it with a format from 0 to 10.",
+    ),
+    Fault(
+        "unknown version",
+        damaged(overwritten(24, b"\x03\x07")),
+        FAILED,
+        "cloud.las is LAS 3.7: export it as LAS 1.2 to 1.4.",
+    ),
+    Fault(
+        "scale that is not a number: NaN coordinates",
+        damaged(overwritten(SCALE_AT, NAN)),
+        FAILED,
+        "cloud.las has a damaged header (coordinate scale or offset): export it again.",
+    ),
+    Fault(
+        "scale of zero",
+        damaged(overwritten(SCALE_AT, bytes(8))),
+        FAILED,
+        "cloud.las has a damaged header (coordinate scale or offset): export it again.",
+    ),
+    Fault(
+        "infinite offset",
+        damaged(overwritten(OFFSET_AT, INFINITE)),
+        FAILED,
+        "cloud.las has a damaged header (coordinate scale or offset): export it again.",
+    ),
+    Fault(
+        "offset of 1e300",
+        damaged(overwritten(OFFSET_AT, struct.pack("<d", 1e300))),
+        FAILED,
+        "cloud.las has a damaged header (coordinate scale or offset): export it again.",
+    ),
+    Fault("bounds in the header that are no numbers", damaged(overwritten(179, NAN * 6))),
+    Fault("text that is no UTF-8 in the header", damaged(overwritten(26, b"\xff\xfe" * 16))),
+    Fault("bytes behind the points", damaged(lambda data: data + b"rubbish" * 99)),
+    Fault("extra bytes in the points", rewritten(add_extra_bytes)),
+    Fault("LAZ with extra bytes", rewritten(add_extra_bytes, "cloud.laz")),
+    Fault("oldest format, LAS 1.2 with point format 0", rewritten(unchanged, version="1.2", point_format=0)),
+    Fault("waveforms, point format 4", rewritten(unchanged, version="1.3", point_format=4)),
+    Fault(
+        "LAZ without the package that reads it",
+        without_backend,
+        REFUSED,
+        "Rasterize rail points needs the Python package lazrs, which this QGIS does not have: run Install "
+        "packages in the toolbox under Rail Extract, or qgis_process run railextract:installpackages in a shell. "
+        "Build track centerlines and FRPDF cleanup can be used without.",
+    ),
+    Fault("path with spaces, umlauts, quotes and kanji", odd_names),
+]
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_fault(meet, track, fault):
+    outcome = meet(fault, "rasterizerailpoints")
+    if fault.ends == FINE:
+        points = track(length_m=6.0)
+        stored = points[0] + (points - points[0]).round(3)
+        assert cells_of(outcome.results["OUTPUT"]) == cells_under(stored, outcome.results["OUTPUT"])
+
+
+def cells_of(path):
+    return set(map(tuple, np.argwhere(gdal.Open(path).ReadAsArray())))
+
+
+def cells_under(xyz, path):
+    """Row and column of each point, in the grid of a file."""
+    x, side, _, y, _, _ = gdal.Open(path).GetGeoTransform()
+    return set(map(tuple, np.floor(np.column_stack([y - xyz[:, 1], xyz[:, 0] - x]) / side).astype(int)))
