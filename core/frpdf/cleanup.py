@@ -1,4 +1,4 @@
-"""FRPDF over a whole raster: overlapping windows, each pass stitched before the next."""
+"""FRPDF over a whole raster: pass after pass, each along the rails only."""
 
 from __future__ import annotations
 
@@ -7,19 +7,11 @@ import numpy as np
 from ..progress import SILENT, Progress
 from ..raster import TILE, RailRaster
 from . import DEFAULT_PASSES, FEEDBACK_THRESHOLD, OUTPUT_THRESHOLD, START
-from .engine import Engine
+from .corridor import Piece, lay_fields
+from .engine import DeviceExhaustedError, Engine
 
-WINDOW = 512
-"""Cells along the side of what the network sees at once: a pass over it takes well below a second on two cores, so
-that a cancel is heard in time."""
 MARGIN = 64
-"""Cells around a window's core that only give context. Twice the margin changes 1.5 % of the sample's rail cells, at
-their edges, and no line by more than 0.7 mm rms, for more than twice the work."""
-CORE = WINDOW - 2 * MARGIN
-BLOCK = 32
-"""Windows are placed to so many cells."""
-REACH = 64
-"""How far from a rail cell, in cells, the network may set another: half of a gap of 5 m at 4 cm."""
+"""Cells around a raster that was cut out of a larger one that only give context, for each pass."""
 
 UNTIL_STABLE = 0
 MOST_PASSES = 5
@@ -43,67 +35,42 @@ def clean(raster: RailRaster, engine: Engine, passes: int = DEFAULT_PASSES, prog
     RailRaster
         On the same grid.
     """
-    places = windows(raster)
     most = MOST_PASSES if passes == UNTIL_STABLE else passes
     state, output = None, raster
     for number in range(most):
         step = progress.span(number / most, (number + 1) / most)
         before = output
-        state, output = _run_pass(raster, state, engine, number, places, step)
+        state, output = _run_pass(raster, state, engine, number, step)
         if passes == UNTIL_STABLE and number > 0 and _change(before, output) < STABLE_SHARE:
             break
     return output
 
 
-def windows(raster: RailRaster) -> list[tuple[int, int]]:
-    """North-west corners (row, column) of the cores to compute: together they hold all within `REACH` of a rail cell.
-
-    The cores lie in bands along the rows or along the columns, whichever takes fewer; within a band each begins where
-    there is something to compute.
-    """
-    cells = raster.cells()
-    shifts = [np.array([down, right]) for down in (-REACH, 0, REACH) for right in (-REACH, 0, REACH)]
-    blocks = np.unique(np.concatenate([np.unique((cells + shift) // BLOCK, axis=0) for shift in shifts]), axis=0)
-    along_rows = _cover(blocks)
-    along_columns = [(row, column) for column, row in _cover(blocks[:, ::-1])]
-    return sorted(min(along_rows, along_columns, key=len))
-
-
-def _cover(blocks: np.ndarray) -> list[tuple[int, int]]:
-    """Cover blocks, (n, 2), by cores in bands of equal first coordinate; give the corners of the cores in cells."""
-    if len(blocks) == 0:
-        return []
-    side = CORE // BLOCK
-    band = (blocks[:, 0] - blocks[:, 0].min()) // side
-    corners = []
-    for number in np.unique(band):
-        places = np.unique(blocks[band == number, 1])
-        first = (int(number) * side + int(blocks[:, 0].min())) * BLOCK
-        index = 0
-        while index < len(places):
-            corners.append((first, int(places[index]) * BLOCK))
-            index = int(np.searchsorted(places, places[index] + side))
-    return corners
-
-
 def _run_pass(
-    raster: RailRaster,
-    state: RailRaster | None,
-    engine: Engine,
-    number: int,
-    places: list[tuple[int, int]],
-    progress: Progress,
+    raster: RailRaster, state: RailRaster | None, engine: Engine, number: int, progress: Progress
 ) -> tuple[RailRaster, RailRaster]:
-    """Compute one pass at all places; give what the next pass is told, and what the user would get."""
-    told, output = _Canvas(raster), _Canvas(raster)
-    for row, column in progress.follow(places):
-        frame = (row - MARGIN, column - MARGIN, WINDOW, WINDOW)
-        seen = raster.read(*frame).astype(np.float32)
-        known = np.full_like(seen, START) if state is None else state.read(*frame).astype(np.float32)
-        probability = engine.probabilities(seen, known, number)[MARGIN : MARGIN + CORE, MARGIN : MARGIN + CORE]
-        told.paint(row, column, probability >= FEEDBACK_THRESHOLD)
-        output.paint(row, column, probability >= OUTPUT_THRESHOLD)
-    return told.raster(), output.raster()
+    """Compute one pass; give what the next pass is told, and what the user would get."""
+    while True:
+        told, output = _Canvas(raster), _Canvas(raster)
+        fields = lay_fields(raster, engine.most_cells)
+        try:
+            for field, step in zip(fields, progress.split(len(fields))):
+                seen = [raster.read(*piece.window).astype(np.float32) for piece in field.pieces]
+                known = [_state(state, piece) for piece in field.pieces]
+                found = engine.sweep(seen, known, number, field.pieces, step)
+                for piece, probability in zip(field.pieces, found):
+                    told.paint(piece, probability >= FEEDBACK_THRESHOLD, field.inside)
+                    output.paint(piece, probability >= OUTPUT_THRESHOLD, field.inside)
+            return told.raster(), output.raster()
+        except DeviceExhaustedError:
+            progress.warning(engine.retreat())
+
+
+def _state(state: RailRaster | None, piece: Piece) -> np.ndarray:
+    """Give what the network is told of a piece."""
+    if state is None:
+        return np.full((piece.height, piece.width), START, dtype=np.float32)
+    return state.read(*piece.window).astype(np.float32)
 
 
 def _change(before: RailRaster, after: RailRaster) -> float:
@@ -124,9 +91,10 @@ class _Canvas:
         self._grid = grid
         self._cells: list[np.ndarray] = []
 
-    def paint(self, row: int, column: int, block: np.ndarray) -> None:
-        """Set the cells of a block whose north-west corner is given."""
-        self._cells.append(np.argwhere(block) + np.array([row, column]))
+    def paint(self, piece: Piece, block: np.ndarray, inside: Piece) -> None:
+        """Set the cells of a piece that count."""
+        cells = np.argwhere(block) + np.array([piece.row, piece.column])
+        self._cells.append(cells[inside.holds(cells)])
 
     def raster(self) -> RailRaster:
         """Finish."""

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.util import find_spec
 from typing import Protocol
 
 import numpy as np
 
 from ..errors import ModelError
+from ..progress import Progress
+from .corridor import Piece
 
 ENGINES = ("AUTO", "TORCH", "OPENCV")
 DEVICES = ("AUTO", "CPU", "CUDA")
+
+
+class DeviceExhaustedError(Exception):
+    """The device has too little memory for so many cells at once."""
 
 
 class Engine(Protocol):
@@ -20,12 +27,49 @@ class Engine(Protocol):
     ----------
     description : str
         Engine, device and number type, for ENGINE_USED.
+    most_cells : int
+        How many cells to give it at once.
     """
 
     description: str
+    most_cells: int
+
+    def sweep(
+        self,
+        seen: Sequence[np.ndarray],
+        known: Sequence[np.ndarray],
+        number: int,
+        pieces: Sequence[Piece],
+        progress: Progress,
+    ) -> list[np.ndarray]:
+        """Run one pass over pieces of a raster that is empty elsewhere.
+
+        Parameters
+        ----------
+        seen, known : sequences of (height, width) float32 arrays
+            Raster, 0 or 1, and state, as in `network.FRPDF.logits`, of each piece.
+        number : int
+            Number of the pass, from 0.
+        pieces : sequence of Piece
+            Where they lie.
+        progress : Progress
+
+        Returns
+        -------
+        list of (height, width) float32 arrays
+            Probability of rail, for each piece.
+
+        Raises
+        ------
+        DeviceExhaustedError
+            After a `retreat`, the same can be tried again.
+        """
+
+    def retreat(self) -> str:
+        """Be content with less memory, or with another device; give a message for the user."""
 
     def probabilities(self, raster: np.ndarray, state: np.ndarray, number: int) -> np.ndarray:
-        """Run one pass.
+        """Run one pass over a raster around which nothing is known, as in training.
 
         Parameters
         ----------

@@ -15,7 +15,7 @@ EPSILON = 1e-5
 
 @dataclass(frozen=True)
 class Convolution:
-    """A convolution with `same` padding.
+    """A convolution.
 
     Attributes
     ----------
@@ -27,6 +27,11 @@ class Convolution:
     weight: np.ndarray
     bias: np.ndarray
     dilation: int
+
+    @property
+    def reach(self) -> int:
+        """How far, in cells, it looks around a cell."""
+        return self.weight.shape[-1] // 2 * self.dilation
 
 
 @dataclass(frozen=True)

@@ -64,8 +64,43 @@ def to_onnx(layer: FoldedLayer, height: int, width: int) -> bytes:
     for convolution in layer.decoder:
         x = graph.relu(graph.convolve(x, convolution))
     graph.convolve(x, layer.head, output="logits")
-    proto = graph.proto(("input", (1, 2, height, width)), ("logits", (1, 1, height, width)))
-    return _number(1, IR_VERSION) + _message(8, _number(2, OPERATOR_SET)) + _message(7, proto)
+    return graph.model({"input": (1, 2, height, width)}, {"logits": (1, 1, height, width)})
+
+
+def steps_to_onnx(layer: FoldedLayer) -> list[bytes]:
+    """Write each layer of one pass as a model of its own.
+
+    Of (1, channels, height, width) arrays, a model takes `around`, which is larger than its result `found` by as much
+    as it looks around a cell; those of the bridge take `own` as well, what stands in the middle of it.
+    """
+    steps = [_plain_step(convolution) for convolution in layer.encoder]
+    steps += [_bridge_step(dilated, reduce) for dilated, reduce in layer.bridge]
+    first, last = layer.decoder
+    return [*steps, _plain_step(first), _plain_step(last, layer.head)]
+
+
+def _plain_step(convolution: Convolution, head: Convolution | None = None) -> bytes:
+    graph = _Graph()
+    result = graph.convolve("around", convolution, same=False)
+    if head is None:
+        graph.relu(result, output="found")
+    else:
+        graph.convolve(graph.relu(result), head, output="found")
+    return graph.model(_shapes(convolution, "around"), _shapes(head or convolution, "found"))
+
+
+def _bridge_step(dilated: Convolution, reduce: Convolution) -> bytes:
+    graph = _Graph()
+    found = graph.relu(graph.convolve("around", dilated, same=False))
+    graph.relu(graph.convolve(graph.join(found, "own"), reduce), output="found")
+    return graph.model({**_shapes(dilated, "around"), **_shapes(dilated, "own")}, _shapes(reduce, "found"))
+
+
+def _shapes(convolution: Convolution, name: str) -> dict[str, tuple[int, ...]]:
+    """Shape at which one cell is computed; a runtime takes larger ones."""
+    channels_out, channels_in = convolution.weight.shape[:2]
+    side = 2 * convolution.reach + 1
+    return {name: (1, channels_in, side, side) if name == "around" else (1, channels_out, 1, 1)}
 
 
 class _Graph:
@@ -75,7 +110,7 @@ class _Graph:
         self._nodes: list[bytes] = []
         self._weights: list[bytes] = []
 
-    def convolve(self, x: str, convolution: Convolution, output: str | None = None) -> str:
+    def convolve(self, x: str, convolution: Convolution, output: str | None = None, same: bool = True) -> str:
         number = len(self._nodes)
         names = [x, f"weight{number}", f"bias{number}"]
         self._weights += [_tensor(names[1], convolution.weight), _tensor(names[2], convolution.bias)]
@@ -83,21 +118,24 @@ class _Graph:
         attributes = (
             _integers("kernel_shape", (side, side)),
             _integers("dilations", (convolution.dilation,) * 2),
-            _integers("pads", (side // 2 * convolution.dilation,) * 4),
+            _integers("pads", (convolution.reach if same else 0,) * 4),
         )
         return self._node("Conv", names, attributes, output)
 
-    def relu(self, x: str) -> str:
-        return self._node("Relu", [x])
+    def relu(self, x: str, output: str | None = None) -> str:
+        return self._node("Relu", [x], output=output)
 
     def join(self, first: str, second: str) -> str:
         axis = _text(1, "axis") + _number(3, 1) + _number(20, _INT_ATTRIBUTE)
         return self._node("Concat", [first, second], (axis,))
 
-    def proto(self, given: tuple[str, tuple[int, ...]], result: tuple[str, tuple[int, ...]]) -> bytes:
+    def model(self, given: dict[str, tuple[int, ...]], results: dict[str, tuple[int, ...]]) -> bytes:
+        """Finish, with the shapes of what goes in and what comes out."""
         parts = [_message(1, node) for node in self._nodes] + [_text(2, "FRPDF")]
         parts += [_message(5, weight) for weight in self._weights]
-        return b"".join(parts) + _message(11, _value(*given)) + _message(12, _value(*result))
+        parts += [_message(11, _value(*one)) for one in given.items()]
+        parts += [_message(12, _value(*one)) for one in results.items()]
+        return _number(1, IR_VERSION) + _message(8, _number(2, OPERATOR_SET)) + _message(7, b"".join(parts))
 
     def _node(
         self, kind: str, inputs: Iterable[str], attributes: Iterable[bytes] = (), output: str | None = None

@@ -7,8 +7,6 @@ import cv2
 import numpy as np
 import pytest
 import torch
-from hypothesis import given
-from hypothesis import strategies as st
 from rail_extract.core.errors import Cancelled, ModelError
 from rail_extract.core.frpdf import STATISTICS, cleanup, onnx
 from rail_extract.core.frpdf import engine as engine_module
@@ -19,21 +17,25 @@ from rail_extract.core.frpdf.torch_engine import TorchEngine
 from rail_extract.core.frpdf.weights import load_arrays, save_arrays
 from rail_extract.core.frpdf.zoo import MODELS, choose
 from rail_extract.core.progress import Progress
-from rail_extract.core.raster import RailRaster, rasterize
+from rail_extract.core.raster import RailRaster
 from rail_extract.core.training.train import export
 
 
 class Copy:
     """An engine that finds what it sees, and takes note of the states it is told."""
 
-    description = "copy"
+    description, most_cells = "copy", 1 << 22
 
     def __init__(self):
         self.states = []
+        self.cells = 0
 
-    def probabilities(self, raster, state, number):
-        self.states.append((number, state))
-        return raster
+    def sweep(self, seen, known, number, pieces, progress):
+        assert [(piece.height, piece.width) for piece in pieces] == [one.shape for one in seen]
+        self.states += [(number, state) for state in known]
+        self.cells += sum(one.size for one in seen)
+        progress.check()
+        return seen
 
 
 def line_of_cells(length):
@@ -113,26 +115,9 @@ def test_a_ratio_that_no_model_covers_is_refused():
         choose(1.435, 0.150)
 
 
-def test_every_cell_is_computed_once_whatever_the_windows():
+def test_every_cell_comes_out_once():
     raster = line_of_cells(3000)
     assert set(map(tuple, cleanup.clean(raster, Copy()).cells().tolist())) == set(map(tuple, raster.cells().tolist()))
-
-
-def test_windows_follow_the_cells_and_leave_the_rest_alone():
-    assert len(cleanup.windows(line_of_cells(3000))) <= 2 * 6000 / cleanup.CORE
-    assert len(cleanup.windows(rasterize(np.array([[0.0, 0.0], [1e6, 1e6]]), 0.04))) <= 8
-
-
-@given(st.lists(st.tuples(st.integers(-3000, 3000), st.integers(-3000, 3000)), min_size=1, max_size=12))
-def test_cores_hold_all_within_reach_and_do_not_overlap(cells):
-    raster = RailRaster({}, 0.04, 0.0, 0.0).with_cells(np.array(cells))
-    corners = np.array(cleanup.windows(raster))
-    for cell in cells:
-        for shift in ((0, 0), (-cleanup.REACH, cleanup.REACH), (cleanup.REACH, cleanup.REACH)):
-            inside = ((np.array(cell) + shift >= corners) & (np.array(cell) + shift < corners + cleanup.CORE)).all(
-                axis=1
-            )
-            assert inside.sum() == 1
 
 
 def test_the_first_pass_is_told_nothing_and_later_ones_what_was_found():

@@ -141,10 +141,10 @@ def test_short_and_lonely_lines_give_what_can_be_known():
 class RawRaster:
     """An engine that leaves the raster as it is."""
 
-    description = "none"
+    description, most_cells = "none", 1 << 22
 
-    def probabilities(self, raster, *_):
-        return raster
+    def sweep(self, seen, *_):
+        return seen
 
 
 def test_one_run_measures_every_track_of_every_class_if_asked(monkeypatch):

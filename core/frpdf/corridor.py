@@ -1,0 +1,182 @@
+"""Where the network computes: rectangles that follow the rails and the gaps between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..raster import RailRaster
+
+BLOCK = 16
+"""Side, in cells, of the blocks that the corridor is made of."""
+GAP = 8
+"""Longest gap, in blocks, that the network may bridge: 5 m at 4 cm."""
+BESIDE = 1
+"""Blocks around rail cells and gaps that are computed as well: half a gauge, from which nothing else is set."""
+OVERHEAD = 16
+"""What a rectangle costs beyond its own cells, as a frame of so many cells: the copies of what surrounds it."""
+MOST_IN_PIECE = 1 << 18
+"""Cells in a rectangle: a layer takes a tenth of a second on it, so that a cancel is heard in time."""
+CONTEXT = 256
+"""Cells around a field that only give context."""
+
+_ROW = 1 << 32
+"""Distance of two rows in the numbers of blocks."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A rectangle of cells.
+
+    Attributes
+    ----------
+    row, column : int
+        North-west corner.
+    height, width : int
+    """
+
+    row: int
+    column: int
+    height: int
+    width: int
+
+    @property
+    def window(self) -> tuple[int, int, int, int]:
+        """As `RailRaster.read` takes it."""
+        return self.row, self.column, self.height, self.width
+
+    def holds(self, cells: np.ndarray) -> np.ndarray:
+        """Tell which of (n, 2) rows and columns lie inside, (n,) bool."""
+        corner = np.array([self.row, self.column])
+        return ((cells >= corner) & (cells < corner + [self.height, self.width])).all(axis=1)
+
+
+@dataclass(frozen=True)
+class Field:
+    """What is computed at once.
+
+    Attributes
+    ----------
+    inside : Piece
+        Results count here; the fields of a raster do not overlap.
+    pieces : list of Piece
+        Rectangles, none of which overlap, that hold the corridor inside and, for context, `CONTEXT` around.
+    """
+
+    inside: Piece
+    pieces: list[Piece]
+
+
+def lay_fields(raster: RailRaster, most_cells: int) -> list[Field]:
+    """Lay fields of at most `most_cells` cells, but for their context, over all that the network may set."""
+    blocks = corridor(raster)
+    fields = []
+    for inside in _fields(blocks, most_cells // BLOCK**2):
+        frame = CONTEXT // BLOCK
+        wide = Piece(inside.row - frame, inside.column - frame, inside.height + 2 * frame, inside.width + 2 * frame)
+        near = blocks[wide.holds(blocks)]
+        pieces = [_in_cells(piece) for piece in _partition(near, MOST_IN_PIECE // BLOCK**2)]
+        fields.append(Field(_in_cells(inside), pieces))
+    return fields
+
+
+def corridor(raster: RailRaster) -> np.ndarray:
+    """Give the blocks, (n, 2) rows and columns, in which the network may set a cell, sorted.
+
+    These are the blocks with rail cells, the blocks between any two of them no farther apart than a gap, and the
+    blocks beside.
+    """
+    occupied = np.unique(_numbers(raster.cells() // BLOCK))
+    filled = [occupied]
+    for down, right in _directions():
+        starts = occupied[np.isin(occupied + down * _ROW + right, occupied, assume_unique=True)]
+        steps = np.arange(1, max(down, abs(right)))[:, None] / max(down, abs(right))
+        between = np.rint(steps * [down, right]).astype(np.int64)
+        filled.append((starts[:, None] + between @ [_ROW, 1]).ravel())
+    around = np.arange(-BESIDE, BESIDE + 1)
+    shifts = (around[:, None] * _ROW + around).ravel()
+    numbers = np.unique((np.unique(np.concatenate(filled))[:, None] + shifts).ravel())
+    rows = (numbers + _ROW // 2) // _ROW
+    return np.column_stack([rows, numbers - rows * _ROW])
+
+
+def _directions() -> list[tuple[int, int]]:
+    """Half of the steps from a block to another that lies across a gap; the other half are the ways back."""
+    span = range(-GAP, GAP + 1)
+    steps = [(down, right) for down in range(GAP + 1) for right in span if (down, right) > (0, 0)]
+    return [(down, right) for down, right in steps if max(down, abs(right)) > 1 and down**2 + right**2 <= GAP**2]
+
+
+def _numbers(blocks: np.ndarray) -> np.ndarray:
+    return blocks[:, 0] * _ROW + blocks[:, 1]
+
+
+def _in_cells(blocks: Piece) -> Piece:
+    return Piece(*(BLOCK * number for number in blocks.window))
+
+
+def _fields(blocks: np.ndarray, most: int) -> list[Piece]:
+    """Halve the bounding rectangle of blocks until no part holds more than `most` of them."""
+    rectangles, waiting = [], [blocks] if len(blocks) else []
+    while waiting:
+        group = waiting.pop()
+        if len(group) <= most:
+            rectangles.append(_bounds(group))
+        else:
+            waiting += _halves(group)
+    return rectangles
+
+
+def _partition(blocks: np.ndarray, most: int) -> list[Piece]:
+    """Cut blocks apart along rows and columns while their bounding rectangles get cheaper, or are too large."""
+    rectangles, waiting = [], [blocks] if len(blocks) else []
+    while waiting:
+        group = waiting.pop()
+        bounds = _bounds(group)
+        cost, parts = _best_cut(group)
+        if cost < _cost(bounds.height, bounds.width):
+            waiting += parts
+        elif bounds.height * bounds.width > most:
+            waiting += _halves(group)
+        else:
+            rectangles.append(bounds)
+    return rectangles
+
+
+def _bounds(blocks: np.ndarray) -> Piece:
+    corner = blocks.min(axis=0)
+    return Piece(*corner.tolist(), *(blocks.max(axis=0) + 1 - corner).tolist())
+
+
+def _halves(blocks: np.ndarray) -> list[np.ndarray]:
+    """Cut blocks across the longer side of their bounding rectangle."""
+    bounds = _bounds(blocks)
+    axis = int(bounds.width > bounds.height)
+    first = blocks[:, axis] < bounds.window[axis] + bounds.window[2 + axis] // 2
+    return [blocks[first], blocks[~first]]
+
+
+def _best_cut(blocks: np.ndarray) -> tuple[float, list[np.ndarray]]:
+    """Cut blocks in two where the two bounding rectangles cost least; give the cost and the parts."""
+    best, parts = np.inf, []
+    for axis in (0, 1):
+        along = blocks[np.argsort(blocks[:, axis], kind="stable")]
+        place, across = along[:, axis], along[:, 1 - axis]
+        last = np.flatnonzero(np.diff(place))
+        if len(last) == 0:
+            continue
+        before = np.maximum.accumulate(across) - np.minimum.accumulate(across) + 1
+        after = (np.maximum.accumulate(across[::-1]) - np.minimum.accumulate(across[::-1]) + 1)[::-1]
+        cost = _cost(place[last] - place[0] + 1, before[last])
+        cost = cost + _cost(place[-1] - place[last + 1] + 1, after[last + 1])
+        cheapest = int(np.argmin(cost))
+        if cost[cheapest] < best:
+            best = cost[cheapest]
+            parts = [along[: last[cheapest] + 1], along[last[cheapest] + 1 :]]
+    return best, parts
+
+
+def _cost(height, width):
+    """Cells that a rectangle of blocks costs, frame included."""
+    return (height * BLOCK + 2 * OVERHEAD) * (width * BLOCK + 2 * OVERHEAD)

@@ -1,0 +1,77 @@
+"""Pieces and fields hold what may be set, once, and little else."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rail_extract.core.frpdf.corridor import BLOCK, CONTEXT, GAP, MOST_IN_PIECE, corridor, lay_fields
+from rail_extract.core.raster import RailRaster, rasterize
+
+CELL_M = 0.04
+
+
+def raster_of(cells):
+    return RailRaster({}, CELL_M, 0.0, 0.0).with_cells(np.asarray(cells))
+
+
+def double_track(length_m, heading):
+    """Cells of four rails, 1.5 m and 2.5 m apart."""
+    along = np.arange(0.0, length_m, 0.03)[:, None] * [np.cos(heading), np.sin(heading)]
+    across = np.array([-np.sin(heading), np.cos(heading)])
+    return rasterize(np.concatenate([along + offset * across for offset in (0.0, 1.5, 4.0, 5.5)]), CELL_M)
+
+
+places = st.lists(st.tuples(st.integers(-3000, 3000), st.integers(-3000, 3000)), min_size=1, max_size=12)
+
+
+@settings(max_examples=40)
+@given(places)
+def test_pieces_hold_the_corridor_and_do_not_overlap(cells):
+    raster = raster_of(cells)
+    blocks = corridor(raster)
+    (field,) = lay_fields(raster, 1 << 40)
+    holders = sum(piece.holds(blocks * BLOCK).astype(int) for piece in field.pieces)
+    assert (holders == 1).all()
+    assert field.inside.holds(blocks * BLOCK).all()
+    assert all(piece.height * piece.width <= MOST_IN_PIECE for piece in field.pieces)
+    near = np.array(cells)[:, None] + np.array([[-BLOCK, -BLOCK], [0, 0], [BLOCK, BLOCK]])
+    assert sum(piece.holds(near.reshape(-1, 2)).astype(int) for piece in field.pieces).min() == 1
+
+
+@given(st.integers(2, GAP - 1), st.floats(0, 2 * np.pi))
+def test_what_lies_in_a_gap_is_computed(length, heading):
+    end = np.rint(length * BLOCK * np.array([np.sin(heading), np.cos(heading)])).astype(int)
+    between = np.rint(np.linspace(0, 1, 200)[:, None] * end).astype(int)
+    blocks = set(map(tuple, corridor(raster_of([[0, 0], end])).tolist()))
+    assert set(map(tuple, (between // BLOCK).tolist())) <= blocks
+
+
+def test_nothing_is_computed_between_places_too_far_apart_for_a_gap():
+    far = corridor(raster_of([[0, 0], [0, (GAP + 2) * BLOCK]]))
+    assert len(far) == 18
+
+
+def test_fields_share_the_corridor_out_and_see_context():
+    raster = double_track(100.0, 0.4)
+    blocks = corridor(raster)
+    fields = lay_fields(raster, 100_000)
+    assert len(fields) > 4
+    holders = sum(field.inside.holds(blocks * BLOCK).astype(int) for field in fields)
+    assert (holders == 1).all()
+    for field in fields:
+        corner = np.array([field.inside.row, field.inside.column]) - CONTEXT
+        end = corner + 2 * CONTEXT + [field.inside.height, field.inside.width]
+        near = blocks[((blocks * BLOCK >= corner) & (blocks * BLOCK < end)).all(axis=1)]
+        assert sum(piece.holds(near * BLOCK).astype(int) for piece in field.pieces).min() == 1
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.4, np.pi / 4, np.pi / 2])
+def test_pieces_follow_a_track_whatever_its_heading(heading):
+    raster = double_track(300.0, heading)
+    (field,) = lay_fields(raster, 1 << 40)
+    cells = sum(piece.height * piece.width for piece in field.pieces)
+    assert cells < 1.4 * BLOCK**2 * len(corridor(raster))
+
+
+def test_an_empty_raster_has_no_fields():
+    assert lay_fields(RailRaster({}, CELL_M, 0.0, 0.0), 1 << 22) == []
