@@ -54,24 +54,25 @@ def vectorize(
     LineNetwork
         Raw lines with the stairs of the raster in them, in local metres; smooth them next.
     """
-    closed = close(raster, progress.span(0.0, 0.4))
+    closed = close(raster, progress.span(0.0, 0.3))
     pixels = parity_fix(pixel_set(closed.cells()))
     progress.check()
     distance = chamfer_distance(pixels)
+    progress.check()
     edges, tips = prune(veinerize(pixels, distance), distance)
-    progress.set_fraction(0.7)
     progress.check()
-    network = clean_junctions(trace(closed, pixels, edges, tips), head_width_m)
+    traced = trace(closed, pixels, edges, tips)
+    progress.set_fraction(0.6)
+    progress.check()
     places, widths_m = closed.to_local(pixels.cells / 2), raster.cell_m * distance / 2
-    network = cut_kinks(straighten_blots(network, places, widths_m, head_width_m))
-    progress.set_fraction(0.8)
-    progress.check()
+    network = clean_junctions(traced, head_width_m)
+    network = straighten_blots(network, places, widths_m, head_width_m, progress.span(0.6, 0.8))
+    network = cut_kinks(network, progress.span(0.8, 0.85))
     seen = cKDTree(places)
-    network = join_gaps(network, max_gap_m, gap_angle_deg, seen, at_nodes=False)
+    network = join_gaps(network, max_gap_m, gap_angle_deg, seen, at_nodes=False, progress=progress)
     network = resolve_branches(resolve_crossings(network))
-    network = join_gaps(run_through(network), max_gap_m, gap_angle_deg, seen)
-    network = attach_branches(network, seen, max_gap_m)
-    progress.set_fraction(1.0)
+    network = join_gaps(run_through(network), max_gap_m, gap_angle_deg, seen, progress=progress)
+    network = attach_branches(network, seen, max_gap_m, progress.span(0.9, 1.0))
     return _settle_ends(_drop_short(drop_guards(network, head_width_m), min_length_m))
 
 

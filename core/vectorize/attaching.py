@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..progress import SILENT, Progress
 from ..rails import length_along
 from .branches import FARTHEST_M, STEADY_M, parting, sharpest
-from .bridges import FIT_M, STAIRS_M, bridge, curvature
-from .ends import cut_back, stretch, turned, way_out
+from .bridges import FIT_M, STAIRS_M, Bridge, bridge, curvature
+from .crossings import SKIP_M
+from .ends import STEP_M, cut_back, stretch, turned, way_out
 from .joining import unseen_m
 from .junctions import DIRECTION_M
 from .network import LineNetwork
@@ -21,6 +24,9 @@ BESIDE_M = 1.0
 SLOPE_M = 4.0
 """Stretch of the stock rail whose direction is compared with the branch's."""
 
+LEAST_POINTS = 10
+"""A stretch of fewer points, a metre, tells no curvature."""
+
 GUARD_APART_M = 0.13
 """Farthest that a guard or wing rail's axis lies beside a running rail's: a head, and a flangeway of 50 mm."""
 
@@ -28,10 +34,21 @@ GUARD_M = 8.0
 """Longer lines so near another are no guards, but two rails of a very flat switch."""
 
 
-def attach_branches(network: LineNetwork, seen: cKDTree, max_gap_m: float) -> LineNetwork:
-    """Lead free ends back to the rails that they branch off, by curves that both lines explain.
+PULLED_M = 0.03
+"""A stock rail's line that strays so far from its curve is the mean of both rails: a stair is half a cell of it."""
 
-    A branch that leaves on an arc and is y beside its stock rail, at an angle to it, touched it 2 y / angle before.
+
+@dataclass(frozen=True)
+class _Touch:
+    """Where a branch leaves its stock rail: line, vertex of it, and the curve from the branch's end to there."""
+
+    stock: int
+    vertex: int
+    curve: Bridge
+
+
+def attach_branches(network: LineNetwork, seen: cKDTree, max_gap_m: float, progress: Progress = SILENT) -> LineNetwork:
+    """Lead free ends back to the rails that they branch off, by curves that both lines explain.
 
     Parameters
     ----------
@@ -40,80 +57,125 @@ def attach_branches(network: LineNetwork, seen: cKDTree, max_gap_m: float) -> Li
         Places of rail cells.
     max_gap_m : float
         The curve may run no further than this where there are none.
+    progress : Progress
     """
-    lines, nodes, ends, passes = list(network.lines), list(network.nodes), network.ends.copy(), network.passes.tolist()
-    for end in np.flatnonzero(network.degrees()[network.ends.ravel()] == 1).tolist():
-        own = end // 2
-        from_end = turned(lines[own], end)
+    if not network.lines:
+        return network
+    reach_m = FARTHEST_M + SLOPE_M
+    low = np.array([line.min(axis=0) for line in network.lines]) - reach_m
+    high = np.array([line.max(axis=0) for line in network.lines]) + reach_m
+    for end in progress.follow(np.flatnonzero(network.degrees()[network.ends.ravel()] == 1).tolist()):
+        from_end = network.from_end(end)
         if length_along(from_end)[-1] < FIT_M:
             continue
-        best = None
-        for stock, vertex, onward in _touching(from_end, lines, own):
-            found = bridge(from_end, onward)
-            if found is None or unseen_m(found.points, seen) > max_gap_m:
-                continue
-            if best is None or found.cost < best[0].cost:
-                sense = 1 if (onward[1] == lines[stock][vertex + 1]).all() else -1
-                best = found, stock, vertex + sense * int(np.searchsorted(length_along(onward), found.cuts_m[1]))
-        if best is None:
-            continue
-        found, stock, vertex = best
-        first = len(lines[own])
-        free = cut_back(from_end, found.cuts_m[0])
-        lines[own] = turned(np.concatenate([lines[stock][[vertex]], found.points[::-1], free]), end)
-        if end % 2 == 0:
-            passes = [[n, i, v + (len(lines[own]) - first) * (i == own)] for n, i, v in passes]
-        ends.flat[end] = len(nodes)
-        nodes.append(lines[stock][vertex])
-        passes.append([ends.flat[end], stock, vertex])
-    return LineNetwork(
-        tuple(lines), np.array(nodes).reshape(-1, 2), ends, np.array(passes, dtype=np.int64).reshape(-1, 3)
-    ).select(np.ones(len(lines), dtype=bool))
+        near = np.flatnonzero(((from_end[0] > low) & (from_end[0] < high)).all(axis=1))
+        touches = [
+            touch
+            for number in near.tolist()
+            for touch in _touching(from_end, number, network.lines[number])
+            if number != end // 2 and unseen_m(touch.curve.points, seen) <= max_gap_m
+        ]
+        if touches:
+            network = _attached(network, end, min(touches, key=lambda touch: touch.curve.cost))
+    return network.select(np.ones(len(network.lines), dtype=bool))
 
 
-def _touching(from_end: np.ndarray, lines: list[np.ndarray], own: int) -> Iterator[tuple[int, int, np.ndarray]]:
-    """List the lines that a line may branch off: number, vertex where they would touch, and the way on from there."""
+def _touching(from_end: np.ndarray, number: int, line: np.ndarray) -> Iterator[_Touch]:
+    """Give where a line branches off another one, if it may."""
     tip, outward = way_out(stretch(from_end, DIRECTION_M))
     axes = np.array([outward, [-outward[1], outward[0]]])
-    own_stretch = stretch(from_end, STEADY_M)
-    allowed = sharpest(curvature(own_stretch))
-    for number, line in enumerate(lines):
-        x, y = axes @ (line - tip).T
-        near = (x > -STEADY_M) & (x < FARTHEST_M + SLOPE_M) & (np.abs(y) < BESIDE_M)
-        if number == own or np.count_nonzero(near) < 2:
-            continue
-        first, last = np.flatnonzero(near)[[0, -1]]
-        way = line[first : last + 1] if x[last] > x[first] else line[first : last + 1][::-1]
-        x, y = axes @ (way - tip).T
-        if x[0] > 0 or x[-1] < SLOPE_M or (np.diff(x) <= 0).any():
-            continue
-        own_x, own_y = axes @ (own_stretch - tip).T
-        beside = own_x >= x[0]
-        apart = np.interp(own_x, x, y) - own_y
-        if np.count_nonzero(beside) < 2 or len(set(np.sign(apart[beside]))) > 1:
-            continue
-        touch_m, bend = parting(-own_x[beside], np.abs(apart[beside]))
-        if bend > allowed or not 0 < touch_m < FARTHEST_M:
-            continue
-        vertex = int(np.argmin(np.abs(axes[0] @ (line - tip).T - touch_m) + 1e9 * ~near))
-        if not 0 < vertex < len(line) - 1:
-            continue
-        along = axes[0] @ (line[vertex + 1] - line[vertex])
-        onward = line[vertex:] if along > 0 else line[vertex::-1]
-        if length_along(onward)[-1] >= DIRECTION_M:
-            yield number, vertex, onward
+    x, y = axes @ (line - tip).T
+    near = (x > -STEADY_M) & (x < FARTHEST_M + SLOPE_M) & (np.abs(y) < BESIDE_M)
+    if np.count_nonzero(near) < 2:
+        return
+    first, last = np.flatnonzero(near)[[0, -1]]
+    sense = 1 if x[last] > x[first] else -1
+    way = line[first : last + 1][::sense]
+    x, y = axes @ (way - tip).T
+    if x[0] > 0 or x[-1] < SLOPE_M or (np.diff(x) <= 0).any():
+        return
+    own = stretch(from_end, min(STEADY_M, -x[0]))
+    own_x, own_y = axes @ (own - tip).T
+    stock_y = np.interp(own_x, x, y)
+    if len(own) < LEAST_POINTS or len(set(np.sign(stock_y - own_y))) > 1:
+        return
+    touch_m, bend = parting(-own_x, np.abs(stock_y - own_y))
+    seen_bend = curvature(own) - curvature(np.column_stack([own_x, stock_y]) @ axes)
+    if bend > sharpest(seen_bend) or not 0 < touch_m < min(FARTHEST_M, x[-1]):
+        return
+    along = int(np.abs(x - touch_m).argmin())
+    onward = line[(first + along if sense > 0 else last - along) :: sense]
+    if length_along(onward)[-1] < DIRECTION_M:
+        return
+    curve = bridge(from_end, onward)
+    if curve is None:
+        return
+    along += int(np.searchsorted(length_along(onward), curve.cuts_m[1]))
+    vertex = first + along if sense > 0 else last - along
+    if 0 < vertex < len(line) - 1:
+        yield _Touch(number, vertex, curve)
+
+
+def _attached(network: LineNetwork, end: int, touch: _Touch) -> LineNetwork:
+    """Lead one end to where it touches its stock rail, whose own line is straightened there."""
+    own = end // 2
+    network, vertex = _straightened(network, touch, network.from_end(end)[0])
+    place = network.lines[touch.stock][vertex]
+    lines, passes = list(network.lines), network.passes.copy()
+    free = cut_back(network.from_end(end), touch.curve.cuts_m[0])
+    lines[own] = turned(np.concatenate([place[None], touch.curve.points[::-1], free]), end)
+    if end % 2 == 0:
+        passes[passes[:, 1] == own, 2] += len(lines[own]) - len(network.lines[own])
+    ends = network.ends.copy()
+    ends.flat[end] = len(network.nodes)
+    nodes = np.concatenate([network.nodes, place[None]])
+    passes = np.concatenate([passes, [[len(network.nodes), touch.stock, vertex]]])
+    return LineNetwork(tuple(lines), nodes, ends, passes)
+
+
+def _straightened(network: LineNetwork, touch: _Touch, tip: np.ndarray) -> tuple[LineNetwork, int]:
+    """Draw a stock rail as a curve from where a branch touches it to where that is seen apart, if it is pulled aside.
+
+    Returns the network and the number that the vertex of the touch has then.
+    """
+    line, vertex = network.lines[touch.stock], touch.vertex
+    abeam = int(np.hypot(*(line - tip).T).argmin())
+    sense = 1 if abeam > vertex else -1
+    before, onward = line[vertex::-sense], line[vertex::sense]
+    t = length_along(onward)
+    far = int(np.searchsorted(t, t[abs(abeam - vertex)] + SKIP_M))
+    if far == len(onward) or min(length_along(before)[-1], t[-1] - t[far]) < DIRECTION_M:
+        return network, vertex
+    curve = bridge(before, onward[far:])
+    if curve is None or curve.cuts_m[0] > STEP_M or not len(curve.points):
+        return network, vertex
+    far += int(np.searchsorted(t[far:] - t[far], curve.cuts_m[1]))
+    between = np.sort([vertex, vertex + sense * far])
+    own = network.passes[:, 1] == touch.stock
+    held = own & (network.passes[:, 2] > between[0]) & (network.passes[:, 2] < between[1])
+    if held.any() or far >= len(onward) or cKDTree(curve.points).query(onward[1:far])[0].max(initial=0) < PULLED_M:
+        return network, vertex
+    drawn = np.concatenate([line[: between[0] + 1], curve.points[::sense], line[between[1] :]])
+    passes = network.passes.copy()
+    passes[own & (passes[:, 2] >= between[1]), 2] += len(drawn) - len(line)
+    lines = list(network.lines)
+    lines[touch.stock] = drawn
+    moved = vertex if sense > 0 else vertex + len(drawn) - len(line)
+    return replace(network, lines=tuple(lines), passes=passes), moved
 
 
 def drop_guards(network: LineNetwork, head_width_m: float) -> LineNetwork:
     """Remove short lines that lie beside a longer one over their whole length: guard and wing rails, and doubles."""
     lengths = network.lengths()
-    keep = np.ones(len(lengths), dtype=bool)
+    short = np.flatnonzero(lengths < GUARD_M)
+    if not len(short):
+        return network
     reach_m = GUARD_APART_M + STAIRS_M
     dense = [stretch(line, np.inf) for line in network.lines]
-    for number in np.flatnonzero(lengths < GUARD_M).tolist():
-        low, high = dense[number].min(axis=0) - reach_m, dense[number].max(axis=0) + reach_m
-        for other, line in enumerate(dense):
-            inside = line[((line > low) & (line < high)).all(axis=1)]
-            if lengths[other] > lengths[number] and keep[other] and len(inside):
-                keep[number] &= cKDTree(inside).query(dense[number])[0].max() > reach_m
-    return network if keep.all() else network.select(keep)
+    number_of = np.repeat(np.arange(len(dense)), [len(points) for points in dense])
+    tree = cKDTree(np.concatenate(dense))
+    keep = np.ones(len(lengths), dtype=bool)
+    for number in short.tolist():
+        beside = [set(number_of[near].tolist()) for near in tree.query_ball_point(dense[number], reach_m)]
+        keep[number] = not any(keep[one] and lengths[one] > lengths[number] for one in set.intersection(*beside))
+    return network.select(keep)

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..progress import SILENT, Progress
 from ..rails import length_along
 from .bridges import STAIRS_M, TIGHTEST_RADIUS_M, bridge
 from .crossings import SKIP_M
@@ -33,11 +34,20 @@ BEND_M = 1.0
 BEND = BEND_M / TIGHTEST_RADIUS_M + 2 * STAIRS_M / BEND_M
 """Between stretches of this length the tightest rail and the stairs of its raster together turn by this, radians."""
 
+SWERVE_M = 0.05
+SWERVE_SEEN_M = 6.0, 2.0
+"""A line this far aside of what it is from 6 to 2 m before and behind has swerved to a guard rail or a weed; the stairs
+of a raster are less, and the tightest rail itself deviates by a centimetre."""
+
 
 def straighten_blots(
-    network: LineNetwork, places: np.ndarray, widths_m: np.ndarray, head_width_m: float
+    network: LineNetwork,
+    places: np.ndarray,
+    widths_m: np.ndarray,
+    head_width_m: float,
+    progress: Progress = SILENT,
 ) -> LineNetwork:
-    """Draw lines as smooth curves past every place where they are wide or bend as no rail does.
+    """Draw lines as smooth curves past every place where they are wide, or bend or swerve as no rail does.
 
     Parameters
     ----------
@@ -48,30 +58,34 @@ def straighten_blots(
     widths_m : (n,) array
         Width of a strip that has its middle there.
     head_width_m : float
+    progress : Progress
     """
     if not network.lines:
         return network
     tree = cKDTree(places)
     lines = []
-    for line in network.lines:
+    for line in progress.follow(network.lines):
         points, along = _even(line)
         wide = widths_m[tree.query(points)[1]] > WIDE_HEADS * head_width_m
-        lines.append(_straightened(line, _runs(wide | (_turns(points, BEND_M) > BEND), along)))
+        line = _straightened(line, _runs(wide | (_turns(points, BEND_M) > BEND), along))
+        points, along = _even(line)
+        lines.append(_straightened(line, _runs(_swerves(points) > SWERVE_M, along)))
     return replace(network, lines=tuple(lines))
 
 
-def cut_kinks(network: LineNetwork) -> LineNetwork:
+def cut_kinks(network: LineNetwork, progress: Progress = SILENT) -> LineNetwork:
     """Cut lines where they turn as no rail does, and leave out what is bent there; the new ends are free.
 
     Parameters
     ----------
     network : LineNetwork
         Lines without passes.
+    progress : Progress
     """
     lines: list[np.ndarray] = []
     ends: list[list[int]] = []
     nodes = list(network.nodes)
-    for line, own in zip(network.lines, network.ends.tolist()):
+    for line, own in progress.follow(zip(network.lines, network.ends.tolist()), len(network.lines)):
         for piece in _without_kinks(line):
             lines.append(piece)
             ends.append([])
@@ -138,6 +152,21 @@ def _turns(points: np.ndarray, length_m: float) -> np.ndarray:
         cross = back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0]
         turn[reach:-reach] = np.abs(np.arctan2(cross, (back * ahead).sum(axis=1)))
     return turn
+
+
+def _swerves(points: np.ndarray) -> np.ndarray:
+    """Distance of each even point from where the line before and behind it would have it, metres, (n,)."""
+    reach, hidden = (int(round(length_m / STEP_M)) for length_m in SWERVE_SEEN_M)
+    aside = np.zeros(len(points))
+    if len(points) > 2 * reach:
+        steps = np.arange(-reach, reach + 1)
+        around = np.abs(steps) >= hidden
+        weights = np.zeros(len(steps))
+        # The value at 0 of a cubic fitted to the points around, as a sum of these.
+        weights[around] = np.linalg.pinv(np.vander(steps[around] / reach, 4))[-1]
+        expected = np.column_stack([np.convolve(axis, weights[::-1], mode="valid") for axis in points.T])
+        aside[reach:-reach] = np.hypot(*(points[reach:-reach] - expected).T)
+    return aside
 
 
 def _even(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

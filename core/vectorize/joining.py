@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..progress import SILENT, Progress
 from .bridges import STAIRS_M, STEADY_TRANSITION_M, TRANSITION_M, Bridge, bridge
 from .crossings import MERGED_M
 from .ends import STEP_M, cut_back, stretch, way_out
@@ -28,7 +29,12 @@ UNSEEN_M = 0.10
 
 
 def join_gaps(
-    network: LineNetwork, max_gap_m: float, gap_angle_deg: float, seen: cKDTree | None = None, at_nodes: bool = True
+    network: LineNetwork,
+    max_gap_m: float,
+    gap_angle_deg: float,
+    seen: cKDTree | None = None,
+    at_nodes: bool = True,
+    progress: Progress = SILENT,
 ) -> LineNetwork:
     """Join ends that face each other, both within `gap_angle_deg` of the way across, at most `max_gap_m` apart.
 
@@ -44,8 +50,11 @@ def join_gaps(
         Places of rail cells. Ends up to `MERGED_M` apart are joined too, if no more than `max_gap_m` of the way lies
         far from these: where rails merge, an end is not a gap.
     at_nodes : bool
+    progress : Progress
+        Asked for a cancel in every round; how many there will be is not known.
     """
     while True:
+        progress.check()
         joins = _possible_joins(network, max_gap_m, gap_angle_deg, seen, at_nodes)
         best: dict[int, tuple[int, int]] = {}
         for ends in sorted(joins, key=lambda ends: (joins[ends].cost, ends), reverse=True):

@@ -271,6 +271,20 @@ def test_a_cancel_ends_the_work():
         vectorize(draw([straight(5, 0.3)]), HEAD_M, progress=Impatient())
 
 
+def test_a_cancel_is_asked_for_at_every_line():
+    class Counting(Progress):
+        asked = 0
+
+        def check(self):
+            Counting.asked += 1
+
+    rails = [straight(8, 0.3, (0.0, 2.0 * number)) for number in range(30)]
+    progress = Counting()
+    progress.span = lambda start, end: progress
+    vectorize(draw(rails), HEAD_M, progress=progress)
+    assert Counting.asked > 3 * len(rails)
+
+
 def star(*tips):
     """Straight lines from the origin, vertices a metre apart."""
     lines = tuple(np.outer(np.linspace(0, 1, max(int(np.hypot(*tip)), 1) + 1), tip) for tip in tips)

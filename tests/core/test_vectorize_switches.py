@@ -150,3 +150,27 @@ def test_ends_bent_aside_beside_each_other_are_joined_without_their_hooks():
     assert np.abs(line[:, 1]).max() < 0.05
     beside = along_x(18, 40, 0.3)
     assert len(join_gaps(loose(along_x(0, 20), beside), 5.0, 10.0).lines) == 2
+
+
+def test_a_gentle_swerve_to_a_guard_rail_is_undone():
+    line = along_x(0, 30)
+    line[:, 1] = 0.09 * np.exp(-(((line[:, 0] - 15) / 0.9) ** 2))
+    network = straighten_blots(loose(line), line, np.full(len(line), 0.11), HEAD_M)
+    assert np.abs(network.lines[0][:, 1]).max() < 0.03
+
+
+def test_a_stock_rail_drawn_aside_by_its_branch_is_straightened_and_keeps_its_nodes():
+    stock = along_x(0, 60)
+    arc = trace([Element(40, 1 / 300, 1 / 300)], (10.0, 0.0)).xy[::5]
+    places = np.concatenate([stock, arc])
+    stock[:, 1] = 0.5 * np.interp(stock[:, 0], *arc.T) * (stock[:, 0] < 18)
+    side = np.array([[40.0, 0.0], [40.0, -9.0]])
+    nodes = np.concatenate([stock[[0, -1]], arc[[0, -1]], stock[[400]], side[1:]])
+    branch = arc[arc[:, 0] > 19]
+    nodes[2] = branch[0]
+    network = LineNetwork((stock, branch, side), nodes, np.array([[0, 1], [2, 3], [4, 5]]), np.array([[4, 0, 400]]))
+    network = attach_branches(network, cKDTree(places), 5.0)
+    assert np.abs(network.lines[0][:, 1]).max() < 0.02
+    assert len(network.passes) == 2
+    for node, line, vertex in network.passes:
+        np.testing.assert_array_equal(network.lines[line][vertex], network.nodes[node])
