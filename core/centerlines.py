@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .chaining import Chain, chain_pairs, reach_beyond
+from .chaining import Chain, chain_pairs, reach_alone
 from .errors import NoTrackError
 from .forking import fork_centerlines
 from .guide import STEP_M, guide_line
@@ -40,7 +40,7 @@ class CenterlineParameters:
     tolerance_m : float
         Greatest deviation of the rails from the gauge.
     max_gap_m : float
-        Longest stretch without a pair of rails that does not end a track.
+        Longest stretch without any rail that does not end a track.
     smoothing_m : float
         Sigma of PAEK in plan.
     min_length_m : float
@@ -123,7 +123,7 @@ def _draw(
 ) -> Centerline:
     """Draw the centerline of one track."""
     half = 0.5 * (gauge_m + head_width_m)
-    reach = reach_beyond(parameters.max_gap_m)
+    reach = reach_alone(parameters.max_gap_m)
     guide, _ = resample(guide_line(rails, chain, half, reach), STEP_M)
     normals = left_normals(guide)
     lefts = _spans([pair.left for pair in chain.pairs], [pair.left_span for pair in chain.pairs])

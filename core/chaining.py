@@ -88,9 +88,9 @@ class Chain:
     ahead_m: float
 
 
-def reach_beyond(max_gap_m: float) -> float:
-    """How far beyond a stretch a rail may run on alone, whose partner comes back too briefly to be matched."""
-    return max_gap_m + MIN_LENGTH_M
+def reach_alone(max_gap_m: float) -> float:
+    """How far one rail alone may lead from one stretch of track to another."""
+    return max(HIDDEN_M, max_gap_m)
 
 
 def chain_pairs(rails: Sequence[RailLine], pairs: Sequence[RailPair], max_gap_m: float) -> tuple[Chain, ...]:
@@ -101,9 +101,10 @@ def chain_pairs(rails: Sequence[RailLine], pairs: Sequence[RailPair], max_gap_m:
     """
     if not pairs:
         return ()
-    led = tuple(_led(pairs, max(HIDDEN_M, max_gap_m)))
+    led = tuple(_led(pairs, reach_alone(max_gap_m)))
     partner = _partners(rails, pairs, led, max_gap_m)
-    alone_m = dict.fromkeys(range(2 * len(pairs)), reach_beyond(max_gap_m))
+    # At a track's end a rail may break off whose partner comes back too briefly to be matched.
+    alone_m = dict.fromkeys(range(2 * len(pairs)), max_gap_m + MIN_LENGTH_M)
     for link in led:
         for end in (link.first, link.second):
             alone_m[end] = min(alone_m[end], max(link.length_m, 0.0))
@@ -126,7 +127,7 @@ def _partners(
 ) -> dict[int, int]:
     """Say which end continues in which; holds both directions."""
     leading = {(end, link.rail) for link in led for end in (link.first, link.second)}
-    ends = _Ends.of(rails, pairs, reach_beyond(max_gap_m), leading)
+    ends = _Ends.of(rails, pairs, reach_alone(max_gap_m), leading)
     links = np.sort(np.array([(link.first, link.second) for link in led], dtype=int).reshape(-1, 2))
     links, count = np.unique(links, axis=0, return_counts=True)
     pointed = _pointed(ends, max_gap_m)
