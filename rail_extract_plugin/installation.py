@@ -13,7 +13,7 @@ from importlib import metadata
 from pathlib import Path
 
 from ..core.errors import RailExtractError
-from ..core.progress import Progress
+from ..core.progress import SILENT, Progress
 from . import processes
 from .dependencies import OWNED_BY_QGIS, is_installed, pins
 from .interpreter import Interpreter
@@ -26,6 +26,7 @@ PIP_ENVIRONMENT = {
     "PIP_NO_INPUT": "1",
     "PIP_PROGRESS_BAR": "off",
     "PIP_REQUIRE_VIRTUALENV": "0",
+    "PIP_RETRIES": "2",
     "PIP_ROOT_USER_ACTION": "ignore",
     "PIP_USER": "0",
     "PYTHONIOENCODING": "utf-8",
@@ -74,7 +75,7 @@ class Pip:
     def __init__(self, interpreter: Interpreter, workshop: Path, folders: Sequence[Path]) -> None:
         self._program = interpreter.program
         self._workshop = workshop
-        paths = [os.environ.get("PYTHONPATH", ""), *map(str, folders)]
+        paths = [_inherited(), *map(str, folders)]
         self._changes = {**interpreter.changes, **PIP_ENVIRONMENT, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
 
     def prepare(self, progress: Progress) -> None:
@@ -121,7 +122,7 @@ class Pip:
                 "the package index, and the space on the disk. Nothing was changed."
             )
 
-    def check_imports(self, modules: Sequence[str], folders: Sequence[Path], progress: Progress) -> None:
+    def check_imports(self, modules: Sequence[str], folders: Sequence[Path]) -> None:
         """Import modules as QGIS will.
 
         Raises
@@ -131,14 +132,14 @@ class Pip:
         """
         paths = list(map(str, folders))
         arguments = ["-c", IMPORT, str(len(paths) + 2), *paths, *modules]
-        ended = processes.run(self._program, arguments, {**self._changes, "PYTHONPATH": _inherited()}, progress)
+        ended = processes.run(self._program, arguments, {**self._changes, "PYTHONPATH": _inherited()})
         if ended.code != 0:
             reason = ended.output.strip().splitlines()[-1:] or ["it crashed"]
             raise RailExtractError(
                 f"{', '.join(modules)} does not work in the Python of this QGIS ({reason[0]}). Nothing was changed."
             )
 
-    def _run(self, *arguments: str, progress: Progress = processes.SILENT) -> processes.Ended:
+    def _run(self, *arguments: str, progress: Progress = SILENT) -> processes.Ended:
         return processes.run(self._program, ["-m", "pip", *arguments], self._changes, progress)
 
 
@@ -175,7 +176,7 @@ def install(order: Order, interpreter: Interpreter, folder: Path, others: Sequen
         if wanted:
             pip.install(wanted, ["--no-deps", "--target", str(staging), *order.options], progress)
         progress.set_fraction(0.8)
-        pip.check_imports(order.modules, [*others, folder, staging], progress)
+        pip.check_imports(order.modules, [*others, folder, staging])
         if wanted:
             _move(staging, folder)
     return ", ".join(requirement.replace("==", " ") for requirement in wanted)
