@@ -59,7 +59,9 @@ def test_chained_by_hand_the_steps_give_the_lines_of_extract_rails(succeed, sour
 def test_the_model_gives_the_lines_of_extract_rails(succeed, source, folder, whole, request):
     outputs = {"rails:RAILS": folder / "mr.gpkg", "centerlines:CENTERLINES": folder / "mt.gpkg"}
     model = request.config.rootpath / "models" / "extract_rails.model3"
-    assert succeed(model, {**source, "ITERATIONS": 1, **outputs}) == {one: str(path) for one, path in outputs.items()}
+    written = succeed(model, {**source, "ITERATIONS": 1, **outputs})
+    # Newer QGIS names the outputs that were skipped as well.
+    assert {one: path for one, path in written.items() if path} == {one: str(path) for one, path in outputs.items()}
     for path, lines in zip(outputs.values(), whole):
         assert farthest(read_lines(path), lines) < 0.001
 
