@@ -60,6 +60,37 @@ def test_branches_leave_the_through_track_at_the_toe(name, hand, heading, shown_
     assert side.bridged_m == pytest.approx(np.sqrt(2 * shown_m * FORM[name].radius_m), abs=0.3)
 
 
+@pytest.mark.parametrize("name", ["#6", "#10", "#20"])
+@pytest.mark.parametrize("shown_m", [0.02, 0.05])
+def test_branches_of_straight_switches_leave_at_an_angle(name, shown_m):
+    """As long as some of the straight shows: a parabola would lead back past the toe by up to 4 m."""
+    rails, toe, truth = turnout(FORM[name], 1, 0.3, shown_m)
+    through, side = by_rails(build_centerlines(rails, GAUGE, WIDTH))
+    start = near_end(side, toe)
+    assert np.hypot(*(start[:2] - toe)) < 1.0
+    assert (through.xyz == start).all(axis=1).sum() == 1
+    result = compare_lines([through.xyz, side.xyz], truth)
+    assert result.lateral_p95_m < 0.004
+    assert result.length_ratio < 1.005
+
+
+@pytest.mark.parametrize("early_m", [0.5, 2.0])
+def test_branches_that_begin_on_the_through_track_lose_what_they_share(early_m):
+    rails, toe, truth = turnout(FORM["300-1:9"], 1, 0.3, 0.0)
+    lines = [rail.xyz for rail in rails]
+    for through, side in ((0, 2), (1, 3)):
+        away = np.hypot(*(lines[through][:, :2] - lines[side][0, :2]).T)
+        shared = (away < early_m) & (
+            lines[through] @ [np.cos(0.3), np.sin(0.3), 0] < lines[side][0] @ [np.cos(0.3), np.sin(0.3), 0]
+        )
+        lines[side] = np.concatenate([lines[through][shared], lines[side]])
+    through, side = by_rails(build_centerlines(rails_of(*lines), GAUGE, WIDTH))
+    start = near_end(side, toe)
+    assert np.hypot(*(start[:2] - toe)) < 0.5
+    assert (through.xyz == start).all(axis=1).any()
+    assert compare_lines([through.xyz, side.xyz], truth).length_ratio < 1.004
+
+
 def test_a_turnout_in_a_curve_forks_as_well_though_rails_are_not_exact():
     rails, toe, truth = turnout(FORM["500-1:12"], 1, 1.0, 0.1, (Element(120.0, 1 / 900, 1 / 900),), noise_m=0.001)
     through, side = by_rails(build_centerlines(rails, GAUGE, WIDTH))
