@@ -73,7 +73,8 @@ def match_polylines(first: np.ndarray, second: np.ndarray, tolerance: float) -> 
     Parameters
     ----------
     first, second : (m, 2), (n, 2) arrays
-        Vertices, at steps of at most half the tolerance: a longer segment has neighbours out of everything's reach.
+        Vertices, abreast of each other, or else at steps of at most half the tolerance: of a longer segment the middle
+        may be out of every vertex's reach.
     tolerance : float
         Largest distance between a vertex and a segment, exclusive, in the unit of the vertices.
 
