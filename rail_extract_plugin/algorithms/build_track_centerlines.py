@@ -6,17 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from qgis.core import (
-    QgsProcessing,
     QgsProcessingContext,
-    QgsProcessingOutputNumber,
-    QgsProcessingParameterFeatureSink,
 )
 
 from ...core.errors import RailExtractError
 from ...core.progress import Progress
 from ...core.standards import RailStandard
+from .. import inputs, outputs
 from .. import parameters as groups
-from ..i18n import tr
 from ..layers import CENTERLINES, figures_of, write_lines
 from ..values import Values
 from .base import RailAlgorithm
@@ -50,9 +47,8 @@ class BuildTrackCenterlines(RailAlgorithm):
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs of the interface, in its order."""
-        line = QgsProcessing.SourceType.TypeVectorLine
         for definition in (
-            groups.rails(),
+            inputs.rails(),
             *groups.rail(),
             *groups.pairing(),
             groups.max_gap(),
@@ -61,9 +57,9 @@ class BuildTrackCenterlines(RailAlgorithm):
             groups.min_length(),
         ):
             self.addParameter(definition)
-        self.addParameter(QgsProcessingParameterFeatureSink("OUTPUT", tr("Track centerlines"), line))
-        self.addOutput(QgsProcessingOutputNumber("CENTERLINE_COUNT", tr("Number of track centerlines")))
-        self.addOutput(QgsProcessingOutputNumber("CENTERLINE_LENGTH", tr("Length of the track centerlines [m]")))
+        self.addParameter(outputs.centerlines())
+        for output in outputs.centerline_figures():
+            self.addOutput(output)
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read what has to be read in the main thread, and check it all."""

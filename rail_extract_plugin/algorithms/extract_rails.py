@@ -10,22 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
     QgsCoordinateReferenceSystem,
-    QgsProcessing,
     QgsProcessingContext,
-    QgsProcessingOutputNumber,
-    QgsProcessingOutputString,
-    QgsProcessingParameterFeatureSink,
-    QgsProcessingParameterFileDestination,
-    QgsProcessingParameterRasterDestination,
     QgsProcessingUtils,
 )
 
 from ...core.frpdf.zoo import choose as choose_model
 from ...core.progress import Estimating, Progress
 from ...core.standards import RailStandard
+from .. import inputs, outputs
 from .. import parameters as groups
 from ..clouds import CloudSource, spool_points
-from ..i18n import tr
 from ..layers import CENTERLINES, RAILS, figures_of, figures_of_stations, write_lines, write_raster, write_stations
 from ..reports import Origin, write_report
 from ..values import Values
@@ -67,7 +61,7 @@ class ExtractRails(RailAlgorithm):
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs of the interface, in its order."""
         for definition in (
-            *groups.cloud(),
+            *inputs.cloud(),
             *groups.rail(),
             *groups.area(),
             *groups.cleanup(),
@@ -76,27 +70,15 @@ class ExtractRails(RailAlgorithm):
             groups.step(),
         ):
             self.addParameter(definition)
-        line = QgsProcessing.SourceType.TypeVectorLine
-        self.addParameter(QgsProcessingParameterFeatureSink("RAILS", tr("Rails"), line, optional=True))
-        self.addParameter(
-            QgsProcessingParameterFeatureSink("CENTERLINES", tr("Track centerlines"), line, optional=True)
-        )
-        point = QgsProcessing.SourceType.TypeVectorPoint
-        for optional in (
-            QgsProcessingParameterFeatureSink("QUALITY", tr("Track geometry"), point, optional=True),
-            QgsProcessingParameterRasterDestination("CLEANED", tr("Cleaned rail raster"), optional=True),
-        ):
-            optional.setCreateByDefault(False)
-            self.addParameter(optional)
-        html = tr("Web pages (*.html)")
-        self.addParameter(QgsProcessingParameterFileDestination("REPORT", tr("Report"), html, optional=True))
-        self.addOutput(QgsProcessingOutputNumber("RAIL_COUNT", tr("Number of rails")))
-        self.addOutput(QgsProcessingOutputNumber("RAIL_LENGTH", tr("Length of the rails [m]")))
-        self.addOutput(QgsProcessingOutputNumber("CENTERLINE_COUNT", tr("Number of track centerlines")))
-        self.addOutput(QgsProcessingOutputNumber("CENTERLINE_LENGTH", tr("Length of the track centerlines [m]")))
-        for output in groups.quality_figures():
+        for destination in (outputs.rails("RAILS", optional=True), outputs.centerlines("CENTERLINES", optional=True)):
+            self.addParameter(destination)
+        for extra in (outputs.quality("QUALITY"), outputs.cleaned()):
+            extra.setCreateByDefault(False)
+            self.addParameter(extra)
+        self.addParameter(outputs.report())
+        figures = (*outputs.rail_figures(), *outputs.centerline_figures(), *outputs.quality_figures())
+        for output in (*figures, outputs.engine()):
             self.addOutput(output)
-        self.addOutput(QgsProcessingOutputString("ENGINE_USED", tr("Engine that ran the network")))
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read what has to be read in the main thread, and check it all."""

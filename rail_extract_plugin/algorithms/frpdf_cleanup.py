@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsProcessingContext, QgsProcessingOutputString, QgsProcessingParameterRasterDestination
+from qgis.core import QgsProcessingContext, QgsProcessingParameterRasterDestination
 
 from ...core.frpdf.zoo import Model
 from ...core.progress import Progress
+from .. import inputs, outputs
 from .. import parameters as groups
 from ..i18n import tr
 from ..layers import write_raster
@@ -48,10 +49,10 @@ class FrpdfCleanup(RailAlgorithm):
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs of the interface, in its order."""
-        for definition in (groups.raster(), groups.model(), *groups.cleanup(), *groups.raster_rail()):
+        for definition in (inputs.raster(), groups.model(), *groups.cleanup(), *groups.raster_rail()):
             self.addParameter(definition)
         self.addParameter(QgsProcessingParameterRasterDestination("OUTPUT", tr("Cleaned rail raster")))
-        self.addOutput(QgsProcessingOutputString("ENGINE_USED", tr("Engine that ran the network")))
+        self.addOutput(outputs.engine())
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read the raster's header, and check that a model fits it."""

@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from qgis.core import (
-    QgsProcessing,
     QgsProcessingContext,
-    QgsProcessingParameterFeatureSink,
 )
 
 from ...core.errors import RailExtractError
 from ...core.progress import Progress
+from .. import inputs, outputs
 from .. import parameters as groups
 from ..clouds import CloudSource
-from ..i18n import tr
 from ..layers import figures_of_stations, write_stations
 from ..values import Values
 from .base import RailAlgorithm
@@ -66,12 +64,10 @@ class MeasureTrackGeometry(RailAlgorithm):
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs of the interface, in its order."""
-        inputs = (groups.centerlines(), groups.rails_of_tracks(), groups.points_of_rails())
-        for definition in (*inputs, groups.step(), *groups.head()):
+        layers = (inputs.centerlines(), inputs.rails_of_tracks(), inputs.points_of_rails())
+        for definition in (*layers, groups.step(), *groups.head(), outputs.quality()):
             self.addParameter(definition)
-        point = QgsProcessing.SourceType.TypeVectorPoint
-        self.addParameter(QgsProcessingParameterFeatureSink("OUTPUT", tr("Track geometry"), point, optional=True))
-        for output in groups.quality_figures():
+        for output in outputs.quality_figures():
             self.addOutput(output)
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:

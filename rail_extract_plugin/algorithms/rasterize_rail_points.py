@@ -10,6 +10,7 @@ from qgis.core import QgsCoordinateReferenceSystem, QgsProcessingContext, QgsPro
 from ...core.frpdf.zoo import choose as choose_model
 from ...core.progress import Progress
 from ...core.standards import RailStandard
+from .. import inputs
 from .. import parameters as groups
 from ..clouds import CloudSource, read_points
 from ..i18n import tr
@@ -46,7 +47,7 @@ class RasterizeRailPoints(RailAlgorithm):
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs of the interface, in its order."""
-        for definition in (*groups.cloud(), *groups.rail(), *groups.area()):
+        for definition in (*inputs.cloud(), *groups.rail(), *groups.area()):
             self.addParameter(definition)
         self.addParameter(QgsProcessingParameterRasterDestination("OUTPUT", tr("Rail raster")))
 

@@ -7,17 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
-    QgsProcessing,
     QgsProcessingContext,
-    QgsProcessingOutputNumber,
-    QgsProcessingParameterFeatureSink,
 )
 
 from ...core.progress import Progress
 from ...core.standards import RailStandard
+from .. import inputs, outputs
 from .. import parameters as groups
 from ..clouds import CloudSource
-from ..i18n import tr
 from ..layers import RAILS, figures_of, write_lines
 from ..values import Values
 from .base import RailAlgorithm
@@ -55,12 +52,11 @@ class VectorizeRails(RailAlgorithm):
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs of the interface, in its order."""
-        for definition in (groups.raster(), groups.points(), *groups.lines(), *groups.raster_rail()):
+        for definition in (inputs.raster(), inputs.points(), *groups.lines(), *groups.raster_rail()):
             self.addParameter(definition)
-        line = QgsProcessing.SourceType.TypeVectorLine
-        self.addParameter(QgsProcessingParameterFeatureSink("OUTPUT", tr("Rails"), line))
-        self.addOutput(QgsProcessingOutputNumber("RAIL_COUNT", tr("Number of rails")))
-        self.addOutput(QgsProcessingOutputNumber("RAIL_LENGTH", tr("Length of the rails [m]")))
+        self.addParameter(outputs.rails())
+        for output in outputs.rail_figures():
+            self.addOutput(output)
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read the raster's header, and find the cloud's files."""

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
 import subprocess
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from lines import read_lines
 
 EXTRACT_RAILS = "railextract:extractrails"
+
+STANDARD = "IN_75R_1000"
+"""Of the sample."""
 
 
 def command(parameters: dict[str, object], *options: str, algorithm: object = EXTRACT_RAILS) -> list[str]:
@@ -44,3 +51,33 @@ def start_qgis_process():
 @pytest.fixture(scope="session")
 def sample(request) -> Path:
     return request.config.rootpath / "resources" / "sample"
+
+
+@pytest.fixture(scope="session")
+def truth(sample):
+    return lambda kind: read_lines(sample / "sample_truth.geojson", where=f"kind = '{kind}'")
+
+
+@dataclass
+class Run:
+    """A run over the sample, and where it wrote."""
+
+    results: dict
+    cloud: Path
+    rails: Path
+    centerlines: Path
+    quality: Path
+    cleaned: Path
+    report: Path
+
+
+@pytest.fixture(scope="session")
+def extracted(qgis_process, sample, tmp_path_factory):
+    """The sample, in a folder and with outputs whose names have a blank and umlauts."""
+    folder = tmp_path_factory.mktemp("Größe östlich 1")
+    cloud = shutil.copy(sample / "sample.laz", folder / "Schienen 1.laz")
+    names = ("Schiënen.gpkg", "Gleis achsen.shp", "Güte.shp", "gesäubert 1.tif", "Bericht ü.html")
+    outputs = dict(zip(("RAILS", "CENTERLINES", "QUALITY", "CLEANED", "REPORT"), (folder / name for name in names)))
+    run = qgis_process({"INPUT": cloud, "STANDARD": STANDARD, **outputs}, "--json")
+    assert run.returncode == 0, run.stdout + run.stderr
+    return Run(json.loads(run.stdout[run.stdout.index("{") :])["results"], cloud, *outputs.values())

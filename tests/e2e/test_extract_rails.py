@@ -1,9 +1,5 @@
-import json
-import shutil
 import signal
-from dataclasses import dataclass
 from importlib.util import find_spec
-from pathlib import Path
 
 import pytest
 from lines import read_features, read_lines
@@ -12,32 +8,6 @@ from rail_extract.core.synthetic.compare import compare_lines
 STANDARD = "IN_75R_1000"
 TRUE_GAUGE_MM, GAUGE_TOLERANCE_MM = 1000, 5
 TRACKS = 3
-
-
-@dataclass
-class Run:
-    """A run over the sample and where it wrote."""
-
-    results: dict
-    rails: Path
-    centerlines: Path
-
-
-@pytest.fixture(scope="module")
-def extracted(qgis_process, sample, tmp_path_factory):
-    """The sample, in a folder and with outputs whose names have a blank and umlauts."""
-    folder = tmp_path_factory.mktemp("Größe östlich 1")
-    cloud = shutil.copy(sample / "sample.laz", folder / "Schienen 1.laz")
-    rails, centerlines = folder / "Schiënen.gpkg", folder / "Gleis achsen.shp"
-    parameters = {"INPUT": cloud, "STANDARD": STANDARD, "RAILS": rails, "CENTERLINES": centerlines}
-    run = qgis_process(parameters, "--json")
-    assert run.returncode == 0, run.stdout + run.stderr
-    return Run(json.loads(run.stdout[run.stdout.index("{") :])["results"], rails, centerlines)
-
-
-@pytest.fixture
-def truth(sample):
-    return lambda kind: read_lines(sample / "sample_truth.geojson", where=f"kind = '{kind}'")
 
 
 def test_results_are_those_of_the_files(extracted):

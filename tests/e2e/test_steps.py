@@ -73,6 +73,7 @@ def test_the_model_gives_the_lines_of_extract_rails(succeed, source, folder, who
         ("frpdfcleanup", {"INPUT": "gone.tif"}, "gone.tif"),
         ("vectorizerails", {"INPUT": "gone.tif"}, "gone.tif"),
         ("buildtrackcenterlines", {"INPUT": "gone.gpkg"}, "gone.gpkg"),
+        ("measuretrackgeometry", {"INPUT": "gone.gpkg"}, "gone.gpkg"),
     ],
 )
 def test_bad_input_is_one_sentence_and_an_exit_code(qgis_process, tmp_path, algorithm, parameters, sentence):
