@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .paek import REACH_SIGMAS, filled, local_fit, reflected, repeated
+from .progress import SILENT, Progress
 from .rails import length_along
 from .vectorize.ends import stretch, way_out
 from .vectorize.network import LineNetwork
@@ -19,7 +20,7 @@ DIRECTION_SIGMAS = 2.5
 """Length over which the direction of a line end is measured: its stairs are about as long."""
 
 
-def smooth_network(network: LineNetwork, sigma_m: float) -> LineNetwork:
+def smooth_network(network: LineNetwork, sigma_m: float, progress: Progress = SILENT) -> LineNetwork:
     """Smooth all lines of a network; lines that meet in a node still meet in it, and free ends stay.
 
     A line that ends in a node is smoothed as if it ran on into its straightest continuation. The node moves to the mean
@@ -42,7 +43,7 @@ def smooth_network(network: LineNetwork, sigma_m: float) -> LineNetwork:
     anchors_of = [np.flatnonzero(anchor_line == number) for number in range(len(along))]
 
     stations, lines, places = [], [], np.empty(len(anchor_line), dtype=np.int64)
-    for number, own in enumerate(anchors_of):
+    for number, own in enumerate(progress.follow(anchors_of)):
         even = filled(along[number][[0, -1]], sigma_m / NETWORK_STATIONS_PER_SIGMA)
         stations.append(np.union1d(even, anchor_station[own]))
         places[own] = np.searchsorted(stations[-1], anchor_station[own])

@@ -55,11 +55,15 @@ def vectorize(
         Raw lines with the stairs of the raster in them, in local metres; smooth them next.
     """
     closed = close(raster, progress.span(0.0, 0.3))
-    pixels = parity_fix(pixel_set(closed.cells()))
+    cells = pixel_set(closed.cells())
+    progress.check()
+    pixels = parity_fix(cells)
     progress.check()
     distance = chamfer_distance(pixels)
     progress.check()
-    edges, tips = prune(veinerize(pixels, distance), distance)
+    edges = veinerize(pixels, distance)
+    progress.check()
+    edges, tips = prune(edges, distance)
     progress.check()
     traced = trace(closed, pixels, edges, tips)
     progress.set_fraction(0.6)

@@ -51,11 +51,10 @@ def join_gaps(
         far from these: where rails merge, an end is not a gap.
     at_nodes : bool
     progress : Progress
-        Asked for a cancel in every round; how many there will be is not known.
+        Only asked for a cancel: how many rounds there will be is not known.
     """
     while True:
-        progress.check()
-        joins = _possible_joins(network, max_gap_m, gap_angle_deg, seen, at_nodes)
+        joins = _possible_joins(network, max_gap_m, gap_angle_deg, seen, at_nodes, progress)
         best: dict[int, tuple[int, int]] = {}
         for ends in sorted(joins, key=lambda ends: (joins[ends].cost, ends), reverse=True):
             best[ends[0]] = best[ends[1]] = ends
@@ -70,7 +69,12 @@ def join_gaps(
 
 
 def _possible_joins(
-    network: LineNetwork, max_gap_m: float, gap_angle_deg: float, seen: cKDTree | None, at_nodes: bool
+    network: LineNetwork,
+    max_gap_m: float,
+    gap_angle_deg: float,
+    seen: cKDTree | None,
+    at_nodes: bool,
+    progress: Progress,
 ) -> dict[tuple[int, int], Bridge]:
     """Find every pair of ends that could be joined."""
     degrees = network.degrees()[network.ends.ravel()]
@@ -84,6 +88,7 @@ def _possible_joins(
     pairs = pairs[(degrees[free[pairs]] == 1).any(axis=1)]
     joins: dict[tuple[int, int], Bridge] = {}
     for hooks_m in HOOKS_M:
+        progress.check()
         one, other = (tuple(part[pairs[:, side]] for part in ways[hook_m]) for side, hook_m in enumerate(hooks_m))
         facing = _faces(*one, other[0], gap_angle_deg) & _faces(*other, one[0], gap_angle_deg)
         for one, other in free[pairs[facing]].tolist():
