@@ -7,7 +7,7 @@ another, the one fades into the other over the length that both show: no step is
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,8 +27,14 @@ SHORTEST_MATCH_M = 1.0
 STATION_M = 0.25
 """Spacing of the stations at which lines are compared."""
 
-TIP_M = 1.0
-"""A piece begins within this distance of the tip that it goes on from: four stations."""
+HOLE_M = 3 * STATION_M
+"""Near a corner of squares, two stretches may show a rail up to so far apart before a third takes notice."""
+
+TIP_M = SHORTEST_MATCH_M + 2 * STATION_M
+"""A piece begins within this distance of the tip that it goes on from, even if they match for too short a length."""
+
+LONGEST_SHARED_M = 3 * HALO_M
+"""Two stretches show a rail that crosses their border for twice `HALO_M`, and for half as much again askew."""
 
 
 @dataclass(frozen=True)
@@ -129,31 +135,60 @@ class _Table:
         known = [rail.xyz[:, :2] for rail in earlier]
         for rail in rails:
             for start, end in _new_runs(rail, known, stretch, corner):
-                self._numbers[stretch.key].append(len(self._pieces))
-                self._add(rail, start, end, tips, places)
+                first = len(self._pieces)
+                self._add(rail, start, end, stretch, corner, tips, places)
+                self._numbers[stretch.key] += range(first, len(self._pieces))
 
-    def _add(self, rail: RailLine, start: float, end: float, tips: list[tuple[int, int]], places: np.ndarray) -> None:
+    def _add(
+        self,
+        rail: RailLine,
+        start: float,
+        end: float,
+        stretch: Stretch,
+        corner: np.ndarray,
+        tips: list[tuple[int, int]],
+        places: np.ndarray,
+    ) -> None:
         """Add a piece, and link those of its ends that lie within the rail to the tips they go on from."""
-        number, piece = len(self._pieces), _Piece(rail, start, end, {})
-        self._pieces.append(piece)
-        length = length_along(rail.xyz[:, :2])[-1]
-        feet = project([rail.xyz[:, :2]], places, SAME_RAIL_M) if len(places) else None
-        for side, inner in ((0, start > 0), (1, end < length)):
-            if not inner or feet is None:
-                continue
-            away = np.abs(feet.t - (end if side else start))
-            free = [place for place in np.argsort(away) if away[place] <= TIP_M]
-            free = [place for place in free if tips[feet.point[place]][1] not in self._linked(tips[feet.point[place]])]
-            if not free:
-                continue
-            other, other_side = tips[feet.point[free[0]]]
-            chainage = float(feet.t[free[0]])
-            piece.start, piece.end = (piece.start, chainage) if side else (chainage, piece.end)
-            piece.links[side] = (other, other_side)
-            self._pieces[other].links[other_side] = (number, side)
+        number = len(self._pieces)
+        self._pieces.append(_Piece(rail, start, end, {}))
+        ahead = _prolonged(rail.xyz[:, :2])
+        feet = project([ahead], places, SAME_RAIL_M)
+        near = [(tips[point], t - HOLE_M) for point, t in zip(feet.point, feet.t)]
+        length = float(length_along(ahead)[-1]) - 2 * HOLE_M
+        inner = [side for side, is_inner in enumerate((start > 0, end < length)) if is_inner]
+        ends = rail.xyz[[0, -1], :2] - corner
+        cut = np.flatnonzero(~stretch.holds(ends, HALO_M - STATION_M)).tolist()
+        for side in [*inner, *(side for side in cut if side not in inner)]:
+            self._connect(number, side, near)
+        piece = self._pieces[number]
+        if len(inner) == 2 and not piece.links:
+            self._pieces.pop()
+        elif len(inner) == 1 and inner[0] not in piece.links:
+            # A branch hides in the line it leaves, which alone the earlier stretch shows.
+            self._give_rest(piece, inner[0], length)
 
-    def _linked(self, tip: tuple[int, int]) -> Mapping[int, tuple[int, int]]:
-        return self._pieces[tip[0]].links
+    def _connect(self, number: int, side: int, tips: list[tuple[tuple[int, int], float]]) -> None:
+        """Link one end of a new piece to the nearest tip on its rail, if there is one."""
+        piece = self._pieces[number]
+        place = piece.end if side else piece.start
+        free = [(abs(t - place), t, tip) for tip, t in tips if tip[1] not in self._pieces[tip[0]].links]
+        away, chainage, tip = min(free, default=(np.inf, np.inf, None))
+        if away <= TIP_M:
+            piece.links[side] = tip
+            self._pieces[tip[0]].links[tip[1]] = (number, side)
+            length = length_along(piece.rail.xyz[:, :2])[-1]
+            self._move_end(piece, side, float(np.clip(chainage, 0.0, length)))
+
+    def _give_rest(self, piece: _Piece, side: int, length: float) -> None:
+        """Let a piece reach to the end of its rail, if what others show of that is short."""
+        rest = length - piece.end if side else piece.start
+        if rest <= LONGEST_SHARED_M:
+            self._move_end(piece, side, length * side)
+
+    @staticmethod
+    def _move_end(piece: _Piece, side: int, chainage: float) -> None:
+        piece.start, piece.end = (piece.start, chainage) if side else (chainage, piece.end)
 
     def lines(self) -> list[RailLine]:
         """Chain the pieces up."""
@@ -194,6 +229,15 @@ def runs(marked: np.ndarray) -> list[tuple[int, int]]:
     return [(int(first), int(after) - 1) for first, after in edges.reshape(-1, 2)]
 
 
+def _prolonged(line: np.ndarray) -> np.ndarray:
+    """Let a line, (n, 2) or (n, 3), run on straight for `HOLE_M` at both ends."""
+    along = length_along(line[:, :2])
+    inner = interpolate(line, along, np.array([TIP_M, along[-1] - TIP_M]).clip(0.0, along[-1]))
+    out = np.array([line[0] - inner[0], line[-1] - inner[1]])
+    out *= HOLE_M / np.hypot(*out[:, :2].T)[:, None]
+    return np.concatenate([line[:1] + out[0], line, line[-1:] + out[1]])
+
+
 def _new_runs(
     rail: RailLine, known: Sequence[np.ndarray], stretch: Stretch, corner: np.ndarray
 ) -> list[tuple[float, float]]:
@@ -203,15 +247,29 @@ def _new_runs(
     shared = np.flatnonzero(~stretch.holds(stations - corner, -HALO_M))
     if len(shared) and known:
         seen[shared[project(known, stations[shared], SAME_RAIL_M).point]] = True
-    if not seen.any():
-        return [(0.0, float(t[-1]))]
-    seen = _without_short(seen, t)
-    seen = ~_without_short(~seen, t)
-    return [(float(t[max(first - 1, 0)]), float(t[min(last + 1, len(t) - 1)])) for first, last in runs(~seen)]
+    seen = _without_short(_closed(seen, t), t)
+    new = ~seen
+    if seen.any():
+        # A single station may be missing where a line was cut: rounding decides whether the other reaches as far.
+        first, last = np.flatnonzero(seen)[[0, -1]]
+        cut = ~stretch.holds(stations[[0, -1]] - corner, HALO_M - STATION_M)
+        new[:first] &= first > 1 or not cut[0]
+        new[last + 1 :] &= last + 2 < len(t) or not cut[1]
+    return [(float(t[max(first - 1, 0)]), float(t[min(last + 1, len(t) - 1)])) for first, last in runs(new)]
+
+
+def _closed(seen: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Mark short runs between marked ones as well: where one known line ends, the next has begun."""
+    closed = seen.copy()
+    for first, last in runs(~seen):
+        closed[first : last + 1] = (
+            first > 0 and last + 1 < len(t) and t[min(last + 1, len(t) - 1)] - t[first - 1] <= HOLE_M
+        )
+    return closed
 
 
 def _without_short(marked: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Unmark runs that are short, unless nothing else is there."""
+    """Unmark short runs, unless they are most of the line."""
     kept = np.zeros(len(marked), dtype=bool)
     for first, last in runs(marked):
         kept[first : last + 1] = t[last] - t[first] >= min(SHORTEST_MATCH_M, 0.5 * t[-1])
@@ -219,28 +277,26 @@ def _without_short(marked: np.ndarray, t: np.ndarray) -> np.ndarray:
 
 
 def _faded(part: RailLine, side: int, into: RailLine) -> RailLine:
-    """Let one end of a line fade into another line over the length that both show, twice `HALO_M` at most."""
-    xyz = part.xyz if side else part.xyz[::-1]
+    """Let one end of a line fade into the line it goes on in, over twice `HALO_M`.
+
+    Where the other does not show it for so long, as near a corner of squares, it is taken to be as far off as there.
+    """
+    xyz = (part.xyz if side else part.xyz[::-1]).copy()
     along = length_along(xyz[:, :2])
-    last = np.flatnonzero(along >= along[-1] - 2 * HALO_M)
-    feet = project([into.xyz[:, :2]], xyz[last, :2], SAME_RAIL_M)
+    share = 1.0 - np.clip((along[-1] - along) / min(2 * HALO_M, along[-1]), 0.0, 1.0)
+    last = np.flatnonzero(share > 0)
+    ahead = into.xyz
+    feet = project([ahead[:, :2]], xyz[last, :2], SAME_RAIL_M)
     if not len(feet.point):
-        return part
-    seen = np.zeros(len(last), dtype=bool)
-    seen[feet.point] = True
-    first = int(np.flatnonzero(np.append(~seen, True)[::-1])[0])
-    if not seen[-1]:
-        return part
-    first = int(np.max(np.flatnonzero(~seen), initial=-1)) + 1
-    order = np.argsort(feet.point)
-    chainage = dict(zip(feet.point[order].tolist(), feet.t[order].tolist()))
-    which = last[first:]
-    t = np.array([chainage[number] for number in range(first, len(last))])
-    target = interpolate(into.xyz, length_along(into.xyz[:, :2]), t)
-    share = (along[which] - along[which[0]]) / max(along[-1] - along[which[0]], np.finfo(float).tiny)
-    moved = xyz.copy()
-    moved[which] += (3 * share**2 - 2 * share**3)[:, None] * (target - xyz[which])
-    return replace(part, xyz=moved if side else moved[::-1])
+        ahead = _prolonged(into.xyz)
+        feet = project([ahead[:, :2]], xyz[last, :2], SAME_RAIL_M)
+    if len(feet.point):
+        order = np.argsort(feet.point)
+        shown = last[feet.point[order]]
+        target = interpolate(ahead, length_along(ahead[:, :2]), feet.t[order])
+        off = interpolate(target - xyz[shown], along[shown], along[last])
+        xyz[last] += (3 * share[last] ** 2 - 2 * share[last] ** 3)[:, None] * off
+    return replace(part, xyz=xyz if side else xyz[::-1])
 
 
 def united(parts: Sequence[RailLine]) -> RailLine:
