@@ -22,7 +22,7 @@ BESIDE_M = 1.0
 """A branch that is no nearer to its stock rail is not led back to it: nothing of the switch was seen."""
 
 SLOPE_M = 4.0
-"""Stretch of the stock rail whose direction is compared with the branch's."""
+"""Least length of a stock rail beyond the end of its branch: there the branch is to be led back to it."""
 
 LEAST_POINTS = 10
 """A stretch of fewer points, a metre, tells no curvature."""
