@@ -3,45 +3,43 @@
 import json
 import os
 import subprocess
+from pathlib import Path
 
 import pytest
 
 CUT = "578214,578222,2494300,2494345"
 
 
-@pytest.fixture(scope="module")
-def bare(tmp_path_factory):
-    """Start qgis_process with a new profile and without the packages of the virtual environment."""
-    environment = {**os.environ, "QGIS_CUSTOM_CONFIG_PATH": str(tmp_path_factory.mktemp("Größe östlich 3"))}
-    del environment["PYTHONPATH"]
+class BareQgis:
+    """qgis_process with a profile of its own, and without the packages of the virtual environment."""
 
-    def start(*words: str) -> subprocess.Popen:
-        return subprocess.Popen(
-            [os.environ["QGIS_PROCESS"], *words], env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
-        )
+    def __init__(self, profile: Path) -> None:
+        self.profile = profile
+        self.environment = {**os.environ, "QGIS_CUSTOM_CONFIG_PATH": str(profile)}
+        self.packages = self.environment.pop("PYTHONPATH")
+        self._call("plugins", "enable", "rail_extract")
 
-    with start("plugins", "enable", "rail_extract") as enabling:
-        assert b"rail_extract" in enabling.stdout.read()
-    return start
-
-
-@pytest.fixture(scope="module")
-def run_bare(bare):
-    def run(algorithm: str, **parameters: object) -> tuple[int, str]:
+    def run(self, algorithm: str, **parameters: object) -> subprocess.CompletedProcess:
         words = [f"{name}={value}" for name, value in parameters.items()]
-        with bare("--json", "run", f"railextract:{algorithm}", "--", *words) as process:
-            output = process.stdout.read().decode()
-        return process.returncode, output
+        return self._call("--json", "run", f"railextract:{algorithm}", "--", *words)
 
-    return run
+    def results(self, algorithm: str, **parameters: object) -> dict:
+        done = self.run(algorithm, **parameters)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return json.loads(done.stdout[done.stdout.index("{") :])["results"]
+
+    def _call(self, *words: str) -> subprocess.CompletedProcess:
+        call = [os.environ["QGIS_PROCESS"], *words]
+        return subprocess.run(call, env=self.environment, capture_output=True, text=True)
 
 
-def results_of(output: str) -> dict:
-    return json.loads(output[output.index("\n{") :])["results"]
+@pytest.fixture
+def bare(tmp_path):
+    return BareQgis(tmp_path / "Größe östlich 3")
 
 
 @pytest.mark.network
-def test_packages_are_installed_and_rails_extracted(run_bare, sample, tmp_path):
+def test_packages_are_installed_and_rails_extracted(bare, sample, tmp_path):
     parameters = {
         "INPUT": sample / "sample.laz",
         "STANDARD": "IN_75R_1000",
@@ -49,28 +47,32 @@ def test_packages_are_installed_and_rails_extracted(run_bare, sample, tmp_path):
         "ITERATIONS": 1,
         "RAILS": tmp_path / "rails.gpkg",
     }
-    code, output = run_bare("extractrails", **parameters)
-    assert code == 1
-    assert "which this QGIS does not have: run Install packages" in output
-    code, output = run_bare("checkinstallation")
-    assert code == 0
-    assert results_of(output)["SELF_TEST"].startswith("failed: laspy, lazrs, cv2 missing")
+    refused = bare.run("extractrails", **parameters)
+    assert refused.returncode == 1
+    assert "which this QGIS does not have: run Install packages" in refused.stdout + refused.stderr
+    assert bare.results("checkinstallation")["SELF_TEST"].startswith("failed: laspy, lazrs, cv2 missing")
 
-    code, output = run_bare("installpackages")
-    assert code == 0, output
-    installed = results_of(output)["INSTALLED"]
+    installed = bare.results("installpackages")["INSTALLED"]
     assert "laspy" in installed
     assert "opencv" in installed
     assert "numpy" not in installed
     assert "torch" not in installed
 
-    code, output = run_bare("extractrails", **parameters)
-    assert code == 0, output
-    found = results_of(output)
+    found = bare.results("extractrails", **parameters)
     assert found["RAIL_COUNT"] == 6
     assert found["ENGINE_USED"].startswith("OpenCV")
-    code, output = run_bare("installpackages")
-    assert results_of(output)["INSTALLED"] == ""
+    assert bare.results("installpackages")["INSTALLED"] == ""
+
+
+def test_folder_of_packages_is_named_by_a_variable(bare):
+    bare.environment["RAIL_EXTRACT_PACKAGES"] = bare.packages
+    assert bare.results("checkinstallation")["SELF_TEST"].startswith("passed")
+
+
+def test_folder_of_packages_is_named_by_a_setting(bare):
+    with (bare.profile / "profiles" / "default" / "QGIS" / "QGIS3.ini").open("a") as settings:
+        settings.write(f"\n[Processing]\nConfiguration\\RAIL_EXTRACT_PACKAGES={bare.packages}\n")
+    assert bare.results("checkinstallation")["SELF_TEST"].startswith("passed")
 
 
 def test_installation_is_checked(qgis_process):
