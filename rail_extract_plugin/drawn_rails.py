@@ -47,6 +47,9 @@ def read_rails(
     flat = sum(bool(np.isnan(rail.xyz[0, 2])) for rail in rails)
     if flat:
         progress.warning(f"{flat} of {len(rails)} lines have no heights: what is made of them has none either.")
+    copies = len(rails) - len({rail.xyz.tobytes() for rail in rails})
+    if copies:
+        progress.warning(f"{copies} of {len(rails)} lines lie on another one: what is made of them comes twice.")
     return rails, frame
 
 
@@ -75,6 +78,11 @@ def _read(
     ]
     if not found:
         raise RailExtractError(f"{name} holds no line: give a layer of lines.")
+    lost = next((feature.id() for feature, vertices in found if not np.isfinite(vertices[:, :2]).all()), None)
+    if lost is not None:
+        raise RailExtractError(
+            f"{name} has a line (feature {lost}) with a place that is no number: repair or delete it."
+        )
     middle = np.median(np.concatenate([vertices for _, vertices in found]), axis=0)
     origin = np.round(np.nan_to_num(middle) / ORIGIN_STEP) * ORIGIN_STEP
     frame = LocalFrame(origin, horizontal_unit_m, vertical_unit_m, crs_wkt)
@@ -104,7 +112,7 @@ def _parts(geometry: QgsGeometry, chord: float) -> Iterator[np.ndarray]:
     straight.convertToStraightSegment(chord, QgsAbstractGeometry.SegmentationToleranceType.MaximumDifference)
     for part in straight.constParts():
         xyz = np.array([(vertex.x(), vertex.y(), vertex.z()) for vertex in part.vertices()], dtype=float).reshape(-1, 3)
-        if np.isnan(xyz[:, 2]).any():
+        if not np.isfinite(xyz[:, 2]).all():
             xyz[:, 2] = np.nan
         moves = np.append(True, np.any(np.diff(xyz[:, :2], axis=0) != 0, axis=1))
         if moves.sum() > 1:

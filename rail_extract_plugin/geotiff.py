@@ -88,7 +88,9 @@ def read_rasters(path: Path, header: RasterHeader, progress: Progress = SILENT) 
 
 
 def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress = SILENT) -> None:
-    """Write rasters of the header's grid; cells outside its window are left out. A failed file is taken away again.
+    """Write rasters of the header's grid; cells outside its window are left out.
+
+    The file takes its name when it is whole: what was there before stays until then, also if the program is killed.
 
     Raises
     ------
@@ -97,17 +99,17 @@ def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster
     Cancelled
         The user cancelled.
     """
+    part = path.with_name(f"{path.name}.part")
     gdal.ErrorReset()
     try:
-        _write(path, header, rasters, progress)
+        _write(part, header, rasters, progress)
         if gdal.GetLastErrorType() >= gdal.CE_Failure:
             raise RuntimeError(gdal.GetLastErrorMsg())
-    except RuntimeError as error:
-        path.unlink(missing_ok=True)
+        part.replace(path)
+    except (RuntimeError, OSError) as error:
         raise RasterError(f"{path} can't be written ({error}): choose another place.") from error
-    except BaseException:
-        path.unlink(missing_ok=True)
-        raise
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def filled_blocks(dataset: gdal.Dataset, number: int) -> list[tuple[int, int, int, int]]:
@@ -149,7 +151,10 @@ def _class_codes(dataset: gdal.Dataset, name: str) -> tuple[int, ...]:
     """Class of each band, by its description."""
     texts = [dataset.GetRasterBand(number).GetDescription() for number in range(1, dataset.RasterCount + 1)]
     if texts and all(text.isdecimal() and int(text) <= HIGHEST_CLASS for text in texts):
-        return tuple(int(text) for text in texts)
+        codes = tuple(int(text) for text in texts)
+        if len(set(codes)) < len(codes):
+            raise RasterError(f"{name} has several bands of one class ({', '.join(texts)}): give each class one band.")
+        return codes
     if len(texts) == 1:
         return (RAIL_CLASS,)
     raise RasterError(

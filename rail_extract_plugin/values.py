@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsCoordinateReferenceSystem, QgsProcessingAlgorithm, QgsProcessingContext
+from qgis.core import (
+    QgsCoordinateReferenceSystem,
+    QgsProcessingAlgorithm,
+    QgsProcessingContext,
+    QgsProcessingFeatureSource,
+    QgsWkbTypes,
+)
 
-from ..core.errors import ParameterError, RasterError
+from ..core.errors import ParameterError, RailExtractError, RasterError
 from ..core.standards import CUSTOM, DEFAULT, RailStandard, distinct_gauges, resolve
 from .clouds import CloudSource, cloud_source
 
@@ -32,6 +39,13 @@ NUMBERS = {
 }
 """Attribute of the core's `Parameters` that a number of the interface goes into."""
 
+NO_LINES = (
+    QgsWkbTypes.GeometryType.PointGeometry,
+    QgsWkbTypes.GeometryType.PolygonGeometry,
+    QgsWkbTypes.GeometryType.NullGeometry,
+)
+"""Of a layer that may hold anything the type is unknown."""
+
 CHOICES = {"ENGINE": "engine", "DEVICE": "device"}
 
 
@@ -52,8 +66,17 @@ class Values:
         self._algorithm, self._parameters, self._context = algorithm, parameters, context
 
     def number(self, name: str) -> float:
-        """Read a number."""
-        return self._algorithm.parameterAsDouble(self._parameters, name, self._context)
+        """Read a number.
+
+        Raises
+        ------
+        ParameterError
+            It is NaN, which QGIS lets pass.
+        """
+        number = self._algorithm.parameterAsDouble(self._parameters, name, self._context)
+        if math.isnan(number):
+            raise ParameterError(f"{name} can't be nan: give a number.")
+        return number
 
     def optional_number(self, name: str) -> float | None:
         """Read a number that may be left empty."""
@@ -86,6 +109,24 @@ class Values:
             raise RasterError(f"{name} is no raster that can be read: give the output of Rasterize Rail Points.")
         path = Path(layer.source())
         return path, read_header(path)
+
+    def lines(self, name: str) -> QgsProcessingFeatureSource:
+        """Find a layer of lines.
+
+        Raises
+        ------
+        RailExtractError
+            There is no such layer, or it is one of points, polygons or nothing.
+        """
+        source = self._algorithm.parameterAsSource(self._parameters, name, self._context)
+        if source is None:
+            raise RailExtractError(f"{name} is no layer that can be read: give a layer of lines.")
+        kind = source.wkbType()
+        if QgsWkbTypes.geometryType(kind) in NO_LINES:
+            raise RailExtractError(
+                f"{name} is a layer of the type {QgsWkbTypes.displayString(kind)}: give a layer of lines."
+            )
+        return source
 
     def cloud(self, name: str) -> CloudSource:
         """Find the files of a cloud; CRS, where the algorithm has it, stands in for theirs."""

@@ -10,6 +10,7 @@ from qgis.core import (
     QgsProcessingContext,
     QgsProcessingException,
     QgsProcessingFeedback,
+    QgsProcessingParameterNumber,
     QgsProcessingParameterPointCloudLayer,
 )
 from qgis.PyQt.QtGui import QIcon
@@ -21,6 +22,8 @@ from ..destinations import check_writable
 from ..feedback import QgisProgress
 from ..i18n import tr
 from ..paths import ICON
+from ..refusals import explain_refused
+from ..values import Values
 
 HOMEPAGE = "https://example.org/rail-extract"
 
@@ -59,8 +62,9 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     def checkParameterValues(self, parameters: dict[str, Any], context: QgsProcessingContext) -> tuple[bool, str]:
         """Check all values before a run: as QGIS does, then whether outputs can be written, then as `read` does."""
         accepted, message = super().checkParameterValues(self._with_paths_accepted(parameters), context)
-        if accepted:
-            accepted, message = self.canExecute()
+        if not accepted:
+            return False, self._refusal(parameters, context) or message
+        accepted, message = self.canExecute()
         if not accepted:
             return False, message
         try:
@@ -70,7 +74,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
                 if not supported:
                     return False, message
                 check_writable(value, context)
-            self.read(parameters, context)
+            self._read(parameters, context)
         except RailExtractError as error:
             return False, str(error)
         return True, ""
@@ -83,7 +87,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         if not executable:
             raise QgsProcessingException(reason)
         try:
-            self._job = self.read(parameters, context)
+            self._job = self._read(parameters, context)
         except RailExtractError as error:
             raise QgsProcessingException(str(error)) from None
         return True
@@ -103,6 +107,24 @@ class RailAlgorithm(QgsProcessingAlgorithm):
             raise QgsProcessingException(tr("The memory does not suffice: choose a smaller extent.")) from None
         progress.set_fraction(1)
         return results
+
+    def _read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Any:
+        """Read the parameters, each number before all else."""
+        values = Values(self, parameters, context)
+        for definition in self.parameterDefinitions():
+            if isinstance(definition, QgsProcessingParameterNumber):
+                values.optional_number(definition.name())
+        return self.read(parameters, context)
+
+    def _refusal(self, parameters: dict[str, Any], context: QgsProcessingContext) -> str | None:
+        """Say what is wrong with the first value that QGIS does not accept, outputs aside."""
+        accepted = self._with_paths_accepted(parameters)
+        told = (
+            explain_refused(definition, accepted.get(definition.name()), context)
+            for definition in self.parameterDefinitions()
+            if not definition.isDestination()
+        )
+        return next(filter(None, told), None)
 
     def _with_paths_accepted(self, parameters: dict[str, Any]) -> dict[str, Any]:
         """Put a layer object in place of paths of clouds: QGIS refuses all that its build can't open; `read` checks."""

@@ -9,7 +9,6 @@ from qgis.core import (
     QgsProcessingContext,
 )
 
-from ...core.errors import RailExtractError
 from ...core.progress import Progress
 from ...core.standards import RailStandard
 from .. import inputs, outputs
@@ -65,8 +64,7 @@ class BuildTrackCenterlines(RailAlgorithm):
         """Read what has to be read in the main thread, and check it all."""
         values = Values(self, parameters, context)
         standard = values.standard()
-        if self.parameterAsSource(parameters, "INPUT", context) is None:
-            raise RailExtractError(self.invalidSourceError(parameters, "INPUT"))
+        values.lines("INPUT")
         return Job(standard, values.other_gauges_m(standard))
 
     def compute(
@@ -76,9 +74,9 @@ class BuildTrackCenterlines(RailAlgorithm):
         from ...core.pipeline import tracks_of
         from ..drawn_rails import read_rails
 
-        source = self.parameterAsSource(parameters, "INPUT", context)
-        rails, frame = read_rails(source, progress.span(0, READING))
-        settings = Values(self, parameters, context).settings(job.standard, job.other_gauges_m)
+        values = Values(self, parameters, context)
+        rails, frame = read_rails(values.lines("INPUT"), progress.span(0, READING))
+        settings = values.settings(job.standard, job.other_gauges_m)
         classes = sorted({rail.class_code for rail in rails})
         tracks = []
         for code, share in zip(classes, progress.span(READING, 1).split(len(classes))):

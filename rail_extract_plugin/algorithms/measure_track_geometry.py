@@ -9,7 +9,6 @@ from qgis.core import (
     QgsProcessingContext,
 )
 
-from ...core.errors import RailExtractError
 from ...core.progress import Progress
 from .. import inputs, outputs
 from .. import parameters as groups
@@ -74,8 +73,7 @@ class MeasureTrackGeometry(RailAlgorithm):
         """Read what has to be read in the main thread, and check it all."""
         values = Values(self, parameters, context)
         for name in ("INPUT", "RAILS"):
-            if self.parameterAsSource(parameters, name, context) is None:
-                raise RailExtractError(self.invalidSourceError(parameters, name))
+            values.lines(name)
         return Job(values.head_width_m(), values.cloud("POINTS") if values.filled("POINTS") else None)
 
     def compute(
@@ -85,9 +83,9 @@ class MeasureTrackGeometry(RailAlgorithm):
         from ...core.geometry import measure_track_geometry
         from ..track_inputs import check_gauges, read_inputs
 
-        sources = (self.parameterAsSource(parameters, name, context) for name in ("INPUT", "RAILS"))
-        tracks = read_inputs(*sources, job.cloud, progress.span(0, READING))
-        step_m = Values(self, parameters, context).number("STEP")
+        values = Values(self, parameters, context)
+        tracks = read_inputs(values.lines("INPUT"), values.lines("RAILS"), job.cloud, progress.span(0, READING))
+        step_m = values.number("STEP")
         share = progress.span(READING, 1)
         measured = measure_track_geometry(
             tracks.centerlines, tracks.rails, job.head_width_m, tracks.clouds, step_m, share

@@ -1,0 +1,435 @@
+"""Rasters and lines that are not what they should be."""
+
+import math
+
+import numpy as np
+import pytest
+from faults import FAILED, FINE, REFUSED, WARNED, Fault
+from osgeo import gdal, osr
+from qgis.core import QgsFeature, QgsGeometry, QgsLineString, QgsPoint, QgsVectorLayer
+
+TITLE = "Rasters and lines"
+NAN, INFINITE = float("nan"), float("inf")
+
+LENGTH_M, GAUGE_M, HEAD_M, CELL_M = 6.0, 1.435, 0.072, 0.0399
+TAGS = {"RAIL_GAUGE_MM": "1435", "RAIL_HEAD_MM": "72", "RAIL_MODEL": "base"}
+
+
+def track_cells(bands=1, kind=np.uint8):
+    """Two rails, each two cells wide, 6 m from west to east, with a metre of nothing around."""
+    cells = np.zeros((bands, 90, 200), kind)
+    for row in (25, 25 + round((GAUGE_M + HEAD_M) / CELL_M)):
+        cells[:, row : row + 2, 25:175] = 1
+    return cells
+
+
+def raster(
+    bench, cells=None, grid=(500_000, CELL_M, 0, 3_000_000, 0, -CELL_M), tags=TAGS, epsg=32643, texts=("10",), nodata=0
+):
+    """Write cells, (bands, rows, columns), as a GeoTIFF."""
+    cells = track_cells() if cells is None else cells
+    kind = gdal.GDT_Float32 if cells.dtype == np.float32 else gdal.GDT_Byte
+    path = bench.folder / "rail.tif"
+    dataset = gdal.GetDriverByName("GTiff").Create(str(path), cells.shape[2], cells.shape[1], len(cells), kind)
+    if grid:
+        dataset.SetGeoTransform(grid)
+    if epsg:
+        system = osr.SpatialReference()
+        system.ImportFromEPSG(epsg)
+        dataset.SetProjection(system.ExportToWkt())
+    dataset.SetMetadata(tags)
+    for number, band in enumerate(cells, start=1):
+        dataset.GetRasterBand(number).WriteArray(band)
+        if nodata is not None:
+            dataset.GetRasterBand(number).SetNoDataValue(nodata)
+        if number <= len(texts):
+            dataset.GetRasterBand(number).SetDescription(texts[number - 1])
+    dataset = None
+    return {"INPUT": path}
+
+
+def of_raster(change=None, **given):
+    """A raster, whose bytes may be changed."""
+
+    def prepare(bench):
+        parameters = raster(bench, **given)
+        if change:
+            parameters["INPUT"].write_bytes(change(parameters["INPUT"].read_bytes()))
+        return parameters
+
+    return prepare
+
+
+def as_floats_with_nan():
+    cells = track_cells(kind=np.float32)
+    cells[cells == 0] = np.nan
+    return cells
+
+
+def inverted_nodata():
+    """255 where nothing is, as other programs write it."""
+    cells = track_cells()
+    cells[cells == 0] = 255
+    return cells
+
+
+def text_file(bench):
+    (bench.folder / "rail.tif").write_text("no raster")
+    return {"INPUT": bench.folder / "rail.tif"}
+
+
+def over_itself(bench):
+    """Output onto the input."""
+    parameters = raster(bench)
+    return {**parameters, "OUTPUT": parameters["INPUT"]}
+
+
+LEFT = "LINESTRING Z (500000 3000001.507 100, 500006 3000001.507 100)"
+RIGHT = "LINESTRING Z (500000 3000000 100, 500006 3000000 100)"
+
+
+def line(*vertices):
+    return QgsGeometry(QgsLineString([QgsPoint(*vertex) for vertex in vertices]))
+
+
+FLAT_LEFT, FLAT_RIGHT = (text.replace(" Z", "").replace(" 100)", ")").replace(" 100,", ",") for text in (LEFT, RIGHT))
+
+
+def lines(*texts, kind="LineStringZ", crs="EPSG:32643", fields="", values=()):
+    """A layer of lines in memory; the bench keeps it alive."""
+
+    def prepare(bench):
+        layer = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "lines", "memory")
+        for number, text in enumerate(texts):
+            feature = QgsFeature(layer.fields())
+            feature.setGeometry(QgsGeometry.fromWkt(text) if isinstance(text, str) else text)
+            if values:
+                feature.setAttributes(list(values[number]))
+            assert layer.dataProvider().addFeature(feature)
+        return {"INPUT": layer}
+
+    return prepare
+
+
+def table(bench):
+    return {"INPUT": QgsVectorLayer("None?field=rail_id:integer", "table", "memory")}
+
+
+def no_vector_file(bench):
+    (bench.folder / "lines.gpkg").write_bytes(b"SQLite format 3\0" + bytes(50))
+    return {"INPUT": bench.folder / "lines.gpkg"}
+
+
+def arc(radius, across):
+    r = radius + across
+    places = (f"{500_000 + r * math.sin(angle)} {3_000_000 + r * math.cos(angle)} 5" for angle in (0, 0.1, 0.2))
+    return f"CIRCULARSTRING Z ({', '.join(places)})"
+
+
+ONE_TRACK = {"CENTERLINE_COUNT": 1}
+TWO_RAILS = {"RAIL_COUNT": 2}
+NO_TRACKS = {"CENTERLINE_COUNT": 0}
+V, B = "vectorizerails", "buildtrackcenterlines"
+
+RASTERS = [
+    Fault(
+        "no raster file",
+        text_file,
+        REFUSED,
+        "INPUT can't be …/rail.tif: give a raster layer, or a raster file that can be read.",
+    ),
+    Fault(
+        "missing raster",
+        lambda bench: {"INPUT": bench.folder / "gone.tif"},
+        REFUSED,
+        "INPUT can't be …/gone.tif: give a raster layer, or a raster file that can be read.",
+    ),
+    Fault(
+        "GeoTIFF cut in its header",
+        of_raster(lambda data: data[:60]),
+        REFUSED,
+        "INPUT can't be …/rail.tif: give a raster layer, or a raster file that can be read.",
+    ),
+    Fault(
+        "GeoTIFF cut in its cells",
+        of_raster(lambda data: data[:4000]),
+        FAILED,
+        "rail.tif is damaged at row 0, column 0: make it again.",
+    ),
+    Fault(
+        "turned raster",
+        of_raster(grid=(500_000, CELL_M, 0.001, 3_000_000, 0.001, -CELL_M)),
+        REFUSED,
+        "rail.tif is turned or its cells are not square: warp it to square cells, north up.",
+    ),
+    Fault(
+        "cells that are not square",
+        of_raster(grid=(500_000, CELL_M, 0, 3_000_000, 0, -0.05)),
+        REFUSED,
+        "rail.tif is turned or its cells are not square: warp it to square cells, north up.",
+    ),
+    Fault(
+        "raster with south up",
+        of_raster(grid=(500_000, CELL_M, 0, 3_000_000, 0, CELL_M)),
+        REFUSED,
+        "rail.tif is turned or its cells are not square: warp it to square cells, north up.",
+    ),
+    Fault(
+        "raster without a place",
+        of_raster(grid=None, epsg=None),
+        REFUSED,
+        "rail.tif is turned or its cells are not square: warp it to square cells, north up.",
+    ),
+    Fault(
+        "raster in degrees",
+        of_raster(grid=(75, 4e-7, 0, 27, 0, -4e-7), epsg=4326),
+        REFUSED,
+        "Lengths can't be computed in WGS 84: project the cloud first.",
+    ),
+    Fault(
+        "wrong number of bands (an RGB picture)",
+        of_raster(cells=track_cells(3), texts=()),
+        REFUSED,
+        "rail.tif has 3 bands, and not every description is a class code: give a raster with one band, or "
+        "with one band a class like those of Rasterize Rail Points.",
+    ),
+    Fault(
+        "band that is no class",
+        of_raster(cells=track_cells(2), texts=("10", "300")),
+        REFUSED,
+        "rail.tif has 2 bands, and not every description is a class code: give a raster with one band, or "
+        "with one band a class like those of Rasterize Rail Points.",
+    ),
+    Fault(
+        "two bands of one class",
+        of_raster(cells=track_cells(2), texts=("10", "10")),
+        REFUSED,
+        "rail.tif has several bands of one class (10, 10): give each class one band.",
+    ),
+    Fault(
+        "no tags",
+        of_raster(tags={}),
+        REFUSED,
+        "The raster does not say for which rails it was made (tags RAIL_GAUGE_MM and RAIL_HEAD_MM): fill "
+        "GAUGE and HEAD_WIDTH.",
+    ),
+    Fault(
+        "tags that are no numbers",
+        of_raster(tags={"RAIL_GAUGE_MM": "wide", "RAIL_HEAD_MM": "72"}),
+        REFUSED,
+        "The tag RAIL_GAUGE_MM of the raster can't be 'wide': rasterize the points again.",
+    ),
+    Fault(
+        "tags that are NaN",
+        of_raster(tags={"RAIL_GAUGE_MM": "nan", "RAIL_HEAD_MM": "72"}),
+        REFUSED,
+        "A gauge of nan mm is not possible: give millimetres from 500 to 2000.",
+    ),
+    Fault(
+        "tag of an extent that is none",
+        of_raster(tags={**TAGS, "RAIL_EXTENT": "1,2"}),
+        REFUSED,
+        "The tag RAIL_EXTENT of the raster can't be '1,2': rasterize the points again.",
+    ),
+    Fault(
+        "tags that contradict the cell size",
+        of_raster(grid=(500_000, 0.5, 0, 3_000_000, 0, -0.5)),
+        REFUSED,
+        "The raster's cells are 500.0 mm wide, but a gauge of 1435 mm with a railhead of 72.0 mm needs 39.9 "
+        "mm: rasterize the points for these rails, or correct GAUGE and HEAD_WIDTH.",
+        run="frpdfcleanup",
+    ),
+    Fault(
+        "tag of an unknown model", of_raster(tags={**TAGS, "RAIL_MODEL": "gone"}), FINE, gives={}, run="frpdfcleanup"
+    ),
+    Fault(
+        "empty raster",
+        of_raster(cells=np.zeros((1, 90, 200), np.uint8)),
+        FAILED,
+        "rail.tif holds no rail cell: give a raster with 1 where there is rail.",
+    ),
+    Fault(
+        "raster of one cell",
+        of_raster(cells=np.ones((1, 1, 1), np.uint8)),
+        WARNED,
+        "Without POINTS the rails have no heights and lie where the raster shows them.",
+        {"RAIL_COUNT": 0},
+    ),
+    Fault(
+        "raster full of rail",
+        of_raster(cells=np.ones((1, 90, 200), np.uint8)),
+        WARNED,
+        "Without POINTS the rails have no heights and lie where the raster shows them.",
+        {},
+    ),
+    Fault(
+        "real numbers, NaN for nothing",
+        of_raster(cells=as_floats_with_nan(), nodata=None),
+        WARNED,
+        "Without POINTS the rails have no heights and lie where the raster shows them.",
+        TWO_RAILS,
+    ),
+    Fault(
+        "255 for nothing",
+        of_raster(cells=inverted_nodata(), nodata=255),
+        WARNED,
+        "Without POINTS the rails have no heights and lie where the raster shows them.",
+        TWO_RAILS,
+    ),
+    Fault(
+        "no value for nothing",
+        of_raster(nodata=None),
+        WARNED,
+        "Without POINTS the rails have no heights and lie where the raster shows them.",
+        TWO_RAILS,
+    ),
+    Fault("output onto the input", over_itself, run="frpdfcleanup"),
+]
+
+LINES = [
+    Fault(
+        "no vector file",
+        no_vector_file,
+        REFUSED,
+        "INPUT can't be …/lines.gpkg: give a vector layer, or a vector file that can be read.",
+    ),
+    Fault(
+        "missing lines",
+        lambda bench: {"INPUT": bench.folder / "gone.gpkg"},
+        REFUSED,
+        "INPUT can't be …/gone.gpkg: give a vector layer, or a vector file that can be read.",
+    ),
+    Fault("layer without lines", lines(), FAILED, "INPUT holds no line: give a layer of lines."),
+    Fault("table without shapes", table, REFUSED, "INPUT is a layer of the type NoGeometry: give a layer of lines."),
+    Fault(
+        "points instead of lines",
+        lines("POINT (500000 3000000)", kind="Point"),
+        REFUSED,
+        "INPUT is a layer of the type Point: give a layer of lines.",
+    ),
+    Fault(
+        "polygons instead of lines",
+        lines("POLYGON ((500000 3000000, 500001 3000000, 500001 3000001, 500000 3000000))", kind="Polygon"),
+        REFUSED,
+        "INPUT is a layer of the type Polygon: give a layer of lines.",
+    ),
+    Fault("empty and missing shapes among lines", lines(LEFT, "LINESTRING Z EMPTY", "", RIGHT), gives=ONE_TRACK),
+    Fault("only empty shapes", lines("LINESTRING Z EMPTY", ""), FAILED, "INPUT holds no line: give a layer of lines."),
+    Fault(
+        "lines of one place",
+        lines("LINESTRING Z (500000 3000000 1, 500000 3000000 1)"),
+        FAILED,
+        "INPUT holds no line: give a layer of lines.",
+    ),
+    Fault(
+        "parts in one feature",
+        lines(f"MULTILINESTRING Z ({LEFT[13:]}, {RIGHT[13:]})", kind="MultiLineStringZ"),
+        gives=ONE_TRACK,
+    ),
+    Fault("curved lines", lines(arc(100, 0), arc(100, 1.507), kind="CompoundCurveZ"), gives=ONE_TRACK),
+    Fault(
+        "no heights",
+        lines(FLAT_LEFT, FLAT_RIGHT, kind="LineString"),
+        WARNED,
+        "2 of 2 lines have no heights: what is made of them has none either.",
+        ONE_TRACK,
+    ),
+    Fault(
+        "one height that is no number",
+        lines(line((500000, 3000001.507, 100), (500006, 3000001.507, NAN)), RIGHT),
+        WARNED,
+        "1 of 2 lines have no heights: what is made of them has none either.",
+        ONE_TRACK,
+    ),
+    Fault(
+        "place that is no number",
+        lines(line((500000, 3000001.507, 100), (500003, NAN, 100), (500006, 3000001.507, 100)), RIGHT),
+        FAILED,
+        "INPUT has a line (feature 1) with a place that is no number: repair or delete it.",
+    ),
+    Fault(
+        "infinite place",
+        lines(line((500000, 3000001.507, 100), (INFINITE, 3000001.507, 100)), RIGHT),
+        FAILED,
+        "INPUT has a line (feature 1) with a place that is no number: repair or delete it.",
+    ),
+    Fault(
+        "every line twice",
+        lines(LEFT, RIGHT, LEFT, RIGHT),
+        WARNED,
+        "2 of 4 lines lie on another one: what is made of them comes twice.",
+        {"CENTERLINE_COUNT": 2},
+    ),
+    Fault(
+        "vertices that repeat",
+        lines(LEFT.replace("(", "(500000 3000001.507 100, 500000 3000001.507 100, "), RIGHT),
+        gives=ONE_TRACK,
+    ),
+    Fault(
+        "line that crosses itself",
+        lines(LEFT, RIGHT, "LINESTRING Z (500020 3000000 1, 500030 3000010 1, 500030 3000000 1, 500020 3000010 1)"),
+        gives=ONE_TRACK,
+    ),
+    Fault(
+        "line that ends where it begins",
+        lines(LEFT, RIGHT, "LINESTRING Z (500020 3000000 1, 500030 3000010 1, 500030 3000000 1, 500020 3000000 1)"),
+        gives=ONE_TRACK,
+    ),
+    Fault("vertical line", lines(LEFT, RIGHT, "LINESTRING Z (500020 3000000 1, 500020 3000000 9)"), gives=ONE_TRACK),
+    Fault(
+        "one rail alone",
+        lines(LEFT),
+        WARNED,
+        "No two rails run parallel: there are rails but no track centerlines.",
+        NO_TRACKS,
+    ),
+    Fault(
+        "rails of another gauge",
+        lines(LEFT.replace("1.507", "1.072"), RIGHT),
+        FAILED,
+        "No track of 1435 mm gauge found: rails lie 1072 mm apart, is the gauge 1000 mm?",
+    ),
+    Fault(
+        "rails that cross at a right angle",
+        lines(LEFT, "LINESTRING Z (500003 2999997 100, 500003 3000004 100)"),
+        WARNED,
+        "No two rails run parallel: there are rails but no track centerlines.",
+        NO_TRACKS,
+    ),
+    Fault(
+        "field class_code with text",
+        lines(LEFT, RIGHT, fields="&field=class_code:string", values=[("ten",), ("ten",)]),
+        gives=ONE_TRACK,
+    ),
+    Fault(
+        "equal rail_id on two rails",
+        lines(LEFT, RIGHT, fields="&field=rail_id:integer", values=[(1,), (1,)]),
+        gives=ONE_TRACK,
+    ),
+    Fault(
+        "lines without a coordinate system",
+        lines(LEFT, RIGHT, crs=""),
+        WARNED,
+        "The lines have no coordinate system: their coordinates are taken as metres.",
+        ONE_TRACK,
+    ),
+    Fault(
+        "lines in degrees",
+        lines("LINESTRING Z (75 27 0, 75.1 27 0)", crs="EPSG:4326"),
+        FAILED,
+        "The lines are in degrees (WGS 84), where lengths can't be measured: reproject them, for example to "
+        "the UTM zone of the place.",
+    ),
+]
+
+FAULTS = [*RASTERS, *LINES]
+
+
+@pytest.mark.parametrize("fault", RASTERS, ids=lambda fault: fault.name)
+def test_raster(meet, fault):
+    meet(fault, "vectorizerails")
+
+
+@pytest.mark.parametrize("fault", LINES, ids=lambda fault: fault.name)
+def test_lines(meet, fault):
+    meet(fault, "buildtrackcenterlines")
