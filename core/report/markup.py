@@ -39,7 +39,9 @@ def table(headings: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
 
 
 def metres(length_m: float) -> str:
-    """Write a length for a person: 0.4 m, 39 m, 12,345 m."""
+    """Write a length for a person: 0.4 m, 39 m, 1,234 m, 12.3 km."""
+    if length_m >= 10_000:
+        return f"{length_m / 1000:,.1f} km"
     return f"{length_m:.1f} m" if length_m < 10 else f"{length_m:,.0f} m"
 
 

@@ -13,8 +13,8 @@ from .plan import draw_plan
 from .plots import draw_profiles
 from .style import STYLE
 
-MOST_PLACES = 8
-"""Rows of the list of places to look at; the pictures show all."""
+MOST_PLACES = 5
+"""Places to look at that are listed for each reason; the pictures show all."""
 
 VERDICTS = (
     (0.0, "good", "Good throughout: points support every metre, at gauge and with a small error."),
@@ -141,7 +141,8 @@ def _places(findings: Findings) -> str:
         return ""
     rows = [
         (place.track_id, f"{place.start_m:,.1f} to {place.end_m:,.1f} m", metres(place.length_m), place.doubt.label)
-        for place in places[:MOST_PLACES]
+        for doubt in DOUBTS
+        for place in [one for one in places if one.doubt == doubt][:MOST_PLACES]
     ]
     listed = tag("div", table(("Track", "Chainage", "In doubt", "Why"), rows), class_="scroll")
     more = len(places) - len(rows)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .findings import DOUBTS, Findings, TrackFindings
+from .findings import DOUBTS, Doubt, Findings, TrackFindings
 from .markup import tag, text
 from .plots import curve, round_up
 
@@ -29,24 +29,23 @@ def draw_plan(findings: Findings) -> str:
     def place(points: np.ndarray) -> np.ndarray:
         return (points[:, :2] - middle) * [scale, -scale] + [WIDTH / 2, height / 2]
 
-    lines = [_draw_track(track, place(track.geometry.xyz)) for track in findings.tracks]
-    labels = [_label(track, place(track.geometry.xyz), number) for number, track in enumerate(findings.tracks)]
+    drawn = [(track, place(track.geometry.xyz)) for track in findings.tracks]
+    lines = [tag("path", d=curve(*places.T), class_="track") for _, places in drawn]
+    marks = [_mark(track, places, doubt) for doubt in reversed(DOUBTS) for track, places in drawn]
+    labels = [_label(*one, number) for number, one in enumerate(drawn)]
     furniture = (_scale_bar(scale, height), _north())
     view = f"0 0 {WIDTH:g} {height:.0f}"
-    return tag("svg", *lines, *labels, *furniture, viewBox=view, role="img", aria_label="Map of the tracks")
+    return tag("svg", *lines, *marks, *labels, *furniture, viewBox=view, role="img", aria_label="Map of the tracks")
 
 
-def _draw_track(track: TrackFindings, places: np.ndarray) -> str:
-    """Draw a track, and over it what is in doubt."""
-    parts = [tag("path", d=curve(*places.T), class_="track")]
-    for doubt in reversed(DOUBTS):
-        doubtful = track.doubtful[doubt]
-        # A station stands for the way to both neighbours.
-        near = doubtful | np.append(doubtful[1:], False) | np.append(False, doubtful[:-1])
-        marked = np.where(near, places[:, 1], np.nan)
-        if doubtful.any():
-            parts.append(tag("path", d=curve(places[:, 0], marked), class_=f"{doubt.name} mark"))
-    return "".join(parts)
+def _mark(track: TrackFindings, places: np.ndarray, doubt: Doubt) -> str:
+    """Mark where a track is in doubt for a reason."""
+    doubtful = track.doubtful[doubt]
+    if not doubtful.any():
+        return ""
+    # A station stands for the way to both neighbours.
+    near = doubtful | np.append(doubtful[1:], False) | np.append(False, doubtful[:-1])
+    return tag("path", d=curve(places[:, 0], np.where(near, places[:, 1], np.nan)), class_=f"{doubt.name} mark")
 
 
 def _label(track: TrackFindings, places: np.ndarray, number: int) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from .findings import DOUBTS, GAUGE_OFF_MM, TrackFindings
 from .markup import tag, text
 
-WIDTH, LEFT, RIGHT = 1040.0, 76.0, 12.0
+WIDTH, LEFT, RIGHT = 1040.0, 76.0, 24.0
 """Units of a picture across, and its margins for labels."""
 
 PANEL, SPACE, AXIS = 92.0, 26.0, 38.0

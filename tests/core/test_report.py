@@ -112,6 +112,18 @@ def test_each_track_is_judged_by_its_own_gauge():
     assert findings.share == 0
 
 
+def test_the_longest_places_are_listed_for_each_reason():
+    sigma = np.full(1001, 1.0)
+    sigma[100:900:20] = 9.0
+    bridged = at(1001, 950)
+    html = page(track(length_m=1000.0, sigma_mm=sigma, bridged=bridged))
+    rows = elements(html, "tbody")[0].findall("tr")
+    assert [row.findall("td")[3].text for row in rows] == ["a rail has no points"] + 5 * ["standard error above 5 mm"]
+    assert "35 more places are marked below." in html
+    marks = [one.get("class") for one in elements(html, "svg")[0].iter("path") if "mark" in one.get("class")]
+    assert marks == ["unsure mark", "unsupported mark"]  # the gravest on top
+
+
 def test_rails_without_a_track_are_told():
     alone = RailLine(np.array([[0.0, 50, 0], [35, 50, 0]]), 99, 10, 10, 1.0, 1.0, 0.0)
     assert "1 rail belongs to no track (35 m)." in page(track(), more_rails=(alone,))
@@ -169,7 +181,7 @@ def test_a_long_line_stays_a_small_page():
     gauge[31_234] = GAUGE_MM + 40
     html = page(track(length_m=50_000.0, gauge_mm=gauge, bridged=np.arange(50_001) % 100 == 0))
     assert len(html) < 1_500_000
-    assert "50,000 m" in html
+    assert "50.0 km" in html
     _, profiles = elements(html, "svg")
     paths = [one.get("d") for one in profiles.iter("path")]
     heights = [float(y) for y in re.findall(r"[ML][\d.]+ (-?[\d.]+)", paths[1])]
@@ -201,6 +213,8 @@ def test_rounding_up_gives_the_next_of_one_two_and_five(value):
     assert round(found / 10.0 ** np.floor(np.log10(found) + 1e-9), 6) in (1, 2, 5)
 
 
-@pytest.mark.parametrize(("length_m", "words"), [(0.42, "0.4 m"), (39.4, "39 m"), (12345, "12,345 m")])
+@pytest.mark.parametrize(
+    ("length_m", "words"), [(0.42, "0.4 m"), (39.4, "39 m"), (1234, "1,234 m"), (12345, "12.3 km")]
+)
 def test_lengths_are_written_for_a_person(length_m, words):
     assert metres(length_m) == words

@@ -86,6 +86,17 @@ def test_report_and_its_figures(run, scene, tmp_path):
     assert outcome.results["BRIDGED_LENGTH"] == 0
 
 
+def test_one_rail_alone_is_no_track_and_the_report_says_so(run, write_cloud, track, outputs, tmp_path):
+    points = track()
+    more = {"QUALITY": tmp_path / "quality.gpkg", "REPORT": tmp_path / "report.html"}
+    outcome = run({"INPUT": write_cloud(points[points[:, 1] < 3_000_000]), "ITERATIONS": 1, **outputs, **more})
+    assert outcome.ok, outcome.error
+    assert (outcome.results["RAIL_COUNT"], outcome.results["CENTERLINE_COUNT"]) == (1, 0)
+    assert (outcome.results["STATION_COUNT"], outcome.results["BRIDGED_LENGTH"]) == (0, 0)
+    assert lines_of(more["QUALITY"])[1] == []
+    assert "No track was found." in more["REPORT"].read_text(encoding="utf-8")
+
+
 def test_without_quality_and_report_nothing_is_measured(run, scene):
     outcome = run(scene)
     assert outcome.ok, outcome.error
