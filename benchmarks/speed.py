@@ -1,7 +1,7 @@
-"""Print how long the sample takes: the whole `qgis_process` call, and the stages of the walk inside it.
+"""Print where the time goes on the sample, and how fast and how exact the network's shortcuts are.
 
 Run `make -s env` and set what it prints, then `python benchmarks/speed.py`. Times are of this machine at this moment:
-compare rows of one run, not of two.
+compare rows of one run, not of two. On a machine that others use, `--clock cpu` counts this process's own time.
 """
 
 from __future__ import annotations
@@ -16,12 +16,21 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from rail_extract.core import pipeline
-from rail_extract.core.points import read_rail_points
-from rail_extract.core.standards import resolve
+START = time.perf_counter()
+
+from rail_extract.core import pipeline  # noqa: E402
+from rail_extract.core.frpdf.weights import load_arrays  # noqa: E402
+from rail_extract.core.frpdf.zoo import choose  # noqa: E402
+from rail_extract.core.points import read_rail_points  # noqa: E402
+from rail_extract.core.standards import resolve  # noqa: E402
+from speed_network import CLOCKS, Cut, cells_table, changes_table, speed_table  # noqa: E402
+
+IMPORT_SECONDS = time.perf_counter() - START
 
 SAMPLE = Path(__file__).resolve().parent.parent / "resources" / "sample" / "sample.laz"
 STANDARD = "IN_75R_1000"
+CUT = (578_204.0, 2_494_295.0, 578_228.0, 2_494_309.5)
+"""Some 24 m of the sample's southern track."""
 STAGES = (
     "load_arrays",
     "make_engine",
@@ -32,38 +41,65 @@ STAGES = (
     "refine",
     "elevate",
     "thin",
+    "build_centerlines",
 )
-STAGES += ("build_centerlines",)
+PARTS = ("stages", "network", "changes", "calls")
 
 
 def main() -> None:
-    """Time the stages, then whole calls."""
+    """Print the parts asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=3, help="whole calls (default 3)")
-    runs = parser.parse_args().runs
-    seconds, description = stages()
+    parser.add_argument("parts", nargs="*", choices=[*PARTS, []], help=f"of {', '.join(PARTS)} (default all)")
+    parser.add_argument("--runs", type=int, default=3, help="whole calls, and rounds of the network (default 3)")
+    parser.add_argument("--clock", choices=CLOCKS, default="wall", help="how stages and the network are timed")
+    arguments = parser.parse_args()
+    parts, clock = arguments.parts or PARTS, CLOCKS[arguments.clock]
+    spent = 0.0
+    if "stages" in parts:
+        spent = print_stages(clock)
+    if "network" in parts:
+        print(*speed_table(sample_cut(), arguments.runs, clock), "", *cells_table(), "", sep="\n")
+    if "changes" in parts:
+        print(*changes_table(sample_cut()), "", sep="\n")
+    if "calls" in parts:
+        print_calls(arguments.runs, spent)
+
+
+def print_stages(clock) -> float:
+    """Print seconds by stage of the walk, imports included; give their sum."""
+    seconds, description = stages(clock)
+    seconds = {"import": IMPORT_SECONDS, **seconds}
     print(f"Stages on the sample, with {description}")
     for name, spent in seconds.items():
         print(f"  {name:20}{spent:7.2f} s")
     print(f"  {'sum':20}{sum(seconds.values()):7.2f} s")
-    print(f"Peak memory: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB")
+    print(f"Peak memory: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB\n")
+    return sum(seconds.values())
+
+
+def print_calls(runs: int, walk_s: float) -> None:
+    """Print seconds of whole calls, and what of them is not the walk."""
     if "QGIS_PROCESS" not in os.environ:
         sys.exit("QGIS_PROCESS is not set: run `make -s env` and set what it prints to time whole calls.")
+    starts = sorted(_call("help", "railextract:extractrails") for _ in range(runs))
     whole = sorted(whole_call() for _ in range(runs))
     print(f"Whole qgis_process calls: {', '.join(f'{spent:.1f}' for spent in whole)} s")
+    print(f"  QGIS and the plugin start: {starts[0]:.1f} s")
+    if walk_s:
+        print(f"  reading parameters, and writing: {whole[0] - starts[0] - walk_s:.1f} s")
 
 
-def stages() -> tuple[dict[str, float], str]:
+def stages(clock) -> tuple[dict[str, float], str]:
     """Run the walk with a clock on each of its steps; give seconds by step and what ran the network."""
     spent: Counter[str] = Counter()
 
     def timed(name, function):
         def run(*arguments, **options):
-            start = time.perf_counter()
+            start = clock()
             try:
                 return function(*arguments, **options)
             finally:
-                spent[name] += time.perf_counter() - start
+                spent[name] += clock() - start
 
         return run
 
@@ -71,8 +107,19 @@ def stages() -> tuple[dict[str, float], str]:
     clouds = timed("read_rail_points", read_rail_points)(SAMPLE, [10])
     for name in STAGES:
         setattr(pipeline, name, timed(name, getattr(pipeline, name)))
-    network = pipeline.extract_rails(clouds, pipeline.Parameters(standard.gauge_m, standard.head_width_m))
+    parameters = pipeline.Parameters(standard.gauge_m, standard.head_width_m)
+    network = timed("whole walk", pipeline.extract_rails)(clouds, parameters)
+    named = sum(spent[name] for name in STAGES)
+    spent["joining and all else"] = spent.pop("whole walk") - named
     return dict(spent), network.engine
+
+
+def sample_cut() -> Cut:
+    """Read the short piece of the sample that the network is measured on."""
+    standard = resolve(STANDARD)
+    parameters = pipeline.Parameters(standard.gauge_m, standard.head_width_m, simplify_xy_m=0.0, simplify_z_m=0.0)
+    arrays = load_arrays(choose(standard.gauge_m, standard.head_width_m).path)
+    return Cut(read_rail_points(SAMPLE, [10], extent=CUT)[0], parameters, arrays)
 
 
 def whole_call() -> float:
@@ -80,15 +127,16 @@ def whole_call() -> float:
     with tempfile.TemporaryDirectory() as folder:
         outputs = [f"{name}={Path(folder) / name.lower()}.gpkg" for name in ("RAILS", "CENTERLINES")]
         words = [f"INPUT={SAMPLE}", f"STANDARD={STANDARD}", *outputs]
-        start = time.perf_counter()
-        run = subprocess.run(
-            [os.environ["QGIS_PROCESS"], "run", "railextract:extractrails", "--", *words],
-            capture_output=True,
-            text=True,
-        )
-        if run.returncode:
-            sys.exit(f"qgis_process ended with {run.returncode}:\n{run.stdout}\n{run.stderr}")
-        return time.perf_counter() - start
+        return _call("run", "railextract:extractrails", "--", *words)
+
+
+def _call(*words: str) -> float:
+    """Run `qgis_process`; give seconds."""
+    start = time.perf_counter()
+    run = subprocess.run([os.environ["QGIS_PROCESS"], *words], capture_output=True, text=True)
+    if run.returncode:
+        sys.exit(f"qgis_process ended with {run.returncode}:\n{run.stdout}\n{run.stderr}")
+    return time.perf_counter() - start
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ BLOCK = 16
 GAP = 8
 """Longest gap, in blocks, that the network may bridge: 5 m at 4 cm."""
 BESIDE = 1
-"""Blocks around rail cells and gaps that are computed as well: half a gauge, from which nothing else is set."""
+"""Blocks around rail cells and gaps that are computed as well: 0.6 m, farther than the network moves a rail."""
 OVERHEAD = 16
 """What a rectangle costs beyond its own cells, as a frame of so many cells: the copies of what surrounds it."""
 MOST_IN_PIECE = 1 << 18

@@ -19,6 +19,7 @@ class OpenCvEngine(LayeredEngine):
         self._layers = fold(arrays)
         self._passes = [_steps_of(layer) for layer in self._layers]
         self._nets: dict[tuple[int, int, int], cv2.dnn.Net] = {}
+        self._scratch = np.empty(0, dtype=np.float32)
         self.description = f"OpenCV {cv2.__version__}, CPU, float32"
 
     def probabilities(self, raster: np.ndarray, state: np.ndarray, number: int) -> np.ndarray:
@@ -41,7 +42,13 @@ class OpenCvEngine(LayeredEngine):
         return array
 
     def _surroundings(self, outside: np.ndarray, height: int, width: int) -> np.ndarray:
-        return np.repeat(outside, height * width, axis=2).reshape(-1, height, width)
+        # Fresh memory costs more than writing into it: the system clears every page of it first.
+        size = len(outside) * height * width
+        if size > len(self._scratch):
+            self._scratch = np.empty(size, dtype=np.float32)
+        around = self._scratch[:size].reshape(-1, height, width)
+        around[:] = outside
+        return around
 
     def _probabilities(self, logits: np.ndarray) -> np.ndarray:
         return 1 / (1 + np.exp(-logits[0]))

@@ -85,7 +85,7 @@ class TorchEngine(LayeredEngine):
         return _pixels_first(torch.from_numpy(array).to(self._device, self._dtype))
 
     def _surroundings(self, outside: Tensor, height: int, width: int) -> Tensor:
-        # Fresh memory costs more than what is computed in it: the system clears every page of it first.
+        # Fresh memory costs more than writing into it: the system clears every page of it first.
         size = len(outside) * height * width
         if size > len(self._scratch):
             self._scratch = torch.empty(size, dtype=self._dtype, device=self._device)

@@ -1,0 +1,187 @@
+"""What `speed.py` prints of the network: how fast it is beside plain PyTorch, and what each shortcut changes."""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from statistics import median
+
+import numpy as np
+import torch
+from rail_extract.core.frpdf import START
+from rail_extract.core.frpdf.cleanup import clean
+from rail_extract.core.frpdf.corridor import Piece, lay_fields
+from rail_extract.core.frpdf.engine import Engine
+from rail_extract.core.frpdf.network import FRPDF, RECEPTIVE_RADIUS
+from rail_extract.core.frpdf.opencv_engine import OpenCvEngine
+from rail_extract.core.frpdf.torch_engine import TorchEngine
+from rail_extract.core.pipeline import Parameters, lines_of
+from rail_extract.core.points import RailPoints
+from rail_extract.core.polyline import interpolate, project, resample
+from rail_extract.core.progress import SILENT
+from rail_extract.core.rails import RailLine, length_along
+from rail_extract.core.raster import RailRaster, cell_size, rasterize
+
+TILE = 512
+"""Side of the tiles that plain PyTorch computes, in cells."""
+SMALL_FIELD = 100_000
+"""Cells at once that cut a short scene into several fields."""
+DIAGONAL_M, CELL_M = 3000.0, 0.04
+END_M, SAMPLING_M, NEAR_M = 0.5, 0.05, 0.1
+"""Left out at either end of a line, where it may end a few centimetres apart; spacing and reach of the comparison."""
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A short piece of the sample, with its weights.
+
+    Attributes
+    ----------
+    points : RailPoints
+    parameters : Parameters
+        Lines are not thinned: thinning by 2 mm may keep other vertices of the same curve.
+    arrays : dict
+    """
+
+    points: RailPoints
+    parameters: Parameters
+    arrays: dict[str, np.ndarray]
+
+    @property
+    def raster(self) -> RailRaster:
+        """Rail cells."""
+        return rasterize(self.points.xyz, cell_size(self.parameters.gauge_m, self.parameters.head_width_m))
+
+
+def plain_network(arrays: dict[str, np.ndarray]) -> FRPDF:
+    """Make the paper's network as it is written down, in float32."""
+    network = FRPDF()
+    state = network.state_dict()
+    network.load_state_dict({name: torch.from_numpy(arrays[name]) if name in arrays else state[name] for name in state})
+    return network.eval()
+
+
+def speed_table(cut: Cut, rounds: int, clock: Callable[[], float]) -> Iterable[str]:
+    """Time the first pass, contestants in turn, `rounds` times; print medians of seconds a megacell."""
+    raster = cut.raster
+    (field,) = lay_fields(raster, 1 << 40)
+    row, column = raster.cells().min(axis=0)
+    tile = raster.read(int(row), int(column), TILE, TILE).astype(np.float32)
+    seen = [raster.read(*piece.window).astype(np.float32) for piece in field.pieces]
+    network, exact = plain_network(cut.arrays), TorchEngine(cut.arrays, "CPU", exact=True)
+    fast, opencv = TorchEngine(cut.arrays, "CPU"), OpenCvEngine(cut.arrays)
+    contestants = {
+        "eager PyTorch, float32, tile": (TILE**2, lambda: _eager(network, tile)),
+        "folded, float32, tile": (TILE**2, lambda: exact.probabilities(tile, _start(tile), 0)),
+        f"folded, {_number_type(fast)}, tile": (TILE**2, lambda: fast.probabilities(tile, _start(tile), 0)),
+    }
+    cells = sum(one.size for one in seen)
+    for title, engine in (("float32", exact), (_number_type(fast), fast), ("OpenCV, float32", opencv)):
+        contestants[f"{title}, along the track"] = (cells, lambda engine=engine: _sweep(engine, seen, field.pieces))
+    seconds: dict[str, list[float]] = {title: [] for title in contestants}
+    for _ in range(rounds + 1):
+        for title, (size, run) in contestants.items():
+            gc.collect()
+            start = clock()
+            run()
+            seconds[title].append((clock() - start) / size * 1e6)
+    middle = {title: median(spent[1:]) for title, spent in seconds.items()}  # the first round warms up
+    eager = next(iter(middle.values()))
+    yield f"{'One pass':40}{'s/Mcell':>9}{'times faster than eager':>25}"
+    for title, spent in middle.items():
+        yield f"{title:40}{spent:9.2f}{eager / spent:25.2f}"
+    titles = list(middle)
+    yield f"OpenCV takes {middle[titles[-1]] / middle[titles[-3]]:.2f} times as long as PyTorch in float32"
+
+
+def cells_table() -> Iterable[str]:
+    """Print how much of its bounding box is computed for a double track on the diagonal."""
+    along = np.arange(0.0, DIAGONAL_M, CELL_M / 2)[:, None] * [np.sqrt(0.5), np.sqrt(0.5)]
+    across = np.array([-np.sqrt(0.5), np.sqrt(0.5)])
+    raster = rasterize(np.concatenate([along + offset * across for offset in (0.0, 1.5, 4.0, 5.5)]), CELL_M)
+    cells = raster.cells()
+    height, width = (cells.max(axis=0) + 1 - cells.min(axis=0)).tolist()
+    fields = lay_fields(raster, TorchEngine.most_cells)
+    computed = sum(piece.height * piece.width for field in fields for piece in field.pieces)
+    yield (
+        f"Cells computed for {DIAGONAL_M / 1000:g} km of double track on the diagonal:"
+        f" {100 * computed / (height * width):.2f} % of the bounding box"
+    )
+
+
+def changes_table(cut: Cut) -> Iterable[str]:
+    """Print what each shortcut changes beside the plain network in float32 that sees the whole cut at once."""
+    raster = cut.raster
+    exact, fast = TorchEngine(cut.arrays, "CPU", exact=True), TorchEngine(cut.arrays, "CPU")
+    plain = _clean_whole(plain_network(cut.arrays), raster)
+    pieces = clean(raster, exact)
+    quick = clean(raster, fast)
+    exact.most_cells = SMALL_FIELD
+    rows = {
+        "pieces along the track": (pieces, plain),
+        f"{len(lay_fields(raster, SMALL_FIELD))} fields instead of one": (clean(raster, exact), pieces),
+        f"{_number_type(fast)} instead of float32": (quick, pieces),
+        "OpenCV instead of PyTorch": (clean(raster, OpenCvEngine(cut.arrays)), pieces),
+        "all that AUTO does": (quick, plain),
+    }
+    yield f"{'Shortcut':40}{'cells, %':>9}{'lines, mm rms (worst line)':>28}"
+    for title, (found, reference) in rows.items():
+        yield f"{title:40}{100 * _changed(found, reference):9.2f}{_apart(cut, found, reference):28.2f}"
+
+
+def _eager(network: FRPDF, tile: np.ndarray) -> None:
+    with torch.no_grad():
+        seen = torch.from_numpy(tile)[None, None]
+        torch.sigmoid(network.logits(seen, torch.full_like(seen, START), 0)).numpy()
+
+
+def _sweep(engine: Engine, seen: Sequence[np.ndarray], pieces: Sequence[Piece]) -> None:
+    engine.sweep(seen, [_start(one) for one in seen], 0, pieces, SILENT)
+
+
+def _start(raster: np.ndarray) -> np.ndarray:
+    return np.full_like(raster, START)
+
+
+def _number_type(engine: Engine) -> str:
+    return engine.description.split(", ")[-1]
+
+
+def _clean_whole(network: FRPDF, raster: RailRaster) -> RailRaster:
+    """Run the plain network over the bounding box and all around that it can see."""
+    cells = raster.cells()
+    corner = cells.min(axis=0) - RECEPTIVE_RADIUS
+    height, width = (cells.max(axis=0) + 1 + RECEPTIVE_RADIUS - corner).tolist()
+    with torch.inference_mode():
+        seen = torch.from_numpy(raster.read(*corner.tolist(), height, width))[None, None]
+        logits = network(seen.float())[-1][0, 0].numpy()
+    return raster.with_cells(np.argwhere(logits >= 0) + corner)
+
+
+def _changed(found: RailRaster, reference: RailRaster) -> float:
+    """Share of the rail cells that differ."""
+    ours, theirs = (set(map(tuple, one.cells().tolist())) for one in (found, reference))
+    return len(ours ^ theirs) / len(theirs)
+
+
+def _apart(cut: Cut, found: RailRaster, reference: RailRaster) -> float:
+    """How far the lines of two rasters lie apart, the worst line's rms in millimetres; nan if there are not as many."""
+    ours, theirs = (lines_of(one, 10, cut.points, cut.parameters) for one in (found, reference))
+    if len(ours) != len(theirs):
+        return np.nan
+    return 1000 * max(min(_distance_m(line, other) for other in theirs) for line in ours)
+
+
+def _distance_m(line: RailLine, other: RailLine) -> float:
+    xyz, t = resample(line.xyz, SAMPLING_M)
+    xyz = xyz[(t > END_M) & (t < t[-1] - END_M)]
+    feet = project([other.xyz[:, :2]], xyz[:, :2], NEAR_M)
+    if len(feet.t) < len(xyz):
+        return np.inf
+    height = interpolate(other.xyz[:, 2:], length_along(other.xyz[:, :2]), feet.t)[:, 0]
+    return float(np.sqrt(np.mean(feet.across**2 + (xyz[feet.point, 2] - height) ** 2)))
+
+
+CLOCKS = {"wall": time.perf_counter, "cpu": time.process_time}
