@@ -72,7 +72,7 @@ def connect(scheduler: str | None, workers: int) -> Iterator[Client]:
         "distributed.nanny.pre-spawn-environ": ONE_THREAD,
     }
     with dask.config.set(settings):
-        cluster = LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
+        cluster = LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=":0")
     with cluster, Client(cluster) as client:
         yield client
 

@@ -1,0 +1,201 @@
+"""Print how time and memory grow with length, what a second worker brings, and what a national network costs.
+
+`python benchmarks/scaling.py` measures a synthetic double track of 1 km and of 10 km, each in a process of its own, and
+one worker against two, of one thread each. `--km 0.3` is quicker. `--memory 100` adds a run over so many kilometres for
+its memory alone: the raster is not cleaned by the network, so its time means nothing. Compare rows of one run only.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from rail_extract.core import pipeline
+from rail_extract.core.cluster.run import connect, extract
+from rail_extract.core.las import laspy
+from rail_extract.core.pipeline import Parameters, extract_rails, stretch_side
+from rail_extract.core.points import ask
+from rail_extract.core.spool import spool
+from rail_extract.core.standards import STANDARDS
+from rail_extract.core.synthetic.curves import Element, trace
+from rail_extract.core.synthetic.plain_scenes import spacing
+from rail_extract.core.synthetic.scanner import Scanner
+from rail_extract.core.synthetic.scene import RAIL, Plan, build
+from rail_extract.core.synthetic.tracks import Track
+
+STANDARD = STANDARDS["EN_60E1_1435"]
+PIECE_M = 100.0
+"""A straight piece of this length is scanned once and laid end to end, a file each."""
+
+HEADING = 0.35
+"""At an angle to the squares, so that borders are crossed in both directions."""
+
+POINTS_PER_M = 500
+"""Rail points on a metre of double track: 50 million on 100 km."""
+
+NETWORK_KM = 70_000
+"""Track of a large national network; a kilometre of double track is two of these."""
+
+WORKERS = (2, 16, 64, 256)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--km", type=float, default=1.0, help="shorter of the two lengths (default 1)")
+    parser.add_argument("--times", type=int, default=10, help="how many times as long the longer is (default 10)")
+    parser.add_argument("--memory", type=float, metavar="KM", help="length of a further run for its memory")
+    parser.add_argument("--skip-workers", action="store_true", help="leave the workers out")
+    parser.add_argument("--measure", nargs=2, metavar=("FOLDER", "NETWORK"), help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    if args.measure:
+        print(json.dumps(measure(Path(args.measure[0]), args.measure[1] == "with")))
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        short = compare_lengths(Path(folder), args.km, args.times)
+        if not args.skip_workers:
+            compare_workers(Path(folder) / "short", Path(folder))
+        print_costs(short, args.km)
+        if args.memory:
+            shutil.rmtree(Path(folder) / "long")
+            lay_track(Path(folder) / "memory", args.memory)
+            show(f"{args.memory:g} km without the network", in_own_process(Path(folder) / "memory", "without"))
+
+
+def compare_lengths(folder: Path, km: float, times: int) -> dict:
+    """Run a short and a long track, each in a process of its own."""
+    lay_track(folder / "short", km)
+    lay_track(folder / "long", km * times)
+    short = show(f"{km:g} km", in_own_process(folder / "short", "with"))
+    long = show(f"{km * times:g} km", in_own_process(folder / "long", "with"))
+    seconds, memory = long["seconds"] / short["seconds"], long["peak_mib"] / short["peak_mib"]
+    print(f"{times} times the length: {seconds:.2f} times the time, {memory:.2f} times the memory")
+    return short
+
+
+def compare_workers(tiles: Path, folder: Path) -> None:
+    """Run one worker of one thread, then two."""
+    seconds = []
+    for workers in (1, 2):
+        with connect(None, workers) as client:
+            client.wait_for_workers(workers)
+            client.run(engine_of_worker)
+            start = time.perf_counter()
+            found = extract(client, [tiles], [RAIL], parameters(), folder / f"work{workers}")
+            seconds.append(time.perf_counter() - start)
+        print(f"{workers} worker(s) of one thread: {seconds[-1]:.1f} s, {len(found.rails)} rails")
+    print(f"Two workers are {seconds[0] / seconds[1]:.2f} times as fast as one")
+
+
+def engine_of_worker() -> None:
+    """Load what the network runs on, which a long run does but once."""
+    pipeline.engine_for(parameters())
+
+
+def print_costs(short: dict, km: float) -> None:
+    """State what a kilometre and a national network cost on cores like these."""
+    track_km = 2 * km
+    print("A kilometre of track:")
+    for name in ("reading_s", "stretches_s", "joining_s"):
+        print(f"  {name[:-2]:12}{short[name] / track_km:10.2f} s")
+    for name in ("cloud_bytes", "spool_bytes", "lines_bytes"):
+        print(f"  {name[:-6]:12}{short[name] / track_km / 1e6:10.2f} MB")
+    parallel = (short["reading_s"] + short["stretches_s"]) / track_km * NETWORK_KM / 3600
+    serial = short["joining_s"] / track_km * NETWORK_KM / 3600
+    print(f"{NETWORK_KM} km of track, workers as fast as this process: hours of workers + hours of joining")
+    for workers in WORKERS:
+        print(f"  {workers:4} workers {parallel / workers:8.1f} + {serial:.1f} h")
+
+
+def lay_track(folder: Path, km: float) -> None:
+    """Write files of a straight double track."""
+    folder.mkdir()
+    curve = trace([Element(PIECE_M)], heading=HEADING)
+    tracks = [Track(curve, spacing(STANDARD), np.full(len(curve.xy), 100.0), left=left) for left in (0.0, 4.5)]
+    scene = build("piece", Plan(tracks, STANDARD, Scanner(noise_m=0.004)), np.random.RandomState(8))
+    xyz = scene.xyz[scene.classification == RAIL]
+    chosen = np.random.RandomState(9).randint(len(xyz), size=int(POINTS_PER_M * PIECE_M))
+    step = PIECE_M * np.array([np.cos(HEADING), np.sin(HEADING), 0.0])
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.scales = np.full(3, 0.001)
+    for number in range(round(1000 * km / PIECE_M)):
+        cloud = laspy.LasData(header)
+        cloud.x, cloud.y, cloud.z = (xyz[chosen] + number * step).T
+        cloud.classification = np.full(len(chosen), RAIL, dtype=np.uint8)
+        cloud.write(folder / f"tile_{number:05}.las")
+
+
+def parameters() -> Parameters:
+    """Give the settings of all runs."""
+    return Parameters(STANDARD.gauge_m, STANDARD.head_width_m)
+
+
+def in_own_process(folder: Path, network: str) -> dict:
+    """Measure in a process of its own, for the peak of memory is one of the process."""
+    words = [sys.executable, __file__, "--measure", str(folder), network]
+    run = subprocess.run(words, capture_output=True, text=True)
+    if run.returncode:
+        sys.exit(run.stderr)
+    return json.loads(run.stdout.splitlines()[-1])
+
+
+def measure(folder: Path, with_network: bool) -> dict:
+    """Extract all that is in a folder; give seconds by step, peak of memory and bytes."""
+    if not with_network:
+        pipeline.clean = lambda raster, *_: raster
+    spent = {"stretches_s": 0.0}
+    walk = pipeline._walk
+
+    def timed(*arguments):
+        start = time.perf_counter()
+        try:
+            return walk(*arguments)
+        finally:
+            spent["stretches_s"] += time.perf_counter() - start
+
+    pipeline._walk = timed
+    start = time.perf_counter()
+    with tempfile.TemporaryDirectory() as work:
+        clouds = spool(ask(folder, [RAIL]), stretch_side(parameters()), Path(work))
+        read = time.perf_counter()
+        network = extract_rails(clouds, parameters())
+        end = time.perf_counter()
+        spooled = size_of(Path(work))
+    return {
+        "seconds": end - start,
+        "reading_s": read - start,
+        "stretches_s": spent["stretches_s"],
+        "joining_s": end - read - spent["stretches_s"],
+        "peak_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "cloud_bytes": size_of(folder),
+        "spool_bytes": spooled,
+        "lines_bytes": sum(line.xyz.nbytes for line in (*network.rails, *network.centerlines)),
+        "rails": len(network.rails),
+        "rails_km": sum(rail.length_m for rail in network.rails) / 1000,
+        "engine": network.engine,
+    }
+
+
+def size_of(folder: Path) -> int:
+    """Add up the files in a folder, in bytes."""
+    return sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
+
+
+def show(what: str, figures: dict) -> dict:
+    """Print one run."""
+    steps = ", ".join(f"{figures[f'{step}_s']:.1f} {step}" for step in ("reading", "stretches", "joining"))
+    print(f"{what}: {figures['seconds']:.1f} s ({steps}), peak {figures['peak_mib']:.0f} MiB", flush=True)
+    print(f"  {figures['rails']} rails of {figures['rails_km']:.3f} km, {figures['engine']}", flush=True)
+    return figures
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,164 @@
+"""Extraction on real workers: the same lines as in one process, whatever dies in between."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pyogrio
+import pytest
+import shapely
+from rail_extract.__main__ import main
+from rail_extract.core.cluster.extract import INCOMPLETE
+from rail_extract.core.cluster.run import connect, extract
+from rail_extract.core.errors import DiskError
+from rail_extract.core.pipeline import Parameters, extract_rails, stretch_side
+from rail_extract.core.points import ask, read_rail_points
+from rail_extract.core.spool import spool
+from rail_extract.core.standards import STANDARDS
+from rail_extract.core.synthetic.curves import Element, trace
+from rail_extract.core.synthetic.plain_scenes import spacing
+from rail_extract.core.synthetic.scanner import Scanner
+from rail_extract.core.synthetic.scene import RAIL, Plan, build
+from rail_extract.core.synthetic.tracks import Track
+from rail_extract.core.synthetic.write import write_cloud
+
+STANDARD = STANDARDS["EN_60E1_1435"]
+PARAMETERS = Parameters(STANDARD.gauge_m, STANDARD.head_width_m, passes=1, engine="OPENCV", stretch_tiles=4)
+
+
+@pytest.fixture(scope="module")
+def tiles(tmp_path_factory):
+    """A track of 60 m, in two stretches and three files."""
+    folder = tmp_path_factory.mktemp("tiles")
+    curve = trace([Element(60.0)], heading=0.05)
+    plan = Plan([Track(curve, spacing(STANDARD), np.zeros(len(curve.xy)))], STANDARD, Scanner(profile_step_m=0.08))
+    scene = build("short", plan, np.random.RandomState(4))
+    for number, part in enumerate(np.array_split(np.argsort(scene.xyz[:, 0]), 3)):
+        part = replace(scene, xyz=scene.xyz[part], classification=scene.classification[part])
+        write_cloud(part, folder / f"tile{number}.laz")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def one_process(tiles):
+    return extract_rails(read_rail_points(tiles, [RAIL]), PARAMETERS)
+
+
+@pytest.fixture(scope="module")
+def client():
+    with connect(None, 2) as client:
+        yield client
+
+
+def same(found, expected, frame, other):
+    """Lines, ids and figures agree within a tenth of a millimetre."""
+    assert len(found) == len(expected)
+    for one, two in zip(found, expected):
+        np.testing.assert_allclose(frame.to_crs(one.xyz), other.to_crs(two.xyz), rtol=0, atol=1e-4)
+        for name in ("rail_id", "points", "sigma_mm", "track_id", "left_ids", "gauge_mm", "bridged_m"):
+            assert getattr(one, name, None) == pytest.approx(getattr(two, name, None), abs=0.01)
+
+
+def test_workers_give_what_one_process_gives(tiles, one_process, client, tmp_path):
+    found = extract(client, [tiles], [RAIL], PARAMETERS, tmp_path)
+    assert found.failures == ()
+    same(found.rails, one_process.rails, found.frame, one_process.frame)
+    same(found.centerlines, one_process.centerlines, found.frame, one_process.frame)
+    assert len(found.rails) == 2 and len(found.centerlines) == 1
+    assert sum(rail.length_m for rail in found.rails) == pytest.approx(120, abs=1)
+
+
+def test_a_restart_computes_only_what_changed(tiles, client, tmp_path):
+    extract(client, [tiles / "tile0.laz", tiles / "tile1.laz"], [RAIL], PARAMETERS, tmp_path)
+    before = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()}
+    extract(client, [tiles / "tile0.laz", tiles / "tile1.laz"], [RAIL], PARAMETERS, tmp_path)
+    assert {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()} == before
+    extract(client, [tiles], [RAIL], PARAMETERS, tmp_path)
+    after = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()}
+    assert before.items() <= after.items()
+    assert len([file for file in after.keys() - before.keys() if "raster" in file.name]) > 0
+
+
+def test_a_killed_worker_is_replaced_and_its_stretches_run_again(tiles, one_process, client, tmp_path):
+    killed = []
+
+    def kill(client):
+        while not killed:
+            busy = [
+                worker for worker, tasks in client.processing().items() if any("clean" in str(task) for task in tasks)
+            ]
+            pids = client.run(os.getpid, workers=busy[:1]) if busy else {}
+            for pid in pids.values():
+                os.kill(pid, signal.SIGKILL)
+                killed.append(pid)
+            time.sleep(0.01)
+
+    killer = threading.Thread(target=kill, args=(client,), daemon=True)
+    killer.start()
+    found = extract(client, [tiles], [RAIL], PARAMETERS, tmp_path)
+    killer.join(timeout=5)
+    assert len(killed) == 1
+    assert found.failures == ()
+    same(found.rails, one_process.rails, found.frame, one_process.frame)
+
+
+def test_a_corrupt_tile_is_named_and_the_rest_is_written(tiles, tmp_path, capsys):
+    for name in ("tile0.laz", "tile1.laz"):
+        (tmp_path / name).write_bytes((tiles / name).read_bytes())
+    whole = (tiles / "tile2.laz").read_bytes()
+    (tmp_path / "tile2.laz").write_bytes(whole[: len(whole) // 2])
+    out = tmp_path / "out.gpkg"
+    words = ["extract", str(tmp_path), "--rails", str(out), "--centerlines", str(out), "--workers", "1"]
+    code = main([*words, "--iterations", "1", "--stretch-tiles", "4", "--engine", "OPENCV"])
+    assert code == INCOMPLETE
+    assert "tile2.laz" in capsys.readouterr().err
+    meta, _, geometry, values = pyogrio.raw.read(out, layer="rails")
+    assert list(meta["fields"]) == ["rail_id", "class_code", "length_m", "points", "resid_mm", "sigma_mm", "bridged_m"]
+    assert meta["geometry_type"] == "LineString Z"
+    lines = shapely.from_wkb(geometry)
+    assert [shapely.get_num_coordinates(line) > 5 for line in lines] == [True, True]
+    assert 60 < values[2].sum() < 100
+    assert pyogrio.read_info(out, layer="centerlines")["features"] == 1
+    assert {file.name for file in tmp_path.iterdir()} == {"out.gpkg", "tile0.laz", "tile1.laz", "tile2.laz"}
+
+
+FULL_DISK = """
+import resource, sys
+from pathlib import Path
+from rail_extract.core.points import LocalFrame
+from rail_extract.core.cluster.geopackage import RAIL_FIELDS, write
+from rail_extract.core.errors import DiskError
+from rail_extract.core.rails import RailLine
+import numpy as np
+resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+rails = [RailLine(np.random.rand(20_000, 3), 1, 10, 5, 1.0, 1.0, 0.0)]
+try:
+    write({"rails": (Path(sys.argv[1]), rails, RAIL_FIELDS)}, LocalFrame(np.zeros(3)))
+except DiskError as error:
+    print(error)
+"""
+
+
+def test_a_full_disk_leaves_what_was_there(tmp_path):
+    out = tmp_path / "out.gpkg"
+    out.write_bytes(b"before")
+    said = subprocess.run([sys.executable, "-c", FULL_DISK, str(out)], capture_output=True, text=True)
+    assert "make room" in said.stdout, said.stderr
+    assert out.read_bytes() == b"before"
+    assert [file.name for file in tmp_path.iterdir()] == ["out.gpkg"]
+
+
+def test_a_full_work_folder_is_one_sentence(tiles, tmp_path):
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
+    try:
+        with pytest.raises(DiskError, match="make room"):
+            spool(ask(tiles, [RAIL]), stretch_side(PARAMETERS), tmp_path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
