@@ -144,6 +144,7 @@ def extract_rails(
         stretches = lay_out(sources, source)
         results, rasters = _walk(source, stretches, parameters, engine, step.span(0.0, 0.9))
         found = whole_rails(results, source.frame, parameters, first_id=len(rails) + 1)
+        warn_if_none(found, source.class_code, progress)
         tracks = tracks_of(found, parameters, step.span(0.9, 0.95), first_id=len(centerlines) + 1)
         geometry += geometry_of(tracks, found, source, stretches, parameters, step.span(0.95, 1.0))
         rails += found
@@ -230,7 +231,15 @@ def lines_of(
 
     Without points the rails stay where the raster shows them, and have no heights.
     """
-    return _finished(_all_vertices(raster, class_code, points, parameters, progress), parameters, first_id)
+    rails = _finished(_all_vertices(raster, class_code, points, parameters, progress), parameters, first_id)
+    warn_if_none(rails, class_code, progress)
+    return rails
+
+
+def warn_if_none(rails: Sequence[RailLine], class_code: int, progress: Progress) -> None:
+    """Tell the user that a class came to nothing."""
+    if not rails:
+        progress.warning(f"Class {class_code} shows no rail: check the rail classes, the standard and MIN_LENGTH.")
 
 
 def _all_vertices(

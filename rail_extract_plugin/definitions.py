@@ -9,13 +9,16 @@ from qgis.core import QgsProcessingParameterDefinition, QgsProcessingParameterEn
 
 Definitions = tuple[QgsProcessingParameterDefinition, ...]
 
+UNBOUNDED = 1e9
+"""Largest value of a number that has no upper limit."""
+
 
 def number(
     name: str,
     label: str,
     default: float | None = None,
     minimum: float = 0.0,
-    maximum: float = 1e9,
+    maximum: float = UNBOUNDED,
     whole: bool = False,
     optional: bool = False,
 ) -> QgsProcessingParameterNumber:

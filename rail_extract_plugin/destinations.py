@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
@@ -48,13 +49,35 @@ def check_writable(value: Any, context: QgsProcessingContext) -> None:
         ) from error
 
 
-def _output_file(value: Any, context: QgsProcessingContext) -> Path | None:
-    """File behind a destination; None for memory layers and databases."""
+def check_distinct(outputs: Mapping[str, Any], context: QgsProcessingContext) -> None:
+    """Refuse two outputs, values by name, that would overwrite each other.
+
+    Raises
+    ------
+    RailExtractError
+        Two are the same file, or the same table of one.
+    """
+    seen: dict[str, str] = {}
+    for name, value in outputs.items():
+        if _output_file(value, context) is None:
+            continue
+        other = seen.setdefault(_text(value, context), name)
+        if other != name:
+            raise RailExtractError(f"{other} and {name} are one file: give each a name of its own.")
+
+
+def _text(value: Any, context: QgsProcessingContext) -> str:
+    """Destination as a user writes it; empty where there is none."""
     if isinstance(value, QgsProcessingOutputLayerDefinition):
         value = value.sink
     if isinstance(value, QgsProperty):
         value = value.valueAsString(context.expressionContext())[0]
-    text = value or ""
+    return value or ""
+
+
+def _output_file(value: Any, context: QgsProcessingContext) -> Path | None:
+    """File behind a destination; None for memory layers and databases."""
+    text = _text(value, context)
     if text.startswith("ogr:"):
         text = QgsDataSourceUri(text[len("ogr:") :]).database()
     is_file = text and text != QgsProcessing.TEMPORARY_OUTPUT and not re.match(r"\w{2,}:", text)

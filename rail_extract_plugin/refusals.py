@@ -8,12 +8,19 @@ from qgis.core import (
     QgsProcessingContext,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterEnum,
+    QgsProcessingParameterExtent,
     QgsProcessingParameterFeatureSource,
     QgsProcessingParameterNumber,
     QgsProcessingParameterRasterLayer,
 )
 
-LAYERS = {QgsProcessingParameterFeatureSource: "vector", QgsProcessingParameterRasterLayer: "raster"}
+from .definitions import UNBOUNDED
+
+EXPECTED = {
+    QgsProcessingParameterExtent: "four numbers: xmin,xmax,ymin,ymax",
+    QgsProcessingParameterFeatureSource: "a vector layer, or a vector file that can be read",
+    QgsProcessingParameterRasterLayer: "a raster layer, or a raster file that can be read",
+}
 
 
 def explain_refused(
@@ -37,8 +44,10 @@ def explain_refused(
 
 def _expected(definition: QgsProcessingParameterDefinition) -> str:
     if isinstance(definition, QgsProcessingParameterNumber):
-        return f"a number from {definition.minimum():g} to {definition.maximum():g}"
+        lowest, highest = definition.minimum(), definition.maximum()
+        return f"{lowest:g} or more" if highest == UNBOUNDED else f"a number from {lowest:g} to {highest:g}"
     if isinstance(definition, QgsProcessingParameterEnum):
         return f"one of its {len(definition.options())} choices, such as {definition.options()[0]}"
-    kind = next((kind for one, kind in LAYERS.items() if isinstance(definition, one)), None)
-    return f"a {kind} layer, or a {kind} file that can be read" if kind else f"what it asks for: {definition.help()}"
+    known = next((text for kind, text in EXPECTED.items() if isinstance(definition, kind)), None)
+    first_sentence = definition.help().split(". ")[0].rstrip(".")
+    return known or first_sentence[:1].lower() + first_sentence[1:]

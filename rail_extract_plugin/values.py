@@ -132,6 +132,8 @@ class Values:
         """Find the files of a cloud; CRS, where the algorithm has it, stands in for theirs."""
         source = cloud_source(self._parameters.get(name), self._context)
         crs = self._algorithm.parameterAsCrs(self._parameters, "CRS", self._context)
+        if self.filled("CRS") and not crs.isValid():
+            raise ParameterError(f"CRS {self._parameters['CRS']} is no coordinate system: choose one from the list.")
         return replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
 
     def extent(self, crs: QgsCoordinateReferenceSystem) -> tuple[float, float, float, float] | None:

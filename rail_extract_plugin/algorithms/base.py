@@ -18,7 +18,7 @@ from qgis.PyQt.QtGui import QIcon
 from ...core.errors import Cancelled, RailExtractError
 from ...core.progress import Progress
 from ..dependencies import explain_missing, missing_packages
-from ..destinations import check_writable
+from ..destinations import check_distinct, check_writable
 from ..feedback import QgisProgress
 from ..i18n import tr
 from ..paths import ICON
@@ -74,6 +74,8 @@ class RailAlgorithm(QgsProcessingAlgorithm):
                 if not supported:
                     return False, message
                 check_writable(value, context)
+            outputs = self.destinationParameterDefinitions()
+            check_distinct({output.name(): parameters.get(output.name()) for output in outputs}, context)
             self._read(parameters, context)
         except RailExtractError as error:
             return False, str(error)

@@ -252,7 +252,8 @@ RASTERS = [
         "raster of one cell",
         of_raster(cells=np.ones((1, 1, 1), np.uint8)),
         WARNED,
-        "Without POINTS the rails have no heights and lie where the raster shows them.",
+        "Without POINTS the rails have no heights and lie where the raster shows them. "
+        "Class 10 shows no rail: check the rail classes, the standard and MIN_LENGTH.",
         {"RAIL_COUNT": 0},
     ),
     Fault(

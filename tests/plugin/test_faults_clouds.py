@@ -1,0 +1,202 @@
+"""Clouds whose points or coordinate systems are odd."""
+
+import numpy as np
+import pytest
+from faults import FAILED, WARNED, Fault
+
+TITLE = "Points and coordinate systems"
+
+TRACK, NOTHING = {"RAIL_COUNT": 2, "CENTERLINE_COUNT": 1}, {"RAIL_COUNT": 0, "CENTERLINE_COUNT": 0}
+PLACE = np.array([500_000.0, 3_000_000.0, 100.0])
+
+
+def of(change):
+    """A cloud of points made from those of a track of 6 m."""
+    return lambda bench: {"INPUT": bench.cloud(change(bench.track(length_m=6.0))), "ITERATIONS": 1}
+
+
+def scattered(*sides_m, count=3600):
+    """Points anywhere in a box."""
+    return of(lambda points: PLACE + np.random.default_rng(2).uniform(0, sides_m, (count, 3)))
+
+
+def cross(points):
+    """The same track again, turned by a right angle about its middle."""
+    middle = PLACE + [3, 0, 0]
+    x, y, z = (points - middle).T
+    return np.concatenate([points, middle + np.column_stack([-y, x, z])])
+
+
+POINTS = [
+    Fault(
+        "one point",
+        of(lambda points: points[:1]),
+        WARNED,
+        "Class 10 shows no rail: check the rail classes, the standard and MIN_LENGTH.",
+        NOTHING,
+    ),
+    Fault(
+        "two points",
+        of(lambda points: points[:2]),
+        WARNED,
+        "Class 10 shows no rail: check the rail classes, the standard and MIN_LENGTH.",
+        NOTHING,
+    ),
+    Fault(
+        "all points in one place",
+        of(lambda points: np.tile(points[:1], (3000, 1))),
+        WARNED,
+        "Class 10 shows no rail: check the rail classes, the standard and MIN_LENGTH.",
+        NOTHING,
+    ),
+    Fault("every point twice", of(lambda points: np.repeat(points, 2, axis=0)), gives=TRACK),
+    Fault(
+        "one rail only",
+        of(lambda points: points[:1800]),
+        WARNED,
+        "No two rails run parallel: there are rails but no track centerlines.",
+        {"RAIL_COUNT": 1, "CENTERLINE_COUNT": 0},
+    ),
+    Fault(
+        "vertical wall",
+        scattered(6, 0.01, 3),
+        WARNED,
+        "No two rails run parallel: there are rails but no track centerlines.",
+    ),
+    Fault(
+        "points scattered over a square",
+        scattered(6, 6, 0.1),
+        WARNED,
+        "Class 10 shows no rail: check the rail classes, the standard and MIN_LENGTH.",
+        NOTHING,
+    ),
+    Fault(
+        "heap of points",
+        scattered(2, 2, 0.1, count=20_000),
+        WARNED,
+        "Class 10 shows no rail: check the rail classes, the standard and MIN_LENGTH.",
+    ),
+    Fault("tracks that cross at a right angle", of(cross), gives={"RAIL_COUNT": 4, "CENTERLINE_COUNT": 2}),
+    Fault(
+        "track shorter than the shortest line",
+        of(lambda points: points[points[:, 0] < 500_000.5]),
+        WARNED,
+        "Class 10 shows no rail: check the rail classes, the standard and MIN_LENGTH.",
+        NOTHING,
+    ),
+    Fault(
+        "rails of another gauge",
+        of(lambda points: points + np.where(points[:, 1:2] > 3_000_000, [0, 0.1, 0], 0)),
+        FAILED,
+        "No track of 1435 mm gauge found: rails lie 1608 mm apart, is the gauge 1520 mm?",
+    ),
+    Fault(
+        "stray point 1000 km away", of(lambda points: np.append(points, points[:1] + [1e6, 0, 0], axis=0)), gives=TRACK
+    ),
+    Fault("stray point 100 km up", of(lambda points: np.append(points, points[:1] + [0, 0, 1e5], axis=0)), gives=TRACK),
+    Fault("every height zero", of(lambda points: points * [1, 1, 0]), gives=TRACK),
+]
+
+
+def tiles(*systems, **parameters):
+    """A folder with half a track each in these coordinate systems."""
+
+    def prepare(bench):
+        folder, points = bench.folder / "tiles", bench.track(length_m=6.0)
+        folder.mkdir()
+        for number, (epsg, half) in enumerate(zip(systems, (points[::2], points[1::2]))):
+            bench.cloud(half, f"tile{number}.las", epsg=epsg, folder=folder)
+        return {"INPUT": folder, **parameters}
+
+    return prepare
+
+
+def in_system(epsg, scale=1.0, place=(0, 0, 0), **parameters):
+    """The points in another coordinate system: scaled, then moved."""
+
+    def prepare(bench):
+        points = (bench.track(length_m=6.0) - PLACE) * scale + place
+        return {"INPUT": bench.cloud(points, epsg=epsg), **parameters}
+
+    return prepare
+
+
+def with_broken_system(bench):
+    path = bench.cloud(bench.track(length_m=6.0))
+    path.write_bytes(path.read_bytes().replace(b"PROJCRS[", b"PROJCRX[").replace(b"PROJCS[", b"PROJCX["))
+    return {"INPUT": path}
+
+
+FEET = 3937 / 1200
+HERE = tuple(PLACE)
+
+SYSTEMS = [
+    Fault(
+        "no coordinate system",
+        in_system(None, 1, HERE),
+        WARNED,
+        "The cloud states no coordinate system: its coordinates are taken as metres.",
+    ),
+    Fault(
+        "coordinate system that is not understood",
+        with_broken_system,
+        WARNED,
+        "The cloud states no coordinate system: its coordinates are taken as metres.",
+    ),
+    Fault(
+        "degrees",
+        in_system(4326, (1e-5, 1e-5, 1), (75, 27, 100)),
+        FAILED,
+        "cloud.las is in degrees (WGS 84), where lengths can't be measured: reproject it, for example to UTM "
+        "zone 43N (EPSG:32643).",
+    ),
+    Fault(
+        "degrees beyond the earth",
+        in_system(4326, 1, (500_000, 3_000_000, 100)),
+        FAILED,
+        "cloud.las is in degrees (WGS 84), where lengths can't be measured: reproject it, for example to the "
+        "UTM zone of the place.",
+    ),
+    Fault(
+        "degrees given for a cloud without a system",
+        in_system(None, 1, HERE, CRS="EPSG:4326"),
+        FAILED,
+        "cloud.las is in degrees (WGS 84), where lengths can't be measured: reproject it, for example to the "
+        "UTM zone of the place.",
+    ),
+    Fault(
+        "coordinates from the earth's centre",
+        in_system(4978, 1, (5e6, 3e6, 2e6)),
+        FAILED,
+        "Lengths can't be computed in WGS 84: project the cloud first.",
+    ),
+    Fault("US survey feet", in_system(2263, FEET, (980_000, 200_000, 300))),
+    Fault("feet in plan, metres in height", in_system("2263+5703", (FEET, FEET, 1), (980_000, 200_000, 100))),
+    Fault(
+        "tiles in different zones",
+        tiles(32643, 32644),
+        FAILED,
+        "tile0.las is in WGS 84 / UTM zone 43N but tile1.las is in WGS 84 / UTM zone 44N: bring all tiles "
+        "into one coordinate system first.",
+    ),
+    Fault(
+        "one tile without a system",
+        tiles(32643, None),
+        FAILED,
+        "tile0.las is in WGS 84 / UTM zone 43N but tile1.las is in no coordinate system: bring all tiles "
+        "into one coordinate system first.",
+    ),
+    Fault("one tile without a system, which is given", tiles(32643, None, CRS="EPSG:32643")),
+]
+
+FAULTS = [*POINTS, *SYSTEMS]
+
+
+@pytest.mark.parametrize("fault", POINTS, ids=lambda fault: fault.name)
+def test_points(meet, fault):
+    meet(fault, "extractrails")
+
+
+@pytest.mark.parametrize("fault", SYSTEMS, ids=lambda fault: fault.name)
+def test_system(meet, fault):
+    meet(fault, "rasterizerailpoints")

@@ -1,0 +1,231 @@
+"""Parameters that no run can be made of, or that contradict each other."""
+
+import pytest
+from faults import FAILED, REFUSED, Fault
+
+TITLE = "Parameters"
+
+NAN, INFINITE = float("nan"), float("inf")
+SMALLEST = {
+    "GAUGE": "1",
+    "HEAD_WIDTH": "1",
+    "ITERATIONS": "0 to 5",
+    "SMOOTHING_XY": "0.05",
+    "SMOOTHING_Z": "0.05",
+    "TOLERANCE_XY": "0.005",
+    "TOLERANCE_Z": "0.001",
+    "CROWN_RADIUS": "1",
+    "MAX_GAP": "0",
+    "GAP_ANGLE": "0 to 90",
+    "SIMPLIFY_XY": "0",
+    "SIMPLIFY_Z": "0",
+    "MIN_LENGTH": "0",
+    "CENTERLINE_TOLERANCE": "0.001",
+    "STEP": "0.1",
+}
+"""Every number of Extract Rails, and the smallest value it takes."""
+
+
+def with_(**parameters):
+    """A good cloud, and these parameters."""
+    return lambda bench: {"INPUT": bench.cloud(bench.track(length_m=6.0)), **parameters}
+
+
+def range_of(name):
+    return f"a number from {SMALLEST[name]}" if " to " in SMALLEST[name] else f"{SMALLEST[name]} or more"
+
+
+def same_file(bench):
+    return {**with_()(bench), "RAILS": bench.folder / "out.gpkg", "CENTERLINES": bench.folder / "out.gpkg"}
+
+
+FAULTS = [
+    *(
+        Fault(f"{name} not a number", with_(**{name: NAN}), REFUSED, f"{name} can't be nan: give a number.")
+        for name in SMALLEST
+    ),
+    *(
+        Fault(
+            f"{name} negative",
+            with_(**{name: -1}),
+            REFUSED,
+            f"{name} can't be -1: give {range_of(name)}.",
+        )
+        for name in SMALLEST
+    ),
+    *(
+        Fault(
+            f"{name} zero",
+            with_(**{name: 0}),
+            REFUSED,
+            f"{name} can't be 0: give {range_of(name)}.",
+        )
+        for name in SMALLEST
+        if SMALLEST[name].split()[0] != "0"
+    ),
+    Fault(
+        "infinite SMOOTHING_XY",
+        with_(SMOOTHING_XY=INFINITE),
+        REFUSED,
+        "SMOOTHING_XY can't be inf: give 0.05 or more.",
+    ),
+    Fault(
+        "text for a number",
+        with_(SMOOTHING_XY="wide"),
+        REFUSED,
+        "SMOOTHING_XY can't be wide: give 0.05 or more.",
+    ),
+    Fault(
+        "gauge that no railway has",
+        with_(GAUGE=300),
+        REFUSED,
+        "A gauge of 300 mm is not possible: give millimetres from 500 to 2000.",
+    ),
+    Fault(
+        "gauge in metres instead of millimetres",
+        with_(GAUGE=1.435),
+        REFUSED,
+        "A gauge of 1.435 mm is not possible: give millimetres from 500 to 2000.",
+    ),
+    Fault(
+        "railhead that no rail has",
+        with_(HEAD_WIDTH=200),
+        REFUSED,
+        "A railhead width of 200 mm is not possible: give millimetres from 40 to 90.",
+    ),
+    Fault(
+        "gauge and railhead that no model covers",
+        with_(GAUGE=600, HEAD_WIDTH=75),
+        REFUSED,
+        "A gauge of 600 mm is 8.0 times a railhead of 75.0 mm, and the models cover 13.4 to 26.7 times: "
+        "check GAUGE and HEAD_WIDTH.",
+    ),
+    Fault(
+        "CUSTOM without gauge and railhead",
+        with_(STANDARD="CUSTOM"),
+        REFUSED,
+        "The standard CUSTOM needs both the gauge and the railhead width, in millimetres.",
+    ),
+    Fault(
+        "CUSTOM with a gauge alone",
+        with_(STANDARD="CUSTOM", GAUGE=1435),
+        REFUSED,
+        "The standard CUSTOM needs both the gauge and the railhead width, in millimetres.",
+    ),
+    Fault(
+        "unknown standard",
+        with_(STANDARD="EN_99"),
+        REFUSED,
+        "STANDARD can't be EN_99: give one of its 47 choices, such as US_90ARAA_1435.",
+    ),
+    Fault(
+        "unknown engine", with_(ENGINE="JAX"), REFUSED, "ENGINE can't be JAX: give one of its 3 choices, such as AUTO."
+    ),
+    Fault(
+        "no class",
+        with_(RAIL_CLASSES=""),
+        REFUSED,
+        "RAIL_CLASSES can't be empty: give classes whose points lie on rails, such as 10 or 10,11.",
+    ),
+    Fault(
+        "class in words",
+        with_(RAIL_CLASSES="ten"),
+        REFUSED,
+        'RAIL_CLASSES "ten" should be whole numbers such as 10 or 10,11.',
+    ),
+    Fault(
+        "range of classes",
+        with_(RAIL_CLASSES="10-12"),
+        REFUSED,
+        'RAIL_CLASSES "10-12" should be whole numbers such as 10 or 10,11.',
+    ),
+    Fault(
+        "class above 255", with_(RAIL_CLASSES="300"), FAILED, "Rail classes must be numbers from 0 to 255, not [300]."
+    ),
+    Fault(
+        "class that no point has",
+        with_(RAIL_CLASSES="11"),
+        FAILED,
+        "The cloud has no point of class 11; its classes and their counts are 10 (3600): set the rail classes.",
+    ),
+    Fault(
+        "other gauges in words",
+        with_(OTHER_GAUGES="wide"),
+        REFUSED,
+        'OTHER_GAUGES "wide" should be millimetres such as 1000;1067.',
+    ),
+    Fault(
+        "other gauge of zero",
+        with_(OTHER_GAUGES="0"),
+        REFUSED,
+        'OTHER_GAUGES "0" should be millimetres such as 1000;1067.',
+    ),
+    Fault(
+        "other gauge too near to the gauge",
+        with_(OTHER_GAUGES="1440"),
+        REFUSED,
+        "Gauges of 1435 and 1440 mm can't be told apart within CENTERLINE_TOLERANCE (0.05 m): give one of "
+        "them, or a smaller tolerance.",
+    ),
+    Fault(
+        "tolerance as wide as the gauges differ",
+        with_(OTHER_GAUGES="1067", CENTERLINE_TOLERANCE=0.5),
+        REFUSED,
+        "Gauges of 1067 and 1435 mm can't be told apart within CENTERLINE_TOLERANCE (0.5 m): give one of "
+        "them, or a smaller tolerance.",
+    ),
+    Fault(
+        "extent beside the cloud",
+        with_(EXTENT="0,1,0,1"),
+        FAILED,
+        "No point of class 10 lies inside the extent: choose a larger one.",
+    ),
+    Fault(
+        "extent without area",
+        with_(EXTENT="500000,500000,3000000,3000001"),
+        FAILED,
+        "The extent (500000.0, 3000000.0, 500000.0, 3000001.0) is empty: give xmin, ymin, xmax, ymax.",
+    ),
+    Fault(
+        "extent that is none",
+        with_(EXTENT="here"),
+        REFUSED,
+        "EXTENT can't be here: give four numbers: xmin,xmax,ymin,ymax.",
+    ),
+    Fault(
+        "extent in a coordinate system far away",
+        with_(EXTENT="0,1,0,1 [EPSG:4326]"),
+        FAILED,
+        "No point of class 10 lies inside the extent: choose a larger one.",
+    ),
+    Fault(
+        "coordinate system that is none",
+        with_(CRS="EPSG:0"),
+        REFUSED,
+        "CRS EPSG:0 is no coordinate system: choose one from the list.",
+    ),
+    Fault(
+        "OPENCV on a GPU",
+        with_(ENGINE="OPENCV", DEVICE="CUDA"),
+        FAILED,
+        "The engine OPENCV computes on the processor alone: set DEVICE to AUTO, or ENGINE to TORCH.",
+    ),
+    Fault(
+        "no cloud",
+        lambda bench: {"INPUT": None},
+        REFUSED,
+        "INPUT can't be empty: give a loaded point cloud, or the path of a LAS, LAZ or COPC file, of a "
+        "folder of them or of a .vpc file.",
+    ),
+    Fault(
+        "two outputs in one file",
+        same_file,
+        REFUSED,
+        "RAILS and CENTERLINES are one file: give each a name of its own.",
+    ),
+]
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_fault(meet, fault):
+    meet(fault, "extractrails")
