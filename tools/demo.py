@@ -22,6 +22,7 @@ TRUTH = ROOT / "resources" / "sample" / "sample_truth.geojson"
 DEMO = ROOT / "build" / "demo"
 OUTPUT = DEMO / "rails.gpkg"
 PICTURE = DEMO / "map.png"
+REPORT = DEMO / "report.html"
 STANDARD = "IN_75R_1000"
 
 HEADER = (
@@ -37,6 +38,7 @@ def extract() -> dict:
         "STANDARD": STANDARD,
         "RAILS": f"ogr:dbname='{OUTPUT}' table=\"rails\" (geom)",
         "CENTERLINES": f"ogr:dbname='{OUTPUT}' table=\"centerlines\" (geom)",
+        "REPORT": REPORT,
     }
     words = [f"{name}={value}" for name, value in inputs.items()]
     command = [os.environ["QGIS_PROCESS"], "--json", "run", "railextract:extractrails", "--", *words]
@@ -70,7 +72,8 @@ def main() -> None:
     gauges = [items["gauge_mm"] for _, items in read_features(OUTPUT, "centerlines")]
     print(f"\nGauge of the tracks: {', '.join(f'{gauge:.1f}' for gauge in gauges)} mm (truth: 1000 mm)")
     draw_map(SAMPLE, read_lines(OUTPUT, "rails"), read_lines(OUTPUT, "centerlines"), PICTURE)
-    print(f"Lines: {OUTPUT.relative_to(ROOT)}\nMap:   {PICTURE.relative_to(ROOT)}")
+    for name, path in (("Lines", OUTPUT), ("Map", PICTURE), ("Report", REPORT)):
+        print(f"{name + ':':8}{path.relative_to(ROOT)}")
 
 
 if __name__ == "__main__":

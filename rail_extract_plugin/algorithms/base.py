@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from qgis.core import (
+    QgsApplication,
     QgsPointCloudLayer,
     QgsProcessingAlgorithm,
     QgsProcessingContext,
@@ -21,11 +22,14 @@ from ..dependencies import explain_missing, missing_packages
 from ..destinations import check_distinct, check_writable
 from ..feedback import QgisProgress
 from ..i18n import tr
-from ..paths import ICON
+from ..paths import ICON, PICTURES
 from ..refusals import explain_refused
 from ..values import Values
 
 HOMEPAGE = "https://example.org/rail-extract"
+
+COMMAND_LINE = "qgis_process"
+"""What QGIS calls the platform of its command line."""
 
 
 class RailAlgorithm(QgsProcessingAlgorithm):
@@ -42,6 +46,8 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     TAGS: tuple[str, ...] = ()
     SUMMARY = ""
     HELP = ""
+    PICTURE = ""
+    """File in the folder of pictures, shown beside the dialog."""
     NEEDS: tuple[tuple[str, ...], ...] = ()
     """Python modules without which it can't run; any one of those in a need meets it, the first is recommended."""
 
@@ -179,7 +185,13 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     def shortHelpString(self) -> str:
         """Give the text beside the dialog."""
-        return f"{tr(self.SUMMARY)}\n\n{tr(self.HELP)}"
+        return "\n\n".join(filter(None, (tr(self.SUMMARY), self._picture(), tr(self.HELP))))
+
+    def _picture(self) -> str:
+        """Show `PICTURE`, if there is one, but not as text on a command line."""
+        if not self.PICTURE or QgsApplication.platform() == COMMAND_LINE:
+            return ""
+        return f'<img src="{(PICTURES / self.PICTURE).as_uri()}">'
 
     def helpUrl(self) -> str:
         """Give the address of the guide."""

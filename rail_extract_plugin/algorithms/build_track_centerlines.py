@@ -37,6 +37,7 @@ class BuildTrackCenterlines(RailAlgorithm):
     TAGS = ("railway", "rail", "track", "centerline", "axis", "gauge", "cant")
     NEEDS = (("numpy",), ("scipy",), ("pyproj",))
     SUMMARY = "Pairs rails that lie a gauge apart and draws the line midway between the two rails of each track."
+    PICTURE = "gauge.svg"
     HELP = (
         "Takes the lines of Vectorize Rails, or rails drawn by hand: multi-part and curved lines, in any direction. "
         "Fields rail_id and class_code are used where they are there; only rails of one class make a track.\n\n"

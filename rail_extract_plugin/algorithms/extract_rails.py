@@ -51,11 +51,16 @@ class ExtractRails(RailAlgorithm):
     TAGS = ("lidar", "las", "laz", "point cloud", "railway", "rail", "track", "centerline", "vectorize")
     NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",), ("cv2", "torch"))
     SUMMARY = "Turns lidar points classified as rail into the 3D lines of the railheads and of the track centerlines."
+    PICTURE = "gauge.svg"
     HELP = (
         "A rail line is the top of the railhead on the head's own axis. The gauge in the results is the distance in "
         "space between the two rail lines less the railhead width; it is not measured 14 mm below the top.\n\n"
         "Choose the rail standard, or fill gauge and railhead width. Results have the coordinate system of the cloud, "
-        "which must be a projected one. Left and right are seen along the line, and cant is left minus right."
+        "which must be a projected one. Left and right are seen along the line, and cant is left minus right.\n\n"
+        "The report says in words and pictures whether the result is good and where it is not. sigma_mm of a line is "
+        "its standard error across, and bridged_m the length along which it has no points. Track geometry gives points "
+        "along each track with gauge, cant, twist, radius and gradient; STATION_COUNT, SIGMA and BRIDGED_LENGTH sum up "
+        "what was measured for it or for the report."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:

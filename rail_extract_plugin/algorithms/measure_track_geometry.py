@@ -48,6 +48,7 @@ class MeasureTrackGeometry(RailAlgorithm):
     )
     NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
     SUMMARY = "Measures gauge, cant, twist, radius and gradient along tracks, and how well the points support them."
+    PICTURE = "gauge.svg"
     HELP = (
         "Takes the lines of Extract Rails, or lines drawn by hand, and gives points along each centerline.\n\n"
         "chainage_m: distance from the start of the line, in plan. gauge_mm: distance in space between the rail lines "

@@ -41,6 +41,15 @@ def qgis_process():
 
 
 @pytest.fixture(scope="session")
+def qgis_process_help():
+    def run(algorithm: str) -> str:
+        words = [os.environ["QGIS_PROCESS"], "help", algorithm]
+        return subprocess.run(words, capture_output=True, text=True, check=True).stdout
+
+    return run
+
+
+@pytest.fixture(scope="session")
 def start_qgis_process():
     def start(parameters: dict[str, object]) -> subprocess.Popen:
         return subprocess.Popen(command(parameters), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)

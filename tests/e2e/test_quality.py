@@ -153,3 +153,9 @@ def test_the_cleaned_raster_lies_under_the_rails(extracted):
     rows, columns = ((y - vertices[:, 1]) / side).astype(int), ((vertices[:, 0] - x) / side).astype(int)
     near = [cells[row - 1 : row + 2, column - 1 : column + 2].any() for row, column in zip(rows, columns)]
     assert np.mean(near) > 0.95
+
+
+def test_help_on_the_command_line_is_text(qgis_process_help):
+    text = qgis_process_help("railextract:measuretrackgeometry")
+    assert "chainage_m" in text
+    assert "<img" not in text

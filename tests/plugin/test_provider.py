@@ -1,6 +1,9 @@
+import re
 from pathlib import Path
 
-from qgis.PyQt.QtGui import QIcon
+import pytest
+from qgis.PyQt.QtCore import QUrl
+from qgis.PyQt.QtGui import QIcon, QImage
 
 
 def test_toolbox_offers_the_algorithms(qgis, plugin):
@@ -32,11 +35,21 @@ def test_algorithm_explains_itself(algorithm):
     assert "14 mm" in algorithm.shortHelpString()
 
 
+@pytest.mark.parametrize("name", ["extractrails", "buildtrackcenterlines", "measuretrackgeometry"])
+def test_help_shows_what_gauge_and_railhead_are(qgis, plugin, name):
+    text = qgis.processingRegistry().createAlgorithmById(f"railextract:{name}").shortHelpString()
+    (address,) = re.findall('<img src="(.*?)">', text)
+    picture = QImage(QUrl(address).toLocalFile())
+    assert picture.width() > 300
+    assert {picture.pixelColor(x, 50).name() for x in range(picture.width())} >= {"#1565c0", "#e64a19"}
+
+
 def test_every_parameter_explains_itself(plugin):
     for algorithm in plugin.provider.algorithms():
         assert algorithm.group() in ("Rails and tracks", "Setup")
         for definition in algorithm.parameterDefinitions():
-            assert definition.isDestination() or definition.help(), (algorithm.id(), definition.name())
+            plain = definition.isDestination() and algorithm.name() not in ("extractrails", "measuretrackgeometry")
+            assert plain or definition.help(), (algorithm.id(), definition.name())
 
 
 def test_unloading_takes_the_provider_away(qgis, plugin):
