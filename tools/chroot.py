@@ -70,6 +70,7 @@ def make_system(name: str, packages: list[str]) -> Path:
         [
             "mmdebstrap",
             "--variant=apt",
+            "--dpkgopt=force-unsafe-io",
             *(f"--aptopt={option}" for option in options),
             f"--include={','.join((*BASE_PACKAGES, *packages))}",
             suites[0],
