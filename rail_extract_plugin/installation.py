@@ -75,8 +75,8 @@ class Pip:
     def __init__(self, interpreter: Interpreter, workshop: Path, folders: Sequence[Path]) -> None:
         self._program = interpreter.program
         self._workshop = workshop
-        paths = [_inherited(), *map(str, folders)]
-        self._changes = {**interpreter.changes, **PIP_ENVIRONMENT, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
+        self._paths = [*filter(None, [_inherited()]), *map(str, folders)]
+        self._changes = {**interpreter.changes, **PIP_ENVIRONMENT}
 
     def prepare(self, progress: Progress) -> None:
         """Make sure that there is a pip, and that it is not too old.
@@ -95,7 +95,7 @@ class Pip:
         if tuple(map(int, version.groups())) < OLDEST_PIP:
             newer = self._workshop / "pip"
             self.install(["pip"], ["--target", str(newer)], progress)
-            self._changes["PYTHONPATH"] = os.pathsep.join((str(newer), self._changes["PYTHONPATH"]))
+            self._paths.insert(0, str(newer))
 
     def resolve(self, order: Order, progress: Progress) -> dict[str, str]:
         """Ask what an order takes beyond what is there: versions by normalized names."""
@@ -119,7 +119,7 @@ class Pip:
             reasons = re.findall(r"^ERROR: (.*)$", ended.output, re.MULTILINE) or ["see the log"]
             raise RailExtractError(
                 f"pip could not install {', '.join(requirements)} ({reasons[-1].rstrip('.')}): check the connection to "
-                "the package index, and the space on the disk. Nothing was changed."
+                "the package index, and the space on the disk. None of it was kept."
             )
 
     def check_imports(self, modules: Sequence[str], folders: Sequence[Path]) -> None:
@@ -132,15 +132,16 @@ class Pip:
         """
         paths = list(map(str, folders))
         arguments = ["-c", IMPORT, str(len(paths) + 2), *paths, *modules]
-        ended = processes.run(self._program, arguments, {**self._changes, "PYTHONPATH": _inherited()})
+        ended = processes.run(self._program, arguments, self._changes)
         if ended.code != 0:
             reason = ended.output.strip().splitlines()[-1:] or ["it crashed"]
             raise RailExtractError(
-                f"{', '.join(modules)} does not work in the Python of this QGIS ({reason[0]}). Nothing was changed."
+                f"{', '.join(modules)} does not work in the Python of this QGIS ({reason[0]}). None of it was kept."
             )
 
     def _run(self, *arguments: str, progress: Progress = SILENT) -> processes.Ended:
-        return processes.run(self._program, ["-m", "pip", *arguments], self._changes, progress)
+        changes = {**self._changes, "PYTHONPATH": os.pathsep.join(self._paths)}
+        return processes.run(self._program, ["-m", "pip", *arguments], changes, progress)
 
 
 def install(order: Order, interpreter: Interpreter, folder: Path, others: Sequence[Path], progress: Progress) -> str:
