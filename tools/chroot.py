@@ -9,7 +9,6 @@ import os
 import shutil
 import subprocess
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -33,22 +32,8 @@ VIRTUAL = ("/proc", "/sys", "/dev")
 
 CPU_BUILDS = "https://download.pytorch.org/whl/cpu"
 
-
-@dataclass(frozen=True)
-class Release:
-    """A Debian release.
-
-    Attributes
-    ----------
-    suites : tuple of str
-        The last one is preferred.
-    """
-
-    suites: tuple[str, ...]
-
-
-RELEASES = {"latest": Release(("forky",)), "3.40": Release(("bookworm", "bookworm-backports"))}
-"""Debian's testing has QGIS 3.44, the backports to Debian 12 have QGIS 3.40."""
+RELEASES = {"latest": ("forky",), "3.40": ("bookworm", "bookworm-backports")}
+"""Suites of Debian, the last one preferred: testing has QGIS 3.44, the backports to Debian 12 have QGIS 3.40."""
 
 
 def make_system(name: str, packages: list[str]) -> Path:
@@ -56,7 +41,7 @@ def make_system(name: str, packages: list[str]) -> Path:
     folder = CHROOTS / name
     if folder.exists():
         return folder
-    suites = RELEASES[name].suites
+    suites = RELEASES[name]
     unfinished = CHROOTS / f"{name}.unfinished"
     shutil.rmtree(unfinished, ignore_errors=True)
     CHROOTS.mkdir(exist_ok=True)
