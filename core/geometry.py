@@ -6,10 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .elevation import measure_again
 from .midline import Meeting, Side, bridged_steps
 from .parallels import commonest_spacing
-from .points import RailPoints
 from .polyline import interpolate, left_normals, resample
 from .progress import SILENT, Progress
 from .rails import Centerline, RailLine, TrackGeometry, length_along
@@ -42,7 +40,6 @@ def measure_track_geometry(
     centerlines: Sequence[Centerline],
     rails: Sequence[RailLine],
     head_width_m: float,
-    clouds: Sequence[RailPoints] = (),
     step_m: float = 1.0,
     progress: Progress = SILENT,
 ) -> tuple[TrackGeometry, ...]:
@@ -53,13 +50,10 @@ def measure_track_geometry(
     centerlines : sequence of Centerline
         Their `left_ids` and `right_ids` name the rails; where they name none, the nearest at gauge are taken.
     rails : sequence of RailLine
-        As extracted, or read from files.
+        Best as `measuring.measure_in_stretches` makes them from points: with heights that are smoothed over 1 m only,
+        and support by chainage. Of a rail without support, `sigma_mm` holds for all of it and `points` count as evenly
+        spread; without gaps, it counts as bridged only where it is missing.
     head_width_m : float
-    clouds : sequence of RailPoints
-        Points of the rails' classes, in the frame of the lines. With them heights are found anew, smoothed over 1 m
-        only, and support is known by chainage. Of a class without, heights are those of the lines, a rail's `sigma_mm`
-        holds for all of it, its `points` count as evenly spread, and only where it is missing it counts as bridged,
-        unless its gaps are known.
     step_m : float
         Distance of the stations.
     progress : Progress
@@ -69,22 +63,7 @@ def measure_track_geometry(
     tuple of TrackGeometry
         One a centerline, in their order.
     """
-    rails = _measured_again(rails, clouds, head_width_m, progress.span(0.0, 0.8))
-    tracks = progress.span(0.8, 1.0).follow(centerlines)
-    return tuple(_measure(line, rails, head_width_m, step_m) for line in tracks)
-
-
-def _measured_again(
-    rails: Sequence[RailLine], clouds: Sequence[RailPoints], head_width_m: float, progress: Progress
-) -> list[RailLine]:
-    """Give the rails of each class heights and support from its points."""
-    measured = list(rails)
-    for points, share in zip(clouds, progress.split(len(clouds))):
-        mine = [number for number, rail in enumerate(rails) if rail.class_code == points.class_code]
-        again = measure_again([rails[number] for number in mine], points, head_width_m, PROFILE_SIGMA_M, share)
-        for number, rail in zip(mine, again):
-            measured[number] = rail
-    return measured
+    return tuple(_measure(line, rails, head_width_m, step_m) for line in progress.follow(centerlines))
 
 
 def _measure(line: Centerline, rails: Sequence[RailLine], head_width_m: float, step_m: float) -> TrackGeometry:

@@ -320,5 +320,5 @@ def geometry_of(
         return ()
     measured = measure_in_stretches(rails, source, stretches, parameters.head_width_m, progress.span(0.0, 0.8))
     return measure_track_geometry(
-        centerlines, measured, parameters.head_width_m, (), parameters.quality_step_m, progress.span(0.8, 1.0)
+        centerlines, measured, parameters.head_width_m, parameters.quality_step_m, progress.span(0.8, 1.0)
     )

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
 from qgis.core import QgsCoordinateReferenceSystem
 
@@ -10,7 +13,12 @@ from ..core.crs import same_plane
 from ..core.errors import CrsError, NoRailPointsError
 from ..core.points import LocalFrame, RailPoints, read_headers
 from ..core.progress import Progress
-from .clouds import Bounds, CloudSource, read_points
+from .clouds import Bounds, CloudSource, read_points, spool_points
+
+if TYPE_CHECKING:
+    from ..core.spool import SpooledPoints
+
+Points = TypeVar("Points")
 
 
 @dataclass(frozen=True)
@@ -45,6 +53,18 @@ def read_points_in(area: Area, cloud: CloudSource, progress: Progress) -> dict[i
     NoRailPointsError
         The cloud has no points of a class there.
     """
+    return _all_of(area, cloud, lambda *wanted: read_points(*wanted, progress))
+
+
+def spool_points_in(
+    area: Area, cloud: CloudSource, side_m: float, folder: Path, progress: Progress
+) -> dict[int, SpooledPoints]:
+    """Do as `read_points_in`, but leave the points on disk, sorted into squares: a cloud of any size fits."""
+    return _all_of(area, cloud, lambda *wanted: spool_points(*wanted, side_m, folder, progress))
+
+
+def _all_of(area: Area, cloud: CloudSource, read: Callable[..., Sequence[Points]]) -> dict[int, Points]:
+    """Have points read, and see to it that there are some of every class."""
     crs_wkt = read_headers(cloud.paths)[0].crs_wkt or cloud.crs_wkt
     check_same_plane("POINTS", crs_wkt, f"the {area.what}", area.frame)
 
@@ -53,7 +73,7 @@ def read_points_in(area: Area, cloud: CloudSource, progress: Progress) -> dict[i
 
     source = replace(cloud, crs_wkt=cloud.crs_wkt or area.frame.crs_wkt)
     try:
-        clouds = {points.class_code: points for points in read_points(source, area.class_codes, bounds, progress)}
+        clouds = {points.class_code: points for points in read(source, area.class_codes, bounds)}
     except NoRailPointsError:
         clouds = {}
     missing = [str(code) for code in area.class_codes if code not in clouds]

@@ -4,21 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from qgis.core import QgsProcessingFeatureSource
 
 from ..core.errors import RailExtractError
-from ..core.points import LocalFrame, RailPoints
+from ..core.measuring import measure_in_stretches
+from ..core.points import LocalFrame
 from ..core.progress import Progress
 from ..core.rails import Centerline, RailLine, TrackGeometry
+from ..core.spool import SpooledPoints
 from ..core.standards import RAIL_CLASS
-from .area_points import Area, check_same_plane, read_points_in
+from ..core.stretches import lay_out
+from .area_points import Area, check_same_plane, spool_points_in
 from .clouds import Bounds, CloudSource
 from .drawn_rails import read_centerlines, read_rails
 
 MARGIN_M = 1.0
 """Points further outside the rails' extent say nothing about them: more than ten times the width of a head."""
+
+SQUARE_M = 500.0
+"""Side of the squares that points are taken by, about that of the stretches of Extract Rails."""
 
 SURE_GAUGE_MM = 1.0
 """Difference between two mean gauges of a track that noise does not make, but another width of the railhead does."""
@@ -32,7 +39,7 @@ class TrackInputs:
     ----------
     centerlines : tuple of Centerline
     rails : tuple of RailLine
-    clouds : tuple of RailPoints
+    clouds : tuple of SpooledPoints
         One for each class of the rails; none where no cloud was given.
     frame : LocalFrame
         Turns local metres into the centerlines' coordinates.
@@ -40,7 +47,7 @@ class TrackInputs:
 
     centerlines: tuple[Centerline, ...]
     rails: tuple[RailLine, ...]
-    clouds: tuple[RailPoints, ...]
+    clouds: tuple[SpooledPoints, ...]
     frame: LocalFrame
 
 
@@ -48,9 +55,10 @@ def read_inputs(
     centerlines: QgsProcessingFeatureSource,
     rails: QgsProcessingFeatureSource,
     cloud: CloudSource | None,
+    folder: Path,
     progress: Progress,
 ) -> TrackInputs:
-    """Read lines, and the points of the rails' classes around them.
+    """Read lines, and put the points of the rails' classes around them into a folder, sorted into squares.
 
     Raises
     ------
@@ -70,11 +78,23 @@ def read_inputs(
         return TrackInputs(tracks, lines, (), frame)
     classes = tuple(sorted({rail.class_code for rail in lines}))
     area = Area("rails", classes, _bounds(lines, frame), frame)
-    clouds = tuple(read_points_in(area, cloud, progress.span(0.2, 1.0)).values())
+    clouds = tuple(spool_points_in(area, cloud, SQUARE_M, folder, progress.span(0.2, 1.0)).values())
     theirs = clouds[0].frame
     origin = frame.to_crs(-_shift(frame, theirs))
     tracks, lines = _moved(tracks, frame, theirs), _moved(lines, frame, theirs)
     return TrackInputs(tracks, lines, clouds, replace(frame, origin=origin))
+
+
+def measured_rails(tracks: TrackInputs, head_width_m: float, progress: Progress) -> list[RailLine]:
+    """Give the rails of each class heights and support from its points; without a cloud they stay as they are."""
+    measured = list(tracks.rails)
+    for points, share in zip(tracks.clouds, progress.split(len(tracks.clouds))):
+        mine = [number for number, rail in enumerate(tracks.rails) if rail.class_code == points.class_code]
+        stretches = lay_out(tracks.clouds, points)
+        again = measure_in_stretches([tracks.rails[one] for one in mine], points, stretches, head_width_m, share)
+        for number, rail in zip(mine, again):
+            measured[number] = rail
+    return measured
 
 
 def check_gauges(tracks: TrackInputs, measured: Sequence[TrackGeometry], progress: Progress) -> None:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
-from qgis.core import (
-    QgsProcessingContext,
-)
+from qgis.core import QgsProcessingContext, QgsProcessingUtils
 
 from ...core.progress import Progress
 from .. import inputs, outputs
@@ -17,8 +17,8 @@ from ..layers import figures_of_stations, write_stations
 from ..values import Values
 from .base import RailAlgorithm
 
-READING = 0.3
-"""Share of the progress bar for reading lines and cloud."""
+READING, MEASURING = 0.3, 0.9
+"""Shares of the progress bar at which lines and cloud are read, and at which the rails are measured."""
 
 
 @dataclass(frozen=True)
@@ -82,15 +82,15 @@ class MeasureTrackGeometry(RailAlgorithm):
     ) -> dict[str, Any]:
         """Measure every track, then write the points."""
         from ...core.geometry import measure_track_geometry
-        from ..track_inputs import check_gauges, read_inputs
+        from ..track_inputs import check_gauges, measured_rails, read_inputs
 
         values = Values(self, parameters, context)
-        tracks = read_inputs(values.lines("INPUT"), values.lines("RAILS"), job.cloud, progress.span(0, READING))
-        step_m = values.number("STEP")
-        share = progress.span(READING, 1)
-        measured = measure_track_geometry(
-            tracks.centerlines, tracks.rails, job.head_width_m, tracks.clouds, step_m, share
-        )
+        lines = values.lines("INPUT"), values.lines("RAILS")
+        with TemporaryDirectory(dir=QgsProcessingUtils.tempFolder()) as folder:
+            tracks = read_inputs(*lines, job.cloud, Path(folder), progress.span(0, READING))
+            rails = measured_rails(tracks, job.head_width_m, progress.span(READING, MEASURING))
+        share = progress.span(MEASURING, 1)
+        measured = measure_track_geometry(tracks.centerlines, rails, job.head_width_m, values.number("STEP"), share)
         check_gauges(tracks, measured, progress)
         progress.check()
         written = write_stations(self, "OUTPUT", measured, tracks.frame, parameters, context)

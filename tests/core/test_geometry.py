@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from rail_extract.core import pipeline
 from rail_extract.core.centerlines import build_centerlines
-from rail_extract.core.elevation import ElevationParameters, elevate
-from rail_extract.core.geometry import measure_track_geometry
+from rail_extract.core.elevation import ElevationParameters, elevate, measure_again
+from rail_extract.core.geometry import PROFILE_SIGMA_M, measure_track_geometry
 from rail_extract.core.points import LocalFrame, RailPoints
 from rail_extract.core.rails import NO_GAPS, Centerline, RailLine, Support
 from rail_extract.core.raster import cell_size, rasterize
@@ -81,7 +81,7 @@ def test_scanned_track_is_measured_to_millimetres(stored):
     if stored:
         rails, lines = thin(rails, 0.002, 0.002), thin(lines, 0.002, 0.002)
         rails = [replace(rail, support=None, gaps=NO_GAPS) for rail in rails]
-    (found,) = measure_track_geometry(lines, rails, WIDTH, [points])
+    (found,) = measure_track_geometry(lines, measure_again(rails, points, WIDTH, PROFILE_SIGMA_M), WIDTH)
     t = found.chainage_m
     assert rms(found.gauge_mm - 1435.0) < 2.0
     assert rms(found.cant_mm - ramp(t, -CANT_MM)) < 1.0

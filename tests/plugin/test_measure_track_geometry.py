@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from qgis.core import NULL, QgsFeature, QgsGeometry, QgsLineString, QgsVectorLayer
+from rail_extract.rail_extract_plugin import track_inputs
 
 SPACING_MM = 1507.0
 RADIUS_M = 300.0
@@ -158,6 +159,20 @@ def test_layers_and_cloud_give_the_numbers_of_extract_rails(run, measure, write_
         np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-4, err_msg=name)
     assert outcome.results["SIGMA"] == pytest.approx(results["SIGMA"], rel=1e-6)
     assert values["points"].sum() > 3000
+
+
+def test_a_cloud_is_measured_square_by_square(run, measure, write_cloud, track, tmp_path, monkeypatch):
+    """In squares of four metres the numbers are those of the whole."""
+    cloud = write_cloud(track())
+    paths = {name: tmp_path / f"{name}.gpkg" for name in ("RAILS", "CENTERLINES")}
+    assert run({"INPUT": cloud, "ITERATIONS": 1, **paths}).ok
+    given = str(paths["CENTERLINES"]), str(paths["RAILS"])
+    _, _, whole = measure(*given, POINTS=str(cloud))
+    monkeypatch.setattr(track_inputs, "SQUARE_M", 4.0)
+    _, _, parts = measure(*given, POINTS=str(cloud))
+    for name, values in whole.items():
+        off = 1 if name == "points" else 0.05  # a point between two stations may be rounded to either
+        np.testing.assert_allclose(parts[name], values, rtol=1e-4, atol=off, err_msg=name)
 
 
 def test_another_head_width_than_before_is_warned_of(measure, new_feedback):
