@@ -63,7 +63,8 @@ def _run_pass(
                     output.paint(piece, probability >= OUTPUT_THRESHOLD, field.inside)
             return told.raster(), output.raster()
         except DeviceExhaustedError:
-            progress.warning(engine.retreat())
+            pass  # and let go of the error first: what it passed through still holds the device's memory
+        progress.warning(engine.retreat())
 
 
 def _state(state: RailRaster | None, piece: Piece) -> np.ndarray:
