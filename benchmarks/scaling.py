@@ -119,7 +119,7 @@ def lay_track(folder: Path, km: float) -> None:
     """Write files of a straight double track."""
     folder.mkdir()
     curve = trace([Element(PIECE_M)], heading=HEADING)
-    tracks = [Track(curve, spacing(STANDARD), np.full(len(curve.xy), 100.0), left=left) for left in (0.0, 4.5)]
+    tracks = [Track(curve, spacing(STANDARD), np.full(len(curve.xy), 100.0), left_m=left) for left in (0.0, 4.5)]
     scene = build("piece", Plan(tracks, STANDARD, Scanner(noise_m=0.004)), np.random.RandomState(8))
     xyz = scene.xyz[scene.classification == RAIL]
     chosen = np.random.RandomState(9).randint(len(xyz), size=int(POINTS_PER_M * PIECE_M))

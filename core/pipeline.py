@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from .centerlines import CenterlineParameters, build_centerlines
 from .elevation import ElevationParameters, elevate, flat_rails, numbered
-from .errors import NoRailPointsError, NoTrackError
+from .errors import NoRailPointsError, NoTrackError, ParameterError
 from .frpdf import DEFAULT_PASSES
 from .frpdf.cleanup import MARGIN, MOST_PASSES, UNTIL_STABLE, clean
 from .frpdf.engine import Engine, make_engine
@@ -156,7 +156,17 @@ def extract_rails(
 
 
 def stretch_side(parameters: Parameters) -> float:
-    """Side of the stretches in metres."""
+    """Side of the stretches in metres.
+
+    Raises
+    ------
+    ParameterError
+        They would overlap with more than their neighbours.
+    """
+    if parameters.stretch_tiles < OVERLAP_TILES:
+        raise ParameterError(
+            f"Stretches of {parameters.stretch_tiles} tiles are too small: give {OVERLAP_TILES} at least."
+        )
     return parameters.stretch_tiles * TILE * cell_size(parameters.gauge_m, parameters.head_width_m)
 
 

@@ -1,13 +1,20 @@
 """The steps of the walk: what each gives alone, and several gauges in one run."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from rail_extract.core.errors import NoTrackError
-from rail_extract.core.pipeline import Parameters, lines_of, tracks_of
+from rail_extract.core import pipeline
+from rail_extract.core.errors import Cancelled, NoTrackError, ParameterError
+from rail_extract.core.pipeline import Parameters, extract_rails, lines_of, tracks_of
 from rail_extract.core.points import LocalFrame, RailPoints
-from rail_extract.core.rails import RailLine
+from rail_extract.core.polyline import project
+from rail_extract.core.progress import Progress
+from rail_extract.core.rails import RailLine, length_along
 from rail_extract.core.raster import cell_size, rasterize
+from rail_extract.core.standards import STANDARDS
 from rail_extract.core.synthetic.curves import Element, trace, transition_curve
+from rail_extract.core.synthetic.plain_scenes import straight
 
 WIDTH = 0.072
 CURVES = [trace([Element(40.0)], heading=0.4), trace(transition_curve(15, 20, 15, 1 / 300), heading=-0.6)]
@@ -64,3 +71,51 @@ def test_lines_without_points_stay_where_the_raster_shows_them():
     assert flat.length_m == pytest.approx(20 * np.hypot(1, 0.3), abs=0.1)
     assert np.abs(flat.xyz[:, 1] - 0.3 * flat.xyz[:, 0]).max() < raster.cell_m
     np.testing.assert_allclose(high.xyz[:, 2], 100, atol=1e-6)
+
+
+def largest_step(xyz):
+    """How far a vertex lies beside the chord between its neighbours."""
+    t = length_along(xyz[:, :2])
+    share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
+    return np.abs(xyz[1:-1] - xyz[:-2] - share * (xyz[2:] - xyz[:-2])).max()
+
+
+def test_a_line_in_stretches_is_the_line_in_one_piece(monkeypatch):
+    # Clean points need no network; without it the test sees what the seams change, and nothing else.
+    monkeypatch.setattr(pipeline, "clean", lambda raster, *_: raster)
+    points = straight().rail_points()
+    whole_settings = Parameters(
+        1.435, STANDARDS["EN_60E1_1435"].head_width_m, keep_cleaned=True, quality_step_m=1.0, simplify_xy_m=0.0
+    )
+    whole = extract_rails([points], whole_settings)
+    parts = extract_rails([points], replace(whole_settings, stretch_tiles=4))
+    assert [rail.rail_id for rail in parts.rails] == [1, 2]
+    for one, two in zip(whole.rails, parts.rails):
+        across = project([one.xyz[:, :2]], two.xyz[:, :2], 0.01).across
+        assert len(across) >= len(two.xyz) - 4
+        assert np.abs(across).max() < 1.5e-3 and np.sqrt(np.mean(across**2)) < 3e-4
+        assert largest_step(two.xyz) < largest_step(one.xyz) + 1e-4
+        assert two.length_m == pytest.approx(one.length_m, abs=0.1)
+        assert two.points == pytest.approx(one.points, rel=0.01)
+        assert two.sigma_mm == pytest.approx(one.sigma_mm, rel=0.1)
+        assert len(two.support.t) == pytest.approx(len(one.support.t), abs=5)
+    assert parts.centerlines[0].length_m == pytest.approx(whole.centerlines[0].length_m, abs=0.1)
+    assert parts.cleaned[0].count() == pytest.approx(whole.cleaned[0].count(), rel=0.02)
+    one, two = whole.geometry[0], parts.geometry[0]
+    count = min(len(one.chainage_m), len(two.chainage_m))
+    np.testing.assert_allclose(two.gauge_mm[:count], one.gauge_mm[:count], atol=1.0)
+    np.testing.assert_allclose(two.cant_mm[:count], one.cant_mm[:count], atol=0.5)
+
+
+def test_a_run_in_stretches_hears_a_cancel():
+    class Stopped(Progress):
+        def is_cancelled(self):
+            return True
+
+    with pytest.raises(Cancelled):
+        extract_rails([straight().rail_points()], Parameters(1.435, WIDTH, stretch_tiles=4), Stopped())
+
+
+def test_stretches_smaller_than_their_overlap_are_refused():
+    with pytest.raises(ParameterError, match="4"):
+        extract_rails([straight().rail_points()], Parameters(1.435, WIDTH, stretch_tiles=2))
