@@ -12,8 +12,9 @@ from .geometry import PROFILE_SIGMA_M
 from .polyline import resample
 from .progress import SILENT, Progress
 from .rails import RailLine
-from .seams import runs, united
 from .stretches import Key, PointSource, Stretch, unique_keys
+from .trimming import runs
+from .uniting import united
 
 CONTEXT_M = 10.0
 """How far beyond a stretch its rails are measured: the disc reaches 1 m, the smoothing of heights over 1 m no more

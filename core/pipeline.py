@@ -20,7 +20,7 @@ from .progress import SILENT, Progress
 from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from .raster import TILE, RailRaster, cell_size, rasterize
 from .refinement import refine
-from .seams import StretchRails, join, trim
+from .seams import join
 from .smoothing import smooth_network
 from .standards import distinct_gauges
 from .stretches import (
@@ -37,6 +37,7 @@ from .stretches import (
     own_tiles,
 )
 from .thinning import thin
+from .trimming import StretchRails, trim
 from .vectorize import vectorize
 
 NETWORK_SHARE = 0.7

@@ -15,9 +15,9 @@ import numpy as np
 
 from ..rails import RailLine, Support
 from ..raster import TILE, RailRaster
-from ..seams import StretchRails
 from ..spool import writing
 from ..stretches import Stretch
+from ..trimming import StretchRails
 
 FORMAT = 1
 """Counts up when stretches come out otherwise, so that results of an earlier version are not taken for new ones."""

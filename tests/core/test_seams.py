@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from rail_extract.core.points import LocalFrame
 from rail_extract.core.polyline import project
 from rail_extract.core.rails import RailLine, Support, length_along
-from rail_extract.core.seams import join, trim
+from rail_extract.core.seams import join
 from rail_extract.core.stretches import HALO_M, Stretch, unique_keys
+from rail_extract.core.trimming import trim
 
 SIDE, REACH = 40.0, 20.0
 FRAME = LocalFrame(np.zeros(3))
@@ -78,10 +79,10 @@ def test_one_line_comes_back_whole(heading, bend):
 @given(st.floats(-3.1, 3.1), st.floats(-0.012, 0.012))
 def test_where_stretches_disagree_no_step_is_left(heading, bend):
     true = rail(curve(heading, bend))
-    (line,) = join(seen_by_stretches([true], error_m=0.0005), FRAME)
+    (line,) = join(seen_by_stretches([true], error_m=0.003), FRAME)
     smooth = steps(true)
     assert steps(line) < smooth + 1e-4
-    assert np.abs(project([true.xyz[:, :2]], line.xyz[:, :2], 1.0).across).max() < 0.0008
+    assert np.abs(project([true.xyz[:, :2]], line.xyz[:, :2], 1.0).across).max() < 0.0045
 
 
 @pytest.mark.parametrize("offset", [-1e-9, 0.0, 0.3, HALO_M, HALO_M + 0.01])
