@@ -1,8 +1,8 @@
 """Print how time and memory grow with length, what a second worker brings, and what a national network costs.
 
 `python benchmarks/scaling.py` measures a synthetic double track of 1 km and of 10 km, each in a process of its own, and
-on the longer one a worker against two, of one thread each. `--km 0.6` is quicker; under half a kilometre there is nothing
-to split. `--memory 100` adds a run over so many kilometres for its memory alone: the network does not clean the raster,
+on the longer one a worker against two, of one thread each. `--km 0.6` is quicker; half a kilometre can't be split.
+`--memory 100` adds a run over so many kilometres for its memory alone: the network does not clean the raster,
 and so its time means nothing. Compare rows of one run only.
 """
 

@@ -15,6 +15,7 @@ from ..frpdf.engine import DEVICES, ENGINES
 from ..pipeline import Parameters
 from ..progress import Estimating, Progress
 from ..standards import DEFAULT, resolve
+from .fields import CENTERLINE_FIELDS, RAIL_FIELDS
 
 NEEDS = {"distributed": "distributed", "pyogrio": "pyogrio", "shapely": "shapely"}
 """Modules and packages of the extra "cluster"."""
@@ -99,7 +100,7 @@ def parameters_of(args: argparse.Namespace) -> Parameters:
 
 def _run_in(folder: Path, args: argparse.Namespace, parameters: Parameters) -> int:
     """Extract with a folder for what is finished."""
-    from .geopackage import CENTERLINE_FIELDS, RAIL_FIELDS, write
+    from .geopackage import write
     from .run import connect, extract
 
     codes = _numbers(args.rail_classes, "--rail-classes", int)
