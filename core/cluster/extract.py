@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 import tempfile
@@ -12,9 +13,11 @@ from pathlib import Path
 
 from ..errors import ParameterError, RailExtractError
 from ..frpdf.engine import DEVICES, ENGINES
+from ..frpdf.zoo import choose
 from ..pipeline import Parameters
 from ..progress import Estimating, Progress
-from ..standards import DEFAULT, resolve
+from ..spool import writing
+from ..standards import DEFAULT, distinct_gauges, resolve
 from .fields import CENTERLINE_FIELDS, RAIL_FIELDS
 
 NEEDS = {"distributed": "distributed", "pyogrio": "pyogrio", "shapely": "shapely"}
@@ -53,7 +56,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--engine", choices=ENGINES, default=Parameters.engine, help="what runs the network")
     parser.add_argument("--device", choices=DEVICES, default=Parameters.device, help="where the network runs")
     for field in _plain_fields():
-        parser.add_argument(_option(field.name), type=type(field.default), default=field.default, metavar="N")
+        unit = {"_m": "metres, ", "eg": "degrees, "}.get(field.name[-2:], "")
+        text = f"as in QGIS ({unit}default: {field.default:g})"
+        parser.add_argument(
+            _option(field.name), type=type(field.default), default=field.default, metavar="N", help=text
+        )
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="use the Dask cluster at tcp://... instead of workers here"
     )
@@ -73,28 +80,47 @@ def run(args: argparse.Namespace) -> int:
     if missing:
         raise RailExtractError(f"Packages are missing ({', '.join(missing)}): run pip install rail_extract[cluster].")
     parameters = parameters_of(args)
-    outputs = [path for path in (args.rails, args.centerlines) if path is not None]
-    if any(path.suffix.lower() != ".gpkg" for path in outputs):
-        raise ParameterError(f"Results are GeoPackages: give {outputs[0].name} the ending .gpkg.")
+    for path in (args.rails, args.centerlines or args.rails):
+        if path.suffix.lower() != ".gpkg":
+            raise ParameterError(f"Results are GeoPackages: give {path.name} the ending .gpkg.")
+        with writing(path.parent):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=path.parent).close()
     if args.work is not None:
         return _run_in(args.work, args, parameters)
-    args.rails.parent.mkdir(parents=True, exist_ok=True)
     # Beside the results, for there workers elsewhere find it as well.
     with tempfile.TemporaryDirectory(dir=args.rails.parent, prefix=".rail_extract_") as folder:
         return _run_in(Path(folder), args, parameters)
 
 
 def parameters_of(args: argparse.Namespace) -> Parameters:
-    """Gather what the options tell; errors as those of `standards.resolve`."""
+    """Gather what the options tell.
+
+    Raises
+    ------
+    ParameterError
+        One is out of range or contradicts another.
+    ModelError
+        No weights fit the standard.
+    """
     standard = resolve(args.standard, args.gauge, args.head_width)
+    choose(standard.gauge_m, standard.head_width_m)
+    others = _numbers(args.other_gauges, "--other-gauges", float)
+    gauges_m = distinct_gauges((standard.gauge_m, *(mm / 1000 for mm in others)), args.centerline_tolerance)
+    plain = {field.name: getattr(args, _option(field.name)[2:].replace("-", "_")) for field in _plain_fields()}
+    for name, value in {**plain, "iterations": args.iterations, "workers": args.workers - 1}.items():
+        if not (math.isfinite(value) and value >= 0):
+            raise ParameterError(
+                f"The option {_option(name)} can't be {getattr(args, name, value)}: give a larger number."
+            )
     return Parameters(
         standard.gauge_m,
         standard.head_width_m,
         args.iterations,
         args.engine,
         args.device,
-        other_gauges_m=tuple(mm / 1000 for mm in _numbers(args.other_gauges, "--other-gauges", float)),
-        **{field.name: getattr(args, _option(field.name)[2:].replace("-", "_")) for field in _plain_fields()},
+        other_gauges_m=gauges_m[1:],
+        **plain,
     )
 
 

@@ -128,6 +128,25 @@ def test_a_corrupt_tile_is_named_and_the_rest_is_written(tiles, tmp_path, capsys
     assert {file.name for file in tmp_path.iterdir()} == {"out.gpkg", "tile0.laz", "tile1.laz", "tile2.laz"}
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--rails", "out.shp"], "GeoPackage"),
+        (["--rails", "out.gpkg", "--other-gauges", "1430"], "told apart"),
+        (["--rails", "out.gpkg", "--other-gauges", "wide"], "numbers"),
+        (["--rails", "out.gpkg", "--gauge", "300"], "gauge"),
+        (["--rails", "out.gpkg", "--max-gap", "-1"], "--max-gap"),
+        (["--rails", "out.gpkg", "--workers", "0"], "--workers"),
+        (["--rails", "out.gpkg", "--rail-classes", "300"], "0 to 255"),
+        (["--rails", "out.gpkg", "--scheduler", "nonsense"], "scheduler"),
+    ],
+)
+def test_what_can_be_refused_is_refused_before_the_night(tiles, tmp_path, monkeypatch, capsys, words, said):
+    monkeypatch.chdir(tmp_path)
+    assert main(["extract", str(tiles), *words]) == 1
+    assert said in capsys.readouterr().err
+
+
 FULL_DISK = """
 import resource, sys
 from pathlib import Path
