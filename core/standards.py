@@ -120,7 +120,10 @@ def resolve(name: str, gauge_mm: float | None = None, head_width_mm: float | Non
     """
     if name == CUSTOM:
         if gauge_mm is None or head_width_mm is None:
-            raise ParameterError("The standard CUSTOM needs both the gauge and the railhead width, in millimetres.")
+            raise ParameterError(
+                "The standard CUSTOM needs both the gauge and the railhead width, in millimetres: fill GAUGE and "
+                "HEAD_WIDTH."
+            )
     elif name not in STANDARDS:
         raise ParameterError(f"The rail standard {name!r} is unknown: choose one like {DEFAULT}, or {CUSTOM}.")
     if gauge_mm is not None:

@@ -19,6 +19,7 @@ from qgis.core import (
 
 from ..core.errors import CloudError
 from ..core.progress import Progress
+from ..core.standards import RAIL_CLASS
 
 if TYPE_CHECKING:
     from ..core.points import RailPoints
@@ -98,6 +99,23 @@ def spool_points(
     crs = QgsCoordinateReferenceSystem(read_headers(source.paths)[0].crs_wkt or source.crs_wkt or "")
     request = ask(source.paths, class_codes, source.crs_wkt, bounds(crs), progress)
     return spool(request, side_m, folder, progress)
+
+
+def check_lengths(source: CloudSource) -> None:
+    """Refuse a cloud in degrees by the header of its first file; other faults of files are the run's to tell.
+
+    Raises
+    ------
+    CrsError
+        Lengths can't be measured there.
+    """
+    from ..core.las import list_files
+    from ..core.points import ask
+
+    try:
+        ask(list_files(source.paths)[:1], (RAIL_CLASS,), source.crs_wkt)
+    except CloudError:
+        return
 
 
 def _loaded_layer(name: str, context: QgsProcessingContext) -> QgsMapLayer | None:

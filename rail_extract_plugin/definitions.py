@@ -12,6 +12,9 @@ Definitions = tuple[QgsProcessingParameterDefinition, ...]
 UNBOUNDED = 1e9
 """Largest value of a number that has no upper limit."""
 
+M_DECIMALS, MM_DECIMALS = 3, 2
+"""Digits that the widgets show after the point of metres and of millimetres."""
+
 
 def number(
     name: str,
@@ -21,13 +24,14 @@ def number(
     maximum: float = UNBOUNDED,
     whole: bool = False,
     optional: bool = False,
+    decimals: int = M_DECIMALS,
 ) -> QgsProcessingParameterNumber:
     """Make a number; its widget shows the unit of the label and no layer's."""
     kinds = QgsProcessingParameterNumber.Type
     kind = kinds.Integer if whole else kinds.Double
     made = QgsProcessingParameterNumber(name, label, kind, default, optional, minimum, maximum)
     if not whole:
-        made.setMetadata({"widget_wrapper": {"decimals": 3}})
+        made.setMetadata({"widget_wrapper": {"decimals": decimals}})
     return made
 
 

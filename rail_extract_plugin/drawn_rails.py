@@ -17,7 +17,7 @@ from qgis.core import (
     QgsProcessingFeatureSource,
 )
 
-from ..core.crs import is_geographic, parse_crs, units
+from ..core.crs import parse_crs, units
 from ..core.errors import CrsError, RailExtractError
 from ..core.points import ORIGIN_STEP, LocalFrame
 from ..core.progress import SILENT, Progress
@@ -94,14 +94,24 @@ def _system(crs: QgsCoordinateReferenceSystem, progress: Progress) -> tuple[str 
     if not crs.isValid():
         progress.warning("The lines have no coordinate system: their coordinates are taken as metres.")
         return None, 1.0, 1.0
+    check_system(crs)
     wkt = crs.toWkt(QgsCoordinateReferenceSystem.WktVariant.WKT_PREFERRED)
-    system = parse_crs(wkt)
-    if is_geographic(system):
+    return (wkt, *units(parse_crs(wkt)))
+
+
+def check_system(crs: QgsCoordinateReferenceSystem) -> None:
+    """Refuse lines in degrees.
+
+    Raises
+    ------
+    CrsError
+        Lengths can't be measured there.
+    """
+    if crs.isGeographic():
         raise CrsError(
-            f"The lines are in degrees ({system.name}), where lengths can't be measured: reproject them, for example "
-            "to the UTM zone of the place."
+            f"The lines are in degrees ({crs.description()}), where lengths can't be measured: reproject them, for "
+            "example to the UTM zone of the place."
         )
-    return (wkt, *units(system))
 
 
 def _parts(geometry: QgsGeometry, chord: float) -> Iterator[np.ndarray]:

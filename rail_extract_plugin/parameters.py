@@ -11,7 +11,7 @@ from qgis.core import (
 
 from ..core.frpdf.zoo import MODELS
 from ..core.standards import CUSTOM, DEFAULT, STANDARDS
-from .definitions import Definitions, advanced, choice, helped, number
+from .definitions import MM_DECIMALS, Definitions, advanced, choice, helped, number
 from .i18n import tr
 
 AUTO = "AUTO"
@@ -22,21 +22,41 @@ TORCH_BUILDS = ("NONE", "CPU", "CUDA")
 MOST_ITERATIONS = 5
 """The network's repairs have settled by then."""
 
+# The largest values keep out what can only be millimetres in a field of metres; they are no advice.
+
+WIDEST_REACH_M = 0.5
+"""Points further away than half of the narrowest gauge in use (600 mm) could as well be of another rail."""
+
+COARSEST_M = 1.0
+"""Vertices that are left out more coarsely than this give no line of a rail, which is a tenth as wide."""
+
+LONGEST_SMOOTHING_M = 100.0
+"""Nothing of the tightest curves and dips of a railway is left then."""
+
+FLATTEST_CROWN_M = 10_000.0
+"""A disc as large as this is flat over any dip."""
+
+LONGEST_M = 100_000.0
+"""Longer than any gap to bridge, any line to leave out, any stretch between two measurements."""
+
 
 def rail() -> Definitions:
     """Which rails lie there."""
     return (
         helped(
             choice("STANDARD", tr("Rail standard"), (*STANDARDS, CUSTOM), DEFAULT),
-            tr("Rail profile and gauge. CUSTOM takes both from the two fields below."),
+            tr(
+                "Rail profile and gauge: EN_60E1_1435 is 60E1 of EN 13674 on 1435 mm. It says how far apart the rails "
+                "are and how wide a railhead is. CUSTOM takes both from the two fields below."
+            ),
         ),
         helped(
-            number("GAUGE", tr("Gauge [mm]"), minimum=1.0, optional=True),
-            tr("Distance between the inner faces of the two railheads; if filled, instead of the standard's."),
+            number("GAUGE", tr("Gauge [mm]"), minimum=1.0, optional=True, decimals=MM_DECIMALS),
+            tr("Distance between the inner faces of the two railheads. Leave it empty to take the standard's."),
         ),
         helped(
-            number("HEAD_WIDTH", tr("Railhead width [mm]"), minimum=1.0, optional=True),
-            tr("Width of the top of one rail; if filled, instead of the standard's."),
+            number("HEAD_WIDTH", tr("Railhead width [mm]"), minimum=1.0, optional=True, decimals=MM_DECIMALS),
+            tr("Width of the top of one rail. Leave it empty to take the standard's."),
         ),
     )
 
@@ -45,11 +65,11 @@ def raster_rail() -> Definitions:
     """Which rails a raster is of that does not say so itself."""
     return (
         advanced(
-            number("GAUGE", tr("Gauge [mm]"), minimum=1.0, optional=True),
+            number("GAUGE", tr("Gauge [mm]"), minimum=1.0, optional=True, decimals=MM_DECIMALS),
             tr("For a raster made elsewhere, which does not say its gauge; if filled, instead of what it says."),
         ),
         advanced(
-            number("HEAD_WIDTH", tr("Railhead width [mm]"), minimum=1.0, optional=True),
+            number("HEAD_WIDTH", tr("Railhead width [mm]"), minimum=1.0, optional=True, decimals=MM_DECIMALS),
             tr("For a raster made elsewhere, which does not say its width; if filled, instead of what it says."),
         ),
     )
@@ -66,8 +86,8 @@ def model() -> QgsProcessingParameterDefinition:
 def step() -> QgsProcessingParameterDefinition:
     """How often tracks are measured."""
     return advanced(
-        number("STEP", tr("Distance of the measurements [m]"), 1.0, minimum=0.1),
-        tr("Gauge, cant, twist, radius and gradient are stated at these distances along each track."),
+        number("STEP", tr("Step of the track geometry [m]"), 1.0, 0.1, LONGEST_M),
+        tr("Gauge, cant, twist, radius and gradient are stated once in this distance along each track."),
     )
 
 
@@ -83,11 +103,11 @@ def area() -> Definitions:
     return (
         helped(
             QgsProcessingParameterExtent("EXTENT", tr("Extent"), optional=True),
-            tr("Only points inside this rectangle are read."),
+            tr("Only points inside this rectangle are read. Leave it empty to read them all."),
         ),
         advanced(
-            QgsProcessingParameterCrs("CRS", tr("Coordinate system of a cloud without one"), optional=True),
-            tr("Used where the cloud states none."),
+            QgsProcessingParameterCrs("CRS", tr("CRS of a cloud without one"), optional=True),
+            tr("The projected coordinate system of files that state none; others keep their own."),
         ),
     )
 
@@ -97,15 +117,15 @@ def cleanup() -> Definitions:
     return (
         advanced(
             number("ITERATIONS", tr("Passes of the network"), 2, maximum=MOST_ITERATIONS, whole=True),
-            tr("0 repeats until nothing changes, at most five times."),
+            tr("How often the network looks again at what it found. 0: until nothing changes, at most five times."),
         ),
         advanced(
-            choice("ENGINE", tr("Engine"), ENGINES, AUTO),
-            tr("Library that runs the network; AUTO takes the fastest one installed."),
+            choice("ENGINE", tr("Engine of the network"), ENGINES, AUTO),
+            tr("Python package that runs the network: PyTorch or OpenCV. AUTO takes the faster one that is installed."),
         ),
         advanced(
-            choice("DEVICE", tr("Device"), DEVICES, AUTO),
-            tr("Processor that runs the network; AUTO takes a GPU where there is one."),
+            choice("DEVICE", tr("Device of the network"), DEVICES, AUTO),
+            tr("CPU is the processor, CUDA an Nvidia GPU, which takes PyTorch. AUTO uses the GPU where there is one."),
         ),
     )
 
@@ -121,8 +141,8 @@ def torch() -> QgsProcessingParameterDefinition:
 def smoothing_xy() -> QgsProcessingParameterDefinition:
     """How smooth lines are in plan."""
     return advanced(
-        number("SMOOTHING_XY", tr("Smoothing in plan [m]"), 0.8, minimum=0.05),
-        tr("Standard deviation of the smoothing along the line."),
+        number("SMOOTHING_XY", tr("Smoothing in plan [m]"), 0.8, 0.05, LONGEST_SMOOTHING_M),
+        tr("Bends shorter than a few times this length are evened out: standard deviation of the smoothing."),
     )
 
 
@@ -131,20 +151,20 @@ def lines() -> Definitions:
     return (
         smoothing_xy(),
         advanced(
-            number("SMOOTHING_Z", tr("Smoothing in height [m]"), 3.0, minimum=0.05),
-            tr("Standard deviation of the smoothing of heights along the line."),
+            number("SMOOTHING_Z", tr("Smoothing in height [m]"), 3.0, 0.05, LONGEST_SMOOTHING_M),
+            tr("Dips shorter than a few times this length are evened out: standard deviation of the smoothing."),
         ),
         advanced(
-            number("TOLERANCE_XY", tr("Points count up to this far from the line [m]"), 0.10, minimum=0.005),
-            tr("Points further away in plan give the line no height."),
+            number("TOLERANCE_XY", tr("Tolerance in plan [m]"), 0.10, 0.005, WIDEST_REACH_M),
+            tr("Points up to this far beside the line give it its height, others none."),
         ),
         advanced(
-            number("TOLERANCE_Z", tr("Points count up to this far below the top [m]"), 0.03, minimum=0.001),
-            tr("Points further below the top of the rail give the line no height."),
+            number("TOLERANCE_Z", tr("Tolerance in height [m]"), 0.03, 0.001, WIDEST_REACH_M),
+            tr("Points up to this far below the top of the rail give the line its height, others none."),
         ),
         advanced(
-            number("CROWN_RADIUS", tr("Radius that finds the top [m]"), 20.0, minimum=1.0),
-            tr("The disc that is rolled along the height profile from above; smaller follows sharper dips."),
+            number("CROWN_RADIUS", tr("Crown radius of the rolling disc [m]"), 20.0, 1.0, FLATTEST_CROWN_M),
+            tr("A disc rolled along the heights from above finds the top of the rail. Smaller follows sharper dips."),
         ),
         max_gap(),
         advanced(
@@ -159,8 +179,8 @@ def lines() -> Definitions:
 def max_gap() -> QgsProcessingParameterDefinition:
     """Which gaps are closed."""
     return helped(
-        number("MAX_GAP", tr("Longest gap to close [m]"), 5.0),
-        tr("Line ends up to this far apart are joined if they point at each other."),
+        number("MAX_GAP", tr("Longest gap to close [m]"), 5.0, maximum=LONGEST_M),
+        tr("Line ends up to this far apart are joined if they point at each other. 0 leaves all gaps open."),
     )
 
 
@@ -168,11 +188,11 @@ def simplification() -> Definitions:
     """How many vertices lines keep."""
     return (
         advanced(
-            number("SIMPLIFY_XY", tr("Simplification in plan [m]"), 0.002),
+            number("SIMPLIFY_XY", tr("Simplification in plan [m]"), 0.002, maximum=COARSEST_M),
             tr("Vertices are left out as long as the line stays this close in plan."),
         ),
         advanced(
-            number("SIMPLIFY_Z", tr("Simplification in height [m]"), 0.002),
+            number("SIMPLIFY_Z", tr("Simplification in height [m]"), 0.002, maximum=COARSEST_M),
             tr("Vertices are left out as long as the line stays this close in height."),
         ),
     )
@@ -180,7 +200,9 @@ def simplification() -> Definitions:
 
 def min_length() -> QgsProcessingParameterDefinition:
     """Which lines are too short."""
-    return advanced(number("MIN_LENGTH", tr("Shortest line [m]"), 1.0), tr("Shorter lines are left out."))
+    return advanced(
+        number("MIN_LENGTH", tr("Shortest line [m]"), 1.0, maximum=LONGEST_M), tr("Shorter lines are left out.")
+    )
 
 
 def pairing() -> Definitions:
@@ -188,10 +210,10 @@ def pairing() -> Definitions:
     return (
         advanced(
             QgsProcessingParameterString("OTHER_GAUGES", tr("Other gauges [mm]"), optional=True),
-            tr("Gauges of further tracks in the same cloud, such as 1000;1067."),
+            tr("Gauges of further tracks in the same cloud, such as 1000;1067, for mixed traffic."),
         ),
         advanced(
-            number("CENTERLINE_TOLERANCE", tr("Tolerance of the gauge [m]"), 0.05, minimum=0.001),
+            number("CENTERLINE_TOLERANCE", tr("Centerline tolerance of the gauge [m]"), 0.05, 0.001, WIDEST_REACH_M),
             tr("Rails whose distance is off by more than this make no track."),
         ),
     )

@@ -7,6 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 RESOURCES = ROOT / "resources"
 MODEL = ROOT / "models" / "extract_rails.model3"
-ICON = RESOURCES / "icons" / "rail_extract.svg"
+ICONS = RESOURCES / "icons"
+ICON = ICONS / "rail_extract.svg"
 STYLES = RESOURCES / "styles"
 PICTURES = RESOURCES / "help"

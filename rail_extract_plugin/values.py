@@ -18,7 +18,7 @@ from qgis.core import (
 
 from ..core.errors import ParameterError, RailExtractError, RasterError
 from ..core.standards import CUSTOM, DEFAULT, RailStandard, distinct_gauges, resolve
-from .clouds import CloudSource, cloud_source
+from .clouds import CloudSource, check_lengths, cloud_source
 
 if TYPE_CHECKING:
     from ..core.pipeline import Parameters
@@ -45,6 +45,9 @@ NO_LINES = (
     QgsWkbTypes.GeometryType.NullGeometry,
 )
 """Of a layer that may hold anything the type is unknown."""
+
+LAST_CLASS = 255
+"""A point's class is one byte."""
 
 CHOICES = {"ENGINE": "engine", "DEVICE": "device"}
 
@@ -116,8 +119,10 @@ class Values:
         Raises
         ------
         RailExtractError
-            There is no such layer, or it is one of points, polygons or nothing.
+            There is no such layer, it is one of points, polygons or nothing, or it is in degrees.
         """
+        from .drawn_rails import check_system
+
         source = self._algorithm.parameterAsSource(self._parameters, name, self._context)
         if source is None:
             raise RailExtractError(f"{name} is no layer that can be read: give a layer of lines.")
@@ -126,6 +131,7 @@ class Values:
             raise RailExtractError(
                 f"{name} is a layer of the type {QgsWkbTypes.displayString(kind)}: give a layer of lines."
             )
+        check_system(source.sourceCrs())
         return source
 
     def cloud(self, name: str) -> CloudSource:
@@ -134,18 +140,38 @@ class Values:
         crs = self._algorithm.parameterAsCrs(self._parameters, "CRS", self._context)
         if self.filled("CRS") and not crs.isValid():
             raise ParameterError(f"CRS {self._parameters['CRS']} is no coordinate system: choose one from the list.")
-        return replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
+        if crs.isGeographic():
+            raise ParameterError(
+                f"CRS {crs.authid()} is in degrees, where lengths can't be measured: choose a projected one."
+            )
+        source = replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
+        check_lengths(source)
+        return source
 
     def extent(self, crs: QgsCoordinateReferenceSystem) -> tuple[float, float, float, float] | None:
-        """Read EXTENT in `crs`: smallest x, smallest y, largest x, largest y."""
+        """Read EXTENT in `crs`: smallest x, smallest y, largest x, largest y.
+
+        Raises
+        ------
+        ParameterError
+            It is a point or a line.
+        """
         extent = self._algorithm.parameterAsExtent(self._parameters, "EXTENT", self._context, crs)
-        if extent.isNull():
+        if not self.filled("EXTENT") or extent.isNull():
             return None
+        if extent.isEmpty():
+            raise ParameterError("EXTENT has no area: give a rectangle as xmin,xmax,ymin,ymax, or leave it empty.")
         return extent.xMinimum(), extent.yMinimum(), extent.xMaximum(), extent.yMaximum()
+
+    def engine(self) -> str:
+        """Read ENGINE, and check that it is installed and can run on DEVICE."""
+        from ..core.frpdf.engine import choose_engine
+
+        return choose_engine(self.choice("ENGINE"), self.choice("DEVICE"))
 
     def class_codes(self) -> tuple[int, ...]:
         """Read RAIL_CLASSES."""
-        return whole_numbers(self.text("RAIL_CLASSES"), "RAIL_CLASSES")
+        return class_numbers(self.text("RAIL_CLASSES"), "RAIL_CLASSES")
 
     def standard(self) -> RailStandard:
         """Read STANDARD, with GAUGE and HEAD_WIDTH in place of its own."""
@@ -177,17 +203,17 @@ class Values:
         return self._algorithm.parameterDefinition(name) is not None
 
 
-def whole_numbers(text: str, what: str) -> tuple[int, ...]:
-    """Numbers from a text such as "10,11"; `what` names the parameter in the error.
+def class_numbers(text: str, what: str) -> tuple[int, ...]:
+    """Classes from a text such as "10,11"; `what` names the parameter in the error.
 
     Raises
     ------
     ParameterError
-        The text is no list of whole numbers, or has none.
+        The text is no list of classes, or has none.
     """
     words = _words(text)
-    if not words or not all(word.isdecimal() for word in words):
-        raise ParameterError(f'{what} "{text}" should be whole numbers such as 10 or 10,11.')
+    if not words or not all(word.isdecimal() and int(word) <= LAST_CLASS for word in words):
+        raise ParameterError(f'{what} "{text}" should be whole numbers from 0 to {LAST_CLASS} such as 10 or 10,11.')
     return tuple(dict.fromkeys(int(word) for word in words))
 
 

@@ -100,20 +100,31 @@ def make_engine(arrays: dict[str, np.ndarray], engine: str = "AUTO", device: str
     ModelError
         The engine's package or device is not there, or the weights are not FRPDF's.
     """
+    if choose_engine(engine, device) == "TORCH":
+        from .torch_engine import TorchEngine
+
+        return TorchEngine(arrays, device)
+    from .opencv_engine import OpenCvEngine
+
+    return OpenCvEngine(arrays)
+
+
+def choose_engine(engine: str, device: str) -> str:
+    """Tell which engine AUTO means here, without importing it.
+
+    Raises
+    ------
+    ModelError
+        The engine's package is not there, or it can't use the device.
+    """
     if engine == "AUTO":
         engine = "TORCH" if find_spec("torch") else "OPENCV"
     module, package = _PACKAGES[engine]
     if not find_spec(module):
         raise ModelError(f"The engine {engine} needs the package {package}: install it, or set ENGINE to AUTO.")
-    if engine == "TORCH":
-        from .torch_engine import TorchEngine
-
-        return TorchEngine(arrays, device)
-    if device == "CUDA":
+    if engine == "OPENCV" and device == "CUDA":
         raise ModelError("The engine OPENCV computes on the processor alone: set DEVICE to AUTO, or ENGINE to TORCH.")
-    from .opencv_engine import OpenCvEngine
-
-    return OpenCvEngine(arrays)
+    return engine
 
 
 _PACKAGES = {"TORCH": ("torch", "torch"), "OPENCV": ("cv2", "opencv-python-headless")}

@@ -11,22 +11,40 @@ from qgis.core import (
     QgsProcessingContext,
     QgsProcessingException,
     QgsProcessingFeedback,
-    QgsProcessingParameterNumber,
     QgsProcessingParameterPointCloudLayer,
 )
 from qgis.PyQt.QtGui import QIcon
 
 from ...core.errors import Cancelled, RailExtractError
 from ...core.progress import Progress
+from ..contradictions import refuse_contradictions
 from ..dependencies import explain_missing, missing_packages
 from ..destinations import check_distinct, check_writable
 from ..feedback import QgisProgress
+from ..help_panel import help_panel
 from ..i18n import tr
-from ..paths import ICON, PICTURES
+from ..paths import ICONS, PICTURES
 from ..refusals import explain_refused
 from ..values import Values
 
 HOMEPAGE = "https://example.org/rail-extract"
+
+# What people search for, also in the languages of the larger railways; the search looks at the words as they stand.
+RAIL_WORDS = (
+    "rail",
+    "rails",
+    "railway",
+    "railroad",
+    "track",
+    "Gleis",
+    "Schiene",
+    "Bahn",
+    "voie ferrée",
+    "vía",
+    "binario",
+)
+CLOUD_WORDS = ("lidar", "las", "laz", "copc", "point cloud", "laser scanning", "Punktwolke", "nuage de points")
+TRACK_WORDS = ("gauge", "cant", "superelevation", "alignment", "Spurweite", "Gleisachse", "Überhöhung", "écartement")
 
 COMMAND_LINE = "qgis_process"
 """What QGIS calls the platform of its command line."""
@@ -78,7 +96,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
                 value = parameters.get(output.name())
                 supported, message = self.provider().isSupportedOutputValue(value, output, context)
                 if not supported:
-                    return False, message
+                    return False, f"{message}: choose another one, such as .{output.defaultFileExtension()}."
                 check_writable(value, context)
             outputs = self.destinationParameterDefinitions()
             check_distinct({output.name(): parameters.get(output.name()) for output in outputs}, context)
@@ -117,11 +135,8 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         return results
 
     def _read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Any:
-        """Read the parameters, each number before all else."""
-        values = Values(self, parameters, context)
-        for definition in self.parameterDefinitions():
-            if isinstance(definition, QgsProcessingParameterNumber):
-                values.optional_number(definition.name())
+        """Read the parameters, after a look at those that need no file."""
+        refuse_contradictions(self.parameterDefinitions(), Values(self, parameters, context))
         return self.read(parameters, context)
 
     def _refusal(self, parameters: dict[str, Any], context: QgsProcessingContext) -> str | None:
@@ -184,14 +199,11 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         return tr(self.SUMMARY)
 
     def shortHelpString(self) -> str:
-        """Give the text beside the dialog."""
-        return "\n\n".join(filter(None, (tr(self.SUMMARY), self._picture(), tr(self.HELP))))
-
-    def _picture(self) -> str:
-        """Show `PICTURE`, if there is one, but not as text on a command line."""
-        if not self.PICTURE or QgsApplication.platform() == COMMAND_LINE:
-            return ""
-        return f'<img src="{(PICTURES / self.PICTURE).as_uri()}">'
+        """Give the text beside the dialog; plain where a command line prints it, which lists the fields itself."""
+        summary, text = tr(self.SUMMARY), tr(self.HELP)
+        if QgsApplication.platform() == COMMAND_LINE:
+            return f"{summary}\n\n{text}"
+        return help_panel(summary, PICTURES / self.PICTURE if self.PICTURE else None, text, self.parameterDefinitions())
 
     def helpUrl(self) -> str:
         """Give the address of the guide."""
@@ -199,8 +211,8 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     def icon(self) -> QIcon:
         """Give the icon shown in the toolbox."""
-        return QIcon(str(ICON))
+        return QIcon(self.svgIconPath())
 
     def svgIconPath(self) -> str:
         """Give the same icon for places that draw it themselves."""
-        return str(ICON)
+        return str(ICONS / f"{self.NAME}.svg")

@@ -15,7 +15,7 @@ from .. import inputs, outputs
 from .. import parameters as groups
 from ..layers import CENTERLINES, figures_of, write_lines
 from ..values import Values
-from .base import RailAlgorithm
+from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
 READING = 0.1
 """Share of the progress bar for reading the lines."""
@@ -34,7 +34,7 @@ class BuildTrackCenterlines(RailAlgorithm):
 
     NAME = "buildtrackcenterlines"
     LABEL = "Build track centerlines"
-    TAGS = ("railway", "rail", "track", "centerline", "axis", "gauge", "cant")
+    TAGS = (*RAIL_WORDS, *TRACK_WORDS, "centerline", "centreline", "axis")
     NEEDS = (("numpy",), ("scipy",), ("pyproj",))
     SUMMARY = "Pairs rails that lie a gauge apart and draws the line midway between the two rails of each track."
     PICTURE = "gauge.svg"

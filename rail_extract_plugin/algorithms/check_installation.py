@@ -28,7 +28,7 @@ class CheckInstallation(RailAlgorithm):
     LABEL = "Check installation"
     GROUP = "Setup"
     GROUP_ID = "setup"
-    TAGS = ("version", "versions", "test", "diagnose", "support", "gpu", "cuda", "engine")
+    TAGS = ("rail", "setup", "version", "versions", "test", "diagnose", "support", "gpu", "cuda", "engine")
     SUMMARY = "Tells which versions, engine and models are there, and tests them on a short track."
     HELP = (
         "Takes less than a minute. It extracts a straight track of 20 m, made on the spot, and compares it with the "

@@ -23,7 +23,7 @@ from ..clouds import CloudSource, spool_points
 from ..layers import CENTERLINES, RAILS, figures_of, figures_of_stations, write_lines, write_raster, write_stations
 from ..reports import Origin, write_report
 from ..values import Values
-from .base import RailAlgorithm
+from .base import CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
     from ...core.rails import RailNetwork
@@ -48,7 +48,7 @@ class ExtractRails(RailAlgorithm):
 
     NAME = "extractrails"
     LABEL = "Extract rails"
-    TAGS = ("lidar", "las", "laz", "point cloud", "railway", "rail", "track", "centerline", "vectorize")
+    TAGS = (*RAIL_WORDS, *CLOUD_WORDS, *TRACK_WORDS, "centerline", "centreline", "axis", "vectorize", "line", "3d")
     NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",), ("cv2", "torch"))
     SUMMARY = "Turns lidar points classified as rail into the 3D lines of the railheads and of the track centerlines."
     PICTURE = "gauge.svg"

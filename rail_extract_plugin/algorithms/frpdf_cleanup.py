@@ -15,7 +15,7 @@ from .. import parameters as groups
 from ..i18n import tr
 from ..layers import write_raster
 from ..values import Values
-from .base import RailAlgorithm
+from .base import RAIL_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
     from ..rasters import RasterHeader
@@ -38,7 +38,8 @@ class FrpdfCleanup(RailAlgorithm):
 
     NAME = "frpdfcleanup"
     LABEL = "FRPDF cleanup"
-    TAGS = ("railway", "rail", "raster", "neural network", "deep learning", "clean", "repair", "gaps")
+    TAGS = (*RAIL_WORDS, "raster", "neural network", "deep learning", "clean", "repair", "gaps", "noise")
+    PICTURE = "raster.svg"
     NEEDS = (("numpy",), ("pyproj",), ("cv2", "torch"))
     SUMMARY = "Closes gaps in a rail raster and removes what is no rail, with the neural network FRPDF."
     HELP = (

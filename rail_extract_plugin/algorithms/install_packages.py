@@ -39,7 +39,7 @@ class InstallPackages(RailAlgorithm):
     LABEL = "Install packages"
     GROUP = "Setup"
     GROUP_ID = "setup"
-    TAGS = ("python", "pip", "dependencies", "laspy", "opencv", "torch", "pytorch")
+    TAGS = ("rail", "setup", "install", "python", "pip", "dependencies", "laspy", "opencv", "torch", "pytorch")
     SUMMARY = "Installs the Python packages that Rail Extract needs and this QGIS does not have."
     HELP = (
         "They go into a folder of your QGIS profile, fitted to the numpy and scipy that QGIS came with; nothing that "

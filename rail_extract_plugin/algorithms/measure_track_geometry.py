@@ -15,7 +15,7 @@ from .. import parameters as groups
 from ..clouds import CloudSource
 from ..layers import figures_of_stations, write_stations
 from ..values import Values
-from .base import RailAlgorithm
+from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
 READING, MEASURING = 0.3, 0.9
 """Shares of the progress bar at which lines and cloud are read, and at which the rails are measured."""
@@ -34,29 +34,22 @@ class MeasureTrackGeometry(RailAlgorithm):
 
     NAME = "measuretrackgeometry"
     LABEL = "Measure track geometry"
-    TAGS = (
-        "railway",
-        "track",
-        "gauge",
-        "cant",
-        "superelevation",
-        "twist",
-        "radius",
-        "curvature",
-        "gradient",
-        "quality",
-    )
+    TAGS = (*RAIL_WORDS, *TRACK_WORDS, "twist", "radius", "curvature", "gradient", "quality", "chainage")
     NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
     SUMMARY = "Measures gauge, cant, twist, radius and gradient along tracks, and how well the points support them."
     PICTURE = "gauge.svg"
     HELP = (
         "Takes the lines of Extract Rails, or lines drawn by hand, and gives points along each centerline.\n\n"
-        "chainage_m: distance from the start of the line, in plan. gauge_mm: distance in space between the rail lines "
-        "less the railhead width; it is not measured 14 mm below the top. cant_mm: left rail minus right rail, seen "
-        "along the line. twist_mm: change of cant over 3 m, ahead minus behind. radius_m: on a chord of 20 m, positive "
-        "in curves to the left, empty above 10 km. grade_pm: rise in per mille over 10 m. sigma_mm: standard error of "
-        "the centerline across. points: those on both rails that are nearest. bridged: 1 where a rail has no points or "
-        "is not there.\n\n"
+        "chainage_m: distance from the start of the line, in plan.\n"
+        "gauge_mm: distance in space between the rail lines less the railhead width; not measured 14 mm below the "
+        "top.\n"
+        "cant_mm: left rail minus right rail, seen along the line.\n"
+        "twist_mm: change of cant over 3 m, ahead minus behind.\n"
+        "radius_m: on a chord of 20 m, positive in curves to the left, empty above 10 km.\n"
+        "grade_pm: rise in per mille over 10 m.\n"
+        "sigma_mm: standard error of the centerline across.\n"
+        "points: those on both rails that are nearest.\n"
+        "bridged: 1 where a rail has no points or is not there.\n\n"
         "With POINTS, heights are measured anew and smoothed over 1 m only, and sigma_mm, points and bridged are those "
         "of the place. Without, heights are those of the rails, each rail's sigma_mm and points are taken as even "
         "along it, and bridged is 1 only where a rail is not there."

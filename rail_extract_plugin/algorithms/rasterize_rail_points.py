@@ -16,7 +16,7 @@ from ..clouds import CloudSource, read_points
 from ..i18n import tr
 from ..layers import write_raster
 from ..values import Values
-from .base import RailAlgorithm
+from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
 
 READING = 0.8
 """Share of the progress bar for reading the cloud."""
@@ -36,7 +36,8 @@ class RasterizeRailPoints(RailAlgorithm):
 
     NAME = "rasterizerailpoints"
     LABEL = "Rasterize rail points"
-    TAGS = ("lidar", "las", "laz", "point cloud", "railway", "rail", "raster")
+    TAGS = (*RAIL_WORDS, *CLOUD_WORDS, "raster", "cells", "image")
+    PICTURE = "raster.svg"
     NEEDS = (("numpy",), ("laspy",), ("lazrs",), ("pyproj",))
     SUMMARY = "Marks the cells of a raster in which lidar points classified as rail lie."
     HELP = (

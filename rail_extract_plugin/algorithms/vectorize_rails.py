@@ -17,7 +17,7 @@ from .. import parameters as groups
 from ..clouds import CloudSource
 from ..layers import RAILS, figures_of, write_lines
 from ..values import Values
-from .base import RailAlgorithm
+from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
     from ..rasters import RasterHeader
@@ -41,7 +41,8 @@ class VectorizeRails(RailAlgorithm):
 
     NAME = "vectorizerails"
     LABEL = "Vectorize rails"
-    TAGS = ("lidar", "point cloud", "railway", "rail", "raster", "vectorize", "line")
+    TAGS = (*RAIL_WORDS, *CLOUD_WORDS, "raster", "vectorize", "line", "3d")
+    PICTURE = "gauge.svg"
     NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
     SUMMARY = "Turns a rail raster into the lines of the railheads, and points give them their exact place and height."
     HELP = (

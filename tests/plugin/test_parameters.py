@@ -2,7 +2,7 @@ import pytest
 from qgis.core import QgsProcessingParameterDefinition
 from rail_extract.core.errors import ParameterError
 from rail_extract.core.standards import STANDARDS
-from rail_extract.rail_extract_plugin.values import gauges_m, whole_numbers
+from rail_extract.rail_extract_plugin.values import class_numbers, gauges_m
 
 PARAMETERS = [
     ("INPUT", "pointcloud", None),
@@ -101,14 +101,14 @@ def test_labels_of_quantities_state_their_unit(algorithm):
 
 
 @pytest.mark.parametrize(("text", "numbers"), [("10", (10,)), ("10,11", (10, 11)), (" 11; 10 11", (11, 10))])
-def test_whole_numbers(text, numbers):
-    assert whole_numbers(text, "RAIL_CLASSES") == numbers
+def test_class_numbers(text, numbers):
+    assert class_numbers(text, "RAIL_CLASSES") == numbers
 
 
-@pytest.mark.parametrize("text", ["", " ", "ten", "1.5", "-1", "10-12"])
-def test_whole_numbers_refuses(text):
+@pytest.mark.parametrize("text", ["", " ", "ten", "1.5", "-1", "10-12", "256"])
+def test_class_numbers_refuses(text):
     with pytest.raises(ParameterError, match="RAIL_CLASSES"):
-        whole_numbers(text, "RAIL_CLASSES")
+        class_numbers(text, "RAIL_CLASSES")
 
 
 @pytest.mark.parametrize(
