@@ -36,9 +36,9 @@ def check_writable(value: Any, context: QgsProcessingContext) -> None:
     path = _output_file(value, context)
     if path is None:
         return
-    if path.is_dir():
-        raise RailExtractError(f"The output {path} is a folder: give the name of a file in it.")
     try:
+        if path.is_dir():
+            raise RailExtractError(f"The output {path} is a folder: give the name of a file in it.")
         if path.exists():
             path.open("r+b").close()
         else:
@@ -75,10 +75,16 @@ def _text(value: Any, context: QgsProcessingContext) -> str:
     return value or ""
 
 
+def plain_file(value: Any, context: QgsProcessingContext) -> Path | None:
+    """File that a destination names by its path; None for memory layers, databases and tables of a file."""
+    text = _text(value, context)
+    is_file = text and text != QgsProcessing.TEMPORARY_OUTPUT and not re.match(r"\w{2,}:", text)
+    return Path(text) if is_file else None
+
+
 def _output_file(value: Any, context: QgsProcessingContext) -> Path | None:
     """File behind a destination; None for memory layers and databases."""
     text = _text(value, context)
     if text.startswith("ogr:"):
         text = QgsDataSourceUri(text[len("ogr:") :]).database()
-    is_file = text and text != QgsProcessing.TEMPORARY_OUTPUT and not re.match(r"\w{2,}:", text)
-    return Path(text) if is_file else None
+    return plain_file(text, context)

@@ -26,6 +26,7 @@ from ..core.errors import RailExtractError
 from ..core.progress import SILENT, Progress
 from .compat import INTEGER, REAL, TEXT, field
 from .styling import style_on_load
+from .whole_files import write_whole
 
 if TYPE_CHECKING:
     from ..core.points import LocalFrame
@@ -120,17 +121,20 @@ def is_flat(lines: Sequence[RailLine | Centerline | TrackGeometry]) -> bool:
     return bool(lines) and all(any(map(math.isnan, line.xyz[:, 2])) for line in lines)
 
 
-def add_features(sink: QgsFeatureSink, made: Iterator[QgsFeature]) -> None:
-    """Write features into a sink.
+def add_features(sink: QgsFeatureSink, made: Iterator[QgsFeature]) -> int:
+    """Write features into a sink, and count them.
 
     Raises
     ------
     RailExtractError
         The output does not take one, as on a full disk.
     """
+    count = 0
     for feature in made:
         if not sink.addFeature(feature, QgsFeatureSink.Flag.FastInsert):
             raise RailExtractError(f"The output can't be written ({sink.lastError()}): check the disk's free space.")
+        count += 1
+    return count
 
 
 def write_lines(
@@ -221,12 +225,15 @@ def _write(
     context: QgsProcessingContext,
 ) -> dict[str, str]:
     """Write features into the output called `name`, if the user wants it."""
-    sink, layer_id = algorithm.parameterAsSink(
-        parameters, name, context, fields(kind.columns), shape, output_crs(frame.crs_wkt)
-    )
-    if sink is None:
+    columns, crs = fields(kind.columns), output_crs(frame.crs_wkt)
+
+    def write(value: Any) -> tuple[str, int]:
+        sink, layer_id = algorithm.parameterAsSink({**parameters, name: value}, name, context, columns, shape, crs)
+        return (layer_id, add_features(sink, made)) if sink else ("", 0)
+
+    layer_id = write_whole(parameters.get(name), context, write)
+    if not layer_id:
         return {}
-    add_features(sink, made)
     style_on_load(layer_id, kind.style, context)
     return {name: layer_id}
 

@@ -12,16 +12,15 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "faults.md"
 
-REFUSED = "is refused before the run"
-FAILED = "ends the run"
+REFUSED = "is refused"
 WARNED = "goes on with a warning"
 FINE = "gives the right result"
 
 INTRODUCTION = """# What goes wrong, and what Rail Extract says
 
-Each row is a test: the fault is made, the algorithm is run in QGIS, and it must end as the row says. A run that ends
-early says so in the one sentence shown, raises no traceback, and leaves neither an output nor a temporary file; an
-output that was there before stays as it was. In the sentences, … stands for what changes from case to case.
+Each row is a test: the fault is made, the algorithm is run in QGIS, and it must end as the row says. What is refused,
+in the dialog or in the run, is refused in the one sentence shown, without a traceback, and leaves neither an output nor
+a temporary file. In the sentences, … stands for what changes from case to case.
 
 `.venv/bin/python tools/faults.py` writes this page from the tables in `tests/plugin/test_faults_*.py`, and a test
 compares the two.
@@ -38,7 +37,7 @@ class Fault:
     prepare : callable
         Makes the fault, given a bench (fixture of the tests), and gives the parameters of the run.
     ends : str
-        `REFUSED`, `FAILED`, `WARNED` or `FINE`.
+        `REFUSED`, `WARNED` or `FINE`.
     says : str
         The whole sentence; … stands for anything. Empty where nothing is said.
     gives : dict

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from faults import FAILED, WARNED, Fault
+from faults import REFUSED, WARNED, Fault
 
 TITLE = "Points and coordinate systems"
 
@@ -87,7 +87,7 @@ POINTS = [
     Fault(
         "rails of another gauge",
         of(lambda points: points + np.where(points[:, 1:2] > 3_000_000, [0, 0.1, 0], 0)),
-        FAILED,
+        REFUSED,
         "No track of 1435 mm gauge found: rails lie 1608 mm apart, is the gauge 1520 mm?",
     ),
     Fault(
@@ -146,28 +146,27 @@ SYSTEMS = [
     Fault(
         "degrees",
         in_system(4326, (1e-5, 1e-5, 1), (75, 27, 100)),
-        FAILED,
+        REFUSED,
         "cloud.las is in degrees (WGS 84), where lengths can't be measured: reproject it, for example to UTM "
         "zone 43N (EPSG:32643).",
     ),
     Fault(
         "degrees beyond the earth",
         in_system(4326, 1, (500_000, 3_000_000, 100)),
-        FAILED,
+        REFUSED,
         "cloud.las is in degrees (WGS 84), where lengths can't be measured: reproject it, for example to the "
         "UTM zone of the place.",
     ),
     Fault(
         "degrees given for a cloud without a system",
         in_system(None, 1, HERE, CRS="EPSG:4326"),
-        FAILED,
-        "cloud.las is in degrees (WGS 84), where lengths can't be measured: reproject it, for example to the "
-        "UTM zone of the place.",
+        REFUSED,
+        "CRS EPSG:4326 is in degrees, where lengths can't be measured: choose a projected one.",
     ),
     Fault(
         "coordinates from the earth's centre",
         in_system(4978, 1, (5e6, 3e6, 2e6)),
-        FAILED,
+        REFUSED,
         "Lengths can't be computed in WGS 84: project the cloud first.",
     ),
     Fault("US survey feet", in_system(2263, FEET, (980_000, 200_000, 300))),
@@ -175,14 +174,14 @@ SYSTEMS = [
     Fault(
         "tiles in different zones",
         tiles(32643, 32644),
-        FAILED,
+        REFUSED,
         "tile0.las is in WGS 84 / UTM zone 43N but tile1.las is in WGS 84 / UTM zone 44N: bring all tiles "
         "into one coordinate system first.",
     ),
     Fault(
         "one tile without a system",
         tiles(32643, None),
-        FAILED,
+        REFUSED,
         "tile0.las is in WGS 84 / UTM zone 43N but tile1.las is in no coordinate system: bring all tiles "
         "into one coordinate system first.",
     ),

@@ -7,7 +7,7 @@ import struct
 import laspy
 import numpy as np
 import pytest
-from faults import FAILED, FINE, REFUSED, Fault
+from faults import FINE, REFUSED, Fault
 from osgeo import gdal
 from rail_extract.rail_extract_plugin import dependencies
 
@@ -137,23 +137,23 @@ NAN, INFINITE = struct.pack("<d", np.nan), struct.pack("<d", np.inf)
 ITEM = {"assets": {"data": {"href": "gone.laz"}}}
 
 FAULTS = [
-    Fault("empty file", holding(b""), FAILED, "cloud.las is empty (0 bytes): copy or export it again."),
+    Fault("empty file", holding(b""), REFUSED, "cloud.las is empty (0 bytes): copy or export it again."),
     Fault(
         "text file called .las",
         holding(b"x,y,z\n1,2,3\n"),
-        FAILED,
+        REFUSED,
         "cloud.las is no LAS or LAZ file, which begins with LASF: export the cloud as one.",
     ),
     Fault(
         "PDF called .las (wrong magic)",
         holding(b"%PDF-1.4 " * 100),
-        FAILED,
+        REFUSED,
         "cloud.las is no LAS or LAZ file, which begins with LASF: export the cloud as one.",
     ),
     Fault(
         "folder called .las",
         lambda bench: (bench.folder / "a.las").mkdir() or {"INPUT": bench.folder / "a.las"},
-        FAILED,
+        REFUSED,
         "The folder …/a.las holds no .las or .laz file: choose another one.",
     ),
     Fault(
@@ -171,13 +171,13 @@ FAULTS = [
     Fault(
         "folder without clouds",
         folder_without_clouds,
-        FAILED,
+        REFUSED,
         "The folder …/tiles holds no .las or .laz file: choose another one.",
     ),
     Fault(
         "folder with one bad tile",
         one_bad_tile,
-        FAILED,
+        REFUSED,
         "bad.las is cut off: it has room for 3596 of the 3600 points that its header announces; copy or "
         "export it again.",
     ),
@@ -202,151 +202,151 @@ FAULTS = [
     Fault(
         "cut in the header",
         damaged(cut(200)),
-        FAILED,
+        REFUSED,
         "cloud.las is cut off within its header: copy or export it again.",
     ),
     Fault(
         "cut in the records",
         damaged(among_records),
-        FAILED,
+        REFUSED,
         "cloud.las is cut off before its first point: copy or export it again.",
     ),
     Fault(
         "cut before the points",
         damaged(at_points),
-        FAILED,
+        REFUSED,
         "cloud.las is cut off: it has room for 0 of the 3600 points that its header announces; copy or "
         "export it again.",
     ),
     Fault(
         "cut in the points",
         damaged(cut(-1000)),
-        FAILED,
+        REFUSED,
         "cloud.las is cut off: it has room for 3566 of the 3600 points that its header announces; copy or "
         "export it again.",
     ),
     Fault(
         "cut in the records behind the points",
         damaged(with_late_record_cut),
-        FAILED,
+        REFUSED,
         "cloud.las is cut off: the records behind its points are missing; copy or export it again.",
     ),
     Fault(
         "LAZ cut in the header",
         damaged(cut(200), "cloud.laz"),
-        FAILED,
+        REFUSED,
         "cloud.laz is cut off within its header: copy or export it again.",
     ),
     Fault(
         "LAZ cut before the points",
         damaged(at_points, "cloud.laz"),
-        FAILED,
+        REFUSED,
         "cloud.laz is cut off or damaged (unpack requires a buffer of 8 bytes): copy or export it again.",
     ),
     Fault(
         "LAZ cut in the chunks",
         damaged(in_chunks, "cloud.laz"),
-        FAILED,
+        REFUSED,
         "cloud.laz is cut off: its table of chunks is missing; copy or export it again.",
     ),
     Fault(
         "LAZ cut in the table of chunks",
         damaged(in_chunk_table, "cloud.laz"),
-        FAILED,
+        REFUSED,
         "cloud.laz is cut off: its table of chunks is missing; copy or export it again.",
     ),
     Fault(
         "zero points",
         damaged(overwritten(COUNT_AT, bytes(8))),
-        FAILED,
+        REFUSED,
         "cloud.las holds no points: leave it out, or export it again.",
     ),
     Fault(
         "absurd number of points",
         damaged(overwritten(COUNT_AT, b"\xff" * 6)),
-        FAILED,
+        REFUSED,
         "cloud.las is cut off: it has room for 3600 of the 281474976710655 points that its header announces; "
         "copy or export it again.",
     ),
     Fault(
         "LAZ with an absurd number of points",
         damaged(overwritten(COUNT_AT, b"\xff" * 6), "cloud.laz"),
-        FAILED,
+        REFUSED,
         "cloud.laz is damaged: its compressed chunks don't fit the file; export it again.",
     ),
     Fault(
         "absurd number of records",
         damaged(overwritten(RECORDS_AT, b"\xff" * 4)),
-        FAILED,
+        REFUSED,
         "cloud.las has a damaged header (375 bytes and 4294967295 records announced before the points): "
         "export it again.",
     ),
     Fault(
         "points said to lie beyond the end",
         damaged(overwritten(96, b"\xff\xff\xff\x7f")),
-        FAILED,
+        REFUSED,
         "cloud.las is cut off before its first point: copy or export it again.",
     ),
     Fault(
         "points said to lie in the header",
         damaged(overwritten(96, struct.pack("<I", 10))),
-        FAILED,
+        REFUSED,
         "cloud.las has a damaged header (375 bytes and 1 records announced before the points): export it again.",
     ),
     Fault(
         "header said to be too short",
         damaged(overwritten(94, struct.pack("<H", 0))),
-        FAILED,
+        REFUSED,
         "cloud.las is cut off or damaged (Incoherent header size): copy or export it again.",
     ),
     Fault(
         "header said to be longer than the file",
         damaged(overwritten(94, b"\xff\xff")),
-        FAILED,
+        REFUSED,
         "cloud.las has a damaged header (65535 bytes and 1 records announced before the points): export it again.",
     ),
     Fault("record said to reach into the points", damaged(overwritten(HEADER + 20, b"\xff\xff"))),
     Fault(
         "point said to have no bytes",
         damaged(overwritten(105, bytes(2))),
-        FAILED,
+        REFUSED,
         "cloud.las is cut off or damaged (Incoherent point size, header says 0 point_format created says "
         "30): copy or export it again.",
     ),
     Fault(
         "unknown point format",
         damaged(overwritten(104, b"\x3f")),
-        FAILED,
+        REFUSED,
         "cloud.las has a damaged header (point format 63): export it with a format from 0 to 10.",
     ),
     Fault(
         "unknown version",
         damaged(overwritten(24, b"\x03\x07")),
-        FAILED,
+        REFUSED,
         "cloud.las is LAS 3.7: export it as LAS 1.2 to 1.4.",
     ),
     Fault(
         "scale that is not a number: NaN coordinates",
         damaged(overwritten(SCALE_AT, NAN)),
-        FAILED,
+        REFUSED,
         "cloud.las has a damaged header (coordinate scale or offset): export it again.",
     ),
     Fault(
         "scale of zero",
         damaged(overwritten(SCALE_AT, bytes(8))),
-        FAILED,
+        REFUSED,
         "cloud.las has a damaged header (coordinate scale or offset): export it again.",
     ),
     Fault(
         "infinite offset",
         damaged(overwritten(OFFSET_AT, INFINITE)),
-        FAILED,
+        REFUSED,
         "cloud.las has a damaged header (coordinate scale or offset): export it again.",
     ),
     Fault(
         "offset of 1e300",
         damaged(overwritten(OFFSET_AT, struct.pack("<d", 1e300))),
-        FAILED,
+        REFUSED,
         "cloud.las has a damaged header (coordinate scale or offset): export it again.",
     ),
     Fault("bounds in the header that are no numbers", damaged(overwritten(179, NAN * 6))),

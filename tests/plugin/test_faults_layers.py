@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from faults import FAILED, FINE, REFUSED, WARNED, Fault
+from faults import FINE, REFUSED, WARNED, Fault
 from osgeo import gdal, osr
 from qgis.core import QgsFeature, QgsGeometry, QgsLineString, QgsPoint, QgsVectorLayer
 
@@ -153,7 +153,7 @@ RASTERS = [
     Fault(
         "GeoTIFF cut in its cells",
         of_raster(lambda data: data[:4000]),
-        FAILED,
+        REFUSED,
         "rail.tif is damaged at row 0, column 0: make it again.",
     ),
     Fault(
@@ -245,7 +245,7 @@ RASTERS = [
     Fault(
         "empty raster",
         of_raster(cells=np.zeros((1, 90, 200), np.uint8)),
-        FAILED,
+        REFUSED,
         "rail.tif holds no rail cell: give a raster with 1 where there is rail.",
     ),
     Fault(
@@ -300,7 +300,7 @@ LINES = [
         REFUSED,
         "INPUT can't be …/gone.gpkg: give a vector layer, or a vector file that can be read.",
     ),
-    Fault("layer without lines", lines(), FAILED, "INPUT holds no line: give a layer of lines."),
+    Fault("layer without lines", lines(), REFUSED, "INPUT holds no line: give a layer of lines."),
     Fault("table without shapes", table, REFUSED, "INPUT is a layer of the type NoGeometry: give a layer of lines."),
     Fault(
         "points instead of lines",
@@ -315,11 +315,11 @@ LINES = [
         "INPUT is a layer of the type Polygon: give a layer of lines.",
     ),
     Fault("empty and missing shapes among lines", lines(LEFT, "LINESTRING Z EMPTY", "", RIGHT), gives=ONE_TRACK),
-    Fault("only empty shapes", lines("LINESTRING Z EMPTY", ""), FAILED, "INPUT holds no line: give a layer of lines."),
+    Fault("only empty shapes", lines("LINESTRING Z EMPTY", ""), REFUSED, "INPUT holds no line: give a layer of lines."),
     Fault(
         "lines of one place",
         lines("LINESTRING Z (500000 3000000 1, 500000 3000000 1)"),
-        FAILED,
+        REFUSED,
         "INPUT holds no line: give a layer of lines.",
     ),
     Fault(
@@ -345,13 +345,13 @@ LINES = [
     Fault(
         "place that is no number",
         lines(line((500000, 3000001.507, 100), (500003, NAN, 100), (500006, 3000001.507, 100)), RIGHT),
-        FAILED,
+        REFUSED,
         "INPUT has a line (feature 1) with a place that is no number: repair or delete it.",
     ),
     Fault(
         "infinite place",
         lines(line((500000, 3000001.507, 100), (INFINITE, 3000001.507, 100)), RIGHT),
-        FAILED,
+        REFUSED,
         "INPUT has a line (feature 1) with a place that is no number: repair or delete it.",
     ),
     Fault(
@@ -387,7 +387,7 @@ LINES = [
     Fault(
         "rails of another gauge",
         lines(LEFT.replace("1.507", "1.072"), RIGHT),
-        FAILED,
+        REFUSED,
         "No track of 1435 mm gauge found: rails lie 1072 mm apart, is the gauge 1000 mm?",
     ),
     Fault(
@@ -417,7 +417,7 @@ LINES = [
     Fault(
         "lines in degrees",
         lines("LINESTRING Z (75 27 0, 75.1 27 0)", crs="EPSG:4326"),
-        FAILED,
+        REFUSED,
         "The lines are in degrees (WGS 84), where lengths can't be measured: reproject them, for example to "
         "the UTM zone of the place.",
     ),

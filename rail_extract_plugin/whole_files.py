@@ -1,0 +1,90 @@
+"""Vector files that take their name when they are whole: what was there before stays until then."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import Any
+
+from qgis.core import (
+    QgsProcessingContext,
+    QgsProcessingOutputLayerDefinition,
+    QgsProperty,
+    QgsVectorLayer,
+)
+
+from ..core.errors import RailExtractError
+from .destinations import plain_file
+
+PREFIX = "rail_extract_"
+
+
+def write_whole(value: Any, context: QgsProcessingContext, write: Callable[[Any], tuple[str, int]]) -> str:
+    """Write a layer in a folder beside its destination, and move its files there when they are complete.
+
+    Memory layers and tables in databases and existing files are written where they belong.
+
+    Parameters
+    ----------
+    value : str, QgsProperty, QgsProcessingOutputLayerDefinition or None
+        Value of the destination parameter.
+    context : QgsProcessingContext
+    write : callable
+        Writes to such a value, and gives the layer's id and the number of its features, or an empty id.
+
+    Returns
+    -------
+    str
+        The layer's id, empty where the user skipped the output.
+
+    Raises
+    ------
+    RailExtractError
+        The files can't be written, or not completely.
+    """
+    path = plain_file(value, context)
+    if path is None:
+        return write(value)[0]
+    folder = None
+    try:
+        folder = Path(mkdtemp(prefix=PREFIX, dir=path.absolute().parent))
+        layer_id, count = write(_redirected(value, folder / path.name))
+        _check_count(layer_id, count)
+        for file in folder.iterdir():
+            file.replace(path.with_name(file.name))
+    except OSError as error:
+        raise RailExtractError(
+            f"The output {path} can't be written ({error.strerror}): close what uses it, or choose another place."
+        ) from error
+    finally:
+        if folder:
+            shutil.rmtree(folder, ignore_errors=True)
+    return _renamed(layer_id, str(path) + layer_id.rsplit(path.name, 1)[1], context)
+
+
+def _redirected(value: Any, path: Path) -> Any:
+    """Give the same value for another file."""
+    if not isinstance(value, QgsProcessingOutputLayerDefinition):
+        return str(path)
+    other = QgsProcessingOutputLayerDefinition(value)
+    other.sink = QgsProperty.fromValue(str(path))
+    return other
+
+
+def _check_count(layer_id: str, count: int) -> None:
+    """Refuse a file that holds fewer features than were written: GDAL does not tell what fails on closing."""
+    layer = QgsVectorLayer(layer_id, "written", "ogr")
+    found = layer.featureCount() if layer.isValid() else 0
+    if 0 <= found < count:
+        raise RailExtractError(
+            f"The output can't be written ({found} of {count} features arrived): check the disk's free space."
+        )
+
+
+def _renamed(layer_id: str, other_id: str, context: QgsProcessingContext) -> str:
+    """Have QGIS load the layer from where it is now."""
+    waiting = context.layersToLoadOnCompletion()
+    context.setLayersToLoadOnCompletion({other_id if key == layer_id else key: waiting[key] for key in waiting})
+    return other_id

@@ -1,0 +1,327 @@
+"""What can go wrong around a run: packages, weights, disks, other programs, and the user who cancels."""
+
+import shutil
+
+import faults
+import numpy as np
+import pytest
+from faults import REFUSED, Fault
+from qgis.core import QgsCoordinateTransformContext, QgsFeature, QgsGeometry, QgsVectorFileWriter, QgsVectorLayer
+from rail_extract.core import pipeline
+from rail_extract.core.frpdf import engine, zoo
+from rail_extract.rail_extract_plugin import dependencies
+
+resource = pytest.importorskip("resource", reason="only Unix limits the size of files")
+
+TITLE = "Environment"
+
+MEASURE = "measuretrackgeometry"
+TRACK = {"RAIL_COUNT": 2, "CENTERLINE_COUNT": 1}
+
+
+def cloud(bench):
+    return {"INPUT": bench.cloud(bench.track(length_m=6.0)), "ITERATIONS": 1}
+
+
+def without(*modules):
+    """A Python that lacks packages."""
+
+    def prepare(bench):
+        find_spec = dependencies.find_spec
+        for module in (dependencies, engine):
+            bench.patch.setattr(module, "find_spec", lambda name: None if name in modules else find_spec(name))
+        return cloud(bench)
+
+    return prepare
+
+
+def without_engine(bench):
+    return {**without("torch")(bench), "ENGINE": "TORCH"}
+
+
+def with_weights(change):
+    """A plugin whose weights are not as they were shipped."""
+
+    def prepare(bench):
+        shutil.copytree(zoo.FOLDER, bench.folder / "models")
+        bench.patch.setattr(zoo, "FOLDER", bench.folder / "models")
+        change(zoo.MODELS[0].path)
+        return cloud(bench)
+
+    return prepare
+
+
+def halve(path):
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def put_others(path):
+    np.savez(path, other=np.zeros(3))
+
+
+def put_code(path):
+    """Weights that would run a program when unpickled."""
+    np.savez(path, other=np.array([print], dtype=object))
+
+
+def output(make):
+    """An output where it can't be."""
+    return lambda bench: {**cloud(bench), "RAILS": make(bench.folder)}
+
+
+def below_a_file(folder):
+    (folder / "file").write_text("no folder")
+    return folder / "file" / "rails.gpkg"
+
+
+def a_folder(folder):
+    (folder / "rails.gpkg").mkdir()
+    return folder / "rails.gpkg"
+
+
+def cancelled(percent):
+    """The user cancels at this progress."""
+
+    def prepare(bench):
+        bench.feedback.progressChanged.connect(lambda done: bench.feedback.cancel() if done >= percent else None)
+        return cloud(bench)
+
+    return prepare
+
+
+def removed_on_the_way(bench):
+    """Somebody removes the folder of the outputs while the run goes on."""
+    bench.feedback.progressChanged.connect(lambda done: shutil.rmtree(bench.folder / "gone", ignore_errors=True))
+    (bench.folder / "gone").mkdir()
+    skipped = dict.fromkeys(("CENTERLINES", "QUALITY", "CLEANED"))
+    return {**cloud(bench), **skipped, "RAILS": bench.folder / "gone" / "rails.gpkg"}
+
+
+def lines(*texts):
+    layer = QgsVectorLayer("LineStringZ?crs=EPSG:32643", "lines", "memory")
+    for text in texts:
+        feature = QgsFeature()
+        feature.setGeometry(QgsGeometry.fromWkt(text))
+        assert layer.dataProvider().addFeature(feature)
+    return layer
+
+
+def long_track():
+    """Six kilometres, whose stations take a megabyte."""
+    left, middle, right = (
+        f"LINESTRING Z (500000 {3000000 + across} 100, 506000 {3000000 + across} 100)" for across in (1.507, 0.7535, 0)
+    )
+    return {"INPUT": lines(middle), "RAILS": lines(left, right)}
+
+
+def full_disk(room, make, suffix):
+    """A disk that takes files up to so many bytes; what is written then fails as on a full one."""
+
+    def prepare(bench):
+        parameters = make(bench)
+        soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+        bench.at_end(lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard)))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
+        return {**parameters, "OUTPUT": bench.folder / "out" / f"OUTPUT{suffix}"}
+
+    return prepare
+
+
+def points_only(bench):
+    return {"INPUT": bench.cloud(bench.track(length_m=6.0))}
+
+
+def open_elsewhere(bench):
+    """An output of an earlier run that is still open."""
+    path = bench.folder / "out" / "RAILS.gpkg"
+    before = lines("LINESTRING Z (0 0 0, 1 1 1)", "LINESTRING Z (0 0 0, 2 2 2)")
+    options = QgsVectorFileWriter.SaveVectorOptions()
+    QgsVectorFileWriter.writeAsVectorFormatV3(before, str(path), QgsCoordinateTransformContext(), options)
+    held = QgsVectorLayer(str(path), "held", "ogr").getFeatures()
+    assert next(held).isValid()
+    bench.at_end(held.close)
+    return cloud(bench)
+
+
+def exhausted(bench):
+    """A cloud too large for the memory."""
+
+    def fail(*arguments, **named):
+        raise MemoryError
+
+    bench.patch.setattr(pipeline, "clean_stretch", fail)
+    return cloud(bench)
+
+
+FAULTS = [
+    Fault(
+        "missing package laspy",
+        without("laspy"),
+        REFUSED,
+        "Extract rails needs the Python package laspy, which this QGIS does not have: run Install packages "
+        "in the toolbox under Rail Extract, or …",
+    ),
+    Fault(
+        "missing packages torch and cv2",
+        without("torch", "cv2"),
+        REFUSED,
+        "Extract rails needs the Python package cv2, which this QGIS does not have: run Install packages in "
+        "the toolbox under Rail Extract, or …",
+    ),
+    Fault(
+        "missing package of the chosen engine",
+        without_engine,
+        REFUSED,
+        "The engine TORCH needs the package torch: install it, or set ENGINE to AUTO.",
+    ),
+    Fault(
+        "no weights",
+        with_weights(lambda path: path.unlink()),
+        REFUSED,
+        "The network's weights …/models/frpdf_base.npz are missing: install the plugin again.",
+    ),
+    Fault(
+        "weights cut off",
+        with_weights(halve),
+        REFUSED,
+        "The network's weights …/models/frpdf_base.npz can't be read (File is not a zip file): install the "
+        "plugin again.",
+    ),
+    Fault(
+        "weights that are text",
+        with_weights(lambda path: path.write_text("weights")),
+        REFUSED,
+        "The network's weights …/models/frpdf_base.npz can't be read (Cannot load file containing pickled "
+        "data when allow_pickle=False): install the plugin again.",
+    ),
+    Fault(
+        "weights of another network",
+        with_weights(put_others),
+        REFUSED,
+        "These are no weights of FRPDF ('layer.1.dilated.1.running_mean'): install the plugin again.",
+    ),
+    Fault(
+        "weights that hold a program",
+        with_weights(put_code),
+        REFUSED,
+        "The network's weights …/models/frpdf_base.npz can't be read (Object arrays cannot be loaded when "
+        "allow_pickle=False): install the plugin again.",
+    ),
+    Fault(
+        "output below a file",
+        output(below_a_file),
+        REFUSED,
+        "The output …/file/rails.gpkg can't be written (Not a directory): choose another place.",
+    ),
+    Fault(
+        "output in a folder that is not there",
+        output(lambda folder: folder / "gone" / "rails.gpkg"),
+        REFUSED,
+        "The output …/gone/rails.gpkg can't be written (No such file or directory): choose another place.",
+    ),
+    Fault(
+        "output that is a folder",
+        output(a_folder),
+        REFUSED,
+        "The output …/rails.gpkg is a folder: give the name of a file in it.",
+    ),
+    Fault(
+        "output on a disk without writing",
+        output(lambda folder: "/proc/rails.gpkg"),
+        REFUSED,
+        "The output /proc/rails.gpkg can't be written (No such file or directory): choose another place.",
+    ),
+    Fault(
+        "output with a name too long",
+        output(lambda folder: folder / f"{'r' * 300}.gpkg"),
+        REFUSED,
+        "The output …/rrr….gpkg can't be written (File name too long): choose another place.",
+    ),
+    Fault(
+        "output of an unknown format",
+        output(lambda folder: folder / "rails.docx"),
+        REFUSED,
+        "“.docx” files are not supported as outputs for this algorithm: choose another one, such as .gpkg.",
+    ),
+    Fault(
+        "output whose folder goes away on the way",
+        removed_on_the_way,
+        REFUSED,
+        "The output …/gone/rails.gpkg can't be written (No such file or directory): close what uses it, or "
+        "choose another place.",
+    ),
+    Fault(
+        "output with spaces, umlauts and kanji",
+        output(lambda folder: folder / "Schienen größer 線路.gpkg"),
+        gives=TRACK,
+    ),
+    Fault("output of an earlier run, open elsewhere", open_elsewhere, gives=TRACK),
+    Fault(
+        "full disk, GeoTIFF",
+        full_disk(1000, points_only, ".tif"),
+        REFUSED,
+        "…/out/OUTPUT.tif can't be written (…): choose another place.",
+        run="rasterizerailpoints",
+    ),
+    Fault(
+        "full disk, GeoPackage that can't begin",
+        full_disk(50_000, lambda bench: long_track(), ".gpkg"),
+        REFUSED,
+        "The output can't be written (…): check the disk's free space.",
+        run=MEASURE,
+    ),
+    Fault(
+        "full disk, GeoPackage that can't end",
+        full_disk(200_000, lambda bench: long_track(), ".gpkg"),
+        REFUSED,
+        "The output can't be written (0 of 6001 features arrived): check the disk's free space.",
+        run=MEASURE,
+    ),
+    Fault(
+        "full disk, shapefile",
+        full_disk(50_000, lambda bench: long_track(), ".shp"),
+        REFUSED,
+        "The output can't be written (…): check the disk's free space.",
+        run=MEASURE,
+    ),
+    Fault(
+        "full disk, GeoJSON",
+        full_disk(50_000, lambda bench: long_track(), ".geojson"),
+        REFUSED,
+        "The output can't be written (0 of 6001 features arrived): check the disk's free space.",
+        run=MEASURE,
+    ),
+    Fault("too little memory", exhausted, REFUSED, "The memory does not suffice: choose a smaller extent."),
+    *(
+        Fault(f"cancelled at {percent} %", cancelled(percent), REFUSED, "Cancelled; nothing was written.")
+        for percent in (0, 10, 20, 40, 60, 80, 90)
+    ),
+]
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_fault(meet, fault):
+    meet(fault, "extractrails")
+
+
+def test_a_bad_cloud_in_a_batch_spoils_no_other(qgis, plugin, outcome, bench):
+    good, other = (bench.cloud(bench.track(length_m=6.0), name) for name in ("1.las", "3.las"))
+    bad = bench.folder / "2.las"
+    bad.write_bytes(b"no cloud")
+    algorithm = qgis.processingRegistry().createAlgorithmById("railextract:rasterizerailpoints")
+    runs = [
+        outcome(algorithm, {"INPUT": path, "OUTPUT": bench.folder / f"{path.stem}.tif"}) for path in (good, bad, other)
+    ]
+    assert [run.ok for run in runs] == [True, False, True]
+    assert runs[1].error.startswith("2.las is no LAS or LAZ file")
+    assert sorted(path.name for path in bench.folder.glob("*.tif")) == ["1.tif", "3.tif"]
+
+
+def test_the_page_lists_every_fault():
+    """Else write it again: python tools/faults.py."""
+    assert faults.PAGE.read_text(encoding="utf-8") == faults.page()
+
+
+def test_no_two_faults_have_one_name():
+    names = [(title, fault.name) for title, table in faults.tables() for fault in table]
+    assert len(names) == len(set(names)) >= 60
