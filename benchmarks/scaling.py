@@ -104,14 +104,14 @@ def engine_of_worker() -> None:
 def print_costs(short: dict, km: float) -> None:
     """State what a kilometre and a national network cost on cores like these."""
     track_km = 2 * km
-    print("A kilometre of track:")
+    print("A kilometre of track, times in core-seconds:")
     for name in ("reading_s", "stretches_s", "joining_s"):
         print(f"  {name[:-2]:12}{short[name] / track_km:10.2f} s")
     for name in ("cloud_bytes", "spool_bytes", "lines_bytes"):
         print(f"  {name[:-6]:12}{short[name] / track_km / 1e6:10.2f} MB")
     parallel = (short["reading_s"] + short["stretches_s"]) / track_km * NETWORK_KM / 3600
     serial = short["joining_s"] / track_km * NETWORK_KM / 3600
-    print(f"{NETWORK_KM} km of track, workers as fast as this process: hours of workers + hours of joining")
+    print(f"{NETWORK_KM} km of track, workers of one core each: hours of workers + hours of joining")
     for workers in WORKERS:
         print(f"  {workers:4} workers {parallel / workers:8.1f} + {serial:.1f} h")
 
@@ -149,33 +149,33 @@ def in_own_process(folder: Path, network: str) -> dict:
 
 
 def measure(folder: Path, with_network: bool) -> dict:
-    """Extract all that is in a folder; give seconds by step, peak of memory and bytes."""
+    """Extract all that is in a folder; give core-seconds by step, peak of memory and bytes."""
     if not with_network:
         pipeline.clean = lambda raster, *_: raster
-    spent = {"stretches_s": 0.0}
     walk = pipeline._walk
+    marks = []
 
-    def timed(*arguments):
-        start = time.perf_counter()
+    def marked(*arguments):
+        marks.append(time.process_time())
         try:
             return walk(*arguments)
         finally:
-            spent["stretches_s"] += time.perf_counter() - start
+            marks.append(time.process_time())
 
-    pipeline._walk = timed
+    pipeline._walk = marked
     pipeline.engine_for(parameters())  # loads the packages, which is done but once
     start = time.perf_counter()
     with tempfile.TemporaryDirectory() as work:
+        marks.append(time.process_time())
         clouds = spool(ask(folder, [RAIL]), stretch_side(parameters()), Path(work))
-        read = time.perf_counter()
         network = extract_rails(clouds, parameters())
-        end = time.perf_counter()
+        marks.append(time.process_time())
         spooled = size_of(Path(work))
     return {
-        "seconds": end - start,
-        "reading_s": read - start,
-        "stretches_s": spent["stretches_s"],
-        "joining_s": end - read - spent["stretches_s"],
+        "seconds": time.perf_counter() - start,
+        "reading_s": marks[1] - marks[0],
+        "stretches_s": marks[2] - marks[1],
+        "joining_s": marks[3] - marks[2],
         "peak_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
         "cloud_bytes": size_of(folder),
         "spool_bytes": spooled,
@@ -194,7 +194,7 @@ def size_of(folder: Path) -> int:
 def show(what: str, figures: dict) -> dict:
     """Print one run."""
     steps = ", ".join(f"{figures[f'{step}_s']:.1f} {step}" for step in ("reading", "stretches", "joining"))
-    print(f"{what}: {figures['seconds']:.1f} s ({steps}), peak {figures['peak_mib']:.0f} MiB", flush=True)
+    print(f"{what}: {figures['seconds']:.1f} s ({steps} core-seconds), peak {figures['peak_mib']:.0f} MiB", flush=True)
     print(f"  {figures['rails']} rails of {figures['rails_km']:.3f} km, {figures['engine']}", flush=True)
     return figures
 

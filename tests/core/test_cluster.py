@@ -108,13 +108,14 @@ def test_a_killed_worker_is_replaced_and_its_stretches_run_again(tiles, one_proc
     same(found.rails, one_process.rails, found.frame, one_process.frame)
 
 
-def test_a_corrupt_tile_is_named_and_the_rest_is_written(tiles, tmp_path, capsys):
+def test_on_a_running_cluster_a_corrupt_tile_is_named_and_the_rest_is_written(tiles, client, tmp_path, capsys):
     for name in ("tile0.laz", "tile1.laz"):
         (tmp_path / name).write_bytes((tiles / name).read_bytes())
     whole = (tiles / "tile2.laz").read_bytes()
     (tmp_path / "tile2.laz").write_bytes(whole[: len(whole) // 2])
     out = tmp_path / "out.gpkg"
-    words = ["extract", str(tmp_path), "--rails", str(out), "--centerlines", str(out), "--workers", "1"]
+    words = ["extract", str(tmp_path), "--rails", str(out), "--centerlines", str(out)]
+    words += ["--scheduler", client.scheduler.address]
     code = main([*words, "--iterations", "1", "--stretch-tiles", "4", "--engine", "OPENCV"])
     assert code == INCOMPLETE
     assert "tile2.laz" in capsys.readouterr().err
