@@ -19,6 +19,7 @@ from .joining import join_gaps
 from .junctions import clean_junctions, run_through, weld_pairs
 from .network import LineNetwork
 from .pixels import chamfer_distance, parity_fix, pixel_set
+from .routes import choose_routes
 from .tracing import trace
 from .veinerization import prune, veinerize
 
@@ -77,7 +78,8 @@ def vectorize(
     network = resolve_branches(resolve_crossings(network))
     network = join_gaps(run_through(network), max_gap_m, gap_angle_deg, seen, progress=progress)
     network = attach_branches(network, seen, max_gap_m, progress.span(0.9, 1.0))
-    return _settle_ends(_drop_short(drop_guards(network, head_width_m), min_length_m))
+    network = choose_routes(_drop_short(drop_guards(network, head_width_m), min_length_m))
+    return _settle_ends(network)
 
 
 def _drop_short(network: LineNetwork, min_length_m: float) -> LineNetwork:

@@ -18,7 +18,7 @@ FARTHEST_M = 32.0
 """Farthest that a branch is drawn back: on 2500 m of radius, as at 1:26.5, two rails are 0.2 m apart after so long."""
 
 STEADY_M = 8.0
-"""Stretch over which the curvature of the stem is measured: the rail that keeps it is the main one."""
+"""Stretch of two rails over which is measured how they part."""
 
 SHARPER = 2.0
 UNSURE_CURVATURE = 16 * STAIRS_M / STEADY_M**2
@@ -27,15 +27,15 @@ at both ends of that stretch may hide. This tells switches from frogs."""
 
 
 def resolve_branches(network: LineNetwork) -> LineNetwork:
-    """Draw the rails of every branching as smooth curves from the common stem, and weld the steadier one to it.
+    """Draw the rails of every branching as smooth curves from the common stem; which runs on is left open.
 
     Returns
     -------
     LineNetwork
         Nodes of three lines, one of which continues in both others, lie where the two begin to part.
     """
-    lines, nodes, partner = list(network.lines), network.nodes.copy(), {}
-    for node, stem, legs in _branchings(network):
+    lines, nodes = list(network.lines), network.nodes.copy()
+    for node, stem, legs in branchings(network):
         trunk, *rails = (turned(lines[end // 2], end) for end in (stem, *legs))
         if min(length_along(rail)[-1] for rail in rails) < SKIP_M + DIRECTION_M:
             continue
@@ -51,13 +51,10 @@ def resolve_branches(network: LineNetwork) -> LineNetwork:
         for leg, curve, rail in zip(legs, curves, free):
             rail = cut_back(rail, curve.cuts_m[1])
             lines[leg // 2] = turned(np.concatenate([trunk[:1], curve.points, rail]), leg)
-        own = curvature(stretch(trunk, STEADY_M)[::-1])
-        steady = legs[int(np.argmin([abs(curve.curvature - own) for curve in curves]))]
-        partner[stem], partner[steady] = steady, stem
-    return LineNetwork(tuple(lines), nodes, network.ends, network.passes).weld(partner) if partner else network
+    return LineNetwork(tuple(lines), nodes, network.ends, network.passes)
 
 
-def _branchings(network: LineNetwork) -> Iterator[tuple[int, int, list[int]]]:
+def branchings(network: LineNetwork) -> Iterator[tuple[int, int, list[int]]]:
     """List the nodes in which one line end, the stem, continues in two others, the legs."""
     for node, ends in ends_by_node(network):
         if len({end // 2 for end in ends}) == 3 == len(ends) and node not in network.passes[:, 0]:

@@ -39,8 +39,6 @@ class Bridge:
     ----------
     cost : float
         Its length in metres, made larger by what it misses and how it bends; 1 to 3 times the length.
-    curvature : float
-        In the middle, 1/m, positive to the left.
     cuts_m : tuple of float
         Lengths at the two ends that stray from the curve, as rails seem to beside weeds and other rails.
     points : (n, 2) array
@@ -48,7 +46,6 @@ class Bridge:
     """
 
     cost: float
-    curvature: float
     cuts_m: tuple[float, float]
     points: np.ndarray
 
@@ -86,7 +83,7 @@ def bridge(
         float(np.hypot(*np.diff(side[: count + 1], axis=0).T).sum())
         for side, count in zip((before[::-1], after), astray)
     )
-    return Bridge(gap * (1 + misfit / MISFIT_M + bend), cubic[2], cuts_m, points)
+    return Bridge(gap * (1 + misfit / MISFIT_M + bend), cuts_m, points)
 
 
 def curvature(points: np.ndarray) -> float:

@@ -11,6 +11,7 @@ from .bridges import Bridge, bridge
 from .ends import cut_back, stretch, turned
 from .junctions import ends_by_node
 from .network import LineNetwork
+from .steadiness import unsteadiness
 
 MERGED_M = 14.0
 """Longest stretch that two crossing rails share: heads of 76 mm in cells of 40 mm do so for 9 m at 1:26.5, and wing
@@ -22,6 +23,10 @@ SKIP_M = 0.5
 MISFIT_M = 0.015
 """Legs of a crossing may stray further from a curve than ends across a gap: wing rails widen them, and four of them
 that meet are known to belong together."""
+
+DECIDING_M = 12.0
+"""Stretch of each leg by which its continuation is told: a rail of a 1:26.5 frog that ran on as the other one would
+stray from one curvature by 16 mm over so long, where stairs make it stray by half as much."""
 
 _PAIRINGS = (((0, 2), (1, 3)), ((0, 3), (1, 2)), ((0, 1), (2, 3)))
 
@@ -104,7 +109,7 @@ def _cut_off(network: LineNetwork) -> list[dict[int, float]]:
 
 
 def _best_pairing(network: LineNetwork, legs: Mapping[int, float]) -> dict[tuple[int, int], Bridge]:
-    """Find the cheapest way of running two rails through four legs; empty if there is none."""
+    """Find the way of running two rails through four legs on which both keep their curvature best; empty if none."""
     cut = {end: cut_back(network.from_end(end), skip_m) for end, skip_m in legs.items()}
     options = []
     for pairing in _PAIRINGS:
@@ -112,4 +117,8 @@ def _best_pairing(network: LineNetwork, legs: Mapping[int, float]) -> dict[tuple
         found = {(one, other): bridge(cut[one], cut[other], misfit_m=MISFIT_M) for one, other in ends}
         if None not in found.values():
             options.append(found)
-    return min(options, key=lambda found: sum(join.cost for join in found.values()), default={})
+    return min(
+        options,
+        key=lambda found: sum(unsteadiness(cut[one], cut[other], DECIDING_M) ** 2 for one, other in found),
+        default={},
+    )

@@ -71,6 +71,20 @@ class LineNetwork:
         passes = passes[(passes[:, 2] > 0) & (passes[:, 2] < last)]
         return LineNetwork(tuple(lines), np.array(nodes).reshape(-1, 2), ends, passes)
 
+    def parted(self) -> tuple[LineNetwork, dict[int, int]]:
+        """Cut all lines at the nodes that they pass, and say which ends belong together, as `weld` takes it."""
+        lines, ends, partner = [], [], {}
+        for number, (line, own) in enumerate(zip(self.lines, self.ends.tolist())):
+            passes = self.passes[self.passes[:, 1] == number]
+            passes = passes[np.argsort(passes[:, 2], kind="stable")]
+            vertices, nodes = [0, *passes[:, 2].tolist(), len(line) - 1], [own[0], *passes[:, 0].tolist(), own[1]]
+            for piece in range(len(nodes) - 1):
+                if piece:
+                    partner[2 * len(lines)], partner[2 * len(lines) - 1] = 2 * len(lines) - 1, 2 * len(lines)
+                lines.append(line[vertices[piece] : vertices[piece + 1] + 1])
+                ends.append(nodes[piece : piece + 2])
+        return LineNetwork(tuple(lines), self.nodes, np.array(ends, dtype=np.int64).reshape(-1, 2)), partner
+
     def weld(self, partner: Mapping[int, int], bridges: Mapping[int, np.ndarray] | None = None) -> LineNetwork:
         """Make one line of lines that continue each other.
 

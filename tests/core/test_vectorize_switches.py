@@ -11,8 +11,9 @@ from rail_extract.core.vectorize.branches import parting, resolve_branches
 from rail_extract.core.vectorize.bridges import MISFIT_M
 from rail_extract.core.vectorize.crossings import resolve_crossings
 from rail_extract.core.vectorize.joining import join_gaps
-from rail_extract.core.vectorize.junctions import weld_pairs
+from rail_extract.core.vectorize.junctions import run_through, weld_pairs
 from rail_extract.core.vectorize.network import LineNetwork
+from rail_extract.core.vectorize.routes import choose_routes
 from scipy.spatial import cKDTree
 
 HEAD_M = 0.072
@@ -114,6 +115,7 @@ def test_a_merged_stretch_is_resolved_into_two_rails(radius):
     lines = (stem, *legs)
     nodes = np.concatenate([fork, stem[:1], *(line[-1:] for line in lines[1:])])
     network = resolve_branches(LineNetwork(lines, nodes, np.array([[1, 0], [0, 2], [0, 3]])))
+    network = choose_routes(run_through(network))
     through, branch = sorted(network.lines, key=len, reverse=True)
     assert np.abs(through[:, 1]).max() < 0.02
     assert branch[0, 0] == pytest.approx(40 + np.sqrt(2 * radius * MISFIT_M), abs=0.7)
