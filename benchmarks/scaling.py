@@ -61,10 +61,10 @@ def main() -> None:
         print(json.dumps(measure(Path(args.measure[0]), args.measure[1] == "with")))
         return
     with tempfile.TemporaryDirectory() as folder:
-        short = compare_lengths(Path(folder), args.km, args.times)
+        long = compare_lengths(Path(folder), args.km, args.times)
         if not args.skip_workers:
             compare_workers(Path(folder) / "long", Path(folder))
-        print_costs(short, args.km)
+        print_costs(long, args.km * args.times)
         if args.memory:
             shutil.rmtree(Path(folder) / "long")
             lay_track(Path(folder) / "memory", args.memory)
@@ -79,7 +79,7 @@ def compare_lengths(folder: Path, km: float, times: int) -> dict:
     long = show(f"{km * times:g} km", in_own_process(folder / "long", "with"))
     seconds, memory = long["seconds"] / short["seconds"], long["peak_mib"] / short["peak_mib"]
     print(f"{times} times the length: {seconds:.2f} times the time, {memory:.2f} times the memory")
-    return short
+    return long
 
 
 def compare_workers(tiles: Path, folder: Path) -> None:
@@ -101,16 +101,16 @@ def engine_of_worker() -> None:
     pipeline.engine_for(parameters())
 
 
-def print_costs(short: dict, km: float) -> None:
+def print_costs(figures: dict, km: float) -> None:
     """State what a kilometre and a national network cost on cores like these."""
     track_km = 2 * km
     print("A kilometre of track, times in core-seconds:")
     for name in ("reading_s", "stretches_s", "joining_s"):
-        print(f"  {name[:-2]:12}{short[name] / track_km:10.2f} s")
+        print(f"  {name[:-2]:12}{figures[name] / track_km:10.2f} s")
     for name in ("cloud_bytes", "spool_bytes", "lines_bytes"):
-        print(f"  {name[:-6]:12}{short[name] / track_km / 1e6:10.2f} MB")
-    parallel = (short["reading_s"] + short["stretches_s"]) / track_km * NETWORK_KM / 3600
-    serial = short["joining_s"] / track_km * NETWORK_KM / 3600
+        print(f"  {name[:-6]:12}{figures[name] / track_km / 1e6:10.2f} MB")
+    parallel = (figures["reading_s"] + figures["stretches_s"]) / track_km * NETWORK_KM / 3600
+    serial = figures["joining_s"] / track_km * NETWORK_KM / 3600
     print(f"{NETWORK_KM} km of track, workers of one core each: hours of workers + hours of joining")
     for workers in WORKERS:
         print(f"  {workers:4} workers {parallel / workers:8.1f} + {serial:.1f} h")
