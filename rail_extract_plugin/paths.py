@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+METADATA = ROOT / "metadata.txt"
 RESOURCES = ROOT / "resources"
 MODEL = ROOT / "models" / "extract_rails.model3"
 ICONS = RESOURCES / "icons"

@@ -10,14 +10,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from qgis.core import QgsApplication, QgsProcessingAlgorithm
-from qgis.gui import QgsCollapsibleGroupBoxBasic
-from qgis.PyQt.QtWidgets import QScrollArea, QSplitter, QTextBrowser, QWidget
+from qgis.PyQt.QtWidgets import QGroupBox, QScrollArea, QSplitter, QWidget
 
 SIZES = {"wide": (1180, 860), "narrow": (760, 560)}
 """Pixels of a dialog on a large screen, and of one that is as small as users make it."""
 
-HELP_WIDTH = 430
-"""Pixels of the help panel where there is room."""
+HELP_SHARE = 0.36
+"""Share of the width that the help panel gets."""
 
 PROVIDER = "railextract"
 
@@ -28,7 +27,7 @@ def dialog_pictures(folder: Path) -> tuple[Path, ...]:
     Parameters
     ----------
     folder : Path
-        Where ALGORITHM_SIZE.png goes for each of `SIZES`, and ALGORITHM_all.png with every field and all the help.
+        Where ALGORITHM_SIZE.png goes for each of `SIZES`, and ALGORITHM_all.png with every field.
 
     Returns
     -------
@@ -45,30 +44,35 @@ def _pictures(algorithm: QgsProcessingAlgorithm, folder: Path) -> Iterator[Path]
 
     dialog = AlgorithmDialog(algorithm.create())
     dialog.show()
+    _fold(dialog, True)
     for name, size in SIZES.items():
         yield _grab(dialog, size, folder / f"{algorithm.name()}_{name}.png")
-    for group in dialog.findChildren(QgsCollapsibleGroupBoxBasic):
-        group.setCollapsed(False)
+    _fold(dialog, False)
     width, height = SIZES["wide"]
     yield _grab(dialog, (width, height + _hidden_height(dialog)), folder / f"{algorithm.name()}_all.png")
     dialog.close()
+
+
+def _fold(dialog: QWidget, folded: bool) -> None:
+    """Hide or show the advanced parameters; QGIS leaves them as they were in the last dialog."""
+    for group in dialog.findChildren(QGroupBox):
+        group.setProperty("collapsed", folded)
 
 
 def _grab(dialog: QWidget, size: tuple[int, int], picture: Path) -> Path:
     dialog.resize(*size)
     QgsApplication.processEvents()
     splitter = dialog.findChild(QSplitter)
-    splitter.setSizes([dialog.width() - HELP_WIDTH, min(HELP_WIDTH, dialog.width() // 2)])
+    splitter.setSizes([round(share * dialog.width()) for share in (1 - HELP_SHARE, HELP_SHARE)])
     QgsApplication.processEvents()
     dialog.grab().save(str(picture))
     return picture
 
 
 def _hidden_height(dialog: QWidget) -> int:
-    """Pixels by which the fields or the help, whichever is longer, do not fit into the dialog."""
+    """Pixels by which the fields do not fit into the dialog."""
     QgsApplication.processEvents()
-    areas = [*dialog.findChildren(QScrollArea), *dialog.findChildren(QTextBrowser)]
-    return max(area.verticalScrollBar().maximum() for area in areas)
+    return max(area.verticalScrollBar().maximum() for area in dialog.findChildren(QScrollArea))
 
 
 def _start() -> QgsApplication:

@@ -21,13 +21,12 @@ from ..contradictions import refuse_contradictions
 from ..dependencies import explain_missing, missing_packages
 from ..destinations import check_distinct, check_writable
 from ..feedback import QgisProgress
+from ..guide import guide
 from ..help_panel import help_panel
 from ..i18n import tr
 from ..paths import ICONS, PICTURES
 from ..refusals import explain_refused
 from ..values import Values
-
-HOMEPAGE = "https://example.org/rail-extract"
 
 # What people search for, also in the languages of the larger railways; the search looks at the words as they stand.
 RAIL_WORDS = (
@@ -66,6 +65,8 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     HELP = ""
     PICTURE = ""
     """File in the folder of pictures, shown beside the dialog."""
+    GUIDE = "parameters.md"
+    """Page of the guide that the dialog's help button opens."""
     NEEDS: tuple[tuple[str, ...], ...] = ()
     """Python modules without which it can't run; any one of those in a need meets it, the first is recommended."""
 
@@ -207,7 +208,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     def helpUrl(self) -> str:
         """Give the address of the guide."""
-        return HOMEPAGE
+        return guide(self.GUIDE)
 
     def icon(self) -> QIcon:
         """Give the icon shown in the toolbox."""

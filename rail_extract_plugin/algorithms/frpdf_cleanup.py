@@ -12,6 +12,7 @@ from ...core.frpdf.zoo import Model
 from ...core.progress import Progress
 from .. import inputs, outputs
 from .. import parameters as groups
+from ..definitions import helped
 from ..i18n import tr
 from ..layers import write_raster
 from ..values import Values
@@ -52,7 +53,12 @@ class FrpdfCleanup(RailAlgorithm):
         """Declare the parameters and outputs of the interface, in its order."""
         for definition in (inputs.raster(), groups.model(), *groups.cleanup(), *groups.raster_rail()):
             self.addParameter(definition)
-        self.addParameter(QgsProcessingParameterRasterDestination("OUTPUT", tr("Cleaned rail raster")))
+        self.addParameter(
+            helped(
+                QgsProcessingParameterRasterDestination("OUTPUT", tr("Cleaned rail raster")),
+                tr("A GeoTIFF for Vectorize Rails."),
+            )
+        )
         self.addOutput(outputs.engine())
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:

@@ -13,6 +13,7 @@ from ...core.standards import RailStandard
 from .. import inputs
 from .. import parameters as groups
 from ..clouds import CloudSource, read_points
+from ..definitions import helped
 from ..i18n import tr
 from ..layers import write_raster
 from ..values import Values
@@ -50,7 +51,12 @@ class RasterizeRailPoints(RailAlgorithm):
         """Declare the parameters and outputs of the interface, in its order."""
         for definition in (*inputs.cloud(), *groups.rail(), *groups.area()):
             self.addParameter(definition)
-        self.addParameter(QgsProcessingParameterRasterDestination("OUTPUT", tr("Rail raster")))
+        self.addParameter(
+            helped(
+                QgsProcessingParameterRasterDestination("OUTPUT", tr("Rail raster")),
+                tr("A GeoTIFF for FRPDF Cleanup, which repairs it, or for Vectorize Rails."),
+            )
+        )
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read what has to be read in the main thread, and check it all."""

@@ -48,8 +48,7 @@ def test_every_parameter_explains_itself(plugin):
     for algorithm in plugin.provider.algorithms():
         assert algorithm.group() in ("Rails and tracks", "Setup")
         for definition in algorithm.parameterDefinitions():
-            plain = definition.isDestination() and algorithm.name() not in ("extractrails", "measuretrackgeometry")
-            assert plain or definition.help(), (algorithm.id(), definition.name())
+            assert definition.help(), (algorithm.id(), definition.name())
 
 
 def test_unloading_takes_the_provider_away(qgis, plugin):
