@@ -26,6 +26,9 @@ from ..core.rails import Centerline, RailLine
 CHORD_M = 0.0005
 """How far the straight pieces that stand for a curved line may lie beside it: well below what a survey sees."""
 
+LONGEST_M = 500_000.0
+"""Longer straight pieces have a stray vertex: the longest straight railway has 478 km."""
+
 
 def read_rails(
     source: QgsProcessingFeatureSource, progress: Progress = SILENT, name: str = "INPUT", untold_class: int = 0
@@ -83,10 +86,20 @@ def _read(
         raise RailExtractError(
             f"{name} has a line (feature {lost}) with a place that is no number: repair or delete it."
         )
+    stray = next(
+        (feature.id() for feature, vertices in found if _longest(vertices) * horizontal_unit_m > LONGEST_M), None
+    )
+    if stray is not None:
+        raise RailExtractError(f"{name} has a line (feature {stray}) with a vertex far away: repair or delete it.")
     middle = np.median(np.concatenate([vertices for _, vertices in found]), axis=0)
     origin = np.round(np.nan_to_num(middle) / ORIGIN_STEP) * ORIGIN_STEP
     frame = LocalFrame(origin, horizontal_unit_m, vertical_unit_m, crs_wkt)
     return [(feature, frame.to_local(vertices)) for feature, vertices in found], frame
+
+
+def _longest(vertices: np.ndarray) -> float:
+    """Length of the longest straight piece in plan, in units of the vertices."""
+    return float(np.hypot(*np.diff(vertices[:, :2], axis=0).T).max())
 
 
 def _system(crs: QgsCoordinateReferenceSystem, progress: Progress) -> tuple[str | None, float, float]:

@@ -355,6 +355,12 @@ LINES = [
         "INPUT has a line (feature 1) with a place that is no number: repair or delete it.",
     ),
     Fault(
+        "stray vertex 1000 km away",
+        lines(line((500000, 3000001.507, 100), (1_500_000, 3000001.507, 100)), RIGHT),
+        REFUSED,
+        "INPUT has a line (feature 1) with a vertex far away: repair or delete it.",
+    ),
+    Fault(
         "every line twice",
         lines(LEFT, RIGHT, LEFT, RIGHT),
         WARNED,
