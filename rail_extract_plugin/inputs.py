@@ -21,7 +21,10 @@ def cloud() -> Definitions:
     return (
         helped(
             QgsProcessingParameterPointCloudLayer("INPUT", tr("Point cloud (layer, file or folder)")),
-            tr("A loaded point cloud, or the path of a LAS, LAZ or COPC file, of a folder of them or of a .vpc file."),
+            tr(
+                "A loaded point cloud, or the path of a LAS, LAZ or COPC file, of a folder of them or of a .vpc file. "
+                "The dialog's button takes one file: for many, take their virtual point cloud (.vpc)."
+            ),
         ),
         helped(
             QgsProcessingParameterString("RAIL_CLASSES", tr("Rail classes"), defaultValue=str(RAIL_CLASS)),

@@ -6,8 +6,9 @@ Runs in the environment that `make env` prints: ``python tools/dialog_pictures.p
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from qgis.core import QgsApplication, QgsProcessingAlgorithm
 from qgis.PyQt.QtWidgets import QGroupBox, QScrollArea, QSplitter, QWidget
@@ -21,13 +22,15 @@ HELP_SHARE = 0.36
 PROVIDER = "railextract"
 
 
-def dialog_pictures(folder: Path) -> tuple[Path, ...]:
+def dialog_pictures(folder: Path, filled: Mapping[str, Mapping[str, Any]] | None = None) -> tuple[Path, ...]:
     """Write pictures of every dialog of the plugin, which must be registered in a QGIS with widgets.
 
     Parameters
     ----------
     folder : Path
         Where ALGORITHM_SIZE.png goes for each of `SIZES`, and ALGORITHM_all.png with every field.
+    filled : mapping, optional
+        What stands in the fields instead of the defaults: values by parameter, by algorithm.
 
     Returns
     -------
@@ -36,13 +39,15 @@ def dialog_pictures(folder: Path) -> tuple[Path, ...]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     algorithms = QgsApplication.processingRegistry().providerById(PROVIDER).algorithms()
-    return tuple(picture for algorithm in algorithms for picture in _pictures(algorithm, folder))
+    values = filled or {}
+    return tuple(picture for one in algorithms for picture in _pictures(one, values.get(one.name(), {}), folder))
 
 
-def _pictures(algorithm: QgsProcessingAlgorithm, folder: Path) -> Iterator[Path]:
+def _pictures(algorithm: QgsProcessingAlgorithm, values: Mapping[str, Any], folder: Path) -> Iterator[Path]:
     from processing.gui.AlgorithmDialog import AlgorithmDialog
 
     dialog = AlgorithmDialog(algorithm.create())
+    dialog.mainWidget().setParameters(values)
     dialog.show()
     _fold(dialog, True)
     for name, size in SIZES.items():
@@ -75,7 +80,7 @@ def _hidden_height(dialog: QWidget) -> int:
     return max(area.verticalScrollBar().maximum() for area in dialog.findChildren(QScrollArea))
 
 
-def _start() -> QgsApplication:
+def start_qgis() -> QgsApplication:
     """Start QGIS with widgets, its processing framework and the plugin."""
     application = QgsApplication([], True)
     application.initQgis()
@@ -90,5 +95,5 @@ def _start() -> QgsApplication:
 
 
 if __name__ == "__main__":
-    started = _start()
+    started = start_qgis()
     print(*dialog_pictures(Path(sys.argv[1])), sep="\n")

@@ -24,6 +24,7 @@ from ..feedback import QgisProgress
 from ..guide import guide
 from ..help_panel import help_panel
 from ..i18n import tr
+from ..labels import for_reader
 from ..paths import ICONS, PICTURES
 from ..refusals import explain_refused
 from ..values import Values
@@ -85,7 +86,12 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         raise NotImplementedError
 
     def checkParameterValues(self, parameters: dict[str, Any], context: QgsProcessingContext) -> tuple[bool, str]:
-        """Check all values before a run: as QGIS does, then whether outputs can be written, then as `read` does."""
+        """Check all values before a run, and say what is wrong in words of whom QGIS shows it to."""
+        accepted, message = self._check(parameters, context)
+        return accepted, for_reader(message, self.parameterDefinitions())
+
+    def _check(self, parameters: dict[str, Any], context: QgsProcessingContext) -> tuple[bool, str]:
+        """Check as QGIS does, then whether outputs can be written, then as `read` does."""
         accepted, message = super().checkParameterValues(self._with_paths_accepted(parameters), context)
         if not accepted:
             return False, self._refusal(parameters, context) or message

@@ -7,6 +7,7 @@ from dialog_pictures import HELP_SHARE, SIZES, dialog_pictures
 from qgis.PyQt.QtCore import QUrl
 from qgis.PyQt.QtGui import QImage
 from qgis.PyQt.QtWidgets import QScrollArea, QSplitter, QTextBrowser
+from rail_extract.rail_extract_plugin.labels import for_reader, with_labels
 
 NAMES = (
     *("extractrails", "rasterizerailpoints", "frpdfcleanup", "vectorizerails", "buildtrackcenterlines"),
@@ -137,6 +138,15 @@ def test_dialog_refuses_contradictions(open_dialog, context, write_cloud, track,
     assert message in said
 
 
+def test_dialog_calls_parameters_by_their_labels(make):
+    algorithm = make("extractrails")
+    definitions = algorithm.parameterDefinitions()
+    said = "The standard CUSTOM needs both: fill GAUGE and HEAD_WIDTH, not MAX_GAPS."
+    shown = 'The standard CUSTOM needs both: fill "Gauge [mm]" and "Railhead width [mm]", not MAX_GAPS.'
+    assert with_labels(said, definitions) == shown
+    assert for_reader(said, definitions) == said  # what runs here has no windows of QGIS
+
+
 def test_dialog_refuses_a_cloud_in_degrees(open_dialog, context, write_cloud, track):
     dialog = open_dialog("extractrails")
     cloud = write_cloud(track() * [1e-5, 1e-6, 1] + [70, 20, 0], epsg=4326)
@@ -155,7 +165,7 @@ def test_dialog_accepts_what_is_right(open_dialog, context, write_cloud, track):
 
 
 def test_pictures_of_the_dialogs(plugin, tmp_path):
-    pictures = dialog_pictures(tmp_path / "dialogs")
+    pictures = dialog_pictures(tmp_path / "dialogs", {"extractrails": {"INPUT": "sample.laz"}})
     assert {path.stem for path in pictures} == {f"{name}_{size}" for name in NAMES for size in (*SIZES, "all")}
     for path in pictures:
         image = QImage(str(path))
