@@ -263,9 +263,10 @@ def _all_vertices(
         parameters.max_gap_m,
         parameters.gap_angle_deg,
         parameters.min_length_m,
-        progress.span(0.0, 0.5),
+        progress.span(0.0, 0.45),
+        None if points is None else rasterize(points.xyz, raster.cell_m),
     )
-    network = smooth_network(network, parameters.smoothing_xy_m)
+    network = smooth_network(network, parameters.smoothing_xy_m, progress.span(0.45, 0.5))
     elevation = ElevationParameters(
         head_width_m=parameters.head_width_m,
         tolerance_xy_m=parameters.tolerance_xy_m,

@@ -36,6 +36,7 @@ def vectorize(
     gap_angle_deg: float = 10.0,
     min_length_m: float = 1.0,
     progress: Progress = SILENT,
+    raw: RailRaster | None = None,
 ) -> LineNetwork:
     """Turn rail cells into lines: one line a rail, straight through junctions and across gaps (paper, section 8).
 
@@ -49,6 +50,10 @@ def vectorize(
         Ends at most this far apart are joined if both point at each other within this angle.
     min_length_m : float
         Shorter lines are dropped unless they link two junctions.
+    progress : Progress
+    raw : RailRaster, optional
+        Cells of all points. A stretch that the network left out for they are too few is no gap: what counts of it
+        towards `max_gap_m` is only where there is none of them either.
 
     Returns
     -------
@@ -73,7 +78,7 @@ def vectorize(
     network = clean_junctions(traced, head_width_m)
     network = straighten_blots(network, places, widths_m, head_width_m, progress.span(0.6, 0.8))
     network = cut_kinks(network, progress.span(0.8, 0.85))
-    seen = cKDTree(places)
+    seen = cKDTree(places if raw is None else np.concatenate([places, raw.to_local(raw.cells())]))
     network = join_gaps(network, max_gap_m, gap_angle_deg, seen, at_nodes=False, progress=progress)
     network = resolve_branches(resolve_crossings(network))
     network = join_gaps(run_through(network), max_gap_m, gap_angle_deg, seen, progress=progress)

@@ -48,7 +48,7 @@ def join_gaps(
     max_gap_m, gap_angle_deg : float
     seen : cKDTree, optional
         Places of rail cells. Ends up to `MERGED_M` apart are joined too, if no more than `max_gap_m` of the way lies
-        far from these: where rails merge, an end is not a gap.
+        far from these: where rails merge, or points are too few for the network, an end is not a gap.
     at_nodes : bool
     progress : Progress
         Only asked for a cancel: how many rounds there will be is not known.

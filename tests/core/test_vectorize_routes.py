@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.synthetic.curves import Element, trace
+from rail_extract.core.synthetic.switch_scenes import turnout
+from rail_extract.core.vectorize import vectorize
 from rail_extract.core.vectorize.crossings import resolve_crossings
+from rail_extract.core.vectorize.ends import stretch
 from rail_extract.core.vectorize.network import LineNetwork
 from rail_extract.core.vectorize.routes import choose_routes
 from rail_extract.core.vectorize.steadiness import unsteadiness
+from scipy.spatial import cKDTree
 
 
 def stairs(line):
@@ -108,3 +113,25 @@ def test_two_rails_cross_at_a_flat_frog_and_do_not_exchange(number, heading):
         x, y = turned @ line.T
         assert np.abs(np.abs(y) - np.abs(x) * np.tan(half)).max() < 0.06
         assert y[np.argmin(x)] * y[np.argmax(x)] < 0
+
+
+def follows(line, rails):
+    """Tell which rails a line follows where no other one is near it."""
+    distance = np.array([rail.query(stretch(line, np.inf))[0] for rail in rails])
+    alone = np.partition(distance, 1, axis=0)[1] > 0.2
+    return set(distance[:, alone].argmin(axis=0).tolist())
+
+
+@pytest.mark.parametrize(
+    ("form", "hand", "heading", "seed", "curvature"),
+    [("2500-1:26.5", -1, 3.29, 207, 0.0), ("2500-1:26.5", -1, 0.47, 201, 0.0)],
+)
+def test_every_line_of_a_scanned_turnout_follows_one_rail_alone(form, hand, heading, seed, curvature):
+    scene = turnout("turnout", form, hand, heading, seed, curvature)
+    head_m = scene.standard.head_width_m
+    rails = [cKDTree(stretch(rail[:, :2], np.inf)) for rail in scene.rails]
+    xyz = scene.rail_points().xyz
+    seen = np.min([rail.query(xyz[:, :2])[0] for rail in rails], axis=0) < head_m / 2
+    network = vectorize(rasterize(xyz[seen], cell_size(scene.standard.gauge_m, head_m)), head_m)
+    followed = [follows(line, rails) for line in network.lines]
+    assert sorted(followed, key=min) == [{0}, {1}, {2}, {3}]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rail_extract.core.raster import rasterize
 from rail_extract.core.synthetic.curves import Element, trace
+from rail_extract.core.vectorize import vectorize
 from rail_extract.core.vectorize.attaching import attach_branches, drop_guards
 from rail_extract.core.vectorize.blots import cut_kinks, straighten_blots
 from rail_extract.core.vectorize.branches import parting, resolve_branches
@@ -176,3 +178,17 @@ def test_a_stock_rail_drawn_aside_by_its_branch_is_straightened_and_keeps_its_no
     assert len(network.passes) == 2
     for node, line, vertex in network.passes:
         np.testing.assert_array_equal(network.lines[line][vertex], network.nodes[node])
+
+
+def test_a_stretch_that_the_network_left_out_is_no_gap_where_there_are_points():
+    rng = np.random.default_rng(5)
+    xy = np.column_stack([rng.uniform(0, 60, 9000), rng.uniform(-HEAD_M / 2, HEAD_M / 2, 9000)])
+    lost = (xy[:, 0] > 25) & (xy[:, 0] < 34)
+    cleaned, sparse = rasterize(xy[~lost], 0.04), xy[lost][::30]
+    assert len(vectorize(cleaned, HEAD_M).lines) == 2
+    assert (
+        len(vectorize(cleaned, HEAD_M, raw=rasterize(np.concatenate([xy[~lost], sparse + [0.0, 0.5]]), 0.04)).lines)
+        == 2
+    )
+    (line,) = vectorize(cleaned, HEAD_M, raw=rasterize(np.concatenate([xy[~lost], sparse]), 0.04)).lines
+    assert np.abs(line[:, 1]).max() < 0.05
