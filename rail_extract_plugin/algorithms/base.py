@@ -206,10 +206,10 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         return tr(self.SUMMARY)
 
     def shortHelpString(self) -> str:
-        """Give the text beside the dialog; plain where a command line prints it, which lists the fields itself."""
+        """Give the text beside the dialog; a command line prints summary and parameters itself, and no HTML."""
         summary, text = tr(self.SUMMARY), tr(self.HELP)
         if QgsApplication.platform() == COMMAND_LINE:
-            return f"{summary}\n\n{text}"
+            return text
         return help_panel(summary, PICTURES / self.PICTURE if self.PICTURE else None, text, self.parameterDefinitions())
 
     def helpUrl(self) -> str:
