@@ -52,6 +52,14 @@ scan: package  ## apply the plugin site's rules to the zip
 contact-sheet: .venv/installed  ## draw synthetic training pairs by family and severity, docs/contact_sheet.png
 	@$(PYTHON) tools/contact_sheet.py
 
+.PHONY: parameter-pictures
+parameter-pictures: .venv/installed  ## draw what the parameters do, docs/pictures/parameters
+	@$(PYTHON) tools/parameter_pictures.py
+
+.PHONY: screenshots
+screenshots: plugin  ## take pictures of the dialogs and of the sample's result, docs/pictures
+	@. ./$(ENVIRONMENT) && $(PYTHON) tools/screenshots.py
+
 .PHONY: clean
 clean:  ## remove what was built; .venv stays
 	rm -rf build

@@ -1,0 +1,186 @@
+"""Take pictures of the real dialogs and of the sample's result, for the guide: `docs/pictures`.
+
+Runs in the environment that `make env` prints; `make screenshots` does both. Chromium draws the report, where that is
+installed.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+from dialog_pictures import HELP_SHARE, SIZES, dialog_pictures, start_qgis  # noqa: E402
+from PIL import Image  # noqa: E402
+from qgis.core import (  # noqa: E402
+    QgsApplication,
+    QgsMapLayer,
+    QgsMapRendererParallelJob,
+    QgsMapSettings,
+    QgsRasterLayer,
+    QgsRectangle,
+    QgsVectorLayer,
+    QgsVectorLayerCache,
+)
+from qgis.gui import (  # noqa: E402
+    QgsAttributeTableFilterModel,
+    QgsAttributeTableModel,
+    QgsAttributeTableView,
+    QgsMapCanvas,
+)
+from qgis.PyQt.QtCore import QSize  # noqa: E402
+from qgis.PyQt.QtGui import QColor  # noqa: E402
+
+ROOT = Path(__file__).resolve().parents[1]
+SAMPLE = ROOT / "resources" / "sample" / "sample.laz"
+STYLES = ROOT / "resources" / "styles"
+FOLDER = ROOT / "docs" / "pictures"
+STANDARD = "IN_75R_1000"
+
+OUTPUTS = {
+    "QUALITY": "quality.gpkg",
+    "CENTERLINES": "centerlines.gpkg",
+    "RAILS": "rails.gpkg",
+    "CLEANED": "raster.tif",
+    "REPORT": "report.html",
+}
+"""The files of a run, from the layer on top down; layers are named as their styles."""
+
+DIALOGS = {
+    "extractrails_wide": "dialog",
+    "extractrails_all": "dialog_all",
+    "installpackages_wide": "install_packages",
+}
+"""Pictures of dialogs that the guide shows, by their names here and there."""
+
+MAP_SIZE, TABLE_HEIGHT, REPORT_SIZE = QSize(1000, 480), 230, (1140, 2265)
+"""Pixels."""
+
+REPORT_TOP = 1300
+"""Pixels of the report above the plots of the first track."""
+
+DETAIL_M = 16.0
+"""Width of the ground in the detailed map: single measurements are seen in it."""
+
+
+COLORS = 128
+"""Colours that a picture keeps: none of them is off by more than a few parts of 255."""
+
+
+def main() -> None:
+    """Take all pictures."""
+    application = start_qgis()
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        dialog_pictures(folder / "dialogs")
+        for source, target in DIALOGS.items():
+            shutil.copy(folder / "dialogs" / f"{source}.png", FOLDER / f"{target}.png")
+        _crop(FOLDER / "dialog_all.png", right=round(HELP_SHARE * SIZES["wide"][0]))
+        _extract(folder)
+        layers = [_layer(folder / OUTPUTS[output]) for output in ("QUALITY", "CENTERLINES", "RAILS", "CLEANED")]
+        whole = layers[2].extent()
+        whole.scale(1.05)
+        _map(layers[1:3], whole, FOLDER / "map.png")
+        _map(layers, _detail(layers[0]), FOLDER / "map_detail.png")
+        for layer in layers[1:3]:
+            _table(layer, FOLDER / f"table_{layer.name()}.png")
+        _report(folder / OUTPUTS["REPORT"], FOLDER / "report.png")
+        del layers
+    for picture in sorted(FOLDER.glob("*.png")):
+        _shrink(picture)
+        print(f"{picture.name}: {picture.stat().st_size / 1000:.0f} kB")
+    application.exitQgis()
+
+
+def _extract(folder: Path) -> None:
+    """Run Extract Rails on the sample."""
+    import processing
+
+    outputs = {output: str(folder / name) for output, name in OUTPUTS.items()}
+    processing.run("railextract:extractrails", {"INPUT": str(SAMPLE), "STANDARD": STANDARD, **outputs})
+
+
+def _layer(path: Path) -> QgsMapLayer:
+    """Load a layer and style it as the plugin does."""
+    layer = (QgsRasterLayer if path.suffix == ".tif" else QgsVectorLayer)(str(path), path.stem)
+    layer.loadNamedStyle(str(STYLES / f"{path.stem}.qml"))
+    return layer
+
+
+def _detail(points: QgsVectorLayer) -> QgsRectangle:
+    """Choose a small part of the map, round the middle one of the measurements."""
+    places = [feature.geometry().asPoint() for feature in points.getFeatures()]
+    middle = places[len(places) // 2]
+    height = DETAIL_M * MAP_SIZE.height() / MAP_SIZE.width()
+    return QgsRectangle.fromCenterAndSize(middle, DETAIL_M, height)
+
+
+def _map(layers: Sequence[QgsMapLayer], extent: QgsRectangle, picture: Path) -> None:
+    """Draw a map as QGIS's own canvas does."""
+    settings = QgsMapSettings()
+    settings.setLayers(layers)
+    settings.setDestinationCrs(layers[0].crs())
+    settings.setExtent(extent)
+    settings.setOutputSize(MAP_SIZE)
+    settings.setOutputDpi(110)
+    settings.setBackgroundColor(QColor("white"))
+    job = QgsMapRendererParallelJob(settings)
+    job.start()
+    job.waitForFinished()
+    job.renderedImage().save(str(picture))
+
+
+def _table(layer: QgsVectorLayer, picture: Path) -> None:
+    """Draw a layer's attribute table."""
+    canvas, cache = QgsMapCanvas(), QgsVectorLayerCache(layer, layer.featureCount())
+    model = QgsAttributeTableModel(cache)
+    model.loadLayer()
+    filtered = QgsAttributeTableFilterModel(canvas, model)
+    view = QgsAttributeTableView()
+    view.setModel(filtered)
+    view.resizeColumnsToContents()
+    view.hideColumn(model.fieldCol(layer.fields().indexOf("fid")))
+    view.resize(view.horizontalHeader().length() + 30, TABLE_HEIGHT)
+    view.show()
+    QgsApplication.processEvents()
+    view.grab().save(str(picture))
+    view.setModel(None)
+
+
+def _report(page: Path, picture: Path) -> None:
+    """Draw the top of the report."""
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        print(f"chromium is not installed: {picture.name} stays as it is (apt-get install chromium).")
+        return
+    size = ",".join(map(str, REPORT_SIZE))
+    options = ("--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", f"--window-size={size}")
+    command = [chromium, *options, f"--user-data-dir={page.parent / 'chromium'}", f"--screenshot={picture}"]
+    subprocess.run([*command, page.as_uri()], check=True, capture_output=True)
+    shutil.copy(picture, FOLDER / "report_track.png")
+    _crop(picture, bottom=REPORT_SIZE[1] - REPORT_TOP)
+    _crop(FOLDER / "report_track.png", top=REPORT_TOP)
+
+
+def _crop(picture: Path, top: int = 0, right: int = 0, bottom: int = 0) -> None:
+    """Cut pixels off the sides of a picture."""
+    with Image.open(picture) as image:
+        cropped = image.crop((0, top, image.width - right, image.height - bottom))
+    cropped.save(picture)
+
+
+def _shrink(picture: Path) -> None:
+    """Store a picture with a palette that covers all colours, also those of thin lines."""
+    with Image.open(picture) as image:
+        smaller = image.convert("RGB").quantize(COLORS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    smaller.save(picture, optimize=True)
+
+
+if __name__ == "__main__":
+    main()
