@@ -11,7 +11,8 @@ from ..raster import RailRaster
 BLOCK = 16
 """Side, in cells, of the blocks that the corridor is made of."""
 GAP = 8
-"""Longest gap, in blocks, that the network may bridge: 5 m at 4 cm."""
+"""Blocks so far apart may have a gap between them that the network bridges: 4 m at 4 cm. What is longer is left to the
+vectorizer."""
 BESIDE = 1
 """Blocks around rail cells and gaps that are computed as well: 0.6 m, farther than the network moves a rail."""
 OVERHEAD = 16

@@ -38,7 +38,7 @@ def test_pieces_hold_the_corridor_and_do_not_overlap(cells):
     assert sum(piece.holds(near.reshape(-1, 2)).astype(int) for piece in field.pieces).min() == 1
 
 
-@given(st.integers(2, GAP - 1), st.floats(0, 2 * np.pi))
+@given(st.floats(2, GAP - np.sqrt(2)), st.floats(0, 2 * np.pi))
 def test_what_lies_in_a_gap_is_computed(length, heading):
     end = np.rint(length * BLOCK * np.array([np.sin(heading), np.cos(heading)])).astype(int)
     between = np.rint(np.linspace(0, 1, 200)[:, None] * end).astype(int)

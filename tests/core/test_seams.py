@@ -13,6 +13,8 @@ from rail_extract.core.trimming import trim
 
 SIDE, REACH = 40.0, 20.0
 FRAME = LocalFrame(np.zeros(3))
+STEP_M = 0.2
+"""Distance of the vertices of a true line."""
 
 
 def rail(xyz, gaps=()):
@@ -50,9 +52,9 @@ def moved(line, by):
 
 
 def curve(heading, bend, length=190.0, start=(3.0, 5.0)):
-    s = np.arange(0.0, length, 0.2)
+    s = np.arange(0.0, length, STEP_M)
     angle = heading + bend * s
-    xy = np.array(start) + np.column_stack([np.cumsum(0.2 * np.cos(angle)), np.cumsum(0.2 * np.sin(angle))])
+    xy = np.array(start) + STEP_M * np.column_stack([np.cumsum(np.cos(angle)), np.cumsum(np.sin(angle))])
     return np.column_stack([xy, 0.01 * s])
 
 
@@ -70,7 +72,9 @@ def test_one_line_comes_back_whole(heading, bend):
     true = rail(curve(heading, bend))
     (line,) = join(seen_by_stretches([true]), FRAME)
     assert line.length_m == pytest.approx(true.length_m, abs=1e-3)
-    assert np.abs(project([true.xyz[:, :2]], line.xyz[:, :2], 1.0).across).max() < 1e-4
+    left_out = STEP_M * 2
+    rise = abs(bend) * left_out**2 / 8  # of a chord: a seam may leave out a vertex
+    assert np.abs(project([true.xyz[:, :2]], line.xyz[:, :2], 1.0).across).max() < 1e-5 + rise
     assert line.points == pytest.approx(true.points, rel=0.01)
     assert line.sigma_mm == pytest.approx(1.0) and line.resid_mm == pytest.approx(2.0)
 
