@@ -53,7 +53,8 @@ def peer_lines(points: RailPoints, gauge_m: float, head_width_m: float) -> list:
         if length_m >= SHORTEST_M:
             sigma = SMOOTHING_M / (length_m / (len(xy) - 1))
             lines.append(gaussian_filter1d(xy, sigma, axis=0, mode="mirror"))
-    return [np.column_stack([xy, _heights(xy, points.xyz)]) for xy in lines]
+    risen = [(xy, _heights(xy, points.xyz)) for xy in lines]
+    return [np.column_stack([xy, z]) for xy, z in risen if z is not None]
 
 
 def _pieces(skeleton: np.ndarray) -> list:
@@ -97,11 +98,13 @@ def _ordered(cells: np.ndarray) -> np.ndarray:
         seen.add(at)
 
 
-def _heights(xy: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Mean height of the points around each vertex, smoothed; gaps are filled linearly."""
+def _heights(xy: np.ndarray, points: np.ndarray) -> np.ndarray | None:
+    """Mean height of the points around each vertex, smoothed; gaps are filled linearly. None without any point."""
     near = cKDTree(points[:, :2]).query_ball_point(xy, REACH_M)
     z = np.array([points[numbers, 2].mean() if numbers else np.nan for numbers in near])
     known = np.flatnonzero(np.isfinite(z))
+    if len(known) == 0:
+        return None
     z = np.interp(np.arange(len(z)), known, z[known])
     spacing_m = length_along(xy)[-1] / (len(xy) - 1)
     return gaussian_filter1d(z, SMOOTHING_M / spacing_m, mode="mirror")
