@@ -24,8 +24,8 @@ from rail_extract.core.cluster.run import connect, extract
 from rail_extract.core.las import laspy
 from rail_extract.core.pipeline import Parameters, extract_rails, stretch_side
 from rail_extract.core.points import ask
-from rail_extract.core.spool import spool
 from rail_extract.core.standards import STANDARDS
+from rail_extract.core.stretches.spool import spool
 from rail_extract.core.synthetic.curves import Element, trace
 from rail_extract.core.synthetic.plain_scenes import spacing
 from rail_extract.core.synthetic.scanner import Scanner

@@ -17,9 +17,9 @@ from rail_extract.core.frpdf.engine import Engine
 from rail_extract.core.frpdf.network import FRPDF, RECEPTIVE_RADIUS
 from rail_extract.core.frpdf.opencv_engine import OpenCvEngine
 from rail_extract.core.frpdf.torch_engine import TorchEngine
+from rail_extract.core.lines.polyline import interpolate, project, resample
 from rail_extract.core.pipeline import Parameters, lines_of
 from rail_extract.core.points import RailPoints
-from rail_extract.core.polyline import interpolate, project, resample
 from rail_extract.core.progress import SILENT
 from rail_extract.core.rails import RailLine, length_along
 from rail_extract.core.raster import RailRaster, cell_size, rasterize

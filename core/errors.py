@@ -39,5 +39,9 @@ class DiskError(RailExtractError):
     """A file can't be written, as on a full disk."""
 
 
+class DeviceExhaustedError(Exception):
+    """The device has too little memory for so many cells at once."""
+
+
 class Cancelled(Exception):  # noqa: N818 - not an error: the user asked for it
     """The user cancelled the run."""

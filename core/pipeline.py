@@ -5,25 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from .centerlines import CenterlineParameters, build_centerlines
-from .elevation import ElevationParameters, elevate, flat_rails, numbered
 from .errors import NoRailPointsError, NoTrackError, ParameterError
 from .frpdf import DEFAULT_PASSES
 from .frpdf.cleanup import MARGIN, MOST_PASSES, UNTIL_STABLE, clean
 from .frpdf.engine import Engine, make_engine
 from .frpdf.weights import load_arrays
 from .frpdf.zoo import choose
-from .geometry import measure_track_geometry
-from .measuring import measure_in_stretches
+from .heads.elevation import ElevationParameters, elevate, flat_rails, numbered
+from .heads.measuring import measure_in_stretches
+from .heads.refinement import refine
+from .lines.smoothing import smooth_network
+from .lines.thinning import thin
 from .points import LocalFrame, RailPoints
 from .progress import SILENT, Progress
 from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from .raster import TILE, RailRaster, cell_size, rasterize
-from .refinement import refine
-from .seams import join
-from .smoothing import smooth_network
 from .standards import distinct_gauges
-from .stretches import (
+from .stretches.seams import join
+from .stretches.squares import (
     OVERLAP_TILES,
     STRETCH_TILES,
     Key,
@@ -36,8 +35,9 @@ from .stretches import (
     mosaic,
     own_tiles,
 )
-from .thinning import thin
-from .trimming import StretchRails, trim
+from .stretches.trimming import StretchRails, trim
+from .tracks.centerlines import CenterlineParameters, build_centerlines
+from .tracks.geometry import measure_track_geometry
 from .vectorize import vectorize
 
 NETWORK_SHARE = 0.7

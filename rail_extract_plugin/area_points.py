@@ -16,7 +16,7 @@ from ..core.progress import Progress
 from .clouds import Bounds, CloudSource, read_points, spool_points
 
 if TYPE_CHECKING:
-    from ..core.spool import SpooledPoints
+    from ..core.stretches.spool import SpooledPoints
 
 Points = TypeVar("Points")
 

@@ -23,7 +23,7 @@ from ..core.standards import RAIL_CLASS
 
 if TYPE_CHECKING:
     from ..core.points import RailPoints
-    from ..core.spool import SpooledPoints
+    from ..core.stretches.spool import SpooledPoints
 
 Bounds = tuple[float, float, float, float]
 
@@ -94,7 +94,7 @@ def spool_points(
 ) -> tuple[SpooledPoints, ...]:
     """Do as `read_points`, but leave the points on disk, sorted into squares: a cloud of any size fits."""
     from ..core.points import ask, read_headers
-    from ..core.spool import spool
+    from ..core.stretches.spool import spool
 
     crs = QgsCoordinateReferenceSystem(read_headers(source.paths)[0].crs_wkt or source.crs_wkt or "")
     request = ask(source.paths, class_codes, source.crs_wkt, bounds(crs), progress)

@@ -10,13 +10,13 @@ import numpy as np
 from qgis.core import QgsProcessingFeatureSource
 
 from ..core.errors import RailExtractError
-from ..core.measuring import measure_in_stretches
+from ..core.heads.measuring import measure_in_stretches
 from ..core.points import LocalFrame
 from ..core.progress import Progress
 from ..core.rails import Centerline, RailLine, TrackGeometry
-from ..core.spool import SpooledPoints
 from ..core.standards import RAIL_CLASS
-from ..core.stretches import lay_out
+from ..core.stretches.spool import SpooledPoints
+from ..core.stretches.squares import lay_out
 from .area_points import Area, check_same_plane, spool_points_in
 from .clouds import Bounds, CloudSource
 from .drawn_rails import read_centerlines, read_rails

@@ -16,8 +16,8 @@ from ..frpdf.engine import DEVICES, ENGINES
 from ..frpdf.zoo import choose
 from ..pipeline import Parameters
 from ..progress import Estimating, Progress
-from ..spool import writing
 from ..standards import DEFAULT, distinct_gauges, resolve
+from ..stretches.spool import writing
 from .fields import CENTERLINE_FIELDS, RAIL_FIELDS
 
 NEEDS = {"distributed": "distributed", "pyogrio": "pyogrio", "shapely": "shapely"}

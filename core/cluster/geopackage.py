@@ -13,7 +13,7 @@ import shapely
 from ..errors import DiskError
 from ..points import LocalFrame
 from ..rails import Centerline, RailLine
-from ..spool import writing
+from ..stretches.spool import writing
 
 UNKNOWN_IN_METRES = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1]]'
 """Stated where the cloud has no coordinate system, because GDAL else calls a GeoPackage's coordinates degrees."""

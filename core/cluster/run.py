@@ -16,8 +16,8 @@ from ..pipeline import Parameters, stretch_side, tracks_of, whole_rails
 from ..points import LocalFrame, Request, ask
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
-from ..spool import SpooledFile, SpooledPoints, gather
-from ..stretches import lay_out
+from ..stretches.spool import SpooledFile, SpooledPoints, gather
+from ..stretches.squares import lay_out
 from .tasks import Failure, StretchTask, clean, draw, sort_points
 from .work import fingerprint, load_rails
 

@@ -14,8 +14,8 @@ from ..frpdf.engine import Engine
 from ..las import CloudHeader
 from ..pipeline import Parameters, clean_stretch, engine_for, rails_of_stretch
 from ..points import Request
-from ..spool import SpooledFile, SpooledPoints, spool_file
-from ..stretches import Key, Stretch, around
+from ..stretches.spool import SpooledFile, SpooledPoints, spool_file
+from ..stretches.squares import Key, Stretch, around
 from .work import fingerprint, load_raster, save_rails, save_raster
 
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from ..rails import RailLine, Support
 from ..raster import TILE, RailRaster
-from ..spool import writing
-from ..stretches import Stretch
-from ..trimming import StretchRails
+from ..stretches.spool import writing
+from ..stretches.squares import Stretch
+from ..stretches.trimming import StretchRails
 
 FORMAT = 1
 """Counts up when stretches come out otherwise, so that results of an earlier version are not taken for new ones."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..errors import DeviceExhaustedError
 from ..progress import SILENT, Progress
 from ..raster import TILE, RailRaster
 from . import DEFAULT_PASSES, FEEDBACK_THRESHOLD, OUTPUT_THRESHOLD, START
 from .corridor import Piece, lay_fields
-from .engine import DeviceExhaustedError, Engine
+from .engine import Engine
 
 MARGIN = 64
 """Cells around a raster that was cut out of a larger one that only give context, for each pass."""

@@ -16,10 +16,6 @@ ENGINES = ("AUTO", "TORCH", "OPENCV")
 DEVICES = ("AUTO", "CPU", "CUDA")
 
 
-class DeviceExhaustedError(Exception):
-    """The device has too little memory for so many cells at once."""
-
-
 class Engine(Protocol):
     """Runs the folded network somewhere.
 

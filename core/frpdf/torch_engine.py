@@ -9,10 +9,9 @@ import torch
 from torch import Tensor
 from torch.nn.functional import conv2d
 
-from ..errors import ModelError
+from ..errors import DeviceExhaustedError, ModelError
 from ..progress import Progress
 from .corridor import Piece
-from .engine import DeviceExhaustedError
 from .folding import Convolution, FoldedLayer, fold
 from .layered import LayeredEngine, Step
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..polyline import interpolate, left_normals, project
+from ..lines.polyline import interpolate, left_normals, project
 from ..rails import Centerline, RailLine, TrackGeometry, length_along
 from .compare import cut, nearest
 

@@ -74,7 +74,7 @@ class MeasureTrackGeometry(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Measure every track, then write the points."""
-        from ...core.geometry import measure_track_geometry
+        from ...core.tracks.geometry import measure_track_geometry
         from ..track_inputs import check_gauges, measured_rails, read_inputs
 
         values = Values(self, parameters, context)

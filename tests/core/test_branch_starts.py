@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from rail_extract.core.branch_starts import slide_branches
+from rail_extract.core.heads.branch_starts import slide_branches
 from rail_extract.core.vectorize.network import LineNetwork
 
 WIDTH, TOE, LENGTH = 0.072, 30.0, 80.0

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rail_extract.core.centerlines import build_centerlines
 from rail_extract.core.errors import Cancelled
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine, length_along
@@ -14,6 +13,7 @@ from rail_extract.core.synthetic.compare import compare_lines
 from rail_extract.core.synthetic.curves import Curve, Element, trace
 from rail_extract.core.synthetic.tracks import Track
 from rail_extract.core.synthetic.turnouts import FORMS, branch
+from rail_extract.core.tracks.centerlines import build_centerlines
 
 GAUGE, WIDTH = 1.435, 0.072
 SPACING = GAUGE + WIDTH

@@ -19,8 +19,8 @@ from rail_extract.core.cluster.run import connect, extract
 from rail_extract.core.errors import DiskError
 from rail_extract.core.pipeline import Parameters, extract_rails, stretch_side
 from rail_extract.core.points import ask, read_rail_points
-from rail_extract.core.spool import spool
 from rail_extract.core.standards import STANDARDS
+from rail_extract.core.stretches.spool import spool
 from rail_extract.core.synthetic.curves import Element, trace
 from rail_extract.core.synthetic.plain_scenes import spacing
 from rail_extract.core.synthetic.scanner import Scanner

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rail_extract.core.dtw import distance_to_segment, match_polylines, squared_distance_integral
+from rail_extract.core.tracks.dtw import distance_to_segment, match_polylines, squared_distance_integral
 
 COUNT = st.integers(2, 7)
 SEEDS = st.integers(0, 2**32 - 1)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from rail_extract.core.elevation import ElevationParameters, elevate, find_gaps, flat_rails
+from rail_extract.core.heads.elevation import ElevationParameters, elevate, find_gaps, flat_rails
 from rail_extract.core.points import LocalFrame, RailPoints
 from rail_extract.core.vectorize.network import LineNetwork
 

@@ -8,9 +8,9 @@ from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.frpdf.engine import make_engine
 from rail_extract.core.frpdf.weights import load_arrays
 from rail_extract.core.frpdf.zoo import choose
+from rail_extract.core.lines.polyline import interpolate, project, resample
 from rail_extract.core.pipeline import Parameters, lines_of
 from rail_extract.core.points import RailPoints, read_rail_points
-from rail_extract.core.polyline import interpolate, project, resample
 from rail_extract.core.rails import length_along
 from rail_extract.core.raster import cell_size, rasterize
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rail_extract.core.envelope import extremal_boundary
+from rail_extract.core.heads.envelope import extremal_boundary
 
 HEIGHT = st.floats(-3, 3, allow_nan=False).map(lambda value: round(value, 2))
 POSITION = st.floats(0, 12, allow_nan=False).map(lambda value: round(value, 2))

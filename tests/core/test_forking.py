@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
-from rail_extract.core.centerlines import build_centerlines
+from rail_extract.core.lines.thinning import thin
 from rail_extract.core.rails import RailLine
 from rail_extract.core.synthetic.compare import compare_lines
 from rail_extract.core.synthetic.curves import Element, trace
 from rail_extract.core.synthetic.tracks import Track
 from rail_extract.core.synthetic.turnouts import FORMS, branch
-from rail_extract.core.thinning import thin
+from rail_extract.core.tracks.centerlines import build_centerlines
 
 GAUGE, WIDTH = 1.435, 0.072
 TOE_M = 30.0

@@ -3,18 +3,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rail_extract.core import pipeline
-from rail_extract.core.centerlines import build_centerlines
-from rail_extract.core.elevation import ElevationParameters, elevate, measure_again
-from rail_extract.core.geometry import PROFILE_SIGMA_M, measure_track_geometry
+from rail_extract.core.heads.elevation import ElevationParameters, elevate, measure_again
+from rail_extract.core.heads.refinement import refine
+from rail_extract.core.lines.smoothing import smooth_network
+from rail_extract.core.lines.thinning import thin
 from rail_extract.core.points import LocalFrame, RailPoints
 from rail_extract.core.rails import NO_GAPS, Centerline, RailLine, Support
 from rail_extract.core.raster import cell_size, rasterize
-from rail_extract.core.refinement import refine
-from rail_extract.core.smoothing import smooth_network
 from rail_extract.core.synthetic.curves import Element, trace, transition_curve
 from rail_extract.core.synthetic.scanner import Scanner, scan
 from rail_extract.core.synthetic.tracks import Track
-from rail_extract.core.thinning import thin
+from rail_extract.core.tracks.centerlines import build_centerlines
+from rail_extract.core.tracks.geometry import PROFILE_SIGMA_M, measure_track_geometry
 from rail_extract.core.vectorize import vectorize
 
 GAUGE, WIDTH = 1.435, 0.072

@@ -1,5 +1,5 @@
 import numpy as np
-from rail_extract.core.neighbours import free_edges
+from rail_extract.core.heads.neighbours import free_edges
 
 WIDTH = 0.072
 RIGHT, LEFT = 0, 1

@@ -2,10 +2,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core.pairing import pair_rails
-from rail_extract.core.parallels import commonest_spacing, find_parallels
 from rail_extract.core.rails import RailLine
 from rail_extract.core.synthetic.curves import Element, trace, transition_curve
+from rail_extract.core.tracks.pairing import pair_rails
+from rail_extract.core.tracks.parallels import commonest_spacing, find_parallels
 
 GAUGE, WIDTH = 1.435, 0.072
 SPACING = GAUGE + WIDTH

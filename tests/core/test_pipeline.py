@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from rail_extract.core import pipeline
 from rail_extract.core.errors import Cancelled, NoTrackError, ParameterError
+from rail_extract.core.lines.polyline import project
 from rail_extract.core.pipeline import Parameters, extract_rails, lines_of, tracks_of
 from rail_extract.core.points import LocalFrame, RailPoints
-from rail_extract.core.polyline import project
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine, length_along
 from rail_extract.core.raster import cell_size, rasterize

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
+from rail_extract.core.heads.refinement import refine
+from rail_extract.core.lines.polyline import project
+from rail_extract.core.lines.smoothing import smooth_network
 from rail_extract.core.points import LocalFrame, RailPoints
-from rail_extract.core.polyline import project
 from rail_extract.core.raster import cell_size, rasterize
-from rail_extract.core.refinement import refine
-from rail_extract.core.smoothing import smooth_network
 from rail_extract.core.synthetic.curves import Element, trace
 from rail_extract.core.synthetic.scanner import Scanner, scan
 from rail_extract.core.synthetic.tracks import Track

@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rail_extract.core.lines.smoothing import smooth_network
 from rail_extract.core.rails import length_along
 from rail_extract.core.raster import rasterize
-from rail_extract.core.smoothing import smooth_network
 from rail_extract.core.synthetic.drawing import Window, draw_label
 from rail_extract.core.synthetic.layouts import Layout, random_layout
 from rail_extract.core.synthetic.pairs import BASE_RATIO, CELL_M, SPACING_M

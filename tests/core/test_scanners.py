@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rail_extract.core.elevation import ElevationParameters, elevate
+from rail_extract.core.heads.elevation import ElevationParameters, elevate
+from rail_extract.core.heads.refinement import refine
+from rail_extract.core.lines.polyline import left_normals, resample
 from rail_extract.core.points import LocalFrame, RailPoints
-from rail_extract.core.polyline import left_normals, resample
-from rail_extract.core.refinement import refine
 from rail_extract.core.synthetic.compare import compare_lines, match
 from rail_extract.core.synthetic.curves import Element, trace
 from rail_extract.core.synthetic.plain_scenes import canted, rolling

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rail_extract.core.lines.polyline import project
 from rail_extract.core.points import LocalFrame
-from rail_extract.core.polyline import project
 from rail_extract.core.rails import RailLine, Support, length_along
-from rail_extract.core.seams import join
-from rail_extract.core.stretches import HALO_M, Stretch, unique_keys
-from rail_extract.core.trimming import trim
+from rail_extract.core.stretches.seams import join
+from rail_extract.core.stretches.squares import HALO_M, Stretch, unique_keys
+from rail_extract.core.stretches.trimming import trim
 
 SIDE, REACH = 40.0, 20.0
 FRAME = LocalFrame(np.zeros(3))

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial.legendre import leggauss
-from rail_extract.core.network_smoothing import NETWORK_STATIONS_PER_SIGMA
+from rail_extract.core.lines.network_smoothing import NETWORK_STATIONS_PER_SIGMA
+from rail_extract.core.lines.smoothing import simplify, smooth_line, smooth_network, smooth_profile
 from rail_extract.core.rails import length_along
-from rail_extract.core.smoothing import simplify, smooth_line, smooth_network, smooth_profile
 from rail_extract.core.synthetic.curves import trace, transition_curve
 from rail_extract.core.vectorize.network import LineNetwork
 

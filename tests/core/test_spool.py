@@ -6,8 +6,8 @@ from rail_extract.core.errors import Cancelled, NoRailPointsError
 from rail_extract.core.las import laspy
 from rail_extract.core.points import ask, read_rail_points
 from rail_extract.core.progress import Progress
-from rail_extract.core.spool import spool
-from rail_extract.core.stretches import MemorySource, Stretch, lay_out
+from rail_extract.core.stretches.spool import spool
+from rail_extract.core.stretches.squares import MemorySource, Stretch, lay_out
 
 SIDE = 30.0
 

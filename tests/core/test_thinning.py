@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
+from rail_extract.core.lines.thinning import thin
 from rail_extract.core.rails import RailLine
-from rail_extract.core.thinning import thin
 
 
 def rail(xyz):

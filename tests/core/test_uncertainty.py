@@ -1,17 +1,17 @@
 import numpy as np
 import pytest
-from rail_extract.core.elevation import ElevationParameters, elevate
-from rail_extract.core.head_edges import station_count
+from rail_extract.core.heads.elevation import ElevationParameters, elevate
+from rail_extract.core.heads.head_edges import station_count
+from rail_extract.core.heads.refinement import refine
+from rail_extract.core.heads.uncertainty import measure_support
+from rail_extract.core.lines.polyline import interpolate, project
+from rail_extract.core.lines.smoothing import smooth_network
 from rail_extract.core.points import LocalFrame, RailPoints
-from rail_extract.core.polyline import interpolate, project
 from rail_extract.core.rails import Support, length_along
 from rail_extract.core.raster import cell_size, rasterize
-from rail_extract.core.refinement import refine
-from rail_extract.core.smoothing import smooth_network
 from rail_extract.core.synthetic.curves import Element, trace
 from rail_extract.core.synthetic.scanner import Scanner, scan
 from rail_extract.core.synthetic.tracks import Track
-from rail_extract.core.uncertainty import measure_support
 from rail_extract.core.vectorize import vectorize
 
 GAUGE, WIDTH = 1.435, 0.072

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rail_extract.core.errors import Cancelled
+from rail_extract.core.lines.smoothing import smooth_network
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import length_along
 from rail_extract.core.raster import RailRaster
-from rail_extract.core.smoothing import smooth_network
 from rail_extract.core.synthetic.curves import Element, trace
 from rail_extract.core.synthetic.turnouts import FORMS, branch
 from rail_extract.core.vectorize import vectorize

@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..lines.polyline import Feet, interpolate, project, resample, starts_at_its_end
+from ..points import RailPoints
+from ..progress import SILENT, Progress
+from ..rails import RailLine, length_along
+from ..vectorize.network import LineNetwork
 from .head_edges import widest_reach
 from .neighbours import free_edges
-from .points import RailPoints
-from .polyline import Feet, interpolate, project, resample, starts_at_its_end
-from .progress import SILENT, Progress
-from .rails import RailLine, length_along
 from .railtop import LEAST_POINTS, find_top
 from .uncertainty import measure_support
-from .vectorize.network import LineNetwork
 
 BRIDGE_M = 0.5
 """A longer stretch without points counts as bridged: five profiles of the fastest train's scanner."""

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ..rails import RailLine
 from .chaining import Chain
 from .leads import Lead, leads, runs_on
 from .pairing import RailPair
-from .rails import RailLine
 
 STEP_M = 0.25
 """Vertex distance of the guide: chords of a tram's curve of 25 m keep to 0.3 mm."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .polyline import interpolate, project, resample
-from .rails import RailLine, length_along
-from .stretches import HALO_M, Key, Stretch, around
+from ..lines.polyline import interpolate, project, resample
+from ..rails import RailLine, length_along
+from .squares import HALO_M, Key, Stretch, around
 from .trimming import STATION_M, runs
 from .uniting import HOLE_M, SAME_RAIL_M, faded, prolonged, united
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..rails import length_along
 from .network_smoothing import smooth_network
 from .paek import filled, local_fit, reflected, repeated
-from .rails import length_along
 
 __all__ = ["simplify", "smooth_line", "smooth_network", "smooth_profile"]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .polyline import resample
-from .rails import RailLine
-from .stretches import HALO_M, Stretch
+from ..lines.polyline import resample
+from ..rails import RailLine
+from .squares import HALO_M, Stretch
 
 STATION_M = 0.25
 """Spacing of the stations at which lines are cut and compared."""

@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..lines.polyline import interpolate, project
+from ..points import LocalFrame
+from ..rails import RailLine, length_along
 from .laying import Table
-from .points import LocalFrame
-from .polyline import interpolate, project
-from .rails import RailLine, length_along
 from .trimming import STATION_M, StretchRails
 from .uniting import SAME_RAIL_M
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..progress import SILENT, Progress
+from ..rails import length_along
+from ..vectorize.ends import stretch, way_out
+from ..vectorize.network import LineNetwork
 from .paek import REACH_SIGMAS, filled, local_fit, reflected, repeated
-from .progress import SILENT, Progress
-from .rails import length_along
-from .vectorize.ends import stretch, way_out
-from .vectorize.network import LineNetwork
 
 NETWORK_STATIONS_PER_SIGMA = 8
 """A network is evaluated at even stations alone: at 0.1 m for sigma 0.8 m a bend of 25 m deviates by 0.05 mm."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..lines.smoothing import smooth_profile
 from .envelope import extremal_boundary
 from .railhead import cross_slope, rough_level, spread
-from .smoothing import smooth_profile
 
 LEAST_POINTS = 10
 """A line that fewer points support is none of a rail: 1 m of the sparsest rail has more."""

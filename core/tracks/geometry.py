@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..lines.polyline import interpolate, left_normals, resample
+from ..lines.smoothing import smooth_line, smooth_profile
+from ..progress import SILENT, Progress
+from ..rails import Centerline, RailLine, TrackGeometry, length_along
 from .midline import Meeting, Side, bridged_steps
 from .parallels import commonest_spacing
-from .polyline import interpolate, left_normals, resample
-from .progress import SILENT, Progress
-from .rails import Centerline, RailLine, TrackGeometry, length_along
-from .smoothing import smooth_line, smooth_profile
 
 FINE_M = 0.25
 """Spacing of the stations at which both rails are met."""

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from .polyline import interpolate, left_normals, project
-from .rails import length_along
-from .vectorize.ends import turned
-from .vectorize.network import LineNetwork
+from ..lines.polyline import interpolate, left_normals, project
+from ..rails import length_along
+from ..vectorize.ends import turned
+from ..vectorize.network import LineNetwork
 
 PARTED_HEADS = 3.0
 """Distance of the axes, in head widths, up to which the way they part tells where they touch."""

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..lines.polyline import interpolate, left_normals, project
+from ..progress import SILENT, Progress
+from ..rails import RailLine, length_along
 from .dtw import match_polylines
 from .parallels import REACH_M, Parallels, find_parallels
-from .polyline import interpolate, left_normals, project
-from .progress import SILENT, Progress
-from .rails import RailLine, length_along
 
 MIN_LENGTH_M = 3.0
 """Shorter stretches at gauge are chance meetings in a switch."""

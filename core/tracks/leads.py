@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..lines.polyline import interpolate, left_normals
+from ..rails import RailLine, length_along
 from .pairing import RailPair
-from .polyline import interpolate, left_normals
-from .rails import RailLine, length_along
 
 
 @dataclass(frozen=True)

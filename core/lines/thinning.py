@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 from scipy.linalg import solveh_banded
 
-from .rails import Centerline, RailLine, length_along
+from ..rails import Centerline, RailLine, length_along
 from .smoothing import essential_vertices
 
 Line = TypeVar("Line", RailLine, Centerline)

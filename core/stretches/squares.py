@@ -12,8 +12,8 @@ from typing import Protocol
 
 import numpy as np
 
-from .points import LocalFrame, RailPoints
-from .raster import TILE, RailRaster
+from ..points import LocalFrame, RailPoints
+from ..raster import TILE, RailRaster
 
 STRETCH_TILES = 50
 """Tiles along the side, half a kilometre: what overlaps is a sixth of it, and the widest yard fits into memory."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .progress import SILENT, Progress
-from .rails import length_along
+from ..progress import SILENT, Progress
+from ..rails import length_along
 
 STATION_M = 0.05
 """Spacing of the stations at which points look for their line; of two lines this close, either may be taken."""

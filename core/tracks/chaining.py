@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..rails import RailLine
 from .leads import leads
 from .pairing import LEFT, MIN_LENGTH_M, OVERLAP_M, RIGHT, RailPair
-from .rails import RailLine
 
 DIRECTION_M = 1.0
 """Length over which a stretch's direction at its end is measured."""

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from .polyline import interpolate, project
-from .rails import RailLine, Support, length_along
-from .stretches import HALO_M
+from ..lines.polyline import interpolate, project
+from ..rails import RailLine, Support, length_along
+from .squares import HALO_M
 from .trimming import STATION_M
 
 SAME_RAIL_M = 0.03

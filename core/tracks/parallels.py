@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .polyline import left_normals, resample, unit_tangents
-from .progress import SILENT, Progress
-from .rails import RailLine
+from ..lines.polyline import left_normals, resample, unit_tangents
+from ..progress import SILENT, Progress
+from ..rails import RailLine
 
 STEP_M = 0.5
 """Spacing of the stations: six on the shortest match, and a railway curve stays within 2 mm of their chords."""

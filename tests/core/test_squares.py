@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rail_extract.core.points import LocalFrame, RailPoints
 from rail_extract.core.raster import TILE, rasterize
-from rail_extract.core.stretches import (
+from rail_extract.core.stretches.squares import (
     MemorySource,
     Stretch,
     around,

@@ -7,19 +7,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..errors import NoTrackError
+from ..lines.polyline import left_normals, resample, starts_at_its_end
+from ..lines.smoothing import smooth_line
+from ..progress import SILENT, Progress
+from ..rails import Centerline, RailLine, length_along
+from ..standards import STANDARDS
 from .chaining import Chain, chain_pairs, reach_alone
-from .errors import NoTrackError
 from .forking import fork_centerlines
 from .guide import STEP_M, guide_line
 from .leads import runs_on
 from .midline import Meeting, Side, at_gauge, bridged_steps, midway
 from .pairing import MIN_LENGTH_M, pair_rails
 from .parallels import commonest_spacing
-from .polyline import left_normals, resample, starts_at_its_end
-from .progress import SILENT, Progress
-from .rails import Centerline, RailLine, length_along
-from .smoothing import smooth_line
-from .standards import STANDARDS
 
 STATIONS_AT_ONCE = 8192
 """Stations drawn in one go, 2 km of track: lets a cancel through several times a second."""

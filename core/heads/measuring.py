@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..lines.polyline import resample
+from ..progress import SILENT, Progress
+from ..rails import RailLine
+from ..stretches.squares import Key, PointSource, Stretch, unique_keys
+from ..stretches.trimming import runs
+from ..stretches.uniting import united
+from ..tracks.geometry import PROFILE_SIGMA_M
 from .elevation import measure_again
-from .geometry import PROFILE_SIGMA_M
-from .polyline import resample
-from .progress import SILENT, Progress
-from .rails import RailLine
-from .stretches import Key, PointSource, Stretch, unique_keys
-from .trimming import runs
-from .uniting import united
 
 CONTEXT_M = 10.0
 """How far beyond a stretch its rails are measured: the disc reaches 1 m, the smoothing of heights over 1 m no more

@@ -10,18 +10,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..lines.network_smoothing import lead
+from ..lines.polyline import interpolate, left_normals, project
+from ..lines.smoothing import smooth_profile
+from ..points import RailPoints
+from ..progress import SILENT, Progress
+from ..rails import length_along
+from ..vectorize.bridges import bridge
+from ..vectorize.network import LineNetwork
 from .branch_starts import slide_branches
 from .head_edges import HALF_HEAD, histograms, middles, widest_reach
 from .neighbours import free_edges
-from .network_smoothing import lead
-from .points import RailPoints
-from .polyline import interpolate, left_normals, project
-from .progress import SILENT, Progress
 from .railhead import on_top
-from .rails import length_along
-from .smoothing import smooth_profile
-from .vectorize.bridges import bridge
-from .vectorize.network import LineNetwork
 
 LEAST_SHARE = 0.25
 """Share of a line's stations that have to show an edge; otherwise the line stays as it is."""

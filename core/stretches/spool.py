@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from .errors import DiskError
-from .las import CloudHeader
-from .points import LocalFrame, RailPoints, Request, origin_steps
-from .progress import SILENT, Progress
-from .stretches import Key, Stretch, around, unique_keys
+from ..errors import DiskError
+from ..las import CloudHeader
+from ..points import LocalFrame, RailPoints, Request, origin_steps
+from ..progress import SILENT, Progress
+from .squares import Key, Stretch, around, unique_keys
 
 REPORT = "report.json"
 
