@@ -113,7 +113,7 @@ def simplify_xy() -> Figure:
 def iterations() -> Figure:
     """Draw a stretch of raster before the network and after each number of passes."""
     case = bench(
-        bend(14), gaps=((4.0, 5.5), (8.0, 8.6)), scanner=Scanner(profile_step_m=0.08, noise_m=0.01),
+        bend(14), gaps=((4.0, 6.2), (9.0, 9.6)), scanner=Scanner(profile_step_m=0.08, noise_m=0.01),
         weeds_near=8, weeds_between=25, stones=120,
     )  # fmt: skip
     rasters = [("points", case.raster)] + [(f"ITERATIONS = {n}", case.cleaned(n)) for n in (1, 2)]
@@ -133,12 +133,13 @@ def centerline_tolerance() -> Figure:
     rails = [RailLine(xyz, number, 10, 0, 0.0, 0.0, 0.0) for number, xyz in enumerate(sides, start=1)]
     figure, axes = _figure("along the track [m]", "across [m], stretched")
     for number, xyz in enumerate(sides):
-        axes.plot(xyz[:, 0], xyz[:, 1], color=RAIL, label=None if number else "rails; the gauge grows by 100 mm")
+        axes.plot(xyz[:, 0], xyz[:, 1], color="0.4", label=None if number else "rails; the gauge grows by 100 mm")
     for number, (value, color) in enumerate(zip((0.02, 0.05, 0.08), SERIES)):
         for line in tracks_of(rails, Parameters(STANDARD.gauge_m, STANDARD.head_width_m, centerline_tolerance_m=value)):
             text = f"CENTERLINE_TOLERANCE = {value:g} m: {line.length_m:.1f} m"
             axes.plot(line.xyz[:, 0], line.xyz[:, 1] + 0.15 * (1 - number), color=color, label=text)
     axes.set_title("The centerline ends where the gauge is off by more; the lines are drawn 15 cm apart")
+    axes.set_ylim(-1.9, 0.95)
     return _closed(figure, axes)
 
 
@@ -195,7 +196,7 @@ def _draw(axes: Axes, case: Bench, rails: Sequence[RailLine], tracks: Sequence[C
     """Draw points and lines, each rail in a colour of its own; the ends are marked."""
     across, along = _turned(case.points.xyz)
     axes.plot(along, across, ".", color=POINTS, markersize=1)
-    for lines, colors, style in ((rails, ("#1565c0", "#2e7d32", "#6a1b9a"), "-"), (tracks, (TRACK,), "--")):
+    for lines, colors, style in ((rails, (RAIL, "#2e7d32", "#6a1b9a"), "-"), (tracks, (TRACK,), "--")):
         for number, line in enumerate(lines):
             across, along = _turned(line.xyz)
             axes.plot(along, across, style, color=colors[number % len(colors)], linewidth=1.6)

@@ -73,8 +73,7 @@ COLORS = 128
 
 
 def main() -> None:
-    """Take all pictures."""
-    application = start_qgis()
+    """Take all pictures, in a QGIS that is started."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -95,7 +94,6 @@ def main() -> None:
     for picture in sorted(FOLDER.glob("*.png")):
         _shrink(picture)
         print(f"{picture.name}: {picture.stat().st_size / 1000:.0f} kB")
-    application.exitQgis()
 
 
 def _extract(folder: Path) -> None:
@@ -183,4 +181,5 @@ def _shrink(picture: Path) -> None:
 
 
 if __name__ == "__main__":
+    started = start_qgis()  # kept to the end, or QGIS falls while Python ends
     main()
