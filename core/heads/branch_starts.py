@@ -24,15 +24,25 @@ LEAST_STRETCH_M = 1.5
 FARTHEST_M = 25.0
 """No branch touches its stock rail this far before the heads lie apart."""
 
+TANGENTIAL, STRAIGHT = 2, 1
+"""Powers of the way by which lines part."""
+
+HEEL_SPREAD_M = 0.15
+"""Distance of the axes up to which a blade is straight: the heels of American switches lie 6 1/4 inches apart."""
+
+CLEARLY = 0.5
+"""A blade counts as straight where so much of what an arc leaves over is left over: most switches part on arcs."""
+
 STEP_M = 0.1
 """Spacing of the vertices that a branch is given before it."""
 
 
 def slide_branches(network: LineNetwork, head_width_m: float, sure_m: float) -> LineNetwork:
-    """Let each branch begin where it touches the rail that it leaves, tangentially.
+    """Let each branch begin where it touches the rail that it leaves.
 
     Axes that part on arcs lie apart by the square of the way from there, so that the square root of their distance is
-    a straight line over it. Branches that part in any other way stay as they are.
+    a straight line over it; beside a straight blade, as American switches have, their distance itself is one. The blade
+    counts where it fits clearly better. Branches that part in any other way stay as they are.
 
     Parameters
     ----------
@@ -61,38 +71,55 @@ def _slide(network: LineNetwork, end: int, stock: int, vertex: int, between_m: t
         return network
     sense = 1.0 if feet.t[-1] > along[vertex] else -1.0
     way, apart = sense * (feet.t - along[vertex]), np.abs(feet.across)
-    touch, first = _touch(way, apart, *between_m)
-    if touch is None:
+    first, last = _parting(apart, *between_m)
+    if first + 2 > last or way[last - 1] - way[first] < LEAST_STRETCH_M:
+        return network
+    touch, power = _touch(way[first:last], apart[first:last])
+    if not way[first] - FARTHEST_M <= touch < way[first]:
         return network
     start = int(np.argmin(np.abs(along - along[vertex] - sense * touch)))
     if not 0 < start < len(line) - 1:
         return network
     touch = sense * (along[start] - along[vertex])
     left = np.sign(feet.across[first])
-    new = _arc(line, along[vertex] + sense * touch, along[vertex] + sense * way[first], left * apart[first])
+    new = _blade(line, along[vertex] + sense * touch, along[vertex] + sense * way[first], left * apart[first], power)
     kept = feet.point[first]
     return _with_start(network, end, (stock, start), np.concatenate([line[[start]], new]), kept)
 
 
-def _touch(way: np.ndarray, apart: np.ndarray, least_m: float, most_m: float) -> tuple[float | None, int]:
-    """Find where two lines touched, and the first place at which they are `least_m` apart for good."""
+def _parting(apart: np.ndarray, least_m: float, most_m: float) -> tuple[int, int]:
+    """Find the stretch, first place and the one after the last, from `least_m` apart for good to `most_m` apart."""
     beyond = np.flatnonzero(apart > most_m)
-    last = beyond[0] if len(beyond) else len(apart)
+    last = int(beyond[0]) if len(beyond) else len(apart)
     below = np.flatnonzero(apart[:last] < least_m)
-    first = below[-1] + 1 if len(below) else 0
-    if first + 2 > last or way[last - 1] - way[first] < LEAST_STRETCH_M:
-        return None, first
-    slope, root = np.polyfit(way[first:last], np.sqrt(apart[first:last]), 1)
-    if slope <= 0 or -root / slope < way[first] - FARTHEST_M or -root / slope >= way[first]:
-        return None, first
-    return float(-root / slope), first
+    return int(below[-1]) + 1 if len(below) else 0, last
 
 
-def _arc(line: np.ndarray, touch: float, first: float, across: float) -> np.ndarray:
+def _touch(way: np.ndarray, apart: np.ndarray) -> tuple[float, int]:
+    """Find where two lines touched, and the power of the way from there by which they part: 2 on arcs, 1 on blades.
+
+    Lines that do not part have no such place: NaN.
+    """
+    blade = apart <= HEEL_SPREAD_M
+    if np.count_nonzero(blade) > 2:
+        straight, off = _root(way[blade], apart[blade], STRAIGHT)
+        if off < CLEARLY * _root(way[blade], apart[blade], TANGENTIAL)[1]:
+            return straight, STRAIGHT
+    return _root(way, apart, TANGENTIAL)[0], TANGENTIAL
+
+
+def _root(way: np.ndarray, apart: np.ndarray, power: int) -> tuple[float, float]:
+    """Fit a power of the way to the distance: where it begins, and the rms of what is left, metres."""
+    slope, root = np.polyfit(way, apart ** (1 / power), 1)
+    off = np.sqrt(np.mean((np.maximum(slope * way + root, 0.0) ** power - apart) ** 2))
+    return (float(-root / slope), float(off)) if slope > 0 else (np.nan, np.inf)
+
+
+def _blade(line: np.ndarray, touch: float, first: float, across: float, power: int) -> np.ndarray:
     """Places between chainages `touch` and `first` of a line, `across` to its left at the latter; neither included."""
     share = np.linspace(0, 1, max(int(abs(first - touch) / STEP_M), 1) + 1)[1:-1]
     along, at = length_along(line), touch + share * (first - touch)
-    return interpolate(line, along, at) + (across * share**2)[:, None] * interpolate(left_normals(line), along, at)
+    return interpolate(line, along, at) + (across * share**power)[:, None] * interpolate(left_normals(line), along, at)
 
 
 def _with_start(network: LineNetwork, end: int, at: tuple[int, int], start: np.ndarray, kept: int) -> LineNetwork:

@@ -43,6 +43,21 @@ def test_a_branch_that_began_too_early_begins_later():
     assert slid.lines[1][0, 0] == pytest.approx(TOE, abs=0.06)
 
 
+@pytest.mark.parametrize("angle", [1 / 30, 1 / 60])
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_straight_blade_begins_at_its_point(angle, turned):
+    """A straight American switch: an angle at the point, the closure curve behind the heel."""
+
+    def offset(x):
+        heel = 0.16 / angle
+        return angle * x + np.clip(x - heel, 0, None) ** 2 / 600
+
+    slid = slide_branches(network(offset, TOE - 2.8, 1, turned), WIDTH, 0.5 * WIDTH)
+    branch = slid.lines[1][::-1] if turned else slid.lines[1]
+    assert branch[0, 0] == pytest.approx(TOE, abs=0.3)
+    assert np.abs(branch[:, 1] - offset(branch[:, 0] - TOE)).max() < 0.01
+
+
 @pytest.mark.parametrize("offset", [lambda x: x / 3, lambda x: 0.5 + 0 * x, lambda x: 0.05 - x / 2000])
 def test_lines_that_do_not_part_on_an_arc_stay(offset):
     before = network(offset, TOE)
