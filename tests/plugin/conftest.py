@@ -6,6 +6,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -184,14 +185,14 @@ def track():
 
 @dataclass
 class Bench:
-    """Where faults are made: a folder, and what makes clouds, changes the environment and restores it."""
+    """Where faults are made: a folder, what makes clouds and changes the environment, and what restores it after a run."""
 
     folder: Path
     cloud: Callable[..., Path]
     track: Callable[..., np.ndarray]
     patch: pytest.MonkeyPatch
     feedback: Feedback
-    at_end: Callable[[Callable[[], None]], None]
+    run: ExitStack
 
 
 OUTPUTS = {
@@ -206,8 +207,8 @@ OUTPUTS = {
 
 
 @pytest.fixture
-def bench(tmp_path, write_cloud, track, monkeypatch, new_feedback, request):
-    return Bench(tmp_path, write_cloud, track, monkeypatch, new_feedback(), request.addfinalizer)
+def bench(tmp_path, write_cloud, track, monkeypatch, new_feedback):
+    return Bench(tmp_path, write_cloud, track, monkeypatch, new_feedback(), ExitStack())
 
 
 @pytest.fixture
@@ -220,7 +221,8 @@ def meet(bench, run_step, monkeypatch):
         temporary.mkdir(), out.mkdir()
         monkeypatch.setattr(tempfile, "tempdir", str(temporary))
         outputs = {Path(name).stem: out / name for name in OUTPUTS[algorithm]}
-        outcome = run_step(algorithm, {**outputs, **fault.prepare(bench)}, feedback)
+        with bench.run:
+            outcome = run_step(algorithm, {**outputs, **fault.prepare(bench)}, feedback)
         said = outcome.error.strip() or " ".join(feedback.warnings)
         good = WARNED if feedback.warnings else FINE
         found = good if outcome.ok else REFUSED

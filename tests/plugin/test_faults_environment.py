@@ -120,7 +120,7 @@ def full_disk(room, make, suffix):
     def prepare(bench):
         parameters = make(bench)
         soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-        bench.at_end(lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard)))
+        bench.run.callback(lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard)))
         resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
         return {**parameters, "OUTPUT": bench.folder / "out" / f"OUTPUT{suffix}"}
 
@@ -139,7 +139,7 @@ def open_elsewhere(bench):
     QgsVectorFileWriter.writeAsVectorFormatV3(before, str(path), QgsCoordinateTransformContext(), options)
     held = QgsVectorLayer(str(path), "held", "ogr").getFeatures()
     assert next(held).isValid()
-    bench.at_end(held.close)
+    bench.run.callback(held.close)
     return cloud(bench)
 
 
