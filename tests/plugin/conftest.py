@@ -185,7 +185,7 @@ def track():
 
 @dataclass
 class Bench:
-    """Where faults are made: a folder, what makes clouds and changes the environment, and what restores it after a run."""
+    """Where faults are made: a folder, what makes clouds, changes the environment, and restores it after a run."""
 
     folder: Path
     cloud: Callable[..., Path]
