@@ -6,7 +6,8 @@ the heads lie side by side. What lies before that is the end of the arc on which
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,6 +31,9 @@ TANGENTIAL, STRAIGHT = 2, 1
 HEEL_SPREAD_M = 0.15
 """Distance of the axes up to which a blade is straight: the heels of American switches lie 6 1/4 inches apart."""
 
+SWITCH_M = 2.5
+"""Nodes so near belong to the two blades of one switch: the widest gauge, and where blades begin a metre apart."""
+
 CLEARLY = 0.5
 """A blade counts as straight where so much of what an arc leaves over is left over: most switches part on arcs."""
 
@@ -52,42 +56,89 @@ def slide_branches(network: LineNetwork, head_width_m: float, sure_m: float) -> 
         Distance of the axes from which both lines can be trusted.
     """
     between_m = sure_m, PARTED_HEADS * head_width_m
-    for number, node in enumerate(network.passes[:, 0].tolist()):
-        for end in np.flatnonzero(network.ends.ravel() == node).tolist():
-            _, stock, vertex = network.passes[number].tolist()
-            if end // 2 != stock:
-                network = _slide(network, end, stock, vertex, between_m)
+    starts = [
+        (number, end)
+        for number, (node, stock, _) in enumerate(network.passes.tolist())
+        for end in np.flatnonzero(network.ends.ravel() == node).tolist()
+        if end // 2 != stock
+    ]
+    partings = [_parting(network, end, number, between_m) for number, end in starts]
+    for (number, end), parting in zip(starts, partings):
+        if parting is not None:
+            of_switch = [other for other in partings if other is not None and other.near(parting)]
+            network = _slide(network, end, number, between_m, _power(of_switch))
     return network.select(np.ones(len(network.lines), dtype=bool))
 
 
-def _slide(network: LineNetwork, end: int, stock: int, vertex: int, between_m: tuple[float, float]) -> LineNetwork:
-    """Move one line's end along the line that runs through its node."""
-    own = end // 2
-    branch, line = turned(network.lines[own], end), network.lines[stock]
+@dataclass(frozen=True)
+class _Parting:
+    """How a line parts from the one that runs through its node.
+
+    Attributes
+    ----------
+    place : (2,) array
+        The node.
+    stock, sense : int, float
+        Number of the other line, and the sense along it in which this one leaves.
+    way, apart : (n,) arrays
+        Way along the other line from the node, and distance of the axes, where they tell of it.
+    left : float
+        Side on which this one leaves.
+    kept : int
+        Vertex of this line, from its end, at the first of these places.
+    """
+
+    place: np.ndarray
+    stock: int
+    sense: float
+    way: np.ndarray
+    apart: np.ndarray
+    left: float
+    kept: int
+
+    def near(self, other: _Parting) -> bool:
+        """Tell whether both belong to one switch, whose two blades lie a gauge apart."""
+        return bool(np.hypot(*(self.place - other.place)) < SWITCH_M)
+
+
+def _parting(network: LineNetwork, end: int, number: int, between_m: tuple[float, float]) -> _Parting | None:
+    """See how a line's end parts from the line of a pass; None where too little shows."""
+    _, stock, vertex = network.passes[number].tolist()
+    branch, line = turned(network.lines[end // 2], end), network.lines[stock]
     along = length_along(line)
     feet = project([line], branch, FARTHEST_M / 10)
     feet = feet[np.argsort(feet.point)]
     if len(feet.t) < 2:
-        return network
+        return None
     sense = 1.0 if feet.t[-1] > along[vertex] else -1.0
     way, apart = sense * (feet.t - along[vertex]), np.abs(feet.across)
-    first, last = _parting(apart, *between_m)
+    first, last = _telling(apart, *between_m)
     if first + 2 > last or way[last - 1] - way[first] < LEAST_STRETCH_M:
+        return None
+    left, kept = float(np.sign(feet.across[first])), int(feet.point[first])
+    return _Parting(line[vertex], stock, sense, way[first:last], apart[first:last], left, kept)
+
+
+def _slide(network: LineNetwork, end: int, number: int, between_m: tuple[float, float], power: int) -> LineNetwork:
+    """Move one line's end along the line that runs through its node."""
+    parting = _parting(network, end, number, between_m)
+    if parting is None:
         return network
-    touch, power = _touch(way[first:last], apart[first:last])
-    if not way[first] - FARTHEST_M <= touch < way[first]:
+    blade = parting.apart <= HEEL_SPREAD_M if power == STRAIGHT else np.ones(len(parting.apart), dtype=bool)
+    touch, _ = _root(parting.way[blade], parting.apart[blade], power)
+    if not parting.way[0] - FARTHEST_M <= touch < parting.way[0]:
         return network
-    start = int(np.argmin(np.abs(along - along[vertex] - sense * touch)))
+    line, vertex = network.lines[parting.stock], network.passes[number, 2]
+    along = length_along(line)
+    start = int(np.argmin(np.abs(along - along[vertex] - parting.sense * touch)))
     if not 0 < start < len(line) - 1:
         return network
-    touch = sense * (along[start] - along[vertex])
-    left = np.sign(feet.across[first])
-    new = _blade(line, along[vertex] + sense * touch, along[vertex] + sense * way[first], left * apart[first], power)
-    kept = feet.point[first]
-    return _with_start(network, end, (stock, start), np.concatenate([line[[start]], new]), kept)
+    across = parting.left * parting.apart[0]
+    new = _blade(line, along[start], along[vertex] + parting.sense * parting.way[0], across, power)
+    return _with_start(network, end, (parting.stock, start), np.concatenate([line[[start]], new]), parting.kept)
 
 
-def _parting(apart: np.ndarray, least_m: float, most_m: float) -> tuple[int, int]:
+def _telling(apart: np.ndarray, least_m: float, most_m: float) -> tuple[int, int]:
     """Find the stretch, first place and the one after the last, from `least_m` apart for good to `most_m` apart."""
     beyond = np.flatnonzero(apart > most_m)
     last = int(beyond[0]) if len(beyond) else len(apart)
@@ -95,17 +146,15 @@ def _parting(apart: np.ndarray, least_m: float, most_m: float) -> tuple[int, int
     return int(below[-1]) + 1 if len(below) else 0, last
 
 
-def _touch(way: np.ndarray, apart: np.ndarray) -> tuple[float, int]:
-    """Find where two lines touched, and the power of the way from there by which they part: 2 on arcs, 1 on blades.
-
-    Lines that do not part have no such place: NaN.
-    """
-    blade = apart <= HEEL_SPREAD_M
-    if np.count_nonzero(blade) > 2:
-        straight, off = _root(way[blade], apart[blade], STRAIGHT)
-        if off < CLEARLY * _root(way[blade], apart[blade], TANGENTIAL)[1]:
-            return straight, STRAIGHT
-    return _root(way, apart, TANGENTIAL)[0], TANGENTIAL
+def _power(partings: Sequence[_Parting]) -> int:
+    """Tell from the blades of one switch whether lines part by the way or by its square."""
+    left_over = {STRAIGHT: 0.0, TANGENTIAL: 0.0}
+    for parting in partings:
+        blade = parting.apart <= HEEL_SPREAD_M
+        if np.count_nonzero(blade) > 2:
+            for power in left_over:
+                left_over[power] += _root(parting.way[blade], parting.apart[blade], power)[1] ** 2
+    return STRAIGHT if left_over[STRAIGHT] < CLEARLY**2 * left_over[TANGENTIAL] else TANGENTIAL
 
 
 def _root(way: np.ndarray, apart: np.ndarray, power: int) -> tuple[float, float]:
