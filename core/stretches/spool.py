@@ -21,8 +21,6 @@ from .squares import Key, Stretch, around, unique_keys
 
 REPORT = "report.json"
 
-Spooled = Mapping[Key, tuple[str, ...]]
-
 
 @dataclass(frozen=True)
 class SpooledFile:
