@@ -32,15 +32,12 @@ class PassBatchNorm2d(nn.BatchNorm2d):
         """Normalize with the statistics of the current pass."""
         number = min(self.current_pass, STATISTICS - 1)
         suffix = f"_{number}" if number else ""
+        return self.normalize(x, getattr(self, "running_mean" + suffix), getattr(self, "running_var" + suffix))
+
+    def normalize(self, x: Tensor, mean: Tensor, variance: Tensor) -> Tensor:
+        """Normalize with the running statistics, or in training with the batch's, which then update them."""
         return nn.functional.batch_norm(
-            x,
-            getattr(self, "running_mean" + suffix),
-            getattr(self, "running_var" + suffix),
-            self.weight,
-            self.bias,
-            self.training,
-            self.momentum,
-            self.eps,
+            x, mean, variance, self.weight, self.bias, self.training, self.momentum, self.eps
         )
 
 

@@ -1,8 +1,11 @@
-"""Weight gradients of dilated convolutions on the CPU.
+"""Dilated convolutions and batch norm as they train fast on the CPU.
 
 PyTorch's bfloat16 kernels are fast forward at every dilation, and backward to the input, which is a forward convolution
 with the flipped kernel. Their weight gradient of a dilated kernel crashes (torch 2.13, channels last) or takes a slow
 path. Split into phases, a dilated convolution is a plain one: that has a fast weight gradient.
+
+Batch norm runs along the channels, and the network's are too few to fill a vector register; taken by several columns
+at once it is four times as fast.
 """
 
 from __future__ import annotations
@@ -11,8 +14,13 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from ..frpdf.network import PassBatchNorm2d
+
 LARGEST_PHASED_DILATION = 40
 """Beyond it the phases of a training crop are smaller than the kernel, and one product per kernel tap is faster."""
+
+COLUMNS_AT_ONCE = 4
+"""Columns whose channels are normalized as one row of 96 numbers; they divide the sides of all crops."""
 
 
 class _DilatedConvolution(torch.autograd.Function):
@@ -97,9 +105,28 @@ class CpuConv2d(nn.Conv2d):
             return _DilatedConvolution.apply(x.to(dtype), self.weight.to(dtype), self.dilation[0])
 
 
+class CpuBatchNorm2d(PassBatchNorm2d):
+    """Batch norm with statistics over every fourth column: four sets of them, so alike that one keeps their means."""
+
+    def normalize(self, x: Tensor, mean: Tensor, variance: Tensor) -> Tensor:
+        """Normalize `COLUMNS_AT_ONCE` columns as if they were channels."""
+        batch, channels, height, width = x.shape
+        if not self.training or width % COLUMNS_AT_ONCE:
+            return super().normalize(x, mean, variance)
+        wide = x.permute(0, 2, 3, 1).reshape(batch, height, -1, COLUMNS_AT_ONCE * channels).permute(0, 3, 1, 2)
+        means, variances = mean.repeat(COLUMNS_AT_ONCE), variance.repeat(COLUMNS_AT_ONCE)
+        weight, bias = self.weight.repeat(COLUMNS_AT_ONCE), self.bias.repeat(COLUMNS_AT_ONCE)
+        wide = functional.batch_norm(wide, means, variances, weight, bias, True, self.momentum, self.eps)
+        mean.copy_(means.view(COLUMNS_AT_ONCE, channels).mean(0))
+        variance.copy_(variances.view(COLUMNS_AT_ONCE, channels).mean(0))
+        return wide.permute(0, 2, 3, 1).reshape(batch, height, width, channels).permute(0, 3, 1, 2)
+
+
 def train_on_cpu(network: nn.Module) -> nn.Module:
-    """Let the dilated convolutions of a network use `CpuConv2d`; parameters and results stay the same."""
+    """Let a network use `CpuConv2d` and `CpuBatchNorm2d`; its parameters stay the same."""
     for module in network.modules():
+        if type(module) is PassBatchNorm2d:
+            module.__class__ = CpuBatchNorm2d
         if type(module) is nn.Conv2d and module.dilation[0] > 1 and module.bias is None:
             module.__class__ = CpuConv2d
     return network.to(memory_format=torch.channels_last)

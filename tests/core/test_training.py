@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 from rail_extract.core.frpdf import STATISTICS
+from rail_extract.core.frpdf.network import PassBatchNorm2d
 from rail_extract.core.frpdf.torch_engine import TorchEngine
 from rail_extract.core.frpdf.weights import load_arrays
 from rail_extract.core.training import curves, evaluate, gradients, train
@@ -36,6 +37,24 @@ def test_gradients_of_dilated_convolutions_are_those_of_torch(dilation):
     )
     for ours, theirs in zip(found, expected):
         assert torch.allclose(ours, theirs, rtol=1e-4, atol=1e-3)
+
+
+def test_batch_norm_of_several_columns_at_once_is_that_of_torch():
+    torch.manual_seed(0)
+    plain = PassBatchNorm2d(5)
+    own = gradients.train_on_cpu(torch.nn.Sequential(PassBatchNorm2d(5)))[0]
+    assert type(own) is gradients.CpuBatchNorm2d
+    x = (torch.randn(3, 5, 64, 96) * torch.rand(5, 1, 1) + torch.randn(5, 1, 1)).requires_grad_()
+    upstream = torch.randn_like(x)
+    for norm in (plain, own):
+        norm.current_pass = 1
+    expected = torch.autograd.grad(plain(x), (x, plain.weight, plain.bias), upstream)
+    found = torch.autograd.grad(own(x), (x, own.weight, own.bias), upstream)
+    for ours, theirs in zip(found, expected):
+        assert (ours - theirs).norm() < 0.03 * theirs.norm()
+    for name in ("running_mean", "running_var", "running_mean_1", "running_var_1"):
+        assert torch.allclose(getattr(own, name), getattr(plain, name), rtol=1e-3, atol=1e-3)
+    assert torch.allclose(own.eval()(x), plain.eval()(x), atol=0.01)
 
 
 def test_the_learning_rate_rises_and_falls_as_a_cosine():
