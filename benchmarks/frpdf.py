@@ -2,7 +2,8 @@
 
 Run `python benchmarks/frpdf.py [NETWORK ...]`. A network is one of
 
-- `weights.npz`: weights of FRPDF, after one pass and after two (`weights.npz@3`: after three alone);
+- `weights.npz`: weights of FRPDF, after one pass and after two (`weights.npz@3`: after three alone; `@0`: once less
+  than a thousandth of the rail cells changes from pass to pass, five passes at most);
 - `unet=weights.npz`: weights of a rival, from `python -m rail_extract train FOLDER --network unet`;
 - `network.onnx`: from `(1, 1, height, width)`, 0 or 1, to the same shape, probability of rail;
 - `pass1.onnx+pass2.onnx`: passes of FRPDF as `python -m rail_extract onnx` writes them (with `--side 1024`);
@@ -200,7 +201,8 @@ def _title(row: str) -> str:
     if ".npz@" not in row:
         return " + ".join(Path(part).name for part in row.split("+"))
     path, passes = row.rsplit("@", 1)
-    return f"{path.split('=')[0] if '=' in path else Path(path).stem}, {passes} pass{'es' if int(passes) > 1 else ''}"
+    name = path.split("=")[0] if "=" in path else Path(path).stem
+    return f"{name}, " + {"0": "until stable", "1": "1 pass"}.get(passes, f"{passes} passes")
 
 
 def report(tallies: Sequence[Tally], count: int) -> Iterable[str]:

@@ -18,6 +18,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..frpdf import DEFAULT_PASSES, FEEDBACK_THRESHOLD, OUTPUT_THRESHOLD, START
+from ..frpdf.cleanup import MOST_PASSES, STABLE_SHARE, UNTIL_STABLE
 from ..frpdf.engine import Engine, make_engine
 from ..frpdf.weights import load_arrays
 from ..frpdf.zoo import MODELS
@@ -105,14 +106,17 @@ def classical(observed: np.ndarray) -> np.ndarray:
 
 
 def cleaner_of(engine: Engine, passes: int) -> Cleaner:
-    """Make a cleaner of an engine that sees a raster whole."""
+    """Make a cleaner of an engine that sees a raster whole; 0 passes run until the result is stable."""
 
     def clean(observed: np.ndarray) -> np.ndarray:
-        seen = observed.astype(np.float32)
+        seen, found = observed.astype(np.float32), observed
         state = np.full_like(seen, START)
-        for number in range(passes):
-            probability = engine.probabilities(seen, state, number)
-            state = (probability >= FEEDBACK_THRESHOLD).astype(np.float32)
-        return probability >= OUTPUT_THRESHOLD
+        for number in range(passes or MOST_PASSES):
+            before, probability = found, engine.probabilities(seen, state, number)
+            state, found = (probability >= FEEDBACK_THRESHOLD).astype(np.float32), probability >= OUTPUT_THRESHOLD
+            changed = np.count_nonzero(before != found)
+            if passes == UNTIL_STABLE and number > 0 and changed < STABLE_SHARE * np.count_nonzero(found):
+                break
+        return found
 
     return clean

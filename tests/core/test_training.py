@@ -166,3 +166,24 @@ def test_the_classical_row_closes_and_drops_specks():
     cleaned = evaluate.classical(observed)
     assert cleaned[20, 5:60].all()
     assert not cleaned[50, 50]
+
+
+class Filling:
+    """An engine that finds one cell of a row more in each pass, up to the last."""
+
+    def __init__(self, cells, last):
+        self.cells, self.last, self.passes = cells, last, 0
+
+    def probabilities(self, raster, state, number):
+        self.passes = number + 1
+        found = np.zeros((1, self.cells), dtype=np.float32)
+        found[0, : self.cells // 2 + min(number, self.last)] = 0.9
+        return found
+
+
+@pytest.mark.parametrize(("last", "passes"), [(0, 2), (2, 4), (9, 5)])
+def test_passes_run_until_the_result_is_stable(last, passes):
+    engine = Filling(100, last)
+    found = evaluate.cleaner_of(engine, 0)(np.zeros((1, 100), dtype=bool))
+    assert engine.passes == passes
+    assert np.count_nonzero(found) == 50 + min(last, passes - 1)
