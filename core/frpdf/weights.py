@@ -1,4 +1,4 @@
-"""Weights of FRPDF on disk: plain arrays in an .npz file, named as in the network's state."""
+"""Weights of FRPDF on disk: plain arrays in an .npz file, named as in the network's state, kernels as float16."""
 
 from __future__ import annotations
 
@@ -36,6 +36,7 @@ def load_arrays(path: Path) -> dict[str, np.ndarray]:
 
 
 def save_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
-    """Write weights, compressed."""
+    """Write weights, compressed; the four-dimensional ones, the kernels, as float16, which halves the file."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(path, **arrays)
+    halved = {name: array.astype(np.float16) if array.ndim == 4 else array for name, array in arrays.items()}
+    np.savez_compressed(path, **halved)
