@@ -17,9 +17,14 @@ else:
     INTEGER, REAL, TEXT = QVariant.Int, QVariant.Double, QVariant.String
 
 
-def field(name: str, kind) -> QgsField:
+DIGITS = 20
+"""Room for a number with decimals: a shapefile makes it one digit if none is stated, and is written with 15 decimals
+if neither are those."""
+
+
+def field(name: str, kind, decimals: int = 0) -> QgsField:
     """Make a field; `kind` is `INTEGER`, `REAL` or `TEXT`."""
-    return QgsField(name, kind)
+    return QgsField(name, kind, "", DIGITS if decimals else 0, decimals)
 
 
 def group_layer(details: QgsProcessingContext.LayerDetails, group: str, place: int) -> None:

@@ -23,6 +23,7 @@ from qgis.core import (
 )
 
 from ..core.errors import RailExtractError
+from ..core.fields import BRIDGED, CENTERLINE_FIELDS, LENGTH, QUALITY_FIELDS, RAIL_FIELDS, SIGMA, Field
 from ..core.progress import SILENT, Progress
 from .compat import INTEGER, REAL, TEXT, field
 from .styling import style_on_load
@@ -37,50 +38,14 @@ if TYPE_CHECKING:
 UNKNOWN_IN_METRES = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1]]'
 """Stated in outputs without a coordinate system, because GDAL else calls a GeoPackage's coordinates degrees."""
 
-RAIL_FIELDS = (
-    ("rail_id", INTEGER),
-    ("class_code", INTEGER),
-    ("length_m", REAL),
-    ("points", INTEGER),
-    ("resid_mm", REAL),
-    ("sigma_mm", REAL),
-    ("bridged_m", REAL),
-)
-CENTERLINE_FIELDS = (
-    ("track_id", INTEGER),
-    ("class_code", INTEGER),
-    ("left_ids", TEXT),
-    ("right_ids", TEXT),
-    ("length_m", REAL),
-    ("gauge_mm", REAL),
-    ("gaugesd_mm", REAL),
-    ("cant_mm", REAL),
-    ("cantmax_mm", REAL),
-    ("bridged_m", REAL),
-)
-QUALITY_FIELDS = (
-    ("track_id", INTEGER),
-    ("chainage_m", REAL),
-    ("gauge_mm", REAL),
-    ("cant_mm", REAL),
-    ("twist_mm", REAL),
-    ("radius_m", REAL),
-    ("grade_pm", REAL),
-    ("sigma_mm", REAL),
-    ("points", INTEGER),
-    ("bridged", INTEGER),
-)
-"""Names and types, each name that of the attribute of `RailLine`, `Centerline` or `TrackGeometry` it holds.
-
-Of a `TrackGeometry` the first is one value and the others are profiles.
-"""
+KINDS = {int: INTEGER, float: REAL, str: TEXT}
 
 
 @dataclass(frozen=True)
 class LayerKind:
     """Fields of a layer, and the style it gets when QGIS loads it."""
 
-    columns: tuple[tuple[str, Any], ...]
+    columns: tuple[Field, ...]
     style: str
 
 
@@ -88,22 +53,22 @@ RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELD
 QUALITY = LayerKind(QUALITY_FIELDS, "quality")
 
 
-def fields(columns: Sequence[tuple[str, Any]]) -> QgsFields:
-    """Make the fields of a layer from `RAIL_FIELDS` or `CENTERLINE_FIELDS`."""
+def fields(columns: Sequence[Field]) -> QgsFields:
+    """Make the fields of a layer."""
     made = QgsFields()
-    for name, kind in columns:
-        made.append(field(name, kind))
+    for column in columns:
+        made.append(field(column.name, KINDS[column.kind], column.decimals))
     return made
 
 
 def features(
-    lines: Sequence[RailLine | Centerline], columns: Sequence[tuple[str, Any]], frame: LocalFrame
+    lines: Sequence[RailLine | Centerline], columns: Sequence[Field], frame: LocalFrame
 ) -> Iterator[QgsFeature]:
     """Turn lines into features in the cloud's coordinates, with heights unless no line has any."""
     flat = is_flat(lines)
     for line in lines:
         coordinates = frame.to_crs(line.xyz).T[: 2 if flat else 3].tolist()
-        values = [getattr(line, name) for name, _ in columns]
+        values = [getattr(line, column.name) for column in columns]
         yield _feature(QgsGeometry(QgsLineString(*coordinates)), values, columns)
 
 
@@ -111,7 +76,7 @@ def stations(tracks: Sequence[TrackGeometry], frame: LocalFrame) -> Iterator[Qgs
     """Turn the stations of measured tracks into point features in the cloud's coordinates."""
     for track in tracks:
         places = frame.to_crs(track.xyz).tolist()
-        profiles = (getattr(track, name) for name, _ in QUALITY.columns[1:])
+        profiles = (getattr(track, column.name) for column in QUALITY.columns[1:])
         for (x, y, z), *row in zip(places, repeat(track.track_id), *profiles):
             yield _feature(QgsGeometry(QgsPoint(x, y) if math.isnan(z) else QgsPoint(x, y, z)), row, QUALITY.columns)
 
@@ -196,7 +161,7 @@ def write_raster(
 
 def figures_of(lines: Sequence[RailLine | Centerline], what: str) -> dict[str, float]:
     """Count lines and measure them, as the outputs RAIL_COUNT and RAIL_LENGTH for RAIL."""
-    return {f"{what}_COUNT": len(lines), f"{what}_LENGTH": float(sum(line.length_m for line in lines))}
+    return {f"{what}_COUNT": len(lines), f"{what}_LENGTH": LENGTH.value(sum(line.length_m for line in lines))}
 
 
 def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, float | None]:
@@ -204,8 +169,8 @@ def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, float | No
     sigma = [value for track in tracks for value in track.sigma_mm if math.isfinite(value)]
     return {
         "STATION_COUNT": sum(len(track.chainage_m) for track in tracks),
-        "SIGMA": math.sqrt(sum(value**2 for value in sigma) / len(sigma)) if sigma else None,
-        "BRIDGED_LENGTH": float(sum(track.bridged_m for track in tracks)),
+        "SIGMA": SIGMA.value(math.sqrt(sum(value**2 for value in sigma) / len(sigma))) if sigma else None,
+        "BRIDGED_LENGTH": BRIDGED.value(sum(track.bridged_m for track in tracks)),
     }
 
 
@@ -238,16 +203,8 @@ def _write(
     return {name: layer_id}
 
 
-def _feature(geometry: QgsGeometry, values: Sequence[Any], columns: Sequence[tuple[str, Any]]) -> QgsFeature:
+def _feature(geometry: QgsGeometry, values: Sequence[Any], columns: Sequence[Field]) -> QgsFeature:
     feature = QgsFeature()
     feature.setGeometry(geometry)
-    feature.setAttributes([_attribute(value, kind) for value, (_, kind) in zip(values, columns)])
+    feature.setAttributes([column.value(value) for column, value in zip(columns, values)])
     return feature
-
-
-def _attribute(value: Any, kind: Any) -> Any:
-    if kind == TEXT:
-        return ",".join(str(item) for item in value)
-    if kind == INTEGER:
-        return int(value)
-    return float(value) if math.isfinite(value) else None

@@ -12,13 +12,13 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ..errors import ParameterError, RailExtractError
+from ..fields import CENTERLINE_FIELDS, RAIL_FIELDS
 from ..frpdf.engine import DEVICES, ENGINES
 from ..frpdf.zoo import choose
 from ..pipeline import Parameters
 from ..progress import Estimating, Progress
 from ..standards import DEFAULT, distinct_gauges, resolve
 from ..stretches.spool import writing
-from .fields import CENTERLINE_FIELDS, RAIL_FIELDS
 
 NEEDS = {"distributed": "distributed", "pyogrio": "pyogrio", "shapely": "shapely"}
 """Modules and packages of the extra "cluster"."""

@@ -11,6 +11,7 @@ import pyogrio
 import shapely
 
 from ..errors import DiskError
+from ..fields import Field
 from ..points import LocalFrame
 from ..rails import Centerline, RailLine
 from ..stretches.spool import writing
@@ -18,8 +19,10 @@ from ..stretches.spool import writing
 UNKNOWN_IN_METRES = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1]]'
 """Stated where the cloud has no coordinate system, because GDAL else calls a GeoPackage's coordinates degrees."""
 
+KINDS = {int: np.int32, float: float, str: object}
 
-def write(layers: dict[str, tuple[Path, Sequence[RailLine | Centerline], dict]], frame: LocalFrame) -> None:
+
+def write(layers: dict[str, tuple[Path, Sequence[RailLine | Centerline], Sequence[Field]]], frame: LocalFrame) -> None:
     """Write layers into GeoPackages; those that are there are replaced once the new ones are whole.
 
     Parameters
@@ -50,7 +53,12 @@ def write(layers: dict[str, tuple[Path, Sequence[RailLine | Centerline], dict]],
 
 
 def _write_layer(
-    file: Path, name: str, lines: Sequence[RailLine | Centerline], fields: dict, frame: LocalFrame, path: Path
+    file: Path,
+    name: str,
+    lines: Sequence[RailLine | Centerline],
+    fields: Sequence[Field],
+    frame: LocalFrame,
+    path: Path,
 ) -> None:
     """Write one layer; `path` is the name that the file will have."""
     try:
@@ -60,8 +68,8 @@ def _write_layer(
             driver="GPKG",
             geometry=_geometry(lines, frame),
             geometry_type="LineString Z",
-            field_data=[_column(lines, field, kind) for field, kind in fields.items()],
-            fields=list(fields),
+            field_data=[_column(lines, field) for field in fields],
+            fields=[field.name for field in fields],
             crs=frame.crs_wkt or UNKNOWN_IN_METRES,
             append=file.exists(),
             nan_as_null=True,
@@ -76,9 +84,6 @@ def _geometry(lines: Sequence[RailLine | Centerline], frame: LocalFrame) -> np.n
     return np.array([shapely.to_wkb(shape, output_dimension=3) for shape in shapes], dtype=object)
 
 
-def _column(lines: Sequence[RailLine | Centerline], field: str, kind: type) -> np.ndarray:
+def _column(lines: Sequence[RailLine | Centerline], field: Field) -> np.ndarray:
     """Values of one field, (n,)."""
-    values = [getattr(line, field) for line in lines]
-    if kind is str:
-        return np.array([",".join(map(str, value)) for value in values], dtype=object)
-    return np.array(values, dtype=kind)
+    return np.array([field.value(getattr(line, field.name)) for line in lines], dtype=KINDS[field.kind])

@@ -152,7 +152,7 @@ FULL_DISK = """
 import resource, sys
 from pathlib import Path
 from rail_extract.core.points import LocalFrame
-from rail_extract.core.cluster.fields import RAIL_FIELDS
+from rail_extract.core.fields import RAIL_FIELDS
 from rail_extract.core.cluster.geopackage import write
 from rail_extract.core.errors import DiskError
 from rail_extract.core.rails import RailLine

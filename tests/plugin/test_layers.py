@@ -1,20 +1,25 @@
 import numpy as np
 import pytest
-from qgis.core import NULL, QgsProcessing, QgsProcessingOutputLayerDefinition, QgsProperty, QgsUnitTypes, QgsVectorLayer
+from qgis.core import (
+    NULL,
+    QgsProcessing,
+    QgsProcessingOutputLayerDefinition,
+    QgsProcessingUtils,
+    QgsProperty,
+    QgsUnitTypes,
+    QgsVectorLayer,
+    QgsWkbTypes,
+)
 from rail_extract.core.errors import RailExtractError
+from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
 from rail_extract.core.points import LocalFrame
 from rail_extract.core.rails import Centerline, RailLine
 from rail_extract.rail_extract_plugin.destinations import check_writable
-from rail_extract.rail_extract_plugin.layers import (
-    CENTERLINE_FIELDS,
-    RAIL_FIELDS,
-    features,
-    fields,
-    output_crs,
-)
+from rail_extract.rail_extract_plugin.layers import add_features, features, fields, output_crs
 
 FEET = LocalFrame(np.array([1000.0, 2000.0, 10.0]), horizontal_unit_m=0.3048, vertical_unit_m=0.3048)
 XYZ = np.array([[0.0, 0.0, 0.0], [3.048, 0.0, 0.3048]])
+COLUMNS = [column for column in CENTERLINE_FIELDS if column.kind is float]
 
 
 def test_rail_becomes_a_feature_in_the_units_of_the_cloud(qgis):
@@ -22,32 +27,57 @@ def test_rail_becomes_a_feature_in_the_units_of_the_cloud(qgis):
     (feature,) = features([rail], RAIL_FIELDS, FEET)
     vertices = [(point.x(), point.y(), point.z()) for point in feature.geometry().vertices()]
     assert np.allclose(vertices, [(1000, 2000, 10), (1010, 2000, 11)])
-    assert feature.attributes() == pytest.approx([3, 10, np.hypot(3.048, 0.3048), 812, 4.5, 0.7, 0.0])
+    assert feature.attributes() == [3, 10, 3.063, 812, 4.5, 0.7, 0.0]
 
 
 def test_centerline_becomes_a_feature(qgis):
     line = Centerline(XYZ, 1, 10, (1, 4), (2,), 1435.2, float("nan"), -20.0, -41.0, 0.5)
     (feature,) = features([line], CENTERLINE_FIELDS, FEET)
-    attributes = dict(zip((name for name, _ in CENTERLINE_FIELDS), feature.attributes()))
+    attributes = dict(zip((column.name for column in CENTERLINE_FIELDS), feature.attributes()))
     assert (attributes["left_ids"], attributes["right_ids"]) == ("1,4", "2")
     assert attributes["cantmax_mm"] == -41.0
     assert attributes["gaugesd_mm"] == NULL
 
 
-@pytest.mark.parametrize("columns", [RAIL_FIELDS, CENTERLINE_FIELDS])
+ALL_FIELDS = pytest.mark.parametrize("columns", [RAIL_FIELDS, CENTERLINE_FIELDS, QUALITY_FIELDS])
+
+
+@ALL_FIELDS
 def test_shapefiles_keep_the_field_names(qgis, columns):
-    assert fields(columns).names() == [name for name, _ in columns]
+    assert fields(columns).names() == [column.name for column in columns]
     assert max(map(len, fields(columns).names())) <= 10
 
 
-@pytest.mark.parametrize("columns", [RAIL_FIELDS, CENTERLINE_FIELDS])
+@ALL_FIELDS
 def test_fields_have_their_types(qgis, columns):
     layer = QgsVectorLayer("LineStringZ", "lines", "memory")
     assert layer.dataProvider().addAttributes(fields(columns).toList())
-    kinds = {name: layer.dataProvider().fields().field(name).isNumeric() for name, _ in columns}
-    assert [name for name, numeric in kinds.items() if not numeric] == [
-        name for name, _ in columns if name in ("left_ids", "right_ids")
-    ]
+    found = layer.dataProvider().fields()
+    assert {column.name for column in columns if not found.field(column.name).isNumeric()} <= {"left_ids", "right_ids"}
+
+
+@pytest.mark.parametrize("suffix", [".gpkg", ".shp", ".geojson", ".csv"])
+def test_numbers_are_shown_with_the_decimals_that_mean_something(tmp_path, context, suffix):
+    line = Centerline(XYZ, 1, 10, (1, 4), (2,), 1435.2189, 1 / 3, -20.04, -0.01, 123456.789)
+    path = str(tmp_path / f"lines{suffix}")
+    shape, crs = QgsWkbTypes.Type.LineStringZ, output_crs(None)
+    sink, layer_id = QgsProcessingUtils.createFeatureSink(path, context, fields(CENTERLINE_FIELDS), shape, crs)
+    add_features(sink, features([line], CENTERLINE_FIELDS, FEET))
+    del sink
+    layer = QgsVectorLayer(layer_id, "lines", "ogr")
+    (feature,) = layer.getFeatures()
+    assert float(feature["length_m"]) == 3.063
+    shown = {column.name: layer.fields().field(column.name).displayString(feature[column.name]) for column in COLUMNS}
+    digits = {name: text.replace(",", "") for name, text in shown.items()}
+    assert {name: float(text) for name, text in digits.items()} == {
+        "length_m": 3.063,
+        "gauge_mm": 1435.2,
+        "gaugesd_mm": 0.3,
+        "cant_mm": -20.0,
+        "cantmax_mm": 0.0,
+        "bridged_m": 123456.79,
+    }
+    assert all(len(digits[column.name].partition(".")[2]) <= column.decimals for column in COLUMNS), shown
 
 
 def test_unknown_coordinate_system_is_cartesian_metres(qgis):

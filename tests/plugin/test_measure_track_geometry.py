@@ -10,6 +10,9 @@ RADIUS_M = 300.0
 CANT_MM = 60.0
 PLACE = np.array([500_000.0, 3_000_000.0, 100.0])
 
+LAST_DIGIT = 0.11
+"""Numbers that differ by less than shows may be rounded up and down."""
+
 
 def layer_of(lines, kind="LineStringZ", crs="EPSG:32643", fields="", values=()):
     """A layer in memory of lines, (n, 3) each, with the fields and values given."""
@@ -97,11 +100,11 @@ def test_radius_is_empty_above_ten_kilometres(measure, radius_m, known):
 
 def test_feet_give_the_same_millimetres(measure):
     lines = curved_track(unit_m=1200 / 3937)
-    _, layer, values = measure(layer_of(lines[:1], crs="EPSG:2263"), layer_of(lines[1:], crs="EPSG:2263"))
+    _, layer, values = measure(layer_of(lines[:1], crs="EPSG:2227"), layer_of(lines[1:], crs="EPSG:2227"))
     np.testing.assert_allclose(values["gauge_mm"], SPACING_MM - 72.0, atol=0.2)
     np.testing.assert_allclose(values["cant_mm"], -CANT_MM, atol=0.01)
     np.testing.assert_allclose(values["radius_m"], RADIUS_M, rtol=0.002)
-    assert layer.crs().authid() == "EPSG:2263"
+    assert layer.crs().authid() == "EPSG:2227"
 
 
 def test_step_and_head_width(measure):
@@ -156,8 +159,8 @@ def test_layers_and_cloud_give_the_numbers_of_extract_rails(run, measure, write_
     assert len(features) == outcome.results["STATION_COUNT"] == results["STATION_COUNT"] > 20
     for name, found in values.items():
         expected = [np.nan if feature[name] == NULL else feature[name] for feature in features]
-        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-4, err_msg=name)
-    assert outcome.results["SIGMA"] == pytest.approx(results["SIGMA"], rel=1e-6)
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=LAST_DIGIT, err_msg=name)
+    assert outcome.results["SIGMA"] == pytest.approx(results["SIGMA"], abs=0.01)
     assert values["points"].sum() > 3000
 
 
@@ -171,7 +174,7 @@ def test_a_cloud_is_measured_square_by_square(run, measure, write_cloud, track, 
     monkeypatch.setattr(track_inputs, "SQUARE_M", 4.0)
     _, _, parts = measure(*given, POINTS=str(cloud))
     for name, values in whole.items():
-        off = 1 if name == "points" else 0.05  # a point between two stations may be rounded to either
+        off = 1 if name == "points" else LAST_DIGIT  # a point between two stations may be rounded to either
         np.testing.assert_allclose(parts[name], values, rtol=1e-4, atol=off, err_msg=name)
 
 

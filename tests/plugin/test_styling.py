@@ -22,7 +22,8 @@ from qgis.core import (
 from qgis.PyQt.QtCore import QSize
 from qgis.PyQt.QtGui import QColor
 from qgis.PyQt.QtXml import QDomDocument
-from rail_extract.rail_extract_plugin.layers import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS, fields
+from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
+from rail_extract.rail_extract_plugin.layers import fields
 from rail_extract.rail_extract_plugin.paths import STYLES
 from rail_extract.rail_extract_plugin.styling import style_on_load
 
