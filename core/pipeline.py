@@ -13,6 +13,7 @@ from .frpdf.weights import load_arrays
 from .frpdf.zoo import choose
 from .heads.elevation import ElevationParameters, elevate, flat_rails, numbered
 from .heads.measuring import measure_in_stretches
+from .heads.reach import warn_if_out_of_reach
 from .heads.refinement import refine
 from .lines.smoothing import smooth_network
 from .lines.thinning import thin
@@ -146,6 +147,7 @@ def extract_rails(
         results, rasters = _walk(source, stretches, parameters, engine, step.span(0.0, 0.9))
         found = whole_rails(results, source.frame, parameters, first_id=len(rails) + 1)
         warn_if_none(found, source.class_code, progress)
+        warn_if_out_of_reach(found, parameters.head_width_m, parameters.smoothing_xy_m, progress)
         tracks = tracks_of(found, parameters, step.span(0.9, 0.95), first_id=len(centerlines) + 1)
         geometry += geometry_of(tracks, found, source, stretches, parameters, step.span(0.95, 1.0))
         rails += found
@@ -244,6 +246,7 @@ def lines_of(
     """
     rails = _finished(_all_vertices(raster, class_code, points, parameters, progress), parameters, first_id)
     warn_if_none(rails, class_code, progress)
+    warn_if_out_of_reach(rails, parameters.head_width_m, parameters.smoothing_xy_m, progress)
     return rails
 
 

@@ -1,11 +1,13 @@
 """Parameters that no run can be made of, or that contradict each other."""
 
+import numpy as np
 import pytest
-from faults import REFUSED, Fault
+from faults import REFUSED, WARNED, Fault
 
 TITLE = "Parameters"
 
 NAN, INFINITE = float("nan"), float("inf")
+PLACE = np.array([500_000.0, 3_000_000.0, 100.0])
 POSITIVE = (
     *("GAUGE", "HEAD_WIDTH", "SMOOTHING_XY", "SMOOTHING_Z", "TOLERANCE_XY", "TOLERANCE_Z", "CROWN_RADIUS"),
     *("CENTERLINE_TOLERANCE", "STEP"),
@@ -23,7 +25,28 @@ def same_file(bench):
     return {**with_()(bench), "RAILS": bench.folder / "out.gpkg", "CENTERLINES": bench.folder / "out.gpkg"}
 
 
+def in_a_sharp_curve(**parameters):
+    """The track in an arc of 25 m, and these parameters."""
+
+    def prepare(bench):
+        along, across, z = (bench.track(length_m=24.0) - PLACE).T
+        angle, radius_m = along / 25.0, 25.0 - across
+        points = PLACE + np.column_stack([radius_m * np.sin(angle), 25.0 - radius_m * np.cos(angle), z])
+        return {"INPUT": bench.cloud(points), "ITERATIONS": 1, **parameters}
+
+    return prepare
+
+
 FAULTS = [
+    Fault(
+        "SMOOTHING_XY too large for a sharp curve",
+        in_a_sharp_curve(SMOOTHING_XY=2.5),
+        WARNED,
+        "SMOOTHING_XY of 2.5 m draws lines in curves up to … mm aside, farther than points can bring them back: set it "
+        "to … m or less.",
+        {"RAIL_COUNT": 2, "CENTERLINE_COUNT": 1},
+    ),
+    Fault("SMOOTHING_XY that suits a sharp curve", in_a_sharp_curve(SMOOTHING_XY=1.5)),
     *(
         Fault(f"{name} not a number", with_(**{name: NAN}), REFUSED, f"{name} can't be nan: give a number.")
         for name in NUMBERS
