@@ -6,6 +6,8 @@ import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from .errors import CrsError
 
 if TYPE_CHECKING:
@@ -20,6 +22,15 @@ EPSG_CODES = range(1024, 32767)
 
 LENGTH_UNITS = {9001: ("metre", 1.0), 9002: ("foot", 0.3048), 9003: ("US survey foot", 1200 / 3937)}
 """EPSG's codes for units of length: name and metres."""
+
+LARGEST_STRETCH = 0.005
+"""Share by which a system may stretch lengths: gauge then reads 7 mm off, and from 10 mm on the report calls it wrong.
+Grids of countries stay below 0.0035; Web Mercator exceeds it even on the equator."""
+
+BASELINE_M = 100.0
+"""Length on which the stretch is measured: short for a projection, long against the rounding of degrees."""
+
+WGS_84 = "EPSG:4326"
 
 SAME_PLACE = 1e-3
 """Units of a coordinate system by which a place may differ between two descriptions of it."""
@@ -121,8 +132,12 @@ def units(crs: pyproj.CRS) -> tuple[float, float]:
 
 def is_geographic(crs: pyproj.CRS) -> bool:
     """Tell whether the plan coordinates are longitude and latitude."""
-    parts = _unbound(crs).sub_crs_list or [crs]
-    return _unbound(parts[0]).is_geographic
+    return _plane(crs).is_geographic
+
+
+def _plane(crs: pyproj.CRS) -> pyproj.CRS:
+    """Leave the heights out of a system."""
+    return _unbound((_unbound(crs).sub_crs_list or [crs])[0])
 
 
 def _unbound(crs: pyproj.CRS) -> pyproj.CRS:
@@ -135,6 +150,46 @@ def utm_zone(longitude: float, latitude: float) -> str:
     zone = int((longitude + 180) // 6) % 60 + 1
     hemisphere, code = ("N", 32600 + zone) if latitude >= 0 else ("S", 32700 + zone)
     return f"UTM zone {zone}{hemisphere} (EPSG:{code})"
+
+
+def check_stretch(crs: pyproj.CRS, places: Sequence[tuple[float, float]], what: str, it: str = "it") -> None:
+    """Refuse a system in which lengths are not those on the ground, as in Web Mercator away from the equator.
+
+    Parameters
+    ----------
+    crs : CRS
+    places : sequence of (x, y)
+        In units of the CRS. One without too much stretch suffices, for the others may be those of stray points.
+    what, it : str
+        The subject of the sentence with its verb, and how the remedy calls it.
+
+    Raises
+    ------
+    CrsError
+        A gauge would come out wrong.
+    """
+    plane = _plane(crs)
+    found = [_stretch(plane, *place) for place in places] if plane.is_projected else []
+    known = [one for one in found if np.isfinite(one).all()]
+    if not known:
+        return
+    factor, longitude, latitude = min(known, key=lambda one: abs(one[0] - 1))
+    if abs(factor - 1) > LARGEST_STRETCH:
+        raise CrsError(
+            f"{what} in {plane.name}, which draws lengths there {factor:.3f} times as long as they are: "
+            f"reproject {it}, for example to {utm_zone(longitude, latitude)}."
+        )
+
+
+def _stretch(plane: pyproj.CRS, x: float, y: float) -> tuple[float, float, float]:
+    """Length in the plane of one metre on the ground where that is farthest from one, and longitude and latitude."""
+    pyproj = import_pyproj()
+    half = BASELINE_M / 2 / plane.axis_info[0].unit_conversion_factor
+    to_degrees = pyproj.Transformer.from_crs(plane, WGS_84, always_xy=True)
+    longitudes, latitudes = to_degrees.transform([x - half, x, x + half, x], [y, y - half, y, y + half])
+    ground = pyproj.Geod(ellps="WGS84").inv(longitudes[:2], latitudes[:2], longitudes[2:], latitudes[2:])[2]
+    factors = [BASELINE_M / length_m for length_m in ground]
+    return max(factors, key=lambda factor: abs(factor - 1)), longitudes[0], latitudes[0]
 
 
 def common_crs(systems: Sequence[tuple[str, pyproj.CRS | None]]) -> pyproj.CRS | None:
@@ -166,7 +221,7 @@ def same_plane(first_wkt: str, second_wkt: str, xy: tuple[float, float]) -> bool
     Descriptions of one system differ from file to file, and what counts is where they put the rails.
     """
     pyproj = import_pyproj()
-    plane = [_unbound((_unbound(crs).sub_crs_list or [crs])[0]) for crs in map(parse_crs, (first_wkt, second_wkt))]
+    plane = [_plane(parse_crs(wkt)) for wkt in (first_wkt, second_wkt)]
     try:
         there = pyproj.Transformer.from_crs(*plane, always_xy=True).transform(*xy)
     except pyproj.exceptions.ProjError:

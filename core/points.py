@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .crs import common_crs, is_geographic, parse_crs, units, utm_zone
+from .crs import check_stretch, common_crs, is_geographic, parse_crs, units, utm_zone
 from .errors import CloudError, CrsError, NoRailPointsError, ParameterError
 from .progress import SILENT, Progress
 
@@ -250,6 +251,9 @@ def _shared_crs(headers: Sequence[CloudHeader], given: str | None, progress: Pro
             f"{headers[0].path.name} is in degrees ({crs.name}), where lengths can't be measured: "
             f"reproject it, for example to {_fitting_zone(headers[0])}."
         )
+    else:
+        xmin, ymin, xmax, ymax = headers[0].extent
+        check_stretch(crs, list(product((xmin, xmax), (ymin, ymax))), f"{headers[0].path.name} is")
     return crs
 
 

@@ -134,9 +134,9 @@ def test_chunks_of_any_size_as_in_copc(tmp_path, monkeypatch):
     ("crs", "horizontal_m", "vertical_m"),
     [
         (UTM, 1.0, 1.0),
-        ("EPSG:2263", 1200 / 3937, 1200 / 3937),  # New York, US survey feet
+        ("EPSG:2227", 1200 / 3937, 1200 / 3937),  # California, US survey feet
         ("EPSG:2222", 0.3048, 0.3048),  # Arizona, international feet
-        ("EPSG:2263+5703", 1200 / 3937, 1.0),  # heights in metres
+        ("EPSG:2227+5703", 1200 / 3937, 1.0),  # heights in metres
         ("EPSG:6355+6360", 1.0, 1200 / 3937),  # heights in US survey feet
     ],
 )
@@ -188,8 +188,8 @@ def test_without_crs_it_goes_on_in_metres_with_a_warning(tmp_path):
 def test_a_given_crs_stands_in_only_where_the_cloud_has_none(tmp_path):
     make_cloud(tmp_path / "bare.las", crs=None)
     make_cloud(tmp_path / "utm.las")
-    (bare,) = read_rail_points(tmp_path / "bare.las", [RAIL], crs_wkt="EPSG:2263")
-    (utm,) = read_rail_points(tmp_path / "utm.las", [RAIL], crs_wkt="EPSG:2263")
+    (bare,) = read_rail_points(tmp_path / "bare.las", [RAIL], crs_wkt="EPSG:2227")
+    (utm,) = read_rail_points(tmp_path / "utm.las", [RAIL], crs_wkt="EPSG:2227")
     assert bare.frame.horizontal_unit_m == pytest.approx(1200 / 3937)
     assert utm.frame.horizontal_unit_m == 1.0
     with pytest.raises(CrsError, match="not understood"):

@@ -1,5 +1,7 @@
 """Clouds whose points or coordinate systems are odd."""
 
+import json
+
 import numpy as np
 import pytest
 from faults import REFUSED, WARNED, Fault
@@ -127,6 +129,15 @@ def with_broken_system(bench):
     return {"INPUT": path}
 
 
+def drawn_in_mercator(bench):
+    shape = {"type": "LineString", "coordinates": [[1_024_000, 6_446_000, 100], [1_024_050, 6_446_000, 100]]}
+    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3857"}}
+    feature = {"type": "Feature", "properties": {}, "geometry": shape}
+    drawn = {"type": "FeatureCollection", "crs": crs, "features": [feature]}
+    (bench.folder / "drawn.geojson").write_text(json.dumps(drawn))
+    return {"INPUT": bench.folder / "drawn.geojson"}
+
+
 FEET = 3937 / 1200
 HERE = tuple(PLACE)
 
@@ -171,6 +182,21 @@ SYSTEMS = [
     ),
     Fault("US survey feet", in_system(2263, FEET, (980_000, 200_000, 300))),
     Fault("feet in plan, metres in height", in_system("2263+5703", (FEET, FEET, 1), (980_000, 200_000, 100))),
+    Fault(
+        "Web Mercator",
+        in_system(3857, 1.555, (1_024_000, 6_446_000, 100)),
+        REFUSED,
+        "cloud.las is in WGS 84 / Pseudo-Mercator, which draws lengths there 1.557 times as long as they are: "
+        "reproject it, for example to UTM zone 32N (EPSG:32632).",
+    ),
+    Fault(
+        "rails drawn in Web Mercator",
+        drawn_in_mercator,
+        REFUSED,
+        "The lines are in WGS 84 / Pseudo-Mercator, which draws lengths there 1.557 times as long as they are: "
+        "reproject them, for example to UTM zone 32N (EPSG:32632).",
+        run="buildtrackcenterlines",
+    ),
     Fault(
         "tiles in different zones",
         tiles(32643, 32644),

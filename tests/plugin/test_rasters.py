@@ -39,7 +39,7 @@ def places(raster, frame):
 
 
 @pytest.mark.parametrize(
-    ("code", "unit_m"), [(None, 1.0), ("EPSG:32643", 1.0), ("EPSG:2263", 1200 / 3937), ("EPSG:2263+6360", 1200 / 3937)]
+    ("code", "unit_m"), [(None, 1.0), ("EPSG:32643", 1.0), ("EPSG:2227", 1200 / 3937), ("EPSG:2227+6360", 1200 / 3937)]
 )
 def test_cells_come_back_where_they_were(tmp_path, code, unit_m):
     frame, path = frame_in(code, unit_m), tmp_path / "räster 1.tif"
@@ -88,7 +88,7 @@ def corridor(tmp_path):
 
 def test_bounds_are_those_of_the_file_where_all_points_were_taken(tmp_path):
     raster = rasterize(strokes(), CELL_M)
-    header = header_for([raster], (10,), frame_in("EPSG:2263", 1200 / 3937), STANDARD)
+    header = header_for([raster], (10,), frame_in("EPSG:2227", 1200 / 3937), STANDARD)
     write_rasters(tmp_path / "r.tif", header, [raster])
     dataset = gdal.Open(str(tmp_path / "r.tif"))
     x, width, _, y, _, height = dataset.GetGeoTransform()
