@@ -6,6 +6,7 @@ import gc
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from statistics import median
 
 import numpy as np
@@ -14,7 +15,9 @@ from rail_extract.core.frpdf import START
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.frpdf.corridor import Piece, lay_fields
 from rail_extract.core.frpdf.engine import Engine
+from rail_extract.core.frpdf.folding import fold
 from rail_extract.core.frpdf.network import FRPDF, RECEPTIVE_RADIUS
+from rail_extract.core.frpdf.onnx import to_onnx
 from rail_extract.core.frpdf.opencv_engine import OpenCvEngine
 from rail_extract.core.frpdf.torch_engine import TorchEngine
 from rail_extract.core.lines.polyline import interpolate, project, resample
@@ -63,6 +66,22 @@ def plain_network(arrays: dict[str, np.ndarray]) -> FRPDF:
     return network.eval()
 
 
+def open_vino(
+    arrays: dict[str, np.ndarray], number_type: str, height: int, width: int
+) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    """Make the first pass run on OpenVINO, on as many threads as PyTorch has; takes a raster and its state."""
+    from openvino import Core
+
+    settings = {
+        "INFERENCE_PRECISION_HINT": {"float32": "f32", "bfloat16": "bf16"}[number_type],
+        "INFERENCE_NUM_THREADS": torch.get_num_threads(),
+        "PERFORMANCE_HINT": "LATENCY",
+    }
+    core = Core()
+    model = core.compile_model(core.read_model(to_onnx(fold(arrays)[0], height, width), b""), "CPU", settings)
+    return lambda raster, state: 1 / (1 + np.exp(-model(np.stack([raster, state])[None] * 2 - 1)[0][0, 0]))
+
+
 def speed_table(cut: Cut, rounds: int, clock: Callable[[], float]) -> Iterable[str]:
     """Time the first pass, contestants in turn, `rounds` times; print medians of seconds a megacell."""
     raster = cut.raster
@@ -77,6 +96,13 @@ def speed_table(cut: Cut, rounds: int, clock: Callable[[], float]) -> Iterable[s
         "folded, float32, tile": (TILE**2, lambda: exact.probabilities(tile, _start(tile), 0)),
         f"folded, {_number_type(fast)}, tile": (TILE**2, lambda: fast.probabilities(tile, _start(tile), 0)),
     }
+    if find_spec("openvino"):
+        for engine in (exact, fast):
+            run = open_vino(cut.arrays, _number_type(engine), *tile.shape)
+            title = f"OpenVINO, {_number_type(engine)}, tile"
+            contestants[title] = (TILE**2, lambda run=run: run(tile, _start(tile)))
+    else:
+        yield "OpenVINO is not installed and is left out: pip install openvino."
     cells = sum(one.size for one in seen)
     for title, engine in (("float32", exact), (_number_type(fast), fast), ("OpenCV, float32", opencv)):
         contestants[f"{title}, along the track"] = (cells, lambda engine=engine: _sweep(engine, seen, field.pieces))

@@ -43,6 +43,15 @@ def test_the_plain_network_is_the_one_of_the_weights(benchmark, network):
     np.testing.assert_allclose(found, expected, atol=1e-6)
 
 
+def test_open_vino_computes_the_same_pass(benchmark, network):
+    pytest.importorskip("openvino")
+    arrays = export(network)
+    tile = (np.random.default_rng(0).random((40, 50)) < 0.2).astype(np.float32)
+    known = np.full_like(tile, 0.5)
+    found = benchmark.open_vino(arrays, "float32", 40, 50)(tile, known)
+    np.testing.assert_allclose(found, TorchEngine(arrays, "CPU", exact=True).probabilities(tile, known, 0), atol=1e-5)
+
+
 def test_changed_cells_are_counted_either_way(benchmark):
     reference = raster_of([[0, column] for column in range(100)])
     found = raster_of([[0, column] for column in range(2, 103)])
