@@ -1,12 +1,13 @@
 import subprocess
 import sys
 from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pytest
 from lines import farthest, read_features
 from osgeo import gdal
-from qgis.core import QgsVectorLayer
+from qgis.core import QgsProcessingUtils, QgsVectorLayer
 from rail_extract.rail_extract_plugin.geotiff import read_header
 
 
@@ -137,11 +138,16 @@ def test_progress_advances_to_the_end(run, scene, new_feedback):
 
 
 @pytest.mark.parametrize("share", [0, 20, 50, 90])
-def test_cancelled_run_writes_nothing(run, scene, outputs, new_feedback, share):
-    outcome = run({**scene, **outputs}, new_feedback(cancel_at=share))
+def test_cancelled_run_writes_nothing_and_leaves_no_points(run, scene, outputs, new_feedback, share):
+    temporary, points, feedback = Path(QgsProcessingUtils.tempFolder()), [], new_feedback(cancel_at=share)
+    before = set(temporary.iterdir())
+    feedback.progressChanged.connect(lambda _: points.extend(temporary.glob("*/*/10_*")))
+    outcome = run({**scene, **outputs}, feedback)
     assert not outcome.ok
     assert outcome.error == "Cancelled; nothing was written."
     assert not any(path.exists() for path in outputs.values())
+    assert points or share == 0
+    assert set(temporary.iterdir()) == before
 
 
 def test_failed_run_leaves_the_old_output(run, outputs, write_cloud, track):
