@@ -11,7 +11,7 @@ from ..lines.polyline import interpolate, project, resample
 from ..rails import RailLine, length_along
 from .squares import HALO_M, Key, Stretch, around
 from .trimming import STATION_M, runs
-from .uniting import HOLE_M, SAME_RAIL_M, faded, prolonged, united
+from .uniting import HOLE_M, SAME_RAIL_M, closed_ring, faded, prolonged, united
 
 SHORTEST_MATCH_M = 1.0
 """Lines that are close together for a shorter length merely cross or part."""
@@ -120,7 +120,7 @@ class Table:
                 continue
             chain = self._chain(first, 0 if 0 not in self._pieces[first].links else 1)
             done.update(number for number, _ in chain)
-            lines.append(united([self._cut(number, entered) for number, entered in chain]))
+            lines.append(closed_ring(united([self._cut(number, entered) for number, entered in chain])))
         return lines
 
     def _chain(self, first: int, entered: int) -> list[Tip]:

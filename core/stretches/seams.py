@@ -18,17 +18,18 @@ from ..points import LocalFrame
 from ..rails import RailLine, length_along
 from .laying import Table
 from .trimming import STATION_M, StretchRails
-from .uniting import SAME_RAIL_M
+from .uniting import SAME_RAIL_M, closed_ring
 
 
 def join(results: Iterable[StretchRails], frame: LocalFrame) -> list[RailLine]:
     """Make whole lines of those of all stretches, in the local metres of `frame`.
 
-    A single stretch's lines stay as they are; in other cases lines are the same whatever order the stretches come in.
+    A single stretch's lines stay as they are, but for rings, which close; in other cases lines are the same whatever
+    order the stretches come in.
     """
     ordered = sorted(results, key=lambda result: result.stretch.key)
     if len(ordered) == 1 and not np.isfinite(ordered[0].stretch.side_m):
-        return list(ordered[0].rails)
+        return [closed_ring(rail) for rail in ordered[0].rails]
     table, nodes = Table(), []
     for result in ordered:
         shift = result.stretch.shift_to(frame)

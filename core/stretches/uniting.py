@@ -54,6 +54,19 @@ def prolonged(line: np.ndarray) -> np.ndarray:
     return np.concatenate([ends[0][::-1], line, ends[1]])
 
 
+def closed_ring(line: RailLine) -> RailLine:
+    """Let the ends of a ring meet exactly; what they differ by fades over twice `HALO_M` on either side."""
+    along = length_along(line.xyz[:, :2])
+    off = line.xyz[-1] - line.xyz[0]
+    if along[-1] <= 4 * HALO_M or np.hypot(*off[:2]) > SAME_RAIL_M:
+        return line
+    share = 1.0 - np.clip(np.minimum(along, along[-1] - along) / (2 * HALO_M), 0.0, 1.0)
+    half = np.copysign(0.5, 0.5 * along[-1] - along) * (3 * share**2 - 2 * share**3)
+    xyz = line.xyz + half[:, None] * off
+    xyz[-1] = xyz[0]
+    return replace(line, xyz=xyz)
+
+
 def united(parts: Sequence[RailLine]) -> RailLine:
     """Make one line of pieces that begin where the one before ends."""
     if len(parts) == 1:

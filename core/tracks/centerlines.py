@@ -20,6 +20,7 @@ from .leads import runs_on
 from .midline import Meeting, Side, at_gauge, bridged_steps, midway
 from .pairing import MIN_LENGTH_M, pair_rails
 from .parallels import commonest_spacing
+from .rings import begun_abreast, closed_up, is_closed, run_on
 
 STATIONS_AT_ONCE = 8192
 """Stations drawn in one go, 2 km of track: lets a cancel through several times a second."""
@@ -97,7 +98,7 @@ def build_centerlines(
 def _in_order(rails: Sequence[RailLine]) -> list[RailLine]:
     """Sort rails by place, and let all start in the west: the tracks must not depend on how rails come."""
     turned = [rail.reversed() if starts_at_its_end(rail.xyz) else rail for rail in rails]
-    return sorted(turned, key=lambda rail: (*rail.xyz[0, :2], *rail.xyz[-1, :2], rail.length_m))
+    return begun_abreast(sorted(turned, key=lambda rail: (*rail.xyz[0, :2], *rail.xyz[-1, :2], rail.length_m)))
 
 
 def _refuse_other_spacing(rails: Sequence[RailLine], gauge_m: float, head_width_m: float, tolerance_m: float) -> None:
@@ -137,6 +138,8 @@ def _draw(
     both = ~np.isnan(apart)
     cant = (left.height_m - right.height_m)[both]
     gauge = np.hypot(apart[both], np.nan_to_num(cant)) - head_width_m
+    if all(is_closed(rails[number].xyz) for pair in chain.pairs for number in (pair.left, pair.right)):
+        xyz = closed_up(xyz)
     xyz = _smoothed(xyz, parameters.smoothing_m, smoothing)
     flip = starts_at_its_end(xyz)
     sides = [_ids(rails, (pair.left for pair in chain.pairs)), _ids(rails, (pair.right for pair in chain.pairs))]
@@ -179,9 +182,13 @@ def _met(side: Side, guide: np.ndarray, directions: np.ndarray, half_m: float, p
 
 def _smoothed(xyz: np.ndarray, smoothing_m: float, progress: Progress) -> np.ndarray:
     """Smooth in plan, and place vertices as close as the shape asks for."""
-    along = length_along(xyz[:, :2])
-    _, t = resample(xyz, smoothing_m / 4)
+    stations, t = resample(xyz, smoothing_m / 4)
     margin_m = MARGIN_SIGMAS * smoothing_m
+    closed = is_closed(xyz)
+    if closed:
+        xyz, lead_m = run_on(xyz, margin_m)
+        t = t + lead_m
+    along = length_along(xyz[:, :2])
     plan = []
     for part in progress.follow(np.array_split(t, int(np.ceil(len(t) / STATIONS_AT_ONCE)))):
         first, last = np.searchsorted(along, [part[0] - margin_m, part[-1] + margin_m])
@@ -189,4 +196,5 @@ def _smoothed(xyz: np.ndarray, smoothing_m: float, progress: Progress) -> np.nda
         # Free ends: rails are smooth already, and a fixed end would straighten a curve.
         near = xyz[first : last + 1, :2]
         plan.append(smooth_line(near, smoothing_m, stations=part - along[first], ends="free"))
-    return np.column_stack([np.concatenate(plan), np.interp(t, along, xyz[:, 2])])
+    smooth = np.column_stack([np.concatenate(plan), stations[:, 2]])
+    return np.concatenate([smooth[:-1], smooth[:1]]) if closed else smooth

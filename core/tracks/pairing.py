@@ -211,8 +211,9 @@ def _abreast(a: _OffsetCurve, b: _OffsetCurve, tolerance_m: float) -> Iterator[t
     feet = project([b.xy], a.at(s), tolerance_m)
     order = np.argsort(feet.point)
     point, t = feet.point[order], feet.t[order]
-    runs = np.split(np.arange(len(point)), np.flatnonzero(np.diff(point) > 1) + 1)
-    for run in runs:
+    # A closed rail that begins elsewhere than its partner begins anew within the stretch.
+    apart = (np.diff(point) > 1) | (np.abs(np.diff(t)) > SPLIT_M)
+    for run in np.split(np.arange(len(point)), np.flatnonzero(apart) + 1):
         if len(run) > 1:
             yield s[point[run]], t[run]
 

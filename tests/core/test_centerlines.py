@@ -52,6 +52,23 @@ def test_centerline_of_concentric_arcs_is_the_arc_between(radius, turned):
     assert line.gaugesd_mm < 0.2
 
 
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("begins", [0.0, 0.03, 0.05, 2.0, 6.2])
+def test_a_ring_becomes_one_closed_centerline(begins, turned):
+    """Wherever its two rails begin, and whichever way they run."""
+    angle = np.linspace(0, 2 * np.pi, 1500)
+    outer, inner = (
+        flat(radius * np.column_stack([np.cos(angle + start), np.sin(angle + start)]))
+        for radius, start in ((30 + 0.5 * SPACING, 1.0), (30 - 0.5 * SPACING, 1.0 + begins))
+    )
+    outer[-1], inner[-1] = outer[0], inner[0]
+    (line,) = build_centerlines(rails_of(outer, inner[::-1] if turned else inner), GAUGE, WIDTH)
+    np.testing.assert_array_equal(line.xyz[0], line.xyz[-1])
+    np.testing.assert_allclose(np.hypot(*line.xyz[:, :2].T), 30, atol=3e-4)
+    assert line.length_m == pytest.approx(60 * np.pi, rel=1e-4)
+    assert line.bridged_m < 0.1
+
+
 @pytest.mark.parametrize("curve", [STRAIGHT, CURVED])
 def test_three_tracks_give_three_centerlines_at_gauge(curve):
     lines = [track(curve, left_m) for left_m in (0.0, 4.0, 8.0)]

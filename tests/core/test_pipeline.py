@@ -15,6 +15,9 @@ from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.synthetic.curves import Element, trace, transition_curve
 from rail_extract.core.synthetic.plain_scenes import straight
+from rail_extract.core.synthetic.scanner import Scanner
+from rail_extract.core.synthetic.scene import Plan, build
+from rail_extract.core.synthetic.tracks import Track
 
 WIDTH = 0.072
 CURVES = [trace([Element(40.0)], heading=0.4), trace(transition_curve(15, 20, 15, 1 / 300), heading=-0.6)]
@@ -105,6 +108,31 @@ def test_a_line_in_stretches_is_the_line_in_one_piece(monkeypatch):
     count = min(len(one.chainage_m), len(two.chainage_m))
     np.testing.assert_allclose(two.gauge_mm[:count], one.gauge_mm[:count], atol=1.0)
     np.testing.assert_allclose(two.cant_mm[:count], one.cant_mm[:count], atol=0.5)
+
+
+@pytest.mark.parametrize("tiles", [4, 50])
+def test_a_ring_comes_back_closed(monkeypatch, tiles):
+    """Over several stretches, of which one sees all of it and the others a part, and in one."""
+    monkeypatch.setattr(pipeline, "clean", lambda raster, *_: raster)
+    standard, radius = STANDARDS["EN_49E1_1435"], 39.5
+    curve = trace([Element(2 * np.pi * radius, 1 / radius, 1 / radius)], start=(3.0, -2.0 - radius))
+    height = 100 + 0.3 * np.sin(curve.heading)
+    track = Track(curve, standard.gauge_m + standard.head_width_m, height)
+    scene = build("ring", Plan([track], standard, Scanner(profile_step_m=0.1)), np.random.RandomState(3))
+    settings = Parameters(standard.gauge_m, standard.head_width_m, stretch_tiles=tiles)
+    found = extract_rails([scene.rail_points()], settings)
+    assert (len(found.rails), len(found.centerlines)) == (2, 1)
+    for line, true in (*zip(_by_length(found.rails), sorted(scene.rails, key=len)), (found.centerlines[0], curve.xy)):
+        np.testing.assert_array_equal(line.xyz[0], line.xyz[-1])
+        expected = length_along(np.concatenate([true, true[:1]])[:, :2])[-1]
+        assert length_along(line.xyz[:, :2])[-1] == pytest.approx(expected, rel=1e-3)
+        off = np.hypot(*(line.xyz[:, :2] - [3.0, -2.0]).T) - expected / (2 * np.pi)
+        assert np.sqrt(np.mean(off**2)) < 2e-3
+        assert largest_step(line.xyz) < 0.05
+
+
+def _by_length(lines):
+    return sorted(lines, key=lambda line: line.length_m)
 
 
 def test_a_run_in_stretches_hears_a_cancel():

@@ -89,6 +89,18 @@ def test_where_stretches_disagree_no_step_is_left(heading, bend):
     assert np.abs(project([true.xyz[:, :2]], line.xyz[:, :2], 1.0).across).max() < 0.0015
 
 
+@pytest.mark.parametrize("start", [(3.0, 5.0), (40.0, -11.0), (20.0, 20.0)])
+def test_a_ring_comes_back_closed(start):
+    length = 2 * np.pi * 45.0
+    flat = curve(0.3, 1 / 45.0, length=length, start=start) * [1, 1, 0]
+    true = rail(np.concatenate([flat, flat[:1]]))
+    (line,) = join(seen_by_stretches([true], error_m=0.0008), FRAME)
+    np.testing.assert_array_equal(line.xyz[0], line.xyz[-1])
+    assert line.length_m == pytest.approx(true.length_m, rel=1e-4)
+    assert np.abs(project([true.xyz[:, :2]], line.xyz[:, :2], 1.0).across).max() < 0.0015
+    assert line.points == pytest.approx(true.points, rel=0.01)
+
+
 @pytest.mark.parametrize("offset", [-1e-9, 0.0, 0.3, HALO_M, HALO_M + 0.01])
 def test_a_line_along_a_border_comes_back_whole(offset):
     s = np.arange(0.0, 190.0, 0.2)
