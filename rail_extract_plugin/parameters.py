@@ -156,7 +156,10 @@ def lines() -> Definitions:
         ),
         advanced(
             number("TOLERANCE_XY", tr("Tolerance in plan [m]"), 0.10, 0.005, WIDEST_REACH_M),
-            tr("Points up to this far beside the line give it its height, others none."),
+            tr(
+                "Points up to this far beside the line give it its height, others none. Half a railhead is the limit "
+                "in any case."
+            ),
         ),
         advanced(
             number("TOLERANCE_Z", tr("Tolerance in height [m]"), 0.03, 0.001, WIDEST_REACH_M),
@@ -164,7 +167,10 @@ def lines() -> Definitions:
         ),
         advanced(
             number("CROWN_RADIUS", tr("Crown radius of the rolling disc [m]"), 20.0, 1.0, FLATTEST_CROWN_M),
-            tr("A disc rolled along the heights from above finds the top of the rail. Smaller follows sharper dips."),
+            tr(
+                "A disc rolled along the heights from above finds the top of the rail. It hardly changes the line: "
+                "reduce it only where short, deep dips lose their points."
+            ),
         ),
         max_gap(),
         advanced(
