@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
 
 from qgis.core import (
     QgsProcessingContext,
+    QgsProcessingException,
     QgsProcessingOutputLayerDefinition,
     QgsProperty,
     QgsVectorLayer,
@@ -62,6 +63,43 @@ def write_whole(value: Any, context: QgsProcessingContext, write: Callable[[Any]
         if folder:
             shutil.rmtree(folder, ignore_errors=True)
     return _renamed(layer_id, str(path) + layer_id.rsplit(path.name, 1)[1], context)
+
+
+def write_each(
+    writers: Mapping[str, Callable[[], dict[str, str]]], parameters: dict[str, Any], context: QgsProcessingContext
+) -> dict[str, str]:
+    """Write the outputs of a run one after the other; where one fails, the others are not lost.
+
+    Parameters
+    ----------
+    writers : mapping of str to callable
+        By the output's name what writes it, and gives the path or id by that name, or nothing if it is skipped.
+    parameters : dict
+    context : QgsProcessingContext
+
+    Raises
+    ------
+    RailExtractError
+        Some could not be written; says which, why, and which files are whole.
+    """
+    written: dict[str, str] = {}
+    failures: dict[str, Exception] = {}
+    for name, write in writers.items():
+        try:
+            written.update(write())
+        except (RailExtractError, QgsProcessingException) as error:
+            failures[name] = error
+    if failures:
+        raise RailExtractError(_explain(failures, [name for name in written if plain_file(parameters[name], context)]))
+    return written
+
+
+def _explain(failures: Mapping[str, Exception], whole: Sequence[str]) -> str:
+    """Give the first reason, and say which outputs are missing and which are whole."""
+    first = str(next(iter(failures.values())))
+    if not whole:
+        return first
+    return f"{first} Not written: {', '.join(failures)}. Written and whole: {', '.join(whole)}."
 
 
 def _redirected(value: Any, path: Path) -> Any:

@@ -19,8 +19,8 @@ FINE = "gives the right result"
 INTRODUCTION = """# What goes wrong, and what Rail Extract says
 
 Each row is a test: the fault is made, the algorithm is run in QGIS, and it must end as the row says. What is refused,
-in the dialog or in the run, is refused in the one sentence shown, without a traceback, and leaves neither an output nor
-a temporary file. In the sentences, … stands for what changes from case to case.
+in the dialog or in the run, is refused in the one sentence shown, without a traceback, and leaves no temporary file and
+no output but those that the sentence calls whole. In the sentences, … stands for what changes from case to case.
 
 `.venv/bin/python tools/faults.py` writes this page from the tables in `tests/plugin/test_faults_*.py`, and a test
 compares the two.

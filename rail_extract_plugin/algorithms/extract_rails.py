@@ -23,6 +23,7 @@ from ..clouds import CloudSource, spool_points
 from ..layers import CENTERLINES, RAILS, figures_of, figures_of_stations, write_lines, write_raster, write_stations
 from ..reports import Origin, write_report
 from ..values import Values
+from ..whole_files import write_each
 from .base import CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
@@ -119,13 +120,15 @@ class ExtractRails(RailAlgorithm):
             network = extract_rails(clouds, settings, progress.span(READING, 1))
         progress.check()
         origin = Origin(job.cloud.paths, job.standard, job.other_gauges_m, job.command)
-        written = {
-            **self._write_cleaned(job, network, [one.class_code for one in clouds], parameters, context),
-            **write_lines(self, "RAILS", RAILS, network.rails, network.frame, parameters, context),
-            **write_lines(self, "CENTERLINES", CENTERLINES, network.centerlines, network.frame, parameters, context),
-            **write_stations(self, "QUALITY", network.geometry, network.frame, parameters, context),
-            **write_report(self, "REPORT", network, origin, parameters, context),
+        class_codes, frame, rest = [one.class_code for one in clouds], network.frame, (parameters, context)
+        writers = {
+            "CLEANED": lambda: self._write_cleaned(job, network, class_codes, *rest),
+            "RAILS": lambda: write_lines(self, "RAILS", RAILS, network.rails, frame, *rest),
+            "CENTERLINES": lambda: write_lines(self, "CENTERLINES", CENTERLINES, network.centerlines, frame, *rest),
+            "QUALITY": lambda: write_stations(self, "QUALITY", network.geometry, frame, *rest),
+            "REPORT": lambda: write_report(self, "REPORT", network, origin, *rest),
         }
+        written = write_each(writers, parameters, context)
         figures = {**figures_of(network.rails, "RAIL"), **figures_of(network.centerlines, "CENTERLINE")}
         measured = figures_of_stations(network.geometry) if settings.quality_step_m else {}
         return {**written, **figures, **measured, "ENGINE_USED": network.engine}

@@ -1,3 +1,4 @@
+import shutil
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -155,6 +156,19 @@ def test_failed_run_leaves_the_old_output(run, outputs, write_cloud, track):
     outcome = run({"INPUT": write_cloud(track(), class_code=2), **outputs})
     assert not outcome.ok
     assert outputs["RAILS"].read_bytes() == b"old"
+
+
+def test_where_one_output_fails_the_others_are_whole(run, scene, outputs, tmp_path, new_feedback):
+    gone, feedback = tmp_path / "gone", new_feedback()
+    gone.mkdir()
+    feedback.progressChanged.connect(lambda done: shutil.rmtree(gone, ignore_errors=True))
+    more = {"CENTERLINES": gone / "tracks.gpkg", "QUALITY": tmp_path / "quality.gpkg", "REPORT": tmp_path / "r.html"}
+    outcome = run({**scene, **outputs, **more}, feedback)
+    assert not outcome.ok
+    assert outcome.error.endswith("Not written: CENTERLINES. Written and whole: RAILS, QUALITY, REPORT.")
+    assert len(lines_of(outputs["RAILS"])[1]) == 2
+    assert len(lines_of(more["QUALITY"])[1]) > 10
+    assert "Track 1" in more["REPORT"].read_text(encoding="utf-8")
 
 
 def wrong_magic(path):

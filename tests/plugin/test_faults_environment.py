@@ -97,6 +97,13 @@ def removed_on_the_way(bench):
     return {**cloud(bench), **skipped, "RAILS": bench.folder / "gone" / "rails.gpkg"}
 
 
+def one_removed_on_the_way(bench):
+    """The same for one output of two."""
+    skipped = dict.fromkeys(("QUALITY", "CLEANED"))
+    gone = removed_on_the_way(bench)["RAILS"].with_name("tracks.gpkg")
+    return {**cloud(bench), **skipped, "RAILS": bench.folder / "rails.gpkg", "CENTERLINES": gone}
+
+
 def lines(*texts):
     layer = QgsVectorLayer("LineStringZ?crs=EPSG:32643", "lines", "memory")
     for text in texts:
@@ -249,6 +256,13 @@ FAULTS = [
         REFUSED,
         "The output …/gone/rails.gpkg can't be written (No such file or directory): close what uses it, or "
         "choose another place.",
+    ),
+    Fault(
+        "folder of one output goes away on the way",
+        one_removed_on_the_way,
+        REFUSED,
+        "The output …/gone/tracks.gpkg can't be written (No such file or directory): close what uses it, or "
+        "choose another place. Not written: CENTERLINES. Written and whole: RAILS.",
     ),
     Fault(
         "output with spaces, umlauts and kanji",
