@@ -11,7 +11,7 @@ from ..lines.paek import filled
 from ..lines.polyline import interpolate
 from ..lines.smoothing import STATIONS_PER_SIGMA, smooth_line
 from ..progress import Progress
-from ..rails import RailLine, length_along
+from ..rails import SAME_PLACE_M, RailLine, length_along
 
 REACH_HEADS = 0.5
 """Displacement, in head widths, from which points bring a line back to within a centimetre, for it still lies over the
@@ -52,5 +52,6 @@ def displacement(line: np.ndarray, smoothing_m: float) -> float:
     """
     t = length_along(line)
     stations = filled(t, smoothing_m / STATIONS_PER_SIGMA)
-    smoothed = smooth_line(line, smoothing_m, stations)
+    is_ring = bool(np.hypot(*(line[-1] - line[0])) < SAME_PLACE_M)
+    smoothed = smooth_line(line, smoothing_m, stations, closed=is_ring)
     return float(np.hypot(*(smoothed - interpolate(line, t, stations)).T).max())

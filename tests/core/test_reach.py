@@ -37,6 +37,10 @@ def test_a_line_that_ends_in_an_arc_is_drawn_aside_by_a_share_of_sigma_squared(r
     assert displacement(arc(radius_m), sigma_m) == pytest.approx(0.26 * sigma_m**2 / radius_m, rel=0.03)
 
 
+def test_a_ring_has_no_end():
+    assert displacement(arc(25.0, 2 * np.pi * 25.0), 2.0) == pytest.approx(1.8 * 2.0**4 / 25.0**3, abs=5e-4)
+
+
 def test_a_straight_line_stays():
     assert displacement(np.array([[0.0, 0.0], [30.0, 10.0]]), 3.0) == pytest.approx(0, abs=1e-9)
 
