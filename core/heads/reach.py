@@ -11,7 +11,8 @@ from ..lines.paek import filled
 from ..lines.polyline import interpolate
 from ..lines.smoothing import STATIONS_PER_SIGMA, smooth_line
 from ..progress import Progress
-from ..rails import SAME_PLACE_M, RailLine, length_along
+from ..rails import RailLine, length_along
+from ..tracks.rings import is_closed
 
 REACH_HEADS = 0.5
 """Displacement, in head widths, from which points bring a line back to within a centimetre, for it still lies over the
@@ -52,6 +53,5 @@ def displacement(line: np.ndarray, smoothing_m: float) -> float:
     """
     t = length_along(line)
     stations = filled(t, smoothing_m / STATIONS_PER_SIGMA)
-    is_ring = bool(np.hypot(*(line[-1] - line[0])) < SAME_PLACE_M)
-    smoothed = smooth_line(line, smoothing_m, stations, closed=is_ring)
+    smoothed = smooth_line(line, smoothing_m, stations, closed=is_closed(line))
     return float(np.hypot(*(smoothed - interpolate(line, t, stations)).T).max())
