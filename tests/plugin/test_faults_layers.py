@@ -24,13 +24,21 @@ def track_cells(bands=1, kind=np.uint8):
 
 
 def raster(
-    bench, cells=None, grid=(500_000, CELL_M, 0, 3_000_000, 0, -CELL_M), tags=TAGS, epsg=32643, texts=("10",), nodata=0
+    bench,
+    cells=None,
+    grid=(500_000, CELL_M, 0, 3_000_000, 0, -CELL_M),
+    tags=TAGS,
+    epsg=32643,
+    texts=("10",),
+    nodata=0,
+    options=(),
 ):
     """Write cells, (bands, rows, columns), as a GeoTIFF."""
     cells = track_cells() if cells is None else cells
     kind = gdal.GDT_Float32 if cells.dtype == np.float32 else gdal.GDT_Byte
     path = bench.folder / "rail.tif"
-    dataset = gdal.GetDriverByName("GTiff").Create(str(path), cells.shape[2], cells.shape[1], len(cells), kind)
+    size = cells.shape[2], cells.shape[1], len(cells)
+    dataset = gdal.GetDriverByName("GTiff").Create(str(path), *size, kind, options=list(options))
     if grid:
         dataset.SetGeoTransform(grid)
     if epsg:
@@ -58,6 +66,19 @@ def of_raster(change=None, **given):
         return parameters
 
     return prepare
+
+
+def damaged_cells(bench):
+    """A GeoTIFF that opens, with a first block that can't be unpacked, wherever GDAL has put it."""
+    parameters = raster(bench, options=["COMPRESS=DEFLATE"])
+    dataset = gdal.Open(str(parameters["INPUT"]))
+    band = dataset.GetRasterBand(1)
+    start, size = (int(band.GetMetadataItem(f"BLOCK_{item}_0_0", "TIFF")) for item in ("OFFSET", "SIZE"))
+    band = dataset = None
+    with parameters["INPUT"].open("r+b") as file:
+        file.seek(start)
+        file.write(bytes(size))
+    return parameters
 
 
 def as_floats_with_nan():
@@ -151,8 +172,8 @@ RASTERS = [
         "INPUT can't be …/rail.tif: give a raster layer, or a raster file that can be read.",
     ),
     Fault(
-        "GeoTIFF cut in its cells",
-        of_raster(lambda data: data[:4000]),
+        "GeoTIFF damaged in its cells",
+        damaged_cells,
         REFUSED,
         "rail.tif is damaged at row 0, column 0: make it again.",
     ),
