@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .errors import CrsError
+from .progress import Progress
 
 if TYPE_CHECKING:
     import pyproj
@@ -152,8 +153,12 @@ def utm_zone(longitude: float, latitude: float) -> str:
     return f"UTM zone {zone}{hemisphere} (EPSG:{code})"
 
 
-def check_stretch(crs: pyproj.CRS, places: Sequence[tuple[float, float]], what: str, it: str = "it") -> None:
-    """Refuse a system in which lengths are not those on the ground, as in Web Mercator away from the equator.
+def warn_of_stretch(
+    crs: pyproj.CRS, places: Sequence[tuple[float, float]], what: str, progress: Progress, it: str = "it"
+) -> None:
+    """Warn of a system in which lengths are not those on the ground, as in Web Mercator away from the equator.
+
+    No more than a warning: coordinates that are local ones, and only labelled with a system, have true lengths.
 
     Parameters
     ----------
@@ -162,11 +167,7 @@ def check_stretch(crs: pyproj.CRS, places: Sequence[tuple[float, float]], what: 
         In units of the CRS. One without too much stretch suffices, for the others may be those of stray points.
     what, it : str
         The subject of the sentence with its verb, and how the remedy calls it.
-
-    Raises
-    ------
-    CrsError
-        A gauge would come out wrong.
+    progress : Progress
     """
     plane = _plane(crs)
     found = [_stretch(plane, *place) for place in places] if plane.is_projected else []
@@ -175,8 +176,8 @@ def check_stretch(crs: pyproj.CRS, places: Sequence[tuple[float, float]], what: 
         return
     factor, longitude, latitude = min(known, key=lambda one: abs(one[0] - 1))
     if abs(factor - 1) > LARGEST_STRETCH:
-        raise CrsError(
-            f"{what} in {plane.name}, which draws lengths there {factor:.3f} times as long as they are: "
+        progress.warning(
+            f"{what} in {plane.name}, which draws lengths there {factor:.3f} times as long as they are, gauges too: "
             f"reproject {it}, for example to {utm_zone(longitude, latitude)}."
         )
 

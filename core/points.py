@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .crs import check_stretch, common_crs, is_geographic, parse_crs, units, utm_zone
+from .crs import common_crs, is_geographic, parse_crs, units, utm_zone, warn_of_stretch
 from .errors import CloudError, CrsError, NoRailPointsError, ParameterError
 from .progress import SILENT, Progress
 
@@ -253,7 +253,7 @@ def _shared_crs(headers: Sequence[CloudHeader], given: str | None, progress: Pro
         )
     else:
         xmin, ymin, xmax, ymax = headers[0].extent
-        check_stretch(crs, list(product((xmin, xmax), (ymin, ymax))), f"{headers[0].path.name} is")
+        warn_of_stretch(crs, list(product((xmin, xmax), (ymin, ymax))), f"{headers[0].path.name} is", progress)
     return crs
 
 

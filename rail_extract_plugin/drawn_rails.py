@@ -17,7 +17,7 @@ from qgis.core import (
     QgsProcessingFeatureSource,
 )
 
-from ..core.crs import check_stretch, parse_crs, units
+from ..core.crs import parse_crs, units, warn_of_stretch
 from ..core.errors import CrsError, RailExtractError
 from ..core.points import ORIGIN_STEP, LocalFrame
 from ..core.progress import SILENT, Progress
@@ -94,7 +94,7 @@ def _read(
     middle = np.median(np.concatenate([vertices for _, vertices in found]), axis=0)
     origin = np.round(np.nan_to_num(middle) / ORIGIN_STEP) * ORIGIN_STEP
     if crs_wkt:
-        check_stretch(parse_crs(crs_wkt), [tuple(middle[:2])], "The lines are", "them")
+        warn_of_stretch(parse_crs(crs_wkt), [tuple(middle[:2])], "The lines are", progress, "them")
     frame = LocalFrame(origin, horizontal_unit_m, vertical_unit_m, crs_wkt)
     return [(feature, frame.to_local(vertices)) for feature, vertices in found], frame
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from osgeo import gdal
 
-from ..core.crs import check_stretch, parse_crs, units
+from ..core.crs import parse_crs, units
 from ..core.errors import RasterError
 from ..core.points import LocalFrame
 from ..core.progress import SILENT, Progress
@@ -48,11 +48,7 @@ def read_header(path: Path) -> RasterHeader:
     if skew_x or skew_y or not math.isclose(width, -height, rel_tol=ALIKE) or width <= 0:
         raise RasterError(f"{path.name} is turned or its cells are not square: warp it to square cells, north up.")
     wkt = dataset.GetProjection() or None
-    unit_m = 1.0
-    if wkt:
-        crs = parse_crs(wkt)
-        unit_m = units(crs)[0]
-        check_stretch(crs, [(x, y)], f"{path.name} is")
+    unit_m = units(parse_crs(wkt))[0] if wkt else 1.0
     return RasterHeader(
         class_codes=_class_codes(dataset, path.name),
         frame=LocalFrame(np.array([x, y, 0.0]), unit_m, unit_m, wkt),

@@ -130,7 +130,8 @@ def with_broken_system(bench):
 
 
 def drawn_in_mercator(bench):
-    shape = {"type": "LineString", "coordinates": [[1_024_000, 6_446_000, 100], [1_024_050, 6_446_000, 100]]}
+    rails = [[[1_024_000, y, 100], [1_024_050, y, 100]] for y in (6_446_000, 6_446_001.507)]
+    shape = {"type": "MultiLineString", "coordinates": rails}
     crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3857"}}
     feature = {"type": "Feature", "properties": {}, "geometry": shape}
     drawn = {"type": "FeatureCollection", "crs": crs, "features": [feature]}
@@ -184,17 +185,17 @@ SYSTEMS = [
     Fault("feet in plan, metres in height", in_system("2263+5703", (FEET, FEET, 1), (980_000, 200_000, 100))),
     Fault(
         "Web Mercator",
-        in_system(3857, 1.555, (1_024_000, 6_446_000, 100)),
-        REFUSED,
-        "cloud.las is in WGS 84 / Pseudo-Mercator, which draws lengths there 1.557 times as long as they are: "
-        "reproject it, for example to UTM zone 32N (EPSG:32632).",
+        in_system(3857, 1, (1_024_000, 6_446_000, 100)),
+        WARNED,
+        "cloud.las is in WGS 84 / Pseudo-Mercator, which draws lengths there 1.557 times as long as they are, gauges "
+        "too: reproject it, for example to UTM zone 32N (EPSG:32632).",
     ),
     Fault(
         "rails drawn in Web Mercator",
         drawn_in_mercator,
-        REFUSED,
-        "The lines are in WGS 84 / Pseudo-Mercator, which draws lengths there 1.557 times as long as they are: "
-        "reproject them, for example to UTM zone 32N (EPSG:32632).",
+        WARNED,
+        "The lines are in WGS 84 / Pseudo-Mercator, which draws lengths there 1.557 times as long as they are, gauges "
+        "too: reproject them, for example to UTM zone 32N (EPSG:32632).",
         run="buildtrackcenterlines",
     ),
     Fault(
