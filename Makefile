@@ -3,6 +3,8 @@
 SYSTEM_PYTHON ?= /usr/bin/python3
 # Empty: without PyTorch.
 TORCH ?= torch==2.13.0
+# Builds for the processor; failing this, the package index gives those for CUDA, which are far larger.
+TORCH_BUILDS ?= https://download.pytorch.org/whl/cpu
 SUDO = $(if $(filter 0,$(shell id -u)),,sudo)
 PYTHON = .venv/bin/python
 ENVIRONMENT = build/environment.sh
@@ -30,7 +32,7 @@ test-qgis: plugin  ## run the tests that need QGIS: plugin and, through qgis_pro
 .PHONY: test-latest test-3.40
 test-latest test-3.40: test-%:  ## run the same with Debian testing's QGIS, or with the backports' 3.40, in a chroot
 	@command -v mmdebstrap > /dev/null || $(SUDO) apt-get install -q -y mmdebstrap debian-archive-keyring >&2
-	@$(SUDO) $(SYSTEM_PYTHON) tools/chroot.py $* '$(TORCH)' $(filter-out git,$(APT_PACKAGES))
+	@$(SUDO) $(SYSTEM_PYTHON) tools/chroot.py $* '$(TORCH)' $(TORCH_BUILDS) $(filter-out git,$(APT_PACKAGES))
 
 .PHONY: lint
 lint: .venv/installed  ## check style, and that nothing is used that QGIS 4 lacks
@@ -83,6 +85,7 @@ $(ENVIRONMENT): tools/environment.py .venv/installed
 .venv/installed: .venv/constraints.txt requirements.txt tools/requirements.txt pyproject.toml
 	@echo "Installing Python packages into .venv" >&2
 	@$(if $(TORCH),cat,grep -v '^torch') requirements.txt > build/requirements.txt
+	@$(if $(TORCH),$(PYTHON) -m pip install --quiet --no-deps --retries 0 --extra-index-url $(TORCH_BUILDS) '$(TORCH)' >&2 || true)
 	@$(PYTHON) -m pip install --quiet --constraint $< -r build/requirements.txt -r tools/requirements.txt >&2
 	@$(PYTHON) -m pip install --quiet --no-deps --editable . >&2
 	@touch $@

@@ -39,14 +39,21 @@ def check_writable(value: Any, context: QgsProcessingContext) -> None:
     try:
         if path.is_dir():
             raise RailExtractError(f"The output {path} is a folder: give the name of a file in it.")
-        if path.exists():
-            path.open("r+b").close()
-        else:
-            TemporaryFile(dir=path.absolute().parent).close()
+        _try_writing(path)
     except OSError as error:
         raise RailExtractError(
             f"The output {path} can't be written ({error.strerror}): choose another place."
         ) from error
+
+
+def _try_writing(path: Path) -> None:
+    """Open a file, or make one beside where it will be; path.exists() would hide a name too long from Python 3.14."""
+    try:
+        path.stat()
+    except FileNotFoundError:
+        TemporaryFile(dir=path.absolute().parent).close()
+    else:
+        path.open("r+b").close()
 
 
 def check_distinct(outputs: Mapping[str, Any], context: QgsProcessingContext) -> None:

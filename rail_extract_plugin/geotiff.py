@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -43,22 +44,23 @@ def read_header(path: Path) -> RasterHeader:
     CrsError
         Its coordinates are no lengths.
     """
-    dataset = _open(path)
-    x, width, skew_x, y, skew_y, height = dataset.GetGeoTransform()
-    if skew_x or skew_y or not math.isclose(width, -height, rel_tol=ALIKE) or width <= 0:
-        raise RasterError(f"{path.name} is turned or its cells are not square: warp it to square cells, north up.")
-    wkt = dataset.GetProjection() or None
-    unit_m = units(parse_crs(wkt))[0] if wkt else 1.0
-    return RasterHeader(
-        class_codes=_class_codes(dataset, path.name),
-        frame=LocalFrame(np.array([x, y, 0.0]), unit_m, unit_m, wkt),
-        cell_m=width * unit_m,
-        window=(0, 0, dataset.RasterYSize, dataset.RasterXSize),
-        gauge_m=_length_m(dataset, GAUGE_TAG),
-        head_width_m=_length_m(dataset, HEAD_TAG),
-        model=dataset.GetMetadataItem(MODEL_TAG),
-        extent=_numbers(dataset, EXTENT_TAG, 4),
-    )
+    with _explained(path):
+        dataset = _open(path)
+        x, width, skew_x, y, skew_y, height = dataset.GetGeoTransform()
+        if skew_x or skew_y or not math.isclose(width, -height, rel_tol=ALIKE) or width <= 0:
+            raise RasterError(f"{path.name} is turned or its cells are not square: warp it to square cells, north up.")
+        wkt = dataset.GetProjection() or None
+        unit_m = units(parse_crs(wkt))[0] if wkt else 1.0
+        return RasterHeader(
+            class_codes=_class_codes(dataset, path.name),
+            frame=LocalFrame(np.array([x, y, 0.0]), unit_m, unit_m, wkt),
+            cell_m=width * unit_m,
+            window=(0, 0, dataset.RasterYSize, dataset.RasterXSize),
+            gauge_m=_length_m(dataset, GAUGE_TAG),
+            head_width_m=_length_m(dataset, HEAD_TAG),
+            model=dataset.GetMetadataItem(MODEL_TAG),
+            extent=_numbers(dataset, EXTENT_TAG, 4),
+        )
 
 
 def read_rasters(path: Path, header: RasterHeader, progress: Progress = SILENT) -> tuple[RailRaster, ...]:
@@ -71,17 +73,18 @@ def read_rasters(path: Path, header: RasterHeader, progress: Progress = SILENT) 
     RasterError
         The file is damaged, or has no rail at all.
     """
-    dataset = _open(path)
-    grid = RailRaster({}, header.cell_m, 0.0, 0.0)
-    rasters = []
-    for number in range(1, dataset.RasterCount + 1):
-        band = dataset.GetRasterBand(number)
-        share = progress.span((number - 1) / dataset.RasterCount, number / dataset.RasterCount)
-        cells = [np.empty((0, 2), dtype=np.int64)]
-        for row, column, height, width in share.follow(filled_blocks(dataset, number)):
-            block = _read(band, row, column, height, width, path.name)
-            cells.append(np.argwhere(block) + np.array([row, column]))
-        rasters.append(grid.with_cells(np.concatenate(cells)))
+    with _explained(path):
+        dataset = _open(path)
+        grid = RailRaster({}, header.cell_m, 0.0, 0.0)
+        rasters = []
+        for number in range(1, dataset.RasterCount + 1):
+            band = dataset.GetRasterBand(number)
+            share = progress.span((number - 1) / dataset.RasterCount, number / dataset.RasterCount)
+            cells = [np.empty((0, 2), dtype=np.int64)]
+            for row, column, height, width in share.follow(filled_blocks(dataset, number)):
+                block = _read(band, row, column, height, width, path.name)
+                cells.append(np.argwhere(block) + np.array([row, column]))
+            rasters.append(grid.with_cells(np.concatenate(cells)))
     if not any(raster.tiles for raster in rasters):
         raise RasterError(f"{path.name} holds no rail cell: give a raster with 1 where there is rail.")
     return tuple(rasters)
@@ -107,9 +110,14 @@ def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster
             raise RuntimeError(gdal.GetLastErrorMsg())
         part.replace(path)
     except (RuntimeError, OSError) as error:
-        raise RasterError(f"{path} can't be written ({error}): choose another place.") from error
+        raise RasterError(f"{path} can't be written ({_cause(error)}): choose another place.") from error
     finally:
         part.unlink(missing_ok=True)
+
+
+def _cause(error: Exception) -> str:
+    """Give what was first to fail: newer GDAL tells what failed of it too, a line each, and the cause last."""
+    return str(error).rpartition("May be caused by: ")[2]
 
 
 def filled_blocks(dataset: gdal.Dataset, number: int) -> list[tuple[int, int, int, int]]:
@@ -137,14 +145,24 @@ def _halves(start: int, length: int) -> tuple[tuple[int, int], ...]:
     return (start, first), (start + first, length - first)
 
 
-def _open(path: Path) -> gdal.Dataset:
+@contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    """Explain what GDAL raises of a damaged file where QGIS or another plugin has switched its exceptions on."""
     try:
-        dataset = gdal.OpenEx(str(path), gdal.OF_RASTER | gdal.OF_READONLY)
-    except RuntimeError:  # where another plugin switched GDAL's exceptions on
-        dataset = None
+        yield
+    except RuntimeError as error:
+        raise _unreadable(path) from error
+
+
+def _open(path: Path) -> gdal.Dataset:
+    dataset = gdal.OpenEx(str(path), gdal.OF_RASTER | gdal.OF_READONLY)
     if dataset is None or dataset.RasterCount == 0:
-        raise RasterError(f"{path} is no raster that can be read: give the output of Rasterize Rail Points.")
+        raise _unreadable(path)
     return dataset
+
+
+def _unreadable(path: Path) -> RasterError:
+    return RasterError(f"{path} is no raster that can be read: give the output of Rasterize Rail Points.")
 
 
 def _class_codes(dataset: gdal.Dataset, name: str) -> tuple[int, ...]:

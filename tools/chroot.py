@@ -30,8 +30,6 @@ SHARED = (
 
 VIRTUAL = ("/proc", "/sys", "/dev")
 
-CPU_BUILDS = "https://download.pytorch.org/whl/cpu"
-
 RELEASES = {"latest": ("forky",), "3.40": ("bookworm", "bookworm-backports")}
 """Suites of Debian, the last one preferred: testing has QGIS 3.44, the backports to Debian 12 have QGIS 3.40."""
 
@@ -101,26 +99,26 @@ def run_inside(system: Path, script: str) -> int:
     return subprocess.run(["unshare", "--mount", "/bin/sh", "-c", "\n".join(lines)], env=environment).returncode
 
 
-def test_script(torch: str) -> str:
+def test_script(torch: str, builds: str) -> str:
     """Script that runs the tests, with PyTorch where its processor build is there for this Python."""
-    probe = f"pip install --dry-run --quiet --break-system-packages --no-deps --retries 0 --index-url {CPU_BUILDS}"
+    probe = f"pip install --dry-run --quiet --break-system-packages --no-deps --retries 0 --index-url {builds}"
     return f"""
 git init --quiet .; git -c safe.directory=/{TREE} add --all
 if {probe} --only-binary=:all: "{torch}" >/dev/null 2>&1; then torch="{torch}"; else torch=""
     echo "There is no processor build of PyTorch for this Python: the network runs with OpenCV."
 fi
-make TORCH="$torch" test-qgis
+make TORCH="$torch" TORCH_BUILDS="{builds}" test-qgis
 """
 
 
 def main() -> int:
-    """Test in the system named first on the command line, with the PyTorch and the packages that follow."""
-    name, torch, *packages = sys.argv[1:]
+    """Test in the system named first on the command line; PyTorch, where its builds are, and packages follow."""
+    name, torch, builds, *packages = sys.argv[1:]
     if os.geteuid() != 0:
         sys.exit("Another system is built and entered by root: run make as root, or with sudo.")
     system = make_system(name, packages)
     copy_tree(system / TREE)
-    return run_inside(system, test_script(torch))
+    return run_inside(system, test_script(torch, builds))
 
 
 if __name__ == "__main__":

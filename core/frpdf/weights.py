@@ -31,8 +31,9 @@ def load_arrays(path: Path) -> dict[str, np.ndarray]:
     except FileNotFoundError:
         raise ModelError(f"The network's weights {path} are missing: install the plugin again.") from None
     except Exception as error:
-        # A damaged archive raises any of a dozen errors, from zipfile, zlib, numpy and struct.
-        raise ModelError(f"The network's weights {path} can't be read ({error}): install the plugin again.") from error
+        # A damaged archive raises any of a dozen errors, from zipfile, zlib, numpy and struct; some advise to load
+        # pickled data after all.
+        raise ModelError(f"The network's weights {path} can't be read: install the plugin again.") from error
 
 
 def save_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:

@@ -112,7 +112,8 @@ def test_pins_are_what_qgis_has():
 
 
 def test_toolbox_loads_without_any_package(reasons_without):
-    reasons = reasons_without(*(package.module for package in PACKAGES), "skimage", "matplotlib")
+    need_numpy = ("skimage", "matplotlib", "shapely")
+    reasons = reasons_without(*(package.module for package in PACKAGES), *need_numpy)
     assert set(reasons) == {algorithm.NAME for algorithm in ALGORITHMS}
     assert {name for name, reason in reasons.items() if not reason} == {"installpackages", "checkinstallation"}
     assert "numpy, scipy, laspy, lazrs, cv2, pyproj" in reasons["extractrails"]
