@@ -8,11 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..lines.paek import filled
-from ..lines.polyline import interpolate
+from ..lines.polyline import interpolate, is_closed
 from ..lines.smoothing import STATIONS_PER_SIGMA, smooth_line
 from ..progress import Progress
 from ..rails import RailLine, length_along
-from ..tracks.rings import is_closed
 
 REACH_HEADS = 0.5
 """Displacement, in head widths, from which points bring a line back to within a centimetre, for it still lies over the

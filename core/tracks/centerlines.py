@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import NoTrackError
-from ..lines.polyline import left_normals, resample, starts_at_its_end
+from ..lines.polyline import is_closed, left_normals, resample, starts_at_its_end
 from ..lines.smoothing import smooth_line
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine, length_along
@@ -20,7 +20,7 @@ from .leads import runs_on
 from .midline import Meeting, Side, at_gauge, bridged_steps, midway
 from .pairing import MIN_LENGTH_M, pair_rails
 from .parallels import commonest_spacing
-from .rings import begun_abreast, closed_up, is_closed, run_on
+from .rings import begun_abreast, closed_up, run_on
 
 STATIONS_AT_ONCE = 8192
 """Stations drawn in one go, 2 km of track: lets a cancel through several times a second."""

@@ -6,26 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..lines.polyline import resample
+from ..lines.polyline import LEAST_ROUND_M, is_closed, resample
 from ..rails import RailLine, length_along
 from ..stretches.uniting import united
-
-CLOSED_M = 0.01
-"""A line whose ends lie this close together is closed; ours meet exactly, and thinning leaves ends where they are."""
 
 STATION_M = 0.05
 """Spacing of the places where a closed rail may begin: two of a track then begin abreast within half of it."""
 
 SEAM_M = 0.5
 """The ends of a ring's centerline lie this close together, ahead of each other or past: matches end a little short."""
-
-LEAST_ROUND_M = 10.0
-"""A closed rail is longer: a track can't turn in less."""
-
-
-def is_closed(line: np.ndarray) -> bool:
-    """Tell whether a line, (n, 2) or (n, 3), ends in plan where it begins."""
-    return np.hypot(*(line[-1, :2] - line[0, :2])) <= CLOSED_M and length_along(line[:, :2])[-1] > LEAST_ROUND_M
 
 
 def begun_abreast(rails: Sequence[RailLine]) -> list[RailLine]:
