@@ -88,7 +88,7 @@ POINTS = [
     ),
     Fault(
         "rails of another gauge",
-        of(lambda points: points + np.where(points[:, 1:2] > 3_000_000, [0, 0.1, 0], 0)),
+        of(lambda points: points + np.where(points[:, 1:2] > 3_000_000, [0, 0.1005, 0], 0)),
         REFUSED,
         "No track of 1435 mm gauge found: rails lie 1608 mm apart, is the gauge 1520 mm?",
     ),
