@@ -111,11 +111,10 @@ def cleaner_of(engine: Engine, passes: int) -> Cleaner:
     def clean(observed: np.ndarray) -> np.ndarray:
         seen, found = observed.astype(np.float32), observed
         state = np.full_like(seen, START)
-        for number in range(passes or MOST_PASSES):
+        for number in range(MOST_PASSES if passes == UNTIL_STABLE else passes):
             before, probability = found, engine.probabilities(seen, state, number)
             state, found = (probability >= FEEDBACK_THRESHOLD).astype(np.float32), probability >= OUTPUT_THRESHOLD
-            changed = np.count_nonzero(before != found)
-            if passes == UNTIL_STABLE and number > 0 and changed < STABLE_SHARE * np.count_nonzero(found):
+            if passes == UNTIL_STABLE and number > 0 and (before != found).sum() < STABLE_SHARE * found.sum():
                 break
         return found
 
