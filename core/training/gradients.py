@@ -5,7 +5,7 @@ with the flipped kernel. Their weight gradient of a dilated kernel crashes (torc
 path. Split into phases, a dilated convolution is a plain one: that has a fast weight gradient.
 
 Batch norm runs along the channels, and the network's are too few to fill a vector register; taken by several columns
-at once it is four times as fast.
+at once it is four times as fast. The rectifier's gradient takes a tenth of its time once it is vectorized.
 """
 
 from __future__ import annotations
@@ -122,9 +122,35 @@ class CpuBatchNorm2d(PassBatchNorm2d):
         return wide.permute(0, 2, 3, 1).reshape(batch, height, width, channels).permute(0, 3, 1, 2)
 
 
+class _Rectifier(torch.autograd.Function):
+    """ReLU whose gradient is vectorized in bfloat16 too: that of leaky ReLU is, at a slope of 0 the same."""
+
+    @staticmethod
+    def forward(ctx, x: Tensor) -> Tensor:
+        y = functional.relu(x)
+        ctx.save_for_backward(y)
+        return y
+
+    @staticmethod
+    def backward(ctx, gradient: Tensor) -> Tensor:
+        (y,) = ctx.saved_tensors
+        gradient = gradient.contiguous(memory_format=torch.channels_last)
+        return torch.ops.aten.leaky_relu_backward(gradient, y, 0.0, True)
+
+
+class CpuReLU(nn.ReLU):
+    """A `ReLU` that trains fast in bfloat16; not in place, which would copy the views of `CpuBatchNorm2d`."""
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Set what is negative to 0."""
+        return _Rectifier.apply(x)
+
+
 def train_on_cpu(network: nn.Module) -> nn.Module:
-    """Let a network use `CpuConv2d` and `CpuBatchNorm2d`; its parameters stay the same."""
+    """Let a network use the layers of this module; its parameters stay the same."""
     for module in network.modules():
+        if type(module) is nn.ReLU:
+            module.__class__ = CpuReLU
         if type(module) is PassBatchNorm2d:
             module.__class__ = CpuBatchNorm2d
         if type(module) is nn.Conv2d and module.dilation[0] > 1 and module.bias is None:

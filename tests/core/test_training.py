@@ -57,6 +57,19 @@ def test_batch_norm_of_several_columns_at_once_is_that_of_torch():
     assert torch.allclose(own.eval()(x), plain.eval()(x), atol=0.01)
 
 
+def test_the_rectifier_and_its_gradient_are_those_of_torch():
+    torch.manual_seed(0)
+    own = gradients.train_on_cpu(torch.nn.Sequential(torch.nn.ReLU(inplace=True)))[0]
+    assert type(own) is gradients.CpuReLU
+    x = torch.randn(2, 5, 8, 9, dtype=torch.bfloat16)
+    x[0, 0, 0, :3] = 0
+    x.requires_grad_()
+    upstream = torch.randn_like(x)
+    y, expected = own(x), torch.relu(x)
+    assert torch.equal(y, expected)
+    assert torch.equal(*(torch.autograd.grad(result, x, upstream)[0] for result in (y, expected)))
+
+
 def test_the_learning_rate_rises_and_falls_as_a_cosine():
     settings = train.Settings(1000, 0.003, 0, "cpu")
     assert train.learning_rate(0, settings) == pytest.approx(0.003 / train.WARM_UP_STEPS)
