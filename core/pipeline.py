@@ -146,8 +146,7 @@ def extract_rails(
         stretches = lay_out(sources, source)
         results, rasters = _walk(source, stretches, parameters, engine, step.span(0.0, 0.9))
         found = whole_rails(results, source.frame, parameters, first_id=len(rails) + 1)
-        warn_if_none(found, source.class_code, progress)
-        warn_if_out_of_reach(found, parameters.head_width_m, parameters.smoothing_xy_m, progress)
+        warn_of_rails(found, source.class_code, parameters, progress)
         tracks = tracks_of(found, parameters, step.span(0.9, 0.95), first_id=len(centerlines) + 1)
         geometry += geometry_of(tracks, found, source, stretches, parameters, step.span(0.95, 1.0))
         rails += found
@@ -245,15 +244,15 @@ def lines_of(
     Without points the rails stay where the raster shows them, and have no heights.
     """
     rails = _finished(_all_vertices(raster, class_code, points, parameters, progress), parameters, first_id)
-    warn_if_none(rails, class_code, progress)
-    warn_if_out_of_reach(rails, parameters.head_width_m, parameters.smoothing_xy_m, progress)
+    warn_of_rails(rails, class_code, parameters, progress)
     return rails
 
 
-def warn_if_none(rails: Sequence[RailLine], class_code: int, progress: Progress) -> None:
-    """Tell the user that a class came to nothing."""
+def warn_of_rails(rails: Sequence[RailLine], class_code: int, parameters: Parameters, progress: Progress) -> None:
+    """Tell the user where a class came to nothing, or lines hardly follow their rails."""
     if not rails:
         progress.warning(f"Class {class_code} shows no rail: check the rail classes, the standard and MIN_LENGTH.")
+    warn_if_out_of_reach(rails, parameters.head_width_m, parameters.smoothing_xy_m, progress)
 
 
 def _all_vertices(

@@ -22,6 +22,7 @@ from qgis.core import (
     QgsWkbTypes,
 )
 
+from ..core.crs import UNKNOWN_IN_METRES
 from ..core.errors import RailExtractError
 from ..core.fields import BRIDGED, CENTERLINE_FIELDS, LENGTH, QUALITY_FIELDS, RAIL_FIELDS, SIGMA, Field
 from ..core.progress import SILENT, Progress
@@ -34,9 +35,6 @@ if TYPE_CHECKING:
     from ..core.rails import Centerline, RailLine, TrackGeometry
     from ..core.raster import RailRaster
     from .rasters import RasterHeader
-
-UNKNOWN_IN_METRES = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1]]'
-"""Stated in outputs without a coordinate system, because GDAL else calls a GeoPackage's coordinates degrees."""
 
 KINDS = {int: INTEGER, float: REAL, str: TEXT}
 

@@ -170,7 +170,10 @@ def _numbers(text: str, option: str, kind: type) -> tuple:
 
 
 class _Console(Progress):
-    """Writes a line whenever there is news of the remaining time."""
+    """Writes news of the remaining time, and what the user should look at, to the error output."""
 
     def status(self, text: str) -> None:
         print(text, file=sys.stderr, flush=True)
+
+    def warning(self, text: str) -> None:
+        print(f"Warning: {text}", file=sys.stderr, flush=True)

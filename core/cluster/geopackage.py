@@ -10,14 +10,12 @@ import numpy as np
 import pyogrio
 import shapely
 
+from ..crs import UNKNOWN_IN_METRES
 from ..errors import DiskError
 from ..fields import Field
 from ..points import LocalFrame
 from ..rails import Centerline, RailLine
 from ..stretches.spool import writing
-
-UNKNOWN_IN_METRES = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1]]'
-"""Stated where the cloud has no coordinate system, because GDAL else calls a GeoPackage's coordinates degrees."""
 
 KINDS = {int: np.int32, float: float, str: object}
 

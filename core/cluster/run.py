@@ -12,7 +12,7 @@ from distributed import Client, Future, LocalCluster, as_completed
 
 from ..errors import CloudError, NoTrackError, RailExtractError
 from ..frpdf.zoo import choose
-from ..pipeline import Parameters, stretch_side, tracks_of, whole_rails
+from ..pipeline import Parameters, stretch_side, tracks_of, warn_of_rails, whole_rails
 from ..points import LocalFrame, Request, ask
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
@@ -126,6 +126,7 @@ def extract(
     for source, tasks in zip(sources, results):
         parts = [load_rails(file, task.stretch) for task, file in tasks]
         mine = whole_rails(parts, source.frame, parameters, len(rails) + 1) if parts else []
+        warn_of_rails(mine, source.class_code, parameters, progress)
         rails += mine
         try:
             centerlines += tracks_of(mine, parameters, first_id=len(centerlines) + 1)
@@ -192,6 +193,5 @@ def _finished(futures: Iterable[Future], progress: Progress, failures: list[str]
         result = Failure(f"A task was given up ({error}).") if error is not None else future.result()
         if isinstance(result, Failure):
             failures.append(result.reason)
-            progress.warning(result.reason)
         else:
             yield future, result

@@ -129,6 +129,15 @@ def test_on_a_running_cluster_a_corrupt_tile_is_named_and_the_rest_is_written(ti
     assert {file.name for file in tmp_path.iterdir()} == {"out.gpkg", "tile0.laz", "tile1.laz", "tile2.laz"}
 
 
+def test_what_the_user_should_look_at_is_on_the_error_output(tiles, client, tmp_path, capsys):
+    words = ["extract", str(tiles), "--rails", str(tmp_path / "out.gpkg"), "--min-length", "1000", "--iterations", "1"]
+    words += ["--scheduler", client.scheduler.address, "--stretch-tiles", "4", "--engine", "OPENCV"]
+    assert main(words) == 0
+    said = capsys.readouterr()
+    assert "Warning: Class 10 shows no rail" in said.err
+    assert said.out.startswith("0 rails, 0.000 km")
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
