@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from .errors import NoRailPointsError, NoTrackError, ParameterError
 from .frpdf import DEFAULT_PASSES
-from .frpdf.cleanup import MARGIN, MOST_PASSES, UNTIL_STABLE, clean
+from .frpdf.cleanup import MARGIN, clean, most_passes
 from .frpdf.engine import Engine, make_engine
 from .frpdf.weights import load_arrays
 from .frpdf.zoo import choose
@@ -206,8 +206,7 @@ def clean_stretch(
 ) -> RailRaster:
     """Rasterize the points of a stretch, have the network clean the raster, and keep what lies inside."""
     cell_m = cell_size(parameters.gauge_m, parameters.head_width_m)
-    passes = MOST_PASSES if parameters.passes == UNTIL_STABLE else parameters.passes
-    points = source.near(stretch, passes * MARGIN * cell_m)
+    points = source.near(stretch, most_passes(parameters.passes) * MARGIN * cell_m)
     return own_tiles(clean(rasterize(points.xyz, cell_m), engine, parameters.passes, progress), stretch)
 
 

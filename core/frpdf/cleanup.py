@@ -20,6 +20,16 @@ STABLE_SHARE = 0.001
 """Passes end once fewer than this share of the rail cells change."""
 
 
+def most_passes(passes: int) -> int:
+    """Give the number of passes after which a run ends in any case."""
+    return MOST_PASSES if passes == UNTIL_STABLE else passes
+
+
+def is_stable(changed: int, cells: int) -> bool:
+    """Tell whether a pass that changed so many cells, and found so many, changed next to nothing."""
+    return changed < STABLE_SHARE * max(cells, 1)
+
+
 def clean(raster: RailRaster, engine: Engine, passes: int = DEFAULT_PASSES, progress: Progress = SILENT) -> RailRaster:
     """Remove noise and bridge gaps with the network (paper, sections 5 and 7).
 
@@ -36,13 +46,13 @@ def clean(raster: RailRaster, engine: Engine, passes: int = DEFAULT_PASSES, prog
     RailRaster
         On the same grid.
     """
-    most = MOST_PASSES if passes == UNTIL_STABLE else passes
+    most = most_passes(passes)
     state, output = None, raster
     for number in range(most):
         step = progress.span(number / most, (number + 1) / most)
         before = output
         state, output = _run_pass(raster, state, engine, number, step)
-        if passes == UNTIL_STABLE and number > 0 and _change(before, output) < STABLE_SHARE:
+        if passes == UNTIL_STABLE and number > 0 and is_stable(_changed(before, output), output.count()):
             break
     return output
 
@@ -75,15 +85,10 @@ def _state(state: RailRaster | None, piece: Piece) -> np.ndarray:
     return state.read(*piece.window).astype(np.float32)
 
 
-def _change(before: RailRaster, after: RailRaster) -> float:
-    """Share of the rail cells that differ."""
-    differing = sum(
-        np.count_nonzero(
-            before.read(*(TILE * np.array(index)), TILE, TILE) != after.read(*(TILE * np.array(index)), TILE, TILE)
-        )
-        for index in set(before.tiles) | set(after.tiles)
-    )
-    return differing / max(after.count(), 1)
+def _changed(before: RailRaster, after: RailRaster) -> int:
+    """Count the cells that differ."""
+    windows = [(*(TILE * np.array(index)), TILE, TILE) for index in set(before.tiles) | set(after.tiles)]
+    return sum(np.count_nonzero(before.read(*window) != after.read(*window)) for window in windows)
 
 
 class _Canvas:

@@ -18,7 +18,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..frpdf import DEFAULT_PASSES, FEEDBACK_THRESHOLD, OUTPUT_THRESHOLD, START
-from ..frpdf.cleanup import MOST_PASSES, STABLE_SHARE, UNTIL_STABLE
+from ..frpdf.cleanup import UNTIL_STABLE, is_stable, most_passes
 from ..frpdf.engine import Engine, make_engine
 from ..frpdf.weights import load_arrays
 from ..frpdf.zoo import MODELS
@@ -111,10 +111,10 @@ def cleaner_of(engine: Engine, passes: int) -> Cleaner:
     def clean(observed: np.ndarray) -> np.ndarray:
         seen, found = observed.astype(np.float32), observed
         state = np.full_like(seen, START)
-        for number in range(MOST_PASSES if passes == UNTIL_STABLE else passes):
+        for number in range(most_passes(passes)):
             before, probability = found, engine.probabilities(seen, state, number)
             state, found = (probability >= FEEDBACK_THRESHOLD).astype(np.float32), probability >= OUTPUT_THRESHOLD
-            if passes == UNTIL_STABLE and number > 0 and (before != found).sum() < STABLE_SHARE * found.sum():
+            if passes == UNTIL_STABLE and number > 0 and is_stable((before != found).sum(), found.sum()):
                 break
         return found
 
