@@ -14,8 +14,9 @@ from .ends import STEP_M, cut_back, stretch, turned
 from .junctions import DEFLECTION_DEG, DIRECTION_M, deflections, ends_by_node
 from .network import LineNetwork
 
-FARTHEST_M = 32.0
-"""Farthest that a branch is drawn back: on 2500 m of radius, as at 1:26.5, two rails are 0.2 m apart after so long."""
+FARTHEST_M = 40.0
+"""Farthest that a branch is drawn back: on 2500 m of radius, as at 1:26.5, two rails are 0.2 m apart after 32 m, and
+what is seen of them tells that length to a quarter."""
 
 STEADY_M = 8.0
 """Stretch of two rails over which is measured how they part."""

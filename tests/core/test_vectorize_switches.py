@@ -106,7 +106,7 @@ def test_rails_that_part_on_an_arc_begin_where_a_line_tells_them_apart(radius):
     assert parting(x, x[::-1])[0] == np.inf
 
 
-@pytest.mark.parametrize("radius", [190, 2500])
+@pytest.mark.parametrize("radius", [190, 2500, 4800])
 def test_a_merged_stretch_is_resolved_into_two_rails(radius):
     stock = along_x(0, 120)
     arc = trace([Element(80, 1 / radius, 1 / radius)], (40.0, 0.0)).xy[::5]
