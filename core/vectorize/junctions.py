@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from .ends import stretch, way_out
 from .network import LineNetwork
@@ -22,6 +23,10 @@ RUNG_DEG = 30.0
 BUBBLE_M = 1.0
 """A loop with sides shorter than this is a hole in a blot, not two rails."""
 
+SLIT_M = 10.0
+"""So long a loop is a slit that noise bridges once more if its sides lie no farther apart than a rung is long: where
+rails part on 2500 m of radius, heads come apart after 23 m, and after 33 m they are too far apart for a rung."""
+
 DEFLECTION_DEG = 15.0
 """A rail runs on through a node if it turns by less; the steepest turnouts in use branch off at about 14 degrees."""
 
@@ -35,7 +40,7 @@ DIRECTION_M = 2.5
 def clean_junctions(network: LineNetwork, head_width_m: float) -> LineNetwork:
     """Remove spurs, small loops and rungs between rails, contract short links, and weld what is left of degree 2."""
     network = contract_links(weld_pairs(network), head_width_m)
-    network = weld_pairs(drop_bubbles(network))
+    network = weld_pairs(drop_bubbles(network, RUNG_HEADS * head_width_m))
     network = weld_pairs(drop_rungs(network, RUNG_HEADS * head_width_m))
     return drop_spurs(network, SPUR_M)
 
@@ -95,19 +100,26 @@ def contract_links(network: LineNetwork, length_m: float) -> LineNetwork:
     return LineNetwork(lines, nodes, ends).select(~short)
 
 
-def drop_bubbles(network: LineNetwork) -> LineNetwork:
-    """Of several short lines between the same two junctions keep the shortest, and no short loop at a junction."""
+def drop_bubbles(network: LineNetwork, apart_m: float) -> LineNetwork:
+    """Of several lines between the same two junctions keep the shortest, and no short loop at a junction.
+
+    The others go if they are short, or if they nowhere lie farther than `apart_m` from the shortest.
+    """
     lengths = network.lengths()
     degrees = network.degrees()
     keep = np.ones(len(network.lines), dtype=bool)
-    seen = set()
+    shortest: dict[tuple[int, ...], np.ndarray] = {}
     for number in np.argsort(lengths, kind="stable").tolist():
-        if lengths[number] >= BUBBLE_M:
+        if lengths[number] >= SLIT_M:
             break
         link = tuple(sorted(network.ends[number].tolist()))
-        if degrees[list(link)].min() > 2:
-            keep[number] = link[0] != link[1] and link not in seen
-            seen.add(link)
+        if degrees[list(link)].min() <= 2:
+            continue
+        if lengths[number] < BUBBLE_M:
+            keep[number] = link[0] != link[1] and link not in shortest
+        elif link in shortest:
+            keep[number] = cKDTree(shortest[link]).query(stretch(network.lines[number], SLIT_M))[0].max() > apart_m
+        shortest.setdefault(link, stretch(network.lines[number], SLIT_M))
     return network.select(keep)
 
 

@@ -15,7 +15,14 @@ from rail_extract.core.synthetic.curves import Element, trace
 from rail_extract.core.synthetic.turnouts import FORMS, branch
 from rail_extract.core.vectorize import vectorize
 from rail_extract.core.vectorize.joining import join_gaps
-from rail_extract.core.vectorize.junctions import contract_links, drop_rungs, drop_spurs, run_through, weld_pairs
+from rail_extract.core.vectorize.junctions import (
+    contract_links,
+    drop_bubbles,
+    drop_rungs,
+    drop_spurs,
+    run_through,
+    weld_pairs,
+)
 from rail_extract.core.vectorize.network import LineNetwork
 from scipy.spatial import cKDTree
 
@@ -366,3 +373,13 @@ def test_welding_across_a_gap_keeps_the_passes_in_place():
     check_invariants(joined)
     assert len(joined.lines) == 2
     assert max(joined.lengths()) == pytest.approx(32)
+
+
+@pytest.mark.parametrize(("length", "apart", "left"), [(0.5, 0.3, 4), (3.0, 0.15, 4), (3.0, 0.3, 5), (12.0, 0.15, 5)])
+def test_a_slit_between_rails_that_part_is_no_loop_of_two_rails(length, apart, left):
+    nodes = np.array([(0, 0), (10, 0), (10 + length, 0), (40, 0), (40, 1)], dtype=float)
+    aside = np.linspace(0, np.pi, 50)
+    slit = np.column_stack([10 + length * aside / np.pi, apart * np.sin(aside)])
+    lines = (nodes[[0, 1]], nodes[[1, 2]], slit, nodes[[2, 3]], nodes[[2, 4]])
+    network = LineNetwork(lines, nodes, np.array([[0, 1], [1, 2], [1, 2], [2, 3], [2, 4]]))
+    assert len(drop_bubbles(network, 0.2).lines) == left
