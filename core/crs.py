@@ -33,9 +33,6 @@ BASELINE_M = 100.0
 
 WGS_84 = "EPSG:4326"
 
-UNKNOWN_IN_METRES = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1]]'
-"""Stated in outputs without a coordinate system, because GDAL else calls a GeoPackage's coordinates degrees."""
-
 SAME_PLACE = 1e-3
 """Units of a coordinate system by which a place may differ between two descriptions of it."""
 

@@ -1,10 +1,13 @@
-"""Fields of the results: names, types and decimals, the same in QGIS and from the command `extract`."""
+"""What layers of results state, the same in QGIS and from the command `extract`: names, types and decimals of fields."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from typing import Any
+
+UNKNOWN_IN_METRES = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1]]'
+"""Stated in outputs without a coordinate system, because GDAL else calls a GeoPackage's coordinates degrees."""
 
 
 @dataclass(frozen=True)

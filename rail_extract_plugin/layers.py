@@ -22,9 +22,17 @@ from qgis.core import (
     QgsWkbTypes,
 )
 
-from ..core.crs import UNKNOWN_IN_METRES
 from ..core.errors import RailExtractError
-from ..core.fields import BRIDGED, CENTERLINE_FIELDS, LENGTH, QUALITY_FIELDS, RAIL_FIELDS, SIGMA, Field
+from ..core.fields import (
+    BRIDGED,
+    CENTERLINE_FIELDS,
+    LENGTH,
+    QUALITY_FIELDS,
+    RAIL_FIELDS,
+    SIGMA,
+    UNKNOWN_IN_METRES,
+    Field,
+)
 from ..core.progress import SILENT, Progress
 from .compat import INTEGER, REAL, TEXT, field
 from .styling import style_on_load

@@ -10,9 +10,8 @@ import numpy as np
 import pyogrio
 import shapely
 
-from ..crs import UNKNOWN_IN_METRES
 from ..errors import DiskError
-from ..fields import Field
+from ..fields import UNKNOWN_IN_METRES, Field
 from ..points import LocalFrame
 from ..rails import Centerline, RailLine
 from ..stretches.spool import writing
