@@ -1,4 +1,4 @@
-"""What layers of results state, the same in QGIS and from the command `extract`: names, types and decimals of fields."""
+"""What layers of results state, the same in QGIS and from the command `extract`: names, types and decimals."""
 
 from __future__ import annotations
 
