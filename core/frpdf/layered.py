@@ -7,6 +7,7 @@ what the layer makes of an empty raster.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Callable
@@ -37,7 +38,7 @@ class Step:
     run: Callable[[Array, Array], Array]
 
 
-class LayeredEngine:
+class LayeredEngine(ABC):
     """What engines share; they say how a step runs and where arrays live.
 
     Attributes
@@ -78,21 +79,21 @@ class LayeredEngine:
         side = 2 * step.reach + 1
         return results, step.run(self._surroundings(outside, side, side), outside)
 
+    @abstractmethod
     def _steps(self, number: int) -> Sequence[Step]:
         """Give the layers for a set of batch statistics."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _load(self, array: np.ndarray) -> Array:
         """Take in a float32 array."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _surroundings(self, outside: Array, height: int, width: int) -> Array:
         """Make an array full of `outside`, (channels, 1, 1), to write into; the next call may reuse it."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _probabilities(self, logits: Array) -> np.ndarray:
         """Hand out (1, height, width) logits as (height, width) float32 probabilities."""
-        raise NotImplementedError
 
 
 def overlaps(

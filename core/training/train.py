@@ -35,7 +35,7 @@ CROP_SHARES = (0.4, 0.3, 0.3)
 LAST_CROP = 1024
 """Side of the one crop of each of the last steps: the widest dilation reaches 381 cells each way, so that only here
 most cells see all of it."""
-LAST_SHARE = 0.02
+LAST_SHARE = 0.01
 """Share of the steps with the last crop; such a step costs four of the others."""
 EARLY_PASS_WEIGHT = 0.5
 """Weight of the loss of a pass that is not the last one, which makes the result."""
