@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -130,6 +131,15 @@ def project(lines: Sequence[np.ndarray], xy: np.ndarray, reach_m: float, progres
     return Feet(point[order], line[order], t[order], across[order])
 
 
+def threads() -> int:
+    """Give the number of threads to compute with, as scipy takes it: all cores, unless this process is told a number.
+
+    Numerical libraries go by the same variable; Dask sets it for each of several workers on a computer.
+    """
+    told = os.environ.get("OMP_NUM_THREADS", "")
+    return int(told) if told.isdecimal() and int(told) else -1
+
+
 @dataclass(frozen=True)
 class _Stations:
     """Stations of several lines in one row; piece k runs from station k to station k + 1."""
@@ -146,7 +156,7 @@ class _Stations:
 
     def feet(self, xy: np.ndarray, first: int, reach_m: float) -> Iterator[np.ndarray]:
         """Numbers of the points in reach (the first of `xy` is number `first`), their lines, t and across."""
-        workers = -1 if len(xy) > POINTS_FOR_THREADS else 1
+        workers = threads() if len(xy) > POINTS_FOR_THREADS else 1
         distance, nearest = self.tree.query(xy, distance_upper_bound=reach_m + STATION_M, workers=workers)
         near = np.flatnonzero(np.isfinite(distance))
         xy, nearest = xy[near], nearest[near]

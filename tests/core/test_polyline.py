@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rail_extract.core.lines.polyline import left_normals, project, resample, starts_at_its_end
+from rail_extract.core.lines.polyline import left_normals, project, resample, starts_at_its_end, threads
 
 ANGLES = st.floats(0, 2 * np.pi)
 
@@ -92,3 +92,12 @@ def test_normals_point_to_the_left():
 )
 def test_lines_start_in_the_west_or_in_the_south_when_they_run_north(step, turned):
     assert starts_at_its_end(np.array([[5.0, 5.0], np.add([5.0, 5.0], step)])) is turned
+
+
+@pytest.mark.parametrize(("told", "number"), [("1", 1), ("12", 12), ("", -1), ("0", -1), ("4,2", -1), (None, -1)])
+def test_a_process_told_how_many_threads_it_may_use_uses_no_more(monkeypatch, told, number):
+    if told is None:
+        monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    else:
+        monkeypatch.setenv("OMP_NUM_THREADS", told)
+    assert threads() == number
