@@ -14,9 +14,9 @@ import numpy as np
 from ..lines.polyline import Feet, interpolate, project, resample, starts_at_its_end
 from ..points import RailPoints
 from ..progress import SILENT, Progress
-from ..rails import RailLine, length_along
+from ..rails import RailLine, Support, length_along
 from ..vectorize.network import LineNetwork
-from .head_edges import widest_reach
+from .head_edges import stations_along, widest_reach
 from .neighbours import free_edges
 from .railtop import LEAST_POINTS, find_top
 from .uncertainty import measure_support
@@ -43,7 +43,7 @@ class ElevationParameters:
     head_width_m : float
         Width of the railhead.
     tolerance_xy_m : float
-        Greatest distance of a point from its line, in plan.
+        Greatest distance from its line, in plan, of a point that gives height; half a head is the limit in any case.
     tolerance_z_m : float
         Greatest depth of a point below the top surface.
     crown_radius_m : float
@@ -65,6 +65,11 @@ class ElevationParameters:
     cell_m: float = 0.04
     min_length_m: float = 1.0
 
+    @property
+    def unseen_m(self) -> float:
+        """Standard deviation of a line where no points show its head: it lies anywhere in its cell."""
+        return self.cell_m / np.sqrt(12)
+
 
 def elevate(
     network: LineNetwork, points: RailPoints, parameters: ElevationParameters, progress: Progress = SILENT
@@ -85,8 +90,8 @@ def elevate(
     tuple of RailLine
         By place of their starts from west to east, numbered from 1. Lines without points and short ones are left out.
     """
-    reach = max(parameters.tolerance_xy_m, widest_reach(parameters.head_width_m))
-    feet = project(network.lines, points.xyz[:, :2], reach, progress.span(0.0, 0.6))
+    reach_m = widest_reach(parameters.head_width_m)
+    feet = project(network.lines, points.xyz[:, :2], reach_m, progress.span(0.0, 0.6))
     free_ends = (network.degrees() == 1)[network.ends]
     edges = free_edges(network.lines, parameters.head_width_m)
     rails = []
@@ -154,7 +159,7 @@ def _raise_line(
         along[-1],
         parameters.head_width_m,
         parameters.smoothing_xy_m,
-        unseen_m=parameters.cell_m / np.sqrt(12),
+        unseen_m=parameters.unseen_m,
         free=edges,
     ).between(start, end)
     xyz = np.column_stack([interpolate(line, along, stations), profile.at(stations)])
@@ -183,7 +188,7 @@ def measure_again(
     Returns
     -------
     list of RailLine
-        In their order; rails without points stay as they are.
+        In their order; a rail without points keeps its heights, and is a gap from end to end.
     """
     plans = [resample(rail.xyz[:, :2], smoothing_z_m / 4)[0] for rail in rails]
     feet = project(plans, points.xyz[:, :2], widest_reach(head_width_m), progress.span(0.0, 0.7))
@@ -194,10 +199,19 @@ def measure_again(
     for number, rail in enumerate(progress.span(0.7, 1.0).follow(rails)):
         mine = feet.of(number)
         again = _raise_line(plans[number], FIXED_ENDS, edges[number], mine, points.xyz[mine.point, 2], parameters)
-        if again is not None:
-            rail = replace(rail, xyz=again.xyz, gaps=again.gaps, support=again.support)
-        measured.append(rail)
+        if again is None:
+            measured.append(_unsupported(rail, parameters))
+        else:
+            measured.append(replace(rail, xyz=again.xyz, gaps=again.gaps, support=again.support))
     return measured
+
+
+def _unsupported(rail: RailLine, parameters: ElevationParameters) -> RailLine:
+    """Say of a rail that no points support it anywhere."""
+    length_m = float(length_along(rail.xyz[:, :2])[-1])
+    t = stations_along(length_m)
+    support = Support(t, np.zeros(len(t), dtype=int), np.full(len(t), parameters.unseen_m))
+    return replace(rail, gaps=np.array([[0.0, length_m]]), support=support)
 
 
 def _supported(t: np.ndarray, length_m: float, free_ends: np.ndarray) -> tuple[float, float]:

@@ -64,6 +64,11 @@ def station_count(length_m: float) -> int:
     return int(length_m / STATION_M) + 1
 
 
+def stations_along(length_m: float) -> np.ndarray:
+    """Middles of the windows along a line, (s,) metres."""
+    return (np.arange(station_count(length_m)) + 0.5) * STATION_M
+
+
 def histograms(
     t: np.ndarray, across: np.ndarray, length_m: float, head_width_m: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -88,7 +93,7 @@ def histograms(
     for window in windows[-2::-1]:
         enough = window.sum(axis=1) >= ENOUGH_POINTS
         chosen[enough] = window[enough]
-    return (np.arange(rows) + 0.5) * STATION_M, chosen, windows[-1]
+    return stations_along(length_m), chosen, windows[-1]
 
 
 def middles(counts: np.ndarray, wide_counts: np.ndarray, free: np.ndarray) -> np.ndarray:

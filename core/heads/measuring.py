@@ -68,7 +68,7 @@ def measure_in_stretches(
                 rails[number].between(start - CONTEXT_M, end + CONTEXT_M) for number, start, end in wanted[key]
             )
         ]
-        again = measure_again(pieces, points, head_width_m, PROFILE_SIGMA_M) if len(points.xyz) else pieces
+        again = measure_again(pieces, points, head_width_m, PROFILE_SIGMA_M)
         for (number, start, end), piece in zip(wanted[key], again):
             lead = min(start, CONTEXT_M)
             part = piece.between(lead, lead + end - start)
