@@ -180,6 +180,11 @@ class Centerline:
         return float(length_along(self.xyz[:, :2] if flat else self.xyz)[-1])
 
 
+def cell_borders(chainage: np.ndarray) -> np.ndarray:
+    """Borders, (n + 1,), of what each of n stations stands for: half way to its neighbours."""
+    return np.concatenate([chainage[:1], 0.5 * (chainage[1:] + chainage[:-1]), chainage[-1:]])
+
+
 @dataclass(frozen=True)
 class TrackGeometry:
     """Geometry of one track at stations along its centerline, (n,) arrays; NaN where it can't be known.
@@ -223,9 +228,8 @@ class TrackGeometry:
 
     @property
     def cells_m(self) -> np.ndarray:
-        """Length that each station stands for, (n,): half way to its neighbours."""
-        borders = 0.5 * (self.chainage_m[1:] + self.chainage_m[:-1])
-        return np.diff(np.concatenate([self.chainage_m[:1], borders, self.chainage_m[-1:]]))
+        """Length that each station stands for, (n,)."""
+        return np.diff(cell_borders(self.chainage_m))
 
     @property
     def bridged_m(self) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..rails import Centerline, RailNetwork, TrackGeometry
+from ..rails import Centerline, RailNetwork, TrackGeometry, cell_borders
 
 GAUGE_OFF_MM = 10.0
 """Further from its gauge no plain track is left lying; curves below 200 m are widened by more, and worth a look."""
@@ -157,7 +157,7 @@ def _places(geometry: TrackGeometry, doubt: Doubt, doubtful: np.ndarray, merge_m
     numbers = np.flatnonzero(doubtful)
     if not len(numbers):
         return
-    borders = np.concatenate([geometry.chainage_m[:1], np.cumsum(geometry.cells_m) + geometry.chainage_m[0]])
+    borders = cell_borders(geometry.chainage_m)
     starts, ends = borders[numbers], borders[numbers + 1]
     apart = np.flatnonzero(starts[1:] - ends[:-1] > merge_m) + 1
     for mine in np.split(np.arange(len(numbers)), apart):

@@ -9,7 +9,7 @@ import numpy as np
 from ..lines.polyline import interpolate, left_normals, resample
 from ..lines.smoothing import smooth_line, smooth_profile
 from ..progress import SILENT, Progress
-from ..rails import Centerline, RailLine, TrackGeometry, length_along
+from ..rails import Centerline, RailLine, TrackGeometry, cell_borders, length_along
 from .midline import Meeting, Side, bridged_steps
 from .parallels import commonest_spacing
 
@@ -55,7 +55,7 @@ def measure_track_geometry(
         spread; without gaps, it counts as bridged only where it is missing.
     head_width_m : float
     step_m : float
-        Distance of the stations.
+        Distance of the stations, but for the last one, which is the end of the track.
     progress : Progress
 
     Returns
@@ -69,8 +69,8 @@ def measure_track_geometry(
 def _measure(line: Centerline, rails: Sequence[RailLine], head_width_m: float, step_m: float) -> TrackGeometry:
     """Measure one track."""
     fine, along = resample(line.xyz, FINE_M)
-    count = max(int(along[-1] / step_m), 1)
-    chainage = np.minimum(np.arange(count + 1) * step_m, along[-1])
+    # The last station is the end, for what lies behind the last multiple of the step has to be stated too.
+    chainage = np.append(np.arange(max(round(along[-1] / step_m), 1)) * step_m, along[-1])
     normals = left_normals(fine)
     half = 0.5 * _spacing(line, rails, head_width_m)
     left = _meet(rails, line.left_ids, fine[:, :2], normals, half)
@@ -81,7 +81,8 @@ def _measure(line: Centerline, rails: Sequence[RailLine], head_width_m: float, s
     behind, ahead = _profile(along, cant, twist_at.ravel()).reshape(2, -1)
     reached = (twist_at[0] >= 0) & (twist_at[1] <= along[-1])
     bridged = np.concatenate([[0.0], np.cumsum(bridged_steps(rails, left, right, along))])
-    cells = np.clip([chainage - 0.5 * step_m, chainage + 0.5 * step_m], 0.0, along[-1])
+    borders = cell_borders(chainage)
+    cells = np.stack([borders[:-1], borders[1:]])
     return TrackGeometry(
         track_id=line.track_id,
         xyz=interpolate(line.xyz, length_along(line.xyz[:, :2]), chainage),
