@@ -104,7 +104,7 @@ class Parameters:
 
 
 def extract_rails(
-    clouds: Sequence[RailPoints | PointSource], parameters: Parameters, progress: Progress = SILENT
+    points: Sequence[RailPoints | PointSource], parameters: Parameters, progress: Progress = SILENT
 ) -> RailNetwork:
     """Extract rails and centerlines from classified points.
 
@@ -113,7 +113,7 @@ def extract_rails(
 
     Parameters
     ----------
-    clouds : sequence of RailPoints or PointSource
+    points : sequence of RailPoints or PointSource
         From `points.read_rail_points` or `spool.spool`: one for each class, in one frame.
     parameters : Parameters
     progress : Progress
@@ -129,29 +129,29 @@ def extract_rails(
     ModelError
         No weights fit the standard, or the engine is not there.
     NoTrackError
-        Rails run parallel, but none at a gauge that was given.
+        Rails run parallel, but those of no class at a gauge that was given.
     Cancelled
         The user cancelled.
     """
-    if not clouds:
+    if not points:
         raise NoRailPointsError("There is no point to extract rails from.")
     engine = engine_for(parameters)
     side_m = stretch_side(parameters)
-    sources = [MemorySource(cloud, side_m) if isinstance(cloud, RailPoints) else cloud for cloud in clouds]
+    sources = [MemorySource(cloud, side_m) if isinstance(cloud, RailPoints) else cloud for cloud in points]
     rails: list[RailLine] = []
-    centerlines: list[Centerline] = []
-    geometry: list[TrackGeometry] = []
     cleaned: list[RailRaster] = []
-    for source, step in zip(sources, progress.split(len(sources))):
-        stretches = lay_out(sources, source)
-        results, rasters = _walk(source, stretches, parameters, engine, step.span(0.0, 0.9))
+    for source, step in zip(sources, progress.span(0.0, 0.9).split(len(sources))):
+        results, rasters = _walk(source, lay_out(sources, source), parameters, engine, step)
         found = whole_rails(results, source.frame, parameters, first_id=len(rails) + 1)
         warn_of_rails(found, source.class_code, parameters, progress)
-        tracks = tracks_of(found, parameters, step.span(0.9, 0.95), first_id=len(centerlines) + 1)
-        geometry += geometry_of(tracks, found, source, stretches, parameters, step.span(0.95, 1.0))
         rails += found
-        centerlines += tracks
         cleaned += rasters
+    centerlines = tracks_of(rails, parameters, progress.span(0.9, 0.95))
+    geometry: list[TrackGeometry] = []
+    for source, step in zip(sources, progress.span(0.95, 1.0).split(len(sources))):
+        stretches = lay_out(sources, source)
+        mine = ([line for line in lines if line.class_code == source.class_code] for lines in (centerlines, rails))
+        geometry += geometry_of(*mine, source, stretches, parameters, step)
     return RailNetwork(
         tuple(rails), tuple(centerlines), sources[0].frame, engine.description, tuple(geometry), tuple(cleaned)
     )
@@ -187,7 +187,7 @@ def _walk(
     rasters: dict[Key, RailRaster] = {}
     results: list[StretchRails] = []
     done = 0.0
-    for key, ready in in_turn(by_key):
+    for key, ready, spent in in_turn(by_key):
         weight = source.counts[key] / total if len(by_key) > 1 else 1.0
         rasters[key] = clean_stretch(
             source, by_key[key], parameters, engine, progress.span(done, done + NETWORK_SHARE * weight)
@@ -198,6 +198,8 @@ def _walk(
             step = progress.span(done, done + (1 - NETWORK_SHARE) * weight)
             results.append(rails_of_stretch(source, by_key[one], rasters, parameters, step))
             done += (1 - NETWORK_SHARE) * weight
+        for one in () if parameters.keep_cleaned else spent:
+            del rasters[one]
     return results, [assembled(rasters, by_key, source.frame)] if parameters.keep_cleaned else []
 
 
@@ -290,13 +292,36 @@ def _finished(rails: Sequence[RailLine], parameters: Parameters, first_id: int) 
     return [replace(rail, rail_id=number) for number, rail in enumerate(thinned, start=first_id)]
 
 
-def tracks_of(
-    rails: Sequence[RailLine], parameters: Parameters, progress: Progress = SILENT, first_id: int = 1
-) -> list[Centerline]:
-    """Pair the rails of one class by every gauge, draw the centerlines and thin them.
+def tracks_of(rails: Sequence[RailLine], parameters: Parameters, progress: Progress = SILENT) -> list[Centerline]:
+    """Pair the rails of each class by every gauge, draw the centerlines, thin and number them.
 
     The rails come as users get them, so that rails from a file give the same tracks.
+
+    Raises
+    ------
+    NoTrackError
+        Rails run parallel, but those of no class at a gauge that was given; of one class among others, the user is
+        warned.
     """
+    codes = sorted({rail.class_code for rail in rails})
+    centerlines: list[Centerline] = []
+    refusals: dict[int, NoTrackError] = {}
+    for code, share in zip(codes, progress.split(len(codes))):
+        try:
+            centerlines += _tracks_of_class([rail for rail in rails if rail.class_code == code], parameters, share)
+        except NoTrackError as refusal:
+            refusals[code] = refusal
+    if refusals and not centerlines:
+        raise next(iter(refusals.values()))
+    for code, refusal in refusals.items():
+        progress.warning(f"Class {code}: {refusal}")
+    return [replace(line, track_id=number) for number, line in enumerate(centerlines, start=1)]
+
+
+def _tracks_of_class(
+    rails: Sequence[RailLine], parameters: Parameters, progress: Progress
+) -> tuple[Centerline, ...]:
+    """Do so for the rails of one class."""
     settings = CenterlineParameters(
         tolerance_m=parameters.centerline_tolerance_m,
         max_gap_m=parameters.max_gap_m,
@@ -306,18 +331,16 @@ def tracks_of(
     gauges = distinct_gauges((parameters.gauge_m, *parameters.other_gauges_m), parameters.centerline_tolerance_m)
     centerlines: list[Centerline] = []
     refusals: list[NoTrackError] = []
-    for number, gauge_m in enumerate(gauges):
-        step = progress.span(number / len(gauges), (number + 1) / len(gauges))
+    for gauge_m, step in zip(gauges, progress.split(len(gauges))):
         try:
             centerlines += build_centerlines(rails, gauge_m, parameters.head_width_m, settings, step)
         except NoTrackError as refusal:
             refusals.append(refusal)
     if refusals and not centerlines:
         raise refusals[0]
-    if rails and not centerlines:
+    if not centerlines:
         progress.warning("No two rails run parallel: there are rails but no track centerlines.")
-    thinned = thin(centerlines, parameters.simplify_xy_m, parameters.simplify_z_m)
-    return [replace(line, track_id=number) for number, line in enumerate(thinned, start=first_id)]
+    return thin(centerlines, parameters.simplify_xy_m, parameters.simplify_z_m)
 
 
 def geometry_of(

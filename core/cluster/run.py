@@ -122,16 +122,16 @@ def extract(
     if not any(results):
         raise RailExtractError(f"Not one stretch could be extracted; the first error was: {failures[0]}")
     rails: list[RailLine] = []
-    centerlines: list[Centerline] = []
     for source, tasks in zip(sources, results):
         parts = [load_rails(file, task.stretch) for task, file in tasks]
         mine = whole_rails(parts, source.frame, parameters, len(rails) + 1) if parts else []
         warn_of_rails(mine, source.class_code, parameters, progress)
         rails += mine
-        try:
-            centerlines += tracks_of(mine, parameters, first_id=len(centerlines) + 1)
-        except NoTrackError as error:
-            failures.append(str(error))
+    centerlines: list[Centerline] = []
+    try:
+        centerlines = tracks_of(rails, parameters, progress.span(READING + STRETCHES, 1.0))
+    except NoTrackError as error:
+        failures.append(str(error))
     progress.set_fraction(1.0)
     return Extraction(tuple(rails), tuple(centerlines), sources[0].frame, tuple(failures))
 

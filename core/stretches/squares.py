@@ -129,14 +129,29 @@ def lay_out(sources: Sequence[PointSource], source: PointSource) -> list[Stretch
     return [Stretch.square(key, source.side_m, source.frame) for key in sorted(source.counts)]
 
 
-def in_turn(keys: Iterable[Key]) -> Iterator[tuple[Key, list[Key]]]:
-    """Go through squares in order; with each come those that now have had their turn with all their neighbours."""
+def in_turn(keys: Iterable[Key]) -> Iterator[tuple[Key, list[Key], list[Key]]]:
+    """Go through squares in order.
+
+    Yields
+    ------
+    Key
+        The square whose turn it is.
+    list of Key
+        Those that now have had their turn with all their neighbours.
+    list of Key
+        Those that now have been listed so with all their neighbours: nothing needs them any longer.
+    """
     everyone, passed, finished = set(keys), set(), set()
+
+    def surrounded(one: Key, by: set[Key]) -> bool:
+        return everyone & set(around(one)) <= by
+
     for key in sorted(everyone):
         passed.add(key)
-        ready = [one for one in around(key) if one in passed - finished and not everyone & set(around(one)) - passed]
+        ready = [one for one in around(key) if one in passed - finished and surrounded(one, passed)]
         finished.update(ready)
-        yield key, ready
+        beside = {near for one in ready for near in around(one) if near in finished}
+        yield key, ready, sorted(near for near in beside if surrounded(near, finished))
 
 
 def own_tiles(raster: RailRaster, stretch: Stretch) -> RailRaster:

@@ -78,11 +78,7 @@ class BuildTrackCenterlines(RailAlgorithm):
         values = Values(self, parameters, context)
         rails, frame = read_rails(values.lines("INPUT"), progress.span(0, READING))
         settings = values.settings(job.standard, job.other_gauges_m)
-        classes = sorted({rail.class_code for rail in rails})
-        tracks = []
-        for code, share in zip(classes, progress.span(READING, 1).split(len(classes))):
-            mine = [rail for rail in rails if rail.class_code == code]
-            tracks += tracks_of(mine, settings, share, first_id=len(tracks) + 1)
+        tracks = tracks_of(rails, settings, progress.span(READING, 1))
         progress.check()
         written = write_lines(self, "OUTPUT", CENTERLINES, tracks, frame, parameters, context)
         return {**written, **figures_of(tracks, "CENTERLINE")}

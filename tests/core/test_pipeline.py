@@ -23,6 +23,14 @@ WIDTH = 0.072
 CURVES = [trace([Element(40.0)], heading=0.4), trace(transition_curve(15, 20, 15, 1 / 300), heading=-0.6)]
 
 
+class Warnings(Progress):
+    def __init__(self):
+        self.said = []
+
+    def warning(self, text):
+        self.said.append(text)
+
+
 def rails_at(curve, *lefts):
     """Exact rails at distances to the left of a curve."""
     lines = [np.column_stack([curve.offset(left), np.full(len(curve.xy), 100.0)]) for left in lefts]
@@ -50,8 +58,8 @@ def test_four_rails_of_two_gauges_on_one_axis_make_two_tracks():
 
 def test_tracks_of_two_gauges_side_by_side_are_numbered_through():
     lefts = (0.0, 1.435 + WIDTH, 5.0, 5.0 + 1.0 + WIDTH)
-    tracks = tracks_of(rails_at(CURVES[0], *lefts), Parameters(1.435, WIDTH, other_gauges_m=(1.0, 1.435)), first_id=7)
-    assert [(track.track_id, round(track.gauge_mm)) for track in tracks] == [(7, 1435), (8, 1000)]
+    tracks = tracks_of(rails_at(CURVES[0], *lefts), Parameters(1.435, WIDTH, other_gauges_m=(1.0, 1.435)))
+    assert [(track.track_id, round(track.gauge_mm)) for track in tracks] == [(1, 1435), (2, 1000)]
 
 
 def test_a_gauge_that_nothing_has_is_no_error_beside_one_that_something_has():
@@ -59,6 +67,16 @@ def test_a_gauge_that_nothing_has_is_no_error_beside_one_that_something_has():
     assert len(tracks_of(rails, Parameters(1.435, WIDTH, other_gauges_m=(1.0,)))) == 1
     with pytest.raises(NoTrackError):
         tracks_of(rails, Parameters(1.435, WIDTH))
+
+
+def test_a_class_of_another_gauge_does_not_cost_the_others_their_tracks():
+    fits, other = rails_at(CURVES[0], 0.0, 1.435 + WIDTH), rails_at(CURVES[0], 5.0, 6.0 + WIDTH)
+    other = [replace(rail, class_code=11) for rail in other]
+    heard = Warnings()
+    (track,) = tracks_of([*other, *fits], Parameters(1.435, WIDTH), heard)
+    assert (track.track_id, track.class_code) == (1, 10)
+    (said,) = heard.said
+    assert said.startswith("Class 11: No track of 1435 mm gauge found")
 
 
 def test_lines_without_points_stay_where_the_raster_shows_them():

@@ -31,12 +31,14 @@ def cloud(seed=0, count=4000, length=150.0):
 
 @given(keys)
 def test_every_square_has_its_turn_and_comes_ready_once_after_its_neighbours(squares):
-    passed, finished = set(), []
-    for key, ready in in_turn(squares):
+    passed, finished, gone = set(), [], []
+    for key, ready, spent in in_turn(squares):
         passed.add(key)
         finished += ready
         assert all(set(around(one)) & squares <= passed for one in ready)
-    assert sorted(finished) == sorted(squares)
+        assert not {near for one in ready for near in around(one)} & set(gone)
+        gone += spent
+    assert sorted(finished) == sorted(gone) == sorted(squares)
 
 
 def test_squares_part_the_points_and_margins_overlap():
