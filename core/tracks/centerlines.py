@@ -17,7 +17,7 @@ from .chaining import Chain, chain_pairs, reach_alone
 from .forking import fork_centerlines
 from .guide import STEP_M, guide_line
 from .leads import runs_on
-from .midline import Meeting, Side, at_gauge, bridged_steps, midway
+from .midline import ASTRAY_M, Meeting, Side, at_gauge, bridged_steps, midway
 from .pairing import MIN_LENGTH_M, pair_rails
 from .parallels import commonest_spacing
 from .rings import begun_abreast, closed_up, run_on
@@ -130,8 +130,10 @@ def _draw(
     lefts = _spans([pair.left for pair in chain.pairs], [pair.left_span for pair in chain.pairs])
     rights = _spans([pair.right for pair in chain.pairs], [pair.right_span for pair in chain.pairs])
     to_left, to_right, smoothing = progress.split(3)
-    left = _met(Side.of(rails, lefts, reach), guide, normals, half, to_left)
-    right = _met(Side.of(rails, rights, reach), guide, -normals, half, to_right)
+    # The guide runs half a gauge beside one rail, so that the other is off by all that the gauge is.
+    astray_m = max(ASTRAY_M, parameters.tolerance_m)
+    left = _met(Side.of(rails, lefts, reach), guide, normals, half, astray_m, to_left)
+    right = _met(Side.of(rails, rights, reach), guide, -normals, half, astray_m, to_right)
     left, right = at_gauge(left, right, 2 * half, parameters.tolerance_m)
     xyz = midway(guide, normals, left, right, 2 * half)
     apart = left.distance_m + right.distance_m
@@ -173,11 +175,13 @@ def _spans(rails: Sequence[int], spans: Sequence[tuple[float, float]]) -> list[t
     return merged
 
 
-def _met(side: Side, guide: np.ndarray, directions: np.ndarray, half_m: float, progress: Progress) -> Meeting:
+def _met(
+    side: Side, guide: np.ndarray, directions: np.ndarray, half_m: float, astray_m: float, progress: Progress
+) -> Meeting:
     """Meet the rails of one side from the stations of a guide."""
     parts = range(0, len(guide), STATIONS_AT_ONCE)
     pieces = (slice(start, start + STATIONS_AT_ONCE) for start in progress.follow(parts))
-    return Meeting.joined([side.meet(guide[piece], directions[piece], half_m) for piece in pieces])
+    return Meeting.joined([side.meet(guide[piece], directions[piece], half_m, astray_m) for piece in pieces])
 
 
 def _smoothed(xyz: np.ndarray, smoothing_m: float, progress: Progress) -> np.ndarray:

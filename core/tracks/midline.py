@@ -93,9 +93,11 @@ class Side:
         xyz, t, matched = (np.concatenate(parts) for parts in (pieces, chainages, matched))
         return cls(xyz, stretch, rail, t, matched, cKDTree(xyz[:, :2]))
 
-    def meet(self, stations: np.ndarray, directions: np.ndarray, expected_m: float) -> Meeting:
+    def meet(
+        self, stations: np.ndarray, directions: np.ndarray, expected_m: float, astray_m: float = ASTRAY_M
+    ) -> Meeting:
         """Go from stations in their directions, (n, 2) unit vectors, to the rail."""
-        off, nearest = self.tree.query(stations + expected_m * directions, distance_upper_bound=ASTRAY_M)
+        off, nearest = self.tree.query(stations + expected_m * directions, distance_upper_bound=astray_m)
         nearest = np.where(np.isfinite(off), nearest, 0)
         found = np.full((3, len(stations)), np.nan)
         for first in (nearest - 1, nearest):

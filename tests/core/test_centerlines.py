@@ -8,7 +8,7 @@ from rail_extract.core.synthetic.compare import compare_lines
 from rail_extract.core.synthetic.curves import Element, trace, transition_curve
 from rail_extract.core.synthetic.tracks import Track
 from rail_extract.core.synthetic.turnouts import FORMS, branch
-from rail_extract.core.tracks.centerlines import build_centerlines
+from rail_extract.core.tracks.centerlines import CenterlineParameters, build_centerlines
 
 GAUGE, WIDTH = 1.435, 0.072
 SPACING = GAUGE + WIDTH
@@ -201,6 +201,15 @@ def test_another_gauge_is_refused_with_the_spacing_measured(gauge, width, questi
         build_centerlines(rails_of(left, right), GAUGE, WIDTH)
     apart = round(1000 * (gauge + width))
     assert str(refusal.value) == f"No track of 1435 mm gauge found: rails lie {apart} mm apart{question}"
+
+
+@pytest.mark.parametrize("curve", [STRAIGHT, CURVED])
+@pytest.mark.parametrize("off", [-0.35, -0.24, 0.24, 0.45])
+def test_rails_as_far_off_the_gauge_as_allowed_make_a_track(curve, off):
+    left, right, middle = track(curve, spacing=SPACING + off)
+    (line,) = build_centerlines(rails_of(left, right), GAUGE, WIDTH, CenterlineParameters(tolerance_m=0.5))
+    assert line.gauge_mm == pytest.approx(1000 * (GAUGE + off), abs=0.5)
+    assert compare_lines([line.xyz], [middle]).lateral_rmse_m < 0.001
 
 
 def test_lone_rails_give_no_centerline():
