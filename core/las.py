@@ -129,7 +129,7 @@ def read_classes(
     codes : (n,) uint8 array
         Their classes.
     census : (256,) int array
-        Points in the chunk by class, wanted or not.
+        Points in the chunk by class, wanted or not; none that are withheld.
 
     Raises
     ------
@@ -143,11 +143,11 @@ def read_classes(
         done = 0
         for chunk in reader.chunk_iterator(CHUNK):
             progress.check()
-            codes = np.asarray(chunk.classification)
-            keep = np.flatnonzero(wanted[codes])
-            keep = keep[np.asarray(chunk.withheld)[keep] == 0]
+            codes, there = np.asarray(chunk.classification), np.asarray(chunk.withheld) == 0
+            keep = np.flatnonzero(wanted[codes] & there)
             raw = np.column_stack([chunk.X[keep], chunk.Y[keep], chunk.Z[keep]])
-            yield raw * reader.header.scales + reader.header.offsets, codes[keep], np.bincount(codes, minlength=256)
+            census = np.bincount(codes[there], minlength=256)
+            yield raw * reader.header.scales + reader.header.offsets, codes[keep], census
             done += len(codes)
             progress.set_fraction(done / total)
     if done < total:

@@ -318,9 +318,7 @@ def tracks_of(rails: Sequence[RailLine], parameters: Parameters, progress: Progr
     return [replace(line, track_id=number) for number, line in enumerate(centerlines, start=1)]
 
 
-def _tracks_of_class(
-    rails: Sequence[RailLine], parameters: Parameters, progress: Progress
-) -> tuple[Centerline, ...]:
+def _tracks_of_class(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> tuple[Centerline, ...]:
     """Do so for the rails of one class."""
     settings = CenterlineParameters(
         tolerance_m=parameters.centerline_tolerance_m,

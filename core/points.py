@@ -181,6 +181,10 @@ class Request:
         wanted = ", ".join(str(code) for code in sorted(set(self.class_codes)))
         if self.extent is not None and (census.sum() == 0 or census[list(self.class_codes)].any()):
             return NoRailPointsError(f"No point of class {wanted} lies inside the extent: choose a larger one.")
+        if not census.any():
+            return NoRailPointsError(
+                "All points of the cloud are marked as withheld: export those that count unmarked."
+            )
         there = ", ".join(f"{code} ({census[code]})" for code in np.flatnonzero(census))
         return NoRailPointsError(
             f"The cloud has no point of class {wanted}; its classes and their counts are {there}: set the rail classes."

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from qgis.core import QgsCoordinateReferenceSystem
 
-from ..core.crs import same_plane
+from ..core.crs import parse_crs, same_plane, units
 from ..core.errors import CrsError, NoRailPointsError
 from ..core.points import LocalFrame, RailPoints, read_headers
 from ..core.progress import Progress
@@ -91,12 +91,17 @@ def check_same_plane(name: str, crs_wkt: str | None, other_name: str, other: Loc
     Raises
     ------
     CrsError
-        They are known and differ; both are named.
+        They are known and differ; both are named. Or the other is unknown, and was taken to be in metres wrongly.
     """
     if crs_wkt and other.crs_wkt and not same_plane(crs_wkt, other.crs_wkt, tuple(other.origin[:2])):
         raise CrsError(
             f"{name} are in {_title(crs_wkt)} but {other_name} in {_title(other.crs_wkt)}: give both in one "
             "coordinate system."
+        )
+    if crs_wkt and not other.crs_wkt and units(parse_crs(crs_wkt))[0] != other.horizontal_unit_m:
+        raise CrsError(
+            f"{name} are in {_title(crs_wkt)}, whose unit is not the metre: assign a coordinate system to {other_name} "
+            "too."
         )
 
 

@@ -203,15 +203,16 @@ def _length_m(dataset: gdal.Dataset, tag: str) -> float | None:
 
 def _read(band: gdal.Band, row: int, column: int, height: int, width: int, name: str) -> np.ndarray:
     """Rail cells of a block, (height, width) bool."""
-    try:
-        data = band.ReadRaster(column, row, width, height, buf_type=gdal.GDT_Byte)
-    except RuntimeError:
-        data = None
-    if data is None:
-        raise RasterError(f"{name} is damaged at row {row}, column {column}: make it again.")
-    block = np.frombuffer(data, dtype=np.uint8).reshape(height, width)
-    empty = band.GetNoDataValue() or 0
-    return (block != 0) & (block != empty)
+    is_rail = np.ones((height, width), dtype=bool)
+    for cells in (band, band.GetMaskBand()):  # the mask is 0 where there are no data
+        try:
+            data = cells.ReadRaster(column, row, width, height, buf_type=gdal.GDT_Byte)
+        except RuntimeError:
+            data = None
+        if data is None:
+            raise RasterError(f"{name} is damaged at row {row}, column {column}: make it again.")
+        is_rail &= np.frombuffer(data, dtype=np.uint8).reshape(height, width) != 0
+    return is_rail
 
 
 def _write(path: Path, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress) -> None:
@@ -223,12 +224,15 @@ def _write(path: Path, header: RasterHeader, rasters: Sequence[RailRaster], prog
         for number, raster in enumerate(rasters, start=1)
         for block in sorted(_blocks_of(raster, header.window))
     ]
-    for number, (top, left) in progress.follow(blocks):
-        row, column, height, width = header.window
-        size = min(BLOCK, height - top), min(BLOCK, width - left)
-        cells = rasters[number - 1].read(row + top, column + left, *size)
-        dataset.GetRasterBand(number).WriteRaster(left, top, size[1], size[0], cells.astype(np.uint8).tobytes())
-    dataset.FlushCache()
+    row, column, height, width = header.window
+    try:
+        for number, (top, left) in progress.follow(blocks):
+            size = min(BLOCK, height - top), min(BLOCK, width - left)
+            cells = rasters[number - 1].read(row + top, column + left, *size)
+            dataset.GetRasterBand(number).WriteRaster(left, top, size[1], size[0], cells.astype(np.uint8).tobytes())
+        dataset.FlushCache()
+    finally:
+        del dataset  # else the traceback of a cancel keeps the file open, and Windows does not remove it then
 
 
 def _blocks_of(raster: RailRaster, window: tuple[int, int, int, int]) -> set[tuple[int, int]]:

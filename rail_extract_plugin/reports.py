@@ -54,7 +54,7 @@ def write_report(
     parameters: dict[str, Any],
     context: QgsProcessingContext,
 ) -> dict[str, str]:
-    """Write the report on a network, with its geometry, into the output called `name`.
+    """Write the report on a network, with its geometry, into the output called `name`; an older one stays till then.
 
     Returns
     -------
@@ -72,10 +72,14 @@ def write_report(
     if not path:
         return {}
     page = build_page(network, origin.gauges_m, origin.title, _facts(network, origin))
+    part = Path(f"{path}.part")
     try:
-        Path(path).write_text(page, encoding="utf-8")
+        try:
+            part.write_text(page, encoding="utf-8")
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
     except OSError as error:
-        Path(path).unlink(missing_ok=True)
         raise RailExtractError(f"{path} can't be written ({error.strerror}): choose another place.") from error
     return {name: path}
 

@@ -72,6 +72,7 @@ def read_inputs(
     tracks, frame = read_centerlines(centerlines, progress.span(0.0, 0.1))
     lines, rail_frame = read_rails(rails, progress.span(0.1, 0.2), "RAILS", RAIL_CLASS)
     check_same_plane("RAILS", rail_frame.crs_wkt, "INPUT", frame)
+    check_same_plane("INPUT", frame.crs_wkt, "RAILS", rail_frame)
     lines = _moved(lines, rail_frame, frame)
     if cloud is None:
         progress.info("Without POINTS, each rail's sigma_mm and points are taken as even along it.")

@@ -38,6 +38,16 @@ TOLD_OTHERWISE = (
 )
 """Parameters that no option of their own name gives."""
 
+POSITIVE = (
+    "smoothing_xy_m",
+    "smoothing_z_m",
+    "tolerance_xy_m",
+    "tolerance_z_m",
+    "crown_radius_m",
+    "centerline_tolerance_m",
+)
+"""Parameters that can't be 0: nothing is smoothed over no length, and nothing lies within none."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
@@ -78,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
     """
     missing = [package for module, package in NEEDS.items() if find_spec(module) is None]
     if missing:
-        raise RailExtractError(f"Packages are missing ({', '.join(missing)}): run pip install rail_extract[cluster].")
+        raise RailExtractError(f"Packages are missing ({', '.join(missing)}): in a clone, run pip install .[cluster].")
     parameters = parameters_of(args)
     for path in (args.rails, args.centerlines or args.rails):
         if path.suffix.lower() != ".gpkg":
@@ -109,7 +119,7 @@ def parameters_of(args: argparse.Namespace) -> Parameters:
     gauges_m = distinct_gauges((standard.gauge_m, *(mm / 1000 for mm in others)), args.centerline_tolerance)
     plain = {field.name: getattr(args, _option(field.name)[2:].replace("-", "_")) for field in _plain_fields()}
     for name, value in {**plain, "iterations": args.iterations, "workers": args.workers - 1}.items():
-        if not (math.isfinite(value) and value >= 0):
+        if not (math.isfinite(value) and value >= 0) or (name in POSITIVE and value == 0):
             raise ParameterError(
                 f"The option {_option(name)} can't be {getattr(args, name, value)}: give a larger number."
             )

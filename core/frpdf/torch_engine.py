@@ -17,8 +17,8 @@ from .layered import LayeredEngine, Step
 
 FEWEST_CELLS = 1 << 18
 """A device without room for so few cells is given up."""
-FIRST_FAST_HALF = (7, 0)
-"""Compute capability from which every card is faster in float16 than in float32."""
+FIRST_FAST_HALF, FIRST_BFLOAT16 = (7, 0), (8, 0)
+"""Compute capabilities from which every card is faster in float16 than in float32, and knows bfloat16."""
 
 
 class TorchEngine(LayeredEngine):
@@ -167,9 +167,10 @@ def _pixels_first(x: Tensor) -> Tensor:
 def _fast_type(device: str) -> torch.dtype:
     """Bfloat16 where it is native: elsewhere it is emulated, and slower than float32."""
     if device == "cuda":
-        if torch.cuda.is_bf16_supported(including_emulation=False):
+        capability = torch.cuda.get_device_capability()
+        if capability >= FIRST_BFLOAT16:
             return torch.bfloat16
-        return torch.float16 if torch.cuda.get_device_capability() >= FIRST_FAST_HALF else torch.float32
+        return torch.float16 if capability >= FIRST_FAST_HALF else torch.float32
     probes = ("_is_avx512_bf16_supported", "_is_amx_tile_supported")
     native = any(getattr(torch.cpu, probe, lambda: False)() for probe in probes)
     return torch.bfloat16 if native else torch.float32

@@ -73,7 +73,7 @@ def prune(edges: np.ndarray, distance: np.ndarray) -> tuple[np.ndarray, np.ndarr
     # The sum of the neighbours left is, for a leaf, its only neighbour.
     neighbour_sum = np.bincount(tail, weights=head, minlength=count).astype(np.int64)
     area = np.ones(count, dtype=np.int64)
-    longest = np.arange(count)  # steps * count + tip, so that the larger number is the longer branch
+    longest = np.arange(count, dtype=np.int64)  # steps * count + tip, so that the larger number is the longer branch
     gone = np.zeros(count, dtype=bool)
     leaves = np.flatnonzero(degree == 1)
     while len(leaves):

@@ -147,6 +147,7 @@ def test_what_the_user_should_look_at_is_on_the_error_output(tiles, client, tmp_
         (["--rails", "out.gpkg", "--gauge", "300"], "gauge"),
         (["--rails", "out.gpkg", "--max-gap", "-1"], "--max-gap"),
         (["--rails", "out.gpkg", "--workers", "0"], "--workers"),
+        (["--rails", "out.gpkg", "--smoothing-xy", "0"], "--smoothing-xy"),
         (["--rails", "out.gpkg", "--rail-classes", "300"], "0 to 255"),
         (["--rails", "out.gpkg", "--scheduler", "nonsense"], "scheduler"),
     ],

@@ -103,6 +103,15 @@ def test_withheld_points_are_left_out(tmp_path):
     cloud.write(tmp_path / "a.las")
     (points,) = read_rail_points(tmp_path / "a.las", [RAIL])
     assert len(points.xyz) == 2900
+    cloud.withheld[:] = 1
+    cloud.classification[:500] = 2
+    cloud.write(tmp_path / "a.las")
+    with pytest.raises(NoRailPointsError, match="^All points of the cloud are marked as withheld"):
+        read_rail_points(tmp_path / "a.las", [RAIL])
+    cloud.withheld[:500] = 0
+    cloud.write(tmp_path / "a.las")
+    with pytest.raises(NoRailPointsError, match=r"counts are 2 \(500\): set"):
+        read_rail_points(tmp_path / "a.las", [RAIL])
 
 
 def test_chunks_join_without_loss(tmp_path, monkeypatch):

@@ -12,6 +12,7 @@ TITLE = "Rasters and lines"
 NAN, INFINITE = float("nan"), float("inf")
 
 LENGTH_M, GAUGE_M, HEAD_M, CELL_M = 6.0, 1.435, 0.072, 0.0399
+KINDS = {np.uint8: gdal.GDT_Byte, np.int16: gdal.GDT_Int16, np.float32: gdal.GDT_Float32}
 TAGS = {"RAIL_GAUGE_MM": "1435", "RAIL_HEAD_MM": "72", "RAIL_MODEL": "base"}
 
 
@@ -35,7 +36,7 @@ def raster(
 ):
     """Write cells, (bands, rows, columns), as a GeoTIFF."""
     cells = track_cells() if cells is None else cells
-    kind = gdal.GDT_Float32 if cells.dtype == np.float32 else gdal.GDT_Byte
+    kind = KINDS[cells.dtype.type]
     path = bench.folder / "rail.tif"
     size = cells.shape[2], cells.shape[1], len(cells)
     dataset = gdal.GetDriverByName("GTiff").Create(str(path), *size, kind, options=list(options))
@@ -87,11 +88,16 @@ def as_floats_with_nan():
     return cells
 
 
-def inverted_nodata():
-    """255 where nothing is, as other programs write it."""
-    cells = track_cells()
-    cells[cells == 0] = 255
+def inverted_nodata(nothing=255, kind=np.uint8):
+    """A value other than 0 where nothing is, as other programs write it."""
+    cells = track_cells(kind=kind)
+    cells[cells == 0] = nothing
     return cells
+
+
+def without_system_beside_feet(bench):
+    cloud = bench.cloud(np.array([[500_000.0, 3_000_000.0, 100.0], [500_001.0, 3_000_000.0, 100.0]]), epsg=2263)
+    return {**raster(bench, epsg=None), "POINTS": cloud}
 
 
 def text_file(bench):
@@ -299,11 +305,25 @@ RASTERS = [
         TWO_RAILS,
     ),
     Fault(
+        "whole numbers, 32767 for nothing",
+        of_raster(cells=inverted_nodata(32767, np.int16), nodata=32767),
+        WARNED,
+        "Without POINTS the rails have no heights and lie where the raster shows them.",
+        TWO_RAILS,
+    ),
+    Fault(
         "no value for nothing",
         of_raster(nodata=None),
         WARNED,
         "Without POINTS the rails have no heights and lie where the raster shows them.",
         TWO_RAILS,
+    ),
+    Fault(
+        "raster without a coordinate system, cloud in feet",
+        without_system_beside_feet,
+        REFUSED,
+        "POINTS are in NAD83 / New York Long Island (ftUS), whose unit is not the metre: assign a coordinate system to "
+        "the raster too.",
     ),
     Fault("output onto the input", over_itself, run="frpdfcleanup"),
 ]
