@@ -15,7 +15,7 @@ from .heads.elevation import ElevationParameters, elevate, flat_rails, numbered
 from .heads.measuring import measure_in_stretches
 from .heads.reach import warn_if_out_of_reach
 from .heads.refinement import refine
-from .lines.smoothing import smooth_network
+from .lines.network_smoothing import smooth_network
 from .lines.thinning import thin
 from .points import LocalFrame, RailPoints
 from .progress import SILENT, Progress

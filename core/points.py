@@ -13,6 +13,7 @@ import numpy as np
 from .crs import common_crs, is_geographic, parse_crs, units, utm_zone, warn_of_stretch
 from .errors import CloudError, CrsError, NoRailPointsError, ParameterError
 from .progress import SILENT, Progress
+from .standards import LAST_CLASS
 
 if TYPE_CHECKING:
     import pyproj
@@ -237,8 +238,8 @@ def origin_steps(xyz_crs: np.ndarray) -> np.ndarray:
 
 
 def _check_request(class_codes: Sequence[int], extent: tuple[float, float, float, float] | None) -> None:
-    if not class_codes or not all(0 <= code <= 255 for code in class_codes):
-        raise ParameterError(f"Rail classes must be numbers from 0 to 255, not {list(class_codes)}.")
+    if not class_codes or not all(0 <= code <= LAST_CLASS for code in class_codes):
+        raise ParameterError(f"Rail classes must be numbers from 0 to {LAST_CLASS}, not {list(class_codes)}.")
     if extent is not None and not (extent[0] < extent[2] and extent[1] < extent[3]):
         raise ParameterError(f"The extent {extent} is empty: give xmin, ymin, xmax, ymax.")
 

@@ -17,8 +17,8 @@ from .errors import ParameterError
 DEFAULT = "EN_60E1_1435"
 CUSTOM = "CUSTOM"
 
-RAIL_CLASS = 10
-"""Class of points on rails in the LAS specification: what is meant where a file does not say."""
+RAIL_CLASS, LAST_CLASS = 10, 255
+"""Class of points on rails in the LAS specification: what is meant where a file does not say. A class is one byte."""
 
 GAUGE_RANGE_MM = (500.0, 2000.0)
 """From below the narrowest public railways (600 mm) to beyond the widest gauge in use (1676 mm)."""

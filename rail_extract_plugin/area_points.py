@@ -11,9 +11,9 @@ from qgis.core import QgsCoordinateReferenceSystem
 
 from ..core.crs import parse_crs, same_plane, units
 from ..core.errors import CrsError, NoRailPointsError
-from ..core.points import LocalFrame, RailPoints, read_headers
+from ..core.points import LocalFrame, RailPoints
 from ..core.progress import Progress
-from .clouds import Bounds, CloudSource, read_points, spool_points
+from .clouds import Bounds, CloudSource, crs_of, read_points, spool_points
 
 if TYPE_CHECKING:
     from ..core.stretches.spool import SpooledPoints
@@ -65,8 +65,7 @@ def spool_points_in(
 
 def _all_of(area: Area, cloud: CloudSource, read: Callable[..., Sequence[Points]]) -> dict[int, Points]:
     """Have points read, and see to it that there are some of every class."""
-    crs_wkt = read_headers(cloud.paths)[0].crs_wkt or cloud.crs_wkt
-    check_same_plane("POINTS", crs_wkt, f"the {area.what}", area.frame)
+    check_same_plane("POINTS", crs_of(cloud), f"the {area.what}", area.frame)
 
     def bounds(crs: QgsCoordinateReferenceSystem) -> Bounds:
         return area.bounds

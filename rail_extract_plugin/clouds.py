@@ -78,9 +78,9 @@ def read_points(
     progress: Progress,
 ) -> tuple[RailPoints, ...]:
     """Read the points of the wanted classes; `bounds` says in the cloud's coordinate system where to look."""
-    from ..core.points import read_headers, read_rail_points
+    from ..core.points import read_rail_points
 
-    crs = QgsCoordinateReferenceSystem(read_headers(source.paths)[0].crs_wkt or source.crs_wkt or "")
+    crs = QgsCoordinateReferenceSystem(crs_of(source) or "")
     return read_rail_points(source.paths, class_codes, source.crs_wkt, bounds(crs), progress)
 
 
@@ -93,12 +93,19 @@ def spool_points(
     progress: Progress,
 ) -> tuple[SpooledPoints, ...]:
     """Do as `read_points`, but leave the points on disk, sorted into squares: a cloud of any size fits."""
-    from ..core.points import ask, read_headers
+    from ..core.points import ask
     from ..core.stretches.spool import spool
 
-    crs = QgsCoordinateReferenceSystem(read_headers(source.paths)[0].crs_wkt or source.crs_wkt or "")
+    crs = QgsCoordinateReferenceSystem(crs_of(source) or "")
     request = ask(source.paths, class_codes, source.crs_wkt, bounds(crs), progress)
     return spool(request, side_m, folder, progress)
+
+
+def crs_of(source: CloudSource) -> str | None:
+    """Give a cloud's coordinate system as WKT, by its first file: whether all agree is told when they are read."""
+    from ..core.las import list_files, read_header
+
+    return read_header(list_files(source.paths)[0]).crs_wkt or source.crs_wkt
 
 
 def check_lengths(source: CloudSource) -> None:

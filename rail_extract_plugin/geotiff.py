@@ -15,7 +15,7 @@ from ..core.errors import RasterError
 from ..core.points import LocalFrame
 from ..core.progress import SILENT, Progress
 from ..core.raster import TILE, RailRaster
-from ..core.standards import RAIL_CLASS
+from ..core.standards import LAST_CLASS, RAIL_CLASS
 from .rasters import BLOCK, EXTENT_TAG, GAUGE_TAG, HEAD_TAG, MODEL_TAG, RasterHeader
 
 CREATION = (
@@ -30,8 +30,6 @@ CREATION = (
 
 ALIKE = 1e-6
 """Two sides of a cell may differ by this share: writers round."""
-
-HIGHEST_CLASS = 255
 
 
 def read_header(path: Path) -> RasterHeader:
@@ -168,7 +166,7 @@ def _unreadable(path: Path) -> RasterError:
 def _class_codes(dataset: gdal.Dataset, name: str) -> tuple[int, ...]:
     """Class of each band, by its description."""
     texts = [dataset.GetRasterBand(number).GetDescription() for number in range(1, dataset.RasterCount + 1)]
-    if texts and all(text.isdecimal() and int(text) <= HIGHEST_CLASS for text in texts):
+    if texts and all(text.isdecimal() and int(text) <= LAST_CLASS for text in texts):
         codes = tuple(int(text) for text in texts)
         if len(set(codes)) < len(codes):
             raise RasterError(f"{name} has several bands of one class ({', '.join(texts)}): give each class one band.")

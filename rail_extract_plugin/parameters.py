@@ -9,18 +9,13 @@ from qgis.core import (
     QgsProcessingParameterString,
 )
 
+from ..core.frpdf import AUTO, DEFAULT_PASSES, DEVICES, ENGINES, MOST_PASSES
 from ..core.frpdf.zoo import MODELS
 from ..core.standards import CUSTOM, DEFAULT, STANDARDS
 from .definitions import MM_DECIMALS, Definitions, advanced, choice, helped, number
 from .i18n import tr
 
-AUTO = "AUTO"
-ENGINES = (AUTO, "TORCH", "OPENCV")
-DEVICES = (AUTO, "CPU", "CUDA")
 TORCH_BUILDS = ("NONE", "CPU", "CUDA")
-
-MOST_ITERATIONS = 5
-"""The network's repairs have settled by then."""
 
 # The largest values keep out what can only be millimetres in a field of metres; they are no advice.
 
@@ -116,8 +111,11 @@ def cleanup() -> Definitions:
     """How the network repairs the raster."""
     return (
         advanced(
-            number("ITERATIONS", tr("Passes of the network"), 2, maximum=MOST_ITERATIONS, whole=True),
-            tr("How often the network looks again at what it found. 0: until nothing changes, at most five times."),
+            number("ITERATIONS", tr("Passes of the network"), DEFAULT_PASSES, maximum=MOST_PASSES, whole=True),
+            tr(
+                "How often the network looks again at what it found. 0: until fewer than one rail cell in a thousand "
+                "changes, at most five times."
+            ),
         ),
         advanced(
             choice("ENGINE", tr("Engine of the network"), ENGINES, AUTO),

@@ -17,7 +17,7 @@ from qgis.core import (
 )
 
 from ..core.errors import ParameterError, RailExtractError, RasterError
-from ..core.standards import CUSTOM, DEFAULT, RailStandard, distinct_gauges, resolve
+from ..core.standards import CUSTOM, DEFAULT, LAST_CLASS, RailStandard, distinct_gauges, resolve
 from .clouds import CloudSource, check_lengths, cloud_source
 
 if TYPE_CHECKING:
@@ -45,9 +45,6 @@ NO_LINES = (
     QgsWkbTypes.GeometryType.NullGeometry,
 )
 """Of a layer that may hold anything the type is unknown."""
-
-LAST_CLASS = 255
-"""A point's class is one byte."""
 
 CHOICES = {"ENGINE": "engine", "DEVICE": "device"}
 

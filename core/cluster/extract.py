@@ -13,7 +13,7 @@ from pathlib import Path
 
 from ..errors import ParameterError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, RAIL_FIELDS
-from ..frpdf.engine import DEVICES, ENGINES
+from ..frpdf import DEVICES, ENGINES
 from ..frpdf.zoo import choose
 from ..pipeline import Parameters
 from ..progress import Estimating, Progress

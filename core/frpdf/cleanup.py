@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import DeviceExhaustedError
 from ..progress import SILENT, Progress
 from ..raster import TILE, RailRaster
-from . import DEFAULT_PASSES, FEEDBACK_THRESHOLD, OUTPUT_THRESHOLD, START
+from . import DEFAULT_PASSES, FEEDBACK_THRESHOLD, MOST_PASSES, OUTPUT_THRESHOLD, START
 from .corridor import Piece, lay_fields
 from .engine import Engine
 
@@ -15,7 +15,6 @@ MARGIN = 64
 """Cells around a raster that was cut out of a larger one that only give context, for each pass."""
 
 UNTIL_STABLE = 0
-MOST_PASSES = 5
 STABLE_SHARE = 0.001
 """Passes end once fewer than this share of the rail cells change."""
 

@@ -10,10 +10,8 @@ import numpy as np
 
 from ..errors import ModelError
 from ..progress import Progress
+from . import AUTO
 from .corridor import Piece
-
-ENGINES = ("AUTO", "TORCH", "OPENCV")
-DEVICES = ("AUTO", "CPU", "CUDA")
 
 
 class Engine(Protocol):
@@ -81,7 +79,7 @@ class Engine(Protocol):
         """
 
 
-def make_engine(arrays: dict[str, np.ndarray], engine: str = "AUTO", device: str = "AUTO") -> Engine:
+def make_engine(arrays: dict[str, np.ndarray], engine: str = AUTO, device: str = AUTO) -> Engine:
     """Set up the engine that the user chose, or PyTorch where it is installed and OpenCV elsewhere.
 
     Parameters
@@ -113,7 +111,7 @@ def choose_engine(engine: str, device: str) -> str:
     ModelError
         The engine's package is not there, or it can't use the device.
     """
-    if engine == "AUTO":
+    if engine == AUTO:
         engine = "TORCH" if find_spec("torch") else "OPENCV"
     module, package = _PACKAGES[engine]
     if not find_spec(module):

@@ -67,7 +67,7 @@ def slide_branches(network: LineNetwork, head_width_m: float, sure_m: float) -> 
         if parting is not None:
             of_switch = [other for other in partings if other is not None and other.near(parting)]
             network = _slide(network, end, number, between_m, _power(of_switch))
-    return network.select(np.ones(len(network.lines), dtype=bool))
+    return network.tidy()
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,11 @@
-"""Smoothing of lines, height profiles and networks by PAEK, and the thinning of their vertices afterwards.
-
-What the smoothing keeps and loses, and how networks are led back to their nodes: ALGORITHMS.md sections 2.4 to 2.9.
-"""
+"""Smoothing of lines and height profiles by PAEK; what it keeps and loses: ALGORITHMS.md sections 2.4 to 2.9."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..rails import length_along
-from .network_smoothing import smooth_network
 from .paek import filled, local_fit, reflected, repeated
-
-__all__ = ["simplify", "smooth_line", "smooth_network", "smooth_profile"]
 
 STATIONS_PER_SIGMA = 4
 """The smoothed line has nothing shorter than sigma left in it; a quarter of it shows the curve."""
@@ -21,9 +15,6 @@ GAP_SIGMAS = 3.0
 
 SAME_STATION_M = 1e-6
 """Points of a profile that lie closer along the line than this are averaged."""
-
-EXACT_M = 1e-9
-"""A vertex nearer than this to the chord says nothing, even at a tolerance of zero."""
 
 
 def smooth_line(
@@ -93,44 +84,6 @@ def smooth_profile(t: np.ndarray, z: np.ndarray, sigma_m: float, stations: np.nd
     return np.interp(stations, np.concatenate(known_t), np.concatenate(known_z))
 
 
-def simplify(xyz: np.ndarray, tolerance_xy_m: float, tolerance_z_m: float) -> np.ndarray:
-    """Leave out vertices that lie within tolerance of the line through the others (Douglas and Peucker, 1973).
-
-    Plan and height are judged at once, so that the result keeps both tolerances.
-
-    Parameters
-    ----------
-    xyz : (n, 3) array
-        Heights may be NaN; then the plan alone counts.
-    tolerance_xy_m, tolerance_z_m : float
-        How far a vertex may lie beside the result in plan, and above or below it.
-
-    Returns
-    -------
-    (k, 3) array
-        Some of the vertices, the first and the last among them.
-    """
-    return xyz[essential_vertices(xyz, tolerance_xy_m, tolerance_z_m)]
-
-
-def essential_vertices(xyz: np.ndarray, tolerance_xy_m: float, tolerance_z_m: float) -> np.ndarray:
-    """Mark the vertices that `simplify` keeps, (n,) bool."""
-    keep = np.zeros(len(xyz), dtype=bool)
-    keep[[0, -1]] = True
-    spans = [(0, len(xyz) - 1)]
-    while spans:
-        first, last = spans.pop()
-        if last - first < 2:
-            continue
-        beside, above = _deviation(xyz[first : last + 1])
-        excess = np.fmax(beside / max(tolerance_xy_m, EXACT_M), above / max(tolerance_z_m, EXACT_M))
-        worst = int(excess.argmax())
-        if excess[worst] > 1:
-            keep[first + 1 + worst] = True
-            spans += [(first, first + 1 + worst), (first + 1 + worst, last)]
-    return keep
-
-
 def _averaged(t: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sort points by t and average those at the same place."""
     order = np.argsort(t, kind="stable")
@@ -138,12 +91,3 @@ def _averaged(t: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     group = np.cumsum(np.concatenate([[0], np.diff(t) > SAME_STATION_M]))
     count = np.bincount(group)
     return np.bincount(group, t) / count, np.bincount(group, z) / count
-
-
-def _deviation(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distance of the inner vertices from the segment between the outer ones, in plan and in height, (n - 2,) each."""
-    chord, inner = xyz[-1] - xyz[0], xyz[1:-1] - xyz[0]
-    length_squared = chord[0] ** 2 + chord[1] ** 2
-    share = np.clip(inner[:, :2] @ chord[:2] / length_squared, 0, 1) if length_squared > 0 else np.zeros(len(inner))
-    off = inner - share[:, None] * chord
-    return np.hypot(off[:, 0], off[:, 1]), np.abs(off[:, 2])

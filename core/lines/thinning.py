@@ -14,9 +14,11 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from ..rails import Centerline, RailLine, length_along
-from .smoothing import essential_vertices
 
 Line = TypeVar("Line", RailLine, Centerline)
+
+EXACT_M = 1e-9
+"""A vertex nearer than this to the chord says nothing, even at a tolerance of zero."""
 
 
 def thin(lines: Sequence[Line], tolerance_xy_m: float, tolerance_z_m: float) -> tuple[Line, ...]:
@@ -42,6 +44,48 @@ def _thinned(xyz: np.ndarray, ends: set[tuple[float, ...]], tolerance_xy_m: floa
     knots = [0, *inner, len(xyz) - 1]
     pieces = [xyz[first : last + 1] for first, last in zip(knots, knots[1:])]
     return np.concatenate([*(_fitted(piece, tolerance_xy_m, tolerance_z_m)[:-1] for piece in pieces), xyz[-1:]])
+
+
+def essential_vertices(xyz: np.ndarray, tolerance_xy_m: float, tolerance_z_m: float) -> np.ndarray:
+    """Mark vertices without which the line through the others leaves the tolerances (Douglas and Peucker, 1973).
+
+    Plan and height are judged at once, so that the line keeps both tolerances.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Heights may be NaN; then the plan alone counts.
+    tolerance_xy_m, tolerance_z_m : float
+        How far a vertex may lie beside the line in plan, and above or below it.
+
+    Returns
+    -------
+    (n,) bool array
+        The first and the last are always marked.
+    """
+    keep = np.zeros(len(xyz), dtype=bool)
+    keep[[0, -1]] = True
+    spans = [(0, len(xyz) - 1)]
+    while spans:
+        first, last = spans.pop()
+        if last - first < 2:
+            continue
+        beside, above = _deviation(xyz[first : last + 1])
+        excess = np.fmax(beside / max(tolerance_xy_m, EXACT_M), above / max(tolerance_z_m, EXACT_M))
+        worst = int(excess.argmax())
+        if excess[worst] > 1:
+            keep[first + 1 + worst] = True
+            spans += [(first, first + 1 + worst), (first + 1 + worst, last)]
+    return keep
+
+
+def _deviation(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distance of the inner vertices from the segment between the outer ones, in plan and in height, (n - 2,) each."""
+    chord, inner = xyz[-1] - xyz[0], xyz[1:-1] - xyz[0]
+    length_squared = chord[0] ** 2 + chord[1] ** 2
+    share = np.clip(inner[:, :2] @ chord[:2] / length_squared, 0, 1) if length_squared > 0 else np.zeros(len(inner))
+    off = inner - share[:, None] * chord
+    return np.hypot(off[:, 0], off[:, 1]), np.abs(off[:, 2])
 
 
 def _fitted(xyz: np.ndarray, tolerance_xy_m: float, tolerance_z_m: float) -> np.ndarray:

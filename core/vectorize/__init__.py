@@ -83,7 +83,7 @@ def vectorize(
     network = resolve_branches(resolve_crossings(network))
     network = join_gaps(run_through(network), max_gap_m, gap_angle_deg, seen, progress=progress)
     network = attach_branches(network, seen, max_gap_m, progress.span(0.9, 1.0))
-    network = choose_routes(_drop_short(drop_guards(network, head_width_m), min_length_m))
+    network = choose_routes(_drop_short(drop_guards(network), min_length_m))
     return _settle_ends(network)
 
 

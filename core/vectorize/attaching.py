@@ -77,7 +77,7 @@ def attach_branches(network: LineNetwork, seen: cKDTree, max_gap_m: float, progr
         ]
         if touches:
             network = _attached(network, end, min(touches, key=lambda touch: touch.curve.cost))
-    return network.select(np.ones(len(network.lines), dtype=bool))
+    return network.tidy()
 
 
 def _touching(from_end: np.ndarray, number: int, line: np.ndarray) -> Iterator[_Touch]:
@@ -164,7 +164,7 @@ def _straightened(network: LineNetwork, touch: _Touch, tip: np.ndarray) -> tuple
     return replace(network, lines=tuple(lines), passes=passes), moved
 
 
-def drop_guards(network: LineNetwork, head_width_m: float) -> LineNetwork:
+def drop_guards(network: LineNetwork) -> LineNetwork:
     """Remove short lines that lie beside a longer one over their whole length: guard and wing rails, and doubles."""
     lengths = network.lengths()
     short = np.flatnonzero(lengths < GUARD_M)

@@ -93,7 +93,7 @@ def cut_kinks(network: LineNetwork, progress: Progress = SILENT) -> LineNetwork:
                 ends[-1].append(node if (was == now).all() else len(nodes))
                 nodes += [] if (was == now).all() else [now]
     whole = LineNetwork(tuple(lines), np.array(nodes).reshape(-1, 2), np.array(ends, dtype=int).reshape(-1, 2))
-    return weld_pairs(whole.select(np.ones(len(lines), dtype=bool)))
+    return weld_pairs(whole.tidy())
 
 
 def _without_kinks(line: np.ndarray) -> list[np.ndarray]:

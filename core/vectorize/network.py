@@ -45,8 +45,7 @@ class LineNetwork:
 
     def from_end(self, end: int) -> np.ndarray:
         """Vertices of the line seen from one of its ends."""
-        line = self.lines[end // 2]
-        return line[::-1] if end % 2 else line
+        return turned(self.lines[end // 2], end)
 
     def select(self, keep: np.ndarray) -> LineNetwork:
         """Keep the lines marked in `keep`, (m,) bool, and forget nodes and passes that nothing else touches."""
@@ -54,7 +53,7 @@ class LineNetwork:
         passes = self.passes[keep[self.passes[:, 1]]]
         passes = np.column_stack([passes[:, 0], number[passes[:, 1]], passes[:, 2]])
         lines = tuple(line for line, kept in zip(self.lines, keep) if kept)
-        return LineNetwork(lines, self.nodes, self.ends[keep], passes)._tidy()
+        return LineNetwork(lines, self.nodes, self.ends[keep], passes).tidy()
 
     def cut_back(self, cuts_m: Mapping[int, float]) -> LineNetwork:
         """Take lengths off line ends; such an end becomes a node of its own."""
@@ -119,7 +118,7 @@ class LineNetwork:
             ends.append((self.ends.flat[start], self.ends.flat[start if closed else last]))
         passes += self._moved_passes(place)
         welded_ends, welded_passes = np.array(ends, dtype=np.int64), np.array(passes, dtype=np.int64)
-        return LineNetwork(tuple(lines), self.nodes, welded_ends.reshape(-1, 2), welded_passes.reshape(-1, 3))._tidy()
+        return LineNetwork(tuple(lines), self.nodes, welded_ends.reshape(-1, 2), welded_passes.reshape(-1, 3)).tidy()
 
     def _moved_passes(self, place: Mapping[int, tuple[int, int, bool]]) -> list[tuple[int, int, int]]:
         """Say where the passes of welded lines are now, given each line's new number, first vertex and sense."""
@@ -129,7 +128,7 @@ class LineNetwork:
             moved.append((node, number, first + (len(self.lines[line]) - 1 - vertex if turned else vertex)))
         return moved
 
-    def _tidy(self) -> LineNetwork:
+    def tidy(self) -> LineNetwork:
         """Forget passes in which no second line takes part, and nodes that no line touches; number the rest anew."""
         keep = self.degrees()[self.passes[:, 0]] > 2
         used = np.zeros(len(self.nodes), dtype=bool)

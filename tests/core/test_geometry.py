@@ -5,7 +5,7 @@ import pytest
 from rail_extract.core import pipeline
 from rail_extract.core.heads.elevation import ElevationParameters, elevate, measure_again
 from rail_extract.core.heads.refinement import refine
-from rail_extract.core.lines.smoothing import smooth_network
+from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.lines.thinning import thin
 from rail_extract.core.points import LocalFrame, RailPoints
 from rail_extract.core.rails import NO_GAPS, Centerline, RailLine, Support

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 from rail_extract.core.heads.refinement import refine
+from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.lines.polyline import project
-from rail_extract.core.lines.smoothing import smooth_network
 from rail_extract.core.points import LocalFrame, RailPoints
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.synthetic.curves import Element, trace

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core.lines.smoothing import smooth_network
+from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.rails import length_along
 from rail_extract.core.raster import rasterize
 from rail_extract.core.synthetic.drawing import Window, draw_label

@@ -1,12 +1,12 @@
-"""PAEK against quadrature and closed formulas; networks that still meet; thinning within tolerance."""
+"""PAEK against quadrature and closed formulas; networks that still meet."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial.legendre import leggauss
-from rail_extract.core.lines.network_smoothing import NETWORK_STATIONS_PER_SIGMA
-from rail_extract.core.lines.smoothing import simplify, smooth_line, smooth_network, smooth_profile
+from rail_extract.core.lines.network_smoothing import NETWORK_STATIONS_PER_SIGMA, smooth_network
+from rail_extract.core.lines.smoothing import smooth_line, smooth_profile
 from rail_extract.core.rails import length_along
 from rail_extract.core.synthetic.curves import trace, transition_curve
 from rail_extract.core.vectorize.network import LineNetwork
@@ -249,46 +249,3 @@ def test_a_diamond_keeps_its_crossing_in_both_lines():
     for node, line, vertex in smoothed.passes:
         np.testing.assert_array_equal(smoothed.lines[line][vertex], smoothed.nodes[node])
     assert np.hypot(*smoothed.nodes[4]) < 0.005
-
-
-@given(st.integers(0, 10**6), st.floats(1e-3, 0.3), st.floats(1e-3, 0.3))
-@settings(max_examples=25, deadline=None)
-def test_simplified_lines_keep_both_tolerances(seed, tolerance_xy, tolerance_z):
-    line = random_line(seed, count=60, dimensions=3)
-    thin = simplify(line, tolerance_xy, tolerance_z)
-    kept = [int(np.flatnonzero((line == vertex).all(axis=1))[0]) for vertex in thin]
-    assert kept[0] == 0
-    assert kept[-1] == 59
-    assert kept == sorted(kept)
-    for first, last in zip(kept[:-1], kept[1:]):
-        chord = line[last] - line[first]
-        for vertex in line[first : last + 1]:
-            share = np.clip((vertex - line[first])[:2] @ chord[:2] / (chord[:2] @ chord[:2]), 0, 1)
-            off = vertex - line[first] - share * chord
-            assert np.hypot(*off[:2]) <= tolerance_xy + 1e-12
-            assert abs(off[2]) <= tolerance_z + 1e-12
-
-
-def test_simplify_sees_height_alone_and_plan_without_height():
-    hump = np.column_stack([np.arange(5.0), np.zeros(5), [0, 0, 0.01, 0, 0]])
-    assert len(simplify(hump, 0.002, 0.002)) > 2
-    assert len(simplify(hump, 0.002, 0.02)) == 2
-    hump[:, 2] = np.nan
-    assert len(simplify(hump, 0.002, 0.002)) == 2
-    hump[2, 1] = 0.01
-    assert len(simplify(hump, 0.002, 0.002)) == 5
-
-
-def test_simplify_keeps_a_closed_line_closed():
-    loop = np.column_stack([circle(25, 5000), np.zeros(5001)])
-    thin = simplify(loop, 0.002, 0.002)
-    np.testing.assert_array_equal(thin[0], thin[-1])
-    fewest = 2 * np.pi * 25 / np.sqrt(8 * 25 * 0.002)
-    assert fewest <= len(thin) <= 2.1 * fewest
-
-
-def test_simplify_by_nothing_drops_only_what_lies_on_the_line():
-    arc = np.column_stack([circle(25, 50)[:30], np.zeros(30)])
-    np.testing.assert_array_equal(simplify(arc, 0.0, 0.0), arc)
-    straight = np.column_stack([np.arange(9.0), np.zeros(9), np.zeros(9)])
-    assert len(simplify(straight, 0.0, 0.0)) == 2

@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
-from rail_extract.core.lines.thinning import thin
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rail_extract.core.lines.thinning import essential_vertices, thin
 from rail_extract.core.rails import RailLine
 
 
@@ -67,3 +69,46 @@ def test_a_single_inner_vertex_moves_to_the_best_fit():
     (line,) = thin([rail(bend)], 0.002, 0.002)
     np.testing.assert_array_equal(line.xyz[[0, -1]], bend[[0, -1]])
     assert line.xyz[1:-1, 1] == pytest.approx([0.1 + 0.001 / 1.5], abs=2e-5)
+
+
+@given(st.integers(0, 10**6), st.floats(1e-3, 0.3), st.floats(1e-3, 0.3))
+@settings(max_examples=25, deadline=None)
+def test_simplified_lines_keep_both_tolerances(seed, tolerance_xy, tolerance_z):
+    random = np.random.default_rng(seed)
+    line = np.cumsum(random.normal(size=(60, 3)) * 0.3 + [0.5, 0, 0], axis=0)
+    kept = np.flatnonzero(essential_vertices(line, tolerance_xy, tolerance_z)).tolist()
+    assert kept[0] == 0
+    assert kept[-1] == 59
+    for first, last in zip(kept[:-1], kept[1:]):
+        chord = line[last] - line[first]
+        for vertex in line[first : last + 1]:
+            share = np.clip((vertex - line[first])[:2] @ chord[:2] / (chord[:2] @ chord[:2]), 0, 1)
+            off = vertex - line[first] - share * chord
+            assert np.hypot(*off[:2]) <= tolerance_xy + 1e-12
+            assert abs(off[2]) <= tolerance_z + 1e-12
+
+
+def test_thinning_sees_height_alone_and_plan_without_height():
+    hump = np.column_stack([np.arange(5.0), np.zeros(5), [0, 0, 0.01, 0, 0]])
+    assert essential_vertices(hump, 0.002, 0.002).sum() > 2
+    assert essential_vertices(hump, 0.002, 0.02).sum() == 2
+    hump[:, 2] = np.nan
+    assert essential_vertices(hump, 0.002, 0.002).sum() == 2
+    hump[2, 1] = 0.01
+    assert essential_vertices(hump, 0.002, 0.002).sum() == 5
+
+
+def test_thinning_keeps_a_closed_line_closed():
+    angle = np.linspace(0, 2 * np.pi, 5001)
+    loop = 25 * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    kept = essential_vertices(loop, 0.002, 0.002)
+    assert kept[0]
+    assert kept[-1]
+    fewest = 2 * np.pi * 25 / np.sqrt(8 * 25 * 0.002)
+    assert fewest <= kept.sum() <= 2.1 * fewest
+
+
+def test_thinning_by_nothing_drops_only_what_lies_on_the_line():
+    assert essential_vertices(arc(25, 90.0, step=3.0), 0.0, 0.0).all()
+    straight = np.column_stack([np.arange(9.0), np.zeros(9), np.zeros(9)])
+    assert essential_vertices(straight, 0.0, 0.0).sum() == 2

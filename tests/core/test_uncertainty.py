@@ -4,8 +4,8 @@ from rail_extract.core.heads.elevation import ElevationParameters, elevate
 from rail_extract.core.heads.head_edges import station_count
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.heads.uncertainty import measure_support
+from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.lines.polyline import interpolate, project
-from rail_extract.core.lines.smoothing import smooth_network
 from rail_extract.core.points import LocalFrame, RailPoints
 from rail_extract.core.rails import Support, length_along
 from rail_extract.core.raster import cell_size, rasterize

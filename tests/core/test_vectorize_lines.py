@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rail_extract.core.errors import Cancelled
-from rail_extract.core.lines.smoothing import smooth_network
+from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import length_along
 from rail_extract.core.raster import RailRaster

@@ -93,7 +93,7 @@ def test_rails_join_across_more_than_a_gap_where_cells_show_them_merged():
 
 def test_a_guard_rail_goes_and_a_rail_of_its_own_stays():
     rail, guard, other = along_x(0, 40), along_x(10, 14, 0.116), along_x(20, 24, 0.3)
-    network = drop_guards(loose(rail, guard, other), HEAD_M)
+    network = drop_guards(loose(rail, guard, other))
     np.testing.assert_allclose(np.sort(network.lengths()), [3.9, 39.9], atol=0.11)
 
 
