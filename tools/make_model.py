@@ -84,7 +84,7 @@ def build() -> QgsProcessingModelAlgorithm:
 def _file_instead_of(cloud) -> QgsProcessingParameterFile:
     """Make a file parameter of the cloud's: a QGIS without PDAL refuses every path in a point cloud parameter."""
     made = QgsProcessingParameterFile(cloud.name(), "Point cloud (LAS, LAZ or COPC file, folder of them, or .vpc)")
-    made.setHelp(cloud.help())
+    made.setHelp("The path of a LAS, LAZ or COPC file, of a folder of them or of a virtual point cloud (.vpc).")
     return made
 
 

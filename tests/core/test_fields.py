@@ -20,6 +20,6 @@ def test_there_is_no_negative_zero():
 
 
 def test_ids():
-    assert Field("rail_id", int).value(np.int64(7)) == 7
-    assert Field("bridged", int).value(np.True_) == 1
-    assert Field("left_ids", str).value((1, 12)) == "1,12"
+    assert Field("rail_id", int, "").value(np.int64(7)) == 7
+    assert Field("bridged", int, "").value(np.True_) == 1
+    assert Field("left_ids", str, "").value((1, 12)) == "1,12"

@@ -3,6 +3,8 @@
 import re
 from pathlib import Path
 
+import reference
+
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
@@ -28,3 +30,7 @@ def test_commands_name_algorithms_and_parameters_that_exist(plugin):
     for name, words in commands:
         known = {one.name() for one in algorithms(plugin)[name].parameterDefinitions()}
         assert not set(re.findall(r"\b([A-Z_]+)=", words)) - known, name
+
+
+def test_reference_is_what_its_command_writes(plugin):
+    assert reference.page(plugin.provider) == reference.PAGE.read_text(encoding="utf-8")

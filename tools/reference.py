@@ -1,0 +1,112 @@
+"""Write docs/reference.md: algorithms, parameters, outputs, fields and rail standards, as they are in the code.
+
+Run it after a change of any of these, in the environment that `make env` prints.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+from dialog_pictures import start_qgis  # noqa: E402
+from qgis.core import (  # noqa: E402
+    QgsProcessingAlgorithm,
+    QgsProcessingParameterDefinition,
+    QgsProcessingParameterEnum,
+    QgsProcessingParameterNumber,
+    QgsProcessingProvider,
+)
+from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS, Field  # noqa: E402
+from rail_extract.core.standards import CUSTOM, STANDARDS, UNCONFIRMED  # noqa: E402
+from rail_extract.rail_extract_plugin.algorithms import ALGORITHMS  # noqa: E402
+from rail_extract.rail_extract_plugin.definitions import UNBOUNDED  # noqa: E402
+
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference.md"
+
+INTRODUCTION = """# Reference
+
+Ids and names for models, batch files and `qgis_process`; they stay as they are. What parameters do is told with
+pictures in [parameters.md](parameters.md).
+
+`python tools/reference.py` writes this page from the code, and a test compares the two.
+"""
+
+LAYERS = {"Rails": RAIL_FIELDS, "Centerlines": CENTERLINE_FIELDS, "Track geometry": QUALITY_FIELDS}
+
+
+def page(provider: QgsProcessingProvider) -> str:
+    """Put the page together."""
+    parts = [INTRODUCTION, "\n## Algorithms\n"]
+    for algorithm in (provider.algorithm(one.NAME) for one in ALGORITHMS):
+        parts += [f"\n### {algorithm.displayName()}: `{algorithm.id()}`\n\n{algorithm.shortDescription()}\n"]
+        parts += _table(("parameter", "in the dialog", "default", "values"), _inputs(algorithm))
+        parts += _table(("output", "what it is"), _outputs(algorithm))
+    parts += ["\n## Fields\n"]
+    for title, fields in LAYERS.items():
+        parts += [f"\n### {title}\n", *_table(("field", "type", "what it is"), map(_field, fields))]
+    parts += ["\n## Rail standards\n", *_table(("STANDARD", "rail", "gauge", "railhead"), _standards())]
+    parts += [
+        f"\n`{CUSTOM}` takes GAUGE and HEAD_WIDTH. A width marked * is not confirmed by a table of rail sections.\n"
+    ]
+    return "".join(parts)
+
+
+def _table(titles: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Lines of a table, after an empty one; none where there are no rows."""
+    rows = list(rows)
+    lines = [titles, ["---"] * len(titles), *rows] if rows else []
+    return [*"\n" * bool(rows), *(f"| {' | '.join(cells)} |\n" for cells in lines)]
+
+
+def _inputs(algorithm: QgsProcessingAlgorithm) -> Iterator[tuple[str, ...]]:
+    """Name, label, default and values of each parameter but the destinations."""
+    for one in algorithm.parameterDefinitions():
+        if not one.isDestination():
+            flags = QgsProcessingParameterDefinition.Flag
+            optional, rare = (bool(one.flags() & flag) for flag in (flags.FlagOptional, flags.FlagAdvanced))
+            default = "" if one.defaultValue() is None else f"{one.defaultValue()}"
+            label = f"{one.description()}, *advanced*" if rare else one.description()
+            yield f"`{one.name()}`", label, default or ("optional" if optional else "required"), _values(one)
+
+
+def _values(definition: QgsProcessingParameterDefinition) -> str:
+    """Which values a number or a choice takes."""
+    if isinstance(definition, QgsProcessingParameterNumber):
+        if definition.maximum() >= UNBOUNDED:
+            return f"from {definition.minimum():g}"
+        return f"{definition.minimum():g} to {definition.maximum():g}"
+    if isinstance(definition, QgsProcessingParameterEnum):
+        options = definition.options()
+        return "[rail standards](#rail-standards)" if CUSTOM in options else ", ".join(options)
+    return ""
+
+
+def _outputs(algorithm: QgsProcessingAlgorithm) -> Iterator[tuple[str, str]]:
+    """Name and label of each output."""
+    for one in algorithm.outputDefinitions():
+        destination = algorithm.parameterDefinition(one.name())
+        yield f"`{one.name()}`", destination.help() if destination and destination.help() else one.description()
+
+
+def _field(field: Field) -> tuple[str, str, str]:
+    kind = {int: "whole number", float: f"number, {field.decimals} decimals", str: "text"}[field.kind]
+    return f"`{field.name}`", kind, field.meaning
+
+
+def _standards() -> Iterator[tuple[str, ...]]:
+    for standard in STANDARDS.values():
+        sure = "*" if standard.label.endswith(UNCONFIRMED) else ""
+        rail = standard.label.rpartition(",")[0]
+        yield (
+            f"`{standard.name}`",
+            rail,
+            f"{1000 * standard.gauge_m:g} mm",
+            f"{1000 * standard.head_width_m:g} mm{sure}",
+        )
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(start_qgis().plugin.provider), encoding="utf-8")
