@@ -103,6 +103,8 @@ def _standards() -> dict[str, RailStandard]:
 STANDARDS = _standards()
 """Every standard of the interface by its static string, CUSTOM aside."""
 
+UNCONFIRMED_PROFILES = tuple(profile for profile, _, _, confirmed, _ in _PROFILES if not confirmed)
+
 
 def resolve(name: str, gauge_mm: float | None = None, head_width_mm: float | None = None) -> RailStandard:
     """Look a standard up; a given gauge or head width overrides its own.

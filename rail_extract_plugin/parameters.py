@@ -11,7 +11,7 @@ from qgis.core import (
 
 from ..core.frpdf import AUTO, DEFAULT_PASSES, DEVICES, ENGINES, MOST_PASSES
 from ..core.frpdf.zoo import MODELS
-from ..core.standards import CUSTOM, DEFAULT, STANDARDS
+from ..core.standards import CUSTOM, DEFAULT, STANDARDS, UNCONFIRMED_PROFILES
 from .definitions import MM_DECIMALS, Definitions, advanced, choice, helped, number
 from .i18n import tr
 
@@ -42,8 +42,9 @@ def rail() -> Definitions:
             choice("STANDARD", tr("Rail standard"), (*STANDARDS, CUSTOM), DEFAULT),
             tr(
                 "Rail profile and gauge: EN_60E1_1435 is 60E1 of EN 13674 on 1435 mm. It says how far apart the rails "
-                "are and how wide a railhead is. CUSTOM takes both from the two fields below."
-            ),
+                "are and how wide a railhead is. CUSTOM takes both from the two fields below. No table confirms the "
+                "width of {}."
+            ).format(", ".join(UNCONFIRMED_PROFILES)),
         ),
         helped(
             number("GAUGE", tr("Gauge [mm]"), minimum=1.0, optional=True, decimals=MM_DECIMALS),

@@ -109,4 +109,5 @@ def _standards() -> Iterator[tuple[str, ...]]:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page(start_qgis().plugin.provider), encoding="utf-8")
+    application = start_qgis()
+    PAGE.write_text(page(application.plugin.provider), encoding="utf-8")
