@@ -29,6 +29,9 @@ STANDARD = STANDARDS["EN_60E1_1435"]
 SCANNER = Scanner(noise_m=0.004)
 HEADING = 0.35
 """Radians to the grid's axes; far from the angles at which rasters err most."""
+COLUMNS = 3
+"""Panels side by side, so that they can be read on a page."""
+TICKS_MM, TICKS_DENSITY = (0.3, 1, 3, 10, 30), (30, 100, 300)
 GAPS_AT_M = (8.0, 20.0, 32.0)
 """Middles of the gaps in the left rail; those of the right one lie 4 m further on."""
 
@@ -150,17 +153,27 @@ def draw(outcomes: dict[str, list[Outcome]], figure: str, label: str, path: Path
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    drawing, panels = pyplot.subplots(1, len(outcomes), figsize=(3 * len(outcomes), 2.8), sharey=True, squeeze=False)
-    for panel, (name, found) in zip(panels[0], outcomes.items()):
+    columns = min(len(outcomes), COLUMNS)
+    rows = -(-len(outcomes) // columns)
+    drawing, panels = pyplot.subplots(rows, columns, figsize=(3 * columns, 2.6 * rows), sharey=True, squeeze=False)
+    for panel, (name, found) in zip(panels.flat, outcomes.items()):
         values = [outcome.value for outcome in found]
         for who, title, colour in (("ours", "Rail Extract", "tab:blue"), ("peer", "plain script", "tab:orange")):
             errors = [1000 * getattr(getattr(outcome, who), figure) for outcome in found]
             panel.plot(values, errors, "o-", label=title, color=colour, markersize=3)
-        panel.set(title=SWEEPS[name].title, xlabel=SWEEPS[name].unit, yscale="log")
+        panel.set(title=SWEEPS[name].title, xlabel=SWEEPS[name].unit, yscale="log", yticks=TICKS_MM)
+        scales = [panel.yaxis]
         if SWEEPS[name].logarithmic:
-            panel.set_xscale("log")
+            panel.set(xscale="log", xticks=TICKS_DENSITY)
+            scales.append(panel.xaxis)
+        for scale in scales:
+            scale.set_major_formatter("{x:g}")
+            scale.set_minor_formatter("")
         panel.grid(True, which="both", linewidth=0.3)
-    panels[0, 0].set_ylabel(label)
+    for unused in panels.flat[len(outcomes) :]:
+        unused.remove()
+    for row in panels:
+        row[0].set_ylabel(label)
     panels[0, 0].legend(fontsize=8)
     drawing.tight_layout()
     drawing.savefig(path, dpi=100)

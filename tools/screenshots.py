@@ -22,7 +22,6 @@ from qgis.core import (  # noqa: E402
     QgsMapLayer,
     QgsMapRendererParallelJob,
     QgsMapSettings,
-    QgsRasterLayer,
     QgsRectangle,
     QgsVectorLayer,
     QgsVectorLayerCache,
@@ -46,7 +45,6 @@ OUTPUTS = {
     "QUALITY": "quality.gpkg",
     "CENTERLINES": "centerlines.gpkg",
     "RAILS": "rails.gpkg",
-    "CLEANED": "raster.tif",
     "REPORT": "report.html",
 }
 """The files of a run, from the layer on top down; layers are named as their styles."""
@@ -64,6 +62,9 @@ MAP_SIZE, TABLE_HEIGHT, REPORT_SIZE = QSize(1000, 480), 230, (1140, 2265)
 REPORT_TOP = 1300
 """Pixels of the report above the plots of the first track."""
 
+SPLITTER, BUTTONS = 27, 400
+"""Pixels of a dialog right of its fields without the help, and below them."""
+
 DETAIL_M = 16.0
 """Width of the ground in the detailed map: single measurements are seen in it."""
 
@@ -80,9 +81,9 @@ def main() -> None:
         dialog_pictures(folder / "dialogs")
         for source, target in DIALOGS.items():
             shutil.copy(folder / "dialogs" / f"{source}.png", FOLDER / f"{target}.png")
-        _crop(FOLDER / "dialog_all.png", right=round(HELP_SHARE * SIZES["wide"][0]))
+        _crop(FOLDER / "dialog_all.png", right=round(HELP_SHARE * SIZES["wide"][0]) + SPLITTER, bottom=BUTTONS)
         _extract(folder)
-        layers = [_layer(folder / OUTPUTS[output]) for output in ("QUALITY", "CENTERLINES", "RAILS", "CLEANED")]
+        layers = [_layer(folder / OUTPUTS[output]) for output in ("QUALITY", "CENTERLINES", "RAILS")]
         whole = layers[2].extent()
         whole.scale(1.05)
         _map(layers[1:3], whole, FOLDER / "map.png")
@@ -106,7 +107,7 @@ def _extract(folder: Path) -> None:
 
 def _layer(path: Path) -> QgsMapLayer:
     """Load a layer and style it as the plugin does."""
-    layer = (QgsRasterLayer if path.suffix == ".tif" else QgsVectorLayer)(str(path), path.stem)
+    layer = QgsVectorLayer(str(path), path.stem)
     layer.loadNamedStyle(str(STYLES / f"{path.stem}.qml"))
     return layer
 
