@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from os import SEEK_END
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,9 @@ LARGEST_OFFSET = 1e10
 
 LAST_POINT_FORMAT, FORMAT_BITS = 10, 0x3F
 """Of LAS 1.4; the other bits of the byte mark compressed points."""
+
+AT_THE_END = -1
+"""Place of a LAZ file's table of chunks where its writer could not go back: the last 8 bytes then tell it."""
 
 LARGEST_LAZ_CHUNK = 2**30
 """Bytes of a chunk when unpacked; writers use 50,000 points, some 2 MB."""
@@ -82,7 +86,7 @@ class CloudHeader:
 
 
 def list_files(paths: str | Path | Sequence[str | Path]) -> tuple[Path, ...]:
-    """Name the files of one path or several; a folder stands for the LAS and LAZ files in it, by name.
+    """Name the files of one path or several, each once; a folder stands for the LAS and LAZ files in it, by name.
 
     Raises
     ------
@@ -91,7 +95,7 @@ def list_files(paths: str | Path | Sequence[str | Path]) -> tuple[Path, ...]:
     """
     files: list[Path] = []
     for path in [paths] if isinstance(paths, (str, Path)) else paths:
-        path = Path(path)
+        path = Path(path).absolute()  # a worker may run elsewhere
         if not path.exists():
             raise CloudError(f"{path} does not exist: check the path.")
         found = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES) if path.is_dir() else [path]
@@ -100,7 +104,7 @@ def list_files(paths: str | Path | Sequence[str | Path]) -> tuple[Path, ...]:
         files.extend(found)
     if not files:
         raise CloudError("No point cloud was given: name a LAS or LAZ file or a folder of them.")
-    return tuple(files)
+    return tuple({file.resolve(): file for file in reversed(files)}.values())[::-1]
 
 
 def read_header(path: Path) -> CloudHeader:
@@ -157,7 +161,12 @@ def read_classes(
 @contextmanager
 def _open(path: Path) -> Iterator[laspy.LasReader]:
     """Open a checked file; whatever goes wrong in reading it becomes a `CloudError`."""
-    _check_start(path)
+    try:
+        _check_start(path)
+    except OSError as error:
+        raise CloudError(
+            f"{path.name} can't be read ({error.strerror}): check its permissions, the disk or the network drive."
+        ) from error
     fields = laspy.DecompressionSelection
     selection = fields.XY_RETURNS_CHANNEL | fields.Z | fields.CLASSIFICATION | fields.FLAGS
     try:
@@ -232,6 +241,9 @@ def _check_compressed(path: Path, header: laspy.LasHeader) -> None:
     with path.open("rb") as file:
         file.seek(header.offset_to_point_data)
         (table_at,) = struct.unpack("<q", file.read(8))
+        if table_at == AT_THE_END:
+            file.seek(-8, SEEK_END)
+            (table_at,) = struct.unpack("<q", file.read(8))
         if not header.offset_to_point_data < table_at <= size - 8:
             raise CloudError(f"{path.name} is cut off: its table of chunks is missing; copy or export it again.")
         file.seek(table_at)

@@ -73,24 +73,6 @@ class RailPoints:
     class_code: int
 
 
-def read_headers(paths: str | Path | Sequence[str | Path]) -> tuple[CloudHeader, ...]:
-    """Read what the files say of themselves, without their points: count, extent and coordinate system.
-
-    Parameters
-    ----------
-    paths : path or sequence of paths
-        LAS, LAZ or COPC files, or folders of them.
-
-    Raises
-    ------
-    CloudError
-        A file is missing, damaged or no point cloud.
-    """
-    from .las import list_files, read_header
-
-    return tuple(read_header(path) for path in list_files(paths))
-
-
 def read_rail_points(
     paths: str | Path | Sequence[str | Path],
     class_codes: Sequence[int],
@@ -206,7 +188,7 @@ def ask(
     them is added to the list.
     """
     _check_request(class_codes, extent)
-    headers = read_headers(paths) if unreadable is None else _readable_headers(paths, unreadable)
+    headers = _read_headers(paths, unreadable)
     crs = _shared_crs(headers, crs_wkt, progress)
     units_m = (1.0, 1.0) if crs is None else units(crs)
     return Request(
@@ -214,7 +196,7 @@ def ask(
     )
 
 
-def _readable_headers(paths: str | Path | Sequence[str | Path], unreadable: list[str]) -> tuple[CloudHeader, ...]:
+def _read_headers(paths: str | Path | Sequence[str | Path], unreadable: list[str] | None) -> tuple[CloudHeader, ...]:
     from .las import list_files, read_header
 
     headers, last = [], None
@@ -222,6 +204,8 @@ def _readable_headers(paths: str | Path | Sequence[str | Path], unreadable: list
         try:
             headers.append(read_header(path))
         except CloudError as error:
+            if unreadable is None:
+                raise
             unreadable.append(str(error))
             last = error
     if not headers and last is not None:

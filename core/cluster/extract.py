@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import sys
 import tempfile
 from dataclasses import fields
@@ -74,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="use the Dask cluster at tcp://... instead of workers here"
     )
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="workers here (default: one a core)")
+    parser.add_argument("--workers", type=int, help="workers here (default: one a core, as far as memory suffices)")
     parser.add_argument("--work", type=Path, help="folder that keeps what is finished, for a restart")
 
 
@@ -89,6 +88,8 @@ def run(args: argparse.Namespace) -> int:
     missing = [package for module, package in NEEDS.items() if find_spec(module) is None]
     if missing:
         raise RailExtractError(f"Packages are missing ({', '.join(missing)}): in a clone, run pip install .[cluster].")
+    from .geopackage import check_closed
+
     parameters = parameters_of(args)
     for path in (args.rails, args.centerlines or args.rails):
         if path.suffix.lower() != ".gpkg":
@@ -96,6 +97,7 @@ def run(args: argparse.Namespace) -> int:
         with writing(path.parent):
             path.parent.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=path.parent).close()
+        check_closed(path)
     if args.work is not None:
         return _run_in(args.work, args, parameters)
     # Beside the results, for there workers elsewhere find it as well.
@@ -118,7 +120,8 @@ def parameters_of(args: argparse.Namespace) -> Parameters:
     others = _numbers(args.other_gauges, "--other-gauges", float)
     gauges_m = distinct_gauges((standard.gauge_m, *(mm / 1000 for mm in others)), args.centerline_tolerance)
     plain = {field.name: getattr(args, _option(field.name)[2:].replace("-", "_")) for field in _plain_fields()}
-    for name, value in {**plain, "iterations": args.iterations, "workers": args.workers - 1}.items():
+    workers = 0 if args.workers is None else args.workers - 1
+    for name, value in {**plain, "iterations": args.iterations, "workers": workers}.items():
         if not (math.isfinite(value) and value >= 0) or (name in POSITIVE and value == 0):
             raise ParameterError(
                 f"The option {_option(name)} can't be {getattr(args, name, value)}: give a larger number."

@@ -32,8 +32,10 @@ def write(layers: dict[str, tuple[Path, Sequence[RailLine | Centerline], Sequenc
     Raises
     ------
     DiskError
-        A file can't be written, as on a full disk; what was there before is left as it was.
+        A file can't be written, as on a full disk; what was there before is left as it was. Or it is open elsewhere;
+        then the new one lies beside it.
     """
+    layers = {name: (path.resolve(), lines, fields) for name, (path, lines, fields) in layers.items()}
     unfinished = {path: path.with_name(f".{uuid.uuid4().hex}.gpkg") for path, _, _ in layers.values()}
     try:
         for name, (path, lines, fields) in layers.items():
@@ -41,12 +43,36 @@ def write(layers: dict[str, tuple[Path, Sequence[RailLine | Centerline], Sequenc
                 path.parent.mkdir(parents=True, exist_ok=True)
             _write_layer(unfinished[path], name, lines, fields, frame, path)
         for path, whole in unfinished.items():
-            with writing(path.parent):
-                whole.replace(path)
+            _replace(path, whole)
     finally:
         for leftover in unfinished.values():
             for file in leftover.parent.glob(f"{leftover.name}*"):
                 file.unlink()
+
+
+def check_closed(path: Path) -> None:
+    """Refuse a GeoPackage that another program is writing to: what it has not put in yet would damage a new file.
+
+    Raises
+    ------
+    DiskError
+    """
+    log = path.with_name(f"{path.name}-wal")
+    if log.exists() and log.stat().st_size:
+        raise DiskError(f"{path} is open in another program ({log.name} is there): close it there, or choose another.")
+
+
+def _replace(path: Path, whole: Path) -> None:
+    """Let a whole file take its name; where it can't, it stays under another one."""
+    try:
+        check_closed(path)
+        with writing(path.parent):
+            whole.replace(path)
+    except DiskError as error:
+        kept = path.with_name(f"{path.stem}_new{path.suffix}")
+        with writing(path.parent):
+            whole.replace(kept)
+        raise DiskError(f"{error} The new lines are in {kept}.") from error
 
 
 def _write_layer(

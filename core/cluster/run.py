@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import os
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import dask
 from distributed import Client, Future, LocalCluster, as_completed
+from distributed.system import MEMORY_LIMIT
 
 from ..errors import CloudError, NoTrackError, RailExtractError
 from ..frpdf.zoo import choose
@@ -17,9 +19,9 @@ from ..points import LocalFrame, Request, ask
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
 from ..stretches.spool import SpooledFile, SpooledPoints, gather
-from ..stretches.squares import lay_out
+from ..stretches.squares import Key, lay_out
 from .tasks import Failure, StretchTask, clean, draw, sort_points
-from .work import fingerprint, load_rails
+from .work import load_rails, version
 
 DEATHS = 10
 """Workers that may die over one stretch, of whatever else, before it is given up."""
@@ -27,8 +29,11 @@ DEATHS = 10
 READING, STRETCHES = 0.25, 0.7
 """Shares of the progress; joining, pairing and writing have the rest."""
 
-ONE_THREAD = {"OMP_NUM_THREADS": 1, "MKL_NUM_THREADS": 1, "OPENBLAS_NUM_THREADS": 1, "OPENCV_FOR_THREADS_NUM": 1}
-"""What local workers are told: as many of them as there are cores, each on one."""
+ONE_THREAD = tuple(f"{name}_NUM_THREADS" for name in ("OMP", "MKL", "OPENBLAS", "RAYON")) + ("OPENCV_FOR_THREADS_NUM",)
+"""Variables that keep a local worker on one core: there are as many workers as cores."""
+
+WORKER_BYTES = 3 << 29
+"""Memory for each local worker: one takes a gigabyte at its peak (docs/scaling.md), and the joining process some."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +56,10 @@ class Extraction:
 
 
 @contextmanager
-def connect(scheduler: str | None, workers: int) -> Iterator[Client]:
+def connect(scheduler: str | None, workers: int | None = None) -> Iterator[Client]:
     """Use an existing Dask scheduler, or start workers of one thread each on this computer.
+
+    Without a number there is one a core, as far as the memory suffices.
 
     Raises
     ------
@@ -67,12 +74,13 @@ def connect(scheduler: str | None, workers: int) -> Iterator[Client]:
         with client:
             yield client
         return
-    settings = {
-        "distributed.scheduler.allowed-failures": DEATHS,
-        "distributed.nanny.pre-spawn-environ": ONE_THREAD,
-    }
+    if workers is None:
+        workers = max(min(os.cpu_count() or 1, MEMORY_LIMIT // WORKER_BYTES), 1)
+    settings = {"distributed.scheduler.allowed-failures": DEATHS}
+    settings.update({f"distributed.nanny.pre-spawn-environ.{name}": 1 for name in ONE_THREAD})
     with dask.config.set(settings):
-        cluster = LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=":0")
+        # No limit of memory: Dask's own, an even share of what there is, kills workers at their peak.
+        cluster = LocalCluster(n_workers=workers, threads_per_worker=1, memory_limit=None, dashboard_address=":0")
     with cluster, Client(cluster) as client:
         yield client
 
@@ -116,9 +124,8 @@ def extract(
     side_m = stretch_side(parameters)
     found = _sorted_points(client, request, side_m, folder, failures, progress.span(0.0, READING))
     sources = gather(request, side_m, found)
-    weights = fingerprint(choose(parameters.gauge_m, parameters.head_width_m).path.read_bytes())
     drawn = progress.span(READING, READING + STRETCHES)
-    results = _stretches(client, sources, parameters, weights, folder, failures, drawn)
+    results = _stretches(client, sources, parameters, folder, failures, drawn)
     if not any(results):
         raise RailExtractError(f"Not one stretch could be extracted; the first error was: {failures[0]}")
     rails: list[RailLine] = []
@@ -144,7 +151,14 @@ def _sorted_points(
         client.submit(sort_points, replace(request, headers=()), header, side_m, str(folder), pure=False): number
         for number, header in enumerate(request.headers)
     }
-    found = {futures[future]: result for future, result in _finished(futures, progress, failures)}
+    found: dict[int, SpooledFile] = {}
+    for future in progress.follow(as_completed(futures), total=len(futures)):
+        number = futures[future]
+        result = _result(future, request.headers[number].path.name)
+        if isinstance(result, Failure):
+            failures.append(result.reason)
+        else:
+            found[number] = result
     if not found:
         raise CloudError(f"Not one file could be read; the first error was: {failures[0]}")
     return [found[number] for number in sorted(found)]
@@ -154,44 +168,53 @@ def _stretches(
     client: Client,
     sources: Sequence[SpooledPoints],
     parameters: Parameters,
-    weights: str,
     folder: Path,
     failures: list[str],
     progress: Progress,
 ) -> list[list[tuple[StretchTask, Path]]]:
-    """Clean and draw the stretches of all classes; gives the files of the rails of each."""
-    drawing: dict[Future, tuple[int, StretchTask]] = {}
-    for number, source in enumerate(sources):
-        tasks = {
-            stretch.key: StretchTask(source.part(stretch), stretch, parameters, weights, str(folder))
-            for stretch in lay_out(sources, source)
-        }
-        cleaned = {key: client.submit(clean, task, pure=False) for key, task in tasks.items()}
-        for task in tasks.values():
-            rasters = [cleaned[near] for near in task.neighbours()]
-            drawing[client.submit(draw, task, rasters, pure=False)] = (number, task)
+    """Clean and draw the stretches of all classes; gives the files of the rails of each.
+
+    Those of a stretch are drawn as soon as its neighbours are clean, or have failed: Dask itself would give up whatever
+    depends on a failure.
+    """
+    weights = choose(parameters.gauge_m, parameters.head_width_m).path
+    tasks = {
+        (number, stretch.key): StretchTask(source.part(stretch), stretch, parameters, version(weights), str(folder))
+        for number, source in enumerate(sources)
+        for stretch in lay_out(sources, source)
+    }
+    running = {client.submit(clean, task, pure=False): (clean, one) for one, task in tasks.items()}
+    queue = as_completed(running)
+    rasters: dict[tuple[int, Key], str | Failure] = {}
     results: list[list[tuple[StretchTask, Path]]] = [[] for _ in sources]
-    for future, file in _finished(drawing, progress, failures):
-        number, task = drawing[future]
-        results[number].append((task, Path(file)))
+    for future in progress.follow(queue, total=2 * len(tasks)):
+        work, (number, key) = running.pop(future)
+        found = _result(future, f"Stretch {key}")
+        if work is draw:
+            if isinstance(found, Failure):
+                failures.append(found.reason)
+            else:
+                results[number].append((tasks[number, key], Path(found)))
+            continue
+        rasters[number, key] = found
+        for near in tasks[number, key].neighbours():
+            around = [(number, one) for one in tasks[number, near].neighbours()]
+            if all(one in rasters for one in around):
+                drawing = client.submit(draw, tasks[number, near], [rasters[one] for one in around], pure=False)
+                running[drawing] = (draw, (number, near))
+                queue.add(drawing)
     return results
 
 
-def _finished(futures: Iterable[Future], progress: Progress, failures: list[str]) -> Iterator[tuple[Future, object]]:
-    """Yield futures and their results as they come; failures are noted instead.
+def _result(future: Future, what: str) -> object:
+    """Give what a task gave, or why it failed.
 
     Raises
     ------
     DiskError
         A worker could not write.
     """
-    waiting = list(futures)
-    for future in progress.follow(as_completed(waiting), total=len(waiting)):
-        error = future.exception() if future.status == "error" else None
-        if isinstance(error, RailExtractError):
-            raise error
-        result = Failure(f"A task was given up ({error}).") if error is not None else future.result()
-        if isinstance(result, Failure):
-            failures.append(result.reason)
-        else:
-            yield future, result
+    error = future.exception() if future.status == "error" else None
+    if isinstance(error, RailExtractError):
+        raise error
+    return future.result() if error is None else Failure(f"{what} was given up ({error}).")

@@ -11,12 +11,13 @@ import numpy as np
 
 from ..errors import DiskError, RailExtractError
 from ..frpdf.engine import Engine
+from ..frpdf.zoo import choose
 from ..las import CloudHeader
 from ..pipeline import Parameters, clean_stretch, engine_for, rails_of_stretch
 from ..points import Request
 from ..stretches.spool import SpooledFile, SpooledPoints, spool_file
 from ..stretches.squares import Key, Stretch, around
-from .work import fingerprint, load_raster, save_rails, save_raster
+from .work import CORE, fingerprint, load_raster, save_rails, save_raster, version
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,8 @@ class StretchTask:
         Of the stretch and its neighbours.
     stretch : Stretch
     parameters : Parameters
-    weights : str
-        Fingerprint of the network's weights.
+    version : str
+        Of the code and the network's weights; see `work.version`.
     folder : str
         Where results go.
     """
@@ -45,7 +46,7 @@ class StretchTask:
     source: SpooledPoints
     stretch: Stretch
     parameters: Parameters
-    weights: str
+    version: str
     folder: str
 
     @property
@@ -53,7 +54,15 @@ class StretchTask:
         """Fingerprint of the points around, whose files name themselves by size and time, and of the parameters."""
         settings = replace(self.parameters, quality_step_m=None, keep_cleaned=False)
         files = sorted(Path(file).parts[-2:] for files in self.source.files.values() for file in files)
-        return fingerprint(self.stretch.key, self.stretch.side_m, files, settings, self.weights)
+        place = (self.stretch.key, self.stretch.side_m, self.stretch.frame.origin.tolist())
+        return fingerprint(place, files, settings, self.version)
+
+    def differs_here(self) -> Failure | None:
+        """Refuse to run where the code or the weights are not those of whoever asks."""
+        weights = choose(self.parameters.gauge_m, self.parameters.head_width_m).path
+        if version(weights) == self.version:
+            return None
+        return Failure(f"A worker has another version of Rail Extract ({CORE.parent}): install the same everywhere.")
 
     def neighbours(self) -> list[Key]:
         """Name the stretch and those around it, by their squares."""
@@ -80,7 +89,9 @@ def sort_points(request: Request, header: CloudHeader, side_m: float, folder: st
 
 def clean(task: StretchTask) -> str | Failure:
     """Clean the raster of a stretch, unless that is done; gives the file."""
-    path = task.file("raster", task.name)
+    path, refusal = task.file("raster", task.name), task.differs_here()
+    if refusal:
+        return refusal
     if not path.exists():
         try:
             save_raster(path, clean_stretch(task.source, task.stretch, task.parameters, _engine(task.parameters)))
@@ -96,6 +107,9 @@ def draw(task: StretchTask, rasters: Sequence[str | Failure]) -> str | Failure:
     files = {key: file for key, file in zip(task.neighbours(), rasters) if isinstance(file, str)}
     if task.stretch.key not in files:
         return rasters[task.neighbours().index(task.stretch.key)]
+    refusal = task.differs_here()
+    if refusal:
+        return refusal
     path = task.file("rails", fingerprint(task.name, sorted(Path(file).name for file in files.values())))
     if not path.exists():
         try:

@@ -6,9 +6,11 @@ A file is there whole or not at all, so that whatever dies in between, the next 
 from __future__ import annotations
 
 import hashlib
+import os
 import uuid
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -19,13 +21,19 @@ from ..stretches.spool import writing
 from ..stretches.squares import Stretch
 from ..stretches.trimming import StretchRails
 
-FORMAT = 1
-"""Counts up when stretches come out otherwise, so that results of an earlier version are not taken for new ones."""
+CORE = Path(__file__).resolve().parent.parent
 
 
 def fingerprint(*facts: object) -> str:
     """Make a file name of everything that a result depends on."""
-    return hashlib.sha256(repr((FORMAT, *facts)).encode()).hexdigest()[:32]
+    return hashlib.sha256(repr(facts).encode()).hexdigest()[:32]
+
+
+@lru_cache
+def version(weights: Path) -> str:
+    """Make a name of the code and of the network's weights: stretches of another version are not taken for own ones."""
+    files = [*sorted(CORE.rglob("*.py")), weights]
+    return fingerprint(*(file.read_bytes() for file in files))
 
 
 def save_raster(path: Path, raster: RailRaster) -> None:
@@ -94,6 +102,8 @@ def _save(path: Path, **arrays: np.ndarray) -> None:
         try:
             with unfinished.open("wb") as file:
                 np.savez_compressed(file, **arrays)
+                file.flush()
+                os.fsync(file.fileno())  # else a file may have its name and be empty after a power cut
             unfinished.replace(path)
         finally:
             unfinished.unlink(missing_ok=True)

@@ -31,7 +31,10 @@ class TorchEngine(LayeredEngine):
             raise ModelError("There is no CUDA device that PyTorch can use: choose AUTO or CPU.")
         self._folded = fold(arrays)
         self._exact = exact
-        self._move("cuda" if has_cuda and device != "CPU" else "cpu")
+        try:
+            self._move("cuda" if has_cuda and device != "CPU" else "cpu")
+        except RuntimeError:  # others have filled the graphics card, so that not even the weights go there
+            self._move("cpu")
 
     def _move(self, device: str) -> None:
         self._device = device

@@ -6,6 +6,7 @@ import errno
 import hashlib
 import json
 import shutil
+import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -109,23 +110,43 @@ def spool(request: Request, side_m: float, folder: Path, progress: Progress = SI
 def spool_file(
     request: Request, header: CloudHeader, side_m: float, folder: Path, progress: Progress = SILENT
 ) -> SpooledFile:
-    """Sort the points of one file into squares; one that has not changed since it was sorted is not read again."""
+    """Sort the points of one file into squares; one that has not changed since it was sorted is not read again.
+
+    Two that sort the same file at the same time do so each in a folder of its own, and the first to finish is right.
+    """
     mine = folder / _fingerprint(request, header, side_m)
-    if (mine / REPORT).exists():
-        return SpooledFile(str(mine), json.loads((mine / REPORT).read_text(encoding="ascii")))
-    shutil.rmtree(mine, ignore_errors=True)
-    unfinished = _Census()
-    with writing(folder):
-        mine.mkdir(parents=True)
+    if not mine.exists():
+        unfinished = folder / f"{mine.name}.{uuid.uuid4().hex}"
+        try:
+            with writing(folder):
+                unfinished.mkdir(parents=True)
+            _sort(request, header, side_m, unfinished, progress)
+            with writing(folder):
+                _name_first(unfinished, mine)
+        finally:
+            shutil.rmtree(unfinished, ignore_errors=True)
+    return SpooledFile(str(mine), json.loads((mine / REPORT).read_text(encoding="ascii")))
+
+
+def _sort(request: Request, header: CloudHeader, side_m: float, folder: Path, progress: Progress) -> None:
+    """Write the points of a file into files of their squares, and the report on them."""
+    found = _Census()
     for xyz, codes, census in request.read(header, progress):
-        unfinished.census += census
-        with writing(folder):
+        found.census += census
+        with writing(folder.parent):
             for code in np.unique(codes).tolist():
-                unfinished.add(code, xyz[codes == code], request.zero, side_m, mine)
-    with writing(folder):
-        (mine / "unfinished").write_text(json.dumps(unfinished.report()), encoding="ascii")
-        (mine / "unfinished").replace(mine / REPORT)
-    return SpooledFile(str(mine), unfinished.report())
+                found.add(code, xyz[codes == code], request.zero, side_m, folder)
+    with writing(folder.parent):
+        (folder / REPORT).write_text(json.dumps(found.report()), encoding="ascii")
+
+
+def _name_first(folder: Path, name: Path) -> None:
+    """Give a folder its name, unless there is one of this name by now."""
+    try:
+        folder.rename(name)
+    except OSError:
+        if not name.exists():
+            raise
 
 
 def gather(request: Request, side_m: float, found: Sequence[SpooledFile]) -> tuple[SpooledPoints, ...]:

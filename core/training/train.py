@@ -19,6 +19,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from ..errors import ParameterError
 from ..frpdf import DEFAULT_PASSES, OUTPUT_THRESHOLD, START, STATISTICS
 from ..frpdf.network import PassBatchNorm2d, Recurrent, feedback
 from ..frpdf.weights import load_arrays, save_arrays
@@ -52,7 +53,7 @@ DATA, STATISTICS_DATA = 0, 1
 
 @dataclass(frozen=True)
 class Settings:
-    """A training: the same settings give the same weights on the same machine."""
+    """A training: the same settings give the same weights on the same processor; a GPU adds up in no fixed order."""
 
     steps: int
     rate: float
@@ -102,7 +103,7 @@ def train(settings: Settings, folder: Path, minutes: float) -> Recurrent | None:
     torch.manual_seed(settings.seed)
     network = new_network(settings)
     optimizer = Optimizers(network)
-    first = _resume(folder / "checkpoint.pt", network, optimizer)
+    first = _resume(folder / "checkpoint.pt", settings, network, optimizer)
     until = time.monotonic() + 60 * minutes
     for step in range(first, settings.steps):
         started = time.monotonic()
@@ -113,6 +114,7 @@ def train(settings: Settings, folder: Path, minutes: float) -> Recurrent | None:
         out_of_time = time.monotonic() > until
         if done % CHECKPOINT_STEPS == 0 or out_of_time or done == settings.steps:
             state = {"network": network.state_dict(), "optimizer": optimizer.state_dict(), "step": done}
+            state["settings"] = _plain(settings)
             torch.save(state, folder / "checkpoint.new")
             (folder / "checkpoint.new").replace(folder / "checkpoint.pt")
             draw_curves(folder / "log.csv", folder / "curves.png")
@@ -216,11 +218,26 @@ def export(network: Recurrent) -> dict[str, np.ndarray]:
     }
 
 
-def _resume(path: Path, network: Recurrent, optimizer: Optimizers) -> int:
-    """Load a checkpoint where there is one, and give the number of the next step."""
+def _plain(settings: Settings) -> dict[str, str]:
+    """Give the settings that decide what the weights become, as text."""
+    return {field.name: str(getattr(settings, field.name)) for field in fields(settings) if field.name != "device"}
+
+
+def _resume(path: Path, settings: Settings, network: Recurrent, optimizer: Optimizers) -> int:
+    """Load a checkpoint where there is one, and give the number of the next step.
+
+    Raises
+    ------
+    ParameterError
+        It is of another training.
+    """
     if not path.exists():
         return 0
     state = torch.load(path, weights_only=True)
+    others = {name: value for name, value in _plain(settings).items() if state["settings"].get(name) != value}
+    if others:
+        told = ", ".join(f"--{name} {state['settings'].get(name)}" for name in others)
+        raise ParameterError(f"{path.parent} holds a training with {told}: give the same, or another folder.")
     network.load_state_dict(state["network"])
     optimizer.load_state_dict(state["optimizer"])
     return state["step"]

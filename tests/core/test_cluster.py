@@ -9,18 +9,25 @@ import threading
 import time
 from dataclasses import replace
 
+import laspy
 import numpy as np
 import pyogrio
 import pytest
 import shapely
+from distributed import Client, KilledWorker, LocalCluster
 from rail_extract.__main__ import main
+from rail_extract.core.cluster import run
 from rail_extract.core.cluster.extract import INCOMPLETE
+from rail_extract.core.cluster.geopackage import write
 from rail_extract.core.cluster.run import connect, extract
-from rail_extract.core.errors import DiskError
+from rail_extract.core.cluster.tasks import clean
+from rail_extract.core.errors import DiskError, RailExtractError
+from rail_extract.core.fields import RAIL_FIELDS
 from rail_extract.core.pipeline import Parameters, extract_rails, stretch_side
-from rail_extract.core.points import ask, read_rail_points
+from rail_extract.core.points import LocalFrame, ask, read_rail_points
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.stretches.spool import spool
+from rail_extract.core.stretches.squares import lay_out
 from rail_extract.core.synthetic.curves import Element, trace
 from rail_extract.core.synthetic.plain_scenes import spacing
 from rail_extract.core.synthetic.scanner import Scanner
@@ -127,6 +134,82 @@ def test_on_a_running_cluster_a_corrupt_tile_is_named_and_the_rest_is_written(ti
     assert 50 < values[2].sum() < 85
     assert pyogrio.read_info(out, layer="centerlines")["features"] == 1
     assert {file.name for file in tmp_path.iterdir()} == {"out.gpkg", "tile0.laz", "tile1.laz", "tile2.laz"}
+
+
+@pytest.fixture
+def lone_worker():
+    """Tasks in this process, where they can be put others in the place of."""
+    with LocalCluster(processes=False, n_workers=1, dashboard_address=":0") as cluster, Client(cluster) as client:
+        yield client
+
+
+def test_a_stretch_that_kills_its_workers_does_not_take_its_neighbours_along(tiles, lone_worker, tmp_path, monkeypatch):
+    def dying(task):
+        if task.stretch.key == doomed:
+            raise KilledWorker("clean", None, 10)
+        return clean(task)
+
+    doomed = max(lay_out_keys(tiles, tmp_path))
+    monkeypatch.setattr(run, "clean", dying)
+    found = extract(lone_worker, [tiles], [RAIL], PARAMETERS, tmp_path / "work")
+    assert len(found.failures) == 1
+    assert found.failures[0].startswith(f"Stretch {doomed} was given up")
+    assert len(found.rails) == 2
+    assert 20 < found.rails[0].length_m < 45
+
+
+def lay_out_keys(tiles, folder):
+    (source,) = spool(ask([tiles], [RAIL]), stretch_side(PARAMETERS), folder / "keys")
+    return [stretch.key for stretch in lay_out([source], source)]
+
+
+def test_a_worker_of_another_version_is_named(tiles, lone_worker, tmp_path, monkeypatch):
+    monkeypatch.setattr(run, "version", lambda weights: "older")
+    with pytest.raises(RailExtractError, match="A worker has another version of Rail Extract"):
+        extract(lone_worker, [tiles], [RAIL], PARAMETERS, tmp_path)
+
+
+def test_finished_stretches_of_another_cloud_are_not_taken(tiles, client, tmp_path):
+    """An undivided cloud has its own middle for its origin, which further files of another class move."""
+    parameters = replace(PARAMETERS, stretch_tiles=50)
+    alone = extract(client, [tiles / "tile0.laz"], [RAIL], parameters, tmp_path)
+    others = [tmp_path / f"other{number}.laz" for number in (1, 2)]
+    for number, path in enumerate(others, start=1):
+        cloud = laspy.read(tiles / f"tile{number}.laz")
+        cloud.x, cloud.classification[:] = np.asarray(cloud.x) + 300, 11
+        cloud.write(path)
+    both = extract(client, [tiles / "tile0.laz", *others], [RAIL, 11], parameters, tmp_path)
+    assert not np.allclose(alone.frame.origin, both.frame.origin)
+    same([rail for rail in both.rails if rail.class_code == RAIL], alone.rails, both.frame, alone.frame)
+
+
+def test_two_names_of_one_file_hold_both_layers(tiles, client, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = ["extract", str(tiles), "--rails", "two.gpkg", "--centerlines", str(tmp_path / "two.gpkg")]
+    words += [
+        "--scheduler",
+        client.scheduler.address,
+        "--stretch-tiles",
+        "4",
+        "--engine",
+        "OPENCV",
+        "--iterations",
+        "1",
+    ]
+    assert main(words) == 0
+    assert {name for name, _ in pyogrio.list_layers("two.gpkg")} == {"rails", "centerlines"}
+
+
+def test_a_geopackage_that_another_program_writes_to_is_left_alone(tiles, tmp_path, capsys):
+    out = tmp_path / "out.gpkg"
+    out.write_text("theirs")
+    (tmp_path / "out.gpkg-wal").write_text("not yet in it")
+    assert main(["extract", str(tiles), "--rails", str(out)]) == 1
+    assert f"{out} is open in another program" in capsys.readouterr().err
+    with pytest.raises(DiskError, match=r"The new lines are in .*out_new\.gpkg"):
+        write({"rails": (out, (), RAIL_FIELDS)}, LocalFrame(np.zeros(3)))
+    assert out.read_text() == "theirs"
+    assert pyogrio.read_info(tmp_path / "out_new.gpkg")["features"] == 0
 
 
 def test_what_the_user_should_look_at_is_on_the_error_output(tiles, client, tmp_path, capsys):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+
 import laspy
 import numpy as np
 import pyproj
@@ -18,7 +20,7 @@ from rail_extract.core.errors import (
     ParameterError,
     RailExtractError,
 )
-from rail_extract.core.points import LocalFrame, read_headers, read_rail_points
+from rail_extract.core.points import LocalFrame, read_rail_points
 from rail_extract.core.progress import Progress
 
 RAIL = 10
@@ -94,6 +96,33 @@ def test_each_class_is_kept_apart_in_one_frame(tmp_path):
     assert len(first.xyz) == np.count_nonzero(codes == RAIL)
     assert len(second.xyz) == np.count_nonzero(codes == 11)
     assert first.frame is second.frame
+
+
+def test_a_file_named_twice_is_read_once(tmp_path, monkeypatch):
+    make_cloud(tmp_path / "a.laz", codes=(RAIL,))
+    monkeypatch.chdir(tmp_path)
+    (points,) = read_rail_points([tmp_path, "a.laz", tmp_path / "a.laz"], [RAIL])
+    assert len(points.xyz) == 3000
+    assert all(file.is_absolute() for file in las.list_files("a.laz"))
+
+
+def test_a_file_that_can_not_be_opened_is_named(tmp_path):
+    make_cloud(tmp_path / "a.laz", codes=(RAIL,))
+    (tmp_path / "b.laz").symlink_to(tmp_path / "gone.laz")
+    with pytest.raises(CloudError, match=r"^b\.laz can't be read \(No such file or directory\): check"):
+        read_rail_points(tmp_path, [RAIL])
+
+
+def test_a_table_of_chunks_whose_place_stands_at_the_end_is_found(tmp_path):
+    """As writers leave it that can't go back, into a pipe."""
+    make_cloud(tmp_path / "a.laz", codes=(RAIL,))
+    whole = bytearray((tmp_path / "a.laz").read_bytes())
+    (points_at,) = struct.unpack("<I", whole[96:100])
+    table_at = bytes(whole[points_at : points_at + 8])
+    whole[points_at : points_at + 8] = struct.pack("<q", -1)
+    (tmp_path / "a.laz").write_bytes(whole + table_at)
+    (points,) = read_rail_points(tmp_path / "a.laz", [RAIL])
+    assert len(points.xyz) == 3000
 
 
 def test_withheld_points_are_left_out(tmp_path):
@@ -279,7 +308,7 @@ def test_progress_rises_to_the_end_and_a_cancel_is_heard(tmp_path, monkeypatch):
 
 def test_headers_tell_count_extent_and_system(tmp_path):
     xyz, _ = make_cloud(tmp_path / "a.laz")
-    (header,) = read_headers(tmp_path / "a.laz")
+    header = las.read_header(tmp_path / "a.laz")
     assert header.point_count == 3000
     expected = (*xyz[:, :2].min(axis=0), *xyz[:, :2].max(axis=0))
     assert header.extent == pytest.approx(expected, abs=1e-6)

@@ -69,6 +69,23 @@ def test_a_reading_that_was_cut_off_starts_anew(files, tmp_path):
     assert sum(again[0].counts.values()) == len(read_rail_points(files, [10])[0].xyz)
 
 
+def test_two_readers_of_one_file_leave_it_whole(files, tmp_path):
+    class Racing(Progress):
+        others = 0
+
+        def is_cancelled(self):
+            if not self.others:
+                self.others = sum(spool(ask(files, [10]), SIDE, tmp_path)[0].counts.values())
+            return False
+
+    progress = Racing()
+    (source,) = spool(ask(files, [10]), SIDE, tmp_path, progress)
+    expected = len(read_rail_points(files, [10])[0].xyz)
+    assert sum(source.counts.values()) == progress.others == expected
+    assert len(source.near(Stretch((0, 0), source.frame, np.inf), 0.0).xyz) == expected
+    assert len([folder for folder in tmp_path.iterdir() if folder != files]) == 2
+
+
 def test_an_extent_and_classes_that_are_not_there(files, tmp_path):
     extent = (500_000, 5_399_900, 500_020, 5_400_000)
     (part,) = spool(ask(files, [10], extent=extent), SIDE, tmp_path)

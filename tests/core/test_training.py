@@ -1,10 +1,12 @@
 """Training: gradients of the CPU path, resuming, the exported statistics, evaluation."""
 
 import argparse
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
+from rail_extract.core.errors import ParameterError
 from rail_extract.core.frpdf import STATISTICS
 from rail_extract.core.frpdf.network import PassBatchNorm2d
 from rail_extract.core.frpdf.torch_engine import TorchEngine
@@ -93,6 +95,8 @@ def test_a_resumed_training_ends_where_an_unbroken_one_does(small, tmp_path):
     for name, value in unbroken.state_dict().items():
         assert torch.allclose(value, resumed.state_dict()[name], atol=1e-6), name
     assert (tmp_path / "b" / "log.csv").read_text().count("\n") == 4
+    with pytest.raises(ParameterError, match="holds a training with --seed 7: give the same"):
+        train.train(replace(settings, seed=8), tmp_path / "b", np.inf)
 
 
 def test_the_command_leaves_weights_that_the_engine_takes(small, tmp_path):
