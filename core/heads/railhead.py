@@ -11,6 +11,10 @@ BIN_M = 0.5
 LEVEL_BINS = 5
 """Bins whose medians are compared: a growth of weeds up to 1 m long can't lift the level."""
 
+CROSSING_M, CROSSING_BINS = 1.0, 41
+"""Bins that lie so far from the median of so many, 20 m of rail, are of a rail on a bridge across: no rail rises so
+fast, and what a bridge hides is shorter."""
+
 SLOPE_BINS = 9
 """Bins that share one slope across: over 4.5 m cant changes by 1 % of its slope at most."""
 
@@ -63,7 +67,11 @@ def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
 def _without_steps(t: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Apply a running median to what is left of heights after their trend, so that a gradient keeps its ends."""
     trend = np.polynomial.Polynomial.fit(t, z, 1)(t) if len(t) > LEVEL_BINS else 0.0
-    return trend + median_filter(z - trend, LEVEL_BINS, mode="nearest")
+    level = z - trend
+    own = np.abs(level - median_filter(level, CROSSING_BINS, mode="nearest")) <= CROSSING_M
+    if own.any():
+        level = np.interp(t, t[own], level[own])
+    return trend + median_filter(level, LEVEL_BINS, mode="nearest")
 
 
 def spread(values: np.ndarray) -> float:

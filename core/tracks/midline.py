@@ -159,8 +159,13 @@ def midway(
     shift = np.where(np.isnan(both), np.where(np.isnan(to_left), usual / 2 - to_right, to_left - usual / 2), 0.0)
     shift = np.where(np.isnan(both), shift, (to_left - to_right) / 2)
     known = ~np.isnan(shift)
-    z = (_filled(left.height_m) + _filled(right.height_m)) / 2
-    return np.column_stack([guide + shift[:, None] * normals, z])[known]
+    return np.column_stack([guide + shift[:, None] * normals, _heights(left.height_m, right.height_m)])[known]
+
+
+def _heights(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Find the height midway between both rails, (n,); where one is missing, the other and the cant around tell."""
+    half_cant = np.nan_to_num(_filled(left - right)) / 2
+    return _filled(np.where(np.isnan(left), right + half_cant, left - half_cant))
 
 
 def bridged_steps(rails: Sequence[RailLine], left: Meeting, right: Meeting, along: np.ndarray) -> np.ndarray:

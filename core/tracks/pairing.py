@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +34,9 @@ FINE_M = 0.025
 
 SPLIT_M = 5.0
 """Stations abreast that lie further apart than this begin a new stretch: gaps in a rail are at most about as long."""
+
+SAME_LEVEL_M = 0.4
+"""Rails of a track differ in height by cant alone, 0.2 m at most; those of a bridge and those below it by metres."""
 
 LEFT, RIGHT = 1, -1
 
@@ -71,7 +74,6 @@ def pair_rails(
     gauge_m: float,
     head_width_m: float,
     tolerance_m: float = 0.05,
-    min_length_m: float = MIN_LENGTH_M,
     progress: Progress = SILENT,
 ) -> tuple[RailPair, ...]:
     """Find the stretches along which two rails of one class lie a gauge apart (ALGORITHMS.md sections 4.2 and 4.3).
@@ -86,8 +88,6 @@ def pair_rails(
         Their sum is the distance between the rail lines.
     tolerance_m : float
         Largest deviation from that distance.
-    min_length_m : float
-        Shortest stretch to keep.
     progress : Progress
 
     Returns
@@ -105,8 +105,8 @@ def pair_rails(
     candidates = [stretch for group in at_gauge.groups() for stretch in _stretches(group)]
     matches = []
     for stretch in progress.span(0.3, 1.0).follow(candidates):
-        matches.extend(_match(rails, stretch, spacing, tolerance_m, min_length_m))
-    return _select(matches, min_length_m)
+        matches.extend(_match(rails, stretch, spacing, tolerance_m))
+    return tuple(match.pair() for match in _without_ghosts(_select(matches)))
 
 
 @dataclass(frozen=True)
@@ -147,9 +147,7 @@ def _stretches(group: Parallels) -> Iterator[Parallels]:
         yield group[mine]
 
 
-def _match(
-    rails: Sequence[RailLine], stretch: Parallels, spacing: float, tolerance_m: float, min_length_m: float
-) -> Iterator[_Match]:
+def _match(rails: Sequence[RailLine], stretch: Parallels, spacing: float, tolerance_m: float) -> Iterator[_Match]:
     """Match the offset curves of two rails along one stretch."""
     a, b, same = int(stretch.a[0]), int(stretch.b[0]), bool(stretch.same[0])
     side_a = LEFT if stretch.left_m[0] > 0 else RIGHT
@@ -162,8 +160,15 @@ def _match(
         for found in match_polylines(curve_a.at(s_a), curve_b.at(s_b), tolerance_m):
             t_a, t_b = curve_a.t_at(s_a[found.first]), curve_b.t_at(s_b[found.second])
             match = _Match(a, b, t_a, t_b, side_a, side_b, found.penalty / found.length)
-            if match.length_m >= min_length_m:
+            if match.length_m >= MIN_LENGTH_M and _on_one_level(rails[a].xyz, t_a, rails[b].xyz, t_b):
                 yield match
+
+
+def _on_one_level(a: np.ndarray, t_a: np.ndarray, b: np.ndarray, t_b: np.ndarray) -> bool:
+    """Tell whether two rails, (n, 3) and (m, 3), lie on one level abreast of each other; unknown heights do."""
+    z_a, z_b = (np.interp(t, length_along(line[:, :2]), line[:, 2]) for line, t in ((a, t_a), (b, t_b)))
+    apart = np.abs(z_a - z_b)[np.isfinite(z_a - z_b)]
+    return not len(apart) or bool(np.median(apart) <= SAME_LEVEL_M)
 
 
 @dataclass(frozen=True)
@@ -218,19 +223,62 @@ def _abreast(a: _OffsetCurve, b: _OffsetCurve, tolerance_m: float) -> Iterator[t
             yield s[point[run]], t[run]
 
 
-def _select(matches: Sequence[_Match], min_length_m: float) -> tuple[RailPair, ...]:
+def _select(matches: Sequence[_Match]) -> list[_Match]:
     """Give every stretch of a rail's side to the longest match that claims it."""
-    used: dict[tuple[int, int], list[tuple[float, float]]] = defaultdict(list)
-    pairs = []
+    used = _Sides()
+    selected = []
     for match in sorted(matches, key=lambda match: (-match.length_m, match.mean_penalty)):
-        taken = _inside(match.t_a, used[match.a, match.side_a]) | _inside(match.t_b, used[match.b, match.side_b])
-        for part in _free_runs(match, taken):
-            if part.length_m < min_length_m:
-                continue
-            used[match.a, match.side_a].append(tuple(np.sort(part.t_a[[0, -1]])))
-            used[match.b, match.side_b].append(tuple(np.sort(part.t_b[[0, -1]])))
-            pairs.append(part.pair())
-    return tuple(pairs)
+        for part in _free_runs(match, used.on_a(match) | used.on_b(match)):
+            used.add(part)
+            selected.append(part)
+    return selected
+
+
+def _without_ghosts(matches: Sequence[_Match]) -> list[_Match]:
+    """Drop what lies between two tracks whose inner rails happen to be at gauge too, as of trams 3 m apart.
+
+    A rail that has a single partner belongs to its track for sure. Where a match takes a rail away from such a track,
+    and the other one has a partner on its far side as well, nothing but chance speaks for it; one after the other, so
+    that of many tracks in a row every second match stays.
+    """
+    while True:
+        partners = _Sides(matches)
+        doubtful = [partners.beyond_a(match) & partners.beyond_b(match) for match in matches]
+        sure = _Sides(part for match, out in zip(matches, doubtful) for part in _free_runs(match, out))
+        ghosts = [out & (sure.beyond_a(match) | sure.beyond_b(match)) for match, out in zip(matches, doubtful)]
+        if not any(ghost.any() for ghost in ghosts):
+            return list(matches)
+        matches = [part for match, ghost in zip(matches, ghosts) for part in _free_runs(match, ghost)]
+
+
+class _Sides:
+    """Which stretches of the sides of rails have partners."""
+
+    def __init__(self, matches: Iterable[_Match] = ()) -> None:
+        self._used: dict[tuple[int, int], list[tuple[float, float]]] = defaultdict(list)
+        for match in matches:
+            self.add(match)
+
+    def add(self, match: _Match) -> None:
+        """Take note of a match."""
+        self._used[match.a, match.side_a].append(tuple(np.sort(match.t_a[[0, -1]])))
+        self._used[match.b, match.side_b].append(tuple(np.sort(match.t_b[[0, -1]])))
+
+    def on_a(self, match: _Match) -> np.ndarray:
+        """Tell at which nodes of a match its first rail has a partner on this side, (n,) bool."""
+        return _inside(match.t_a, self._used[match.a, match.side_a])
+
+    def on_b(self, match: _Match) -> np.ndarray:
+        """Tell the same of its second rail."""
+        return _inside(match.t_b, self._used[match.b, match.side_b])
+
+    def beyond_a(self, match: _Match) -> np.ndarray:
+        """Tell at which nodes its first rail has a partner on the other side, (n,) bool."""
+        return _inside(match.t_a, self._used[match.a, -match.side_a])
+
+    def beyond_b(self, match: _Match) -> np.ndarray:
+        """Tell the same of its second rail."""
+        return _inside(match.t_b, self._used[match.b, -match.side_b])
 
 
 def _inside(t: np.ndarray, intervals: Sequence[tuple[float, float]]) -> np.ndarray:
@@ -242,8 +290,9 @@ def _inside(t: np.ndarray, intervals: Sequence[tuple[float, float]]) -> np.ndarr
 
 
 def _free_runs(match: _Match, taken: np.ndarray) -> Iterator[_Match]:
-    """Split a match into the parts between taken nodes."""
+    """Split a match into the parts between taken nodes that are long enough."""
     borders = np.flatnonzero(np.diff(taken)) + 1
     for run in np.split(np.arange(len(taken)), borders):
-        if not taken[run[0]]:
-            yield match[run[0] : run[-1] + 1]
+        part = match[run[0] : run[-1] + 1]
+        if not taken[run[0]] and part.length_m >= MIN_LENGTH_M:
+            yield part

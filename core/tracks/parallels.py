@@ -117,7 +117,7 @@ def commonest_spacing(rails: Sequence[RailLine], least_length_m: float) -> float
         return None
     spacing = np.abs(find_parallels(rails).left_m)
     spacing = spacing[spacing >= NEAREST_M]
-    if len(spacing) * STEP_M < least_length_m:
+    if not len(spacing) or len(spacing) * STEP_M < least_length_m:
         return None
     counts = np.convolve(np.bincount((spacing / BIN_M).astype(int)), np.ones(3), mode="same")
     if counts.max() * STEP_M < least_length_m:

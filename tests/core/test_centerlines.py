@@ -172,6 +172,23 @@ def test_rails_without_heights_give_a_centerline_without():
     assert line.length_m == pytest.approx(CURVED.length_m, abs=0.5)
 
 
+@pytest.mark.parametrize("cant", [0.0, 0.1])
+@pytest.mark.parametrize("side", [0, 1])
+def test_where_one_rail_is_missing_the_other_tells_the_height(cant, side):
+    """Beyond its end on a gradient, and in a gap of it in a sag."""
+    x = STRAIGHT.chainage
+    for height, cut in ((0.04 * x, slice(0, -60)), (x**2 / 4000, slice(0, None))):
+        left, right, middle = track(STRAIGHT, height=height, cant=cant)
+        rails = [left, right]
+        rails[side] = rails[side][cut]
+        if cut.stop is None:
+            rails[side : side + 1] = without(rails[side], 0.3, 0.7)
+        (line,) = build_centerlines(rails_of(*rails), GAUGE, WIDTH)
+        t = np.hypot(*(line.xyz[:, :2] - middle[0, :2]).T)
+        expected = np.interp(t, np.hypot(*(middle[:, :2] - middle[0, :2]).T), middle[:, 2])
+        np.testing.assert_allclose(line.xyz[:, 2], expected, atol=0.002)
+
+
 def test_what_rails_bridged_counts_for_the_track():
     left, right, _ = track(STRAIGHT)
     (left_rail, right_rail) = rails_of(left, right)

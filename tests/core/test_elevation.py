@@ -116,6 +116,25 @@ def test_heights_run_on_across_a_gap_which_counts_as_bridged(gap):
     assert rail.bridged_m == pytest.approx(gap, abs=0.2)
 
 
+@pytest.mark.parametrize("grade", [0.0, 0.04, 0.1])
+@pytest.mark.parametrize("crossing", [(40.0, 41.5), (38.0, 39.5, 42.0, 43.5), (36.5, 38.0, 40.0, 41.5, 43.5, 45.0)])
+def test_a_bridge_does_not_lift_the_rail_that_it_hides(grade, crossing):
+    """Where its rails cross, only their points are near the line below."""
+
+    def profile(x):
+        return grade * x
+
+    below = head(80, 80, profile=profile)
+    below = below[np.abs(below[:, 0] - 40.75) > 5.0]
+    random = np.random.default_rng(3)
+    above = [np.column_stack([random.uniform(x, x + 0.07, 30), random.uniform(-0.036, 0.036, 30)]) for x in crossing]
+    above = np.column_stack([np.concatenate(above), np.full(30 * len(crossing), 6.5) + grade * 40])
+    (rail,) = elevate(network_of(straight_line(80)), cloud(below, above), PARAMETERS)
+    x = np.arange(0, 80, 0.1)
+    np.testing.assert_allclose(np.interp(x, rail.xyz[:, 0], rail.xyz[:, 2]), profile(x), atol=0.006)
+    assert rail.bridged_m == pytest.approx(10.0, abs=0.3)
+
+
 def test_gaps_are_long_stretches_without_points_and_unsupported_ends():
     t = np.concatenate([np.arange(2.0, 5.01, 0.1), np.arange(5.4, 8.01, 0.1), [9.0]])
     np.testing.assert_allclose(find_gaps(t, 0.0, 10.0), [[0, 2], [8, 9], [9, 10]])

@@ -60,6 +60,28 @@ def test_rails_of_neighbouring_tracks_never_pair(distance):
     assert sorted(tuple(sorted((pair.left, pair.right))) for pair in pairs) == [(0, 1), (2, 3), (4, 5)]
 
 
+@pytest.mark.parametrize("curve", [STRAIGHT, CURVED, TRAM])
+@pytest.mark.parametrize("count", [2, 3, 4, 5])
+@pytest.mark.parametrize("off", [-0.03, 0.0, 0.03])
+def test_tracks_twice_as_far_apart_as_their_rails_stay_the_only_ones(curve, count, off):
+    """As those of trams in narrow streets: there the inner rails of neighbours lie at gauge as well."""
+    rails = rails_of(*tracks(curve, *((2 * SPACING + off) * np.arange(count))))
+    pairs = pair_rails(rails, GAUGE, WIDTH)
+    found = sorted(tuple(sorted((pair.left, pair.right))) for pair in pairs)
+    assert found == [(2 * number, 2 * number + 1) for number in range(count)]
+
+
+def test_a_rail_that_two_tracks_share_serves_both():
+    rails = rails_of(*beside(STRAIGHT, 0.0, SPACING, 2 * SPACING))
+    assert len(pair_rails(rails, GAUGE, WIDTH)) == 2
+
+
+@pytest.mark.parametrize(("height", "count"), [(0.0, 1), (0.18, 1), (6.5, 0), (np.nan, 1)])
+def test_rails_on_two_levels_are_no_track(height, count):
+    left, right = tracks(STRAIGHT, 0.0)
+    assert len(pair_rails([rail(left), rail(right, 2, z=height)], GAUGE, WIDTH)) == count
+
+
 @pytest.mark.parametrize(("widening", "count"), [(0.04, 1), (-0.04, 1), (0.06, 0), (-0.06, 0)])
 def test_rails_pair_within_the_tolerance_of_the_gauge(widening, count):
     rails = rails_of(*tracks(STRAIGHT, 0.0, spacing=SPACING + widening))
