@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..lines.polyline import resample
+from ..lines.smoothing import GAP_SIGMAS
 from ..progress import SILENT, Progress
-from ..rails import RailLine
+from ..rails import RailLine, length_along
 from ..stretches.squares import Key, PointSource, Stretch, unique_keys
 from ..stretches.trimming import runs
 from ..stretches.uniting import united
@@ -74,9 +75,20 @@ def measure_in_stretches(
             part = piece.between(lead, lead + end - start)
             measured[number].append((start, replace(part, xyz=part.xyz + shift)))
     return [
-        united([part for _, part in sorted(parts, key=lambda part: part[0])]) if parts else rail
+        _straight_across_gaps(united([part for _, part in sorted(parts, key=lambda part: part[0])])) if parts else rail
         for parts, rail in zip(measured, rails)
     ]
+
+
+def _straight_across_gaps(rail: RailLine) -> RailLine:
+    """Let heights run straight across long gaps, as in a profile that is made at once; a square sees one side only."""
+    t, xyz = length_along(rail.xyz[:, :2]), rail.xyz.copy()
+    for start, end in rail.gaps:
+        if end - start > GAP_SIGMAS * PROFILE_SIGMA_M and start > 0 and end < t[-1]:
+            inside = (t > start) & (t < end)
+            heights = np.interp([start, end], t[~inside], rail.xyz[~inside, 2])
+            xyz[inside, 2] = np.interp(t[inside], [start, end], heights)
+    return replace(rail, xyz=xyz)
 
 
 def _by_stretch(rail: RailLine, zero: np.ndarray, side_m: float) -> list[tuple[Key, float, float]]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from ..lines.polyline import distance_to
 from ..lines.smoothing import smooth_profile
 from ..rails import Support
 from .head_edges import BLUR_BINS, HALF_HEAD, STATION_M, Heads, histograms
@@ -62,7 +63,7 @@ def measure_support(
     share = averaged / np.maximum(wide_counts.sum(axis=1), 1)
     sampling = _sampling(edges.density * share / bin_m, edges.weight, noise_m, BLUR_BINS * bin_m)
     view = (heads.best(edges) - heads.best(edges.alike(free))) * bin_m / np.sqrt(3)
-    bridging = sampling * _distance_to(t[top], stations) / smoothing_m
+    bridging = sampling * distance_to(t[top], stations) / smoothing_m
     remainder = smooth_profile(stations[known], middle[known] * bin_m, smoothing_m, stations)
     sigma = np.sqrt(sampling**2 + view**2 + bridging**2 + remainder**2)
     return Support(stations, points, np.where(known, np.minimum(sigma, unseen_m), unseen_m))
@@ -83,9 +84,3 @@ def _sampling(density: np.ndarray, weight: np.ndarray, noise_m: float, blur_m: f
     spread_m = np.hypot(blur_m, noise_m)
     variance = np.sqrt(np.pi) * spread_m**2 / (2 * blur_m * np.maximum(density, 1e-9))
     return np.sqrt(np.sum(weight**2 * variance, axis=0)) / np.maximum(np.sum(weight, axis=0), 1e-9)
-
-
-def _distance_to(t: np.ndarray, stations: np.ndarray) -> np.ndarray:
-    """Distance of the stations from the nearest of the chainages `t`, increasing; (s,)."""
-    after = np.clip(np.searchsorted(t, stations), 1, len(t) - 1)
-    return np.minimum(np.abs(stations - t[after - 1]), np.abs(stations - t[after]))

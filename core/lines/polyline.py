@@ -68,6 +68,13 @@ def unit_tangents(vertices: np.ndarray) -> np.ndarray:
     return both / np.maximum(np.linalg.norm(both, axis=1, keepdims=True), np.finfo(float).tiny)
 
 
+def distance_to(t: np.ndarray, stations: np.ndarray) -> np.ndarray:
+    """Distance of stations from the nearest of the chainages `t`, increasing; inf where there are none."""
+    around = np.concatenate([[-np.inf], t, [np.inf]])
+    after = np.searchsorted(t, stations) + 1
+    return np.minimum(stations - around[after - 1], around[after] - stations)
+
+
 def left_normals(vertices: np.ndarray) -> np.ndarray:
     """Point to the left of a polyline at its vertices; (n, 2) unit vectors."""
     tangents = unit_tangents(vertices)

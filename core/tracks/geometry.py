@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
-from ..lines.polyline import interpolate, left_normals, resample
+from ..lines.polyline import distance_to, interpolate, left_normals, resample
 from ..lines.smoothing import smooth_line, smooth_profile
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine, TrackGeometry, cell_borders, length_along
@@ -18,6 +19,9 @@ FINE_M = 0.25
 
 PROFILE_SIGMA_M = 1.0
 """Sigma of PAEK for gauge, cant and heights: a twist over 3 m keeps nearly all of its size."""
+
+UNKNOWN_M = 1.5
+"""Farther from where both rails are there, gauge and cant can't be told: half the base of a twist."""
 
 TWIST_BASE_M = 3.0
 """Length over which the change of cant is stated, as the standards for track geometry do."""
@@ -63,18 +67,46 @@ def measure_track_geometry(
     tuple of TrackGeometry
         One a centerline, in their order.
     """
-    return tuple(_measure(line, rails, head_width_m, step_m) for line in progress.follow(centerlines))
+    beside = _Beside(rails)
+    return tuple(_measure(line, beside, head_width_m, step_m) for line in progress.follow(centerlines))
 
 
-def _measure(line: Centerline, rails: Sequence[RailLine], head_width_m: float, step_m: float) -> TrackGeometry:
+class _Beside:
+    """The rails that tracks may run between; what holds for all tracks is found once, and only if it is needed."""
+
+    def __init__(self, rails: Sequence[RailLine]) -> None:
+        self.rails = rails
+
+    @cached_property
+    def spacing_m(self) -> float:
+        """Distance at which most rails lie."""
+        return commonest_spacing(self.rails, 0.0) or 0.0
+
+    @cached_property
+    def everyone(self) -> Side:
+        """All rails."""
+        return self._side(range(len(self.rails)))
+
+    def named(self, ids: Sequence[int]) -> Side:
+        """Rails of these ids, or all if none of them is there."""
+        numbers = [number for number, rail in enumerate(self.rails) if rail.rail_id in ids]
+        return self._side(numbers) if numbers else self.everyone
+
+    def _side(self, numbers: Sequence[int]) -> Side:
+        spans = [(number, (0.0, float(length_along(self.rails[number].xyz[:, :2])[-1]))) for number in numbers]
+        return Side.of(self.rails, spans, 0.0)
+
+
+def _measure(line: Centerline, beside: _Beside, head_width_m: float, step_m: float) -> TrackGeometry:
     """Measure one track."""
+    rails = beside.rails
     fine, along = resample(line.xyz, FINE_M)
     # The last station is the end, for what lies behind the last multiple of the step has to be stated too.
     chainage = np.append(np.arange(max(round(along[-1] / step_m), 1)) * step_m, along[-1])
     normals = left_normals(fine)
-    half = 0.5 * _spacing(line, rails, head_width_m)
-    left = _meet(rails, line.left_ids, fine[:, :2], normals, half)
-    right = _meet(rails, line.right_ids, fine[:, :2], -normals, half)
+    half = 0.5 * (line.gauge_mm / 1000 + head_width_m if np.isfinite(line.gauge_mm) else beside.spacing_m)
+    left = beside.named(line.left_ids).meet(fine[:, :2], normals, half)
+    right = beside.named(line.right_ids).meet(fine[:, :2], -normals, half)
     cant = left.height_m - right.height_m
     gauge = np.hypot(left.distance_m + right.distance_m, np.nan_to_num(cant)) - head_width_m
     twist_at = np.add.outer(0.5 * TWIST_BASE_M * np.array([-1, 1]), chainage)
@@ -98,28 +130,13 @@ def _measure(line: Centerline, rails: Sequence[RailLine], head_width_m: float, s
     )
 
 
-def _spacing(line: Centerline, rails: Sequence[RailLine], head_width_m: float) -> float:
-    """Distance between the rails of a track: as its centerline says, or as most rails lie."""
-    if np.isfinite(line.gauge_mm):
-        return line.gauge_mm / 1000 + head_width_m
-    return commonest_spacing(rails, 0.0) or 0.0
-
-
-def _meet(
-    rails: Sequence[RailLine], ids: Sequence[int], stations: np.ndarray, directions: np.ndarray, expected_m: float
-) -> Meeting:
-    """Meet the rails of these ids, or any if none of them is there."""
-    named = [number for number, rail in enumerate(rails) if rail.rail_id in ids] or range(len(rails))
-    spans = [(number, (0.0, float(length_along(rails[number].xyz[:, :2])[-1]))) for number in named]
-    return Side.of(rails, spans, 0.0).meet(stations, directions, expected_m)
-
-
 def _profile(along: np.ndarray, values: np.ndarray, chainage: np.ndarray) -> np.ndarray:
-    """Smooth what is known of a profile; all NaN stays so."""
+    """Smooth what is known of a profile; NaN where nothing near is."""
     known = np.isfinite(values)
     if not known.any():
         return np.full(len(chainage), np.nan)
-    return smooth_profile(along[known], values[known], PROFILE_SIGMA_M, chainage)
+    smooth = smooth_profile(along[known], values[known], PROFILE_SIGMA_M, chainage)
+    return np.where(distance_to(along[known], chainage) <= UNKNOWN_M, smooth, np.nan)
 
 
 def _radius(xy: np.ndarray, chainage: np.ndarray) -> np.ndarray:
@@ -163,8 +180,12 @@ def _points(rails: Sequence[RailLine], side: Meeting, along: np.ndarray, cells: 
         mine = (side.rail == number) & np.isfinite(side.t)
         if mine.sum() < 2:
             continue
-        passed = _points_before(rails[number], side.t[mine])
-        total += np.abs(np.diff(np.interp(cells, along[mine], passed), axis=0)[0])
+        t = side.t[mine]
+        steps = np.abs(np.diff(_points_before(rails[number], t)))
+        # Where a ring closes, or the rail is met again further on, what lies between was not passed.
+        steps[np.abs(np.diff(t)) > 2 * FINE_M] = 0.0
+        passed = np.concatenate([[0.0], np.cumsum(steps)])
+        total += np.diff(np.interp(cells, along[mine], passed), axis=0)[0]
     return np.round(total).astype(int)
 
 

@@ -104,6 +104,30 @@ def test_stations_stand_for_all_of_the_track(step, chainage):
     assert found.bridged_m == pytest.approx(199)
 
 
+def test_gauge_and_cant_are_unknown_where_a_rail_is_missing():
+    left, right = Track(trace([Element(40.0)]), GAUGE + WIDTH).rails()
+    line = Centerline(0.5 * (left + right), 1, 10, (1,), (2,), 1435.0, 0.0, 0.0, 0.0, 0.0)
+    short = right[right[:, 0] < 30]
+    (found,) = measure_track_geometry([line], rail_lines(left, short), WIDTH)
+    gone = found.chainage_m > short[-1, 0] + 1.7
+    assert gone.sum() > 7
+    for values in (found.gauge_mm, found.cant_mm):
+        np.testing.assert_array_equal(np.isnan(values), gone)
+    assert found.bridged[found.chainage_m > 30.6].all()
+
+
+def test_points_are_counted_once_round_a_ring():
+    angle = np.linspace(0, 2 * np.pi, 400)
+    rings = [np.column_stack([r * np.cos(angle), r * np.sin(angle), 0 * angle]) for r in (9.2465, 10.7535, 10.0)]
+    for ring, turn in zip(rings, (130, 40, 0)):
+        ring[:] = np.roll(ring[:-1], turn, axis=0)[np.r_[0:399, 0]]
+    rails = [replace(rail, points=1000) for rail in rail_lines(*rings[:2])]
+    line = Centerline(rings[2], 1, 10, (1,), (2,), 1435.0, 0.0, 0.0, 0.0, 0.0)
+    (found,) = measure_track_geometry([line], rails, WIDTH)
+    assert found.points.sum() == pytest.approx(2000, rel=0.03)
+    assert found.points.max() < 2 * np.median(found.points)
+
+
 def test_support_is_told_by_chainage():
     """Gaps in one rail, and few points on the other, along a centerline that runs against both."""
     left, right = Track(trace([Element(40.0)]), GAUGE + WIDTH).rails()

@@ -37,6 +37,17 @@ def test_a_tunnel_is_a_gap_whatever_squares_it_runs_through(side):
     assert measured.length_m == pytest.approx(LENGTH, abs=0.01)
 
 
+@pytest.mark.parametrize("side", [1000.0, 100.0, 50.0])
+def test_heights_run_straight_across_a_tunnel_on_a_gradient(side):
+    rail, points = rail_and_points()
+    lift = 0.03 * points.xyz[:, :1] * [0, 0, 1]
+    source = MemorySource(RailPoints(points.xyz + lift, points.frame, 10), side)
+    (measured,) = measure_in_stretches([rail], source, lay_out([source], source), WIDTH)
+    x = np.arange(0.0, LENGTH, 0.5)
+    height = np.interp(x, measured.xyz[:, 0], measured.xyz[:, 2])
+    np.testing.assert_allclose(height, 0.03 * x, atol=0.006)
+
+
 def test_a_rail_beside_all_points_is_a_gap_from_end_to_end():
     rail, points = rail_and_points()
     away = RailPoints(points.xyz + [0, 5.0, 0], points.frame, 10)
