@@ -81,7 +81,7 @@ class RailLine:
         north); z is NaN everywhere when there were no points to give height.
     rail_id, class_code : int
     points : int
-        Rail points that support the line.
+        Rail points that support the line; of a piece of one, the share of them, which may be no whole number.
     resid_mm : float
         Root mean square of the supporting points' offsets across the line.
     sigma_mm : float

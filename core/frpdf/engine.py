@@ -60,7 +60,10 @@ class Engine(Protocol):
         """
 
     def retreat(self) -> str:
-        """Be content with less memory, or with another device; give a message for the user."""
+        """Be content with less memory, or with another device; give a message for the user.
+
+        Only engines that raise `DeviceExhaustedError` need it.
+        """
 
     def probabilities(self, raster: np.ndarray, state: np.ndarray, number: int) -> np.ndarray:
         """Run one pass over a raster around which nothing is known, as in training.

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..lines.polyline import interpolate
 from ..progress import SILENT, Progress
 from ..rails import length_along
 from .bridges import STAIRS_M, TIGHTEST_RADIUS_M, bridge
@@ -177,7 +178,7 @@ def _even(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _between(line: np.ndarray, along: np.ndarray, start: float, end: float) -> np.ndarray:
     """Cut out the part of a line between two chainages."""
-    borders = [[np.interp(t, along, axis) for axis in line.T] for t in (start, end)]
+    borders = interpolate(line, along, [start, end])
     return np.concatenate([borders[:1], line[(along > start) & (along < end)], borders[1:]])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..lines.polyline import interpolate
 from ..rails import length_along
 
 STEP_M = 0.1
@@ -20,7 +21,7 @@ def stretch(from_end: np.ndarray, length_m: float) -> np.ndarray:
     along = length_along(from_end)
     length_m = min(length_m, along[-1])
     stations = np.linspace(0.0, length_m, max(int(length_m / STEP_M), 1) + 1)
-    return np.column_stack([np.interp(stations, along, axis) for axis in from_end.T])
+    return interpolate(from_end, along, stations)
 
 
 def cut_back(from_end: np.ndarray, length_m: float) -> np.ndarray:
@@ -28,8 +29,7 @@ def cut_back(from_end: np.ndarray, length_m: float) -> np.ndarray:
     if length_m <= 0:
         return from_end
     along = length_along(from_end)
-    first = [[np.interp(length_m, along, axis) for axis in from_end.T]]
-    return np.concatenate([first, from_end[along > length_m]])
+    return np.concatenate([interpolate(from_end, along, [length_m]), from_end[along > length_m]])
 
 
 def way_out(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
