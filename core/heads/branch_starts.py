@@ -1,12 +1,12 @@
 """Where a branch touches its stock rail: told from how it parts from it, once points have led both to their heads.
 
 The raster shows two rails apart from where their heads are a cell apart; the points show both outer edges from where
-the heads lie side by side. What lies before that is the end of the arc on which they part.
+the heads lie side by side. What lies before that is the end of the arc on which they part, or of a straight blade:
+points between the two tell which.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,10 @@ from ..lines.polyline import interpolate, left_normals, project
 from ..rails import length_along
 from ..vectorize.ends import turned
 from ..vectorize.network import LineNetwork
+from .railhead import on_top
+
+APART_HEADS = 1.3
+"""Distance of two axes, in head widths, from which the raster has a cell between the heads."""
 
 PARTED_HEADS = 3.0
 """Distance of the axes, in head widths, up to which the way they part tells where they touch."""
@@ -34,23 +38,30 @@ HEEL_SPREAD_M = 0.15
 SWITCH_M = 2.5
 """Nodes so near belong to the two blades of one switch: the widest gauge, and where blades begin a metre apart."""
 
-CLEARLY = 0.5
-"""A blade counts as straight where so much of what an arc leaves over is left over: most switches part on arcs."""
+EMPTY_SHARE = 0.4
+"""Density of points between the edges of a straight blade and of an arc, over that on the head beside, below which no
+head lies there: noise of a centimetre fills a quarter, and leaves three of a head that is there."""
+
+LEAST_ON_HEAD = 20
+"""Points on the head beside, without which the blade is taken for an arc, as most are."""
 
 STEP_M = 0.1
 """Spacing of the vertices that a branch is given before it."""
 
 
-def slide_branches(network: LineNetwork, head_width_m: float, sure_m: float) -> LineNetwork:
+def slide_branches(network: LineNetwork, xyz: np.ndarray, head_width_m: float, sure_m: float) -> LineNetwork:
     """Let each branch begin where it touches the rail that it leaves.
 
     Axes that part on arcs lie apart by the square of the way from there, so that the square root of their distance is
-    a straight line over it; beside a straight blade, as American switches have, their distance itself is one. The blade
-    counts where it fits clearly better. Branches that part in any other way stay as they are.
+    a straight line over it; beside a straight blade, as American switches have, their distance itself is one. Both fit
+    where the heads lie apart, but the arc begins metres before the blade: where no head shows beside the stock rail
+    there, it is a blade. Branches that part in any other way stay as they are.
 
     Parameters
     ----------
     network : LineNetwork
+    xyz : (k, 3) array
+        Rail points.
     head_width_m : float
     sure_m : float
         Distance of the axes from which both lines can be trusted.
@@ -62,11 +73,13 @@ def slide_branches(network: LineNetwork, head_width_m: float, sure_m: float) -> 
         for end in np.flatnonzero(network.ends.ravel() == node).tolist()
         if end // 2 != stock
     ]
-    partings = [_parting(network, end, number, between_m) for number, end in starts]
-    for (number, end), parting in zip(starts, partings):
-        if parting is not None:
-            of_switch = [other for other in partings if other is not None and other.near(parting)]
-            network = _slide(network, end, number, between_m, _power(of_switch))
+    apart_m = APART_HEADS * head_width_m, between_m[1]
+    partings = [_parting(network, end, number, apart_m) for number, end in starts]
+    shown = [np.zeros(2) if one is None else _points_of_arc(network, one, xyz, head_width_m) for one in partings]
+    places = [network.nodes[network.passes[number, 0]] for number, _ in starts]
+    for (number, end), place in zip(starts, places):
+        of_switch = [points for points, other in zip(shown, places) if np.hypot(*(other - place)) < SWITCH_M]
+        network = _slide(network, end, number, between_m, _power(sum(of_switch)))
     return network.tidy()
 
 
@@ -76,8 +89,8 @@ class _Parting:
 
     Attributes
     ----------
-    place : (2,) array
-        The node.
+    node_m : float
+        Chainage of the node on the other line.
     stock, sense : int, float
         Number of the other line, and the sense along it in which this one leaves.
     way, apart : (n,) arrays
@@ -88,7 +101,7 @@ class _Parting:
         Vertex of this line, from its end, at the first of these places.
     """
 
-    place: np.ndarray
+    node_m: float
     stock: int
     sense: float
     way: np.ndarray
@@ -96,9 +109,10 @@ class _Parting:
     left: float
     kept: int
 
-    def near(self, other: _Parting) -> bool:
-        """Tell whether both belong to one switch, whose two blades lie a gauge apart."""
-        return bool(np.hypot(*(self.place - other.place)) < SWITCH_M)
+    def law(self, power: int) -> _Law:
+        """Fit a straight blade up to its heel, or an arc."""
+        blade = self.apart <= HEEL_SPREAD_M if power == STRAIGHT else np.ones(len(self.apart), dtype=bool)
+        return _Law.fitted(self.way[blade], self.apart[blade], power)
 
 
 def _parting(network: LineNetwork, end: int, number: int, between_m: tuple[float, float]) -> _Parting | None:
@@ -116,7 +130,7 @@ def _parting(network: LineNetwork, end: int, number: int, between_m: tuple[float
     if first + 2 > last or way[last - 1] - way[first] < LEAST_STRETCH_M:
         return None
     left, kept = float(np.sign(feet.across[first])), int(feet.point[first])
-    return _Parting(line[vertex], stock, sense, way[first:last], apart[first:last], left, kept)
+    return _Parting(float(along[vertex]), stock, sense, way[first:last], apart[first:last], left, kept)
 
 
 def _slide(network: LineNetwork, end: int, number: int, between_m: tuple[float, float], power: int) -> LineNetwork:
@@ -124,8 +138,7 @@ def _slide(network: LineNetwork, end: int, number: int, between_m: tuple[float, 
     parting = _parting(network, end, number, between_m)
     if parting is None:
         return network
-    blade = parting.apart <= HEEL_SPREAD_M if power == STRAIGHT else np.ones(len(parting.apart), dtype=bool)
-    touch, _ = _root(parting.way[blade], parting.apart[blade], power)
+    touch = parting.law(power).touch
     if not parting.way[0] - FARTHEST_M <= touch < parting.way[0]:
         return network
     line, vertex = network.lines[parting.stock], network.passes[number, 2]
@@ -146,22 +159,54 @@ def _telling(apart: np.ndarray, least_m: float, most_m: float) -> tuple[int, int
     return int(below[-1]) + 1 if len(below) else 0, last
 
 
-def _power(partings: Sequence[_Parting]) -> int:
-    """Tell from the blades of one switch whether lines part by the way or by its square."""
-    left_over = {STRAIGHT: 0.0, TANGENTIAL: 0.0}
-    for parting in partings:
-        blade = parting.apart <= HEEL_SPREAD_M
-        if np.count_nonzero(blade) > 2:
-            for power in left_over:
-                left_over[power] += _root(parting.way[blade], parting.apart[blade], power)[1] ** 2
-    return STRAIGHT if left_over[STRAIGHT] < CLEARLY**2 * left_over[TANGENTIAL] else TANGENTIAL
+def _points_of_arc(network: LineNetwork, parting: _Parting, xyz: np.ndarray, head_width_m: float) -> np.ndarray:
+    """Count points where only an arc has its head, and on the head in a strip of the same area beside: (2,)."""
+    blade, arc = parting.law(STRAIGHT), parting.law(TANGENTIAL)
+    line, along = network.lines[parting.stock], length_along(network.lines[parting.stock])
+    way = parting.sense * (along - parting.node_m)
+    shared = (way >= max(arc.touch, parting.way[0] - FARTHEST_M)) & (way <= parting.way[0])
+    if np.count_nonzero(shared) < 2:  # also where there is no such arc
+        return np.zeros(2)
+    piece = line[shared]
+    reach_m = head_width_m + parting.apart[0]
+    near = np.flatnonzero(np.all((xyz[:, :2] > piece.min(0) - reach_m) & (xyz[:, :2] < piece.max(0) + reach_m), axis=1))
+    feet = project([piece], xyz[near, :2], reach_m)
+    if not len(feet.t):
+        return np.zeros(2)
+    top, _ = on_top(feet.t, feet.across, xyz[near[feet.point], 2], head_width_m)
+    feet = feet[top]
+    way = parting.sense * (feet.t + along[shared][0] - parting.node_m)
+    strip = arc(way) - blade(way)
+    beyond = parting.left * feet.across - 0.5 * head_width_m - blade(way)
+    return np.array([np.count_nonzero((outward > 0) & (outward < strip)) for outward in (beyond, -beyond)])
 
 
-def _root(way: np.ndarray, apart: np.ndarray, power: int) -> tuple[float, float]:
-    """Fit a power of the way to the distance: where it begins, and the rms of what is left, metres."""
-    slope, root = np.polyfit(way, apart ** (1 / power), 1)
-    off = np.sqrt(np.mean((np.maximum(slope * way + root, 0.0) ** power - apart) ** 2))
-    return (float(-root / slope), float(off)) if slope > 0 else (np.nan, np.inf)
+def _power(points: np.ndarray) -> int:
+    """Tell from the points at a switch, see `_points_of_arc`, whether lines part by the way or by its square."""
+    on_arc, on_head = points
+    return STRAIGHT if on_head >= LEAST_ON_HEAD and on_arc < EMPTY_SHARE * on_head else TANGENTIAL
+
+
+@dataclass(frozen=True)
+class _Law:
+    """How the distance of two lines grows with the way: by a power, (slope way + root)^power, from where that is 0."""
+
+    slope: float
+    root: float
+    power: int
+
+    @classmethod
+    def fitted(cls, way: np.ndarray, apart: np.ndarray, power: int) -> _Law:
+        """Fit it to distances, (n,)."""
+        return cls(*np.polyfit(way, apart ** (1 / power), 1).tolist(), power)
+
+    @property
+    def touch(self) -> float:
+        """Way at which the lines touch; NaN where they come closer."""
+        return -self.root / self.slope if self.slope > 0 else np.nan
+
+    def __call__(self, way: np.ndarray) -> np.ndarray:
+        return np.maximum(self.slope * way + self.root, 0.0) ** self.power
 
 
 def _blade(line: np.ndarray, touch: float, first: float, across: float, power: int) -> np.ndarray:

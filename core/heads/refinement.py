@@ -18,7 +18,7 @@ from ..progress import SILENT, Progress
 from ..rails import length_along
 from ..vectorize.bridges import bridge
 from ..vectorize.network import LineNetwork
-from .branch_starts import slide_branches
+from .branch_starts import APART_HEADS, slide_branches
 from .head_edges import HALF_HEAD, histograms, middles, widest_reach
 from .neighbours import free_edges
 from .railhead import on_top
@@ -37,10 +37,10 @@ head widths or more, which half a window of 1.25 m makes longer, and the bend of
 CROSSING_M = 3.0
 """Where two lines cross moves this far at most when they move by half a head: at 1:26.5 by 1 m each."""
 
-SURE_HEADS = (1.3, 0.2, 0.2)
-"""Distance of a branch from its stock rail, in head widths, that lines can be trusted from after each round: first
-where the raster has a cell between the heads, then where their points part by more than noise. Without branches the
-third round moves lines by less than 0.1 mm."""
+SURE_HEADS = (APART_HEADS, 0.7, 0.7)
+"""Distance of a branch from its stock rail, in head widths, that lines can be trusted from after each round: first as
+far as the raster tells, then where most of the head stands free. Nearer its line still leans to where it was thought to
+begin, which draws a start half a metre forward. Without branches the third round moves lines by less than 0.1 mm."""
 
 
 def refine(
@@ -72,7 +72,7 @@ def refine(
     for number, sure in enumerate(rounds):
         share = progress.span(number / len(rounds), (number + 1) / len(rounds))
         network = _shifted(network, points, head_width_m, smoothing_m, share)
-        network = slide_branches(network, head_width_m, sure * head_width_m)
+        network = slide_branches(network, points.xyz, head_width_m, sure * head_width_m)
     return network
 
 

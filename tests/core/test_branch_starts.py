@@ -21,13 +21,31 @@ def network(offset, node_at, hand=1, turned=False, stock_turned=False):
     return LineNetwork(lines, nodes, ends, passes)
 
 
+def heads(offset, hand=1, density=100):
+    """Points on the heads of a stock rail along the x axis and of a branch beside it, with 3 mm of noise."""
+    rng = np.random.default_rng(5)
+    x = rng.uniform(0, LENGTH, (2, int(density * LENGTH)))
+    across = np.array([np.zeros_like(x[0]), np.where(x[1] > TOE, hand * offset(x[1] - TOE), 0.0)])
+    y = across + rng.uniform(-0.5, 0.5, x.shape) * WIDTH
+    y, z = y + rng.normal(0, 0.003, x.shape), rng.normal(0, 0.003, x.shape)
+    return np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+
+
+NO_POINTS = np.empty((0, 3))
+
+
 @pytest.mark.parametrize("radius", [190.0, 1200.0])
 @pytest.mark.parametrize("hand", [1, -1])
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("stock_turned", [False, True])
 def test_a_branch_on_an_arc_begins_where_the_arc_touches(radius, hand, turned, stock_turned):
     late = TOE + np.sqrt(2 * radius * 0.04)
-    slid = slide_branches(network(lambda x: x**2 / (2 * radius), late, hand, turned, stock_turned), WIDTH, 0.5 * WIDTH)
+
+    def offset(x):
+        return x**2 / (2 * radius)
+
+    before = network(offset, late, hand, turned, stock_turned)
+    slid = slide_branches(before, heads(offset, hand), WIDTH, 0.5 * WIDTH)
     branch = slid.lines[1][::-1] if turned else slid.lines[1]
     assert branch[0, 0] == pytest.approx(TOE, abs=0.06)
     true = hand * np.clip(branch[:, 0] - TOE, 0, None) ** 2 / (2 * radius)
@@ -39,29 +57,38 @@ def test_a_branch_on_an_arc_begins_where_the_arc_touches(radius, hand, turned, s
 
 
 def test_a_branch_that_began_too_early_begins_later():
-    slid = slide_branches(network(lambda x: np.clip(x, 0, None) ** 2 / 600, 22.0), WIDTH, 0.5 * WIDTH)
+    before = network(lambda x: np.clip(x, 0, None) ** 2 / 600, 22.0)
+    slid = slide_branches(before, NO_POINTS, WIDTH, 0.5 * WIDTH)
     assert slid.lines[1][0, 0] == pytest.approx(TOE, abs=0.06)
 
 
+def straight_switch(angle):
+    """An American switch: an angle at the point, the closure curve behind the heel."""
+    return lambda x: angle * x + np.clip(x - 0.16 / angle, 0, None) ** 2 / 600
+
+
 @pytest.mark.parametrize("angle", [1 / 30, 1 / 60])
+@pytest.mark.parametrize("hand", [1, -1])
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_straight_blade_begins_at_its_point(angle, turned):
-    """A straight American switch: an angle at the point, the closure curve behind the heel."""
-
-    def offset(x):
-        heel = 0.16 / angle
-        return angle * x + np.clip(x - heel, 0, None) ** 2 / 600
-
-    slid = slide_branches(network(offset, TOE - 2.8, 1, turned), WIDTH, 0.5 * WIDTH)
+@pytest.mark.parametrize("sure", [1.3, 0.5])
+def test_a_straight_blade_begins_at_its_point(angle, hand, turned, sure):
+    offset = straight_switch(angle)
+    slid = slide_branches(network(offset, TOE - 2.8, hand, turned), heads(offset, hand), WIDTH, sure * WIDTH)
     branch = slid.lines[1][::-1] if turned else slid.lines[1]
-    assert branch[0, 0] == pytest.approx(TOE, abs=0.3)
-    assert np.abs(branch[:, 1] - offset(branch[:, 0] - TOE)).max() < 0.01
+    assert branch[0, 0] == pytest.approx(TOE, abs=0.06)
+    assert np.abs(branch[:, 1] - hand * offset(branch[:, 0] - TOE)).max() < 0.0005
+
+
+def test_without_points_a_blade_is_taken_for_an_arc():
+    offset = straight_switch(1 / 30)
+    slid = slide_branches(network(offset, TOE - 2.8), NO_POINTS, WIDTH, 1.3 * WIDTH)
+    assert slid.lines[1][0, 0] < TOE - 2.0
 
 
 @pytest.mark.parametrize("offset", [lambda x: x / 3, lambda x: 0.5 + 0 * x, lambda x: 0.05 - x / 2000])
 def test_lines_that_do_not_part_on_an_arc_stay(offset):
     before = network(offset, TOE)
-    after = slide_branches(before, WIDTH, 0.5 * WIDTH)
+    after = slide_branches(before, NO_POINTS, WIDTH, 0.5 * WIDTH)
     for one, other in zip(before.lines, after.lines):
         np.testing.assert_array_equal(one, other)
 
@@ -71,7 +98,7 @@ def test_other_lines_still_meet_the_branch_that_was_given_a_new_start():
     third = before.lines[1][200] + np.array([[0.0, 0.0], [0.0, 5.0]])
     nodes = np.concatenate([before.nodes, third])
     ends, passes = np.array([*before.ends, [4, 5]]), np.array([*before.passes, [4, 1, 200]])
-    after = slide_branches(LineNetwork((*before.lines, third), nodes, ends, passes), WIDTH, 0.5 * WIDTH)
+    after = slide_branches(LineNetwork((*before.lines, third), nodes, ends, passes), NO_POINTS, WIDTH, 0.5 * WIDTH)
     assert len(after.lines[1]) > len(before.lines[1])
     for node, line, vertex in after.passes.tolist():
         np.testing.assert_array_equal(after.lines[line][vertex], after.nodes[node])
