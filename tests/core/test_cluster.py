@@ -14,6 +14,7 @@ import numpy as np
 import pyogrio
 import pytest
 import shapely
+import torch
 from distributed import Client, KilledWorker, LocalCluster
 from rail_extract.__main__ import main
 from rail_extract.core.cluster import run
@@ -70,6 +71,11 @@ def same(found, expected, frame, other):
         np.testing.assert_allclose(frame.to_crs(one.xyz), other.to_crs(two.xyz), rtol=0, atol=1e-4)
         for name in ("rail_id", "points", "sigma_mm", "track_id", "left_ids", "gauge_mm", "bridged_m"):
             assert getattr(one, name, None) == pytest.approx(getattr(two, name, None), abs=0.01)
+
+
+def test_a_local_worker_keeps_to_its_core_and_its_memory(client):
+    found = client.run(lambda: (torch.get_num_threads(), os.environ["MALLOC_TRIM_THRESHOLD_"]))
+    assert list(found.values()) == [(1, "268435456")] * 2
 
 
 def test_workers_give_what_one_process_gives(tiles, one_process, client, tmp_path):
