@@ -11,9 +11,11 @@ from rail_extract.core.frpdf import STATISTICS
 from rail_extract.core.frpdf.network import PassBatchNorm2d
 from rail_extract.core.frpdf.torch_engine import TorchEngine
 from rail_extract.core.frpdf.weights import load_arrays
+from rail_extract.core.synthetic.pairs import random_pair
 from rail_extract.core.training import curves, evaluate, gradients, train
 from rail_extract.core.training.optimizers import Optimizers
 from rail_extract.core.training.rivals import NETWORKS, TrainedNetwork, parameter_count
+from scipy import ndimage
 
 
 @pytest.fixture
@@ -81,8 +83,19 @@ def test_the_learning_rate_rises_and_falls_as_a_cosine():
 
 def test_the_loss_of_a_perfect_answer_is_small_and_of_the_opposite_large():
     label = (torch.arange(100.0).reshape(1, 1, 10, 10) % 3 == 0).float()
-    assert train.loss_of(40 * label - 20, label) < 0.01
-    assert train.loss_of(20 - 40 * label, label) > 10
+    even = torch.ones_like(label)
+    assert train.loss_of(40 * label - 20, label, even) < 0.01
+    assert train.loss_of(20 - 40 * label, label, even) > 10
+
+
+def test_cells_by_gaps_and_by_what_looks_like_rails_weigh_more_whether_rail_or_not():
+    pair = random_pair(np.random.default_rng(3), 256, 0.8, family="turnout")
+    weights = train.cell_weights(pair)
+    hard = (pair.gap > 0) | pair.distractor
+    near = ndimage.distance_transform_cdt(~hard, "chessboard") <= train.HARD_REACH
+    np.testing.assert_array_equal(weights, np.where(near, train.HARD_WEIGHT, 1.0))
+    assert 0.01 < near.mean() < 0.2
+    assert (near & pair.label).any() and (near & ~pair.label).any()
 
 
 def test_a_resumed_training_ends_where_an_unbroken_one_does(small, tmp_path):
