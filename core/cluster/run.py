@@ -33,7 +33,7 @@ ONE_THREAD = tuple(f"{name}_NUM_THREADS" for name in ("OMP", "MKL", "OPENBLAS", 
 """Variables that keep a local worker on one core: there are as many workers as cores."""
 
 MEMORY_KEPT = {"MALLOC_TRIM_THRESHOLD_": 256 << 20, "MALLOC_MMAP_THRESHOLD_": 32 << 20}
-"""Bytes that glibc keeps of what a local worker frees, and the largest array it takes from them. Under Dask's own 64 KiB
+"""Bytes that glibc keeps of what a local worker frees, and the largest array it takes from them. Under Dask's 64 KiB
 every array goes back to the system, which clears its memory before it is lent again: a tenth of a worker's time."""
 
 WORKER_BYTES = 3 << 29
