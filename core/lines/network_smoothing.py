@@ -129,9 +129,13 @@ def _moved_nodes(nodes: np.ndarray, anchor_node: np.ndarray, rank: np.ndarray, p
 
 def lead(line: np.ndarray, t: np.ndarray, places: np.ndarray, targets: np.ndarray) -> None:
     """Bend a line in place so that its vertices at `places` come to `targets`; t in sigma."""
-    fading = _fading(t[places][:, None] - t[places])
-    weights = np.linalg.lstsq(fading, targets - line[places], rcond=1e-9)[0]
-    line += _fading(t[:, None] - t[places]) @ weights
+    order = np.argsort(places)
+    places, targets = places[order], targets[order]
+    apart = np.flatnonzero(np.diff(t[places]) > REACH_SIGMAS) + 1
+    for own, own_targets in zip(np.split(places, apart), np.split(targets, apart)):
+        first, last = np.searchsorted(t, t[own[[0, -1]]] + [-REACH_SIGMAS, REACH_SIGMAS])
+        weights = np.linalg.lstsq(_fading(t[own][:, None] - t[own]), own_targets - line[own], rcond=1e-9)[0]
+        line[first:last] += _fading(t[first:last, None] - t[own]) @ weights
     line[places] = targets
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial.legendre import leggauss
-from rail_extract.core.lines.network_smoothing import NETWORK_STATIONS_PER_SIGMA, smooth_network
+from rail_extract.core.lines.network_smoothing import NETWORK_STATIONS_PER_SIGMA, lead, smooth_network
 from rail_extract.core.lines.smoothing import smooth_line, smooth_profile
 from rail_extract.core.rails import length_along
 from rail_extract.core.synthetic.curves import trace, transition_curve
@@ -249,3 +249,32 @@ def test_a_diamond_keeps_its_crossing_in_both_lines():
     for node, line, vertex in smoothed.passes:
         np.testing.assert_array_equal(smoothed.lines[line][vertex], smoothed.nodes[node])
     assert np.hypot(*smoothed.nodes[4]) < 0.005
+
+
+def test_a_line_is_led_to_its_nodes_smoothly_and_only_near_them():
+    rng = np.random.default_rng(4)
+    t = np.arange(0, 400, 0.125)
+    places = np.array([2900, 0, 800, 803, 1600, len(t) - 1])
+    line = np.zeros((len(t), 2))
+    targets = rng.normal(0, 0.01, (len(places), 2))
+    lead(line, t, places, targets)
+    np.testing.assert_array_equal(line[places], targets)
+    assert np.abs(np.diff(line, 2, axis=0)).max() < 0.02 * 0.125  # no corner, though two nodes pull apart
+    midway = np.abs(t[:, None] - t[places]).min(axis=1) > 25
+    assert midway.sum() > 500
+    assert np.abs(line[midway]).max() < 1e-10
+
+
+def test_leading_a_line_equals_one_dense_system():
+    rng = np.random.default_rng(5)
+    t = np.cumsum(rng.uniform(0.05, 0.2, 4000))
+    places = np.sort(rng.choice(len(t), 40, replace=False))
+    line, targets = rng.normal(size=(len(t), 2)), rng.normal(size=(40, 2))
+
+    def fading(d):
+        return (1 + np.abs(d)) * np.exp(-np.abs(d))
+
+    weights = np.linalg.solve(fading(t[places][:, None] - t[places]), targets - line[places])
+    expected = line + fading(t[:, None] - t[places]) @ weights
+    lead(line, t, places, targets)
+    np.testing.assert_allclose(line, expected, atol=1e-9)
