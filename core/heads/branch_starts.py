@@ -111,8 +111,10 @@ class _Parting:
 
     def law(self, power: int) -> _Law:
         """Fit a straight blade up to its heel, or an arc."""
-        blade = self.apart <= HEEL_SPREAD_M if power == STRAIGHT else np.ones(len(self.apart), dtype=bool)
-        return _Law.fitted(self.way[blade], self.apart[blade], power)
+        told = self.apart <= HEEL_SPREAD_M
+        if power == TANGENTIAL or np.count_nonzero(told) < 3:  # the widest heads hide the heel
+            told[:] = True
+        return _Law.fitted(self.way[told], self.apart[told], power)
 
 
 def _parting(network: LineNetwork, end: int, number: int, between_m: tuple[float, float]) -> _Parting | None:

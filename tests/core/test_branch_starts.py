@@ -79,6 +79,11 @@ def test_a_straight_blade_begins_at_its_point(angle, hand, turned, sure):
     assert np.abs(branch[:, 1] - hand * offset(branch[:, 0] - TOE)).max() < 0.0005
 
 
+def test_heads_so_wide_that_they_hide_the_heel_are_no_obstacle():
+    slid = slide_branches(network(straight_switch(1 / 30), TOE - 2.8), NO_POINTS, 0.125, 1.3 * 0.125)
+    assert slid.degrees().tolist().count(3) == 1
+
+
 def test_without_points_a_blade_is_taken_for_an_arc():
     offset = straight_switch(1 / 30)
     slid = slide_branches(network(offset, TOE - 2.8), NO_POINTS, WIDTH, 1.3 * WIDTH)
