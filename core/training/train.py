@@ -52,7 +52,10 @@ WARM_UP_STEPS = 40
 STATISTICS_STEPS = 60
 """Steps over which the batch statistics of the final weights are averaged."""
 CHECKPOINT_STEPS = 50
-DATA, STATISTICS_DATA = 0, 1
+CALIBRATION_STEPS, CALIBRATION_ROUNDS = 30, 2
+"""Steps of which the output's bias is told, and rounds of it: what one pass feeds back moves along."""
+LOGIT_BIN, GREATEST_LOGIT = 0.05, 8.0
+DATA, STATISTICS_DATA, CALIBRATION_DATA = 0, 1, 2
 """Streams of random numbers; evaluation has streams of its own."""
 
 
@@ -93,6 +96,7 @@ def run(arguments: argparse.Namespace) -> None:
         print(f"Stopped before the end; the same command goes on from {arguments.folder / 'checkpoint.pt'}.")
         return
     recompute_statistics(network, settings)
+    calibrate(network, settings)
     save_arrays(arguments.folder / "weights.npz", export(network))
     print(f"Wrote {arguments.folder / 'weights.npz'}.")
 
@@ -219,6 +223,24 @@ def recompute_statistics(network: Recurrent, settings: Settings) -> None:
         observed, *_ = batch(settings, STATISTICS_DATA, step)
         for _ in run_passes(network, observed, max(settings.passes, STATISTICS)):
             pass
+
+
+@torch.no_grad()
+def calibrate(network: Recurrent, settings: Settings) -> None:
+    """Move the output's bias so that F1 is largest at `OUTPUT_THRESHOLD`: weights of cells lean it to one side."""
+    network.eval()
+    edges = torch.arange(-GREATEST_LOGIT, GREATEST_LOGIT, LOGIT_BIN)
+    for _ in range(CALIBRATION_ROUNDS):
+        rails, others = np.zeros((2, len(edges) - 1))
+        for step in range(CALIBRATION_STEPS):
+            observed, label, _ = batch(settings, CALIBRATION_DATA, step)
+            *_, logits = run_passes(network, observed, settings.passes)
+            logits = logits.clamp(-GREATEST_LOGIT + LOGIT_BIN, GREATEST_LOGIT - 2 * LOGIT_BIN).cpu()
+            rails += torch.histogram(logits[label.cpu() > 0.5], edges)[0].numpy()
+            others += torch.histogram(logits[label.cpu() <= 0.5], edges)[0].numpy()
+        found, invented = (np.cumsum(counts[::-1])[::-1] for counts in (rails, others))
+        best = float(edges[int(np.argmax(2 * found / (found + invented + rails.sum())))])
+        head_of(network).bias -= best - math.log(OUTPUT_THRESHOLD / (1 - OUTPUT_THRESHOLD))
 
 
 def export(network: Recurrent) -> dict[str, np.ndarray]:
