@@ -128,8 +128,12 @@ def _moved_nodes(nodes: np.ndarray, anchor_node: np.ndarray, rank: np.ndarray, p
 
 
 def lead(line: np.ndarray, t: np.ndarray, places: np.ndarray, targets: np.ndarray) -> None:
-    """Bend a line in place so that its vertices at `places` come to `targets`; t in sigma."""
-    order = np.argsort(places)
+    """Bend a line in place so that its vertices at `places` come to `targets`; t in sigma, not decreasing.
+
+    Places further apart than the correction reaches are served by systems of their own, so that long lines take linear
+    time and memory.
+    """
+    order = np.argsort(places, kind="stable")
     places, targets = places[order], targets[order]
     apart = np.flatnonzero(np.diff(t[places]) > REACH_SIGMAS) + 1
     for own, own_targets in zip(np.split(places, apart), np.split(targets, apart)):

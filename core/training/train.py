@@ -41,8 +41,8 @@ most cells see all of it."""
 LAST_SHARE = 0.01
 """Share of the steps with the last crop; such a step costs four of the others."""
 HARD_WEIGHT, HARD_REACH = 3.0, 2
-"""Weight in the entropy of cells so near to a gap, a guard rail or a lone line: they are few, and what lines hang on.
-Rail or not, those around weigh alike, so that what the network holds probable does not shift."""
+"""Weight in the entropy of cells so near to a gap, a guard rail or a lone line, rail or not: they are few, and what
+lines hang on. The output finds too little for it, which `calibrate` makes good."""
 EARLY_PASS_WEIGHT = 0.5
 """Weight of the loss of a pass that is not the last one, which makes the result."""
 HEAD_BIAS = -4.0
@@ -55,6 +55,7 @@ CHECKPOINT_STEPS = 50
 CALIBRATION_STEPS, CALIBRATION_ROUNDS = 30, 2
 """Steps of which the output's bias is told, and rounds of it: what one pass feeds back moves along."""
 LOGIT_BIN, GREATEST_LOGIT = 0.05, 8.0
+"""Steps and range in which the bias is sought: one moves F1 by less than 0.0005, and the range is all but certainty."""
 DATA, STATISTICS_DATA, CALIBRATION_DATA = 0, 1, 2
 """Streams of random numbers; evaluation has streams of its own."""
 
@@ -227,7 +228,7 @@ def recompute_statistics(network: Recurrent, settings: Settings) -> None:
 
 @torch.no_grad()
 def calibrate(network: Recurrent, settings: Settings) -> None:
-    """Move the output's bias so that F1 is largest at `OUTPUT_THRESHOLD`: weights of cells lean it to one side."""
+    """Move the output's bias, in place, so that F1 by cell is largest at `OUTPUT_THRESHOLD`; see `HARD_WEIGHT`."""
     network.eval()
     edges = torch.arange(-GREATEST_LOGIT, GREATEST_LOGIT, LOGIT_BIN)
     for _ in range(CALIBRATION_ROUNDS):
