@@ -98,13 +98,18 @@ def list_files(paths: str | Path | Sequence[str | Path]) -> tuple[Path, ...]:
         path = Path(path).absolute()  # a worker may run elsewhere
         if not path.exists():
             raise CloudError(f"{path} does not exist: check the path.")
-        found = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES) if path.is_dir() else [path]
+        found = _tiles(path) if path.is_dir() else [path]
         if not found:
             raise CloudError(f"The folder {path} holds no .las or .laz file: choose another one.")
         files.extend(found)
     if not files:
         raise CloudError("No point cloud was given: name a LAS or LAZ file or a folder of them.")
     return tuple({file.resolve(): file for file in reversed(files)}.values())[::-1]
+
+
+def _tiles(folder: Path) -> list[Path]:
+    """List a folder's LAS and LAZ files; those that macOS hides beside each on foreign disks begin with a dot."""
+    return sorted(file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES and file.name[0] != ".")
 
 
 def read_header(path: Path) -> CloudHeader:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,7 +17,11 @@ from qgis.core import (
     QgsProperty,
 )
 
+from ..core.disk import check_closed
 from ..core.errors import RailExtractError
+
+TABLE = "ogr:"
+"""Begins destinations that are a table of a file."""
 
 
 def check_writable(value: Any, context: QgsProcessingContext) -> None:
@@ -40,6 +45,9 @@ def check_writable(value: Any, context: QgsProcessingContext) -> None:
         if path.is_dir():
             raise RailExtractError(f"The output {path} is a folder: give the name of a file in it.")
         _try_writing(path)
+        if plain_file(value, context) and path.exists():
+            path.replace(path)  # refused on Windows while another program has it open
+            check_closed(path)
     except OSError as error:
         raise RailExtractError(
             f"The output {path} can't be written ({error.strerror}): choose another place."
@@ -64,13 +72,16 @@ def check_distinct(outputs: Mapping[str, Any], context: QgsProcessingContext) ->
     RailExtractError
         Two are the same file, or the same table of one.
     """
-    seen: dict[str, str] = {}
+    seen: list[tuple[str, str, str]] = []
     for name, value in outputs.items():
-        if _output_file(value, context) is None:
+        path = _output_file(value, context)
+        if path is None:
             continue
-        other = seen.setdefault(_text(value, context), name)
-        if other != name:
-            raise RailExtractError(f"{other} and {name} are one file: give each a name of its own.")
+        file, table = os.path.normcase(path.resolve()), _table(_text(value, context))
+        for other, other_file, other_table in seen:
+            if file == other_file and (not table or not other_table or table == other_table):
+                raise RailExtractError(f"{other} and {name} are one file: give each a name of its own.")
+        seen.append((name, file, table))
 
 
 def _text(value: Any, context: QgsProcessingContext) -> str:
@@ -92,6 +103,13 @@ def plain_file(value: Any, context: QgsProcessingContext) -> Path | None:
 def _output_file(value: Any, context: QgsProcessingContext) -> Path | None:
     """File behind a destination; None for memory layers and databases."""
     text = _text(value, context)
-    if text.startswith("ogr:"):
-        text = QgsDataSourceUri(text[len("ogr:") :]).database()
-    return plain_file(text, context)
+    return plain_file(_uri(text).database() if text.startswith(TABLE) else text, context)
+
+
+def _table(text: str) -> str:
+    """Table that a destination names in a file; empty where it is the file itself."""
+    return _uri(text).table() if text.startswith(TABLE) else ""
+
+
+def _uri(text: str) -> QgsDataSourceUri:
+    return QgsDataSourceUri(text[len(TABLE) :])

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from qgis.core import QgsProcessingFeedback
+from collections.abc import Sequence
+
+from qgis.core import QgsProcessingFeedback, QgsProcessingParameterDefinition
 
 from ..core.progress import Progress
+from .labels import for_reader
 
 
 class QgisProgress(Progress):
@@ -13,10 +16,15 @@ class QgisProgress(Progress):
     Parameters
     ----------
     feedback : QgsProcessingFeedback
+    definitions : sequence of QgsProcessingParameterDefinition
+        Parameters that what is reported may name.
     """
 
-    def __init__(self, feedback: QgsProcessingFeedback) -> None:
+    def __init__(
+        self, feedback: QgsProcessingFeedback, definitions: Sequence[QgsProcessingParameterDefinition]
+    ) -> None:
         self._feedback = feedback
+        self._definitions = definitions
 
     def set_fraction(self, fraction: float) -> None:
         """Move the progress bar."""
@@ -28,11 +36,11 @@ class QgisProgress(Progress):
 
     def info(self, text: str) -> None:
         """Write a line into the log."""
-        self._feedback.pushInfo(text)
+        self._feedback.pushInfo(for_reader(text, self._definitions))
 
     def warning(self, text: str) -> None:
         """Write a marked line into the log."""
-        self._feedback.pushWarning(text)
+        self._feedback.pushWarning(for_reader(text, self._definitions))
 
     def is_cancelled(self) -> bool:
         """Tell whether the cancel button was pressed."""

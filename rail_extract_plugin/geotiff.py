@@ -11,6 +11,7 @@ import numpy as np
 from osgeo import gdal
 
 from ..core.crs import parse_crs, units
+from ..core.disk import take_names
 from ..core.errors import RasterError
 from ..core.points import LocalFrame
 from ..core.progress import SILENT, Progress
@@ -95,7 +96,7 @@ def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster
 
     Raises
     ------
-    RasterError
+    RasterError, DiskError
         The file can't be written.
     Cancelled
         The user cancelled.
@@ -106,8 +107,8 @@ def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster
         _write(part, header, rasters, progress)
         if gdal.GetLastErrorType() >= gdal.CE_Failure:
             raise RuntimeError(gdal.GetLastErrorMsg())
-        part.replace(path)
-    except (RuntimeError, OSError) as error:
+        take_names(path, {part: path})
+    except RuntimeError as error:
         raise RasterError(f"{path} can't be written ({_cause(error)}): choose another place.") from error
     finally:
         part.unlink(missing_ok=True)

@@ -10,6 +10,9 @@ from qgis.core import QgsApplication, QgsProcessingParameterDefinition
 WITH_DIALOGS = "desktop"
 """What QGIS calls the platform of its windows."""
 
+NAME = r"(?<![\w./\\])[A-Z][A-Z_]+(?![\w/\\]|\.\w)"
+"""A word in capitals that is no part of a path."""
+
 
 def for_reader(sentence: str, definitions: Sequence[QgsProcessingParameterDefinition]) -> str:
     """Word a sentence about parameters as the platform's users know them."""
@@ -19,4 +22,4 @@ def for_reader(sentence: str, definitions: Sequence[QgsProcessingParameterDefini
 def with_labels(sentence: str, definitions: Sequence[QgsProcessingParameterDefinition]) -> str:
     """Put the labels, in quotes, in place of the names of parameters."""
     labels = {definition.name(): definition.description() for definition in definitions}
-    return re.sub(r"\b[A-Z][A-Z_]+\b", lambda name: f'"{labels[name[0]]}"' if name[0] in labels else name[0], sentence)
+    return re.sub(NAME, lambda name: f'"{labels[name[0]]}"' if name[0] in labels else name[0], sentence)

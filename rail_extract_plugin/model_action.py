@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from processing.gui.ContextAction import ContextAction
 from processing.gui.ProviderActions import ProviderContextMenuActions
-from processing.modeler.ModelerDialog import ModelerDialog
 from qgis.core import QgsProcessingAlgorithm, QgsProcessingModelAlgorithm
 
 from .i18n import tr
@@ -34,6 +33,8 @@ class OpenModelAction(ContextAction):
 
     def execute(self) -> None:
         """Open the model designer."""
+        from processing.modeler.ModelerDialog import ModelerDialog  # newer QGIS moves it, which must not stop a start
+
         model = QgsProcessingModelAlgorithm()
         model.fromFile(str(MODEL))
         self.dialog = ModelerDialog.create(model)

@@ -185,7 +185,10 @@ def max_gap() -> QgsProcessingParameterDefinition:
     """Which gaps are closed."""
     return helped(
         number("MAX_GAP", tr("Longest gap to close [m]"), 5.0, maximum=LONGEST_M),
-        tr("Line ends up to this far apart are joined if they point at each other. 0 leaves all gaps open."),
+        tr(
+            "Line ends up to this far apart are joined if they point at each other; 0 joins none. Where one rail of a "
+            "track goes on, its centerline does for up to 30 m, whatever is set here."
+        ),
     )
 
 

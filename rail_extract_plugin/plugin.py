@@ -30,10 +30,11 @@ class RailExtractPlugin:
 
     def initGui(self) -> None:
         """Start in QGIS with windows."""
+        self.initProcessing()
+
         from . import package_setting
         from .model_action import OpenModelAction
 
-        self.initProcessing()
         self.action = OpenModelAction()
         self.action.register()
         package_setting.register()

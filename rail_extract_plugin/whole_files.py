@@ -5,8 +5,8 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from tempfile import mkdtemp
 from typing import Any
+from uuid import uuid4
 
 from qgis.core import (
     QgsProcessingContext,
@@ -16,6 +16,7 @@ from qgis.core import (
     QgsVectorLayer,
 )
 
+from ..core.disk import take_names
 from ..core.errors import RailExtractError
 from .destinations import plain_file
 
@@ -48,20 +49,22 @@ def write_whole(value: Any, context: QgsProcessingContext, write: Callable[[Any]
     path = plain_file(value, context)
     if path is None:
         return write(value)[0]
-    folder = None
+    # With the rights of any new folder: its files keep them on Windows, where a temporary one is its maker's alone.
+    folder = path.absolute().with_name(PREFIX + uuid4().hex[:8])
     try:
-        folder = Path(mkdtemp(prefix=PREFIX, dir=path.absolute().parent))
+        folder.mkdir()
         layer_id, count = write(_redirected(value, folder / path.name))
         _check_count(layer_id, count)
-        for file in folder.iterdir():
-            file.replace(path.with_name(file.name))
+        take_names(path, {file: path.with_name(file.name) for file in folder.iterdir()})
     except OSError as error:
         raise RailExtractError(
-            f"The output {path} can't be written ({error.strerror}): close what uses it, or choose another place."
+            f"The output {path} can't be written ({error.strerror}): choose another place."
         ) from error
+    except (RailExtractError, QgsProcessingException) as error:
+        # What a traceback refers to keeps the file open, and Windows does not remove it then.
+        raise error.with_traceback(None) from error.__cause__
     finally:
-        if folder:
-            shutil.rmtree(folder, ignore_errors=True)
+        shutil.rmtree(folder, ignore_errors=True)
     return _renamed(layer_id, str(path) + layer_id.rsplit(path.name, 1)[1], context)
 
 

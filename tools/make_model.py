@@ -46,7 +46,8 @@ COLUMN, ROW = 260, 130
 
 HELP = (
     "The steps of Extract Rails one by one, to be changed in the model designer: leave a step out, put your own in its "
-    "place, or look at what lies between. As it is, it gives the same lines as Extract Rails."
+    "place, or look at what lies between. As it is, it gives the lines of Extract Rails, of clouds beyond half a "
+    "kilometre within half a millimetre."
 )
 
 

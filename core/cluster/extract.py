@@ -10,6 +10,7 @@ from dataclasses import fields
 from importlib.util import find_spec
 from pathlib import Path
 
+from ..disk import check_closed, writing
 from ..errors import ParameterError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, RAIL_FIELDS
 from ..frpdf import DEVICES, ENGINES
@@ -17,7 +18,6 @@ from ..frpdf.zoo import choose
 from ..pipeline import Parameters
 from ..progress import Estimating, Progress
 from ..standards import DEFAULT, distinct_gauges, resolve
-from ..stretches.spool import writing
 
 NEEDS = {"distributed": "distributed", "pyogrio": "pyogrio", "shapely": "shapely"}
 """Modules and packages of the extra "cluster"."""
@@ -88,8 +88,6 @@ def run(args: argparse.Namespace) -> int:
     missing = [package for module, package in NEEDS.items() if find_spec(module) is None]
     if missing:
         raise RailExtractError(f"Packages are missing ({', '.join(missing)}): in a clone, run pip install .[cluster].")
-    from .geopackage import check_closed
-
     parameters = parameters_of(args)
     for path in (args.rails, args.centerlines or args.rails):
         if path.suffix.lower() != ".gpkg":

@@ -10,11 +10,11 @@ import numpy as np
 import pyogrio
 import shapely
 
+from ..disk import take_names, writing
 from ..errors import DiskError
 from ..fields import UNKNOWN_IN_METRES, Field
 from ..points import LocalFrame
 from ..rails import Centerline, RailLine
-from ..stretches.spool import writing
 
 KINDS = {int: np.int32, float: float, str: object}
 
@@ -43,36 +43,11 @@ def write(layers: dict[str, tuple[Path, Sequence[RailLine | Centerline], Sequenc
                 path.parent.mkdir(parents=True, exist_ok=True)
             _write_layer(unfinished[path], name, lines, fields, frame, path)
         for path, whole in unfinished.items():
-            _replace(path, whole)
+            take_names(path, {whole: path})
     finally:
         for leftover in unfinished.values():
             for file in leftover.parent.glob(f"{leftover.name}*"):
                 file.unlink()
-
-
-def check_closed(path: Path) -> None:
-    """Refuse a GeoPackage that another program is writing to: what it has not put in yet would damage a new file.
-
-    Raises
-    ------
-    DiskError
-    """
-    log = path.with_name(f"{path.name}-wal")
-    if log.exists() and log.stat().st_size:
-        raise DiskError(f"{path} is open in another program ({log.name} is there): close it there, or choose another.")
-
-
-def _replace(path: Path, whole: Path) -> None:
-    """Let a whole file take its name; where it can't, it stays under another one."""
-    try:
-        check_closed(path)
-        with writing(path.parent):
-            whole.replace(path)
-    except DiskError as error:
-        kept = path.with_name(f"{path.stem}_new{path.suffix}")
-        with writing(path.parent):
-            whole.replace(kept)
-        raise DiskError(f"{error} The new lines are in {kept}.") from error
 
 
 def _write_layer(

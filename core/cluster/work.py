@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..disk import writing
 from ..rails import RailLine, Support
 from ..raster import TILE, RailRaster
-from ..stretches.spool import writing
 from ..stretches.squares import Stretch
 from ..stretches.trimming import StretchRails
 

@@ -98,9 +98,15 @@ def make_engine(arrays: dict[str, np.ndarray], engine: str = AUTO, device: str =
         The engine's package or device is not there, or the weights are not FRPDF's.
     """
     if choose_engine(engine, device) == "TORCH":
-        from .torch_engine import TorchEngine
-
-        return TorchEngine(arrays, device)
+        try:
+            from .torch_engine import TorchEngine
+        except (ImportError, OSError) as error:  # Windows: a library that it needs, or another plugin's of its name
+            if engine != AUTO or device == "CUDA" or not find_spec("cv2"):
+                raise ModelError(
+                    f"PyTorch is there but does not start ({error}): set ENGINE to OPENCV, or install PyTorch anew."
+                ) from error
+        else:
+            return TorchEngine(arrays, device)
     from .opencv_engine import OpenCvEngine
 
     return OpenCvEngine(arrays)

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
 import shutil
 import uuid
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from ..errors import DiskError
+from ..disk import writing
 from ..las import CloudHeader
 from ..points import LocalFrame, RailPoints, Request, origin_steps
 from ..progress import SILENT, Progress
@@ -157,17 +155,6 @@ def gather(request: Request, side_m: float, found: Sequence[SpooledFile]) -> tup
     steps = [_merged([file.report["steps"][axis] for file in found]) for axis in range(3)]
     frame = request.frame_at([(np.array(list(one)), np.array(list(one.values()))) for one in steps])
     return tuple(_source(code, found, frame, side_m) for code in codes)
-
-
-@contextmanager
-def writing(folder: Path) -> Iterator[None]:
-    """Say in one sentence that what is written into a folder does not fit, or must not be written."""
-    try:
-        yield
-    except OSError as error:
-        full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-        remedy = "make room on this disk" if full else "check the folder's permissions"
-        raise DiskError(f"{folder} can't be written to ({error.strerror}): {remedy} or choose another.") from error
 
 
 class _Census:

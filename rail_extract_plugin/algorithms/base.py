@@ -122,18 +122,18 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         try:
             self._job = self._read(parameters, context)
         except RailExtractError as error:
-            raise QgsProcessingException(str(error)) from None
+            raise QgsProcessingException(for_reader(str(error), self.parameterDefinitions())) from None
         return True
 
     def processAlgorithm(
         self, parameters: dict[str, Any], context: QgsProcessingContext, feedback: QgsProcessingFeedback
     ) -> dict:
         """Compute in any thread; every failure that a user can remedy is one sentence."""
-        progress = QgisProgress(feedback)
+        progress = QgisProgress(feedback, self.parameterDefinitions())
         try:
             results = self.compute(self._job, parameters, context, progress)
         except RailExtractError as error:
-            raise QgsProcessingException(str(error)) from None
+            raise QgsProcessingException(for_reader(str(error), self.parameterDefinitions())) from None
         except Cancelled:
             raise QgsProcessingException(tr("Cancelled; nothing was written.")) from None
         except MemoryError:

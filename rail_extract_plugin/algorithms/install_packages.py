@@ -8,7 +8,7 @@ from typing import Any
 
 from qgis.core import QgsProcessingContext, QgsProcessingOutputFolder, QgsProcessingOutputString
 
-from ...core.errors import ParameterError
+from ...core.errors import Cancelled, ParameterError, RailExtractError
 from ...core.progress import Progress
 from .. import package_folders
 from .. import parameters as groups
@@ -85,7 +85,13 @@ class InstallPackages(RailAlgorithm):
         progress.info(f"Python: {interpreter.program}")
         installed = []
         for order, share in zip(orders, progress.split(len(orders))):
-            installed.append(install(order, interpreter, folder, package_folders.folders(), share))
+            try:
+                installed.append(install(order, interpreter, folder, package_folders.folders(), share))
+            except (RailExtractError, Cancelled) as error:
+                if not installed:
+                    raise
+                reason = str(error) or tr("Cancelled.")
+                raise RailExtractError(tr("{} Kept is {}.").format(reason, ", ".join(installed))) from error
             package_folders.use()
         progress.info(tr("Installed: {} in {}").format(", ".join(installed), folder))
         return {"FOLDER": str(folder), "INSTALLED": ", ".join(installed)}

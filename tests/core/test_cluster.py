@@ -216,7 +216,7 @@ def test_a_geopackage_that_another_program_writes_to_is_left_alone(tiles, tmp_pa
     (tmp_path / "out.gpkg-wal").write_text("not yet in it")
     assert main(["extract", str(tiles), "--rails", str(out)]) == 1
     assert f"{out} is open in another program" in capsys.readouterr().err
-    with pytest.raises(DiskError, match=r"The new lines are in .*out_new\.gpkg"):
+    with pytest.raises(DiskError, match=r"The new one is .*out_new\.gpkg"):
         write({"rails": (out, (), RAIL_FIELDS)}, LocalFrame(np.zeros(3)))
     assert out.read_text() == "theirs"
     assert pyogrio.read_info(tmp_path / "out_new.gpkg")["features"] == 0

@@ -1,6 +1,7 @@
 """Engines compute what the network computes; cleanup stitches windows and passes."""
 
 import argparse
+import sys
 from importlib.util import find_spec
 
 import cv2
@@ -105,6 +106,15 @@ def test_engines_are_chosen_by_name_and_by_what_is_installed(network, monkeypatc
         make_engine(arrays, "TORCH")
     with pytest.raises(ModelError, match="processor alone"):
         make_engine(arrays, "OPENCV", "CUDA")
+
+
+def test_a_pytorch_that_does_not_start_gives_way_to_opencv(network, monkeypatch):
+    arrays = export(network)
+    monkeypatch.setitem(sys.modules, "rail_extract.core.frpdf.torch_engine", None)  # its import fails
+    assert make_engine(arrays).description.startswith("OpenCV")
+    for asked in (("TORCH", "AUTO"), ("AUTO", "CUDA")):
+        with pytest.raises(ModelError, match="PyTorch is there but does not start"):
+            make_engine(arrays, *asked)
 
 
 @pytest.mark.parametrize("standard", [(1.435, 0.0762), (1.0, 0.06191), (1.676, 0.0667)])

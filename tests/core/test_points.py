@@ -106,6 +106,12 @@ def test_a_file_named_twice_is_read_once(tmp_path, monkeypatch):
     assert all(file.is_absolute() for file in las.list_files("a.laz"))
 
 
+def test_what_macos_hides_beside_files_is_no_tile(tmp_path):
+    make_cloud(tmp_path / "a.laz", codes=(RAIL,))
+    (tmp_path / "._a.laz").write_bytes(b"\0\5\x16\7")
+    assert [file.name for file in las.list_files(tmp_path)] == ["a.laz"]
+
+
 def test_a_file_that_can_not_be_opened_is_named(tmp_path):
     make_cloud(tmp_path / "a.laz", codes=(RAIL,))
     (tmp_path / "b.laz").symlink_to(tmp_path / "gone.laz")

@@ -141,8 +141,8 @@ def test_dialog_refuses_contradictions(open_dialog, context, write_cloud, track,
 def test_dialog_calls_parameters_by_their_labels(make):
     algorithm = make("extractrails")
     definitions = algorithm.parameterDefinitions()
-    said = "The standard CUSTOM needs both: fill GAUGE and HEAD_WIDTH, not MAX_GAPS."
-    shown = 'The standard CUSTOM needs both: fill "Gauge [mm]" and "Railhead width [mm]", not MAX_GAPS.'
+    said = "The standard CUSTOM needs both: fill GAUGE and HEAD_WIDTH, not MAX_GAPS or OUTPUT/CRS.gpkg."
+    shown = said.replace("GAUGE", '"Gauge [mm]"').replace("HEAD_WIDTH", '"Railhead width [mm]"')
     assert with_labels(said, definitions) == shown
     assert for_reader(said, definitions) == said  # what runs here has no windows of QGIS
 

@@ -1,11 +1,13 @@
 """What can go wrong around a run: packages, weights, disks, other programs, and the user who cancels."""
 
 import shutil
+import sqlite3
 
 import faults
 import numpy as np
 import pytest
 from faults import REFUSED, Fault
+from osgeo import ogr
 from qgis.core import QgsCoordinateTransformContext, QgsFeature, QgsGeometry, QgsVectorFileWriter, QgsVectorLayer
 from rail_extract.core import pipeline
 from rail_extract.core.frpdf import engine, zoo
@@ -138,16 +140,40 @@ def points_only(bench):
     return {"INPUT": bench.cloud(bench.track(length_m=6.0))}
 
 
-def open_elsewhere(bench):
-    """An output of an earlier run that is still open."""
-    path = bench.folder / "out" / "RAILS.gpkg"
+def earlier(path):
+    """An output of an earlier run."""
     before = lines("LINESTRING Z (0 0 0, 1 1 1)", "LINESTRING Z (0 0 0, 2 2 2)")
     options = QgsVectorFileWriter.SaveVectorOptions()
+    options.driverName = QgsVectorFileWriter.driverForExtension(path.suffix)
     QgsVectorFileWriter.writeAsVectorFormatV3(before, str(path), QgsCoordinateTransformContext(), options)
+    return path
+
+
+def open_elsewhere(bench):
+    """An output of an earlier run that is still open."""
+    path = earlier(bench.folder / "out" / "RAILS.gpkg")
     held = QgsVectorLayer(str(path), "held", "ogr").getFeatures()
     assert next(held).isValid()
     bench.run.callback(held.close)
     return cloud(bench)
+
+
+def edited_elsewhere(bench):
+    """An output of an earlier run that is being edited: what is saved lies in a log until the program closes it."""
+    path = earlier(bench.folder / "rails.gpkg")
+    database = sqlite3.connect(path)
+    bench.run.callback(database.close)
+    assert database.execute("PRAGMA journal_mode = WAL").fetchone() == ("wal",)
+    database.execute("CREATE TABLE mine (number)")
+    return {**cloud(bench), "RAILS": path}
+
+
+def indexed_before(bench):
+    """A shapefile of an earlier run, with an index of its two lines elsewhere."""
+    path = earlier(bench.folder / "out" / "RAILS.shp")
+    ogr.Open(str(path), 1).ExecuteSQL("CREATE SPATIAL INDEX ON RAILS")
+    assert path.with_suffix(".qix").exists()
+    return {**cloud(bench), "RAILS": path}
 
 
 def exhausted(bench):
@@ -251,15 +277,14 @@ FAULTS = [
         "output whose folder goes away on the way",
         removed_on_the_way,
         REFUSED,
-        "The output …/gone/rails.gpkg can't be written (No such file or directory): close what uses it, or "
-        "choose another place.",
+        "The output …/gone/rails.gpkg can't be written (No such file or directory): choose another place.",
     ),
     Fault(
         "folder of one output goes away on the way",
         one_removed_on_the_way,
         REFUSED,
-        "The output …/gone/tracks.gpkg can't be written (No such file or directory): close what uses it, or "
-        "choose another place. Not written: CENTERLINES. Written and whole: RAILS.",
+        "The output …/gone/tracks.gpkg can't be written (No such file or directory): choose another place. "
+        "Not written: CENTERLINES. Written and whole: RAILS.",
     ),
     Fault(
         "output with spaces, umlauts and kanji",
@@ -267,6 +292,13 @@ FAULTS = [
         gives=TRACK,
     ),
     Fault("output of an earlier run, open elsewhere", open_elsewhere, gives=TRACK),
+    Fault(
+        "output of an earlier run, edited elsewhere",
+        edited_elsewhere,
+        REFUSED,
+        "…/rails.gpkg is open in another program (rails.gpkg-wal is there): close it there, or choose another.",
+    ),
+    Fault("shapefile of an earlier run, with a spatial index", indexed_before, gives=TRACK),
     Fault(
         "full disk, GeoTIFF",
         full_disk(1000, points_only, ".tif"),

@@ -25,6 +25,14 @@ def same_file(bench):
     return {**with_()(bench), "RAILS": bench.folder / "out.gpkg", "CENTERLINES": bench.folder / "out.gpkg"}
 
 
+def same_file_spelled_otherwise(bench):
+    return {**same_file(bench), "CENTERLINES": bench.folder / "out" / ".." / "out.gpkg"}
+
+
+def file_and_table_of_it(bench):
+    return {**same_file(bench), "CENTERLINES": f"ogr:dbname='{bench.folder / 'out.gpkg'}' table=\"tracks\" (geom)"}
+
+
 def in_a_sharp_curve(**parameters):
     """The track in an arc of 25 m, and these parameters."""
 
@@ -213,6 +221,18 @@ FAULTS = [
     Fault(
         "two outputs in one file",
         same_file,
+        REFUSED,
+        "RAILS and CENTERLINES are one file: give each a name of its own.",
+    ),
+    Fault(
+        "two outputs in one file, spelled in two ways",
+        same_file_spelled_otherwise,
+        REFUSED,
+        "RAILS and CENTERLINES are one file: give each a name of its own.",
+    ),
+    Fault(
+        "a file for one output, a table of it for another",
+        file_and_table_of_it,
         REFUSED,
         "RAILS and CENTERLINES are one file: give each a name of its own.",
     ),

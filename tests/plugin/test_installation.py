@@ -7,6 +7,9 @@ from pathlib import Path
 import pytest
 from rail_extract.core.errors import Cancelled, RailExtractError
 from rail_extract.core.progress import SILENT, Progress
+from rail_extract.rail_extract_plugin import package_folders
+from rail_extract.rail_extract_plugin.algorithms import install_packages
+from rail_extract.rail_extract_plugin.algorithms.install_packages import InstallPackages, Job
 from rail_extract.rail_extract_plugin.installation import Order, install
 from rail_extract.rail_extract_plugin.interpreter import Interpreter, find_interpreter
 
@@ -146,3 +149,14 @@ def test_old_pip_asks_for_a_newer_one(add_wheel, folder, tmp_path):
     add_wheel("railfirst")
     with pytest.raises(RailExtractError, match="pip could not install pip"):
         install(Order(("railfirst",), ("railfirst",)), Interpreter(str(program)), folder, [], SILENT)
+
+
+def test_what_is_kept_is_told_where_pytorch_fails(add_wheel, folder, monkeypatch):
+    add_wheel("railone")
+    monkeypatch.setattr(package_folders, "own_folder", lambda: folder)
+    monkeypatch.setitem(install_packages.BUILDS, ("CPU", sys.platform), ("--no-such-option",))
+    with pytest.raises(
+        RailExtractError, match=r"could not install torch .* None of it was kept\. Kept is railone 1\.0\.$"
+    ):
+        InstallPackages().compute(Job({"railone": "railone"}, "CPU"), {}, None, SILENT)
+    assert (folder / "railone.py").exists()
