@@ -1,14 +1,17 @@
-"""Where the guide lies on the web."""
+"""Where the guide lies: in the zip, or for a clone, where nothing was built, on the web."""
 
 from __future__ import annotations
 
 from configparser import ConfigParser
 
-from .paths import METADATA
+from .paths import GUIDE, METADATA
 
 
 def guide(page: str) -> str:
-    """Give the address of a page of the guide, in the repository that the plugin's metadata name."""
+    """Give the address of a page of the guide: `tools/package.py` puts them into the zip."""
+    shipped = GUIDE / f"{page}.html"
+    if shipped.exists():
+        return shipped.as_uri()
     metadata = ConfigParser(interpolation=None)
     metadata.read(METADATA, encoding="utf-8")
-    return f"{metadata['general']['repository']}/blob/main/docs/{page}"
+    return f"{metadata['general']['repository']}/blob/main/docs/{page}.md"

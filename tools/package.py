@@ -1,4 +1,4 @@
-"""Build the plugin's zip from the files that git tracks, and unpack it where QGIS finds it.
+"""Build the plugin's zip from the files that git tracks and the guide, and unpack it where QGIS finds it.
 
 The same files give the same bytes: entries are sorted and carry no time and no rights of this computer.
 """
@@ -9,6 +9,8 @@ import shutil
 import subprocess
 import zipfile
 from pathlib import Path
+
+from guide_pages import guide_files
 
 ROOT = Path(__file__).resolve().parent.parent
 ARCHIVE = ROOT / "build" / "rail_extract.zip"
@@ -44,11 +46,12 @@ def build(archive: Path) -> None:
     """Write the zip."""
     archive.parent.mkdir(parents=True, exist_ok=True)
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as file:
-        for name in product_files():
+        contents = {**{name: (ROOT / name).read_bytes() for name in product_files()}, **guide_files()}
+        for name, content in sorted(contents.items()):
             entry = zipfile.ZipInfo(f"{PLUGIN}/{name}", EARLIEST)
             entry.external_attr = READABLE
             entry.compress_type = zipfile.ZIP_DEFLATED
-            file.writestr(entry, (ROOT / name).read_bytes())
+            file.writestr(entry, content)
 
 
 def unpack(archive: Path, plugins: Path) -> None:

@@ -66,7 +66,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     HELP = ""
     PICTURE = ""
     """File in the folder of pictures, shown beside the dialog."""
-    GUIDE = "parameters.md"
+    GUIDE = "parameters"
     """Page of the guide that the dialog's help button opens."""
     NEEDS: tuple[tuple[str, ...], ...] = ()
     """Python modules without which it can't run; any one of those in a need meets it, the first is recommended."""

@@ -28,7 +28,7 @@ class CheckInstallation(RailAlgorithm):
     LABEL = "Check installation"
     GROUP = "Setup"
     GROUP_ID = "setup"
-    GUIDE = "troubleshooting.md"
+    GUIDE = "troubleshooting"
     TAGS = ("rail", "setup", "version", "versions", "test", "diagnose", "support", "gpu", "cuda", "engine")
     SUMMARY = "Tells which versions, engine and models are there, and tests them on a short track."
     HELP = (

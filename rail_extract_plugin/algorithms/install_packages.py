@@ -39,7 +39,7 @@ class InstallPackages(RailAlgorithm):
     LABEL = "Install packages"
     GROUP = "Setup"
     GROUP_ID = "setup"
-    GUIDE = "troubleshooting.md"
+    GUIDE = "troubleshooting"
     TAGS = ("rail", "setup", "install", "python", "pip", "dependencies", "laspy", "opencv", "torch", "pytorch")
     SUMMARY = "Installs the Python packages that Rail Extract needs and this QGIS does not have."
     HELP = (

@@ -34,6 +34,17 @@ def test_zip_holds_what_runs_and_no_more(names):
     assert not [name for name in names if re.search(r"/(tests|tools|benchmarks|\.ci)/|\.pyc$", name)]
 
 
+def test_help_buttons_open_pages_that_come_with_it(archive, names):
+    pages = [name for name in names if name.endswith(".html")]
+    assert {f"rail_extract/resources/guide/{page}.html" for page in ("README", "parameters", "troubleshooting")} <= set(
+        pages
+    )
+    with zipfile.ZipFile(archive) as file:
+        for page in pages:
+            links = re.findall(r'(?:href|src)="(?!\w+:|#)([^"#]+)', file.read(page).decode())
+            assert links and not {f"rail_extract/resources/guide/{link}" for link in links} - set(names), page
+
+
 def test_versions_agree(request):
     root = request.config.rootpath
     stated = {

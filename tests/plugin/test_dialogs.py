@@ -1,12 +1,14 @@
 """What a user sees before a run: names, icons, fields, the help beside them, and what is refused."""
 
 import re
+from pathlib import Path
 
 import pytest
 from dialog_pictures import HELP_SHARE, SIZES, dialog_pictures
 from qgis.PyQt.QtCore import QUrl
 from qgis.PyQt.QtGui import QImage
 from qgis.PyQt.QtWidgets import QScrollArea, QSplitter, QTextBrowser
+from rail_extract.rail_extract_plugin import guide
 from rail_extract.rail_extract_plugin.labels import for_reader, with_labels
 
 NAMES = (
@@ -107,8 +109,13 @@ def test_toolbox_search(make, word, found):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_help_button_opens_the_guide(make, name):
-    assert re.fullmatch(r"https://\S+/rail-extract/blob/main/docs/\w+\.md", make(name).helpUrl())
+def test_help_button_opens_the_guide(make, name, tmp_path, monkeypatch):
+    address = make(name).helpUrl()
+    assert re.fullmatch(r"https://\S+/rail-extract/blob/main/docs/\w+\.md", address)
+    page = tmp_path / f"{Path(address).stem}.html"
+    page.touch()
+    monkeypatch.setattr(guide, "GUIDE", tmp_path)  # as in the zip
+    assert make(name).helpUrl() == page.as_uri()
 
 
 CONTRADICTIONS = [

@@ -1,0 +1,75 @@
+"""Turn the guide for users, pages of `docs`, into web pages that come with the plugin: help buttons open them."""
+
+from __future__ import annotations
+
+import re
+from configparser import ConfigParser
+from html import escape
+from pathlib import Path
+from posixpath import normpath
+
+import markdown
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
+FOLDER = "resources/guide"
+"""Where the pages lie in the plugin."""
+
+PAGES = ("README", "tutorial", "parameters", "reference", "limits", "troubleshooting", "faults", "accuracy", "scaling")
+"""What users read; the rest of the folder is for those who build."""
+
+EXTENSIONS = ("fenced_code", "sane_lists", "tables", "toc")
+
+PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width">
+<title>{title} - Rail Extract</title>
+<style>
+body {{ max-width: 52em; margin: 2em auto; padding: 0 1em; font: 16px/1.5 sans-serif; color: #222; background: #fff }}
+table {{ border-collapse: collapse }}
+th, td {{ border: 1px solid #ccc; padding: 0.2em 0.6em; text-align: left; vertical-align: top }}
+img {{ max-width: 100% }}
+pre, code {{ background: #f3f3f3 }}
+pre {{ padding: 0.6em; overflow-x: auto }}
+blockquote {{ margin-left: 0; padding-left: 1em; border-left: 3px solid #999 }}
+</style>
+</head>
+<body>
+<p><a href="README.html">The guide</a></p>
+{body}
+</body>
+</html>
+"""
+
+
+def guide_files() -> dict[str, bytes]:
+    """Make the files of the guide, by their names in the plugin: pages, and the pictures that they show."""
+    files = {}
+    for name in PAGES:
+        text = (DOCS / f"{name}.md").read_text(encoding="utf-8")
+        for picture in re.findall(r"!\[[^\]]*\]\(([^)]+)\)", text):
+            files[f"{FOLDER}/{picture}"] = (DOCS / picture).read_bytes()
+        files[f"{FOLDER}/{name}.html"] = _page(text).encode()
+    return files
+
+
+def _page(text: str) -> str:
+    title = re.search(r"^# (.+)", text)[1]
+    body = markdown.markdown(text, extensions=EXTENSIONS, output_format="html")
+    return PAGE.format(title=escape(title), body=re.sub(r'(?<=href=")(?!\w+:|#)[^"]+', _target, body))
+
+
+def _target(link: re.Match) -> str:
+    """Lead a link to the page in the plugin, or where there is none into the repository."""
+    path, mark, place = link[0].partition("#")
+    if path.removesuffix(".md") in PAGES:
+        return path.removesuffix(".md") + ".html" + mark + place
+    return f"{_repository()}/blob/main/{normpath(f'docs/{path}')}{mark}{place}"
+
+
+def _repository() -> str:
+    metadata = ConfigParser(interpolation=None)
+    metadata.read(ROOT / "metadata.txt", encoding="utf-8")
+    return metadata["general"]["repository"]
