@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -24,7 +25,8 @@ from .raster import TILE, RailRaster, cell_size, rasterize
 from .standards import distinct_gauges
 from .stretches.seams import join
 from .stretches.squares import (
-    OVERLAP_TILES,
+    HALO_M,
+    OVERLAP_M,
     STRETCH_TILES,
     Key,
     MemorySource,
@@ -40,6 +42,7 @@ from .stretches.trimming import StretchRails, trim
 from .tracks.centerlines import CenterlineParameters, build_centerlines
 from .tracks.geometry import measure_track_geometry
 from .vectorize import vectorize
+from .vectorize.bridges import FIT_M
 
 NETWORK_SHARE = 0.7
 """Part of a stretch's time that the network takes, for the progress."""
@@ -165,11 +168,22 @@ def stretch_side(parameters: Parameters) -> float:
     ParameterError
         They would overlap with more than their neighbours.
     """
-    if parameters.stretch_tiles < OVERLAP_TILES:
-        raise ParameterError(
-            f"Stretches of {parameters.stretch_tiles} tiles are too small: give {OVERLAP_TILES} at least."
-        )
-    return parameters.stretch_tiles * TILE * cell_size(parameters.gauge_m, parameters.head_width_m)
+    tile_m = TILE * cell_size(parameters.gauge_m, parameters.head_width_m)
+    least = math.ceil(OVERLAP_M / tile_m)
+    if parameters.stretch_tiles < least:
+        raise ParameterError(f"Stretches of {parameters.stretch_tiles} tiles are too small: give {least} at least.")
+    return parameters.stretch_tiles * tile_m
+
+
+def overlap_tiles(parameters: Parameters) -> int:
+    """Tiles around a stretch that its lines are drawn from as well.
+
+    Both sides of a border must see the same of it: twice a gap with what its bridge is fitted to on either side, and
+    three sigma of the smoothing in height. No more than the neighbours, however long the gaps.
+    """
+    reach_m = HALO_M + max(2 * (parameters.max_gap_m + 2 * FIT_M), 3 * parameters.smoothing_z_m)
+    tile_m = TILE * cell_size(parameters.gauge_m, parameters.head_width_m)
+    return min(math.ceil(max(reach_m, OVERLAP_M) / tile_m), parameters.stretch_tiles)
 
 
 def engine_for(parameters: Parameters) -> Engine:
@@ -220,16 +234,22 @@ def rails_of_stretch(
     progress: Progress = SILENT,
 ) -> StretchRails:
     """Draw the rails of a stretch, given its own cleaned raster and those of its neighbours."""
-    raster = mosaic(rasters, stretch)
-    points = source.near(stretch, OVERLAP_TILES * TILE * raster.cell_m)
+    tiles = overlap_tiles(parameters)
+    raster = mosaic(rasters, stretch, tiles)
+    overlap_m = tiles * TILE * raster.cell_m
+    points = source.near(stretch, overlap_m)
+    if math.isfinite(stretch.side_m):
+        # A line that the stretch sees in part is longer than what it sees; `whole_rails` drops those that are short.
+        parameters = replace(parameters, min_length_m=min(parameters.min_length_m, overlap_m - HALO_M))
     return trim(_all_vertices(raster, source.class_code, points, parameters, progress), stretch)
 
 
 def whole_rails(
     results: Sequence[StretchRails], frame: LocalFrame, parameters: Parameters, first_id: int = 1
 ) -> list[RailLine]:
-    """Join the rails of all stretches, thin and number them."""
-    return _finished(numbered(join(results, frame)), parameters, first_id)
+    """Join the rails of all stretches, drop the short ones, thin and number them."""
+    rails = [rail for rail in join(results, frame) if rail.length_m >= parameters.min_length_m]
+    return _finished(numbered(rails), parameters, first_id)
 
 
 def lines_of(
@@ -330,6 +350,7 @@ def _tracks_of_class(rails: Sequence[RailLine], parameters: Parameters, progress
     centerlines: list[Centerline] = []
     refusals: list[NoTrackError] = []
     for gauge_m, step in zip(gauges, progress.split(len(gauges))):
+        settings = replace(settings, other_gauges_m=tuple(other for other in gauges if other != gauge_m))
         try:
             centerlines += build_centerlines(rails, gauge_m, parameters.head_width_m, settings, step)
         except NoTrackError as refusal:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import shutil
 import sys
 import tempfile
 from dataclasses import fields
@@ -99,8 +100,11 @@ def run(args: argparse.Namespace) -> int:
     if args.work is not None:
         return _run_in(args.work, args, parameters)
     # Beside the results, for there workers elsewhere find it as well.
-    with tempfile.TemporaryDirectory(dir=args.rails.parent, prefix=".rail_extract_") as folder:
+    folder = tempfile.mkdtemp(dir=args.rails.parent, prefix=".rail_extract_")
+    try:
         return _run_in(Path(folder), args, parameters)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)  # workers of a cluster that are still at it may write meanwhile
 
 
 def parameters_of(args: argparse.Namespace) -> Parameters:

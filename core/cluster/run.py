@@ -12,6 +12,7 @@ import dask
 from distributed import Client, Future, LocalCluster, as_completed
 from distributed.system import MEMORY_LIMIT
 
+from ..disk import writing
 from ..errors import CloudError, NoTrackError, RailExtractError
 from ..frpdf.zoo import choose
 from ..pipeline import Parameters, stretch_side, tracks_of, warn_of_rails, whole_rails
@@ -126,6 +127,8 @@ def extract(
     failures: list[str] = []
     request = ask(paths, class_codes, crs_wkt, progress=progress, unreadable=failures)
     folder = folder.resolve()
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)  # not by workers: a run that has failed may have removed it
     side_m = stretch_side(parameters)
     found = _sorted_points(client, request, side_m, folder, failures, progress.span(0.0, READING))
     sources = gather(request, side_m, found)

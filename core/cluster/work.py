@@ -98,7 +98,6 @@ def _save(path: Path, **arrays: np.ndarray) -> None:
     """Write arrays under another name first: a full disk or a killed worker leaves no half of a file."""
     unfinished = path.with_name(f"{uuid.uuid4().hex}.unfinished")
     with writing(path.parent):
-        path.parent.mkdir(parents=True, exist_ok=True)
         try:
             with unfinished.open("wb") as file:
                 np.savez_compressed(file, **arrays)

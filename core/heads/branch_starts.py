@@ -61,7 +61,7 @@ def slide_branches(network: LineNetwork, xyz: np.ndarray, head_width_m: float, s
     ----------
     network : LineNetwork
     xyz : (k, 3) array
-        Rail points.
+        Rail points by rising x.
     head_width_m : float
     sure_m : float
         Distance of the axes from which both lines can be trusted.
@@ -171,11 +171,13 @@ def _points_of_arc(network: LineNetwork, parting: _Parting, xyz: np.ndarray, hea
         return np.zeros(2)
     piece = line[shared]
     reach_m = head_width_m + parting.apart[0]
-    near = np.flatnonzero(np.all((xyz[:, :2] > piece.min(0) - reach_m) & (xyz[:, :2] < piece.max(0) + reach_m), axis=1))
-    feet = project([piece], xyz[near, :2], reach_m)
+    low, high = piece.min(axis=0) - reach_m, piece.max(axis=0) + reach_m
+    near = xyz[slice(*np.searchsorted(xyz[:, 0], [low[0], high[0]]))]
+    near = near[(near[:, 1] > low[1]) & (near[:, 1] < high[1])]
+    feet = project([piece], near[:, :2], reach_m)
     if not len(feet.t):
         return np.zeros(2)
-    top, _ = on_top(feet.t, feet.across, xyz[near[feet.point], 2], head_width_m)
+    top, _ = on_top(feet.t, feet.across, near[feet.point, 2], head_width_m)
     feet = feet[top]
     way = parting.sense * (feet.t + along[shared][0] - parting.node_m)
     strip = arc(way) - blade(way)

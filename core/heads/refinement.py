@@ -69,10 +69,11 @@ def refine(
         where they touch the rail that they leave.
     """
     rounds = SURE_HEADS if len(network.passes) else SURE_HEADS[:2]
+    by_x = points.xyz[np.argsort(points.xyz[:, 0])] if len(network.passes) else points.xyz
     for number, sure in enumerate(rounds):
         share = progress.span(number / len(rounds), (number + 1) / len(rounds))
         network = _shifted(network, points, head_width_m, smoothing_m, share)
-        network = slide_branches(network, points.xyz, head_width_m, sure * head_width_m)
+        network = slide_branches(network, by_x, head_width_m, sure * head_width_m)
     return network
 
 

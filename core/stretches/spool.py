@@ -117,7 +117,7 @@ def spool_file(
         unfinished = folder / f"{mine.name}.{uuid.uuid4().hex}"
         try:
             with writing(folder):
-                unfinished.mkdir(parents=True)
+                unfinished.mkdir()
             _sort(request, header, side_m, unfinished, progress)
             with writing(folder):
                 _name_first(unfinished, mine)

@@ -46,12 +46,15 @@ class CenterlineParameters:
         Sigma of PAEK in plan.
     min_length_m : float
         Shorter centerlines are dropped.
+    other_gauges_m : tuple of float
+        Gauges for which centerlines are made as well, so that what is nearer to one of them is left to it.
     """
 
     tolerance_m: float = 0.05
     max_gap_m: float = 5.0
     smoothing_m: float = 0.8
     min_length_m: float = 1.0
+    other_gauges_m: tuple[float, ...] = ()
 
 
 def build_centerlines(
@@ -83,10 +86,11 @@ def build_centerlines(
         Rails run parallel, but at another spacing.
     """
     rails = _in_order(rails)
-    pairs = pair_rails(rails, gauge_m, head_width_m, parameters.tolerance_m, progress=progress.span(0.0, 0.5))
+    others = parameters.other_gauges_m
+    pairs = pair_rails(rails, gauge_m, head_width_m, parameters.tolerance_m, others, progress.span(0.0, 0.5))
     if not pairs:
         _refuse_other_spacing(rails, gauge_m, head_width_m, parameters.tolerance_m)
-    chains = chain_pairs(rails, pairs, parameters.max_gap_m)
+    chains = chain_pairs(rails, pairs, parameters.max_gap_m, parameters.tolerance_m)
     steps = progress.span(0.5, 0.95).split(len(chains))
     drawn = [_draw(rails, chain, gauge_m, head_width_m, parameters, step) for chain, step in zip(chains, steps)]
     kept = [line for line in drawn if line.length_m >= parameters.min_length_m]

@@ -17,13 +17,11 @@ DIRECTION_M = 1.0
 """Length over which a stretch's direction at its end is measured."""
 
 CONTINUATION = np.radians(10.0)
-"""Stretches that continue each other point at each other within this angle, like the ends of rails."""
+"""Stretches that continue each other point at each other within this angle, like the ends of rails; besides they may
+miss each other by the tolerance of the gauge."""
 
 TIGHTEST_M = 25.0
 """Radius of the tightest tram curve, along which a track turns in a gap."""
-
-MISS_M = 0.05
-"""Stretches may in addition miss each other by the tolerance of the gauge."""
 
 HIDDEN_M = 30.0
 """For so long one rail alone tells where its track runs: a coach of 27 m that stands beside hides the other one."""
@@ -93,7 +91,9 @@ def reach_alone(max_gap_m: float) -> float:
     return max(HIDDEN_M, max_gap_m)
 
 
-def chain_pairs(rails: Sequence[RailLine], pairs: Sequence[RailPair], max_gap_m: float) -> tuple[Chain, ...]:
+def chain_pairs(
+    rails: Sequence[RailLine], pairs: Sequence[RailPair], max_gap_m: float, tolerance_m: float = 0.05
+) -> tuple[Chain, ...]:
     """Put stretches of track in a row where they continue each other.
 
     A rail leads from one to the next, or they point at each other across at most `max_gap_m` without any rail. Of
@@ -102,7 +102,7 @@ def chain_pairs(rails: Sequence[RailLine], pairs: Sequence[RailPair], max_gap_m:
     if not pairs:
         return ()
     led = tuple(_led(pairs, reach_alone(max_gap_m)))
-    partner = _partners(rails, pairs, led, max_gap_m)
+    partner = _partners(rails, pairs, led, max_gap_m, tolerance_m)
     # At a track's end a rail may break off whose partner comes back too briefly to be matched.
     alone_m = dict.fromkeys(range(2 * len(pairs)), max_gap_m + MIN_LENGTH_M)
     for link in led:
@@ -123,14 +123,14 @@ def chain_pairs(rails: Sequence[RailLine], pairs: Sequence[RailPair], max_gap_m:
 
 
 def _partners(
-    rails: Sequence[RailLine], pairs: Sequence[RailPair], led: Sequence[_Led], max_gap_m: float
+    rails: Sequence[RailLine], pairs: Sequence[RailPair], led: Sequence[_Led], max_gap_m: float, tolerance_m: float
 ) -> dict[int, int]:
     """Say which end continues in which; holds both directions."""
     leading = {(end, link.rail) for link in led for end in (link.first, link.second)}
     ends = _Ends.of(rails, pairs, reach_alone(max_gap_m), leading)
     links = np.sort(np.array([(link.first, link.second) for link in led], dtype=int).reshape(-1, 2))
     links, count = np.unique(links, axis=0, return_counts=True)
-    pointed = _pointed(ends, max_gap_m)
+    pointed = _pointed(ends, max_gap_m, tolerance_m)
     links = np.concatenate([links, pointed])
     rails_leading = np.append(count, np.zeros(len(pointed), dtype=int))
     partner: dict[int, int] = {}
@@ -165,7 +165,7 @@ def _led(pairs: Sequence[RailPair], longest_m: float) -> Iterator[_Led]:
                 yield _Led(end, start, rail, start_m - end_m)
 
 
-def _pointed(ends: _Ends, max_gap_m: float) -> np.ndarray:
+def _pointed(ends: _Ends, max_gap_m: float, tolerance_m: float) -> np.ndarray:
     """Find the pairs of places that point at each other, (n, 2) numbers."""
     overlap_m = MIN_LENGTH_M + 2 * OVERLAP_M  # two rails that run on may do so side by side
     places = cKDTree(ends.xy).query_pairs(max(max_gap_m, overlap_m), output_type="ndarray")
@@ -174,7 +174,7 @@ def _pointed(ends: _Ends, max_gap_m: float) -> np.ndarray:
     fits = (ahead.min(axis=0) >= -overlap_m) & (ahead.max(axis=0) <= max_gap_m)
     open_m = np.maximum(ahead.min(axis=0), 0.0)
     fits &= turn <= CONTINUATION + open_m / TIGHTEST_M
-    fits &= miss.max(axis=0) <= MISS_M + np.sin(CONTINUATION) * open_m
+    fits &= miss.max(axis=0) <= tolerance_m + np.sin(CONTINUATION) * open_m
     return places[fits]
 
 

@@ -33,8 +33,8 @@ PLAN_SIGMA_M = 3.0
 """Sigma of PAEK for these points: leaves half a millimetre, or 1 % at a radius of 600 m; a circle of 25 m shrinks by
 9 mm, which is less than 0.1 % of its radius."""
 
-STRAIGHT_M = 10_000.0
-"""Larger radii are not told from none: 10 km makes a versine of 5 mm."""
+LEAST_VERSINE_M = 0.005
+"""Flatter curves are not told from none: on a chord of 20 m those beyond 10 km, on that of a short piece others too."""
 
 GRADE_BASE_M = 10.0
 """Length over which the gradient is taken: 1 mm of height counts as 0.1 per mille."""
@@ -125,7 +125,7 @@ def _measure(line: Centerline, beside: _Beside, head_width_m: float, step_m: flo
         radius_m=_radius(line.xyz[:, :2], chainage),
         grade_pm=_grade(along, fine[:, 2], chainage),
         sigma_mm=1000 * np.interp(chainage, along, 0.5 * np.hypot(_sigma(rails, left), _sigma(rails, right))),
-        points=sum(_points(rails, side, along, cells) for side in (left, right)),
+        points=_whole(sum(_points(rails, side, along, cells) for side in (left, right))),
         bridged=np.diff(np.interp(cells, along, bridged), axis=0)[0] > 0.5 * np.diff(cells, axis=0)[0],
     )
 
@@ -150,7 +150,7 @@ def _radius(xy: np.ndarray, chainage: np.ndarray) -> np.ndarray:
     doubled_area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
     sides = np.prod([np.hypot(*side.T) for side in (first, second, chord)], axis=0)
     curvature = 2 * doubled_area / sides
-    bent = np.abs(curvature) >= 1 / STRAIGHT_M
+    bent = 0.5 * np.abs(curvature) * half**2 >= LEAST_VERSINE_M
     return np.where(bent, 1 / np.where(bent, curvature, 1.0), np.nan)
 
 
@@ -174,7 +174,7 @@ def _sigma(rails: Sequence[RailLine], side: Meeting) -> np.ndarray:
 
 
 def _points(rails: Sequence[RailLine], side: Meeting, along: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Count the points on the rails of one side in cells along the track, given their (2, n) borders."""
+    """Tell how many points lie on the rails of one side in cells along the track, given their (2, n) borders."""
     total = np.zeros(cells.shape[1])
     for number in np.unique(side.rail):
         mine = (side.rail == number) & np.isfinite(side.t)
@@ -186,7 +186,12 @@ def _points(rails: Sequence[RailLine], side: Meeting, along: np.ndarray, cells: 
         steps[np.abs(np.diff(t)) > 2 * FINE_M] = 0.0
         passed = np.concatenate([[0.0], np.cumsum(steps)])
         total += np.diff(np.interp(cells, along[mine], passed), axis=0)[0]
-    return np.round(total).astype(int)
+    return total
+
+
+def _whole(counts: np.ndarray) -> np.ndarray:
+    """Round counts so that any that follow each other add up to what they did, within one."""
+    return np.diff(np.round(np.cumsum(counts)), prepend=0.0).astype(int)
 
 
 def _points_before(rail: RailLine, t: np.ndarray) -> np.ndarray:

@@ -74,6 +74,7 @@ def pair_rails(
     gauge_m: float,
     head_width_m: float,
     tolerance_m: float = 0.05,
+    other_gauges_m: Sequence[float] = (),
     progress: Progress = SILENT,
 ) -> tuple[RailPair, ...]:
     """Find the stretches along which two rails of one class lie a gauge apart (ALGORITHMS.md sections 4.2 and 4.3).
@@ -88,6 +89,8 @@ def pair_rails(
         Their sum is the distance between the rail lines.
     tolerance_m : float
         Largest deviation from that distance.
+    other_gauges_m : sequence of float
+        Gauges that rails are paired by as well: a match that is nearer to one of them belongs to that.
     progress : Progress
 
     Returns
@@ -105,7 +108,9 @@ def pair_rails(
     candidates = [stretch for group in at_gauge.groups() for stretch in _stretches(group)]
     matches = []
     for stretch in progress.span(0.3, 1.0).follow(candidates):
-        matches.extend(_match(rails, stretch, spacing, tolerance_m))
+        found = _match(rails, stretch, spacing, tolerance_m)
+        others_m = [gauge + head_width_m for gauge in other_gauges_m]
+        matches.extend(match for match in found if _is_nearest(match, stretch, spacing, others_m))
     return tuple(match.pair() for match in _without_ghosts(_select(matches)))
 
 
@@ -162,6 +167,14 @@ def _match(rails: Sequence[RailLine], stretch: Parallels, spacing: float, tolera
             match = _Match(a, b, t_a, t_b, side_a, side_b, found.penalty / found.length)
             if match.length_m >= MIN_LENGTH_M and _on_one_level(rails[a].xyz, t_a, rails[b].xyz, t_b):
                 yield match
+
+
+def _is_nearest(match: _Match, stretch: Parallels, spacing: float, others_m: Sequence[float]) -> bool:
+    """Tell whether the rails of a match, found along a stretch, lie no nearer to another spacing."""
+    first, last = np.sort(match.t_a[[0, -1]])
+    inside = (stretch.t_a >= first) & (stretch.t_a <= last)
+    apart_m = np.abs(stretch.left_m[inside]).mean()
+    return all(abs(apart_m - spacing) <= abs(apart_m - other) for other in others_m)
 
 
 def _on_one_level(a: np.ndarray, t_a: np.ndarray, b: np.ndarray, t_b: np.ndarray) -> bool:

@@ -8,7 +8,6 @@ family and severity, is `benchmarks/frpdf.py`.
 from __future__ import annotations
 
 import argparse
-import resource
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -70,7 +69,6 @@ def run(arguments: argparse.Namespace) -> None:
             f"{row.name:28}{s.fn:9d}{s.fp:9d}{s.tp:9d}{s.precision:11.3f}{s.recall:8.3f}{s.f1:7.3f}{row.seconds:10.2f}",
             flush=True,
         )
-    print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
 
 
 def evaluation_pairs(count: int = COUNT) -> list[Pair]:

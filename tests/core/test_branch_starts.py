@@ -28,7 +28,8 @@ def heads(offset, hand=1, density=100):
     across = np.array([np.zeros_like(x[0]), np.where(x[1] > TOE, hand * offset(x[1] - TOE), 0.0)])
     y = across + rng.uniform(-0.5, 0.5, x.shape) * WIDTH
     y, z = y + rng.normal(0, 0.003, x.shape), rng.normal(0, 0.003, x.shape)
-    return np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    return points[np.argsort(points[:, 0])]
 
 
 NO_POINTS = np.empty((0, 3))

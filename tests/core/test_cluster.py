@@ -165,7 +165,7 @@ def test_a_stretch_that_kills_its_workers_does_not_take_its_neighbours_along(til
 
 
 def lay_out_keys(tiles, folder):
-    (source,) = spool(ask([tiles], [RAIL]), stretch_side(PARAMETERS), folder / "keys")
+    (source,) = spool(ask([tiles], [RAIL]), stretch_side(PARAMETERS), folder)
     return [stretch.key for stretch in lay_out([source], source)]
 
 

@@ -197,3 +197,20 @@ def test_one_run_measures_every_track_of_every_class_if_asked(monkeypatch):
         assert rms(found.cant_mm - 20.0) < 1.0
         np.testing.assert_allclose(found.xyz[0], line.xyz[0])
     assert pipeline.extract_rails(clouds[:1], pipeline.Parameters(GAUGE, WIDTH)).geometry == ()
+
+
+@pytest.mark.parametrize("step_m", [0.25, 1.0, 3.0])
+def test_points_of_stations_add_up_to_those_of_the_rails(step_m):
+    left, right = curved_track().rails()
+    rails = rail_lines(left, right, points=60)
+    (found,) = measure_track_geometry(build_centerlines(rails, GAUGE, WIDTH), rails, WIDTH, step_m)
+    assert abs(found.points.sum() - 120) <= 1
+
+
+def test_a_short_piece_has_no_radius_that_a_millimetre_makes():
+    x = np.arange(0, 3.3, 0.1)
+    sag = 0.001 * np.sin(np.pi * x / x[-1])  # versine 1 mm: a radius of 1.3 km
+    left, right = (np.column_stack([x, sag + side * 0.5 * (GAUGE + WIDTH), 0 * x]) for side in (1, -1))
+    rails = rail_lines(left, right)
+    (found,) = measure_track_geometry(build_centerlines(rails, GAUGE, WIDTH), rails, WIDTH)
+    assert np.isnan(found.radius_m).all()

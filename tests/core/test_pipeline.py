@@ -7,7 +7,7 @@ import pytest
 from rail_extract.core import pipeline
 from rail_extract.core.errors import Cancelled, NoTrackError, ParameterError
 from rail_extract.core.lines.polyline import project
-from rail_extract.core.pipeline import Parameters, extract_rails, lines_of, tracks_of
+from rail_extract.core.pipeline import Parameters, extract_rails, lines_of, overlap_tiles, tracks_of
 from rail_extract.core.points import LocalFrame, RailPoints
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine, length_along
@@ -60,6 +60,16 @@ def test_tracks_of_two_gauges_side_by_side_are_numbered_through():
     lefts = (0.0, 1.435 + WIDTH, 5.0, 5.0 + 1.0 + WIDTH)
     tracks = tracks_of(rails_at(CURVES[0], *lefts), Parameters(1.435, WIDTH, other_gauges_m=(1.0, 1.435)))
     assert [(track.track_id, round(track.gauge_mm)) for track in tracks] == [(1, 1435), (2, 1000)]
+
+
+@pytest.mark.parametrize("gauge", [1.000, 1.020, 1.030, 1.040, 1.050, 1.067])
+def test_a_track_between_two_gauges_is_one_track(gauge):
+    rails = rails_at(CURVES[1], 0.0, gauge + WIDTH)
+    settings = [Parameters(one, WIDTH, other_gauges_m=(other,)) for one, other in ((1.0, 1.067), (1.067, 1.0))]
+    first, second = (tracks_of(rails, one) for one in settings)
+    assert len(first) == len(second) == 1
+    assert first[0].gauge_mm == pytest.approx(1000 * gauge, abs=0.2)
+    assert first[0].length_m == pytest.approx(second[0].length_m, abs=1e-6)
 
 
 def test_a_gauge_that_nothing_has_is_no_error_beside_one_that_something_has():
@@ -126,6 +136,32 @@ def test_a_line_in_stretches_is_the_line_in_one_piece(monkeypatch):
     count = min(len(one.chainage_m), len(two.chainage_m))
     np.testing.assert_allclose(two.gauge_mm[:count], one.gauge_mm[:count], atol=1.0)
     np.testing.assert_allclose(two.cant_mm[:count], one.cant_mm[:count], atol=0.5)
+
+
+def test_the_shortest_line_counts_whole_lines_not_what_a_stretch_sees_of_them(monkeypatch):
+    """Two lines across a border of stretches at x = 0, of 120 m and of 90 m, of which 30 m lie before it."""
+    monkeypatch.setattr(pipeline, "clean", lambda raster, *_: raster)
+    lines = [np.arange(-30, end, 0.005) for end in (90, 60)]
+    points = [np.column_stack([x, np.full(len(x), 5.0 + 4 * y), np.full(len(x), 100.0)]) for y, x in enumerate(lines)]
+    cloud = RailPoints(np.concatenate(points), LocalFrame(np.zeros(3)), 10)
+    for shortest, lengths in ((1, [120, 90]), (60, [120, 90]), (100, [120]), (130, [])):
+        settings = Parameters(1.435, WIDTH, min_length_m=shortest, stretch_tiles=4)
+        found = _by_length(extract_rails([cloud], settings).rails)[::-1]
+        assert [rail.length_m for rail in found] == pytest.approx(lengths, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("gauge", "changed", "tiles"),
+    [
+        (1.435, {}, 4),  # 10.2 m each
+        (1.0, {}, 6),  # 7.3 m
+        (1.435, {"max_gap_m": 45.0}, 11),  # 4 + 2 (45 + 8) = 110 m
+        (1.435, {"smoothing_z_m": 20.0}, 7),  # 4 + 3 * 20 = 64 m
+        (1.435, {"max_gap_m": 1e5}, 50),
+    ],
+)
+def test_stretches_overlap_by_what_borders_need(gauge, changed, tiles):
+    assert overlap_tiles(Parameters(gauge, WIDTH, **changed)) == tiles
 
 
 @pytest.mark.parametrize("tiles", [4, 50])

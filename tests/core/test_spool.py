@@ -31,7 +31,7 @@ def files(tmp_path):
 
 
 def test_disk_and_memory_give_the_same_points_in_the_same_frame(files, tmp_path):
-    spooled = spool(ask(files, [10, 11]), SIDE, tmp_path / "spool")
+    spooled = spool(ask(files, [10, 11]), SIDE, tmp_path)
     read = read_rail_points(files, [10, 11])
     assert [one.class_code for one in spooled] == [one.class_code for one in read] == [10, 11]
     for source, points in zip(spooled, read):

@@ -91,7 +91,7 @@ def test_a_mosaic_shows_what_the_neighbours_hold():
     stretches = {stretch.key: stretch for stretch in lay_out([source], source)}
     rasters = {key: own_tiles(rasterize(source.near(one, 0.0).xyz, CELL), one) for key, one in stretches.items()}
     key = sorted(stretches)[2]
-    seen = mosaic(rasters, stretches[key])
+    seen = mosaic(rasters, stretches[key], 4)
     expected = rasterize(source.near(stretches[key], SIDE - 1e-6).xyz, CELL)
     assert set(seen.tiles) == set(expected.tiles)
     assert all((seen.tiles[place] == expected.tiles[place]).all() for place in seen.tiles)
