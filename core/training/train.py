@@ -40,7 +40,7 @@ LAST_CROP = 1024
 most cells see all of it."""
 LAST_SHARE = 0.01
 """Share of the steps with the last crop; such a step costs four of the others."""
-HARD_WEIGHT, HARD_REACH = 3.0, 2
+HARD_WEIGHT, HARD_REACH = 5.0, 2
 """Weight in the entropy of cells so near to a gap, a guard rail or a lone line, rail or not: they are few, and what
 lines hang on. The output finds too little for it, which `calibrate` makes good."""
 EARLY_PASS_WEIGHT = 0.5
