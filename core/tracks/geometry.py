@@ -191,7 +191,8 @@ def _points(rails: Sequence[RailLine], side: Meeting, along: np.ndarray, cells: 
 
 def _whole(counts: np.ndarray) -> np.ndarray:
     """Round counts so that any that follow each other add up to what they did, within one."""
-    return np.diff(np.round(np.cumsum(counts)), prepend=0.0).astype(int)
+    total = np.round(np.cumsum(counts), 6)  # halves are common: which way they go must not hang on the last bit
+    return np.diff(np.round(total), prepend=0.0).astype(int)
 
 
 def _points_before(rail: RailLine, t: np.ndarray) -> np.ndarray:
