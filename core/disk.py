@@ -66,9 +66,10 @@ def take_names(path: Path, whole: Mapping[Path, Path]) -> None:
         for stale in _companions(path) - set(whole.values()):
             stale.unlink(missing_ok=True)
     except (DiskError, OSError) as error:
-        for file, name in whole.items():
-            if file.exists():
-                file.replace(name.with_name(f"{path.stem}_new{name.name[len(path.stem) :]}"))
+        kept = {file: name.with_name(f"{path.stem}_new{name.name[len(path.stem) :]}") for file, name in whole.items()}
+        with writing(path.parent):
+            for file in filter(Path.exists, kept):
+                file.replace(kept[file])
         reason = error if isinstance(error, DiskError) else f"{path} can't be replaced ({error.strerror})."
         raise DiskError(f"{reason} The new one is {path.with_name(f'{path.stem}_new{path.suffix}')}.") from error
 

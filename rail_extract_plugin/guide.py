@@ -12,6 +12,11 @@ def guide(page: str) -> str:
     shipped = GUIDE / f"{page}.html"
     if shipped.exists():
         return shipped.as_uri()
+    return on_the_web(f"docs/{page}.md")
+
+
+def on_the_web(file: str) -> str:
+    """Give the address of a file in the repository that the plugin's metadata name."""
     metadata = ConfigParser(interpolation=None)
     metadata.read(METADATA, encoding="utf-8")
-    return f"{metadata['general']['repository']}/blob/main/docs/{page}.md"
+    return f"{metadata['general']['repository']}/blob/main/{file}"

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from configparser import ConfigParser
 from html import escape
 from pathlib import Path
 from posixpath import normpath
 
 import markdown
+from rail_extract.rail_extract_plugin.guide import on_the_web
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -66,10 +66,4 @@ def _target(link: re.Match) -> str:
     path, mark, place = link[0].partition("#")
     if path.removesuffix(".md") in PAGES:
         return path.removesuffix(".md") + ".html" + mark + place
-    return f"{_repository()}/blob/main/{normpath(f'docs/{path}')}{mark}{place}"
-
-
-def _repository() -> str:
-    metadata = ConfigParser(interpolation=None)
-    metadata.read(ROOT / "metadata.txt", encoding="utf-8")
-    return metadata["general"]["repository"]
+    return on_the_web(normpath(f"docs/{path}")) + mark + place
