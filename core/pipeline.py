@@ -168,7 +168,7 @@ def stretch_side(parameters: Parameters) -> float:
     ParameterError
         They would overlap with more than their neighbours.
     """
-    tile_m = TILE * cell_size(parameters.gauge_m, parameters.head_width_m)
+    tile_m = _tile_side(parameters)
     least = math.ceil(OVERLAP_M / tile_m)
     if parameters.stretch_tiles < least:
         raise ParameterError(f"Stretches of {parameters.stretch_tiles} tiles are too small: give {least} at least.")
@@ -182,8 +182,12 @@ def overlap_tiles(parameters: Parameters) -> int:
     three sigma of the smoothing in height. No more than the neighbours, however long the gaps.
     """
     reach_m = HALO_M + max(2 * (parameters.max_gap_m + 2 * FIT_M), 3 * parameters.smoothing_z_m)
-    tile_m = TILE * cell_size(parameters.gauge_m, parameters.head_width_m)
-    return min(math.ceil(max(reach_m, OVERLAP_M) / tile_m), parameters.stretch_tiles)
+    return min(math.ceil(max(reach_m, OVERLAP_M) / _tile_side(parameters)), parameters.stretch_tiles)
+
+
+def _tile_side(parameters: Parameters) -> float:
+    """Side of a raster tile in metres."""
+    return TILE * cell_size(parameters.gauge_m, parameters.head_width_m)
 
 
 def engine_for(parameters: Parameters) -> Engine:
@@ -236,7 +240,7 @@ def rails_of_stretch(
     """Draw the rails of a stretch, given its own cleaned raster and those of its neighbours."""
     tiles = overlap_tiles(parameters)
     raster = mosaic(rasters, stretch, tiles)
-    overlap_m = tiles * TILE * raster.cell_m
+    overlap_m = tiles * _tile_side(parameters)
     points = source.near(stretch, overlap_m)
     if math.isfinite(stretch.side_m):
         # A line that the stretch sees in part is longer than what it sees; `whole_rails` drops those that are short.

@@ -106,10 +106,10 @@ def pair_rails(
     # Chords of stations and rails not quite abreast hide a little of the true distance, hence the doubled tolerance.
     at_gauge = parallels[np.abs(np.abs(parallels.left_m) - spacing) < 2 * tolerance_m]
     candidates = [stretch for group in at_gauge.groups() for stretch in _stretches(group)]
+    others_m = [gauge + head_width_m for gauge in other_gauges_m]
     matches = []
     for stretch in progress.span(0.3, 1.0).follow(candidates):
         found = _match(rails, stretch, spacing, tolerance_m)
-        others_m = [gauge + head_width_m for gauge in other_gauges_m]
         matches.extend(match for match in found if _is_nearest(match, stretch, spacing, others_m))
     return tuple(match.pair() for match in _without_ghosts(_select(matches)))
 
