@@ -22,7 +22,7 @@ demo: plugin  ## extract the sample's rails through qgis_process; lines and map 
 
 .PHONY: test
 test: lint plugin  ## run every test: core, plugin and, through qgis_process, the whole
-	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest tests/core
+	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest tests/core tests/laboratory tests/benchmarks tests/docs
 	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest tests/plugin tests/e2e
 
 .PHONY: test-qgis

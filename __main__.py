@@ -8,11 +8,11 @@ import sys
 from collections.abc import Sequence
 
 COMMANDS = {
-    "extract": ("core.cluster.extract", "extract rails and track centerlines on many workers"),
-    "train": ("core.training.train", "train FRPDF on synthetic rasters"),
-    "evaluate": ("core.training.evaluate", "compare weights on a fixed set of synthetic rasters"),
+    "extract": ("core.commands.extract", "extract rails and track centerlines on many workers"),
+    "train": ("laboratory.training.train", "train FRPDF on synthetic rasters"),
+    "evaluate": ("laboratory.training.evaluate", "compare weights on a fixed set of synthetic rasters"),
     "onnx": ("core.frpdf.onnx", "write the network for other runtimes"),
-    "scenes": ("core.synthetic.write", "write synthetic clouds with their true lines"),
+    "scenes": ("laboratory.scenes.write", "write synthetic clouds with their true lines"),
 }
 """Module and help of each command; a module offers `add_arguments(parser)` and `run(args)`, that may give a code."""
 

@@ -10,9 +10,9 @@ import multiprocessing
 import sys
 from concurrent.futures import ProcessPoolExecutor
 
-from measuring import Result, measure
-from rail_extract.core.synthetic.scenes import SCENES
-from tables import error_table, found_table
+from rail_extract.laboratory.ruler.measuring import Result, measure
+from rail_extract.laboratory.ruler.tables import error_table, found_table
+from rail_extract.laboratory.scenes.catalogue import SCENES
 
 
 def main() -> None:

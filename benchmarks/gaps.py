@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 from rail_extract.core.frpdf import DEFAULT_PASSES
 from rail_extract.core.frpdf.engine import make_engine
+from rail_extract.core.frpdf.models import MODELS
 from rail_extract.core.frpdf.weights import load_arrays
-from rail_extract.core.frpdf.zoo import MODELS
-from rail_extract.core.synthetic.distortion import Pair
-from rail_extract.core.synthetic.layouts import FAMILIES
-from rail_extract.core.synthetic.pairs import BASE_RATIO, CELL_M, RATIO_TOLERANCE, RATIOS, SPACING_M, random_pair
-from rail_extract.core.training.evaluate import Cleaner, cleaner_of
-from rail_extract.core.training.scores import Scores, bridged, score
+from rail_extract.laboratory.rasters.distortion import Pair
+from rail_extract.laboratory.rasters.layouts import FAMILIES
+from rail_extract.laboratory.rasters.pairs import BASE_RATIO, CELL_M, RATIO_TOLERANCE, RATIOS, SPACING_M, random_pair
+from rail_extract.laboratory.training.evaluate import Cleaner, cleaner_of
+from rail_extract.laboratory.training.scores import Scores, bridged, score
 
 SEED = 3_2026
 """Apart from the seeds of trainings and of the other benchmarks."""

@@ -20,17 +20,17 @@ from pathlib import Path
 
 import numpy as np
 from rail_extract.core import pipeline
+from rail_extract.core.clouds.las import laspy
+from rail_extract.core.clouds.points import ask
 from rail_extract.core.cluster.run import connect, extract
-from rail_extract.core.las import laspy
-from rail_extract.core.pipeline import Parameters, extract_rails, stretch_side
-from rail_extract.core.points import ask
+from rail_extract.core.pipeline import Parameters, extract_rails, square_side
+from rail_extract.core.squares.spool import spool
 from rail_extract.core.standards import STANDARDS
-from rail_extract.core.stretches.spool import spool
-from rail_extract.core.synthetic.curves import Element, trace
-from rail_extract.core.synthetic.plain_scenes import spacing
-from rail_extract.core.synthetic.scanner import Scanner
-from rail_extract.core.synthetic.scene import RAIL, Plan, build
-from rail_extract.core.synthetic.tracks import Track
+from rail_extract.laboratory.curves import Element, trace
+from rail_extract.laboratory.scenes.plain import spacing
+from rail_extract.laboratory.scenes.scanner import Scanner
+from rail_extract.laboratory.scenes.scene import RAIL, Plan, build
+from rail_extract.laboratory.scenes.tracks import Track
 
 STANDARD = STANDARDS["EN_60E1_1435"]
 PIECE_M = 100.0
@@ -167,7 +167,7 @@ def measure(folder: Path, with_network: bool) -> dict:
     start = time.perf_counter()
     with tempfile.TemporaryDirectory() as work:
         marks.append(time.process_time())
-        clouds = spool(ask(folder, [RAIL]), stretch_side(parameters()), Path(work))
+        clouds = spool(ask(folder, [RAIL]), square_side(parameters()), Path(work))
         network = extract_rails(clouds, parameters())
         marks.append(time.process_time())
         spooled = size_of(Path(work))

@@ -12,16 +12,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from peer import peer_lines
 from rail_extract.core.pipeline import Parameters, extract_rails
-from rail_extract.core.rails import length_along
+from rail_extract.core.polyline import length_along
 from rail_extract.core.standards import STANDARDS
-from rail_extract.core.synthetic.compare import Comparison, compare_lines
-from rail_extract.core.synthetic.curves import Element, trace
-from rail_extract.core.synthetic.plain_scenes import rolling, spacing
-from rail_extract.core.synthetic.scanner import Scanner
-from rail_extract.core.synthetic.scene import Clutter, Gaps, Plan, Scene, build
-from rail_extract.core.synthetic.tracks import Track
+from rail_extract.laboratory.curves import Element, trace
+from rail_extract.laboratory.ruler.lines import Comparison, compare_lines
+from rail_extract.laboratory.ruler.peer import peer_lines
+from rail_extract.laboratory.scenes.plain import rolling, spacing
+from rail_extract.laboratory.scenes.scanner import Scanner
+from rail_extract.laboratory.scenes.scene import Clutter, Gaps, Plan, Scene, build
+from rail_extract.laboratory.scenes.tracks import Track
 
 SEED = 100
 LENGTH_M = 40.0

@@ -11,6 +11,7 @@ from statistics import median
 
 import numpy as np
 import torch
+from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frpdf import START
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.frpdf.corridor import Piece, lay_fields
@@ -20,11 +21,10 @@ from rail_extract.core.frpdf.network import FRPDF, RECEPTIVE_RADIUS
 from rail_extract.core.frpdf.onnx import to_onnx
 from rail_extract.core.frpdf.opencv_engine import OpenCvEngine
 from rail_extract.core.frpdf.torch_engine import TorchEngine
-from rail_extract.core.lines.polyline import interpolate, project, resample
 from rail_extract.core.pipeline import Parameters, lines_of
-from rail_extract.core.points import RailPoints
+from rail_extract.core.polyline import interpolate, length_along, project, resample
 from rail_extract.core.progress import SILENT
-from rail_extract.core.rails import RailLine, length_along
+from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import RailRaster, cell_size, rasterize
 
 TILE = 512

@@ -9,8 +9,8 @@ import multiprocessing
 import time
 
 import numpy as np
-from rail_extract.core.synthetic.layouts import FAMILIES, WEIGHTS
-from rail_extract.core.synthetic.pairs import random_pair
+from rail_extract.laboratory.rasters.layouts import FAMILIES, WEIGHTS
+from rail_extract.laboratory.rasters.pairs import random_pair
 
 SIDE = 512
 PROCESSES = 2

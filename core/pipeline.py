@@ -6,43 +6,44 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from .clouds.points import RailPoints
 from .errors import NoRailPointsError, NoTrackError, ParameterError
+from .frame import LocalFrame
 from .frpdf import DEFAULT_PASSES
 from .frpdf.cleanup import MARGIN, clean, most_passes
 from .frpdf.engine import Engine, make_engine
+from .frpdf.models import choose
 from .frpdf.weights import load_arrays
-from .frpdf.zoo import choose
 from .heads.elevation import ElevationParameters, elevate, flat_rails, numbered
-from .heads.measuring import measure_in_stretches
-from .heads.reach import warn_if_out_of_reach
 from .heads.refinement import refine
+from .heads.smoothing_check import warn_if_out_of_reach
+from .lines.bridges import FIT_M
 from .lines.network_smoothing import smooth_network
 from .lines.thinning import thin
-from .points import LocalFrame, RailPoints
 from .progress import SILENT, Progress
 from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from .raster import TILE, RailRaster, cell_size, rasterize
-from .standards import distinct_gauges
-from .stretches.seams import join
-from .stretches.squares import (
+from .squares.grid import (
     HALO_M,
     OVERLAP_M,
-    STRETCH_TILES,
+    SQUARE_TILES,
     Key,
     MemorySource,
     PointSource,
-    Stretch,
+    Square,
     assembled,
     in_turn,
     lay_out,
     mosaic,
     own_tiles,
 )
-from .stretches.trimming import StretchRails, trim
+from .squares.pieces import SquareRails, trim
+from .squares.remeasuring import measure_in_squares
+from .squares.seams import join
+from .standards import distinct_gauges
 from .tracks.centerlines import CenterlineParameters, build_centerlines
 from .tracks.geometry import measure_track_geometry
 from .vectorize import vectorize
-from .vectorize.bridges import FIT_M
 
 NETWORK_SHARE = 0.7
 """Part of a stretch's time that the network takes, for the progress."""
@@ -78,7 +79,7 @@ class Parameters:
         Deviation from the gauge at which two rails still make a track.
     quality_step_m : float or None
         Distance of the stations at which the tracks' geometry is measured; None leaves it out.
-    stretch_tiles : int
+    square_tiles : int
         Side, in raster tiles, of the squares that are worked on one after another; results don't hang on it.
     keep_cleaned : bool
         Whether the rasters that the network made are handed out as well.
@@ -102,7 +103,7 @@ class Parameters:
     other_gauges_m: tuple[float, ...] = ()
     centerline_tolerance_m: float = 0.05
     quality_step_m: float | None = None
-    stretch_tiles: int = STRETCH_TILES
+    square_tiles: int = SQUARE_TILES
     keep_cleaned: bool = False
 
 
@@ -139,7 +140,7 @@ def extract_rails(
     if not points:
         raise NoRailPointsError("There is no point to extract rails from.")
     engine = engine_for(parameters)
-    side_m = stretch_side(parameters)
+    side_m = square_side(parameters)
     sources = [MemorySource(cloud, side_m) if isinstance(cloud, RailPoints) else cloud for cloud in points]
     rails: list[RailLine] = []
     cleaned: list[RailRaster] = []
@@ -160,7 +161,7 @@ def extract_rails(
     )
 
 
-def stretch_side(parameters: Parameters) -> float:
+def square_side(parameters: Parameters) -> float:
     """Side of the stretches in metres.
 
     Raises
@@ -170,9 +171,9 @@ def stretch_side(parameters: Parameters) -> float:
     """
     tile_m = _tile_side(parameters)
     least = math.ceil(OVERLAP_M / tile_m)
-    if parameters.stretch_tiles < least:
-        raise ParameterError(f"Stretches of {parameters.stretch_tiles} tiles are too small: give {least} at least.")
-    return parameters.stretch_tiles * tile_m
+    if parameters.square_tiles < least:
+        raise ParameterError(f"Stretches of {parameters.square_tiles} tiles are too small: give {least} at least.")
+    return parameters.square_tiles * tile_m
 
 
 def overlap_tiles(parameters: Parameters) -> int:
@@ -182,7 +183,7 @@ def overlap_tiles(parameters: Parameters) -> int:
     three sigma of the smoothing in height. No more than the neighbours, however long the gaps.
     """
     reach_m = HALO_M + max(2 * (parameters.max_gap_m + 2 * FIT_M), 3 * parameters.smoothing_z_m)
-    return min(math.ceil(max(reach_m, OVERLAP_M) / _tile_side(parameters)), parameters.stretch_tiles)
+    return min(math.ceil(max(reach_m, OVERLAP_M) / _tile_side(parameters)), parameters.square_tiles)
 
 
 def _tile_side(parameters: Parameters) -> float:
@@ -197,32 +198,32 @@ def engine_for(parameters: Parameters) -> Engine:
 
 
 def _walk(
-    source: PointSource, stretches: Sequence[Stretch], parameters: Parameters, engine: Engine, progress: Progress
-) -> tuple[list[StretchRails], list[RailRaster]]:
+    source: PointSource, stretches: Sequence[Square], parameters: Parameters, engine: Engine, progress: Progress
+) -> tuple[list[SquareRails], list[RailRaster]]:
     """Clean all stretches of one class, and draw the lines of each as soon as its neighbours are clean as well."""
     by_key = {stretch.key: stretch for stretch in stretches}
     total = sum(source.counts.values())
     rasters: dict[Key, RailRaster] = {}
-    results: list[StretchRails] = []
+    results: list[SquareRails] = []
     done = 0.0
     for key, ready, spent in in_turn(by_key):
         weight = source.counts[key] / total if len(by_key) > 1 else 1.0
-        rasters[key] = clean_stretch(
+        rasters[key] = clean_square(
             source, by_key[key], parameters, engine, progress.span(done, done + NETWORK_SHARE * weight)
         )
         done += NETWORK_SHARE * weight
         for one in ready:
             weight = source.counts[one] / total if len(by_key) > 1 else 1.0
             step = progress.span(done, done + (1 - NETWORK_SHARE) * weight)
-            results.append(rails_of_stretch(source, by_key[one], rasters, parameters, step))
+            results.append(rails_of_square(source, by_key[one], rasters, parameters, step))
             done += (1 - NETWORK_SHARE) * weight
         for one in () if parameters.keep_cleaned else spent:
             del rasters[one]
     return results, [assembled(rasters, by_key, source.frame)] if parameters.keep_cleaned else []
 
 
-def clean_stretch(
-    source: PointSource, stretch: Stretch, parameters: Parameters, engine: Engine, progress: Progress = SILENT
+def clean_square(
+    source: PointSource, stretch: Square, parameters: Parameters, engine: Engine, progress: Progress = SILENT
 ) -> RailRaster:
     """Rasterize the points of a stretch, have the network clean the raster, and keep what lies inside."""
     cell_m = cell_size(parameters.gauge_m, parameters.head_width_m)
@@ -230,13 +231,13 @@ def clean_stretch(
     return own_tiles(clean(rasterize(points.xyz, cell_m), engine, parameters.passes, progress), stretch)
 
 
-def rails_of_stretch(
+def rails_of_square(
     source: PointSource,
-    stretch: Stretch,
+    stretch: Square,
     rasters: Mapping[Key, RailRaster],
     parameters: Parameters,
     progress: Progress = SILENT,
-) -> StretchRails:
+) -> SquareRails:
     """Draw the rails of a stretch, given its own cleaned raster and those of its neighbours."""
     tiles = overlap_tiles(parameters)
     raster = mosaic(rasters, stretch, tiles)
@@ -249,7 +250,7 @@ def rails_of_stretch(
 
 
 def whole_rails(
-    results: Sequence[StretchRails], frame: LocalFrame, parameters: Parameters, first_id: int = 1
+    results: Sequence[SquareRails], frame: LocalFrame, parameters: Parameters, first_id: int = 1
 ) -> list[RailLine]:
     """Join the rails of all stretches, drop the short ones, thin and number them."""
     rails = [rail for rail in join(results, frame) if rail.length_m >= parameters.min_length_m]
@@ -370,14 +371,14 @@ def geometry_of(
     centerlines: Sequence[Centerline],
     rails: Sequence[RailLine],
     source: PointSource,
-    stretches: Sequence[Stretch],
+    stretches: Sequence[Square],
     parameters: Parameters,
     progress: Progress = SILENT,
 ) -> tuple[TrackGeometry, ...]:
     """Measure the tracks of one class, if asked for."""
     if parameters.quality_step_m is None:
         return ()
-    measured = measure_in_stretches(rails, source, stretches, parameters.head_width_m, progress.span(0.0, 0.8))
+    measured = measure_in_squares(rails, source, stretches, parameters.head_width_m, progress.span(0.0, 0.8))
     return measure_track_geometry(
         centerlines, measured, parameters.head_width_m, parameters.quality_step_m, progress.span(0.8, 1.0)
     )

@@ -6,25 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .points import LocalFrame
+from .frame import LocalFrame
+from .polyline import length_along
 from .raster import RailRaster
-
-
-def length_along(vertices: np.ndarray) -> np.ndarray:
-    """Distance of each vertex from the first, along the line.
-
-    Parameters
-    ----------
-    vertices : (n, 2) or (n, 3) array
-        A polyline; plan length for two columns, true length for three.
-
-    Returns
-    -------
-    (n,) float array, starting at 0
-    """
-    steps = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps)])
-
 
 SAME_PLACE_M = 1e-9
 """Vertices closer together than this along a line are one."""

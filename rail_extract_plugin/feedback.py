@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from qgis.core import QgsProcessingFeedback, QgsProcessingParameterDefinition
 
 from ..core.progress import Progress
-from .labels import for_reader
+from .dialog.labels import for_reader
 
 
 class QgisProgress(Progress):

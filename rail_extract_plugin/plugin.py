@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from qgis.core import QgsApplication
 
-from . import package_folders
 from .provider import RailExtractProvider
+from .setup import package_folders
 
 
 class RailExtractPlugin:
@@ -32,8 +32,8 @@ class RailExtractPlugin:
         """Start in QGIS with windows."""
         self.initProcessing()
 
-        from . import package_setting
         from .model_action import OpenModelAction
+        from .setup import package_setting
 
         self.action = OpenModelAction()
         self.action.register()
@@ -42,7 +42,7 @@ class RailExtractPlugin:
     def unload(self) -> None:
         """Take the algorithms away again."""
         if self.action is not None:
-            from . import package_setting
+            from .setup import package_setting
 
             package_setting.deregister()
             self.action.deregister()

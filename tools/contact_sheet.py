@@ -7,8 +7,8 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
-from rail_extract.core.synthetic.layouts import FAMILIES
-from rail_extract.core.synthetic.pairs import BASE_RATIO, random_pair
+from rail_extract.laboratory.rasters.layouts import FAMILIES
+from rail_extract.laboratory.rasters.pairs import BASE_RATIO, random_pair
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402

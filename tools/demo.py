@@ -14,7 +14,7 @@ from pathlib import Path
 
 from lines import read_features, read_lines
 from picture import draw_map
-from rail_extract.core.synthetic.compare import Comparison, compare_lines
+from rail_extract.laboratory.ruler.lines import Comparison, compare_lines
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLE = ROOT / "resources" / "sample" / "sample.laz"

@@ -8,7 +8,7 @@ from pathlib import Path
 from posixpath import normpath
 
 import markdown
-from rail_extract.rail_extract_plugin.guide import on_the_web
+from rail_extract.rail_extract_plugin.dialog.guide import on_the_web
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"

@@ -12,11 +12,11 @@ from rail_extract.core.pipeline import Parameters, engine_for, lines_of, tracks_
 from rail_extract.core.rails import Centerline, RailLine
 from rail_extract.core.raster import RailRaster, cell_size, rasterize
 from rail_extract.core.standards import STANDARDS
-from rail_extract.core.synthetic.curves import Curve, Element, trace
-from rail_extract.core.synthetic.plain_scenes import spacing
-from rail_extract.core.synthetic.scanner import Scanner
-from rail_extract.core.synthetic.scene import Clutter, Gaps, Plan, Scene, build
-from rail_extract.core.synthetic.tracks import Track
+from rail_extract.laboratory.curves import Curve, Element, trace
+from rail_extract.laboratory.scenes.plain import spacing
+from rail_extract.laboratory.scenes.scanner import Scanner
+from rail_extract.laboratory.scenes.scene import Clutter, Gaps, Plan, Scene, build
+from rail_extract.laboratory.scenes.tracks import Track
 
 STANDARD = STANDARDS["EN_60E1_1435"]
 SCANNER = Scanner()

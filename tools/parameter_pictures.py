@@ -20,12 +20,12 @@ from parameter_bench import HEADING, STANDARD, Bench, bench, bend  # noqa: E402
 from rail_extract.core.pipeline import Parameters, tracks_of  # noqa: E402
 from rail_extract.core.rails import Centerline, RailLine  # noqa: E402
 from rail_extract.core.standards import STANDARDS  # noqa: E402
-from rail_extract.core.synthetic.compare import match  # noqa: E402
-from rail_extract.core.synthetic.curves import Element, trace  # noqa: E402
-from rail_extract.core.synthetic.plain_scenes import spacing  # noqa: E402
-from rail_extract.core.synthetic.scanner import Scanner  # noqa: E402
-from rail_extract.core.synthetic.scene import Plan, build  # noqa: E402
-from rail_extract.core.synthetic.tracks import Track  # noqa: E402
+from rail_extract.laboratory.curves import Element, trace  # noqa: E402
+from rail_extract.laboratory.ruler.lines import match  # noqa: E402
+from rail_extract.laboratory.scenes.plain import spacing  # noqa: E402
+from rail_extract.laboratory.scenes.scanner import Scanner  # noqa: E402
+from rail_extract.laboratory.scenes.scene import Plan, build  # noqa: E402
+from rail_extract.laboratory.scenes.tracks import Track  # noqa: E402
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures" / "parameters"
 DPI = 80

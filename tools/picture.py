@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from rail_extract.core.points import read_rail_points
+from rail_extract.core.clouds.points import read_rail_points
 
 RAIL_CLASS = 10
 DETAIL_M = 12.0

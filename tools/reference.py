@@ -22,7 +22,7 @@ from qgis.core import (  # noqa: E402
 from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS, Field  # noqa: E402
 from rail_extract.core.standards import CUSTOM, STANDARDS, UNCONFIRMED  # noqa: E402
 from rail_extract.rail_extract_plugin.algorithms import ALGORITHMS  # noqa: E402
-from rail_extract.rail_extract_plugin.definitions import UNBOUNDED  # noqa: E402
+from rail_extract.rail_extract_plugin.dialog.definitions import UNBOUNDED  # noqa: E402
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference.md"
 

@@ -12,17 +12,18 @@ import dask
 from distributed import Client, Future, LocalCluster, as_completed
 from distributed.system import MEMORY_LIMIT
 
+from ..clouds.points import Request, ask
 from ..disk import writing
 from ..errors import CloudError, NoTrackError, RailExtractError
-from ..frpdf.zoo import choose
-from ..pipeline import Parameters, stretch_side, tracks_of, warn_of_rails, whole_rails
-from ..points import LocalFrame, Request, ask
+from ..frame import LocalFrame
+from ..frpdf.models import choose
+from ..pipeline import Parameters, square_side, tracks_of, warn_of_rails, whole_rails
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
-from ..stretches.spool import SpooledFile, SpooledPoints, gather
-from ..stretches.squares import Key, lay_out
-from .tasks import Failure, StretchTask, clean, draw, sort_points
-from .work import load_rails, version
+from ..squares.grid import Key, lay_out
+from ..squares.spool import SpooledFile, SpooledPoints, gather
+from .store import load_rails, version
+from .tasks import Failure, SquareTask, clean, draw, sort_points
 
 DEATHS = 10
 """Workers that may die over one stretch, of whatever else, before it is given up."""
@@ -129,7 +130,7 @@ def extract(
     folder = folder.resolve()
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)  # not by workers: a run that has failed may have removed it
-    side_m = stretch_side(parameters)
+    side_m = square_side(parameters)
     found = _sorted_points(client, request, side_m, folder, failures, progress.span(0.0, READING))
     sources = gather(request, side_m, found)
     drawn = progress.span(READING, READING + STRETCHES)
@@ -179,7 +180,7 @@ def _stretches(
     folder: Path,
     failures: list[str],
     progress: Progress,
-) -> list[list[tuple[StretchTask, Path]]]:
+) -> list[list[tuple[SquareTask, Path]]]:
     """Clean and draw the stretches of all classes; gives the files of the rails of each.
 
     Those of a stretch are drawn as soon as its neighbours are clean, or have failed: Dask itself would give up whatever
@@ -187,17 +188,17 @@ def _stretches(
     """
     weights = choose(parameters.gauge_m, parameters.head_width_m).path
     tasks = {
-        (number, stretch.key): StretchTask(source.part(stretch), stretch, parameters, version(weights), str(folder))
+        (number, stretch.key): SquareTask(source.part(stretch), stretch, parameters, version(weights), str(folder))
         for number, source in enumerate(sources)
         for stretch in lay_out(sources, source)
     }
     running = {client.submit(clean, task, pure=False): (clean, one) for one, task in tasks.items()}
     queue = as_completed(running)
     rasters: dict[tuple[int, Key], str | Failure] = {}
-    results: list[list[tuple[StretchTask, Path]]] = [[] for _ in sources]
+    results: list[list[tuple[SquareTask, Path]]] = [[] for _ in sources]
     for future in progress.follow(queue, total=2 * len(tasks)):
         work, (number, key) = running.pop(future)
-        found = _result(future, f"Stretch {key}")
+        found = _result(future, f"Square {key}")
         if work is draw:
             if isinstance(found, Failure):
                 failures.append(found.reason)

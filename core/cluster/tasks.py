@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
+from ..clouds.las import CloudHeader
+from ..clouds.points import Request
 from ..errors import DiskError, RailExtractError
 from ..frpdf.engine import Engine
-from ..frpdf.zoo import choose
-from ..las import CloudHeader
-from ..pipeline import Parameters, clean_stretch, engine_for, rails_of_stretch
-from ..points import Request
-from ..stretches.spool import SpooledFile, SpooledPoints, spool_file
-from ..stretches.squares import Key, Stretch, around
-from .work import CORE, fingerprint, load_raster, save_rails, save_raster, version
+from ..frpdf.models import choose
+from ..pipeline import Parameters, clean_square, engine_for, rails_of_square
+from ..squares.grid import Key, Square, around
+from ..squares.spool import SpooledFile, SpooledPoints, spool_file
+from .store import CORE, fingerprint, load_raster, save_rails, save_raster, version
 
 
 @dataclass(frozen=True)
@@ -28,14 +28,14 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class StretchTask:
+class SquareTask:
     """One stretch of one class.
 
     Attributes
     ----------
     source : SpooledPoints
         Of the stretch and its neighbours.
-    stretch : Stretch
+    stretch : Square
     parameters : Parameters
     version : str
         Of the code and the network's weights; see `work.version`.
@@ -44,7 +44,7 @@ class StretchTask:
     """
 
     source: SpooledPoints
-    stretch: Stretch
+    stretch: Square
     parameters: Parameters
     version: str
     folder: str
@@ -87,22 +87,22 @@ def sort_points(request: Request, header: CloudHeader, side_m: float, folder: st
         return Failure(f"{header.path.name} can't be read ({error.strerror}): check the disk or the network drive.")
 
 
-def clean(task: StretchTask) -> str | Failure:
+def clean(task: SquareTask) -> str | Failure:
     """Clean the raster of a stretch, unless that is done; gives the file."""
     path, refusal = task.file("raster", task.name), task.differs_here()
     if refusal:
         return refusal
     if not path.exists():
         try:
-            save_raster(path, clean_stretch(task.source, task.stretch, task.parameters, _engine(task.parameters)))
+            save_raster(path, clean_square(task.source, task.stretch, task.parameters, _engine(task.parameters)))
         except DiskError:
             raise
         except Exception as error:  # noqa: BLE001 - whatever a stretch dies of, the others shall live
-            return Failure(f"Stretch {task.stretch.key} could not be cleaned ({error}).")
+            return Failure(f"Square {task.stretch.key} could not be cleaned ({error}).")
     return str(path)
 
 
-def draw(task: StretchTask, rasters: Sequence[str | Failure]) -> str | Failure:
+def draw(task: SquareTask, rasters: Sequence[str | Failure]) -> str | Failure:
     """Draw the rails of a stretch, unless that is done, from what was cleaned of its `neighbours`; gives the file."""
     files = {key: file for key, file in zip(task.neighbours(), rasters) if isinstance(file, str)}
     if task.stretch.key not in files:
@@ -114,7 +114,7 @@ def draw(task: StretchTask, rasters: Sequence[str | Failure]) -> str | Failure:
     if not path.exists():
         try:
             cleaned = {key: load_raster(Path(file)) for key, file in files.items()}
-            save_rails(path, rails_of_stretch(task.source, task.stretch, cleaned, task.parameters))
+            save_rails(path, rails_of_square(task.source, task.stretch, cleaned, task.parameters))
         except DiskError:
             raise
         except Exception as error:  # noqa: BLE001 - as above

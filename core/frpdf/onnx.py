@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from .folding import Convolution, FoldedLayer, fold
+from .models import MODELS
 from .weights import load_arrays
-from .zoo import MODELS
 
 IR_VERSION, OPERATOR_SET = 8, 13
 """Versions every runtime since 2021 reads."""

@@ -11,11 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..lines.polyline import interpolate, left_normals, project
-from ..rails import length_along
-from ..vectorize.ends import turned
-from ..vectorize.network import LineNetwork
-from .railhead import on_top
+from ..lines.ends import turned
+from ..lines.network import LineNetwork
+from ..polyline import interpolate, left_normals, length_along, project
+from .level import on_top
 
 APART_HEADS = 1.3
 """Distance of two axes, in head widths, from which the raster has a cell between the heads."""

@@ -11,14 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..lines.polyline import Feet, interpolate, project, resample, starts_at_its_end
-from ..points import RailPoints
+from ..clouds.points import RailPoints
+from ..lines.network import LineNetwork
+from ..polyline import Feet, interpolate, length_along, project, resample, starts_at_its_end
 from ..progress import SILENT, Progress
-from ..rails import RailLine, Support, length_along
-from ..vectorize.network import LineNetwork
-from .head_edges import stations_along, widest_reach
+from ..rails import RailLine, Support
+from .edges import stations_along, widest_reach
 from .neighbours import free_edges
-from .railtop import LEAST_POINTS, find_top
+from .top import LEAST_POINTS, find_top
 from .uncertainty import measure_support
 
 BRIDGE_M = 0.5

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..lines.polyline import interpolate, left_normals
-from ..rails import length_along
-from .head_edges import STATION_M, station_count
+from ..polyline import interpolate, left_normals, length_along
+from .edges import STATION_M, station_count
 
 BESIDE_HEADS = 1.5
 """Distance of two axes, in head widths, from which the ground between both heads is wide enough to show their edges."""

@@ -10,18 +10,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..clouds.points import RailPoints
+from ..lines.bridges import bridge
+from ..lines.network import LineNetwork
 from ..lines.network_smoothing import lead
-from ..lines.polyline import interpolate, left_normals, project
 from ..lines.smoothing import smooth_profile
-from ..points import RailPoints
+from ..polyline import interpolate, left_normals, length_along, project
 from ..progress import SILENT, Progress
-from ..rails import length_along
-from ..vectorize.bridges import bridge
-from ..vectorize.network import LineNetwork
 from .branch_starts import APART_HEADS, slide_branches
-from .head_edges import HALF_HEAD, histograms, middles, widest_reach
+from .edges import HALF_HEAD, histograms, middles, widest_reach
+from .level import on_top
 from .neighbours import free_edges
-from .railhead import on_top
 
 LEAST_SHARE = 0.25
 """Share of a line's stations that have to show an edge; otherwise the line stays as it is."""

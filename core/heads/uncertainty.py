@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from ..lines.polyline import distance_to
 from ..lines.smoothing import smooth_profile
+from ..polyline import distance_to
 from ..rails import Support
-from .head_edges import BLUR_BINS, HALF_HEAD, STATION_M, Heads, histograms
-from .railhead import on_top
+from .edges import BLUR_BINS, HALF_HEAD, STATION_M, Heads, histograms
+from .level import on_top
 
 VARIANCE_FACTOR = 0.33375
 """Of independent points `spacing` apart, PAEK's result has this variance times spacing / sigma (section 2.4)."""

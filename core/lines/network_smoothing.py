@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..polyline import length_along
 from ..progress import SILENT, Progress
-from ..rails import length_along
-from ..vectorize.ends import stretch, way_out
-from ..vectorize.network import LineNetwork
+from .ends import stretch, way_out
+from .network import LineNetwork
 from .paek import REACH_SIGMAS, filled, local_fit, reflected, repeated
 
 NETWORK_STATIONS_PER_SIGMA = 8

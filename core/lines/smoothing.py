@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..rails import length_along
+from ..polyline import length_along
 from .paek import filled, local_fit, reflected, repeated
 
 STATIONS_PER_SIGMA = 4

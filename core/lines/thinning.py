@@ -13,7 +13,8 @@ from typing import TypeVar
 import numpy as np
 from scipy.linalg import solveh_banded
 
-from ..rails import Centerline, RailLine, length_along
+from ..polyline import length_along
+from ..rails import Centerline, RailLine
 
 Line = TypeVar("Line", RailLine, Centerline)
 

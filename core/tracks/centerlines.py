@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import NoTrackError
-from ..lines.polyline import is_closed, left_normals, resample, starts_at_its_end
 from ..lines.smoothing import smooth_line
+from ..polyline import is_closed, left_normals, length_along, resample, starts_at_its_end
 from ..progress import SILENT, Progress
-from ..rails import Centerline, RailLine, length_along
+from ..rails import Centerline, RailLine
 from ..standards import STANDARDS
 from .chaining import Chain, chain_pairs, reach_alone
 from .forking import fork_centerlines

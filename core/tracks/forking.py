@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..lines.polyline import interpolate, left_normals, project, resample
+from ..polyline import interpolate, left_normals, length_along, project, resample
 from ..progress import SILENT, Progress
-from ..rails import Centerline, length_along
+from ..rails import Centerline
 
 STATION_M = 0.5
 """Spacing of the stations among which an end looks for the track it may have left."""

@@ -7,10 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ..lines.polyline import distance_to, interpolate, left_normals, resample
 from ..lines.smoothing import smooth_line, smooth_profile
+from ..polyline import distance_to, interpolate, left_normals, length_along, resample
 from ..progress import SILENT, Progress
-from ..rails import Centerline, RailLine, TrackGeometry, cell_borders, length_along
+from ..rails import Centerline, RailLine, TrackGeometry, cell_borders
 from .midline import Meeting, Side, bridged_steps
 from .parallels import commonest_spacing
 
@@ -54,7 +54,7 @@ def measure_track_geometry(
     centerlines : sequence of Centerline
         Their `left_ids` and `right_ids` name the rails; where they name none, the nearest at gauge are taken.
     rails : sequence of RailLine
-        Best as `measuring.measure_in_stretches` makes them from points: with heights that are smoothed over 1 m only,
+        Best as `measuring.measure_in_squares` makes them from points: with heights that are smoothed over 1 m only,
         and support by chainage. Of a rail without support, `sigma_mm` holds for all of it and `points` count as evenly
         spread; without gaps, it counts as bridged only where it is missing.
     head_width_m : float

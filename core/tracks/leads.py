@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..lines.polyline import interpolate, left_normals
-from ..rails import RailLine, length_along
+from ..polyline import interpolate, left_normals, length_along
+from ..rails import RailLine
 from .pairing import RailPair
 
 

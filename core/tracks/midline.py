@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..lines.polyline import interpolate
-from ..rails import RailLine, length_along
+from ..polyline import interpolate, length_along
+from ..rails import RailLine
 
 PIECE_M = 0.1
 """Pieces in which rails are searched; on a tram's curve of 25 m they deviate by 0.05 mm."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..lines.polyline import interpolate, left_normals, project
+from ..polyline import interpolate, left_normals, length_along, project
 from ..progress import SILENT, Progress
-from ..rails import RailLine, length_along
+from ..rails import RailLine
 from .dtw import match_polylines
 from .parallels import REACH_M, Parallels, find_parallels
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..lines.polyline import left_normals, resample, unit_tangents
+from ..polyline import left_normals, resample, unit_tangents
 from ..progress import SILENT, Progress
 from ..rails import RailLine
 

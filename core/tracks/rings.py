@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..lines.polyline import LEAST_ROUND_M, is_closed, resample
-from ..rails import RailLine, length_along
-from ..stretches.uniting import united
+from ..lines.uniting import united
+from ..polyline import LEAST_ROUND_M, is_closed, length_along, resample
+from ..rails import RailLine
 
 STATION_M = 0.05
 """Spacing of the places where a closed rail may begin: two of a track then begin abreast within half of it."""

@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..lines.ends import stretch, way_out
+from ..lines.network import LineNetwork
 from ..progress import SILENT, Progress
 from ..raster import RailRaster
 from .attaching import attach_branches, drop_guards
-from .blots import cut_kinks, straighten_blots
 from .branches import resolve_branches
 from .closing import close
 from .crossings import resolve_crossings
-from .ends import stretch, way_out
 from .joining import join_gaps
 from .junctions import clean_junctions, run_through, weld_pairs
-from .network import LineNetwork
 from .pixels import chamfer_distance, parity_fix, pixel_set
+from .repairs import cut_kinks, straighten_blots
 from .routes import choose_routes
 from .tracing import trace
 from .veinerization import prune, veinerize

@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..lines.bridges import FIT_M, STAIRS_M, Bridge, bridge, curvature
+from ..lines.ends import STEP_M, cut_back, stretch, turned, way_out
+from ..lines.network import LineNetwork
+from ..polyline import length_along
 from ..progress import SILENT, Progress
-from ..rails import length_along
 from .branches import FARTHEST_M, STEADY_M, parting, sharpest
-from .bridges import FIT_M, STAIRS_M, Bridge, bridge, curvature
 from .crossings import SKIP_M
-from .ends import STEP_M, cut_back, stretch, turned, way_out
 from .joining import unseen_m
 from .junctions import DIRECTION_M
-from .network import LineNetwork
 
 BESIDE_M = 1.0
 """A branch that is no nearer to its stock rail is not led back to it: nothing of the switch was seen."""

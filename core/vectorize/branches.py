@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..rails import length_along
-from .bridges import MISFIT_M, STAIRS_M, bridge, curvature
+from ..lines.bridges import MISFIT_M, STAIRS_M, bridge, curvature
+from ..lines.ends import STEP_M, cut_back, stretch, turned
+from ..lines.network import LineNetwork
+from ..polyline import length_along
 from .crossings import MISFIT_M as KNOWN_MISFIT_M
 from .crossings import SKIP_M
-from .ends import STEP_M, cut_back, stretch, turned
 from .junctions import DEFLECTION_DEG, DIRECTION_M, deflections, ends_by_node
-from .network import LineNetwork
 
 FARTHEST_M = 40.0
 """Farthest that a branch is drawn back: on 2500 m of radius, as at 1:26.5, two rails are 0.2 m apart after 32 m, and

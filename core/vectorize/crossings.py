@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .bridges import Bridge, bridge
-from .ends import cut_back, stretch, turned
+from ..lines.bridges import Bridge, bridge
+from ..lines.ends import cut_back, stretch, turned
+from ..lines.network import LineNetwork
 from .junctions import ends_by_node
-from .network import LineNetwork
 from .steadiness import unsteadiness
 
 MERGED_M = 14.0

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..lines.bridges import STAIRS_M, STEADY_TRANSITION_M, TRANSITION_M, Bridge, bridge
+from ..lines.ends import STEP_M, cut_back, stretch, way_out
+from ..lines.network import LineNetwork
 from ..progress import SILENT, Progress
-from .bridges import STAIRS_M, STEADY_TRANSITION_M, TRANSITION_M, Bridge, bridge
 from .crossings import MERGED_M
-from .ends import STEP_M, cut_back, stretch, way_out
-from .network import LineNetwork
 
 DIRECTION_M = 2.0
 """Stretch over which an end's direction is measured; the stairs of a raster line are up to this long."""

@@ -10,8 +10,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .ends import stretch, way_out
-from .network import LineNetwork
+from ..lines.ends import stretch, way_out
+from ..lines.network import LineNetwork
 
 SPUR_M = 1.0
 """A branch that ends free after less than this is a weed on the rail's flank; longer ones may go on beyond a gap."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from ..lines.network import LineNetwork
 from .branches import branchings
-from .network import LineNetwork
 from .steadiness import unsteadiness
 
 ROUTE_M = 40.0

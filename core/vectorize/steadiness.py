@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .ends import STEP_M, stretch
+from ..lines.ends import STEP_M, stretch
 
 COARSE_M = 1.0
 """Spacing of the points that stand for a stretch of such a length: directions between nearer ones show the stairs."""

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from ..rails import length_along
+from ..lines.network import LineNetwork
+from ..polyline import length_along
 from ..raster import RailRaster
-from .network import LineNetwork
 from .pixels import Pixels
 
 TANGENT_PIXELS = 25

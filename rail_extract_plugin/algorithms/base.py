@@ -17,17 +17,17 @@ from qgis.PyQt.QtGui import QIcon
 
 from ...core.errors import Cancelled, RailExtractError
 from ...core.progress import Progress
-from ..contradictions import refuse_contradictions
-from ..dependencies import explain_missing, missing_packages
-from ..destinations import check_distinct, check_writable
+from ..dialog.contradictions import refuse_contradictions
+from ..dialog.guide import guide
+from ..dialog.help_panel import help_panel
+from ..dialog.labels import for_reader
+from ..dialog.refusals import explain_refused
+from ..dialog.values import Values
 from ..feedback import QgisProgress
-from ..guide import guide
-from ..help_panel import help_panel
 from ..i18n import tr
-from ..labels import for_reader
 from ..paths import ICONS, PICTURES
-from ..refusals import explain_refused
-from ..values import Values
+from ..setup.dependencies import explain_missing, missing_packages
+from ..writing.destinations import check_distinct, check_writable
 
 # What people search for, also in the languages of the larger railways; the search looks at the words as they stand.
 RAIL_WORDS = (

@@ -11,10 +11,10 @@ from qgis.core import (
 
 from ...core.progress import Progress
 from ...core.standards import RailStandard
-from .. import inputs, outputs
-from .. import parameters as groups
-from ..layers import CENTERLINES, figures_of, write_lines
-from ..values import Values
+from ..dialog import inputs, outputs
+from ..dialog import parameters as groups
+from ..dialog.values import Values
+from ..writing.layers import CENTERLINES, figures_of, write_lines
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
 READING = 0.1
@@ -73,7 +73,7 @@ class BuildTrackCenterlines(RailAlgorithm):
     ) -> dict[str, Any]:
         """Pair the rails of every class, then write the centerlines."""
         from ...core.pipeline import tracks_of
-        from ..drawn_rails import read_rails
+        from ..reading.line_layers import read_rails
 
         values = Values(self, parameters, context)
         rails, frame = read_rails(values.lines("INPUT"), progress.span(0, READING))

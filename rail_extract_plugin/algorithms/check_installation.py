@@ -15,8 +15,8 @@ from qgis.core import (
 
 from ...core.errors import RailExtractError
 from ...core.progress import Progress
-from ..dependencies import missing_packages
 from ..i18n import tr
+from ..setup.dependencies import missing_packages
 from .base import RailAlgorithm
 from .extract_rails import ExtractRails
 
@@ -54,7 +54,7 @@ class CheckInstallation(RailAlgorithm):
         self, job: None, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Look at everything, and say it line by line."""
-        from .. import self_test
+        from ..setup import self_test
 
         versions = {
             "QGIS": Qgis.QGIS_VERSION,
@@ -80,7 +80,7 @@ class CheckInstallation(RailAlgorithm):
 
     def _test(self, progress: Progress) -> tuple[bool, str, str]:
         """Extract a track where nothing is missing for that."""
-        from .. import self_test
+        from ..setup import self_test
 
         missing = missing_packages(ExtractRails.NEEDS)
         if missing:

@@ -14,16 +14,24 @@ from qgis.core import (
     QgsProcessingUtils,
 )
 
-from ...core.frpdf.zoo import choose as choose_model
+from ...core.frpdf.models import choose as choose_model
 from ...core.progress import Estimating, Progress
 from ...core.standards import RailStandard
-from .. import inputs, outputs
-from .. import parameters as groups
-from ..clouds import CloudSource, spool_points
-from ..layers import CENTERLINES, RAILS, figures_of, figures_of_stations, write_lines, write_raster, write_stations
-from ..reports import Origin, write_report
-from ..values import Values
-from ..whole_files import write_each
+from ..dialog import inputs, outputs
+from ..dialog import parameters as groups
+from ..dialog.values import Values
+from ..reading.clouds import CloudSource, spool_points
+from ..writing.layers import (
+    CENTERLINES,
+    RAILS,
+    figures_of,
+    figures_of_stations,
+    write_lines,
+    write_raster,
+    write_stations,
+)
+from ..writing.reports import Origin, write_report
+from ..writing.whole_files import write_each
 from .base import CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
@@ -104,7 +112,7 @@ class ExtractRails(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Extract everything, then write it."""
-        from ...core.pipeline import extract_rails, stretch_side
+        from ...core.pipeline import extract_rails, square_side
 
         values, progress = Values(self, parameters, context), Estimating(progress)
         settings = values.settings(job.standard, job.other_gauges_m)
@@ -113,7 +121,7 @@ class ExtractRails(RailAlgorithm):
             quality_step_m=values.number("STEP") if values.filled("QUALITY") or values.filled("REPORT") else None,
             keep_cleaned=values.filled("CLEANED"),
         )
-        side_m = stretch_side(settings)
+        side_m = square_side(settings)
         with TemporaryDirectory(dir=QgsProcessingUtils.tempFolder()) as folder:
             reading = progress.span(0, READING)
             clouds = spool_points(job.cloud, job.class_codes, values.extent, side_m, Path(folder), reading)
@@ -142,7 +150,7 @@ class ExtractRails(RailAlgorithm):
         context: QgsProcessingContext,
     ) -> dict[str, str]:
         """Write what the network made, in a file like that of FRPDF Cleanup; no file where it left nothing."""
-        from ..rasters import header_for, on_one_grid
+        from ..reading.rasters import header_for, on_one_grid
 
         if not any(raster.tiles for raster in network.cleaned):
             return {}

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsProcessingContext, QgsProcessingParameterRasterDestination
 
-from ...core.frpdf.zoo import Model
+from ...core.frpdf.models import Model
 from ...core.progress import Progress
-from .. import inputs, outputs
-from .. import parameters as groups
-from ..definitions import helped
+from ..dialog import inputs, outputs
+from ..dialog import parameters as groups
+from ..dialog.definitions import helped
+from ..dialog.values import Values
 from ..i18n import tr
-from ..layers import write_raster
-from ..values import Values
+from ..writing.layers import write_raster
 from .base import RAIL_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
-    from ..rasters import RasterHeader
+    from ..reading.rasters import RasterHeader
 
 READING, WRITING = 0.05, 0.95
 """Shares of the progress bar at which the network begins and ends."""
@@ -63,7 +63,7 @@ class FrpdfCleanup(RailAlgorithm):
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read the raster's header, and check that a model fits it."""
-        from ..rasters import choose_model
+        from ..reading.rasters import choose_model
 
         values = Values(self, parameters, context)
         path, header = values.raster("INPUT")
@@ -79,7 +79,7 @@ class FrpdfCleanup(RailAlgorithm):
         from ...core.frpdf.cleanup import clean
         from ...core.frpdf.engine import make_engine
         from ...core.frpdf.weights import load_arrays
-        from ..geotiff import read_rasters
+        from ..reading.geotiff import read_rasters
 
         values = Values(self, parameters, context)
         engine = make_engine(load_arrays(job.model.path), values.choice("ENGINE"), values.choice("DEVICE"))

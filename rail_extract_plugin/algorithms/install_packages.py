@@ -10,11 +10,11 @@ from qgis.core import QgsProcessingContext, QgsProcessingOutputFolder, QgsProces
 
 from ...core.errors import Cancelled, ParameterError, RailExtractError
 from ...core.progress import Progress
-from .. import package_folders
-from .. import parameters as groups
-from ..dependencies import OPTIONAL, PACKAGES, is_installed
+from ..dialog import parameters as groups
+from ..dialog.values import Values
 from ..i18n import tr
-from ..values import Values
+from ..setup import package_folders
+from ..setup.dependencies import OPTIONAL, PACKAGES, is_installed
 from .base import RailAlgorithm
 
 BUILDS = {
@@ -69,8 +69,8 @@ class InstallPackages(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Install what is missing, PyTorch last since it may fail on its own."""
-        from ..installation import Order, install
-        from ..interpreter import find_interpreter
+        from ..setup.installation import Order, install
+        from ..setup.interpreter import find_interpreter
 
         orders = []
         if job.packages:

@@ -10,11 +10,11 @@ from typing import Any
 from qgis.core import QgsProcessingContext, QgsProcessingUtils
 
 from ...core.progress import Progress
-from .. import inputs, outputs
-from .. import parameters as groups
-from ..clouds import CloudSource
-from ..layers import figures_of_stations, write_stations
-from ..values import Values
+from ..dialog import inputs, outputs
+from ..dialog import parameters as groups
+from ..dialog.values import Values
+from ..reading.clouds import CloudSource
+from ..writing.layers import figures_of_stations, write_stations
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
 READING, MEASURING = 0.3, 0.9
@@ -75,7 +75,7 @@ class MeasureTrackGeometry(RailAlgorithm):
     ) -> dict[str, Any]:
         """Measure every track, then write the points."""
         from ...core.tracks.geometry import measure_track_geometry
-        from ..track_inputs import check_gauges, measured_rails, read_inputs
+        from ..reading.track_inputs import check_gauges, measured_rails, read_inputs
 
         values = Values(self, parameters, context)
         lines = values.lines("INPUT"), values.lines("RAILS")

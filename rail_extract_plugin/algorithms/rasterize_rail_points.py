@@ -7,16 +7,16 @@ from typing import Any
 
 from qgis.core import QgsCoordinateReferenceSystem, QgsProcessingContext, QgsProcessingParameterRasterDestination
 
-from ...core.frpdf.zoo import choose as choose_model
+from ...core.frpdf.models import choose as choose_model
 from ...core.progress import Progress
 from ...core.standards import RailStandard
-from .. import inputs
-from .. import parameters as groups
-from ..clouds import CloudSource, read_points
-from ..definitions import helped
+from ..dialog import inputs
+from ..dialog import parameters as groups
+from ..dialog.definitions import helped
+from ..dialog.values import Values
 from ..i18n import tr
-from ..layers import write_raster
-from ..values import Values
+from ..reading.clouds import CloudSource, read_points
+from ..writing.layers import write_raster
 from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
 
 READING = 0.8
@@ -70,7 +70,7 @@ class RasterizeRailPoints(RailAlgorithm):
     ) -> dict[str, Any]:
         """Rasterize every class, then write the file."""
         from ...core.raster import cell_size, rasterize
-        from ..rasters import header_for
+        from ..reading.rasters import header_for
 
         values = Values(self, parameters, context)
         clouds = read_points(job.cloud, job.class_codes, values.extent, progress.span(0, READING))

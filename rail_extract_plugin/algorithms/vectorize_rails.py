@@ -12,15 +12,15 @@ from qgis.core import (
 
 from ...core.progress import Progress
 from ...core.standards import RailStandard
-from .. import inputs, outputs
-from .. import parameters as groups
-from ..clouds import CloudSource
-from ..layers import RAILS, figures_of, write_lines
-from ..values import Values
+from ..dialog import inputs, outputs
+from ..dialog import parameters as groups
+from ..dialog.values import Values
+from ..reading.clouds import CloudSource
+from ..writing.layers import RAILS, figures_of, write_lines
 from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
-    from ..rasters import RasterHeader
+    from ..reading.rasters import RasterHeader
 
 READING = 0.3
 """Share of the progress bar for reading raster and cloud."""
@@ -71,9 +71,9 @@ class VectorizeRails(RailAlgorithm):
     ) -> dict[str, Any]:
         """Make the lines of every class, then write them."""
         from ...core.pipeline import lines_of
-        from ..area_points import Area, read_points_in
-        from ..geotiff import read_rasters
-        from ..rasters import moved
+        from ..reading.area_points import Area, read_points_in
+        from ..reading.geotiff import read_rasters
+        from ..reading.rasters import moved
 
         rasters = read_rasters(job.path, job.header, progress.span(0, READING / 2))
         if job.cloud is None:

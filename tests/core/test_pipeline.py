@@ -5,19 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rail_extract.core import pipeline
+from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.errors import Cancelled, NoTrackError, ParameterError
-from rail_extract.core.lines.polyline import project
+from rail_extract.core.frame import LocalFrame
 from rail_extract.core.pipeline import Parameters, extract_rails, lines_of, overlap_tiles, tracks_of
-from rail_extract.core.points import LocalFrame, RailPoints
+from rail_extract.core.polyline import length_along, project
 from rail_extract.core.progress import Progress
-from rail_extract.core.rails import RailLine, length_along
+from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.standards import STANDARDS
-from rail_extract.core.synthetic.curves import Element, trace, transition_curve
-from rail_extract.core.synthetic.plain_scenes import straight
-from rail_extract.core.synthetic.scanner import Scanner
-from rail_extract.core.synthetic.scene import Plan, build
-from rail_extract.core.synthetic.tracks import Track
+from rail_extract.laboratory.curves import Element, trace, transition_curve
+from rail_extract.laboratory.scenes.plain import straight
+from rail_extract.laboratory.scenes.scanner import Scanner
+from rail_extract.laboratory.scenes.scene import Plan, build
+from rail_extract.laboratory.scenes.tracks import Track
 
 WIDTH = 0.072
 CURVES = [trace([Element(40.0)], heading=0.4), trace(transition_curve(15, 20, 15, 1 / 300), heading=-0.6)]
@@ -119,7 +120,7 @@ def test_a_line_in_stretches_is_the_line_in_one_piece(monkeypatch):
         1.435, STANDARDS["EN_60E1_1435"].head_width_m, keep_cleaned=True, quality_step_m=1.0, simplify_xy_m=0.0
     )
     whole = extract_rails([points], whole_settings)
-    parts = extract_rails([points], replace(whole_settings, stretch_tiles=4))
+    parts = extract_rails([points], replace(whole_settings, square_tiles=4))
     assert [rail.rail_id for rail in parts.rails] == [1, 2]
     for one, two in zip(whole.rails, parts.rails):
         across = project([one.xyz[:, :2]], two.xyz[:, :2], 0.01).across
@@ -145,7 +146,7 @@ def test_the_shortest_line_counts_whole_lines_not_what_a_stretch_sees_of_them(mo
     points = [np.column_stack([x, np.full(len(x), 5.0 + 4 * y), np.full(len(x), 100.0)]) for y, x in enumerate(lines)]
     cloud = RailPoints(np.concatenate(points), LocalFrame(np.zeros(3)), 10)
     for shortest, lengths in ((1, [120, 90]), (60, [120, 90]), (100, [120]), (130, [])):
-        settings = Parameters(1.435, WIDTH, min_length_m=shortest, stretch_tiles=4)
+        settings = Parameters(1.435, WIDTH, min_length_m=shortest, square_tiles=4)
         found = _by_length(extract_rails([cloud], settings).rails)[::-1]
         assert [rail.length_m for rail in found] == pytest.approx(lengths, abs=0.2)
 
@@ -173,7 +174,7 @@ def test_a_ring_comes_back_closed(monkeypatch, tiles):
     height = 100 + 0.3 * np.sin(curve.heading)
     track = Track(curve, standard.gauge_m + standard.head_width_m, height)
     scene = build("ring", Plan([track], standard, Scanner(profile_step_m=0.1)), np.random.RandomState(3))
-    settings = Parameters(standard.gauge_m, standard.head_width_m, stretch_tiles=tiles)
+    settings = Parameters(standard.gauge_m, standard.head_width_m, square_tiles=tiles)
     found = extract_rails([scene.rail_points()], settings)
     assert (len(found.rails), len(found.centerlines)) == (2, 1)
     for line, true in (*zip(_by_length(found.rails), sorted(scene.rails, key=len)), (found.centerlines[0], curve.xy)):
@@ -195,9 +196,9 @@ def test_a_run_in_stretches_hears_a_cancel():
             return True
 
     with pytest.raises(Cancelled):
-        extract_rails([straight().rail_points()], Parameters(1.435, WIDTH, stretch_tiles=4), Stopped())
+        extract_rails([straight().rail_points()], Parameters(1.435, WIDTH, square_tiles=4), Stopped())
 
 
 def test_stretches_smaller_than_their_overlap_are_refused():
     with pytest.raises(ParameterError, match="4"):
-        extract_rails([straight().rail_points()], Parameters(1.435, WIDTH, stretch_tiles=2))
+        extract_rails([straight().rail_points()], Parameters(1.435, WIDTH, square_tiles=2))

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rail_extract.core.lines.polyline import left_normals, project, resample, starts_at_its_end, threads
+from rail_extract.core.polyline import left_normals, project, resample, starts_at_its_end, threads
 
 ANGLES = st.floats(0, 2 * np.pi)
 

@@ -3,7 +3,7 @@ from importlib.util import find_spec
 
 import pytest
 from lines import read_features, read_lines
-from rail_extract.core.synthetic.compare import compare_lines
+from rail_extract.laboratory.ruler.lines import compare_lines
 
 STANDARD = "IN_75R_1000"
 TRUE_GAUGE_MM, GAUGE_TOLERANCE_MM = 1000, 5

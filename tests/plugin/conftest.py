@@ -15,7 +15,7 @@ import laspy
 import numpy as np
 import pytest
 from faults import FINE, REFUSED, WARNED, Fault
-from rail_extract.core.crs import import_pyproj
+from rail_extract.core.clouds.crs import import_pyproj
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 

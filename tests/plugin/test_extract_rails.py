@@ -9,7 +9,7 @@ import pytest
 from lines import farthest, read_features
 from osgeo import gdal
 from qgis.core import QgsProcessingUtils, QgsVectorLayer
-from rail_extract.rail_extract_plugin.geotiff import read_header
+from rail_extract.rail_extract_plugin.reading.geotiff import read_header
 
 
 @pytest.fixture

@@ -10,8 +10,9 @@ from faults import REFUSED, Fault
 from osgeo import ogr
 from qgis.core import QgsCoordinateTransformContext, QgsFeature, QgsGeometry, QgsVectorFileWriter, QgsVectorLayer
 from rail_extract.core import pipeline
-from rail_extract.core.frpdf import engine, zoo
-from rail_extract.rail_extract_plugin import dependencies
+from rail_extract.core.frpdf import engine
+from rail_extract.core.frpdf import models as zoo
+from rail_extract.rail_extract_plugin.setup import dependencies
 
 resource = pytest.importorskip("resource", reason="only Unix limits the size of files")
 
@@ -182,7 +183,7 @@ def exhausted(bench):
     def fail(*arguments, **named):
         raise MemoryError
 
-    bench.patch.setattr(pipeline, "clean_stretch", fail)
+    bench.patch.setattr(pipeline, "clean_square", fail)
     return cloud(bench)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from faults import FINE, REFUSED, Fault
 from osgeo import gdal
-from rail_extract.rail_extract_plugin import dependencies
+from rail_extract.rail_extract_plugin.setup import dependencies
 
 TITLE = "Point cloud files"
 

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from qgis.core import QgsFeature, QgsGeometry, QgsLineString, QgsPoint, QgsVectorLayer
-from rail_extract.core.crs import import_pyproj
+from rail_extract.core.clouds.crs import import_pyproj
 from rail_extract.core.errors import RailExtractError
-from rail_extract.core.points import LocalFrame
+from rail_extract.core.frame import LocalFrame
 from rail_extract.core.raster import rasterize
 from rail_extract.core.standards import STANDARDS
-from rail_extract.rail_extract_plugin.geotiff import read_header, read_rasters, write_rasters
-from rail_extract.rail_extract_plugin.rasters import header_for
+from rail_extract.rail_extract_plugin.reading.geotiff import read_header, read_rasters, write_rasters
+from rail_extract.rail_extract_plugin.reading.rasters import header_for
 
 BOUNDED = settings(
     max_examples=60,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from qgis.core import NULL, QgsFeature, QgsGeometry, QgsLineString, QgsVectorLayer
-from rail_extract.rail_extract_plugin import track_inputs
+from rail_extract.rail_extract_plugin.reading import track_inputs
 
 SPACING_MM = 1507.0
 RADIUS_M = 300.0

@@ -10,8 +10,8 @@ from osgeo import gdal
 from qgis.core import QgsRasterLayer, QgsVectorLayer
 from rail_extract.core.frpdf import engine
 from rail_extract.core.raster import cell_size
-from rail_extract.rail_extract_plugin.geotiff import read_header, read_rasters
 from rail_extract.rail_extract_plugin.paths import STYLES
+from rail_extract.rail_extract_plugin.reading.geotiff import read_header, read_rasters
 
 LAST_DIGIT = 0.11
 """Numbers that differ by less than shows may be rounded up and down."""

@@ -1,0 +1,1 @@
+"""Point clouds: files, coordinate systems, and the points of wanted classes in local metres."""

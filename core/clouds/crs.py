@@ -1,0 +1,234 @@
+"""Coordinate reference systems of clouds: what their units are, and whether lengths can be computed in them."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import CrsError
+from ..progress import Progress
+
+if TYPE_CHECKING:
+    import pyproj
+
+MODEL_TYPE_KEY, MODEL_PROJECTED = 1024, 1
+VERTICAL_CRS_KEY, VERTICAL_UNIT_KEY = 4096, 4099
+"""GeoTIFF keys, as in OGC 19-008r4, section 7."""
+
+EPSG_CODES = range(1024, 32767)
+"""Values of a GeoTIFF key that are EPSG codes, by the same standard."""
+
+LENGTH_UNITS = {9001: ("metre", 1.0), 9002: ("foot", 0.3048), 9003: ("US survey foot", 1200 / 3937)}
+"""EPSG's codes for units of length: name and metres."""
+
+LARGEST_STRETCH = 0.005
+"""Share by which a system may stretch lengths: gauge then reads 7 mm off, and from 10 mm on the report calls it wrong.
+Grids of countries stay below 0.0035; Web Mercator exceeds it even on the equator."""
+
+BASELINE_M = 100.0
+"""Length on which the stretch is measured: short for a projection, long against the rounding of degrees."""
+
+WGS_84 = "EPSG:4326"
+
+SAME_PLACE = 1e-3
+"""Units of a coordinate system by which a place may differ between two descriptions of it."""
+
+
+def import_pyproj():
+    """Import pyproj on first need.
+
+    Raises
+    ------
+    CrsError
+        pyproj is not installed.
+    """
+    try:
+        with warnings.catch_warnings():
+            # In a virtual environment pyproj misses PROJ's data folder and says so; PROJ itself finds it.
+            warnings.simplefilter("ignore", UserWarning)
+            import pyproj
+    except ImportError as error:
+        raise CrsError(
+            "The Python package pyproj, which reads coordinate systems, is missing: run pip install pyproj."
+        ) from error
+    return pyproj
+
+
+def parse_crs(text: str) -> pyproj.CRS:
+    """Understand a coordinate system given as WKT or as a code such as EPSG:32643.
+
+    Raises
+    ------
+    CrsError
+        The text is neither.
+    """
+    pyproj = import_pyproj()
+    try:
+        return pyproj.CRS.from_user_input(text)
+    except pyproj.exceptions.CRSError as error:
+        raise CrsError(f"The coordinate system {text[:60]!r} is not understood: give WKT or an EPSG code.") from error
+
+
+def crs_of_geokeys(crs: pyproj.CRS | None, keys: dict[int, int]) -> pyproj.CRS | None:
+    """Correct a coordinate system read from GeoTIFF keys by the keys on model type and heights.
+
+    Parameters
+    ----------
+    crs : pyproj.CRS or None
+        Made of the keys on projected and geographic systems alone.
+    keys : dict of int to int
+        Key numbers and their short values.
+
+    Returns
+    -------
+    pyproj.CRS or None
+        None for a projection without a code: its geographic base is not what the coordinates are in.
+    """
+    if crs is None or (crs.is_geographic and keys.get(MODEL_TYPE_KEY) == MODEL_PROJECTED):
+        return None
+    vertical = _vertical_crs(keys.get(VERTICAL_CRS_KEY, 0), keys.get(VERTICAL_UNIT_KEY, 0))
+    if vertical is None or crs.is_compound or crs.is_geographic:
+        return crs
+    return import_pyproj().crs.CompoundCRS(f"{crs.name} + {vertical.name}", [crs, vertical])
+
+
+def _vertical_crs(code: int, unit: int) -> pyproj.CRS | None:
+    """Find the height system of an EPSG code, or make one that knows just the unit."""
+    pyproj = import_pyproj()
+    if code in EPSG_CODES:
+        try:
+            vertical = pyproj.CRS.from_epsg(code)
+        except pyproj.exceptions.CRSError:
+            vertical = None
+        if vertical is not None and vertical.is_vertical:
+            return vertical
+    if unit not in LENGTH_UNITS:
+        return None
+    name, metres = LENGTH_UNITS[unit]
+    return pyproj.CRS.from_wkt(
+        f'VERTCRS["height ({name})",VDATUM["unknown"],CS[vertical,1],AXIS["up",up],LENGTHUNIT["{name}",{metres!r}]]'
+    )
+
+
+def units(crs: pyproj.CRS) -> tuple[float, float]:
+    """Metres in the horizontal and in the vertical unit; without a height system both are the same.
+
+    Raises
+    ------
+    CrsError
+        Coordinates are not lengths (degrees, or from the earth's centre).
+    """
+    parts = [_unbound(part) for part in _unbound(crs).sub_crs_list or [crs]]
+    axes = parts[0].axis_info
+    if parts[0].is_geographic or parts[0].is_geocentric or not axes:
+        raise CrsError(f"Lengths can't be computed in {crs.name}: project the cloud first.")
+    horizontal = axes[0].unit_conversion_factor
+    if len(parts) > 1:
+        return horizontal, parts[1].axis_info[0].unit_conversion_factor
+    return horizontal, axes[2].unit_conversion_factor if len(axes) == 3 else horizontal
+
+
+def is_geographic(crs: pyproj.CRS) -> bool:
+    """Tell whether the plan coordinates are longitude and latitude."""
+    return _plane(crs).is_geographic
+
+
+def _plane(crs: pyproj.CRS) -> pyproj.CRS:
+    """Leave the heights out of a system."""
+    return _unbound((_unbound(crs).sub_crs_list or [crs])[0])
+
+
+def _unbound(crs: pyproj.CRS) -> pyproj.CRS:
+    """Strip the datum shift that some WKT binds to a system."""
+    return crs.source_crs if crs.is_bound else crs
+
+
+def utm_zone(longitude: float, latitude: float) -> str:
+    """Name the UTM zone (WGS 84) of a place given in degrees, as in "UTM zone 43N (EPSG:32643)"."""
+    zone = int((longitude + 180) // 6) % 60 + 1
+    hemisphere, code = ("N", 32600 + zone) if latitude >= 0 else ("S", 32700 + zone)
+    return f"UTM zone {zone}{hemisphere} (EPSG:{code})"
+
+
+def warn_of_stretch(
+    crs: pyproj.CRS, places: Sequence[tuple[float, float]], what: str, progress: Progress, it: str = "it"
+) -> None:
+    """Warn of a system in which lengths are not those on the ground, as in Web Mercator away from the equator.
+
+    No more than a warning: coordinates that are local ones, and only labelled with a system, have true lengths.
+
+    Parameters
+    ----------
+    crs : CRS
+    places : sequence of (x, y)
+        In units of the CRS. One without too much stretch suffices, for the others may be those of stray points.
+    what, it : str
+        The subject of the sentence with its verb, and how the remedy calls it.
+    progress : Progress
+    """
+    plane = _plane(crs)
+    found = [_stretch(plane, *place) for place in places] if plane.is_projected else []
+    known = [one for one in found if np.isfinite(one).all()]
+    if not known:
+        return
+    factor, longitude, latitude = min(known, key=lambda one: abs(one[0] - 1))
+    if abs(factor - 1) > LARGEST_STRETCH:
+        progress.warning(
+            f"{what} in {plane.name}, which draws lengths there {factor:.3f} times as long as they are, gauges too: "
+            f"reproject {it}, for example to {utm_zone(longitude, latitude)}."
+        )
+
+
+def _stretch(plane: pyproj.CRS, x: float, y: float) -> tuple[float, float, float]:
+    """Length in the plane of one metre on the ground where that is farthest from one, and longitude and latitude."""
+    pyproj = import_pyproj()
+    half = BASELINE_M / 2 / plane.axis_info[0].unit_conversion_factor
+    to_degrees = pyproj.Transformer.from_crs(plane, WGS_84, always_xy=True)
+    longitudes, latitudes = to_degrees.transform([x - half, x, x + half, x], [y, y - half, y, y + half])
+    ground = pyproj.Geod(ellps="WGS84").inv(longitudes[:2], latitudes[:2], longitudes[2:], latitudes[2:])[2]
+    factors = [BASELINE_M / length_m for length_m in ground]
+    return max(factors, key=lambda factor: abs(factor - 1)), longitudes[0], latitudes[0]
+
+
+def common_crs(systems: Sequence[tuple[str, pyproj.CRS | None]]) -> pyproj.CRS | None:
+    """Find the one system that all files share.
+
+    Parameters
+    ----------
+    systems : sequence of (file name, CRS or None)
+
+    Raises
+    ------
+    CrsError
+        Two files differ; both are named.
+    """
+    (first_name, first), *others = systems
+    for name, crs in others:
+        same = first is crs is None or (first is not None and crs is not None and first.equals(crs, True))
+        if not same:
+            raise CrsError(
+                f"{first_name} is in {_name(first)} but {name} is in {_name(crs)}: "
+                "bring all tiles into one coordinate system first."
+            )
+    return first
+
+
+def same_plane(first_wkt: str, second_wkt: str, xy: tuple[float, float]) -> bool:
+    """Tell whether two systems mean the same place by plan coordinates, tried at `xy`; heights do not matter.
+
+    Descriptions of one system differ from file to file, and what counts is where they put the rails.
+    """
+    pyproj = import_pyproj()
+    plane = [_plane(parse_crs(wkt)) for wkt in (first_wkt, second_wkt)]
+    try:
+        there = pyproj.Transformer.from_crs(*plane, always_xy=True).transform(*xy)
+    except pyproj.exceptions.ProjError:
+        return plane[0].equals(plane[1], True)
+    return max(abs(there[0] - xy[0]), abs(there[1] - xy[1])) < SAME_PLACE
+
+
+def _name(crs: pyproj.CRS | None) -> str:
+    return "no coordinate system" if crs is None else crs.name

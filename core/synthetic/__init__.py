@@ -1,1 +1,0 @@
-"""Track layouts, their corruption into training rasters, and 3D scenes with exact truth."""

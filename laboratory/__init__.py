@@ -1,0 +1,1 @@
+"""The laboratory beside the product: training rasters, 3D scenes with exact truth, the ruler, and training."""

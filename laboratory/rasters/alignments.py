@@ -1,0 +1,89 @@
+"""Random axes of tracks in plan, and axes derived from others."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..curves import Curve, Element, trace
+from .paths import STEP_M
+
+SHARPEST_RADIUS_M, WIDEST_RADIUS_M = 25.0, 4000.0
+"""Tramways' smallest, and a main line's; anything wider looks straight in a raster."""
+
+WORLD_M = 60.0
+"""Tracks are laid this far on both sides of the spot a raster shows: a raster of 1024 cells is 41 m wide."""
+
+TRACK_SPACING_M = (3.5, 6.0)
+
+
+def random_radius(rng: np.random.Generator, sharpest_m: float, widest_m: float = WIDEST_RADIUS_M) -> float:
+    """Draw a radius; its logarithm is spread evenly."""
+    return math.exp(rng.uniform(math.log(sharpest_m), math.log(widest_m)))
+
+
+def straight(rng: np.random.Generator) -> Curve:
+    """Draw a straight track through the origin, in any direction."""
+    return centred([Element(2 * WORLD_M)], rng.uniform(-math.pi, math.pi))
+
+
+def bend(rng: np.random.Generator, radius_m: float, turns: tuple[int, ...]) -> Curve:
+    """Draw arcs of about one radius with transitions between them and straights at both ends.
+
+    Parameters
+    ----------
+    rng : numpy Generator
+    radius_m : float
+    turns : tuple of int
+        1 for an arc to the left, -1 to the right: (1, -1) is a reverse curve. Some arcs follow without a transition,
+        as in turnouts and yards.
+    """
+    elements, curvature = [Element(WORLD_M)], 0.0
+    for turn in (*turns, 0):
+        target = turn / (radius_m * rng.uniform(1.0, 1.4))
+        if rng.random() < 0.8:
+            elements.append(Element(rng.uniform(4.0, 30.0), curvature, target))
+        if turn:
+            elements.append(Element(min(rng.uniform(6.0, 60.0), 2.0 * radius_m), target, target))
+        curvature = target
+    elements.append(Element(WORLD_M))
+    return centred(elements, rng.uniform(-math.pi, math.pi))
+
+
+def random_alignment(rng: np.random.Generator, sharpest_m: float = SHARPEST_RADIUS_M) -> Curve:
+    """Draw straights, arcs and clothoids in any order, around the origin."""
+    elements: list[Element] = []
+    curvature = 0.0
+    while sum(element.length_m for element in elements) < 2 * WORLD_M:
+        target = rng.choice([-1, 1]) / random_radius(rng, sharpest_m) if rng.random() < 0.7 else 0.0
+        if target != curvature and rng.random() < 0.8:
+            elements.append(Element(rng.uniform(4.0, 40.0), curvature, target))
+        elements.append(Element(rng.uniform(5.0, 60.0), target, target))
+        curvature = target
+    return centred(elements, rng.uniform(-math.pi, math.pi))
+
+
+def centred(elements: list[Element], heading: float) -> Curve:
+    """Trace elements, keep `WORLD_M` on both sides of their middle, and move the middle to the origin."""
+    whole = trace(elements, heading=heading, step_m=STEP_M)
+    curve = whole.piece(0.5 * whole.length_m - WORLD_M, 0.5 * whole.length_m + WORLD_M)
+    return Curve(curve.xy - curve.xy[len(curve.xy) // 2], curve.heading, curve.curvature, curve.step_m)
+
+
+def shifted(axis: Curve, left_m: float) -> Curve:
+    """Make the parallel axis; it has the same samples, so its steps are shorter or longer in curves."""
+    curvature = axis.curvature / (1 - left_m * axis.curvature)
+    return Curve(axis.offset(left_m), axis.heading, curvature, axis.step_m)
+
+
+def bent(axis: Curve, local: Curve) -> Curve:
+    """Bend a curve that was drawn beside a straight axis (x along, y to the left) so that it runs beside this one."""
+    along, left = local.xy[:, 0], local.xy[:, 1]
+    kept = (along >= 0) & (along <= axis.length_m)
+    along, left = along[kept], left[kept]
+    base = np.column_stack([np.interp(along, axis.chainage, column) for column in axis.xy.T])
+    heading = np.interp(along, axis.chainage, axis.heading)
+    xy = base + left[:, None] * np.column_stack([-np.sin(heading), np.cos(heading)])
+    curvature = np.interp(along, axis.chainage, axis.curvature) + local.curvature[kept]
+    return Curve(xy, heading + local.heading[kept], curvature, local.step_m)

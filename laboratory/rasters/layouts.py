@@ -1,0 +1,237 @@
+"""Random track layouts by family: what a railway lays, from a plain track to a yard.
+
+Layouts are drawn at the scale of the base model: rail centres 1511.2 mm apart. Any other standard is the same picture
+at another scale (ALGORITHMS.md section 5.7), but for the ratio of gauge to railhead. The paper has two strategies:
+splits along random alignments, which most families vary, and random points joined by clothoids, `connections`. Like
+the paper's, the layouts hold more than railways build, so that they hold all that railways build.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from ..curves import Curve, trace
+from .alignments import (
+    SHARPEST_RADIUS_M,
+    TRACK_SPACING_M,
+    WORLD_M,
+    bend,
+    random_alignment,
+    random_radius,
+    shifted,
+    straight,
+)
+from .clothoids import Pose, random_joins
+from .fittings import GUARD_LENGTH_M, OPENING_M, check_rail, crossing, guard
+from .paths import NO_TRACK, STEP_M, Layout, RailPath, TrackSize, beside, combine, track
+from .turnouts import FORMS, YARD_FORMS, crossover, turnout
+
+CHECKED_RADIUS_M = 200.0
+"""Curves sharper than this may have a check rail along their inner rail."""
+
+YARD_SPACING_M = (4.5, 6.0)
+
+CROSSING_ANGLES = (1 / 9, math.pi / 2)
+"""Angles of diamond crossings, radians: from the flattest with fixed frogs to a square one."""
+
+GAUGE_PAIRS = ((0.914, 1.067), (1.000, 1.435), (1.067, 1.435), (1.435, 1.668), (1.435, 1.676))
+"""Gauges that share a rail, metres; closer ones need four rails."""
+
+BUFFER_LENGTH_M = (1.8, 3.0)
+BUFFER_AHEAD_M = (0.0, 0.6)
+"""How far before the rails' ends the beam of a buffer stop lies."""
+
+AREA_M, POSES = 40.0, 14
+"""Points to be joined lie this far around the middle; of so many, some face each other well enough."""
+
+
+def random_layout(rng: np.random.Generator, size: TrackSize, family: str | None = None) -> Layout:
+    """Draw a layout of a family, or of one drawn after `WEIGHTS`."""
+    if family is None:
+        names = list(WEIGHTS)
+        family = names[rng.choice(len(names), p=np.array(list(WEIGHTS.values())) / sum(WEIGHTS.values()))]
+    return FAMILIES[family](rng, size)
+
+
+def plain(rng: np.random.Generator, size: TrackSize) -> Layout:
+    """One track, straight or nearly so."""
+    axis = straight(rng) if rng.random() < 0.5 else bend(rng, random_radius(rng, 1500.0), (int(rng.choice([-1, 1])),))
+    return track(axis, size, spot=True)
+
+
+def curve(rng: np.random.Generator, size: TrackSize) -> Layout:
+    """One track in a curve of 25 m radius or more, or in a reverse curve; sharp ones may have a check rail."""
+    turn, radius_m = int(rng.choice([-1, 1])), random_radius(rng, SHARPEST_RADIUS_M, 1500.0)
+    axis = bend(rng, radius_m, (turn,) if rng.random() < 0.6 else (turn, -turn))
+    checked = radius_m < CHECKED_RADIUS_M and rng.random() < 0.3
+    lines = (check_rail(rng, axis, turn, size),) if checked else ()
+    return combine([track(axis, size, spot=True), Layout(distractors=lines)])
+
+
+def parallel(rng: np.random.Generator, size: TrackSize) -> Layout:
+    """Two to four parallel tracks along a random alignment."""
+    return _tracks(_parallels(rng, int(rng.choice([2, 3, 4], p=[0.6, 0.3, 0.1])))[1], size)
+
+
+def split(rng: np.random.Generator, size: TrackSize) -> Layout:
+    """One track or two with one or two turnouts, of any form (the paper's first strategy)."""
+    _, axes, _ = _parallels(rng, int(rng.choice([1, 2], p=[0.7, 0.3])))
+    parts = []
+    for _ in range(int(rng.choice([1, 2], p=[0.7, 0.3]))):
+        main = axes[rng.integers(len(axes))]
+        main = main.reversed() if rng.random() < 0.5 else main
+        toe_m = rng.uniform(0.3, 0.6) * main.length_m
+        form, hand = FORMS[rng.integers(len(FORMS))], int(rng.choice([-1, 1]))
+        inherited = main.curvature[int(toe_m / main.step_m)]
+        if abs(inherited + hand / form.radius_m) > 1 / SHARPEST_RADIUS_M:
+            hand = -hand
+        parts.append(turnout(rng, main, toe_m, form, hand, size))
+    return combine([*(track(axis, size) for axis in axes), *parts])
+
+
+def crossed_over(rng: np.random.Generator, size: TrackSize) -> Layout:
+    """Two parallel tracks with a crossover, or two that cross each other."""
+    axis, axes, offsets = _parallels(rng, 2, sharpest_m=150.0)
+    form = YARD_FORMS[rng.integers(2, len(YARD_FORMS))]
+    ways = [offsets] if rng.random() < 0.7 else [offsets, offsets[::-1]]
+    parts = [crossover(rng, axis, way, WORLD_M, form, size) for way in ways]
+    return combine([*(track(one, size) for one in axes), *parts])
+
+
+def diamond(rng: np.random.Generator, size: TrackSize) -> Layout:
+    """Two tracks that cross; flat crossings have guard rails through their middle."""
+    axis = straight(rng) if rng.random() < 0.6 else bend(rng, random_radius(rng, 190.0), (1,))
+    angle = rng.choice([-1, 1]) * math.exp(rng.uniform(*np.log(CROSSING_ANGLES)))
+    middle = len(axis.xy) // 2
+    other = straight(rng)
+    cosine, sine = (f(axis.heading[middle] + angle - other.heading[0]) for f in (math.cos, math.sin))
+    turned = other.xy @ np.array([[cosine, sine], [-sine, cosine]]) + axis.xy[middle]
+    other = Curve(turned, np.full(len(turned), axis.heading[middle] + angle), other.curvature, other.step_m)
+    parts = [track(axis, size, spot=True), track(other, size)]
+    places = [crossing(first.xy, second.xy) for first in parts[0].rails for second in parts[1].rails]
+    openings = tuple((parts[0].rails[n // 2].xy[at[0]], rng.uniform(*OPENING_M)) for n, at in enumerate(places) if at)
+    guards = []
+    if rng.random() < 0.7:
+        for one in (axis, other):
+            centre = int(np.linalg.norm(one.xy - axis.xy[middle], axis=1).argmin())
+            guards += [guard(rng, one, centre, side, size, GUARD_LENGTH_M) for side in (1, -1)]
+    return combine([*parts, Layout((), tuple(guards), openings, tuple(spot for spot, _ in openings))])
+
+
+def ladder(rng: np.random.Generator, size: TrackSize) -> Layout:
+    """Turnouts of one form one behind the other, whose branches run parallel."""
+    form, hand = YARD_FORMS[rng.integers(1, len(YARD_FORMS))], int(rng.choice([-1, 1]))
+    main = straight(rng)
+    spacing_m = rng.uniform(*YARD_SPACING_M) / math.sin(form.angle)
+    toes = np.arange(rng.uniform(0.1, 0.3) * main.length_m, 0.8 * main.length_m, spacing_m)
+    return combine([track(main, size), *(turnout(rng, main, toe_m, form, hand, size) for toe_m in toes.tolist())])
+
+
+def yard(rng: np.random.Generator, size: TrackSize) -> Layout:
+    """Four to seven tracks side by side; some end at buffers, some are linked by crossovers."""
+    axis, axes, offsets = _parallels(rng, int(rng.integers(4, 8)), YARD_SPACING_M, sharpest_m=150.0)
+    parts = []
+    for one in axes:
+        ends = rng.random() < 0.3
+        parts.append(_buffered(rng, one, size) if ends else track(one, size, spot=True))
+    for _ in range(int(rng.integers(1, 3))):
+        first = int(rng.integers(len(axes) - 1))
+        pair = offsets[first], offsets[first + 1]
+        form = YARD_FORMS[rng.integers(1, len(YARD_FORMS))]
+        parts.append(
+            crossover(rng, axis, pair[:: rng.choice([-1, 1])], rng.uniform(0.4, 0.6) * axis.length_m, form, size)
+        )
+    return combine(parts)
+
+
+def dual_gauge(rng: np.random.Generator, size: TrackSize) -> Layout:
+    """One track with a third rail for a second gauge; either gauge may be the one asked for."""
+    axis = random_alignment(rng, 2 * SHARPEST_RADIUS_M)
+    narrow, wide = GAUGE_PAIRS[rng.integers(len(GAUGE_PAIRS))]
+    asked = narrow if rng.random() < 0.5 else wide
+    third_m = (wide - narrow) / asked * (size.spacing_m - size.head_width_m)
+    outside = 1 if asked == narrow else -1
+    side = rng.choice([-1, 1])
+    third = beside(axis, side * (0.5 * size.spacing_m + outside * third_m), 0)
+    both = track(axis, size, spot=True)
+    return Layout((*both.rails, third), spots=both.spots)
+
+
+def buffer_end(rng: np.random.Generator, size: TrackSize) -> Layout:
+    """One track that ends at a buffer stop, at times beside one that goes on."""
+    _, axes, _ = _parallels(rng, int(rng.choice([1, 2])))
+    ending = axes[0].reversed() if rng.random() < 0.5 else axes[0]
+    return combine([_buffered(rng, ending, size), *(track(one, size) for one in axes[1:])])
+
+
+def connections(rng: np.random.Generator, size: TrackSize) -> Layout:
+    """Random points with random directions, joined by combinations of clothoids (the paper's second strategy)."""
+    tracks: list[Layout] = []
+    while not tracks:
+        poses = [Pose(*rng.uniform(-AREA_M, AREA_M, size=2), rng.uniform(-math.pi, math.pi)) for _ in range(POSES)]
+        joins = random_joins(rng, poses, int(rng.integers(2, 7)), SHARPEST_RADIUS_M)
+        axes = [trace(elements, (start.x, start.y), start.heading, STEP_M) for start, elements in joins]
+        tracks = [track(axis, size, spot=True) for axis in axes]
+    return combine(tracks)
+
+
+FAMILIES: dict[str, Callable[[np.random.Generator, TrackSize], Layout]] = {
+    "plain": plain,
+    "curve": curve,
+    "parallel": parallel,
+    "turnout": split,
+    "crossover": crossed_over,
+    "diamond": diamond,
+    "ladder": ladder,
+    "yard": yard,
+    "dual gauge": dual_gauge,
+    "buffer end": buffer_end,
+    "connections": connections,
+}
+
+WEIGHTS = {
+    "plain": 1.0,
+    "curve": 2.0,
+    "parallel": 2.0,
+    "turnout": 3.0,
+    "crossover": 1.5,
+    "diamond": 1.0,
+    "ladder": 1.0,
+    "yard": 1.5,
+    "dual gauge": 1.0,
+    "buffer end": 0.5,
+    "connections": 2.5,
+}
+"""How often each family is drawn for training: what is common and what is hard, more often."""
+
+
+def _parallels(
+    rng: np.random.Generator,
+    count: int,
+    spacing_m: tuple[float, float] = TRACK_SPACING_M,
+    sharpest_m: float = SHARPEST_RADIUS_M,
+) -> tuple[Curve, list[Curve], tuple[float, ...]]:
+    """Draw an alignment, axes parallel to it about the origin, and their offsets to its left."""
+    offsets = np.concatenate([[0.0], np.cumsum(rng.uniform(*spacing_m, size=count - 1))])
+    offsets -= offsets[count // 2]
+    axis = random_alignment(rng, sharpest_m + np.abs(offsets).max())
+    return axis, [shifted(axis, offset) for offset in offsets.tolist()], tuple(offsets.tolist())
+
+
+def _tracks(axes: list[Curve], size: TrackSize) -> Layout:
+    return combine(track(axis, size, spot=True) for axis in axes)
+
+
+def _buffered(rng: np.random.Generator, axis: Curve, size: TrackSize) -> Layout:
+    """End a track near the middle, with a beam across that is no rail."""
+    axis = axis.piece(0.0, rng.uniform(0.4, 0.6) * axis.length_m)
+    end, normal = axis.xy[-1], axis.left_normal[-1]
+    forward = np.array([normal[1], -normal[0]])
+    along = np.arange(-0.5, 0.5, STEP_M / BUFFER_LENGTH_M[1]) * rng.uniform(*BUFFER_LENGTH_M)
+    beam = end - rng.uniform(*BUFFER_AHEAD_M) * forward + along[:, None] * normal
+    line = RailPath(beam, np.tile(forward, (len(beam), 1)), NO_TRACK)
+    ended = track(axis, size)
+    return Layout(ended.rails, (line,), spots=(end,))

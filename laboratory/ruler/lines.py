@@ -1,0 +1,255 @@
+"""Comparison of extracted lines with true ones: how much was found, how much is right, how far off it lies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ...core.polyline import length_along
+
+STEP_M = 0.05
+"""Length of the pieces in which lines are compared; a chord this long leaves an arc of 25 m by 0.01 mm."""
+
+CANDIDATES = 4
+"""Nearest pieces that are looked at: two of a line may share a place, and two lines may cross there."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What lines are worth against the truth.
+
+    Errors are taken where line and truth are within the tolerance, once along the truth and once along the lines;
+    the worse of both stands here.
+
+    Attributes
+    ----------
+    completeness : float
+        Share of the true length with a line within the tolerance, in plan.
+    correctness : float
+        Share of the lines' length within the tolerance of a true line, in plan.
+    lateral_rmse_m, lateral_p95_m, lateral_bias_m : float
+        Offset of the line in plan, positive to the left of the truth.
+    height_rmse_m, height_p95_m, height_bias_m : float
+        Height of the line above the truth.
+    line_count, truth_count : int
+    length_ratio : float
+        Length of all lines over length of the truth, in space.
+    """
+
+    completeness: float
+    correctness: float
+    lateral_rmse_m: float
+    lateral_p95_m: float
+    lateral_bias_m: float
+    height_rmse_m: float
+    height_p95_m: float
+    height_bias_m: float
+    line_count: int
+    truth_count: int
+    length_ratio: float
+
+
+@dataclass(frozen=True)
+class Offsets:
+    """Offsets of lines from the truth at many places, (n,) each; `weight` is the length a place stands for."""
+
+    distance: np.ndarray
+    lateral: np.ndarray
+    height: np.ndarray
+    weight: np.ndarray
+
+    @property
+    def length_m(self) -> float:
+        """Length of all places together."""
+        return float(self.weight.sum())
+
+    @classmethod
+    def between(cls, true: np.ndarray, line: np.ndarray, left: np.ndarray, weight: np.ndarray) -> Offsets:
+        """Offsets from true places to places on lines, (n, 3) each, where `left` is the truth's left."""
+        step = line - true
+        return cls(np.hypot(step[:, 0], step[:, 1]), np.sum(step[:, :2] * left, axis=1), step[:, 2], weight)
+
+    def within(self, tolerance_m: float) -> Offsets:
+        """Those whose line is near the truth."""
+        near = self.distance <= tolerance_m
+        return Offsets(self.distance[near], self.lateral[near], self.height[near], self.weight[near])
+
+
+@dataclass(frozen=True)
+class Match:
+    """Offsets between lines and truth, found once and judged by any tolerance.
+
+    Attributes
+    ----------
+    there, back : Offsets
+        Along the truth, and along the lines.
+    line : (n,) int array
+        Line that each place of `back` lies on.
+    t : (n,) array
+        Plan distance of each place of `back` from the start of its line, metres.
+    line_count, truth_count : int
+    """
+
+    there: Offsets
+    back: Offsets
+    line: np.ndarray
+    t: np.ndarray
+    line_count: int
+    truth_count: int
+
+    def within(self, tolerance_m: float) -> Comparison:
+        """Compare, taking for the same thing what is at most this far apart in plan."""
+        there, back = self.there.within(tolerance_m), self.back.within(tolerance_m)
+        return Comparison(
+            completeness=there.length_m / self.there.length_m,
+            correctness=back.length_m / self.back.length_m if len(self.line) else 0.0,
+            lateral_rmse_m=_worse(_rms(there.lateral), _rms(back.lateral)),
+            lateral_p95_m=_worse(_p95(there.lateral), _p95(back.lateral)),
+            lateral_bias_m=_worse(_mean(there.lateral), _mean(back.lateral)),
+            height_rmse_m=_worse(_rms(there.height), _rms(back.height)),
+            height_p95_m=_worse(_p95(there.height), _p95(back.height)),
+            height_bias_m=_worse(_mean(there.height), _mean(back.height)),
+            line_count=self.line_count,
+            truth_count=self.truth_count,
+            length_ratio=self.back.length_m / self.there.length_m,
+        )
+
+    def share_within(self, sigma_m: np.ndarray, tolerance_m: float = 0.05) -> float:
+        """Share of the lateral errors along the lines that are at most the standard error at each place, (n,) m."""
+        near = self.back.distance <= tolerance_m
+        return float(_mean(np.abs(self.back.lateral[near]) <= sigma_m[near]))
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Short straight pieces of polylines.
+
+    Attributes
+    ----------
+    start, end : (n, 3) array
+        Metres.
+    number : (n,) int array
+        Of their lines.
+    t : (n,) array
+        Plan distance of their middles from the starts of their lines.
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    number: np.ndarray
+    t: np.ndarray
+
+    @property
+    def middle(self) -> np.ndarray:
+        """Points midway between the ends, (n, 3)."""
+        return 0.5 * (self.start + self.end)
+
+    @property
+    def left(self) -> np.ndarray:
+        """Unit vectors to the left in plan, (n, 2)."""
+        along = (self.end - self.start)[:, :2]
+        return np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """Lengths in space, (n,)."""
+        return np.linalg.norm(self.end - self.start, axis=1)
+
+
+def compare_lines(
+    extracted: Sequence[np.ndarray], truth: Sequence[np.ndarray], tolerance_m: float = 0.05
+) -> Comparison:
+    """Compare lines with the truth.
+
+    Parameters
+    ----------
+    extracted, truth : sequence of (n, 3) array
+        Polylines in metres; without extracted lines the errors are NaN, and without heights those of height.
+    tolerance_m : float
+        How far apart, in plan, line and truth still are the same thing.
+
+    Returns
+    -------
+    Comparison
+    """
+    return match(extracted, truth).within(tolerance_m)
+
+
+def match(extracted: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> Match:
+    """Find for every place of the truth the nearest line, and for every place of the lines the nearest truth.
+
+    Parameters
+    ----------
+    extracted, truth : sequence of (n, 3) array
+        Polylines in metres.
+    """
+    lines, true = cut(extracted), cut(truth)
+    if not len(lines.start):
+        nothing = np.full(len(true.start), np.inf)
+        there = Offsets(nothing, nothing, nothing, true.lengths)
+        return Match(there, there.within(0.0), lines.number, lines.t, len(extracted), len(truth))
+    feet, _ = nearest(true.middle, lines)
+    there = Offsets.between(true.middle, feet, true.left, true.lengths)
+    feet, piece = nearest(lines.middle, true)
+    back = Offsets.between(feet, lines.middle, true.left[piece], lines.lengths)
+    return Match(there, back, lines.number, lines.t, len(extracted), len(truth))
+
+
+def cut(lines: Sequence[np.ndarray]) -> Pieces:
+    """Cut polylines into pieces of equal length, `STEP_M` at most."""
+    starts, ends, middles, counts = [np.empty((0, 3))], [np.empty((0, 3))], [np.empty(0)], []
+    for line in lines:
+        chainage = length_along(np.asarray(line)[:, :2])
+        count = int(np.ceil(chainage[-1] / STEP_M))
+        at = np.linspace(0, chainage[-1], count + 1)
+        places = np.column_stack([np.interp(at, chainage, column) for column in np.asarray(line, dtype=float).T])
+        starts.append(places[:-1])
+        ends.append(places[1:])
+        middles.append(0.5 * (at[:-1] + at[1:]))
+        counts.append(count)
+    numbers = np.repeat(np.arange(len(lines)), counts)
+    return Pieces(np.concatenate(starts), np.concatenate(ends), numbers, np.concatenate(middles))
+
+
+def nearest(places: np.ndarray, pieces: Pieces) -> tuple[np.ndarray, np.ndarray]:
+    """Find the nearest point, in plan, on any piece.
+
+    Parameters
+    ----------
+    places : (n, 3) array
+
+    Returns
+    -------
+    feet : (n, 3) array
+        Points on the pieces.
+    numbers : (n,) int array
+        Their pieces.
+    """
+    count = min(CANDIDATES, len(pieces.start))
+    _, candidates = cKDTree(pieces.middle[:, :2]).query(places[:, :2], k=np.arange(1, count + 1))
+    start, step = pieces.start[candidates], (pieces.end - pieces.start)[candidates]
+    ahead = np.sum((places[:, None, :2] - start[..., :2]) * step[..., :2], axis=2)
+    share = np.clip(ahead / np.sum(step[..., :2] ** 2, axis=2), 0, 1)
+    feet = start + share[..., None] * step
+    distance = np.linalg.norm(feet[..., :2] - places[:, None, :2], axis=2)
+    rows, best = np.arange(len(places)), np.argmin(distance, axis=1)
+    return feet[rows, best], candidates[rows, best]
+
+
+def _worse(a: float, b: float) -> float:
+    return float(a if abs(a) >= abs(b) else b)
+
+
+def _rms(values: np.ndarray) -> float:
+    return np.sqrt(np.mean(values**2)) if len(values) else np.nan
+
+
+def _mean(values: np.ndarray) -> float:
+    return np.mean(values) if len(values) else np.nan
+
+
+def _p95(values: np.ndarray) -> float:
+    return np.percentile(np.abs(values), 95) if len(values) else np.nan

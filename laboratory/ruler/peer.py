@@ -1,0 +1,111 @@
+"""What a plain script makes of rail points: closing, scikit-image's skeleton, Gaussian smoothing.
+
+The baseline that every accuracy table prints beside our own lines.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import binary_closing, binary_dilation, convolve, gaussian_filter1d, label, maximum
+from scipy.spatial import cKDTree
+from skimage.morphology import skeletonize
+
+from ...core.clouds.points import RailPoints
+from ...core.polyline import length_along
+from ...core.raster import cell_size, rasterize
+
+SMOOTHING_M = 0.8
+"""Standard deviation of the Gaussian along a piece: the same number as our own smoothing's."""
+
+SHORTEST_M = 1.0
+"""Pieces below this are dropped, as ours are."""
+
+REACH_M = 0.10
+"""Points this near in plan give a vertex its height, as in our own elevation."""
+
+CLOSING = np.ones((5, 5), dtype=bool)
+"""Closes holes of up to four cells, the distance of profiles."""
+
+SPUR_CELLS, PRUNINGS = 10, 3
+"""Branches below this length are spurs; each round can bare new ones."""
+
+AROUND = np.ones((3, 3), dtype=int)
+
+
+def peer_lines(points: RailPoints, gauge_m: float, head_width_m: float) -> list:
+    """Extract rail lines in the plain way.
+
+    Returns
+    -------
+    list of (n, 3) array
+        Local metres.
+    """
+    raster = rasterize(points.xyz, cell_size(gauge_m, head_width_m))
+    cells = raster.cells()
+    corner = cells.min(axis=0) - 2
+    height, width = cells.max(axis=0) + 3 - corner
+    skeleton = skeletonize(binary_closing(raster.read(*corner, height, width), CLOSING))
+    for _ in range(PRUNINGS):
+        skeleton = _pruned(skeleton)
+    lines = []
+    for piece in _pieces(skeleton):
+        xy = raster.to_local(piece + corner)
+        length_m = length_along(xy)[-1]
+        if length_m >= SHORTEST_M:
+            sigma = SMOOTHING_M / (length_m / (len(xy) - 1))
+            lines.append(gaussian_filter1d(xy, sigma, axis=0, mode="mirror"))
+    risen = [(xy, _heights(xy, points.xyz)) for xy in lines]
+    return [np.column_stack([xy, z]) for xy, z in risen if z is not None]
+
+
+def _pieces(skeleton: np.ndarray) -> list:
+    """Cut a skeleton at its junctions and order the cells of every piece: a list of (n, 2) arrays."""
+    chains, count = label(skeleton & (_neighbours(skeleton) <= 2), AROUND)
+    cells = np.argwhere(chains)
+    order = np.argsort(chains[tuple(cells.T)], kind="stable")
+    borders = np.searchsorted(chains[tuple(cells[order].T)], np.arange(1, count + 2))
+    return [_ordered(cells[order[a:b]]) for a, b in zip(borders, borders[1:])]
+
+
+def _pruned(skeleton: np.ndarray) -> np.ndarray:
+    """Erase short branches that hang on a junction, and thin what is left of the junctions."""
+    neighbours = _neighbours(skeleton)
+    junctions = skeleton & (neighbours > 2)
+    chains, count = label(skeleton & ~junctions, AROUND)
+    numbers = np.arange(1, count + 1)
+    free = maximum(neighbours == 1, chains, numbers).astype(bool)
+    hanging = maximum(binary_dilation(junctions, AROUND), chains, numbers).astype(bool)
+    short = np.bincount(chains.ravel())[1:] < SPUR_CELLS
+    spurs = np.append(False, free & hanging & short)
+    return skeletonize(skeleton & ~spurs[chains])
+
+
+def _neighbours(skeleton: np.ndarray) -> np.ndarray:
+    """Count the set cells around each set cell; 0 elsewhere."""
+    return skeleton * (convolve(skeleton.astype(int), AROUND, mode="constant") - 1)
+
+
+def _ordered(cells: np.ndarray) -> np.ndarray:
+    """Walk along a chain of cells from one of its ends."""
+    links = cKDTree(cells).query_ball_point(cells, 1.5)
+    at = min(range(len(cells)), key=lambda number: len(links[number]))
+    walk, seen = [at], {at}
+    while True:
+        ahead = [number for number in links[at] if number not in seen]
+        if not ahead:
+            return cells[walk]
+        at = min(ahead, key=lambda number: np.abs(cells[number] - cells[at]).sum())
+        walk.append(at)
+        seen.add(at)
+
+
+def _heights(xy: np.ndarray, points: np.ndarray) -> np.ndarray | None:
+    """Mean height of the points around each vertex, smoothed; gaps are filled linearly. None without any point."""
+    near = cKDTree(points[:, :2]).query_ball_point(xy, REACH_M)
+    z = np.array([points[numbers, 2].mean() if numbers else np.nan for numbers in near])
+    known = np.flatnonzero(np.isfinite(z))
+    if len(known) == 0:
+        return None
+    z = np.interp(np.arange(len(z)), known, z[known])
+    spacing_m = length_along(xy)[-1] / (len(xy) - 1)
+    return gaussian_filter1d(z, SMOOTHING_M / spacing_m, mode="mirror")

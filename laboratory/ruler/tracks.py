@@ -1,0 +1,157 @@
+"""Gauge and cant between extracted rails, held against those between the true ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core.polyline import interpolate, left_normals, length_along, project
+from ...core.rails import Centerline, RailLine, TrackGeometry
+from .lines import cut, nearest
+
+ASTRAY_M = 0.10
+"""A rail this far from where the centerline has it is another one, or none."""
+
+CURVED_M = 1500.0
+"""Radii above this are not judged: their versine on a chord of 20 m is below 35 mm."""
+
+CHORD_M = 20.0
+STEADY = 0.02
+"""Radii are judged where the true curvature changes by less than this share within so much to either side: on arcs, the
+chord that measures them wholly among them."""
+
+STEP_M = 0.5
+"""Distance between the places at which tracks are measured."""
+
+
+@dataclass(frozen=True)
+class TrackErrors:
+    """Measured less true values along all centerlines, metres: mean and root mean square."""
+
+    gauge_bias_m: float
+    gauge_rmse_m: float
+    cant_bias_m: float
+    cant_rmse_m: float
+
+
+def compare_tracks(
+    centerlines: Sequence[Centerline], rails: Sequence[RailLine], truth: Sequence[np.ndarray], head_width_m: float
+) -> TrackErrors:
+    """Compare gauge and cant every `STEP_M` of the centerlines, where both lines and truth have both rails.
+
+    Parameters
+    ----------
+    centerlines : sequence of Centerline
+    rails : sequence of RailLine
+        Those the centerlines were made of.
+    truth : sequence of (n, 3) array
+        True rails, metres, in the same frame.
+    head_width_m : float
+    """
+    errors = [np.empty((0, 2))]
+    for centerline in centerlines:
+        own = [rail.xyz for rail in rails if rail.rail_id in (*centerline.left_ids, *centerline.right_ids)]
+        middle, left = _places(centerline.xyz)
+        half_m = (centerline.gauge_mm / 1000 + head_width_m) / 2
+        found, true = (_gauge_and_cant(middle, half_m * left, lines) for lines in (own, truth))
+        errors.append(found - true)
+    error = np.concatenate(errors)
+    error = error[np.isfinite(error).all(axis=1)]
+    if not len(error):
+        return TrackErrors(*[float("nan")] * 4)
+    bias, rmse = error.mean(axis=0), np.sqrt(np.mean(error**2, axis=0))
+    return TrackErrors(float(bias[0]), float(rmse[0]), float(bias[1]), float(rmse[1]))
+
+
+@dataclass(frozen=True)
+class GeometryErrors:
+    """Errors of measured track geometry at its stations, root mean squares; NaN where the truth has nothing of a kind.
+
+    Attributes
+    ----------
+    gauge_m, cant_m : float
+    radius : float
+        In proportion to the true radius, where that is constant and below `CURVED_M`.
+    """
+
+    gauge_m: float
+    cant_m: float
+    radius: float
+
+
+def compare_geometry(
+    geometry: Sequence[TrackGeometry],
+    rails: Sequence[np.ndarray],
+    centerlines: Sequence[np.ndarray],
+    head_width_m: float,
+) -> GeometryErrors:
+    """Compare measured gauge, cant and radius with the truth.
+
+    Parameters
+    ----------
+    geometry : sequence of TrackGeometry
+    rails, centerlines : sequence of (n, 3) array
+        True lines, metres, in the same frame.
+    head_width_m : float
+    """
+    plain, curved = [np.empty((0, 2))], [np.empty(0)]
+    for track in geometry:
+        half_m = (np.nanmedian(track.gauge_mm) / 1000 + head_width_m) / 2
+        true = _gauge_and_cant(track.xyz[:, :2], half_m * left_normals(track.xyz), rails)
+        measured = np.column_stack([track.gauge_mm / 1000 + head_width_m, track.cant_mm / 1000])
+        plain.append(measured - true)
+        radius = _true_radius(track.xyz[:, :2], centerlines)
+        curved.append(np.abs(track.radius_m) / radius - 1)
+    errors, ratios = np.concatenate(plain), np.concatenate(curved)
+    gauge, cant = (_rms(column[np.isfinite(column)]) for column in errors.T)
+    return GeometryErrors(gauge, cant, _rms(ratios[np.isfinite(ratios)]))
+
+
+def _true_radius(places: np.ndarray, centerlines: Sequence[np.ndarray]) -> np.ndarray:
+    """Radius of the true centerlines beside places, (n,); NaN where it changes within a chord, or is large."""
+    radius = np.full(len(places), np.nan)
+    feet = project([line[:, :2] for line in centerlines], places, ASTRAY_M)
+    for number in np.unique(feet.line):
+        mine = feet.of(int(number))
+        line = centerlines[number][:, :2]
+        along = length_along(line)
+        mine = mine[(mine.t >= CHORD_M) & (mine.t <= along[-1] - CHORD_M)]
+        t = mine.t[:, None] + CHORD_M * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+        around = interpolate(line, along, t.ravel()).reshape(-1, 5, 2)
+        bends = np.array([_curvature(around[:, [k, k + 1, k + 2]]) for k in range(3)])
+        steady = (np.ptp(bends, axis=0) < STEADY * np.abs(bends[1])) & (np.abs(bends[1]) > 1 / CURVED_M)
+        radius[mine.point[steady]] = 1 / np.abs(bends[1][steady])
+    return radius
+
+
+def _curvature(places: np.ndarray) -> np.ndarray:
+    """Curvature of the circles through three places each, (n, 3, 2) to (n,), positive to the left."""
+    one, two, chord = places[:, 1] - places[:, 0], places[:, 2] - places[:, 1], places[:, 2] - places[:, 0]
+    area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+    return 2 * area / np.prod([np.hypot(*side.T) for side in (one, two, chord)], axis=0)
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
+
+
+def _places(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places every `STEP_M` of a line and unit vectors to its left there, (n, 2) each."""
+    t = length_along(line[:, :2])
+    at = np.arange(STEP_M / 2, t[-1], STEP_M)
+    normals = left_normals(line[:, :2])
+    return tuple(np.column_stack([np.interp(at, t, c) for c in values[:, :2].T]) for values in (line, normals))
+
+
+def _gauge_and_cant(middle: np.ndarray, to_left: np.ndarray, lines: Sequence[np.ndarray]) -> np.ndarray:
+    """Distance and difference in height of the rails to the left and right of places, (n, 2); NaN where one lacks."""
+    pieces = cut(lines)
+    sides = []
+    for place in (middle + to_left, middle - to_left):
+        feet, _ = nearest(np.column_stack([place, np.zeros(len(place))]), pieces)
+        astray = np.linalg.norm(feet[:, :2] - place, axis=1) > ASTRAY_M
+        sides.append(np.where(astray[:, None], np.nan, feet))
+    step = sides[0] - sides[1]
+    return np.column_stack([np.linalg.norm(step, axis=1), step[:, 2]])

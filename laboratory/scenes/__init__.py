@@ -1,0 +1,1 @@
+"""Classified clouds of tracks with exact truth."""

@@ -1,0 +1,162 @@
+"""A scene: a classified cloud of tracks with exact truth, scanned from a plan.
+
+Every scene is seeded. Random numbers come from `RandomState`, whose stream numpy promises never to change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...core.clouds.points import RailPoints
+from ...core.frame import LocalFrame
+from ...core.standards import RailStandard
+from . import clutter
+from .frogs import frog_guards, laid_together
+from .scanner import Scanner, scan
+from .tracks import Track
+
+UNCLASSIFIED, GROUND, RAIL = 1, 2, 10
+"""Classes of the LAS specification."""
+
+Gaps = tuple[tuple[float, float], ...]
+"""Stretches of one rail without points: start and end along it, metres."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A classified cloud and the truth about it.
+
+    Attributes
+    ----------
+    name : str
+    xyz : (n, 3) array
+        All points, local metres.
+    classification : (n,) uint8 array
+    rails : tuple of (k, 3) array
+        Tops of the heads on their own axes, local metres: left and right rail of the first track, of the second, ...
+    centerlines : tuple of (k, 3) array
+        Lines midway between the tops.
+    standard : RailStandard
+    frame : LocalFrame
+        Where in the world the scene lies.
+    other_gauges_m : tuple of float
+        Gauges of tracks that have another one than the standard's.
+    """
+
+    name: str
+    xyz: np.ndarray
+    classification: np.ndarray
+    rails: tuple[np.ndarray, ...]
+    centerlines: tuple[np.ndarray, ...]
+    standard: RailStandard
+    frame: LocalFrame
+    other_gauges_m: tuple[float, ...] = ()
+
+    def rail_points(self) -> RailPoints:
+        """Give what `read_rail_points` would read of the scene's file."""
+        return RailPoints(self.xyz[self.classification == RAIL], self.frame, RAIL)
+
+
+@dataclass(frozen=True)
+class Clutter:
+    """How much of what is no rail a scene holds.
+
+    Attributes
+    ----------
+    weeds_near, weeds_between : int
+        Weeds classified as rail within 0.3 m of rails and within 2 m of tracks.
+    stones : int
+        Points of ballast and rail feet classified as rail.
+    other_weeds : int
+        Weeds that the classification told apart.
+    ground_step_m : float or None
+        Grid of the thinned ground; None leaves the ground out.
+    """
+
+    weeds_near: int = 0
+    weeds_between: int = 0
+    stones: int = 0
+    other_weeds: int = 0
+    ground_step_m: float | None = None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that makes a scene, before chance comes in.
+
+    Attributes
+    ----------
+    tracks : sequence of Track
+        A branch after the track that it leaves.
+    standard : RailStandard
+    scanner : Scanner
+    ridden : int
+        Track that the scanner rides on.
+    gaps : dict of (track, side) to Gaps
+        Where rails have no points; side is +1 for the left rail and -1 for the right one.
+    clutter : Clutter
+    frame : LocalFrame
+    other_gauges_m : tuple of float
+        See `Scene`.
+    """
+
+    tracks: Sequence[Track]
+    standard: RailStandard
+    scanner: Scanner = Scanner()
+    ridden: int = 0
+    gaps: dict[tuple[int, int], Gaps] = field(default_factory=dict)
+    clutter: Clutter = Clutter()
+    frame: LocalFrame = LocalFrame(np.zeros(3))
+    other_gauges_m: tuple[float, ...] = ()
+
+
+def build(name: str, plan: Plan, rng: np.random.RandomState) -> Scene:
+    """Scan the rails of a plan, with the guard rails of its frogs, and strew its clutter."""
+    rails = tuple(rail for track in plan.tracks for rail in track.rails())
+    centerlines = tuple(track.thinned(track.centerline) for track in plan.tracks)
+    clouds = [(RAIL, points) for points in _scanned(plan, rng)] + _clutter(plan.clutter, rails, centerlines, rng)
+    classification = np.repeat([code for code, _ in clouds], [len(points) for _, points in clouds])
+    xyz = np.concatenate([points for _, points in clouds])
+    return Scene(
+        name,
+        xyz,
+        classification.astype(np.uint8),
+        rails,
+        centerlines,
+        plan.standard,
+        plan.frame,
+        plan.other_gauges_m,
+    )
+
+
+def _scanned(plan: Plan, rng: np.random.RandomState) -> list[np.ndarray]:
+    """Scan every running rail, one rail's points where two share a place, and the guard rails."""
+    path = plan.tracks[plan.ridden].centerline
+    head_width_m = plan.standard.head_width_m
+    running = [
+        scan(track.railhead(side), head_width_m, path, plan.scanner, rng, plan.gaps.get((number, side), ()))
+        for number, track in enumerate(plan.tracks)
+        for side in track.sides
+    ]
+    running = laid_together(plan.tracks, running, head_width_m)
+    guards = frog_guards(plan.tracks, head_width_m)
+    return running + [scan(guard, head_width_m, path, plan.scanner, rng) for guard in guards]
+
+
+def _clutter(
+    amount: Clutter, rails: Sequence[np.ndarray], centerlines: Sequence[np.ndarray], rng: np.random.RandomState
+) -> list[tuple[int, np.ndarray]]:
+    """Make the points of what is no rail, by class."""
+    weed_height = (-clutter.HEAD_ABOVE_GROUND_M, 0.06)
+    clouds = [
+        (RAIL, clutter.weeds(rng, rails, amount.weeds_near, 0.3, weed_height)),
+        (RAIL, clutter.weeds(rng, centerlines, amount.weeds_between, 2.0, weed_height)),
+        (RAIL, clutter.stones(rng, rails, amount.stones, 0.2)),
+        (UNCLASSIFIED, clutter.weeds(rng, centerlines, amount.other_weeds, 4.0, (-0.15, 0.4))),
+    ]
+    if amount.ground_step_m is not None:
+        clouds.append((GROUND, clutter.ground(rng, centerlines, 3.0, amount.ground_step_m)))
+    return clouds

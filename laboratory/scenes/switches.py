@@ -1,0 +1,131 @@
+"""Scenes of tracks with switches: turnouts, a crossover, a diamond and the throat of a yard."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...core.standards import STANDARDS
+from ..curves import Curve, Element, trace
+from ..rasters.turnouts import FORMS, branch
+from .plain import random_gaps, spacing
+from .scanner import Scanner
+from .scene import Clutter, Plan, Scene, build
+from .tracks import Track
+
+STANDARD = STANDARDS["EN_60E1_1435"]
+SCANNER = Scanner(noise_m=0.004)
+TRACK_CENTRES_M = 4.5
+FREE_M = 30.0
+"""Plain track before the toe and behind the branch's arc."""
+
+
+def turnout(name: str, form: str, hand: int, heading: float, seed: int, curvature: float = 0.0) -> Scene:
+    """Lay one turnout into plain track.
+
+    Parameters
+    ----------
+    name : str
+    form : str
+        Name of one of `turnouts.FORMS`.
+    hand : int
+        1: the branch leaves to the left; -1: to the right.
+    heading : float
+        Direction of the main track, radians.
+    seed : int
+    curvature : float
+        Of the main track, 1/m.
+    """
+    rng = np.random.RandomState(seed)
+    shape = next(candidate for candidate in FORMS if candidate.name == form)
+    main = trace([Element(2 * FREE_M + shape.arc_m, curvature, curvature)], heading=heading)
+    side = branch(main, FREE_M, shape, hand, FREE_M)
+    return _build(name, [main, side], rng, gaps=2)
+
+
+def crossover(seed: int = 20) -> Scene:
+    """Two parallel tracks, a crossover of two 300-1:9 turnouts between them."""
+    rng = np.random.RandomState(seed)
+    main = trace([Element(120)], heading=0.5)
+    second = Curve(main.offset(TRACK_CENTRES_M), main.heading, main.curvature, main.step_m)
+    return _build("crossover", [main, second, _link(main, 25.0, 300.0, np.arctan(1 / 9))], rng, gaps=3)
+
+
+def diamond(seed: int = 21) -> Scene:
+    """Two straight tracks that cross at 1:9 without a switch."""
+    rng = np.random.RandomState(seed)
+    half_m, angle = 45.0, np.arctan(1 / 9)
+    tracks = [
+        trace([Element(2 * half_m)], (-half_m * np.cos(heading), -half_m * np.sin(heading)), heading)
+        for heading in (0.8, 0.8 + angle)
+    ]
+    return _build("diamond", tracks, rng, gaps=2)
+
+
+def throat(seed: int = 22) -> Scene:
+    """Throat of a yard: two ladders of 190-1:7.5 turnouts lead from one track to ten."""
+    rng = np.random.RandomState(seed)
+    form = next(candidate for candidate in FORMS if candidate.name == "190-1:7.5")
+    turn = form.arc_m / form.radius_m
+    apart_m = TRACK_CENTRES_M / np.sin(turn)
+    main = trace([Element(270.0)], heading=-0.2)
+    curves = [main]
+    for hand, toe_m, count in ((1, 10.0, 5), (-1, 40.0, 4)):
+        # The first yard track leaves the ladder where both arcs together lie one track centre beside the main track.
+        first_m = form.arc_m + apart_m - 2 * form.radius_m * np.tan(turn / 2)
+        ladder = branch(main, toe_m, form, hand, first_m + (count - 2) * apart_m)
+        ladder = _turned_back(ladder, form.arc_m, first_m + (count - 1) * apart_m, hand / form.radius_m, main)
+        curves.append(ladder)
+        for number in range(count - 1):
+            leg_m = main.length_m - toe_m - first_m - number * apart_m - form.arc_m
+            curves.append(branch(ladder, first_m + number * apart_m, form, -hand, leg_m))
+    return _build("throat", curves, rng, gaps=1, scanner=Scanner(noise_m=0.004, half_range_m=30.0, ray_step_rad=0.0015))
+
+
+def _turned_back(ladder: Curve, arc_m: float, end_m: float, curvature: float, main: Curve) -> Curve:
+    """Draw a ladder anew that turns parallel to the main track at its end, as the last yard track."""
+    toe_m = float(main.step_m * np.argmin(np.linalg.norm(main.xy - ladder.xy[0], axis=1)))
+    elements = [
+        Element(arc_m, curvature, curvature),
+        Element(end_m - arc_m),
+        Element(arc_m, -curvature, -curvature),
+        Element(main.length_m - toe_m - end_m - arc_m),
+    ]
+    return trace(elements, tuple(ladder.xy[0]), float(ladder.heading[0]))
+
+
+def _link(main: Curve, toe_m: float, radius_m: float, angle: float) -> Curve:
+    """Lay a link from a straight track to its left neighbour: arc, straight, arc."""
+    toe = int(round(toe_m / main.step_m))
+    straight_m = (TRACK_CENTRES_M - 2 * radius_m * (1 - np.cos(angle))) / np.sin(angle)
+    elements = [
+        Element(radius_m * angle, 1 / radius_m, 1 / radius_m),
+        Element(straight_m),
+        Element(radius_m * angle, -1 / radius_m, -1 / radius_m),
+    ]
+    return trace(elements, tuple(main.xy[toe]), float(main.heading[toe]))
+
+
+def _build(name: str, curves: list[Curve], rng: np.random.RandomState, gaps: int, scanner: Scanner = SCANNER) -> Scene:
+    """Lay 60E1 rails on curves, the first one ridden and with gaps, all on one ground that rises and waves."""
+    tracks = [Track(curve, spacing(STANDARD), _ground(curve)) for curve in curves]
+    length_m = sum(curve.length_m for curve in curves)
+    plan = Plan(
+        tracks,
+        STANDARD,
+        scanner,
+        gaps={
+            key: places
+            for number, curve in enumerate(curves)
+            for key, places in random_gaps(rng, number, curve.length_m, gaps, longest_m=1.5).items()
+        },
+        clutter=Clutter(
+            weeds_near=int(0.12 * length_m), weeds_between=int(0.15 * length_m), stones=int(1.5 * length_m)
+        ),
+    )
+    return build(name, plan, rng)
+
+
+def _ground(curve: Curve) -> np.ndarray:
+    """Heights by place, so that tracks that meet lie equally high."""
+    x = curve.xy[:, 0]
+    return 0.004 * x + 0.01 * np.sin(2 * np.pi * x / 80.0)

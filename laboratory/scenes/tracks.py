@@ -1,0 +1,110 @@
+"""Tracks in space: a plan curve with heights and cant, and the two railheads that lie on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..curves import Curve
+
+UP = np.array([0.0, 0.0, 1.0])
+
+TRUTH_SAGITTA_M = 2e-5
+"""How far a chord between two vertices of a truth line may run from the curve: nothing beside a millimetre."""
+
+LONGEST_CHORD_M = 0.5
+"""Vertex distance of truth lines on straight track."""
+
+
+@dataclass(frozen=True)
+class Railhead:
+    """A railhead in space, sampled along the track.
+
+    Attributes
+    ----------
+    top : (n, 3) array
+        Top of the head on the head's own axis, metres.
+    axis : (n, 3) array
+        Unit vectors up along the head's axis.
+    across : (n, 3) array
+        Unit vectors to the left across the head, perpendicular to the axis.
+    """
+
+    top: np.ndarray
+    axis: np.ndarray
+    across: np.ndarray
+
+
+@dataclass(frozen=True)
+class Track:
+    """A track: its plan, heights and cant.
+
+    Attributes
+    ----------
+    curve : Curve
+        Plan of the track's axis, or of a line parallel to it.
+    spacing_m : float
+        Distance between the tops of the two heads: gauge and one head width.
+    height_m, cant_m : float or (n,) array
+        Height midway between the tops, and left top above right top, at the curve's samples.
+    left_m : float
+        How far to the left of the curve the track's axis runs.
+    inclination : float
+        Inward lean of the heads: 1/20 in most countries, 1/40 in some.
+    sides : tuple of int
+        Rails that are the track's own, +1 left and -1 right; a third rail beside another track has one.
+    """
+
+    curve: Curve
+    spacing_m: float
+    height_m: float | np.ndarray = 0.0
+    cant_m: float | np.ndarray = 0.0
+    left_m: float = 0.0
+    inclination: float = 1 / 20
+    sides: tuple[int, ...] = (1, -1)
+
+    @property
+    def centerline(self) -> np.ndarray:
+        """Line midway between the tops, (n, 3)."""
+        height = np.broadcast_to(self.height_m, len(self.curve.xy))
+        return np.column_stack([self.curve.offset(self.left_m), height])
+
+    def railhead(self, side: int) -> Railhead:
+        """Build one of the two railheads: `side` is +1 for the left and -1 for the right one."""
+        left = np.column_stack([self.curve.left_normal, np.zeros(len(self.curve.xy))])
+        tilt = np.broadcast_to(np.arcsin(np.asarray(self.cant_m) / self.spacing_m), len(left))
+        top = self.centerline + side * 0.5 * self.spacing_m * _turned(left, tilt)
+        lean = tilt + side * np.arctan(self.inclination)
+        across = _turned(left, lean)
+        axis = _turned(left, lean + np.pi / 2)
+        return Railhead(top, axis, across)
+
+    def rails(self) -> tuple[np.ndarray, ...]:
+        """Tops of the track's own rails, each (k, 3), with as few vertices as the curvature allows."""
+        return tuple(self.thinned(self.railhead(side).top) for side in self.sides)
+
+    def thinned(self, line: np.ndarray) -> np.ndarray:
+        """Keep as many of a line's (n, 3) vertices, one at each of the curve's samples, as the curvature asks for."""
+        sharpest = max(float(np.abs(self.curve.curvature).max()), 1e-9)
+        chord_m = min(np.sqrt(8 * TRUTH_SAGITTA_M / sharpest), LONGEST_CHORD_M)
+        stride = max(int(chord_m / self.curve.step_m), 1)
+        last = len(self.curve.xy) - 1
+        return line[np.unique(np.append(np.arange(0, last, stride), last))]
+
+    def piece(self, start_m: float, end_m: float) -> Track:
+        """Cut out the part between two chainages of the curve, to the nearest samples."""
+        height, cant = (np.broadcast_to(value, len(self.curve.xy)) for value in (self.height_m, self.cant_m))
+        first = max(int(round(start_m / self.curve.step_m)), 0)
+        curve = self.curve.piece(start_m, end_m)
+        part = slice(first, first + len(curve.xy))
+        return replace(self, curve=curve, height_m=height[part], cant_m=cant[part])
+
+    def inset(self, narrower_m: float) -> Track:
+        """Bring the two heads closer together, as guard rails lie inside running rails."""
+        return replace(self, spacing_m=self.spacing_m - narrower_m)
+
+
+def _turned(left: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Turn horizontal unit vectors up by an angle (radians) about the track's direction."""
+    return np.cos(angle)[:, None] * left + np.sin(angle)[:, None] * UP

@@ -1,0 +1,107 @@
+"""Scenes as files: a LAZ cloud and its truth lines; the command `python -m rail_extract scenes`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+
+from ...core.clouds.crs import parse_crs
+from ...core.clouds.las import laspy
+from ...core.errors import CloudError, ParameterError
+from .catalogue import SCENES
+from .scene import Scene
+
+SCALE_M = 0.001
+"""Step of the coordinates in the file: a millimetre, as scanners write."""
+
+TRUTH_DECIMALS = 4
+"""Digits of truth coordinates behind the point: a tenth of a millimetre."""
+
+MADE = date(2025, 1, 1)
+"""Date in the file's header; fixed, so that the same scene makes the same file."""
+
+
+def write_cloud(scene: Scene, path: Path) -> None:
+    """Write a scene as LAS 1.4, compressed when the name ends in .laz."""
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.scales = np.full(3, SCALE_M)
+    header.offsets = scene.frame.origin
+    header.creation_date = MADE
+    header.generating_software = "Rail Extract scenes"
+    if scene.frame.crs_wkt:
+        header.add_crs(parse_crs(scene.frame.crs_wkt))
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = scene.frame.to_crs(scene.xyz).T
+    cloud.classification = scene.classification
+    cloud.write(path)
+
+
+def write_truth(scene: Scene, path: Path) -> None:
+    """Write true rails and centerlines as GeoJSON in the cloud's own coordinates and reference system."""
+    lines = [("rail", line) for line in scene.rails] + [("centerline", line) for line in scene.centerlines]
+    features = [json.dumps(_feature(scene, kind, line)) for kind, line in lines]
+    head = {"type": "FeatureCollection", "name": path.stem}
+    if scene.frame.crs_wkt:
+        code = "::".join(parse_crs(scene.frame.crs_wkt).to_authority())
+        head["crs"] = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:{code}"}}
+    text = json.dumps(head)[:-1] + ', "features": [\n' + ",\n".join(features) + "\n]}\n"
+    path.write_text(text, encoding="ascii")
+
+
+def _feature(scene: Scene, kind: str, line: np.ndarray) -> dict:
+    coordinates = np.round(scene.frame.to_crs(line), TRUTH_DECIMALS).tolist()
+    properties = {
+        "kind": kind,
+        "gauge_mm": round(scene.standard.gauge_m * 1000, 2),
+        "head_mm": round(scene.standard.head_width_m * 1000, 2),
+    }
+    geometry = {"type": "LineString", "coordinates": coordinates}
+    return {"type": "Feature", "properties": properties, "geometry": geometry}
+
+
+def read_truth(path: Path, kind: str) -> tuple[np.ndarray, ...]:
+    """Read back true lines of a kind, "rail" or "centerline": (n, 3) arrays in the cloud's coordinates."""
+    features = json.loads(path.read_text(encoding="ascii"))["features"]
+    return tuple(
+        np.array(feature["geometry"]["coordinates"]) for feature in features if feature["properties"]["kind"] == kind
+    )
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", help=f"any of {', '.join(SCENES)}; all by default")
+    parser.add_argument("--into", type=Path, default=Path(), help="folder to write to (default: here)")
+    parser.add_argument("--name", help="name of the files, for a single scene (default: the scene's)")
+
+
+def run(args: argparse.Namespace) -> None:
+    """Write the wanted scenes, a cloud and a truth file each.
+
+    Raises
+    ------
+    ParameterError
+        A scene is unknown, or several shall have one name.
+    CloudError
+        The folder can't be written to.
+    """
+    names: Sequence[str] = args.scenes or tuple(SCENES)
+    unknown = [name for name in names if name not in SCENES]
+    if unknown:
+        raise ParameterError(f"There is no scene {unknown[0]!r}: choose from {', '.join(SCENES)}.")
+    if args.name and len(names) > 1:
+        raise ParameterError("One name can't serve several scenes: name a single scene.")
+    for name in names:
+        scene = SCENES[name]()
+        stem = args.name or name
+        try:
+            args.into.mkdir(parents=True, exist_ok=True)
+            write_cloud(scene, args.into / f"{stem}.laz")
+            write_truth(scene, args.into / f"{stem}_truth.geojson")
+        except OSError as error:
+            raise CloudError(f"The folder {args.into} can't be written to ({error}): choose another.") from error
+        print(f"{stem}.laz: {len(scene.xyz)} points, {len(scene.rails)} rails, {len(scene.centerlines)} tracks")

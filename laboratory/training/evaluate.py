@@ -1,0 +1,119 @@
+"""Evaluate cleanup on a small fixed set of synthetic rasters, for a look during training.
+
+The set is a function of its seeds, which no training uses: 132RE at 4 cm, the plainer families of layouts, severities
+from 0.2 to 0.8, where the corrupted rasters themselves score an F1 of at most 0.5. The full comparison, with every
+family and severity, is `benchmarks/frpdf.py`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy import ndimage
+
+from ...core.frpdf import DEFAULT_PASSES, FEEDBACK_THRESHOLD, OUTPUT_THRESHOLD, START
+from ...core.frpdf.cleanup import UNTIL_STABLE, is_stable, most_passes
+from ...core.frpdf.engine import Engine, make_engine
+from ...core.frpdf.models import MODELS
+from ...core.frpdf.weights import load_arrays
+from ..rasters.distortion import Pair
+from ..rasters.pairs import BASE_RATIO, random_pair
+from .scores import Scores, score
+
+EVALUATION_SEED = 20251
+"""Apart from the seeds of trainings, which are small."""
+SIDE = 512
+COUNT = 48
+SEVERITIES = (0.2, 0.8)
+FAMILIES = ("plain", "curve", "parallel", "turnout", "connections")
+SMALLEST_PIECE = 30
+"""Cells of a piece that the classical row keeps: about half a metre of rail."""
+
+Cleaner = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of the table: what cleaned, its counts, and seconds a raster."""
+
+    name: str
+    scores: Scores
+    seconds: float
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("weights", type=Path, nargs="*", help=".npz files; the shipped models where none is named")
+    parser.add_argument("--count", type=int, default=COUNT, help=f"rasters of the set to use (default {COUNT})")
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Print the table."""
+    pairs = evaluation_pairs(arguments.count)
+    print(f"{len(pairs)} rasters of {SIDE} x {SIDE}, severity {SEVERITIES[0]} to {SEVERITIES[1]}, strict by cell")
+    print(f"{'':28}{'FN':>9}{'FP':>9}{'TP':>9}{'precision':>11}{'recall':>8}{'F1':>7}{'s/raster':>10}")
+    cleaners: list[tuple[str, Cleaner]] = [("input", lambda x: x), ("closing, pieces filtered", classical)]
+    for path in arguments.weights or [model.path for model in MODELS]:
+        engine = make_engine(load_arrays(path))
+        for passes in range(1, DEFAULT_PASSES + 1):
+            cleaners.append((f"{path.stem}, {passes} pass{'es' if passes > 1 else ''}", cleaner_of(engine, passes)))
+    for name, cleaner in cleaners:
+        row = evaluate(name, cleaner, pairs)
+        s = row.scores
+        print(
+            f"{row.name:28}{s.fn:9d}{s.fp:9d}{s.tp:9d}{s.precision:11.3f}{s.recall:8.3f}{s.f1:7.3f}{row.seconds:10.2f}",
+            flush=True,
+        )
+
+
+def evaluation_pairs(count: int = COUNT) -> list[Pair]:
+    """Draw the first `count` pairs of the fixed set."""
+    severities = np.linspace(*SEVERITIES, COUNT)
+    return [
+        random_pair(
+            np.random.default_rng([EVALUATION_SEED, number]),
+            SIDE,
+            severities[number],
+            BASE_RATIO,
+            FAMILIES[number % len(FAMILIES)],
+        )
+        for number in np.random.default_rng(EVALUATION_SEED).permutation(COUNT)[:count]
+    ]
+
+
+def evaluate(name: str, cleaner: Cleaner, pairs: list[Pair]) -> Row:
+    """Clean all rasters and add up their counts."""
+    total, started = Scores(), time.perf_counter()
+    for pair in pairs:
+        total += score(cleaner(pair.observed), pair.label)
+    return Row(name, total, (time.perf_counter() - started) / len(pairs))
+
+
+def classical(observed: np.ndarray) -> np.ndarray:
+    """Close and drop small pieces: what one does without a network."""
+    closed = ndimage.binary_closing(np.pad(observed, 2), np.ones((3, 3)))[2:-2, 2:-2]
+    pieces, count = ndimage.label(closed, np.ones((3, 3)))
+    large = np.bincount(pieces.ravel(), minlength=count + 1) >= SMALLEST_PIECE
+    large[0] = False
+    return large[pieces]
+
+
+def cleaner_of(engine: Engine, passes: int) -> Cleaner:
+    """Make a cleaner of an engine that sees a raster whole; 0 passes run until the result is stable."""
+
+    def clean(observed: np.ndarray) -> np.ndarray:
+        seen, found = observed.astype(np.float32), observed
+        state = np.full_like(seen, START)
+        for number in range(most_passes(passes)):
+            before, probability = found, engine.probabilities(seen, state, number)
+            state, found = (probability >= FEEDBACK_THRESHOLD).astype(np.float32), probability >= OUTPUT_THRESHOLD
+            if passes == UNTIL_STABLE and number > 0 and is_stable((before != found).sum(), found.sum()):
+                break
+        return found
+
+    return clean

@@ -1,0 +1,164 @@
+"""Networks to compare FRPDF with, of as many parameters within 5 %, and FRPDF with one of its choices undone.
+
+All have FRPDF's recurrence, batch norm and pass statistics, so that a comparison is of what lies in between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from ...core.frpdf import CHANNELS, DILATIONS, KERNEL_RADIUS
+from ...core.frpdf.network import FRPDF, CustomConv2d, ProgressiveCombine2d, Recurrent, StackedConv2d
+from ...core.frpdf.weights import load_arrays
+from .gradients import train_on_cpu
+
+UNET_CHANNELS = (6, 13, 25, 50, 100)
+"""Channels from full resolution to a sixteenth."""
+ATROUS_CHANNELS = 16
+"""As in ACNN."""
+ATROUS_BLOCKS = 62
+"""ACNN has 64 or 128."""
+ATROUS_RATES = (1, 3)
+"""Dilations of a block's two convolutions: without gaps, and the largest reach for their number."""
+POOLINGS = (1, 2, 4, 8, 16, 32, 64)
+"""Side of the cells that each block pools, in place of the dilations 1, 3, 7, 15, 31, 63, 127."""
+
+
+class UNetLayer(nn.Module):
+    """U-Net (Ronneberger, Fischer, Brox 2015): pooled fourfold on the way down, long skips on the way up."""
+
+    def __init__(self, channels: Sequence[int] = UNET_CHANNELS) -> None:
+        super().__init__()
+        self.down = nn.ModuleList(StackedConv2d(a, b, 1, 1) for a, b in zip((2, *channels), channels))
+        self.up = nn.ModuleList(StackedConv2d(a + b, a, 1, 1) for a, b in zip(channels, channels[1:]))
+        self.head = nn.Conv2d(channels[0], 1, 1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Map (batch, 2, height, width), sides multiples of 16, to logits."""
+        levels = []
+        for stacked in self.down:
+            x = stacked(functional.max_pool2d(x, 2) if levels else x)
+            levels.append(x)
+        for stacked, level in zip(reversed(self.up), reversed(levels[:-1])):
+            x = stacked(torch.cat([functional.interpolate(x, scale_factor=2.0), level], dim=1))
+        return self.head(x)
+
+
+class AtrousBlock(nn.Module):
+    """Two dilated convolutions, added to what went in."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.convolutions = nn.Sequential(*(CustomConv2d(channels, channels, 1, rate) for rate in ATROUS_RATES))
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Map (batch, channels, height, width) to the same shape."""
+        return x + self.convolutions(x)
+
+
+class AtrousLayer(nn.Sequential):
+    """The atrous network of Zhou and others (ACNN, ICRA 2020): full resolution, many narrow blocks, short skips."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            CustomConv2d(2, ATROUS_CHANNELS, 1, 1),
+            *(AtrousBlock(ATROUS_CHANNELS) for _ in range(ATROUS_BLOCKS)),
+            nn.Conv2d(ATROUS_CHANNELS, 1, 1),
+        )
+
+
+class PooledCombine2d(ProgressiveCombine2d):
+    """FRPDF's block with pooling in place of dilation: as many parameters, a like reach, coarser cells."""
+
+    def __init__(self, channels: int, radius: int, pooling: int) -> None:
+        super().__init__(channels, radius, 1)
+        self.pooling = pooling
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Map (batch, channels, height, width), sides multiples of the pooling, to the same shape."""
+        pooled = self.dilated(functional.max_pool2d(x, self.pooling))
+        return self.reduce(torch.cat([functional.interpolate(pooled, scale_factor=float(self.pooling)), x], dim=1))
+
+
+class PooledLayer(nn.Sequential):
+    """FRPDF with pooling in place of dilations."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            StackedConv2d(2, CHANNELS, KERNEL_RADIUS, 1),
+            *(PooledCombine2d(CHANNELS, KERNEL_RADIUS, pooling) for pooling in POOLINGS),
+            StackedConv2d(CHANNELS, CHANNELS, KERNEL_RADIUS, 1),
+            nn.Conv2d(CHANNELS, 1, 1),
+        )
+
+
+class SkippingLayer(nn.Module):
+    """FRPDF with U-Net's long skips: the last blocks also see what came out of the first ones."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.encoder = StackedConv2d(2, CHANNELS, KERNEL_RADIUS, 1)
+        self.blocks = nn.ModuleList(ProgressiveCombine2d(CHANNELS, KERNEL_RADIUS, d) for d in DILATIONS)
+        self.joins = nn.ModuleList(CustomConv2d(2 * CHANNELS, CHANNELS, 0, 1) for _ in range((len(DILATIONS) + 1) // 2))
+        self.decoder = StackedConv2d(CHANNELS, CHANNELS, KERNEL_RADIUS, 1)
+        self.head = nn.Conv2d(CHANNELS, 1, 1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Map (batch, 2, height, width) to logits."""
+        x = self.encoder(x)
+        first, joins = [x], iter(self.joins)
+        for number, block in enumerate(self.blocks, start=1):
+            x = block(x)
+            if number < len(self.joins):
+                first.append(x)
+            else:
+                x = next(joins)(torch.cat([x, first.pop()], dim=1))
+        return self.head(self.decoder(x))
+
+
+NETWORKS: dict[str, Callable[[], Recurrent]] = {
+    "frpdf": FRPDF,
+    "unet": lambda: Recurrent(UNetLayer()),
+    "acnn": lambda: Recurrent(AtrousLayer()),
+    "pooled": lambda: Recurrent(PooledLayer()),
+    "skipping": lambda: Recurrent(SkippingLayer()),
+}
+"""What can be trained, by name."""
+
+
+def parameter_count(network: nn.Module) -> int:
+    """Count what training learns."""
+    return sum(parameter.numel() for parameter in network.parameters())
+
+
+def head_of(network: Recurrent) -> nn.Conv2d:
+    """Give the last convolution, whose bias is the logit of a cell of which nothing is known."""
+    return [module for module in network.modules() if isinstance(module, nn.Conv2d)][-1]
+
+
+class TrainedNetwork:
+    """An engine, see `core.frpdf.engine.Engine`, of any network as it was trained: unfolded, in bfloat16."""
+
+    def __init__(self, name: str, weights: Path) -> None:
+        self._network = NETWORKS[name]()
+        arrays = {key: torch.from_numpy(array) for key, array in load_arrays(weights).items()}
+        self._network.load_state_dict({**self._network.state_dict(), **arrays})
+        self._device = "cuda" if torch.cuda.is_available() else "cpu"
+        if self._device == "cpu":
+            train_on_cpu(self._network)
+        self._network.eval().to(self._device, memory_format=torch.channels_last)
+        self.description = f"{name}, {parameter_count(self._network)} parameters"
+
+    @torch.no_grad()
+    def probabilities(self, raster: np.ndarray, state: np.ndarray, number: int) -> np.ndarray:
+        """Run one pass."""
+        tensors = (torch.from_numpy(array)[None, None].to(self._device) for array in (raster, state))
+        with torch.autocast(self._device, torch.bfloat16):
+            logits = self._network.logits(*tensors, number)
+        return torch.sigmoid(logits.float())[0, 0].cpu().numpy()

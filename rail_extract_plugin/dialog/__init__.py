@@ -1,0 +1,1 @@
+"""Dialogs: parameters, help, and the values that a user enters."""

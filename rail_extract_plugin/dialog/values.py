@@ -1,0 +1,232 @@
+"""What the user filled in: the values of an algorithm's parameters, as the core takes them."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from qgis.core import (
+    QgsCoordinateReferenceSystem,
+    QgsProcessingAlgorithm,
+    QgsProcessingContext,
+    QgsProcessingFeatureSource,
+    QgsWkbTypes,
+)
+
+from ...core.errors import ParameterError, RailExtractError, RasterError
+from ...core.standards import CUSTOM, DEFAULT, LAST_CLASS, RailStandard, distinct_gauges, resolve
+from ..reading.clouds import CloudSource, check_lengths, cloud_source
+
+if TYPE_CHECKING:
+    from ...core.pipeline import Parameters
+    from ..reading.rasters import RasterHeader
+
+NUMBERS = {
+    "SMOOTHING_XY": "smoothing_xy_m",
+    "SMOOTHING_Z": "smoothing_z_m",
+    "TOLERANCE_XY": "tolerance_xy_m",
+    "TOLERANCE_Z": "tolerance_z_m",
+    "CROWN_RADIUS": "crown_radius_m",
+    "MAX_GAP": "max_gap_m",
+    "GAP_ANGLE": "gap_angle_deg",
+    "SIMPLIFY_XY": "simplify_xy_m",
+    "SIMPLIFY_Z": "simplify_z_m",
+    "MIN_LENGTH": "min_length_m",
+    "CENTERLINE_TOLERANCE": "centerline_tolerance_m",
+}
+"""Attribute of the core's `Parameters` that a number of the interface goes into."""
+
+NO_LINES = (
+    QgsWkbTypes.GeometryType.PointGeometry,
+    QgsWkbTypes.GeometryType.PolygonGeometry,
+    QgsWkbTypes.GeometryType.NullGeometry,
+)
+"""Of a layer that may hold anything the type is unknown."""
+
+CHOICES = {"ENGINE": "engine", "DEVICE": "device"}
+
+
+class Values:
+    """Values of the parameters of one run.
+
+    Parameters
+    ----------
+    algorithm : QgsProcessingAlgorithm
+    parameters : dict
+        Values by name, as QGIS hands them over.
+    context : QgsProcessingContext
+    """
+
+    def __init__(
+        self, algorithm: QgsProcessingAlgorithm, parameters: dict[str, Any], context: QgsProcessingContext
+    ) -> None:
+        self._algorithm, self._parameters, self._context = algorithm, parameters, context
+
+    def number(self, name: str) -> float:
+        """Read a number.
+
+        Raises
+        ------
+        ParameterError
+            It is NaN, which QGIS lets pass.
+        """
+        number = self._algorithm.parameterAsDouble(self._parameters, name, self._context)
+        if math.isnan(number):
+            raise ParameterError(f"{name} can't be nan: give a number.")
+        return number
+
+    def optional_number(self, name: str) -> float | None:
+        """Read a number that may be left empty."""
+        return self.number(name) if self.filled(name) else None
+
+    def text(self, name: str) -> str:
+        """Read a text."""
+        return self._algorithm.parameterAsString(self._parameters, name, self._context)
+
+    def choice(self, name: str) -> str:
+        """Read the static string of an enum."""
+        return self._algorithm.parameterAsEnumString(self._parameters, name, self._context)
+
+    def filled(self, name: str) -> bool:
+        """Tell whether there is a value."""
+        return self._parameters.get(name) not in (None, "")
+
+    def raster(self, name: str) -> tuple[Path, RasterHeader]:
+        """Find the file of a raster, and read its header.
+
+        Raises
+        ------
+        RasterError
+            It is no rail raster in a file.
+        """
+        from ..reading.geotiff import read_header
+
+        layer = self._algorithm.parameterAsRasterLayer(self._parameters, name, self._context)
+        if layer is None:
+            raise RasterError(f"{name} is no raster that can be read: give the output of Rasterize Rail Points.")
+        path = Path(layer.source())
+        return path, read_header(path)
+
+    def lines(self, name: str) -> QgsProcessingFeatureSource:
+        """Find a layer of lines.
+
+        Raises
+        ------
+        RailExtractError
+            There is no such layer, it is one of points, polygons or nothing, or it is in degrees.
+        """
+        from ..reading.line_layers import check_system
+
+        source = self._algorithm.parameterAsSource(self._parameters, name, self._context)
+        if source is None:
+            raise RailExtractError(f"{name} is no layer that can be read: give a layer of lines.")
+        kind = source.wkbType()
+        if QgsWkbTypes.geometryType(kind) in NO_LINES:
+            raise RailExtractError(
+                f"{name} is a layer of the type {QgsWkbTypes.displayString(kind)}: give a layer of lines."
+            )
+        check_system(source.sourceCrs())
+        return source
+
+    def cloud(self, name: str) -> CloudSource:
+        """Find the files of a cloud; CRS, where the algorithm has it, stands in for theirs."""
+        source = cloud_source(self._parameters.get(name), self._context)
+        crs = self._algorithm.parameterAsCrs(self._parameters, "CRS", self._context)
+        if self.filled("CRS") and not crs.isValid():
+            raise ParameterError(f"CRS {self._parameters['CRS']} is no coordinate system: choose one from the list.")
+        if crs.isGeographic():
+            raise ParameterError(
+                f"CRS {crs.authid()} is in degrees, where lengths can't be measured: choose a projected one."
+            )
+        source = replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
+        check_lengths(source)
+        return source
+
+    def extent(self, crs: QgsCoordinateReferenceSystem) -> tuple[float, float, float, float] | None:
+        """Read EXTENT in `crs`: smallest x, smallest y, largest x, largest y.
+
+        Raises
+        ------
+        ParameterError
+            It is a point or a line.
+        """
+        extent = self._algorithm.parameterAsExtent(self._parameters, "EXTENT", self._context, crs)
+        if not self.filled("EXTENT") or extent.isNull():
+            return None
+        if extent.isEmpty():
+            raise ParameterError("EXTENT has no area: give a rectangle as xmin,xmax,ymin,ymax, or leave it empty.")
+        return extent.xMinimum(), extent.yMinimum(), extent.xMaximum(), extent.yMaximum()
+
+    def engine(self) -> str:
+        """Read ENGINE, and check that it is installed and can run on DEVICE."""
+        from ...core.frpdf.engine import choose_engine
+
+        return choose_engine(self.choice("ENGINE"), self.choice("DEVICE"))
+
+    def class_codes(self) -> tuple[int, ...]:
+        """Read RAIL_CLASSES."""
+        return class_numbers(self.text("RAIL_CLASSES"), "RAIL_CLASSES")
+
+    def standard(self) -> RailStandard:
+        """Read STANDARD, with GAUGE and HEAD_WIDTH in place of its own."""
+        return resolve(self.choice("STANDARD"), self.optional_number("GAUGE"), self.optional_number("HEAD_WIDTH"))
+
+    def head_width_m(self) -> float:
+        """Read HEAD_WIDTH, or what STANDARD says of it."""
+        head_width_mm = self.optional_number("HEAD_WIDTH")
+        if head_width_mm is None and self.choice("STANDARD") == CUSTOM:
+            raise ParameterError("The standard CUSTOM needs the railhead width, in millimetres: fill HEAD_WIDTH.")
+        return resolve(DEFAULT if head_width_mm else self.choice("STANDARD"), None, head_width_mm).head_width_m
+
+    def other_gauges_m(self, standard: RailStandard) -> tuple[float, ...]:
+        """Read OTHER_GAUGES, and check them beside the standard's gauge."""
+        others = gauges_m(self.text("OTHER_GAUGES"), "OTHER_GAUGES")
+        return distinct_gauges((standard.gauge_m, *others), self.number("CENTERLINE_TOLERANCE"))[1:]
+
+    def settings(self, standard: RailStandard, other_gauges_m: tuple[float, ...] = ()) -> Parameters:
+        """Gather what the algorithm's parameters tell the core; the core's defaults stand for the rest."""
+        from ...core.pipeline import Parameters
+
+        told: dict[str, Any] = {field: self.number(name) for name, field in NUMBERS.items() if self._has(name)}
+        told.update({field: self.choice(name) for name, field in CHOICES.items() if self._has(name)})
+        if self._has("ITERATIONS"):
+            told["passes"] = int(self.number("ITERATIONS"))
+        return Parameters(standard.gauge_m, standard.head_width_m, other_gauges_m=other_gauges_m, **told)
+
+    def _has(self, name: str) -> bool:
+        return self._algorithm.parameterDefinition(name) is not None
+
+
+def class_numbers(text: str, what: str) -> tuple[int, ...]:
+    """Classes from a text such as "10,11"; `what` names the parameter in the error.
+
+    Raises
+    ------
+    ParameterError
+        The text is no list of classes, or has none.
+    """
+    words = _words(text)
+    if not words or not all(word.isdecimal() and int(word) <= LAST_CLASS for word in words):
+        raise ParameterError(f'{what} "{text}" should be whole numbers from 0 to {LAST_CLASS} such as 10 or 10,11.')
+    return tuple(dict.fromkeys(int(word) for word in words))
+
+
+def gauges_m(text: str, what: str) -> tuple[float, ...]:
+    """Metres from a text of millimetres such as "1000;1067"; `what` names the parameter in the error.
+
+    Raises
+    ------
+    ParameterError
+        The text holds something else than positive numbers.
+    """
+    words = _words(text)
+    if not all(re.fullmatch(r"\d+(\.\d+)?", word) and float(word) > 0 for word in words):
+        raise ParameterError(f'{what} "{text}" should be millimetres such as 1000;1067.')
+    return tuple(float(word) / 1000 for word in words)
+
+
+def _words(text: str) -> list[str]:
+    return [word for word in re.split(r"[;,\s]+", text) if word]

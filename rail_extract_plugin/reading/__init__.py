@@ -1,0 +1,1 @@
+"""Inputs: point clouds, rasters and line layers, as the core takes them."""

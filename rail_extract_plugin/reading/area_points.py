@@ -1,0 +1,109 @@
+"""Points of a cloud in the area of a raster or of lines that were made from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from qgis.core import QgsCoordinateReferenceSystem
+
+from ...core.clouds.crs import parse_crs, same_plane, units
+from ...core.clouds.points import RailPoints
+from ...core.errors import CrsError, NoRailPointsError
+from ...core.frame import LocalFrame
+from ...core.progress import Progress
+from .clouds import Bounds, CloudSource, crs_of, read_points, spool_points
+
+if TYPE_CHECKING:
+    from ...core.squares.spool import SpooledPoints
+
+Points = TypeVar("Points")
+
+
+@dataclass(frozen=True)
+class Area:
+    """Where points of which classes are looked for.
+
+    Attributes
+    ----------
+    what : str
+        What lies there, for messages: raster or rails.
+    class_codes : tuple of int
+    bounds : tuple of float
+        Smallest x, smallest y, largest x, largest y, in units of the coordinate system.
+    frame : LocalFrame
+    """
+
+    what: str
+    class_codes: tuple[int, ...]
+    bounds: Bounds
+    frame: LocalFrame
+
+
+def read_points_in(area: Area, cloud: CloudSource, progress: Progress) -> dict[int, RailPoints]:
+    """Read the points of an area's classes, by class, all in one local frame.
+
+    A cloud or an area that states no coordinate system is taken to be in that of the other.
+
+    Raises
+    ------
+    CrsError
+        Cloud and area are in different coordinate systems.
+    NoRailPointsError
+        The cloud has no points of a class there.
+    """
+    return _all_of(area, cloud, lambda *wanted: read_points(*wanted, progress))
+
+
+def spool_points_in(
+    area: Area, cloud: CloudSource, side_m: float, folder: Path, progress: Progress
+) -> dict[int, SpooledPoints]:
+    """Do as `read_points_in`, but leave the points on disk, sorted into squares: a cloud of any size fits."""
+    return _all_of(area, cloud, lambda *wanted: spool_points(*wanted, side_m, folder, progress))
+
+
+def _all_of(area: Area, cloud: CloudSource, read: Callable[..., Sequence[Points]]) -> dict[int, Points]:
+    """Have points read, and see to it that there are some of every class."""
+    check_same_plane("POINTS", crs_of(cloud), f"the {area.what}", area.frame)
+
+    def bounds(crs: QgsCoordinateReferenceSystem) -> Bounds:
+        return area.bounds
+
+    source = replace(cloud, crs_wkt=cloud.crs_wkt or area.frame.crs_wkt)
+    try:
+        clouds = {points.class_code: points for points in read(source, area.class_codes, bounds)}
+    except NoRailPointsError:
+        clouds = {}
+    missing = [str(code) for code in area.class_codes if code not in clouds]
+    if missing:
+        raise NoRailPointsError(
+            f"POINTS have no point of class {', '.join(missing)} in the area of the {area.what}: "
+            f"give the cloud that the {area.what} came from."
+        )
+    return clouds
+
+
+def check_same_plane(name: str, crs_wkt: str | None, other_name: str, other: LocalFrame) -> None:
+    """Refuse two coordinate systems that mean different places; an unknown one is taken to be the other.
+
+    Raises
+    ------
+    CrsError
+        They are known and differ; both are named. Or the other is unknown, and was taken to be in metres wrongly.
+    """
+    if crs_wkt and other.crs_wkt and not same_plane(crs_wkt, other.crs_wkt, tuple(other.origin[:2])):
+        raise CrsError(
+            f"{name} are in {_title(crs_wkt)} but {other_name} in {_title(other.crs_wkt)}: give both in one "
+            "coordinate system."
+        )
+    if crs_wkt and not other.crs_wkt and units(parse_crs(crs_wkt))[0] != other.horizontal_unit_m:
+        raise CrsError(
+            f"{name} are in {_title(crs_wkt)}, whose unit is not the metre: assign a coordinate system to {other_name} "
+            "too."
+        )
+
+
+def _title(wkt: str) -> str:
+    return QgsCoordinateReferenceSystem(wkt).description()

@@ -1,0 +1,273 @@
+"""Files of rail rasters: GeoTIFFs with one band a class, of which only blocks that hold rail cells are touched."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from osgeo import gdal
+
+from ...core.clouds.crs import parse_crs, units
+from ...core.disk import take_names
+from ...core.errors import RasterError
+from ...core.frame import LocalFrame
+from ...core.progress import SILENT, Progress
+from ...core.raster import TILE, RailRaster
+from ...core.standards import LAST_CLASS, RAIL_CLASS
+from .rasters import BLOCK, EXTENT_TAG, GAUGE_TAG, HEAD_TAG, MODEL_TAG, RasterHeader
+
+CREATION = (
+    "TILED=YES",
+    f"BLOCKXSIZE={BLOCK}",
+    f"BLOCKYSIZE={BLOCK}",
+    "SPARSE_OK=TRUE",
+    "INTERLEAVE=BAND",
+    "COMPRESS=DEFLATE",
+    "BIGTIFF=IF_SAFER",
+)
+
+ALIKE = 1e-6
+"""Two sides of a cell may differ by this share: writers round."""
+
+
+def read_header(path: Path) -> RasterHeader:
+    """Read and check all but the cells.
+
+    Raises
+    ------
+    RasterError
+        It is no raster, is turned, has cells that are not square, or bands of which it is not known what they hold.
+    CrsError
+        Its coordinates are no lengths.
+    """
+    with _explained(path):
+        dataset = _open(path)
+        x, width, skew_x, y, skew_y, height = dataset.GetGeoTransform()
+        if skew_x or skew_y or not math.isclose(width, -height, rel_tol=ALIKE) or width <= 0:
+            raise RasterError(f"{path.name} is turned or its cells are not square: warp it to square cells, north up.")
+        wkt = dataset.GetProjection() or None
+        unit_m = units(parse_crs(wkt))[0] if wkt else 1.0
+        return RasterHeader(
+            class_codes=_class_codes(dataset, path.name),
+            frame=LocalFrame(np.array([x, y, 0.0]), unit_m, unit_m, wkt),
+            cell_m=width * unit_m,
+            window=(0, 0, dataset.RasterYSize, dataset.RasterXSize),
+            gauge_m=_length_m(dataset, GAUGE_TAG),
+            head_width_m=_length_m(dataset, HEAD_TAG),
+            model=dataset.GetMetadataItem(MODEL_TAG),
+            extent=_numbers(dataset, EXTENT_TAG, 4),
+        )
+
+
+def read_rasters(path: Path, header: RasterHeader, progress: Progress = SILENT) -> tuple[RailRaster, ...]:
+    """Read the cells of every band, block by block and only where the file holds any.
+
+    A cell is rail where its value is neither 0 nor the band's value for no data.
+
+    Raises
+    ------
+    RasterError
+        The file is damaged, or has no rail at all.
+    """
+    with _explained(path):
+        dataset = _open(path)
+        grid = RailRaster({}, header.cell_m, 0.0, 0.0)
+        rasters = []
+        for number in range(1, dataset.RasterCount + 1):
+            band = dataset.GetRasterBand(number)
+            share = progress.span((number - 1) / dataset.RasterCount, number / dataset.RasterCount)
+            cells = [np.empty((0, 2), dtype=np.int64)]
+            for row, column, height, width in share.follow(filled_blocks(dataset, number)):
+                block = _read(band, row, column, height, width, path.name)
+                cells.append(np.argwhere(block) + np.array([row, column]))
+            rasters.append(grid.with_cells(np.concatenate(cells)))
+    if not any(raster.tiles for raster in rasters):
+        raise RasterError(f"{path.name} holds no rail cell: give a raster with 1 where there is rail.")
+    return tuple(rasters)
+
+
+def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress = SILENT) -> None:
+    """Write rasters of the header's grid; cells outside its window are left out.
+
+    The file takes its name when it is whole: what was there before stays until then, also if the program is killed.
+
+    Raises
+    ------
+    RasterError, DiskError
+        The file can't be written.
+    Cancelled
+        The user cancelled.
+    """
+    part = path.with_name(f"{path.name}.part")
+    gdal.ErrorReset()
+    try:
+        _write(part, header, rasters, progress)
+        if gdal.GetLastErrorType() >= gdal.CE_Failure:
+            raise RuntimeError(gdal.GetLastErrorMsg())
+        take_names(path, {part: path})
+    except RuntimeError as error:
+        raise RasterError(f"{path} can't be written ({_cause(error)}): choose another place.") from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _cause(error: Exception) -> str:
+    """Give what was first to fail: newer GDAL tells what failed of it too, a line each, and the cause last."""
+    return str(error).rpartition("May be caused by: ")[2]
+
+
+def filled_blocks(dataset: gdal.Dataset, number: int) -> list[tuple[int, int, int, int]]:
+    """Find the blocks of a band that its file holds: row, column, height and width of each, in cells."""
+    return list(_filled(dataset.GetRasterBand(number), 0, 0, dataset.RasterYSize, dataset.RasterXSize))
+
+
+def _filled(band: gdal.Band, row: int, column: int, height: int, width: int) -> Iterator[tuple[int, int, int, int]]:
+    status, _ = band.GetDataCoverageStatus(column, row, width, height, gdal.GDAL_DATA_COVERAGE_STATUS_DATA)
+    if not status & gdal.GDAL_DATA_COVERAGE_STATUS_DATA:
+        return
+    if height <= BLOCK and width <= BLOCK:
+        yield row, column, height, width
+        return
+    for top, rows in _halves(row, height):
+        for left, columns in _halves(column, width):
+            yield from _filled(band, top, left, rows, columns)
+
+
+def _halves(start: int, length: int) -> tuple[tuple[int, int], ...]:
+    """Split a stretch of cells between two blocks, near its middle."""
+    if length <= BLOCK:
+        return ((start, length),)
+    first = BLOCK * math.ceil(length / BLOCK / 2)
+    return (start, first), (start + first, length - first)
+
+
+@contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    """Explain what GDAL raises of a damaged file where QGIS or another plugin has switched its exceptions on."""
+    try:
+        yield
+    except RuntimeError as error:
+        raise _unreadable(path) from error
+
+
+def _open(path: Path) -> gdal.Dataset:
+    dataset = gdal.OpenEx(str(path), gdal.OF_RASTER | gdal.OF_READONLY)
+    if dataset is None or dataset.RasterCount == 0:
+        raise _unreadable(path)
+    return dataset
+
+
+def _unreadable(path: Path) -> RasterError:
+    return RasterError(f"{path} is no raster that can be read: give the output of Rasterize Rail Points.")
+
+
+def _class_codes(dataset: gdal.Dataset, name: str) -> tuple[int, ...]:
+    """Class of each band, by its description."""
+    texts = [dataset.GetRasterBand(number).GetDescription() for number in range(1, dataset.RasterCount + 1)]
+    if texts and all(text.isdecimal() and int(text) <= LAST_CLASS for text in texts):
+        codes = tuple(int(text) for text in texts)
+        if len(set(codes)) < len(codes):
+            raise RasterError(f"{name} has several bands of one class ({', '.join(texts)}): give each class one band.")
+        return codes
+    if len(texts) == 1:
+        return (RAIL_CLASS,)
+    raise RasterError(
+        f"{name} has {len(texts)} bands, and not every description is a class code: give a raster with one band, or "
+        "with one band a class like those of Rasterize Rail Points."
+    )
+
+
+def _numbers(dataset: gdal.Dataset, tag: str, count: int) -> tuple[float, ...] | None:
+    """Numbers of a tag; None where it is missing."""
+    text = dataset.GetMetadataItem(tag)
+    if not text:
+        return None
+    try:
+        numbers = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != count:
+        raise RasterError(f"The tag {tag} of the raster can't be {text!r}: rasterize the points again.")
+    return numbers
+
+
+def _length_m(dataset: gdal.Dataset, tag: str) -> float | None:
+    """Length of a tag in millimetres; None where it is missing."""
+    numbers = _numbers(dataset, tag, 1)
+    return None if numbers is None else numbers[0] / 1000
+
+
+def _read(band: gdal.Band, row: int, column: int, height: int, width: int, name: str) -> np.ndarray:
+    """Rail cells of a block, (height, width) bool."""
+    is_rail = np.ones((height, width), dtype=bool)
+    for cells in (band, band.GetMaskBand()):  # the mask is 0 where there are no data
+        try:
+            data = cells.ReadRaster(column, row, width, height, buf_type=gdal.GDT_Byte)
+        except RuntimeError:
+            data = None
+        if data is None:
+            raise RasterError(f"{name} is damaged at row {row}, column {column}: make it again.")
+        is_rail &= np.frombuffer(data, dtype=np.uint8).reshape(height, width) != 0
+    return is_rail
+
+
+def _write(path: Path, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress) -> None:
+    dataset = _create(path, header)
+    if dataset is None:
+        return
+    blocks = [
+        (number, block)
+        for number, raster in enumerate(rasters, start=1)
+        for block in sorted(_blocks_of(raster, header.window))
+    ]
+    row, column, height, width = header.window
+    try:
+        for number, (top, left) in progress.follow(blocks):
+            size = min(BLOCK, height - top), min(BLOCK, width - left)
+            cells = rasters[number - 1].read(row + top, column + left, *size)
+            dataset.GetRasterBand(number).WriteRaster(left, top, size[1], size[0], cells.astype(np.uint8).tobytes())
+        dataset.FlushCache()
+    finally:
+        del dataset  # else the traceback of a cancel keeps the file open, and Windows does not remove it then
+
+
+def _blocks_of(raster: RailRaster, window: tuple[int, int, int, int]) -> set[tuple[int, int]]:
+    """North-west corners of the file's blocks, counted from that of the window, that a raster has tiles in."""
+    row, column, height, width = window
+    corners = {
+        ((down * TILE - row) // BLOCK * BLOCK, (right * TILE - column) // BLOCK * BLOCK) for down, right in raster.tiles
+    }
+    return {(top, left) for top, left in corners if 0 <= top < height and 0 <= left < width}
+
+
+def _create(path: Path, header: RasterHeader) -> gdal.Dataset | None:
+    """Make an empty file; None, with GDAL's error set, where that fails."""
+    row, column, height, width = header.window
+    driver = gdal.GetDriverByName("GTiff")
+    dataset = driver.Create(str(path), width, height, len(header.class_codes), gdal.GDT_Byte, list(CREATION))
+    if dataset is None:
+        return None
+    x, y, _ = header.frame.to_crs(np.array([column * header.cell_m, -row * header.cell_m, 0.0]))
+    side = header.cell_m / header.frame.horizontal_unit_m
+    dataset.SetGeoTransform((float(x), side, 0.0, float(y), 0.0, -side))
+    if header.frame.crs_wkt:
+        dataset.SetProjection(header.frame.crs_wkt)
+    tags = {
+        GAUGE_TAG: _millimetres(header.gauge_m),
+        HEAD_TAG: _millimetres(header.head_width_m),
+        MODEL_TAG: header.model,
+        EXTENT_TAG: ",".join(map(repr, header.extent or ())),
+    }
+    dataset.SetMetadata({tag: text for tag, text in tags.items() if text})
+    for number, code in enumerate(header.class_codes, start=1):
+        band = dataset.GetRasterBand(number)
+        band.SetDescription(str(code))
+        band.SetNoDataValue(0)
+    return dataset
+
+
+def _millimetres(length_m: float | None) -> str:
+    return "" if length_m is None else f"{1000 * length_m:.6g}"

@@ -1,0 +1,193 @@
+"""Rails and centerlines read from vector layers: those of Rail Extract, or lines drawn by hand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from qgis.core import (
+    NULL,
+    QgsAbstractGeometry,
+    QgsCoordinateReferenceSystem,
+    QgsFeature,
+    QgsFeatureRequest,
+    QgsGeometry,
+    QgsProcessingFeatureSource,
+)
+
+from ...core.clouds.crs import parse_crs, units, warn_of_stretch
+from ...core.errors import CrsError, RailExtractError
+from ...core.frame import ORIGIN_STEP, LocalFrame
+from ...core.progress import SILENT, Progress
+from ...core.rails import Centerline, RailLine
+
+CHORD_M = 0.0005
+"""How far the straight pieces that stand for a curved line may lie beside it: well below what a survey sees."""
+
+LONGEST_M = 500_000.0
+"""Longer straight pieces have a stray vertex: the longest straight railway has 478 km."""
+
+
+def read_rails(
+    source: QgsProcessingFeatureSource, progress: Progress = SILENT, name: str = "INPUT", untold_class: int = 0
+) -> tuple[tuple[RailLine, ...], LocalFrame]:
+    """Read every part of every line, and find the local frame for them.
+
+    Lines without a `rail_id` are numbered by their feature; those without a `class_code` have `untold_class`; other
+    fields of rails are used where they are there.
+
+    Raises
+    ------
+    CrsError
+        The lines are in degrees.
+    RailExtractError
+        There is no line; the message calls the layer `name`.
+    """
+    found, frame = _read(source, progress, name)
+    rails = tuple(_rail(feature, xyz, untold_class) for feature, xyz in found)
+    flat = sum(bool(np.isnan(rail.xyz[0, 2])) for rail in rails)
+    if flat:
+        progress.warning(f"{flat} of {len(rails)} lines have no heights: what is made of them has none either.")
+    copies = len(rails) - len({rail.xyz.tobytes() for rail in rails})
+    if copies:
+        progress.warning(f"{copies} of {len(rails)} lines lie on another one: what is made of them comes twice.")
+    return rails, frame
+
+
+def read_centerlines(
+    source: QgsProcessingFeatureSource, progress: Progress = SILENT, name: str = "INPUT"
+) -> tuple[tuple[Centerline, ...], LocalFrame]:
+    """Read every part of every line, as `read_rails` does; figures that are in no field are NaN.
+
+    Lines without a `track_id` are numbered by their feature; those without `left_ids` or `right_ids` name no rails.
+    """
+    found, frame = _read(source, progress, name)
+    return tuple(_centerline(feature, xyz) for feature, xyz in found), frame
+
+
+def _read(
+    source: QgsProcessingFeatureSource, progress: Progress, name: str
+) -> tuple[list[tuple[QgsFeature, np.ndarray]], LocalFrame]:
+    """Read features and the vertices, (n, 3) local metres, of each of their parts."""
+    crs_wkt, horizontal_unit_m, vertical_unit_m = _system(source.sourceCrs(), progress)
+    request = QgsFeatureRequest()
+    flags = QgsProcessingFeatureSource.Flag.FlagSkipGeometryValidityChecks
+    found = [
+        (feature, vertices)
+        for feature in progress.follow(source.getFeatures(request, flags), source.featureCount())
+        for vertices in _parts(feature.geometry(), CHORD_M / horizontal_unit_m)
+    ]
+    if not found:
+        raise RailExtractError(f"{name} holds no line: give a layer of lines.")
+    lost = next((feature.id() for feature, vertices in found if not np.isfinite(vertices[:, :2]).all()), None)
+    if lost is not None:
+        raise RailExtractError(
+            f"{name} has a line (feature {lost}) with a place that is no number: repair or delete it."
+        )
+    stray = next(
+        (feature.id() for feature, vertices in found if _longest(vertices) * horizontal_unit_m > LONGEST_M), None
+    )
+    if stray is not None:
+        raise RailExtractError(f"{name} has a line (feature {stray}) with a vertex far away: repair or delete it.")
+    middle = np.median(np.concatenate([vertices for _, vertices in found]), axis=0)
+    origin = np.round(np.nan_to_num(middle) / ORIGIN_STEP) * ORIGIN_STEP
+    if crs_wkt:
+        warn_of_stretch(parse_crs(crs_wkt), [tuple(middle[:2])], "The lines are", progress, "them")
+    frame = LocalFrame(origin, horizontal_unit_m, vertical_unit_m, crs_wkt)
+    return [(feature, frame.to_local(vertices)) for feature, vertices in found], frame
+
+
+def _longest(vertices: np.ndarray) -> float:
+    """Length of the longest straight piece in plan, in units of the vertices."""
+    return float(np.hypot(*np.diff(vertices[:, :2], axis=0).T).max())
+
+
+def _system(crs: QgsCoordinateReferenceSystem, progress: Progress) -> tuple[str | None, float, float]:
+    """Coordinate system as WKT, and metres in its horizontal and vertical unit."""
+    if not crs.isValid():
+        progress.warning("The lines have no coordinate system: their coordinates are taken as metres.")
+        return None, 1.0, 1.0
+    check_system(crs)
+    wkt = crs.toWkt(QgsCoordinateReferenceSystem.WktVariant.WKT_PREFERRED)
+    return (wkt, *units(parse_crs(wkt)))
+
+
+def check_system(crs: QgsCoordinateReferenceSystem) -> None:
+    """Refuse lines in degrees.
+
+    Raises
+    ------
+    CrsError
+        Lengths can't be measured there.
+    """
+    if crs.isGeographic():
+        raise CrsError(
+            f"The lines are in degrees ({crs.description()}), where lengths can't be measured: reproject them, for "
+            "example to the UTM zone of the place."
+        )
+
+
+def _parts(geometry: QgsGeometry, chord: float) -> Iterator[np.ndarray]:
+    """Vertices, (n, 3), of the parts of a line that have a length; heights are NaN unless all vertices have one."""
+    if geometry.isNull():
+        return
+    straight = QgsGeometry(geometry)
+    straight.convertToStraightSegment(chord, QgsAbstractGeometry.SegmentationToleranceType.MaximumDifference)
+    for part in straight.constParts():
+        xyz = np.array([(vertex.x(), vertex.y(), vertex.z()) for vertex in part.vertices()], dtype=float).reshape(-1, 3)
+        if not np.isfinite(xyz[:, 2]).all():
+            xyz[:, 2] = np.nan
+        moves = np.append(True, np.any(np.diff(xyz[:, :2], axis=0) != 0, axis=1))
+        if moves.sum() > 1:
+            yield xyz[moves]
+
+
+def _rail(feature: QgsFeature, xyz: np.ndarray, untold_class: int) -> RailLine:
+    return RailLine(
+        xyz,
+        rail_id=int(_number(feature, "rail_id", feature.id())),
+        class_code=int(_number(feature, "class_code", untold_class)),
+        points=int(_number(feature, "points", 0)),
+        resid_mm=_number(feature, "resid_mm", np.nan),
+        sigma_mm=_number(feature, "sigma_mm", np.nan),
+        bridged_m=_number(feature, "bridged_m", 0.0),
+    )
+
+
+def _centerline(feature: QgsFeature, xyz: np.ndarray) -> Centerline:
+    return Centerline(
+        xyz,
+        track_id=int(_number(feature, "track_id", feature.id())),
+        class_code=int(_number(feature, "class_code", 0)),
+        left_ids=_ids(feature, "left_ids"),
+        right_ids=_ids(feature, "right_ids"),
+        gauge_mm=_number(feature, "gauge_mm", np.nan),
+        gaugesd_mm=_number(feature, "gaugesd_mm", np.nan),
+        cant_mm=_number(feature, "cant_mm", np.nan),
+        cantmax_mm=_number(feature, "cantmax_mm", np.nan),
+        bridged_m=_number(feature, "bridged_m", 0.0),
+    )
+
+
+def _number(feature: QgsFeature, name: str, default: float) -> float:
+    """Value of a field; `default` where there is no such field, or no finite number in it."""
+    try:
+        value = float(_value(feature, name))
+    except (TypeError, ValueError):
+        return default
+    return value if math.isfinite(value) else default
+
+
+def _ids(feature: QgsFeature, name: str) -> tuple[int, ...]:
+    """Ids in a field such as "3,5"; none where there is no such field, or something else in it."""
+    words = str(_value(feature, name) or "").split(",")
+    return tuple(int(word) for word in words) if all(word.strip().isdecimal() for word in words) else ()
+
+
+def _value(feature: QgsFeature, name: str) -> Any:
+    """Value of a field; None where there is no such field, or no value in it."""
+    index = feature.fields().lookupField(name)
+    value = feature.attribute(index) if index >= 0 else NULL
+    return None if value == NULL else value

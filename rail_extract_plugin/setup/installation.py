@@ -1,0 +1,234 @@
+"""Python packages installed by pip into a folder of their own; what belongs to QGIS stays as it is."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from ...core.errors import RailExtractError
+from ...core.progress import SILENT, Progress
+from . import processes
+from .dependencies import OWNED_BY_QGIS, is_installed, pins
+from .interpreter import Interpreter
+
+OLDEST_PIP = (22, 2)
+"""The first that says what it would install."""
+
+PIP_ENVIRONMENT = {
+    "PIP_DISABLE_PIP_VERSION_CHECK": "1",
+    "PIP_NO_INPUT": "1",
+    "PIP_PROGRESS_BAR": "off",
+    "PIP_REQUIRE_VIRTUALENV": "0",
+    "PIP_RETRIES": "2",
+    "PIP_ROOT_USER_ACTION": "ignore",
+    "PIP_USER": "0",
+    "PYTHONIOENCODING": "utf-8",
+}
+"""A user's own settings of pip count, but for those that a folder of its own contradicts."""
+
+BINARIES = "--only-binary=:all:"
+"""Nobody should need a compiler."""
+
+IMPORT = (
+    "import sys; end = int(sys.argv[1]); sys.path += sys.argv[2:end]; [__import__(name) for name in sys.argv[end:]]"
+)
+
+
+@dataclass(frozen=True)
+class Order:
+    """What to install.
+
+    Attributes
+    ----------
+    requirements : tuple of str
+        As pip understands them.
+    modules : tuple of str
+        What must be importable afterwards.
+    options : tuple of str
+        Where pip shall look, if not where it does by itself.
+    """
+
+    requirements: tuple[str, ...]
+    modules: tuple[str, ...]
+    options: tuple[str, ...] = ()
+
+
+class Pip:
+    """QGIS's pip.
+
+    Parameters
+    ----------
+    interpreter : Interpreter
+    workshop : Path
+        Folder for what pip needs on the way.
+    folders : sequence of Path
+        Folders of packages that are there beside QGIS's own.
+    """
+
+    def __init__(self, interpreter: Interpreter, workshop: Path, folders: Sequence[Path]) -> None:
+        self._program = interpreter.program
+        self._workshop = workshop
+        self._paths = [*filter(None, [_inherited()]), *map(str, folders)]
+        self._changes = {**interpreter.changes, **PIP_ENVIRONMENT}
+
+    def prepare(self, progress: Progress) -> None:
+        """Make sure that there is a pip, and that it is not too old.
+
+        Raises
+        ------
+        RailExtractError
+            There is none, or no newer one can be had.
+        """
+        version = re.match(r"pip (\d+)\.(\d+)", self._run("--version").output)
+        if version is None:
+            raise RailExtractError(
+                f"The Python of this QGIS, {self._program}, has no pip: install it (Debian and Ubuntu: the package "
+                "python3-pip; OSGeo4W: the package python3-pip) and run Install packages again."
+            )
+        if tuple(map(int, version.groups())) < OLDEST_PIP:
+            newer = self._workshop / "pip"
+            self.install(["pip"], ["--target", str(newer)], progress)
+            self._paths.insert(0, str(newer))
+
+    def resolve(self, order: Order, progress: Progress) -> dict[str, str]:
+        """Ask what an order takes beyond what is there: versions by normalized names."""
+        report, constraints = self._workshop / "report.json", self._workshop / "constraints.txt"
+        constraints.write_text("\n".join(pins()), encoding="utf-8")
+        options = ["--dry-run", "--report", str(report), "--constraint", str(constraints), *order.options]
+        self.install(order.requirements, options, progress)
+        found = json.loads(report.read_text(encoding="utf-8"))["install"]
+        return {normalized(item["metadata"]["name"]): item["metadata"]["version"] for item in found}
+
+    def install(self, requirements: Sequence[str], options: Sequence[str], progress: Progress) -> None:
+        """Run pip install.
+
+        Raises
+        ------
+        RailExtractError
+            It failed.
+        """
+        ended = self._run("install", BINARIES, *options, *requirements, progress=progress)
+        if ended.code != 0:
+            reasons = re.findall(r"^ERROR: (.*)$", ended.output, re.MULTILINE) or ["see the log"]
+            raise RailExtractError(
+                f"pip could not install {', '.join(requirements)} ({reasons[-1].rstrip('.')}): check the connection to "
+                "the package index, and the space on the disk. None of it was kept."
+            )
+
+    def check_imports(self, modules: Sequence[str], folders: Sequence[Path]) -> None:
+        """Import modules as QGIS will.
+
+        Raises
+        ------
+        RailExtractError
+            One can't be imported.
+        """
+        paths = list(map(str, folders))
+        arguments = ["-c", IMPORT, str(len(paths) + 2), *paths, *modules]
+        ended = processes.run(self._program, arguments, self._changes)
+        if ended.code != 0:
+            reason = ended.output.strip().splitlines()[-1:] or ["it crashed"]
+            raise RailExtractError(
+                f"{', '.join(modules)} does not work in the Python of this QGIS ({reason[0]}). None of it was kept."
+            )
+
+    def _run(self, *arguments: str, progress: Progress = SILENT) -> processes.Ended:
+        changes = {**self._changes, "PYTHONPATH": os.pathsep.join(self._paths)}
+        return processes.run(self._program, ["-m", "pip", *arguments], changes, progress)
+
+
+def install(order: Order, interpreter: Interpreter, folder: Path, others: Sequence[Path], progress: Progress) -> str:
+    """Install packages into `folder`, all or none of them.
+
+    Parameters
+    ----------
+    order : Order
+    interpreter : Interpreter
+    folder : Path
+        Made if it is not there.
+    others : sequence of Path
+        Further folders of packages that QGIS uses.
+    progress : Progress
+
+    Returns
+    -------
+    str
+        Names and versions of what was installed.
+
+    Raises
+    ------
+    RailExtractError
+        pip failed, the folder can't be written, or the packages don't work with what QGIS has.
+    """
+    with _workshop(folder) as workshop:
+        pip = Pip(interpreter, workshop, [*others, folder])
+        pip.prepare(progress.span(0, 0.1))
+        found = pip.resolve(order, progress)
+        progress.set_fraction(0.3)
+        wanted = _beyond_qgis(found, progress)
+        staging = workshop / "packages"
+        if wanted:
+            pip.install(wanted, ["--no-deps", "--target", str(staging), *order.options], progress)
+        progress.set_fraction(0.8)
+        pip.check_imports(order.modules, [*others, folder, staging])
+        if wanted:
+            _move(staging, folder)
+    return ", ".join(requirement.replace("==", " ") for requirement in wanted)
+
+
+def normalized(name: str) -> str:
+    """Spell a package's name in the one way in which names compare."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def _beyond_qgis(found: dict[str, str], progress: Progress) -> list[str]:
+    """Leave out what QGIS has: it comes first, and stays."""
+    wanted = []
+    for name, version in found.items():
+        present = _version_in_qgis(name)
+        if present is None:
+            wanted.append(f"{name}=={version}")
+        else:
+            progress.warning(f"QGIS has {name} {present}, which stays in place of {version}.")
+    return wanted
+
+
+def _version_in_qgis(name: str) -> str | None:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "of its own" if name in OWNED_BY_QGIS and is_installed(name) else None
+
+
+def _inherited() -> str:
+    return os.environ.get("PYTHONPATH", "")
+
+
+@contextmanager
+def _workshop(folder: Path) -> Iterator[Path]:
+    """Folder beside `folder` that is gone afterwards, whatever happens."""
+    workshop = folder.with_name(f"{folder.name}.unfinished")
+    try:
+        shutil.rmtree(workshop, ignore_errors=True)
+        workshop.mkdir(parents=True)
+        yield workshop
+    except OSError as error:
+        raise RailExtractError(f"{folder} can't be written ({error}): free space, or make it writable.") from error
+    finally:
+        shutil.rmtree(workshop, ignore_errors=True)
+
+
+def _move(staging: Path, folder: Path) -> None:
+    folder.mkdir(exist_ok=True)
+    for entry in staging.iterdir():
+        old = folder / entry.name
+        if old.is_dir():
+            shutil.rmtree(old)
+        entry.replace(old)

@@ -1,0 +1,75 @@
+"""The Python program that belongs to this QGIS."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ...core.errors import RailExtractError
+from . import processes
+from .dependencies import version_of
+
+QUESTION = """
+import sys
+try:
+    from numpy import __version__
+except ImportError:
+    __version__ = None
+print(*sys.version_info[:2], __version__)
+"""
+# Any other Python than QGIS's own answers differently, or has no numpy at all.
+
+
+@dataclass(frozen=True)
+class Interpreter:
+    """A Python program and the environment variables that it needs beyond QGIS's."""
+
+    program: str
+    changes: dict[str, str] = field(default_factory=dict)
+
+
+def find_interpreter() -> Interpreter:
+    """Find the Python program whose packages are those that QGIS sees.
+
+    Raises
+    ------
+    RailExtractError
+        There is none.
+    """
+    expected = " ".join(map(str, (*sys.version_info[:2], version_of("numpy"))))
+    tried = list(dict.fromkeys(candidates(Path(sys.executable), Path(sys.prefix), sys.platform)))
+    # Where QGIS starts Python from within an app bundle, the program alone does not know where its library lies.
+    for changes in ({}, {"PYTHONHOME": sys.prefix}):
+        for program in filter(Path.is_file, tried):
+            if processes.run(str(program), ["-c", QUESTION], changes).output.strip() == expected:
+                return Interpreter(str(program), changes)
+    raise RailExtractError(
+        f"The Python program of this QGIS was not found in {', '.join(sorted({str(path.parent) for path in tried}))}: "
+        "install the packages with another tool into a folder, and name it in the environment variable "
+        "RAIL_EXTRACT_PACKAGES."
+    )
+
+
+def candidates(executable: Path, prefix: Path, platform: str) -> Iterator[Path]:
+    """List where the program may lie, the likeliest first.
+
+    On Windows and macOS `executable` is QGIS itself, and starting that would open another QGIS.
+
+    Parameters
+    ----------
+    executable, prefix : Path
+        `sys.executable` and `sys.prefix`.
+    platform : str
+        `sys.platform`.
+    """
+    names = ("python3", "python", "python{}.{}".format(*sys.version_info))
+    if platform == "win32":
+        folders = (prefix, executable.parent)
+        names = tuple(f"{name}.exe" for name in names)
+    else:
+        folders = (prefix / "bin", executable.parent / "bin", executable.parent, prefix / "tools" / "python3")
+    for folder in folders:
+        for name in names:
+            yield folder / name

@@ -1,0 +1,87 @@
+"""Programs run through Qt: their output goes into the log line by line, and a cancel ends them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from qgis.PyQt.QtCore import QProcess, QProcessEnvironment
+
+from ...core.progress import SILENT, Progress
+
+POLL_MS = 200
+"""How often output is shown and a cancel is heard."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a program ended.
+
+    Attributes
+    ----------
+    code : int or None
+        Exit code; None where it could not be started or crashed.
+    output : str
+        What it printed, errors among it.
+    """
+
+    code: int | None
+    output: str
+
+
+def run(
+    program: str, arguments: Sequence[str], changes: Mapping[str, str] | None = None, progress: Progress = SILENT
+) -> Ended:
+    """Run a program to its end.
+
+    Parameters
+    ----------
+    program : str
+    arguments : sequence of str
+    changes : mapping, optional
+        Environment variables that differ from QGIS's own.
+    progress : Progress
+        Gets the lines of the output.
+
+    Raises
+    ------
+    Cancelled
+        The user cancelled; the program has ended.
+    """
+    environment = QProcessEnvironment.systemEnvironment()
+    for name, value in (changes or {}).items():
+        environment.insert(name, value)
+    process = QProcess()
+    process.setProcessEnvironment(environment)
+    process.setProcessChannelMode(QProcess.ProcessChannelMode.MergedChannels)
+    process.start(program, list(arguments))
+    log = _Log(progress)
+    try:
+        while process.state() != QProcess.ProcessState.NotRunning and not process.waitForFinished(POLL_MS):
+            log.add(bytes(process.readAll()))
+            progress.check()
+    finally:
+        process.kill()
+        process.waitForFinished()
+    log.add(bytes(process.readAll()), last=True)
+    failed = process.error() in (QProcess.ProcessError.FailedToStart, QProcess.ProcessError.Crashed)
+    return Ended(None if failed else process.exitCode(), log.text)
+
+
+class _Log:
+    """Cuts a stream of bytes into the lines that a progress shows."""
+
+    def __init__(self, progress: Progress) -> None:
+        self.text = ""
+        self._progress = progress
+        self._rest = b""
+
+    def add(self, data: bytes, last: bool = False) -> None:
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        if last and self._rest:
+            lines.append(self._rest)
+        for line in lines:
+            text = line.decode("utf-8", "replace").rstrip()
+            self.text += f"{text}\n"
+            if text:
+                self._progress.info(text)

@@ -1,0 +1,1 @@
+"""Outputs: layers, files, styles and the report."""

@@ -1,0 +1,96 @@
+"""The report, from an algorithm to a file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from qgis.core import QgsCoordinateReferenceSystem, QgsProcessingAlgorithm, QgsProcessingContext
+
+from ...core.errors import RailExtractError
+from ...core.standards import RailStandard
+
+if TYPE_CHECKING:
+    from ...core.rails import RailNetwork
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a result was made from, and how.
+
+    Attributes
+    ----------
+    paths : tuple of Path
+        Files or folders of the cloud.
+    standard : RailStandard
+    other_gauges_m : tuple of float
+    command : str
+        What repeats the run.
+    """
+
+    paths: tuple[Path, ...]
+    standard: RailStandard
+    other_gauges_m: tuple[float, ...]
+    command: str
+
+    @property
+    def gauges_m(self) -> tuple[float, ...]:
+        """All gauges that tracks may have."""
+        return (self.standard.gauge_m, *self.other_gauges_m)
+
+    @property
+    def title(self) -> str:
+        """Name of the cloud."""
+        first, *more = self.paths
+        return f"{first.name} and {len(more)} more" if more else first.name
+
+
+def write_report(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    network: RailNetwork,
+    origin: Origin,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the report on a network, with its geometry, into the output called `name`; an older one stays till then.
+
+    Returns
+    -------
+    dict of str to str
+        The file's path by the output's name; empty where the user skipped it.
+
+    Raises
+    ------
+    RailExtractError
+        The file can't be written.
+    """
+    from ...core.report import build_page
+
+    path = algorithm.parameterAsFileOutput(parameters, name, context)
+    if not path:
+        return {}
+    page = build_page(network, origin.gauges_m, origin.title, _facts(network, origin))
+    part = Path(f"{path}.part")
+    try:
+        try:
+            part.write_text(page, encoding="utf-8")
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
+    except OSError as error:
+        raise RailExtractError(f"{path} can't be written ({error.strerror}): choose another place.") from error
+    return {name: path}
+
+
+def _facts(network: RailNetwork, origin: Origin) -> dict[str, str]:
+    """State what the figures hang on."""
+    crs = QgsCoordinateReferenceSystem(network.frame.crs_wkt or "")
+    return {
+        "Rail": origin.standard.label,
+        "Gauge": ", ".join(f"{1000 * gauge_m:g} mm" for gauge_m in origin.gauges_m),
+        "Railhead width": f"{1000 * origin.standard.head_width_m:g} mm",
+        "Coordinate system": crs.userFriendlyIdentifier() if crs.isValid() else "none stated: metres",
+        "Command": origin.command,
+    }

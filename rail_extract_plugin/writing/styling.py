@@ -1,0 +1,52 @@
+"""Styles that results get when QGIS loads them."""
+
+from __future__ import annotations
+
+from qgis.core import (
+    QgsMapLayer,
+    QgsProcessingContext,
+    QgsProcessingFeedback,
+    QgsProcessingLayerPostProcessorInterface,
+)
+from qgis.PyQt import sip
+
+from ..compat import group_layer
+from ..i18n import tr
+from ..paths import STYLES
+
+BOTTOM_TO_TOP = ("raster", "rails", "centerlines", "quality")
+"""Order of the layers, by their styles."""
+
+
+class _Styler(QgsProcessingLayerPostProcessorInterface):
+    def __init__(self, style: str) -> None:
+        super().__init__()
+        self._path = str(STYLES / f"{style}.qml")
+
+    def postProcessLayer(
+        self, layer: QgsMapLayer, context: QgsProcessingContext, feedback: QgsProcessingFeedback
+    ) -> None:
+        layer.loadNamedStyle(self._path)
+        layer.triggerRepaint()
+
+
+_kept: list[_Styler] = []
+"""QGIS calls these after the algorithm is gone, without holding a reference, and deletes them with its context."""
+
+
+def _styler(style: str) -> _Styler:
+    """Make an object for one layer, and keep it until QGIS has deleted it."""
+    _kept[:] = [one for one in _kept if not sip.isdeleted(one)]
+    _kept.append(_Styler(style))
+    return _kept[-1]
+
+
+def style_on_load(layer_id: str, style: str, context: QgsProcessingContext) -> None:
+    """Have QGIS apply `style` (a .qml file of the plugin) if it loads the layer when the run is done.
+
+    All layers of a run go into one group, points above lines above rasters, where QGIS has groups for results.
+    """
+    if context.willLoadLayerOnCompletion(layer_id):
+        details = context.layerToLoadOnCompletionDetails(layer_id)
+        details.setPostProcessor(_styler(style))
+        group_layer(details, tr("Rail Extract"), BOTTOM_TO_TOP.index(style))

@@ -1,0 +1,410 @@
+"""Reading of rail points: formats, units, tiles, and every file that is not what it should be."""
+
+from __future__ import annotations
+
+import struct
+
+import laspy
+import numpy as np
+import pyproj
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from laspy._compression import lazrsbackend
+from rail_extract.core.clouds import las
+from rail_extract.core.clouds.points import read_rail_points
+from rail_extract.core.errors import (
+    Cancelled,
+    CloudError,
+    CrsError,
+    NoRailPointsError,
+    ParameterError,
+    RailExtractError,
+)
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.progress import Progress
+
+RAIL = 10
+UTM = "EPSG:32643"
+PLACE = np.array([578123.0, 2494456.0, 556.0])
+
+
+def make_cloud(path, crs=UTM, version="1.4", point_format=6, count=3000, place=PLACE, codes=(1, 2, RAIL), spread=20.0):
+    """Write a cloud around a place and return its coordinates, as stored, and classes."""
+    random = np.random.RandomState(1)
+    header = laspy.LasHeader(version=version, point_format=point_format)
+    header.scales = [0.001] * 3 if spread > 1 else [1e-9] * 3
+    header.offsets = np.floor(place)
+    if crs is not None:
+        header.add_crs(pyproj.CRS.from_user_input(crs))
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = (place + spread * random.standard_normal((count, 3))).T
+    cloud.classification = random.choice(codes, size=count)
+    cloud.write(path)
+    return np.column_stack([cloud.x, cloud.y, cloud.z]), np.asarray(cloud.classification)
+
+
+class Listener(Progress):
+    def __init__(self, cancel_after=None):
+        self.warnings, self.fractions, self.checks, self.cancel_after = [], [], 0, cancel_after
+
+    def warning(self, text):
+        self.warnings.append(text)
+
+    def set_fraction(self, fraction):
+        self.fractions.append(fraction)
+
+    def is_cancelled(self):
+        self.checks += 1
+        return self.cancel_after is not None and self.checks > self.cancel_after
+
+
+@pytest.mark.parametrize(
+    ("name", "version", "point_format"),
+    [("a.las", "1.2", 3), ("a.laz", "1.2", 1), ("a.laz", "1.3", 3), ("a.las", "1.4", 6), ("a.LAZ", "1.4", 7)],
+)
+def test_every_format_gives_the_wanted_class_alone(tmp_path, name, version, point_format):
+    xyz, codes = make_cloud(tmp_path / name, version=version, point_format=point_format)
+    (points,) = read_rail_points(tmp_path / name, [RAIL])
+    assert points.class_code == RAIL
+    np.testing.assert_allclose(points.frame.to_crs(points.xyz), xyz[codes == RAIL], rtol=0, atol=1e-9)
+    assert "UTM zone 43N" in points.frame.crs_wkt
+
+
+def test_local_coordinates_are_small_and_the_origin_is_round(tmp_path):
+    make_cloud(tmp_path / "a.las")
+    (points,) = read_rail_points(tmp_path / "a.las", [RAIL])
+    assert np.abs(points.xyz).max() < 200
+    np.testing.assert_array_equal(points.frame.origin % 100, 0)
+
+
+def test_a_stray_point_far_away_does_not_move_the_origin(tmp_path):
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.scales = [0.001] * 3
+    header.offsets = np.floor(PLACE)
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = (PLACE + np.array([[0, 0, 0], [1, 0, 0], [1e6, 1e6, 0]])).T
+    cloud.classification = [RAIL] * 3
+    cloud.write(tmp_path / "a.las")
+    (points,) = read_rail_points(tmp_path / "a.las", [RAIL])
+    assert np.abs(points.xyz[:2]).max() < 100
+
+
+def test_each_class_is_kept_apart_in_one_frame(tmp_path):
+    _, codes = make_cloud(tmp_path / "a.laz", codes=(2, RAIL, 11))
+    first, second = read_rail_points(tmp_path / "a.laz", [11, RAIL, 12])
+    assert (first.class_code, second.class_code) == (RAIL, 11)
+    assert len(first.xyz) == np.count_nonzero(codes == RAIL)
+    assert len(second.xyz) == np.count_nonzero(codes == 11)
+    assert first.frame is second.frame
+
+
+def test_a_file_named_twice_is_read_once(tmp_path, monkeypatch):
+    make_cloud(tmp_path / "a.laz", codes=(RAIL,))
+    monkeypatch.chdir(tmp_path)
+    (points,) = read_rail_points([tmp_path, "a.laz", tmp_path / "a.laz"], [RAIL])
+    assert len(points.xyz) == 3000
+    assert all(file.is_absolute() for file in las.list_files("a.laz"))
+
+
+def test_what_macos_hides_beside_files_is_no_tile(tmp_path):
+    make_cloud(tmp_path / "a.laz", codes=(RAIL,))
+    (tmp_path / "._a.laz").write_bytes(b"\0\5\x16\7")
+    assert [file.name for file in las.list_files(tmp_path)] == ["a.laz"]
+
+
+def test_a_file_that_can_not_be_opened_is_named(tmp_path):
+    make_cloud(tmp_path / "a.laz", codes=(RAIL,))
+    (tmp_path / "b.laz").symlink_to(tmp_path / "gone.laz")
+    with pytest.raises(CloudError, match=r"^b\.laz can't be read \(No such file or directory\): check"):
+        read_rail_points(tmp_path, [RAIL])
+
+
+def test_a_table_of_chunks_whose_place_stands_at_the_end_is_found(tmp_path):
+    """As writers leave it that can't go back, into a pipe."""
+    make_cloud(tmp_path / "a.laz", codes=(RAIL,))
+    whole = bytearray((tmp_path / "a.laz").read_bytes())
+    (points_at,) = struct.unpack("<I", whole[96:100])
+    table_at = bytes(whole[points_at : points_at + 8])
+    whole[points_at : points_at + 8] = struct.pack("<q", -1)
+    (tmp_path / "a.laz").write_bytes(whole + table_at)
+    (points,) = read_rail_points(tmp_path / "a.laz", [RAIL])
+    assert len(points.xyz) == 3000
+
+
+def test_withheld_points_are_left_out(tmp_path):
+    make_cloud(tmp_path / "a.las", codes=(RAIL,))
+    cloud = laspy.read(tmp_path / "a.las")
+    cloud.withheld[:100] = 1
+    cloud.write(tmp_path / "a.las")
+    (points,) = read_rail_points(tmp_path / "a.las", [RAIL])
+    assert len(points.xyz) == 2900
+    cloud.withheld[:] = 1
+    cloud.classification[:500] = 2
+    cloud.write(tmp_path / "a.las")
+    with pytest.raises(NoRailPointsError, match="^All points of the cloud are marked as withheld"):
+        read_rail_points(tmp_path / "a.las", [RAIL])
+    cloud.withheld[:500] = 0
+    cloud.write(tmp_path / "a.las")
+    with pytest.raises(NoRailPointsError, match=r"counts are 2 \(500\): set"):
+        read_rail_points(tmp_path / "a.las", [RAIL])
+
+
+def test_chunks_join_without_loss(tmp_path, monkeypatch):
+    xyz, codes = make_cloud(tmp_path / "a.laz")
+    monkeypatch.setattr(las, "CHUNK", 700)
+    (points,) = read_rail_points(tmp_path / "a.laz", [RAIL])
+    np.testing.assert_allclose(points.frame.to_crs(points.xyz), xyz[codes == RAIL], rtol=0, atol=1e-9)
+
+
+def test_chunks_of_any_size_as_in_copc(tmp_path, monkeypatch):
+    class Writer(lazrsbackend.LazrsPointWriter):
+        def __init__(self, dest, point_format, parallel):
+            super().__init__(dest, point_format, parallel=False)
+            self.vlr = lazrsbackend.lazrs.LazVlr.new_for_compression(point_format.id, 0, True)
+
+        def write_points(self, points):
+            for part in (points[:70], points[70:2000], points[2000:]):
+                super().write_points(part)
+                self.compressor.finish_current_chunk()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(lazrsbackend, "LazrsPointWriter", Writer)
+        xyz, codes = make_cloud(tmp_path / "a.copc.laz")
+    (points,) = read_rail_points(tmp_path / "a.copc.laz", [RAIL])
+    np.testing.assert_allclose(points.frame.to_crs(points.xyz), xyz[codes == RAIL], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("crs", "horizontal_m", "vertical_m"),
+    [
+        (UTM, 1.0, 1.0),
+        ("EPSG:2227", 1200 / 3937, 1200 / 3937),  # California, US survey feet
+        ("EPSG:2222", 0.3048, 0.3048),  # Arizona, international feet
+        ("EPSG:2227+5703", 1200 / 3937, 1.0),  # heights in metres
+        ("EPSG:6355+6360", 1.0, 1200 / 3937),  # heights in US survey feet
+    ],
+)
+def test_units_become_metres_and_back(tmp_path, crs, horizontal_m, vertical_m):
+    xyz, _ = make_cloud(tmp_path / "a.las", crs=crs, codes=(RAIL,))
+    (points,) = read_rail_points(tmp_path / "a.las", [RAIL])
+    scale = np.array([horizontal_m, horizontal_m, vertical_m])
+    np.testing.assert_allclose(np.ptp(points.xyz, axis=0), np.ptp(xyz, axis=0) * scale, rtol=1e-12)
+    np.testing.assert_allclose(points.frame.to_crs(points.xyz), xyz, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("keys", "vertical_m"),
+    [({4099: 9001}, 1.0), ({4099: 9003}, 1200 / 3937), ({4096: 5703}, 1.0), ({4096: 6360, 4099: 9003}, 1200 / 3937)],
+)
+def test_vertical_geotiff_keys_count(tmp_path, keys, vertical_m):
+    path = tmp_path / "a.las"
+    make_cloud(path, crs="EPSG:2222", version="1.2", point_format=1)
+    cloud = laspy.read(path)
+    (record,) = cloud.header.vlrs.get("GeoKeyDirectoryVlr")
+    for number, value in keys.items():
+        record.geo_keys.append(laspy.vlrs.known.GeoKeyEntryStruct(number, 0, 1, value))
+    record.geo_keys_header.number_of_keys += len(keys)
+    cloud.write(path)
+    (points,) = read_rail_points(path, [RAIL])
+    assert points.frame.horizontal_unit_m == 0.3048
+    assert points.frame.vertical_unit_m == pytest.approx(vertical_m, rel=1e-9)
+
+
+@given(
+    origin=st.tuples(*[st.floats(-1e7, 1e7)] * 3),
+    xyz=st.lists(st.tuples(*[st.floats(-1e4, 1e4)] * 3), min_size=1, max_size=5),
+    unit=st.sampled_from([1.0, 0.3048, 1200 / 3937]),
+)
+def test_a_frame_leads_there_and_back(origin, xyz, unit):
+    frame = LocalFrame(np.array(origin), unit, 1.0)
+    np.testing.assert_allclose(frame.to_local(frame.to_crs(np.array(xyz))), np.array(xyz), rtol=0, atol=1e-7)
+
+
+def test_without_crs_it_goes_on_in_metres_with_a_warning(tmp_path):
+    make_cloud(tmp_path / "a.las", crs=None)
+    listener = Listener()
+    (points,) = read_rail_points(tmp_path / "a.las", [RAIL], progress=listener)
+    assert points.frame.crs_wkt is None
+    assert points.frame.horizontal_unit_m == 1.0
+    assert "no coordinate system" in listener.warnings[0]
+
+
+def test_a_given_crs_stands_in_only_where_the_cloud_has_none(tmp_path):
+    make_cloud(tmp_path / "bare.las", crs=None)
+    make_cloud(tmp_path / "utm.las")
+    (bare,) = read_rail_points(tmp_path / "bare.las", [RAIL], crs_wkt="EPSG:2227")
+    (utm,) = read_rail_points(tmp_path / "utm.las", [RAIL], crs_wkt="EPSG:2227")
+    assert bare.frame.horizontal_unit_m == pytest.approx(1200 / 3937)
+    assert utm.frame.horizontal_unit_m == 1.0
+    with pytest.raises(CrsError, match="not understood"):
+        read_rail_points(tmp_path / "bare.las", [RAIL], crs_wkt="nonsense")
+
+
+@pytest.mark.parametrize(
+    ("place", "zone"),
+    [([77.2, 13.1, 5.0], "43N (EPSG:32643)"), ([-58.4, -34.6, 5.0], "21S (EPSG:32721)")],
+)
+def test_degrees_are_refused_with_the_fitting_zone(tmp_path, place, zone):
+    make_cloud(tmp_path / "a.las", crs="EPSG:4326", place=np.array(place), spread=1e-3)
+    with pytest.raises(CrsError) as caught:
+        read_rail_points(tmp_path / "a.las", [RAIL])
+    assert zone in str(caught.value)
+
+
+def test_a_folder_of_tiles_is_one_cloud(tmp_path):
+    east = PLACE + [500, 0, 0]
+    parts = [make_cloud(tmp_path / "1.las"), make_cloud(tmp_path / "2.LAZ", place=east)]
+    (tmp_path / "readme.txt").write_text("no cloud")
+    expected = np.concatenate([xyz[codes == RAIL] for xyz, codes in parts])
+    (points,) = read_rail_points(tmp_path, [RAIL])
+    np.testing.assert_allclose(points.frame.to_crs(points.xyz), expected, rtol=0, atol=1e-9)
+
+
+def test_an_extent_cuts_points_and_spares_tiles(tmp_path):
+    xyz, codes = make_cloud(tmp_path / "1.las")
+    make_cloud(tmp_path / "2.las", place=PLACE + [500, 0, 0])
+    extent = (PLACE[0] - 5, PLACE[1] - 5, PLACE[0] + 5, PLACE[1] + 5)
+    (points,) = read_rail_points(tmp_path, [RAIL], extent=extent)
+    inside = (np.abs(xyz[:, :2] - PLACE[:2]) <= 5).all(axis=1) & (codes == RAIL)
+    assert len(points.xyz) == np.count_nonzero(inside) > 0
+    with pytest.raises(NoRailPointsError, match="extent"):
+        read_rail_points(tmp_path, [RAIL], extent=(0, 0, 1, 1))
+
+
+def test_tiles_in_different_systems_are_named(tmp_path):
+    make_cloud(tmp_path / "west.las")
+    make_cloud(tmp_path / "east.las", crs="EPSG:32644")
+    with pytest.raises(CrsError, match=r"east.las is in WGS 84 / UTM zone 44N but west.las is in .* 43N"):
+        read_rail_points(tmp_path, [RAIL])
+
+
+def test_the_same_system_in_wkt_and_geotiff_keys_is_one(tmp_path):
+    make_cloud(tmp_path / "old.las", version="1.2", point_format=1)
+    make_cloud(tmp_path / "new.las", version="1.4", point_format=6)
+    (points,) = read_rail_points(tmp_path, [RAIL])
+    assert points.frame.horizontal_unit_m == 1.0
+
+
+def test_missing_class_names_the_classes_there(tmp_path):
+    _, codes = make_cloud(tmp_path / "a.las", codes=(1, 2))
+    with pytest.raises(NoRailPointsError) as caught:
+        read_rail_points(tmp_path / "a.las", [RAIL])
+    ones, twos = np.count_nonzero(codes == 1), np.count_nonzero(codes == 2)
+    assert f"1 ({ones}), 2 ({twos})" in str(caught.value)
+
+
+@pytest.mark.parametrize("codes", [[], [-1], [256]])
+def test_impossible_classes_are_refused(tmp_path, codes):
+    make_cloud(tmp_path / "a.las")
+    with pytest.raises(ParameterError, match="0 to 255"):
+        read_rail_points(tmp_path / "a.las", codes)
+
+
+def test_progress_rises_to_the_end_and_a_cancel_is_heard(tmp_path, monkeypatch):
+    make_cloud(tmp_path / "a.las")
+    monkeypatch.setattr(las, "CHUNK", 500)
+    listener = Listener()
+    read_rail_points(tmp_path / "a.las", [RAIL], progress=listener)
+    assert listener.fractions == sorted(listener.fractions)
+    assert len(listener.fractions) == 6
+    assert listener.fractions[-1] == pytest.approx(1)
+    with pytest.raises(Cancelled):
+        read_rail_points(tmp_path / "a.las", [RAIL], progress=Listener(cancel_after=2))
+
+
+def test_headers_tell_count_extent_and_system(tmp_path):
+    xyz, _ = make_cloud(tmp_path / "a.laz")
+    header = las.read_header(tmp_path / "a.laz")
+    assert header.point_count == 3000
+    expected = (*xyz[:, :2].min(axis=0), *xyz[:, :2].max(axis=0))
+    assert header.extent == pytest.approx(expected, abs=1e-6)
+    assert "UTM zone 43N" in header.crs_wkt
+
+
+def write_bytes(path, data):
+    path.write_bytes(data)
+    return path
+
+
+def damaged(tmp_path, name, change):
+    """Write a good cloud and change its bytes."""
+    make_cloud(tmp_path / name)
+    data = bytearray((tmp_path / name).read_bytes())
+    changed = change(data)
+    return write_bytes(tmp_path / name, bytes(data if changed is None else changed))
+
+
+def set_bytes(at, value):
+    def change(data):
+        data[at : at + len(value)] = value
+
+    return change
+
+
+NAN = np.float64(np.nan).tobytes()
+
+BAD_FILES = {
+    "missing": (lambda folder: folder / "nowhere.las", "does not exist"),
+    "empty folder": (lambda folder: folder, "holds no .las or .laz"),
+    "empty file": (lambda folder: write_bytes(folder / "a.las", b""), "is empty"),
+    "not LAS": (lambda folder: write_bytes(folder / "a.las", b"%PDF-1.4 " * 100), "no LAS or LAZ file"),
+    "text": (lambda folder: write_bytes(folder / "a.las", b"x,y,z\n"), "no LAS or LAZ file"),
+    "cut in the header": (
+        lambda folder: damaged(folder, "a.las", lambda data: data[:200]),
+        "cut off within its header",
+    ),
+    "cut in the records": (lambda folder: damaged(folder, "a.las", lambda data: data[:600]), "before its first point"),
+    "cut in the points": (
+        lambda folder: damaged(folder, "a.las", lambda data: data[:-500]),
+        "room for 2983 of the 3000",
+    ),
+    "LAZ cut in the points": (lambda folder: damaged(folder, "a.laz", lambda data: data[:9000]), "cut off"),
+    "LAZ cut at the end": (lambda folder: damaged(folder, "a.laz", lambda data: data[:-6]), "cut off"),
+    "version": (lambda folder: damaged(folder, "a.las", set_bytes(24, b"\x03\x07")), "is LAS 3.7"),
+    "point format": (lambda folder: damaged(folder, "a.las", set_bytes(104, b"\x3f")), "damaged"),
+    "absurd count": (lambda folder: damaged(folder, "a.las", set_bytes(247, b"\xff" * 6)), "of the 281474976710655"),
+    "absurd LAZ count": (lambda folder: damaged(folder, "a.laz", set_bytes(247, b"\xff" * 6)), "damaged"),
+    "absurd records": (lambda folder: damaged(folder, "a.las", set_bytes(100, b"\xff" * 4)), "damaged header"),
+    "absurd late records": (lambda folder: damaged(folder, "a.las", set_bytes(243, b"\xff" * 4)), "records behind"),
+    "zero points": (lambda folder: damaged(folder, "a.las", set_bytes(247, b"\x00" * 8)), "holds no points"),
+    "scale not a number": (lambda folder: damaged(folder, "a.las", set_bytes(131, NAN)), "scale or offset"),
+    "scale zero": (lambda folder: damaged(folder, "a.las", set_bytes(131, b"\x00" * 8)), "scale or offset"),
+    "offset not a number": (lambda folder: damaged(folder, "a.las", set_bytes(171, NAN)), "scale or offset"),
+}
+
+
+@pytest.mark.parametrize("fault", BAD_FILES)
+def test_bad_files_end_in_one_clear_sentence(tmp_path, fault):
+    make, sentence = BAD_FILES[fault]
+    with pytest.raises(CloudError) as caught:
+        read_rail_points(make(tmp_path), [RAIL])
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_laz_without_backend_names_the_package(tmp_path, monkeypatch):
+    make_cloud(tmp_path / "a.laz")
+    monkeypatch.setattr(las, "lazrs", None)
+    with pytest.raises(CloudError, match="pip install lazrs"):
+        read_rail_points(tmp_path / "a.laz", [RAIL])
+
+
+@pytest.mark.parametrize("name", ["a.las", "a.laz"])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(changes=st.lists(st.tuples(st.floats(0, 1), st.integers(0, 255)), max_size=4), cut=st.floats(0.2, 1))
+def test_any_damage_is_read_or_explained(tmp_path, name, changes, cut):
+    path = tmp_path / name
+    if not (tmp_path / "good").exists():
+        make_cloud(path, count=300)
+        (tmp_path / "good").write_bytes(path.read_bytes())
+    data = bytearray((tmp_path / "good").read_bytes())
+    for place, value in changes:
+        data[4 + int(place * (len(data) - 5))] = value
+    path.write_bytes(data[: int(cut * len(data)) if cut < 0.9 else len(data)])
+    try:
+        clouds = read_rail_points(path, [RAIL])
+    except RailExtractError as error:
+        assert str(error)
+    else:
+        assert all(np.isfinite(points.xyz).all() for points in clouds)

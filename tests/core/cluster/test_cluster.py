@@ -1,0 +1,289 @@
+"""Extraction on real workers: the same lines as in one process, whatever dies in between."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import replace
+
+import laspy
+import numpy as np
+import pyogrio
+import pytest
+import shapely
+import torch
+from distributed import Client, KilledWorker, LocalCluster
+from rail_extract.__main__ import main
+from rail_extract.core.clouds.points import ask, read_rail_points
+from rail_extract.core.cluster import run
+from rail_extract.core.cluster.run import connect, extract
+from rail_extract.core.cluster.tasks import clean
+from rail_extract.core.commands.extract import INCOMPLETE
+from rail_extract.core.commands.geopackage import write
+from rail_extract.core.errors import DiskError, RailExtractError
+from rail_extract.core.fields import RAIL_FIELDS
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.pipeline import Parameters, extract_rails, square_side
+from rail_extract.core.squares.grid import lay_out
+from rail_extract.core.squares.spool import spool
+from rail_extract.core.standards import STANDARDS
+from rail_extract.laboratory.curves import Element, trace
+from rail_extract.laboratory.scenes.plain import spacing
+from rail_extract.laboratory.scenes.scanner import Scanner
+from rail_extract.laboratory.scenes.scene import RAIL, Plan, build
+from rail_extract.laboratory.scenes.tracks import Track
+from rail_extract.laboratory.scenes.write import write_cloud
+
+STANDARD = STANDARDS["EN_60E1_1435"]
+PARAMETERS = Parameters(STANDARD.gauge_m, STANDARD.head_width_m, passes=1, engine="OPENCV", square_tiles=4)
+
+
+@pytest.fixture(scope="module")
+def tiles(tmp_path_factory):
+    """A track of 50 m, in two stretches and three files."""
+    folder = tmp_path_factory.mktemp("tiles")
+    curve = trace([Element(50.0)], heading=0.05)
+    plan = Plan([Track(curve, spacing(STANDARD), np.zeros(len(curve.xy)))], STANDARD, Scanner(profile_step_m=0.08))
+    scene = build("short", plan, np.random.RandomState(4))
+    for number, part in enumerate(np.array_split(np.argsort(scene.xyz[:, 0]), 3)):
+        part = replace(scene, xyz=scene.xyz[part], classification=scene.classification[part])
+        write_cloud(part, folder / f"tile{number}.laz")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def one_process(tiles):
+    return extract_rails(read_rail_points(tiles, [RAIL]), PARAMETERS)
+
+
+@pytest.fixture(scope="module")
+def client():
+    with connect(None, 2) as client:
+        yield client
+
+
+def same(found, expected, frame, other):
+    """Lines, ids and figures agree within a tenth of a millimetre."""
+    assert len(found) == len(expected)
+    for one, two in zip(found, expected):
+        np.testing.assert_allclose(frame.to_crs(one.xyz), other.to_crs(two.xyz), rtol=0, atol=1e-4)
+        for name in ("rail_id", "points", "sigma_mm", "track_id", "left_ids", "gauge_mm", "bridged_m"):
+            assert getattr(one, name, None) == pytest.approx(getattr(two, name, None), abs=0.01)
+
+
+def test_a_local_worker_keeps_to_its_core_and_its_memory(client):
+    found = client.run(lambda: (torch.get_num_threads(), os.environ["MALLOC_TRIM_THRESHOLD_"]))
+    assert list(found.values()) == [(1, "268435456")] * 2
+
+
+def test_workers_give_what_one_process_gives(tiles, one_process, client, tmp_path):
+    found = extract(client, [tiles], [RAIL], PARAMETERS, tmp_path)
+    assert found.failures == ()
+    same(found.rails, one_process.rails, found.frame, one_process.frame)
+    same(found.centerlines, one_process.centerlines, found.frame, one_process.frame)
+    assert len(found.rails) == 2 and len(found.centerlines) == 1
+    assert sum(rail.length_m for rail in found.rails) == pytest.approx(100, abs=1)
+
+
+def test_a_restart_computes_only_what_changed(tiles, client, tmp_path):
+    extract(client, [tiles / "tile0.laz", tiles / "tile1.laz"], [RAIL], PARAMETERS, tmp_path)
+    before = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()}
+    extract(client, [tiles / "tile0.laz", tiles / "tile1.laz"], [RAIL], PARAMETERS, tmp_path)
+    assert {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()} == before
+    extract(client, [tiles], [RAIL], PARAMETERS, tmp_path)
+    after = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()}
+    assert before.items() <= after.items()
+    assert len([file for file in after.keys() - before.keys() if "raster" in file.name]) > 0
+
+
+def test_a_killed_worker_is_replaced_and_its_stretches_run_again(tiles, one_process, client, tmp_path):
+    killed = []
+
+    def kill(client):
+        while not killed:
+            busy = [
+                worker for worker, tasks in client.processing().items() if any("clean" in str(task) for task in tasks)
+            ]
+            pids = client.run(os.getpid, workers=busy[:1]) if busy else {}
+            for pid in pids.values():
+                os.kill(pid, signal.SIGKILL)
+                killed.append(pid)
+            time.sleep(0.01)
+
+    killer = threading.Thread(target=kill, args=(client,), daemon=True)
+    killer.start()
+    found = extract(client, [tiles], [RAIL], PARAMETERS, tmp_path)
+    killer.join(timeout=5)
+    assert len(killed) == 1
+    assert found.failures == ()
+    same(found.rails, one_process.rails, found.frame, one_process.frame)
+
+
+def test_on_a_running_cluster_a_corrupt_tile_is_named_and_the_rest_is_written(tiles, client, tmp_path, capsys):
+    for name in ("tile0.laz", "tile1.laz"):
+        (tmp_path / name).write_bytes((tiles / name).read_bytes())
+    whole = (tiles / "tile2.laz").read_bytes()
+    (tmp_path / "tile2.laz").write_bytes(whole[: len(whole) // 2])
+    out = tmp_path / "out.gpkg"
+    words = ["extract", str(tmp_path), "--rails", str(out), "--centerlines", str(out)]
+    words += ["--scheduler", client.scheduler.address]
+    code = main([*words, "--iterations", "1", "--stretch-tiles", "4", "--engine", "OPENCV"])
+    assert code == INCOMPLETE
+    assert "tile2.laz" in capsys.readouterr().err
+    meta, _, geometry, values = pyogrio.raw.read(out, layer="rails")
+    assert list(meta["fields"]) == ["rail_id", "class_code", "length_m", "points", "resid_mm", "sigma_mm", "bridged_m"]
+    assert meta["geometry_type"] == "LineString Z"
+    lines = shapely.from_wkb(geometry)
+    assert [shapely.get_num_coordinates(line) > 5 for line in lines] == [True, True]
+    assert 50 < values[2].sum() < 85
+    assert pyogrio.read_info(out, layer="centerlines")["features"] == 1
+    assert {file.name for file in tmp_path.iterdir()} == {"out.gpkg", "tile0.laz", "tile1.laz", "tile2.laz"}
+
+
+@pytest.fixture
+def lone_worker():
+    """Tasks in this process, where they can be put others in the place of."""
+    with LocalCluster(processes=False, n_workers=1, dashboard_address=":0") as cluster, Client(cluster) as client:
+        yield client
+
+
+def test_a_stretch_that_kills_its_workers_does_not_take_its_neighbours_along(tiles, lone_worker, tmp_path, monkeypatch):
+    def dying(task):
+        if task.stretch.key == doomed:
+            raise KilledWorker("clean", None, 10)
+        return clean(task)
+
+    doomed = max(lay_out_keys(tiles, tmp_path))
+    monkeypatch.setattr(run, "clean", dying)
+    found = extract(lone_worker, [tiles], [RAIL], PARAMETERS, tmp_path / "work")
+    assert len(found.failures) == 1
+    assert found.failures[0].startswith(f"Square {doomed} was given up")
+    assert len(found.rails) == 2
+    assert 20 < found.rails[0].length_m < 45
+
+
+def lay_out_keys(tiles, folder):
+    (source,) = spool(ask([tiles], [RAIL]), square_side(PARAMETERS), folder)
+    return [stretch.key for stretch in lay_out([source], source)]
+
+
+def test_a_worker_of_another_version_is_named(tiles, lone_worker, tmp_path, monkeypatch):
+    monkeypatch.setattr(run, "version", lambda weights: "older")
+    with pytest.raises(RailExtractError, match="A worker has another version of Rail Extract"):
+        extract(lone_worker, [tiles], [RAIL], PARAMETERS, tmp_path)
+
+
+def test_finished_stretches_of_another_cloud_are_not_taken(tiles, client, tmp_path):
+    """An undivided cloud has its own middle for its origin, which further files of another class move."""
+    parameters = replace(PARAMETERS, square_tiles=50)
+    alone = extract(client, [tiles / "tile0.laz"], [RAIL], parameters, tmp_path)
+    others = [tmp_path / f"other{number}.laz" for number in (1, 2)]
+    for number, path in enumerate(others, start=1):
+        cloud = laspy.read(tiles / f"tile{number}.laz")
+        cloud.x, cloud.classification[:] = np.asarray(cloud.x) + 300, 11
+        cloud.write(path)
+    both = extract(client, [tiles / "tile0.laz", *others], [RAIL, 11], parameters, tmp_path)
+    assert not np.allclose(alone.frame.origin, both.frame.origin)
+    again = [rail for rail in both.rails if rail.class_code == RAIL]
+    for one, two in zip(again, alone.rails):
+        ends = (frame.to_crs(rail.xyz[[0, -1]]) for frame, rail in ((both.frame, one), (alone.frame, two)))
+        np.testing.assert_allclose(*ends, rtol=0, atol=0.1)
+    assert len(again) == len(alone.rails) == 2
+
+
+def test_two_names_of_one_file_hold_both_layers(tiles, client, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = ["extract", str(tiles), "--rails", "two.gpkg", "--centerlines", str(tmp_path / "two.gpkg")]
+    words += [
+        "--scheduler",
+        client.scheduler.address,
+        "--stretch-tiles",
+        "4",
+        "--engine",
+        "OPENCV",
+        "--iterations",
+        "1",
+    ]
+    assert main(words) == 0
+    assert {name for name, _ in pyogrio.list_layers("two.gpkg")} == {"rails", "centerlines"}
+
+
+def test_a_geopackage_that_another_program_writes_to_is_left_alone(tiles, tmp_path, capsys):
+    out = tmp_path / "out.gpkg"
+    out.write_text("theirs")
+    (tmp_path / "out.gpkg-wal").write_text("not yet in it")
+    assert main(["extract", str(tiles), "--rails", str(out)]) == 1
+    assert f"{out} is open in another program" in capsys.readouterr().err
+    with pytest.raises(DiskError, match=r"The new one is .*out_new\.gpkg"):
+        write({"rails": (out, (), RAIL_FIELDS)}, LocalFrame(np.zeros(3)))
+    assert out.read_text() == "theirs"
+    assert pyogrio.read_info(tmp_path / "out_new.gpkg")["features"] == 0
+
+
+def test_what_the_user_should_look_at_is_on_the_error_output(tiles, client, tmp_path, capsys):
+    words = ["extract", str(tiles), "--rails", str(tmp_path / "out.gpkg"), "--min-length", "1000", "--iterations", "1"]
+    words += ["--scheduler", client.scheduler.address, "--stretch-tiles", "4", "--engine", "OPENCV"]
+    assert main(words) == 0
+    said = capsys.readouterr()
+    assert "Warning: Class 10 shows no rail" in said.err
+    assert said.out.startswith("0 rails, 0.000 km")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--rails", "out.shp"], "GeoPackage"),
+        (["--rails", "out.gpkg", "--other-gauges", "1430"], "told apart"),
+        (["--rails", "out.gpkg", "--other-gauges", "wide"], "numbers"),
+        (["--rails", "out.gpkg", "--gauge", "300"], "gauge"),
+        (["--rails", "out.gpkg", "--max-gap", "-1"], "--max-gap"),
+        (["--rails", "out.gpkg", "--workers", "0"], "--workers"),
+        (["--rails", "out.gpkg", "--smoothing-xy", "0"], "--smoothing-xy"),
+        (["--rails", "out.gpkg", "--rail-classes", "300"], "0 to 255"),
+        (["--rails", "out.gpkg", "--scheduler", "nonsense"], "scheduler"),
+    ],
+)
+def test_what_can_be_refused_is_refused_before_the_night(tiles, tmp_path, monkeypatch, capsys, words, said):
+    monkeypatch.chdir(tmp_path)
+    assert main(["extract", str(tiles), *words]) == 1
+    assert said in capsys.readouterr().err
+
+
+FULL_DISK = """
+import resource, sys
+from pathlib import Path
+from rail_extract.core.clouds.points import LocalFrame
+from rail_extract.core.fields import RAIL_FIELDS
+from rail_extract.core.commands.geopackage import write
+from rail_extract.core.errors import DiskError
+from rail_extract.core.rails import RailLine
+import numpy as np
+resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+rails = [RailLine(np.random.rand(20_000, 3), 1, 10, 5, 1.0, 1.0, 0.0)]
+try:
+    write({"rails": (Path(sys.argv[1]), rails, RAIL_FIELDS)}, LocalFrame(np.zeros(3)))
+except DiskError as error:
+    print(error)
+"""
+
+
+def test_a_full_disk_leaves_what_was_there(tmp_path):
+    out = tmp_path / "out.gpkg"
+    out.write_bytes(b"before")
+    said = subprocess.run([sys.executable, "-c", FULL_DISK, str(out)], capture_output=True, text=True)
+    assert "make room" in said.stdout, said.stderr
+    assert out.read_bytes() == b"before"
+    assert [file.name for file in tmp_path.iterdir()] == ["out.gpkg"]
+
+
+def test_a_full_work_folder_is_one_sentence(tiles, tmp_path):
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
+    try:
+        with pytest.raises(DiskError, match="make room"):
+            spool(ask(tiles, [RAIL]), square_side(PARAMETERS), tmp_path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))

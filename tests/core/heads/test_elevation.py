@@ -1,0 +1,212 @@
+import numpy as np
+import pytest
+from rail_extract.core.clouds.points import RailPoints
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.heads.elevation import ElevationParameters, elevate, find_gaps, flat_rails
+from rail_extract.core.lines.network import LineNetwork
+
+WIDTH = 0.072
+PARAMETERS = ElevationParameters(head_width_m=WIDTH)
+
+
+def network_of(*lines):
+    lines = tuple(np.asarray(line, dtype=float) for line in lines)
+    nodes = np.array([line[end] for line in lines for end in (0, -1)])
+    return LineNetwork(lines, nodes, np.arange(2 * len(lines)).reshape(-1, 2))
+
+
+def straight_line(length, step=0.1):
+    x = np.arange(0, length + step / 2, step)
+    return np.column_stack([x, np.zeros_like(x)])
+
+
+def head(length, density, noise=0.003, low_share=0.1, slope=0.0, profile=lambda x: 0 * x, low_m=0.035, seed=0):
+    """Points of a head along the x axis: a crown of 300 mm radius, and a share of points low on its left face."""
+    random = np.random.default_rng(seed)
+    count = int(length * density)
+    x, across = random.uniform(0, length, count), random.uniform(-WIDTH / 2, WIDTH / 2, count)
+    down = across**2 / 0.6
+    low = random.random(count) < low_share
+    across[low], down[low] = WIDTH / 2, random.uniform(0, low_m, low.sum())
+    xyz = np.column_stack([x, across, profile(x) + slope * across - down])
+    return xyz + random.normal(0, noise, xyz.shape)
+
+
+def cloud(*parts, code=10):
+    return RailPoints(np.concatenate(parts), LocalFrame(np.zeros(3)), code)
+
+
+def height_error(rail, profile=lambda x: 0 * x):
+    """Bias and rms of a rail's height, every 0.1 m."""
+    x = np.arange(rail.xyz[0, 0], rail.xyz[-1, 0], 0.1)
+    error = np.interp(x, rail.xyz[:, 0], rail.xyz[:, 2]) - profile(x)
+    return error.mean(), np.sqrt(np.mean(error**2))
+
+
+@pytest.mark.parametrize(
+    ("noise", "low_share", "bias_limit", "rms_limit"),
+    [
+        (0.0, 0.1, 0.0006, 0.001),
+        (0.003, 0.1, 0.0006, 0.001),
+        (0.005, 0.1, 0.0008, 0.0015),
+        (0.01, 0.1, 0.0015, 0.0025),
+        (0.003, 0.4, 0.0012, 0.0015),
+    ],
+)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_height_is_that_of_the_top_though_faces_and_noise_pull(noise, low_share, bias_limit, rms_limit, seed):
+    points = cloud(head(160, 79, noise, low_share, seed=seed))
+    (rail,) = elevate(network_of(straight_line(160)), points, PARAMETERS)
+    bias, rms = height_error(rail)
+    assert abs(bias) < bias_limit
+    assert rms < rms_limit
+
+
+@pytest.mark.parametrize("slope", [-0.12, -0.05, 0.05, 0.12])
+def test_height_is_that_of_the_axis_though_the_head_leans(slope):
+    (rail,) = elevate(network_of(straight_line(100)), cloud(head(100, 100, slope=slope)), PARAMETERS)
+    bias, rms = height_error(rail)
+    assert abs(bias) < 0.0008
+    assert rms < 0.0012
+
+
+def test_weeds_above_and_stones_below_leave_the_height_alone():
+    random = np.random.default_rng(5)
+    weeds = np.column_stack([random.uniform(0, 100, 200), random.normal(0, 0.03, 200), random.uniform(0.005, 0.2, 200)])
+    bush = np.column_stack([random.uniform(40, 40.8, 300), random.normal(0, 0.03, 300), random.uniform(0.03, 0.2, 300)])
+    stones = np.column_stack(
+        [random.uniform(0, 100, 300), random.normal(0, 0.05, 300), random.uniform(-0.2, -0.05, 300)]
+    )
+    points = cloud(head(100, 100), weeds, bush, stones)
+    (rail,) = elevate(network_of(straight_line(100)), points, PARAMETERS)
+    x = np.arange(0, 100, 0.1)
+    error = np.interp(x, rail.xyz[:, 0], rail.xyz[:, 2])
+    assert abs(error.mean()) < 0.001
+    assert np.abs(error).max() < 0.005
+
+
+def test_a_settled_wave_keeps_its_height():
+    def profile(x):
+        return 0.02 * np.sin(2 * np.pi * x / 80)
+
+    (rail,) = elevate(network_of(straight_line(240)), cloud(head(240, 100, profile=profile)), PARAMETERS)
+    bias, rms = height_error(rail, profile)
+    assert abs(bias) < 0.001
+    assert rms < 0.001
+
+
+def test_steep_gradients_reach_the_ends():
+    def profile(x):
+        return 0.04 * x
+
+    points = cloud(head(30, 60, profile=profile))
+    (rail,) = elevate(network_of(straight_line(30)), points, PARAMETERS)
+    np.testing.assert_allclose(rail.xyz[[0, -1], 2], profile(np.array([0.0, 30.0])), atol=0.003)
+
+
+@pytest.mark.parametrize("gap", [2.0, 5.0, 20.0])
+def test_heights_run_on_across_a_gap_which_counts_as_bridged(gap):
+    def profile(x):
+        return 0.01 * x
+
+    xyz = head(80, 80, profile=profile)
+    xyz = xyz[(xyz[:, 0] < 40) | (xyz[:, 0] > 40 + gap)]
+    (rail,) = elevate(network_of(straight_line(80)), cloud(xyz), PARAMETERS)
+    x = np.arange(38, 42 + gap, 0.1)
+    np.testing.assert_allclose(np.interp(x, rail.xyz[:, 0], rail.xyz[:, 2]), profile(x), atol=0.004)
+    assert rail.bridged_m == pytest.approx(gap, abs=0.2)
+
+
+@pytest.mark.parametrize("grade", [0.0, 0.04, 0.1])
+@pytest.mark.parametrize("crossing", [(40.0, 41.5), (38.0, 39.5, 42.0, 43.5), (36.5, 38.0, 40.0, 41.5, 43.5, 45.0)])
+def test_a_bridge_does_not_lift_the_rail_that_it_hides(grade, crossing):
+    """Where its rails cross, only their points are near the line below."""
+
+    def profile(x):
+        return grade * x
+
+    below = head(80, 80, profile=profile)
+    below = below[np.abs(below[:, 0] - 40.75) > 5.0]
+    random = np.random.default_rng(3)
+    above = [np.column_stack([random.uniform(x, x + 0.07, 30), random.uniform(-0.036, 0.036, 30)]) for x in crossing]
+    above = np.column_stack([np.concatenate(above), np.full(30 * len(crossing), 6.5) + grade * 40])
+    (rail,) = elevate(network_of(straight_line(80)), cloud(below, above), PARAMETERS)
+    x = np.arange(0, 80, 0.1)
+    np.testing.assert_allclose(np.interp(x, rail.xyz[:, 0], rail.xyz[:, 2]), profile(x), atol=0.006)
+    assert rail.bridged_m == pytest.approx(10.0, abs=0.3)
+
+
+def test_gaps_are_long_stretches_without_points_and_unsupported_ends():
+    t = np.concatenate([np.arange(2.0, 5.01, 0.1), np.arange(5.4, 8.01, 0.1), [9.0]])
+    np.testing.assert_allclose(find_gaps(t, 0.0, 10.0), [[0, 2], [8, 9], [9, 10]])
+    assert find_gaps(np.arange(0, 10.01, 0.1), 0.0, 10.0).shape == (0, 2)
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_gaps_lie_where_the_finished_line_has_no_points(turn):
+    points = cloud(head(40, 80) + [5.0, 0.0, 0.0])
+    points = RailPoints(points.xyz[np.abs(points.xyz[:, 0] - 21.0) > 1.5], points.frame, points.class_code)
+    (rail,) = elevate(network_of(straight_line(60)[::turn]), points, PARAMETERS)
+    np.testing.assert_allclose(rail.xyz[0, 0], 5.0, atol=0.1)
+    np.testing.assert_allclose(rail.gaps, [[14.5, 17.5]], atol=0.2)
+
+
+def test_lines_are_directed_numbered_and_carry_their_class():
+    lines = [straight_line(20)[::-1] + [30.0, 0.0], straight_line(20), straight_line(20)[:, ::-1] + [5.0, 10.0]]
+    east = head(20, 80)
+    north = east[:, [1, 0, 2]] * [-1, 1, 1]
+    points = cloud(east + [30.0, 0, 0], east, north + [5.0, 10.0, 0], code=11)
+    rails = elevate(network_of(*lines), points, PARAMETERS)
+    assert [rail.rail_id for rail in rails] == [1, 2, 3]
+    assert {rail.class_code for rail in rails} == {11}
+    np.testing.assert_allclose([rail.xyz[0, :2] for rail in rails], [[0, 0], [5, 10], [30, 0]], atol=1e-9)
+    np.testing.assert_allclose([rail.xyz[-1, :2] for rail in rails], [[20, 0], [5, 30], [50, 0]], atol=1e-9)
+
+
+def test_lines_without_points_and_short_lines_are_left_out():
+    lines = [straight_line(20), straight_line(20) + [0.0, 5.0], straight_line(0.8) + [0.0, 10.0]]
+    points = cloud(head(20, 80), head(0.8, 80) + [0.0, 10.0, 0.0])
+    rails = elevate(network_of(*lines), points, PARAMETERS)
+    assert len(rails) == 1
+    assert rails[0].xyz[0, 1] == 0.0
+
+
+def test_figures_of_support():
+    (rail,) = elevate(network_of(straight_line(100)), cloud(head(100, 100, low_share=0.0)), PARAMETERS)
+    assert rail.points == pytest.approx(10000, rel=0.15)
+    assert rail.resid_mm == pytest.approx(1000 * WIDTH / np.sqrt(12), rel=0.05)
+    (denser,) = elevate(network_of(straight_line(100)), cloud(head(100, 400, low_share=0.0)), PARAMETERS)
+    assert denser.sigma_mm == pytest.approx(rail.sigma_mm / 2, rel=0.05)
+
+
+def test_rails_without_points_are_flat():
+    (rail,) = flat_rails(network_of(straight_line(10)[::-1]), 10, PARAMETERS)
+    assert np.isnan(rail.xyz[:, 2]).all()
+    assert rail.length_m == pytest.approx(10.0)
+    assert rail.xyz[0, 0] == 0.0
+    assert rail.rail_id == 1
+
+
+def test_free_ends_without_points_are_cut_and_shared_ones_kept():
+    line = straight_line(40)
+    points = cloud(head(30, 100) + [4.0, 0.0, 0.0])
+    (rail,) = elevate(network_of(line), points, PARAMETERS)
+    np.testing.assert_allclose(rail.xyz[[0, -1], 0], [4.0, 34.0], atol=0.1)
+    assert rail.bridged_m == 0.0
+    meeting = network_of(line, straight_line(30) + [40.0, 0.0], straight_line(30) + [40.0, 1.0])
+    meeting = LineNetwork(meeting.lines, meeting.nodes, np.array([[0, 1], [1, 3], [1, 5]]))
+    (rail,) = elevate(meeting, points, PARAMETERS)
+    np.testing.assert_allclose(rail.xyz[[0, -1], 0], [4.0, 40.0], atol=0.1)
+    assert rail.bridged_m == pytest.approx(6.0, abs=0.1)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("count", [0, 1, 3, 9, 10, 12, 30, 100])
+@pytest.mark.parametrize("height", [0.01, 0.1, 1.0])
+def test_scattered_points_give_a_finite_line_or_none(count, height):
+    random = np.random.default_rng(count)
+    xyz = random.uniform([0, -0.1, -height], [5, 0.1, height], (count, 3))
+    for rail in elevate(network_of(straight_line(5)), cloud(xyz), PARAMETERS):
+        assert np.isfinite(rail.xyz).all()
+        assert rail.points >= 10
+        assert np.abs(rail.xyz[:, 2]).max() < 3 * height

@@ -1,0 +1,111 @@
+import numpy as np
+import pytest
+from rail_extract.core.clouds.points import RailPoints
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.heads.edges import station_count
+from rail_extract.core.heads.elevation import ElevationParameters, elevate
+from rail_extract.core.heads.refinement import refine
+from rail_extract.core.heads.uncertainty import measure_support
+from rail_extract.core.lines.network_smoothing import smooth_network
+from rail_extract.core.polyline import interpolate, length_along, project
+from rail_extract.core.rails import Support
+from rail_extract.core.raster import cell_size, rasterize
+from rail_extract.core.vectorize import vectorize
+from rail_extract.laboratory.curves import Element, trace
+from rail_extract.laboratory.scenes.scanner import Scanner, scan
+from rail_extract.laboratory.scenes.tracks import Track
+
+GAUGE, WIDTH = 1.435, 0.072
+UNSEEN = 0.0115
+
+
+def head(length, density, noise=0.003, seed=0):
+    """Points on a flat head along the x axis: chainage, offset and height."""
+    random = np.random.default_rng(seed)
+    count = int(length * density)
+    t = np.sort(random.uniform(0, length, count))
+    across = random.uniform(-WIDTH / 2, WIDTH / 2, count) + random.normal(0, noise, count)
+    return t, across, random.normal(0, noise, count)
+
+
+def support(t, across, z, length=60.0):
+    free = np.ones((2, station_count(length)), dtype=bool)
+    return measure_support(t, across, z, length, WIDTH, smoothing_m=0.8, unseen_m=UNSEEN, free=free)
+
+
+@pytest.mark.parametrize(("left_m", "noise_m"), [(0.0, 0.003), (0.0, 0.008), (4.0, 0.005), (8.0, 0.005)])
+def test_two_thirds_of_a_line_lie_within_sigma(left_m, noise_m):
+    """Scanned from abreast and from the side, with little and much noise, and gaps in one rail."""
+    own = trace([Element(120.0, 1 / 900, 1 / 900)], heading=0.1)
+    track, path = Track(own, GAUGE + WIDTH, left_m=left_m), Track(own, GAUGE + WIDTH).centerline
+    random = np.random.RandomState(3)
+    scanner = Scanner(noise_m=noise_m)
+    gaps = ((30.0, 31.5), (60.0, 62.0), (90.0, 93.0))
+    rails = [scan(track.railhead(side), WIDTH, path, scanner, random, gaps[: 3 * (side > 0)]) for side in (1, -1)]
+    points = RailPoints(np.concatenate(rails), LocalFrame(np.zeros(3)), 10)
+    network = smooth_network(vectorize(rasterize(points.xyz, cell_size(GAUGE, WIDTH)), WIDTH), 0.8)
+    lines = elevate(refine(network, points, WIDTH), points, ElevationParameters(WIDTH))
+    errors, local, whole = [], [], []
+    for line in lines:
+        stations = interpolate(line.xyz[:, :2], length_along(line.xyz[:, :2]), line.support.t)
+        feet = project([rail[:, :2] for rail in track.rails()], stations, 0.1)
+        errors.append(feet.across)
+        local.append(line.support.sigma_m[feet.point])
+        whole.append(np.full(len(feet.point), line.sigma_mm / 1000))
+    errors, local, whole = (np.abs(np.concatenate(values)) for values in (errors, local, whole))
+    assert 0.5 < np.mean(errors < local) < 0.9
+    assert 0.5 < np.mean(errors < whole) < 0.9
+
+
+def test_four_times_the_points_halve_sigma():
+    few, many = (support(*head(60, density)).rms_m for density in (100, 400))
+    assert many == pytest.approx(few / 2, rel=0.25)  # chance moves the middle, which counts as well
+
+
+def test_noise_makes_edges_vague():
+    clean, noisy = (support(*head(60, 150, noise)).rms_m for noise in (0.002, 0.008))
+    assert noisy > 1.5 * clean
+
+
+def test_sigma_is_that_of_the_raster_where_no_edges_are_seen():
+    t, across, z = head(60, 150)
+    seen = (t < 30) | (np.abs(across) > 0.1)
+    half = support(t[seen], across[seen], z[seen])
+    assert half.sigma_m[(half.t > 2) & (half.t < 28)].max() < 0.003
+    np.testing.assert_allclose(half.sigma_m[half.t > 36], UNSEEN)
+    nothing = support(*np.empty((3, 0)))
+    np.testing.assert_allclose(nothing.sigma_m, UNSEEN)
+    assert nothing.points.sum() == 0
+
+
+def test_sigma_grows_into_a_gap():
+    t, across, z = head(60, 150)
+    there = np.abs(t - 30) > 2
+    broken = support(t[there], across[there], z[there])
+    sides, middle = broken.sigma_m[np.abs(broken.t - 27) < 0.5], broken.sigma_m[np.abs(broken.t - 30) < 0.3]
+    assert middle.min() > 1.5 * np.median(sides)
+
+
+def test_a_line_beside_its_rail_knows():
+    t, across, z = head(60, 150)
+    assert support(t, across + 0.01, z).rms_m == pytest.approx(0.01, rel=0.15)
+
+
+def test_points_are_counted_where_they_lie():
+    t, across, z = head(60, 150)
+    there = (t > 20) & (t < 30)
+    counted = support(t[there], across[there], z[there])
+    assert counted.points.sum() == pytest.approx(1500, rel=0.1)
+    assert counted.points[(counted.t < 19.5) | (counted.t > 30.5)].sum() == 0
+
+
+def test_support_of_a_part_and_of_the_line_reversed():
+    whole = Support(np.arange(0.125, 10, 0.25), np.arange(40), np.linspace(0.001, 0.002, 40))
+    part = whole.between(2.0, 4.0)
+    np.testing.assert_allclose(part.t[[0, -1]], [0.125, 1.875])
+    np.testing.assert_array_equal(part.points, np.arange(8, 16))
+    np.testing.assert_allclose(whole.between(2.05, 2.1).points, [8])
+    turned = whole.reversed(10.0)
+    np.testing.assert_allclose(turned.t, whole.t)
+    np.testing.assert_array_equal(turned.points, whole.points[::-1])
+    np.testing.assert_array_equal(turned.sigma_m, whole.sigma_m[::-1])

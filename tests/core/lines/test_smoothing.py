@@ -1,0 +1,280 @@
+"""PAEK against quadrature and closed formulas; networks that still meet."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.polynomial.legendre import leggauss
+from rail_extract.core.lines.network import LineNetwork
+from rail_extract.core.lines.network_smoothing import NETWORK_STATIONS_PER_SIGMA, lead, smooth_network
+from rail_extract.core.lines.smoothing import smooth_line, smooth_profile
+from rail_extract.core.polyline import length_along
+from rail_extract.laboratory.curves import trace, transition_curve
+
+SIGMA = 0.8
+
+
+def random_line(seed, count=30, dimensions=2):
+    random = np.random.default_rng(seed)
+    steps = random.normal(size=(count - 1, dimensions)) * 0.3
+    steps[:, 0] += 0.5
+    return np.concatenate([np.zeros((1, dimensions)), np.cumsum(steps, axis=0)])
+
+
+def fit_by_quadrature(vertices, station, sigma):
+    t = length_along(vertices)
+    knots = np.union1d(t, [station])
+    nodes, weights = leggauss(24)
+    middle, half = (knots[1:] + knots[:-1]) / 2, np.diff(knots) / 2
+    at = (middle[:, None] + half[:, None] * nodes).ravel()
+    weight = (half[:, None] * weights).ravel() * np.exp(-np.abs(at - station) / sigma)
+    values = np.column_stack([np.interp(at, t, column) for column in vertices.T])
+    powers = np.vander(at - station, 3, increasing=True)
+    return np.linalg.solve(powers.T @ (weight[:, None] * powers), powers.T @ (weight[:, None] * values))[0]
+
+
+def gain(wavelength, sigma):
+    x = 2 * np.pi * sigma / wavelength
+    return (1 + 3 * x**2 + 1.2 * x**4) / (1 + x**2) ** 3
+
+
+def circle(radius, count):
+    angle = np.linspace(0, 2 * np.pi, count + 1)
+    line = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    line[-1] = line[0]
+    return line
+
+
+@pytest.mark.parametrize("sigma", [0.2, 0.8, 5.0])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_equals_quadrature(seed, sigma):
+    line = random_line(seed, dimensions=3)
+    stations = np.random.default_rng(seed).uniform(0, length_along(line)[-1], 9)
+    smoothed = smooth_line(line, sigma, stations, ends="free")
+    np.testing.assert_allclose(smoothed, [fit_by_quadrature(line, s, sigma) for s in stations], atol=1e-11)
+
+
+@pytest.mark.parametrize("ends", ["fixed", "free"])
+def test_straight_lines_stay(ends):
+    line = np.outer([0.0, 0.3, 0.35, 5.0, 40.0], [0.6, 0.8]) + [1000.0, -2000.0]
+    smoothed = smooth_line(line, SIGMA, ends=ends)
+    across = (smoothed - line[0]) @ [0.8, -0.6]
+    np.testing.assert_allclose(across, 0, atol=1e-9)
+    np.testing.assert_allclose(smoothed[[0, -1]], line[[0, -1]], atol=1e-9)
+
+
+def test_parabolas_come_back_with_free_ends():
+    t = np.arange(0, 30, 0.005)
+    stations = np.linspace(0, t[-1], 50)
+    smoothed = smooth_profile(t, 0.3 - 0.2 * t + 0.05 * t**2, 3.0, stations)
+    np.testing.assert_allclose(smoothed, 0.3 - 0.2 * stations + 0.05 * stations**2, atol=1e-5)
+
+
+@pytest.mark.parametrize("length", [0.01, 0.5, 100])
+def test_fixed_ends_stay_on_lines_short_and_long(length):
+    line = random_line(3) * length
+    np.testing.assert_allclose(smooth_line(line, SIGMA)[[0, -1]], line[[0, -1]], atol=1e-9 * max(length, 1))
+
+
+@pytest.mark.parametrize("wavelength", [1.86, 4.93, 10.9, 40.0])
+def test_waves_are_damped_by_the_transfer_function(wavelength):
+    t = np.arange(0, 160, 0.01)
+    stations = np.linspace(70, 90, 401)
+    wave = np.sin(2 * np.pi * stations / (wavelength * SIGMA))
+    smoothed = smooth_profile(t, np.sin(2 * np.pi * t / (wavelength * SIGMA)), SIGMA, stations)
+    assert smoothed @ wave / (wave @ wave) == pytest.approx(gain(wavelength * SIGMA, SIGMA), abs=1e-4)
+
+
+def test_an_80_m_wave_keeps_its_height_with_sigma_3_m():
+    t = np.arange(0, 320, 0.05)
+    stations = np.arange(80, 240, 0.5)
+    wave = np.sin(2 * np.pi * stations / 80)
+    smoothed = smooth_profile(t, 0.02 * np.sin(2 * np.pi * t / 80), 3.0, stations)
+    assert smoothed @ wave / (wave @ wave) == pytest.approx(0.02, rel=0.01)
+
+
+@pytest.mark.parametrize(("radius", "transition"), [(25, 5.0), (190, 20.0), (600, 50.0)])
+def test_no_kink_where_a_clothoid_meets_an_arc(radius, transition):
+    """Curvature that begins to change by c a metre moves the line by 0.41 c sigma³ at the joint, and nothing turns."""
+    curve = trace(transition_curve(15, transition, 30, 1 / radius))
+    thinner = curve.xy[::5]
+    stations = np.arange(5, length_along(thinner)[-1] - 5, 0.1)
+    smoothed = smooth_line(thinner, SIGMA, stations)
+    true = np.column_stack([np.interp(stations, curve.chainage, column) for column in curve.xy.T])
+    assert np.linalg.norm(smoothed - true, axis=1).max() < 0.45 * SIGMA**3 / (transition * radius) + 3e-5
+    heading = np.unwrap(np.arctan2(*np.diff(smoothed, axis=0).T[::-1]))
+    bend = np.diff(heading) / 0.1
+    assert bend.max() < 1.01 / radius
+    assert bend.min() > -0.01 / radius
+    assert np.abs(np.diff(bend)).max() < 1.5 * 0.1 / transition / radius + 1e-3 / radius
+
+
+@pytest.mark.parametrize(("radius", "sigma"), [(25, 0.8), (190, 5.0)])
+def test_closed_circles_shrink_as_foretold(radius, sigma):
+    smoothed = smooth_line(circle(radius, 40_000), sigma, closed=True)
+    shrunk = radius - np.hypot(*smoothed.T)
+    np.testing.assert_allclose(shrunk, 1.8 * sigma**4 / radius**3, rtol=0.02, atol=2e-6)
+    np.testing.assert_allclose(smoothed[0], smoothed[-1], atol=1e-9)
+
+
+def test_a_closed_line_may_start_anywhere():
+    line = circle(3, 60) + 0.05 * np.random.default_rng(0).normal(size=(61, 2))
+    line[-1] = line[0]
+    shifted = np.concatenate([line[20:], line[1:21]])
+    t, shifted_t = length_along(line), length_along(shifted)
+    smoothed = smooth_line(line, SIGMA, t, closed=True)
+    np.testing.assert_allclose(smooth_line(shifted, SIGMA, shifted_t, closed=True)[:41], smoothed[20:], atol=1e-9)
+
+
+@given(st.integers(0, 10**6), st.sampled_from(["fixed", "free"]))
+@settings(max_examples=25, deadline=None)
+def test_a_reversed_line_is_smoothed_alike(seed, ends):
+    line = random_line(seed, count=12)
+    there = smooth_line(line, SIGMA, length_along(line), ends=ends)
+    back = smooth_line(line[::-1], SIGMA, length_along(line[::-1]), ends=ends)
+    np.testing.assert_allclose(back[::-1], there, atol=1e-9)
+
+
+@given(st.integers(0, 10**6), st.lists(st.floats(0.01, 0.99), min_size=1, max_size=20))
+@settings(max_examples=25, deadline=None)
+def test_vertices_inserted_on_segments_change_nothing(seed, shares):
+    line = random_line(seed, count=12)
+    t = length_along(line)
+    finer = np.union1d(t, np.array(shares) * t[-1])
+    inserted = np.column_stack([np.interp(finer, t, column) for column in line.T])
+    np.testing.assert_allclose(smooth_line(inserted, SIGMA, t), smooth_line(line, SIGMA, t), atol=1e-9)
+
+
+def test_repeated_vertices_change_nothing():
+    line = random_line(4)
+    stations = np.linspace(0, length_along(line)[-1], 17)
+    repeated = np.repeat(line, 3, axis=0)
+    np.testing.assert_allclose(smooth_line(repeated, SIGMA, stations), smooth_line(line, SIGMA, stations), atol=1e-9)
+
+
+def test_default_stations_are_the_vertices_and_quarters_of_sigma():
+    smoothed = smooth_line(np.array([[0.0, 0], [0.05, 0], [1.0, 0]]), SIGMA)
+    np.testing.assert_allclose(smoothed[:, 0], np.concatenate([[0], np.linspace(0.05, 1, 6)]), atol=1e-9)
+
+
+def test_profile_averages_equal_stations_and_takes_any_order():
+    t, z = np.array([0.0, 1.0, 1.0, 2.0, 3.0]), np.array([0.0, 0.8, 1.2, 2.0, 3.0])
+    stations = np.linspace(0, 3, 7)
+    np.testing.assert_allclose(smooth_profile(t, z, 1.0, stations), stations, atol=1e-9)
+    np.testing.assert_allclose(smooth_profile(t[::-1], z[::-1], 1.0, stations), stations, atol=1e-9)
+
+
+def test_profile_is_straight_across_a_long_gap_and_level_beyond_its_ends():
+    t = np.concatenate([np.linspace(0, 10, 101), np.linspace(20, 30, 101)])
+    z = np.where(t < 15, 1.0, 3.0)
+    smoothed = smooth_profile(t, z, 3.0, np.array([-5.0, 5, 10, 15, 20, 25, 40]))
+    np.testing.assert_allclose(smoothed, [1, 1, 1, 2, 3, 3, 3], atol=1e-9)
+
+
+def test_profile_of_one_point_is_level():
+    np.testing.assert_allclose(smooth_profile([4.0], [7.0], 3.0, np.array([0.0, 4.0, 9.0])), 7.0)
+
+
+def test_profile_does_not_mind_density():
+    t = np.concatenate([np.arange(0, 20, 0.01), np.arange(20, 40, 0.1)])
+    stations = np.linspace(13, 27, 31)
+    smoothed = smooth_profile(t, np.sin(t / 4), 1.0, stations)
+    np.testing.assert_allclose(smoothed, np.sin(stations / 4) * gain(8 * np.pi, 1.0), atol=1e-4)
+
+
+def wavy(x, y, seed):
+    return np.column_stack([x, y + 0.01 * np.random.default_rng(seed).normal(size=len(x))])
+
+
+def turnout():
+    """A through line whose vertex 200 is the node in which a branch of 1:9 starts."""
+    x = np.arange(0, 40, 0.1)
+    through = wavy(x, 0 * x, 1)
+    branch = wavy(x[200:], (x[200:] - x[200]) / 9, 2)
+    branch[0] = through[200]
+    nodes = np.array([through[0], through[-1], branch[0], branch[-1]])
+    return LineNetwork((through, branch), nodes, np.array([[0, 1], [2, 3]]), np.array([[2, 0, 200]]))
+
+
+def test_lines_of_a_network_still_meet_and_free_ends_stay():
+    network = turnout()
+    smoothed = smooth_network(network, SIGMA)
+    for line, (start, end) in zip(smoothed.lines, smoothed.ends):
+        np.testing.assert_array_equal(line[[0, -1]], smoothed.nodes[[start, end]])
+    for node, line, vertex in smoothed.passes:
+        np.testing.assert_array_equal(smoothed.lines[line][vertex], smoothed.nodes[node])
+    np.testing.assert_array_equal(smoothed.nodes[[0, 1, 3]], network.nodes[[0, 1, 3]])
+    np.testing.assert_array_equal(smoothed.ends, network.ends)
+
+
+def test_a_branch_does_not_bend_the_line_it_leaves():
+    network = turnout()
+    alone = LineNetwork(network.lines[:1], network.nodes[:2], network.ends[:1])
+    through, expected = smooth_network(network, SIGMA).lines[0], smooth_network(alone, SIGMA).lines[0]
+    t = length_along(expected)
+    np.testing.assert_allclose(through[:, 1], np.interp(through[:, 0], expected[:, 0], expected[:, 1]), atol=2e-5)
+    assert np.diff(t).max() <= SIGMA / NETWORK_STATIONS_PER_SIGMA + 1e-9
+
+
+def test_lines_cut_at_a_node_are_smoothed_as_one():
+    line = wavy(np.arange(0, 40, 0.1), np.zeros(400), 3)
+    whole = smooth_line(line, SIGMA, length_along(line)[[150, 200, 250]])
+    cut = LineNetwork((line[:201], line[200:][::-1]), line[[0, 200, -1]], np.array([[0, 1], [2, 1]]))
+    smoothed = smooth_network(cut, SIGMA)
+    np.testing.assert_allclose(smoothed.nodes[1], whole[1], atol=1e-9)
+
+
+def test_a_loop_in_a_network_is_smoothed_across_its_seam():
+    loop = circle(25, 4000)
+    smoothed = smooth_network(LineNetwork((loop,), loop[:1], np.array([[0, 0]])), SIGMA)
+    np.testing.assert_allclose(np.hypot(*smoothed.lines[0].T), 25, atol=1e-4)
+    np.testing.assert_array_equal(smoothed.lines[0][0], smoothed.lines[0][-1])
+
+
+def test_corners_at_a_node_are_not_smoothed_away():
+    first, second = np.array([[0.0, 0], [10, 0]]), np.array([[10.0, 0], [10, 10]])
+    nodes = np.array([[0.0, 0], [10, 0], [10, 10]])
+    smoothed = smooth_network(LineNetwork((first, second), nodes, np.array([[0, 1], [1, 2]])), SIGMA)
+    np.testing.assert_allclose(smoothed.nodes, nodes, atol=1e-9)
+
+
+def test_a_diamond_keeps_its_crossing_in_both_lines():
+    x = np.arange(-20, 20.05, 0.1)
+    lines = (wavy(x, x / 9, 5), wavy(x, -x / 9, 6))
+    for line in lines:
+        line[200] = 0
+    nodes = np.array([line[i] for line in lines for i in (0, -1)] + [[0.0, 0.0]])
+    network = LineNetwork(lines, nodes, np.array([[0, 1], [2, 3]]), np.array([[4, 0, 200], [4, 1, 200]]))
+    smoothed = smooth_network(network, SIGMA)
+    for node, line, vertex in smoothed.passes:
+        np.testing.assert_array_equal(smoothed.lines[line][vertex], smoothed.nodes[node])
+    assert np.hypot(*smoothed.nodes[4]) < 0.005
+
+
+def test_a_line_is_led_to_its_nodes_smoothly_and_only_near_them():
+    rng = np.random.default_rng(4)
+    t = np.arange(0, 400, 0.125)
+    places = np.array([2900, 0, 800, 803, 1600, len(t) - 1])
+    line = np.zeros((len(t), 2))
+    targets = rng.normal(0, 0.01, (len(places), 2))
+    lead(line, t, places, targets)
+    np.testing.assert_array_equal(line[places], targets)
+    assert np.abs(np.diff(line, 2, axis=0)).max() < 0.02 * 0.125  # no corner, though two nodes pull apart
+    midway = np.abs(t[:, None] - t[places]).min(axis=1) > 25
+    assert midway.sum() > 500
+    assert np.abs(line[midway]).max() < 1e-10
+
+
+def test_leading_a_line_equals_one_dense_system():
+    rng = np.random.default_rng(5)
+    t = np.cumsum(rng.uniform(0.05, 0.2, 4000))
+    places = np.sort(rng.choice(len(t), 40, replace=False))
+    line, targets = rng.normal(size=(len(t), 2)), rng.normal(size=(40, 2))
+
+    def fading(d):
+        return (1 + np.abs(d)) * np.exp(-np.abs(d))
+
+    weights = np.linalg.solve(fading(t[places][:, None] - t[places]), targets - line[places])
+    expected = line + fading(t[:, None] - t[places]) @ weights
+    lead(line, t, places, targets)
+    np.testing.assert_allclose(line, expected, atol=1e-9)

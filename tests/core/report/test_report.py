@@ -1,0 +1,220 @@
+"""The report: what it finds, what it says, and that it is one sound page whatever the network."""
+
+import re
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.rails import Centerline, RailLine, RailNetwork, TrackGeometry
+from rail_extract.core.report import build_page
+from rail_extract.core.report.findings import OFF_GAUGE, UNSUPPORTED, UNSURE, examine
+from rail_extract.core.report.markup import metres, table, tag, text
+from rail_extract.core.report.plots import curve, round_up, ticks
+
+GAUGE_MM = 1435.0
+FRAME = LocalFrame(np.array([500_000.0, 3_000_000.0, 400.0]))
+
+
+def track(track_id=1, length_m=100.0, step_m=1.0, **profiles):
+    """A straight track to the east, with stations at which everything is well unless told otherwise."""
+    along = np.arange(0.0, length_m + step_m / 2, step_m)
+    count = len(along)
+    xyz = np.column_stack([along, np.full(count, 5.0 * track_id), 0.002 * along])
+    usual = {
+        "gauge_mm": np.full(count, GAUGE_MM),
+        "cant_mm": np.zeros(count),
+        "twist_mm": np.zeros(count),
+        "radius_m": np.full(count, np.nan),
+        "grade_pm": np.full(count, 2.0),
+        "sigma_mm": np.full(count, 1.5),
+        "points": np.full(count, 200),
+        "bridged": np.zeros(count, dtype=bool),
+    }
+    geometry = TrackGeometry(track_id, xyz, along, **{**usual, **profiles})
+    ids = (2 * track_id - 1,), (2 * track_id,)
+    return Centerline(xyz, track_id, 10, *ids, GAUGE_MM, 0.5, 0.0, 0.0, 0.0), geometry
+
+
+def network(*tracks, more_rails=(), frame=FRAME):
+    rails = [
+        RailLine(line.xyz, rail_id, 10, 9000, 3.0, 1.0, 0.0)
+        for line, _ in tracks
+        for rail_id in (*line.left_ids, *line.right_ids)
+    ]
+    lines, geometry = zip(*tracks) if tracks else ((), ())
+    return RailNetwork((*rails, *more_rails), lines, frame, "PyTorch 2.0, CPU", geometry)
+
+
+def page(*tracks, gauges_m=(1.435,), source="cloud.laz", facts=None, **more):
+    return build_page(network(*tracks, **more), gauges_m, source, facts)
+
+
+def elements(html, name):
+    return [ET.fromstring(one) for one in re.findall(rf"<{name}\b.*?</{name}>", html, re.DOTALL)]
+
+
+def headline(html):
+    return re.search("<strong>(.*?)</strong>", html).group(1)
+
+
+def at(count, *numbers):
+    marked = np.zeros(count, dtype=bool)
+    marked[list(numbers)] = True
+    return marked
+
+
+def test_a_faultless_network_is_called_good():
+    html = page(track())
+    assert headline(html).startswith("Good throughout")
+    assert "Where to look" not in html
+    (tiles,) = elements(html, "h1")
+    assert tiles.text == "Rail Extract report"
+    for words in ("100.0 %", "1.5 mm", "1435.0 ± 0.5 mm", "straight", "PyTorch 2.0, CPU"):
+        assert words in html
+
+
+def test_every_metre_in_doubt_is_counted_once_and_under_the_gravest_reason():
+    gauge = np.full(101, GAUGE_MM)
+    gauge[[20, 21, 50]] = GAUGE_MM + 15, GAUGE_MM - 15, np.nan
+    sigma = np.full(101, 1.0)
+    sigma[[20, 80, 81, 82]] = 9.0
+    findings = examine(network(track(gauge_mm=gauge, sigma_mm=sigma, bridged=at(101, 21, 22))), (1.435,))
+    assert findings.length_of(UNSUPPORTED) == pytest.approx(3)  # 21, 22 and 50, where nothing is known
+    assert findings.length_of(OFF_GAUGE) == pytest.approx(1)
+    assert findings.length_of(UNSURE) == pytest.approx(3)
+    assert findings.share == pytest.approx(0.07)
+    assert findings.length_m == pytest.approx(100)
+
+
+def test_places_state_where_and_how_much():
+    bridged = at(101, 10, 11, 14, 40)
+    html = page(track(), track(2, bridged=bridged))
+    found = examine(network(track(2, bridged=bridged)), (1.435,)).places()
+    assert [(place.start_m, place.end_m, place.length_m) for place in found] == [(9.5, 14.5, 3.0), (39.5, 40.5, 1.0)]
+    assert headline(html) == "Good, but for a few places to look at."
+    assert "4.0 m of 200 m (2.0 %): a rail has no points. Longest: track 2, 10 to 14 m." in html
+    assert "9.5 to 14.5 m" in html
+
+
+@pytest.mark.parametrize(("count", "words"), [(20, "Usable"), (60, "Poor")])
+def test_the_verdict_follows_the_share_in_doubt(count, words):
+    assert headline(page(track(bridged=at(101, *range(count))))).startswith(words)
+
+
+def test_each_track_is_judged_by_its_own_gauge():
+    line, geometry = track(2, gauge_mm=np.full(101, 1001.0))
+    findings = examine(network(track(), (replace(line, gauge_mm=1001.0), geometry)), (1.435, 1.0))
+    assert [one.nominal_mm for one in findings.tracks] == [1435, 1000]
+    assert findings.share == 0
+
+
+def test_the_longest_places_are_listed_for_each_reason():
+    sigma = np.full(1001, 1.0)
+    sigma[100:900:20] = 9.0
+    bridged = at(1001, 950)
+    html = page(track(length_m=1000.0, sigma_mm=sigma, bridged=bridged))
+    rows = elements(html, "tbody")[0].findall("tr")
+    assert [row.findall("td")[3].text for row in rows] == ["a rail has no points"] + 5 * ["standard error above 5 mm"]
+    assert "35 more places are marked below." in html
+    marks = [one.get("class") for one in elements(html, "svg")[0].iter("path") if "mark" in one.get("class")]
+    assert marks == ["unsure mark", "unsupported mark"]  # the gravest on top
+
+
+def test_rails_without_a_track_are_told():
+    alone = RailLine(np.array([[0.0, 50, 0], [35, 50, 0]]), 99, 10, 10, 1.0, 1.0, 0.0)
+    assert "1 rail belongs to no track (35 m)." in page(track(), more_rails=(alone,))
+    html = page(more_rails=(alone, replace(alone, rail_id=98)))
+    assert headline(html).startswith("No track was found. There are 2 rails")
+    assert not elements(html, "svg")
+
+
+def test_curves_and_heights_are_stated_as_in_the_cloud():
+    radius = np.where(np.arange(101) < 50, np.nan, -600.0)
+    html = page(track(radius_m=radius))
+    assert "600 m right" in html
+    assert ">400<" in html  # a mark on the axis of heights
+    feet = replace(FRAME, horizontal_unit_m=0.3048, vertical_unit_m=0.3048)
+    assert ">122<" in page(track(), frame=feet)
+
+
+def test_the_page_needs_nothing_else_and_is_sound():
+    unknown = np.full(101, np.nan)
+    doubtful = track(2, gauge_mm=unknown, cant_mm=unknown, grade_pm=unknown, sigma_mm=unknown, bridged=at(101, 3, 4))
+    html = page(track(), doubtful)
+    assert not re.search(r"<script|<link|<img|\bsrc=|href=|https?:|url\(|@import", html)
+    pictures = elements(html, "svg")
+    assert len(pictures) == 3
+    for picture in pictures:
+        assert "nan" not in ET.tostring(picture, encoding="unicode").lower()
+    assert html.count("<section>") == html.count("</section>") == 6
+
+
+def test_all_text_is_escaped():
+    nasty = '<script>alert("1")</script>&'
+    html = page(track(), source=nasty, facts={nasty: nasty})
+    assert "<script" not in html
+    assert html.count("&lt;script&gt;") == 4  # the page's title, its head, name and value of the fact
+    assert tag("p", text("<&>"), title='"<') == '<p title="&quot;&lt;">&lt;&amp;&gt;</p>'
+    assert "<td>&lt;b&gt;</td>" in table(["a"], [["<b>"]])
+
+
+def test_marks_stand_in_every_panel_where_the_doubt_is():
+    html = page(track(bridged=at(101, *range(40, 60))))
+    plan, profiles = elements(html, "svg")
+    marks = [one for one in profiles.iter("rect") if one.get("class") == "unsupported"]
+    assert len(marks) == 5
+    panel = next(one for one in profiles.iter("rect") if one.get("class") == "panel")
+    left, width = float(panel.get("x")), float(panel.get("width"))
+    for mark in marks:
+        assert float(mark.get("x")) == pytest.approx(left + 0.395 * width, abs=0.1)
+        assert float(mark.get("width")) == pytest.approx(0.2 * width, abs=0.1)
+    assert [one for one in plan.iter("path") if one.get("class") == "unsupported mark"]
+
+
+def test_a_long_line_stays_a_small_page():
+    """Fifty kilometres by the metre: peaks are kept, and the page loads at once."""
+    gauge = GAUGE_MM + np.random.default_rng(1).normal(0, 2, 50_001)
+    gauge[31_234] = GAUGE_MM + 40
+    html = page(track(length_m=50_000.0, gauge_mm=gauge, bridged=np.arange(50_001) % 100 == 0))
+    assert len(html) < 1_500_000
+    assert "50.0 km" in html
+    _, profiles = elements(html, "svg")
+    paths = [one.get("d") for one in profiles.iter("path")]
+    heights = [float(y) for y in re.findall(r"[ML][\d.]+ (-?[\d.]+)", paths[1])]
+    assert min(heights) < sorted(heights)[1] - 10
+
+
+def test_curves_break_where_nothing_is_known():
+    x = np.arange(6.0)
+    assert curve(x, np.array([np.nan, 1, 2, np.nan, 3, np.nan])) == "M1.0 1.0L2.0 2.0M4.0 3.0"
+    assert curve(x, np.full(6, np.nan)) == ""
+
+
+@given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e6), st.integers(2, 12))
+def test_marks_of_an_axis_are_round_few_and_inside(low, span, count):
+    marks = ticks(low, low + span, count)
+    assert len(marks) <= count + 1
+    assert len(marks) >= count / 2.5 - 1
+    assert ((marks >= low - 1e-6 * span - 1e-8) & (marks <= low + span + 1e-6 * span + 1e-8)).all()
+    if len(marks) > 1:
+        step = marks[1] - marks[0]
+        np.testing.assert_allclose(np.diff(marks), step, rtol=1e-6, atol=1e-8)
+
+
+@given(st.floats(1e-6, 1e6))
+def test_rounding_up_gives_the_next_of_one_two_and_five(value):
+    found = round_up(value)
+    assert value <= found * (1 + 1e-9)
+    assert found < 2.6 * value
+    assert round(found / 10.0 ** np.floor(np.log10(found) + 1e-9), 6) in (1, 2, 5)
+
+
+@pytest.mark.parametrize(
+    ("length_m", "words"), [(0.42, "0.4 m"), (39.4, "39 m"), (1234, "1,234 m"), (12345, "12.3 km")]
+)
+def test_lengths_are_written_for_a_person(length_m, words):
+    assert metres(length_m) == words

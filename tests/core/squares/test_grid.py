@@ -1,0 +1,103 @@
+"""Stretches: the same squares however a cloud is cut, in an order that waits for neighbours, on one raster grid."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from rail_extract.core.clouds.points import RailPoints
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.raster import TILE, rasterize
+from rail_extract.core.squares.grid import (
+    MemorySource,
+    Square,
+    around,
+    assembled,
+    in_turn,
+    lay_out,
+    mosaic,
+    own_tiles,
+    unique_keys,
+)
+
+CELL = 0.04
+SIDE = 4 * TILE * CELL
+FRAME = LocalFrame(np.array([387_600.0, 1_430_200.0, 500.0]), 0.3048, 0.3048)
+
+keys = st.sets(st.tuples(st.integers(-3, 3), st.integers(-3, 3)), min_size=1)
+
+
+def cloud(seed=0, count=4000, length=150.0):
+    along = np.random.RandomState(seed).uniform(0, length, count)
+    return RailPoints(np.column_stack([along, 0.4 * along, np.full(count, 3.0)]), FRAME, 10)
+
+
+@given(keys)
+def test_every_square_has_its_turn_and_comes_ready_once_after_its_neighbours(squares):
+    passed, finished, gone = set(), [], []
+    for key, ready, spent in in_turn(squares):
+        passed.add(key)
+        finished += ready
+        assert all(set(around(one)) & squares <= passed for one in ready)
+        assert not {near for one in ready for near in around(one)} & set(gone)
+        gone += spent
+    assert sorted(finished) == sorted(gone) == sorted(squares)
+
+
+def test_squares_part_the_points_and_margins_overlap():
+    points = cloud()
+    source = MemorySource(points, SIDE)
+    stretches = lay_out([source], source)
+    own = [source.near(stretch, 0.0) for stretch in stretches]
+    assert len(stretches) > 4
+    assert sum(len(one.xyz) for one in own) == len(points.xyz) == sum(source.counts.values())
+    back = np.concatenate([one.frame.to_crs(one.xyz) for one in own])
+    np.testing.assert_allclose(np.sort(back[:, 0]), np.sort(FRAME.to_crs(points.xyz)[:, 0]), rtol=0, atol=1e-6)
+    for stretch in stretches:
+        xyz = source.near(stretch, 5.0).xyz
+        assert xyz[:, :2].min() >= -5 and xyz[:, :2].max() < SIDE + 5
+
+
+def test_the_grid_does_not_hang_on_the_local_origin():
+    points = cloud()
+    moved = LocalFrame(FRAME.origin + 1000.0, 0.3048, 0.3048)
+    other = RailPoints(moved.to_local(FRAME.to_crs(points.xyz)), moved, 10)
+    assert MemorySource(points, SIDE).counts == MemorySource(other, SIDE).counts
+
+
+def test_a_small_cloud_is_one_stretch_in_its_own_frame():
+    points = cloud(length=30.0)
+    source = MemorySource(points, SIDE)
+    (whole,) = lay_out([source], source)
+    assert source.near(whole, 0.0) is points
+    assert len(lay_out([source, MemorySource(cloud(), SIDE)], source)) > 1
+
+
+def test_rasters_of_stretches_make_the_raster_of_the_whole():
+    points = cloud()
+    source = MemorySource(points, SIDE)
+    stretches = {stretch.key: stretch for stretch in lay_out([source], source)}
+    rasters = {
+        key: own_tiles(rasterize(source.near(stretch, 1.0).xyz, CELL), stretch) for key, stretch in stretches.items()
+    }
+    whole = assembled(rasters, stretches, FRAME)
+    places = np.sort(whole.to_local(whole.cells()), axis=0)
+    zero = Square.square((0, 0), SIDE, FRAME)
+    direct = rasterize(points.xyz - zero.shift_to(FRAME), CELL)
+    expected = np.sort(direct.to_local(direct.cells()) + zero.shift_to(FRAME)[:2], axis=0)
+    np.testing.assert_allclose(places, expected, rtol=0, atol=1e-6)
+
+
+def test_a_mosaic_shows_what_the_neighbours_hold():
+    points = cloud()
+    source = MemorySource(points, SIDE)
+    stretches = {stretch.key: stretch for stretch in lay_out([source], source)}
+    rasters = {key: own_tiles(rasterize(source.near(one, 0.0).xyz, CELL), one) for key, one in stretches.items()}
+    key = sorted(stretches)[2]
+    seen = mosaic(rasters, stretches[key], 4)
+    expected = rasterize(source.near(stretches[key], SIDE - 1e-6).xyz, CELL)
+    assert set(seen.tiles) == set(expected.tiles)
+    assert all((seen.tiles[place] == expected.tiles[place]).all() for place in seen.tiles)
+
+
+def test_keys_are_floors():
+    found, number = unique_keys(np.array([[-0.1, 0.0, 0], [0.0, 0.0, 0], [9.99, 10.0, 0]]), 10.0)
+    assert [found[place] for place in number] == [(-1, 0), (0, 0), (0, 1)]

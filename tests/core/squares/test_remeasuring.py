@@ -1,0 +1,58 @@
+"""Rails measured anew by the points of one square at a time."""
+
+import numpy as np
+import pytest
+from rail_extract.core.clouds.points import RailPoints
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.rails import RailLine
+from rail_extract.core.squares.grid import MemorySource, lay_out
+from rail_extract.core.squares.remeasuring import measure_in_squares
+
+WIDTH = 0.072
+LENGTH, TUNNEL = 300.0, (85.0, 215.0)
+
+
+def rail_and_points():
+    """A straight rail as a file holds it, and points on its head, but for a tunnel."""
+    random = np.random.RandomState(3)
+    t = np.sort(random.uniform(0, LENGTH, 30_000))
+    t = t[(t < TUNNEL[0]) | (t > TUNNEL[1])]
+    xyz = np.column_stack([t, random.uniform(-0.5, 0.5, len(t)) * WIDTH, 0.002 * random.standard_normal(len(t))])
+    ends = np.array([[0.0, 0.0, 0.0], [LENGTH, 0.0, 0.0]])
+    return RailLine(ends, 7, 10, 30_000, 1.0, 0.5, 0.0), RailPoints(xyz, LocalFrame(np.zeros(3)), 10)
+
+
+@pytest.mark.parametrize("side", [1000.0, 100.0, 40.0])
+def test_a_tunnel_is_a_gap_whatever_squares_it_runs_through(side):
+    rail, points = rail_and_points()
+    source = MemorySource(points, side)
+    (measured,) = measure_in_squares([rail], source, lay_out([source], source), WIDTH)
+    np.testing.assert_allclose(measured.gaps, [TUNNEL], atol=0.2)
+    support = measured.support
+    inside = (support.t > TUNNEL[0] + 1) & (support.t < TUNNEL[1] - 1)
+    assert len(support.t) == pytest.approx(LENGTH / 0.25, abs=10)
+    assert support.points[inside].sum() == 0
+    assert support.points.sum() == pytest.approx(len(points.xyz), rel=0.02)
+    assert (support.sigma_m[inside][20:-20] > 0.005).all()
+    assert np.median(support.sigma_m[~inside]) < 0.002
+    assert measured.length_m == pytest.approx(LENGTH, abs=0.01)
+
+
+@pytest.mark.parametrize("side", [1000.0, 100.0, 50.0])
+def test_heights_run_straight_across_a_tunnel_on_a_gradient(side):
+    rail, points = rail_and_points()
+    lift = 0.03 * points.xyz[:, :1] * [0, 0, 1]
+    source = MemorySource(RailPoints(points.xyz + lift, points.frame, 10), side)
+    (measured,) = measure_in_squares([rail], source, lay_out([source], source), WIDTH)
+    x = np.arange(0.0, LENGTH, 0.5)
+    height = np.interp(x, measured.xyz[:, 0], measured.xyz[:, 2])
+    np.testing.assert_allclose(height, 0.03 * x, atol=0.006)
+
+
+def test_a_rail_beside_all_points_is_a_gap_from_end_to_end():
+    rail, points = rail_and_points()
+    away = RailPoints(points.xyz + [0, 5.0, 0], points.frame, 10)
+    source = MemorySource(away, 1000.0)
+    (measured,) = measure_in_squares([rail], source, lay_out([source], source), WIDTH)
+    np.testing.assert_array_equal(measured.gaps, [[0.0, LENGTH]])
+    np.testing.assert_allclose(measured.support.sigma_m, WIDTH / np.sqrt(12))

@@ -1,0 +1,94 @@
+"""Points on disk: all of them, bit by bit as in memory, and read but once."""
+
+import numpy as np
+import pytest
+from rail_extract.core.clouds.las import laspy
+from rail_extract.core.clouds.points import ask, read_rail_points
+from rail_extract.core.errors import Cancelled, NoRailPointsError
+from rail_extract.core.progress import Progress
+from rail_extract.core.squares.grid import MemorySource, Square, lay_out
+from rail_extract.core.squares.spool import spool
+
+SIDE = 30.0
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Two files of two classes, on a slant."""
+    along = np.random.RandomState(0).uniform(0, 100, 6000)
+    xyz = np.column_stack([500_000 + along, 5_400_000 - 0.7 * along, 300 + 0.01 * along])
+    codes = np.random.RandomState(1).choice([2, 10, 11], 6000).astype(np.uint8)
+    folder = tmp_path / "cloud"
+    folder.mkdir()
+    for number, part in enumerate((along < 47, along >= 47)):
+        header = laspy.LasHeader(version="1.4", point_format=6)
+        header.scales, header.offsets = np.full(3, 0.001), [500_000, 5_400_000, 0]
+        cloud = laspy.LasData(header)
+        cloud.x, cloud.y, cloud.z = xyz[part].T
+        cloud.classification = codes[part]
+        cloud.write(folder / f"{number}.laz")
+    return folder
+
+
+def test_disk_and_memory_give_the_same_points_in_the_same_frame(files, tmp_path):
+    spooled = spool(ask(files, [10, 11]), SIDE, tmp_path)
+    read = read_rail_points(files, [10, 11])
+    assert [one.class_code for one in spooled] == [one.class_code for one in read] == [10, 11]
+    for source, points in zip(spooled, read):
+        np.testing.assert_array_equal(source.frame.origin, points.frame.origin)
+        memory = MemorySource(points, SIDE)
+        assert source.counts == memory.counts
+        assert source.span_m == pytest.approx(memory.span_m, abs=1e-6)
+        for stretch in lay_out([source], source):
+            one, two = source.near(stretch, 7.0).xyz, memory.near(stretch, 7.0).xyz
+            np.testing.assert_allclose(one[np.lexsort(one.T)], two[np.lexsort(two.T)], rtol=0, atol=1e-8)
+        whole = source.near(Square((0, 0), source.frame, np.inf), 0.0).xyz
+        np.testing.assert_array_equal(whole[np.lexsort(whole.T)], points.xyz[np.lexsort(points.xyz.T)])
+
+
+def test_files_that_have_not_changed_are_not_read_again(files, tmp_path):
+    first = spool(ask(files, [10]), SIDE, tmp_path)
+    kept = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("10_*")}
+    second = spool(ask(files, [10]), SIDE, tmp_path)
+    assert {file: file.stat().st_mtime_ns for file in tmp_path.rglob("10_*")} == kept
+    assert second[0].counts == first[0].counts and second[0].span_m == first[0].span_m
+    np.testing.assert_array_equal(second[0].frame.origin, first[0].frame.origin)
+
+
+def test_a_reading_that_was_cut_off_starts_anew(files, tmp_path):
+    class Stopped(Progress):
+        left = 1
+
+        def is_cancelled(self):
+            self.left -= 1
+            return self.left < 0
+
+    with pytest.raises(Cancelled):
+        spool(ask(files, [10]), SIDE, tmp_path, Stopped())
+    again = spool(ask(files, [10]), SIDE, tmp_path)
+    assert sum(again[0].counts.values()) == len(read_rail_points(files, [10])[0].xyz)
+
+
+def test_two_readers_of_one_file_leave_it_whole(files, tmp_path):
+    class Racing(Progress):
+        others = 0
+
+        def is_cancelled(self):
+            if not self.others:
+                self.others = sum(spool(ask(files, [10]), SIDE, tmp_path)[0].counts.values())
+            return False
+
+    progress = Racing()
+    (source,) = spool(ask(files, [10]), SIDE, tmp_path, progress)
+    expected = len(read_rail_points(files, [10])[0].xyz)
+    assert sum(source.counts.values()) == progress.others == expected
+    assert len(source.near(Square((0, 0), source.frame, np.inf), 0.0).xyz) == expected
+    assert len([folder for folder in tmp_path.iterdir() if folder != files]) == 2
+
+
+def test_an_extent_and_classes_that_are_not_there(files, tmp_path):
+    extent = (500_000, 5_399_900, 500_020, 5_400_000)
+    (part,) = spool(ask(files, [10], extent=extent), SIDE, tmp_path)
+    assert sum(part.counts.values()) == len(read_rail_points(files, [10], extent=extent)[0].xyz)
+    with pytest.raises(NoRailPointsError, match="2 .*10 .*11"):
+        spool(ask(files, [7]), SIDE, tmp_path)

@@ -1,0 +1,237 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rail_extract.core.errors import NoTrackError
+from rail_extract.core.rails import RailLine
+from rail_extract.core.tracks.centerlines import CenterlineParameters, build_centerlines
+from rail_extract.laboratory.curves import Element, trace, transition_curve
+from rail_extract.laboratory.rasters.turnouts import FORMS, branch
+from rail_extract.laboratory.ruler.lines import compare_lines
+from rail_extract.laboratory.scenes.tracks import Track
+
+GAUGE, WIDTH = 1.435, 0.072
+SPACING = GAUGE + WIDTH
+STRAIGHT = trace([Element(60.0)], heading=0.7)
+CURVED = trace(transition_curve(30, 40, 60, 1 / 300), heading=-0.6)
+
+
+def rails_of(*lines, **fields):
+    fields = {"class_code": 10, "points": 0, "resid_mm": 0.0, "sigma_mm": 0.0, "bridged_m": 0.0, **fields}
+    return [RailLine(np.asarray(line), number, **fields) for number, line in enumerate(lines, start=1)]
+
+
+def flat(xy):
+    return np.column_stack([xy, np.zeros(len(xy))])
+
+
+def track(curve, left_m=0.0, spacing=SPACING, height=0.0, cant=0.0):
+    """Left rail, right rail and centerline."""
+    laid = Track(curve, spacing, height, cant, left_m)
+    return (*laid.rails(), laid.thinned(laid.centerline))
+
+
+def without(line, start, end):
+    """The two parts of a line on both sides of a gap, by share of its vertices."""
+    count = len(line)
+    return line[: int(start * count)], line[int(end * count) :]
+
+
+@pytest.mark.parametrize("radius", [25.0, 200.0, 1500.0])
+@pytest.mark.parametrize("turned", [False, True])
+def test_centerline_of_concentric_arcs_is_the_arc_between(radius, turned):
+    angle = np.linspace(0, min(30 / radius, 2.5), 800)
+    arcs = [
+        flat(ring * np.column_stack([np.cos(angle), np.sin(angle)]))
+        for ring in radius + SPACING * np.array([0.5, -0.5])
+    ]
+    (line,) = build_centerlines(rails_of(arcs[0], arcs[1][::-1] if turned else arcs[1]), GAUGE, WIDTH)
+    tolerance = 1e-4 if radius > 100 else 4e-4  # chords between stations show on the tightest curve
+    np.testing.assert_allclose(np.hypot(*line.xyz[:, :2].T), radius, atol=tolerance)
+    assert line.gauge_mm == pytest.approx(1435.0, abs=0.2)
+    assert line.gaugesd_mm < 0.2
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("begins", [0.0, 0.03, 0.05, 2.0, 6.2])
+def test_a_ring_becomes_one_closed_centerline(begins, turned):
+    """Wherever its two rails begin, and whichever way they run."""
+    angle = np.linspace(0, 2 * np.pi, 1500)
+    outer, inner = (
+        flat(radius * np.column_stack([np.cos(angle + start), np.sin(angle + start)]))
+        for radius, start in ((30 + 0.5 * SPACING, 1.0), (30 - 0.5 * SPACING, 1.0 + begins))
+    )
+    outer[-1], inner[-1] = outer[0], inner[0]
+    (line,) = build_centerlines(rails_of(outer, inner[::-1] if turned else inner), GAUGE, WIDTH)
+    np.testing.assert_array_equal(line.xyz[0], line.xyz[-1])
+    np.testing.assert_allclose(np.hypot(*line.xyz[:, :2].T), 30, atol=3e-4)
+    assert line.length_m == pytest.approx(60 * np.pi, rel=1e-4)
+    assert line.bridged_m < 0.1
+
+
+@pytest.mark.parametrize("curve", [STRAIGHT, CURVED])
+def test_three_tracks_give_three_centerlines_at_gauge(curve):
+    lines = [track(curve, left_m) for left_m in (0.0, 4.0, 8.0)]
+    rails = rails_of(*(rail for left, right, _ in lines for rail in (left, right)))
+    found = build_centerlines(rails, GAUGE, WIDTH)
+    assert len(found) == 3
+    assert [line.track_id for line in found] == [1, 2, 3]
+    for line in found:
+        assert line.gauge_mm == pytest.approx(1435.0, abs=1.0)
+        assert line.length_m == pytest.approx(curve.length_m, rel=0.05)
+        assert line.bridged_m < 1.0
+    result = compare_lines([line.xyz for line in found], [middle for _, _, middle in lines])
+    assert result.completeness > 0.995
+    assert result.correctness > 0.995
+    assert result.lateral_rmse_m < 0.0015
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("heading", [0.5, 0.5 + np.pi])
+def test_cant_is_left_minus_right_along_the_line(sign, heading):
+    """Rails and curve may run either way: what counts is the line, which starts in the west."""
+    curve = trace([Element(50.0)], heading=heading)
+    left, right, _ = track(curve, cant=sign * 0.1, height=0.002 * curve.chainage)
+    (line,) = build_centerlines(rails_of(left, right[::-1]), GAUGE, WIDTH)
+    seen = sign if np.cos(heading) > 0 else -sign
+    assert line.xyz[0, 0] < line.xyz[-1, 0]
+    assert line.cant_mm == pytest.approx(100 * seen, abs=0.1)
+    assert line.cantmax_mm == pytest.approx(100 * seen, abs=0.1)
+    assert line.gauge_mm == pytest.approx(1435.0, abs=0.1)
+    assert (line.left_ids, line.right_ids) == (((1,), (2,)) if np.cos(heading) > 0 else ((2,), (1,)))
+    along = np.linalg.norm(line.xyz[:, :2] - curve.xy[0], axis=1)
+    np.testing.assert_allclose(line.xyz[:, 2], 0.002 * along, atol=0.002)
+
+
+def test_largest_cant_keeps_its_sign():
+    cant = np.linspace(0.02, -0.08, len(STRAIGHT.xy))
+    left, right, _ = track(STRAIGHT, cant=cant)
+    (line,) = build_centerlines(rails_of(left, right), GAUGE, WIDTH)
+    assert line.cantmax_mm == pytest.approx(-80, abs=1)
+    assert line.cant_mm == pytest.approx(-30, abs=1)
+
+
+@pytest.mark.parametrize("curve", [STRAIGHT, CURVED])
+def test_rails_broken_in_different_places_give_one_centerline(curve):
+    left, right, middle = track(curve)
+    left_parts, right_parts = without(left, 0.3, 0.32), without(right, 0.6, 0.62)
+    rails = rails_of(left_parts[1], left_parts[0][::-1], right_parts[0], right_parts[1])
+    (line,) = build_centerlines(rails, GAUGE, WIDTH)
+    result = compare_lines([line.xyz], [middle])
+    assert result.completeness > 0.99
+    assert result.lateral_p95_m < 0.003
+    assert {line.left_ids, line.right_ids} == {(2, 1), (3, 4)}
+    gaps = [np.linalg.norm(second[0] - first[-1]) for first, second in (left_parts, right_parts)]
+    assert line.bridged_m == pytest.approx(sum(gaps), abs=0.5)
+
+
+@pytest.mark.parametrize(("gap", "count"), [(4.0, 1), (8.0, 2)])
+def test_gaps_in_both_rails_are_bridged_up_to_the_longest_allowed(gap, count):
+    share = gap / CURVED.length_m
+    left, right, middle = track(CURVED)
+    parts = [*without(left, 0.5, 0.5 + share), *without(right, 0.5, 0.5 + share)]
+    found = build_centerlines(rails_of(*parts), GAUGE, WIDTH)
+    assert len(found) == count
+    assert compare_lines([line.xyz for line in found], [middle]).lateral_p95_m < 0.012
+
+
+def test_long_tracks_are_one_line():
+    curve = trace([Element(1500.0, 1 / 3000, 1 / 3000)], step_m=0.1)
+    left, right, _ = track(curve)
+    (line,) = build_centerlines(rails_of(left, right), GAUGE, WIDTH)
+    assert line.length_m == pytest.approx(1500.0, abs=0.5)
+    assert (line.left_ids, line.right_ids) in (((1,), (2,)), ((2,), (1,)))
+
+
+@pytest.mark.parametrize("form", [form for form in FORMS if form.name in ("190-1:7.5", "300-1:9", "760-1:14")])
+@pytest.mark.parametrize("hand", [1, -1])
+def test_turnouts_fork_into_two_centerlines(form, hand):
+    main = trace([Element(110.0)], heading=0.3)
+    side = branch(main, 20.0, form, hand, 25.0)
+    outer, inner, through = track(main)
+    branch_left, branch_right, diverging = track(side)
+    # The branch's rails begin where they have left the stock rails by the width of a head.
+    rails = rails_of(
+        outer, inner, *(line[np.linalg.norm(line - line[0], axis=1) > 8.0] for line in (branch_left, branch_right))
+    )
+    found = build_centerlines(rails, GAUGE, WIDTH)
+    assert len(found) == 2
+    result = compare_lines([line.xyz for line in found], [through, diverging])
+    assert result.correctness > 0.995
+    assert result.completeness > 0.995
+    assert max(line.length_m for line in found) == pytest.approx(110.0, abs=1.0)
+
+
+def test_rails_without_heights_give_a_centerline_without():
+    left, right, middle = track(CURVED)
+    rails = rails_of(left * [1, 1, np.nan], right * [1, 1, np.nan])
+    (line,) = build_centerlines(rails, GAUGE, WIDTH)
+    assert np.isnan(line.xyz[:, 2]).all()
+    assert np.isnan(line.cant_mm)
+    assert line.gauge_mm == pytest.approx(1435.0, abs=1.0)
+    assert line.length_m == pytest.approx(CURVED.length_m, abs=0.5)
+
+
+@pytest.mark.parametrize("cant", [0.0, 0.1])
+@pytest.mark.parametrize("side", [0, 1])
+def test_where_one_rail_is_missing_the_other_tells_the_height(cant, side):
+    """Beyond its end on a gradient, and in a gap of it in a sag."""
+    x = STRAIGHT.chainage
+    for height, cut in ((0.04 * x, slice(0, -60)), (x**2 / 4000, slice(0, None))):
+        left, right, middle = track(STRAIGHT, height=height, cant=cant)
+        rails = [left, right]
+        rails[side] = rails[side][cut]
+        if cut.stop is None:
+            rails[side : side + 1] = without(rails[side], 0.3, 0.7)
+        (line,) = build_centerlines(rails_of(*rails), GAUGE, WIDTH)
+        t = np.hypot(*(line.xyz[:, :2] - middle[0, :2]).T)
+        expected = np.interp(t, np.hypot(*(middle[:, :2] - middle[0, :2]).T), middle[:, 2])
+        np.testing.assert_allclose(line.xyz[:, 2], expected, atol=0.002)
+
+
+def test_what_rails_bridged_counts_for_the_track():
+    left, right, _ = track(STRAIGHT)
+    (left_rail, right_rail) = rails_of(left, right)
+    left_rail = replace(left_rail, gaps=np.array([[10.0, 13.0], [30.0, 31.0]]))
+    right_rail = replace(right_rail, gaps=np.array([[12.0, 15.0]]))
+    # The gaps of both rails overlap by a metre, which counts once; a rail that runs the other way has the same gaps.
+    for rails in ([left_rail, right_rail], [left_rail.reversed(), right_rail], [left_rail, right_rail.reversed()]):
+        (line,) = build_centerlines(rails, GAUGE, WIDTH)
+        assert line.bridged_m == pytest.approx(6.0, abs=0.01)
+
+
+def test_length_bridged_is_counted_along_the_rail():
+    (rail,) = rails_of([[0.0, 0, 0], [20.0, 0, 0]], gaps=np.array([[2.0, 5.0], [9.0, 10.0]]))
+    t = np.array([-1.0, 0.0, 2.0, 3.5, 7.0, 9.5, 20.0, 21.0, np.nan])
+    np.testing.assert_allclose(rail.bridged_before(t), [-1, 0, 0, 1.5, 3, 3.5, 4, 5, np.nan])
+    np.testing.assert_allclose(rail.reversed().gaps, [[10, 11], [15, 18]])
+    np.testing.assert_allclose(rail.reversed().bridged_before(20 - t), 4 - rail.bridged_before(t))
+
+
+@pytest.mark.parametrize(
+    ("gauge", "width", "question"),
+    [(1.52, 0.072, ", is the gauge 1520 mm?"), (1.0, 0.072, ", is the gauge 1000 mm?"), (1.25, 0.072, ".")],
+)
+def test_another_gauge_is_refused_with_the_spacing_measured(gauge, width, question):
+    left, right, _ = track(CURVED, spacing=gauge + width)
+    with pytest.raises(NoTrackError) as refusal:
+        build_centerlines(rails_of(left, right), GAUGE, WIDTH)
+    apart = round(1000 * (gauge + width))
+    assert str(refusal.value) == f"No track of 1435 mm gauge found: rails lie {apart} mm apart{question}"
+
+
+@pytest.mark.parametrize("curve", [STRAIGHT, CURVED])
+@pytest.mark.parametrize("off", [-0.35, -0.24, 0.24, 0.45])
+def test_rails_as_far_off_the_gauge_as_allowed_make_a_track(curve, off):
+    left, right, middle = track(curve, spacing=SPACING + off)
+    (line,) = build_centerlines(rails_of(left, right), GAUGE, WIDTH, CenterlineParameters(tolerance_m=0.5))
+    assert line.gauge_mm == pytest.approx(1000 * (GAUGE + off), abs=0.5)
+    assert compare_lines([line.xyz], [middle]).lateral_rmse_m < 0.001
+
+
+def test_lone_rails_give_no_centerline():
+    left, right, _ = track(STRAIGHT)
+    assert build_centerlines([], GAUGE, WIDTH) == ()
+    assert build_centerlines(rails_of(left), GAUGE, WIDTH) == ()
+    assert build_centerlines(rails_of(left, right + [2.0, -2.0, 0.0]), GAUGE, WIDTH) == ()
+    assert build_centerlines(rails_of(left[:4], right[:4]), GAUGE, WIDTH) == ()

@@ -1,0 +1,385 @@
+"""From drawn rails to lines and back: accuracy, junctions, gaps, and what must never be joined."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rail_extract.core.errors import Cancelled
+from rail_extract.core.lines.network import LineNetwork
+from rail_extract.core.lines.network_smoothing import smooth_network
+from rail_extract.core.polyline import length_along
+from rail_extract.core.progress import Progress
+from rail_extract.core.raster import RailRaster
+from rail_extract.core.vectorize import vectorize
+from rail_extract.core.vectorize.joining import join_gaps
+from rail_extract.core.vectorize.junctions import (
+    contract_links,
+    drop_bubbles,
+    drop_rungs,
+    drop_spurs,
+    run_through,
+    weld_pairs,
+)
+from rail_extract.laboratory.curves import Element, trace
+from rail_extract.laboratory.rasters.turnouts import FORMS, branch
+from scipy.spatial import cKDTree
+
+CELL_M = 0.04
+HEAD_M = 0.0762
+
+
+def dense(line, step_m=0.005):
+    t = length_along(line)
+    at = np.linspace(0, t[-1], int(t[-1] / step_m) + 2)
+    return np.column_stack([np.interp(at, t, axis) for axis in line.T])
+
+
+def draw(lines, x0=0.0, y0=0.0):
+    """Set the cells whose centre lies within half a railhead of a line."""
+    raster = RailRaster({}, CELL_M, x0, y0)
+    points = np.concatenate([dense(line, 0.01) for line in lines])
+    at = np.unique(np.floor(np.column_stack([y0 - points[:, 1], points[:, 0] - x0]) / CELL_M).astype(int), axis=0)
+    around = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), -1).reshape(-1, 2)
+    cells = np.unique((at[:, None] + around).reshape(-1, 2), axis=0)
+    return raster.with_cells(cells[cKDTree(points).query(raster.to_local(cells))[0] <= HEAD_M / 2])
+
+
+def offsets(line, truth):
+    """Distance of a line from the truth, its last half metres left out."""
+    points = dense(line, 0.02)
+    return cKDTree(dense(truth, 0.002)).query(points[25:-25])[0]
+
+
+def straight(length, slope, start=(3.017, -2.009)):
+    direction = np.array([1.0, slope]) / np.hypot(1.0, slope)
+    return np.array(start) + np.outer([0.0, length], direction)
+
+
+def arc(length, radius, heading=0.3):
+    return trace([Element(length, 1 / radius, 1 / radius)], (1.003, -50.011), heading).xy
+
+
+def smoothed(raster, **parameters):
+    return smooth_network(vectorize(raster, HEAD_M, **parameters), 0.8).lines
+
+
+def check_invariants(network):
+    for line, (start, end) in zip(network.lines, network.ends):
+        np.testing.assert_array_equal(line[[0, -1]], network.nodes[[start, end]])
+    for node, line, vertex in network.passes:
+        np.testing.assert_array_equal(network.lines[line][vertex], network.nodes[node])
+    assert (network.degrees() > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("truth", "rms_mm"),
+    [
+        (straight(30, 0.0), 12),
+        (straight(30, 1 / 200), 12),
+        (straight(30, 1 / 50), 12),
+        (straight(30, 1 / 18), 5),
+        (straight(30, -1 / 9), 5),
+        (straight(30, 0.7), 5),
+        (straight(30, 3.0), 5),
+        (arc(60, 190), 5),
+        (arc(60, 25), 5),
+        (arc(60, -600, heading=2.0), 5),
+    ],
+)
+def test_a_drawn_rail_comes_back(truth, rms_mm):
+    (line,) = smoothed(draw([truth]))
+    assert np.sqrt(np.mean(offsets(line, truth) ** 2)) < rms_mm / 1000
+    np.testing.assert_allclose(sorted(np.hypot(*(line[[0, -1]] - truth[0]).T))[0], 0, atol=0.04)
+    assert length_along(line)[-1] == pytest.approx(length_along(truth)[-1], abs=0.08)
+
+
+def test_a_loop_comes_back_closed():
+    angle = np.linspace(0, 2 * np.pi, 2000)
+    truth = 25 * np.column_stack([np.cos(angle), np.sin(angle)])
+    (line,) = smoothed(draw([truth]))
+    np.testing.assert_array_equal(line[0], line[-1])
+    assert np.sqrt(np.mean((np.hypot(*line.T) - 25) ** 2)) < 0.003
+
+
+def three_tracks(length=160):
+    curve = trace([Element(60), Element(40, 0, 1 / 300), Element(length - 100, 1 / 300, 1 / 300)], heading=0.43)
+    return [curve.offset(track + side) for track in (0.0, 4.0, 8.0) for side in (-0.531, 0.531)]
+
+
+@cache
+def scene(seed):
+    """Six rails with gaps, ragged flanks and weeds."""
+    random = np.random.default_rng(seed)
+    pieces, rails = [], three_tracks()
+    for rail in rails:
+        t = length_along(rail)
+        keep = np.ones(len(rail), dtype=bool)
+        for start in np.arange(10, 150, 12) + random.uniform(0, 5, 12):
+            keep &= (t < start) | (t > start + random.uniform(0.3, 3.0))
+        pieces += [part for part in np.split(rail, np.flatnonzero(np.diff(keep)) + 1) if len(part) > 30]
+        pieces = [part for part in pieces if len(part) > 160]
+    raster = draw(pieces)
+    cells = raster.cells()
+    flank = np.concatenate([cells + step for step in ([0, 1], [1, 0], [0, -1], [-1, 0])])
+    noise = [cells[random.random(len(cells)) > 0.05], flank[random.random(len(flank)) < 0.03]]
+    for middle in cells[random.integers(len(cells), size=25)] + random.integers(-30, 31, (25, 2)):
+        weed = random.normal(0, random.uniform(1, 3), (60, 2)).round().astype(int)
+        noise.append(middle + weed)
+    return raster.with_cells(np.concatenate(noise)), rails
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_three_noisy_tracks_with_gaps_give_one_line_a_rail(seed):
+    raster, rails = scene(seed)
+    network = vectorize(raster, HEAD_M)
+    check_invariants(network)
+    lines = smooth_network(network, 0.8).lines
+    assert 6 <= len(lines) <= 8
+    off = cKDTree(np.concatenate([dense(rail, 0.01) for rail in rails]))
+    found = cKDTree(np.concatenate([dense(line, 0.01) for line in lines]))
+    astray = np.concatenate([off.query(dense(line))[0] for line in lines]) > 0.05
+    missed = np.concatenate([found.query(dense(rail))[0] for rail in rails]) > 0.05
+    assert astray.mean() < 0.005
+    assert missed.mean() < 0.01
+
+
+def test_the_place_in_the_grid_of_tiles_does_not_matter():
+    raster, _ = scene(1)
+    moved = RailRaster({}, CELL_M, raster.x0 - 77 * CELL_M, raster.y0 + 131 * CELL_M).with_cells(
+        raster.cells() + [131, 77]
+    )
+    expected, found = vectorize(raster, HEAD_M), vectorize(moved, HEAD_M)
+    assert len(expected.lines) == len(found.lines)
+    for one, other in zip(expected.lines, found.lines):
+        np.testing.assert_allclose(one, other, atol=1e-9)
+
+
+def with_gap(line, start, length):
+    t = length_along(line)
+    return [line[t <= start], line[t >= start + length]]
+
+
+@pytest.mark.parametrize("radius", [25, 190, 1e9])
+@pytest.mark.parametrize("gap", [0.3, 1.5, 4.0])
+def test_gaps_are_bridged_along_the_curve(radius, gap):
+    truth = arc(24, radius)
+    (line,) = smoothed(draw(with_gap(truth, 10, gap)))
+    assert offsets(line, truth).max() < 0.02
+
+
+def test_a_gap_in_a_reverse_curve_is_bridged():
+    truth = trace([Element(20, 1 / 190, 1 / 190), Element(20, -1 / 190, -1 / 190)], (0.0, 0.0), 0.4).xy
+    (line,) = smoothed(draw(with_gap(truth, 18, 4)))
+    assert offsets(line, truth).max() < 0.02
+
+
+def test_a_gap_where_a_tram_enters_a_sharp_curve_is_bridged():
+    truth = trace([Element(20), Element(20, -1 / 30, -1 / 30)], (0.0, 0.0), 0.4).xy
+    (line,) = smoothed(draw(with_gap(truth, 18, 4)))
+    assert offsets(line, truth).max() < 0.05
+
+
+def test_gaps_longer_than_allowed_stay():
+    pieces = with_gap(straight(30, 0.4)[[0]] + np.outer(np.arange(0, 30, 0.1), [0.93, 0.37]), 10, 4)
+    assert len(vectorize(draw(pieces), HEAD_M, max_gap_m=5).lines) == 1
+    assert len(vectorize(draw(pieces), HEAD_M, max_gap_m=3.5).lines) == 2
+
+
+@pytest.mark.parametrize("spacing", [0.3, 0.5, 1.06, 1.5])
+@pytest.mark.parametrize("gap", [1.0, 4.0])
+def test_the_neighbouring_rail_is_never_joined(spacing, gap):
+    first, second = straight(20, 0.3), straight(20, 0.3)
+    second = second + (first[1] - first[0]) * (1 + gap / 20) + spacing * np.array([-0.287, 0.958])
+    assert len(vectorize(draw([first, second]), HEAD_M).lines) == 2
+
+
+def test_a_weed_before_a_rail_end_is_not_joined():
+    rail = straight(20, 0.3)
+    direction = (rail[1] - rail[0]) / 20
+    weed = rail[1] + np.outer([0.6, 1.2], direction) + np.outer([0.25, 0.65], [-direction[1], direction[0]])
+    network = vectorize(draw([rail, weed]), HEAD_M, min_length_m=0.3)
+    assert len(network.lines) == 2
+
+
+def test_the_nearer_of_two_rails_that_end_is_not_preferred_to_the_straight_one():
+    rail = np.outer(np.arange(0, 30, 0.1), [0.9578, 0.2873]) + [0.013, 0.007]
+    stray = rail[150:152] + [[0.0, 0.0], [1.0, 1.5]]
+    line = max(smoothed(draw([*with_gap(rail, 12, 4), stray])), key=len)
+    assert length_along(line)[-1] == pytest.approx(29.9, abs=0.1)
+    assert offsets(line, rail).max() < 0.03
+
+
+def test_a_branch_ends_in_the_through_rail():
+    through = straight(40, 0.2)
+    turn = np.array([[1, -1 / 9], [1 / 9, 1]])
+    branch = np.array([through.mean(axis=0), through.mean(axis=0) + turn @ (through[1] - through[0]) * 0.4])
+    network = vectorize(draw([through, branch]), HEAD_M)
+    check_invariants(network)
+    assert sorted(network.degrees()) == [1, 1, 1, 3]
+    lengths = sorted(network.lengths())
+    assert lengths[1] > 39.5
+    assert network.passes[0, 1] == np.argmax(network.lengths())
+    smooth = smooth_network(network, 0.8)
+    check_invariants(smooth)
+    assert offsets(smooth.lines[network.passes[0, 1]], through).max() < 0.06
+
+
+@pytest.mark.parametrize("slope", [1 / 6, 1 / 9, 1 / 14])
+def test_rails_that_cross_are_two_straight_lines(slope):
+    angle = np.arctan(slope) / 2
+    rails = [np.outer([-25, 25], [np.cos(0.4 + a), np.sin(0.4 + a)]) for a in (angle, -angle)]
+    lines = smoothed(draw(rails))
+    assert len(lines) == 2
+    for line in lines:
+        assert min(offsets(line, rail).max() for rail in rails) < 0.015
+
+
+@pytest.mark.parametrize(
+    ("name", "curvature"), [("tram 25", 0.0), ("190-1:9", 0.0), ("300-1:9", 1 / 400), ("500-1:12", 0.0)]
+)
+def test_a_turnout_has_two_rails_through_and_two_that_begin_where_they_part(name, curvature):
+    form = next(form for form in FORMS if form.name == name)
+    main = trace([Element(65 + form.arc_m, curvature, curvature)], heading=0.35)
+    side = branch(main, 25.0, form, -1, 20.0)
+    rails = [curve.offset(left) for curve in (main, side) for left in (-0.7556, 0.7556)]
+    network = vectorize(draw(rails), HEAD_M)
+    check_invariants(network)
+    assert len(network.lines) == 4
+    assert sorted(network.degrees()) == [1] * 6 + [3] * 2
+    lines = smooth_network(network, 0.8).lines
+    truth = cKDTree(np.concatenate([dense(rail, 0.005) for rail in rails]))
+    found = cKDTree(np.concatenate([dense(line, 0.02) for line in lines]))
+    assert max(found.query(dense(rail, 0.05))[0].max() for rail in rails) < 0.05
+    astray = np.concatenate([truth.query(line)[0] for line in lines])
+    assert astray.max() < 0.05
+    assert np.sqrt(np.mean(astray**2)) < 0.006
+    longest = sorted(length_along(line)[-1] for line in lines)[-2:]
+    np.testing.assert_allclose(longest, main.length_m, rtol=0.02)
+
+
+def test_no_cells_no_lines():
+    network = vectorize(RailRaster({}, CELL_M, 0.0, 0.0), HEAD_M)
+    assert network.lines == ()
+    assert smooth_network(network, 0.8).lines == ()
+
+
+def test_short_pieces_are_dropped():
+    assert len(vectorize(draw([straight(0.8, 0.3), straight(5, 0.3, (20, 0))]), HEAD_M).lines) == 1
+
+
+def test_a_cancel_ends_the_work():
+    class Impatient(Progress):
+        def is_cancelled(self):
+            return True
+
+    with pytest.raises(Cancelled):
+        vectorize(draw([straight(5, 0.3)]), HEAD_M, progress=Impatient())
+
+
+def test_a_cancel_is_asked_for_at_every_line():
+    class Counting(Progress):
+        asked = 0
+
+        def check(self):
+            Counting.asked += 1
+
+    rails = [straight(8, 0.3, (0.0, 2.0 * number)) for number in range(30)]
+    progress = Counting()
+    progress.span = lambda start, end: progress
+    vectorize(draw(rails), HEAD_M, progress=progress)
+    assert Counting.asked > 3 * len(rails)
+
+
+def star(*tips):
+    """Straight lines from the origin, vertices a metre apart."""
+    lines = tuple(np.outer(np.linspace(0, 1, max(int(np.hypot(*tip)), 1) + 1), tip) for tip in tips)
+    nodes = np.array([(0.0, 0.0), *tips])
+    return LineNetwork(lines, nodes, np.column_stack([np.zeros(len(tips), int), np.arange(1, len(tips) + 1)]))
+
+
+def test_spurs_go_one_at_a_time_so_that_a_rail_keeps_its_end():
+    network = drop_spurs(star((-10.0, 0.0), (0.1, 0.05), (0.12, -0.05)), 0.15)
+    assert len(network.lines) == 1
+    assert network.lengths()[0] == pytest.approx(10.13, abs=0.001)
+    check_invariants(network)
+
+
+def test_through_lines_pass_the_node_and_the_steeper_line_ends_there():
+    network = run_through(star((-10.0, 0.0), (10.0, 0.2), (10.0, 1.5), (0.0, 8.0)))
+    check_invariants(network)
+    assert len(network.lines) == 3
+    assert network.passes.shape == (1, 3)
+    assert sorted(network.lengths())[-1] == pytest.approx(20, abs=0.01)
+
+
+def test_junctions_close_to_each_other_become_one():
+    left, right = star((-10.0, 0.0), (-10.0, 1.0)), star((10.0, 0.0), (10.0, 1.0))
+    link = np.array([[0.0, 0.0], [0.05, 0.0]])
+    lines = (*left.lines, *(line + [0.05, 0] for line in right.lines), link)
+    nodes = np.concatenate([left.nodes, right.nodes + [0.05, 0]])
+    network = contract_links(LineNetwork(lines, nodes, np.array([[0, 1], [0, 2], [3, 4], [3, 5], [0, 3]])), 0.0762)
+    check_invariants(network)
+    assert sorted(network.degrees()) == [1, 1, 1, 1, 4]
+    np.testing.assert_allclose(network.nodes[network.degrees() == 4], [[0.025, 0]])
+
+
+def test_a_rung_between_two_rails_is_dropped():
+    x = np.array([-5.0, 0.0, 5.0])
+    nodes = np.array([(side, y) for y in (0.0, 0.13) for side in x])
+    lines = [nodes[[0, 1]], nodes[[1, 2]], nodes[[3, 4]], nodes[[4, 5]], nodes[[1, 4]]]
+    network = LineNetwork(tuple(lines), nodes, np.array([[0, 1], [1, 2], [3, 4], [4, 5], [1, 4]]))
+    assert len(drop_rungs(network, 0.1).lines) == 5
+    rails = weld_pairs(drop_rungs(network, 0.2))
+    assert len(rails.lines) == 2
+    np.testing.assert_allclose(rails.lengths(), 10)
+
+
+def test_a_weed_on_the_flank_is_no_branch():
+    rail = straight(20, 0.3)
+    weed = rail.mean(axis=0) + np.outer([0.0, 0.8], [0.0, 1.0])
+    assert len(vectorize(draw([rail, weed]), HEAD_M, min_length_m=0.3).lines) == 1
+
+
+@given(st.permutations(range(6)), st.lists(st.booleans(), min_size=6, max_size=6), st.booleans())
+@settings(max_examples=30, deadline=None)
+def test_welding_restores_a_line_cut_into_pieces(order, turned, closed):
+    angle = np.linspace(0, 2 * np.pi if closed else 5.0, 31)
+    whole = np.column_stack([np.cos(angle), np.sin(angle)])
+    whole[-1] = whole[0] if closed else whole[-1]
+    pieces = [whole[5 * number : 5 * number + 6] for number in order]
+    ends = [(number, (number + 1) % 6 if closed else number + 1) for number in order]
+    lines = tuple(piece[::-1] if back else piece for piece, back in zip(pieces, turned))
+    ends = np.array([end[::-1] if back else end for end, back in zip(ends, turned)])
+    welded = weld_pairs(LineNetwork(lines, whole[: 30 if closed else 31 : 5], ends))
+    check_invariants(welded)
+    (line,) = welded.lines
+    assert len(line) == 31
+    np.testing.assert_allclose(length_along(line)[-1], length_along(whole)[-1])
+
+
+def test_welding_across_a_gap_keeps_the_passes_in_place():
+    left = run_through(star((-10.0, 0.0), (10.0, 0.0), (0.0, 8.0)))
+    right = np.column_stack([np.linspace(12, 22, 11), np.zeros(11)])
+    count = len(left.nodes)
+    network = LineNetwork(
+        (right[::-1], *left.lines),
+        np.concatenate([left.nodes, right[[0, -1]]]),
+        np.concatenate([[[count + 1, count]], left.ends]),
+        left.passes + [0, 1, 0],
+    )
+    joined = join_gaps(network, 5.0, 10.0)
+    check_invariants(joined)
+    assert len(joined.lines) == 2
+    assert max(joined.lengths()) == pytest.approx(32)
+
+
+@pytest.mark.parametrize(("length", "apart", "left"), [(0.5, 0.3, 4), (3.0, 0.15, 4), (3.0, 0.3, 5), (12.0, 0.15, 5)])
+def test_a_slit_between_rails_that_part_is_no_loop_of_two_rails(length, apart, left):
+    nodes = np.array([(0, 0), (10, 0), (10 + length, 0), (40, 0), (40, 1)], dtype=float)
+    aside = np.linspace(0, np.pi, 50)
+    slit = np.column_stack([10 + length * aside / np.pi, apart * np.sin(aside)])
+    lines = (nodes[[0, 1]], nodes[[1, 2]], slit, nodes[[2, 3]], nodes[[2, 4]])
+    network = LineNetwork(lines, nodes, np.array([[0, 1], [1, 2], [1, 2], [2, 3], [2, 4]]))
+    assert len(drop_bubbles(network, 0.2).lines) == left

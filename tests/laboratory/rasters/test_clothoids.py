@@ -1,0 +1,87 @@
+"""Combinations of clothoids between oriented points."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rail_extract.laboratory.curves import trace
+from rail_extract.laboratory.rasters.clothoids import SHARES, UNSOLVED, Pose, join, random_joins, table
+
+ANGLES = st.floats(-1.2, 1.2)
+
+
+@given(ANGLES, ANGLES, st.floats(1.0, 200.0), st.floats(-3.0, 3.0), st.integers(0, len(SHARES) - 1))
+def test_a_combination_reaches_its_end_in_its_direction(first, last, chord, direction, share):
+    start = Pose(3.0, -2.0, direction + first)
+    end = Pose(3.0 + chord * math.cos(direction), -2.0 + chord * math.sin(direction), direction + last)
+    elements = join(start, end, share)
+    if elements is None:
+        # two equal quarter turns to the same side are more than the widest shares can do
+        assert share >= 2
+        assert abs(first + last) > 1.5
+        return
+    step = sum(element.length_m for element in elements) / 2000
+    curve = trace(elements, (start.x, start.y), start.heading, step)
+    assert np.abs(curve.xy[-1] - [end.x, end.y]).max() < 1e-7 * chord
+    assert curve.heading[-1] == pytest.approx(direction + last, abs=1e-9)
+
+
+@pytest.mark.parametrize("share", range(len(SHARES)))
+def test_curvature_is_continuous_and_zero_at_both_ends(share):
+    elements = join(Pose(0.0, 0.0, 0.5), Pose(40.0, 0.0, 0.2), share)
+    assert elements[0].start == elements[2].end == 0.0
+    assert [elements[0].end, elements[1].end] == [elements[1].start, elements[2].start]
+    length = sum(element.length_m for element in elements)
+    assert elements[0].length_m == pytest.approx(SHARES[share] * length)
+
+
+def test_points_in_line_are_joined_by_a_straight():
+    elements = join(Pose(0.0, 0.0, 0.0), Pose(25.0, 0.0, 0.0))
+    assert sum(element.length_m for element in elements) == pytest.approx(25.0)
+    assert max(abs(element.end) for element in elements) < 1e-12
+
+
+def test_equal_deflections_give_a_symmetric_curve_and_opposite_ones_a_reverse_curve():
+    turn, reverse = (join(Pose(0.0, 0.0, 0.3), Pose(20.0, 0.0, last)) for last in (-0.3, 0.3))
+    assert turn[0].end == pytest.approx(turn[2].start, rel=1e-9)
+    assert turn[0].end < 0
+    assert reverse[0].end == pytest.approx(-reverse[2].start, rel=1e-9)
+
+
+def test_points_that_look_away_are_not_joined():
+    assert join(Pose(0.0, 0.0, 2.0), Pose(20.0, 0.0, 0.0)) is None
+
+
+def test_the_table_is_solved_everywhere():
+    known = table()
+    assert known.skew.shape == (len(SHARES), 71, 71)
+    assert np.isfinite(known.skew).all()
+    centre = known.skew.shape[1] // 2
+    assert known.energy[:, centre, centre] == pytest.approx(0.0)
+    assert (known.energy > -1e-12).all()
+    assert (known.energy == UNSOLVED).mean() < 0.01
+    # all of these mirror: a curve from the other end, and one to the other side
+    assert known.sharpest[1] == pytest.approx(known.sharpest[1].T)
+    assert known.sharpest[1] == pytest.approx(known.sharpest[1][::-1, ::-1])
+
+
+def test_random_joins_start_and_end_at_poses_and_keep_to_the_radius():
+    rng = np.random.default_rng(3)
+    poses = [Pose(*rng.uniform(-30, 30, size=2), rng.uniform(-3, 3)) for _ in range(20)]
+    joins = random_joins(rng, poses, 4, 25.0)
+    assert len(joins) == 4
+    places = np.array([[pose.x, pose.y] for pose in poses])
+    for start, elements in joins:
+        assert all(abs(element.end) < 1 / 25 for element in elements)
+        length = sum(element.length_m for element in elements)
+        end = trace(elements, (start.x, start.y), start.heading, length / 3000).xy[-1]
+        assert np.linalg.norm(places - end, axis=1).min() < 1e-4
+
+
+def test_bent_joins_are_drawn_less_often_than_straight_ones():
+    poses = [Pose(0.0, 0.0, 0.0), Pose(40.0, 0.0, 0.0), Pose(40.0, 10.0, 0.0)]
+    drawn = [random_joins(np.random.default_rng(seed), poses, 1, 10.0)[0][1] for seed in range(150)]
+    bent = sum(abs(elements[0].end) > 1e-3 for elements in drawn)
+    assert 0 < bent < 0.3 * len(drawn)

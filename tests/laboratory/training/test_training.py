@@ -1,0 +1,245 @@
+"""Training: gradients of the CPU path, resuming, the exported statistics, evaluation."""
+
+import argparse
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from rail_extract.core.errors import ParameterError
+from rail_extract.core.frpdf import STATISTICS
+from rail_extract.core.frpdf.network import PassBatchNorm2d, Recurrent
+from rail_extract.core.frpdf.torch_engine import TorchEngine
+from rail_extract.core.frpdf.weights import load_arrays
+from rail_extract.laboratory.rasters.pairs import random_pair
+from rail_extract.laboratory.training import curves, evaluate, gradients, train
+from rail_extract.laboratory.training.optimizers import Optimizers
+from rail_extract.laboratory.training.rivals import NETWORKS, TrainedNetwork, parameter_count
+from rail_extract.laboratory.training.scores import score
+from scipy import ndimage
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """Make steps and statistics cost little."""
+    monkeypatch.setattr(train, "CROPS", ((48, 1),))
+    monkeypatch.setattr(train, "CROP_SHARES", (1.0,))
+    monkeypatch.setattr(train, "STATISTICS_STEPS", 2)
+    monkeypatch.setattr(train, "CALIBRATION_STEPS", 2)
+    monkeypatch.setattr(train, "CHECKPOINT_STEPS", 1)
+
+
+@pytest.mark.parametrize("dilation", [3, 7, gradients.LARGEST_PHASED_DILATION, gradients.LARGEST_PHASED_DILATION + 1])
+def test_gradients_of_dilated_convolutions_are_those_of_torch(dilation):
+    torch.manual_seed(0)
+    x = torch.randn(2, 5, 50, 61, requires_grad=True)
+    plain = torch.nn.Conv2d(5, 5, 7, padding=3 * dilation, dilation=dilation, bias=False)
+    own = gradients.train_on_cpu(torch.nn.Sequential(plain))[0]
+    assert type(own) is gradients.CpuConv2d
+    upstream = torch.randn(2, 5, 50, 61)
+    found = torch.autograd.grad(own(x), (x, own.weight), upstream)
+    expected = torch.autograd.grad(
+        torch.nn.functional.conv2d(x, own.weight, padding=3 * dilation, dilation=dilation), (x, own.weight), upstream
+    )
+    for ours, theirs in zip(found, expected):
+        assert torch.allclose(ours, theirs, rtol=1e-4, atol=1e-3)
+
+
+def test_batch_norm_of_several_columns_at_once_is_that_of_torch():
+    torch.manual_seed(0)
+    plain = PassBatchNorm2d(5)
+    own = gradients.train_on_cpu(torch.nn.Sequential(PassBatchNorm2d(5)))[0]
+    assert type(own) is gradients.CpuBatchNorm2d
+    x = (torch.randn(3, 5, 64, 96) * torch.rand(5, 1, 1) + torch.randn(5, 1, 1)).requires_grad_()
+    upstream = torch.randn_like(x)
+    for norm in (plain, own):
+        norm.current_pass = 1
+    expected = torch.autograd.grad(plain(x), (x, plain.weight, plain.bias), upstream)
+    found = torch.autograd.grad(own(x), (x, own.weight, own.bias), upstream)
+    for ours, theirs in zip(found, expected):
+        assert (ours - theirs).norm() < 0.03 * theirs.norm()
+    for name in ("running_mean", "running_var", "running_mean_1", "running_var_1"):
+        assert torch.allclose(getattr(own, name), getattr(plain, name), rtol=1e-3, atol=1e-3)
+    assert torch.allclose(own.eval()(x), plain.eval()(x), atol=0.01)
+
+
+def test_the_rectifier_and_its_gradient_are_those_of_torch():
+    torch.manual_seed(0)
+    own = gradients.train_on_cpu(torch.nn.Sequential(torch.nn.ReLU(inplace=True)))[0]
+    assert type(own) is gradients.CpuReLU
+    x = torch.randn(2, 5, 8, 9, dtype=torch.bfloat16)
+    x[0, 0, 0, :3] = 0
+    x.requires_grad_()
+    upstream = torch.randn_like(x)
+    y, expected = own(x), torch.relu(x)
+    assert torch.equal(y, expected)
+    assert torch.equal(*(torch.autograd.grad(result, x, upstream)[0] for result in (y, expected)))
+
+
+def test_the_learning_rate_rises_and_falls_as_a_cosine():
+    settings = train.Settings(1000, 0.003, 0, "cpu")
+    assert train.learning_rate(0, settings) == pytest.approx(0.003 / train.WARM_UP_STEPS)
+    assert train.learning_rate(500, settings) == pytest.approx(0.0015)
+    assert train.learning_rate(999, settings) < 1e-5
+
+
+def test_the_loss_of_a_perfect_answer_is_small_and_of_the_opposite_large():
+    label = (torch.arange(100.0).reshape(1, 1, 10, 10) % 3 == 0).float()
+    even = torch.ones_like(label)
+    assert train.loss_of(40 * label - 20, label, even) < 0.01
+    assert train.loss_of(20 - 40 * label, label, even) > 10
+
+
+def test_cells_by_gaps_and_by_what_looks_like_rails_weigh_more_whether_rail_or_not():
+    pair = random_pair(np.random.default_rng(3), 256, 0.8, family="turnout")
+    weights = train.cell_weights(pair)
+    hard = (pair.gap > 0) | pair.distractor
+    near = ndimage.distance_transform_cdt(~hard, "chessboard") <= train.HARD_REACH
+    np.testing.assert_array_equal(weights, np.where(near, train.HARD_WEIGHT, 1.0))
+    assert 0.01 < near.mean() < 0.2
+    assert (near & pair.label).any() and (near & ~pair.label).any()
+
+
+def test_a_resumed_training_ends_where_an_unbroken_one_does(small, tmp_path):
+    settings = train.Settings(3, 0.003, 7, "cpu")
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+    unbroken = train.train(settings, tmp_path / "a", np.inf)
+    assert train.train(settings, tmp_path / "b", minutes=0.0) is None
+    resumed = train.train(settings, tmp_path / "b", np.inf)
+    for name, value in unbroken.state_dict().items():
+        assert torch.allclose(value, resumed.state_dict()[name], atol=1e-6), name
+    assert (tmp_path / "b" / "log.csv").read_text().count("\n") == 4
+    with pytest.raises(ParameterError, match="holds a training with --seed 7: give the same"):
+        train.train(replace(settings, seed=8), tmp_path / "b", np.inf)
+
+
+def test_the_output_is_calibrated_to_the_largest_f1(monkeypatch):
+    """Rail cells read 1 and others 0, with noise: an output that finds too little is moved to where F1 is largest."""
+    label = (torch.rand(1, 1, 200, 200, generator=torch.manual_seed(1)) < 0.1).float()
+    observed = label + 0.4 * torch.randn(label.shape, generator=torch.manual_seed(2))
+    monkeypatch.setattr(train, "batch", lambda *_: (observed, label, torch.ones_like(label)))
+    monkeypatch.setattr(train, "CALIBRATION_STEPS", 1)
+    network = Recurrent(torch.nn.Conv2d(2, 1, 1))
+    with torch.no_grad():
+        network.layer.weight.copy_(torch.tensor([2.0, 0.0]).reshape(1, 2, 1, 1))
+        network.layer.bias.fill_(-3.0)
+    train.calibrate(network, train.Settings(1, 0.003, 0, "cpu"))
+
+    with torch.no_grad():
+        *_, logits = train.run_passes(network, observed, 2)
+
+    def f1(threshold):
+        return score((logits >= threshold)[0, 0].numpy(), label[0, 0].numpy() > 0.5).f1
+
+    best = max(map(f1, np.arange(-2, 2, 0.1)))
+    assert f1(0.0) > best - 0.003
+    assert f1(-1.0) < best - 0.02
+    assert f1(1.0) < best - 0.02
+
+
+def test_the_command_leaves_weights_that_the_engine_takes(small, tmp_path):
+    parser = argparse.ArgumentParser()
+    train.add_arguments(parser)
+    train.run(parser.parse_args([str(tmp_path / "run"), "--steps", "2", "--device", "cpu"]))
+    arrays = load_arrays(tmp_path / "run" / "weights.npz")
+    engine = TorchEngine(arrays, "CPU")
+    raster = np.zeros((32, 32), np.float32)
+    assert engine.probabilities(raster, raster, 0).shape == (32, 32)
+    means = [arrays["layer.0.0.1.running_mean" + (f"_{n}" if n else "")] for n in range(STATISTICS)]
+    assert not np.allclose(means[0], means[1])
+
+
+@pytest.mark.parametrize("name", NETWORKS)
+def test_networks_to_compare_are_of_one_size(name):
+    assert parameter_count(NETWORKS[name]()) == pytest.approx(parameter_count(NETWORKS["frpdf"]()), rel=0.05)
+
+
+@pytest.mark.parametrize("name", ["unet", "acnn", "pooled", "skipping"])
+def test_a_rival_is_trained_and_run_like_frpdf(small, tmp_path, name, monkeypatch):
+    monkeypatch.setattr(train, "CROPS", ((128, 1),))
+    settings = train.Settings(1, 0.003, 3, "cpu", network=name, passes=1)
+    before = train.new_network(settings).state_dict()
+    network = train.train(settings, tmp_path, np.inf)
+    moved = [key for key, value in network.named_parameters() if not torch.equal(value, before[key])]
+    assert len(moved) == len(list(network.parameters()))
+    train.recompute_statistics(network, settings)
+    train.save_arrays(tmp_path / "weights.npz", train.export(network))
+    raster = np.eye(128, dtype=np.float32)
+    probability = TrainedNetwork(name, tmp_path / "weights.npz").probabilities(raster, 0 * raster + 0.5, 0)
+    assert probability.shape == (128, 128)
+    assert 0 < probability.mean() < 0.5
+
+
+def test_muon_moves_every_direction_of_a_kernel_alike():
+    torch.manual_seed(0)
+    kernel = torch.nn.Conv2d(8, 6, 3, bias=False)
+    network = torch.nn.Sequential(kernel, torch.nn.BatchNorm2d(6)).to(memory_format=torch.channels_last)
+    before = kernel.weight.detach().clone()
+    optimizer = Optimizers(network)
+    (network(torch.randn(1, 8, 16, 16)) ** 3).sum().backward()
+    optimizer.step(rate=0.01)
+    moved = (kernel.weight.detach() - before).reshape(6, -1)
+    sizes = torch.linalg.svdvals(moved) / (0.01 * 0.2 * 72**0.5)
+    assert sizes.min() > 0.4
+    assert sizes.max() < 1.3
+
+
+def test_curves_average_neighbouring_steps_and_count_repeated_ones_once(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("step,loss_1,f1_1\n" + "".join(f"{n},{n},0.5\n" for n in [*range(250), 248, 249]))
+    columns = curves.read_log(log)
+    assert len(columns["step"]) == 250
+    steps, means = curves.binned(columns["step"], columns["loss_1"])
+    assert len(steps) == curves.MOST_BINS
+    assert np.allclose(steps, means)
+    curves.draw_curves(log, tmp_path / "curves.png")
+    assert (tmp_path / "curves.png").stat().st_size > 10_000
+
+
+def test_a_training_for_a_ratio_draws_rails_of_that_width(small, monkeypatch):
+    drawn, draw = [], train.random_pair
+    monkeypatch.setattr(train, "random_pair", lambda rng, side, ratio: drawn.append(ratio) or draw(rng, side))
+    for step in range(5):
+        train.batch(train.Settings(5, 0.003, 0, "cpu", ratio=22.2), train.DATA, step)
+    assert all(abs(np.log(ratio / 22.2)) <= 0.06 for ratio in drawn)
+    assert len(set(drawn)) == 5
+
+
+def test_the_evaluation_set_is_fixed_and_its_input_poor():
+    pairs = evaluate.evaluation_pairs(6)
+    again = evaluate.evaluation_pairs(6)
+    assert all(np.array_equal(a.observed, b.observed) for a, b in zip(pairs, again))
+    assert {pair.label.shape for pair in pairs} == {(evaluate.SIDE, evaluate.SIDE)}
+    assert 0.1 < evaluate.evaluate("input", lambda x: x, pairs).scores.f1 < 0.5
+
+
+def test_the_classical_row_closes_and_drops_specks():
+    observed = np.zeros((64, 64), bool)
+    observed[20, 5:60] = True
+    observed[20, 30:32] = False
+    observed[50, 50] = True
+    cleaned = evaluate.classical(observed)
+    assert cleaned[20, 5:60].all()
+    assert not cleaned[50, 50]
+
+
+class Filling:
+    """An engine that finds one cell of a row more in each pass, up to the last."""
+
+    def __init__(self, cells, last):
+        self.cells, self.last, self.passes = cells, last, 0
+
+    def probabilities(self, raster, state, number):
+        self.passes = number + 1
+        found = np.zeros((1, self.cells), dtype=np.float32)
+        found[0, : self.cells // 2 + min(number, self.last)] = 0.9
+        return found
+
+
+@pytest.mark.parametrize(("last", "passes"), [(0, 2), (2, 4), (9, 5)])
+def test_passes_run_until_the_result_is_stable(last, passes):
+    engine = Filling(100, last)
+    found = evaluate.cleaner_of(engine, 0)(np.zeros((1, 100), dtype=bool))
+    assert engine.passes == passes
+    assert np.count_nonzero(found) == 50 + min(last, passes - 1)

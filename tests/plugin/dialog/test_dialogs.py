@@ -1,0 +1,182 @@
+"""What a user sees before a run: names, icons, fields, the help beside them, and what is refused."""
+
+import re
+from pathlib import Path
+
+import pytest
+from dialog_pictures import HELP_SHARE, SIZES, dialog_pictures
+from qgis.PyQt.QtCore import QUrl
+from qgis.PyQt.QtGui import QImage
+from qgis.PyQt.QtWidgets import QScrollArea, QSplitter, QTextBrowser
+from rail_extract.rail_extract_plugin.dialog import guide
+from rail_extract.rail_extract_plugin.dialog.labels import for_reader, with_labels
+
+NAMES = (
+    *("extractrails", "rasterizerailpoints", "frpdfcleanup", "vectorizerails", "buildtrackcenterlines"),
+    *("measuretrackgeometry", "installpackages", "checkinstallation"),
+)
+SMALLEST_ICON = 16
+
+
+@pytest.fixture
+def make(qgis, plugin):
+    return lambda name: qgis.processingRegistry().createAlgorithmById(f"railextract:{name}")
+
+
+@pytest.fixture
+def open_dialog(qgis, make):
+    from processing.gui.AlgorithmDialog import AlgorithmDialog
+
+    opened = []
+
+    def open_dialog(name):
+        opened.append(AlgorithmDialog(make(name)))
+        opened[-1].show()
+        qgis.processEvents()
+        return opened[-1]
+
+    yield open_dialog
+    for dialog in opened:
+        dialog.close()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_dialog_shows_every_parameter_at_its_default(open_dialog, name):
+    dialog = open_dialog(name)
+    definitions = {definition.name(): definition for definition in dialog.algorithm().parameterDefinitions()}
+    wrappers = dialog.mainWidget().wrappers
+    assert set(wrappers) == set(definitions)
+    for key, definition in definitions.items():
+        if definition.type() in ("number", "enum") or key == "RAIL_CLASSES":
+            assert wrappers[key].parameterValue() == definition.defaultValue()
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_is_cut_at_the_side(qgis, open_dialog, name, size):
+    dialog = open_dialog(name)
+    dialog.resize(*SIZES[size])
+    splitter = dialog.findChild(QSplitter)
+    splitter.setSizes([round(share * dialog.width()) for share in (1 - HELP_SHARE, HELP_SHARE)])
+    qgis.processEvents()
+    areas = [*dialog.findChildren(QScrollArea), dialog.findChild(QTextBrowser, "textShortHelp")]
+    assert [area.horizontalScrollBar().maximum() for area in areas] == [0] * len(areas)
+
+
+def test_arrows_of_fields_go_in_steps_that_fit_the_range(open_dialog):
+    wrappers = open_dialog("extractrails").mainWidget().wrappers
+    for name, largest in {"TOLERANCE_XY": 0.1, "TOLERANCE_Z": 0.1, "CENTERLINE_TOLERANCE": 0.1, "MAX_GAP": 1}.items():
+        assert 0 < wrappers[name].wrappedWidget().singleStep() <= largest
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_panel_explains_the_algorithm_and_every_parameter(open_dialog, name):
+    dialog = open_dialog(name)
+    shown = dialog.findChild(QTextBrowser, "textShortHelp").toPlainText().split("\n")
+    algorithm = dialog.algorithm()
+    assert shown[:2] == [algorithm.displayName(), algorithm.shortDescription()]
+    for definition in algorithm.parameterDefinitions():
+        assert f"{definition.description()}\u2028{definition.help()}" in "\n".join(shown).replace("\n", "\u2028")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_pictures_of_the_panel_are_there(make, name):
+    addresses = re.findall('<img src="(.*?)">', make(name).shortHelpString())
+    assert len(addresses) == (name not in ("installpackages", "checkinstallation"))
+    assert all(QImage(QUrl(address).toLocalFile()).width() == 240 for address in addresses)
+
+
+def test_panel_shows_its_picture(open_dialog):
+    panel = open_dialog("extractrails").findChild(QTextBrowser, "textShortHelp")
+    image = panel.grab().toImage()
+    colours = {image.pixelColor(x, y).name() for x in range(image.width()) for y in range(image.height())}
+    assert {"#1565c0", "#e64a19", "#b0bec5"} <= colours
+
+
+def test_every_algorithm_has_an_icon_of_its_own(make):
+    drawn = [make(name).icon().pixmap(SMALLEST_ICON).toImage() for name in NAMES]
+    assert {(image.width(), image.height()) for image in drawn} == {(SMALLEST_ICON, SMALLEST_ICON)}
+    assert all(first != second for i, first in enumerate(drawn) for second in drawn[:i])
+    assert len({make(name).svgIconPath() for name in NAMES}) == len(NAMES)
+
+
+@pytest.mark.parametrize(
+    ("word", "found"),
+    [("rail", 8), ("gleis", 6), ("voie", 6), ("vía", 6), ("railway", 6), ("laz", 3), ("gauge", 3), ("torch", 1)],
+)
+def test_toolbox_search(make, word, found):
+    assert sum(any(word in tag.lower() for tag in make(name).tags()) for name in NAMES) == found
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_help_button_opens_the_guide(make, name, tmp_path, monkeypatch):
+    address = make(name).helpUrl()
+    assert re.fullmatch(r"https://\S+/rail-extract/blob/main/docs/\w+\.md", address)
+    page = tmp_path / f"{Path(address).stem}.html"
+    page.touch()
+    monkeypatch.setattr(guide, "GUIDE", tmp_path)  # as in the zip
+    assert make(name).helpUrl() == page.as_uri()
+
+
+CONTRADICTIONS = [
+    ({"STANDARD": "CUSTOM"}, "CUSTOM needs both the gauge and the railhead width"),
+    ({"STANDARD": "CUSTOM", "GAUGE": 1435}, "fill GAUGE and HEAD_WIDTH"),
+    ({"GAUGE": 1.435}, "A gauge of 1.44 mm is not possible: give millimetres from 500 to 2000"),
+    ({"HEAD_WIDTH": 7.2}, "A railhead width of 7.2 mm is not possible"),
+    ({"GAUGE": 600, "HEAD_WIDTH": 72}, "check GAUGE and HEAD_WIDTH"),
+    ({"RAIL_CLASSES": "rails"}, 'RAIL_CLASSES "rails" should be whole numbers from 0 to 255'),
+    ({"RAIL_CLASSES": "256"}, 'RAIL_CLASSES "256" should be whole numbers from 0 to 255'),
+    ({"OTHER_GAUGES": "metre gauge"}, 'OTHER_GAUGES "metre gauge" should be millimetres'),
+    ({"OTHER_GAUGES": "1450"}, "can't be told apart within CENTERLINE_TOLERANCE"),
+    ({"EXTENT": "500000,500000,3000000,3000010"}, "EXTENT has no area"),
+    ({"CRS": "EPSG:4326"}, "CRS EPSG:4326 is in degrees, where lengths can't be measured: choose a projected one"),
+    ({"ENGINE": "OPENCV", "DEVICE": "CUDA"}, "set DEVICE to AUTO, or ENGINE to TORCH"),
+    ({"INPUT": "gone.laz"}, "gone.laz does not exist"),
+]
+
+
+@pytest.mark.parametrize(("filled", "message"), CONTRADICTIONS)
+def test_dialog_refuses_contradictions(open_dialog, context, write_cloud, track, filled, message):
+    dialog = open_dialog("extractrails")
+    panel = dialog.mainWidget()
+    panel.setParameters({"INPUT": str(write_cloud(track())), **filled})
+    accepted, said = dialog.algorithm().checkParameterValues(panel.createProcessingParameters(), context)
+    assert not accepted
+    assert message in said
+
+
+def test_dialog_calls_parameters_by_their_labels(make):
+    algorithm = make("extractrails")
+    definitions = algorithm.parameterDefinitions()
+    said = "The standard CUSTOM needs both: fill GAUGE and HEAD_WIDTH, not MAX_GAPS or OUTPUT/CRS.gpkg."
+    shown = said.replace("GAUGE", '"Gauge [mm]"').replace("HEAD_WIDTH", '"Railhead width [mm]"')
+    assert with_labels(said, definitions) == shown
+    assert for_reader(said, definitions) == said  # what runs here has no windows of QGIS
+
+
+def test_dialog_refuses_a_cloud_in_degrees(open_dialog, context, write_cloud, track):
+    dialog = open_dialog("extractrails")
+    cloud = write_cloud(track() * [1e-5, 1e-6, 1] + [70, 20, 0], epsg=4326)
+    dialog.mainWidget().setParameters({"INPUT": str(cloud)})
+    parameters = dialog.mainWidget().createProcessingParameters()
+    accepted, said = dialog.algorithm().checkParameterValues(parameters, context)
+    assert not accepted
+    assert "is in degrees (WGS 84)" in said
+
+
+def test_dialog_accepts_what_is_right(open_dialog, context, write_cloud, track):
+    dialog = open_dialog("extractrails")
+    dialog.mainWidget().setParameters({"INPUT": str(write_cloud(track())), "OTHER_GAUGES": "1000"})
+    parameters = dialog.mainWidget().createProcessingParameters()
+    assert dialog.algorithm().checkParameterValues(parameters, context) == (True, "")
+
+
+def test_pictures_of_the_dialogs(plugin, tmp_path):
+    pictures = dialog_pictures(tmp_path / "dialogs", {"extractrails": {"INPUT": "sample.laz"}})
+    assert {path.stem for path in pictures} == {f"{name}_{size}" for name in NAMES for size in (*SIZES, "all")}
+    for path in pictures:
+        image = QImage(str(path))
+        size = path.stem.split("_")[1]
+        width, height = SIZES.get(size, SIZES["wide"])
+        assert image.width() == width
+        assert image.height() >= height

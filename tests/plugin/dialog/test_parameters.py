@@ -1,0 +1,125 @@
+import pytest
+from qgis.core import QgsProcessingParameterDefinition
+from rail_extract.core.errors import ParameterError
+from rail_extract.core.standards import STANDARDS
+from rail_extract.rail_extract_plugin.dialog.values import class_numbers, gauges_m
+
+PARAMETERS = [
+    ("INPUT", "pointcloud", None),
+    ("RAIL_CLASSES", "string", "10"),
+    ("STANDARD", "enum", "EN_60E1_1435"),
+    ("GAUGE", "number", None),
+    ("HEAD_WIDTH", "number", None),
+    ("EXTENT", "extent", None),
+    ("CRS", "crs", None),
+    ("ITERATIONS", "number", 2),
+    ("ENGINE", "enum", "AUTO"),
+    ("DEVICE", "enum", "AUTO"),
+    ("SMOOTHING_XY", "number", 0.8),
+    ("SMOOTHING_Z", "number", 3.0),
+    ("TOLERANCE_XY", "number", 0.10),
+    ("TOLERANCE_Z", "number", 0.03),
+    ("CROWN_RADIUS", "number", 20.0),
+    ("MAX_GAP", "number", 5.0),
+    ("GAP_ANGLE", "number", 10.0),
+    ("SIMPLIFY_XY", "number", 0.002),
+    ("SIMPLIFY_Z", "number", 0.002),
+    ("MIN_LENGTH", "number", 1.0),
+    ("OTHER_GAUGES", "string", None),
+    ("CENTERLINE_TOLERANCE", "number", 0.05),
+    ("STEP", "number", 1.0),
+    ("RAILS", "sink", None),
+    ("CENTERLINES", "sink", None),
+    ("QUALITY", "sink", None),
+    ("CLEANED", "rasterDestination", None),
+    ("REPORT", "fileDestination", None),
+]
+"""The interface, which other people's scripts depend on."""
+
+OUTPUTS = {
+    "RAILS": "outputVector",
+    "CENTERLINES": "outputVector",
+    "QUALITY": "outputVector",
+    "CLEANED": "outputRaster",
+    "REPORT": "outputHtml",
+    "RAIL_COUNT": "outputNumber",
+    "RAIL_LENGTH": "outputNumber",
+    "CENTERLINE_COUNT": "outputNumber",
+    "CENTERLINE_LENGTH": "outputNumber",
+    "STATION_COUNT": "outputNumber",
+    "SIGMA": "outputNumber",
+    "BRIDGED_LENGTH": "outputNumber",
+    "ENGINE_USED": "outputString",
+}
+
+RESULTS = {"RAILS", "CENTERLINES", "QUALITY", "CLEANED", "REPORT"}
+ESSENTIAL = {"INPUT", "RAIL_CLASSES", "STANDARD", "GAUGE", "HEAD_WIDTH", "EXTENT", "MAX_GAP"} | RESULTS
+OPTIONAL = {"GAUGE", "HEAD_WIDTH", "EXTENT", "CRS", "OTHER_GAUGES"} | RESULTS
+
+
+def having(algorithm, flag):
+    return {definition.name() for definition in algorithm.parameterDefinitions() if definition.flags() & flag}
+
+
+def test_parameters_are_those_of_the_interface(algorithm):
+    found = [(one.name(), one.type(), one.defaultValue()) for one in algorithm.parameterDefinitions()]
+    assert found == PARAMETERS
+
+
+def test_outputs_are_those_of_the_interface(algorithm):
+    assert {output.name(): output.type() for output in algorithm.outputDefinitions()} == OUTPUTS
+
+
+def test_rare_parameters_are_advanced(algorithm):
+    advanced = having(algorithm, QgsProcessingParameterDefinition.Flag.FlagAdvanced)
+    assert advanced == {name for name, _, _ in PARAMETERS} - ESSENTIAL
+
+
+def test_optional_parameters(algorithm):
+    assert having(algorithm, QgsProcessingParameterDefinition.Flag.FlagOptional) == OPTIONAL
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("STANDARD", [*STANDARDS, "CUSTOM"]),
+        ("ENGINE", ["AUTO", "TORCH", "OPENCV"]),
+        ("DEVICE", ["AUTO", "CPU", "CUDA"]),
+    ],
+)
+def test_choices_are_static_strings(algorithm, name, options):
+    definition = algorithm.parameterDefinition(name)
+    assert definition.usesStaticStrings()
+    assert definition.options() == options
+
+
+def test_labels_of_quantities_state_their_unit(algorithm):
+    unitless = {"ITERATIONS"}
+    for definition in algorithm.parameterDefinitions():
+        if definition.type() == "number" and definition.name() not in unitless:
+            assert definition.description().endswith(("[m]", "[mm]", "[°]"))
+
+
+@pytest.mark.parametrize(("text", "numbers"), [("10", (10,)), ("10,11", (10, 11)), (" 11; 10 11", (11, 10))])
+def test_class_numbers(text, numbers):
+    assert class_numbers(text, "RAIL_CLASSES") == numbers
+
+
+@pytest.mark.parametrize("text", ["", " ", "ten", "1.5", "-1", "10-12", "256"])
+def test_class_numbers_refuses(text):
+    with pytest.raises(ParameterError, match="RAIL_CLASSES"):
+        class_numbers(text, "RAIL_CLASSES")
+
+
+@pytest.mark.parametrize(
+    ("text", "gauges"),
+    [("", ()), ("1000;1067", (1.0, 1.067)), ("1435.5 1000", (1.4355, 1.0)), ("1000,1067", (1.0, 1.067))],
+)
+def test_gauges(text, gauges):
+    assert gauges_m(text, "OTHER_GAUGES") == pytest.approx(gauges)
+
+
+@pytest.mark.parametrize("text", ["wide", "0", "-1000", "1e3", "1000;x"])
+def test_gauges_refuses(text):
+    with pytest.raises(ParameterError, match="OTHER_GAUGES"):
+        gauges_m(text, "OTHER_GAUGES")

@@ -1,0 +1,86 @@
+import json
+
+import pytest
+from qgis.core import QgsCoordinateReferenceSystem, QgsPointCloudLayer, QgsProject, QgsProperty, QgsVectorLayer
+from rail_extract.core.errors import CloudError
+from rail_extract.rail_extract_plugin.reading.clouds import CloudSource, cloud_source
+
+
+@pytest.fixture
+def path(write_cloud, track):
+    return write_cloud(track(), "Größe 1.las")
+
+
+@pytest.fixture
+def layer(path):
+    """A layer as QGIS holds it; this QGIS may have no PDAL to open it with, which a plugin can't change."""
+    layer = QgsPointCloudLayer(str(path), "my cloud", "pdal")
+    layer.setCrs(QgsCoordinateReferenceSystem("EPSG:32643"))
+    return layer
+
+
+def test_path(path, context):
+    assert cloud_source(str(path), context) == CloudSource((path,))
+
+
+def test_folder_is_left_to_the_core(path, context):
+    assert cloud_source(str(path.parent), context) == CloudSource((path.parent,))
+
+
+def test_property_of_a_batch(path, context):
+    assert cloud_source(QgsProperty.fromValue(str(path)), context).paths == (path,)
+
+
+def test_layer_brings_its_coordinate_system(path, layer, context):
+    source = cloud_source(layer, context)
+    assert source.paths == (path,)
+    assert "UTM zone 43N" in source.crs_wkt
+
+
+def test_layer_without_coordinate_system(layer, context):
+    layer.setCrs(QgsCoordinateReferenceSystem())
+    assert cloud_source(layer, context).crs_wkt is None
+
+
+def test_virtual_point_cloud_names_its_tiles(path, context):
+    catalogue = path.with_name("all.vpc")
+    catalogue.write_text(json.dumps({"features": [{"assets": {"data": {"href": f"./{path.name}"}}}]}))
+    assert cloud_source(str(catalogue), context).paths == (path,)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{", "[]", '{"features": [{}]}', '{"features": 3}', '{"features": [{"assets": []}]}']
+)
+def test_damaged_virtual_point_cloud(tmp_path, context, text):
+    catalogue = tmp_path / "all.vpc"
+    catalogue.write_text(text)
+    with pytest.raises(CloudError, match="all.vpc is no virtual point cloud"):
+        cloud_source(str(catalogue), context)
+
+
+@pytest.mark.parametrize(
+    ("features", "named"), [([], "no tile at all"), ([{"assets": {"data": {"href": "gone.laz"}}}], "gone.laz")]
+)
+def test_virtual_point_cloud_without_tiles(tmp_path, context, features, named):
+    catalogue = tmp_path / "all.vpc"
+    catalogue.write_text(json.dumps({"features": features}))
+    with pytest.raises(CloudError, match=named):
+        cloud_source(str(catalogue), context)
+
+
+@pytest.mark.parametrize("value", [None, ""])
+def test_nothing_given(context, value):
+    with pytest.raises(CloudError, match="No point cloud was given"):
+        cloud_source(value, context)
+
+
+def test_missing_path(tmp_path, context):
+    with pytest.raises(CloudError, match=r"gone\.laz does not exist"):
+        cloud_source(str(tmp_path / "gone.laz"), context)
+
+
+def test_loaded_layer_of_another_kind(context):
+    vector = QgsVectorLayer("LineStringZ?crs=EPSG:32643", "lines", "memory")
+    QgsProject.instance().addMapLayer(vector)
+    with pytest.raises(CloudError, match='The layer "lines" is no point cloud'):
+        cloud_source(vector.id(), context)

@@ -1,0 +1,174 @@
+"""Lines that users have: drawn by hand, curved, in parts, without heights, in feet, in degrees."""
+
+import math
+
+import numpy as np
+import pytest
+from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from rail_extract.core.errors import CrsError, RailExtractError
+from rail_extract.rail_extract_plugin.reading.line_layers import read_rails
+
+LEFT = "LINESTRING Z (500000 3000001.507 100, 500020 3000001.507 100)"
+RIGHT = "LINESTRING Z (500020 3000000 100.02, 500000 3000000 100.02)"
+"""A track of 1435 mm with heads of 72 mm; the right rail runs against the left, 20 mm higher."""
+
+
+@pytest.fixture
+def layer(qgis):
+    """A layer in memory with a line for each WKT text, and the fields and values given."""
+
+    def make(*texts, kind="LineStringZ", crs="EPSG:32643", fields="", values=()):
+        layer = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "lines", "memory")
+        for number, text in enumerate(texts):
+            feature = QgsFeature(layer.fields())
+            feature.setGeometry(QgsGeometry.fromWkt(text))
+            if values:
+                feature.setAttributes(list(values[number]))
+            assert layer.dataProvider().addFeature(feature)
+        return layer
+
+    return make
+
+
+class Source:
+    """A layer as an algorithm sees it."""
+
+    def __init__(self, layer):
+        self._layer = layer
+
+    def sourceCrs(self):
+        return self._layer.crs()
+
+    def getFeatures(self, request, flags):
+        return self._layer.getFeatures(request)
+
+    def featureCount(self):
+        return self._layer.featureCount()
+
+
+def rails_of(layer):
+    return read_rails(Source(layer))
+
+
+def test_lines_keep_their_places(layer):
+    rails, frame = rails_of(layer(LEFT, RIGHT))
+    assert [(rail.rail_id, rail.class_code, rail.points) for rail in rails] == [(1, 0, 0), (2, 0, 0)]
+    np.testing.assert_allclose(
+        frame.to_crs(rails[0].xyz), [[500000, 3000001.507, 100], [500020, 3000001.507, 100]], atol=1e-9
+    )
+    assert np.abs(rails[0].xyz).max() < 200
+
+
+def test_fields_are_used_where_they_are_there(layer):
+    fields = "&field=rail_id:integer&field=class_code:integer&field=bridged_m:double&field=points:string(5)"
+    rails, _ = rails_of(layer(LEFT, RIGHT, fields=fields, values=[(7, 11, 1.5, "many"), (None, None, None, None)]))
+    assert [(rail.rail_id, rail.class_code, rail.bridged_m, rail.points) for rail in rails] == [
+        (7, 11, 1.5, 0),
+        (2, 0, 0.0, 0),
+    ]
+
+
+def test_every_part_is_a_rail_with_the_number_of_its_feature(layer):
+    parts = "MULTILINESTRING Z ((500000 3000000 1, 500010 3000000 1), (500012 3000000 1, 500020 3000000 1))"
+    rails, _ = rails_of(layer(parts, LEFT, kind="MultiLineStringZ"))
+    assert [(rail.rail_id, round(rail.length_m)) for rail in rails] == [(1, 10), (1, 8), (2, 20)]
+
+
+def test_curves_become_chords_that_stay_within_half_a_millimetre(layer):
+    radius = 100
+    arc = "CIRCULARSTRING Z (500100 3000000 5, 500070.710678118655 3000070.710678118655 6, 500000 3000100 7)"
+    (rail,), frame = rails_of(layer(arc, kind="CompoundCurveZ"))
+    centre = frame.to_local(np.array([500000, 3000000, 0]))
+    assert np.abs(np.hypot(*(rail.xyz - centre).T[:2]) - radius).max() < 1e-6
+    middles = (rail.xyz[1:] + rail.xyz[:-1]) / 2
+    assert np.abs(np.hypot(*(middles - centre).T[:2]) - radius).max() < 0.0006
+    assert rail.length_m == pytest.approx(math.hypot(radius * math.pi / 2, 2), abs=0.01)
+
+
+def test_lines_without_heights_stay_flat(layer):
+    flat = "LINESTRING (500000 3000001.507, 500020 3000001.507)"
+    (rail,), _ = rails_of(layer(flat, kind="LineString"))
+    assert np.isnan(rail.xyz[:, 2]).all()
+    assert rail.length_m == pytest.approx(20)
+
+
+def test_feet_become_metres(layer):
+    (rail,), frame = rails_of(layer("LINESTRING Z (980000 200000 10, 980100 200000 10)", crs="EPSG:2263"))
+    assert frame.horizontal_unit_m == pytest.approx(1200 / 3937, rel=1e-9)
+    assert rail.length_m == pytest.approx(100 * 1200 / 3937)
+
+
+def test_points_and_empty_parts_are_passed_over(layer):
+    still = "LINESTRING Z (500000 3000000 1, 500000 3000000 1)"
+    repeated = "LINESTRING Z (500000 3000000 1, 500000 3000000 1, 500010 3000000 1)"
+    rails, _ = rails_of(layer(still, "LINESTRING Z EMPTY", repeated))
+    assert [len(rail.xyz) for rail in rails] == [2]
+    with pytest.raises(RailExtractError, match="holds no line"):
+        rails_of(layer(still))
+
+
+def test_degrees_are_refused(layer):
+    with pytest.raises(CrsError, match="degrees"):
+        rails_of(layer("LINESTRING Z (75 27 0, 75.1 27 0)", crs="EPSG:4326"))
+
+
+def test_hand_drawn_rails_make_a_track(layer, run_step, context):
+    outcome = run_step("buildtrackcenterlines", {"INPUT": layer(LEFT, RIGHT), "OUTPUT": "memory:tracks"})
+    assert outcome.ok, outcome.error
+    (track,) = context.getMapLayer(outcome.results["OUTPUT"]).getFeatures()
+    assert (track["left_ids"], track["right_ids"]) == ("1", "2")
+    assert track["cant_mm"] == pytest.approx(-20, abs=0.01)
+    assert track["gauge_mm"] == pytest.approx(1435.1, abs=0.1)
+    assert outcome.results["CENTERLINE_COUNT"] == 1
+    assert outcome.results["CENTERLINE_LENGTH"] == pytest.approx(20, abs=0.1)
+    assert outcome.results["CENTERLINE_LENGTH"] == pytest.approx(track["length_m"])
+    assert track.geometry().constGet().is3D()
+    assert {round(vertex.z(), 3) for vertex in track.geometry().vertices()} == {100.01}
+
+
+def test_flat_rails_make_a_flat_track_with_a_warning(layer, run_step, context, new_feedback):
+    texts = [
+        text.replace(" Z", "").replace(" 100.02", "").replace(" 100,", ",").replace(" 100)", ")")
+        for text in (LEFT, RIGHT)
+    ]
+    feedback = new_feedback()
+    flat = layer(*texts, kind="LineString")
+    outcome = run_step("buildtrackcenterlines", {"INPUT": flat, "OUTPUT": "memory:tracks"}, feedback)
+    assert outcome.ok, outcome.error
+    (track,) = context.getMapLayer(outcome.results["OUTPUT"]).getFeatures()
+    assert not track.geometry().constGet().is3D()
+    assert track["gauge_mm"] == pytest.approx(1435, abs=0.1)
+    assert track["length_m"] == pytest.approx(20, abs=0.1)
+    assert "2 of 2 lines have no heights" in feedback.warnings[0]
+
+
+def test_three_rails_make_two_tracks_in_one_run(layer, run_step, context):
+    shared, narrow, wide = (
+        f"LINESTRING Z (500000 {3000000 + left} 100, 500020 {3000000 + left} 100)" for left in (0, 1.072, 1.507)
+    )
+    outcome = run_step(
+        "buildtrackcenterlines",
+        {"INPUT": layer(shared, narrow, wide), "OTHER_GAUGES": "1000;1067", "OUTPUT": "memory:tracks"},
+    )
+    assert outcome.ok, outcome.error
+    tracks = context.getMapLayer(outcome.results["OUTPUT"]).getFeatures()
+    found = [(track["left_ids"], track["right_ids"], round(track["gauge_mm"])) for track in tracks]
+    assert found == [("3", "1", 1435), ("2", "1", 1000)]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "sentence"),
+    [
+        ({"OTHER_GAUGES": "wide"}, 'OTHER_GAUGES "wide" should be millimetres'),
+        ({"OTHER_GAUGES": "1440"}, "can't be told apart within CENTERLINE_TOLERANCE"),
+        ({"OTHER_GAUGES": "10"}, "A gauge of 10 mm is not possible"),
+        ({"GAUGE": 1000}, "is the gauge 1435 mm?"),
+        ({"INPUT": "gone.gpkg"}, "gone.gpkg"),
+        ({"OUTPUT": "/nowhere/t.gpkg"}, "can't be written"),
+    ],
+)
+def test_bad_input_is_one_sentence(layer, run_step, parameters, sentence):
+    outcome = run_step("buildtrackcenterlines", {"INPUT": layer(LEFT, RIGHT), "OUTPUT": "memory:", **parameters})
+    assert not outcome.ok
+    assert sentence in outcome.error
+    assert "Traceback" not in outcome.error

@@ -1,0 +1,264 @@
+"""Rail rasters in files: what comes back, what is touched, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from osgeo import gdal
+from rail_extract.core.clouds.crs import import_pyproj
+from rail_extract.core.errors import Cancelled, CrsError, ModelError, ParameterError, RasterError
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.frpdf.cleanup import clean
+from rail_extract.core.progress import Progress
+from rail_extract.core.raster import TILE, cell_size, rasterize
+from rail_extract.core.standards import STANDARDS
+from rail_extract.core.vectorize import vectorize
+from rail_extract.rail_extract_plugin.reading import rasters as rasters_module
+from rail_extract.rail_extract_plugin.reading.geotiff import filled_blocks, read_header, read_rasters, write_rasters
+from rail_extract.rail_extract_plugin.reading.rasters import BLOCK, choose_model, header_for, moved, on_one_grid
+
+STANDARD = STANDARDS["EN_60E1_1435"]
+CELL_M = cell_size(STANDARD.gauge_m, STANDARD.head_width_m)
+
+
+def frame_in(code, unit_m=1.0):
+    wkt = None if code is None else import_pyproj().CRS.from_user_input(code).to_wkt()
+    return LocalFrame(np.array([500_100.0, 3_000_200.0, 100.0]), unit_m, unit_m, wkt)
+
+
+def strokes(count=200, reach_m=30.0, seed=0):
+    """Points scattered around the local origin, (n, 2)."""
+    return np.random.default_rng(seed).uniform(-reach_m, reach_m, (count, 2))
+
+
+def places(raster, frame):
+    """Cell centres in CRS units, sorted."""
+    xy = raster.to_local(raster.cells())
+    crs = frame.to_crs(np.column_stack([xy, np.zeros(len(xy))]))[:, :2]
+    return crs[np.lexsort(crs.round(4).T)]
+
+
+@pytest.mark.parametrize(
+    ("code", "unit_m"), [(None, 1.0), ("EPSG:32643", 1.0), ("EPSG:2227", 1200 / 3937), ("EPSG:2227+6360", 1200 / 3937)]
+)
+def test_cells_come_back_where_they_were(tmp_path, code, unit_m):
+    frame, path = frame_in(code, unit_m), tmp_path / "räster 1.tif"
+    rasters = [rasterize(strokes(seed=seed), CELL_M) for seed in (1, 2)]
+    extent = (500_000.1, 3_000_100.0, 500_200.123456789, 3_000_300.0)
+    header = header_for(rasters, (10, 11), frame, STANDARD, extent)
+    write_rasters(path, header, rasters)
+    found = read_header(path)
+    assert found.bounds == extent
+    assert (found.class_codes, found.model) == ((10, 11), "base")
+    assert (found.gauge_m, found.head_width_m) == pytest.approx((1.435, 0.072), abs=1e-9)
+    assert found.cell_m == pytest.approx(CELL_M, rel=1e-12)
+    assert found.frame.horizontal_unit_m == pytest.approx(unit_m, rel=1e-9)
+    for before, after in zip(rasters, read_rasters(path, found)):
+        np.testing.assert_allclose(places(after, found.frame), places(before, frame), atol=1e-8)
+        back = moved(after, found.frame, frame)
+        # The same cells, counted from a corner whole tiles away: windows of the network fall on the same places.
+        assert ((before.cells() - after.cells()) % TILE == 0).all()
+        np.testing.assert_allclose(
+            np.sort(back.to_local(back.cells()), axis=0), np.sort(before.to_local(before.cells()), axis=0), atol=1e-7
+        )
+
+
+def test_file_is_a_plain_geotiff_with_a_band_a_class(tmp_path):
+    rasters = [rasterize(strokes(seed=seed), CELL_M) for seed in (1, 2)]
+    write_rasters(tmp_path / "r.tif", header_for(rasters, (10, 11), frame_in("EPSG:32643"), STANDARD), rasters)
+    dataset = gdal.Open(str(tmp_path / "r.tif"))
+    tags = {name: text for name, text in dataset.GetMetadata().items() if name.startswith("RAIL")}
+    assert tags == {"RAIL_GAUGE_MM": "1435", "RAIL_HEAD_MM": "72", "RAIL_MODEL": "base"}
+    assert [dataset.GetRasterBand(number).GetDescription() for number in (1, 2)] == ["10", "11"]
+    band = dataset.GetRasterBand(2)
+    assert (band.DataType, band.GetNoDataValue(), band.GetBlockSize()) == (gdal.GDT_Byte, 0, [BLOCK, BLOCK])
+    cells = np.frombuffer(band.ReadRaster(), np.uint8)
+    assert (cells == 1).sum() == rasters[1].count() == (cells != 0).sum()
+
+
+@pytest.fixture
+def corridor(tmp_path):
+    """A diagonal of 10 km: its bounding box has 31 gigapixels."""
+    along = np.arange(0, 10_000, 0.02)
+    raster = rasterize(np.column_stack([along, along]) / np.sqrt(2), CELL_M)
+    path = tmp_path / "corridor.tif"
+    write_rasters(path, header_for([raster], (10,), frame_in("EPSG:32643"), STANDARD), [raster])
+    return raster, path
+
+
+def test_bounds_are_those_of_the_file_where_all_points_were_taken(tmp_path):
+    raster = rasterize(strokes(), CELL_M)
+    header = header_for([raster], (10,), frame_in("EPSG:2227", 1200 / 3937), STANDARD)
+    write_rasters(tmp_path / "r.tif", header, [raster])
+    dataset = gdal.Open(str(tmp_path / "r.tif"))
+    x, width, _, y, _, height = dataset.GetGeoTransform()
+    expected = (x, y + height * dataset.RasterYSize, x + width * dataset.RasterXSize, y)
+    for bounds in (header.bounds, read_header(tmp_path / "r.tif").bounds):
+        np.testing.assert_allclose(bounds, expected, atol=1e-6)
+
+
+def test_corridor_takes_no_room_and_no_time_for_what_is_empty(corridor):
+    raster, path = corridor
+    header = read_header(path)
+    assert header.window[2] * header.window[3] > 31e9
+    blocks = filled_blocks(gdal.Open(str(path)), 1)
+    assert len(blocks) < 4 * 10_000 / np.sqrt(2) / (BLOCK * CELL_M)
+    assert path.stat().st_size < 4_000_000
+    (found,) = read_rasters(path, header)
+    assert found.count() == raster.count()
+    assert len(found.tiles) == len(raster.tiles)
+
+
+def test_sparse_file_is_cleaned_and_vectorized_by_its_cells_alone(tmp_path):
+    """Ten metres of rail at both ends of the 10 km."""
+    along = np.arange(0, 10, 0.02)
+    xy = np.concatenate([np.column_stack([along, along / 3]), np.column_stack([7000 + along, 7000 + along / 3])])
+    raster, path = rasterize(xy, CELL_M), tmp_path / "ends.tif"
+    write_rasters(path, header_for([raster], (10,), frame_in("EPSG:32643"), STANDARD), [raster])
+    header = read_header(path)
+    (found,) = read_rasters(path, header)
+
+    class Copy:
+        description, most_cells, cells = "copy", 1 << 22, 0
+
+        def sweep(self, seen, *_):
+            self.cells += sum(piece.size for piece in seen)
+            return seen
+
+    engine = Copy()
+    cleaned = clean(found, engine, passes=1)
+    assert engine.cells <= 200 * found.count()
+    write_rasters(path, header, [cleaned])
+    assert path.stat().st_size < 500_000
+    network = vectorize(read_rasters(path, header)[0], STANDARD.head_width_m)
+    assert [round(line) for line in network.lengths()] == [11, 11]
+
+
+def test_points_a_world_apart_make_no_file():
+    raster = rasterize(np.array([[0.0, 0.0], [1e6, 1e6]]), CELL_M)
+    with pytest.raises(RasterError, match="spread over 1000 by 1000 km"):
+        header_for([raster], (10,), frame_in("EPSG:32643"), STANDARD)
+
+
+@pytest.fixture
+def geotiff(tmp_path):
+    """Write a raster as other programs might."""
+
+    def write(bands=1, transform=(0, 0.04, 0, 0, 0, -0.04), epsg=32643, tags=None, descriptions=(), nodata=None):
+        path = tmp_path / "other.tif"
+        dataset = gdal.GetDriverByName("GTiff").Create(str(path), 40, 30, bands, gdal.GDT_Byte)
+        dataset.SetGeoTransform(transform)
+        dataset.SetProjection(import_pyproj().CRS.from_epsg(epsg).to_wkt())
+        dataset.SetMetadata(tags or {})
+        for number in range(1, bands + 1):
+            band = dataset.GetRasterBand(number)
+            if nodata is not None:
+                band.SetNoDataValue(nodata)
+                band.Fill(nodata)
+            band.WriteRaster(5, 7, 2, 1, bytes([1, 1]))
+            if descriptions:
+                band.SetDescription(descriptions[number - 1])
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize("nodata", [None, 0, 255])
+def test_raster_made_elsewhere(geotiff, nodata):
+    path = geotiff(nodata=nodata)
+    header = read_header(path)
+    assert (header.class_codes, header.gauge_m, header.model) == ((10,), None, None)
+    assert read_rasters(path, header)[0].cells().tolist() == [[7, 5], [7, 6]]
+
+
+@pytest.mark.parametrize(
+    ("made", "error", "sentence"),
+    [
+        ({"transform": (0, 0.04, 0.01, 0, 0, -0.04)}, RasterError, "turned"),
+        ({"transform": (0, 0.04, 0, 0, 0, -0.05)}, RasterError, "not square"),
+        ({"transform": (0, 0.04, 0, 0, 0, 0.04)}, RasterError, "north up"),
+        ({"bands": 3}, RasterError, "has 3 bands"),
+        ({"bands": 2, "descriptions": ("10", "red")}, RasterError, "has 2 bands"),
+        ({"epsg": 4326}, CrsError, "Lengths can't be computed"),
+        ({"tags": {"RAIL_GAUGE_MM": "wide"}}, RasterError, "RAIL_GAUGE_MM of the raster can't be 'wide'"),
+    ],
+)
+def test_unfit_raster_is_refused(geotiff, made, error, sentence):
+    with pytest.raises(error, match=sentence):
+        read_header(geotiff(**made))
+
+
+def test_no_raster_is_refused(tmp_path):
+    (tmp_path / "text.tif").write_text("no raster")
+    with pytest.raises(RasterError, match="is no raster"):
+        read_header(tmp_path / "text.tif")
+
+
+def test_empty_raster_is_refused(geotiff):
+    path = geotiff()
+    dataset = gdal.Open(str(path), gdal.GA_Update)
+    dataset.GetRasterBand(1).Fill(0)
+    dataset = None
+    with pytest.raises(RasterError, match="holds no rail cell"):
+        read_rasters(path, read_header(path))
+
+
+def test_standard_comes_from_the_user_else_from_the_tags(geotiff):
+    untold = read_header(geotiff())
+    with pytest.raises(ParameterError, match="fill GAUGE and HEAD_WIDTH"):
+        untold.standard(None, None)
+    with pytest.raises(ParameterError, match="fill GAUGE and HEAD_WIDTH"):
+        untold.standard(1435, None)
+    assert untold.standard(1435, 72).gauge_m == pytest.approx(1.435)
+    told = read_header(geotiff(tags={"RAIL_GAUGE_MM": "1000", "RAIL_HEAD_MM": "61.91"}))
+    assert (told.standard(None, None).gauge_m, told.standard(1067, None).gauge_m) == pytest.approx((1.0, 1.067))
+    assert told.standard(1067, None).head_width_m == pytest.approx(0.06191)
+
+
+def test_model_by_name_by_tag_and_by_ratio(geotiff):
+    tags = {"RAIL_GAUGE_MM": "1435", "RAIL_HEAD_MM": "72"}
+    for header in (read_header(geotiff(tags=tags)), read_header(geotiff(tags={**tags, "RAIL_MODEL": "base"}))):
+        assert choose_model(header, "AUTO").name == "base"
+    assert choose_model(read_header(geotiff(tags={**tags, "RAIL_MODEL": "gone"})), "base").name == "base"
+    with pytest.raises(RasterError, match="cells are 40.0 mm wide, but .* needs 28.1 mm"):
+        choose_model(read_header(geotiff(tags={"RAIL_GAUGE_MM": "1000", "RAIL_HEAD_MM": "61.91"})), "AUTO")
+    with pytest.raises(ModelError, match="models cover"):
+        choose_model(read_header(geotiff(tags={"RAIL_GAUGE_MM": "1460", "RAIL_HEAD_MM": "45"})), "AUTO")
+
+
+def test_unwritable_file_is_refused(tmp_path):
+    raster = rasterize(strokes(), CELL_M)
+    header = header_for([raster], (10,), frame_in("EPSG:32643"), STANDARD)
+    with pytest.raises(RasterError, match="can't be written"):
+        write_rasters(tmp_path / "gone" / "r.tif", header, [raster])
+
+
+def test_cancelled_writing_leaves_no_file(tmp_path):
+    class Impatient(Progress):
+        def is_cancelled(self):
+            return True
+
+    raster = rasterize(strokes(), CELL_M)
+    header = header_for([raster], (10,), frame_in("EPSG:32643"), STANDARD)
+    with pytest.raises(Cancelled):
+        write_rasters(tmp_path / "r.tif", header, [raster], Impatient())
+    assert not list(tmp_path.iterdir())
+
+
+def test_limit_counts_blocks(monkeypatch):
+    raster = rasterize(strokes(), CELL_M)
+    monkeypatch.setattr(rasters_module, "MOST_BLOCKS", 3)
+    with pytest.raises(RasterError, match="set EXTENT"):
+        header_for([raster], (10,), frame_in("EPSG:32643"), STANDARD)
+
+
+def test_rasters_of_stretches_come_onto_one_grid():
+    """Two rasters that begin tiles apart, as those of classes with other stretches do."""
+    side_m = TILE * CELL_M
+    frame = frame_in("EPSG:32643")
+    first = replace(rasterize(strokes(), CELL_M), x0=3 * side_m, y0=-2 * side_m)
+    second = replace(rasterize(strokes(seed=1), CELL_M), x0=-side_m, y0=5 * side_m)
+    aligned, common = on_one_grid([first, second], frame)
+    assert {(raster.x0, raster.y0) for raster in aligned} == {(0.0, 0.0)}
+    for raster, before in zip(aligned, (first, second)):
+        np.testing.assert_allclose(places(raster, common), places(before, frame), atol=1e-6)

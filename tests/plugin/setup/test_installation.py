@@ -1,0 +1,162 @@
+"""Real pip, with wheels from a folder in place of the network."""
+
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from rail_extract.core.errors import Cancelled, RailExtractError
+from rail_extract.core.progress import SILENT, Progress
+from rail_extract.rail_extract_plugin.algorithms import install_packages
+from rail_extract.rail_extract_plugin.algorithms.install_packages import InstallPackages, Job
+from rail_extract.rail_extract_plugin.setup import package_folders
+from rail_extract.rail_extract_plugin.setup.installation import Order, install
+from rail_extract.rail_extract_plugin.setup.interpreter import Interpreter, find_interpreter
+
+
+@pytest.fixture
+def add_wheel(monkeypatch, tmp_path):
+    """Put a package of one module into the folder that pip alone looks in."""
+    index = tmp_path / "index"
+    index.mkdir()
+    for name in ("PIP_FIND_LINKS", "PIP_EXTRA_INDEX_URL", "PIP_CONFIG_FILE"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("PIP_CONFIG_FILE", "/dev/null")
+    monkeypatch.setenv("PIP_NO_INDEX", "1")
+    monkeypatch.setenv("PIP_FIND_LINKS", str(index))
+
+    def add(name: str, version: str = "1.0", requires: tuple[str, ...] = (), code: str = "") -> None:
+        record = f"{name}-{version}.dist-info"
+        needs = "".join(f"Requires-Dist: {one}\n" for one in requires)
+        with zipfile.ZipFile(index / f"{name}-{version}-py3-none-any.whl", "w") as wheel:
+            wheel.writestr(f"{name}.py", code or f"VERSION = '{version}'\n")
+            wheel.writestr(f"{record}/METADATA", f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n{needs}")
+            wheel.writestr(f"{record}/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+            wheel.writestr(f"{record}/RECORD", "")
+
+    return add
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return tmp_path / "Größe 1" / "packages"
+
+
+@pytest.fixture
+def put(folder):
+    """Install one package by its name, which is its module's as well."""
+
+    def put(name: str, progress: Progress = SILENT) -> str:
+        return install(Order((name,), (name,)), find_interpreter(), folder, [folder], progress)
+
+    return put
+
+
+def names_in(folder: Path) -> set[str]:
+    return {entry.name for entry in folder.iterdir()} - {"__pycache__"}
+
+
+def test_package_and_what_it_needs_go_into_the_folder(put, add_wheel, folder):
+    add_wheel("railfirst", requires=("railsecond", "numpy"))
+    add_wheel("railsecond", "2.1")
+    assert sorted(put("railfirst").split(", ")) == ["railfirst 1.0", "railsecond 2.1"]
+    assert {"railfirst.py", "railsecond.py"} <= names_in(folder)
+    assert not [name for name in names_in(folder) if name.startswith("numpy")]
+    assert list(folder.parent.iterdir()) == [folder]
+
+
+def test_what_is_there_is_not_installed_again(put, add_wheel):
+    add_wheel("railfirst", requires=("railsecond",))
+    add_wheel("railsecond")
+    assert put("railsecond") == "railsecond 1.0"
+    assert put("railfirst") == "railfirst 1.0"
+
+
+def test_numpy_of_qgis_decides_which_version_is_taken(put, add_wheel):
+    add_wheel("railfirst", "2.0", requires=("numpy>=99",))
+    add_wheel("railfirst", "1.0", requires=("numpy>=1",))
+    assert put("railfirst") == "railfirst 1.0"
+    assert put("railfirst") == ""
+
+
+def test_other_packages_of_qgis_stay(put, add_wheel, folder):
+    class Listener(Progress):
+        def warning(self, text):
+            warnings.append(text)
+
+    warnings = []
+    add_wheel("railfirst", requires=("laspy>=99",))
+    add_wheel("laspy", "99.0")
+    assert put("railfirst", Listener()) == "railfirst 1.0"
+    assert [text for text in warnings if text.startswith("QGIS has laspy ") and text.endswith("in place of 99.0.")]
+    assert "laspy.py" not in names_in(folder)
+
+
+@pytest.mark.parametrize(
+    ("requires", "code", "sentence"),
+    [
+        (("railmissing",), "", "No matching distribution found for railmissing"),
+        (
+            (),
+            "import railmissing",
+            "does not work in the Python of this QGIS .*No module named 'railmissing'",
+        ),
+        ((), "import os; os.abort()", "does not work in the Python of this QGIS"),
+    ],
+)
+def test_failure_is_a_sentence_and_changes_nothing(put, add_wheel, folder, requires, code, sentence):
+    add_wheel("railsecond")
+    put("railsecond")
+    before = names_in(folder)
+    add_wheel("railfirst", requires=requires, code=code)
+    with pytest.raises(RailExtractError, match=sentence):
+        put("railfirst")
+    assert names_in(folder) == before
+    assert list(folder.parent.iterdir()) == [folder]
+
+
+def test_cancel_changes_nothing(put, add_wheel, folder):
+    class Impatient(Progress):
+        def info(self, text):
+            heard.append(text)
+
+        def is_cancelled(self):
+            return any("Processing" in text for text in heard)
+
+    heard = []
+    add_wheel("railfirst")
+    with pytest.raises(Cancelled):
+        put("railfirst", Impatient())
+    assert not list(folder.parent.iterdir())
+
+
+def test_folder_that_cannot_be_made(put, folder):
+    folder.parent.write_text("a file")
+    with pytest.raises(RailExtractError, match="can't be written"):
+        put("railfirst")
+
+
+def test_python_without_pip(folder):
+    with pytest.raises(RailExtractError, match="has no pip: install it"):
+        install(Order(("one",), ("one",)), Interpreter("/bin/false"), folder, [], SILENT)
+
+
+def test_old_pip_asks_for_a_newer_one(add_wheel, folder, tmp_path):
+    program = tmp_path / "python"
+    script = f'if test "$3" = --version; then echo "pip 21.1 from x"; else exec {sys.executable} "$@"; fi'
+    program.write_text(f"#!/bin/sh\n{script}\n")
+    program.chmod(0o755)
+    add_wheel("railfirst")
+    with pytest.raises(RailExtractError, match="pip could not install pip"):
+        install(Order(("railfirst",), ("railfirst",)), Interpreter(str(program)), folder, [], SILENT)
+
+
+def test_what_is_kept_is_told_where_pytorch_fails(add_wheel, folder, monkeypatch):
+    add_wheel("railone")
+    monkeypatch.setattr(package_folders, "own_folder", lambda: folder)
+    monkeypatch.setitem(install_packages.BUILDS, ("CPU", sys.platform), ("--no-such-option",))
+    with pytest.raises(
+        RailExtractError, match=r"could not install torch .* None of it was kept\. Kept is railone 1\.0\.$"
+    ):
+        InstallPackages().compute(Job({"railone": "railone"}, "CPU"), {}, None, SILENT)
+    assert (folder / "railone.py").exists()

@@ -1,0 +1,51 @@
+import sys
+
+import pytest
+from rail_extract.core.errors import Cancelled
+from rail_extract.core.progress import Progress
+from rail_extract.rail_extract_plugin.setup.processes import run
+
+
+class Listener(Progress):
+    """Keeps the lines it hears, and cancels after as many as it is told."""
+
+    def __init__(self, most: int = 1000) -> None:
+        self.lines: list[str] = []
+        self._most = most
+
+    def info(self, text):
+        self.lines.append(text)
+
+    def is_cancelled(self):
+        return len(self.lines) >= self._most
+
+
+def test_output_comes_line_by_line_with_errors_among_it():
+    code = "import sys; print('one'); print(); print('zwei ü', file=sys.stderr, end='')"
+    listener = Listener()
+    ended = run(sys.executable, ["-u", "-c", code], {"PYTHONIOENCODING": "utf-8"}, listener)
+    assert ended.code == 0
+    assert listener.lines == ["one", "zwei ü"]
+    assert ended.output == "one\n\nzwei ü\n"
+
+
+def test_environment_is_changed_where_asked(monkeypatch):
+    monkeypatch.setenv("RAIL_KEPT", "kept")
+    code = "import os; print(os.environ['RAIL_KEPT'], os.environ['RAIL_CHANGED'])"
+    assert run(sys.executable, ["-c", code], {"RAIL_CHANGED": "changed"}).output == "kept changed\n"
+
+
+def test_exit_code_is_handed_out():
+    assert run(sys.executable, ["-c", "raise SystemExit(3)"]).code == 3
+
+
+def test_program_that_is_not_there_or_crashes_has_no_exit_code():
+    assert run("/nowhere/python", []).code is None
+    assert run(sys.executable, ["-c", "import os; os.abort()"]).code is None
+
+
+def test_cancel_ends_the_program(tmp_path):
+    code = "import sys, time; print('begun', flush=True); time.sleep(60); open(sys.argv[1], 'w')"
+    with pytest.raises(Cancelled):
+        run(sys.executable, ["-c", code, str(tmp_path / "late")], progress=Listener(most=1))
+    assert not list(tmp_path.iterdir())

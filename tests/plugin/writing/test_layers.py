@@ -1,0 +1,134 @@
+import numpy as np
+import pytest
+from qgis.core import (
+    NULL,
+    QgsProcessing,
+    QgsProcessingOutputLayerDefinition,
+    QgsProcessingUtils,
+    QgsProperty,
+    QgsUnitTypes,
+    QgsVectorLayer,
+    QgsWkbTypes,
+)
+from rail_extract.core.errors import RailExtractError
+from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.rails import Centerline, RailLine
+from rail_extract.rail_extract_plugin.writing.destinations import check_writable
+from rail_extract.rail_extract_plugin.writing.layers import add_features, features, fields, output_crs
+
+FEET = LocalFrame(np.array([1000.0, 2000.0, 10.0]), horizontal_unit_m=0.3048, vertical_unit_m=0.3048)
+XYZ = np.array([[0.0, 0.0, 0.0], [3.048, 0.0, 0.3048]])
+COLUMNS = [column for column in CENTERLINE_FIELDS if column.kind is float]
+
+
+def test_rail_becomes_a_feature_in_the_units_of_the_cloud(qgis):
+    rail = RailLine(XYZ, rail_id=3, class_code=10, points=812, resid_mm=4.5, sigma_mm=np.float64(0.7), bridged_m=0.0)
+    (feature,) = features([rail], RAIL_FIELDS, FEET)
+    vertices = [(point.x(), point.y(), point.z()) for point in feature.geometry().vertices()]
+    assert np.allclose(vertices, [(1000, 2000, 10), (1010, 2000, 11)])
+    assert feature.attributes() == [3, 10, 3.063, 812, 4.5, 0.7, 0.0]
+
+
+def test_centerline_becomes_a_feature(qgis):
+    line = Centerline(XYZ, 1, 10, (1, 4), (2,), 1435.2, float("nan"), -20.0, -41.0, 0.5)
+    (feature,) = features([line], CENTERLINE_FIELDS, FEET)
+    attributes = dict(zip((column.name for column in CENTERLINE_FIELDS), feature.attributes()))
+    assert (attributes["left_ids"], attributes["right_ids"]) == ("1,4", "2")
+    assert attributes["cantmax_mm"] == -41.0
+    assert attributes["gaugesd_mm"] == NULL
+
+
+ALL_FIELDS = pytest.mark.parametrize("columns", [RAIL_FIELDS, CENTERLINE_FIELDS, QUALITY_FIELDS])
+
+
+@ALL_FIELDS
+def test_shapefiles_keep_the_field_names(qgis, columns):
+    assert fields(columns).names() == [column.name for column in columns]
+    assert max(map(len, fields(columns).names())) <= 10
+
+
+@ALL_FIELDS
+def test_fields_have_their_types(qgis, columns):
+    layer = QgsVectorLayer("LineStringZ", "lines", "memory")
+    assert layer.dataProvider().addAttributes(fields(columns).toList())
+    found = layer.dataProvider().fields()
+    assert {column.name for column in columns if not found.field(column.name).isNumeric()} <= {"left_ids", "right_ids"}
+
+
+@pytest.mark.parametrize("suffix", [".gpkg", ".shp", ".geojson", ".csv"])
+def test_numbers_are_shown_with_the_decimals_that_mean_something(tmp_path, context, suffix):
+    line = Centerline(XYZ, 1, 10, (1, 4), (2,), 1435.2189, 1 / 3, -20.04, -0.01, 123456.789)
+    path = str(tmp_path / f"lines{suffix}")
+    shape, crs = QgsWkbTypes.Type.LineStringZ, output_crs(None)
+    sink, layer_id = QgsProcessingUtils.createFeatureSink(path, context, fields(CENTERLINE_FIELDS), shape, crs)
+    add_features(sink, features([line], CENTERLINE_FIELDS, FEET))
+    del sink
+    layer = QgsVectorLayer(layer_id, "lines", "ogr")
+    (feature,) = layer.getFeatures()
+    assert float(feature["length_m"]) == 3.063
+    shown = {column.name: layer.fields().field(column.name).displayString(feature[column.name]) for column in COLUMNS}
+    digits = {name: text.replace(",", "") for name, text in shown.items()}
+    assert {name: float(text) for name, text in digits.items()} == {
+        "length_m": 3.063,
+        "gauge_mm": 1435.2,
+        "gaugesd_mm": 0.3,
+        "cant_mm": -20.0,
+        "cantmax_mm": 0.0,
+        "bridged_m": 123456.79,
+    }
+    assert all(len(digits[column.name].partition(".")[2]) <= column.decimals for column in COLUMNS), shown
+
+
+def test_unknown_coordinate_system_is_cartesian_metres(qgis):
+    crs = output_crs(None)
+    assert crs.isValid()
+    assert not crs.isGeographic()
+    assert crs.mapUnits() == QgsUnitTypes.DistanceUnit.DistanceMeters
+
+
+@pytest.mark.parametrize(
+    "value", [None, "", "memory:", QgsProcessing.TEMPORARY_OUTPUT, "postgres:dbname='x' table=\"y\" (geom)"]
+)
+def test_outputs_that_are_no_files_are_let_through(context, value):
+    check_writable(value, context)
+
+
+def as_text(path):
+    return str(path)
+
+
+def as_table(path):
+    return f"ogr:dbname='{path}' table=\"rails\" (geom)"
+
+
+def as_definition(path):
+    return QgsProcessingOutputLayerDefinition(str(path))
+
+
+def as_property(path):
+    return QgsProperty.fromValue(str(path))
+
+
+@pytest.mark.parametrize("form", [as_text, as_table, as_definition, as_property])
+def test_writable_output(tmp_path, context, form):
+    check_writable(form(tmp_path / "räils 1.gpkg"), context)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("form", [as_text, as_table, as_definition, as_property])
+def test_folder_of_the_output_is_missing(tmp_path, context, form):
+    with pytest.raises(RailExtractError, match="can't be written"):
+        check_writable(form(tmp_path / "gone" / "rails.gpkg"), context)
+
+
+def test_output_is_a_folder(tmp_path, context):
+    with pytest.raises(RailExtractError, match="is a folder"):
+        check_writable(str(tmp_path), context)
+
+
+def test_existing_output_stays_as_it_is(tmp_path, context):
+    path = tmp_path / "rails.gpkg"
+    path.write_bytes(b"old")
+    check_writable(str(path), context)
+    assert path.read_bytes() == b"old"

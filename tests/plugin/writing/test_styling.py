@@ -1,0 +1,204 @@
+"""How results look when QGIS loads them."""
+
+import gc
+
+import pytest
+from qgis.core import (
+    Qgis,
+    QgsExpressionContext,
+    QgsExpressionContextUtils,
+    QgsFeature,
+    QgsGeometry,
+    QgsMapRendererParallelJob,
+    QgsMapSettings,
+    QgsProcessingContext,
+    QgsProject,
+    QgsRasterLayer,
+    QgsReadWriteContext,
+    QgsRectangle,
+    QgsRenderContext,
+    QgsVectorLayer,
+)
+from qgis.PyQt.QtCore import QSize
+from qgis.PyQt.QtGui import QColor
+from qgis.PyQt.QtXml import QDomDocument
+from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
+from rail_extract.rail_extract_plugin.paths import STYLES
+from rail_extract.rail_extract_plugin.writing.layers import fields
+from rail_extract.rail_extract_plugin.writing.styling import style_on_load
+
+KINDS = {
+    "rails": ("LineStringZ", RAIL_FIELDS),
+    "centerlines": ("LineStringZ", CENTERLINE_FIELDS),
+    "quality": ("PointZ", QUALITY_FIELDS),
+}
+
+
+@pytest.fixture
+def styled(context, new_feedback):
+    """A layer in memory with these rows, styled as QGIS does after a run."""
+
+    def make(style, rows=()):
+        shape, columns = KINDS[style]
+        layer = QgsVectorLayer(f"{shape}?crs=EPSG:32643", style, "memory")
+        layer.dataProvider().addAttributes(fields(columns).toList())
+        layer.updateFields()
+        for wkt, values in rows:
+            feature = QgsFeature(layer.fields())
+            feature.setGeometry(QgsGeometry.fromWkt(wkt))
+            for name, value in values.items():
+                feature[name] = value
+            assert layer.dataProvider().addFeature(feature)
+        details = QgsProcessingContext.LayerDetails(style, QgsProject.instance(), style.upper())
+        context.addLayerToLoadOnCompletion(layer.id(), details)
+        style_on_load(layer.id(), style, context)
+        gc.collect()
+        post_processor = context.layerToLoadOnCompletionDetails(layer.id()).postProcessor()
+        post_processor.postProcessLayer(layer, context, new_feedback())
+        return layer
+
+    return make
+
+
+def colours(layer):
+    """Colour of each feature's symbol."""
+    rendering = QgsRenderContext()
+    rendering.setExpressionContext(QgsExpressionContext(QgsExpressionContextUtils.globalProjectLayerScopes(layer)))
+    renderer = layer.renderer()
+    renderer.startRender(rendering, layer.fields())
+    found = []
+    for feature in layer.getFeatures():
+        rendering.expressionContext().setFeature(feature)
+        symbol = renderer.symbolForFeature(feature, rendering)
+        found.append(symbol and symbol.color().name())
+    renderer.stopRender(rendering)
+    return found
+
+
+LINE = "LINESTRING Z (500000 3000000 1, 500100 3000000 1)"
+
+
+def test_rails_are_coloured_by_their_standard_error(styled):
+    errors = (0.5, 2.0, 4.0, 7.0, 30.0, None)
+    assert colours(styled("rails", [(LINE, {"sigma_mm": sigma}) for sigma in errors])) == [
+        "#1565c0",
+        "#1565c0",
+        "#4fb3bf",
+        "#f28e2b",
+        "#d62839",
+        "#d62839",
+    ]
+
+
+def test_quality_is_coloured_by_how_far_the_gauge_is_off_that_of_its_track(styled):
+    gauges = {1: (1435, 1435, 1435, 1443, 1420, None), 2: (1000, 1000, 1001, 985, 1012)}
+    rows = [
+        ("POINT Z (500000 3000000 1)", {"track_id": track, "gauge_mm": gauge, "bridged": 0})
+        for track, values in gauges.items()
+        for gauge in values
+    ]
+    well, wide, too_wide, too_narrow, unknown = "#4da05a", "#ef8a62", "#b2182b", "#2166ac", "#969696"
+    assert colours(styled("quality", rows)) == [
+        *[well, well, well, wide, too_narrow, unknown],
+        *[well, well, well, too_narrow, too_wide],
+    ]
+
+
+def test_centerlines_carry_their_number_and_direction(styled):
+    layer = styled("centerlines", [(LINE, {"track_id": 7})])
+    assert colours(layer) == ["#e64a19"]
+    arrows = layer.renderer().symbol().symbolLayer(1)
+    assert arrows.layerType() == "MarkerLine"
+    assert arrows.subSymbol().symbolLayer(0).properties()["name"] == "filled_arrowhead"
+    assert layer.labelsEnabled()
+    settings = layer.labeling().settings()
+    scopes = QgsExpressionContext(QgsExpressionContextUtils.globalProjectLayerScopes(layer))
+    scopes.setFeature(next(layer.getFeatures()))
+    assert settings.getLabelExpression().evaluate(scopes) == "Track 7"
+    assert settings.format().buffer().enabled()
+
+
+@pytest.mark.parametrize("style", KINDS)
+def test_layers_can_be_drawn(styled, style):
+    """What is drawn is neither nothing nor QGIS's random colour."""
+    rows = {
+        "rails": (LINE, {"sigma_mm": 1.0}),
+        "centerlines": (LINE, {"track_id": 1}),
+        "quality": ("POINT Z (500050 3000000 1)", {"track_id": 1, "gauge_mm": 1435.0, "bridged": 1}),
+    }
+    layer = styled(style, [rows[style]])
+    settings = QgsMapSettings()
+    settings.setLayers([layer])
+    settings.setDestinationCrs(layer.crs())
+    settings.setExtent(QgsRectangle(500000, 2999950, 500100, 3000050))
+    settings.setOutputSize(QSize(300, 300))
+    settings.setBackgroundColor(QColor("white"))
+    job = QgsMapRendererParallelJob(settings)
+    job.start()
+    job.waitForFinished()
+    image = job.renderedImage()
+    seen = {image.pixelColor(x, y).name() for x in range(60, 200) for y in range(100, 200)}
+    assert {"rails": "#1565c0", "centerlines": "#e64a19", "quality": "#f28e2b"}[style] in seen
+
+
+@pytest.mark.parametrize("style", ["rails", "centerlines"])
+def test_lines_lie_at_their_height_in_3d(styled, style):
+    module = pytest.importorskip("qgis._3d")
+    module.Qgs3D.initialize()
+    document = QDomDocument()  # what is written lives as long
+    written = document.createElement("renderer-3d")
+    layer = styled(style)
+    layer.renderer3D().writeXml(written, QgsReadWriteContext())
+    data = written.firstChildElement("symbol").firstChildElement("data")
+    for name, value in (("alt-clamping", "absolute"), ("alt-binding", "vertex"), ("simple-lines", "1")):
+        assert data.attribute(name) == value
+
+
+@pytest.mark.skipif(Qgis.QGIS_VERSION_INT < 32600, reason="vector layers have no elevation properties")
+@pytest.mark.parametrize("style", KINDS)
+def test_layers_know_that_their_heights_are_heights(styled, style):
+    layer = styled(style)
+    properties = layer.elevationProperties()
+    assert properties.clamping() == Qgis.AltitudeClamping.Absolute
+    assert properties.binding() == Qgis.AltitudeBinding.Vertex
+
+
+@pytest.mark.skipif(Qgis.QGIS_VERSION_INT < 33200, reason="no groups for results")
+def test_layers_of_a_run_share_a_group_points_on_top(styled, context):
+    layers = [styled(style) for style in ("quality", "rails", "centerlines")]
+    details = [context.layerToLoadOnCompletionDetails(layer.id()) for layer in layers]
+    assert {one.groupName for one in details} == {"Rail Extract"}
+    assert details[0].layerSortKey > details[2].layerSortKey > details[1].layerSortKey
+
+
+def test_rasters_are_black_on_nothing(qgis, write_cloud, track, run_step, tmp_path):
+    path = tmp_path / "raster.tif"
+    assert run_step("rasterizerailpoints", {"INPUT": write_cloud(track()), "OUTPUT": path}).ok
+    layer = QgsRasterLayer(str(path), "raster")
+    layer.loadNamedStyle(str(STYLES / "raster.qml"))
+    (entry,) = layer.renderer().classes()
+    assert (entry.value, entry.color.name(), entry.color.alpha()) == (1, "#000000", 255)
+    assert layer.dataProvider().sourceNoDataValue(1) == 0  # drawn as nothing
+
+
+def test_styles_are_there_again_after_a_run_has_ended(qgis, new_feedback):
+    """QGIS deletes with its context what styles layers; two layers of one run have one each."""
+    for _ in range(2):
+        context = QgsProcessingContext()
+        layers = [QgsVectorLayer("LineStringZ?field=sigma_mm:double", "rails", "memory") for _ in range(2)]
+        for layer in layers:
+            details = QgsProcessingContext.LayerDetails("rails", QgsProject.instance(), "RAILS")
+            context.addLayerToLoadOnCompletion(layer.id(), details)
+            style_on_load(layer.id(), "rails", context)
+        gc.collect()
+        for layer in layers:
+            details = context.layerToLoadOnCompletionDetails(layer.id())
+            details.postProcessor().postProcessLayer(layer, context, new_feedback())
+            assert layer.renderer().type() == "graduatedSymbol"
+        del details, context
+        gc.collect()
+
+
+def test_layer_that_is_not_loaded_is_left_alone(context):
+    style_on_load("unknown", "rails", context)
+    assert not context.layersToLoadOnCompletion()
