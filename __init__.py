@@ -9,6 +9,6 @@ def classFactory(iface):  # noqa: N802 - the name QGIS calls
     iface : qgis.gui.QgisInterface or None
         None under ``qgis_process``.
     """
-    from .__init__.rail_extract_plugin.plugin import RailExtractPlugin
+    from .rail_extract_plugin.plugin import RailExtractPlugin
 
     return RailExtractPlugin(iface)
