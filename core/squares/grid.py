@@ -59,10 +59,6 @@ class Square:
             return np.ones(len(xyz), dtype=bool)
         return ((xyz[:, :2] >= -margin_m) & (xyz[:, :2] < self.side_m + margin_m)).all(axis=1)
 
-    def shift_to(self, frame: LocalFrame) -> np.ndarray:
-        """Local metres of `frame` less those of the stretch, (3,)."""
-        return frame.to_local(self.frame.origin[None])[0]
-
 
 class PointSource(Protocol):
     """Rail points of one class that can be asked for by squares.
@@ -94,7 +90,7 @@ class MemorySource:
 
     def __init__(self, points: RailPoints, side_m: float) -> None:
         self.frame, self.class_code, self.side_m = points.frame, points.class_code, side_m
-        origin = Square.square((0, 0), side_m, points.frame).shift_to(points.frame)
+        origin = Square.square((0, 0), side_m, points.frame).frame.shift_to(points.frame)
         keys, number = unique_keys(points.xyz - origin, side_m)
         self._points, self._order = points, np.argsort(number, kind="stable")
         borders = np.searchsorted(number[self._order], np.arange(len(keys) + 1))
@@ -108,7 +104,7 @@ class MemorySource:
             return self._points
         parts = [self._order[self._ranges[key]] for key in around(stretch.key) if key in self._ranges]
         chosen = np.sort(np.concatenate(parts)) if parts else np.empty(0, dtype=np.int64)
-        xyz = self._points.xyz[chosen] - stretch.shift_to(self.frame)
+        xyz = self._points.xyz[chosen] - stretch.frame.shift_to(self.frame)
         return RailPoints(xyz[stretch.holds(xyz, margin_m)], stretch.frame, self.class_code)
 
 
@@ -187,7 +183,7 @@ def assembled(rasters: Mapping[Key, RailRaster], stretches: Mapping[Key, Square]
     if len(rasters) == 1 and not np.isfinite(stretches[first].side_m):
         return rasters[first]
     count = tiles_along(stretches[first].side_m, rasters[first].cell_m)
-    x0, y0, _ = stretches[first].shift_to(frame)
+    x0, y0, _ = stretches[first].frame.shift_to(frame)
     tiles = {
         (row - count * (key[1] - first[1]), column + count * (key[0] - first[0])): tile
         for key, raster in rasters.items()

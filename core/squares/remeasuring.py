@@ -51,7 +51,7 @@ def measure_in_squares(
     if not np.isfinite(stretches[0].side_m):
         points = source.near(stretches[0], 0.0)
         return measure_again(rails, points, head_width_m, PROFILE_SIGMA_M, progress)
-    zero = Square.square((0, 0), source.side_m, source.frame).shift_to(source.frame)
+    zero = Square.square((0, 0), source.side_m, source.frame).frame.shift_to(source.frame)
     wanted: dict[Key, list[tuple[int, float, float]]] = {}
     for number, rail in enumerate(rails):
         for key, start, end in _by_stretch(rail, zero, source.side_m):
@@ -60,7 +60,7 @@ def measure_in_squares(
     measured: list[list[tuple[float, RailLine]]] = [[] for _ in rails]
     for key in progress.follow(sorted(wanted)):
         stretch = by_key.get(key) or Square.square(key, source.side_m, source.frame)
-        shift = stretch.shift_to(source.frame)
+        shift = stretch.frame.shift_to(source.frame)
         points = source.near(stretch, CONTEXT_M)
         pieces = [
             replace(piece, xyz=piece.xyz - shift)

@@ -32,7 +32,7 @@ def join(results: Iterable[SquareRails], frame: LocalFrame) -> list[RailLine]:
         return [closed_ring(rail) for rail in ordered[0].rails]
     table, nodes = Table(), []
     for result in ordered:
-        shift = result.stretch.shift_to(frame)
+        shift = result.stretch.frame.shift_to(frame)
         table.lay(result.stretch, [replace(rail, xyz=rail.xyz + shift) for rail in result.rails], shift[:2])
         nodes.append(result.nodes + shift[:2])
     return _reconnected(table.lines(), np.concatenate(nodes))

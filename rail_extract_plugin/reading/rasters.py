@@ -141,17 +141,16 @@ def choose_model(header: RasterHeader, name: str) -> Model:
 def on_one_grid(rasters: Sequence[RailRaster], frame: LocalFrame) -> tuple[list[RailRaster], LocalFrame]:
     """Give rasters whose grids lie whole tiles apart the grid of the first, and the frame that it begins at."""
     first = rasters[0]
-    origin = frame.to_crs(np.array([first.x0, first.y0, 0.0]))
     side_m = TILE * first.cell_m
     aligned = []
     for raster in rasters:
         down, right = round((first.y0 - raster.y0) / side_m), round((raster.x0 - first.x0) / side_m)
         tiles = {(row + down, column + right): tile for (row, column), tile in raster.tiles.items()}
         aligned.append(replace(raster, tiles=tiles, x0=0.0, y0=0.0))
-    return aligned, replace(frame, origin=origin)
+    return aligned, frame.with_origin(np.array([first.x0, first.y0, 0.0]))
 
 
 def moved(raster: RailRaster, frame: LocalFrame, other: LocalFrame) -> RailRaster:
     """Give a raster's place in another local frame of the same coordinate system."""
-    x0, y0, _ = other.to_local(frame.to_crs(np.array([raster.x0, raster.y0, 0.0])))
-    return replace(raster, x0=float(x0), y0=float(y0))
+    right, up, _ = frame.shift_to(other)
+    return replace(raster, x0=raster.x0 + float(right), y0=raster.y0 + float(up))

@@ -81,9 +81,8 @@ def read_inputs(
     area = Area("rails", classes, _bounds(lines, frame), frame)
     clouds = tuple(spool_points_in(area, cloud, SQUARE_M, folder, progress.span(0.2, 1.0)).values())
     theirs = clouds[0].frame
-    origin = frame.to_crs(-_shift(frame, theirs))
     tracks, lines = _moved(tracks, frame, theirs), _moved(lines, frame, theirs)
-    return TrackInputs(tracks, lines, clouds, replace(frame, origin=origin))
+    return TrackInputs(tracks, lines, clouds, frame.with_origin(theirs.shift_to(frame)))
 
 
 def measured_rails(tracks: TrackInputs, head_width_m: float, progress: Progress) -> list[RailLine]:
@@ -126,20 +125,8 @@ def _mean(values: np.ndarray) -> float:
     return float(known.mean()) if len(known) else np.nan
 
 
-def _shift(frame: LocalFrame, other: LocalFrame) -> np.ndarray:
-    """Way from a place in one local frame to the same in another of the same plane, (3,) metres.
-
-    Units of height may differ between the two, so each origin counts in its own.
-    """
-    return _origin_m(frame) - _origin_m(other)
-
-
-def _origin_m(frame: LocalFrame) -> np.ndarray:
-    return frame.origin * [frame.horizontal_unit_m, frame.horizontal_unit_m, frame.vertical_unit_m]
-
-
 def _moved(lines: Sequence, frame: LocalFrame, other: LocalFrame) -> tuple:
-    shift = _shift(frame, other)
+    shift = frame.shift_to(other)
     return tuple(replace(line, xyz=line.xyz + shift) for line in lines)
 
 

@@ -21,7 +21,6 @@ from rail_extract.core.errors import (
     ParameterError,
     RailExtractError,
 )
-from rail_extract.core.frame import LocalFrame
 from rail_extract.core.progress import Progress
 
 RAIL = 10
@@ -209,16 +208,6 @@ def test_vertical_geotiff_keys_count(tmp_path, keys, vertical_m):
     (points,) = read_rail_points(path, [RAIL])
     assert points.frame.horizontal_unit_m == 0.3048
     assert points.frame.vertical_unit_m == pytest.approx(vertical_m, rel=1e-9)
-
-
-@given(
-    origin=st.tuples(*[st.floats(-1e7, 1e7)] * 3),
-    xyz=st.lists(st.tuples(*[st.floats(-1e4, 1e4)] * 3), min_size=1, max_size=5),
-    unit=st.sampled_from([1.0, 0.3048, 1200 / 3937]),
-)
-def test_a_frame_leads_there_and_back(origin, xyz, unit):
-    frame = LocalFrame(np.array(origin), unit, 1.0)
-    np.testing.assert_allclose(frame.to_local(frame.to_crs(np.array(xyz))), np.array(xyz), rtol=0, atol=1e-7)
 
 
 def test_without_crs_it_goes_on_in_metres_with_a_warning(tmp_path):

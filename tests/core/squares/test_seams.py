@@ -34,7 +34,7 @@ def seen_by_stretches(lines, error_m=0.0):
         stretch = Square.square(key, SIDE, FRAME)
         found = []
         for line in lines:
-            inside = stretch.holds(line.xyz - stretch.shift_to(FRAME), REACH)
+            inside = stretch.holds(line.xyz - stretch.frame.shift_to(FRAME), REACH)
             edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
             along = length_along(line.xyz[:, :2])
             for first, after in edges.reshape(-1, 2):
@@ -42,7 +42,7 @@ def seen_by_stretches(lines, error_m=0.0):
                     part = line.between(along[first], along[after - 1])
                     beside = error_m * np.array([np.sin(17 * key[0] + key[1]), np.cos(5 * key[1] + key[0]), 0.3])
                     found.append(part.reversed() if (key[0] + key[1]) % 2 else part)
-                    found[-1] = moved(found[-1], beside - stretch.shift_to(FRAME))
+                    found[-1] = moved(found[-1], beside - stretch.frame.shift_to(FRAME))
         results.append(trim(found, stretch))
     return results
 
