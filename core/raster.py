@@ -24,7 +24,7 @@ BORDER_CELLS = 1e-6
 
 
 def cell_size(gauge_m: float, head_width_m: float) -> float:
-    """Cell size in metres at which the two rails lie `CENTRE_SPACING_CELLS` apart (ALGORITHMS.md section 5.7)."""
+    """Cell size in metres at which the two rails lie `CENTRE_SPACING_CELLS` apart (docs/method.md section 2.1)."""
     return (gauge_m + head_width_m) / CENTRE_SPACING_CELLS
 
 
@@ -134,7 +134,7 @@ class RailRaster:
 
 
 def rasterize(xy: np.ndarray, cell_m: float) -> RailRaster:
-    """Rasterize rail points: a cell is set where it holds at least one point (paper, section 7).
+    """Rasterize rail points: a cell is set where it holds at least one point (docs/method.md section 2.2).
 
     Cell borders lie on multiples of `cell_m`, so that clouds of one local origin share one grid.
 

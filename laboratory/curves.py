@@ -116,7 +116,7 @@ def trace(
 
 
 def transition_curve(straight_m: float, clothoid_m: float, arc_m: float, curvature: float) -> list[Element]:
-    """Straight, clothoid, arc, clothoid, straight: the railway's classical curve (ALGORITHMS.md section 6.3)."""
+    """Straight, clothoid, arc, clothoid, straight: the railway's classical curve (docs/method.md section 11.2)."""
     return [
         Element(straight_m),
         Element(clothoid_m, 0.0, curvature),

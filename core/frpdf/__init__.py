@@ -1,6 +1,6 @@
 """FRPDF, the network that cleans rail rasters: its layers, its weights, its engines and its passes.
 
-The constants here are the paper's (section 5); they stand apart from `network`, which needs PyTorch.
+The constants here are those of Gribov and Chang, section 5; they stand apart from `network`, which needs PyTorch.
 """
 
 CHANNELS = 24

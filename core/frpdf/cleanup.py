@@ -30,7 +30,7 @@ def is_stable(changed: int, cells: int) -> bool:
 
 
 def clean(raster: RailRaster, engine: Engine, passes: int = DEFAULT_PASSES, progress: Progress = SILENT) -> RailRaster:
-    """Remove noise and bridge gaps with the network (paper, sections 5 and 7).
+    """Remove noise and bridge gaps with the network (Gribov and Chang, sections 5 and 7).
 
     Parameters
     ----------

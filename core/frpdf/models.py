@@ -47,7 +47,7 @@ MODELS = (Model("base", 1.435, 0.0762, "frpdf_base.npz"),)
 
 
 def choose(gauge_m: float, head_width_m: float) -> Model:
-    """Choose the model whose ratio of gauge to railhead is nearest (paper, section 7).
+    """Choose the model whose ratio of gauge to railhead is nearest (Gribov and Chang, section 7).
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The FRPDF network, line for line as in the paper's figures (section 5): 293,545 parameters.
+"""The FRPDF network, line for line as in the figures of Gribov and Chang, section 5: 293,545 parameters.
 
 Class names are the paper's. Every layer keeps the full resolution; context comes from dilation alone.
 """
@@ -18,7 +18,7 @@ class PassBatchNorm2d(nn.BatchNorm2d):
     """Batch norm whose running statistics are kept per pass, with the affine part shared by all passes.
 
     The state channel is constant in the first pass and binary afterwards, so activations differ between passes; one
-    set of running statistics fits neither (ALGORITHMS.md section 5.5).
+    set of running statistics fits neither (docs/method.md section 3.2).
     """
 
     def __init__(self, channels: int) -> None:

@@ -1,6 +1,6 @@
 """Heights of rails: the points on top of each railhead, found by a rolling disc and smoothed along the line.
 
-The steps are those of the paper's section "Postprocessing of Vectorized Geometry": points are projected onto their
+The steps are those of Gribov and Chang, section 8 (docs/method.md section 6.4): points are projected onto their
 line, those on the head's top kept, and their heights smoothed by PAEK.
 """
 

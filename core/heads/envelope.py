@@ -1,4 +1,4 @@
-"""The upper boundary of a union of equal discs, and the surface a disc rolls along (ALGORITHMS.md section 3)."""
+"""The upper boundary of a union of equal discs, and the surface a disc rolls along (docs/method.md section 6.4)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Lateral refinement: lines move to the middle between both edges of their railhead.
 
 The raster leaves a line up to half a cell beside its rail, for long stretches where the rail runs along the grid. The
-points know better: where most of them lie within one head width, there the head is (ALGORITHMS.md section 1.9).
+points know better: where most of them lie within one head width, there the head is (docs/method.md section 6.2).
 """
 
 from __future__ import annotations

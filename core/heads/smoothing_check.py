@@ -21,7 +21,7 @@ SHARPEST_M = 10.0
 """Radius of a tram's sharpest curve; what bends more sharply is no rail's curve."""
 
 END_SHIFT = 0.26
-"""Where a line ends in an arc of radius R, PAEK draws it aside by this times sigma² / R (ALGORITHMS.md section 2.5);
+"""Where a line ends in an arc of radius R, PAEK draws it aside by this times sigma² / R (docs/method.md section 5.4);
 where the arc begins at a straight, by half as much."""
 
 

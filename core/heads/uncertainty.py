@@ -17,7 +17,8 @@ from .edges import BLUR_BINS, HALF_HEAD, STATION_M, Heads, histograms
 from .level import on_top
 
 VARIANCE_FACTOR = 0.33375
-"""Of independent points `spacing` apart, PAEK's result has this variance times spacing / sigma (section 2.4)."""
+"""Of independent points `spacing` apart, PAEK's result has this variance times spacing / sigma (docs/method.md
+section 5.3)."""
 
 
 def measure_support(

@@ -4,7 +4,7 @@ At a station s of a piecewise linear P(t) the quadratic a + b u + e u² that fit
 exp(-|u| / sigma) gives the smoothed position a. The needed moments are integrated exactly segment by segment, and the
 moments of a longer stretch follow from those of its two halves. That operation is associative, so all vertices are
 served at once by doubling scans. Idea: Bodansky, Gribov and Pilouk, "Smoothing and compression of lines obtained by
-raster-to-vector conversion", 2002; formulas: ALGORITHMS.md section 2.
+raster-to-vector conversion", 2002; formulas: docs/method.md section 5.2.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Smoothing of lines and height profiles by PAEK; what it keeps and loses: ALGORITHMS.md sections 2.4 to 2.9."""
+"""Smoothing of lines and height profiles by PAEK; what it keeps and loses: docs/method.md section 5.3."""
 
 from __future__ import annotations
 

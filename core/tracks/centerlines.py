@@ -1,4 +1,4 @@
-"""Track centerlines: the line midway between the two rails of a track (paper, "Railroad Track Centerline ...")."""
+"""Track centerlines: the line midway between the two rails of a track (docs/method.md section 8)."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Dynamic time warping of two polylines: the stretches that run within a tolerance of each other.
 
-The paper's matching (section "Matching Pairs of Polylines"): a vertex of one polyline paired with a segment of the
-other is an edge of the lattice of vertex pairs (i, j); a match is a path along edges, each step advancing on one of
-the polylines.
+The matching of Gribov and Chang, section 9 (docs/method.md section 8.2): a vertex of one polyline paired with a
+segment of the other is an edge of the lattice of vertex pairs (i, j); a match is a path along edges, each step
+advancing on one of the polylines.
 """
 
 from __future__ import annotations
@@ -128,7 +128,10 @@ def distance_to_segment(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def squared_distance_integral(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Squared distance from the origin, integrated along the segments p to q, (n, 2) each (paper, appendix); (n,)."""
+    """Squared distance from the origin, integrated along the segments p to q, (n, 2) each; (n,).
+
+    Gribov and Chang, appendix.
+    """
     length = np.linalg.norm(q - p, axis=1)
     return length / 3 * np.einsum("ij,ij->i", p, p + q) + length / 3 * np.einsum("ij,ij->i", q, q)
 

@@ -77,7 +77,7 @@ def pair_rails(
     other_gauges_m: Sequence[float] = (),
     progress: Progress = SILENT,
 ) -> tuple[RailPair, ...]:
-    """Find the stretches along which two rails of one class lie a gauge apart (ALGORITHMS.md sections 4.2 and 4.3).
+    """Find the stretches along which two rails of one class lie a gauge apart (docs/method.md section 8.3).
 
     Each rail is moved half the spacing towards the other, and the moved curves are matched. Every rail has two sides;
     a stretch of a side serves one track, that of the longest match.

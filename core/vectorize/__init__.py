@@ -38,7 +38,7 @@ def vectorize(
     progress: Progress = SILENT,
     raw: RailRaster | None = None,
 ) -> LineNetwork:
-    """Turn rail cells into lines: one line a rail, straight through junctions and across gaps (paper, section 8).
+    """Turn rail cells into lines: one per rail, straight through junctions and across gaps (docs/method.md section 4).
 
     Parameters
     ----------

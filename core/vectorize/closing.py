@@ -1,4 +1,4 @@
-"""Small holes and gaps in the cleaned raster are filled before it becomes lines (paper, section 10)."""
+"""Small holes and gaps in the cleaned raster are filled before it becomes lines (docs/method.md section 4.1)."""
 
 from __future__ import annotations
 

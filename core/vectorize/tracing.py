@@ -1,4 +1,4 @@
-"""The pruned graph of pixels becomes polylines that run from node to node (ALGORITHMS.md sections 1.6 and 1.7)."""
+"""The pruned graph of pixels becomes polylines that run from node to node (docs/method.md section 4.5)."""
 
 from __future__ import annotations
 

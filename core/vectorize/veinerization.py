@@ -1,7 +1,7 @@
 """The veinerization graph: every pixel climbs to deeper ones, and weak branches are peeled off.
 
 Deseilligny, Stamon and Suen, "Veinerization: a new shape description for flexible skeletonization", IEEE PAMI 20(5),
-1998; the steps stand in ALGORITHMS.md sections 1.4 and 1.5.
+1998; the steps: docs/method.md section 4.3 and section 4.4.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Combinations of clothoids that join oriented points, from a table computed once (ALGORITHMS.md section 6.2).
+"""Combinations of clothoids that join oriented points, from a table computed once (docs/method.md section 11.3).
 
 A combination is three pieces: its curvature rises from zero, runs linearly, and falls back to zero, so that chains of
 them have no jump of curvature. With the chord as unit of length, the curvature is fixed by the deflections at both

@@ -1,6 +1,6 @@
 """From a layout to a pair of rasters: as a scanner shows it at one severity from 0 to 1, and as it is.
 
-The paper names the kinds of distortion (section 4.4), ALGORITHMS.md section 6.5 gives them numbers, and
+Gribov and Chang, section 4.3, name the kinds of distortion; docs/method.md section 3.7 has the principles, and
 docs/synthetic.md lists what each severity does. A label follows its rail's own shift at wavelengths above
 `LABEL_WAVELENGTH_M`: the network is to smooth noise, not to straighten track.
 """

@@ -1,4 +1,4 @@
-"""What belongs to crossing rails and is no running rail: openings, guard, wing and check rails (section 6.4)."""
+"""What belongs to crossing rails and is no running rail: openings, guard, wing and check rails."""
 
 from __future__ import annotations
 

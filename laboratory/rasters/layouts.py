@@ -1,7 +1,7 @@
 """Random track layouts by family: what a railway lays, from a plain track to a yard.
 
 Layouts are drawn at the scale of the base model: rail centres 1511.2 mm apart. Any other standard is the same picture
-at another scale (ALGORITHMS.md section 5.7), but for the ratio of gauge to railhead. The paper has two strategies:
+at another scale (docs/method.md section 2.1), but for the ratio of gauge to railhead. The paper has two strategies:
 splits along random alignments, which most families vary, and random points joined by clothoids, `connections`. Like
 the paper's, the layouts hold more than railways build, so that they hold all that railways build.
 """

@@ -16,7 +16,7 @@ SPACING_M = 1.5112
 CELL_M = 0.04
 
 RATIOS = (14.2, 25.2)
-"""Least and greatest ratio of gauge to railhead width among the world's rail standards (ALGORITHMS.md section 7)."""
+"""Least and greatest ratio of gauge to railhead width among the world's rail standards (docs/method.md section 10)."""
 BASE_RATIO = 18.83
 """Ratio of 132RE, the paper's example."""
 RATIO_TOLERANCE = 0.06

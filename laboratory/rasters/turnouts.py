@@ -1,4 +1,4 @@
-"""Turnouts and crossovers: the forms railways build, and the rails they lay (ALGORITHMS.md section 6.4)."""
+"""Turnouts and crossovers: the forms railways build, and the rails they lay (docs/method.md section 11.4)."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 HEAD_ABOVE_GROUND_M = 0.15
-"""Railhead above sleepers and ballast (paper, section 3)."""
+"""Railhead above sleepers and ballast (Gribov and Chang, section 3)."""
 
 BALLAST_WIDTH_M = 1.6
 """From a track's axis to where its bed begins to fall."""

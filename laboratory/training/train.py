@@ -1,7 +1,7 @@
 """Train FRPDF, or a network to compare it with, on synthetic pairs; on the CPU or CUDA, resumable, seeded, logged.
 
-Loss on every pass, no gradient through the feedback, shared weights, batch statistics per pass (ALGORITHMS.md
-section 5.5).
+Loss on every pass, no gradient through the feedback, shared weights, batch statistics per pass; see
+docs/method.md section 3.8.
 """
 
 from __future__ import annotations
