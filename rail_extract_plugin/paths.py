@@ -1,4 +1,4 @@
-"""Where the plugin's own files lie."""
+"""Paths of the plugin's own files."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ RESOURCES = ROOT / "resources"
 MODEL = ROOT / "models" / "extract_rails.model3"
 ICONS = RESOURCES / "icons"
 ICON = ICONS / "rail_extract.svg"
+SAMPLE = RESOURCES / "sample"
 STYLES = RESOURCES / "styles"
 PICTURES = RESOURCES / "help"
 GUIDE = RESOURCES / "guide"

@@ -30,10 +30,10 @@ class CheckInstallation(RailAlgorithm):
     GROUP_ID = "setup"
     GUIDE = "troubleshooting"
     TAGS = ("rail", "setup", "version", "versions", "test", "diagnose", "support", "gpu", "cuda", "engine")
-    SUMMARY = "Tells which versions, engine and models are there, and tests them on a short track."
+    SUMMARY = "Lists the versions, the engine and the models in use, and tests them on a short piece of track."
     HELP = (
-        "Takes less than a minute. It extracts a straight track of 20 m, made on the spot, and compares it with the "
-        "truth. Put what it prints into every report of an error."
+        "Takes less than a minute. It extracts 20 m of the sample that comes with the plugin and compares the lines "
+        "with the true rails. Include the output in every bug report."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
@@ -87,7 +87,7 @@ class CheckInstallation(RailAlgorithm):
             names = ", ".join(package.module for package in missing)
             return False, tr("{} missing, run Install packages").format(names), ""
         try:
-            return self_test.extract_straight(progress)
+            return self_test.extract_sample(progress)
         except (RailExtractError, ImportError) as error:
             return False, str(error).rstrip("."), ""
 
