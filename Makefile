@@ -7,6 +7,9 @@ TORCH ?= torch==2.13.0
 TORCH_BUILDS ?= https://download.pytorch.org/whl/cpu
 SUDO = $(if $(filter 0,$(shell id -u)),,sudo)
 PYTHON = .venv/bin/python
+CHECK = .check/bin/python
+# The checkout under its import name, whatever its folder is called.
+AS_PACKAGE = .check/src
 ENVIRONMENT = build/environment.sh
 
 APT_PACKAGES = git qgis python3-qgis python3-venv python3-pip python3-numpy python3-scipy python3-matplotlib python3-pyproj
@@ -20,9 +23,13 @@ help:  ## list the targets
 demo: plugin  ## extract the sample's rails through qgis_process; lines and map go into build/demo
 	@. ./$(ENVIRONMENT) && $(PYTHON) tools/demo.py
 
+.PHONY: check
+check: lint  ## lint, types, import rules and the tests that need neither QGIS nor PyTorch; two minutes
+	@PYTHONPATH=$(AS_PACKAGE) $(CHECK) -m pytest -n auto tests/core tests/docs tests/tools
+
 .PHONY: test
-test: lint plugin  ## run every test: core, plugin and, through qgis_process, the whole
-	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest tests/core tests/laboratory tests/benchmarks tests/docs
+test: check plugin  ## run every test: check, core with PyTorch, plugin and, through qgis_process, the whole
+	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest -n auto tests/core tests/laboratory tests/benchmarks
 	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest tests/plugin tests/e2e
 
 .PHONY: test-qgis
@@ -35,8 +42,9 @@ test-latest test-3.40: test-%:  ## run the same with Debian testing's QGIS, or w
 	@$(SUDO) $(SYSTEM_PYTHON) tools/chroot.py $* '$(TORCH)' $(TORCH_BUILDS) $(filter-out git,$(APT_PACKAGES))
 
 .PHONY: lint
-lint: .venv/installed  ## check style, and that nothing is used that QGIS 4 lacks
-	@$(PYTHON) -m ruff check . && $(PYTHON) -m ruff format --check . && $(PYTHON) tools/qt6.py
+lint: .check/installed  ## check style, words, types and import rules
+	@$(CHECK) -m ruff check . && $(CHECK) -m ruff format --check . && $(CHECK) tools/words.py
+	@MYPYPATH=$(AS_PACKAGE) $(CHECK) -m mypy && PYTHONPATH=$(AS_PACKAGE) .check/bin/lint-imports --no-cache
 
 .PHONY: env
 env: plugin  ## print export lines for `$QGIS_PROCESS run railextract:extractrails`: eval "$(make -s env)"
@@ -80,6 +88,16 @@ build/profile/enabled: | $(ENVIRONMENT) package
 
 $(ENVIRONMENT): tools/environment.py .venv/installed
 	@$(PYTHON) tools/environment.py > $@
+
+# An environment without QGIS and PyTorch, for `make check`.
+.check/installed: requirements.txt tools/check-requirements.txt pyproject.toml
+	@$(SYSTEM_PYTHON) -c "import ensurepip" 2>/dev/null || { $(SUDO) apt-get update -q && $(SUDO) apt-get install -q -y python3-venv; } >&2
+	@echo "Installing Python packages into .check" >&2
+	@mkdir -p build && grep -v '^torch' requirements.txt > build/requirements-check.txt
+	@$(SYSTEM_PYTHON) -m venv .check
+	@$(CHECK) -m pip install --quiet -r build/requirements-check.txt -r tools/check-requirements.txt numpy scipy >&2
+	@mkdir -p $(AS_PACKAGE) && ln -sfn ../.. $(AS_PACKAGE)/rail_extract
+	@touch $@
 
 # Packages over QGIS's own Python: numpy and scipy stay at the system's versions, which GDAL's bridge is built against.
 .venv/installed: .venv/constraints.txt requirements.txt tools/requirements.txt pyproject.toml
