@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from qgis.core import QgsProcessingFeedback, QgsProcessingParameterDefinition
 
 from ..core.progress import Progress
-from .dialog.labels import for_reader
+from .dialog.wording import for_user
 
 
 class QgisProgress(Progress):
@@ -36,11 +36,11 @@ class QgisProgress(Progress):
 
     def info(self, text: str) -> None:
         """Write a line into the log."""
-        self._feedback.pushInfo(for_reader(text, self._definitions))
+        self._feedback.pushInfo(for_user(text, self._definitions))
 
     def warning(self, text: str) -> None:
         """Write a marked line into the log."""
-        self._feedback.pushWarning(for_reader(text, self._definitions))
+        self._feedback.pushWarning(for_user(text, self._definitions))
 
     def is_cancelled(self) -> bool:
         """Tell whether the cancel button was pressed."""

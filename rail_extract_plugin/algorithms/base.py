@@ -17,12 +17,11 @@ from qgis.PyQt.QtGui import QIcon
 
 from ...core.errors import Cancelled, RailExtractError
 from ...core.progress import Progress
-from ..dialog.contradictions import refuse_contradictions
+from ..dialog.checks import check_values, explain_invalid
 from ..dialog.guide import guide
 from ..dialog.help_panel import help_panel
-from ..dialog.labels import for_reader
-from ..dialog.refusals import explain_refused
-from ..dialog.values import Values
+from ..dialog.parameter_values import ParameterValues
+from ..dialog.wording import for_user
 from ..feedback import QgisProgress
 from ..i18n import tr
 from ..paths import ICONS, PICTURES
@@ -88,7 +87,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     def checkParameterValues(self, parameters: dict[str, Any], context: QgsProcessingContext) -> tuple[bool, str]:
         """Check all values before a run, and say what is wrong in words of whom QGIS shows it to."""
         accepted, message = self._check(parameters, context)
-        return accepted, for_reader(message, self.parameterDefinitions())
+        return accepted, for_user(message, self.parameterDefinitions())
 
     def _check(self, parameters: dict[str, Any], context: QgsProcessingContext) -> tuple[bool, str]:
         """Check as QGIS does, then whether outputs can be written, then as `read` does."""
@@ -122,7 +121,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         try:
             self._job = self._read(parameters, context)
         except RailExtractError as error:
-            raise QgsProcessingException(for_reader(str(error), self.parameterDefinitions())) from None
+            raise QgsProcessingException(for_user(str(error), self.parameterDefinitions())) from None
         return True
 
     def processAlgorithm(
@@ -133,7 +132,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         try:
             results = self.compute(self._job, parameters, context, progress)
         except RailExtractError as error:
-            raise QgsProcessingException(for_reader(str(error), self.parameterDefinitions())) from None
+            raise QgsProcessingException(for_user(str(error), self.parameterDefinitions())) from None
         except Cancelled:
             raise QgsProcessingException(tr("Cancelled; nothing was written.")) from None
         except MemoryError:
@@ -143,14 +142,14 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     def _read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Any:
         """Read the parameters, after a look at those that need no file."""
-        refuse_contradictions(self.parameterDefinitions(), Values(self, parameters, context))
+        check_values(self.parameterDefinitions(), ParameterValues(self, parameters, context))
         return self.read(parameters, context)
 
     def _refusal(self, parameters: dict[str, Any], context: QgsProcessingContext) -> str | None:
         """Say what is wrong with the first value that QGIS does not accept, outputs aside."""
         accepted = self._with_paths_accepted(parameters)
         told = (
-            explain_refused(definition, accepted.get(definition.name()), context)
+            explain_invalid(definition, accepted.get(definition.name()), context)
             for definition in self.parameterDefinitions()
             if not definition.isDestination()
         )

@@ -13,7 +13,7 @@ from ...core.progress import Progress
 from ...core.standards import RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
-from ..dialog.values import Values
+from ..dialog.parameter_values import ParameterValues
 from ..writing.layers import CENTERLINES, figures_of, write_lines
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
@@ -63,7 +63,7 @@ class BuildTrackCenterlines(RailAlgorithm):
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read what has to be read in the main thread, and check it all."""
-        values = Values(self, parameters, context)
+        values = ParameterValues(self, parameters, context)
         standard = values.standard()
         values.lines("INPUT")
         return Job(standard, values.other_gauges_m(standard))
@@ -75,7 +75,7 @@ class BuildTrackCenterlines(RailAlgorithm):
         from ...core.pipeline import tracks_of
         from ..reading.line_layers import read_rails
 
-        values = Values(self, parameters, context)
+        values = ParameterValues(self, parameters, context)
         rails, frame = read_rails(values.lines("INPUT"), progress.span(0, READING))
         settings = values.settings(job.standard, job.other_gauges_m)
         tracks = tracks_of(rails, settings, progress.span(READING, 1))

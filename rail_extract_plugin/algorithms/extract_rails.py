@@ -19,7 +19,7 @@ from ...core.progress import Estimating, Progress
 from ...core.standards import RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
-from ..dialog.values import Values
+from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource, spool_points
 from ..writing.layers import (
     CENTERLINES,
@@ -97,7 +97,7 @@ class ExtractRails(RailAlgorithm):
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read what has to be read in the main thread, and check it all."""
-        values = Values(self, parameters, context)
+        values = ParameterValues(self, parameters, context)
         standard = values.standard()
         choose_model(standard.gauge_m, standard.head_width_m)
         return Job(
@@ -114,7 +114,7 @@ class ExtractRails(RailAlgorithm):
         """Extract everything, then write it."""
         from ...core.pipeline import extract_rails, square_side
 
-        values, progress = Values(self, parameters, context), Estimating(progress)
+        values, progress = ParameterValues(self, parameters, context), Estimating(progress)
         settings = values.settings(job.standard, job.other_gauges_m)
         settings = replace(
             settings,
@@ -155,6 +155,8 @@ class ExtractRails(RailAlgorithm):
         if not any(raster.tiles for raster in network.cleaned):
             return {}
         rasters, frame = on_one_grid(network.cleaned, network.frame)
-        extent = Values(self, parameters, context).extent(QgsCoordinateReferenceSystem(network.frame.crs_wkt or ""))
+        extent = ParameterValues(self, parameters, context).extent(
+            QgsCoordinateReferenceSystem(network.frame.crs_wkt or "")
+        )
         header = header_for(rasters, class_codes, frame, job.standard, extent)
         return write_raster(self, "CLEANED", header, rasters, parameters, context)

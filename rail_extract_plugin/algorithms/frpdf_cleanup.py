@@ -13,7 +13,7 @@ from ...core.progress import Progress
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.definitions import helped
-from ..dialog.values import Values
+from ..dialog.parameter_values import ParameterValues
 from ..i18n import tr
 from ..writing.layers import write_raster
 from .base import RAIL_WORDS, RailAlgorithm
@@ -65,7 +65,7 @@ class FrpdfCleanup(RailAlgorithm):
         """Read the raster's header, and check that a model fits it."""
         from ..reading.rasters import choose_model
 
-        values = Values(self, parameters, context)
+        values = ParameterValues(self, parameters, context)
         path, header = values.raster("INPUT")
         standard = header.standard(values.optional_number("GAUGE"), values.optional_number("HEAD_WIDTH"))
         header = replace(header, gauge_m=standard.gauge_m, head_width_m=standard.head_width_m)
@@ -81,7 +81,7 @@ class FrpdfCleanup(RailAlgorithm):
         from ...core.frpdf.weights import load_arrays
         from ..reading.geotiff import read_rasters
 
-        values = Values(self, parameters, context)
+        values = ParameterValues(self, parameters, context)
         engine = make_engine(load_arrays(job.model.path), values.choice("ENGINE"), values.choice("DEVICE"))
         rasters = read_rasters(job.path, job.header, progress.span(0, READING))
         passes = int(values.number("ITERATIONS"))

@@ -11,7 +11,7 @@ from qgis.core import QgsProcessingContext, QgsProcessingOutputFolder, QgsProces
 from ...core.errors import Cancelled, ParameterError, RailExtractError
 from ...core.progress import Progress
 from ..dialog import parameters as groups
-from ..dialog.values import Values
+from ..dialog.parameter_values import ParameterValues
 from ..i18n import tr
 from ..setup import package_folders
 from ..setup.dependencies import OPTIONAL, PACKAGES, is_installed
@@ -58,7 +58,7 @@ class InstallPackages(RailAlgorithm):
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """See what is missing."""
-        build = Values(self, parameters, context).choice("TORCH")
+        build = ParameterValues(self, parameters, context).choice("TORCH")
         if build == "CUDA" and sys.platform == "darwin":
             raise ParameterError("There is no CUDA on macOS: set TORCH to CPU.")
         needed = [package for package in PACKAGES if package.module not in OPTIONAL]

@@ -12,7 +12,7 @@ from qgis.core import QgsProcessingContext, QgsProcessingUtils
 from ...core.progress import Progress
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
-from ..dialog.values import Values
+from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource
 from ..writing.layers import figures_of_stations, write_stations
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
@@ -65,7 +65,7 @@ class MeasureTrackGeometry(RailAlgorithm):
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read what has to be read in the main thread, and check it all."""
-        values = Values(self, parameters, context)
+        values = ParameterValues(self, parameters, context)
         for name in ("INPUT", "RAILS"):
             values.lines(name)
         return Job(values.head_width_m(), values.cloud("POINTS") if values.filled("POINTS") else None)
@@ -77,7 +77,7 @@ class MeasureTrackGeometry(RailAlgorithm):
         from ...core.tracks.geometry import measure_track_geometry
         from ..reading.track_inputs import check_gauges, measured_rails, read_inputs
 
-        values = Values(self, parameters, context)
+        values = ParameterValues(self, parameters, context)
         lines = values.lines("INPUT"), values.lines("RAILS")
         with TemporaryDirectory(dir=QgsProcessingUtils.tempFolder()) as folder:
             tracks = read_inputs(*lines, job.cloud, Path(folder), progress.span(0, READING))

@@ -13,7 +13,7 @@ from ...core.standards import RailStandard
 from ..dialog import inputs
 from ..dialog import parameters as groups
 from ..dialog.definitions import helped
-from ..dialog.values import Values
+from ..dialog.parameter_values import ParameterValues
 from ..i18n import tr
 from ..reading.clouds import CloudSource, read_points
 from ..writing.layers import write_raster
@@ -60,7 +60,7 @@ class RasterizeRailPoints(RailAlgorithm):
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read what has to be read in the main thread, and check it all."""
-        values = Values(self, parameters, context)
+        values = ParameterValues(self, parameters, context)
         standard = values.standard()
         choose_model(standard.gauge_m, standard.head_width_m)
         return Job(values.cloud("INPUT"), values.class_codes(), standard)
@@ -72,7 +72,7 @@ class RasterizeRailPoints(RailAlgorithm):
         from ...core.raster import cell_size, rasterize
         from ..reading.rasters import header_for
 
-        values = Values(self, parameters, context)
+        values = ParameterValues(self, parameters, context)
         clouds = read_points(job.cloud, job.class_codes, values.extent, progress.span(0, READING))
         cell_m = cell_size(job.standard.gauge_m, job.standard.head_width_m)
         rasters = [rasterize(points.xyz, cell_m) for points in clouds]

@@ -14,7 +14,7 @@ from ...core.progress import Progress
 from ...core.standards import RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
-from ..dialog.values import Values
+from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource
 from ..writing.layers import RAILS, figures_of, write_lines
 from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
@@ -61,7 +61,7 @@ class VectorizeRails(RailAlgorithm):
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read the raster's header, and find the cloud's files."""
-        values = Values(self, parameters, context)
+        values = ParameterValues(self, parameters, context)
         path, header = values.raster("INPUT")
         standard = header.standard(values.optional_number("GAUGE"), values.optional_number("HEAD_WIDTH"))
         return Job(path, header, standard, values.cloud("POINTS") if values.filled("POINTS") else None)
@@ -84,7 +84,7 @@ class VectorizeRails(RailAlgorithm):
             clouds = read_points_in(area, job.cloud, progress.span(READING / 2, READING))
             frame = clouds[job.header.class_codes[0]].frame
             rasters = tuple(moved(raster, job.header.frame, frame) for raster in rasters)
-        settings = Values(self, parameters, context).settings(job.standard)
+        settings = ParameterValues(self, parameters, context).settings(job.standard)
         rails = []
         shares = progress.span(READING, 1).split(len(rasters))
         for raster, code, share in zip(rasters, job.header.class_codes, shares):

@@ -9,7 +9,7 @@ from qgis.PyQt.QtCore import QUrl
 from qgis.PyQt.QtGui import QImage
 from qgis.PyQt.QtWidgets import QScrollArea, QSplitter, QTextBrowser
 from rail_extract.rail_extract_plugin.dialog import guide
-from rail_extract.rail_extract_plugin.dialog.labels import for_reader, with_labels
+from rail_extract.rail_extract_plugin.dialog.wording import for_user, with_labels
 
 NAMES = (
     *("extractrails", "rasterizerailpoints", "frpdfcleanup", "vectorizerails", "buildtrackcenterlines"),
@@ -151,7 +151,7 @@ def test_dialog_calls_parameters_by_their_labels(make):
     said = "The standard CUSTOM needs both: fill GAUGE and HEAD_WIDTH, not MAX_GAPS or OUTPUT/CRS.gpkg."
     shown = said.replace("GAUGE", '"Gauge [mm]"').replace("HEAD_WIDTH", '"Railhead width [mm]"')
     assert with_labels(said, definitions) == shown
-    assert for_reader(said, definitions) == said  # what runs here has no windows of QGIS
+    assert for_user(said, definitions) == said  # what runs here has no windows of QGIS
 
 
 def test_dialog_refuses_a_cloud_in_degrees(open_dialog, context, write_cloud, track):

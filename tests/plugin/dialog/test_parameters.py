@@ -2,7 +2,7 @@ import pytest
 from qgis.core import QgsProcessingParameterDefinition
 from rail_extract.core.errors import ParameterError
 from rail_extract.core.standards import STANDARDS
-from rail_extract.rail_extract_plugin.dialog.values import class_numbers, gauges_m
+from rail_extract.rail_extract_plugin.dialog.parameter_values import class_numbers, gauges_m
 
 PARAMETERS = [
     ("INPUT", "pointcloud", None),

@@ -1,10 +1,12 @@
-"""What QGIS itself refuses, said so that a user knows what to do."""
+"""Checks of parameter values before a run: those that QGIS makes, explained, and those that need no file."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from qgis.core import (
+    QgsCoordinateReferenceSystem,
     QgsProcessingContext,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterEnum,
@@ -15,6 +17,7 @@ from qgis.core import (
 )
 
 from .definitions import UNBOUNDED
+from .parameter_values import ParameterValues
 
 EXPECTED = {
     QgsProcessingParameterExtent: "four numbers: xmin,xmax,ymin,ymax",
@@ -23,16 +26,42 @@ EXPECTED = {
 }
 
 
-def explain_refused(
+def check_values(definitions: Sequence[QgsProcessingParameterDefinition], values: ParameterValues) -> None:
+    """Check the values of the parameters that several algorithms share; gauges are checked where they are read.
+
+    Parameters
+    ----------
+    definitions : sequence of QgsProcessingParameterDefinition
+        The algorithm's parameters.
+    values : ParameterValues
+
+    Raises
+    ------
+    RailExtractError
+        A number is NaN, EXTENT has no area, RAIL_CLASSES is not a list of classes, or ENGINE cannot run on DEVICE.
+    """
+    names = {definition.name() for definition in definitions}
+    for definition in definitions:
+        if isinstance(definition, QgsProcessingParameterNumber):
+            values.optional_number(definition.name())
+    if "EXTENT" in names:
+        values.extent(QgsCoordinateReferenceSystem())
+    if "RAIL_CLASSES" in names:
+        values.class_codes()
+    if "ENGINE" in names:
+        values.engine()
+
+
+def explain_invalid(
     definition: QgsProcessingParameterDefinition, value: Any, context: QgsProcessingContext
 ) -> str | None:
-    """Say what is wrong with a value and what to give instead; None where QGIS accepts it.
+    """Return what is wrong with a value and what to enter instead, or None if QGIS accepts the value.
 
     Parameters
     ----------
     definition : QgsProcessingParameterDefinition
     value : object
-        As the user gave it; None stands for the default.
+        As the user entered it; None means the default.
     context : QgsProcessingContext
     """
     given = definition.defaultValue() if value is None else value

@@ -1,4 +1,4 @@
-"""Sentences for those who see a dialog: parameters by their labels, not by the names that scripts use."""
+"""Messages in the user's terms: in QGIS's windows a parameter is called by its label, not by its name in scripts."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from collections.abc import Sequence
 from qgis.core import QgsApplication, QgsProcessingParameterDefinition
 
 WITH_DIALOGS = "desktop"
-"""What QGIS calls the platform of its windows."""
+"""QGIS's name for the platform with windows."""
 
 NAME = r"(?<![\w./\\])[A-Z][A-Z_]+(?![\w/\\]|\.\w)"
-"""A word in capitals that is no part of a path."""
+"""A word in capitals that is not part of a path."""
 
 
-def for_reader(sentence: str, definitions: Sequence[QgsProcessingParameterDefinition]) -> str:
-    """Word a sentence about parameters as the platform's users know them."""
+def for_user(sentence: str, definitions: Sequence[QgsProcessingParameterDefinition]) -> str:
+    """Return the sentence with labels in place of parameter names if this QGIS has windows, else unchanged."""
     return with_labels(sentence, definitions) if QgsApplication.platform() == WITH_DIALOGS else sentence
 
 
 def with_labels(sentence: str, definitions: Sequence[QgsProcessingParameterDefinition]) -> str:
-    """Put the labels, in quotes, in place of the names of parameters."""
+    """Replace the names of parameters with their labels in quotes."""
     labels = {definition.name(): definition.description() for definition in definitions}
     return re.sub(NAME, lambda name: f'"{labels[name[0]]}"' if name[0] in labels else name[0], sentence)

@@ -1,4 +1,4 @@
-"""What the user filled in: the values of an algorithm's parameters, as the core takes them."""
+"""The values of an algorithm's parameters, read from QGIS in the types that the core expects."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ NO_LINES = (
 CHOICES = {"ENGINE": "engine", "DEVICE": "device"}
 
 
-class Values:
+class ParameterValues:
     """Values of the parameters of one run.
 
     Parameters
