@@ -65,7 +65,7 @@ def save_rails(path: Path, found: SquareRails) -> None:
     )
 
 
-def load_rails(path: Path, stretch: Square) -> SquareRails:
+def load_rails(path: Path, square: Square) -> SquareRails:
     """Read what `save_rails` wrote of a stretch."""
     with np.load(path, allow_pickle=False) as held:
         parts = zip(held["figures"].tolist(), *(_unpacked(held, name) for name in ("xyz", "gaps", "support")))
@@ -73,7 +73,7 @@ def load_rails(path: Path, stretch: Square) -> SquareRails:
             RailLine(xyz, 0, int(code), points, resid, sigma, bridged, gaps, Support(*support.T))
             for (code, points, resid, sigma, bridged), xyz, gaps, support in parts
         ]
-        return SquareRails(stretch, tuple(_whole(rail) for rail in rails), held["nodes"])
+        return SquareRails(square, tuple(_whole(rail) for rail in rails), held["nodes"])
 
 
 def _whole(rail: RailLine) -> RailLine:

@@ -1,1 +1,1 @@
-"""Clouds of any size: squares with overlap, points on disk, lines joined across borders."""
+"""Clouds of any size: squares with overlap, points on disk, and lines joined across borders."""

@@ -1,7 +1,8 @@
-"""Stretches: squares of the plane that are worked on by themselves, so that neither length nor memory has a limit.
+"""Squares of the plane that are processed one at a time, so that memory does not grow with the cloud.
 
-The squares lie on a grid anchored at the zero of the cloud's coordinate system. The split is therefore the same however
-files are cut, and whichever other files there are. Sides are whole raster tiles: all stretches share one raster grid.
+The grid of squares is anchored at the zero of the cloud's coordinate system, so the division depends neither on how the
+cloud is cut into files nor on which other files are given. The side is a whole number of raster tiles, so that all
+squares share one raster grid. See docs/method.md section 7.1.
 """
 
 from __future__ import annotations
@@ -17,28 +18,28 @@ from ..frame import LocalFrame
 from ..raster import TILE, RailRaster
 
 SQUARE_TILES = 50
-"""Tiles along the side, half a kilometre: what overlaps is a sixth of it, and the widest yard fits into memory."""
+"""Tiles along a side, about 500 m: the overlap is a sixth of the side, and the widest yard fits into memory."""
 
 OVERLAP_M = 40.0
-"""A stretch's lines are drawn from as much around it as well: by so much of it a line's way through a switch is told.
-Its whole tiles make 41 m at a gauge of 1435 mm."""
+"""Width of the surroundings from which the lines of a square are drawn: that much of a line is needed to decide its
+route through a switch. Rounded up to whole tiles, it is 41 m at a gauge of 1435 mm."""
 
 HALO_M = 4.0
-"""Beyond its border a stretch's lines are still good for so far, and fade into those of the neighbour."""
+"""Distance beyond the border of a square up to which its lines are valid; there they blend into the neighbour's."""
 
 Key = tuple[int, int]
-"""Column and row of a square, to the east and to the north."""
+"""Column (to the east) and row (to the north) of a square."""
 
 
 @dataclass(frozen=True)
 class Square:
-    """A square, or the whole plane where the cloud is small.
+    """A square, or the whole plane if the cloud is small.
 
     Attributes
     ----------
     key : tuple of int
     frame : LocalFrame
-        Its local metres count from its south-western corner; those of the whole plane from the cloud's origin.
+        Its origin is the south-western corner of the square; for the whole plane, the origin of the cloud.
     side_m : float
         Infinite for the whole plane.
     """
@@ -47,50 +48,72 @@ class Square:
     frame: LocalFrame
     side_m: float
 
+    @property
+    def is_whole_plane(self) -> bool:
+        """Whether the cloud is not divided."""
+        return not np.isfinite(self.side_m)
+
     @classmethod
-    def square(cls, key: Key, side_m: float, frame: LocalFrame) -> Square:
-        """Make a square of the grid; `frame` is the cloud's."""
+    def on_grid(cls, key: Key, side_m: float, frame: LocalFrame) -> Square:
+        """Create a square of the grid.
+
+        Parameters
+        ----------
+        key : tuple of int
+        side_m : float
+        frame : LocalFrame
+            Local frame of the cloud.
+        """
         corner = np.array([*key, 0]) * side_m / frame.horizontal_unit_m
         return cls(key, replace(frame, origin=corner), side_m)
 
     def holds(self, xyz: np.ndarray, margin_m: float = 0.0) -> np.ndarray:
-        """Tell which of (n, 2) or (n, 3) places, in its local metres, lie at most `margin_m` outside, (n,) bool."""
-        if not np.isfinite(self.side_m):
+        """Return which places lie in the square or at most `margin_m` outside, (n,) bool.
+
+        Parameters
+        ----------
+        xyz : (n, 2) or (n, 3) array
+            Local metres of the square.
+        margin_m : float
+        """
+        if self.is_whole_plane:
             return np.ones(len(xyz), dtype=bool)
         return ((xyz[:, :2] >= -margin_m) & (xyz[:, :2] < self.side_m + margin_m)).all(axis=1)
 
 
 class PointSource(Protocol):
-    """Rail points of one class that can be asked for by squares.
+    """Rail points of one class, read square by square."""
 
-    Attributes
-    ----------
-    frame : LocalFrame
-    class_code : int
-    side_m : float
-        Side of the squares.
-    counts : mapping of key to int
-        Points by square; squares without points are missing.
-    span_m : float
-        Longer side of the rectangle that holds all points.
-    """
+    @property
+    def frame(self) -> LocalFrame:
+        """Local frame of the cloud."""
 
-    frame: LocalFrame
-    class_code: int
-    side_m: float
-    counts: Mapping[Key, int]
-    span_m: float
+    @property
+    def class_code(self) -> int:
+        """Code of the class."""
 
-    def near(self, stretch: Square, margin_m: float) -> RailPoints:
-        """Read the points of a stretch and those at most `margin_m` outside, in its frame."""
+    @property
+    def side_m(self) -> float:
+        """Side of the squares."""
+
+    @property
+    def counts(self) -> Mapping[Key, int]:
+        """Number of points by square; squares without points are not listed."""
+
+    @property
+    def span_m(self) -> float:
+        """Longer side of the bounding rectangle of all points."""
+
+    def near(self, square: Square, margin_m: float) -> RailPoints:
+        """Read the points of a square and those at most `margin_m` outside, in the frame of the square."""
 
 
 class MemorySource:
-    """Points that are in memory already."""
+    """Points in memory, a `PointSource`."""
 
     def __init__(self, points: RailPoints, side_m: float) -> None:
         self.frame, self.class_code, self.side_m = points.frame, points.class_code, side_m
-        origin = Square.square((0, 0), side_m, points.frame).frame.shift_to(points.frame)
+        origin = Square.on_grid((0, 0), side_m, points.frame).frame.shift_to(points.frame)
         keys, number = unique_keys(points.xyz - origin, side_m)
         self._points, self._order = points, np.argsort(number, kind="stable")
         borders = np.searchsorted(number[self._order], np.arange(len(keys) + 1))
@@ -98,92 +121,124 @@ class MemorySource:
         self.counts = {key: part.stop - part.start for key, part in self._ranges.items()}
         self.span_m = float(np.ptp(points.xyz[:, :2], axis=0).max()) if len(points.xyz) else 0.0
 
-    def near(self, stretch: Square, margin_m: float) -> RailPoints:
+    def near(self, square: Square, margin_m: float) -> RailPoints:
         """See `PointSource`."""
-        if not np.isfinite(stretch.side_m):
+        if square.is_whole_plane:
             return self._points
-        parts = [self._order[self._ranges[key]] for key in around(stretch.key) if key in self._ranges]
+        parts = [self._order[self._ranges[key]] for key in around(square.key) if key in self._ranges]
         chosen = np.sort(np.concatenate(parts)) if parts else np.empty(0, dtype=np.int64)
-        xyz = self._points.xyz[chosen] - stretch.frame.shift_to(self.frame)
-        return RailPoints(xyz[stretch.holds(xyz, margin_m)], stretch.frame, self.class_code)
+        xyz = self._points.xyz[chosen] - square.frame.shift_to(self.frame)
+        return RailPoints(xyz[square.holds(xyz, margin_m)], square.frame, self.class_code)
 
 
 def unique_keys(xyz_m: np.ndarray, side_m: float) -> tuple[list[Key], np.ndarray]:
-    """Squares that hold points, given in metres from the zero of the coordinate system, and each point's among them."""
+    """Find the squares in which points lie.
+
+    Parameters
+    ----------
+    xyz_m : (n, 2) or (n, 3) array
+        Metres from the zero of the coordinate system.
+    side_m : float
+        Side of the squares.
+
+    Returns
+    -------
+    keys : list of Key
+        The squares, in ascending order.
+    number : (n,) int array
+        Index into `keys` for each point.
+    """
     rows, number = np.unique(np.floor(xyz_m[:, :2] / side_m).astype(np.int64), axis=0, return_inverse=True)
     return [(column, row) for column, row in rows.tolist()], number.ravel()
 
 
 def around(key: Key) -> list[Key]:
-    """Name a square and its eight neighbours."""
+    """Return the keys of a square and its eight neighbours."""
     return [(key[0] + right, key[1] + up) for right in (-1, 0, 1) for up in (-1, 0, 1)]
 
 
 def lay_out(sources: Sequence[PointSource], source: PointSource) -> list[Square]:
-    """List the stretches of one of the sources; a single one where all of them together are no longer than a square."""
+    """List the squares of one of the sources; a single one if every source fits into a square."""
     if max(one.span_m for one in sources) <= source.side_m:
         return [Square((0, 0), source.frame, np.inf)]
-    return [Square.square(key, source.side_m, source.frame) for key in sorted(source.counts)]
+    return [Square.on_grid(key, source.side_m, source.frame) for key in sorted(source.counts)]
 
 
 def in_turn(keys: Iterable[Key]) -> Iterator[tuple[Key, list[Key], list[Key]]]:
-    """Go through squares in order.
+    """Visit squares in order.
 
     Yields
     ------
     Key
-        The square whose turn it is.
+        The square to visit.
     list of Key
-        Those that now have had their turn with all their neighbours.
+        Squares that have become ready: they and all their neighbours have been visited.
     list of Key
-        Those that now have been listed so with all their neighbours: nothing needs them any longer.
+        Squares that are no longer needed: they and all their neighbours are ready.
     """
-    everyone, passed, finished = set(keys), set(), set()
+    all_keys, visited, done = set(keys), set(), set()
 
-    def surrounded(one: Key, by: set[Key]) -> bool:
-        return everyone & set(around(one)) <= by
+    def neighbours_in(key: Key, subset: set[Key]) -> bool:
+        return all_keys & set(around(key)) <= subset
 
-    for key in sorted(everyone):
-        passed.add(key)
-        ready = [one for one in around(key) if one in passed - finished and surrounded(one, passed)]
-        finished.update(ready)
-        beside = {near for one in ready for near in around(one) if near in finished}
-        yield key, ready, sorted(near for near in beside if surrounded(near, finished))
+    for key in sorted(all_keys):
+        visited.add(key)
+        ready = [one for one in around(key) if one in visited - done and neighbours_in(one, visited)]
+        done.update(ready)
+        affected = {near for one in ready for near in around(one) if near in done}
+        yield key, ready, sorted(near for near in affected if neighbours_in(near, done))
 
 
-def own_tiles(raster: RailRaster, stretch: Square) -> RailRaster:
-    """Keep the tiles of a raster that lie inside the stretch."""
-    if not np.isfinite(stretch.side_m):
+def own_tiles(raster: RailRaster, square: Square) -> RailRaster:
+    """Keep the tiles of a raster that lie in the square."""
+    if square.is_whole_plane:
         return raster
-    count = tiles_along(stretch.side_m, raster.cell_m)
+    count = tiles_along(square.side_m, raster.cell_m)
     inside = {
         (row, column): tile for (row, column), tile in raster.tiles.items() if -count <= row < 0 and 0 <= column < count
     }
     return replace(raster, tiles=inside)
 
 
-def mosaic(rasters: Mapping[Key, RailRaster], stretch: Square, reach: int) -> RailRaster:
-    """Put together the tiles of a stretch and those of its neighbours that lie within `reach` tiles of it."""
-    own = rasters[stretch.key]
-    if not np.isfinite(stretch.side_m):
+def mosaic(rasters: Mapping[Key, RailRaster], square: Square, margin: int) -> RailRaster:
+    """Combine the raster of a square with the tiles of its neighbours around it.
+
+    Parameters
+    ----------
+    rasters : mapping of Key to RailRaster
+        That of the square and those of its neighbours, each with its origin at the corner of its own square.
+    square : Square
+    margin : int
+        Width, in tiles, of the surroundings to include.
+    """
+    own = rasters[square.key]
+    if square.is_whole_plane:
         return own
-    count, tiles = tiles_along(stretch.side_m, own.cell_m), {}
-    for key in around(stretch.key):
-        down, right = -count * (key[1] - stretch.key[1]), count * (key[0] - stretch.key[0])
+    count, tiles = tiles_along(square.side_m, own.cell_m), {}
+    for key in around(square.key):
+        down, right = -count * (key[1] - square.key[1]), count * (key[0] - square.key[0])
         for (row, column), tile in rasters[key].tiles.items() if key in rasters else ():
             place = (row + down, column + right)
-            if -count - reach <= place[0] < reach and -reach <= place[1] < count + reach:
+            if -count - margin <= place[0] < margin and -margin <= place[1] < count + margin:
                 tiles[place] = tile
     return replace(own, tiles=tiles)
 
 
-def assembled(rasters: Mapping[Key, RailRaster], stretches: Mapping[Key, Square], frame: LocalFrame) -> RailRaster:
-    """Put the rasters of all stretches into one, in the local metres of `frame`."""
+def assembled(rasters: Mapping[Key, RailRaster], squares: Mapping[Key, Square], frame: LocalFrame) -> RailRaster:
+    """Combine the rasters of all squares into one.
+
+    Parameters
+    ----------
+    rasters : mapping of Key to RailRaster
+    squares : mapping of Key to Square
+    frame : LocalFrame
+        Local frame of the result.
+    """
     first = min(rasters)
-    if len(rasters) == 1 and not np.isfinite(stretches[first].side_m):
+    if squares[first].is_whole_plane:
         return rasters[first]
-    count = tiles_along(stretches[first].side_m, rasters[first].cell_m)
-    x0, y0, _ = stretches[first].frame.shift_to(frame)
+    count = tiles_along(squares[first].side_m, rasters[first].cell_m)
+    x0, y0, _ = squares[first].frame.shift_to(frame)
     tiles = {
         (row - count * (key[1] - first[1]), column + count * (key[0] - first[0])): tile
         for key, raster in rasters.items()
@@ -193,5 +248,5 @@ def assembled(rasters: Mapping[Key, RailRaster], stretches: Mapping[Key, Square]
 
 
 def tiles_along(side_m: float, cell_m: float) -> int:
-    """Count the tiles along a side."""
+    """Return the number of raster tiles along the side of a square."""
     return round(side_m / (TILE * cell_m))

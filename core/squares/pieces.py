@@ -1,53 +1,224 @@
-"""What a stretch hands on: its rails, cut where they are no longer good."""
+"""Pieces of rails: what a square contributes, which parts of it are new, and how a piece blends into the next.
+
+See docs/method.md section 7.3.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..polyline import resample, runs
+from ..lines.uniting import SAME_RAIL_M
+from ..polyline import interpolate, length_along, project, resample, runs
 from ..rails import RailLine
 from .grid import HALO_M, Square
 
 STATION_M = 0.25
 """Spacing of the stations at which lines are cut and compared."""
 
+MIN_MATCH_M = 1.0
+"""Lines that are close together over a shorter length only cross or diverge."""
+
+HOLE_STATIONS = 3
+HOLE_M = HOLE_STATIONS * STATION_M
+"""Longest hole that can remain near a corner between the parts of a rail that two squares show; a longer one is filled
+by a third square."""
+
+PieceEnd = tuple[int, int]
+"""Number of a piece and one of its ends: 0 for the start, 1 for the end."""
+
 
 @dataclass(frozen=True)
 class SquareRails:
-    """What one stretch gives.
+    """The result of one square.
 
     Attributes
     ----------
-    stretch : Square
+    square : Square
     rails : tuple of RailLine
-        In its local metres, cut `HALO_M` outside its border; those with no length inside it are left out.
+        In local metres of the square, cut `HALO_M` outside its border; rails without any length inside are left out.
     nodes : (n, 2) array
         Places where rails end on each other.
     """
 
-    stretch: Square
+    square: Square
     rails: tuple[RailLine, ...]
     nodes: np.ndarray
 
 
-def trim(rails: Sequence[RailLine], stretch: Square) -> SquareRails:
-    """Cut the lines of a stretch where they are no longer good."""
+def trim(rails: Sequence[RailLine], square: Square) -> SquareRails:
+    """Cut the lines of a square where they stop being valid."""
     parts: list[RailLine] = []
     for rail in rails:
         stations, t = resample(rail.xyz[:, :2], STATION_M)
-        inside = stretch.holds(stations, HALO_M)
-        if inside.all():
-            found = [(rail, stretch.holds(stations))]
+        valid = square.holds(stations, HALO_M)
+        if valid.all():
+            found = [(rail, square.holds(stations))]
         else:
             found = [
-                (rail.between(t[first], t[last]), stretch.holds(stations[first : last + 1]))
-                for first, last in runs(inside)
+                (rail.between(t[first], t[last]), square.holds(stations[first : last + 1]))
+                for first, last in runs(valid)
                 if last > first
             ]
-        parts += [part for part, own in found if own.any()]
+        parts += [part for part, inside in found if inside.any()]
     places = np.concatenate([rail.xyz[:, :2] for rail in rails]) if rails else np.empty((0, 2))
     unique, counts = np.unique(places, axis=0, return_counts=True)
-    return SquareRails(stretch, tuple(parts), unique[counts > 1])
+    return SquareRails(square, tuple(parts), unique[counts > 1])
+
+
+@dataclass
+class Piece:
+    """The part of a square's rail that no earlier square shows.
+
+    Attributes
+    ----------
+    rail : RailLine
+        In the common frame.
+    start, end : float
+        Chainages along the rail.
+    links : dict of int to PieceEnd
+        For each end, 0 or 1, the end of another piece that continues this one; ends that nothing continues are missing.
+    """
+
+    rail: RailLine
+    start: float
+    end: float
+    links: dict[int, PieceEnd] = field(default_factory=dict)
+
+    def place(self, side: int) -> np.ndarray:
+        """Return the position of one end, (2,)."""
+        along = length_along(self.rail.xyz[:, :2])
+        return interpolate(self.rail.xyz[:, :2], along, np.array([self.chainage(side)]))[0]
+
+    def chainage(self, side: int) -> float:
+        """Return the chainage of one end."""
+        return self.end if side else self.start
+
+    def move_end(self, side: int, chainage: float) -> None:
+        """Move one end along the rail."""
+        self.start, self.end = (self.start, chainage) if side else (chainage, self.end)
+
+
+def parts_near(rails: Sequence[RailLine], square: Square, corner: np.ndarray, margin_m: float) -> list[np.ndarray]:
+    """Cut the parts of rails out that are in a square or near it.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+    square : Square
+    corner : (2,) array
+        Corner of the square in the frame of the rails.
+    margin_m : float
+        Width of the surroundings that count as near.
+
+    Returns
+    -------
+    list of (n, 2) arrays
+    """
+    parts = []
+    for rail in rails:
+        line = rail.xyz[:, :2]
+        for first, last in runs(square.holds(line - corner, margin_m)):
+            part = line[max(first - 1, 0) : last + 2]
+            if len(part) > 1:
+                parts.append(part)
+    return parts
+
+
+def new_parts(
+    rail: RailLine, known: Sequence[np.ndarray], cut: np.ndarray, square: Square, corner: np.ndarray
+) -> list[tuple[float, float]]:
+    """Find the parts of a square's rail that known lines do not show.
+
+    Parameters
+    ----------
+    rail : RailLine
+    known : sequence of (n, 2) arrays
+        Lines of earlier squares.
+    cut : (2,) bool array
+        Whether the rail was cut at its start and at its end.
+    square : Square
+    corner : (2,) array
+        Corner of the square in the frame of the rail.
+
+    Returns
+    -------
+    list of tuple of float
+        Chainages of start and end of each part.
+    """
+    stations, t = resample(rail.xyz[:, :2], STATION_M)
+    seen = np.zeros(len(t), dtype=bool)
+    shared = np.flatnonzero(~square.holds(stations - corner, -HALO_M))
+    seen[shared[project(known, stations[shared], SAME_RAIL_M).point]] = True
+    seen = _without_short_matches(_without_holes(seen, t), t)
+    new = ~seen
+    if seen.any():
+        # One station at a cut end may be unmatched: rounding decides whether the other line reaches as far.
+        first, last = np.flatnonzero(seen)[[0, -1]]
+        new[:first] &= first > 1 or not cut[0]
+        new[last + 1 :] &= last + 2 < len(t) or not cut[1]
+    return [(float(t[max(first - 1, 0)]), float(t[min(last + 1, len(t) - 1)])) for first, last in runs(new)]
+
+
+def _without_holes(seen: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Mark short holes between marked stations as well: one known line ends there and the next begins."""
+    filled = seen.copy()
+    for first, last in runs(~seen):
+        filled[first : last + 1] = first > 0 and last + 1 < len(t) and t[last + 1] - t[first - 1] <= HOLE_M
+    return filled
+
+
+def _without_short_matches(seen: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Unmark short runs unless they cover most of the line."""
+    kept = np.zeros(len(seen), dtype=bool)
+    for first, last in runs(seen):
+        kept[first : last + 1] = t[last] - t[first] >= min(MIN_MATCH_M, 0.5 * t[-1])
+    return kept
+
+
+def blended(part: RailLine, side: int, following: RailLine) -> RailLine:
+    """Blend one end of a line into the line that continues it, over twice `HALO_M`.
+
+    Where the other line is shorter than that, as near a corner of squares, its last known offset is used.
+
+    Parameters
+    ----------
+    part : RailLine
+    side : int
+        0 to blend its start, 1 to blend its end.
+    following : RailLine
+    """
+    xyz = (part.xyz if side else part.xyz[::-1]).copy()
+    along = length_along(xyz[:, :2])
+    share = 1.0 - np.clip((along[-1] - along) / min(2 * HALO_M, along[-1]), 0.0, 1.0)
+    last = np.flatnonzero(share > 0)
+    target_line = following.xyz
+    feet = project([target_line[:, :2]], xyz[last, :2], SAME_RAIL_M)
+    if not len(feet.point):
+        target_line = extended(following.xyz)
+        feet = project([target_line[:, :2]], xyz[last, :2], SAME_RAIL_M)
+    if len(feet.point):
+        order = np.argsort(feet.point)
+        shown = last[feet.point[order]]
+        target = interpolate(target_line, length_along(target_line[:, :2]), feet.t[order])
+        offset = interpolate(target - xyz[shown], along[shown], along[last])
+        xyz[last] += smooth_step(share[last])[:, None] * offset
+    return replace(part, xyz=xyz if side else xyz[::-1])
+
+
+def extended(line: np.ndarray) -> np.ndarray:
+    """Extend a line, (n, 2) or (n, 3), by `HOLE_M` at both ends, with the curvature it has there."""
+    along = length_along(line[:, :2])
+    out = np.arange(1, HOLE_STATIONS + 1) * STATION_M
+    ends = [
+        3 * line[end] - 3 * interpolate(line, along, abs(side - out)) + interpolate(line, along, abs(side - 2 * out))
+        for end, side in ((0, 0.0), (-1, along[-1]))
+    ]
+    return np.concatenate([ends[0][::-1], line, ends[1]])
+
+
+def smooth_step(share: np.ndarray) -> np.ndarray:
+    """Return the weight of a blend for a share between 0 and 1: it starts and ends without a bend."""
+    return 3 * share**2 - 2 * share**3

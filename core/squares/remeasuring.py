@@ -1,4 +1,4 @@
-"""Heights and support of finished rails, found anew stretch by stretch."""
+"""Re-measurement of the heights and the support of finished rails, square by square."""
 
 from __future__ import annotations
 
@@ -17,51 +17,51 @@ from ..tracks.geometry import PROFILE_SIGMA_M
 from .grid import Key, PointSource, Square, unique_keys
 
 CONTEXT_M = 10.0
-"""How far beyond a stretch its rails are measured: the disc reaches 1 m, the smoothing of heights over 1 m no more
-than 3 m, and that of the lateral figures 2.4 m."""
+"""Distance beyond a square over which its rails are measured as well: the disc reaches 1 m, the smoothing of heights
+over 1 m at most 3 m, and that of the lateral figures 2.4 m."""
 
 STATION_M = 1.0
-"""Spacing of the stations whose stretch is looked up."""
+"""Spacing of the stations whose square is looked up."""
 
 
 def measure_in_squares(
     rails: Sequence[RailLine],
     source: PointSource,
-    stretches: Sequence[Square],
+    squares: Sequence[Square],
     head_width_m: float,
     progress: Progress = SILENT,
 ) -> list[RailLine]:
-    """Do what `elevation.measure_again` does, for track geometry, with the points of one stretch at a time.
+    """Measure rails again for track geometry, like `elevation.measure_again`, using the points of one square at a time.
 
     Parameters
     ----------
     rails : sequence of RailLine
         In the frame of the source.
     source : PointSource
-    stretches : sequence of Square
-        All that have points.
+    squares : sequence of Square
+        All squares that have points.
     head_width_m : float
     progress : Progress
 
     Returns
     -------
     list of RailLine
-        In their order.
+        In the order given.
     """
-    if not np.isfinite(stretches[0].side_m):
-        points = source.near(stretches[0], 0.0)
+    if squares[0].is_whole_plane:
+        points = source.near(squares[0], 0.0)
         return measure_again(rails, points, head_width_m, PROFILE_SIGMA_M, progress)
-    zero = Square.square((0, 0), source.side_m, source.frame).frame.shift_to(source.frame)
+    zero = Square.on_grid((0, 0), source.side_m, source.frame).frame.shift_to(source.frame)
     wanted: dict[Key, list[tuple[int, float, float]]] = {}
     for number, rail in enumerate(rails):
-        for key, start, end in _by_stretch(rail, zero, source.side_m):
+        for key, start, end in _by_square(rail, zero, source.side_m):
             wanted.setdefault(key, []).append((number, start, end))
-    by_key = {stretch.key: stretch for stretch in stretches}
+    by_key = {square.key: square for square in squares}
     measured: list[list[tuple[float, RailLine]]] = [[] for _ in rails]
     for key in progress.follow(sorted(wanted)):
-        stretch = by_key.get(key) or Square.square(key, source.side_m, source.frame)
-        shift = stretch.frame.shift_to(source.frame)
-        points = source.near(stretch, CONTEXT_M)
+        square = by_key.get(key) or Square.on_grid(key, source.side_m, source.frame)
+        shift = square.frame.shift_to(source.frame)
+        points = source.near(square, CONTEXT_M)
         pieces = [
             replace(piece, xyz=piece.xyz - shift)
             for piece in (
@@ -70,8 +70,8 @@ def measure_in_squares(
         ]
         again = measure_again(pieces, points, head_width_m, PROFILE_SIGMA_M)
         for (number, start, end), piece in zip(wanted[key], again):
-            lead = min(start, CONTEXT_M)
-            part = piece.between(lead, lead + end - start)
+            before = min(start, CONTEXT_M)
+            part = piece.between(before, before + end - start)
             measured[number].append((start, replace(part, xyz=part.xyz + shift)))
     return [
         _straight_across_gaps(united([part for _, part in sorted(parts, key=lambda part: part[0])])) if parts else rail
@@ -80,7 +80,7 @@ def measure_in_squares(
 
 
 def _straight_across_gaps(rail: RailLine) -> RailLine:
-    """Let heights run straight across long gaps, as in a profile that is made at once; a square sees one side only."""
+    """Interpolate heights across long gaps, as an undivided profile does; a square may show only one side of a gap."""
     t, xyz = length_along(rail.xyz[:, :2]), rail.xyz.copy()
     for start, end in rail.gaps:
         if end - start > GAP_SIGMAS * PROFILE_SIGMA_M and start > 0 and end < t[-1]:
@@ -90,8 +90,8 @@ def _straight_across_gaps(rail: RailLine) -> RailLine:
     return replace(rail, xyz=xyz)
 
 
-def _by_stretch(rail: RailLine, zero: np.ndarray, side_m: float) -> list[tuple[Key, float, float]]:
-    """Cut a rail up by the squares it runs through: square, and chainages from and to, without a gap between them."""
+def _by_square(rail: RailLine, zero: np.ndarray, side_m: float) -> list[tuple[Key, float, float]]:
+    """Divide a rail among the squares it crosses; returns square and chainages of start and end, without gaps."""
     stations, t = resample(rail.xyz[:, :2], STATION_M)
     keys, number = unique_keys(stations - zero[:2], side_m)
     parts = []

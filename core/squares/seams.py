@@ -1,8 +1,9 @@
-"""Seams: the lines of neighbouring stretches become lines that run through.
+"""Seams: the lines of neighbouring squares become continuous lines.
 
-Every stretch knows its lines as far as `HALO_M` beyond its border, so that neighbours show the same rails there. The
-stretches are laid down one after another, and each adds what those before it do not show yet. Where a piece goes on in
-another, the one fades into the other over the length that both show: no step is left, whatever their margins differ by.
+The lines of a square are valid up to `HALO_M` beyond its border, so that neighbours show the same rails there. Squares
+are added one after another, and each contributes the parts of its rails that no earlier square shows. Where one piece
+continues in another, the first blends into the second over the length that both show, so that no step remains however
+the two differ. See docs/method.md section 7.3.
 """
 
 from __future__ import annotations
@@ -14,32 +15,165 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..frame import LocalFrame
-from ..lines.uniting import SAME_RAIL_M, closed_ring
+from ..lines.uniting import SAME_RAIL_M, united
 from ..polyline import interpolate, length_along, project
 from ..rails import RailLine
-from .laying import Table
-from .pieces import STATION_M, SquareRails
+from .grid import HALO_M, Key, Square, around
+from .pieces import (
+    HOLE_M,
+    MIN_MATCH_M,
+    STATION_M,
+    Piece,
+    PieceEnd,
+    SquareRails,
+    blended,
+    extended,
+    new_parts,
+    parts_near,
+    smooth_step,
+)
+
+LINK_M = MIN_MATCH_M + 2 * STATION_M
+"""A piece continues an open end up to this distance away, even if the match between them is too short to count."""
+
+MAX_SHARED_M = 3 * HALO_M
+"""Two squares share 2 `HALO_M` of a rail that crosses their border, and half as much again if it crosses obliquely."""
 
 
 def join(results: Iterable[SquareRails], frame: LocalFrame) -> list[RailLine]:
-    """Make whole lines of those of all stretches, in the local metres of `frame`.
+    """Join the lines of all squares into whole lines, in local metres of `frame`.
 
-    A single stretch's lines stay as they are, but for rings, which close; in other cases lines are the same whatever
-    order the stretches come in.
+    The result does not depend on the order of the squares. If the cloud is not divided, only rings change: they are
+    closed.
     """
-    ordered = sorted(results, key=lambda result: result.stretch.key)
-    if len(ordered) == 1 and not np.isfinite(ordered[0].stretch.side_m):
+    ordered = sorted(results, key=lambda result: result.square.key)
+    if len(ordered) == 1 and ordered[0].square.is_whole_plane:
         return [closed_ring(rail) for rail in ordered[0].rails]
-    table, nodes = Table(), []
+    joiner, nodes = _Joiner(), []
     for result in ordered:
-        shift = result.stretch.frame.shift_to(frame)
-        table.lay(result.stretch, [replace(rail, xyz=rail.xyz + shift) for rail in result.rails], shift[:2])
+        shift = result.square.frame.shift_to(frame)
+        joiner.add(result.square, [replace(rail, xyz=rail.xyz + shift) for rail in result.rails], shift[:2])
         nodes.append(result.nodes + shift[:2])
-    return _reconnected(table.lines(), np.concatenate(nodes))
+    return _reattached(joiner.lines(), np.concatenate(nodes))
 
 
-def _reconnected(lines: Sequence[RailLine], nodes: np.ndarray) -> list[RailLine]:
-    """Bring ends that lay on another line, before that one faded or was cut, onto it again."""
+class _Joiner:
+    """Collects the new parts of the rails of square after square, and links parts that continue each other."""
+
+    def __init__(self) -> None:
+        self._pieces: list[Piece] = []
+        self._rails: dict[Key, list[RailLine]] = {}
+        self._numbers: dict[Key, list[int]] = {}
+
+    def add(self, square: Square, rails: Sequence[RailLine], corner: np.ndarray) -> None:
+        """Add the rails of a square whose corner, (2,), and rails are given in the common frame."""
+        earlier = [key for key in around(square.key) if key in self._rails]
+        known = parts_near([rail for key in earlier for rail in self._rails[key]], square, corner, HALO_M + LINK_M)
+        ends, places = self._open_ends([number for key in earlier for number in self._numbers[key]], square, corner)
+        count_before = len(self._pieces)
+        for rail in rails:
+            feet = project([extended(rail.xyz[:, :2])], places, SAME_RAIL_M)
+            on_rail = [(ends[point], t - HOLE_M) for point, t in zip(feet.point, feet.t)]
+            cut = ~square.holds(rail.xyz[[0, -1], :2] - corner, HALO_M - STATION_M)
+            for start, end in new_parts(rail, known, cut, square, corner):
+                self._add_piece(rail, start, end, cut, on_rail)
+        self._rails[square.key], self._numbers[square.key] = list(rails), list(range(count_before, len(self._pieces)))
+
+    def _open_ends(
+        self, numbers: Sequence[int], square: Square, corner: np.ndarray
+    ) -> tuple[list[PieceEnd], np.ndarray]:
+        """List the ends of pieces that nothing continues yet, near the border of a square, and their places, (n, 2)."""
+        ends = [(number, side) for number in numbers for side in (0, 1) if side not in self._pieces[number].links]
+        places = np.array([self._pieces[number].place(side) for number, side in ends]).reshape(-1, 2)
+        near = ~square.holds(places - corner, -2 * HALO_M) & square.holds(places - corner, 2 * HALO_M)
+        return [end for end, close in zip(ends, near) if close], places[near]
+
+    def _add_piece(
+        self, rail: RailLine, start: float, end: float, cut: np.ndarray, on_rail: list[tuple[PieceEnd, float]]
+    ) -> None:
+        """Add a piece and link its cut ends to the open ends on its rail, given with their chainages."""
+        number, piece = len(self._pieces), Piece(rail, start, end)
+        self._pieces.append(piece)
+        length = float(length_along(rail.xyz[:, :2])[-1])
+        inner = [side for side, is_inner in enumerate((start > 0, end < length)) if is_inner]
+        for side in [*inner, *(side for side in np.flatnonzero(cut).tolist() if side not in inner)]:
+            self._link(number, side, on_rail)
+        if len(inner) == 2 and not piece.links:
+            self._pieces.pop()
+        elif len(inner) == 1 and inner[0] not in piece.links:
+            # The earlier square shows only the line that a branch leaves, and the branch is hidden in it.
+            _extend_to_end_of_rail(piece, inner[0], length)
+
+    def _link(self, number: int, side: int, on_rail: list[tuple[PieceEnd, float]]) -> None:
+        """Link one end of a new piece to the nearest open end on its rail, if there is one."""
+        piece = self._pieces[number]
+        free = [
+            (abs(t - piece.chainage(side)), t, end) for end, t in on_rail if end[1] not in self._pieces[end[0]].links
+        ]
+        if not free:
+            return
+        away, chainage, end = min(free)
+        if away <= LINK_M:
+            piece.links[side] = end
+            self._pieces[end[0]].links[end[1]] = (number, side)
+            length = length_along(piece.rail.xyz[:, :2])[-1]
+            piece.move_end(side, float(np.clip(chainage, 0.0, length)))
+
+    def lines(self) -> list[RailLine]:
+        """Return the lines that the linked pieces form."""
+        done: set[int] = set()
+        loose = [number for number, piece in enumerate(self._pieces) if len(piece.links) < 2]
+        lines = []
+        for first in [*loose, *range(len(self._pieces))]:
+            if first in done:
+                continue
+            chain = self._chain(first, 0 if 0 not in self._pieces[first].links else 1)
+            done.update(number for number, _ in chain)
+            lines.append(closed_ring(united([self._part(number, entered) for number, entered in chain])))
+        return lines
+
+    def _chain(self, first: int, entered: int) -> list[PieceEnd]:
+        """Follow the links from a piece; returns each piece and the end at which it is entered."""
+        chain = [(first, entered)]
+        while True:
+            number, entered = chain[-1]
+            following = self._pieces[number].links.get(1 - entered)
+            if following is None or following[0] == first:
+                return chain
+            chain.append(following)
+
+    def _part(self, number: int, entered: int) -> RailLine:
+        """Cut a piece out of its rail, blended into the pieces added after it, in the direction of its chain."""
+        piece = self._pieces[number]
+        part = piece.rail.between(piece.start, piece.end)
+        for side, (other, _) in piece.links.items():
+            if other > number:
+                part = blended(part, side, self._pieces[other].rail)
+        return part.reversed() if entered else part
+
+
+def _extend_to_end_of_rail(piece: Piece, side: int, length: float) -> None:
+    """Extend a piece to the end of its rail if the remaining part, which other squares show, is short."""
+    rest = length - piece.end if side else piece.start
+    if rest <= MAX_SHARED_M:
+        piece.move_end(side, length * side)
+
+
+def closed_ring(line: RailLine) -> RailLine:
+    """Make the ends of a ring coincide: their difference is spread over twice `HALO_M` on either side."""
+    along = length_along(line.xyz[:, :2])
+    offset = line.xyz[-1] - line.xyz[0]
+    if along[-1] <= 4 * HALO_M or np.hypot(*offset[:2]) > SAME_RAIL_M:
+        return line
+    share = 1.0 - np.clip(np.minimum(along, along[-1] - along) / (2 * HALO_M), 0.0, 1.0)
+    half = np.copysign(0.5, 0.5 * along[-1] - along) * smooth_step(share)
+    xyz = line.xyz + half[:, None] * offset
+    xyz[-1] = xyz[0]
+    return replace(line, xyz=xyz)
+
+
+def _reattached(lines: Sequence[RailLine], nodes: np.ndarray) -> list[RailLine]:
+    """Move ends back onto the line on which they ended before that line was cut or blended."""
     lines = list(lines)
     if not len(nodes) or not lines:
         return lines
@@ -55,12 +189,12 @@ def _reconnected(lines: Sequence[RailLine], nodes: np.ndarray) -> list[RailLine]
         if not others or others[0][0] == 0.0:
             continue
         through = int(owner[others[0][1]])
-        lines[number], lines[through] = _set_on(lines[number], side, lines[through])
+        lines[number], lines[through] = _attached(lines[number], side, lines[through])
     return lines
 
 
-def _set_on(branch: RailLine, side: int, through: RailLine) -> tuple[RailLine, RailLine]:
-    """Move the end of a branch onto a through line, which gets a vertex there, if it lies on it."""
+def _attached(branch: RailLine, side: int, through: RailLine) -> tuple[RailLine, RailLine]:
+    """Move the end of a branch onto a through line and give that line a vertex there, if the end is close to it."""
     place = branch.xyz[side]
     feet = project([through.xyz[:, :2]], place[None, :2], SAME_RAIL_M)
     if not len(feet.t):

@@ -1,4 +1,7 @@
-"""Rail points on disk, sorted into squares in one reading of the files: memory does not grow with the cloud."""
+"""Rail points on disk, sorted into squares in one pass over the files, so that memory does not grow with the cloud.
+
+See docs/method.md section 7.2.
+"""
 
 from __future__ import annotations
 
@@ -24,15 +27,16 @@ REPORT = "report.json"
 
 @dataclass(frozen=True)
 class SpooledFile:
-    """What was found in one file of the cloud.
+    """The sorted points of one file of the cloud.
 
     Attributes
     ----------
     folder : str
-        Where its points lie.
+        Folder that holds the points.
     report : dict
-        Of each class by its code: count by square, smallest and largest x and y in units of the CRS; further the count
-        of all points by class ("census"), and of the wanted ones by `origin_steps` for each axis ("steps").
+        "classes": for each class code, the number of points by square and the smallest and largest x and y in units of
+        the CRS. "census": number of all points by class. "steps": for each axis, the number of points of the requested
+        classes by `origin_steps`.
     """
 
     folder: str
@@ -47,8 +51,8 @@ class SpooledPoints:
     ----------
     frame, class_code, side_m, counts, span_m
         See `PointSource`.
-    files : mapping of key to str
-        The files that hold a square's points.
+    files : mapping of Key to tuple of str
+        Files that hold the points of each square.
     """
 
     frame: LocalFrame
@@ -58,18 +62,18 @@ class SpooledPoints:
     span_m: float
     files: Mapping[Key, tuple[str, ...]]
 
-    def near(self, stretch: Square, margin_m: float) -> RailPoints:
+    def near(self, square: Square, margin_m: float) -> RailPoints:
         """See `PointSource`."""
-        keys = around(stretch.key) if np.isfinite(stretch.side_m) else sorted(self.files)
+        keys = sorted(self.files) if square.is_whole_plane else around(square.key)
         parts = [np.fromfile(file).reshape(-1, 3) for key in keys for file in self.files.get(key, ())]
-        xyz = stretch.frame.to_local(np.concatenate(parts) if parts else np.empty((0, 3)))
-        return RailPoints(xyz[stretch.holds(xyz, margin_m)], stretch.frame, self.class_code)
+        xyz = square.frame.to_local(np.concatenate(parts) if parts else np.empty((0, 3)))
+        return RailPoints(xyz[square.holds(xyz, margin_m)], square.frame, self.class_code)
 
-    def part(self, stretch: Square) -> SpooledPoints:
-        """Leave out squares that neither are the stretch nor touch it: less to send to a worker."""
-        if not np.isfinite(stretch.side_m):
+    def part(self, square: Square) -> SpooledPoints:
+        """Keep only a square and its neighbours, so that less is sent to a worker."""
+        if square.is_whole_plane:
             return self
-        keys = [key for key in around(stretch.key) if key in self.files]
+        keys = [key for key in around(square.key) if key in self.files]
         return replace(
             self, counts={key: self.counts[key] for key in keys}, files={key: self.files[key] for key in keys}
         )
@@ -84,13 +88,13 @@ def spool(request: Request, side_m: float, folder: Path, progress: Progress = SI
     side_m : float
         Side of the squares.
     folder : Path
-        Where to; whoever made it removes it.
+        Folder to write to; the caller removes it.
     progress : Progress
 
     Returns
     -------
     tuple of SpooledPoints
-        One for each wanted class that has points, by rising code, all in one local frame.
+        One for each requested class that has points, in ascending order of code, all in one local frame.
 
     Raises
     ------
@@ -99,7 +103,7 @@ def spool(request: Request, side_m: float, folder: Path, progress: Progress = SI
     DiskError
         The disk is full.
     NoRailPointsError
-        No point of the wanted classes lies in the files and the extent.
+        No point of the requested classes lies within the extent.
     """
     shares = request.shares(progress)
     found = [spool_file(request, header, side_m, folder, share) for header, share in zip(request.headers, shares)]
@@ -109,9 +113,28 @@ def spool(request: Request, side_m: float, folder: Path, progress: Progress = SI
 def spool_file(
     request: Request, header: CloudHeader, side_m: float, folder: Path, progress: Progress = SILENT
 ) -> SpooledFile:
-    """Sort the points of one file into squares; one that has not changed since it was sorted is not read again.
+    """Sort the points of one file into squares, unless that has been done and the file has not changed since.
 
-    Two that sort the same file at the same time do so each in a folder of its own, and the first to finish is right.
+    Two processes may sort the same file at the same time: each writes to its own folder, and the first to finish
+    provides the result.
+
+    Parameters
+    ----------
+    request : Request
+    header : CloudHeader
+        Header of the file.
+    side_m : float
+        Side of the squares.
+    folder : Path
+        Folder to write to.
+    progress : Progress
+
+    Raises
+    ------
+    CloudError
+        The file is damaged.
+    DiskError
+        The disk is full.
     """
     mine = folder / _fingerprint(request, header, side_m)
     if not mine.exists():
@@ -128,7 +151,7 @@ def spool_file(
 
 
 def _sort(request: Request, header: CloudHeader, side_m: float, folder: Path, progress: Progress) -> None:
-    """Write the points of a file into files of their squares, and the report on them."""
+    """Write the points of a file to the files of their squares, and the report."""
     found = _Census()
     for xyz, codes, census in request.read(header, progress):
         found.census += census
@@ -140,7 +163,7 @@ def _sort(request: Request, header: CloudHeader, side_m: float, folder: Path, pr
 
 
 def _name_first(folder: Path, name: Path) -> None:
-    """Give a folder its name, unless there is one of this name by now."""
+    """Rename a folder, unless another process has created one of that name in the meantime."""
     try:
         folder.rename(name)
     except OSError:
@@ -149,7 +172,7 @@ def _name_first(folder: Path, name: Path) -> None:
 
 
 def gather(request: Request, side_m: float, found: Sequence[SpooledFile]) -> tuple[SpooledPoints, ...]:
-    """Put together what was found in the files of a cloud; see `spool`."""
+    """Combine the sorted files of a cloud; see `spool`."""
     codes = sorted({int(code) for file in found for code in file.report["classes"]})
     if not codes:
         raise request.explain_none(np.sum([file.report["census"] for file in found], axis=0))
@@ -159,7 +182,7 @@ def gather(request: Request, side_m: float, found: Sequence[SpooledFile]) -> tup
 
 
 class _Census:
-    """Counts of what goes to disk, in JSON's types."""
+    """Counts of the points written to disk, in JSON types."""
 
     def __init__(self) -> None:
         self.census = np.zeros(256, dtype=np.int64)
@@ -167,7 +190,7 @@ class _Census:
         self._steps: list[dict[float, int]] = [{}, {}, {}]
 
     def add(self, code: int, xyz: np.ndarray, zero: LocalFrame, side_m: float, folder: Path) -> None:
-        """Append points of one class to the files of their squares."""
+        """Append points of one class, (n, 3) in units of the CRS, to the files of their squares."""
         keys, number = unique_keys(zero.to_local(xyz), side_m)
         mine = self._classes.setdefault(code, {"squares": {}, "low": [np.inf] * 2, "high": [-np.inf] * 2})
         for place, key in enumerate(keys):
@@ -184,7 +207,7 @@ class _Census:
         ]
 
     def report(self) -> dict:
-        """Give `SpooledFile.report`."""
+        """Return `SpooledFile.report`."""
         classes = {str(code): found for code, found in self._classes.items()}
         return {
             "classes": classes,
@@ -194,7 +217,7 @@ class _Census:
 
 
 def _merged(counts: Sequence[Sequence[Sequence[float]]]) -> dict[float, int]:
-    """Add up lists of values and counts, by rising value."""
+    """Add up the counts in lists of value and count; the result is in ascending order of value."""
     total: dict[float, int] = {}
     for one in counts:
         for value, count in one:
@@ -203,7 +226,7 @@ def _merged(counts: Sequence[Sequence[Sequence[float]]]) -> dict[float, int]:
 
 
 def _source(code: int, found: Sequence[SpooledFile], frame: LocalFrame, side_m: float) -> SpooledPoints:
-    """Put together what was found of one class."""
+    """Combine the points of one class."""
     counts: dict[Key, int] = {}
     files: dict[Key, tuple[str, ...]] = {}
     mine = [(file.folder, file.report["classes"][str(code)]) for file in found if str(code) in file.report["classes"]]
@@ -218,7 +241,7 @@ def _source(code: int, found: Sequence[SpooledFile], frame: LocalFrame, side_m: 
 
 
 def _fingerprint(request: Request, header: CloudHeader, side_m: float) -> str:
-    """Name that changes with the file and with all that decides which of its points go where."""
+    """Return a name that depends on the file and on everything that determines how its points are sorted."""
     state = header.path.stat()
     facts = (
         str(header.path.resolve()),

@@ -80,7 +80,7 @@ def test_rasters_of_stretches_make_the_raster_of_the_whole():
     }
     whole = assembled(rasters, stretches, FRAME)
     places = np.sort(whole.to_local(whole.cells()), axis=0)
-    zero = Square.square((0, 0), SIDE, FRAME)
+    zero = Square.on_grid((0, 0), SIDE, FRAME)
     direct = rasterize(points.xyz - zero.frame.shift_to(FRAME), CELL)
     expected = np.sort(direct.to_local(direct.cells()) + zero.frame.shift_to(FRAME)[:2], axis=0)
     np.testing.assert_allclose(places, expected, rtol=0, atol=1e-6)

@@ -31,7 +31,7 @@ def seen_by_stretches(lines, error_m=0.0):
     keys = {key for line in lines for key in unique_keys(line.xyz, SIDE)[0]}
     results = []
     for key in sorted(keys):
-        stretch = Square.square(key, SIDE, FRAME)
+        stretch = Square.on_grid(key, SIDE, FRAME)
         found = []
         for line in lines:
             inside = stretch.holds(line.xyz - stretch.frame.shift_to(FRAME), REACH)
