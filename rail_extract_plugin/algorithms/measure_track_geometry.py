@@ -9,6 +9,7 @@ from typing import Any
 
 from qgis.core import QgsProcessingContext, QgsProcessingUtils
 
+from ...core.fields import QUALITY_FIELDS
 from ...core.progress import Progress
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
@@ -38,21 +39,14 @@ class MeasureTrackGeometry(RailAlgorithm):
     NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
     SUMMARY = "Measures gauge, cant, twist, radius and gradient along tracks, and how well the points support them."
     PICTURE = "gauge.svg"
-    HELP = (
-        "Takes the lines of Extract Rails, or lines drawn by hand, and gives points along each centerline.\n\n"
-        "chainage_m: distance from the start of the line, in plan.\n"
-        "gauge_mm: distance in space between the rail lines less the railhead width; not measured 14 mm below the "
-        "top.\n"
-        "cant_mm: left rail minus right rail, seen along the line.\n"
-        "twist_mm: change of cant over 3 m, ahead minus behind.\n"
-        "radius_m: on a chord of 20 m, positive in curves to the left, empty above 10 km.\n"
-        "grade_pm: rise in per mille over 10 m.\n"
-        "sigma_mm: standard error of the centerline across.\n"
-        "points: those on both rails that are nearest.\n"
-        "bridged: 1 where a rail has no points or is not there.\n\n"
-        "With POINTS, heights are measured anew and smoothed over 1 m only, and sigma_mm, points and bridged are those "
-        "of the place. Without, heights are those of the rails, each rail's sigma_mm and points are taken as even "
-        "along it, and bridged is 1 only where a rail is not there."
+    HELP = "\n\n".join(
+        (
+            "Takes the lines of Extract Rails, or lines drawn by hand, and returns points along each centerline.",
+            "\n".join(f"{field.name}: {field.meaning}." for field in QUALITY_FIELDS),
+            "With a point cloud, heights are measured again and smoothed over 1 m only, and sigma_mm, points and "
+            "bridged apply to each station. Without one, the heights are those of the rails, each rail's sigma_mm and "
+            "points are taken as uniform along it, and bridged is 1 only where a rail is missing.",
+        )
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:

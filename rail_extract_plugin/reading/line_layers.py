@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from qgis.core import (
 
 from ...core.clouds.crs import parse_crs, units, warn_of_stretch
 from ...core.errors import CrsError, RailExtractError
+from ...core.fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
 from ...core.frame import ORIGIN_STEP, LocalFrame
 from ...core.progress import SILENT, Progress
 from ...core.rails import Centerline, RailLine
@@ -31,11 +33,11 @@ LONGEST_M = 500_000.0
 
 
 def read_rails(
-    source: QgsProcessingFeatureSource, progress: Progress = SILENT, name: str = "INPUT", untold_class: int = 0
+    source: QgsProcessingFeatureSource, progress: Progress = SILENT, name: str = "INPUT", default_class: int = 0
 ) -> tuple[tuple[RailLine, ...], LocalFrame]:
     """Read every part of every line, and find the local frame for them.
 
-    Lines without a `rail_id` are numbered by their feature; those without a `class_code` have `untold_class`; other
+    Lines without a `rail_id` are numbered by their feature; those without a `class_code` have `default_class`; other
     fields of rails are used where they are there.
 
     Raises
@@ -46,7 +48,7 @@ def read_rails(
         There is no line; the message calls the layer `name`.
     """
     found, frame = _read(source, progress, name)
-    rails = tuple(_rail(feature, xyz, untold_class) for feature, xyz in found)
+    rails = tuple(_rail(feature, xyz, default_class) for feature, xyz in found)
     flat = sum(bool(np.isnan(rail.xyz[0, 2])) for rail in rails)
     if flat:
         progress.warning(f"{flat} of {len(rails)} lines have no heights: what is made of them has none either.")
@@ -144,31 +146,42 @@ def _parts(geometry: QgsGeometry, chord: float) -> Iterator[np.ndarray]:
             yield xyz[moves]
 
 
-def _rail(feature: QgsFeature, xyz: np.ndarray, untold_class: int) -> RailLine:
-    return RailLine(
-        xyz,
-        rail_id=int(_number(feature, "rail_id", feature.id())),
-        class_code=int(_number(feature, "class_code", untold_class)),
-        points=int(_number(feature, "points", 0)),
-        resid_mm=_number(feature, "resid_mm", np.nan),
-        sigma_mm=_number(feature, "sigma_mm", np.nan),
-        bridged_m=_number(feature, "bridged_m", 0.0),
-    )
+def _rail(feature: QgsFeature, xyz: np.ndarray, default_class: int) -> RailLine:
+    defaults = {"rail_id": feature.id(), "class_code": default_class, "bridged_m": 0.0}
+    return RailLine(xyz, **_attributes(feature, RailLine, RAIL_FIELDS, defaults))
 
 
 def _centerline(feature: QgsFeature, xyz: np.ndarray) -> Centerline:
-    return Centerline(
-        xyz,
-        track_id=int(_number(feature, "track_id", feature.id())),
-        class_code=int(_number(feature, "class_code", 0)),
-        left_ids=_ids(feature, "left_ids"),
-        right_ids=_ids(feature, "right_ids"),
-        gauge_mm=_number(feature, "gauge_mm", np.nan),
-        gaugesd_mm=_number(feature, "gaugesd_mm", np.nan),
-        cant_mm=_number(feature, "cant_mm", np.nan),
-        cantmax_mm=_number(feature, "cantmax_mm", np.nan),
-        bridged_m=_number(feature, "bridged_m", 0.0),
-    )
+    defaults = {"track_id": feature.id(), "bridged_m": 0.0}
+    return Centerline(xyz, **_attributes(feature, Centerline, CENTERLINE_FIELDS, defaults))
+
+
+def _attributes(
+    feature: QgsFeature, kind: type, columns: Sequence[Field], defaults: Mapping[str, float]
+) -> dict[str, Any]:
+    """Read the attributes of a line from its fields.
+
+    Parameters
+    ----------
+    feature : QgsFeature
+    kind : type
+        Dataclass of the line. Fields that it computes itself, such as the length, are not read.
+    columns : sequence of Field
+    defaults : mapping of str to float
+        Values for fields that are missing or hold no number; those without a default become 0 (whole numbers) or NaN.
+    """
+    stored = {attribute.name for attribute in dataclasses.fields(kind)}
+    found: dict[str, Any] = {}
+    for column in columns:
+        if column.name not in stored:
+            continue
+        if column.kind is str:
+            found[column.name] = _ids(feature, column.name)
+        elif column.kind is int:
+            found[column.name] = int(_number(feature, column.name, defaults.get(column.name, 0)))
+        else:
+            found[column.name] = _number(feature, column.name, defaults.get(column.name, math.nan))
+    return found
 
 
 def _number(feature: QgsFeature, name: str, default: float) -> float:
