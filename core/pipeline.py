@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from .clouds.points import RailPoints
 from .errors import NoRailPointsError, NoTrackError, ParameterError
 from .frame import LocalFrame
-from .frpdf import DEFAULT_PASSES
 from .frpdf.cleanup import MARGIN, clean, most_passes
 from .frpdf.engine import Engine, make_engine
 from .frpdf.models import choose
@@ -20,13 +19,13 @@ from .heads.smoothing_check import warn_if_out_of_reach
 from .lines.bridges import FIT_M
 from .lines.network_smoothing import smooth_network
 from .lines.thinning import thin
+from .parameters import Parameters
 from .progress import SILENT, Progress
 from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from .raster import TILE, RailRaster, cell_size, rasterize
 from .squares.grid import (
     HALO_M,
     OVERLAP_M,
-    SQUARE_TILES,
     Key,
     MemorySource,
     PointSource,
@@ -47,64 +46,6 @@ from .vectorize import vectorize
 
 NETWORK_SHARE = 0.7
 """Part of a stretch's time that the network takes, for the progress."""
-
-
-@dataclass(frozen=True)
-class Parameters:
-    """What Extract Rails can be told, with its defaults; metres, but for GAP_ANGLE's degrees.
-
-    Attributes
-    ----------
-    gauge_m, head_width_m : float
-        Gauge between the rails' inner faces, and width of the railhead.
-    passes : int
-        Passes of the network; 0 runs until the result is stable.
-    engine, device : str
-        See `frpdf.engine`.
-    smoothing_xy_m, smoothing_z_m : float
-        Sigma of PAEK in plan and in height.
-    tolerance_xy_m, tolerance_z_m : float
-        How far from a line, and how deep below the top surface, a point still gives height.
-    crown_radius_m : float
-        Radius of the disc that rolls along the rail's top.
-    max_gap_m, gap_angle_deg : float
-        Gaps that are closed.
-    simplify_xy_m, simplify_z_m : float
-        Tolerances within which vertices are left out.
-    min_length_m : float
-        Shorter lines are dropped.
-    other_gauges_m : tuple of float
-        Further gauges to pair, for mixed and dual gauge.
-    centerline_tolerance_m : float
-        Deviation from the gauge at which two rails still make a track.
-    quality_step_m : float or None
-        Distance of the stations at which the tracks' geometry is measured; None leaves it out.
-    square_tiles : int
-        Side, in raster tiles, of the squares that are worked on one after another; results don't hang on it.
-    keep_cleaned : bool
-        Whether the rasters that the network made are handed out as well.
-    """
-
-    gauge_m: float
-    head_width_m: float
-    passes: int = DEFAULT_PASSES
-    engine: str = "AUTO"
-    device: str = "AUTO"
-    smoothing_xy_m: float = 0.8
-    smoothing_z_m: float = 3.0
-    tolerance_xy_m: float = 0.10
-    tolerance_z_m: float = 0.03
-    crown_radius_m: float = 20.0
-    max_gap_m: float = 5.0
-    gap_angle_deg: float = 10.0
-    simplify_xy_m: float = 0.002
-    simplify_z_m: float = 0.002
-    min_length_m: float = 1.0
-    other_gauges_m: tuple[float, ...] = ()
-    centerline_tolerance_m: float = 0.05
-    quality_step_m: float | None = None
-    square_tiles: int = SQUARE_TILES
-    keep_cleaned: bool = False
 
 
 def extract_rails(

@@ -3,6 +3,8 @@
 The constants here are those of Gribov and Chang, section 5; they stand apart from `network`, which needs PyTorch.
 """
 
+from ..parameters import Parameters
+
 CHANNELS = 24
 KERNEL_RADIUS = 3
 DILATIONS = (1, 3, 7, 15, 31, 63, 127)
@@ -18,7 +20,7 @@ FEEDBACK_THRESHOLD = 0.75
 OUTPUT_THRESHOLD = 0.5
 """Probability from which the last pass calls a cell rail."""
 
-DEFAULT_PASSES, MOST_PASSES = 2, 5
+DEFAULT_PASSES, MOST_PASSES = Parameters.passes, 5
 """Repairs have settled by the latter; so often it runs where the user leaves the number of passes to it."""
 STATISTICS = 2
 """Sets of batch statistics: the first pass sees a constant state, all later passes see a decided one."""

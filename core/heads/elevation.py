@@ -13,6 +13,7 @@ import numpy as np
 
 from ..clouds.points import RailPoints
 from ..lines.network import LineNetwork
+from ..parameters import Parameters
 from ..polyline import Feet, interpolate, length_along, project, resample, starts_at_its_end
 from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
@@ -57,13 +58,13 @@ class ElevationParameters:
     """
 
     head_width_m: float
-    tolerance_xy_m: float = 0.10
-    tolerance_z_m: float = 0.03
-    crown_radius_m: float = 20.0
-    smoothing_xy_m: float = 0.8
-    smoothing_z_m: float = 3.0
+    tolerance_xy_m: float = Parameters.tolerance_xy_m
+    tolerance_z_m: float = Parameters.tolerance_z_m
+    crown_radius_m: float = Parameters.crown_radius_m
+    smoothing_xy_m: float = Parameters.smoothing_xy_m
+    smoothing_z_m: float = Parameters.smoothing_z_m
     cell_m: float = 0.04
-    min_length_m: float = 1.0
+    min_length_m: float = Parameters.min_length_m
 
     @property
     def unseen_m(self) -> float:

@@ -15,6 +15,7 @@ from ..lines.bridges import bridge
 from ..lines.network import LineNetwork
 from ..lines.network_smoothing import lead
 from ..lines.smoothing import smooth_profile
+from ..parameters import Parameters
 from ..polyline import interpolate, left_normals, length_along, project
 from ..progress import SILENT, Progress
 from .branch_starts import APART_HEADS, slide_branches
@@ -46,7 +47,7 @@ def refine(
     network: LineNetwork,
     points: RailPoints,
     head_width_m: float,
-    smoothing_m: float = 0.8,
+    smoothing_m: float = Parameters.smoothing_xy_m,
     progress: Progress = SILENT,
 ) -> LineNetwork:
     """Move smoothed lines onto the axes of their railheads.

@@ -17,9 +17,6 @@ from ..clouds.points import RailPoints
 from ..frame import LocalFrame
 from ..raster import TILE, RailRaster
 
-SQUARE_TILES = 50
-"""Tiles along a side, about 500 m: the overlap is a sixth of the side, and the widest yard fits into memory."""
-
 OVERLAP_M = 40.0
 """Width of the surroundings from which the lines of a square are drawn: that much of a line is needed to decide its
 route through a switch. Rounded up to whole tiles, it is 41 m at a gauge of 1435 mm."""

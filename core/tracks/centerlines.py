@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import NoTrackError
 from ..lines.smoothing import smooth_line
+from ..parameters import Parameters
 from ..polyline import is_closed, left_normals, length_along, resample, starts_at_its_end
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
@@ -50,10 +51,10 @@ class CenterlineParameters:
         Gauges for which centerlines are made as well, so that what is nearer to one of them is left to it.
     """
 
-    tolerance_m: float = 0.05
-    max_gap_m: float = 5.0
-    smoothing_m: float = 0.8
-    min_length_m: float = 1.0
+    tolerance_m: float = Parameters.centerline_tolerance_m
+    max_gap_m: float = Parameters.max_gap_m
+    smoothing_m: float = Parameters.smoothing_xy_m
+    min_length_m: float = Parameters.min_length_m
     other_gauges_m: tuple[float, ...] = ()
 
 

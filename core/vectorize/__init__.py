@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from ..lines.ends import stretch, way_out
 from ..lines.network import LineNetwork
+from ..parameters import Parameters
 from ..progress import SILENT, Progress
 from ..raster import RailRaster
 from .attaching import attach_branches, drop_guards
@@ -32,9 +33,9 @@ SETTLING_M = 1.0
 def vectorize(
     raster: RailRaster,
     head_width_m: float,
-    max_gap_m: float = 5.0,
-    gap_angle_deg: float = 10.0,
-    min_length_m: float = 1.0,
+    max_gap_m: float = Parameters.max_gap_m,
+    gap_angle_deg: float = Parameters.gap_angle_deg,
+    min_length_m: float = Parameters.min_length_m,
     progress: Progress = SILENT,
     raw: RailRaster | None = None,
 ) -> LineNetwork:

@@ -9,8 +9,9 @@ from qgis.core import (
     QgsProcessingParameterString,
 )
 
-from ...core.frpdf import AUTO, DEFAULT_PASSES, DEVICES, ENGINES, MOST_PASSES
+from ...core.frpdf import AUTO, DEVICES, ENGINES, MOST_PASSES
 from ...core.frpdf.models import MODELS
+from ...core.parameters import DEFAULT_STEP_M, Parameters
 from ...core.standards import CUSTOM, DEFAULT, STANDARDS, UNCONFIRMED_PROFILES
 from ..i18n import tr
 from .definitions import MM_DECIMALS, Definitions, advanced, choice, helped, number
@@ -82,7 +83,7 @@ def model() -> QgsProcessingParameterDefinition:
 def step() -> QgsProcessingParameterDefinition:
     """How often tracks are measured."""
     return advanced(
-        number("STEP", tr("Step of the track geometry [m]"), 1.0, 0.1, LONGEST_M),
+        number("STEP", tr("Step of the track geometry [m]"), DEFAULT_STEP_M, 0.1, LONGEST_M),
         tr("Gauge, cant, twist, radius and gradient are stated once in this distance along each track."),
     )
 
@@ -112,18 +113,18 @@ def cleanup() -> Definitions:
     """How the network repairs the raster."""
     return (
         advanced(
-            number("ITERATIONS", tr("Passes of the network"), DEFAULT_PASSES, maximum=MOST_PASSES, whole=True),
+            number("ITERATIONS", tr("Passes of the network"), Parameters.passes, maximum=MOST_PASSES, whole=True),
             tr(
                 "How often the network looks again at what it found. 0: until fewer than one rail cell in a thousand "
                 "changes, at most five times."
             ),
         ),
         advanced(
-            choice("ENGINE", tr("Engine of the network"), ENGINES, AUTO),
+            choice("ENGINE", tr("Engine of the network"), ENGINES, Parameters.engine),
             tr("Python package that runs the network: PyTorch or OpenCV. AUTO takes the faster one that is installed."),
         ),
         advanced(
-            choice("DEVICE", tr("Device of the network"), DEVICES, AUTO),
+            choice("DEVICE", tr("Device of the network"), DEVICES, Parameters.device),
             tr("CPU is the processor, CUDA an Nvidia GPU, which takes PyTorch. AUTO uses the GPU where there is one."),
         ),
     )
@@ -140,7 +141,7 @@ def torch() -> QgsProcessingParameterDefinition:
 def smoothing_xy() -> QgsProcessingParameterDefinition:
     """How smooth lines are in plan."""
     return advanced(
-        number("SMOOTHING_XY", tr("Smoothing in plan [m]"), 0.8, 0.05, LONGEST_SMOOTHING_M),
+        number("SMOOTHING_XY", tr("Smoothing in plan [m]"), Parameters.smoothing_xy_m, 0.05, LONGEST_SMOOTHING_M),
         tr("Bends shorter than a few times this length are evened out: standard deviation of the smoothing."),
     )
 
@@ -150,22 +151,28 @@ def lines() -> Definitions:
     return (
         smoothing_xy(),
         advanced(
-            number("SMOOTHING_Z", tr("Smoothing in height [m]"), 3.0, 0.05, LONGEST_SMOOTHING_M),
+            number("SMOOTHING_Z", tr("Smoothing in height [m]"), Parameters.smoothing_z_m, 0.05, LONGEST_SMOOTHING_M),
             tr("Dips shorter than a few times this length are evened out: standard deviation of the smoothing."),
         ),
         advanced(
-            number("TOLERANCE_XY", tr("Tolerance in plan [m]"), 0.10, 0.005, WIDEST_REACH_M),
+            number("TOLERANCE_XY", tr("Tolerance in plan [m]"), Parameters.tolerance_xy_m, 0.005, WIDEST_REACH_M),
             tr(
                 "Points up to this far beside the line give it its height, others none. Half a railhead is the limit "
                 "in any case."
             ),
         ),
         advanced(
-            number("TOLERANCE_Z", tr("Tolerance in height [m]"), 0.03, 0.001, WIDEST_REACH_M),
+            number("TOLERANCE_Z", tr("Tolerance in height [m]"), Parameters.tolerance_z_m, 0.001, WIDEST_REACH_M),
             tr("Points up to this far below the top of the rail give the line its height, others none."),
         ),
         advanced(
-            number("CROWN_RADIUS", tr("Crown radius of the rolling disc [m]"), 20.0, 1.0, FLATTEST_CROWN_M),
+            number(
+                "CROWN_RADIUS",
+                tr("Crown radius of the rolling disc [m]"),
+                Parameters.crown_radius_m,
+                1.0,
+                FLATTEST_CROWN_M,
+            ),
             tr(
                 "A disc rolled along the heights from above finds the top of the rail. It hardly changes the line: "
                 "reduce it only where short, deep dips lose their points."
@@ -173,7 +180,7 @@ def lines() -> Definitions:
         ),
         max_gap(),
         advanced(
-            number("GAP_ANGLE", tr("Largest bend across a gap [°]"), 10.0, maximum=90.0),
+            number("GAP_ANGLE", tr("Largest bend across a gap [°]"), Parameters.gap_angle_deg, maximum=90.0),
             tr("Line ends that meet at a larger angle stay apart."),
         ),
         *simplification(),
@@ -184,7 +191,7 @@ def lines() -> Definitions:
 def max_gap() -> QgsProcessingParameterDefinition:
     """Which gaps are closed."""
     return helped(
-        number("MAX_GAP", tr("Longest gap to close [m]"), 5.0, maximum=LONGEST_M),
+        number("MAX_GAP", tr("Longest gap to close [m]"), Parameters.max_gap_m, maximum=LONGEST_M),
         tr(
             "Line ends up to this far apart are joined if they point at each other; 0 joins none. Where one rail of a "
             "track goes on, its centerline does for up to 30 m, whatever is set here."
@@ -196,11 +203,11 @@ def simplification() -> Definitions:
     """How many vertices lines keep."""
     return (
         advanced(
-            number("SIMPLIFY_XY", tr("Simplification in plan [m]"), 0.002, maximum=COARSEST_M),
+            number("SIMPLIFY_XY", tr("Simplification in plan [m]"), Parameters.simplify_xy_m, maximum=COARSEST_M),
             tr("Vertices are left out as long as the line stays this close in plan."),
         ),
         advanced(
-            number("SIMPLIFY_Z", tr("Simplification in height [m]"), 0.002, maximum=COARSEST_M),
+            number("SIMPLIFY_Z", tr("Simplification in height [m]"), Parameters.simplify_z_m, maximum=COARSEST_M),
             tr("Vertices are left out as long as the line stays this close in height."),
         ),
     )
@@ -209,7 +216,8 @@ def simplification() -> Definitions:
 def min_length() -> QgsProcessingParameterDefinition:
     """Which lines are too short."""
     return advanced(
-        number("MIN_LENGTH", tr("Shortest line [m]"), 1.0, maximum=LONGEST_M), tr("Shorter lines are left out.")
+        number("MIN_LENGTH", tr("Shortest line [m]"), Parameters.min_length_m, maximum=LONGEST_M),
+        tr("Shorter lines are left out."),
     )
 
 
@@ -221,7 +229,13 @@ def pairing() -> Definitions:
             tr("Gauges of further tracks in the same cloud, such as 1000;1067, for mixed traffic."),
         ),
         advanced(
-            number("CENTERLINE_TOLERANCE", tr("Centerline tolerance of the gauge [m]"), 0.05, 0.001, WIDEST_REACH_M),
+            number(
+                "CENTERLINE_TOLERANCE",
+                tr("Centerline tolerance of the gauge [m]"),
+                Parameters.centerline_tolerance_m,
+                0.001,
+                WIDEST_REACH_M,
+            ),
             tr("Rails whose distance is off by more than this make no track."),
         ),
     )

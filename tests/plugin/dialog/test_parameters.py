@@ -1,8 +1,9 @@
 import pytest
 from qgis.core import QgsProcessingParameterDefinition
 from rail_extract.core.errors import ParameterError
+from rail_extract.core.parameters import DEFAULT_STEP_M, Parameters
 from rail_extract.core.standards import STANDARDS
-from rail_extract.rail_extract_plugin.dialog.parameter_values import class_numbers, gauges_m
+from rail_extract.rail_extract_plugin.dialog.parameter_values import CHOICES, NUMBERS, class_numbers, gauges_m
 
 PARAMETERS = [
     ("INPUT", "pointcloud", None),
@@ -55,6 +56,10 @@ OUTPUTS = {
 RESULTS = {"RAILS", "CENTERLINES", "QUALITY", "CLEANED", "REPORT"}
 ESSENTIAL = {"INPUT", "RAIL_CLASSES", "STANDARD", "GAUGE", "HEAD_WIDTH", "EXTENT", "MAX_GAP"} | RESULTS
 OPTIONAL = {"GAUGE", "HEAD_WIDTH", "EXTENT", "CRS", "OTHER_GAUGES"} | RESULTS
+
+
+CORE_DEFAULTS = {name: getattr(Parameters, field) for name, field in {**NUMBERS, **CHOICES}.items()}
+CORE_DEFAULTS |= {"ITERATIONS": Parameters.passes, "STEP": DEFAULT_STEP_M}
 
 
 def having(algorithm, flag):
@@ -123,3 +128,14 @@ def test_gauges(text, gauges):
 def test_gauges_refuses(text):
     with pytest.raises(ParameterError, match="OTHER_GAUGES"):
         gauges_m(text, "OTHER_GAUGES")
+
+
+def test_the_defaults_are_those_of_the_core(plugin):
+    seen = set()
+    for algorithm in plugin.provider.algorithms():
+        for definition in algorithm.parameterDefinitions():
+            if definition.name() in CORE_DEFAULTS:
+                seen.add(definition.name())
+                default = CORE_DEFAULTS[definition.name()]
+                assert definition.defaultValue() == default, (algorithm.name(), definition.name())
+    assert seen == set(CORE_DEFAULTS)

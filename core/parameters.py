@@ -1,0 +1,73 @@
+"""The parameters of an extraction and their defaults: the only place where a default is written down.
+
+This module imports neither numpy nor anything that needs it, so that dialogs open before the packages are installed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+DEFAULT_STEP_M = 1.0
+"""Distance between the stations of the track geometry, once it is asked for."""
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """What an extraction can be told; lengths in metres.
+
+    Attributes
+    ----------
+    gauge_m, head_width_m : float
+        Distance between the inner faces of the two railheads, and width of a railhead.
+    passes : int
+        Passes of the network; 0 runs until the result is stable.
+    engine, device : str
+        See `frpdf.engine`.
+    smoothing_xy_m, smoothing_z_m : float
+        Sigma of PAEK in plan and in height.
+    tolerance_xy_m, tolerance_z_m : float
+        A point gives height if it is at most this far from the line in plan and this far below the top surface.
+    crown_radius_m : float
+        Radius of the disc that is rolled along the top of the rail.
+    max_gap_m : float
+        Longest gap that is closed.
+    gap_angle_deg : float
+        Largest bend across a closed gap, in degrees.
+    simplify_xy_m, simplify_z_m : float
+        Vertices are removed while the line moves by no more than this.
+    min_length_m : float
+        Shorter lines are dropped.
+    other_gauges_m : tuple of float
+        Further gauges to pair, for mixed and dual gauge.
+    centerline_tolerance_m : float
+        Largest deviation from the gauge at which two rails make a track.
+    quality_step_m : float or None
+        Distance between the stations at which track geometry is measured; None skips the measurement.
+    square_tiles : int
+        Side of the squares that are processed one at a time, in raster tiles. With 50 tiles (half a kilometre) the
+        overlap is a sixth of the side, and the widest yard fits into memory. The lines depend on it by less than a
+        millimetre.
+    keep_cleaned : bool
+        Whether the result includes the rasters that the network cleaned.
+    """
+
+    gauge_m: float
+    head_width_m: float
+    passes: int = 2
+    engine: str = "AUTO"
+    device: str = "AUTO"
+    smoothing_xy_m: float = 0.8
+    smoothing_z_m: float = 3.0
+    tolerance_xy_m: float = 0.10
+    tolerance_z_m: float = 0.03
+    crown_radius_m: float = 20.0
+    max_gap_m: float = 5.0
+    gap_angle_deg: float = 10.0
+    simplify_xy_m: float = 0.002
+    simplify_z_m: float = 0.002
+    min_length_m: float = 1.0
+    other_gauges_m: tuple[float, ...] = ()
+    centerline_tolerance_m: float = 0.05
+    quality_step_m: float | None = None
+    square_tiles: int = 50
+    keep_cleaned: bool = False
