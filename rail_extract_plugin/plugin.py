@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from qgis.core import QgsApplication
 
 from .provider import RailExtractProvider
 from .setup import package_folders
+
+if TYPE_CHECKING:
+    from .model_action import OpenModelAction
 
 
 class RailExtractPlugin:
@@ -20,7 +25,7 @@ class RailExtractPlugin:
     def __init__(self, iface) -> None:
         self.iface = iface
         self.provider: RailExtractProvider | None = None
-        self.action = None
+        self.action: OpenModelAction | None = None
 
     def initProcessing(self) -> None:
         """Offer the algorithms; all that ``qgis_process`` calls."""

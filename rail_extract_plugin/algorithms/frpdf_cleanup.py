@@ -69,7 +69,7 @@ class FrpdfCleanup(RailAlgorithm):
         path, header = values.raster("INPUT")
         standard = header.standard(values.optional_number("GAUGE"), values.optional_number("HEAD_WIDTH"))
         header = replace(header, gauge_m=standard.gauge_m, head_width_m=standard.head_width_m)
-        model = choose_model(header, values.choice("MODEL"))
+        model = choose_model(header, standard, values.choice("MODEL"))
         return Job(path, replace(header, model=model.name), model)
 
     def compute(

@@ -20,6 +20,7 @@ from ..writing.layers import RAILS, figures_of, write_lines
 from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
+    from ...core.rails import RailLine
     from ..reading.rasters import RasterHeader
 
 READING = 0.3
@@ -85,7 +86,7 @@ class VectorizeRails(RailAlgorithm):
             frame = clouds[job.header.class_codes[0]].frame
             rasters = tuple(moved(raster, job.header.frame, frame) for raster in rasters)
         settings = ParameterValues(self, parameters, context).settings(job.standard)
-        rails = []
+        rails: list[RailLine] = []
         shares = progress.span(READING, 1).split(len(rasters))
         for raster, code, share in zip(rasters, job.header.class_codes, shares):
             rails += lines_of(raster, code, clouds.get(code), settings, share, first_id=len(rails) + 1)

@@ -14,12 +14,12 @@ from ...core.clouds.points import RailPoints
 from ...core.errors import CrsError, NoRailPointsError
 from ...core.frame import LocalFrame
 from ...core.progress import Progress
-from .clouds import Bounds, CloudSource, crs_of, read_points, spool_points
+from .clouds import Bounds, BoundsIn, CloudSource, crs_of, read_points, spool_points
 
 if TYPE_CHECKING:
     from ...core.squares.spool import SpooledPoints
 
-Points = TypeVar("Points")
+Points = TypeVar("Points", RailPoints, "SpooledPoints")
 
 
 @dataclass(frozen=True)
@@ -54,17 +54,21 @@ def read_points_in(area: Area, cloud: CloudSource, progress: Progress) -> dict[i
     NoRailPointsError
         The cloud has no points of a class there.
     """
-    return _all_of(area, cloud, lambda *wanted: read_points(*wanted, progress))
+    return _all_of(area, cloud, lambda source, codes, bounds: read_points(source, codes, bounds, progress))
 
 
 def spool_points_in(
     area: Area, cloud: CloudSource, side_m: float, folder: Path, progress: Progress
 ) -> dict[int, SpooledPoints]:
     """Do as `read_points_in`, but leave the points on disk, sorted into squares: a cloud of any size fits."""
-    return _all_of(area, cloud, lambda *wanted: spool_points(*wanted, side_m, folder, progress))
+    return _all_of(
+        area, cloud, lambda source, codes, bounds: spool_points(source, codes, bounds, side_m, folder, progress)
+    )
 
 
-def _all_of(area: Area, cloud: CloudSource, read: Callable[..., Sequence[Points]]) -> dict[int, Points]:
+def _all_of(
+    area: Area, cloud: CloudSource, read: Callable[[CloudSource, Sequence[int], BoundsIn], Sequence[Points]]
+) -> dict[int, Points]:
     """Have points read, and see to it that there are some of every class."""
     check_same_plane("POINTS", crs_of(cloud), f"the {area.what}", area.frame)
 

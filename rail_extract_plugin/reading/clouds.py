@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Optional
 
 from qgis.core import (
     QgsCoordinateReferenceSystem,
@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from ...core.squares.spool import SpooledPoints
 
 Bounds = tuple[float, float, float, float]
+"""Smallest x, smallest y, largest x, largest y."""
+
+BoundsIn = Callable[[QgsCoordinateReferenceSystem], Optional[Bounds]]
+"""Returns the area to read in a given coordinate system; None to read everything."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +78,7 @@ def cloud_source(value: Any, context: QgsProcessingContext) -> CloudSource:
 def read_points(
     source: CloudSource,
     class_codes: Sequence[int],
-    bounds: Callable[[QgsCoordinateReferenceSystem], Bounds | None],
+    bounds: BoundsIn,
     progress: Progress,
 ) -> tuple[RailPoints, ...]:
     """Read the points of the wanted classes; `bounds` says in the cloud's coordinate system where to look."""
@@ -87,7 +91,7 @@ def read_points(
 def spool_points(
     source: CloudSource,
     class_codes: Sequence[int],
-    bounds: Callable[[QgsCoordinateReferenceSystem], Bounds | None],
+    bounds: BoundsIn,
     side_m: float,
     folder: Path,
     progress: Progress,

@@ -58,7 +58,7 @@ def read_header(path: Path) -> RasterHeader:
             gauge_m=_length_m(dataset, GAUGE_TAG),
             head_width_m=_length_m(dataset, HEAD_TAG),
             model=dataset.GetMetadataItem(MODEL_TAG),
-            extent=_numbers(dataset, EXTENT_TAG, 4),
+            extent=_extent(dataset),
         )
 
 
@@ -192,6 +192,15 @@ def _numbers(dataset: gdal.Dataset, tag: str, count: int) -> tuple[float, ...] |
     if len(numbers) != count:
         raise RasterError(f"The tag {tag} of the raster can't be {text!r}: rasterize the points again.")
     return numbers
+
+
+def _extent(dataset: gdal.Dataset) -> tuple[float, float, float, float] | None:
+    """West, south, east and north of the tag; None where it is missing."""
+    numbers = _numbers(dataset, EXTENT_TAG, 4)
+    if numbers is None:
+        return None
+    west, south, east, north = numbers
+    return west, south, east, north
 
 
 def _length_m(dataset: gdal.Dataset, tag: str) -> float | None:

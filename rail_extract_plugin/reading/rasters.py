@@ -117,8 +117,16 @@ def header_for(
     )
 
 
-def choose_model(header: RasterHeader, name: str) -> Model:
-    """Find the model that the user named, or that fits what the raster says, and check the cell size.
+def choose_model(header: RasterHeader, standard: RailStandard, name: str) -> Model:
+    """Find the model that the user named, or that the raster names, or that fits the rails; check the cell size.
+
+    Parameters
+    ----------
+    header : RasterHeader
+    standard : RailStandard
+        The raster's rails.
+    name : str
+        Name of a model, or AUTO.
 
     Raises
     ------
@@ -127,15 +135,15 @@ def choose_model(header: RasterHeader, name: str) -> Model:
     RasterError
         The cells are not as large as the network expects for such rails.
     """
-    expected_m = cell_size(header.gauge_m, header.head_width_m)
+    expected_m = cell_size(standard.gauge_m, standard.head_width_m)
     if not math.isclose(header.cell_m, expected_m, rel_tol=CELL_TOLERANCE):
         raise RasterError(
-            f"The raster's cells are {1000 * header.cell_m:.1f} mm wide, but a gauge of {1000 * header.gauge_m:.0f} mm "
-            f"with a railhead of {1000 * header.head_width_m:.1f} mm needs {1000 * expected_m:.1f} mm: rasterize the "
-            "points for these rails, or correct GAUGE and HEAD_WIDTH."
+            f"The raster's cells are {1000 * header.cell_m:.1f} mm wide, but a gauge of {1000 * standard.gauge_m:.0f} "
+            f"mm with a railhead of {1000 * standard.head_width_m:.1f} mm needs {1000 * expected_m:.1f} mm: rasterize "
+            "the points for these rails, or correct GAUGE and HEAD_WIDTH."
         )
     named = {model.name: model for model in MODELS}
-    return named.get(name) or named.get(header.model or "") or choose(header.gauge_m, header.head_width_m)
+    return named.get(name) or named.get(header.model or "") or choose(standard.gauge_m, standard.head_width_m)
 
 
 def on_one_grid(rasters: Sequence[RailRaster], frame: LocalFrame) -> tuple[list[RailRaster], LocalFrame]:

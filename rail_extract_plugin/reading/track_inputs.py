@@ -133,5 +133,7 @@ def _moved(lines: Sequence, frame: LocalFrame, other: LocalFrame) -> tuple:
 def _bounds(rails: Sequence[RailLine], frame: LocalFrame) -> Bounds:
     """Smallest x, smallest y, largest x, largest y around rails, in units of the coordinate system."""
     xyz = np.concatenate([rail.xyz for rail in rails])
-    lowest, highest = frame.to_crs([xyz.min(axis=0) - MARGIN_M, xyz.max(axis=0) + MARGIN_M])
-    return float(lowest[0]), float(lowest[1]), float(highest[0]), float(highest[1])
+    (west, south, _), (east, north, _) = frame.to_crs(
+        np.array([xyz.min(axis=0) - MARGIN_M, xyz.max(axis=0) + MARGIN_M])
+    ).tolist()
+    return west, south, east, north

@@ -64,12 +64,12 @@ def candidates(executable: Path, prefix: Path, platform: str) -> Iterator[Path]:
     platform : str
         `sys.platform`.
     """
-    names = ("python3", "python", "python{}.{}".format(*sys.version_info))
+    names = ["python3", "python", "python{}.{}".format(*sys.version_info)]
     if platform == "win32":
-        folders = (prefix, executable.parent)
-        names = tuple(f"{name}.exe" for name in names)
+        folders = [prefix, executable.parent]
+        names = [f"{name}.exe" for name in names]
     else:
-        folders = (prefix / "bin", executable.parent / "bin", executable.parent, prefix / "tools" / "python3")
+        folders = [prefix / "bin", executable.parent / "bin", executable.parent, prefix / "tools" / "python3"]
     for folder in folders:
         for name in names:
             yield folder / name

@@ -165,12 +165,12 @@ def write_raster(
     return {name: path}
 
 
-def figures_of(lines: Sequence[RailLine | Centerline], what: str) -> dict[str, float]:
+def figures_of(lines: Sequence[RailLine | Centerline], what: str) -> dict[str, Any]:
     """Count lines and measure them, as the outputs RAIL_COUNT and RAIL_LENGTH for RAIL."""
     return {f"{what}_COUNT": len(lines), f"{what}_LENGTH": LENGTH.value(sum(line.length_m for line in lines))}
 
 
-def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, float | None]:
+def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, Any]:
     """Count stations, and tell how well the points support the tracks."""
     sigma = [value for track in tracks for value in track.sigma_mm if math.isfinite(value)]
     return {

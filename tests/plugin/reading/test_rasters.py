@@ -216,14 +216,17 @@ def test_standard_comes_from_the_user_else_from_the_tags(geotiff):
 
 
 def test_model_by_name_by_tag_and_by_ratio(geotiff):
-    tags = {"RAIL_GAUGE_MM": "1435", "RAIL_HEAD_MM": "72"}
-    for header in (read_header(geotiff(tags=tags)), read_header(geotiff(tags={**tags, "RAIL_MODEL": "base"}))):
-        assert choose_model(header, "AUTO").name == "base"
-    assert choose_model(read_header(geotiff(tags={**tags, "RAIL_MODEL": "gone"})), "base").name == "base"
+    def chosen(name, gauge, head, **more):
+        header = read_header(geotiff(tags={"RAIL_GAUGE_MM": gauge, "RAIL_HEAD_MM": head, **more}))
+        return choose_model(header, header.standard(None, None), name)
+
+    assert chosen("AUTO", "1435", "72").name == "base"
+    assert chosen("AUTO", "1435", "72", RAIL_MODEL="base").name == "base"
+    assert chosen("base", "1435", "72", RAIL_MODEL="gone").name == "base"
     with pytest.raises(RasterError, match="cells are 40.0 mm wide, but .* needs 28.1 mm"):
-        choose_model(read_header(geotiff(tags={"RAIL_GAUGE_MM": "1000", "RAIL_HEAD_MM": "61.91"})), "AUTO")
+        chosen("AUTO", "1000", "61.91")
     with pytest.raises(ModelError, match="models cover"):
-        choose_model(read_header(geotiff(tags={"RAIL_GAUGE_MM": "1460", "RAIL_HEAD_MM": "45"})), "AUTO")
+        chosen("AUTO", "1460", "45")
 
 
 def test_unwritable_file_is_refused(tmp_path):
