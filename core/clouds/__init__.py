@@ -1,1 +1,1 @@
-"""Point clouds: files, coordinate systems, and the points of wanted classes in local metres."""
+"""Point clouds: file formats, coordinate systems, and the points of the rail classes in local metres."""

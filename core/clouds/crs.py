@@ -1,4 +1,4 @@
-"""Coordinate reference systems of clouds: what their units are, and whether lengths can be computed in them."""
+"""Coordinate reference systems: their units, and whether lengths can be computed in them."""
 
 from __future__ import annotations
 
@@ -16,29 +16,30 @@ if TYPE_CHECKING:
 
 MODEL_TYPE_KEY, MODEL_PROJECTED = 1024, 1
 VERTICAL_CRS_KEY, VERTICAL_UNIT_KEY = 4096, 4099
-"""GeoTIFF keys, as in OGC 19-008r4, section 7."""
+"""GeoTIFF keys (OGC 19-008r4, section 7)."""
 
 EPSG_CODES = range(1024, 32767)
-"""Values of a GeoTIFF key that are EPSG codes, by the same standard."""
+"""Values of a GeoTIFF key that are EPSG codes (same standard)."""
 
 LENGTH_UNITS = {9001: ("metre", 1.0), 9002: ("foot", 0.3048), 9003: ("US survey foot", 1200 / 3937)}
-"""EPSG's codes for units of length: name and metres."""
+"""Name and length in metres of EPSG's units of length."""
 
-LARGEST_STRETCH = 0.005
-"""Share by which a system may stretch lengths: gauge then reads 7 mm off, and from 10 mm on the report calls it wrong.
-Grids of countries stay below 0.0035; Web Mercator exceeds it even on the equator."""
+MAX_SCALE_ERROR = 0.005
+"""Largest deviation of the scale factor from 1. It shifts a gauge of 1435 mm by 7 mm; the report marks deviations of
+more than 10 mm. National grids stay below 0.0035; Web Mercator exceeds the limit even on the equator."""
 
 BASELINE_M = 100.0
-"""Length on which the stretch is measured: short for a projection, long against the rounding of degrees."""
+"""Length on which the scale factor is measured: short enough for the factor to be constant along it, and long
+compared with the rounding of degrees."""
 
 WGS_84 = "EPSG:4326"
 
 SAME_PLACE = 1e-3
-"""Units of a coordinate system by which a place may differ between two descriptions of it."""
+"""Largest difference, in units of the CRS, between the coordinates of a place in two descriptions of the same CRS."""
 
 
 def import_pyproj():
-    """Import pyproj on first need.
+    """Import pyproj when it is first needed.
 
     Raises
     ------
@@ -47,45 +48,50 @@ def import_pyproj():
     """
     try:
         with warnings.catch_warnings():
-            # In a virtual environment pyproj misses PROJ's data folder and says so; PROJ itself finds it.
+            # In a virtual environment, pyproj warns that it can't find PROJ's data folder; PROJ itself finds it.
             warnings.simplefilter("ignore", UserWarning)
             import pyproj
     except ImportError as error:
         raise CrsError(
-            "The Python package pyproj, which reads coordinate systems, is missing: run pip install pyproj."
+            "The Python package that reads coordinate systems is missing: run pip install pyproj."
         ) from error
     return pyproj
 
 
 def parse_crs(text: str) -> pyproj.CRS:
-    """Understand a coordinate system given as WKT or as a code such as EPSG:32643.
+    """Parse a coordinate system given as WKT or as a code such as EPSG:32643.
 
     Raises
     ------
     CrsError
         The text is neither.
+
+    Examples
+    --------
+    >>> parse_crs("EPSG:32643").name
+    'WGS 84 / UTM zone 43N'
     """
     pyproj = import_pyproj()
     try:
         return pyproj.CRS.from_user_input(text)
     except pyproj.exceptions.CRSError as error:
-        raise CrsError(f"The coordinate system {text[:60]!r} is not understood: give WKT or an EPSG code.") from error
+        raise CrsError(f"The coordinate system {text[:60]!r} is unknown: give WKT or an EPSG code.") from error
 
 
 def crs_of_geokeys(crs: pyproj.CRS | None, keys: dict[int, int]) -> pyproj.CRS | None:
-    """Correct a coordinate system read from GeoTIFF keys by the keys on model type and heights.
+    """Correct a coordinate system read from GeoTIFF keys, using the keys for model type and heights.
 
     Parameters
     ----------
     crs : pyproj.CRS or None
-        Made of the keys on projected and geographic systems alone.
+        Built from the keys for projected and geographic systems only.
     keys : dict of int to int
-        Key numbers and their short values.
+        Values by key number.
 
     Returns
     -------
     pyproj.CRS or None
-        None for a projection without a code: its geographic base is not what the coordinates are in.
+        None for a projection without a code, because the coordinates are not in its geographic base.
     """
     if crs is None or (crs.is_geographic and keys.get(MODEL_TYPE_KEY) == MODEL_PROJECTED):
         return None
@@ -96,7 +102,7 @@ def crs_of_geokeys(crs: pyproj.CRS | None, keys: dict[int, int]) -> pyproj.CRS |
 
 
 def _vertical_crs(code: int, unit: int) -> pyproj.CRS | None:
-    """Find the height system of an EPSG code, or make one that knows just the unit."""
+    """Look up the height system of an EPSG code, or build one that states only the unit."""
     pyproj = import_pyproj()
     if code in EPSG_CODES:
         try:
@@ -114,17 +120,22 @@ def _vertical_crs(code: int, unit: int) -> pyproj.CRS | None:
 
 
 def units(crs: pyproj.CRS) -> tuple[float, float]:
-    """Metres in the horizontal and in the vertical unit; without a height system both are the same.
+    """Return the length in metres of the horizontal and the vertical unit; without a height system they are equal.
 
     Raises
     ------
     CrsError
-        Coordinates are not lengths (degrees, or from the earth's centre).
+        The coordinates are degrees, or geocentric.
+
+    Examples
+    --------
+    >>> units(parse_crs("EPSG:2222"))  # Arizona, in feet
+    (0.3048, 0.3048)
     """
     parts = [_unbound(part) for part in _unbound(crs).sub_crs_list or [crs]]
     axes = parts[0].axis_info
     if parts[0].is_geographic or parts[0].is_geocentric or not axes:
-        raise CrsError(f"Lengths can't be computed in {crs.name}: project the cloud first.")
+        raise CrsError(f"Lengths can't be computed in {crs.name}: use a projected coordinate system.")
     horizontal = axes[0].unit_conversion_factor
     if len(parts) > 1:
         return horizontal, parts[1].axis_info[0].unit_conversion_factor
@@ -132,58 +143,64 @@ def units(crs: pyproj.CRS) -> tuple[float, float]:
 
 
 def is_geographic(crs: pyproj.CRS) -> bool:
-    """Tell whether the plan coordinates are longitude and latitude."""
+    """Return whether the plan coordinates are longitude and latitude."""
     return _plane(crs).is_geographic
 
 
 def _plane(crs: pyproj.CRS) -> pyproj.CRS:
-    """Leave the heights out of a system."""
+    """Return the horizontal part of a system."""
     return _unbound((_unbound(crs).sub_crs_list or [crs])[0])
 
 
 def _unbound(crs: pyproj.CRS) -> pyproj.CRS:
     """Strip the datum shift that some WKT binds to a system."""
-    return crs.source_crs if crs.is_bound else crs
+    return crs.source_crs or crs if crs.is_bound else crs
 
 
 def utm_zone(longitude: float, latitude: float) -> str:
-    """Name the UTM zone (WGS 84) of a place given in degrees, as in "UTM zone 43N (EPSG:32643)"."""
+    """Name the UTM zone (WGS 84) of a place given in degrees.
+
+    >>> utm_zone(77.2, 13.1)
+    'UTM zone 43N (EPSG:32643)'
+    """
     zone = int((longitude + 180) // 6) % 60 + 1
     hemisphere, code = ("N", 32600 + zone) if latitude >= 0 else ("S", 32700 + zone)
     return f"UTM zone {zone}{hemisphere} (EPSG:{code})"
 
 
-def warn_of_stretch(
+def warn_of_scale(
     crs: pyproj.CRS, places: Sequence[tuple[float, float]], what: str, progress: Progress, it: str = "it"
 ) -> None:
-    """Warn of a system in which lengths are not those on the ground, as in Web Mercator away from the equator.
+    """Warn about a system in which lengths differ from those on the ground, as in Web Mercator.
 
-    No more than a warning: coordinates that are local ones, and only labelled with a system, have true lengths.
+    This is only a warning because local coordinates may be labelled with a system they are not in; their lengths are
+    true.
 
     Parameters
     ----------
-    crs : CRS
+    crs : pyproj.CRS
     places : sequence of (x, y)
-        In units of the CRS. One without too much stretch suffices, for the others may be those of stray points.
+        In units of the CRS. One place with an acceptable scale factor is enough: the others may belong to stray points.
     what, it : str
-        The subject of the sentence with its verb, and how the remedy calls it.
+        Subject and verb of the sentence, such as "cloud.laz is", and the pronoun that refers to the subject.
     progress : Progress
+        Takes the warning.
     """
     plane = _plane(crs)
-    found = [_stretch(plane, *place) for place in places] if plane.is_projected else []
+    found = [_scale_at(plane, *place) for place in places] if plane.is_projected else []
     known = [one for one in found if np.isfinite(one).all()]
     if not known:
         return
     factor, longitude, latitude = min(known, key=lambda one: abs(one[0] - 1))
-    if abs(factor - 1) > LARGEST_STRETCH:
+    if abs(factor - 1) > MAX_SCALE_ERROR:
         progress.warning(
-            f"{what} in {plane.name}, which draws lengths there {factor:.3f} times as long as they are, gauges too: "
+            f"{what} in {plane.name}, whose scale factor of {factor:.3f} there makes lengths and gauges wrong: "
             f"reproject {it}, for example to {utm_zone(longitude, latitude)}."
         )
 
 
-def _stretch(plane: pyproj.CRS, x: float, y: float) -> tuple[float, float, float]:
-    """Length in the plane of one metre on the ground where that is farthest from one, and longitude and latitude."""
+def _scale_at(plane: pyproj.CRS, x: float, y: float) -> tuple[float, float, float]:
+    """Return scale factor, longitude and latitude at a place; of the factors east and north, that farther from 1."""
     pyproj = import_pyproj()
     half = BASELINE_M / 2 / plane.axis_info[0].unit_conversion_factor
     to_degrees = pyproj.Transformer.from_crs(plane, WGS_84, always_xy=True)
@@ -194,7 +211,7 @@ def _stretch(plane: pyproj.CRS, x: float, y: float) -> tuple[float, float, float
 
 
 def common_crs(systems: Sequence[tuple[str, pyproj.CRS | None]]) -> pyproj.CRS | None:
-    """Find the one system that all files share.
+    """Return the system that all files share; None if no file states one.
 
     Parameters
     ----------
@@ -203,7 +220,7 @@ def common_crs(systems: Sequence[tuple[str, pyproj.CRS | None]]) -> pyproj.CRS |
     Raises
     ------
     CrsError
-        Two files differ; both are named.
+        Two files differ; the message names both.
     """
     (first_name, first), *others = systems
     for name, crs in others:
@@ -211,15 +228,21 @@ def common_crs(systems: Sequence[tuple[str, pyproj.CRS | None]]) -> pyproj.CRS |
         if not same:
             raise CrsError(
                 f"{first_name} is in {_name(first)} but {name} is in {_name(crs)}: "
-                "bring all tiles into one coordinate system first."
+                "reproject all tiles to one coordinate system first."
             )
     return first
 
 
 def same_plane(first_wkt: str, second_wkt: str, xy: tuple[float, float]) -> bool:
-    """Tell whether two systems mean the same place by plan coordinates, tried at `xy`; heights do not matter.
+    """Return whether plan coordinates mean the same place in two systems; heights are ignored.
 
-    Descriptions of one system differ from file to file, and what counts is where they put the rails.
+    Descriptions of one system differ from file to file; what counts is where they put the rails.
+
+    Parameters
+    ----------
+    first_wkt, second_wkt : str
+    xy : (x, y)
+        Coordinates to compare, in units of the systems.
     """
     pyproj = import_pyproj()
     plane = [_plane(parse_crs(wkt)) for wkt in (first_wkt, second_wkt)]

@@ -1,11 +1,10 @@
-"""Rail points: read from classified clouds, in metres from a local origin."""
+"""Rail points: the points of the rail classes of a classified cloud, in metres from a local origin."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,12 +13,11 @@ from ..errors import CloudError, CrsError, NoRailPointsError, ParameterError
 from ..frame import ORIGIN_STEP, LocalFrame
 from ..progress import SILENT, Progress
 from ..standards import LAST_CLASS
-from .crs import common_crs, is_geographic, parse_crs, units, utm_zone, warn_of_stretch
+from .crs import common_crs, is_geographic, parse_crs, units, utm_zone, warn_of_scale
+from .readers import Chunk, CloudHeader, Extent, Paths, list_files, read_classes, read_header
 
 if TYPE_CHECKING:
     import pyproj
-
-    from .las import CloudHeader
 
 
 @dataclass(frozen=True)
@@ -40,41 +38,47 @@ class RailPoints:
 
 
 def read_rail_points(
-    paths: str | Path | Sequence[str | Path],
+    paths: Paths,
     class_codes: Sequence[int],
     crs_wkt: str | None = None,
-    extent: tuple[float, float, float, float] | None = None,
+    extent: Extent | None = None,
     progress: Progress = SILENT,
 ) -> tuple[RailPoints, ...]:
-    """Read the points of the wanted classes; memory grows with these alone.
+    """Read the points of the rail classes; memory grows only with their number.
 
     Parameters
     ----------
     paths : path or sequence of paths
-        LAS, LAZ or COPC files, or folders of them.
+        LAS, LAZ or COPC files, virtual point clouds (.vpc), or folders of tiles.
     class_codes : sequence of int
-        Classes that mean rail, 0 to 255.
+        Rail classes, 0 to 255.
     crs_wkt : str, optional
-        Coordinate system, as WKT or code, of files that state none.
+        Coordinate system, as WKT or EPSG code, for files that state none.
     extent : tuple of float, optional
-        Smallest x, smallest y, largest x, largest y to keep, in units of the CRS.
+        Smallest x, smallest y, largest x, largest y of the points to keep, in units of the CRS.
     progress : Progress
 
     Returns
     -------
     tuple of RailPoints
-        One for each wanted class that has points, by rising code, all in one local frame.
+        One for each rail class that has points, in ascending order of the code, all in one local frame.
 
     Raises
     ------
     CloudError
-        A file is missing, damaged or no point cloud.
+        A file is missing, damaged or not a point cloud.
     CrsError
-        The files differ in their coordinate systems, or it is not made of lengths.
+        The files have different coordinate systems, or theirs is in degrees.
     NoRailPointsError
-        No point of the wanted classes lies in the files and the extent.
+        The files have no points of the rail classes inside the extent.
     ParameterError
-        A class code is none, or the extent is turned around.
+        A class code is out of range, or the extent is empty.
+
+    Examples
+    --------
+    >>> for points in read_rail_points("cloud.laz", [10]):  # doctest: +SKIP
+    ...     print(points.class_code, len(points.xyz))
+    10 151204
     """
     request = ask(paths, class_codes, crs_wkt, extent, progress)
     xyz, codes = _collect(request, progress)
@@ -85,7 +89,7 @@ def read_rail_points(
 
 @dataclass(frozen=True)
 class Request:
-    """Which points of which files are wanted.
+    """Which points to read from which files.
 
     Attributes
     ----------
@@ -94,20 +98,16 @@ class Request:
     extent : tuple of float or None
         In units of the CRS.
     zero : LocalFrame
-        Metres from the zero of the files' coordinate system.
+        Frame whose origin is the zero of the files' coordinate system.
     """
 
     headers: tuple[CloudHeader, ...]
     class_codes: tuple[int, ...]
-    extent: tuple[float, float, float, float] | None
+    extent: Extent | None
     zero: LocalFrame
 
-    def read(
-        self, header: CloudHeader, progress: Progress = SILENT
-    ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Read the wanted points of a file chunk by chunk: coordinates, classes and census; see `las.read_classes`."""
-        from .las import read_classes
-
+    def read(self, header: CloudHeader, progress: Progress = SILENT) -> Iterator[Chunk]:
+        """Read the points requested from a file chunk by chunk; see `readers.read_classes`."""
         if self.extent is not None and not _overlap(header.extent, self.extent):
             return
         for xyz, codes, census in read_classes(header.path, self.class_codes, progress):
@@ -115,43 +115,48 @@ class Request:
             yield xyz[inside], codes[inside], census
 
     def shares(self, progress: Progress) -> list[Progress]:
-        """Give each file the share of the progress that its points have."""
+        """Split the progress among the files in proportion to their points."""
         counts = np.array([header.point_count for header in self.headers], dtype=float)
         after = np.cumsum(counts) / counts.sum()
         return [progress.span(end - count / counts.sum(), end) for end, count in zip(after, counts)]
 
     def frame_at(self, steps: Sequence[tuple[np.ndarray, np.ndarray]]) -> LocalFrame:
-        """Make the frame whose origin lies amid the points, given values and counts of their `origin_steps` by axis."""
+        """Return the frame with its origin at the points' median, from values and counts of `origin_steps` by axis."""
         middle = [values[np.searchsorted(np.cumsum(counts), counts.sum() / 2)] for values, counts in steps]
         return replace(self.zero, origin=np.array(middle) * ORIGIN_STEP)
 
     def explain_none(self, census: np.ndarray) -> NoRailPointsError:
-        """Say in one sentence which classes there are, (256,) counts, instead of the wanted ones."""
+        """Return the error for a cloud without the points requested; it names the classes found, (256,) counts."""
         wanted = ", ".join(str(code) for code in sorted(set(self.class_codes)))
         if self.extent is not None and (census.sum() == 0 or census[list(self.class_codes)].any()):
-            return NoRailPointsError(f"No point of class {wanted} lies inside the extent: choose a larger one.")
+            return NoRailPointsError(f"The extent contains no points of class {wanted}: choose a larger extent.")
         if not census.any():
             return NoRailPointsError(
-                "All points of the cloud are marked as withheld: export those that count unmarked."
+                "All points of the cloud are marked as withheld: export the valid points without this mark."
             )
-        there = ", ".join(f"{code} ({census[code]})" for code in np.flatnonzero(census))
+        found = ", ".join(f"{code} ({census[code]})" for code in np.flatnonzero(census))
         return NoRailPointsError(
-            f"The cloud has no point of class {wanted}; its classes and their counts are {there}: set the rail classes."
+            f"The cloud has no points of class {wanted}; its classes, with the number of points, are {found}: set the "
+            "rail classes."
         )
 
 
 def ask(
-    paths: str | Path | Sequence[str | Path],
+    paths: Paths,
     class_codes: Sequence[int],
     crs_wkt: str | None = None,
-    extent: tuple[float, float, float, float] | None = None,
+    extent: Extent | None = None,
     progress: Progress = SILENT,
     unreadable: list[str] | None = None,
 ) -> Request:
-    """Check what is wanted, and read the headers; parameters and errors as those of `read_rail_points`.
+    """Check a request for points and read the headers of its files; errors as for `read_rail_points`.
 
-    With a list `unreadable`, files that can't be read are left out as long as there is another; what is wrong with
-    them is added to the list.
+    Parameters
+    ----------
+    paths, class_codes, crs_wkt, extent, progress
+        See `read_rail_points`.
+    unreadable : list of str, optional
+        If given, files that can't be read are left out, unless all are, and the reasons are appended here.
     """
     _check_request(class_codes, extent)
     headers = _read_headers(paths, unreadable)
@@ -162,9 +167,7 @@ def ask(
     )
 
 
-def _read_headers(paths: str | Path | Sequence[str | Path], unreadable: list[str] | None) -> tuple[CloudHeader, ...]:
-    from .las import list_files, read_header
-
+def _read_headers(paths: Paths, unreadable: list[str] | None) -> tuple[CloudHeader, ...]:
     headers, last = [], None
     for path in list_files(paths):
         try:
@@ -180,14 +183,15 @@ def _read_headers(paths: str | Path | Sequence[str | Path], unreadable: list[str
 
 
 def origin_steps(xyz_crs: np.ndarray) -> np.ndarray:
-    """Round coordinates, (n, 3) in units of the CRS, to multiples of `ORIGIN_STEP`, (n, 3) numbers of steps.
+    """Round coordinates, (n, 3) in units of the CRS, to multiples of `ORIGIN_STEP`; return (n, 3) numbers of steps.
 
-    The middle one of these is the middle point's: it can be told from their counts alone, file by file.
+    Rounding keeps the order, so the median step is that of the median point, and counts of steps, added up over the
+    files, are enough to find it.
     """
     return np.round(xyz_crs / ORIGIN_STEP)
 
 
-def _check_request(class_codes: Sequence[int], extent: tuple[float, float, float, float] | None) -> None:
+def _check_request(class_codes: Sequence[int], extent: Extent | None) -> None:
     if not class_codes or not all(0 <= code <= LAST_CLASS for code in class_codes):
         raise ParameterError(f"Rail classes must be numbers from 0 to {LAST_CLASS}, not {list(class_codes)}.")
     if extent is not None and not (extent[0] < extent[2] and extent[1] < extent[3]):
@@ -195,8 +199,8 @@ def _check_request(class_codes: Sequence[int], extent: tuple[float, float, float
 
 
 def _shared_crs(headers: Sequence[CloudHeader], given: str | None, progress: Progress) -> pyproj.CRS | None:
-    """Find the one coordinate system of all files, `given` standing in where a file states none."""
-    texts = [header.crs_wkt or given for header in headers]
+    """Return the coordinate system that all files share; `given` applies to files that state none."""
+    texts = [header.crs_wkt or given or "" for header in headers]
     parsed = {text: parse_crs(text) for text in set(texts) if text}
     crs = common_crs([(header.path.name, parsed.get(text)) for header, text in zip(headers, texts)])
     if crs is None:
@@ -208,12 +212,12 @@ def _shared_crs(headers: Sequence[CloudHeader], given: str | None, progress: Pro
         )
     else:
         xmin, ymin, xmax, ymax = headers[0].extent
-        warn_of_stretch(crs, list(product((xmin, xmax), (ymin, ymax))), f"{headers[0].path.name} is", progress)
+        warn_of_scale(crs, list(product((xmin, xmax), (ymin, ymax))), f"{headers[0].path.name} is", progress)
     return crs
 
 
 def _fitting_zone(header: CloudHeader) -> str:
-    """Name the UTM zone that a cloud in degrees lies in."""
+    """Name the UTM zone of a cloud in degrees."""
     xmin, ymin, xmax, ymax = header.extent
     longitude, latitude = (xmin + xmax) / 2, (ymin + ymax) / 2
     fits = abs(longitude) <= 180 and abs(latitude) <= 90
@@ -221,7 +225,7 @@ def _fitting_zone(header: CloudHeader) -> str:
 
 
 def _collect(request: Request, progress: Progress) -> tuple[np.ndarray, np.ndarray]:
-    """Gather coordinates, (n, 3) in CRS units, and classes, (n,), of the wanted points of all files."""
+    """Return coordinates, (n, 3) in CRS units, and classes, (n,), of the points requested from all files."""
     kept_xyz, kept_codes, census = [], [], np.zeros(256, dtype=np.int64)
     for header, share in zip(request.headers, request.shares(progress)):
         for xyz, codes, counts in request.read(header, share):
@@ -233,11 +237,11 @@ def _collect(request: Request, progress: Progress) -> tuple[np.ndarray, np.ndarr
     return np.concatenate(kept_xyz), np.concatenate(kept_codes)
 
 
-def _overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> bool:
-    """Tell whether two extents have a place in common; one that a header states as NaN may be anywhere."""
+def _overlap(a: Extent, b: Extent) -> bool:
+    """Return whether two extents overlap; an extent of NaN, as a header may state it, may be anywhere."""
     return not (a[0] > b[2] or b[0] > a[2] or a[1] > b[3] or b[1] > a[3])
 
 
-def _inside(xyz: np.ndarray, extent: tuple[float, float, float, float]) -> np.ndarray:
+def _inside(xyz: np.ndarray, extent: Extent) -> np.ndarray:
     xmin, ymin, xmax, ymax = extent
     return (xyz[:, 0] >= xmin) & (xyz[:, 0] <= xmax) & (xyz[:, 1] >= ymin) & (xyz[:, 1] <= ymax)

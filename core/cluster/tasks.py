@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..clouds.las import CloudHeader
 from ..clouds.points import Request
+from ..clouds.readers import CloudHeader
 from ..errors import DiskError, RailExtractError
 from ..frpdf.engine import Engine
 from ..frpdf.models import choose

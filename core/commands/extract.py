@@ -55,7 +55,11 @@ POSITIVE = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument(
-        "tiles", nargs="+", type=Path, metavar="TILE", help="LAS, LAZ or COPC files, or folders of them"
+        "tiles",
+        nargs="+",
+        type=Path,
+        metavar="TILE",
+        help="LAS, LAZ, COPC or .vpc files, or folders of tiles",
     )
     parser.add_argument("--rails", type=Path, required=True, help="GeoPackage for the rails; replaced if it is there")
     parser.add_argument("--centerlines", type=Path, help="GeoPackage for the track centerlines; may be the same file")

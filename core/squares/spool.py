@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..clouds.las import CloudHeader
 from ..clouds.points import RailPoints, Request, origin_steps
+from ..clouds.readers import CloudHeader
 from ..disk import writing
 from ..frame import LocalFrame
 from ..progress import SILENT, Progress

@@ -1,8 +1,7 @@
-"""From a point cloud parameter to the files that the core reads."""
+"""Reading of point cloud parameters: which files a value stands for, and the points in them."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from qgis.core import (
     QgsProperty,
 )
 
+from ...core.clouds.readers import list_files, read_header
 from ...core.errors import CloudError
 from ...core.progress import Progress
 from ...core.standards import RAIL_CLASS
@@ -34,14 +34,14 @@ BoundsIn = Callable[[QgsCoordinateReferenceSystem], Optional[Bounds]]
 
 @dataclass(frozen=True)
 class CloudSource:
-    """Where a cloud lies.
+    """The files of a cloud.
 
     Attributes
     ----------
     paths : tuple of Path
-        Files, or folders of them.
+        Files, virtual point clouds, or folders of tiles.
     crs_wkt : str or None
-        What the user set, for files that state none.
+        Coordinate system set by the user, for files that state none.
     """
 
     paths: tuple[Path, ...]
@@ -49,30 +49,30 @@ class CloudSource:
 
 
 def cloud_source(value: Any, context: QgsProcessingContext) -> CloudSource:
-    """Find the files behind the value of a point cloud parameter.
+    """Find the files that the value of a point cloud parameter stands for.
 
     Parameters
     ----------
     value : QgsPointCloudLayer, QgsProperty or str
-        A layer, or the name or id of a loaded one, or the path of a file, a folder or a .vpc file.
+        A layer, the name or id of a loaded layer, or the path of a file, a folder or a virtual point cloud.
     context : QgsProcessingContext
 
     Raises
     ------
     CloudError
-        It is another kind of layer, or no path on this computer.
+        The layer is not a point cloud, or the path is not one of a cloud on this computer.
     """
     if isinstance(value, QgsProperty):
         value = value.valueAsString(context.expressionContext())[0]
     if not value:
-        raise CloudError("No point cloud was given: choose a layer, or a LAS or LAZ file, or a folder of them.")
+        raise CloudError("No point cloud was given: choose a layer, a file or a folder of tiles.")
     layer = value if isinstance(value, QgsMapLayer) else _loaded_layer(str(value), context)
     if layer is None:
-        return CloudSource(_files(Path(str(value))))
+        return _checked(CloudSource((Path(str(value)),)))
     if not isinstance(layer, QgsPointCloudLayer):
-        raise CloudError(f'The layer "{layer.name()}" is no point cloud: choose a point cloud layer or a LAS file.')
+        raise CloudError(f'The layer "{layer.name()}" is not a point cloud: choose a point cloud layer or file.')
     crs_wkt = layer.crs().toWkt() if layer.crs().isValid() else None
-    return CloudSource(_files(Path(layer.source())), crs_wkt)
+    return _checked(CloudSource((Path(layer.source()),), crs_wkt))
 
 
 def read_points(
@@ -81,7 +81,16 @@ def read_points(
     bounds: BoundsIn,
     progress: Progress,
 ) -> tuple[RailPoints, ...]:
-    """Read the points of the wanted classes; `bounds` says in the cloud's coordinate system where to look."""
+    """Read the points of the rail classes.
+
+    Parameters
+    ----------
+    source : CloudSource
+    class_codes : sequence of int
+    bounds : callable
+        Returns the extent to read, given the cloud's coordinate system.
+    progress : Progress
+    """
     from ...core.clouds.points import read_rail_points
 
     crs = QgsCoordinateReferenceSystem(crs_of(source) or "")
@@ -96,7 +105,17 @@ def spool_points(
     folder: Path,
     progress: Progress,
 ) -> tuple[SpooledPoints, ...]:
-    """Do as `read_points`, but leave the points on disk, sorted into squares: a cloud of any size fits."""
+    """Sort the points of the rail classes into squares on disk, so that a cloud of any size fits.
+
+    Parameters
+    ----------
+    source, class_codes, bounds, progress
+        See `read_points`.
+    side_m : float
+        Side of the squares.
+    folder : Path
+        Where to write them.
+    """
     from ...core.clouds.points import ask
     from ...core.squares.spool import spool
 
@@ -106,21 +125,18 @@ def spool_points(
 
 
 def crs_of(source: CloudSource) -> str | None:
-    """Give a cloud's coordinate system as WKT, by its first file: whether all agree is told when they are read."""
-    from ...core.clouds.las import list_files, read_header
-
+    """Return the coordinate system of a cloud's first file as WKT; reading the points checks that all files agree."""
     return read_header(list_files(source.paths)[0]).crs_wkt or source.crs_wkt
 
 
 def check_lengths(source: CloudSource) -> None:
-    """Refuse a cloud in degrees by the header of its first file; other faults of files are the run's to tell.
+    """Refuse a cloud in degrees by the header of its first file; the run reports all other errors in files.
 
     Raises
     ------
     CrsError
-        Lengths can't be measured there.
+        The coordinate system does not measure lengths.
     """
-    from ...core.clouds.las import list_files
     from ...core.clouds.points import ask
 
     try:
@@ -133,21 +149,7 @@ def _loaded_layer(name: str, context: QgsProcessingContext) -> QgsMapLayer | Non
     return QgsProcessingUtils.mapLayerFromString(name, context, allowLoadingNewLayers=False)
 
 
-def _files(path: Path) -> tuple[Path, ...]:
-    if not path.exists():
-        raise CloudError(f"{path} does not exist: give a LAS or LAZ file, or a folder of them, on this computer.")
-    return _tiles(path) if path.suffix.lower() == ".vpc" else (path,)
-
-
-def _tiles(catalogue: Path) -> tuple[Path, ...]:
-    """Tiles of a virtual point cloud, which is a STAC collection in JSON that names a file for each item."""
-    try:
-        items = json.loads(catalogue.read_text(encoding="utf-8"))["features"]
-        # Other assets, such as the overview, repeat points of the tiles.
-        tiles = tuple(catalogue.parent / item["assets"]["data"]["href"] for item in items)
-    except (ValueError, TypeError, KeyError, AttributeError, OSError) as error:
-        raise CloudError(f"{catalogue.name} is no virtual point cloud: build it again from its tiles.") from error
-    absent = next((tile for tile in tiles if not tile.exists()), None)
-    if absent is not None or not tiles:
-        raise CloudError(f"{catalogue.name} names {absent or 'no tile at all'}: build it again from tiles that exist.")
-    return tiles
+def _checked(source: CloudSource) -> CloudSource:
+    """Raise a `CloudError` now if the paths don't lead to cloud files."""
+    list_files(source.paths)
+    return source

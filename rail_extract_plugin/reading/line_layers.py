@@ -18,7 +18,7 @@ from qgis.core import (
     QgsProcessingFeatureSource,
 )
 
-from ...core.clouds.crs import parse_crs, units, warn_of_stretch
+from ...core.clouds.crs import parse_crs, units, warn_of_scale
 from ...core.errors import CrsError, RailExtractError
 from ...core.fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
 from ...core.frame import ORIGIN_STEP, LocalFrame
@@ -96,7 +96,7 @@ def _read(
     middle = np.median(np.concatenate([vertices for _, vertices in found]), axis=0)
     origin = np.round(np.nan_to_num(middle) / ORIGIN_STEP) * ORIGIN_STEP
     if crs_wkt:
-        warn_of_stretch(parse_crs(crs_wkt), [tuple(middle[:2])], "The lines are", progress, "them")
+        warn_of_scale(parse_crs(crs_wkt), [tuple(middle[:2])], "The lines are", progress, "them")
     frame = LocalFrame(origin, horizontal_unit_m, vertical_unit_m, crs_wkt)
     return [(feature, frame.to_local(vertices)) for feature, vertices in found], frame
 

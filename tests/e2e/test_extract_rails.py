@@ -55,7 +55,7 @@ def test_lines_start_in_the_west(extracted):
     ("parameters", "sentence"),
     [
         ({"INPUT": "gone.laz"}, "gone.laz does not exist"),
-        ({"RAIL_CLASSES": "40"}, "has no point of class 40; its classes and their counts are 1 ("),
+        ({"RAIL_CLASSES": "40"}, "has no points of class 40; its classes, with the number of points, are 1 ("),
         ({"GAUGE": "600", "HEAD_WIDTH": "75"}, "check GAUGE and HEAD_WIDTH"),
         ({"CENTERLINES": "/nowhere/tracks.gpkg"}, "can't be written"),
     ],

@@ -190,7 +190,7 @@ def cut_in_points(path):
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (wrong_magic, "is no LAS or LAZ file"),
+        (wrong_magic, "is not a LAS or LAZ file"),
         (empty, "is empty"),
         (cut_in_header, "is cut off"),
         (cut_in_points, "is cut off"),
@@ -208,7 +208,7 @@ def test_damaged_file(run, outputs, write_cloud, track, damage, message, suffix)
     [
         ({"RAIL_CLASSES": "ten"}, "RAIL_CLASSES"),
         ({"RAIL_CLASSES": "300"}, "from 0 to 255"),
-        ({"RAIL_CLASSES": "11"}, "its classes and their counts are 10 (7200)"),
+        ({"RAIL_CLASSES": "11"}, "its classes, with the number of points, are 10 (7200)"),
         ({"STANDARD": "CUSTOM"}, "CUSTOM needs both"),
         ({"STANDARD": "EN_99"}, "STANDARD"),
         ({"GAUGE": 300}, "A gauge of 300 mm is not possible"),

@@ -179,7 +179,7 @@ SYSTEMS = [
         "coordinates from the earth's centre",
         in_system(4978, 1, (5e6, 3e6, 2e6)),
         REFUSED,
-        "Lengths can't be computed in WGS 84: project the cloud first.",
+        "Lengths can't be computed in WGS 84: use a projected coordinate system.",
     ),
     Fault("US survey feet", in_system(2263, FEET, (980_000, 200_000, 300))),
     Fault("feet in plan, metres in height", in_system("2263+5703", (FEET, FEET, 1), (980_000, 200_000, 100))),
@@ -187,30 +187,30 @@ SYSTEMS = [
         "Web Mercator",
         in_system(3857, 1, (1_024_000, 6_446_000, 100)),
         WARNED,
-        "cloud.las is in WGS 84 / Pseudo-Mercator, which draws lengths there 1.557 times as long as they are, gauges "
-        "too: reproject it, for example to UTM zone 32N (EPSG:32632).",
+        "cloud.las is in WGS 84 / Pseudo-Mercator, whose scale factor of 1.557 there makes lengths and gauges wrong: "
+        "reproject it, for example to UTM zone 32N (EPSG:32632).",
     ),
     Fault(
         "rails drawn in Web Mercator",
         drawn_in_mercator,
         WARNED,
-        "The lines are in WGS 84 / Pseudo-Mercator, which draws lengths there 1.557 times as long as they are, gauges "
-        "too: reproject them, for example to UTM zone 32N (EPSG:32632).",
+        "The lines are in WGS 84 / Pseudo-Mercator, whose scale factor of 1.557 there makes lengths and gauges "
+        "wrong: reproject them, for example to UTM zone 32N (EPSG:32632).",
         run="buildtrackcenterlines",
     ),
     Fault(
         "tiles in different zones",
         tiles(32643, 32644),
         REFUSED,
-        "tile0.las is in WGS 84 / UTM zone 43N but tile1.las is in WGS 84 / UTM zone 44N: bring all tiles "
-        "into one coordinate system first.",
+        "tile0.las is in WGS 84 / UTM zone 43N but tile1.las is in WGS 84 / UTM zone 44N: reproject all tiles to one "
+        "coordinate system first.",
     ),
     Fault(
         "one tile without a system",
         tiles(32643, None),
         REFUSED,
-        "tile0.las is in WGS 84 / UTM zone 43N but tile1.las is in no coordinate system: bring all tiles "
-        "into one coordinate system first.",
+        "tile0.las is in WGS 84 / UTM zone 43N but tile1.las is in no coordinate system: reproject all tiles to one "
+        "coordinate system first.",
     ),
     Fault("one tile without a system, which is given", tiles(32643, None, CRS="EPSG:32643")),
 ]

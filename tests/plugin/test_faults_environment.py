@@ -357,7 +357,7 @@ def test_a_bad_cloud_in_a_batch_spoils_no_other(qgis, plugin, outcome, bench):
         outcome(algorithm, {"INPUT": path, "OUTPUT": bench.folder / f"{path.stem}.tif"}) for path in (good, bad, other)
     ]
     assert [run.ok for run in runs] == [True, False, True]
-    assert runs[1].error.startswith("2.las is no LAS or LAZ file")
+    assert runs[1].error.startswith("2.las is not a LAS or LAZ file")
     assert sorted(path.name for path in bench.folder.glob("*.tif")) == ["1.tif", "3.tif"]
 
 

@@ -142,62 +142,62 @@ FAULTS = [
         "text file called .las",
         holding(b"x,y,z\n1,2,3\n"),
         REFUSED,
-        "cloud.las is no LAS or LAZ file, which begins with LASF: export the cloud as one.",
+        'cloud.las is not a LAS or LAZ file (it does not begin with "LASF"): export the cloud as LAS or LAZ.',
     ),
     Fault(
         "PDF called .las (wrong magic)",
         holding(b"%PDF-1.4 " * 100),
         REFUSED,
-        "cloud.las is no LAS or LAZ file, which begins with LASF: export the cloud as one.",
+        'cloud.las is not a LAS or LAZ file (it does not begin with "LASF"): export the cloud as LAS or LAZ.',
     ),
     Fault(
         "folder called .las",
         lambda bench: (bench.folder / "a.las").mkdir() or {"INPUT": bench.folder / "a.las"},
         REFUSED,
-        "The folder …/a.las holds no .las or .laz file: choose another one.",
+        "The folder …/a.las contains no .las or .laz file: choose another folder.",
     ),
     Fault(
         "missing file",
         lambda bench: {"INPUT": bench.folder / "gone.laz"},
         REFUSED,
-        "…/gone.laz does not exist: give a LAS or LAZ file, or a folder of them, on this computer.",
+        "…/gone.laz does not exist: give a .las, .laz or .vpc file, or a folder of tiles, on this computer.",
     ),
     Fault(
         "web address",
         lambda bench: {"INPUT": "https://example.org/cloud.laz"},
         REFUSED,
-        "https:/example.org/cloud.laz does not exist: give a LAS or LAZ file, or a folder of them, on this computer.",
+        "https:/example.org/cloud.laz does not exist: give a .las, .laz or .vpc file, or a folder of tiles, on this "
+        "computer.",
     ),
     Fault(
         "folder without clouds",
         folder_without_clouds,
         REFUSED,
-        "The folder …/tiles holds no .las or .laz file: choose another one.",
+        "The folder …/tiles contains no .las or .laz file: choose another folder.",
     ),
     Fault(
         "folder with one bad tile",
         one_bad_tile,
         REFUSED,
-        "bad.las is cut off: it has room for 3596 of the 3600 points that its header announces; copy or "
-        "export it again.",
+        "bad.las is cut off: it has room for 3596 of the 3600 points stated in its header; copy or export it again.",
     ),
     Fault(
         "virtual point cloud that is no JSON",
         catalogue("{"),
         REFUSED,
-        "all.vpc is no virtual point cloud: build it again from its tiles.",
+        "all.vpc is not a virtual point cloud: build it again from its tiles.",
     ),
     Fault(
         "virtual point cloud without tiles",
         catalogue('{"features": []}'),
         REFUSED,
-        "all.vpc names no tile at all: build it again from tiles that exist.",
+        "all.vpc names no tiles: build it again from existing tiles.",
     ),
     Fault(
         "virtual point cloud of a missing tile",
         catalogue(json.dumps({"features": [ITEM]})),
         REFUSED,
-        "all.vpc names …/gone.laz: build it again from tiles that exist.",
+        "all.vpc names …/gone.laz, which does not exist: build it again from its tiles.",
     ),
     Fault(
         "cut in the header",
@@ -215,21 +215,19 @@ FAULTS = [
         "cut before the points",
         damaged(at_points),
         REFUSED,
-        "cloud.las is cut off: it has room for 0 of the 3600 points that its header announces; copy or "
-        "export it again.",
+        "cloud.las is cut off: it has room for 0 of the 3600 points stated in its header; copy or export it again.",
     ),
     Fault(
         "cut in the points",
         damaged(cut(-1000)),
         REFUSED,
-        "cloud.las is cut off: it has room for 3566 of the 3600 points that its header announces; copy or "
-        "export it again.",
+        "cloud.las is cut off: it has room for 3566 of the 3600 points stated in its header; copy or export it again.",
     ),
     Fault(
-        "cut in the records behind the points",
+        "cut in the records after the points",
         damaged(with_late_record_cut),
         REFUSED,
-        "cloud.las is cut off: the records behind its points are missing; copy or export it again.",
+        "cloud.las is cut off: the records after its points are missing; copy or export it again.",
     ),
     Fault(
         "LAZ cut in the header",
@@ -259,14 +257,14 @@ FAULTS = [
         "zero points",
         damaged(overwritten(COUNT_AT, bytes(8))),
         REFUSED,
-        "cloud.las holds no points: leave it out, or export it again.",
+        "cloud.las has no points: leave it out, or export it again.",
     ),
     Fault(
         "absurd number of points",
         damaged(overwritten(COUNT_AT, b"\xff" * 6)),
         REFUSED,
-        "cloud.las is cut off: it has room for 3600 of the 281474976710655 points that its header announces; "
-        "copy or export it again.",
+        "cloud.las is cut off: it has room for 3600 of the 281474976710655 points stated in its header; copy or "
+        "export it again.",
     ),
     Fault(
         "LAZ with an absurd number of points",
@@ -278,8 +276,7 @@ FAULTS = [
         "absurd number of records",
         damaged(overwritten(RECORDS_AT, b"\xff" * 4)),
         REFUSED,
-        "cloud.las has a damaged header (375 bytes and 4294967295 records announced before the points): "
-        "export it again.",
+        "cloud.las has a damaged header (375 bytes and 4294967295 records stated before the points): export it again.",
     ),
     Fault(
         "points said to lie beyond the end",
@@ -291,7 +288,7 @@ FAULTS = [
         "points said to lie in the header",
         damaged(overwritten(96, struct.pack("<I", 10))),
         REFUSED,
-        "cloud.las has a damaged header (375 bytes and 1 records announced before the points): export it again.",
+        "cloud.las has a damaged header (375 bytes and 1 records stated before the points): export it again.",
     ),
     Fault(
         "header said to be too short",
@@ -303,7 +300,7 @@ FAULTS = [
         "header said to be longer than the file",
         damaged(overwritten(94, b"\xff\xff")),
         REFUSED,
-        "cloud.las has a damaged header (65535 bytes and 1 records announced before the points): export it again.",
+        "cloud.las has a damaged header (65535 bytes and 1 records stated before the points): export it again.",
     ),
     Fault("record said to reach into the points", damaged(overwritten(HEADER + 20, b"\xff\xff"))),
     Fault(

@@ -211,7 +211,7 @@ RASTERS = [
         "raster in degrees",
         of_raster(grid=(75, 4e-7, 0, 27, 0, -4e-7), epsg=4326),
         REFUSED,
-        "Lengths can't be computed in WGS 84: project the cloud first.",
+        "Lengths can't be computed in WGS 84: use a projected coordinate system.",
     ),
     Fault(
         "wrong number of bands (an RGB picture)",

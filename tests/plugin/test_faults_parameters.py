@@ -147,7 +147,8 @@ FAULTS = [
         "class that no point has",
         with_(RAIL_CLASSES="11"),
         REFUSED,
-        "The cloud has no point of class 11; its classes and their counts are 10 (3600): set the rail classes.",
+        "The cloud has no points of class 11; its classes, with the number of points, are 10 (3600): set the rail "
+        "classes.",
     ),
     Fault(
         "other gauges in words",
@@ -179,7 +180,7 @@ FAULTS = [
         "extent beside the cloud",
         with_(EXTENT="0,1,0,1"),
         REFUSED,
-        "No point of class 10 lies inside the extent: choose a larger one.",
+        "The extent contains no points of class 10: choose a larger extent.",
     ),
     Fault(
         "extent without area",
@@ -197,7 +198,7 @@ FAULTS = [
         "extent in a coordinate system far away",
         with_(EXTENT="0,1,0,1 [EPSG:4326]"),
         REFUSED,
-        "No point of class 10 lies inside the extent: choose a larger one.",
+        "The extent contains no points of class 10: choose a larger extent.",
     ),
     Fault(
         "coordinate system that is none",

@@ -1,7 +1,7 @@
-"""Whether two descriptions of a coordinate system mean the same places."""
+"""Coordinate systems: comparing two descriptions, and the warning about the scale factor."""
 
 import pytest
-from rail_extract.core.clouds.crs import import_pyproj, same_plane, warn_of_stretch
+from rail_extract.core.clouds.crs import import_pyproj, same_plane, warn_of_scale
 from rail_extract.core.progress import Progress
 
 PLACE = (500_000.0, 3_000_000.0)
@@ -39,7 +39,7 @@ class Listener(Progress):
 ROME, BERN, ACCRA = (12.5, 41.9), (7.4, 46.9), (-0.2, 5.6)
 
 
-def stretched(code, *places):
+def warnings_at(code, *places):
     crs = import_pyproj().CRS.from_user_input(code)
     to_plane = import_pyproj().Transformer.from_crs("EPSG:4326", crs, always_xy=True)
     return warnings_of(crs, [to_plane.transform(*place) for place in places])
@@ -47,7 +47,7 @@ def stretched(code, *places):
 
 def warnings_of(crs, places):
     listener = Listener()
-    warn_of_stretch(crs, places, "It is", listener)
+    warn_of_scale(crs, places, "It is", listener)
     return listener.said
 
 
@@ -62,11 +62,11 @@ def warnings_of(crs, places):
         ('LOCAL_CS["here",UNIT["metre",1]]', (5.0, 5.0)),
     ],
 )
-def test_grids_in_which_lengths_hold(code, place):
+def test_a_scale_factor_near_1_gives_no_warning(code, place):
     if code.startswith("LOCAL"):
         assert not warnings_of(import_pyproj().CRS.from_user_input(code), [place])
     else:
-        assert not stretched(code, place)
+        assert not warnings_at(code, place)
 
 
 @pytest.mark.parametrize(
@@ -77,15 +77,15 @@ def test_grids_in_which_lengths_hold(code, place):
         ("EPSG:5070", (-121.0, 48.0), "1.007", "UTM zone 10N (EPSG:32610)"),  # equal area
     ],
 )
-def test_systems_that_stretch_lengths_are_named(code, place, factor, zone):
-    (said,) = stretched(code, place)
-    assert f" {factor} times as long" in said
+def test_another_scale_factor_is_named(code, place, factor, zone):
+    (said,) = warnings_at(code, place)
+    assert f"whose scale factor of {factor} there" in said
     assert said.endswith(f"reproject it, for example to {zone}.")
 
 
-def test_a_stray_corner_is_no_reason_to_warn():
-    assert not stretched("EPSG:32632", BERN, (60.0, 46.9))
+def test_a_stray_corner_gives_no_warning():
+    assert not warnings_at("EPSG:32632", BERN, (60.0, 46.9))
 
 
-def test_places_that_are_none_are_left_alone():
+def test_places_outside_the_system_are_ignored():
     assert not warnings_of(import_pyproj().CRS.from_epsg(32632), [(float("nan"), 0.0), (1e300, 1e300)])

@@ -1,4 +1,4 @@
-"""Reading of rail points: formats, units, tiles, and every file that is not what it should be."""
+"""Reading of rail points: LAS versions, units, tiles, and damaged files."""
 
 from __future__ import annotations
 
@@ -103,13 +103,6 @@ def test_a_file_named_twice_is_read_once(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (points,) = read_rail_points([tmp_path, "a.laz", tmp_path / "a.laz"], [RAIL])
     assert len(points.xyz) == 3000
-    assert all(file.is_absolute() for file in las.list_files("a.laz"))
-
-
-def test_what_macos_hides_beside_files_is_no_tile(tmp_path):
-    make_cloud(tmp_path / "a.laz", codes=(RAIL,))
-    (tmp_path / "._a.laz").write_bytes(b"\0\5\x16\7")
-    assert [file.name for file in las.list_files(tmp_path)] == ["a.laz"]
 
 
 def test_a_file_that_can_not_be_opened_is_named(tmp_path):
@@ -145,7 +138,7 @@ def test_withheld_points_are_left_out(tmp_path):
         read_rail_points(tmp_path / "a.las", [RAIL])
     cloud.withheld[:500] = 0
     cloud.write(tmp_path / "a.las")
-    with pytest.raises(NoRailPointsError, match=r"counts are 2 \(500\): set"):
+    with pytest.raises(NoRailPointsError, match=r"number of points, are 2 \(500\): set"):
         read_rail_points(tmp_path / "a.las", [RAIL])
 
 
@@ -226,7 +219,7 @@ def test_a_given_crs_stands_in_only_where_the_cloud_has_none(tmp_path):
     (utm,) = read_rail_points(tmp_path / "utm.las", [RAIL], crs_wkt="EPSG:2227")
     assert bare.frame.horizontal_unit_m == pytest.approx(1200 / 3937)
     assert utm.frame.horizontal_unit_m == 1.0
-    with pytest.raises(CrsError, match="not understood"):
+    with pytest.raises(CrsError, match="'nonsense' is unknown"):
         read_rail_points(tmp_path / "bare.las", [RAIL], crs_wkt="nonsense")
 
 
@@ -257,7 +250,7 @@ def test_an_extent_cuts_points_and_spares_tiles(tmp_path):
     (points,) = read_rail_points(tmp_path, [RAIL], extent=extent)
     inside = (np.abs(xyz[:, :2] - PLACE[:2]) <= 5).all(axis=1) & (codes == RAIL)
     assert len(points.xyz) == np.count_nonzero(inside) > 0
-    with pytest.raises(NoRailPointsError, match="extent"):
+    with pytest.raises(NoRailPointsError, match="^The extent contains no points of class 10: choose"):
         read_rail_points(tmp_path, [RAIL], extent=(0, 0, 1, 1))
 
 
@@ -302,15 +295,6 @@ def test_progress_rises_to_the_end_and_a_cancel_is_heard(tmp_path, monkeypatch):
         read_rail_points(tmp_path / "a.las", [RAIL], progress=Listener(cancel_after=2))
 
 
-def test_headers_tell_count_extent_and_system(tmp_path):
-    xyz, _ = make_cloud(tmp_path / "a.laz")
-    header = las.read_header(tmp_path / "a.laz")
-    assert header.point_count == 3000
-    expected = (*xyz[:, :2].min(axis=0), *xyz[:, :2].max(axis=0))
-    assert header.extent == pytest.approx(expected, abs=1e-6)
-    assert "UTM zone 43N" in header.crs_wkt
-
-
 def write_bytes(path, data):
     path.write_bytes(data)
     return path
@@ -335,10 +319,10 @@ NAN = np.float64(np.nan).tobytes()
 
 BAD_FILES = {
     "missing": (lambda folder: folder / "nowhere.las", "does not exist"),
-    "empty folder": (lambda folder: folder, "holds no .las or .laz"),
+    "empty folder": (lambda folder: folder, "contains no .las or .laz file"),
     "empty file": (lambda folder: write_bytes(folder / "a.las", b""), "is empty"),
-    "not LAS": (lambda folder: write_bytes(folder / "a.las", b"%PDF-1.4 " * 100), "no LAS or LAZ file"),
-    "text": (lambda folder: write_bytes(folder / "a.las", b"x,y,z\n"), "no LAS or LAZ file"),
+    "not LAS": (lambda folder: write_bytes(folder / "a.las", b"%PDF-1.4 " * 100), "is not a LAS or LAZ file"),
+    "text": (lambda folder: write_bytes(folder / "a.las", b"x,y,z\n"), "is not a LAS or LAZ file"),
     "cut in the header": (
         lambda folder: damaged(folder, "a.las", lambda data: data[:200]),
         "cut off within its header",
@@ -355,8 +339,8 @@ BAD_FILES = {
     "absurd count": (lambda folder: damaged(folder, "a.las", set_bytes(247, b"\xff" * 6)), "of the 281474976710655"),
     "absurd LAZ count": (lambda folder: damaged(folder, "a.laz", set_bytes(247, b"\xff" * 6)), "damaged"),
     "absurd records": (lambda folder: damaged(folder, "a.las", set_bytes(100, b"\xff" * 4)), "damaged header"),
-    "absurd late records": (lambda folder: damaged(folder, "a.las", set_bytes(243, b"\xff" * 4)), "records behind"),
-    "zero points": (lambda folder: damaged(folder, "a.las", set_bytes(247, b"\x00" * 8)), "holds no points"),
+    "absurd late records": (lambda folder: damaged(folder, "a.las", set_bytes(243, b"\xff" * 4)), "records after"),
+    "zero points": (lambda folder: damaged(folder, "a.las", set_bytes(247, b"\x00" * 8)), "has no points"),
     "scale not a number": (lambda folder: damaged(folder, "a.las", set_bytes(131, NAN)), "scale or offset"),
     "scale zero": (lambda folder: damaged(folder, "a.las", set_bytes(131, b"\x00" * 8)), "scale or offset"),
     "offset not a number": (lambda folder: damaged(folder, "a.las", set_bytes(171, NAN)), "scale or offset"),

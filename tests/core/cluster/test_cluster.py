@@ -1,5 +1,6 @@
 """Extraction on real workers: the same lines as in one process, whatever dies in between."""
 
+import json
 import os
 import resource
 import signal
@@ -209,6 +210,16 @@ def test_two_names_of_one_file_hold_both_layers(tiles, client, tmp_path, monkeyp
     ]
     assert main(words) == 0
     assert {name for name, _ in pyogrio.list_layers("two.gpkg")} == {"rails", "centerlines"}
+
+
+def test_a_virtual_point_cloud_stands_for_its_tiles(tiles, client, tmp_path):
+    catalogue, out = tmp_path / "all.vpc", tmp_path / "out.gpkg"
+    items = [{"assets": {"data": {"href": str(tiles / f"tile{number}.laz")}}} for number in (0, 1)]
+    catalogue.write_text(json.dumps({"features": items}))
+    words = ["extract", str(catalogue), "--rails", str(out), "--scheduler", client.scheduler.address]
+    assert main([*words, "--stretch-tiles", "4", "--engine", "OPENCV", "--iterations", "1"]) == 0
+    _, _, _, values = pyogrio.raw.read(out, layer="rails")
+    assert 60 < values[2].sum() < 80  # two thirds of two rails of 50 m
 
 
 def test_a_geopackage_that_another_program_writes_to_is_left_alone(tiles, tmp_path, capsys):

@@ -1,0 +1,157 @@
+"""Formats of point clouds: which module reads which suffix, and which files a path stands for.
+
+To add a format, write a module with the two functions of `Reader` and add its suffix to `READERS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Protocol, Union, cast
+
+import numpy as np
+
+from ..errors import CloudError
+from ..progress import SILENT, Progress
+from .vpc import list_tiles
+
+READERS = {".las": "las", ".laz": "las"}
+"""Module of this package by the suffix of the files it reads. It is imported on first use, because QGIS lacks the
+packages that readers need. COPC files end in .copc.laz."""
+
+CATALOGUES: dict[str, Callable[[Path], Sequence[Path]]] = {".vpc": list_tiles}
+"""Functions that list the clouds named in a file, by its suffix."""
+
+Extent = tuple[float, float, float, float]
+"""Smallest x, smallest y, largest x, largest y, in units of the CRS."""
+
+Chunk = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Coordinates (n, 3) in units of the CRS and classes (n,) of the points that were kept, and the number of points read
+by class (256,), kept or not."""
+
+Paths = Union[str, Path, Sequence[Union[str, Path]]]
+"""Files, or folders of them."""
+
+
+@dataclass(frozen=True)
+class CloudHeader:
+    """What the header of a file states.
+
+    Attributes
+    ----------
+    path : Path
+    point_count : int
+    extent : tuple of float
+        Smallest x, smallest y, largest x, largest y in units of the CRS.
+    crs_wkt : str or None
+        Coordinate system as WKT 2; None if the file states none that PROJ understands.
+    """
+
+    path: Path
+    point_count: int
+    extent: Extent
+    crs_wkt: str | None
+
+
+class Reader(Protocol):
+    """What a module in `READERS` offers."""
+
+    def read_header(self, path: Path) -> CloudHeader:
+        """Read and check the header of a file, without its points; see `read_header`."""
+
+    def read_classes(self, path: Path, class_codes: Sequence[int], progress: Progress = SILENT) -> Iterator[Chunk]:
+        """Read a file chunk by chunk and keep the points of some classes; see `read_classes`."""
+
+
+def read_header(path: Path) -> CloudHeader:
+    """Read and check the header of one file, without its points.
+
+    Raises
+    ------
+    CloudError
+        The file has an unknown suffix, is damaged, is cut off or has no points.
+    """
+    return _reader(path).read_header(path)
+
+
+def read_classes(path: Path, class_codes: Sequence[int], progress: Progress = SILENT) -> Iterator[Chunk]:
+    """Read a file chunk by chunk and keep the points of some classes; withheld points are left out.
+
+    Parameters
+    ----------
+    path : Path
+    class_codes : sequence of int
+        Classes to keep, 0 to 255.
+    progress : Progress
+
+    Yields
+    ------
+    xyz : (n, 3) array
+        Points kept from a chunk, in units of the CRS.
+    codes : (n,) uint8 array
+        Their classes.
+    census : (256,) int array
+        Points in the chunk by class, kept or not, without withheld ones.
+
+    Raises
+    ------
+    CloudError
+        The file has an unknown suffix, or turns out to be cut off or damaged.
+    """
+    return _reader(path).read_classes(path, class_codes, progress)
+
+
+def list_files(paths: Paths) -> tuple[Path, ...]:
+    """List the cloud files of one path or several, each file once.
+
+    A folder stands for the cloud files in it, sorted by name, and a virtual point cloud for its tiles.
+
+    Raises
+    ------
+    CloudError
+        A path does not exist or has an unknown suffix, a folder contains no cloud, or a virtual point cloud is damaged.
+    """
+    files: list[Path] = []
+    for path in [paths] if isinstance(paths, (str, Path)) else paths:
+        files.extend(file.absolute() for file in _files_of(Path(path)))  # a worker may run in another folder
+    if not files:
+        raise CloudError("No point cloud was given: name a file or a folder of tiles.")
+    for file in files:
+        _module_of(file)
+    return tuple({file.resolve(): file for file in reversed(files)}.values())[::-1]
+
+
+def _files_of(path: Path) -> Sequence[Path]:
+    """List the files that one path stands for."""
+    if not path.exists():
+        raise CloudError(
+            f"{path} does not exist: give a {_any_of((*READERS, *CATALOGUES))} file, or a folder of tiles, on this "
+            "computer."
+        )
+    if not path.is_dir():
+        return CATALOGUES.get(path.suffix.lower(), lambda file: [file])(path)
+    # On file systems other than its own, macOS puts a hidden file next to each: its name starts with a dot.
+    tiles = sorted(file for file in path.iterdir() if file.suffix.lower() in READERS and file.name[0] != ".")
+    if not tiles:
+        raise CloudError(f"The folder {path} contains no {_any_of(READERS)} file: choose another folder.")
+    return tiles
+
+
+def _reader(path: Path) -> Reader:
+    return cast(Reader, import_module(f".{_module_of(path)}", __package__))
+
+
+def _module_of(path: Path) -> str:
+    """Name the module that reads a file."""
+    module = READERS.get(path.suffix.lower())
+    if module is None:
+        raise CloudError(f"{path.name} has no suffix of a known cloud format: export the cloud as {_any_of(READERS)}.")
+    return module
+
+
+def _any_of(suffixes: Iterable[str]) -> str:
+    """Enumerate suffixes: .las, .laz or .vpc."""
+    *others, last = suffixes
+    return f"{', '.join(others)} or {last}" if others else last

@@ -1,0 +1,110 @@
+"""Formats by suffix, and the files that a path stands for."""
+
+import json
+
+import laspy
+import numpy as np
+import pyproj
+import pytest
+from rail_extract.core.clouds import readers
+from rail_extract.core.clouds.points import read_rail_points
+from rail_extract.core.errors import CloudError
+
+RAIL = 10
+
+
+def write_cloud(path, count=100):
+    """Write a cloud whose points are all rail, and return their coordinates as stored."""
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.scales, header.offsets = [0.001] * 3, [578_123, 2_494_456, 0]
+    header.add_crs(pyproj.CRS.from_epsg(32643))
+    cloud = laspy.LasData(header)
+    cloud.xyz = header.offsets + np.random.default_rng(1).uniform(0, 20, (count, 3))
+    cloud.classification = np.full(count, RAIL, dtype=np.uint8)
+    cloud.write(path)
+    return np.array(cloud.xyz)
+
+
+def write_catalogue(path, *names):
+    path.write_text(json.dumps({"features": [{"assets": {"data": {"href": name}}} for name in names]}))
+    return path
+
+
+def test_header_states_count_extent_and_coordinate_system(tmp_path):
+    xyz = write_cloud(tmp_path / "a.laz")
+    header = readers.read_header(tmp_path / "a.laz")
+    assert (header.path, header.point_count) == (tmp_path / "a.laz", 100)
+    assert header.extent == pytest.approx((*xyz[:, :2].min(axis=0), *xyz[:, :2].max(axis=0)), abs=1e-6)
+    assert "UTM zone 43N" in header.crs_wkt
+
+
+def test_files_are_absolute_and_listed_once(tmp_path, monkeypatch):
+    for name in ("b.LAS", "a.copc.laz"):
+        (tmp_path / name).touch()
+    monkeypatch.chdir(tmp_path)
+    expected = (tmp_path / "a.copc.laz", tmp_path / "b.LAS")
+    assert readers.list_files([tmp_path, "a.copc.laz", tmp_path / "b.LAS"]) == expected
+    assert readers.list_files("a.copc.laz") == expected[:1]
+
+
+def test_folder_stands_for_its_tiles_without_hidden_and_other_files(tmp_path):
+    for name in ("2.laz", "1.las", "._1.las", "notes.txt", "all.vpc"):
+        (tmp_path / name).touch()
+    assert [file.name for file in readers.list_files(tmp_path)] == ["1.las", "2.laz"]
+
+
+def test_a_new_format_is_one_line(tmp_path, monkeypatch):
+    monkeypatch.setitem(readers.READERS, ".xyz", "las")
+    write_cloud(tmp_path / "a.las")
+    (tmp_path / "a.las").rename(tmp_path / "a.xyz")
+    assert [file.name for file in readers.list_files(tmp_path)] == ["a.xyz"]
+    (points,) = read_rail_points(tmp_path, [RAIL])
+    assert len(points.xyz) == 100
+
+
+def test_virtual_point_cloud_stands_for_its_tiles(tmp_path):
+    for name, count in (("1.las", 10), ("2.laz", 200), ("3.las", 3000)):
+        write_cloud(tmp_path / name, count)
+    catalogue = write_catalogue(tmp_path / "all.VPC", "./1.las", str(tmp_path / "2.laz"))
+    assert readers.list_files(catalogue) == (tmp_path / "1.las", tmp_path / "2.laz")
+    (points,) = read_rail_points(catalogue, [RAIL])
+    assert len(points.xyz) == 210
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{", "[]", '{"features": [{}]}', '{"features": 3}', '{"features": [{"assets": []}]}']
+)
+def test_damaged_virtual_point_cloud_is_refused(tmp_path, text):
+    (tmp_path / "all.vpc").write_text(text)
+    with pytest.raises(CloudError, match=r"^all.vpc is not a virtual point cloud: build"):
+        readers.list_files(tmp_path / "all.vpc")
+
+
+@pytest.mark.parametrize(
+    ("names", "sentence"),
+    [((), r"^all.vpc names no tiles"), (("gone.laz",), r"^all.vpc names .*gone.laz, which does not exist")],
+)
+def test_virtual_point_cloud_without_its_tiles_is_refused(tmp_path, names, sentence):
+    with pytest.raises(CloudError, match=sentence):
+        readers.list_files(write_catalogue(tmp_path / "all.vpc", *names))
+
+
+@pytest.mark.parametrize("name", ["cloud.e57", "cloud"])
+def test_unknown_suffix_is_refused(tmp_path, name):
+    (tmp_path / name).touch()
+    sentence = f"^{name} has no suffix of a known cloud format: export the cloud as .las or .laz.$"
+    for given in (tmp_path / name, write_catalogue(tmp_path / "all.vpc", name)):
+        with pytest.raises(CloudError, match=sentence):
+            readers.list_files(given)
+    with pytest.raises(CloudError, match=sentence):
+        readers.read_header(tmp_path / name)
+
+
+def test_no_path_is_refused():
+    with pytest.raises(CloudError, match="^No point cloud was given"):
+        readers.list_files([])
+
+
+def test_missing_path_is_refused_with_the_suffixes(tmp_path):
+    with pytest.raises(CloudError, match="gone.laz does not exist: give a .las, .laz or .vpc file, or a folder"):
+        readers.list_files(tmp_path / "gone.laz")
