@@ -7,7 +7,7 @@ points between the two tell which.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -147,9 +147,11 @@ def _slide(network: LineNetwork, end: int, number: int, between_m: tuple[float, 
     start = int(np.argmin(np.abs(along - along[vertex] - parting.sense * touch)))
     if not 0 < start < len(line) - 1:
         return network
+    if network.meets(end // 2, *network.span(end, parting.kept)):
+        return network
     across = parting.left * parting.apart[0]
     new = _blade(line, along[start], along[vertex] + parting.sense * parting.way[0], across, power)
-    return _with_start(network, end, (parting.stock, start), np.concatenate([line[[start]], new]), parting.kept)
+    return network.with_end(end, new, parting.kept, at=(parting.stock, start))
 
 
 def _telling(apart: np.ndarray, least_m: float, most_m: float) -> tuple[int, int]:
@@ -217,21 +219,3 @@ def _blade(line: np.ndarray, touch: float, first: float, across: float, power: i
     share = np.linspace(0, 1, max(int(abs(first - touch) / STEP_M), 1) + 1)[1:-1]
     along, at = length_along(line), touch + share * (first - touch)
     return interpolate(line, along, at) + (across * share**power)[:, None] * interpolate(left_normals(line), along, at)
-
-
-def _with_start(network: LineNetwork, end: int, at: tuple[int, int], start: np.ndarray, kept: int) -> LineNetwork:
-    """Let a line end in a vertex of another one, its first `kept` vertices from this end replaced by `start`."""
-    own, passes = end // 2, network.passes.copy()
-    old = turned(network.lines[own], end)
-    mine = passes[:, 1] == own
-    from_end = np.where(mine, len(old) - 1 - passes[:, 2] if end % 2 else passes[:, 2], kept)
-    if (from_end < kept).any():
-        return network
-    if end % 2 == 0:
-        passes[mine, 2] += len(start) - kept
-    lines, ends = list(network.lines), network.ends.copy()
-    lines[own] = turned(np.concatenate([start, old[kept:]]), end)
-    ends.flat[end] = len(network.nodes)
-    nodes = np.concatenate([network.nodes, network.lines[at[0]][[at[1]]]])
-    passes = np.concatenate([passes, [[len(nodes) - 1, *at]]])
-    return replace(network, lines=tuple(lines), nodes=nodes, ends=ends, passes=passes)

@@ -55,20 +55,74 @@ class LineNetwork:
         lines = tuple(line for line, kept in zip(self.lines, keep) if kept)
         return LineNetwork(lines, self.nodes, self.ends[keep], passes).tidy()
 
+    def span(self, end: int, count: int) -> tuple[int, int]:
+        """Return the first of the `count` vertices next to a line end, and the one after the last."""
+        length = len(self.lines[end // 2])
+        return (length - count, length) if end % 2 else (0, count)
+
+    def meets(self, number: int, first: int, last: int) -> bool:
+        """Return whether other lines meet line `number` at its vertices `first` to `last` - 1."""
+        return bool(self._passing(number, first, last).any())
+
+    def with_piece(self, number: int, first: int, last: int, vertices: np.ndarray) -> LineNetwork:
+        """Redraw a line between two of its vertices; passes keep their places, those between the two are dropped.
+
+        Parameters
+        ----------
+        number : int
+            Line to edit.
+        first, last : int
+            Its vertices next to the new ones; both stay.
+        vertices : (n, 2) array
+            What replaces the vertices between them, in the line's direction.
+        """
+        return self._spliced(number, first + 1, last, vertices)
+
+    def with_end(self, end: int, vertices: np.ndarray, replaced: int, at: tuple[int, int] | None = None) -> LineNetwork:
+        """Give a line a new end with a node of its own; passes at replaced vertices are dropped, others stay in place.
+
+        Parameters
+        ----------
+        end : int
+            Line end to edit.
+        vertices : (n, 2) array
+            New vertices seen from this end, before those that stay.
+        replaced : int
+            Number of vertices, seen from this end, that the new ones replace.
+        at : tuple of int, optional
+            Line and vertex where the edited line is to end; the vertex is put before the new ones. Without it the line
+            ends in the first new vertex, freely.
+        """
+        start, passes = vertices, self.passes
+        if at is not None:
+            start = np.concatenate([self.lines[at[0]][[at[1]]], vertices])
+            passes = np.concatenate([passes, [[len(self.nodes), *at]]])
+        ends = self.ends.copy()
+        ends.flat[end] = len(self.nodes)
+        network = LineNetwork(self.lines, np.concatenate([self.nodes, start[:1]]), ends, passes)
+        return network._spliced(end // 2, *self.span(end, replaced), turned(start, end))
+
     def cut_back(self, cuts_m: Mapping[int, float]) -> LineNetwork:
-        """Take lengths off line ends; such an end becomes a node of its own."""
-        lines, nodes, ends, passes = list(self.lines), list(self.nodes), self.ends.copy(), self.passes.copy()
+        """Remove lengths from line ends; each end that is cut becomes free."""
+        network = self
         for end, length_m in cuts_m.items():
             if length_m > 0:
-                line = lines[end // 2]
-                lines[end // 2] = turned(cut_back(turned(line, end), length_m), end)
-                ends.flat[end] = len(nodes)
-                nodes.append(lines[end // 2][-1 if end % 2 else 0])
-                if end % 2 == 0:
-                    passes[passes[:, 1] == end // 2, 2] -= len(line) - len(lines[end // 2])
-        last = np.array([len(lines[number]) - 1 for number in passes[:, 1]], dtype=np.int64)
-        passes = passes[(passes[:, 2] > 0) & (passes[:, 2] < last)]
-        return LineNetwork(tuple(lines), np.array(nodes).reshape(-1, 2), ends, passes)
+                line = network.from_end(end)
+                rest = cut_back(line, length_m)
+                network = network.with_end(end, rest[:1], len(line) - len(rest) + 1)
+        return network
+
+    def _spliced(self, number: int, first: int, last: int, vertices: np.ndarray) -> LineNetwork:
+        """Replace the vertices `first` to `last` - 1 of a line."""
+        line, lines, passes = self.lines[number], list(self.lines), self.passes.copy()
+        lines[number] = np.concatenate([line[:first], vertices, line[last:]])
+        passes[self._passing(number, last, len(line)), 2] += len(lines[number]) - len(line)
+        return LineNetwork(tuple(lines), self.nodes, self.ends, passes[~self._passing(number, first, last)])
+
+    def _passing(self, number: int, first: int, last: int) -> np.ndarray:
+        """Mark the passes of a line at its vertices `first` to `last` - 1, (p,) bool."""
+        _, line, vertex = self.passes.T
+        return (line == number) & (vertex >= first) & (vertex < last)
 
     def parted(self) -> tuple[LineNetwork, dict[int, int]]:
         """Cut all lines at the nodes that they pass, and say which ends belong together, as `weld` takes it."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..lines.bridges import FIT_M, STAIRS_M, Bridge, bridge, curvature
-from ..lines.ends import STEP_M, cut_back, stretch, turned, way_out
+from ..lines.ends import STEP_M, stretch, way_out
 from ..lines.network import LineNetwork
 from ..polyline import length_along
 from ..progress import SILENT, Progress
@@ -118,19 +118,9 @@ def _touching(from_end: np.ndarray, number: int, line: np.ndarray) -> Iterator[_
 
 def _attached(network: LineNetwork, end: int, touch: _Touch) -> LineNetwork:
     """Lead one end to where it touches its stock rail, whose own line is straightened there."""
-    own = end // 2
     network, vertex = _straightened(network, touch, network.from_end(end)[0])
-    place = network.lines[touch.stock][vertex]
-    lines, passes = list(network.lines), network.passes.copy()
-    free = cut_back(network.from_end(end), touch.curve.cuts_m[0])
-    lines[own] = turned(np.concatenate([place[None], touch.curve.points[::-1], free]), end)
-    if end % 2 == 0:
-        passes[passes[:, 1] == own, 2] += len(lines[own]) - len(network.lines[own])
-    ends = network.ends.copy()
-    ends.flat[end] = len(network.nodes)
-    nodes = np.concatenate([network.nodes, place[None]])
-    passes = np.concatenate([passes, [[len(network.nodes), touch.stock, vertex]]])
-    return LineNetwork(tuple(lines), nodes, ends, passes)
+    network = network.cut_back({end: touch.curve.cuts_m[0]})
+    return network.with_end(end, touch.curve.points[::-1], 0, at=(touch.stock, vertex))
 
 
 def _straightened(network: LineNetwork, touch: _Touch, tip: np.ndarray) -> tuple[LineNetwork, int]:
@@ -150,18 +140,14 @@ def _straightened(network: LineNetwork, touch: _Touch, tip: np.ndarray) -> tuple
     if curve is None or curve.cuts_m[0] > STEP_M or not len(curve.points):
         return network, vertex
     far += int(np.searchsorted(t[far:] - t[far], curve.cuts_m[1]))
-    between = np.sort([vertex, vertex + sense * far])
-    own = network.passes[:, 1] == touch.stock
-    held = own & (network.passes[:, 2] > between[0]) & (network.passes[:, 2] < between[1])
-    if held.any() or far >= len(onward) or cKDTree(curve.points).query(onward[1:far])[0].max(initial=0) < PULLED_M:
+    if far >= len(onward) or cKDTree(curve.points).query(onward[1:far])[0].max(initial=0) < PULLED_M:
         return network, vertex
-    drawn = np.concatenate([line[: between[0] + 1], curve.points[::sense], line[between[1] :]])
-    passes = network.passes.copy()
-    passes[own & (passes[:, 2] >= between[1]), 2] += len(drawn) - len(line)
-    lines = list(network.lines)
-    lines[touch.stock] = drawn
-    moved = vertex if sense > 0 else vertex + len(drawn) - len(line)
-    return replace(network, lines=tuple(lines), passes=passes), moved
+    first, last = sorted([vertex, vertex + sense * far])
+    if network.meets(touch.stock, first + 1, last):
+        return network, vertex
+    redrawn = network.with_piece(touch.stock, first, last, curve.points[::sense])
+    moved = vertex if sense > 0 else vertex + len(redrawn.lines[touch.stock]) - len(line)
+    return redrawn, moved
 
 
 def drop_guards(network: LineNetwork) -> LineNetwork:

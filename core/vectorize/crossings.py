@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..lines.bridges import Bridge, bridge
-from ..lines.ends import cut_back, stretch, turned
+from ..lines.ends import cut_back, stretch
 from ..lines.network import LineNetwork
 from .junctions import ends_by_node
 from .steadiness import unsteadiness
@@ -38,21 +38,18 @@ def resolve_crossings(network: LineNetwork) -> LineNetwork:
     ends free before it, as flangeways of frogs cut it off. It is resolved if its four legs make two pairs that rails
     could follow; the rails then cross without a node.
     """
-    lines, ends, nodes = list(network.lines), network.ends.copy(), list(network.nodes)
-    keep = np.ones(len(lines), dtype=bool)
+    keep = np.ones(len(network.lines), dtype=bool)
     joins: dict[tuple[int, int], Bridge] = {}
+    cuts_m: dict[int, float] = {}
     for shared, legs in _crossings(network):
         pairing = _best_pairing(network, legs)
-        if not pairing or any(end in taken for taken in joins for end in legs):
+        if not pairing or any(end in cuts_m for end in legs):
             continue
         joins.update(pairing)
         keep[shared] = False
-        more_m = {end: cut for ends, found in pairing.items() for end, cut in zip(ends, found.cuts_m)}
-        for end in legs:
-            free = cut_back(turned(lines[end // 2], end), legs[end] + more_m[end])
-            lines[end // 2] = turned(free, end)
-            ends.flat[end] = len(nodes)
-            nodes.append(free[0])
+        for ends, found in pairing.items():
+            for end, more_m in zip(ends, found.cuts_m):
+                cuts_m[end] = legs[end] + more_m
     if not joins:
         return network
     number = np.cumsum(keep) - 1
@@ -61,7 +58,7 @@ def resolve_crossings(network: LineNetwork) -> LineNetwork:
         one, other = (2 * int(number[end // 2]) + end % 2 for end in (one, other))
         partner[one], partner[other] = other, one
         bridges[one], bridges[other] = found.points, found.points[::-1]
-    return LineNetwork(tuple(lines), np.array(nodes), ends).select(keep).weld(partner, bridges)
+    return network.cut_back(cuts_m).select(keep).weld(partner, bridges)
 
 
 def _crossings(network: LineNetwork) -> Iterator[tuple[list[int], dict[int, float]]]:

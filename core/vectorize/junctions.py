@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -50,16 +49,13 @@ def weld_pairs(network: LineNetwork) -> LineNetwork:
     plain = network.degrees() == 2
     plain[network.passes[:, 0]] = False
     partner: dict[int, int] = {}
-    ends, nodes = network.ends.copy(), list(network.nodes)
     for one, other in (pair for node, pair in ends_by_node(network) if plain[node]):
         if one // 2 == other // 2:
             continue
         if deflections(network, [one, other])[0, 1] > TURNED_BACK_DEG:
-            ends.flat[other] = len(nodes)
-            nodes.append(network.nodes[network.ends.flat[other]])
+            network = network.with_end(other, network.from_end(other)[:1], 1)
         else:
             partner[one], partner[other] = other, one
-    network = replace(network, nodes=np.array(nodes).reshape(-1, 2), ends=ends)
     return network.weld(partner) if partner else network
 
 
