@@ -13,7 +13,8 @@ import numpy as np
 
 from ..lines.ends import turned
 from ..lines.network import LineNetwork
-from ..polyline import interpolate, left_normals, length_along, project
+from ..lines.parting import ARC, STRAIGHT, PartingLaw, left_of
+from ..polyline import length_along, project
 from .level import on_top
 
 APART_HEADS = 1.3
@@ -27,9 +28,6 @@ LEAST_STRETCH_M = 1.5
 
 FARTHEST_M = 25.0
 """No branch touches its stock rail this far before the heads lie apart."""
-
-TANGENTIAL, STRAIGHT = 2, 1
-"""Powers of the way by which lines part."""
 
 HEEL_SPREAD_M = 0.15
 """Distance of the axes up to which a blade is straight: the heels of American switches lie 6 1/4 inches apart."""
@@ -108,12 +106,12 @@ class _Parting:
     left: float
     kept: int
 
-    def law(self, power: int) -> _Law:
+    def law(self, power: int) -> PartingLaw:
         """Fit a straight blade up to its heel, or an arc."""
         told = self.apart <= HEEL_SPREAD_M
-        if power == TANGENTIAL or np.count_nonzero(told) < 3:  # the widest heads hide the heel
+        if power == ARC or np.count_nonzero(told) < 3:  # the widest heads hide the heel
             told[:] = True
-        return _Law.fitted(self.way[told], self.apart[told], power)
+        return PartingLaw.fitted(self.way[told], self.apart[told], power)
 
 
 def _parting(network: LineNetwork, end: int, number: int, between_m: tuple[float, float]) -> _Parting | None:
@@ -164,11 +162,11 @@ def _telling(apart: np.ndarray, least_m: float, most_m: float) -> tuple[int, int
 
 def _points_of_arc(network: LineNetwork, parting: _Parting, xyz: np.ndarray, head_width_m: float) -> np.ndarray:
     """Count points where only an arc has its head, and on the head in a strip of the same area beside: (2,)."""
-    blade, arc = parting.law(STRAIGHT), parting.law(TANGENTIAL)
+    blade, arc = parting.law(STRAIGHT), parting.law(ARC)
     line, along = network.lines[parting.stock], length_along(network.lines[parting.stock])
     way = parting.sense * (along - parting.node_m)
     shared = (way >= max(arc.touch, parting.way[0] - FARTHEST_M)) & (way <= parting.way[0])
-    if np.count_nonzero(shared) < 2:  # also where there is no such arc
+    if np.count_nonzero(shared) < 2 or not np.isfinite(arc.touch):
         return np.zeros(2)
     piece = line[shared]
     reach_m = head_width_m + parting.apart[0]
@@ -189,33 +187,10 @@ def _points_of_arc(network: LineNetwork, parting: _Parting, xyz: np.ndarray, hea
 def _power(points: np.ndarray) -> int:
     """Tell from the points at a switch, see `_points_of_arc`, whether lines part by the way or by its square."""
     on_arc, on_head = points
-    return STRAIGHT if on_head >= LEAST_ON_HEAD and on_arc < EMPTY_SHARE * on_head else TANGENTIAL
-
-
-@dataclass(frozen=True)
-class _Law:
-    """How the distance of two lines grows with the way: by a power, (slope way + root)^power, from where that is 0."""
-
-    slope: float
-    root: float
-    power: int
-
-    @classmethod
-    def fitted(cls, way: np.ndarray, apart: np.ndarray, power: int) -> _Law:
-        """Fit it to distances, (n,)."""
-        return cls(*np.polyfit(way, apart ** (1 / power), 1).tolist(), power)
-
-    @property
-    def touch(self) -> float:
-        """Way at which the lines touch; NaN where they come closer."""
-        return -self.root / self.slope if self.slope > 0 else np.nan
-
-    def __call__(self, way: np.ndarray) -> np.ndarray:
-        return np.maximum(self.slope * way + self.root, 0.0) ** self.power
+    return STRAIGHT if on_head >= LEAST_ON_HEAD and on_arc < EMPTY_SHARE * on_head else ARC
 
 
 def _blade(line: np.ndarray, touch: float, first: float, across: float, power: int) -> np.ndarray:
     """Places between chainages `touch` and `first` of a line, `across` to its left at the latter; neither included."""
     share = np.linspace(0, 1, max(int(abs(first - touch) / STEP_M), 1) + 1)[1:-1]
-    along, at = length_along(line), touch + share * (first - touch)
-    return interpolate(line, along, at) + (across * share**power)[:, None] * interpolate(left_normals(line), along, at)
+    return left_of(line, touch + share * (first - touch), across * share**power)

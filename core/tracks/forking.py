@@ -8,12 +8,13 @@ distance grows with the square of the way; or it leaves at the small angle of a 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..polyline import interpolate, left_normals, length_along, project, resample
+from ..lines.parting import ARC, STRAIGHT, PartingLaw, left_of
+from ..polyline import length_along, project, resample
 from ..progress import SILENT, Progress
 from ..rails import Centerline
 
@@ -115,73 +116,64 @@ def _led_back(branch: np.ndarray, through: np.ndarray) -> np.ndarray | None:
     s, t, off = s[:count], feet.t[order][:count], feet.across[order][:count]
     if not count or s[-1] < LEAST_M or abs(off[0]) > FURTHEST_M:
         return None
-    start = _start(s, off)
-    first = int(np.searchsorted(s, start.at_m))
-    joins = max(first, int(np.max(np.flatnonzero(start.misfit_m > MISFIT_M), initial=-1)) + 1)
-    if joins > len(s) // 2 or start.at_m < -LONGEST_M:
+    law, misfit_m = _law(s, off)
+    first = int(np.searchsorted(s, law.touch))
+    joins = max(first, int(np.max(np.flatnonzero(misfit_m > MISFIT_M), initial=-1)) + 1)
+    if joins > len(s) // 2 or law.touch < -LONGEST_M:
         return None
-    length = s[joins] - start.at_m if s[joins] - start.at_m > STEP_M else 0.0
+    length = s[joins] - law.touch if s[joins] - law.touch > STEP_M else 0.0
     along = length_along(through[:, :2])
     parting = t[joins] - np.sign(t[-1] - t[0]) * length
     if not 0 <= parting <= along[-1]:
         return None
     share = np.linspace(0.0, 1.0, int(np.ceil(length / STEP_M)) + 1)
     chainage = parting + share * (t[joins] - parting)
-    lead = interpolate(through, along, chainage)
-    grown = share**start.power * (length > 0)
+    grown = share**law.power * (length > 0)
     rise = branch[joins, 2] - np.interp(t[joins], along, through[:, 2])
-    lead[:, :2] += (grown * off[joins])[:, None] * interpolate(left_normals(through), along, chainage)
-    lead[:, 2] += grown * rise
+    plan = left_of(through[:, :2], chainage, grown * off[joins])
+    lead = np.column_stack([plan, np.interp(chainage, along, through[:, 2]) + grown * rise])
     return np.concatenate([lead, branch[joins + 1 :]])
 
 
-@dataclass(frozen=True)
-class _Start:
-    """How a branch leaves: the place along it, negative before its own start; how its distance grows; the misfit."""
+def _law(s: np.ndarray, off: np.ndarray) -> tuple[PartingLaw, np.ndarray]:
+    """Find by which law a branch leaves the through track, an arc's or else an angle's, and the misfit to it, metres.
 
-    at_m: float
-    power: int
-    misfit_m: np.ndarray
-
-    @property
-    def rms_m(self) -> float:
-        return float(np.sqrt(np.mean(self.misfit_m**2)))
-
-
-def _start(s: np.ndarray, off: np.ndarray) -> _Start:
-    """Tell from distances, (n,) at `s` along a branch, how it leaves the through track: by an arc, else by an angle."""
-    side = np.sign(off[-1])
-    by_arc = _by_arc(s, side * off)
-    if by_arc.rms_m <= BENT_M:
-        return by_arc
-    by_angle = min(
-        (_by_angle(s, side * off, heel) for heel in np.arange(HEEL_STEP_M, s[-1] / 2, HEEL_STEP_M)),
-        key=lambda start: start.rms_m,
-    )
-    return by_angle if by_angle.rms_m < by_arc.rms_m / 2 and np.isfinite(by_angle.at_m) else by_arc
-
-
-def _by_arc(s: np.ndarray, off: np.ndarray) -> _Start:
-    """Fit a parabola that touches the through track; its start is infinitely far where the distance does not grow.
-
-    The root of the distance grows evenly. What the raster bent where rails merge loses its say in a few rounds.
+    Given are the distances, (n,), at `s` along the branch.
     """
-    root = np.sqrt(np.maximum(off, 0.0))
-    weight = root + np.sqrt(TOUCH_M)  # a distance's root is the less certain the smaller it is
+    off = np.sign(off[-1]) * off
+    arc, arc_misfit_m = _arc(s, off)
+    if _rms(arc_misfit_m) <= BENT_M:
+        return arc, arc_misfit_m
+    heels_m = np.arange(HEEL_STEP_M, s[-1] / 2, HEEL_STEP_M)
+    angle, angle_misfit_m = min((_angle(s, off, heel_m) for heel_m in heels_m), key=lambda found: _rms(found[1]))
+    if _rms(angle_misfit_m) < _rms(arc_misfit_m) / 2 and np.isfinite(angle.touch):
+        return angle, angle_misfit_m
+    return arc, arc_misfit_m
+
+
+def _arc(s: np.ndarray, off: np.ndarray) -> tuple[PartingLaw, np.ndarray]:
+    """Fit a parabola that touches the through track.
+
+    What the raster bent where rails merge loses its weight in a few rounds.
+    """
+    weights = np.sqrt(np.maximum(off, 0.0)) + np.sqrt(TOUCH_M)  # a distance's root is less certain the smaller it is
     trust = np.ones_like(s)
     for _ in range(ROUNDS):
-        growth, first = np.polyfit(s, root, 1, w=weight * trust)
-        misfit = np.abs(off - np.maximum(growth * s + first, 0.0) ** 2)
-        trust = 1 / np.sqrt(1 + (misfit / MISFIT_M) ** 2)
-    return _Start(-first / growth if growth > 0 else -np.inf, 2, misfit)
+        law = PartingLaw.fitted(s, off, ARC, weights * trust)
+        misfit_m = np.abs(off - law(s))
+        trust = 1 / np.sqrt(1 + (misfit_m / MISFIT_M) ** 2)
+    return law, misfit_m
 
 
-def _by_angle(s: np.ndarray, off: np.ndarray, heel_m: float) -> _Start:
+def _angle(s: np.ndarray, off: np.ndarray, heel_m: float) -> tuple[PartingLaw, np.ndarray]:
     """Fit a straight switch up to `heel_m` along the branch and the arc behind it."""
     terms = np.column_stack([np.ones_like(s), s, np.maximum(s - heel_m, 0.0) ** 2])
-    (first, slope, bend), *_ = np.linalg.lstsq(terms, off, rcond=None)
-    misfit = np.abs(off - terms @ (first, slope, bend))
-    return _Start(-first / slope if slope > 0 and bend > 0 else -np.inf, 1, misfit)
+    (root, slope, bend), *_ = np.linalg.lstsq(terms, off, rcond=None)
+    return PartingLaw(slope if bend > 0 else 0.0, root, STRAIGHT), np.abs(off - terms @ (root, slope, bend))
+
+
+def _rms(misfit_m: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(misfit_m**2)))
 
 
 def _prolonged(line: Centerline, xyz: np.ndarray) -> Centerline:

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..lines.bridges import FIT_M, STAIRS_M, Bridge, bridge, curvature
+from ..lines.bridges import FIT_M, MISFIT_M, STAIRS_M, Bridge, bridge, curvature
 from ..lines.ends import STEP_M, stretch, way_out
 from ..lines.network import LineNetwork
+from ..lines.parting import ARC, PartingLaw
 from ..polyline import length_along
 from ..progress import SILENT, Progress
-from .branches import FARTHEST_M, STEADY_M, parting, sharpest
+from .branches import FARTHEST_M, STEADY_M, sharpest
 from .crossings import SKIP_M
 from .joining import unseen_m
 from .junctions import DIRECTION_M
@@ -99,9 +100,10 @@ def _touching(from_end: np.ndarray, number: int, line: np.ndarray) -> Iterator[_
     stock_y = np.interp(own_x, x, y)
     if len(own) < LEAST_POINTS or len(set(np.sign(stock_y - own_y))) > 1:
         return
-    touch_m, bend = parting(-own_x, np.abs(stock_y - own_y))
+    law = PartingLaw.fitted(-own_x, np.abs(stock_y - own_y), ARC)
+    touch_m = -law.way_at(MISFIT_M)
     seen_bend = curvature(own) - curvature(np.column_stack([own_x, stock_y]) @ axes)
-    if bend > sharpest(seen_bend) or not 0 < touch_m < min(FARTHEST_M, x[-1]):
+    if law.curvature > sharpest(seen_bend) or not 0 < touch_m < min(FARTHEST_M, x[-1]):
         return
     along = int(np.abs(x - touch_m).argmin())
     onward = line[(first + along if sense > 0 else last - along) :: sense]

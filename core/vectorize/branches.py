@@ -9,6 +9,7 @@ import numpy as np
 from ..lines.bridges import MISFIT_M, STAIRS_M, bridge, curvature
 from ..lines.ends import STEP_M, cut_back, stretch, turned
 from ..lines.network import LineNetwork
+from ..lines.parting import ARC, PartingLaw
 from ..polyline import length_along
 from .crossings import MISFIT_M as KNOWN_MISFIT_M
 from .crossings import SKIP_M
@@ -70,9 +71,10 @@ def _trunk(stem: np.ndarray, rails: list[np.ndarray]) -> np.ndarray:
     one, other = (stretch(cut_back(rail, SKIP_M), STEADY_M) for rail in rails)
     count = min(len(one), len(other))
     apart_m = np.hypot(*(one[:count] - other[:count]).T)
-    back_m, bend = parting(SKIP_M + STEP_M * np.arange(count), apart_m)
+    law = PartingLaw.fitted(SKIP_M + STEP_M * np.arange(count), apart_m, ARC)
+    back_m = -law.way_at(MISFIT_M)
     too_short = length_along(stem)[-1] < back_m + DIRECTION_M
-    if too_short or not 0 < back_m < FARTHEST_M or bend > sharpest(curvature(one) - curvature(other)):
+    if too_short or not 0 < back_m < FARTHEST_M or law.curvature > sharpest(curvature(one) - curvature(other)):
         return stem[:0]
     return cut_back(stem, back_m)
 
@@ -80,20 +82,3 @@ def _trunk(stem: np.ndarray, rails: list[np.ndarray]) -> np.ndarray:
 def sharpest(seen: float) -> float:
     """Tell how sharply rails may bend apart where they merge if beyond they bend apart by `seen`, 1/m both."""
     return SHARPER * abs(seen) + UNSURE_CURVATURE
-
-
-def parting(along_m: np.ndarray, apart_m: np.ndarray) -> tuple[float, float]:
-    """Tell how far back of chainage 0 two rails begin to part, metres, and how they bend apart, 1/m.
-
-    Rails that part on an arc are k x² / 2 apart x after they touched. They begin to part where that is more than a
-    line tells, `MISFIT_M`. Infinitely far back if they do not part.
-
-    Parameters
-    ----------
-    along_m, apart_m : (n,) arrays
-        Chainages and the distances between the rails there.
-    """
-    slope, root = np.polyfit(along_m, np.sqrt(2 * apart_m), 1)
-    if slope <= 0:
-        return np.inf, 0.0
-    return float((root - np.sqrt(2 * MISFIT_M)) / slope), float(slope**2)

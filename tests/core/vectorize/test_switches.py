@@ -9,7 +9,7 @@ from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.raster import rasterize
 from rail_extract.core.vectorize import vectorize
 from rail_extract.core.vectorize.attaching import attach_branches, drop_guards
-from rail_extract.core.vectorize.branches import parting, resolve_branches
+from rail_extract.core.vectorize.branches import resolve_branches
 from rail_extract.core.vectorize.crossings import resolve_crossings
 from rail_extract.core.vectorize.joining import join_gaps
 from rail_extract.core.vectorize.junctions import run_through, weld_pairs
@@ -95,15 +95,6 @@ def test_a_guard_rail_goes_and_a_rail_of_its_own_stays():
     rail, guard, other = along_x(0, 40), along_x(10, 14, 0.116), along_x(20, 24, 0.3)
     network = drop_guards(loose(rail, guard, other))
     np.testing.assert_allclose(np.sort(network.lengths()), [3.9, 39.9], atol=0.11)
-
-
-@pytest.mark.parametrize("radius", [190, 500, 2500])
-def test_rails_that_part_on_an_arc_begin_where_a_line_tells_them_apart(radius):
-    x = np.arange(20.0, 28.0, 0.1)
-    back_m, bend = parting(x - 20, x**2 / (2 * radius))
-    assert back_m == pytest.approx(20 - np.sqrt(2 * radius * MISFIT_M))
-    assert bend == pytest.approx(1 / radius)
-    assert parting(x, x[::-1])[0] == np.inf
 
 
 @pytest.mark.parametrize("radius", [190, 2500, 4800])
