@@ -1,1 +1,1 @@
-"""What the points tell of the railheads: where their axes lie, how high their tops, and how surely."""
+"""Railheads: refinement of lines across, heights of the top, and the standard error of both."""

@@ -1,4 +1,7 @@
-"""Where the middle of a railhead lies: histograms of points across it, and the edges that these show."""
+"""Edges of the railhead and the middle between them, from histograms of points across the line.
+
+See docs/method.md section 6.2.
+"""
 
 from __future__ import annotations
 
@@ -7,86 +10,96 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 
-STATION_M = 0.25
-"""Spacing of the windows' middles, a third of the smoothing's length."""
+STATION_STEP_M = 0.25
+"""Spacing of the stations along a line, the centers of the windows: a third of the smoothing's sigma."""
 
 WINDOWS = (5, 9, 17, 33)
-"""Lengths of windows in stations, 1.25 to 8.25 m: the shortest with enough points is taken."""
+"""Lengths of the windows in stations, 1.25 to 8.25 m: the shortest one with enough points is used."""
 
 ENOUGH_POINTS = 80
-"""Points on top that a window should hold: they give the middle to 2 mm before smoothing."""
+"""Points on top that a window should contain: they give the middle to 2 mm before smoothing."""
 
-HALF_HEAD = 18
-"""Bins across half a head: about 2 mm each, finer than any cloud's noise."""
+HALF_HEAD_BINS = 18
+"""Bins across half a head: about 2 mm each, finer than the noise of any cloud."""
 
 BLUR_BINS = 1.5
-"""Sigma of the blur across: with fewer points than bins the best place would jump; the edges stay sharp to 3 mm."""
+"""Sigma of the blur across the line: without it the best position would jump where there are fewer points than bins.
+The edges stay sharp to 3 mm."""
 
-FURTHEST = 15
-"""Largest shift in bins, about 3 cm: half a cell of the raster and a little noise."""
+MAX_SHIFT_BINS = 15
+"""Largest shift of a line, about 3 cm: half a cell of the raster and a little noise."""
 
-NEAR_EDGE, RIM = 3, 9
-"""Bins from the edge that its blur covers, and bins beyond these that tell the density on either side of it."""
+BLURRED_BINS, RIM_BINS = 3, 9
+"""Bins next to an edge that are affected by its blur, and bins beyond these that give the density on either side."""
 
-CLEAR_EDGE = 0.4
-"""Density outside of an edge over that inside, at most: with more there is no edge to be seen."""
+MAX_OUTSIDE_SHARE = 0.4
+"""Maximum density outside an edge relative to that inside; with more, no edge is visible."""
 
-LEAST_ON_RIM = 6
-"""Points that have to lie just inside of an edge."""
+MIN_RIM_POINTS = 6
+"""Minimum number of points just inside an edge."""
 
-LEAST_RIM = 0.5
-"""Density just inside of an edge over that on the crown, at least: a shadow on the head has edges of its own."""
+MIN_RIM_SHARE = 0.5
+"""Minimum density just inside an edge relative to that on the crown: a shadow on the head has edges of its own."""
 
 EVEN_EXCESS, ASKEW_EXCESS = 0.05, 0.3
-"""Relative excess of density at one edge over the other from which the other counts less, and no longer: a scanner
-abreast of the rail sees the corners alike, one at 45 degrees sees half a corner on the far side."""
+"""Relative excess of the density at one edge over that at the other from which the weight of the other decreases, and
+from which it is zero: a scanner abreast of the rail sees both corners alike, one at 45 degrees half of the far one."""
 
-VIEW = 161
-"""Stations, 40 m, that share the excess: a scanner on a train keeps its view, and 60 points tell it to 20 % only."""
+VIEW_STATIONS = 161
+"""Stations, 40 m, over which the excess is averaged: a scanner on a train keeps its view, and 60 points give the excess
+to 20 % only."""
 
 SURE_SIGMAS = 2.0
-"""Standard deviations by which an excess has to stand out from chance, to count without its neighbours."""
+"""Standard deviations by which a local excess must exceed chance to count without its neighbours."""
 
-HALF_RANGE = HALF_HEAD + FURTHEST + 2 + NEAR_EDGE + RIM
-"""Bins to either side of a line that all of this can reach."""
+HALF_RANGE_BINS = HALF_HEAD_BINS + MAX_SHIFT_BINS + 2 + BLURRED_BINS + RIM_BINS
+"""Bins on either side of a line that these steps need."""
 
 EDGE_ROUNDS = 2
-"""Once to see how the scanner looks at the head, and once more at the edges that count."""
+"""The first round finds out how the scanner sees the head, the second uses the edges that count."""
 
 
-def widest_reach(head_width_m: float) -> float:
-    """Distance from a line up to which points take part, metres."""
-    return HALF_RANGE * head_width_m / (2 * HALF_HEAD)
+def search_distance(head_width_m: float) -> float:
+    """Return the distance from a line up to which points are used, metres."""
+    return HALF_RANGE_BINS * head_width_m / (2 * HALF_HEAD_BINS)
 
 
 def station_count(length_m: float) -> int:
-    """Count the stations along a line."""
-    return int(length_m / STATION_M) + 1
+    """Return the number of stations along a line."""
+    return int(length_m / STATION_STEP_M) + 1
 
 
 def stations_along(length_m: float) -> np.ndarray:
-    """Middles of the windows along a line, (s,) metres."""
-    return (np.arange(station_count(length_m)) + 0.5) * STATION_M
+    """Return the chainages of the stations along a line, (s,) metres."""
+    return (np.arange(station_count(length_m)) + 0.5) * STATION_STEP_M
 
 
 def histograms(
     t: np.ndarray, across: np.ndarray, length_m: float, head_width_m: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Count points by offset in windows along the line.
+    """Count points by their offset from the line, in windows along it.
+
+    Parameters
+    ----------
+    t, across : (n,) arrays
+        Chainage of the points and offset to the left of the line, metres.
+    length_m : float
+        Length of the line.
+    head_width_m : float
 
     Returns
     -------
     stations : (s,) array
-        Middles of the windows, metres.
-    counts, wide_counts : (s, 2 HALF_RANGE) arrays
-        In the shortest window with enough points and in the longest. Bins of 1 / (2 HALF_HEAD) of a head, the first
-        half to the right of the line.
+        Centers of the windows, metres.
+    counts, wide_counts : (s, 2 HALF_RANGE_BINS) arrays
+        Counts in the shortest window with enough points, and in the longest window. A bin is 1 / (2 HALF_HEAD_BINS) of
+        a head wide; the first half of them is to the right of the line.
     """
     rows = station_count(length_m)
-    row = np.minimum((t / STATION_M).astype(int), rows - 1)
-    column = np.floor(across * (2 * HALF_HEAD / head_width_m)).astype(int) + HALF_RANGE
-    inside = (column >= 0) & (column < 2 * HALF_RANGE)
-    counts = np.bincount(row[inside] * 2 * HALF_RANGE + column[inside], minlength=rows * 2 * HALF_RANGE)
+    row = np.minimum((t / STATION_STEP_M).astype(int), rows - 1)
+    column = np.floor(across * (2 * HALF_HEAD_BINS / head_width_m)).astype(int) + HALF_RANGE_BINS
+    inside = (column >= 0) & (column < 2 * HALF_RANGE_BINS)
+    counts = np.bincount(row[inside] * 2 * HALF_RANGE_BINS + column[inside], minlength=rows * 2 * HALF_RANGE_BINS)
     counts = gaussian_filter1d(counts.reshape(rows, -1).astype(np.float32), BLUR_BINS, axis=1, mode="constant")
     windows = [uniform_filter1d(counts, size, axis=0, mode="constant") * size for size in WINDOWS]
     chosen = windows[-1].copy()
@@ -97,27 +110,34 @@ def histograms(
 
 
 def middles(counts: np.ndarray, wide_counts: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Offset of the head's middle in each window, in bins to the left; NaN where its edges are not to be seen.
+    """Return the offset of the head's middle in each window, (s,) in bins to the left; NaN where no edges are visible.
 
-    How the scanner looks at the head does not change from window to window, so the wide ones tell the densities.
+    The densities come from the wide windows, because the scanner's view of the head changes slowly along the line.
+
+    Parameters
+    ----------
+    counts, wide_counts : (s, 2 HALF_RANGE_BINS) arrays
+        See `histograms`.
+    free : (2, s) bool array
+        See `neighbours.free_edges`.
     """
-    return Heads.of(wide_counts).seen_edges(free).narrowed(counts, wide_counts)
+    return CrossSections.of(wide_counts).find_edges(free).middles_in(counts, wide_counts)
 
 
 @dataclass(frozen=True)
 class Edges:
-    """Right and left edge of the heads in s windows.
+    """Right and left edge of the head in s windows.
 
     Attributes
     ----------
     density : (2, s) array
-        Points a bin just inside of the edge.
+        Points per bin just inside the edge.
     weight : (2, s) array
-        From 0 to 1: the edge that the scanner looks at counts fully; of the other one the corner is hardly seen.
+        0 to 1: the edge that faces the scanner counts fully, while the corner of the other is hardly visible.
     seen : (s,) bool array
-        Whether the edges that count are there.
+        Whether the edges that count are visible.
     inset : (s,) array
-        What a single edge lacks of half a head, in bins to the left: its corner is round.
+        Correction of a middle found from one edge alone, in bins to the left: the round corner hides part of the head.
     """
 
     density: np.ndarray
@@ -126,41 +146,42 @@ class Edges:
     inset: np.ndarray
 
     @classmethod
-    def evenly(cls, free: np.ndarray) -> Edges:
-        """Take both edges alike where they are `free`, (2, s) bool, for a first look."""
+    def initial(cls, free: np.ndarray) -> Edges:
+        """Give all edges that are `free`, (2, s) bool, the same weight, for the first round."""
         return cls(np.ones(free.shape), free.astype(float), free.any(axis=0), np.zeros(free.shape[1]))
 
-    def alike(self, free: np.ndarray) -> Edges:
-        """Trust both edges alike, whatever is seen of them, where both are free."""
+    def equally_weighted(self, free: np.ndarray) -> Edges:
+        """Give both edges full weight where both are free, however well they are visible."""
         return replace(self, weight=np.where(free.all(axis=0), 1.0, self.weight))
 
-    def narrowed(self, counts: np.ndarray, wide_counts: np.ndarray) -> np.ndarray:
-        """Find the middle in narrower windows than those the edges were seen in, (s,); NaN where they were not."""
+    def middles_in(self, counts: np.ndarray, wide_counts: np.ndarray) -> np.ndarray:
+        """Find the middle in narrower windows than the edges were found in, (s,); NaN where no edges are visible."""
         share = counts.sum(axis=1) / np.maximum(wide_counts.sum(axis=1), 1)
-        middle = Heads.of(counts).best(replace(self, density=self.density * share)) + self.inset
-        return np.where(self.seen & (np.abs(middle) < FURTHEST), middle, np.nan)
+        middle = CrossSections.of(counts).middles(replace(self, density=self.density * share)) + self.inset
+        return np.where(self.seen & (np.abs(middle) < MAX_SHIFT_BINS), middle, np.nan)
 
 
 @dataclass(frozen=True)
-class Heads:
-    """Cumulative counts across at the borders of the bins, (s, 2 HALF_RANGE + 1)."""
+class CrossSections:
+    """Cumulative counts across the line at the borders of the bins, (s, 2 HALF_RANGE_BINS + 1)."""
 
     sums: np.ndarray
 
     @classmethod
-    def of(cls, counts: np.ndarray) -> Heads:
-        """Sum the (s, 2 HALF_RANGE) counts of windows."""
+    def of(cls, counts: np.ndarray) -> CrossSections:
+        """Sum up the counts of windows, (s, 2 HALF_RANGE_BINS)."""
         return cls(np.pad(np.cumsum(counts, axis=1), ((0, 0), (1, 0))))
 
-    def best(self, edges: Edges) -> np.ndarray:
-        """Offset of the head whose edges lie where the density falls to half, (s,) in bins to the left of the line.
+    def middles(self, edges: Edges) -> np.ndarray:
+        """Find the middle of the head whose edges are where the density falls to half, (s,) in bins to the left.
 
-        Found as the best of all places at once, by the integral over the place of what each edge lacks of its half.
+        All shifts are evaluated at once: the best one maximizes the integral, over the shift, of the difference between
+        the density at each edge and half of that just inside it.
         """
-        shifts = np.arange(-FURTHEST - 1, FURTHEST + 2)
+        shifts = np.arange(-MAX_SHIFT_BINS - 1, MAX_SHIFT_BINS + 2)
         held = np.zeros((len(self.sums), len(shifts)))
         for side, density, weight in zip((-1, 1), edges.density, edges.weight):
-            within = self.sums[:, HALF_RANGE + shifts + side * HALF_HEAD] / np.maximum(density, 1e-6)[:, None]
+            within = self.sums[:, HALF_RANGE_BINS + shifts + side * HALF_HEAD_BINS] / np.maximum(density, 1e-6)[:, None]
             held += side * weight[:, None] * (within - shifts / 2)
         rows = np.arange(len(held))
         top = np.clip(np.argmax(held, axis=1), 1, len(shifts) - 2)
@@ -168,53 +189,57 @@ class Heads:
         bend = np.maximum(2 * at - before - after, 1e-9)
         return shifts[top] + np.clip(0.5 * (after - before) / bend, -1, 1)
 
-    def seen_edges(self, free: np.ndarray) -> Edges:
-        """Find the edges and what they are worth; only those that are `free`, (2, s) bool, are looked at."""
-        edges = Edges.evenly(free)
+    def find_edges(self, free: np.ndarray) -> Edges:
+        """Find the edges and their weights among those that are `free`, (2, s) bool."""
+        edges = Edges.initial(free)
         for _ in range(EDGE_ROUNDS):
-            edges = self.edges(self.best(edges), free)
+            edges = self._edges_of(self.middles(edges), free)
         return replace(edges, inset=self._inset(edges, free))
 
     def _inset(self, edges: Edges, free: np.ndarray) -> np.ndarray:
-        """Correct the place of heads of which one edge is free by what that edge alone tells where both are, (s,)."""
+        """Return the correction for heads with one free edge, (s,): measured on that edge where both are free."""
         whole = edges.seen & free.all(axis=0)
         inset = np.zeros(len(whole))
         if not whole.any():
             return inset
-        middle = self.best(edges)
+        middle = self.middles(edges)
         for side in (0, 1):
             alone = replace(edges, weight=np.eye(2)[side][:, None] * np.ones(len(whole)))
-            inset[free[side] & ~free[1 - side]] = np.median((middle - self.best(alone))[whole])
+            inset[free[side] & ~free[1 - side]] = np.median((middle - self.middles(alone))[whole])
         return inset
 
-    def edges(self, middle: np.ndarray, free: np.ndarray) -> Edges:
-        """Look at the edges of heads at `middle`, (s,)."""
+    def _edges_of(self, middle: np.ndarray, free: np.ndarray) -> Edges:
+        """Evaluate the edges of heads at `middle`, (s,) bins to the left."""
         centre = np.round(middle).astype(int)
-        inside = np.array([self._density(centre + side * (HALF_HEAD - NEAR_EDGE), -side) for side in (-1, 1)])
-        beyond = np.array([self._density(centre + side * (HALF_HEAD + NEAR_EDGE), side) for side in (-1, 1)])
-        crown = self._density(centre - RIM // 2, 1)
+        inside = np.array([self._density(centre + side * (HALF_HEAD_BINS - BLURRED_BINS), -side) for side in (-1, 1)])
+        beyond = np.array([self._density(centre + side * (HALF_HEAD_BINS + BLURRED_BINS), side) for side in (-1, 1)])
+        crown = self._density(centre - RIM_BINS // 2, 1)
         both = free.all(axis=0)
-        shadow = _sure_excess(inside * RIM)
-        view = _excess(uniform_filter1d(inside * both, VIEW, axis=1, mode="nearest"))
+        shadow = _sure_excess(inside * RIM_BINS)
+        view = _excess(uniform_filter1d(inside * both, VIEW_STATIONS, axis=1, mode="nearest"))
         excess = np.where(shadow.max(axis=0) > ASKEW_EXCESS, shadow, view)
         weight = 1 - np.clip((excess - EVEN_EXCESS) / (ASKEW_EXCESS - EVEN_EXCESS), 0, 1)
-        weight = np.where(both, weight, free)  # of a single edge that is free nothing else is known than where it is
-        clear = (inside >= LEAST_RIM * crown) & (beyond <= CLEAR_EDGE * inside) & (inside * RIM >= LEAST_ON_RIM)
+        weight = np.where(both, weight, free)  # a single free edge has nothing to be compared with
+        clear = (
+            (inside >= MIN_RIM_SHARE * crown)
+            & (beyond <= MAX_OUTSIDE_SHARE * inside)
+            & (inside * RIM_BINS >= MIN_RIM_POINTS)
+        )
         return Edges(inside, weight, np.all(clear | (weight == 0), axis=0) & free.any(axis=0), np.zeros(len(centre)))
 
     def _density(self, start: np.ndarray, direction: int) -> np.ndarray:
-        """Points a bin on the RIM bins that begin at `start`, (s,), and go to the left (1) or right (-1)."""
+        """Return the points per bin on the RIM_BINS bins from `start`, (s,), to the left (1) or to the right (-1)."""
         rows = np.arange(len(start))
-        start = start + HALF_RANGE
-        return np.abs(self.sums[rows, start + direction * RIM] - self.sums[rows, start]) / RIM
+        start = start + HALF_RANGE_BINS
+        return np.abs(self.sums[rows, start + direction * RIM_BINS] - self.sums[rows, start]) / RIM_BINS
 
 
 def _excess(density: np.ndarray) -> np.ndarray:
-    """How much more is seen at the other edge, in proportion, (2, s)."""
+    """Return the relative excess of density at the other edge, (2, s)."""
     return density[::-1] / np.maximum(density, 1e-6) - 1
 
 
 def _sure_excess(points: np.ndarray) -> np.ndarray:
-    """Excess that points just inside of the edges, (2, s), show beyond chance: shadows come and go along the line."""
+    """Return the relative excess, beyond chance, of the points just inside the edges, (2, s): that of local shadows."""
     chance = SURE_SIGMAS * np.sqrt(points[0] + points[1])
     return (points[::-1] - points - chance) / np.maximum(points, 1e-6)

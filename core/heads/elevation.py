@@ -1,7 +1,7 @@
-"""Heights of rails: the points on top of each railhead, found by a rolling disc and smoothed along the line.
+"""Heights of rails, from the points on top of each railhead.
 
-The steps are those of Gribov and Chang, section 8 (docs/method.md section 6.4): points are projected onto their
-line, those on the head's top kept, and their heights smoothed by PAEK.
+The steps are those of Gribov and Chang, section 8 (docs/method.md section 6.4): points are projected onto their line,
+those on top of the head are selected by a rolling disc, and their heights are smoothed by PAEK.
 """
 
 from __future__ import annotations
@@ -17,42 +17,42 @@ from ..parameters import Parameters
 from ..polyline import Feet, interpolate, length_along, project, resample, starts_at_its_end
 from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
-from .edges import stations_along, widest_reach
+from .edges import search_distance, stations_along
 from .neighbours import free_edges
-from .top import LEAST_POINTS, find_top
+from .top import MIN_POINTS, find_top
 from .uncertainty import measure_support
 
-BRIDGE_M = 0.5
-"""A longer stretch without points counts as bridged: five profiles of the fastest train's scanner."""
+MIN_GAP_M = 0.5
+"""Length without points from which a line counts as bridged: five profiles of the fastest train's scanner."""
 
-UNSUPPORTED_END_M = 0.15
-"""A free end that runs on further than this without points is cut: the raster's lines curl where a rail ends."""
+MAX_UNSUPPORTED_END_M = 0.15
+"""Length without points from which a free end is cut off: the raster's lines curl where a rail ends."""
 
-FIXED_ENDS = np.zeros(2, dtype=bool)
-"""Marks ends of a line that are kept whether points support them or not."""
+NO_FREE_ENDS = np.zeros(2, dtype=bool)
+"""Marks both ends of a line to be kept, with or without points."""
 
 END_POINTS = 3
-"""Points that mark the end of support; one alone may be a weed."""
+"""Number of points that mark the end of support; one alone may be a weed."""
 
 
 @dataclass(frozen=True)
 class ElevationParameters:
-    """How heights are found; metres throughout.
+    """Parameters of the heights, in metres.
 
     Attributes
     ----------
     head_width_m : float
         Width of the railhead.
     tolerance_xy_m : float
-        Greatest distance from its line, in plan, of a point that gives height; half a head is the limit in any case.
+        Maximum distance in plan from the line of a point that gives height, at most half a head.
     tolerance_z_m : float
-        Greatest depth of a point below the top surface.
+        Maximum depth of a point below the top surface.
     crown_radius_m : float
         Radius of the disc that rolls along the top.
     smoothing_xy_m, smoothing_z_m : float
-        Sigma of PAEK that smoothed the line in plan, and the one for its heights.
+        Sigma of PAEK in plan and in height.
     cell_m : float
-        Cell of the raster that the line was drawn from.
+        Cell size of the raster from which the line was drawn.
     min_length_m : float
         Shorter lines are dropped.
     """
@@ -68,44 +68,56 @@ class ElevationParameters:
 
     @property
     def unseen_m(self) -> float:
-        """Standard deviation of a line where no points show its head: it lies anywhere in its cell."""
+        """Standard deviation of a line where no points show its head: it may be anywhere in its cell."""
         return self.cell_m / np.sqrt(12)
 
 
 def elevate(
     network: LineNetwork, points: RailPoints, parameters: ElevationParameters, progress: Progress = SILENT
 ) -> tuple[RailLine, ...]:
-    """Give the smoothed plan lines of a network heights and figures.
+    """Add heights and figures to the smoothed plan lines of a network.
 
     Parameters
     ----------
     network : LineNetwork
-        Smoothed lines; all that its nodes join stays joined.
+        Smoothed lines; lines that meet in a node still meet there.
     points : RailPoints
-        The cloud that the network was made from.
+        The points from which the network was made.
     parameters : ElevationParameters
     progress : Progress
 
     Returns
     -------
     tuple of RailLine
-        By place of their starts from west to east, numbered from 1. Lines without points and short ones are left out.
+        In order of their starts from west to east, numbered from 1; without lines that are short or have no points.
     """
-    reach_m = widest_reach(parameters.head_width_m)
+    reach_m = search_distance(parameters.head_width_m)
     feet = project(network.lines, points.xyz[:, :2], reach_m, progress.span(0.0, 0.6))
     free_ends = (network.degrees() == 1)[network.ends]
     edges = free_edges(network.lines, parameters.head_width_m)
     rails = []
     for number, line in enumerate(progress.span(0.6, 1.0).follow(network.lines)):
         mine = feet.of(number)
-        rail = _raise_line(line, free_ends[number], edges[number], mine, points.xyz[mine.point, 2], parameters)
+        rail = _measured(line, free_ends[number], edges[number], mine, points.xyz[mine.point, 2], parameters)
         if rail is not None and rail.length_m >= parameters.min_length_m:
             rails.append(replace(rail, class_code=points.class_code))
     return numbered(rails)
 
 
 def flat_rails(network: LineNetwork, class_code: int, parameters: ElevationParameters) -> tuple[RailLine, ...]:
-    """Make rails without heights of the lines of a network, for want of points; figures of support are 0 or NaN."""
+    """Make rails without heights from the lines of a network.
+
+    Parameters
+    ----------
+    network : LineNetwork
+    class_code : int
+    parameters : ElevationParameters
+
+    Returns
+    -------
+    tuple of RailLine
+        As from `elevate`, but with heights of NaN and figures of support of 0 or NaN.
+    """
     rails = []
     for line in network.lines:
         xyz = np.column_stack([line, np.full(len(line), np.nan)])
@@ -116,13 +128,13 @@ def flat_rails(network: LineNetwork, class_code: int, parameters: ElevationParam
 
 
 def numbered(rails: Sequence[RailLine]) -> tuple[RailLine, ...]:
-    """Let rails start at the right end, and number them from west to east."""
+    """Turn rails so that they start in the west, and number them from west to east."""
     directed = (rail.reversed() if starts_at_its_end(rail.xyz) else rail for rail in rails)
     ordered = sorted(directed, key=lambda rail: tuple(rail.xyz[0, :2]))
     return tuple(replace(rail, rail_id=number) for number, rail in enumerate(ordered, start=1))
 
 
-def _raise_line(
+def _measured(
     line: np.ndarray,
     free_ends: np.ndarray,
     edges: np.ndarray,
@@ -130,9 +142,9 @@ def _raise_line(
     z: np.ndarray,
     parameters: ElevationParameters,
 ) -> RailLine | None:
-    """Give one line its heights; None where hardly a point supports it."""
+    """Measure one line, given the feet and heights of its points; None if too few points support it."""
     head = np.abs(feet.across) <= min(0.5 * parameters.head_width_m, parameters.tolerance_xy_m)
-    if head.sum() < LEAST_POINTS:
+    if head.sum() < MIN_POINTS:
         return None
     found = find_top(
         feet.t[head],
@@ -175,7 +187,7 @@ def measure_again(
     smoothing_z_m: float,
     progress: Progress = SILENT,
 ) -> list[RailLine]:
-    """Give finished rails heights of another smoothing and support anew: the same for rails read from files.
+    """Measure heights, with another smoothing, and the support of finished rails, which may come from files.
 
     Parameters
     ----------
@@ -189,17 +201,17 @@ def measure_again(
     Returns
     -------
     list of RailLine
-        In their order; a rail without points keeps its heights, and is a gap from end to end.
+        In the order given. A rail without points keeps its heights and is a gap from end to end.
     """
     plans = [resample(rail.xyz[:, :2], smoothing_z_m / 4)[0] for rail in rails]
-    feet = project(plans, points.xyz[:, :2], widest_reach(head_width_m), progress.span(0.0, 0.7))
-    # Of lines from anywhere nothing else is known than that they lie on their heads: these take the cell's place.
+    feet = project(plans, points.xyz[:, :2], search_distance(head_width_m), progress.span(0.0, 0.7))
+    # Lines from a file are only known to be on their heads, so the head width takes the place of the cell size.
     parameters = ElevationParameters(head_width_m, smoothing_z_m=smoothing_z_m, cell_m=head_width_m)
     edges = free_edges(plans, head_width_m)
     measured = []
     for number, rail in enumerate(progress.span(0.7, 1.0).follow(rails)):
         mine = feet.of(number)
-        again = _raise_line(plans[number], FIXED_ENDS, edges[number], mine, points.xyz[mine.point, 2], parameters)
+        again = _measured(plans[number], NO_FREE_ENDS, edges[number], mine, points.xyz[mine.point, 2], parameters)
         if again is None:
             measured.append(_unsupported(rail, parameters))
         else:
@@ -208,7 +220,7 @@ def measure_again(
 
 
 def _unsupported(rail: RailLine, parameters: ElevationParameters) -> RailLine:
-    """Say of a rail that no points support it anywhere."""
+    """Mark a rail as supported nowhere."""
     length_m = float(length_along(rail.xyz[:, :2])[-1])
     t = stations_along(length_m)
     support = Support(t, np.zeros(len(t), dtype=int), np.full(len(t), parameters.unseen_m))
@@ -216,21 +228,28 @@ def _unsupported(rail: RailLine, parameters: ElevationParameters) -> RailLine:
 
 
 def _supported(t: np.ndarray, length_m: float, free_ends: np.ndarray) -> tuple[float, float]:
-    """Chainages between which a line is kept: all of it, but for free ends without points."""
+    """Return the chainages between which a line is kept: all of it except free ends without points."""
     start, end = t[END_POINTS - 1], t[-END_POINTS]
-    keep_start = not free_ends[0] or start <= UNSUPPORTED_END_M
-    keep_end = not free_ends[1] or length_m - end <= UNSUPPORTED_END_M
+    keep_start = not free_ends[0] or start <= MAX_UNSUPPORTED_END_M
+    keep_end = not free_ends[1] or length_m - end <= MAX_UNSUPPORTED_END_M
     return 0.0 if keep_start else float(start), length_m if keep_end else float(end)
 
 
 def find_gaps(t: np.ndarray, start: float, end: float) -> np.ndarray:
-    """Find the stretches longer than BRIDGE_M without points from `start` to `end`, given the points' chainages.
+    """Find the gaps, longer than MIN_GAP_M, between the points of a line.
+
+    Parameters
+    ----------
+    t : (n,) array
+        Chainages of the points.
+    start, end : float
+        Chainages of the ends of the line.
 
     Returns
     -------
     (k, 2) array
-        Start and end of each.
+        Start and end of each gap.
     """
     borders = np.concatenate([[start], np.clip(np.sort(t), start, end), [end]])
-    wide = np.flatnonzero(np.diff(borders) > BRIDGE_M)
+    wide = np.flatnonzero(np.diff(borders) > MIN_GAP_M)
     return np.column_stack([borders[wide], borders[wide + 1]])

@@ -1,4 +1,4 @@
-"""The upper boundary of a union of equal discs, and the surface a disc rolls along (docs/method.md section 6.4)."""
+"""Upper boundary of a union of equal discs, and the surface along which a disc rolls (docs/method.md section 6.4)."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Boundary:
-    """The points whose discs make the upper boundary, from left to right.
+    """The points whose discs form the upper boundary, from left to right.
 
-    A disc of the same radius that rests on the points from above touches just these points, one after the other.
+    A disc of the same radius that rolls along the points from above touches these points, one after the other.
 
     Attributes
     ----------
     x, y : (m,) arrays
-        The points, x increasing.
+        Coordinates of the points; x is increasing.
     start : (m,) array
-        Abscissa at which the upper boundary passes over to each point's disc, increasing.
+        Abscissa from which each point's disc forms the boundary, increasing.
     radius : float
     """
 
@@ -29,43 +29,44 @@ class Boundary:
     radius: float
 
     def upper(self, x: np.ndarray) -> np.ndarray:
-        """Height of the upper boundary at `x`, (k,); -inf where no disc reaches."""
+        """Return the height of the upper boundary at `x`, (k,); -inf where there is no disc."""
         number = np.clip(np.searchsorted(self.start, x, side="right") - 1, 0, None)
         return self._disc(number, x)
 
     def closing(self, x: np.ndarray) -> np.ndarray:
-        """Height of the rolling disc's lower side at `x`, (k,), for `x` between the first and the last point.
+        """Return the height of the rolling disc's lower side at `x`, (k,), between the first and the last point.
 
-        Between two neighbours of the boundary the disc rests on both, its centre where their discs hand over.
+        Between two successive points of the boundary the disc rests on both, with its centre where their discs meet.
         """
         if len(self.x) == 1:
             return np.full(len(x), self.y[0])
         left = np.clip(np.searchsorted(self.x, x, side="right") - 1, 0, len(self.x) - 2)
         centre_x = self.start[left + 1]
-        # Where one point stands more than a radius above its neighbour, the disc drops along it down to the lower one.
+        # If one point is more than a radius above the next, the disc drops along it to the lower one.
         centre_y = np.minimum(self._disc(left, centre_x), self._disc(left + 1, centre_x))
         return centre_y - np.sqrt(np.maximum(self.radius**2 - (x - centre_x) ** 2, 0.0))
 
     def _disc(self, number: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Return the height of the upper half of numbered discs at `x`, (k,)."""
         beside = self.radius**2 - (x - self.x[number]) ** 2
         tolerance = 1e-9 * self.radius**2
         return np.where(beside < -tolerance, -np.inf, self.y[number] + np.sqrt(np.maximum(beside, 0.0)))
 
 
 def extremal_boundary(x: np.ndarray, y: np.ndarray, radius: float) -> Boundary:
-    """Upper boundary of the union of discs of one radius around points, in one pass from left to right.
+    """Find the upper boundary of the union of discs of one radius around points.
 
-    Of two discs the one further left lies higher on the left of a single change-over and lower on its right. A stack
-    of the discs on the boundary therefore suffices: each new disc removes those from the top that it covers from
-    before their own start. Every point is pushed once and popped at most once, so the pass is linear after sorting
-    (the paper's directional extremal boundary; Gribov, arXiv 2503.21711).
+    Two discs change over at most once: the left one is higher before that place, the right one after it. One pass from
+    left to right with a stack is therefore enough: each new disc removes from the top of the stack the discs that it
+    covers from before their own start. Every point is pushed once and popped at most once, so the pass is linear after
+    sorting (Gribov and Chang's directional extremal boundary; Gribov, arXiv 2503.21711).
 
     Parameters
     ----------
     x, y : (n,) arrays
-        Centres, in any order; n at least 1.
+        Centres of the discs in any order, at least one.
     radius : float
-        In the unit of x and y.
+        In units of x and y.
     """
     order = np.lexsort((-y, x))
     stack_x: list[float] = []
@@ -89,11 +90,11 @@ def extremal_boundary(x: np.ndarray, y: np.ndarray, radius: float) -> Boundary:
 
 
 def _handover(x_left: float, y_left: float, x_right: float, y_right: float, radius: float) -> float:
-    """Abscissa at which the boundary passes from the left disc's upper half to the right one's."""
+    """Return the abscissa at which the boundary passes from the left disc's upper half to the right one's."""
     dx, dy = x_right - x_left, y_right - y_left
     if dx >= 2 * radius:
         return x_right - radius
     squared = dx * dx + dy * dy
-    if squared >= 2 * radius * dx:  # one upper half lies above the other wherever both exist
+    if squared >= 2 * radius * dx:  # one upper half is above the other wherever both exist
         return x_right - radius if dy > 0 else x_left + radius
     return 0.5 * (x_left + x_right) - dy * sqrt(radius * radius / squared - 0.25)

@@ -1,51 +1,55 @@
-"""What points say of one railhead before its line is exact: rough level, noise, and slope across the head."""
+"""Rough level, noise and slope across of one railhead, estimated while its line is still inexact.
+
+See docs/method.md section 6.1.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 
-BIN_M = 0.5
-"""Length of the bins: a handful of points on the sparsest rail, and no more than 2 cm of height at 4 % gradient."""
+LEVEL_BIN_M = 0.5
+"""Length of the bins: a handful of points on the sparsest rail, and at most 2 cm of height at 4 % gradient."""
 
-LEVEL_BINS = 5
-"""Bins whose medians are compared: a growth of weeds up to 1 m long can't lift the level."""
+MEDIAN_BINS = 5
+"""Bins in the running median: weeds up to 1 m long cannot lift the level."""
 
-CROSSING_M, CROSSING_BINS = 1.0, 41
-"""Bins that lie so far from the median of so many, 20 m of rail, are of a rail on a bridge across: no rail rises so
-fast, and what a bridge hides is shorter."""
+OTHER_RAIL_M, OTHER_RAIL_BINS = 1.0, 41
+"""Bins that differ by more than this from the median of this number of bins, 20 m of rail, belong to a rail on a bridge
+above or below: no rail rises so steeply, and the part that a bridge hides is shorter."""
 
 SLOPE_BINS = 9
-"""Bins that share one slope across: over 4.5 m cant changes by 1 % of its slope at most."""
+"""Bins that share one slope across: over 4.5 m cant changes by at most 1 % of its slope."""
 
 CROWN_SHARE = 0.35
-"""Part of the head width, to either side of the axis, that the corners do not reach: 25 mm of a 72 mm head."""
+"""Part of the head width on either side of the axis that excludes the round corners: 25 mm of a 72 mm head."""
 
 PRIOR_SLOPE = 0.1
-"""Slopes to be expected: 0.05 from inclined rails and 0.1 from 150 mm cant; holds the slope where points are few."""
+"""Expected slope, which keeps the fit stable where points are few: 0.05 from inclined rails, 0.1 from 150 mm cant."""
 
 SLOPE_ROUNDS = 3
-"""Rounds of fitting and leaving out what lies off; the third no longer changes the slope by a thousandth."""
+"""Rounds of fitting and rejecting outliers; the third changes the slope by less than a thousandth."""
 
 OFF_TOP_SIGMAS = 2.5
-"""Points further off the top than this many standard deviations take no part in the slope."""
+"""Distance from the top, in standard deviations, beyond which points do not count for the slope."""
 
-LEAST_NOISE_M = 0.001
-"""No scanner's points are better; keeps the limits open where heights are rounded or made up."""
+MIN_NOISE_M = 0.001
+"""No scanner is better than this; it keeps the limits open where heights are rounded or synthetic."""
 
-LEAST_ON_HEAD = 80
-"""Points on a head from which its top can be told: fewer give no slope."""
+MIN_ON_HEAD = 80
+"""Points needed on a head to find its top; fewer do not determine a slope."""
 
-DEPTH_M, DEPTH_SIGMAS = 0.006, 1.5
-"""Points further below the top, in metres and in standard deviations of the noise, may be of a side face or a corner.
-Tighter than noise would ask for: what it costs in points on top it costs across the whole head alike."""
+MAX_DEPTH_M, MAX_DEPTH_SIGMAS = 0.006, 1.5
+"""Depth below the top, in metres and in standard deviations of the noise, beyond which a point may be on a side face or
+a corner. Tighter than the noise requires: points on top are lost evenly across the head, so the estimate stays
+unbiased."""
 
-ABOVE_SIGMAS = 3.0
-"""Points further above the top, in standard deviations of the noise, are weeds."""
+MAX_ABOVE_SIGMAS = 3.0
+"""Height above the top, in standard deviations of the noise, beyond which a point is a weed."""
 
 
 def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Height of most points around each point's chainage: medians of short bins, themselves filtered by a median.
+    """Return the height of most points around each point: medians of short bins, filtered by a running median.
 
     Parameters
     ----------
@@ -57,32 +61,32 @@ def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
     -------
     (n,) array
     """
-    number = np.floor((t - t[0]) / BIN_M).astype(int)
+    number = np.floor((t - t[0]) / LEVEL_BIN_M).astype(int)
     _, first, number, count = np.unique(number, return_index=True, return_inverse=True, return_counts=True)
     middle = first + count // 2
     middle_t, middle_z = t[middle], z[np.lexsort((z, number))][middle]
-    return np.interp(t, middle_t, _without_steps(middle_t, middle_z))
+    return np.interp(t, middle_t, _median_filtered(middle_t, middle_z))
 
 
-def _without_steps(t: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Apply a running median to what is left of heights after their trend, so that a gradient keeps its ends."""
-    trend = np.polynomial.Polynomial.fit(t, z, 1)(t) if len(t) > LEVEL_BINS else 0.0
+def _median_filtered(t: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Apply a running median to heights after removing their trend, so that the ends of a gradient are kept."""
+    trend = np.polynomial.Polynomial.fit(t, z, 1)(t) if len(t) > MEDIAN_BINS else 0.0
     level = z - trend
-    own = np.abs(level - median_filter(level, CROSSING_BINS, mode="nearest")) <= CROSSING_M
+    own = np.abs(level - median_filter(level, OTHER_RAIL_BINS, mode="nearest")) <= OTHER_RAIL_M
     if own.any():
         level = np.interp(t, t[own], level[own])
-    return trend + median_filter(level, LEVEL_BINS, mode="nearest")
+    return trend + median_filter(level, MEDIAN_BINS, mode="nearest")
 
 
-def spread(values: np.ndarray) -> float:
-    """Estimate the standard deviation of values from the median of their deviations, where outliers hardly count."""
+def robust_sigma(values: np.ndarray) -> float:
+    """Estimate the standard deviation of values from their median absolute deviation, which outliers hardly affect."""
     if not len(values):
-        return LEAST_NOISE_M
-    return max(1.4826 * float(np.median(np.abs(values - np.median(values)))), LEAST_NOISE_M)
+        return MIN_NOISE_M
+    return max(1.4826 * float(np.median(np.abs(values - np.median(values)))), MIN_NOISE_M)
 
 
 def cross_slope(t: np.ndarray, across: np.ndarray, height: np.ndarray, head_width_m: float) -> np.ndarray:
-    """Fit how the top of a head slopes across, from its cant and its lean.
+    """Fit the slope of the top across the head, which comes from cant and from the inclination of the rail.
 
     Parameters
     ----------
@@ -100,8 +104,8 @@ def cross_slope(t: np.ndarray, across: np.ndarray, height: np.ndarray, head_widt
         Rise per metre to the left, at each point.
     """
     crown = np.abs(across) <= CROWN_SHARE * head_width_m
-    limit = OFF_TOP_SIGMAS * spread(height[crown])
-    number = np.floor((t - t[0]) / BIN_M).astype(int)
+    limit = OFF_TOP_SIGMAS * robust_sigma(height[crown])
+    number = np.floor((t - t[0]) / LEVEL_BIN_M).astype(int)
     slope, level = np.zeros(len(t)), np.full(len(t), np.median(height[crown]) if crown.any() else 0.0)
     for _ in range(SLOPE_ROUNDS):
         on_top = crown & (np.abs(height - level - slope * across) <= limit)
@@ -110,12 +114,12 @@ def cross_slope(t: np.ndarray, across: np.ndarray, height: np.ndarray, head_widt
 
 
 def on_top(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> tuple[np.ndarray, float]:
-    """Tell which points lie on the top of the head, its slope across considered, and how noisy these are.
+    """Find the points on the top of the head, allowing for its slope across, and their noise.
 
     Parameters
     ----------
     t, across, z : (n,) arrays
-        Points near the line: chainage, increasing, offset to its left, and height; metres.
+        Chainage (increasing), offset to the left and height of points near the line, metres.
     head_width_m : float
 
     Returns
@@ -125,21 +129,22 @@ def on_top(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float
         Standard deviation of their heights.
     """
     head = np.abs(across) <= 0.5 * head_width_m
-    if head.sum() < LEAST_ON_HEAD:
-        return np.zeros(len(t), dtype=bool), LEAST_NOISE_M
+    if head.sum() < MIN_ON_HEAD:
+        return np.zeros(len(t), dtype=bool), MIN_NOISE_M
     above = z - np.interp(t, t[head], rough_level(t[head], z[head]))
     slope = np.interp(t, t[head], cross_slope(t[head], across[head], above[head], head_width_m))
     flat = above - slope * across
     flat -= np.interp(t, t[head], rough_level(t[head], flat[head]))
-    noise = spread(flat[head & (np.abs(flat) < 2 * DEPTH_M)])
-    noise = spread(flat[head & (np.abs(flat) < max(2 * DEPTH_M, OFF_TOP_SIGMAS * noise))])
-    return (flat >= -max(DEPTH_M, DEPTH_SIGMAS * noise)) & (flat <= max(DEPTH_M, ABOVE_SIGMAS * noise)), noise
+    noise = robust_sigma(flat[head & (np.abs(flat) < 2 * MAX_DEPTH_M)])
+    noise = robust_sigma(flat[head & (np.abs(flat) < max(2 * MAX_DEPTH_M, OFF_TOP_SIGMAS * noise))])
+    lowest, highest = -max(MAX_DEPTH_M, MAX_DEPTH_SIGMAS * noise), max(MAX_DEPTH_M, MAX_ABOVE_SIGMAS * noise)
+    return (flat >= lowest) & (flat <= highest), noise
 
 
 def _moving_fit(
     number: np.ndarray, used: np.ndarray, x: np.ndarray, y: np.ndarray, noise: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Fit y = level + slope x in windows of bins; slope and level at each point."""
+    """Fit y = level + slope x in windows of bins; returns slope and level at each point."""
     moments = np.stack([np.ones_like(x), x, y, x * x, x * y])[:, used]
     size = int(number[-1]) + 1
     sums = np.stack([np.bincount(number[used], row, minlength=size) for row in moments])

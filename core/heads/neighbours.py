@@ -1,4 +1,4 @@
-"""Where another line runs so close beside a line that its head covers an edge: at switches, frogs and crossings."""
+"""Where the head of a neighbouring rail covers an edge: at switches, frogs and crossings."""
 
 from __future__ import annotations
 
@@ -8,23 +8,22 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..polyline import interpolate, left_normals, length_along
-from .edges import STATION_M, station_count
+from .edges import STATION_STEP_M, station_count
 
 BESIDE_HEADS = 1.5
-"""Distance of two axes, in head widths, from which the ground between both heads is wide enough to show their edges."""
+"""Distance of two axes, in head widths, from which the ground between the heads is wide enough to show their edges."""
 
 CROSSED_M = 0.01
-"""Two lines that lie this far on either side of each other cross; less may be what the lines still are off."""
+"""Offset on both sides of a line from which another line crosses it; less may be the error of the lines."""
 
-
-STEEPEST_RUN = 0.5
-"""Cosine of the angle at which lines cross from which each hides the other for less than one window."""
+MIN_RUN = 0.5
+"""Cosine of the crossing angle below which each line hides the other for less than one window."""
 
 
 def free_edges(lines: Sequence[np.ndarray], head_width_m: float) -> list[np.ndarray]:
-    """Say at which stations of each line the right and the left edge of its head stand free of other heads.
+    """Find the stations of each line where the right and the left edge of its head are free of other heads.
 
-    Where a branch leaves its stock rail the heads overlap, and the outer edges of both together are one of either.
+    Where a branch leaves its stock rail the heads overlap, and only the outer edge of each is free.
 
     Parameters
     ----------
@@ -34,7 +33,7 @@ def free_edges(lines: Sequence[np.ndarray], head_width_m: float) -> list[np.ndar
     Returns
     -------
     list of (2, s) bool arrays
-        Of the right and the left edges, at the stations of `head_edges.histograms`.
+        For each line, the right and the left edges at the stations of `edges.stations_along`.
     """
     free = [np.ones((2, station_count(length_along(line)[-1])), dtype=bool) for line in lines]
     for line, station, across in _close_runs(lines, BESIDE_HEADS * head_width_m):
@@ -47,11 +46,11 @@ def free_edges(lines: Sequence[np.ndarray], head_width_m: float) -> list[np.ndar
 
 
 def _close_runs(lines: Sequence[np.ndarray], reach_m: float) -> list[tuple[int, np.ndarray, np.ndarray]]:
-    """List the stretches along which another line is close: line, its stations, and the other's offsets to its left."""
+    """List where another line is close: line, its stations, and the offsets of the other line to the left, (k,)."""
     number, station, places, normals = _stations(lines)
     if not len(number):
         return []
-    pairs = cKDTree(places).query_pairs(np.hypot(reach_m, 0.5 * STATION_M), output_type="ndarray")
+    pairs = cKDTree(places).query_pairs(np.hypot(reach_m, 0.5 * STATION_STEP_M), output_type="ndarray")
     pairs = pairs[number[pairs[:, 0]] != number[pairs[:, 1]]]
     own, other = np.concatenate([pairs, pairs[:, ::-1]]).T
     across = _offset(places[other] - places[own], normals[own], normals[other])
@@ -65,22 +64,23 @@ def _close_runs(lines: Sequence[np.ndarray], reach_m: float) -> list[tuple[int, 
 
 
 def _offset(step: np.ndarray, normal: np.ndarray, other_normal: np.ndarray) -> np.ndarray:
-    """Distance to the left at which straight lines pass whose places are a `step` away, (k,)."""
+    """Return the offsets to the left of straight lines, (k,), given the `step` to a place on each and the normals."""
     tangent, other_tangent = (values @ np.array([[0.0, -1.0], [1.0, 0.0]]) for values in (normal, other_normal))
     ahead, across = (np.einsum("ij,ij->i", step, axis) for axis in (tangent, normal))
     run, rise = (np.einsum("ij,ij->i", other_tangent, axis) for axis in (tangent, normal))
-    return across - ahead * rise / np.where(np.abs(run) > STEEPEST_RUN, run, np.inf)
+    return across - ahead * rise / np.where(np.abs(run) > MIN_RUN, run, np.inf)
 
 
 def _stations(lines: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Stations of all lines: line and station numbers, (k,), places and unit vectors to the left, (k, 2)."""
+    """Return line and station numbers, (k,), places and unit vectors to the left, (k, 2), of all stations."""
     columns = []
     for number, line in enumerate(lines):
         along = length_along(line)
         station = np.arange(station_count(along[-1]))
-        at = np.minimum((station + 0.5) * STATION_M, along[-1])
+        at = np.minimum((station + 0.5) * STATION_STEP_M, along[-1])
         places, normals = interpolate(line, along, at), interpolate(left_normals(line), along, at)
         columns.append((np.full(len(station), number), station, places, normals))
     if not columns:
         return np.empty(0, int), np.empty(0, int), np.empty((0, 2)), np.empty((0, 2))
-    return tuple(np.concatenate(column) for column in zip(*columns))
+    number, station, place, normal = (np.concatenate(column) for column in zip(*columns))
+    return number, station, place, normal

@@ -1,7 +1,7 @@
-"""Lateral refinement: lines move to the middle between both edges of their railhead.
+"""Lateral refinement: lines move to the middle between the edges of their railheads.
 
-The raster leaves a line up to half a cell beside its rail, for long stretches where the rail runs along the grid. The
-points know better: where most of them lie within one head width, there the head is (docs/method.md section 6.2).
+The raster leaves a line up to half a cell off its rail, over long distances where the rail is parallel to the grid. The
+points show the edges of the head, and thus its middle, more exactly (docs/method.md section 6.2).
 """
 
 from __future__ import annotations
@@ -19,28 +19,30 @@ from ..parameters import Parameters
 from ..polyline import interpolate, left_normals, length_along, project
 from ..progress import SILENT, Progress
 from .branch_starts import APART_HEADS, slide_branches
-from .edges import HALF_HEAD, histograms, middles, widest_reach
+from .edges import HALF_HEAD_BINS, histograms, middles, search_distance
 from .level import on_top
 from .neighbours import free_edges
 
-LEAST_SHARE = 0.25
-"""Share of a line's stations that have to show an edge; otherwise the line stays as it is."""
+MIN_SEEN_SHARE = 0.25
+"""Minimum share of a line's stations with visible edges; otherwise the line stays as it is."""
 
-LONGEST_UNSEEN_M = 6.0
-"""Longest stretch drawn anew between what is seen at both its ends, for other rails lead the raster astray there: heads
-that cross at 1:26.5 cover each other for so long. Where an arc of 190 m begins abruptly it strays by 3 mm."""
+MAX_UNSEEN_M = 6.0
+"""Longest section without visible edges that is redrawn from the line on either side, because other rails distort the
+raster there: heads that cross at 1:26.5 cover each other over this length. Where an arc of 190 m begins abruptly, the
+redrawn line is 3 mm off."""
 
 CURL_M, STEADY_M = 0.8, 3.5
-"""Length of a free end that is drawn anew, and of the stretch before it that it goes on from: the raster curls over two
-head widths or more, which half a window of 1.25 m makes longer, and the bend of a tram's rail takes metres to tell."""
+"""Length of a free end that is redrawn, and of the part before it that it continues. The raster curls over two head
+widths or more, half a window of 1.25 m adds to that, and the curvature of a tram's rail takes metres to measure."""
 
-CROSSING_M = 3.0
-"""Where two lines cross moves this far at most when they move by half a head: at 1:26.5 by 1 m each."""
+MAX_CROSSING_SHIFT_M = 3.0
+"""Limit for how far a crossing moves when two lines move by half a head: at 1:26.5 each moves it by 1 m."""
 
 SURE_HEADS = (APART_HEADS, 0.7, 0.7)
-"""Distance of a branch from its stock rail, in head widths, that lines can be trusted from after each round: first as
-far as the raster tells, then where most of the head stands free. Nearer its line still leans to where it was thought to
-begin, which draws a start half a metre forward. Without branches the third round moves lines by less than 0.1 mm."""
+"""Distance of a branch from its stock rail, in head widths, from which its line is reliable after each round: first
+where the raster separates the two, then where most of the head is free. Closer than that, the line is still biased
+towards the start assumed before, which moves the start half a metre forward. Without branches a third round moves lines
+by less than 0.1 mm."""
 
 
 def refine(
@@ -65,8 +67,8 @@ def refine(
     Returns
     -------
     LineNetwork
-        Lines stay as they are where points show no edge of a head. What meets in nodes still does; branches begin
-        where they touch the rail that they leave.
+        Lines stay as they are where points show no edge of a head. Lines that met in a node still do, and branches
+        begin where they touch the rail that they leave.
     """
     rounds = SURE_HEADS if len(network.passes) else SURE_HEADS[:2]
     by_x = points.xyz[np.argsort(points.xyz[:, 0])] if len(network.passes) else points.xyz
@@ -80,8 +82,8 @@ def refine(
 def _shifted(
     network: LineNetwork, points: RailPoints, head_width_m: float, smoothing_m: float, progress: Progress
 ) -> LineNetwork:
-    """Move every line to the middle of its head, and nodes with them."""
-    feet = project(network.lines, points.xyz[:, :2], widest_reach(head_width_m), progress.span(0.0, 0.7))
+    """Move every line to the middle of its head, and the nodes with them."""
+    feet = project(network.lines, points.xyz[:, :2], search_distance(head_width_m), progress.span(0.0, 0.7))
     edges = free_edges(network.lines, head_width_m)
     free_ends = (network.degrees() == 1)[network.ends]
     lines = []
@@ -91,18 +93,18 @@ def _shifted(
         along = length_along(line)
         stations, middle = _middles(mine.t[top], mine.across[top], along[-1], head_width_m, edges[number])
         known = np.isfinite(middle)
-        if known.sum() < max(LEAST_SHARE * len(stations), 2):
+        if known.sum() < max(MIN_SEEN_SHARE * len(stations), 2):
             lines.append(line)
             continue
         shift = smooth_profile(stations[known], middle[known], smoothing_m, along)
         moved = line + shift[:, None] * left_normals(line)
-        moved = _drawn_across(moved, along, _unseen(stations, known))
-        lines.append(_with_straight_ends(moved, along, free_ends[number]))
+        moved = _redrawn(moved, along, _unseen(stations, known))
+        lines.append(_with_redrawn_ends(moved, along, free_ends[number]))
     return _joined(network, lines, smoothing_m)
 
 
-def _with_straight_ends(line: np.ndarray, along: np.ndarray, free_ends: np.ndarray) -> np.ndarray:
-    """Let a line run on at its free ends as it does before them: the raster's lines curl where a rail ends."""
+def _with_redrawn_ends(line: np.ndarray, along: np.ndarray, free_ends: np.ndarray) -> np.ndarray:
+    """Redraw the free ends of a line as a continuation of the line: the raster's lines curl where a rail ends."""
     line = line.copy()
     for from_end, t, free in ((line, along, free_ends[0]), (line[::-1], along[-1] - along[::-1], free_ends[1])):
         steady = (t >= CURL_M) & (t <= CURL_M + STEADY_M)
@@ -114,7 +116,7 @@ def _with_straight_ends(line: np.ndarray, along: np.ndarray, free_ends: np.ndarr
 
 
 def _joined(network: LineNetwork, lines: list[np.ndarray], smoothing_m: float) -> LineNetwork:
-    """Let lines that were moved one by one meet again: where one runs through a node, else at the mean of the ends."""
+    """Make lines that were moved one by one meet again: where lines run through the node, else at the mean of ends."""
     passes = _crossings(network.passes, lines)
     places, votes = np.zeros_like(network.nodes), np.zeros(len(network.nodes))
     through = np.isin(np.arange(len(votes)), passes[:, 0])
@@ -134,15 +136,16 @@ def _joined(network: LineNetwork, lines: list[np.ndarray], smoothing_m: float) -
 
 
 def _crossings(passes: np.ndarray, lines: list[np.ndarray]) -> np.ndarray:
-    """Say at which of their vertices lines cross that run through one node, now that they were moved."""
+    """Find the vertices at which lines that run through the same node cross after they were moved."""
     passes = passes.copy()
     for node in np.unique(passes[:, 0]):
         one, *others = np.flatnonzero(passes[:, 0] == node)
         for other in others:
             (_, a, vertex), b = passes[one], passes[other, 1]
+            along = length_along(lines[a])
             nearby = np.arange(1, len(lines[a]) - 1)
-            nearby = nearby[np.abs(length_along(lines[a])[nearby] - length_along(lines[a])[vertex]) < CROSSING_M]
-            feet = project([lines[b]], lines[a][nearby], CROSSING_M)
+            nearby = nearby[np.abs(along[nearby] - along[vertex]) < MAX_CROSSING_SHIFT_M]
+            feet = project([lines[b]], lines[a][nearby], MAX_CROSSING_SHIFT_M)
             if a != b and len(feet.t):
                 best = np.argmin(np.abs(feet.across))
                 passes[one, 2] = nearby[feet.point[best]]
@@ -153,20 +156,20 @@ def _crossings(passes: np.ndarray, lines: list[np.ndarray]) -> np.ndarray:
 def _middles(
     t: np.ndarray, across: np.ndarray, length_m: float, head_width_m: float, free: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find how far to the left of a line the middle of its head lies, at stations along it; NaN where none is seen."""
+    """Return stations along a line and the offset of the head's middle to the left there; NaN without visible edges."""
     stations, counts, wide_counts = histograms(t, across, length_m, head_width_m)
-    return stations, middles(counts, wide_counts, free) * head_width_m / (2 * HALF_HEAD)
+    return stations, middles(counts, wide_counts, free) * head_width_m / (2 * HALF_HEAD_BINS)
 
 
 def _unseen(stations: np.ndarray, known: np.ndarray) -> list[tuple[float, float]]:
-    """List the stretches between known stations that are short enough to be drawn across, by their chainages."""
+    """List the sections between known stations that are short enough to be redrawn, by their chainages."""
     numbers = np.flatnonzero(known)
     gaps = [(stations[a], stations[b]) for a, b in zip(numbers, numbers[1:]) if b - a > 1]
-    return [(start, end) for start, end in gaps if end - start <= LONGEST_UNSEEN_M]
+    return [(start, end) for start, end in gaps if end - start <= MAX_UNSEEN_M]
 
 
-def _drawn_across(line: np.ndarray, along: np.ndarray, unseen: list[tuple[float, float]]) -> np.ndarray:
-    """Draw a line as a smooth curve across unseen stretches, from what is seen of it before and after them."""
+def _redrawn(line: np.ndarray, along: np.ndarray, unseen: list[tuple[float, float]]) -> np.ndarray:
+    """Redraw unseen sections of a line as smooth curves from the line on either side."""
     line = line.copy()
     for start, end in unseen:
         first, last = np.searchsorted(along, [start, end])

@@ -1,4 +1,4 @@
-"""Whether the smoothing in plan leaves lines within reach of their railheads."""
+"""Check that the smoothing in plan leaves lines close enough to their railheads for the points to correct them."""
 
 from __future__ import annotations
 
@@ -13,36 +13,48 @@ from ..polyline import interpolate, is_closed, length_along
 from ..progress import Progress
 from ..rails import RailLine
 
-REACH_HEADS = 0.5
-"""Displacement, in head widths, from which points bring a line back to within a centimetre, for it still lies over the
-head. On a head of 72 mm in an arc of 15 m, 40 mm are brought back, and 90 mm are not."""
+MAX_SHIFT_HEADS = 0.5
+"""Largest displacement, in head widths, that points correct to within a centimetre, because the line is still above the
+head. For a head of 72 mm in an arc of 15 m radius, 40 mm are corrected and 90 mm are not."""
 
-SHARPEST_M = 10.0
-"""Radius of a tram's sharpest curve; what bends more sharply is no rail's curve."""
+MIN_RADIUS_M = 10.0
+"""Radius of the tightest tram curve; a line that bends more sharply is not following a rail."""
 
 END_SHIFT = 0.26
-"""Where a line ends in an arc of radius R, PAEK draws it aside by this times sigma² / R (docs/method.md section 5.4);
-where the arc begins at a straight, by half as much."""
+"""Displacement by PAEK at the end of a line in an arc of radius R, in units of sigma² / R (docs/method.md section 5.4);
+half as much where an arc follows a straight."""
 
 
 def warn_if_out_of_reach(
     rails: Sequence[RailLine], head_width_m: float, smoothing_m: float, progress: Progress
 ) -> None:
-    """Tell the user that the smoothing cuts curves so far that points can't bring the lines back onto their heads."""
-    limit_m = REACH_HEADS * head_width_m
-    if END_SHIFT * smoothing_m**2 / SHARPEST_M <= limit_m:
+    """Warn the user if the smoothing displaces lines in curves by more than the points can correct.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+    head_width_m : float
+    smoothing_m : float
+        Sigma of PAEK in plan.
+    progress : Progress
+        Receives the warning.
+    """
+    limit_m = MAX_SHIFT_HEADS * head_width_m
+    if END_SHIFT * smoothing_m**2 / MIN_RADIUS_M <= limit_m:
         return
     largest_m = max((displacement(rail.xyz[:, :2], smoothing_m) for rail in rails), default=0.0)
     if largest_m > limit_m:
         best_m = math.floor(10 * smoothing_m * math.sqrt(limit_m / largest_m)) / 10
         progress.warning(
-            f"SMOOTHING_XY of {smoothing_m:g} m draws lines in curves up to {1000 * largest_m:.0f} mm aside, farther "
-            f"than points can bring them back: set it to {best_m:g} m or less."
+            f"SMOOTHING_XY of {smoothing_m:g} m displaces lines in curves by up to {1000 * largest_m:.0f} mm, more "
+            f"than points can correct: set it to {best_m:g} m or less."
         )
 
 
 def displacement(line: np.ndarray, smoothing_m: float) -> float:
-    """Measure how far PAEK draws a line aside at most, metres: lines that follow their rails show what it did to them.
+    """Return the largest displacement of a line by PAEK, metres.
+
+    Applied to a line that follows its rail, it shows how far the line was displaced before.
 
     Parameters
     ----------

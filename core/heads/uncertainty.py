@@ -1,8 +1,9 @@
-"""How far a rail's line may lie beside the head's axis: one standard deviation at stations along it.
+"""Standard error of a rail's line across the head's axis, at stations along the line.
 
-Four parts, each independent of the others: how few and noisy points draw the edges (sampling), how much the answer
-hangs on one edge that alone is seen well (view), how far away the nearest points are (bridging), and how far off the
-middle between the edges is from the line as it stands (remainder). Where no edges are seen, none of them is known.
+It has four independent parts: the number and noise of the points at the edges (sampling), how much the result depends
+on the one edge that is clearly visible (view), the distance to the nearest points (bridging), and the distance between
+the line and the middle of the edges (remainder). None of them is known where no edges are visible. See docs/method.md
+section 6.6.
 """
 
 from __future__ import annotations
@@ -13,11 +14,11 @@ from scipy.ndimage import uniform_filter1d
 from ..lines.smoothing import smooth_profile
 from ..polyline import distance_to
 from ..rails import Support
-from .edges import BLUR_BINS, HALF_HEAD, STATION_M, Heads, histograms
+from .edges import BLUR_BINS, HALF_HEAD_BINS, STATION_STEP_M, CrossSections, histograms
 from .level import on_top
 
 VARIANCE_FACTOR = 0.33375
-"""Of independent points `spacing` apart, PAEK's result has this variance times spacing / sigma (docs/method.md
+"""Variance of PAEK's result for independent points with a variance of 1, in units of spacing / sigma (docs/method.md
 section 5.3)."""
 
 
@@ -36,16 +37,16 @@ def measure_support(
     Parameters
     ----------
     t, across, z : (n,) arrays
-        Points near the line: chainage, increasing, offset to its left, and height; metres.
+        Chainage (increasing), offset to the left and height of points near the line, metres.
     length_m : float
         Plan length of the line.
     head_width_m : float
     smoothing_m : float
         Sigma of PAEK that smoothed the line in plan.
     unseen_m : float
-        Standard deviation of the line where the points show no edges of a head.
+        Standard deviation of the line where no edges of the head are visible.
     free : (2, s) bool array
-        Where its right and left edge stand free of other heads; see `neighbours.free_edges`.
+        Where the right and the left edge are free of other heads; see `neighbours.free_edges`.
 
     Returns
     -------
@@ -53,17 +54,17 @@ def measure_support(
     """
     top, noise_m = on_top(t, across, z, head_width_m)
     stations, counts, wide_counts = histograms(t[top], across[top], length_m, head_width_m)
-    points = np.bincount(np.minimum((t[top] / STATION_M).astype(int), len(stations) - 1), minlength=len(stations))
-    heads, bin_m = Heads.of(wide_counts), head_width_m / (2 * HALF_HEAD)
-    edges = heads.seen_edges(free)
-    middle = edges.narrowed(counts, wide_counts)
+    points = np.bincount(np.minimum((t[top] / STATION_STEP_M).astype(int), len(stations) - 1), minlength=len(stations))
+    sections, bin_m = CrossSections.of(wide_counts), head_width_m / (2 * HALF_HEAD_BINS)
+    edges = sections.find_edges(free)
+    middle = edges.middles_in(counts, wide_counts)
     known = np.isfinite(middle)
     if known.sum() < 2:
         return Support(stations, points, np.full(len(stations), unseen_m))
     averaged = np.maximum(_averaged(points, smoothing_m), counts.sum(axis=1))
     share = averaged / np.maximum(wide_counts.sum(axis=1), 1)
     sampling = _sampling(edges.density * share / bin_m, edges.weight, noise_m, BLUR_BINS * bin_m)
-    view = (heads.best(edges) - heads.best(edges.alike(free))) * bin_m / np.sqrt(3)
+    view = (sections.middles(edges) - sections.middles(edges.equally_weighted(free))) * bin_m / np.sqrt(3)
     bridging = sampling * distance_to(t[top], stations) / smoothing_m
     remainder = smooth_profile(stations[known], middle[known] * bin_m, smoothing_m, stations)
     sigma = np.sqrt(sampling**2 + view**2 + bridging**2 + remainder**2)
@@ -71,16 +72,24 @@ def measure_support(
 
 
 def _averaged(points: np.ndarray, smoothing_m: float) -> np.ndarray:
-    """Count the points that PAEK averages at each station: as many as an even mean over its length would, (s,)."""
-    size = max(int(round(smoothing_m / VARIANCE_FACTOR / STATION_M)), 1)
+    """Return the number of points that PAEK averages at each station, (s,): those of an equivalent moving average."""
+    size = max(int(round(smoothing_m / VARIANCE_FACTOR / STATION_STEP_M)), 1)
     return uniform_filter1d(points.astype(float), size, mode="constant") * size
 
 
 def _sampling(density: np.ndarray, weight: np.ndarray, noise_m: float, blur_m: float) -> np.ndarray:
-    """Estimate how far chance moves the middle between both edges, (s,), given (2, s) points a metre across.
+    """Estimate the standard deviation of the middle between both edges that is due to chance, (s,) metres.
 
-    An edge is where the blurred density falls to half. There it varies, as counts do, by density / (4 √π blur), and
-    falls by density / (√2π spread) a metre, with the spread that blur and noise together give the edge.
+    An edge is where the blurred density falls to half. There the density has, like any count, the variance density /
+    (4 √π blur), and it falls by density / (√2π spread) per metre; the spread of the edge comes from blur and noise.
+
+    Parameters
+    ----------
+    density : (2, s) array
+        Points per metre across, just inside the edges.
+    weight : (2, s) array
+        Weights of the edges.
+    noise_m, blur_m : float
     """
     spread_m = np.hypot(blur_m, noise_m)
     variance = np.sqrt(np.pi) * spread_m**2 / (2 * blur_m * np.maximum(density, 1e-9))

@@ -50,7 +50,7 @@ FAULTS = [
         "SMOOTHING_XY too large for a sharp curve",
         in_a_sharp_curve(SMOOTHING_XY=2.5),
         WARNED,
-        "SMOOTHING_XY of 2.5 m draws lines in curves up to … mm aside, farther than points can bring them back: set it "
+        "SMOOTHING_XY of 2.5 m displaces lines in curves by up to … mm, more than points can correct: set it "
         "to … m or less.",
         {"RAIL_COUNT": 2, "CENTERLINE_COUNT": 1},
     ),

@@ -47,7 +47,7 @@ def test_a_straight_line_stays():
 
 def test_three_metres_are_too_many_in_a_tram_curve():
     assert warned(arc(25.0), 3.0) == [
-        "SMOOTHING_XY of 3 m draws lines in curves up to 98 mm aside, farther than points can bring them back: "
+        "SMOOTHING_XY of 3 m displaces lines in curves by up to 98 mm, more than points can correct: "
         "set it to 1.8 m or less."
     ]
     assert warned(arc(25.0), 1.8) == []
