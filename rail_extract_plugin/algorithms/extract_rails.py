@@ -9,7 +9,6 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
-    QgsCoordinateReferenceSystem,
     QgsProcessingContext,
     QgsProcessingUtils,
 )
@@ -21,6 +20,7 @@ from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource, spool_points
+from ..systems import system
 from ..writing.layers import (
     CENTERLINES,
     RAILS,
@@ -155,8 +155,6 @@ class ExtractRails(RailAlgorithm):
         if not any(raster.tiles for raster in network.cleaned):
             return {}
         rasters, frame = on_one_grid(network.cleaned, network.frame)
-        extent = ParameterValues(self, parameters, context).extent(
-            QgsCoordinateReferenceSystem(network.frame.crs_wkt or "")
-        )
+        extent = ParameterValues(self, parameters, context).extent(system(network.frame.crs_wkt))
         header = header_for(rasters, class_codes, frame, job.standard, extent)
         return write_raster(self, "CLEANED", header, rasters, parameters, context)

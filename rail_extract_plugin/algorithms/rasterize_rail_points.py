@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from qgis.core import QgsCoordinateReferenceSystem, QgsProcessingContext, QgsProcessingParameterRasterDestination
+from qgis.core import QgsProcessingContext, QgsProcessingParameterRasterDestination
 
 from ...core.frpdf.models import choose as choose_model
 from ...core.progress import Progress
@@ -16,6 +16,7 @@ from ..dialog.definitions import helped
 from ..dialog.parameter_values import ParameterValues
 from ..i18n import tr
 from ..reading.clouds import CloudSource, read_points
+from ..systems import system
 from ..writing.layers import write_raster
 from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
 
@@ -77,6 +78,6 @@ class RasterizeRailPoints(RailAlgorithm):
         cell_m = cell_size(job.standard.gauge_m, job.standard.head_width_m)
         rasters = [rasterize(points.xyz, cell_m) for points in clouds]
         frame, codes = clouds[0].frame, [points.class_code for points in clouds]
-        extent = values.extent(QgsCoordinateReferenceSystem(frame.crs_wkt or ""))
+        extent = values.extent(system(frame.crs_wkt))
         header = header_for(rasters, codes, frame, job.standard, extent)
         return write_raster(self, "OUTPUT", header, rasters, parameters, context, progress.span(READING, 1))

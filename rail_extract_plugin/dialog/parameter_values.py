@@ -18,7 +18,8 @@ from qgis.core import (
 
 from ...core.errors import ParameterError, RailExtractError, RasterError
 from ...core.standards import CUSTOM, DEFAULT, LAST_CLASS, RailStandard, distinct_gauges, resolve
-from ..reading.clouds import CloudSource, check_lengths, cloud_source
+from ..reading.clouds import CloudSource, checked_crs, cloud_source
+from ..systems import prepare_system
 
 if TYPE_CHECKING:
     from ...core.pipeline import Parameters
@@ -108,7 +109,9 @@ class ParameterValues:
         if layer is None:
             raise RasterError(f"{name} is no raster that can be read: give the output of Rasterize Rail Points.")
         path = Path(layer.source())
-        return path, read_header(path)
+        header = read_header(path)
+        prepare_system(header.frame.crs_wkt)
+        return path, header
 
     def lines(self, name: str) -> QgsProcessingFeatureSource:
         """Find a layer of lines.
@@ -118,7 +121,7 @@ class ParameterValues:
         RailExtractError
             There is no such layer, it is one of points, polygons or nothing, or it is in degrees.
         """
-        from ..reading.line_layers import check_system
+        from ..reading.line_layers import check_system, wkt_of
 
         source = self._algorithm.parameterAsSource(self._parameters, name, self._context)
         if source is None:
@@ -129,6 +132,7 @@ class ParameterValues:
                 f"{name} is a layer of the type {QgsWkbTypes.displayString(kind)}: give a layer of lines."
             )
         check_system(source.sourceCrs())
+        prepare_system(wkt_of(source.sourceCrs()))
         return source
 
     def cloud(self, name: str) -> CloudSource:
@@ -142,7 +146,7 @@ class ParameterValues:
                 f"CRS {crs.authid()} is in degrees, where lengths can't be measured: choose a projected one."
             )
         source = replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
-        check_lengths(source)
+        prepare_system(checked_crs(source))
         return source
 
     def extent(self, crs: QgsCoordinateReferenceSystem) -> tuple[float, float, float, float] | None:

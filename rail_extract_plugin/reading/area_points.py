@@ -14,6 +14,7 @@ from ...core.clouds.points import RailPoints
 from ...core.errors import CrsError, NoRailPointsError
 from ...core.frame import LocalFrame
 from ...core.progress import Progress
+from ..systems import system
 from .clouds import Bounds, BoundsIn, CloudSource, crs_of, read_points, spool_points
 
 if TYPE_CHECKING:
@@ -110,4 +111,4 @@ def check_same_plane(name: str, crs_wkt: str | None, other_name: str, other: Loc
 
 
 def _title(wkt: str) -> str:
-    return QgsCoordinateReferenceSystem(wkt).description()
+    return system(wkt).description()

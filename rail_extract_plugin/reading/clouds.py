@@ -20,6 +20,7 @@ from ...core.clouds.readers import list_files, read_header
 from ...core.errors import CloudError
 from ...core.progress import Progress
 from ...core.standards import RAIL_CLASS
+from ..systems import system
 
 if TYPE_CHECKING:
     from ...core.clouds.points import RailPoints
@@ -93,8 +94,7 @@ def read_points(
     """
     from ...core.clouds.points import read_rail_points
 
-    crs = QgsCoordinateReferenceSystem(crs_of(source) or "")
-    return read_rail_points(source.paths, class_codes, source.crs_wkt, bounds(crs), progress)
+    return read_rail_points(source.paths, class_codes, source.crs_wkt, bounds(system(crs_of(source))), progress)
 
 
 def spool_points(
@@ -119,8 +119,7 @@ def spool_points(
     from ...core.clouds.points import ask
     from ...core.squares.spool import spool
 
-    crs = QgsCoordinateReferenceSystem(crs_of(source) or "")
-    request = ask(source.paths, class_codes, source.crs_wkt, bounds(crs), progress)
+    request = ask(source.paths, class_codes, source.crs_wkt, bounds(system(crs_of(source))), progress)
     return spool(request, side_m, folder, progress)
 
 
@@ -129,8 +128,10 @@ def crs_of(source: CloudSource) -> str | None:
     return read_header(list_files(source.paths)[0]).crs_wkt or source.crs_wkt
 
 
-def check_lengths(source: CloudSource) -> None:
-    """Refuse a cloud in degrees by the header of its first file; the run reports all other errors in files.
+def checked_crs(source: CloudSource) -> str | None:
+    """Return the coordinate system of a cloud's points as WKT, by the header of the first file.
+
+    None where there is none; also where the file is damaged, which the run reports.
 
     Raises
     ------
@@ -140,9 +141,9 @@ def check_lengths(source: CloudSource) -> None:
     from ...core.clouds.points import ask
 
     try:
-        ask(list_files(source.paths)[:1], (RAIL_CLASS,), source.crs_wkt)
+        return ask(list_files(source.paths)[:1], (RAIL_CLASS,), source.crs_wkt).zero.crs_wkt
     except CloudError:
-        return
+        return None
 
 
 def _loaded_layer(name: str, context: QgsProcessingContext) -> QgsMapLayer | None:

@@ -112,8 +112,13 @@ def _system(crs: QgsCoordinateReferenceSystem, progress: Progress) -> tuple[str 
         progress.warning("The lines have no coordinate system: their coordinates are taken as metres.")
         return None, 1.0, 1.0
     check_system(crs)
-    wkt = crs.toWkt(QgsCoordinateReferenceSystem.WktVariant.WKT_PREFERRED)
+    wkt = wkt_of(crs)
     return (wkt, *units(parse_crs(wkt)))
+
+
+def wkt_of(crs: QgsCoordinateReferenceSystem) -> str:
+    """Return a coordinate system as WKT 2; empty for an invalid one."""
+    return crs.toWkt(QgsCoordinateReferenceSystem.WktVariant.WKT_PREFERRED)
 
 
 def check_system(crs: QgsCoordinateReferenceSystem) -> None:

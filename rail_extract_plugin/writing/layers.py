@@ -35,6 +35,7 @@ from ...core.fields import (
 )
 from ...core.progress import SILENT, Progress
 from ..compat import INTEGER, REAL, TEXT, field
+from ..systems import system
 from .styling import style_on_load
 from .whole_files import write_whole
 
@@ -182,7 +183,7 @@ def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, Any]:
 
 def output_crs(wkt: str | None) -> QgsCoordinateReferenceSystem:
     """Coordinate system for an output, `UNKNOWN_IN_METRES` where the cloud has none."""
-    return QgsCoordinateReferenceSystem.fromWkt(wkt or UNKNOWN_IN_METRES)
+    return system(wkt or UNKNOWN_IN_METRES)
 
 
 def _write(

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsCoordinateReferenceSystem, QgsProcessingAlgorithm, QgsProcessingContext
+from qgis.core import QgsProcessingAlgorithm, QgsProcessingContext
 
 from ...core.errors import RailExtractError
 from ...core.standards import RailStandard
+from ..systems import system
 
 if TYPE_CHECKING:
     from ...core.rails import RailNetwork
@@ -86,7 +87,7 @@ def write_report(
 
 def _facts(network: RailNetwork, origin: Origin) -> dict[str, str]:
     """State what the figures hang on."""
-    crs = QgsCoordinateReferenceSystem(network.frame.crs_wkt or "")
+    crs = system(network.frame.crs_wkt)
     return {
         "Rail": origin.standard.label,
         "Gauge": ", ".join(f"{1000 * gauge_m:g} mm" for gauge_m in origin.gauges_m),
