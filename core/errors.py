@@ -1,22 +1,22 @@
-"""Errors of the core; each message is one sentence that says what is wrong and what to do."""
+"""Errors of the core. Each message is one sentence that states what is wrong and what to do."""
 
 from __future__ import annotations
 
 
 class RailExtractError(Exception):
-    """Base of every error that a user can remedy."""
+    """Base class of the errors that a user can put right."""
 
 
 class CloudError(RailExtractError):
-    """A point cloud file is missing, empty, damaged or no point cloud."""
+    """A point cloud file is missing, empty, damaged or not a point cloud."""
 
 
 class NoRailPointsError(RailExtractError):
-    """The cloud has no point of the wanted classes."""
+    """The cloud has no points of the rail classes."""
 
 
 class CrsError(RailExtractError):
-    """The coordinate reference system can't be computed in."""
+    """Lengths can't be computed in the coordinate system, or it is unknown."""
 
 
 class ParameterError(RailExtractError):
@@ -24,23 +24,23 @@ class ParameterError(RailExtractError):
 
 
 class RasterError(RailExtractError):
-    """A raster does not fit what the step expects of it."""
+    """A raster does not meet the requirements of a step."""
 
 
 class ModelError(RailExtractError):
-    """The network's weights are missing, damaged or don't fit the rail standard."""
+    """The network's weights are missing, are damaged or don't fit the rail standard."""
 
 
 class NoTrackError(RailExtractError):
-    """Rails were found but no two of them make a track of the given gauge."""
+    """Rails were found, but no two of them form a track of the given gauge."""
 
 
 class DiskError(RailExtractError):
-    """A file can't be written, as on a full disk."""
+    """A file can't be written, for example because the disk is full."""
 
 
 class DeviceExhaustedError(Exception):
-    """The device has too little memory for so many cells at once."""
+    """The device does not have enough memory for the cells given to it at once."""
 
 
 class Cancelled(Exception):  # noqa: N818 - not an error: the user asked for it

@@ -1,9 +1,10 @@
-"""Geometry along plan polylines: stations, normals, feet of points, and which end is the start."""
+"""Geometry along polylines in plan: stations, normals, projection of points, and direction."""
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,26 +13,26 @@ from scipy.spatial import cKDTree
 from .progress import SILENT, Progress
 
 STATION_M = 0.05
-"""Spacing of the stations at which points look for their line; of two lines this close, either may be taken."""
+"""Spacing of the stations among which points find their nearest line; of two lines this close, either is taken."""
 
 POINTS_AT_ONCE = 500_000
-"""Points projected in one go: bounds the memory, and lets a cancel through several times a second."""
+"""Points projected at once: limits the memory, and allows several checks for cancellation per second."""
 
 POINTS_FOR_THREADS = 10_000
-"""Fewer are projected by one thread: to start one for each core takes 0.3 ms on two cores, and these take 2 ms."""
+"""Fewer points are projected by a single thread: on two cores, starting the threads takes 0.3 ms, the points 2 ms."""
 
 CLOSED_M = 0.01
-"""A line whose ends lie this close together is closed; ours meet exactly, and thinning leaves ends where they are."""
+"""Largest distance between the ends of a closed line; the ends of extracted rings coincide, even after thinning."""
 
-LEAST_ROUND_M = 10.0
-"""A closed rail is longer: a track can't turn in less."""
+MIN_RING_M = 10.0
+"""Shortest closed rail: no track turns round in less."""
 
 NORTH_TANGENT = np.tan(np.radians(1.0))
-"""A line within one degree of north starts at its southern end, not at its western one."""
+"""Lines within one degree of north start at their southern end, all others at their western end."""
 
 
 def length_along(vertices: np.ndarray) -> np.ndarray:
-    """Distance of each vertex from the first, along the line.
+    """Return the distance of each vertex from the first, along the line.
 
     Parameters
     ----------
@@ -41,18 +42,23 @@ def length_along(vertices: np.ndarray) -> np.ndarray:
     Returns
     -------
     (n,) float array, starting at 0
+
+    Examples
+    --------
+    >>> length_along(np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 10.0]])).tolist()
+    [0.0, 5.0, 11.0]
     """
     steps = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def resample(vertices: np.ndarray, step_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Place stations at equal distances of at most `step_m` along a polyline, both ends among them.
+    """Place stations along a polyline, from end to end, at equal distances of at most `step_m`.
 
     Parameters
     ----------
     vertices : (n, d) array
-        A polyline of some length; distances are measured in the first two columns.
+        A polyline of nonzero length; distances are measured in the first two columns.
     step_m : float
 
     Returns
@@ -60,6 +66,12 @@ def resample(vertices: np.ndarray, step_m: float) -> tuple[np.ndarray, np.ndarra
     stations : (m, d) array
     t : (m,) array
         Plan distance from the start.
+
+    Examples
+    --------
+    >>> stations, t = resample(np.array([[0.0, 0.0], [10.0, 0.0]]), 4.0)
+    >>> t.round(2).tolist()
+    [0.0, 3.33, 6.67, 10.0]
     """
     along = length_along(vertices[:, :2])
     t = np.linspace(0.0, along[-1], max(int(np.ceil(along[-1] / step_m)), 1) + 1)
@@ -67,37 +79,55 @@ def resample(vertices: np.ndarray, step_m: float) -> tuple[np.ndarray, np.ndarra
 
 
 def is_closed(line: np.ndarray) -> bool:
-    """Tell whether a line, (n, 2) or (n, 3), ends in plan where it begins."""
-    return np.hypot(*(line[-1, :2] - line[0, :2])) <= CLOSED_M and length_along(line[:, :2])[-1] > LEAST_ROUND_M
+    """Return whether a line, (n, 2) or (n, 3), ends in plan where it starts."""
+    dx, dy = line[-1, :2] - line[0, :2]
+    return math.hypot(dx, dy) <= CLOSED_M and bool(length_along(line[:, :2])[-1] > MIN_RING_M)
 
 
 def interpolate(values: np.ndarray, along: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Interpolate the columns of `values`, (n, d) given at `along`, linearly at `t`; returns (m, d)."""
+    """Interpolate linearly between rows of an array.
+
+    Parameters
+    ----------
+    values : (n, d) array
+    along : (n,) array
+        Chainage of each row, increasing.
+    t : (m,) array
+        Chainages to interpolate at.
+
+    Returns
+    -------
+    (m, d) array
+    """
     return np.column_stack([np.interp(t, along, column) for column in values.T])
 
 
 def unit_tangents(vertices: np.ndarray) -> np.ndarray:
-    """Directions of a polyline at its vertices, (n, 2) unit vectors; of (n, d) vertices the first two columns count."""
+    """Return the plan directions of a polyline, (n, d), at its vertices as (n, 2) unit vectors."""
     ahead = np.diff(vertices[:, :2], axis=0)
     both = np.concatenate([ahead[:1], ahead[:-1] + ahead[1:], ahead[-1:]])
     return both / np.maximum(np.linalg.norm(both, axis=1, keepdims=True), np.finfo(float).tiny)
 
 
 def distance_to(t: np.ndarray, stations: np.ndarray) -> np.ndarray:
-    """Distance of stations from the nearest of the chainages `t`, increasing; inf where there are none."""
+    """Return the distance of stations from the nearest of the chainages `t`, increasing; inf if there are none."""
     around = np.concatenate([[-np.inf], t, [np.inf]])
     after = np.searchsorted(t, stations) + 1
     return np.minimum(stations - around[after - 1], around[after] - stations)
 
 
 def left_normals(vertices: np.ndarray) -> np.ndarray:
-    """Point to the left of a polyline at its vertices; (n, 2) unit vectors."""
+    """Return the normals to the left of a polyline at its vertices as (n, 2) unit vectors."""
     tangents = unit_tangents(vertices)
     return np.column_stack([-tangents[:, 1], tangents[:, 0]])
 
 
 def starts_at_its_end(vertices: np.ndarray) -> bool:
-    """Tell whether a line has to be turned around to start in the west, or in the south when it runs north."""
+    """Return whether a line must be reversed to start in the west, or in the south if it runs north.
+
+    >>> starts_at_its_end(np.array([[5.0, 0.0], [0.0, 0.0]]))
+    True
+    """
     dx, dy = vertices[-1, :2] - vertices[0, :2]
     if abs(dx) <= NORTH_TANGENT * abs(dy):
         return bool(dy < 0)
@@ -106,16 +136,16 @@ def starts_at_its_end(vertices: np.ndarray) -> bool:
 
 @dataclass(frozen=True)
 class Feet:
-    """Points and where they project perpendicularly onto the nearest of several lines.
+    """Feet of points: their perpendicular projections onto the nearest of several lines.
 
     Attributes
     ----------
     point, line : (n,) int arrays
-        Numbers of the points and of the lines; sorted by line, then by `t`.
+        Indices of the points and of the lines; sorted by line, then by `t`.
     t : (n,) array
-        Distance of the foot from the line's start, metres.
+        Chainage of the foot in metres.
     across : (n,) array
-        Distance of the point from its foot, metres, positive to the left of the line.
+        Distance of the point from its foot in metres, positive to the left of the line.
     """
 
     point: np.ndarray
@@ -124,7 +154,7 @@ class Feet:
     across: np.ndarray
 
     def of(self, line: int) -> Feet:
-        """Pick those on one line."""
+        """Return the feet on one line."""
         mine = slice(*np.searchsorted(self.line, [line, line + 1]))
         return self[mine]
 
@@ -133,14 +163,21 @@ class Feet:
 
 
 def project(lines: Sequence[np.ndarray], xy: np.ndarray, reach_m: float, progress: Progress = SILENT) -> Feet:
-    """Project points onto the nearest line; points further away than `reach_m` or past a line's end are left out.
+    """Project points onto the nearest line; points beyond `reach_m` or past a line's end are left out.
 
     Parameters
     ----------
     lines : sequence of (n, 2) arrays
     xy : (k, 2) array
     reach_m : float
+        Largest distance between a point and its foot, metres.
     progress : Progress
+
+    Examples
+    --------
+    >>> feet = project([np.array([[0.0, 0.0], [10.0, 0.0]])], np.array([[4.0, 0.05], [7.0, 3.0]]), reach_m=0.1)
+    >>> feet.point.tolist(), feet.t.round(3).tolist(), feet.across.round(3).tolist()
+    ([0], [4.0], [0.05])
     """
     if not len(lines) or not len(xy):
         nothing = np.empty(0)
@@ -154,17 +191,17 @@ def project(lines: Sequence[np.ndarray], xy: np.ndarray, reach_m: float, progres
 
 
 def threads() -> int:
-    """Give the number of threads to compute with, as scipy takes it: all cores, unless this process is told a number.
+    """Return the number of threads for scipy to use: that in OMP_NUM_THREADS, else -1 for all cores.
 
-    Numerical libraries go by the same variable; Dask sets it for each of several workers on a computer.
+    Other numerical libraries follow the same variable; Dask sets it for its workers.
     """
-    told = os.environ.get("OMP_NUM_THREADS", "")
-    return int(told) if told.isdecimal() and int(told) else -1
+    number = os.environ.get("OMP_NUM_THREADS", "")
+    return int(number) if number.isdecimal() and int(number) else -1
 
 
 @dataclass(frozen=True)
 class _Stations:
-    """Stations of several lines in one row; piece k runs from station k to station k + 1."""
+    """Stations of several lines, one line after the other; segment k runs from station k to station k + 1."""
 
     tree: cKDTree
     line: np.ndarray
@@ -176,8 +213,8 @@ class _Stations:
         number = np.repeat(np.arange(len(lines), dtype=np.int32), [len(one) for one in t])
         return cls(cKDTree(np.concatenate(stations)), number, np.concatenate(t))
 
-    def feet(self, xy: np.ndarray, first: int, reach_m: float) -> Iterator[np.ndarray]:
-        """Numbers of the points in reach (the first of `xy` is number `first`), their lines, t and across."""
+    def feet(self, xy: np.ndarray, first: int, reach_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return indices of the points in reach (that of `xy[0]` is `first`), and their lines, t and across."""
         workers = threads() if len(xy) > POINTS_FOR_THREADS else 1
         distance, nearest = self.tree.query(xy, distance_upper_bound=reach_m + STATION_M, workers=workers)
         near = np.flatnonzero(np.isfinite(distance))
@@ -187,23 +224,27 @@ class _Stations:
         inside = np.abs(across) <= reach_m
         return near[inside] + first, self.line[nearest[inside]], t[inside], across[inside]
 
-    def _foot(self, xy: np.ndarray, piece: np.ndarray) -> np.ndarray:
-        """Place and signed distance of the feet on one piece for each point, (2, k); inf where there is no such foot.
+    def _foot(self, xy: np.ndarray, segment: np.ndarray) -> np.ndarray:
+        """Return t and across of each point's foot on one segment, (2, k); inf where there is none.
 
-        Feet up to a hundredth of a piece past its ends count, so that none is lost outside a bend.
+        A foot may lie up to 1 % of the segment's length past its ends, so that no point outside a bend is lost.
         """
-        start, end = np.maximum(piece, 0), np.minimum(piece + 1, len(self.t) - 1)
+        start, end = np.maximum(segment, 0), np.minimum(segment + 1, len(self.t) - 1)
         a, b = self.tree.data[start], self.tree.data[end]
         length = self.t[end] - self.t[start]
-        is_piece = (piece == start) & (self.line[start] == self.line[end]) & (length > 0)
-        direction = (b - a) / np.where(is_piece, length, 1.0)[:, None]
+        exists = (segment == start) & (self.line[start] == self.line[end]) & (length > 0)
+        direction = (b - a) / np.where(exists, length, 1.0)[:, None]
         ahead = np.einsum("ij,ij->i", xy - a, direction)
         across = direction[:, 0] * (xy[:, 1] - a[:, 1]) - direction[:, 1] * (xy[:, 0] - a[:, 0])
-        is_foot = is_piece & (ahead > -0.01 * length) & (ahead < 1.01 * length)
+        is_foot = exists & (ahead > -0.01 * length) & (ahead < 1.01 * length)
         return np.where(is_foot, [self.t[start] + ahead, across], np.inf)
 
 
 def runs(marked: np.ndarray) -> list[tuple[int, int]]:
-    """First and last number of each run of marked items."""
+    """Return the first and the last index of each run of marked items.
+
+    >>> runs(np.array([False, True, True, False, True]))
+    [(1, 2), (4, 4)]
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8)))
     return [(int(first), int(after) - 1) for first, after in edges.reshape(-1, 2)]

@@ -1,4 +1,4 @@
-"""The lines that come out: rails and track centerlines, with the figures that go into their fields."""
+"""Results of an extraction: rails, track centerlines and track geometry, with the figures for their fields."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from .polyline import length_along
 from .raster import RailRaster
 
 SAME_PLACE_M = 1e-9
-"""Vertices closer together than this along a line are one."""
+"""Vertices closer than this along a line are the same."""
 
 NO_GAPS = np.empty((0, 2))
 
 
 @dataclass(frozen=True)
 class Support:
-    """How well points support a line, at stations of equal distance along it; (n,) arrays.
+    """Support of a line by points, at equidistant stations along it; (n,) arrays.
 
     Attributes
     ----------
     t : float
-        Plan chainage of the stations, metres.
+        Plan chainage of the stations in metres.
     points : int
-        Points on top of the head that are nearest to the station.
+        Points on top of the railhead for which this is the nearest station.
     sigma_m : float
-        Standard deviation of the line's lateral position.
+        Standard error of the line's lateral position.
     """
 
     t: np.ndarray
@@ -36,44 +36,44 @@ class Support:
 
     @property
     def rms_m(self) -> float:
-        """Standard deviation of the line as a whole."""
+        """Standard error of the whole line (RMS)."""
         return float(np.sqrt(np.mean(self.sigma_m**2)))
 
     def between(self, start: float, end: float) -> Support:
-        """Cut out the stretch from `start` to `end`, with one station at least; chainages then count from `start`."""
+        """Return the part from `start` to `end`, with at least one station; its chainages count from `start`."""
         inside = (self.t >= start) & (self.t <= end)
         inside[np.argmin(np.abs(self.t - 0.5 * (start + end)))] = True
         return self.select(inside, start)
 
     def select(self, which: np.ndarray, start: float) -> Support:
-        """Keep the stations marked in `which`, (n,) bool; chainages then count from `start`."""
+        """Return the stations marked in `which`, (n,) bool; their chainages count from `start`."""
         return Support(self.t[which] - start, self.points[which], self.sigma_m[which])
 
     def reversed(self, length_m: float) -> Support:
-        """Run the line, of this length, the other way."""
+        """Return the support of the reversed line, given the line's length."""
         return Support(length_m - self.t[::-1], self.points[::-1], self.sigma_m[::-1])
 
 
 @dataclass(frozen=True)
 class RailLine:
-    """The top of one railhead on the head's own axis.
+    """A rail: the top of its railhead, on the axis of the railhead.
 
     Attributes
     ----------
     xyz : (n, 3) array
-        Vertices in local metres, from the western end (the southern end where the line runs within one degree of
-        north); z is NaN everywhere when there were no points to give height.
+        Vertices in local metres, from the western end, or from the southern end if the line runs within one degree of
+        north. z is NaN everywhere if no points gave heights.
     rail_id, class_code : int
-    points : int
-        Rail points that support the line; of a piece of one, the share of them, which may be no whole number.
+    points : float
+        Number of points that support the line; for part of a line, its share of them, which may be a fraction.
     resid_mm : float
-        Root mean square of the supporting points' offsets across the line.
+        Root mean square of the lateral distances between these points and the line.
     sigma_mm : float
-        Standard deviation of the line's lateral position: two thirds of the line lie within it.
+        Standard error of the line's lateral position: two thirds of the line are within it.
     bridged_m : float
         Plan length without supporting points.
     gaps : (k, 2) array
-        Where these stretches start and end, in plan chainage along the line; none are known of lines read from files.
+        Plan chainages at which the sections without points start and end; empty for lines read from files.
     support : Support or None
         Support along the line; None for lines read from files.
     """
@@ -81,7 +81,7 @@ class RailLine:
     xyz: np.ndarray
     rail_id: int
     class_code: int
-    points: int
+    points: float
     resid_mm: float
     sigma_mm: float
     bridged_m: float
@@ -90,12 +90,12 @@ class RailLine:
 
     @property
     def length_m(self) -> float:
-        """Length in space; in plan where the line has no height."""
+        """Length in 3D; in plan if the line has no heights."""
         flat = np.isnan(self.xyz[:, 2]).any()
         return float(length_along(self.xyz[:, :2] if flat else self.xyz)[-1])
 
     def bridged_before(self, t: np.ndarray) -> np.ndarray:
-        """Length of gaps between the start and the chainages `t`, (n,) metres; beyond the line's ends all is gap."""
+        """Return the length of gaps before chainages `t`, (n,) metres; everything beyond the line's ends is a gap."""
         beyond = t - np.clip(t, 0.0, length_along(self.xyz[:, :2])[-1])
         if not len(self.gaps):
             return beyond
@@ -103,7 +103,7 @@ class RailLine:
         return beyond + np.interp(t, self.gaps.ravel(), np.repeat(np.append(0.0, passed), 2)[1:-1])
 
     def between(self, start: float, end: float) -> RailLine:
-        """Cut out the stretch between two plan chainages; it gets that share of the points that its stations count."""
+        """Return the part between two plan chainages, with the share of the points that its stations count."""
         along = length_along(self.xyz[:, :2])
         if start <= 0.0 and end >= along[-1]:
             return self
@@ -121,7 +121,7 @@ class RailLine:
         return replace(self, xyz=xyz, points=self.points * share, gaps=gaps, support=support)
 
     def reversed(self) -> RailLine:
-        """Run the same line the other way."""
+        """Return the line in the other direction."""
         plan_length = length_along(self.xyz[:, :2])[-1]
         support = None if self.support is None else self.support.reversed(plan_length)
         return replace(self, xyz=self.xyz[::-1], gaps=plan_length - self.gaps[::-1, ::-1], support=support)
@@ -137,13 +137,13 @@ class Centerline:
         Vertices in local metres, directed like `RailLine.xyz`.
     track_id, class_code : int
     left_ids, right_ids : tuple of int
-        Rails on either side, seen along the line, in the order they are met.
+        Rails on either side, seen along the line, in order along the line.
     gauge_mm, gaugesd_mm : float
-        Mean and standard deviation of the distance between the rail lines less the head width.
+        Mean and standard deviation of the distance between the rail lines minus the railhead width.
     cant_mm, cantmax_mm : float
-        Left minus right height: its mean, and its largest value in size with its sign.
+        Mean of the left minus the right height, and the value of it with the largest absolute value.
     bridged_m : float
-        Plan length along which at least one rail has no supporting points.
+        Plan length in which at least one rail has no supporting points.
     """
 
     xyz: np.ndarray
@@ -159,43 +159,47 @@ class Centerline:
 
     @property
     def length_m(self) -> float:
-        """Length in space; in plan where the line has no height."""
+        """Length in 3D; in plan if the line has no heights."""
         flat = np.isnan(self.xyz[:, 2]).any()
         return float(length_along(self.xyz[:, :2] if flat else self.xyz)[-1])
 
 
 def cell_borders(chainage: np.ndarray) -> np.ndarray:
-    """Borders, (n + 1,), of what each of n stations stands for: half way to its neighbours."""
+    """Return the borders, (n + 1,), of the sections that n stations represent: half way to their neighbours.
+
+    >>> cell_borders(np.array([0.0, 1.0, 3.0])).tolist()
+    [0.0, 0.5, 2.0, 3.0]
+    """
     return np.concatenate([chainage[:1], 0.5 * (chainage[1:] + chainage[:-1]), chainage[-1:]])
 
 
 @dataclass(frozen=True)
 class TrackGeometry:
-    """Geometry of one track at stations along its centerline, (n,) arrays; NaN where it can't be known.
+    """Geometry of one track at stations along its centerline; (n,) arrays, NaN where it is unknown.
 
     Attributes
     ----------
     track_id : int
     xyz : (n, 3) array
-        Stations on the centerline, local metres.
+        Stations on the centerline in local metres.
     chainage_m : float
-        Plan distance from the centerline's start.
+        Plan distance from the start of the centerline.
     gauge_mm : float
-        Distance between the rail lines less the head width.
+        Distance between the rail lines minus the railhead width.
     cant_mm : float
         Left minus right height.
     twist_mm : float
-        Change of cant over 3 m, ahead minus behind; NaN where the track does not reach as far.
+        Change of cant over 3 m, ahead minus behind; NaN at the ends of the track.
     radius_m : float
-        Positive to the left, NaN above 10 km.
+        Positive in left-hand curves, NaN above 10 km.
     grade_pm : float
-        Rise in per mille.
+        Gradient in per mille, positive uphill.
     sigma_mm : float
-        Standard deviation of the centerline's lateral position.
+        Standard error of the centerline's lateral position.
     points : int
-        Points on both rails that are nearest to the station.
+        Points on both rails for which this is the nearest station.
     bridged : bool
-        Whether for most of the station's length a rail has no points or is not there.
+        Whether a rail has no points, or is missing, for most of the section that the station represents.
     """
 
     track_id: int
@@ -212,31 +216,31 @@ class TrackGeometry:
 
     @property
     def cells_m(self) -> np.ndarray:
-        """Length that each station stands for, (n,)."""
+        """Length that each station represents, (n,)."""
         return np.diff(cell_borders(self.chainage_m))
 
     @property
     def bridged_m(self) -> float:
-        """Length of the stations that are bridged."""
+        """Length that the bridged stations represent."""
         return float(self.cells_m[self.bridged].sum())
 
 
 @dataclass(frozen=True)
 class RailNetwork:
-    """Everything extracted from one cloud.
+    """All results of an extraction from one cloud.
 
     Attributes
     ----------
     rails : tuple of RailLine
     centerlines : tuple of Centerline
     frame : LocalFrame
-        Turns the lines' local metres into the cloud's coordinates.
+        Converts the lines' local metres to the cloud's coordinates.
     engine : str
-        Engine and device that ran the network, for ENGINE_USED.
+        Engine and device that ran the network, for the output ENGINE_USED.
     geometry : tuple of TrackGeometry
-        Of each centerline in turn; none unless asked for.
+        One per centerline; empty unless requested. To find that of a centerline, compare `track_id`.
     cleaned : tuple of RailRaster
-        What the network made of each class in turn; none unless asked for.
+        Raster cleaned by the network, one per class; empty unless requested.
     """
 
     rails: tuple[RailLine, ...]

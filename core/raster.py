@@ -1,7 +1,7 @@
 """Sparse, tiled, georeferenced rasters of rail cells.
 
-A railway is long and thin: the bounding box of a 10 km diagonal holds a thousand times the cells of its corridor.
-A `RailRaster` therefore keeps only the tiles that hold a rail cell, and nothing here allocates by bounding box.
+A railway is long and thin: the bounding box of a diagonal of 10 km has a thousand times the cells of its corridor.
+A `RailRaster` therefore keeps only the tiles that contain a rail cell, and no array has the size of a bounding box.
 """
 
 from __future__ import annotations
@@ -14,23 +14,28 @@ import numpy as np
 from .progress import SILENT, Progress
 
 TILE = 256
-"""Cells along the side of a tile: small enough to follow a track, large enough to keep Python out of the way."""
+"""Cells along the side of a tile: few enough to follow a track, enough to make Python's overhead per tile small."""
 
 CENTRE_SPACING_CELLS = 37.78
-"""Cells between the two railhead centres: 1511.2 mm at 40 mm, 132RE in the paper; the same for every model."""
+"""Cells between the two railhead centres: 1511.2 mm (132RE) in cells of 40 mm, the example of Gribov and Chang."""
 
 BORDER_CELLS = 1e-6
-"""A point this close to a border lies beyond it: files count in millimetres, and rounding must not choose the cell."""
+"""A point this close to a cell border belongs to the next cell: files store millimetres, so points lie on borders, and
+the rounding of the last bit must not decide on the cell."""
 
 
 def cell_size(gauge_m: float, head_width_m: float) -> float:
-    """Cell size in metres at which the two rails lie `CENTRE_SPACING_CELLS` apart (docs/method.md section 2.1)."""
+    """Return the cell size in metres at which the rails are `CENTRE_SPACING_CELLS` apart (docs/method.md section 2.1).
+
+    >>> round(cell_size(1.435, 0.0762), 4)
+    0.04
+    """
     return (gauge_m + head_width_m) / CENTRE_SPACING_CELLS
 
 
 @dataclass(frozen=True)
 class RailRaster:
-    """Rail cells on a square grid, kept by tile.
+    """Rail cells on a square grid, stored by tile.
 
     Row numbers grow to the south, column numbers to the east; both may be negative. Cell (0, 0) has its north-west
     corner at (`x0`, `y0`).
@@ -38,11 +43,11 @@ class RailRaster:
     Attributes
     ----------
     tiles : mapping of (tile row, tile column) to (TILE, TILE) bool array
-        Tiles that are missing hold no rail cell.
+        Missing tiles contain no rail cell.
     cell_m : float
-        Side of a cell, metres.
+        Side of a cell in metres.
     x0, y0 : float
-        North-west corner of cell (0, 0), local metres.
+        North-west corner of cell (0, 0) in local metres.
     """
 
     tiles: Mapping[tuple[int, int], np.ndarray]
@@ -51,7 +56,14 @@ class RailRaster:
     y0: float
 
     def read(self, row: int, column: int, height: int, width: int) -> np.ndarray:
-        """Copy a window of cells; outside the kept tiles it is False.
+        """Copy a window of cells; it is False outside the stored tiles.
+
+        Parameters
+        ----------
+        row, column : int
+            First row and first column of the window.
+        height, width : int
+            Size of the window in cells.
 
         Returns
         -------
@@ -72,7 +84,7 @@ class RailRaster:
         return window
 
     def cells(self) -> np.ndarray:
-        """Rows and columns of every rail cell, sorted by tile.
+        """Return rows and columns of all rail cells, sorted by tile.
 
         Returns
         -------
@@ -88,11 +100,16 @@ class RailRaster:
         return int(sum(np.count_nonzero(tile) for tile in self.tiles.values()))
 
     def to_local(self, rows_columns: np.ndarray) -> np.ndarray:
-        """Local x, y in metres of cell positions; (0, 0) is the centre of cell (0, 0), fractions are allowed.
+        """Convert cell positions to local x, y in metres; (0, 0) is the centre of cell (0, 0).
 
         Parameters
         ----------
         rows_columns : (n, 2) array
+            May be fractions.
+
+        Returns
+        -------
+        (n, 2) array
         """
         rows_columns = np.asarray(rows_columns, dtype=float)
         x = self.x0 + (rows_columns[:, 1] + 0.5) * self.cell_m
@@ -100,7 +117,7 @@ class RailRaster:
         return np.column_stack([x, y])
 
     def with_cells(self, cells: np.ndarray) -> RailRaster:
-        """Make a raster on the same grid that holds just these cells, (n, 2) rows and columns."""
+        """Return a raster on the same grid with only these cells, (n, 2) rows and columns."""
         return replace(self, tiles=_tiles_of(cells))
 
     def map_tiles(
@@ -109,14 +126,15 @@ class RailRaster:
         margin: int,
         progress: Progress = SILENT,
     ) -> RailRaster:
-        """Apply `function` to every kept tile and its eight neighbours, seen with `margin` cells around them.
+        """Apply `function` to every stored tile and its eight neighbours, each with `margin` cells around it.
 
         Parameters
         ----------
         function : callable
-            (TILE + 2 margin) square bool array to bool array of the same shape.
+            Maps a bool array of (TILE + 2 margin) × (TILE + 2 margin) cells to one of the same shape.
         margin : int
-            How far, in cells, the function looks around a cell.
+            Distance in cells within which other cells affect the result of a cell.
+        progress : Progress
         """
         tiles = {}
         for index in progress.follow(sorted(self._neighbourhood())):
@@ -128,22 +146,22 @@ class RailRaster:
         return replace(self, tiles=tiles)
 
     def _neighbourhood(self) -> set[tuple[int, int]]:
-        """Give the indices of the kept tiles and of their eight neighbours."""
+        """Return the indices of the stored tiles and of their eight neighbours."""
         steps = (-1, 0, 1)
         return {(row + down, column + right) for row, column in self.tiles for down in steps for right in steps}
 
 
 def rasterize(xy: np.ndarray, cell_m: float) -> RailRaster:
-    """Rasterize rail points: a cell is set where it holds at least one point (docs/method.md section 2.2).
+    """Rasterize rail points: a cell is set if it contains at least one point (docs/method.md section 2.2).
 
-    Cell borders lie on multiples of `cell_m`, so that clouds of one local origin share one grid.
+    Cell borders are multiples of `cell_m`, so that clouds with the same local origin share one grid.
 
     Parameters
     ----------
     xy : (n, 2) or (n, 3) array
         Points in local metres.
     cell_m : float
-        Side of a cell, metres; see `cell_size`.
+        Side of a cell in metres; see `cell_size`.
     """
     rows = np.floor(-np.asarray(xy)[:, 1] / cell_m + BORDER_CELLS).astype(np.int64)
     columns = np.floor(np.asarray(xy)[:, 0] / cell_m + BORDER_CELLS).astype(np.int64)

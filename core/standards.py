@@ -1,9 +1,10 @@
 """Rail standards: gauge and railhead width by name.
 
-Widths are those of the railhead as tables of rail sections state them: Wirth Rail's table of American rails, "Rail
-section properties" (AREMA 2015, EN 13674-1, AS 1085, JIS), AGICO's table of Australian rails, IIT Kanpur's table of
-Indian rails, cranerailclips' table of EN rails and chinarailfastener's of Chinese ones; IN_75R_1000 is the paper's
-example. Tables differ by 1 to 3 mm, by where on the head they measure. Widths from memory alone are marked.
+Head widths come from tables of rail sections: Wirth Rail (American rails), "Rail section properties" (AREMA 2015,
+EN 13674-1, AS 1085, JIS), AGICO (Australian rails), IIT Kanpur (Indian rails), cranerailclips (EN rails) and
+chinarailfastener (Chinese rails); IN_75R_1000 is the example of Gribov and Chang. The tables differ by 1 to 3 mm,
+because they measure at different places on the head. Widths that no table confirms are marked. See docs/method.md
+section 10.
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ DEFAULT = "EN_60E1_1435"
 CUSTOM = "CUSTOM"
 
 RAIL_CLASS, LAST_CLASS = 10, 255
-"""Class of points on rails in the LAS specification: what is meant where a file does not say. A class is one byte."""
+"""Class of rail points in the LAS specification, and the largest class: a class is one byte."""
 
 GAUGE_RANGE_MM = (500.0, 2000.0)
-"""From below the narrowest public railways (600 mm) to beyond the widest gauge in use (1676 mm)."""
+"""From below the narrowest public railways (600 mm) to above the widest gauge in use (1676 mm)."""
 
 HEAD_WIDTH_RANGE_MM = (40.0, 90.0)
-"""From the lightest mine rails to beyond the widest heads of tables (77.79 mm, 141RE); crane rails are wider."""
+"""From the lightest mine rails to above the widest head in tables (77.79 mm, 141RE); crane rails are wider."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +35,9 @@ class RailStandard:
     Attributes
     ----------
     name : str
-        Static string of the interface, or CUSTOM.
+        Key of `STANDARDS`, or CUSTOM. Keys never change.
     label : str
-        For a person.
+        Name to show to users.
     gauge_m, head_width_m : float
     """
 
@@ -48,7 +49,7 @@ class RailStandard:
 
 UNCONFIRMED = " (unconfirmed width)"
 
-# profile, its name for a person, head width in mm, whether a table confirms the width, gauges in mm
+# profile, name to show to users, head width in mm, whether a table confirms the width, gauges in mm
 _PROFILES = (
     ("US_90ARAA", "US 90 ARA-A", 65.09, True, (1435,)),
     ("US_100ARAA", "US 100 ARA-A", 69.85, True, (1435,)),
@@ -101,13 +102,13 @@ def _standards() -> dict[str, RailStandard]:
 
 
 STANDARDS = _standards()
-"""Every standard of the interface by its static string, CUSTOM aside."""
+"""All standards by name, except CUSTOM."""
 
 UNCONFIRMED_PROFILES = tuple(profile for profile, _, _, confirmed, _ in _PROFILES if not confirmed)
 
 
 def resolve(name: str, gauge_mm: float | None = None, head_width_mm: float | None = None) -> RailStandard:
-    """Look a standard up; a given gauge or head width overrides its own.
+    """Look up a standard; a gauge or a head width, if given, overrides that of the standard.
 
     Parameters
     ----------
@@ -118,41 +119,58 @@ def resolve(name: str, gauge_mm: float | None = None, head_width_mm: float | Non
     Raises
     ------
     ParameterError
-        The name is unknown, a number is missing for CUSTOM, or one is none a railway has.
+        The name is unknown, a number is missing for CUSTOM, or a number is outside the range of railways.
+
+    Examples
+    --------
+    >>> resolve("EN_60E1_1435")
+    RailStandard(name='EN_60E1_1435', label='EN 60E1 (UIC 60), 1435 mm', gauge_m=1.435, head_width_m=0.072)
+    >>> resolve("EN_60E1_1435", gauge_mm=1440).gauge_m
+    1.44
+    >>> resolve("CUSTOM", 600, 50).label
+    '50 mm head, 600 mm'
     """
+    if name != CUSTOM and name not in STANDARDS:
+        raise ParameterError(f"The rail standard {name!r} is unknown: choose a name such as {DEFAULT}, or {CUSTOM}.")
+    if gauge_mm is not None:
+        _check("gauge", gauge_mm, GAUGE_RANGE_MM)
+    if head_width_mm is not None:
+        _check("railhead width", head_width_mm, HEAD_WIDTH_RANGE_MM)
     if name == CUSTOM:
         if gauge_mm is None or head_width_mm is None:
             raise ParameterError(
                 "The standard CUSTOM needs both the gauge and the railhead width, in millimetres: fill GAUGE and "
                 "HEAD_WIDTH."
             )
-    elif name not in STANDARDS:
-        raise ParameterError(f"The rail standard {name!r} is unknown: choose one like {DEFAULT}, or {CUSTOM}.")
-    if gauge_mm is not None:
-        _check("gauge", gauge_mm, GAUGE_RANGE_MM)
-    if head_width_mm is not None:
-        _check("railhead width", head_width_mm, HEAD_WIDTH_RANGE_MM)
+        return _custom(gauge_mm / 1000, head_width_mm / 1000)
+    standard = STANDARDS[name]
     if gauge_mm is None and head_width_mm is None:
-        return STANDARDS[name]
-    base = STANDARDS.get(name)
-    gauge_m = base.gauge_m if gauge_mm is None else gauge_mm / 1000
-    head_width_m = base.head_width_m if head_width_mm is None else head_width_mm / 1000
-    return RailStandard(CUSTOM, f"{head_width_m * 1000:g} mm head, {gauge_m * 1000:g} mm", gauge_m, head_width_m)
+        return standard
+    return _custom(
+        standard.gauge_m if gauge_mm is None else gauge_mm / 1000,
+        standard.head_width_m if head_width_mm is None else head_width_mm / 1000,
+    )
+
+
+def _custom(gauge_m: float, head_width_m: float) -> RailStandard:
+    label = f"{head_width_m * 1000:g} mm head, {gauge_m * 1000:g} mm"
+    return RailStandard(CUSTOM, label, gauge_m, head_width_m)
 
 
 def distinct_gauges(gauges_m: Sequence[float], tolerance_m: float) -> tuple[float, ...]:
-    """Gauges to pair rails by, each once.
+    """Return the gauges to pair rails by, without repetitions.
 
     Parameters
     ----------
     gauges_m : sequence of float
     tolerance_m : float
-        Deviation from its gauge at which a track is still one.
+        Largest deviation of a track from its gauge.
 
     Raises
     ------
     ParameterError
-        One is none a railway has, or two are too near to each other to be told apart: tracks would come twice.
+        A gauge is outside the range of railways, or two differ by less than the tolerance: tracks would be found
+        twice.
     """
     distinct = tuple(dict.fromkeys(gauges_m))
     for gauge_m in distinct:
@@ -160,7 +178,7 @@ def distinct_gauges(gauges_m: Sequence[float], tolerance_m: float) -> tuple[floa
     for low, high in zip(sorted(distinct), sorted(distinct)[1:]):
         if high - low < tolerance_m:
             raise ParameterError(
-                f"Gauges of {1000 * low:g} and {1000 * high:g} mm can't be told apart within CENTERLINE_TOLERANCE "
+                f"Gauges of {1000 * low:g} and {1000 * high:g} mm can't be distinguished within CENTERLINE_TOLERANCE "
                 f"({tolerance_m:g} m): give one of them, or a smaller tolerance."
             )
     return distinct

@@ -53,7 +53,7 @@ def read_rail_points(
     class_codes : sequence of int
         Rail classes, 0 to 255.
     crs_wkt : str, optional
-        Coordinate system, as WKT or EPSG code, for files that state none.
+        Coordinate system, as WKT or EPSG code, used where files state none.
     extent : tuple of float, optional
         Smallest x, smallest y, largest x, largest y of the points to keep, in units of the CRS.
     progress : Progress

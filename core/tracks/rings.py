@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..lines.uniting import united
-from ..polyline import LEAST_ROUND_M, is_closed, length_along, resample
+from ..polyline import MIN_RING_M, is_closed, length_along, resample
 from ..rails import RailLine
 
 STATION_M = 0.05
@@ -38,7 +38,7 @@ def closed_up(xyz: np.ndarray) -> np.ndarray:
     """Let a centerline, (n, d), drawn along closed rails end exactly where it begins; others stay as they are."""
     away = np.linalg.norm(xyz[:, :2] - xyz[0, :2], axis=1)
     along = length_along(xyz[:, :2])
-    if away[-1] > SEAM_M or along[-1] <= LEAST_ROUND_M:
+    if away[-1] > SEAM_M or along[-1] <= MIN_RING_M:
         return xyz
     ahead = (xyz[:, :2] - xyz[0, :2]) @ (xyz[1, :2] - xyz[0, :2])
     past = (along > along[-1] - 2 * SEAM_M) & (away <= 2 * SEAM_M) & (ahead >= 0)

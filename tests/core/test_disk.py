@@ -46,7 +46,7 @@ def test_companions_of_the_new_file_stay(tmp_path):
 def test_a_log_that_is_not_empty_keeps_the_old_file(tmp_path, log):
     fill(tmp_path, a_gpkg="old", **{log: "not yet in it"})
     fill(tmp_path / "new", a_gpkg="new")
-    with pytest.raises(DiskError, match=r"is open in another program .* The new one is .*a_new\.gpkg"):
+    with pytest.raises(DiskError, match=r"is open in another program .* The new file is .*a_new\.gpkg"):
         move(tmp_path, tmp_path / "a.gpkg")
     assert contents(tmp_path)["a.gpkg"] == "old"
     assert contents(tmp_path)["a_new.gpkg"] == "new"
@@ -56,6 +56,6 @@ def test_what_can_not_be_replaced_is_left_and_the_new_files_lie_beside(tmp_path)
     fill(tmp_path, a_qix="old")
     (tmp_path / "a.shp").mkdir()  # stands for a file that Windows locks
     fill(tmp_path / "new", a_shp="new", a_dbf="new")
-    with pytest.raises(DiskError, match=r"a\.shp can't be replaced \(Is a directory\)\. The new one is .*a_new\.shp"):
+    with pytest.raises(DiskError, match=r"a\.shp can't be replaced \(Is a directory\)\. The new file is .*a_new\.shp"):
         move(tmp_path, tmp_path / "a.shp")
     assert contents(tmp_path) == {"a.qix": "old", "a_new.shp": "new", "a_new.dbf": "new"}

@@ -297,7 +297,7 @@ FAULTS = [
         "output of an earlier run, edited elsewhere",
         edited_elsewhere,
         REFUSED,
-        "…/rails.gpkg is open in another program (rails.gpkg-wal is there): close it there, or choose another.",
+        "…/rails.gpkg is open in another program (rails.gpkg-wal exists): close it there, or choose another file.",
     ),
     Fault("shapefile of an earlier run, with a spatial index", indexed_before, gives=TRACK),
     Fault(

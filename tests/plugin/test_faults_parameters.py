@@ -166,15 +166,15 @@ FAULTS = [
         "other gauge too near to the gauge",
         with_(OTHER_GAUGES="1440"),
         REFUSED,
-        "Gauges of 1435 and 1440 mm can't be told apart within CENTERLINE_TOLERANCE (0.05 m): give one of "
-        "them, or a smaller tolerance.",
+        "Gauges of 1435 and 1440 mm can't be distinguished within CENTERLINE_TOLERANCE (0.05 m): give one of them, "
+        "or a smaller tolerance.",
     ),
     Fault(
         "tolerance as wide as the gauges differ",
         with_(OTHER_GAUGES="1067", CENTERLINE_TOLERANCE=0.5),
         REFUSED,
-        "Gauges of 1067 and 1435 mm can't be told apart within CENTERLINE_TOLERANCE (0.5 m): give one of "
-        "them, or a smaller tolerance.",
+        "Gauges of 1067 and 1435 mm can't be distinguished within CENTERLINE_TOLERANCE (0.5 m): give one of them, or "
+        "a smaller tolerance.",
     ),
     Fault(
         "extent beside the cloud",

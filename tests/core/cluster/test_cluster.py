@@ -228,7 +228,7 @@ def test_a_geopackage_that_another_program_writes_to_is_left_alone(tiles, tmp_pa
     (tmp_path / "out.gpkg-wal").write_text("not yet in it")
     assert main(["extract", str(tiles), "--rails", str(out)]) == 1
     assert f"{out} is open in another program" in capsys.readouterr().err
-    with pytest.raises(DiskError, match=r"The new one is .*out_new\.gpkg"):
+    with pytest.raises(DiskError, match=r"The new file is .*out_new\.gpkg"):
         write({"rails": (out, (), RAIL_FIELDS)}, LocalFrame(np.zeros(3)))
     assert out.read_text() == "theirs"
     assert pyogrio.read_info(tmp_path / "out_new.gpkg")["features"] == 0
@@ -294,7 +294,7 @@ def test_a_full_work_folder_is_one_sentence(tiles, tmp_path):
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
     try:
-        with pytest.raises(DiskError, match="make room"):
+        with pytest.raises(DiskError, match="free space"):
             spool(ask(tiles, [RAIL]), square_side(PARAMETERS), tmp_path)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
