@@ -29,14 +29,12 @@ from pathlib import Path
 
 import numpy as np
 from rail_extract.core.frpdf import DEFAULT_PASSES
-from rail_extract.core.frpdf.engine import make_engine
 from rail_extract.core.frpdf.models import MODELS
-from rail_extract.core.frpdf.weights import load_arrays
 from rail_extract.laboratory.rasters.distortion import Pair
 from rail_extract.laboratory.rasters.layouts import FAMILIES
 from rail_extract.laboratory.rasters.pairs import BASE_RATIO, random_pair
 from rail_extract.laboratory.training.evaluate import Cleaner, classical, cleaner_of
-from rail_extract.laboratory.training.rivals import NETWORKS, TrainedNetwork, parameter_count
+from rail_extract.laboratory.training.networks import TrainedNetwork
 from rail_extract.laboratory.training.scores import Scores, bridged, score
 
 SEED = 1024_2026
@@ -143,15 +141,11 @@ def make_cleaner(row: str) -> tuple[Cleaner, int | None]:
         return (lambda observed: observed), 0
     if row == "closing":
         return classical, 0
-    if "=" in row:
-        name, rest = row.split("=", 1)
-        path, passes = rest.rsplit("@", 1)
-        return cleaner_of(TrainedNetwork(name, Path(path)), int(passes)), parameter_count(NETWORKS[name]())
     if ".npz@" in row:
-        path, passes = row.rsplit("@", 1)
-        arrays = load_arrays(Path(path))
-        parameters = sum(array.size for name, array in arrays.items() if "running" not in name)
-        return cleaner_of(make_engine(arrays), int(passes)), parameters
+        name, rest = row.split("=", 1) if "=" in row else ("frpdf", row)
+        path, passes = rest.rsplit("@", 1)
+        network = TrainedNetwork(name, Path(path))
+        return cleaner_of(network, int(passes)), network.parameter_count
     if row.endswith(".onnx"):
         return _onnx_cleaner(row.split("+"))
     module, name = row.split(":")
@@ -178,9 +172,7 @@ def _onnx_cleaner(paths: Sequence[str]) -> tuple[Cleaner, int]:
 
 
 class _OnnxPasses:
-    """An engine made of one ONNX network a pass."""
-
-    description = "ONNX files on OpenCV"
+    """Passes from one ONNX file each."""
 
     def __init__(self, nets: Sequence) -> None:
         self._nets = nets

@@ -13,13 +13,12 @@ from pathlib import Path
 
 import numpy as np
 from rail_extract.core.frpdf import DEFAULT_PASSES
-from rail_extract.core.frpdf.engine import make_engine
 from rail_extract.core.frpdf.models import MODELS
-from rail_extract.core.frpdf.weights import load_arrays
 from rail_extract.laboratory.rasters.distortion import Pair
 from rail_extract.laboratory.rasters.layouts import FAMILIES
 from rail_extract.laboratory.rasters.pairs import BASE_RATIO, CELL_M, RATIO_TOLERANCE, RATIOS, SPACING_M, random_pair
 from rail_extract.laboratory.training.evaluate import Cleaner, cleaner_of
+from rail_extract.laboratory.training.networks import TrainedNetwork
 from rail_extract.laboratory.training.scores import Scores, bridged, score
 
 SEED = 3_2026
@@ -43,7 +42,7 @@ def main() -> None:
     parser.add_argument("weights", nargs="?", type=Path, default=MODELS[0].path)
     parser.add_argument("--count", type=int, default=60, help="rasters of each kind (default 60)")
     arguments = parser.parse_args()
-    cleaner = cleaner_of(make_engine(load_arrays(arguments.weights)), DEFAULT_PASSES)
+    cleaner = cleaner_of(TrainedNetwork("frpdf", arguments.weights), DEFAULT_PASSES)
     print("gaps bridged, %".ljust(24) + "".join(f"{length:>7g} m" for length in LENGTHS_M))
     for name, reach_m in (("one rail", RAIL_REACH_M), ("both rails", TRACK_REACH_M)):
         shares = [bridged_share(cleaner, length, reach_m, arguments.count) for length in LENGTHS_M]

@@ -17,7 +17,7 @@ from rail_extract.core.polyline import length_along
 from rail_extract.core.standards import STANDARDS
 from rail_extract.laboratory.curves import Element, trace
 from rail_extract.laboratory.ruler.lines import Comparison, compare_lines
-from rail_extract.laboratory.ruler.peer import peer_lines
+from rail_extract.laboratory.ruler.plain_script import script_lines
 from rail_extract.laboratory.scenes.plain import rolling, spacing
 from rail_extract.laboratory.scenes.scanner import Scanner
 from rail_extract.laboratory.scenes.scene import Clutter, Gaps, Plan, Scene, build
@@ -60,7 +60,7 @@ class Outcome:
 
     value: float
     ours: Comparison
-    peer: Comparison
+    script: Comparison
 
 
 def track_scene(
@@ -127,8 +127,8 @@ def measure(sweep: Sweep, value: float) -> Outcome:
     points = scene.rail_points()
     network = extract_rails((points,), Parameters(STANDARD.gauge_m, STANDARD.head_width_m))
     ours = compare_lines([network.frame.to_crs(rail.xyz) for rail in network.rails], scene.rails)
-    peer = compare_lines(peer_lines(points, STANDARD.gauge_m, STANDARD.head_width_m), scene.rails)
-    return Outcome(density(scene) if sweep.title == "density" else value, ours, peer)
+    script = compare_lines(script_lines(points, STANDARD.gauge_m, STANDARD.head_width_m), scene.rails)
+    return Outcome(density(scene) if sweep.title == "density" else value, ours, script)
 
 
 def _heading(sweep: Sweep) -> str:
@@ -141,7 +141,7 @@ def _row(outcome: Outcome) -> str:
     figures = (
         f"{1000 * one.lateral_rmse_m:10.1f}{1000 * one.lateral_p95_m:10.1f}{1000 * one.height_rmse_m:10.1f}"
         f"{100 * one.completeness:10.2f}"
-        for one in (outcome.ours, outcome.peer)
+        for one in (outcome.ours, outcome.script)
     )
     return f"{outcome.value:<28.3g}" + "".join(figures)
 
@@ -158,7 +158,7 @@ def draw(outcomes: dict[str, list[Outcome]], figure: str, label: str, path: Path
     drawing, panels = pyplot.subplots(rows, columns, figsize=(3 * columns, 2.6 * rows), sharey=True, squeeze=False)
     for panel, (name, found) in zip(panels.flat, outcomes.items()):
         values = [outcome.value for outcome in found]
-        for who, title, colour in (("ours", "Rail Extract", "tab:blue"), ("peer", "plain script", "tab:orange")):
+        for who, title, colour in (("ours", "Rail Extract", "tab:blue"), ("script", "plain script", "tab:orange")):
             errors = [1000 * getattr(getattr(outcome, who), figure) for outcome in found]
             panel.plot(values, errors, "o-", label=title, color=colour, markersize=3)
         panel.set(title=SWEEPS[name].title, xlabel=SWEEPS[name].unit, yscale="log", yticks=TICKS_MM)

@@ -13,11 +13,12 @@ import numpy as np
 import torch
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frpdf import START
+from rail_extract.core.frpdf.architecture import RECEPTIVE_RADIUS
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.frpdf.corridor import Piece, lay_fields
 from rail_extract.core.frpdf.engine import Engine
 from rail_extract.core.frpdf.folding import fold
-from rail_extract.core.frpdf.network import FRPDF, RECEPTIVE_RADIUS
+from rail_extract.core.frpdf.network import FRPDF, set_weights
 from rail_extract.core.frpdf.onnx import to_onnx
 from rail_extract.core.frpdf.opencv_engine import OpenCvEngine
 from rail_extract.core.frpdf.torch_engine import TorchEngine
@@ -61,8 +62,7 @@ class Cut:
 def plain_network(arrays: dict[str, np.ndarray]) -> FRPDF:
     """Make the paper's network as it is written down, in float32."""
     network = FRPDF()
-    state = network.state_dict()
-    network.load_state_dict({name: torch.from_numpy(arrays[name]) if name in arrays else state[name] for name in state})
+    set_weights(network, arrays)
     return network.eval()
 
 
@@ -87,14 +87,15 @@ def speed_table(cut: Cut, rounds: int, clock: Callable[[], float]) -> Iterable[s
     raster = cut.raster
     (field,) = lay_fields(raster, 1 << 40)
     row, column = raster.cells().min(axis=0)
-    tile = raster.read(int(row), int(column), TILE, TILE).astype(np.float32)
+    whole = Piece(int(row), int(column), TILE, TILE)
+    tile = raster.read(*whole.window).astype(np.float32)
     seen = [raster.read(*piece.window).astype(np.float32) for piece in field.pieces]
     network, exact = plain_network(cut.arrays), TorchEngine(cut.arrays, "CPU", exact=True)
     fast, opencv = TorchEngine(cut.arrays, "CPU"), OpenCvEngine(cut.arrays)
     contestants = {
         "eager PyTorch, float32, tile": (TILE**2, lambda: _eager(network, tile)),
-        "folded, float32, tile": (TILE**2, lambda: exact.probabilities(tile, _start(tile), 0)),
-        f"folded, {_number_type(fast)}, tile": (TILE**2, lambda: fast.probabilities(tile, _start(tile), 0)),
+        "folded, float32, tile": (TILE**2, lambda: _sweep(exact, [tile], [whole])),
+        f"folded, {_number_type(fast)}, tile": (TILE**2, lambda: _sweep(fast, [tile], [whole])),
     }
     if find_spec("openvino"):
         for engine in (exact, fast):

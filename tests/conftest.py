@@ -1,11 +1,12 @@
 """Fixtures that test modules of several folders share."""
 
+import numpy as np
 import pytest
 
 
 @pytest.fixture(scope="session")
 def network():
-    """An untrained network with odd batch statistics, so that folding and passes have something to get wrong."""
+    """An untrained network with unusual batch statistics, so that errors in folding and in the passes show."""
     torch = pytest.importorskip("torch")
     from rail_extract.core.frpdf.network import FRPDF
 
@@ -17,3 +18,24 @@ def network():
         if "running_var" in name:
             buffer.uniform_(0.5, 2.0)
     return network.eval()
+
+
+@pytest.fixture(scope="session")
+def random_arrays():
+    """Weights with the names and shapes of the shipped ones and random values, made without PyTorch."""
+    from rail_extract.core.frpdf.models import MODELS
+    from rail_extract.core.frpdf.weights import load_arrays
+
+    rng = np.random.default_rng(3)
+    arrays = {}
+    for name, array in load_arrays(MODELS[0].path).items():
+        if "running_mean" in name:
+            values = rng.normal(0, 0.3, array.shape)
+        elif "running_var" in name:
+            values = rng.uniform(0.5, 2.0, array.shape)
+        elif array.ndim == 4:
+            values = rng.uniform(-1, 1, array.shape) / np.sqrt(array[0].size)
+        else:
+            values = np.full(array.shape, float(name.endswith(".1.weight")))
+        arrays[name] = values.astype(np.float32)
+    return arrays

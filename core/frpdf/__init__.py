@@ -5,10 +5,6 @@ The constants here are those of Gribov and Chang, section 5; they stand apart fr
 
 from ..parameters import Parameters
 
-CHANNELS = 24
-KERNEL_RADIUS = 3
-DILATIONS = (1, 3, 7, 15, 31, 63, 127)
-
 AUTO = "AUTO"
 ENGINES = (AUTO, "TORCH", "OPENCV")
 DEVICES = (AUTO, "CPU", "CUDA")

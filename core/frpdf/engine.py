@@ -1,4 +1,4 @@
-"""What computes a pass of FRPDF: an engine maps windows of raster and state to probabilities."""
+"""Engines: they run the passes of FRPDF on PyTorch or OpenCV."""
 
 from __future__ import annotations
 
@@ -13,20 +13,24 @@ from ..progress import Progress
 from . import AUTO
 from .corridor import Piece
 
+_PACKAGES = {"TORCH": ("torch", "torch"), "OPENCV": ("cv2", "opencv-python-headless")}
+"""Module and package of each engine."""
+
 
 class Engine(Protocol):
-    """Runs the folded network somewhere.
+    """Runs the folded network.
 
     Attributes
     ----------
-    description : str
-        Engine, device and number type, for ENGINE_USED.
     most_cells : int
-        How many cells to give it at once.
+        Cells to be computed at once.
     """
 
-    description: str
     most_cells: int
+
+    @property
+    def description(self) -> str:
+        """Library, device and number type, as shown in ENGINE_USED."""
 
     def sweep(
         self,
@@ -41,11 +45,11 @@ class Engine(Protocol):
         Parameters
         ----------
         seen, known : sequences of (height, width) float32 arrays
-            Raster, 0 or 1, and state, as in `network.FRPDF.logits`, of each piece.
+            Raster, 0 or 1, and state, as in `network.Recurrent.logits`, of each piece.
         number : int
             Number of the pass, from 0.
         pieces : sequence of Piece
-            Where they lie.
+            Positions of the pieces, which do not overlap.
         progress : Progress
 
         Returns
@@ -56,34 +60,18 @@ class Engine(Protocol):
         Raises
         ------
         DeviceExhaustedError
-            After a `retreat`, the same can be tried again.
+            The same call can be repeated after `retreat`.
         """
 
     def retreat(self) -> str:
-        """Be content with less memory, or with another device; give a message for the user.
+        """Demand less memory, or change to the CPU, and return a message for the user.
 
-        Only engines that raise `DeviceExhaustedError` need it.
-        """
-
-    def probabilities(self, raster: np.ndarray, state: np.ndarray, number: int) -> np.ndarray:
-        """Run one pass over a raster around which nothing is known, as in training.
-
-        Parameters
-        ----------
-        raster, state : (height, width) float32 arrays
-            Raster 0 or 1; state as in `network.FRPDF.logits`.
-        number : int
-            Number of the pass, from 0.
-
-        Returns
-        -------
-        (height, width) float32 array
-            Probability of rail.
+        Call it after `sweep` raised `DeviceExhaustedError`.
         """
 
 
 def make_engine(arrays: dict[str, np.ndarray], engine: str = AUTO, device: str = AUTO) -> Engine:
-    """Set up the engine that the user chose, or PyTorch where it is installed and OpenCV elsewhere.
+    """Set up the engine that the user chose; with AUTO, PyTorch where it is installed and OpenCV elsewhere.
 
     Parameters
     ----------
@@ -95,15 +83,15 @@ def make_engine(arrays: dict[str, np.ndarray], engine: str = AUTO, device: str =
     Raises
     ------
     ModelError
-        The engine's package or device is not there, or the weights are not FRPDF's.
+        The engine's package or device is not available, or the weights are not those of FRPDF.
     """
     if choose_engine(engine, device) == "TORCH":
         try:
             from .torch_engine import TorchEngine
-        except (ImportError, OSError) as error:  # Windows: a library that it needs, or another plugin's of its name
+        except (ImportError, OSError) as error:  # Windows: a missing library, or one of another plugin with its name
             if engine != AUTO or device == "CUDA" or not find_spec("cv2"):
                 raise ModelError(
-                    f"PyTorch is there but does not start ({error}): set ENGINE to OPENCV, or install PyTorch anew."
+                    f"PyTorch is installed but does not start ({error}): set ENGINE to OPENCV, or reinstall PyTorch."
                 ) from error
         else:
             return TorchEngine(arrays, device)
@@ -113,12 +101,12 @@ def make_engine(arrays: dict[str, np.ndarray], engine: str = AUTO, device: str =
 
 
 def choose_engine(engine: str, device: str) -> str:
-    """Tell which engine AUTO means here, without importing it.
+    """Return the name of the engine to use, without importing it.
 
     Raises
     ------
     ModelError
-        The engine's package is not there, or it can't use the device.
+        The engine's package is not installed, or the engine cannot use the device.
     """
     if engine == AUTO:
         engine = "TORCH" if find_spec("torch") else "OPENCV"
@@ -126,8 +114,5 @@ def choose_engine(engine: str, device: str) -> str:
     if not find_spec(module):
         raise ModelError(f"The engine {engine} needs the package {package}: install it, or set ENGINE to AUTO.")
     if engine == "OPENCV" and device == "CUDA":
-        raise ModelError("The engine OPENCV computes on the processor alone: set DEVICE to AUTO, or ENGINE to TORCH.")
+        raise ModelError("The engine OPENCV runs on the CPU only: set DEVICE to AUTO, or ENGINE to TORCH.")
     return engine
-
-
-_PACKAGES = {"TORCH": ("torch", "torch"), "OPENCV": ("cv2", "opencv-python-headless")}

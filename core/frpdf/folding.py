@@ -1,13 +1,15 @@
-"""FRPDF as plain convolutions: batch norm folded into the weights, one set for each kind of pass."""
+"""The weights of FRPDF as plain convolutions: batch norm folded in, one list of layers per set of batch statistics."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Optional
 
 import numpy as np
 
 from ..errors import ModelError
-from . import DILATIONS, STATISTICS
+from . import STATISTICS
+from .architecture import STAGES, Combined, Stacked
 
 EPSILON = 1e-5
 """Added to the variance in batch norm."""
@@ -15,7 +17,7 @@ EPSILON = 1e-5
 
 @dataclass(frozen=True)
 class Convolution:
-    """A convolution.
+    """A convolution with bias.
 
     Attributes
     ----------
@@ -26,35 +28,44 @@ class Convolution:
 
     weight: np.ndarray
     bias: np.ndarray
-    dilation: int
+    dilation: int = 1
 
     @property
     def reach(self) -> int:
-        """How far, in cells, it looks around a cell."""
+        """Distance in cells from which it takes information."""
         return self.weight.shape[-1] // 2 * self.dilation
 
 
 @dataclass(frozen=True)
 class FoldedLayer:
-    """One pass of the network: ReLU after every convolution but the head.
+    """A layer: a convolution with ReLU, and in some layers a second, 1 x 1 convolution with ReLU.
 
     Attributes
     ----------
-    encoder, decoder : tuple of two Convolution
-    bridge : tuple of seven pairs of Convolution
-        The dilated convolution, and the one that reduces its result joined with its input.
-    head : Convolution
-        Gives the logits.
+    convolution : Convolution
+    reduction : Convolution, optional
+        Applied to the channels of the result followed by those of the layer's input.
+    is_output : bool
+        The layer returns logits: it has no ReLU.
     """
 
-    encoder: tuple[Convolution, ...]
-    bridge: tuple[tuple[Convolution, Convolution], ...]
-    decoder: tuple[Convolution, ...]
-    head: Convolution
+    convolution: Convolution
+    reduction: Optional[Convolution] = None
+    is_output: bool = False
+
+    @property
+    def reach(self) -> int:
+        """Distance in cells from which it takes information."""
+        return self.convolution.reach
 
 
-def fold(arrays: dict[str, np.ndarray]) -> tuple[FoldedLayer, ...]:
-    """Fold the weights of `core.frpdf.weights` into one layer for each set of batch statistics.
+def fold(arrays: dict[str, np.ndarray]) -> tuple[tuple[FoldedLayer, ...], ...]:
+    """Fold the arrays of a weights file into the layers of a pass, for each set of batch statistics.
+
+    Returns
+    -------
+    tuple of tuple of FoldedLayer
+        The layers of the first pass in order, and those of all later passes.
 
     Raises
     ------
@@ -62,29 +73,28 @@ def fold(arrays: dict[str, np.ndarray]) -> tuple[FoldedLayer, ...]:
         The arrays are not those of FRPDF.
     """
     try:
-        return tuple(_fold_pass(arrays, number) for number in range(STATISTICS))
+        return tuple(tuple(_fold_pass(arrays, number)) for number in range(STATISTICS))
     except (KeyError, ValueError) as error:
-        raise ModelError(f"These are no weights of FRPDF ({error}): install the plugin again.") from error
+        raise ModelError(f"The weights file does not belong to FRPDF ({error}): reinstall the plugin.") from error
 
 
-def _fold_pass(arrays: dict[str, np.ndarray], number: int) -> FoldedLayer:
-    last = len(DILATIONS) + 1
-    bridge = tuple(
-        (
-            _fold_block(arrays, f"layer.{position}.dilated", number, dilation),
-            _fold_block(arrays, f"layer.{position}.reduce", number, 1),
-        )
-        for position, dilation in enumerate(DILATIONS, start=1)
-    )
-    return FoldedLayer(
-        encoder=tuple(_fold_block(arrays, f"layer.0.{block}", number, 1) for block in (0, 1)),
-        bridge=bridge,
-        decoder=tuple(_fold_block(arrays, f"layer.{last}.{block}", number, 1) for block in (0, 1)),
-        head=Convolution(arrays[f"layer.{last + 1}.weight"], arrays[f"layer.{last + 1}.bias"], 1),
-    )
+def _fold_pass(arrays: dict[str, np.ndarray], number: int) -> list[FoldedLayer]:
+    layers = []
+    for position, stage in enumerate(STAGES):
+        name = f"layer.{position}"
+        if isinstance(stage, Stacked):
+            layers += [FoldedLayer(_fold(arrays, f"{name}.{place}", number)) for place in (0, 1)]
+        elif isinstance(stage, Combined):
+            dilated = _fold(arrays, f"{name}.dilated", number, stage.dilation)
+            layers.append(FoldedLayer(dilated, _fold(arrays, f"{name}.reduce", number)))
+        else:
+            output = Convolution(arrays[f"{name}.weight"], arrays[f"{name}.bias"])
+            layers.append(FoldedLayer(output, is_output=True))
+    return layers
 
 
-def _fold_block(arrays: dict[str, np.ndarray], name: str, number: int, dilation: int) -> Convolution:
+def _fold(arrays: dict[str, np.ndarray], name: str, number: int, dilation: int = 1) -> Convolution:
+    """Fold the batch norm that follows a convolution into it."""
     suffix = f"_{number}" if number else ""
     mean, variance = arrays[f"{name}.1.running_mean{suffix}"], arrays[f"{name}.1.running_var{suffix}"]
     scale = arrays[f"{name}.1.weight"] / np.sqrt(variance + EPSILON)

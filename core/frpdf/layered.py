@@ -1,8 +1,8 @@
-"""A pass of the network layer by layer over the pieces of a corridor.
+"""One pass of the network, layer by layer over the pieces of a corridor (docs/method.md section 3.4).
 
-Every layer is computed on all pieces before the next, and sees around each piece what the others hold. So nothing is
-computed twice and nothing along the track is cut off, however far a dilated kernel reaches. Off the corridor stands
-what the layer makes of an empty raster.
+Each layer is computed on all pieces before the next layer starts, and reads the surroundings of a piece from its
+neighbours. So nothing is computed twice, and nothing along the track is cut off, however far a dilated kernel reaches.
+Off the corridor the value is what the layer makes of an empty raster.
 """
 
 from __future__ import annotations
@@ -14,24 +14,26 @@ from typing import Any, Callable
 
 import numpy as np
 
+from ..errors import DeviceExhaustedError
 from ..progress import Progress
 from . import START, STATISTICS
 from .corridor import Piece
 
 Array = Any
-"""(channels, height, width) array of whatever library computes."""
+"""(channels, height, width) array of the library that computes."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """A layer of the network.
+    """A layer, ready to run.
 
     Attributes
     ----------
     reach : int
-        How far, in cells, it looks around a cell.
+        Distance in cells from which the layer takes information.
     run : callable
-        Maps what it sees, `reach` cells larger on each side than its result, and what stands in the middle of that.
+        Takes the input with its surroundings, `reach` cells larger on each side, and the input alone; returns an array
+        of the input's height and width.
     """
 
     reach: int
@@ -39,12 +41,12 @@ class Step:
 
 
 class LayeredEngine(ABC):
-    """What engines share; they say how a step runs and where arrays live.
+    """An engine (see `engine.Engine`) without the library that computes, which subclasses add.
 
     Attributes
     ----------
     most_cells : int
-        How many cells are computed at once.
+        Cells to be computed at once.
     """
 
     most_cells = 1 << 22
@@ -62,44 +64,71 @@ class LayeredEngine(ABC):
         empty = np.array([0.0, 0.0 if number else START], dtype=np.float32)[:, None, None]
         outside = self._load(empty * 2 - 1)
         steps = self._steps(min(number, STATISTICS - 1))
-        for step, stage in zip(steps, progress.split(len(steps))):
-            held, outside = self._advance(step, held, outside, pieces, stage)
+        for step, share in zip(steps, progress.split(len(steps))):
+            held, outside = self._advance(step, held, outside, pieces, share)
         return [self._probabilities(logits) for logits in held]
+
+    def retreat(self) -> str:
+        """Refuse: this engine has no smaller demand to fall back on; see `Engine.retreat`."""
+        raise DeviceExhaustedError
 
     def _advance(
         self, step: Step, held: Sequence[Array], outside: Array, pieces: Sequence[Piece], progress: Progress
     ) -> tuple[list[Array], Array]:
         """Run a layer on all pieces, and on an empty raster."""
         results = []
-        for piece, own in progress.follow(list(zip(pieces, held))):
-            around = self._surroundings(outside, piece.height + 2 * step.reach, piece.width + 2 * step.reach)
-            for other, target, source in overlaps(piece, pieces, step.reach):
-                around[(slice(None), *target)] = held[other][(slice(None), *source)]
+        for number, own in progress.follow(list(enumerate(held))):
+            around = self._surrounded(number, held, outside, pieces, step.reach) if step.reach else own
             results.append(step.run(around, own))
         side = 2 * step.reach + 1
-        return results, step.run(self._surroundings(outside, side, side), outside)
+        return results, step.run(self._filled(outside, side, side), outside)
+
+    def _surrounded(
+        self, number: int, held: Sequence[Array], outside: Array, pieces: Sequence[Piece], reach: int
+    ) -> Array:
+        """Assemble a piece with the cells around it."""
+        piece = pieces[number]
+        around = self._filled(outside, piece.height + 2 * reach, piece.width + 2 * reach)
+        for other, (rows, columns), (other_rows, other_columns) in overlaps(piece, pieces, reach):
+            around[:, rows, columns] = held[other][:, other_rows, other_columns]
+        return around
 
     @abstractmethod
     def _steps(self, number: int) -> Sequence[Step]:
-        """Give the layers for a set of batch statistics."""
+        """Return the layers in order, for a set of batch statistics."""
 
     @abstractmethod
     def _load(self, array: np.ndarray) -> Array:
-        """Take in a float32 array."""
+        """Convert a float32 array."""
 
     @abstractmethod
-    def _surroundings(self, outside: Array, height: int, width: int) -> Array:
-        """Make an array full of `outside`, (channels, 1, 1), to write into; the next call may reuse it."""
+    def _filled(self, outside: Array, height: int, width: int) -> Array:
+        """Return an array to write into that is full of `outside`, (channels, 1, 1); the next call may reuse it."""
 
     @abstractmethod
     def _probabilities(self, logits: Array) -> np.ndarray:
-        """Hand out (1, height, width) logits as (height, width) float32 probabilities."""
+        """Convert (1, height, width) logits to (height, width) float32 probabilities."""
 
 
 def overlaps(
     piece: Piece, pieces: Sequence[Piece], reach: int
 ) -> Iterator[tuple[int, tuple[slice, slice], tuple[slice, slice]]]:
-    """Find what lies within `reach` cells of a piece: number of the other piece, where it goes, and what part of it."""
+    """Find the cells of all pieces that are at most `reach` cells away from a piece.
+
+    Parameters
+    ----------
+    piece : Piece
+    pieces : sequence of Piece
+        All pieces, the piece itself among them.
+    reach : int
+
+    Yields
+    ------
+    number : int
+        Of the other piece.
+    target, source : tuple of slice
+        Rows and columns of these cells within the piece extended by `reach`, and within the other piece.
+    """
     corners = np.array([other.window[:2] for other in pieces])
     ends = corners + [other.window[2:] for other in pieces]
     corner = np.array(piece.window[:2]) - reach

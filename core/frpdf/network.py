@@ -1,25 +1,28 @@
-"""The FRPDF network, line for line as in the figures of Gribov and Chang, section 5: 293,545 parameters.
+"""FRPDF as it is trained, with the class names of the paper (docs/method.md section 3.1): 293,545 parameters.
 
-Class names are the paper's. Every layer keeps the full resolution; context comes from dilation alone.
+Every layer keeps the resolution of the raster; context comes from dilation alone.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 import torch
 from torch import Tensor, nn
 
-from . import CHANNELS, DEFAULT_PASSES, DILATIONS, FEEDBACK_THRESHOLD, KERNEL_RADIUS, START, STATISTICS
-
-RECEPTIVE_RADIUS = 753
-"""Farthest cell that can influence a cell in one pass: 3 for each of 4 plain convolutions, 3 d for each dilated one."""
+from . import DEFAULT_PASSES, FEEDBACK_THRESHOLD, START, STATISTICS
+from .architecture import CHANNELS, KERNEL_RADIUS, STAGES, Combined, Stacked, Stage
 
 
 class PassBatchNorm2d(nn.BatchNorm2d):
-    """Batch norm whose running statistics are kept per pass, with the affine part shared by all passes.
+    """Batch norm with running statistics for each kind of pass; scale and shift are shared by all passes.
 
-    The state channel is constant in the first pass and binary afterwards, so activations differ between passes; one
+    The state is constant in the first pass and binary in all later ones, so activations differ between them, and one
     set of running statistics fits neither (docs/method.md section 3.2).
     """
+
+    momentum: float
 
     def __init__(self, channels: int) -> None:
         super().__init__(channels)
@@ -35,14 +38,25 @@ class PassBatchNorm2d(nn.BatchNorm2d):
         return self.normalize(x, getattr(self, "running_mean" + suffix), getattr(self, "running_var" + suffix))
 
     def normalize(self, x: Tensor, mean: Tensor, variance: Tensor) -> Tensor:
-        """Normalize with the running statistics, or in training with the batch's, which then update them."""
+        """Normalize with the running statistics; in training with those of the batch, which update the running ones.
+
+        Parameters
+        ----------
+        x : (batch, channels, height, width) tensor
+        mean, variance : (channels,) tensor
+            Running statistics.
+
+        Returns
+        -------
+        Tensor of the same shape as `x`
+        """
         return nn.functional.batch_norm(
             x, mean, variance, self.weight, self.bias, self.training, self.momentum, self.eps
         )
 
 
 class CustomConv2d(nn.Sequential):
-    """Convolution without bias, batch norm, ReLU; kernel side 2 `radius` + 1."""
+    """Convolution without bias, batch norm, ReLU; the side of the kernel is 2 `radius` + 1."""
 
     def __init__(self, channels_in: int, channels_out: int, radius: int, dilation: int) -> None:
         super().__init__(
@@ -60,7 +74,7 @@ class CustomConv2d(nn.Sequential):
 
 
 class StackedConv2d(nn.Sequential):
-    """Two `CustomConv2d` one after the other."""
+    """Two `CustomConv2d` in a row."""
 
     def __init__(self, channels_in: int, channels_out: int, radius: int, dilation: int) -> None:
         super().__init__(
@@ -70,7 +84,7 @@ class StackedConv2d(nn.Sequential):
 
 
 class ProgressiveCombine2d(nn.Module):
-    """A dilated convolution joined with its own input and reduced back to the same number of channels."""
+    """A dilated convolution, whose result is joined with its input and reduced to the same number of channels."""
 
     def __init__(self, channels: int, radius: int, dilation: int) -> None:
         super().__init__()
@@ -85,22 +99,25 @@ class ProgressiveCombine2d(nn.Module):
 class FRPDFLayer(nn.Sequential):
     """One pass: two channels in (raster and state, each in -1 to 1), one channel of logits out."""
 
-    def __init__(self) -> None:
-        super().__init__(
-            StackedConv2d(2, CHANNELS, KERNEL_RADIUS, 1),
-            *(ProgressiveCombine2d(CHANNELS, KERNEL_RADIUS, dilation) for dilation in DILATIONS),
-            StackedConv2d(CHANNELS, CHANNELS, KERNEL_RADIUS, 1),
-            nn.Conv2d(CHANNELS, 1, 1),
-        )
+    def __init__(self, stages: Sequence[Stage] = STAGES) -> None:
+        super().__init__(*map(_module, stages))
+
+
+def _module(stage: Stage) -> nn.Module:
+    if isinstance(stage, Stacked):
+        return StackedConv2d(stage.channels_in, CHANNELS, KERNEL_RADIUS, 1)
+    if isinstance(stage, Combined):
+        return ProgressiveCombine2d(CHANNELS, KERNEL_RADIUS, stage.dilation)
+    return nn.Conv2d(CHANNELS, 1, 1)
 
 
 class Recurrent(nn.Module):
-    """The same layer passes over the raster again and again, fed with what it found before.
+    """A network that passes over the raster several times; each pass sees the result of the pass before.
 
     Parameters
     ----------
     layer : nn.Module
-        From two channels, raster and state, each in -1 to 1, to one channel of logits of the same height and width.
+        Maps two channels, raster and state, each in -1 to 1, to one channel of logits of the same height and width.
     """
 
     def __init__(self, layer: nn.Module) -> None:
@@ -115,9 +132,9 @@ class Recurrent(nn.Module):
         raster : (batch, 1, height, width) tensor
             0 or 1; 0.5 where nothing is known.
         state : tensor of the same shape
-            `START` in the first pass, then what `feedback` made of the pass before.
+            `START` in the first pass; in later passes `feedback` of the logits of the pass before.
         number : int
-            Number of the pass, from 0: it chooses the batch statistics.
+            Number of the pass, from 0; it selects the batch statistics.
 
         Returns
         -------
@@ -129,7 +146,7 @@ class Recurrent(nn.Module):
         return self.layer(2 * torch.cat([raster, state], dim=1) - 1)
 
     def forward(self, raster: Tensor, passes: int = DEFAULT_PASSES) -> list[Tensor]:
-        """Run `passes` passes and give the logits of each, (batch, 1, height, width)."""
+        """Run `passes` passes and return the logits of each, (batch, 1, height, width)."""
         state = torch.full_like(raster, START)
         found = []
         for number in range(passes):
@@ -139,12 +156,27 @@ class Recurrent(nn.Module):
 
 
 class FRPDF(Recurrent):
-    """The paper's recurrent network."""
+    """The recurrent network of the paper."""
 
     def __init__(self) -> None:
         super().__init__(FRPDFLayer())
 
 
 def feedback(logits: Tensor) -> Tensor:
-    """Decide what the next pass is told; no gradient flows through the threshold."""
+    """Return the state of the next pass, a bool tensor; no gradient flows through the threshold."""
     return torch.sigmoid(logits.detach()) >= FEEDBACK_THRESHOLD
+
+
+def weights_of(network: nn.Module) -> dict[str, np.ndarray]:
+    """Return parameters and batch statistics as float32 arrays, as `weights.save_arrays` takes them."""
+    return {
+        name: value.detach().cpu().float().contiguous().numpy()
+        for name, value in network.state_dict().items()
+        if "num_batches" not in name
+    }
+
+
+def set_weights(network: nn.Module, arrays: Mapping[str, np.ndarray]) -> None:
+    """Put arrays of a weights file, see `weights_of`, into a network of the same architecture."""
+    tensors = {name: torch.from_numpy(array) for name, array in arrays.items()}
+    network.load_state_dict({**network.state_dict(), **tensors})

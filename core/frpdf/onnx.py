@@ -8,7 +8,7 @@ memory, so that the .npz files are the only weights there are.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -34,18 +34,19 @@ def run(arguments: argparse.Namespace) -> None:
     """Write the shipped models."""
     arguments.folder.mkdir(parents=True, exist_ok=True)
     for model in MODELS:
-        for number, layer in enumerate(fold(load_arrays(model.path)), start=1):
+        for number, layers in enumerate(fold(load_arrays(model.path)), start=1):
             path = arguments.folder / f"{model.name}_pass{number}.onnx"
-            path.write_bytes(to_onnx(layer, arguments.side, arguments.side))
+            path.write_bytes(to_onnx(layers, arguments.side, arguments.side))
             print(path)
 
 
-def to_onnx(layer: FoldedLayer, height: int, width: int) -> bytes:
-    """Write one pass as a model of `input`, (1, 2, height, width) in -1 to 1, to `logits`, (1, 1, height, width).
+def to_onnx(layers: Sequence[FoldedLayer], height: int, width: int) -> bytes:
+    """Write one pass as a model from `input`, (1, 2, height, width) in -1 to 1, to `logits`, (1, 1, height, width).
 
     Parameters
     ----------
-    layer : FoldedLayer
+    layers : sequence of FoldedLayer
+        The layers of the pass.
     height, width : int
         Size of the rasters.
 
@@ -56,51 +57,25 @@ def to_onnx(layer: FoldedLayer, height: int, width: int) -> bytes:
     """
     graph = _Graph()
     x = "input"
-    for convolution in layer.encoder:
-        x = graph.relu(graph.convolve(x, convolution))
-    for dilated, reduce in layer.bridge:
-        joined = graph.join(graph.relu(graph.convolve(x, dilated)), x)
-        x = graph.relu(graph.convolve(joined, reduce))
-    for convolution in layer.decoder:
-        x = graph.relu(graph.convolve(x, convolution))
-    graph.convolve(x, layer.head, output="logits")
+    for layer in layers:
+        x = graph.layer(layer, x, x, output="logits" if layer.is_output else None)
     return graph.model({"input": (1, 2, height, width)}, {"logits": (1, 1, height, width)})
 
 
-def steps_to_onnx(layer: FoldedLayer) -> list[bytes]:
-    """Write each layer of one pass as a model of its own.
+def layer_to_onnx(layer: FoldedLayer) -> bytes:
+    """Write one layer as a model from the arrays that `layered.Step.run` takes, `around` and `own`, to `found`.
 
-    Of (1, channels, height, width) arrays, a model takes `around`, which is larger than its result `found` by as much
-    as it looks around a cell; those of the bridge take `own` as well, what stands in the middle of it.
+    Arrays are (1, channels, height, width). Only layers with a reduction have the input `own`. The shapes in the model
+    are those of a single cell; a runtime also takes larger arrays.
     """
-    steps = [_plain_step(convolution) for convolution in layer.encoder]
-    steps += [_bridge_step(dilated, reduce) for dilated, reduce in layer.bridge]
-    first, last = layer.decoder
-    return [*steps, _plain_step(first), _plain_step(last, layer.head)]
-
-
-def _plain_step(convolution: Convolution, head: Convolution | None = None) -> bytes:
     graph = _Graph()
-    result = graph.convolve("around", convolution, same=False)
-    if head is None:
-        graph.relu(result, output="found")
-    else:
-        graph.convolve(graph.relu(result), head, output="found")
-    return graph.model(_shapes(convolution, "around"), _shapes(head or convolution, "found"))
-
-
-def _bridge_step(dilated: Convolution, reduce: Convolution) -> bytes:
-    graph = _Graph()
-    found = graph.relu(graph.convolve("around", dilated, same=False))
-    graph.relu(graph.convolve(graph.join(found, "own"), reduce), output="found")
-    return graph.model({**_shapes(dilated, "around"), **_shapes(dilated, "own")}, _shapes(reduce, "found"))
-
-
-def _shapes(convolution: Convolution, name: str) -> dict[str, tuple[int, ...]]:
-    """Shape at which one cell is computed; a runtime takes larger ones."""
-    channels_out, channels_in = convolution.weight.shape[:2]
-    side = 2 * convolution.reach + 1
-    return {name: (1, channels_in, side, side) if name == "around" else (1, channels_out, 1, 1)}
+    graph.layer(layer, "around", "own", output="found", padded=False)
+    side = 2 * layer.reach + 1
+    channels_out, channels_in = layer.convolution.weight.shape[:2]
+    given = {"around": (1, channels_in, side, side)}
+    if layer.reduction:
+        given["own"] = (1, channels_in, 1, 1)
+    return graph.model(given, {"found": (1, channels_out, 1, 1)})
 
 
 class _Graph:
@@ -110,7 +85,28 @@ class _Graph:
         self._nodes: list[bytes] = []
         self._weights: list[bytes] = []
 
-    def convolve(self, x: str, convolution: Convolution, output: str | None = None, same: bool = True) -> str:
+    def layer(self, layer: FoldedLayer, around: str, own: str, output: str | None = None, padded: bool = True) -> str:
+        """Add a layer.
+
+        Parameters
+        ----------
+        layer : FoldedLayer
+        around, own : str
+            Input of the convolution, and input that is joined with its result.
+        output : str, optional
+            Name of the result.
+        padded : bool
+            Whether the convolution pads its input so that its result has the same size.
+        """
+        if layer.is_output:
+            return self.convolve(around, layer.convolution, padded, output)
+        found = self.convolve(around, layer.convolution, padded)
+        if layer.reduction is None:
+            return self.relu(found, output)
+        joined = self.join(self.relu(found), own)
+        return self.relu(self.convolve(joined, layer.reduction), output)
+
+    def convolve(self, x: str, convolution: Convolution, padded: bool = True, output: str | None = None) -> str:
         number = len(self._nodes)
         names = [x, f"weight{number}", f"bias{number}"]
         self._weights += [_tensor(names[1], convolution.weight), _tensor(names[2], convolution.bias)]
@@ -118,7 +114,7 @@ class _Graph:
         attributes = (
             _integers("kernel_shape", (side, side)),
             _integers("dilations", (convolution.dilation,) * 2),
-            _integers("pads", (convolution.reach if same else 0,) * 4),
+            _integers("pads", (convolution.reach if padded else 0,) * 4),
         )
         return self._node("Conv", names, attributes, output)
 

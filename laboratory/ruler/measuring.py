@@ -18,7 +18,7 @@ from ...core.rails import RailLine, RailNetwork
 from ..scenes.scene import RAIL, Scene
 from ..scenes.write import write_cloud
 from .lines import Match, match
-from .peer import peer_lines
+from .plain_script import script_lines
 from .tracks import GeometryErrors, TrackErrors, compare_geometry, compare_tracks
 
 SMOOTHING_M = 0.8
@@ -35,7 +35,7 @@ class Result:
     Attributes
     ----------
     scene : str
-    rails, centerlines, peer : Match
+    rails, centerlines, script : Match
         Our lines and the plain script's rails against the truth.
     tracks : TrackErrors
     geometry : GeometryErrors
@@ -43,7 +43,7 @@ class Result:
         Share of our rails' lateral errors that are at most their standard error there, and at most twice that.
     mean_error_m : float
         Standard error of a mean of the points in the smoothing length, spread evenly across the head.
-    seconds, peer_seconds : float
+    seconds, script_seconds : float
     peak_mib : float
         Most memory up to the end of our own extraction.
     """
@@ -51,14 +51,14 @@ class Result:
     scene: str
     rails: Match
     centerlines: Match
-    peer: Match
+    script: Match
     tracks: TrackErrors
     geometry: GeometryErrors
     within_sigma: float
     within_two_sigma: float
     mean_error_m: float
     seconds: float
-    peer_seconds: float
+    script_seconds: float
     peak_mib: float
 
 
@@ -80,19 +80,19 @@ def measure(scene: Scene) -> Result:
     )
     sigma_m = _local_sigma(network.rails, rails)
     start = time.perf_counter()
-    peer = match(peer_lines(scene.rail_points(), standard.gauge_m, standard.head_width_m), scene.rails)
+    script = match(script_lines(scene.rail_points(), standard.gauge_m, standard.head_width_m), scene.rails)
     return Result(
         scene=scene.name,
         rails=rails,
         centerlines=match([_local(scene, network, line.xyz) for line in network.centerlines], scene.centerlines),
-        peer=peer,
+        script=script,
         tracks=compare_tracks(network.centerlines, network.rails, true_rails, standard.head_width_m),
         geometry=compare_geometry(network.geometry, true_rails, true_centerlines, standard.head_width_m),
         within_sigma=rails.share_within(sigma_m),
         within_two_sigma=rails.share_within(2 * sigma_m),
         mean_error_m=_mean_error(scene),
         seconds=seconds,
-        peer_seconds=time.perf_counter() - start,
+        script_seconds=time.perf_counter() - start,
         peak_mib=peak_mib,
     )
 

@@ -25,7 +25,7 @@ def found_table(results: Sequence[Result]) -> str:
     for result in results:
         lines.append(_found(result.scene, "rails", result.rails) + f"{result.seconds:>8.1f}{result.peak_mib:>7.0f}")
         lines.append(_found("", "centerlines", result.centerlines))
-        lines.append(_found("", "plain script", result.peer) + f"{result.peer_seconds:>8.1f}")
+        lines.append(_found("", "plain script", result.script) + f"{result.script_seconds:>8.1f}")
     return "\n".join(lines)
 
 
@@ -52,7 +52,7 @@ def error_table(results: Sequence[Result]) -> str:
             + _millimetres((*gauge_and_cant, measured.gauge_m, measured.cant_m))
             + (f"{100 * measured.radius:>5.1f}%" if np.isfinite(measured.radius) else f"{'-':>6}")
         )
-        lines.append(_errors("", "plain script", result.peer))
+        lines.append(_errors("", "plain script", result.script))
     return "\n".join(lines)
 
 

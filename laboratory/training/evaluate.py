@@ -1,8 +1,8 @@
-"""Evaluate cleanup on a small fixed set of synthetic rasters, for a look during training.
+"""Evaluate weights on a small fixed set of synthetic rasters, as a quick check during training.
 
-The set is a function of its seeds, which no training uses: 132RE at 4 cm, the plainer families of layouts, severities
-from 0.2 to 0.8, where the corrupted rasters themselves score an F1 of at most 0.5. The full comparison, with every
-family and severity, is `benchmarks/frpdf.py`.
+The set depends only on its seeds, which no training uses: 132RE at 4 cm, the simpler families of layouts, severities
+from 0.2 to 0.8, at which the corrupted rasters themselves have an F1 of at most 0.5. `benchmarks/frpdf.py` makes the
+full comparison, with every family and severity.
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from scipy import ndimage
 
 from ...core.frpdf import DEFAULT_PASSES, FEEDBACK_THRESHOLD, OUTPUT_THRESHOLD, START
 from ...core.frpdf.cleanup import UNTIL_STABLE, is_stable, most_passes
-from ...core.frpdf.engine import Engine, make_engine
 from ...core.frpdf.models import MODELS
-from ...core.frpdf.weights import load_arrays
 from ..rasters.distortion import Pair
 from ..rasters.pairs import BASE_RATIO, random_pair
+from .networks import TrainedNetwork
 from .scores import Scores, score
 
 EVALUATION_SEED = 20251
@@ -35,6 +35,14 @@ SMALLEST_PIECE = 30
 """Cells of a piece that the classical row keeps: about half a metre of rail."""
 
 Cleaner = Callable[[np.ndarray], np.ndarray]
+"""Maps a raster, (height, width) bool, to a cleaned one."""
+
+
+class Passes(Protocol):
+    """A network that runs one pass over a whole raster."""
+
+    def probabilities(self, raster: np.ndarray, state: np.ndarray, number: int) -> np.ndarray:
+        """Run pass `number`; see `networks.TrainedNetwork.probabilities`."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +67,9 @@ def run(arguments: argparse.Namespace) -> None:
     print(f"{'':28}{'FN':>9}{'FP':>9}{'TP':>9}{'precision':>11}{'recall':>8}{'F1':>7}{'s/raster':>10}")
     cleaners: list[tuple[str, Cleaner]] = [("input", lambda x: x), ("closing, pieces filtered", classical)]
     for path in arguments.weights or [model.path for model in MODELS]:
-        engine = make_engine(load_arrays(path))
+        network = TrainedNetwork("frpdf", path)
         for passes in range(1, DEFAULT_PASSES + 1):
-            cleaners.append((f"{path.stem}, {passes} pass{'es' if passes > 1 else ''}", cleaner_of(engine, passes)))
+            cleaners.append((f"{path.stem}, {passes} pass{'es' if passes > 1 else ''}", cleaner_of(network, passes)))
     for name, cleaner in cleaners:
         row = evaluate(name, cleaner, pairs)
         s = row.scores
@@ -103,14 +111,14 @@ def classical(observed: np.ndarray) -> np.ndarray:
     return large[pieces]
 
 
-def cleaner_of(engine: Engine, passes: int) -> Cleaner:
-    """Make a cleaner of an engine that sees a raster whole; 0 passes run until the result is stable."""
+def cleaner_of(network: Passes, passes: int) -> Cleaner:
+    """Return a function that cleans a raster with a number of passes; 0 runs until the result is stable."""
 
     def clean(observed: np.ndarray) -> np.ndarray:
         seen, found = observed.astype(np.float32), observed
         state = np.full_like(seen, START)
         for number in range(most_passes(passes)):
-            before, probability = found, engine.probabilities(seen, state, number)
+            before, probability = found, network.probabilities(seen, state, number)
             state, found = (probability >= FEEDBACK_THRESHOLD).astype(np.float32), probability >= OUTPUT_THRESHOLD
             if passes == UNTIL_STABLE and number > 0 and is_stable((before != found).sum(), found.sum()):
                 break

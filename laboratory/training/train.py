@@ -22,14 +22,14 @@ from torch.nn import functional
 
 from ...core.errors import ParameterError
 from ...core.frpdf import DEFAULT_PASSES, OUTPUT_THRESHOLD, START, STATISTICS
-from ...core.frpdf.network import PassBatchNorm2d, Recurrent, feedback
+from ...core.frpdf.network import PassBatchNorm2d, Recurrent, feedback, set_weights, weights_of
 from ...core.frpdf.weights import load_arrays, save_arrays
 from ..rasters.distortion import Pair
 from ..rasters.pairs import random_pair, ratio_near
-from .curves import draw_curves
 from .gradients import train_on_cpu
+from .learning_curves import draw_curves
+from .networks import NETWORKS, head_of
 from .optimizers import Optimizers
-from .rivals import NETWORKS, head_of
 from .scores import Scores, score
 
 CROPS = ((256, 4), (384, 2), (512, 1))
@@ -98,7 +98,7 @@ def run(arguments: argparse.Namespace) -> None:
         return
     recompute_statistics(network, settings)
     calibrate(network, settings)
-    save_arrays(arguments.folder / "weights.npz", export(network))
+    save_arrays(arguments.folder / "weights.npz", weights_of(network))
     print(f"Wrote {arguments.folder / 'weights.npz'}.")
 
 
@@ -138,8 +138,7 @@ def new_network(settings: Settings) -> Recurrent:
     network = NETWORKS[settings.network]()
     torch.nn.init.constant_(head_of(network).bias, HEAD_BIAS)
     if settings.start is not None:
-        arrays = {name: torch.from_numpy(array) for name, array in load_arrays(settings.start).items()}
-        network.load_state_dict({**network.state_dict(), **arrays})
+        set_weights(network, load_arrays(settings.start))
     if settings.device == "cpu":
         train_on_cpu(network)
     return network.to(settings.device, memory_format=torch.channels_last)
@@ -242,15 +241,6 @@ def calibrate(network: Recurrent, settings: Settings) -> None:
         found, invented = (np.cumsum(counts[::-1])[::-1] for counts in (rails, others))
         best = float(edges[int(np.argmax(2 * found / (found + invented + rails.sum())))])
         head_of(network).bias -= best - math.log(OUTPUT_THRESHOLD / (1 - OUTPUT_THRESHOLD))
-
-
-def export(network: Recurrent) -> dict[str, np.ndarray]:
-    """Parameters and batch statistics as plain arrays, without the counters of batches."""
-    return {
-        name: value.detach().cpu().float().contiguous().numpy()
-        for name, value in network.state_dict().items()
-        if "num_batches" not in name
-    }
 
 
 def _plain(settings: Settings) -> dict[str, str]:

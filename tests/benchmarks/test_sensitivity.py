@@ -47,8 +47,8 @@ def test_density_grows_and_curves_bend(sensitivity):
 
 def test_a_row_and_the_pictures_show_both(sensitivity, tmp_path):
     line = np.column_stack([np.arange(10.0), np.zeros(10), np.zeros(10)])
-    ours, peer = compare_lines([line + [0, 0.001, 0]], [line]), compare_lines([line + [0, 0.01, 0.002]], [line])
-    outcome = sensitivity.Outcome(2.0, ours, peer)
+    ours, script = compare_lines([line + [0, 0.001, 0]], [line]), compare_lines([line + [0, 0.01, 0.002]], [line])
+    outcome = sensitivity.Outcome(2.0, ours, script)
     figures = sensitivity._row(outcome).split()
     assert [float(figure) for figure in figures] == [2.0, 1.0, 1.0, 0.0, 100.0, 10.0, 10.0, 2.0, 100.0]
     pytest.importorskip("matplotlib")

@@ -210,7 +210,7 @@ FAULTS = [
         "OPENCV on a GPU",
         with_(ENGINE="OPENCV", DEVICE="CUDA"),
         REFUSED,
-        "The engine OPENCV computes on the processor alone: set DEVICE to AUTO, or ENGINE to TORCH.",
+        "The engine OPENCV runs on the CPU only: set DEVICE to AUTO, or ENGINE to TORCH.",
     ),
     Fault(
         "no cloud",

@@ -1,15 +1,19 @@
 """The network as the paper draws it."""
 
 import numpy as np
-import torch
-from rail_extract.core.frpdf.network import FRPDF, RECEPTIVE_RADIUS, feedback
+import pytest
+from rail_extract.core.frpdf.architecture import RECEPTIVE_RADIUS
+
+torch = pytest.importorskip("torch")
+
+from rail_extract.core.frpdf.network import FRPDF, feedback, set_weights, weights_of  # noqa: E402
 
 
 def test_it_has_the_papers_number_of_parameters(network):
     assert sum(parameter.numel() for parameter in network.parameters()) == 293_545
 
 
-def test_any_shape_goes_in_and_comes_out(network):
+def test_the_output_has_the_shape_of_the_input(network):
     with torch.no_grad():
         for shape in ((1, 1, 8, 13), (2, 1, 31, 5)):
             assert [tuple(logits.shape) for logits in network(torch.zeros(shape), passes=3)] == [shape] * 3
@@ -22,7 +26,7 @@ def test_undecided_input_is_the_value_of_padding(network):
         assert torch.equal(logits, network.layer(torch.zeros(1, 2, 20, 20)))
 
 
-def test_a_cell_sees_753_cells_far_and_no_farther():
+def test_a_cell_is_influenced_from_at_most_753_cells_away():
     torch.manual_seed(0)
     network = FRPDF().eval()
     for name, parameter in network.named_parameters():
@@ -47,3 +51,11 @@ def test_feedback_is_decided_at_three_quarters_and_has_no_gradient():
     logits = torch.logit(torch.tensor([0.2, 0.5, 0.74, 0.76])).requires_grad_()
     assert feedback(logits).tolist() == [False, False, False, True]
     assert not feedback(logits).requires_grad
+
+
+def test_weights_put_into_another_network_give_the_same_network(network):
+    other = FRPDF().eval()
+    set_weights(other, weights_of(network))
+    raster = torch.rand(1, 1, 16, 16)
+    with torch.no_grad():
+        assert all(torch.equal(one, two) for one, two in zip(network(raster, 2), other(raster, 2)))

@@ -5,18 +5,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 from rail_extract.core.errors import ParameterError
 from rail_extract.core.frpdf import STATISTICS
-from rail_extract.core.frpdf.network import PassBatchNorm2d, Recurrent
-from rail_extract.core.frpdf.torch_engine import TorchEngine
+from rail_extract.core.frpdf.folding import fold
 from rail_extract.core.frpdf.weights import load_arrays
 from rail_extract.laboratory.rasters.pairs import random_pair
-from rail_extract.laboratory.training import curves, evaluate, gradients, train
-from rail_extract.laboratory.training.optimizers import Optimizers
-from rail_extract.laboratory.training.rivals import NETWORKS, TrainedNetwork, parameter_count
 from rail_extract.laboratory.training.scores import score
 from scipy import ndimage
+
+torch = pytest.importorskip("torch")
+
+from rail_extract.core.frpdf.network import PassBatchNorm2d, Recurrent, weights_of  # noqa: E402
+from rail_extract.laboratory.training import evaluate, gradients, learning_curves, train  # noqa: E402
+from rail_extract.laboratory.training.networks import NETWORKS, TrainedNetwork, parameter_count  # noqa: E402
+from rail_extract.laboratory.training.optimizers import Optimizers  # noqa: E402
 
 
 @pytest.fixture
@@ -138,14 +140,12 @@ def test_the_output_is_calibrated_to_the_largest_f1(monkeypatch):
     assert f1(1.0) < best - 0.02
 
 
-def test_the_command_leaves_weights_that_the_engine_takes(small, tmp_path):
+def test_the_command_leaves_weights_that_the_engines_take(small, tmp_path):
     parser = argparse.ArgumentParser()
     train.add_arguments(parser)
     train.run(parser.parse_args([str(tmp_path / "run"), "--steps", "2", "--device", "cpu"]))
     arrays = load_arrays(tmp_path / "run" / "weights.npz")
-    engine = TorchEngine(arrays, "CPU")
-    raster = np.zeros((32, 32), np.float32)
-    assert engine.probabilities(raster, raster, 0).shape == (32, 32)
+    assert len(fold(arrays)) == STATISTICS
     means = [arrays["layer.0.0.1.running_mean" + (f"_{n}" if n else "")] for n in range(STATISTICS)]
     assert not np.allclose(means[0], means[1])
 
@@ -164,7 +164,7 @@ def test_a_rival_is_trained_and_run_like_frpdf(small, tmp_path, name, monkeypatc
     moved = [key for key, value in network.named_parameters() if not torch.equal(value, before[key])]
     assert len(moved) == len(list(network.parameters()))
     train.recompute_statistics(network, settings)
-    train.save_arrays(tmp_path / "weights.npz", train.export(network))
+    train.save_arrays(tmp_path / "weights.npz", weights_of(network))
     raster = np.eye(128, dtype=np.float32)
     probability = TrainedNetwork(name, tmp_path / "weights.npz").probabilities(raster, 0 * raster + 0.5, 0)
     assert probability.shape == (128, 128)
@@ -188,13 +188,13 @@ def test_muon_moves_every_direction_of_a_kernel_alike():
 def test_curves_average_neighbouring_steps_and_count_repeated_ones_once(tmp_path):
     log = tmp_path / "log.csv"
     log.write_text("step,loss_1,f1_1\n" + "".join(f"{n},{n},0.5\n" for n in [*range(250), 248, 249]))
-    columns = curves.read_log(log)
+    columns = learning_curves.read_log(log)
     assert len(columns["step"]) == 250
-    steps, means = curves.binned(columns["step"], columns["loss_1"])
-    assert len(steps) == curves.MOST_BINS
+    steps, means = learning_curves.binned(columns["step"], columns["loss_1"])
+    assert len(steps) == learning_curves.MOST_BINS
     assert np.allclose(steps, means)
-    curves.draw_curves(log, tmp_path / "curves.png")
-    assert (tmp_path / "curves.png").stat().st_size > 10_000
+    learning_curves.draw_curves(log, tmp_path / "learning_curves.png")
+    assert (tmp_path / "learning_curves.png").stat().st_size > 10_000
 
 
 def test_a_training_for_a_ratio_draws_rails_of_that_width(small, monkeypatch):

@@ -32,7 +32,7 @@ SPUR_CELLS, PRUNINGS = 10, 3
 AROUND = np.ones((3, 3), dtype=int)
 
 
-def peer_lines(points: RailPoints, gauge_m: float, head_width_m: float) -> list:
+def script_lines(points: RailPoints, gauge_m: float, head_width_m: float) -> list:
     """Extract rail lines in the plain way.
 
     Returns

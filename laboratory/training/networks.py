@@ -13,8 +13,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from ...core.frpdf import CHANNELS, DILATIONS, KERNEL_RADIUS
-from ...core.frpdf.network import FRPDF, CustomConv2d, ProgressiveCombine2d, Recurrent, StackedConv2d
+from ...core.frpdf.architecture import CHANNELS, DILATIONS, KERNEL_RADIUS
+from ...core.frpdf.network import FRPDF, CustomConv2d, ProgressiveCombine2d, Recurrent, StackedConv2d, set_weights
 from ...core.frpdf.weights import load_arrays
 from .gradients import train_on_cpu
 
@@ -143,22 +143,49 @@ def head_of(network: Recurrent) -> nn.Conv2d:
 
 
 class TrainedNetwork:
-    """An engine, see `core.frpdf.engine.Engine`, of any network as it was trained: unfolded, in bfloat16."""
+    """A network in the form in which it was trained, in bfloat16, with the weights of a file.
+
+    It sees a whole raster with unknown surroundings, as in training. The engines in `core.frpdf` take the surroundings
+    to be empty, and compute only along the rails.
+
+    Parameters
+    ----------
+    name : str
+        One of `NETWORKS`.
+    weights : Path
+        An .npz file.
+    """
 
     def __init__(self, name: str, weights: Path) -> None:
         self._network = NETWORKS[name]()
-        arrays = {key: torch.from_numpy(array) for key, array in load_arrays(weights).items()}
-        self._network.load_state_dict({**self._network.state_dict(), **arrays})
+        set_weights(self._network, load_arrays(weights))
         self._device = "cuda" if torch.cuda.is_available() else "cpu"
         if self._device == "cpu":
             train_on_cpu(self._network)
         self._network.eval().to(self._device, memory_format=torch.channels_last)
-        self.description = f"{name}, {parameter_count(self._network)} parameters"
+
+    @property
+    def parameter_count(self) -> int:
+        """Number of trained parameters."""
+        return parameter_count(self._network)
 
     @torch.no_grad()
     def probabilities(self, raster: np.ndarray, state: np.ndarray, number: int) -> np.ndarray:
-        """Run one pass."""
-        tensors = (torch.from_numpy(array)[None, None].to(self._device) for array in (raster, state))
+        """Run one pass.
+
+        Parameters
+        ----------
+        raster, state : (height, width) float32 arrays
+            Raster, 0 or 1, and state, as in `network.Recurrent.logits`.
+        number : int
+            Number of the pass, from 0.
+
+        Returns
+        -------
+        (height, width) float32 array
+            Probability of rail.
+        """
+        seen, known = (torch.from_numpy(array)[None, None].to(self._device) for array in (raster, state))
         with torch.autocast(self._device, torch.bfloat16):
-            logits = self._network.logits(*tensors, number)
+            logits = self._network.logits(seen, known, number)
         return torch.sigmoid(logits.float())[0, 0].cpu().numpy()

@@ -1,0 +1,18 @@
+"""The model for a rail standard."""
+
+import numpy as np
+import pytest
+from rail_extract.core.errors import ModelError
+from rail_extract.core.frpdf.models import MODELS, choose
+
+
+@pytest.mark.parametrize("standard", [(1.435, 0.0762), (1.0, 0.06191), (1.676, 0.0667)])
+def test_a_standard_gets_the_model_with_the_nearest_ratio(standard):
+    nearest = min(MODELS, key=lambda model: abs(np.log(model.ratio * standard[1] / standard[0])))
+    assert choose(*standard) == nearest
+    assert nearest.path.exists()
+
+
+def test_a_ratio_that_no_model_covers_is_refused():
+    with pytest.raises(ModelError, match="GAUGE and HEAD_WIDTH"):
+        choose(1.435, 0.150)

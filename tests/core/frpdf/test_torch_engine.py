@@ -1,0 +1,84 @@
+"""A device without enough memory is asked for less, and replaced by the CPU in the end."""
+
+import numpy as np
+import pytest
+from rail_extract.core.frpdf import cleanup
+from rail_extract.core.frpdf.corridor import lay_fields
+from rail_extract.core.frpdf.layered import LayeredEngine
+from rail_extract.core.progress import Progress
+from rail_extract.core.raster import RailRaster
+
+torch = pytest.importorskip("torch")
+
+from rail_extract.core.frpdf.torch_engine import FEWEST_CELLS, TorchEngine  # noqa: E402
+
+
+def line(length):
+    """A raster whose corridor is one rectangle, so that pieces hold the same cells whichever way they are cut."""
+    columns = np.arange(length)
+    return RailRaster({}, 0.04, 0.0, 0.0).with_cells(np.column_stack([np.zeros_like(columns), columns]))
+
+
+class Small(TorchEngine):
+    """An engine on a device with room for a number of cells, until it moves to the CPU."""
+
+    room = 0
+    moved = False
+
+    def sweep(self, seen, known, number, pieces, progress):
+        self.device_cells = sum(one.size for one in seen)
+        return super().sweep(seen, known, number, pieces, progress)
+
+    def _load(self, array):
+        if not self.moved and self.device_cells > self.room:
+            raise torch.cuda.OutOfMemoryError("out of memory")
+        return super()._load(array)
+
+    def _move(self, device):
+        self.moved = hasattr(self, "_passes")
+        super()._move(device)
+
+
+class Listener(Progress):
+    def __init__(self):
+        self.warnings = []
+
+    def warning(self, text):
+        self.warnings.append(text)
+
+
+def test_fields_with_context_give_the_result_of_one_field(arrays):
+    engine = TorchEngine(arrays, "CPU", exact=True)
+    raster = line(1000)
+    whole = cleanup.clean(raster, engine, passes=1)
+    engine.most_cells = 20_000
+    assert len(lay_fields(raster, engine.most_cells)) > 2
+    parts = cleanup.clean(raster, engine, passes=1)
+    assert whole.count() > 1000
+    np.testing.assert_array_equal(parts.cells(), whole.cells())
+
+
+@pytest.mark.parametrize("room, ends_on_cpu", [(50_000, False), (0, True)])
+def test_an_exhausted_device_is_asked_for_less_and_then_left(arrays, monkeypatch, room, ends_on_cpu):
+    monkeypatch.setattr("rail_extract.core.frpdf.torch_engine.FEWEST_CELLS", 1 << 10)
+    monkeypatch.setattr("rail_extract.core.frpdf.corridor.CONTEXT", 80)
+    raster = line(1500)
+    expected = cleanup.clean(raster, TorchEngine(arrays, "CPU", exact=True), passes=1)
+    assert expected.count() > 1000
+    engine, listener = Small(arrays, "CPU", exact=True), Listener()
+    engine.room = room
+    found = cleanup.clean(raster, engine, passes=1, progress=listener)
+    assert engine.moved == ends_on_cpu
+    assert listener.warnings
+    assert ("on the CPU" in listener.warnings[-1]) == ends_on_cpu
+    assert all("smaller parts" in text for text in listener.warnings[:-1])
+    assert engine.most_cells == LayeredEngine.most_cells or engine.most_cells >= 1 << 10
+    np.testing.assert_array_equal(found.cells(), expected.cells())
+
+
+def test_a_device_is_left_before_its_parts_get_too_small(arrays):
+    engine = TorchEngine(arrays, "CPU")
+    messages = []
+    while "on the CPU" not in (messages or [""])[-1]:
+        messages.append(engine.retreat())
+    assert len(messages) == 1 + np.log2(LayeredEngine.most_cells / FEWEST_CELLS) // 2
