@@ -1,7 +1,7 @@
-"""Write models/extract_rails.model3, the editable twin of Extract Rails, from the algorithms as they are.
+"""Write models/extract_rails.model3, the editable form of Extract Rails, from the algorithms.
 
-Run it after a change of their parameters, in the environment that `make env` prints. Every parameter of Extract Rails
-is an input of the model, and goes to all steps that have one of that name.
+Run it after a change to their parameters, in the environment that `make env` prints. Each parameter of Extract Rails is
+an input of the model and is passed to all steps that have a parameter of this name.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
-os.environ["QT_HASH_SEED"] = "0"  # the same model gives the same file
+os.environ["QT_HASH_SEED"] = "0"  # makes the file reproducible
 
 from qgis.core import (  # noqa: E402
     QgsApplication,
@@ -33,7 +33,7 @@ STEPS = {
     "centerlines": "buildtrackcenterlines",
     "quality": "measuretrackgeometry",
 }
-"""What each step makes, which is its id in the model, and the algorithm that makes it."""
+"""Algorithm of each step, by the result of the step, which is its id in the model."""
 
 CLOUDS = {("raster", "INPUT"), ("rails", "POINTS"), ("quality", "POINTS")}
 RAILS = ("quality", "RAILS")
@@ -42,17 +42,17 @@ TOLD_BY_RASTER = {(step, name) for step in ("cleaned", "rails") for name in ("GA
 RESULTS = {"rails": "RAILS", "centerlines": "CENTERLINES", "quality": "QUALITY"}
 
 COLUMN, ROW = 260, 130
-"""Distances in the designer's picture."""
+"""Spacing of the boxes in the model designer."""
 
 HELP = (
-    "The steps of Extract Rails one by one, to be changed in the model designer: leave a step out, put your own in its "
-    "place, or look at what lies between. As it is, it gives the lines of Extract Rails, of clouds beyond half a "
-    "kilometre within half a millimetre."
+    "The individual steps of Extract Rails, for editing in the model designer: remove a step, replace one with your "
+    "own, or inspect the intermediate results. Unchanged, the model gives the same lines as Extract Rails; for clouds "
+    "longer than half a kilometre, the lines agree to within 0.5 mm."
 )
 
 
 def build() -> QgsProcessingModelAlgorithm:
-    """Make the model; the plugin's provider has to be registered."""
+    """Build the model; the plugin's provider must be registered."""
     registry = QgsApplication.processingRegistry()
     whole = registry.algorithmById("railextract:extractrails")
     model = QgsProcessingModelAlgorithm("Extract rails, step by step", "Rails and tracks", "railsandtracks")
@@ -83,14 +83,16 @@ def build() -> QgsProcessingModelAlgorithm:
 
 
 def _file_instead_of(cloud) -> QgsProcessingParameterFile:
-    """Make a file parameter of the cloud's: a QGIS without PDAL refuses every path in a point cloud parameter."""
-    made = QgsProcessingParameterFile(cloud.name(), "Point cloud (LAS, LAZ or COPC file, folder of them, or .vpc)")
-    made.setHelp("The path of a LAS, LAZ or COPC file, of a folder of them or of a virtual point cloud (.vpc).")
+    """Replace the cloud's parameter with one for files: QGIS without PDAL refuses any path in a cloud parameter."""
+    made = QgsProcessingParameterFile(
+        cloud.name(), "Point cloud (LAS, LAZ or COPC file, folder of such files, or .vpc)"
+    )
+    made.setHelp("The path of a LAS, LAZ or COPC file, of a folder of such files, or of a virtual point cloud (.vpc).")
     return made
 
 
 def _source(step: str, definition, inputs: set[str], before: str | None):
-    """Say where a parameter of a step gets its value from; None leaves it empty."""
+    """Return the source of a parameter's value; None leaves the parameter empty."""
     name = definition.name()
     if (step, name) in CLOUDS:
         return QgsProcessingModelChildParameterSource.fromModelParameter("INPUT")
@@ -106,7 +108,7 @@ def _source(step: str, definition, inputs: set[str], before: str | None):
 
 
 def _output(step: str, number: int) -> QgsProcessingModelOutput:
-    """Make what a step gives an output of the model."""
+    """Define the result of a step as an output of the model."""
     output = QgsProcessingModelOutput(RESULTS[step], RESULTS[step].capitalize())
     output.setChildId(step)
     output.setChildOutputName("OUTPUT")
@@ -115,7 +117,7 @@ def _output(step: str, number: int) -> QgsProcessingModelOutput:
 
 
 def main() -> None:
-    """Register the plugin in a bare QGIS, and write the model."""
+    """Register the plugin in a QGIS without other plugins, and write the model."""
     application = QgsApplication([], False)
     application.initQgis()
     from rail_extract import classFactory

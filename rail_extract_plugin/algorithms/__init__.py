@@ -19,4 +19,4 @@ ALGORITHMS = (
     InstallPackages,
     CheckInstallation,
 )
-"""The whole walk first, then its steps in their order, then what sets it up."""
+"""The whole extraction first, then its steps in order, then the setup."""

@@ -1,4 +1,4 @@
-"""What all algorithms of Rail Extract share: how they appear, check, prepare, run and fail."""
+"""Base of all algorithms: how they appear in the toolbox, check their values, run and report errors."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from ..paths import ICONS, PICTURES
 from ..setup.dependencies import explain_missing, missing_packages
 from ..writing.destinations import check_distinct, check_writable
 
-# What people search for, also in the languages of the larger railways; the search looks at the words as they stand.
+# Search terms, also in the languages of the larger railways: the toolbox search compares whole words.
 RAIL_WORDS = (
     "rail",
     "rails",
@@ -46,14 +46,14 @@ CLOUD_WORDS = ("lidar", "las", "laz", "copc", "point cloud", "laser scanning", "
 TRACK_WORDS = ("gauge", "cant", "superelevation", "alignment", "Spurweite", "Gleisachse", "Überhöhung", "écartement")
 
 COMMAND_LINE = "qgis_process"
-"""What QGIS calls the platform of its command line."""
+"""QGIS's name for the platform of its command line."""
 
 
 class RailAlgorithm(QgsProcessingAlgorithm):
-    """A step of Rail Extract in the toolbox.
+    """An algorithm of Rail Extract in the toolbox.
 
-    A subclass says in the attributes what it is called and needs, declares its parameters in `initAlgorithm`, reads
-    them in `read` and computes in `compute`, the only method that may import what depends on `NEEDS`.
+    A subclass states its name and its needs in the class attributes, declares its parameters in `initAlgorithm`, reads
+    them in `read` and computes in `compute`. Only `compute` may import modules that depend on `NEEDS`.
     """
 
     NAME = ""
@@ -64,14 +64,14 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     SUMMARY = ""
     HELP = ""
     PICTURE = ""
-    """File in the folder of pictures, shown beside the dialog."""
+    """File in the folder of pictures, shown in the help panel of the dialog."""
     GUIDE = "parameters"
-    """Page of the guide that the dialog's help button opens."""
+    """Page of the guide that the Help button opens."""
     NEEDS: tuple[tuple[str, ...], ...] = ()
-    """Python modules without which it can't run; any one of those in a need meets it, the first is recommended."""
+    """Required Python modules: of each inner tuple one is enough, and the first is recommended."""
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Any:
-        """Turn the parameters into what `compute` needs, and check them; runs in the main thread.
+        """Read and check the parameters in the main thread, and return what `compute` needs.
 
         Raises
         ------
@@ -81,16 +81,16 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         raise NotImplementedError
 
     def compute(self, job: Any, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress) -> dict:
-        """Do the work, then write the outputs, and return the results by name."""
+        """Compute, write the outputs and return the results by name."""
         raise NotImplementedError
 
     def checkParameterValues(self, parameters: dict[str, Any], context: QgsProcessingContext) -> tuple[bool, str]:
-        """Check all values before a run, and say what is wrong in words of whom QGIS shows it to."""
+        """Check all values before a run; the message uses the terms of the user's platform."""
         accepted, message = self._check(parameters, context)
         return accepted, for_user(message, self.parameterDefinitions())
 
     def _check(self, parameters: dict[str, Any], context: QgsProcessingContext) -> tuple[bool, str]:
-        """Check as QGIS does, then whether outputs can be written, then as `read` does."""
+        """Check as QGIS does, then that the outputs can be written, then as `read` does."""
         accepted, message = super().checkParameterValues(self._with_paths_accepted(parameters), context)
         if not accepted:
             return False, self._refusal(parameters, context) or message
@@ -114,7 +114,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     def prepareAlgorithm(
         self, parameters: dict[str, Any], context: QgsProcessingContext, feedback: QgsProcessingFeedback
     ) -> bool:
-        """Read the parameters in the main thread; older ``qgis_process`` asks no `canExecute` before."""
+        """Read the parameters in the main thread; older ``qgis_process`` does not call `canExecute` first."""
         executable, reason = self.canExecute()
         if not executable:
             raise QgsProcessingException(reason)
@@ -127,7 +127,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     def processAlgorithm(
         self, parameters: dict[str, Any], context: QgsProcessingContext, feedback: QgsProcessingFeedback
     ) -> dict:
-        """Compute in any thread; every failure that a user can remedy is one sentence."""
+        """Compute in any thread; every error that a user can remedy becomes one sentence."""
         progress = QgisProgress(feedback, self.parameterDefinitions())
         try:
             results = self.compute(self._job, parameters, context, progress)
@@ -136,27 +136,27 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         except Cancelled:
             raise QgsProcessingException(tr("Cancelled; nothing was written.")) from None
         except MemoryError:
-            raise QgsProcessingException(tr("The memory does not suffice: choose a smaller extent.")) from None
+            raise QgsProcessingException(tr("Not enough memory: choose a smaller extent.")) from None
         progress.set_fraction(1)
         return results
 
     def _read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Any:
-        """Read the parameters, after a look at those that need no file."""
+        """Check the values that need no file, then read the parameters."""
         check_values(self.parameterDefinitions(), ParameterValues(self, parameters, context))
         return self.read(parameters, context)
 
     def _refusal(self, parameters: dict[str, Any], context: QgsProcessingContext) -> str | None:
-        """Say what is wrong with the first value that QGIS does not accept, outputs aside."""
+        """Return what is wrong with the first input that QGIS does not accept."""
         accepted = self._with_paths_accepted(parameters)
-        told = (
+        reasons = (
             explain_invalid(definition, accepted.get(definition.name()), context)
             for definition in self.parameterDefinitions()
             if not definition.isDestination()
         )
-        return next(filter(None, told), None)
+        return next(filter(None, reasons), None)
 
     def _with_paths_accepted(self, parameters: dict[str, Any]) -> dict[str, Any]:
-        """Put a layer object in place of paths of clouds: QGIS refuses all that its build can't open; `read` checks."""
+        """Replace paths of clouds with a layer object, because QGIS refuses formats that its build cannot open."""
         stand_ins = {
             definition.name(): QgsPointCloudLayer("", "", "")
             for definition in self.parameterDefinitions()
@@ -165,60 +165,60 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         return {**parameters, **stand_ins}
 
     def canExecute(self) -> tuple[bool, str]:
-        """Tell whether the needed packages are there; the algorithm stands in the toolbox in any case."""
+        """Return whether the required packages are installed; the toolbox lists the algorithm in either case."""
         missing = missing_packages(self.NEEDS)
         return (False, explain_missing(self.displayName(), missing, self._usable_labels())) if missing else (True, "")
 
     def _usable_labels(self) -> list[str]:
-        """Names of the provider's algorithms in this one's group that lack no package."""
+        """Labels of the provider's algorithms in this group whose packages are all installed."""
         mates = self.provider().algorithms() if self.provider() else ()
         return [
             mate.displayName() for mate in mates if mate.GROUP_ID == self.GROUP_ID and not missing_packages(mate.NEEDS)
         ]
 
     def createInstance(self) -> RailAlgorithm:
-        """Make another one, for a run of its own."""
+        """Create an instance for a run."""
         return type(self)()
 
     def name(self) -> str:
-        """Give the identifier that scripts and models use; it never changes."""
+        """Return the identifier for scripts and models; it never changes."""
         return self.NAME
 
     def displayName(self) -> str:
-        """Give the name shown in the toolbox."""
+        """Return the label shown in the toolbox."""
         return tr(self.LABEL)
 
     def group(self) -> str:
-        """Give the group shown in the toolbox."""
+        """Return the label of the group."""
         return tr(self.GROUP)
 
     def groupId(self) -> str:
-        """Give the group's identifier."""
+        """Return the identifier of the group."""
         return self.GROUP_ID
 
     def tags(self) -> list[str]:
-        """Give words that the toolbox search finds it by."""
+        """Return the search terms."""
         return [tr(tag) for tag in self.TAGS]
 
     def shortDescription(self) -> str:
-        """Give the sentence shown under the mouse."""
+        """Return the sentence of the tooltip."""
         return tr(self.SUMMARY)
 
     def shortHelpString(self) -> str:
-        """Give the text beside the dialog; a command line prints summary and parameters itself, and no HTML."""
+        """Return the text of the help panel; a command line prints no HTML, and the summary and parameters itself."""
         summary, text = tr(self.SUMMARY), tr(self.HELP)
         if QgsApplication.platform() == COMMAND_LINE:
             return text
         return help_panel(summary, PICTURES / self.PICTURE if self.PICTURE else None, text, self.parameterDefinitions())
 
     def helpUrl(self) -> str:
-        """Give the address of the guide."""
+        """Return the address of the guide's page."""
         return guide(self.GUIDE)
 
     def icon(self) -> QIcon:
-        """Give the icon shown in the toolbox."""
+        """Return the icon shown in the toolbox."""
         return QIcon(self.svgIconPath())
 
     def svgIconPath(self) -> str:
-        """Give the same icon for places that draw it themselves."""
+        """Return the path of the icon, where QGIS draws it itself."""
         return str(ICONS / f"{self.NAME}.svg")

@@ -1,13 +1,11 @@
-"""Build Track Centerlines: from the lines of rails to the lines midway between the two rails of each track."""
+"""Build Track Centerlines: pairs rails to tracks and draws the line midway between the two rails of each track."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
-from qgis.core import (
-    QgsProcessingContext,
-)
+from qgis.core import QgsProcessingContext
 
 from ...core.progress import Progress
 from ...core.standards import RailStandard
@@ -18,12 +16,12 @@ from ..writing.layers import CENTERLINES, figures_of, write_lines
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
 READING = 0.1
-"""Share of the progress bar for reading the lines."""
+"""Fraction of the progress bar for reading the lines."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What the parameters say."""
+    """The values of the parameters."""
 
     standard: RailStandard
     other_gauges_m: tuple[float, ...]
@@ -36,17 +34,18 @@ class BuildTrackCenterlines(RailAlgorithm):
     LABEL = "Build track centerlines"
     TAGS = (*RAIL_WORDS, *TRACK_WORDS, "centerline", "centreline", "axis")
     NEEDS = (("numpy",), ("scipy",), ("pyproj",))
-    SUMMARY = "Pairs rails that lie a gauge apart and draws the line midway between the two rails of each track."
+    SUMMARY = "Pairs rails that are one gauge apart and draws the line midway between the two rails of each track."
     PICTURE = "gauge.svg"
     HELP = (
-        "Takes the lines of Vectorize Rails, or rails drawn by hand: multi-part and curved lines, in any direction. "
-        "Fields rail_id and class_code are used where they are there; only rails of one class make a track.\n\n"
-        "Fill other gauges for mixed traffic: on track with three rails, the shared one serves both. Lines without "
-        "heights give centerlines without heights."
+        "Takes the lines of Vectorize Rails, or rails drawn by hand: lines in any direction, also curved and "
+        "multi-part ones. The fields rail_id and class_code are used if they exist. Both rails of a track have the "
+        "same class.\n\n"
+        "For mixed and dual gauge, fill in Other gauges: on track with three rails, the common rail belongs to both "
+        "tracks. Lines without heights give centerlines without heights."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs of the interface, in its order."""
+        """Declare the parameters and outputs in the order of the interface."""
         for definition in (
             inputs.rails(),
             *groups.rail(),
@@ -62,7 +61,7 @@ class BuildTrackCenterlines(RailAlgorithm):
             self.addOutput(output)
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
-        """Read what has to be read in the main thread, and check it all."""
+        """Read and check the parameters, in the main thread."""
         values = ParameterValues(self, parameters, context)
         standard = values.standard()
         values.lines("INPUT")
@@ -71,7 +70,7 @@ class BuildTrackCenterlines(RailAlgorithm):
     def compute(
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
-        """Pair the rails of every class, then write the centerlines."""
+        """Pair the rails of each class, then write the centerlines."""
         from ...core.pipeline import tracks_of
         from ..reading.line_layers import read_rails
 

@@ -1,4 +1,4 @@
-"""Check Installation: versions, engine, models, and a short test of it all."""
+"""Check Installation: versions, engine, models, and a short test run."""
 
 from __future__ import annotations
 
@@ -37,23 +37,23 @@ class CheckInstallation(RailAlgorithm):
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the outputs; there is nothing to fill in."""
+        """Declare the outputs; there are no parameters."""
         for name, label in (
             ("VERSIONS", tr("Versions of QGIS, Python and packages")),
             ("MODELS", tr("State of the models")),
             ("ENGINE_USED", tr("Engine and device that run the network")),
-            ("SELF_TEST", tr("What the test came to")),
+            ("SELF_TEST", tr("Result of the test")),
         ):
             self.addOutput(QgsProcessingOutputString(name, label))
-        self.addOutput(QgsProcessingOutputBoolean("PASSED", tr("Whether all is well")))
+        self.addOutput(QgsProcessingOutputBoolean("PASSED", tr("Whether all checks passed")))
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> None:
-        """Nothing is to be read."""
+        """Read nothing: there are no parameters."""
 
     def compute(
         self, job: None, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
-        """Look at everything, and say it line by line."""
+        """Check everything, and report it line by line."""
         from ..setup import self_test
 
         versions = {
@@ -67,7 +67,7 @@ class CheckInstallation(RailAlgorithm):
             progress.info(f"{name}: {text}")
         passed, words, engine = self._test(progress)
         if passed and set(models.values()) != {"ok"}:
-            passed, words = False, tr("{}, but with weights that are not those of the release").format(words)
+            passed, words = False, tr("{}, but the weights are not those of the release").format(words)
         verdict = tr("passed") if passed else tr("failed")
         (progress.info if passed else progress.warning)(f"Self test {verdict}: {words}.")
         return {
@@ -79,13 +79,13 @@ class CheckInstallation(RailAlgorithm):
         }
 
     def _test(self, progress: Progress) -> tuple[bool, str, str]:
-        """Extract a track where nothing is missing for that."""
+        """Run the test if all packages for it are installed."""
         from ..setup import self_test
 
         missing = missing_packages(ExtractRails.NEEDS)
         if missing:
             names = ", ".join(package.module for package in missing)
-            return False, tr("{} missing, run Install packages").format(names), ""
+            return False, tr("{} missing: run Install packages").format(names), ""
         try:
             return self_test.extract_sample(progress)
         except (RailExtractError, ImportError) as error:

@@ -1,4 +1,4 @@
-"""Extract Rails: the whole walk from a classified cloud to 3D rails and track centerlines."""
+"""Extract Rails: the whole way from a classified cloud to 3D rails and track centerlines."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ if TYPE_CHECKING:
     from ...core.rails import RailNetwork
 
 READING = 0.2
-"""Share of the progress bar for reading the cloud."""
+"""Fraction of the progress bar for reading the cloud."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What the parameters say."""
+    """The values of the parameters."""
 
     cloud: CloudSource
     class_codes: tuple[int, ...]
@@ -62,19 +62,19 @@ class ExtractRails(RailAlgorithm):
     SUMMARY = "Turns lidar points classified as rail into the 3D lines of the railheads and of the track centerlines."
     PICTURE = "gauge.svg"
     HELP = (
-        "Choose the point cloud, the classes of its rail points and the rail standard, and run; the other parameters "
-        "suit most clouds. The cloud must be in a projected coordinate system, which the results get too.\n\n"
-        "A rail line is the top of the railhead on the head's own axis. The gauge in the results is the distance in "
-        "space between the two rail lines less the railhead width; it is not measured 14 mm below the top. Left and "
-        "right are seen along the line, and cant is left minus right.\n\n"
-        "The report says in words and pictures whether the result is good and where it is not. sigma_mm of a line is "
-        "its standard error across, and bridged_m the length along which it has no points. Track geometry gives points "
-        "along each track with gauge, cant, twist, radius and gradient; STATION_COUNT, SIGMA and BRIDGED_LENGTH sum up "
-        "what was measured for it or for the report."
+        "Choose the point cloud, the classes of its rail points and the rail standard, then run; the other defaults "
+        "suit most clouds. The cloud must be in a projected coordinate system; the results are in the same system.\n\n"
+        "A rail line follows the top of the railhead on the axis of the head. The gauge in the results is the 3D "
+        "distance between the two rail lines minus the railhead width; it is not measured 14 mm below the top. Left "
+        "and right are as seen along the line, and cant is left minus right.\n\n"
+        "The report assesses the result in words and plots and shows where it is weak. The field sigma_mm is the "
+        "standard error of a line's lateral position, and bridged_m the length without points. Track geometry is a "
+        "layer of points along each track with gauge, cant, twist, radius and gradient. STATION_COUNT, SIGMA and "
+        "BRIDGED_LENGTH summarize the track geometry, measured for this layer or for the report."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs of the interface, in its order."""
+        """Declare the parameters and outputs in the order of the interface."""
         for definition in (
             *inputs.cloud(),
             *groups.rail(),
@@ -96,7 +96,7 @@ class ExtractRails(RailAlgorithm):
             self.addOutput(output)
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
-        """Read what has to be read in the main thread, and check it all."""
+        """Read and check the parameters, in the main thread."""
         values = ParameterValues(self, parameters, context)
         standard = values.standard()
         choose_model(standard.gauge_m, standard.head_width_m)
@@ -111,7 +111,7 @@ class ExtractRails(RailAlgorithm):
     def compute(
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
-        """Extract everything, then write it."""
+        """Extract the rails and tracks, then write the outputs."""
         from ...core.pipeline import extract_rails, square_side
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
@@ -149,7 +149,7 @@ class ExtractRails(RailAlgorithm):
         parameters: dict[str, Any],
         context: QgsProcessingContext,
     ) -> dict[str, str]:
-        """Write what the network made, in a file like that of FRPDF Cleanup; no file where it left nothing."""
+        """Write the network's output as Clean Rail Raster does; no file if no rail cell is left."""
         from ..reading.rasters import header_for, on_one_grid
 
         if not any(raster.tiles for raster in network.cleaned):

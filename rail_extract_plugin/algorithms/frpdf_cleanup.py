@@ -1,4 +1,4 @@
-"""FRPDF Cleanup: the network closes gaps in a rail raster and takes noise out of it."""
+"""Clean Rail Raster (FRPDF): the network closes gaps in a rail raster and removes noise."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from ..reading.rasters import RasterHeader
 
 READING, WRITING = 0.05, 0.95
-"""Shares of the progress bar at which the network begins and ends."""
+"""Fractions of the progress bar at which the network starts and ends."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What the parameters say."""
+    """The values of the parameters."""
 
     path: Path
     header: RasterHeader
@@ -38,31 +38,31 @@ class FrpdfCleanup(RailAlgorithm):
     """The algorithm ``railextract:frpdfcleanup``."""
 
     NAME = "frpdfcleanup"
-    LABEL = "FRPDF cleanup"
+    LABEL = "Clean rail raster (FRPDF)"
     TAGS = (*RAIL_WORDS, "raster", "neural network", "deep learning", "clean", "repair", "gaps", "noise")
     PICTURE = "raster.svg"
     NEEDS = (("numpy",), ("pyproj",), ("cv2", "torch"))
-    SUMMARY = "Closes gaps in a rail raster and removes what is no rail, with the neural network FRPDF."
+    SUMMARY = "Closes gaps in a rail raster and removes cells that are not rail, with the neural network FRPDF."
     HELP = (
-        "Takes the raster of Rasterize Rail Points, or one like it; the result has the same grid, bands and tags. The "
-        "network looks at the raster again and again, each time at what it found before.\n\n"
-        "A raster made elsewhere does not say for which rails it was made: fill the gauge and the railhead width then."
+        "Takes the raster of Rasterize Rail Points, or a similar one. The result has the same grid, bands and tags. "
+        "The network works in passes: each pass starts from the result of the pass before.\n\n"
+        "A raster from other software does not state its gauge and railhead width: fill them in."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs of the interface, in its order."""
+        """Declare the parameters and outputs in the order of the interface."""
         for definition in (inputs.raster(), groups.model(), *groups.cleanup(), *groups.raster_rail()):
             self.addParameter(definition)
         self.addParameter(
             helped(
                 QgsProcessingParameterRasterDestination("OUTPUT", tr("Cleaned rail raster")),
-                tr("A GeoTIFF for Vectorize Rails."),
+                tr("A GeoTIFF; the input of Vectorize Rails."),
             )
         )
         self.addOutput(outputs.engine())
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
-        """Read the raster's header, and check that a model fits it."""
+        """Read the header of the raster and check that a model fits it."""
         from ..reading.rasters import choose_model
 
         values = ParameterValues(self, parameters, context)
@@ -75,7 +75,7 @@ class FrpdfCleanup(RailAlgorithm):
     def compute(
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
-        """Clean every band, then write the file."""
+        """Clean each band, then write the file."""
         from ...core.frpdf.cleanup import clean
         from ...core.frpdf.engine import make_engine
         from ...core.frpdf.weights import load_arrays

@@ -1,4 +1,4 @@
-"""Install Packages: puts the Python packages that QGIS lacks into a folder of the user's profile."""
+"""Install Packages: installs missing Python packages into a folder of the user's profile."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ BUILDS = {
     ("CPU", "linux"): ("--index-url", "https://download.pytorch.org/whl/cpu"),
     ("CUDA", "win32"): ("--index-url", "https://download.pytorch.org/whl/cu126"),
 }
-"""Where the builds of PyTorch are that the usual index does not have for a system."""
+"""Options for pip where the default index has no such build of PyTorch for a system."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What is to be installed: requirements by module, and PyTorch's build or None."""
+    """What to install: requirements by module, and the build of PyTorch or None."""
 
     packages: dict[str, str]
     torch: str | None
@@ -41,23 +41,23 @@ class InstallPackages(RailAlgorithm):
     GROUP_ID = "setup"
     GUIDE = "troubleshooting"
     TAGS = ("rail", "setup", "install", "python", "pip", "dependencies", "laspy", "opencv", "torch", "pytorch")
-    SUMMARY = "Installs the Python packages that Rail Extract needs and this QGIS does not have."
+    SUMMARY = "Installs the Python packages that Rail Extract needs and this QGIS lacks."
     HELP = (
-        "They go into a folder of your QGIS profile, fitted to the numpy and scipy that QGIS came with; nothing that "
-        "belongs to QGIS is changed, and no administrator's rights are needed. What is there already is not installed "
-        "again. It takes a connection to the internet.\n\n"
-        "PyTorch is optional: with it the network runs faster than with OpenCV, and on a GPU. It is a download of "
-        "about 200 MB for the processor and of several GB for CUDA."
+        "The packages go into a folder of your QGIS profile, in versions that work with the numpy and scipy of QGIS. "
+        "QGIS itself is not changed, administrator rights are not needed, and packages that are already installed are "
+        "skipped. An internet connection is required.\n\n"
+        "PyTorch is optional: the network runs faster with it than with OpenCV, and can use a GPU. The download is "
+        "about 200 MB for the CPU build and several GB for CUDA."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs."""
         self.addParameter(groups.torch())
         self.addOutput(QgsProcessingOutputFolder("FOLDER", tr("Folder of the packages")))
-        self.addOutput(QgsProcessingOutputString("INSTALLED", tr("What was installed")))
+        self.addOutput(QgsProcessingOutputString("INSTALLED", tr("Installed packages")))
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
-        """See what is missing."""
+        """Find what is missing."""
         build = ParameterValues(self, parameters, context).choice("TORCH")
         if build == "CUDA" and sys.platform == "darwin":
             raise ParameterError("There is no CUDA on macOS: set TORCH to CPU.")
@@ -68,7 +68,7 @@ class InstallPackages(RailAlgorithm):
     def compute(
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
-        """Install what is missing, PyTorch last since it may fail on its own."""
+        """Install what is missing; PyTorch last, because it may fail on its own."""
         from ..setup.installation import Order, install
         from ..setup.interpreter import find_interpreter
 
@@ -79,7 +79,7 @@ class InstallPackages(RailAlgorithm):
             orders.append(Order(("torch",), ("torch",), BUILDS.get((job.torch, sys.platform), ())))
         folder = package_folders.own_folder()
         if not orders:
-            progress.info(tr("All packages are there; nothing is to be done."))
+            progress.info(tr("All packages are installed; there is nothing to do."))
             return {"FOLDER": str(folder), "INSTALLED": ""}
         interpreter = find_interpreter()
         progress.info(f"Python: {interpreter.program}")
@@ -91,7 +91,7 @@ class InstallPackages(RailAlgorithm):
                 if not installed:
                     raise
                 reason = str(error) or tr("Cancelled.")
-                raise RailExtractError(tr("{} Kept is {}.").format(reason, ", ".join(installed))) from error
+                raise RailExtractError(tr("{} Already installed: {}.").format(reason, ", ".join(installed))) from error
             package_folders.use()
         progress.info(tr("Installed: {} in {}").format(", ".join(installed), folder))
         return {"FOLDER": str(folder), "INSTALLED": ", ".join(installed)}

@@ -1,4 +1,4 @@
-"""Measure Track Geometry: gauge, cant, twist, radius and gradient of tracks by chainage, and their support."""
+"""Measure Track Geometry: gauge, cant, twist, radius and gradient by chainage, with their accuracy and support."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from ..writing.layers import figures_of_stations, write_stations
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
 READING, MEASURING = 0.3, 0.9
-"""Shares of the progress bar at which lines and cloud are read, and at which the rails are measured."""
+"""Fractions of the progress bar at which lines and cloud are read, and at which the rails are measured."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What the parameters say."""
+    """The values of the parameters."""
 
     head_width_m: float
     cloud: CloudSource | None
@@ -37,7 +37,7 @@ class MeasureTrackGeometry(RailAlgorithm):
     LABEL = "Measure track geometry"
     TAGS = (*RAIL_WORDS, *TRACK_WORDS, "twist", "radius", "curvature", "gradient", "quality", "chainage")
     NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
-    SUMMARY = "Measures gauge, cant, twist, radius and gradient along tracks, and how well the points support them."
+    SUMMARY = "Measures gauge, cant, twist, radius and gradient along tracks, and their support by points."
     PICTURE = "gauge.svg"
     HELP = "\n\n".join(
         (
@@ -50,7 +50,7 @@ class MeasureTrackGeometry(RailAlgorithm):
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs of the interface, in its order."""
+        """Declare the parameters and outputs in the order of the interface."""
         layers = (inputs.centerlines(), inputs.rails_of_tracks(), inputs.points_of_rails())
         for definition in (*layers, groups.step(), *groups.head(), outputs.quality()):
             self.addParameter(definition)
@@ -58,7 +58,7 @@ class MeasureTrackGeometry(RailAlgorithm):
             self.addOutput(output)
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
-        """Read what has to be read in the main thread, and check it all."""
+        """Read and check the parameters, in the main thread."""
         values = ParameterValues(self, parameters, context)
         for name in ("INPUT", "RAILS"):
             values.lines(name)
@@ -67,7 +67,7 @@ class MeasureTrackGeometry(RailAlgorithm):
     def compute(
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
-        """Measure every track, then write the points."""
+        """Measure each track, then write the points."""
         from ...core.tracks.geometry import measure_track_geometry
         from ..reading.track_inputs import check_gauges, measured_rails, read_inputs
 

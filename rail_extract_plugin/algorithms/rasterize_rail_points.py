@@ -1,4 +1,4 @@
-"""Rasterize Rail Points: from a classified cloud to a raster of cells that hold rail points."""
+"""Rasterize Rail Points: marks the cells of a raster that contain rail points."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from ..writing.layers import write_raster
 from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
 
 READING = 0.8
-"""Share of the progress bar for reading the cloud."""
+"""Fraction of the progress bar for reading the cloud."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What the parameters say."""
+    """The values of the parameters."""
 
     cloud: CloudSource
     class_codes: tuple[int, ...]
@@ -41,26 +41,26 @@ class RasterizeRailPoints(RailAlgorithm):
     TAGS = (*RAIL_WORDS, *CLOUD_WORDS, "raster", "cells", "image")
     PICTURE = "raster.svg"
     NEEDS = (("numpy",), ("laspy",), ("lazrs",), ("pyproj",))
-    SUMMARY = "Marks the cells of a raster in which lidar points classified as rail lie."
+    SUMMARY = "Marks the cells of a raster that contain lidar points classified as rail."
     HELP = (
-        "The raster has one band a class and 1 where there is rail. Its cells are as large as the network expects for "
-        "the gauge and railhead width, 4 cm for the commonest rails, and it says in its tags which those are.\n\n"
-        "Empty parts take no room in the file, so that it may span a whole line."
+        "The raster has one band per class, with 1 where there is rail. The cell size is the one that the network "
+        "expects for the gauge and railhead width: 4 cm for the commonest rails. Tags of the file state both.\n\n"
+        "Empty areas take no space in the file, so a raster may cover a whole railway line."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs of the interface, in its order."""
+        """Declare the parameters and outputs in the order of the interface."""
         for definition in (*inputs.cloud(), *groups.rail(), *groups.area()):
             self.addParameter(definition)
         self.addParameter(
             helped(
                 QgsProcessingParameterRasterDestination("OUTPUT", tr("Rail raster")),
-                tr("A GeoTIFF for FRPDF Cleanup, which repairs it, or for Vectorize Rails."),
+                tr("A GeoTIFF; the input of Clean Rail Raster, which repairs it, or of Vectorize Rails."),
             )
         )
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
-        """Read what has to be read in the main thread, and check it all."""
+        """Read and check the parameters, in the main thread."""
         values = ParameterValues(self, parameters, context)
         standard = values.standard()
         choose_model(standard.gauge_m, standard.head_width_m)
@@ -69,7 +69,7 @@ class RasterizeRailPoints(RailAlgorithm):
     def compute(
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
-        """Rasterize every class, then write the file."""
+        """Rasterize each class, then write the file."""
         from ...core.raster import cell_size, rasterize
         from ..reading.rasters import header_for
 

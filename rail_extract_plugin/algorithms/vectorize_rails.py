@@ -1,4 +1,4 @@
-"""Vectorize Rails: from a cleaned rail raster to the lines of the railheads, with heights where points give them."""
+"""Vectorize Rails: turns a cleaned rail raster into lines, in 3D if a point cloud is given."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import (
-    QgsProcessingContext,
-)
+from qgis.core import QgsProcessingContext
 
 from ...core.progress import Progress
 from ...core.standards import RailStandard
@@ -24,12 +22,12 @@ if TYPE_CHECKING:
     from ..reading.rasters import RasterHeader
 
 READING = 0.3
-"""Share of the progress bar for reading raster and cloud."""
+"""Fraction of the progress bar for reading raster and cloud."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What the parameters say."""
+    """The values of the parameters."""
 
     path: Path
     header: RasterHeader
@@ -45,15 +43,18 @@ class VectorizeRails(RailAlgorithm):
     TAGS = (*RAIL_WORDS, *CLOUD_WORDS, "raster", "vectorize", "line", "3d")
     PICTURE = "gauge.svg"
     NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
-    SUMMARY = "Turns a rail raster into the lines of the railheads, and points give them their exact place and height."
+    SUMMARY = (
+        "Turns a rail raster into lines of the railheads; a point cloud gives them their exact position and height."
+    )
     HELP = (
-        "Takes the raster of FRPDF Cleanup, or one like it. With the cloud that it was made from, a line is the top of "
-        "the railhead on the head's own axis. Without it, lines are flat and lie where the raster shows them.\n\n"
-        "A raster made elsewhere does not say for which rails it was made: fill the gauge and the railhead width then."
+        "Takes the raster of Clean Rail Raster, or a similar one. With the cloud from which the raster was made, a "
+        "line follows the top of the railhead on the axis of the head. Without the cloud, lines have no heights and "
+        "are only as accurate as the raster.\n\n"
+        "A raster from other software does not state its gauge and railhead width: fill them in."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the parameters and outputs of the interface, in its order."""
+        """Declare the parameters and outputs in the order of the interface."""
         for definition in (inputs.raster(), inputs.points(), *groups.lines(), *groups.raster_rail()):
             self.addParameter(definition)
         self.addParameter(outputs.rails())
@@ -61,7 +62,7 @@ class VectorizeRails(RailAlgorithm):
             self.addOutput(output)
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
-        """Read the raster's header, and find the cloud's files."""
+        """Read the header of the raster, and find the files of the cloud."""
         values = ParameterValues(self, parameters, context)
         path, header = values.raster("INPUT")
         standard = header.standard(values.optional_number("GAUGE"), values.optional_number("HEAD_WIDTH"))
@@ -70,7 +71,7 @@ class VectorizeRails(RailAlgorithm):
     def compute(
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
-        """Make the lines of every class, then write them."""
+        """Vectorize each class, then write the lines."""
         from ...core.pipeline import lines_of
         from ..reading.area_points import Area, read_points_in
         from ..reading.geotiff import read_rasters
@@ -78,7 +79,7 @@ class VectorizeRails(RailAlgorithm):
 
         rasters = read_rasters(job.path, job.header, progress.span(0, READING / 2))
         if job.cloud is None:
-            progress.warning("Without POINTS the rails have no heights and lie where the raster shows them.")
+            progress.warning("Without POINTS, the rails have no heights and are only as accurate as the raster.")
             frame, clouds = job.header.frame, {}
         else:
             area = Area("raster", job.header.class_codes, job.header.bounds, job.header.frame)

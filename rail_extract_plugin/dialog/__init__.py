@@ -1,1 +1,1 @@
-"""Dialogs: parameters, help, and the values that a user enters."""
+"""The dialogs: definitions of parameters and outputs, help, and the values that users enter."""

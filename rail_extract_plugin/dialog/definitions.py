@@ -1,6 +1,6 @@
-"""How parameters are made.
+"""Helpers that define parameters.
 
-Labels carry the unit; numbers are plain numbers, so that no layer's unit is put in their place.
+Labels state the unit. Numbers are plain numbers, so that QGIS does not convert them to the unit of a layer.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ from qgis.core import QgsProcessingParameterDefinition, QgsProcessingParameterEn
 Definitions = tuple[QgsProcessingParameterDefinition, ...]
 
 UNBOUNDED = 1e9
-"""Largest value of a number that has no upper limit."""
+"""Maximum of a number without an upper limit."""
 
 M_DECIMALS, MM_DECIMALS = 3, 2
-"""Digits that the widgets show after the point of metres and of millimetres."""
+"""Decimals that the widgets show for metres and for millimetres."""
 
 
 def number(
@@ -26,7 +26,20 @@ def number(
     optional: bool = False,
     decimals: int = M_DECIMALS,
 ) -> QgsProcessingParameterNumber:
-    """Make a number; its widget shows the unit of the label and no layer's."""
+    """Define a number.
+
+    Parameters
+    ----------
+    name, label : str
+        The label states the unit.
+    default : float, optional
+    minimum, maximum : float
+    whole : bool
+        Whether it is an integer.
+    optional : bool
+    decimals : int
+        Decimals that the widget shows.
+    """
     kinds = QgsProcessingParameterNumber.Type
     kind = kinds.Integer if whole else kinds.Double
     made = QgsProcessingParameterNumber(name, label, kind, default, optional, minimum, maximum)
@@ -36,17 +49,24 @@ def number(
 
 
 def choice(name: str, label: str, options: tuple[str, ...], default: str) -> QgsProcessingParameterEnum:
-    """Make a choice of static strings."""
+    """Define a choice among static strings.
+
+    Parameters
+    ----------
+    name, label : str
+    options : tuple of str
+    default : str
+    """
     return QgsProcessingParameterEnum(name, label, list(options), defaultValue=default, usesStaticStrings=True)
 
 
 def helped(definition: QgsProcessingParameterDefinition, text: str) -> QgsProcessingParameterDefinition:
-    """Add the text that explains a parameter."""
+    """Add the help text of a parameter."""
     definition.setHelp(text)
     return definition
 
 
 def advanced(definition: QgsProcessingParameterDefinition, text: str) -> QgsProcessingParameterDefinition:
-    """Explain a parameter, and show it among the rare ones."""
+    """Add the help text of a parameter and list it among the advanced ones."""
     definition.setFlags(definition.flags() | QgsProcessingParameterDefinition.Flag.FlagAdvanced)
     return helped(definition, text)

@@ -1,4 +1,4 @@
-"""Where the guide lies: in the zip, or for a clone, where nothing was built, on the web."""
+"""Addresses of the guide: in the zip, or, for a clone that was not built, on the web."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..paths import GUIDE, METADATA
 
 
 def guide(page: str) -> str:
-    """Give the address of a page of the guide: `tools/package.py` puts them into the zip."""
+    """Return the address of a page of the guide; `tools/package.py` puts the pages into the zip."""
     shipped = GUIDE / f"{page}.html"
     if shipped.exists():
         return shipped.as_uri()
@@ -16,7 +16,7 @@ def guide(page: str) -> str:
 
 
 def on_the_web(file: str) -> str:
-    """Give the address of a file in the repository that the plugin's metadata name."""
+    """Return the address of a file in the repository named in the plugin's metadata."""
     metadata = ConfigParser(interpolation=None)
     metadata.read(METADATA, encoding="utf-8")
     return f"{metadata['general']['repository']}/blob/main/{file}"

@@ -1,4 +1,4 @@
-"""The text beside a dialog: what an algorithm does, with a picture, and what each of its fields means."""
+"""The help panel of a dialog: what the algorithm does, a picture, and the meaning of each parameter."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ ADVANCED = QgsProcessingParameterDefinition.Flag.FlagAdvanced
 
 
 def help_panel(summary: str, picture: Path | None, text: str, definitions: Definitions) -> str:
-    """Put the parts together: HTML, in which QGIS makes a paragraph of each line.
+    """Return the help panel as HTML; QGIS turns each line into a paragraph.
 
     Parameters
     ----------
     summary, text : str
-        What the algorithm does, in one sentence and in paragraphs.
+        What the algorithm does, in one sentence and in detail.
     picture : Path or None
-        SVG file, shown at its own size.
+        SVG file, shown at its nominal size.
     definitions : sequence of QgsProcessingParameterDefinition
-        Fields of the dialog, with their help.
+        Parameters of the dialog, with their help.
     """
     image = [f'<img src="{picture.as_uri()}">'] if picture else []
     prose = [escape(line, quote=False) for line in text.split("\n") if line]
@@ -41,7 +41,7 @@ def help_panel(summary: str, picture: Path | None, text: str, definitions: Defin
 
 
 def _section(title: str, definitions: Definitions) -> Iterator[str]:
-    """Give a title and a line for each field; nothing where there is no field."""
+    """Yield a heading and a line for each parameter; nothing if there are none."""
     if definitions:
         yield f"<h3>{escape(title)}</h3>"
     for definition in definitions:

@@ -1,4 +1,4 @@
-"""What algorithms take: clouds, rasters and lines."""
+"""The inputs of the algorithms: clouds, rasters and lines."""
 
 from __future__ import annotations
 
@@ -17,40 +17,41 @@ from .definitions import Definitions, helped
 
 
 def cloud() -> Definitions:
-    """Which points are rail."""
+    """Define the parameters for the rail points."""
     return (
         helped(
             QgsProcessingParameterPointCloudLayer("INPUT", tr("Point cloud (layer, file or folder)")),
             tr(
-                "A loaded point cloud, or the path of a LAS, LAZ or COPC file, of a folder of them or of a .vpc file. "
-                "The dialog's button takes one file: for many, take their virtual point cloud (.vpc)."
+                "A loaded point cloud layer, or the path of a LAS, LAZ or COPC file, of a folder of such files, or of "
+                "a virtual point cloud (.vpc). The button of the dialog selects a single file: for many files, select "
+                "their virtual point cloud."
             ),
         ),
         helped(
             QgsProcessingParameterString("RAIL_CLASSES", tr("Rail classes"), defaultValue=str(RAIL_CLASS)),
-            tr("Classes whose points lie on rails, such as 10 or 10,11. Each class is extracted on its own."),
+            tr("Classes of the points on rails, such as 10 or 10,11. Each class is processed separately."),
         ),
     )
 
 
 def raster() -> QgsProcessingParameterDefinition:
-    """Which raster of rails."""
+    """Define the parameter for a rail raster."""
     return helped(
         QgsProcessingParameterRasterLayer("INPUT", tr("Rail raster")),
-        tr("One band a class, 1 where there is rail, as Rasterize Rail Points makes it. North up, square cells."),
+        tr("One band per class, with 1 where there is rail, as from Rasterize Rail Points. North up, square cells."),
     )
 
 
 def points() -> QgsProcessingParameterDefinition:
-    """Which points give lines their heights."""
+    """Define the parameter for the points that give lines their heights."""
     return helped(
         QgsProcessingParameterPointCloudLayer("POINTS", tr("Point cloud (layer, file or folder)"), optional=True),
-        tr("The cloud that the raster was made from: it moves lines onto their railheads and gives them heights."),
+        tr("The cloud from which the raster was made: it moves the lines onto the railheads and gives them heights."),
     )
 
 
 def rails() -> QgsProcessingParameterDefinition:
-    """Which lines are rails."""
+    """Define the parameter for the rails."""
     line = QgsProcessing.SourceType.TypeVectorLine
     return helped(
         QgsProcessingParameterFeatureSource("INPUT", tr("Rails"), [line]),
@@ -59,26 +60,29 @@ def rails() -> QgsProcessingParameterDefinition:
 
 
 def centerlines() -> QgsProcessingParameterDefinition:
-    """Which lines are track centerlines."""
+    """Define the parameter for the track centerlines."""
     line = QgsProcessing.SourceType.TypeVectorLine
     return helped(
         QgsProcessingParameterFeatureSource("INPUT", tr("Track centerlines"), [line]),
-        tr("Lines midway between rails, from Build Track Centerlines or drawn by hand; chainage counts along them."),
+        tr(
+            "Lines midway between rails, from Build Track Centerlines or drawn by hand. Chainage is measured along "
+            "them."
+        ),
     )
 
 
 def rails_of_tracks() -> QgsProcessingParameterDefinition:
-    """Which rails lie beside the centerlines."""
+    """Define the parameter for the rails of the centerlines."""
     line = QgsProcessing.SourceType.TypeVectorLine
     return helped(
         QgsProcessingParameterFeatureSource("RAILS", tr("Rails"), [line]),
-        tr("The lines that the centerlines were built from; those that left_ids and right_ids name, else the nearest."),
+        tr("The rails of these tracks: those named in left_ids and right_ids, otherwise the nearest."),
     )
 
 
 def points_of_rails() -> QgsProcessingParameterDefinition:
-    """Which points support the rails."""
+    """Define the parameter for the points that support the rails."""
     return helped(
         QgsProcessingParameterPointCloudLayer("POINTS", tr("Point cloud (layer, file or folder)"), optional=True),
-        tr("The cloud that the rails came from: it tells heights, sigma_mm and points metre by metre."),
+        tr("The cloud from which the rails were extracted: it gives heights, sigma_mm and points for each station."),
     )

@@ -1,4 +1,4 @@
-"""What algorithms give: layers, files and numbers."""
+"""The outputs of the algorithms: layers, files and numbers."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ Numbers = tuple[QgsProcessingOutputNumber, ...]
 
 
 def rails(name: str = "OUTPUT", optional: bool = False) -> QgsProcessingParameterDefinition:
-    """Lines of railheads."""
+    """Define the layer of rails."""
     line = QgsProcessing.SourceType.TypeVectorLine
     return helped(
         QgsProcessingParameterFeatureSink(name, tr("Rails"), line, optional=optional),
-        tr("Lines on top of the railheads, with their length, their support by points and their standard error."),
+        tr("Lines along the top of the railheads, with length, support by points and standard error."),
     )
 
 
 def centerlines(name: str = "OUTPUT", optional: bool = False) -> QgsProcessingParameterDefinition:
-    """Lines midway between rails."""
+    """Define the layer of track centerlines."""
     line = QgsProcessing.SourceType.TypeVectorLine
     return helped(
         QgsProcessingParameterFeatureSink(name, tr("Track centerlines"), line, optional=optional),
-        tr("Lines midway between the two rails of each track, with its gauge and cant."),
+        tr("Lines midway between the two rails of each track, with gauge and cant."),
     )
 
 
 def quality(name: str = "OUTPUT") -> QgsProcessingParameterDefinition:
-    """Points along tracks."""
+    """Define the layer of points along tracks."""
     point = QgsProcessing.SourceType.TypeVectorPoint
     return helped(
         QgsProcessingParameterFeatureSink(name, tr("Track geometry"), point, optional=True),
@@ -46,23 +46,23 @@ def quality(name: str = "OUTPUT") -> QgsProcessingParameterDefinition:
 
 
 def cleaned() -> QgsProcessingParameterDefinition:
-    """Rasters after the network."""
+    """Define the raster that the network returns."""
     return helped(
         QgsProcessingParameterRasterDestination("CLEANED", tr("Cleaned rail raster"), optional=True),
-        tr("What the network made of the rastered points, like the result of FRPDF Cleanup."),
+        tr("The raster after the network, as from Clean Rail Raster."),
     )
 
 
 def report() -> QgsProcessingParameterDefinition:
-    """Page on the whole result."""
+    """Define the report."""
     return helped(
         QgsProcessingParameterFileDestination("REPORT", tr("Report"), tr("Web pages (*.html)"), optional=True),
-        tr("A page for the browser: whether the result is good and where it is not, a map, and plots of each track."),
+        tr("A web page with an assessment of the result, a map, and plots of each track."),
     )
 
 
 def rail_figures() -> Numbers:
-    """Numbers about the rails."""
+    """Define the figures about rails."""
     return (
         QgsProcessingOutputNumber("RAIL_COUNT", tr("Number of rails")),
         QgsProcessingOutputNumber("RAIL_LENGTH", tr("Length of the rails [m]")),
@@ -70,7 +70,7 @@ def rail_figures() -> Numbers:
 
 
 def centerline_figures() -> Numbers:
-    """Numbers about the tracks."""
+    """Define the figures about tracks."""
     return (
         QgsProcessingOutputNumber("CENTERLINE_COUNT", tr("Number of track centerlines")),
         QgsProcessingOutputNumber("CENTERLINE_LENGTH", tr("Length of the track centerlines [m]")),
@@ -78,14 +78,14 @@ def centerline_figures() -> Numbers:
 
 
 def quality_figures() -> Numbers:
-    """Numbers that tell how well tracks are measured."""
+    """Define the figures about the measured track geometry."""
     return (
-        QgsProcessingOutputNumber("STATION_COUNT", tr("Number of measured places")),
+        QgsProcessingOutputNumber("STATION_COUNT", tr("Number of measured stations")),
         QgsProcessingOutputNumber("SIGMA", tr("Standard error of the centerlines [mm]")),
-        QgsProcessingOutputNumber("BRIDGED_LENGTH", tr("Length without points on a rail [m]")),
+        QgsProcessingOutputNumber("BRIDGED_LENGTH", tr("Length of track where a rail has no points [m]")),
     )
 
 
 def engine() -> QgsProcessingOutputString:
-    """Which engine ran."""
+    """Define the name of the engine."""
     return QgsProcessingOutputString("ENGINE_USED", tr("Engine that ran the network"))

@@ -1,4 +1,4 @@
-"""What algorithms can be told, in the groups in which several of them share it."""
+"""The other parameters, in the groups that several algorithms share."""
 
 from __future__ import annotations
 
@@ -18,152 +18,163 @@ from .definitions import MM_DECIMALS, Definitions, advanced, choice, helped, num
 
 TORCH_BUILDS = ("NONE", "CPU", "CUDA")
 
-# The largest values keep out what can only be millimetres in a field of metres; they are no advice.
+# The maxima below only reject values that must be millimetres in a field of metres; they are not recommendations.
 
 WIDEST_REACH_M = 0.5
-"""Points further away than half of the narrowest gauge in use (600 mm) could as well be of another rail."""
+"""Points further away than about half of the narrowest gauge in use (600 mm) may belong to another rail."""
 
 COARSEST_M = 1.0
-"""Vertices that are left out more coarsely than this give no line of a rail, which is a tenth as wide."""
+"""A line simplified with a larger tolerance no longer represents a rail, which is about 0.07 m wide."""
 
 LONGEST_SMOOTHING_M = 100.0
-"""Nothing of the tightest curves and dips of a railway is left then."""
+"""Removes even the tightest curves and dips of a railway."""
 
 FLATTEST_CROWN_M = 10_000.0
-"""A disc as large as this is flat over any dip."""
+"""A disc of this radius is practically flat over any dip."""
 
 LONGEST_M = 100_000.0
-"""Longer than any gap to bridge, any line to leave out, any stretch between two measurements."""
+"""Longer than any gap to close, any minimum line length and any step between stations."""
 
 
 def rail() -> Definitions:
-    """Which rails lie there."""
+    """Define the rail standard, gauge and railhead width."""
     return (
         helped(
             choice("STANDARD", tr("Rail standard"), (*STANDARDS, CUSTOM), DEFAULT),
             tr(
-                "Rail profile and gauge: EN_60E1_1435 is 60E1 of EN 13674 on 1435 mm. It says how far apart the rails "
-                "are and how wide a railhead is. CUSTOM takes both from the two fields below. No table confirms the "
-                "width of {}."
+                "Rail profile and gauge, which give the rail spacing and the railhead width: EN_60E1_1435 is the "
+                "profile 60E1 of EN 13674 on 1435 mm gauge. CUSTOM takes both from the two fields below. Widths not "
+                "confirmed by a table: {}."
             ).format(", ".join(UNCONFIRMED_PROFILES)),
         ),
         helped(
             number("GAUGE", tr("Gauge [mm]"), minimum=1.0, optional=True, decimals=MM_DECIMALS),
-            tr("Distance between the inner faces of the two railheads. Leave it empty to take the standard's."),
+            tr("Distance between the inner faces of the two railheads. Leave empty to use the value of the standard."),
         ),
         helped(
             number("HEAD_WIDTH", tr("Railhead width [mm]"), minimum=1.0, optional=True, decimals=MM_DECIMALS),
-            tr("Width of the top of one rail. Leave it empty to take the standard's."),
+            tr("Width of the head of one rail. Leave empty to use the value of the standard."),
         ),
     )
 
 
 def raster_rail() -> Definitions:
-    """Which rails a raster is of that does not say so itself."""
+    """Define gauge and railhead width for a raster without tags."""
     return (
         advanced(
             number("GAUGE", tr("Gauge [mm]"), minimum=1.0, optional=True, decimals=MM_DECIMALS),
-            tr("For a raster made elsewhere, which does not say its gauge; if filled, instead of what it says."),
+            tr(
+                "Needed for a raster from other software, which does not state its gauge. Overrides the tag of the "
+                "raster."
+            ),
         ),
         advanced(
             number("HEAD_WIDTH", tr("Railhead width [mm]"), minimum=1.0, optional=True, decimals=MM_DECIMALS),
-            tr("For a raster made elsewhere, which does not say its width; if filled, instead of what it says."),
+            tr(
+                "Needed for a raster from other software, which does not state the width. Overrides the tag of the "
+                "raster."
+            ),
         ),
     )
 
 
 def model() -> QgsProcessingParameterDefinition:
-    """Which weights the network has."""
+    """Define the choice of the network's weights."""
     return helped(
         choice("MODEL", tr("Model"), (AUTO, *(one.name for one in MODELS)), AUTO),
-        tr("Trained weights; AUTO takes those that fit the gauge and the railhead width of the raster."),
+        tr("Trained weights of the network. AUTO selects those that fit the gauge and railhead width of the raster."),
     )
 
 
 def step() -> QgsProcessingParameterDefinition:
-    """How often tracks are measured."""
+    """Define the spacing of the stations of the track geometry."""
     return advanced(
         number("STEP", tr("Step of the track geometry [m]"), DEFAULT_STEP_M, 0.1, LONGEST_M),
-        tr("Gauge, cant, twist, radius and gradient are stated once in this distance along each track."),
+        tr(
+            "Distance between the stations along each track at which gauge, cant, twist, radius and gradient are given."
+        ),
     )
 
 
 def head() -> Definitions:
-    """How wide the railheads are."""
+    """Define the rail standard and railhead width, without the gauge."""
     standard, _, head_width = rail()
-    standard.setHelp(tr("Rail profile, which says how wide the railhead is."))
+    standard.setHelp(tr("Rail profile, which gives the railhead width."))
     return standard, head_width
 
 
 def area() -> Definitions:
-    """Where to look, and in which coordinates."""
+    """Define the extent and the coordinate system of the cloud."""
     return (
         helped(
             QgsProcessingParameterExtent("EXTENT", tr("Extent"), optional=True),
-            tr("Only points inside this rectangle are read. Leave it empty to read them all."),
+            tr("Only points inside this rectangle are read. Leave empty to read all points."),
         ),
         advanced(
             QgsProcessingParameterCrs("CRS", tr("CRS of a cloud without one"), optional=True),
-            tr("The projected coordinate system of files that state none; others keep their own."),
+            tr("Projected coordinate system for files that do not state one; other files keep their own."),
         ),
     )
 
 
 def cleanup() -> Definitions:
-    """How the network repairs the raster."""
+    """Define the passes, engine and device of the network."""
     return (
         advanced(
             number("ITERATIONS", tr("Passes of the network"), Parameters.passes, maximum=MOST_PASSES, whole=True),
             tr(
-                "How often the network looks again at what it found. 0: until fewer than one rail cell in a thousand "
-                "changes, at most five times."
+                "Each pass starts from the result of the pass before. 0 repeats until fewer than one rail cell in a "
+                "thousand changes, with at most five passes."
             ),
         ),
         advanced(
             choice("ENGINE", tr("Engine of the network"), ENGINES, Parameters.engine),
-            tr("Python package that runs the network: PyTorch or OpenCV. AUTO takes the faster one that is installed."),
+            tr("Python package that runs the network: PyTorch or OpenCV. AUTO uses the faster of those installed."),
         ),
         advanced(
             choice("DEVICE", tr("Device of the network"), DEVICES, Parameters.device),
-            tr("CPU is the processor, CUDA an Nvidia GPU, which takes PyTorch. AUTO uses the GPU where there is one."),
+            tr("CPU, or CUDA for an Nvidia GPU, which needs PyTorch. AUTO uses the GPU if there is one."),
         ),
     )
 
 
 def torch() -> QgsProcessingParameterDefinition:
-    """Which PyTorch to install."""
+    """Define the build of PyTorch to install."""
     return helped(
         choice("TORCH", tr("PyTorch"), TORCH_BUILDS, "NONE"),
-        tr("NONE leaves PyTorch out, and OpenCV runs the network; CPU suits every computer; CUDA needs an Nvidia GPU."),
+        tr(
+            "NONE does not install PyTorch; OpenCV runs the network. CPU works on any computer. CUDA needs an Nvidia "
+            "GPU."
+        ),
     )
 
 
 def smoothing_xy() -> QgsProcessingParameterDefinition:
-    """How smooth lines are in plan."""
+    """Define the smoothing in plan."""
     return advanced(
         number("SMOOTHING_XY", tr("Smoothing in plan [m]"), Parameters.smoothing_xy_m, 0.05, LONGEST_SMOOTHING_M),
-        tr("Bends shorter than a few times this length are evened out: standard deviation of the smoothing."),
+        tr("Standard deviation of the smoothing: bends shorter than a few times this length are flattened."),
     )
 
 
 def lines() -> Definitions:
-    """How the raster becomes lines with heights."""
+    """Define how the raster becomes lines with heights."""
     return (
         smoothing_xy(),
         advanced(
             number("SMOOTHING_Z", tr("Smoothing in height [m]"), Parameters.smoothing_z_m, 0.05, LONGEST_SMOOTHING_M),
-            tr("Dips shorter than a few times this length are evened out: standard deviation of the smoothing."),
+            tr("Standard deviation of the smoothing: dips shorter than a few times this length are flattened."),
         ),
         advanced(
             number("TOLERANCE_XY", tr("Tolerance in plan [m]"), Parameters.tolerance_xy_m, 0.005, WIDEST_REACH_M),
             tr(
-                "Points up to this far beside the line give it its height, others none. Half a railhead is the limit "
-                "in any case."
+                "Only points within this distance of the line determine its height. Half the railhead width is the "
+                "limit in any case."
             ),
         ),
         advanced(
             number("TOLERANCE_Z", tr("Tolerance in height [m]"), Parameters.tolerance_z_m, 0.001, WIDEST_REACH_M),
-            tr("Points up to this far below the top of the rail give the line its height, others none."),
+            tr("Only points within this distance below the top of the rail determine the height of the line."),
         ),
         advanced(
             number(
@@ -174,14 +185,14 @@ def lines() -> Definitions:
                 FLATTEST_CROWN_M,
             ),
             tr(
-                "A disc rolled along the heights from above finds the top of the rail. It hardly changes the line: "
-                "reduce it only where short, deep dips lose their points."
+                "A disc of this radius, rolled along the points from above, finds the top of the rail. The value "
+                "hardly affects the line: reduce it only where short, deep dips lose their points."
             ),
         ),
         max_gap(),
         advanced(
             number("GAP_ANGLE", tr("Largest bend across a gap [°]"), Parameters.gap_angle_deg, maximum=90.0),
-            tr("Line ends that meet at a larger angle stay apart."),
+            tr("Line ends that meet at a larger angle are not joined."),
         ),
         *simplification(),
         min_length(),
@@ -189,53 +200,53 @@ def lines() -> Definitions:
 
 
 def max_gap() -> QgsProcessingParameterDefinition:
-    """Which gaps are closed."""
+    """Define the longest gap to close."""
     return helped(
         number("MAX_GAP", tr("Longest gap to close [m]"), Parameters.max_gap_m, maximum=LONGEST_M),
         tr(
-            "Line ends up to this far apart are joined if they point at each other; 0 joins none. Where one rail of a "
-            "track goes on, its centerline does for up to 30 m, whatever is set here."
+            "Line ends up to this distance apart are joined if they point at each other; 0 joins none. Where only one "
+            "rail of a track continues, the centerline follows it for up to 30 m, regardless of this value."
         ),
     )
 
 
 def simplification() -> Definitions:
-    """How many vertices lines keep."""
+    """Define the tolerances of the simplification."""
     return (
         advanced(
             number("SIMPLIFY_XY", tr("Simplification in plan [m]"), Parameters.simplify_xy_m, maximum=COARSEST_M),
-            tr("Vertices are left out as long as the line stays this close in plan."),
+            tr("Vertices are removed while the line stays within this distance in plan."),
         ),
         advanced(
             number("SIMPLIFY_Z", tr("Simplification in height [m]"), Parameters.simplify_z_m, maximum=COARSEST_M),
-            tr("Vertices are left out as long as the line stays this close in height."),
+            tr("Vertices are removed while the line stays within this distance in height."),
         ),
     )
 
 
 def min_length() -> QgsProcessingParameterDefinition:
-    """Which lines are too short."""
+    """Define the minimum length of lines."""
     return advanced(
         number("MIN_LENGTH", tr("Shortest line [m]"), Parameters.min_length_m, maximum=LONGEST_M),
-        tr("Shorter lines are left out."),
+        tr("Shorter lines are dropped."),
     )
 
 
 def pairing() -> Definitions:
-    """Which rails make a track."""
+    """Define which rails make a track."""
     return (
         advanced(
             QgsProcessingParameterString("OTHER_GAUGES", tr("Other gauges [mm]"), optional=True),
-            tr("Gauges of further tracks in the same cloud, such as 1000;1067, for mixed traffic."),
+            tr("Gauges of other tracks in the same cloud, such as 1000;1067, for mixed and dual gauge."),
         ),
         advanced(
             number(
                 "CENTERLINE_TOLERANCE",
-                tr("Centerline tolerance of the gauge [m]"),
+                tr("Gauge tolerance of tracks [m]"),
                 Parameters.centerline_tolerance_m,
                 0.001,
                 WIDEST_REACH_M,
             ),
-            tr("Rails whose distance is off by more than this make no track."),
+            tr("Rails whose gauge deviates by more than this do not make a track."),
         ),
     )

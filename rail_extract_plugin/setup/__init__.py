@@ -1,1 +1,1 @@
-"""Set-up: Python packages, their installation, and the self test."""
+"""Setup: required Python packages, their installation, and the self test."""

@@ -1,4 +1,4 @@
-"""The Python packages that Rail Extract needs beyond QGIS: which are missing, and what to do about it."""
+"""The Python packages that Rail Extract needs in addition to those of QGIS, and what to do if some are missing."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from importlib.util import find_spec
 
 @dataclass(frozen=True)
 class Package:
-    """A package by the name that Python imports and the name that pip installs."""
+    """A package: the name that Python imports, and the requirement that pip installs."""
 
     module: str
     requirement: str
@@ -25,34 +25,34 @@ PACKAGES = (
     Package("pyproj", "pyproj"),
     Package("torch", "torch"),
 )
-"""All that an algorithm may need; requirements.txt lists the same without what belongs to QGIS."""
+"""All packages that an algorithm may need; requirements.txt lists those that do not come with QGIS."""
 
 OWNED_BY_QGIS = ("numpy", "scipy")
-"""Held at the version QGIS came with, since its own parts are built against them."""
+"""Kept at the versions that came with QGIS, because parts of QGIS are built against them."""
 
 OPTIONAL = ("torch",)
-"""Modules in whose place another one serves."""
+"""Modules that another one can replace."""
 
 
 def missing_packages(needs: tuple[tuple[str, ...], ...]) -> tuple[Package, ...]:
-    """Look for modules without importing them.
+    """Find out which packages are missing, without importing modules.
 
     Parameters
     ----------
     needs : tuple of tuple of str
-        Modules of `PACKAGES`; each need is met by any one of its modules.
+        Modules of `PACKAGES`; any one module of an inner tuple is enough.
 
     Returns
     -------
     tuple of Package
-        The first choice of every need that is not met.
+        The first module of each inner tuple of which none is installed.
     """
     unmet = {modules[0] for modules in needs if not any(map(is_installed, modules))}
     return tuple(package for package in PACKAGES if package.module in unmet)
 
 
 def is_installed(module: str) -> bool:
-    """Tell whether Python finds a module; it is not imported."""
+    """Return whether Python finds a module, without importing it."""
     try:
         return find_spec(module) is not None
     except (ImportError, ValueError):
@@ -60,19 +60,20 @@ def is_installed(module: str) -> bool:
 
 
 def explain_missing(label: str, packages: Sequence[Package], usable: Sequence[str]) -> str:
-    """Say what an algorithm lacks, what to do, and what works without it.
+    """Return a message: which packages an algorithm lacks, the remedy, and which algorithms work without them.
 
     Parameters
     ----------
     label : str
-        Name of the algorithm.
+        Label of the algorithm.
     packages : sequence of Package
     usable : sequence of str
-        Names of the algorithms that lack nothing.
+        Labels of the algorithms whose packages are all installed.
     """
     names = ", ".join(package.module for package in packages)
     nouns = "Python package" if len(packages) == 1 else "Python packages"
-    others = f" {_listed(usable)} can be used without." if usable else ""
+    verb, them = "works" if len(usable) == 1 else "work", "it" if len(packages) == 1 else "them"
+    others = f" {_listed(usable)} {verb} without {them}." if usable else ""
     return (
         f"{label} needs the {nouns} {names}, which this QGIS does not have: run Install packages in the toolbox under "
         f"Rail Extract, or qgis_process run railextract:installpackages in a shell.{others}"
@@ -80,12 +81,12 @@ def explain_missing(label: str, packages: Sequence[Package], usable: Sequence[st
 
 
 def version_of(module: str) -> str | None:
-    """Give the version of a module, which is imported; None where it is not there."""
+    """Import a module and return its version, or None if it is not installed."""
     return str(getattr(import_module(module), "__version__", "")) if is_installed(module) else None
 
 
 def pins() -> list[str]:
-    """Give requirements that hold what belongs to QGIS at the versions it has."""
+    """Return requirements that keep the packages of QGIS at their versions."""
     return [f"{name}=={version_of(name)}" for name in OWNED_BY_QGIS if is_installed(name)]
 
 

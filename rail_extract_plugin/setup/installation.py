@@ -1,4 +1,4 @@
-"""Python packages installed by pip into a folder of their own; what belongs to QGIS stays as it is."""
+"""Installs Python packages with pip into a separate folder; the packages of QGIS stay unchanged."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .dependencies import OWNED_BY_QGIS, is_installed, pins
 from .interpreter import Interpreter
 
 OLDEST_PIP = (22, 2)
-"""The first that says what it would install."""
+"""The first version that can report what it would install."""
 
 PIP_ENVIRONMENT = {
     "PIP_DISABLE_PIP_VERSION_CHECK": "1",
@@ -31,10 +31,10 @@ PIP_ENVIRONMENT = {
     "PIP_USER": "0",
     "PYTHONIOENCODING": "utf-8",
 }
-"""A user's own settings of pip count, but for those that a folder of its own contradicts."""
+"""Settings that override the user's own, where those would conflict with a separate folder or a run without a shell."""
 
 BINARIES = "--only-binary=:all:"
-"""Nobody should need a compiler."""
+"""No user should need a compiler."""
 
 IMPORT = (
     "import sys; end = int(sys.argv[1]); sys.path += sys.argv[2:end]; [__import__(name) for name in sys.argv[end:]]"
@@ -48,11 +48,11 @@ class Order:
     Attributes
     ----------
     requirements : tuple of str
-        As pip understands them.
+        In the syntax of pip.
     modules : tuple of str
-        What must be importable afterwards.
+        Modules that must be importable afterwards.
     options : tuple of str
-        Where pip shall look, if not where it does by itself.
+        Options for pip, such as another package index.
     """
 
     requirements: tuple[str, ...]
@@ -61,15 +61,15 @@ class Order:
 
 
 class Pip:
-    """QGIS's pip.
+    """The pip of QGIS's Python.
 
     Parameters
     ----------
     interpreter : Interpreter
     workshop : Path
-        Folder for what pip needs on the way.
+        Folder for temporary files.
     folders : sequence of Path
-        Folders of packages that are there beside QGIS's own.
+        Folders of packages in addition to those of QGIS.
     """
 
     def __init__(self, interpreter: Interpreter, workshop: Path, folders: Sequence[Path]) -> None:
@@ -79,12 +79,12 @@ class Pip:
         self._changes = {**interpreter.changes, **PIP_ENVIRONMENT}
 
     def prepare(self, progress: Progress) -> None:
-        """Make sure that there is a pip, and that it is not too old.
+        """Check that pip is installed, and get a newer one if it is too old.
 
         Raises
         ------
         RailExtractError
-            There is none, or no newer one can be had.
+            There is no pip, or no newer one can be installed.
         """
         version = re.match(r"pip (\d+)\.(\d+)", self._run("--version").output)
         if version is None:
@@ -98,7 +98,7 @@ class Pip:
             self._paths.insert(0, str(newer))
 
     def resolve(self, order: Order, progress: Progress) -> dict[str, str]:
-        """Ask what an order takes beyond what is there: versions by normalized names."""
+        """Return the packages that an order would add: versions by normalized name."""
         report, constraints = self._workshop / "report.json", self._workshop / "constraints.txt"
         constraints.write_text("\n".join(pins()), encoding="utf-8")
         options = ["--dry-run", "--report", str(report), "--constraint", str(constraints), *order.options]
@@ -119,16 +119,16 @@ class Pip:
             reasons = re.findall(r"^ERROR: (.*)$", ended.output, re.MULTILINE) or ["see the log"]
             raise RailExtractError(
                 f"pip could not install {', '.join(requirements)} ({reasons[-1].rstrip('.')}): check the connection to "
-                "the package index, and the space on the disk. None of it was kept."
+                "the package index and the free disk space. No files were kept."
             )
 
     def check_imports(self, modules: Sequence[str], folders: Sequence[Path]) -> None:
-        """Import modules as QGIS will.
+        """Check that QGIS will be able to import modules.
 
         Raises
         ------
         RailExtractError
-            One can't be imported.
+            A module cannot be imported.
         """
         paths = list(map(str, folders))
         arguments = ["-c", IMPORT, str(len(paths) + 2), *paths, *modules]
@@ -136,7 +136,7 @@ class Pip:
         if ended.code != 0:
             reason = ended.output.strip().splitlines()[-1:] or ["it crashed"]
             raise RailExtractError(
-                f"{', '.join(modules)} does not work in the Python of this QGIS ({reason[0]}). None of it was kept."
+                f"{', '.join(modules)} does not work in the Python of this QGIS ({reason[0]}). No files were kept."
             )
 
     def _run(self, *arguments: str, progress: Progress = SILENT) -> processes.Ended:
@@ -145,27 +145,27 @@ class Pip:
 
 
 def install(order: Order, interpreter: Interpreter, folder: Path, others: Sequence[Path], progress: Progress) -> str:
-    """Install packages into `folder`, all or none of them.
+    """Install packages into `folder`, either all of them or none.
 
     Parameters
     ----------
     order : Order
     interpreter : Interpreter
     folder : Path
-        Made if it is not there.
+        Created if it does not exist.
     others : sequence of Path
-        Further folders of packages that QGIS uses.
+        Other folders of packages that QGIS uses.
     progress : Progress
 
     Returns
     -------
     str
-        Names and versions of what was installed.
+        Names and versions of the installed packages.
 
     Raises
     ------
     RailExtractError
-        pip failed, the folder can't be written, or the packages don't work with what QGIS has.
+        pip failed, the folder cannot be written, or the packages do not work with those of QGIS.
     """
     with _workshop(folder) as workshop:
         pip = Pip(interpreter, workshop, [*others, folder])
@@ -184,19 +184,19 @@ def install(order: Order, interpreter: Interpreter, folder: Path, others: Sequen
 
 
 def normalized(name: str) -> str:
-    """Spell a package's name in the one way in which names compare."""
+    """Return a package's name in the normalized spelling, in which names can be compared."""
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
 def _beyond_qgis(found: dict[str, str], progress: Progress) -> list[str]:
-    """Leave out what QGIS has: it comes first, and stays."""
+    """Leave out packages that QGIS has: they come first on the path, and stay."""
     wanted = []
     for name, version in found.items():
         present = _version_in_qgis(name)
         if present is None:
             wanted.append(f"{name}=={version}")
         else:
-            progress.warning(f"QGIS has {name} {present}, which stays in place of {version}.")
+            progress.warning(f"QGIS has {name} {present}, which is used instead of {version}.")
     return wanted
 
 
@@ -213,14 +213,16 @@ def _inherited() -> str:
 
 @contextmanager
 def _workshop(folder: Path) -> Iterator[Path]:
-    """Folder beside `folder` that is gone afterwards, whatever happens."""
+    """Create a folder next to `folder`, and delete it afterwards in any case."""
     workshop = folder.with_name(f"{folder.name}.unfinished")
     try:
         shutil.rmtree(workshop, ignore_errors=True)
         workshop.mkdir(parents=True)
         yield workshop
     except OSError as error:
-        raise RailExtractError(f"{folder} can't be written ({error}): free space, or make it writable.") from error
+        raise RailExtractError(
+            f"{folder} can't be written ({error}): free disk space, or make the folder writable."
+        ) from error
     finally:
         shutil.rmtree(workshop, ignore_errors=True)
 

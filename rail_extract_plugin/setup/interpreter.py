@@ -1,4 +1,4 @@
-"""The Python program that belongs to this QGIS."""
+"""Finds the Python program that belongs to this QGIS."""
 
 from __future__ import annotations
 
@@ -19,43 +19,43 @@ except ImportError:
     __version__ = None
 print(*sys.version_info[:2], __version__)
 """
-# Any other Python than QGIS's own answers differently, or has no numpy at all.
+# A Python other than that of QGIS prints something else, or has no numpy.
 
 
 @dataclass(frozen=True)
 class Interpreter:
-    """A Python program and the environment variables that it needs beyond QGIS's."""
+    """A Python program, and the environment variables that it needs in addition to those of QGIS."""
 
     program: str
     changes: dict[str, str] = field(default_factory=dict)
 
 
 def find_interpreter() -> Interpreter:
-    """Find the Python program whose packages are those that QGIS sees.
+    """Find the Python program that has the same packages as QGIS.
 
     Raises
     ------
     RailExtractError
-        There is none.
+        No such program was found.
     """
     expected = " ".join(map(str, (*sys.version_info[:2], version_of("numpy"))))
     tried = list(dict.fromkeys(candidates(Path(sys.executable), Path(sys.prefix), sys.platform)))
-    # Where QGIS starts Python from within an app bundle, the program alone does not know where its library lies.
+    # In an app bundle, the program does not find its library by itself.
     for changes in ({}, {"PYTHONHOME": sys.prefix}):
         for program in filter(Path.is_file, tried):
             if processes.run(str(program), ["-c", QUESTION], changes).output.strip() == expected:
                 return Interpreter(str(program), changes)
     raise RailExtractError(
         f"The Python program of this QGIS was not found in {', '.join(sorted({str(path.parent) for path in tried}))}: "
-        "install the packages with another tool into a folder, and name it in the environment variable "
-        "RAIL_EXTRACT_PACKAGES."
+        "install the packages into a folder with another tool, and set the environment variable RAIL_EXTRACT_PACKAGES "
+        "to that folder."
     )
 
 
 def candidates(executable: Path, prefix: Path, platform: str) -> Iterator[Path]:
-    """List where the program may lie, the likeliest first.
+    """List possible paths of the program, the likeliest first.
 
-    On Windows and macOS `executable` is QGIS itself, and starting that would open another QGIS.
+    On Windows and macOS, `executable` is QGIS itself, and starting it would open another QGIS.
 
     Parameters
     ----------

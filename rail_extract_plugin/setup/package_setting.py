@@ -1,4 +1,4 @@
-"""The folder of further Python packages, among the providers' settings in the options of the processing framework."""
+"""The setting for an additional folder of Python packages, in the options of the processing framework."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ GROUP = "Rail Extract"
 
 
 def register() -> None:
-    """Show the setting; a change counts from the next start of QGIS."""
+    """Show the setting; a change takes effect after a restart of QGIS."""
     ProcessingConfig.settingIcons[GROUP] = QIcon(str(ICON))
-    description = tr("Folder of further Python packages (after a restart)")
+    description = tr("Additional folder of Python packages (takes effect after a restart)")
     ProcessingConfig.addSetting(Setting(GROUP, VARIABLE, description, "", valuetype=Setting.FOLDER))
     ProcessingConfig.readSettings()
 
 
 def deregister() -> None:
-    """Take the setting away; its value stays."""
+    """Remove the setting; its value is kept."""
     ProcessingConfig.removeSetting(VARIABLE)

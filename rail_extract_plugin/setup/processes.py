@@ -1,4 +1,4 @@
-"""Programs run through Qt: their output goes into the log line by line, and a cancel ends them."""
+"""Runs programs through Qt: their output goes to the log line by line, and cancelling ends them."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from qgis.PyQt.QtCore import QProcess, QProcessEnvironment
 from ...core.progress import SILENT, Progress
 
 POLL_MS = 200
-"""How often output is shown and a cancel is heard."""
+"""Interval at which output is shown and cancellation is checked, milliseconds."""
 
 
 @dataclass(frozen=True)
 class Ended:
-    """How a program ended.
+    """The result of a program.
 
     Attributes
     ----------
     code : int or None
-        Exit code; None where it could not be started or crashed.
+        Exit code; None if the program could not be started or crashed.
     output : str
-        What it printed, errors among it.
+        Its output, including errors.
     """
 
     code: int | None
@@ -39,14 +39,14 @@ def run(
     program : str
     arguments : sequence of str
     changes : mapping, optional
-        Environment variables that differ from QGIS's own.
+        Environment variables that differ from those of QGIS.
     progress : Progress
-        Gets the lines of the output.
+        Receives the lines of the output.
 
     Raises
     ------
     Cancelled
-        The user cancelled; the program has ended.
+        The user cancelled; the program has been ended.
     """
     environment = QProcessEnvironment.systemEnvironment()
     for name, value in (changes or {}).items():
@@ -69,7 +69,7 @@ def run(
 
 
 class _Log:
-    """Cuts a stream of bytes into the lines that a progress shows."""
+    """Splits a stream of bytes into lines for the progress log."""
 
     def __init__(self, progress: Progress) -> None:
         self.text = ""

@@ -335,7 +335,7 @@ FAULTS = [
         "The output can't be written (…): check the disk's free space.",
         run=MEASURE,
     ),
-    Fault("too little memory", exhausted, REFUSED, "The memory does not suffice: choose a smaller extent."),
+    Fault("too little memory", exhausted, REFUSED, "Not enough memory: choose a smaller extent."),
     *(
         Fault(f"cancelled at {percent} %", cancelled(percent), REFUSED, "Cancelled; nothing was written.")
         for percent in (0, 10, 20, 40, 60, 80, 90)

@@ -359,7 +359,7 @@ FAULTS = [
         REFUSED,
         "Rasterize rail points needs the Python package lazrs, which this QGIS does not have: run Install "
         "packages in the toolbox under Rail Extract, or qgis_process run railextract:installpackages in a shell. "
-        "Build track centerlines and FRPDF cleanup can be used without.",
+        "Build track centerlines and Clean rail raster (FRPDF) work without it.",
     ),
     Fault("path with spaces, umlauts, quotes and kanji", odd_names),
 ]

@@ -75,7 +75,7 @@ def test_missing_package_is_named_with_its_remedy(algorithm, without_laspy):
     assert not executable
     assert reason.startswith("Extract rails needs the Python package laspy, which this QGIS does not have: run Install")
     assert "qgis_process run railextract:installpackages" in reason
-    assert reason.endswith("can be used without.")
+    assert reason.endswith("Build track centerlines and Clean rail raster (FRPDF) work without it.")
 
 
 def test_missing_package_ends_a_run_before_it_begins(algorithm, context, new_feedback, without_laspy, tmp_path):
@@ -88,8 +88,9 @@ def test_missing_package_ends_a_run_before_it_begins(algorithm, context, new_fee
 def test_two_packages_make_a_plural():
     reason = explain_missing("This", PACKAGES[-2:], ["One", "Two", "Three"])
     assert "needs the Python packages pyproj, torch, which" in reason
-    assert reason.endswith(" One, Two and Three can be used without.")
+    assert reason.endswith(" One, Two and Three work without them.")
     assert explain_missing("This", PACKAGES[-2:], []).endswith("in a shell.")
+    assert explain_missing("This", PACKAGES[-1:], ["One"]).endswith(" One works without it.")
 
 
 @pytest.mark.parametrize(
@@ -122,7 +123,7 @@ def test_toolbox_loads_without_any_package(reasons_without):
 def test_toolbox_says_what_works_without_laspy(reasons_without):
     reasons = reasons_without("laspy", "lazrs")
     assert "Python packages laspy, lazrs, which" in reasons["extractrails"]
-    assert "FRPDF cleanup" in reasons["extractrails"]
+    assert "Clean rail raster (FRPDF)" in reasons["extractrails"]
     assert not reasons["frpdfcleanup"]
     assert not reasons["buildtrackcenterlines"]
 

@@ -37,7 +37,7 @@ def test_run_without_a_package_says_which(run_step, monkeypatch):
     outcome = run_step("checkinstallation", {})
     assert outcome.ok
     assert outcome.results["PASSED"] is False
-    assert outcome.results["SELF_TEST"] == "failed: laspy, lazrs missing, run Install packages"
+    assert outcome.results["SELF_TEST"] == "failed: laspy, lazrs missing: run Install packages"
 
 
 def test_installation_wants_no_cuda_on_macos(run_step, monkeypatch):
