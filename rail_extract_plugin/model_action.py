@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from processing.gui.ContextAction import ContextAction
 from processing.gui.ProviderActions import ProviderContextMenuActions
-from qgis.core import QgsProcessingAlgorithm, QgsProcessingModelAlgorithm
+from qgis.core import QgsApplication, QgsProcessingAlgorithm, QgsProcessingModelAlgorithm
 
 from .i18n import tr
 from .paths import MODEL
@@ -37,5 +37,7 @@ class OpenModelAction(ContextAction):
 
         model = QgsProcessingModelAlgorithm()
         model.fromFile(str(MODEL))
+        # Running a model without a provider crashes QGIS.
+        model.setProvider(QgsApplication.processingRegistry().providerById("model"))
         self.dialog = ModelerDialog.create(model)
         self.dialog.show()

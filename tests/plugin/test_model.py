@@ -71,6 +71,7 @@ def test_context_menu_of_extract_rails_opens_a_copy(qgis, plugin, model):
     dialog = action.dialog
     assert dialog.model().childAlgorithms().keys() == model.childAlgorithms().keys()
     assert dialog.model().sourceFilePath() == ""
+    assert dialog.model().provider().id() == "model"
     dialog.setDirty(False)
     dialog.close()
     plugin.unload()
