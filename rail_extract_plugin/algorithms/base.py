@@ -11,6 +11,8 @@ from qgis.core import (
     QgsProcessingContext,
     QgsProcessingException,
     QgsProcessingFeedback,
+    QgsProcessingOutputFile,
+    QgsProcessingParameterDefinition,
     QgsProcessingParameterPointCloudLayer,
 )
 from qgis.PyQt.QtGui import QIcon
@@ -139,6 +141,11 @@ class RailAlgorithm(QgsProcessingAlgorithm):
             raise QgsProcessingException(tr("Not enough memory: choose a smaller extent.")) from None
         progress.set_fraction(1)
         return results
+
+    def _add_report(self, definition: QgsProcessingParameterDefinition) -> None:
+        """Declare a report as a file: the batch dialog of several QGIS versions never ends after a web page."""
+        self.addParameter(definition, False)
+        self.addOutput(QgsProcessingOutputFile(definition.name(), definition.description()))
 
     def _read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Any:
         """Check the values that need no file, then read the parameters."""

@@ -15,8 +15,10 @@ from qgis.core import (
 
 from ...core.errors import RailExtractError
 from ...core.progress import Progress
+from ..dialog import outputs
 from ..i18n import tr
 from ..setup.dependencies import missing_packages
+from ..writing.reports import write_check
 from .base import RailAlgorithm
 from .extract_rails import ExtractRails
 
@@ -37,7 +39,8 @@ class CheckInstallation(RailAlgorithm):
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
-        """Declare the outputs; there are no parameters."""
+        """Declare the outputs; without the report among them, QGIS would open no dialog and show no result."""
+        self._add_report(outputs.check_report())
         for name, label in (
             ("VERSIONS", tr("Versions of QGIS, Python and packages")),
             ("MODELS", tr("State of the models")),
@@ -63,14 +66,18 @@ class CheckInstallation(RailAlgorithm):
             **{module: self_test.version(module) for module in self_test.MODULES},
         }
         models = self_test.model_states()
-        for name, text in {**versions, **{f"model {name}": state for name, state in models.items()}}.items():
+        found = {**versions, **{f"model {name}": state for name, state in models.items()}}
+        for name, text in found.items():
             progress.info(f"{name}: {text}")
         passed, words, engine = self._test(progress)
         if passed and set(models.values()) != {"ok"}:
             passed, words = False, tr("{}, but the weights are not those of the release").format(words)
         verdict = tr("passed") if passed else tr("failed")
-        (progress.info if passed else progress.warning)(f"Self test {verdict}: {words}.")
+        sentence = tr("Rail Extract works here.") if passed else tr("Rail Extract does not work here.")
+        (progress.info if passed else progress.warning)(f"{sentence} Self test {verdict}: {words}.")
+        facts = {tr("Self test"): f"{verdict}: {words}", tr("Engine"): engine or tr("none"), **found}
         return {
+            **write_check(self, "REPORT", sentence, facts, parameters, context),
             "VERSIONS": _joined(versions),
             "MODELS": _joined(models),
             "ENGINE_USED": engine,

@@ -90,7 +90,7 @@ class ExtractRails(RailAlgorithm):
         for extra in (outputs.quality("QUALITY"), outputs.cleaned()):
             extra.setCreateByDefault(False)
             self.addParameter(extra)
-        self.addParameter(outputs.report())
+        self._add_report(outputs.report())
         figures = (*outputs.rail_figures(), *outputs.centerline_figures(), *outputs.quality_figures())
         for output in (*figures, outputs.engine()):
             self.addOutput(output)
@@ -118,8 +118,8 @@ class ExtractRails(RailAlgorithm):
         settings = values.settings(job.standard, job.other_gauges_m)
         settings = replace(
             settings,
-            quality_step_m=values.number("STEP") if values.filled("QUALITY") or values.filled("REPORT") else None,
-            keep_cleaned=values.filled("CLEANED"),
+            quality_step_m=values.number("STEP") if values.wanted("QUALITY") or values.wanted("REPORT") else None,
+            keep_cleaned=values.wanted("CLEANED"),
         )
         side_m = square_side(settings)
         with TemporaryDirectory(dir=QgsProcessingUtils.tempFolder()) as folder:

@@ -55,10 +55,16 @@ def cleaned() -> QgsProcessingParameterDefinition:
 
 def report() -> QgsProcessingParameterDefinition:
     """Define the report."""
-    return helped(
-        QgsProcessingParameterFileDestination("REPORT", tr("Report"), tr("Web pages (*.html)"), optional=True),
-        tr("A web page with an assessment of the result, a map, and plots of each track."),
-    )
+    return helped(_page(), tr("A web page with an assessment of the result, a map, and plots of each track."))
+
+
+def check_report() -> QgsProcessingParameterDefinition:
+    """Define the report on the installation."""
+    return helped(_page(), tr("A web page with the result, to be attached to bug reports."))
+
+
+def _page() -> QgsProcessingParameterDefinition:
+    return QgsProcessingParameterFileDestination("REPORT", tr("Report"), tr("Web pages (*.html)"), optional=True)
 
 
 def rail_figures() -> Numbers:

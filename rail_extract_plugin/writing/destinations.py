@@ -84,6 +84,11 @@ def check_distinct(outputs: Mapping[str, Any], context: QgsProcessingContext) ->
         seen.append((name, file, table))
 
 
+def is_wanted(value: Any, context: QgsProcessingContext) -> bool:
+    """Return whether a destination names anything; the batch dialog gives an empty definition for a skipped output."""
+    return bool(_text(value, context))
+
+
 def _text(value: Any, context: QgsProcessingContext) -> str:
     """Destination as a user writes it; empty where there is none."""
     if isinstance(value, QgsProcessingOutputLayerDefinition):

@@ -36,6 +36,7 @@ from ...core.fields import (
 from ...core.progress import SILENT, Progress
 from ..compat import INTEGER, REAL, TEXT, field
 from ..systems import system
+from .destinations import is_wanted
 from .styling import style_on_load
 from .whole_files import write_whole
 
@@ -157,9 +158,17 @@ def write_raster(
     context: QgsProcessingContext,
     progress: Progress = SILENT,
 ) -> dict[str, str]:
-    """Write rasters of rails, one a class, into the output called `name`; gives the file's path by that name."""
+    """Write rasters of rails, one per class, into the output called `name`.
+
+    Returns
+    -------
+    dict of str to str
+        The file's path by the output's name; empty where the user skipped the output.
+    """
     from ..reading.geotiff import write_rasters
 
+    if not is_wanted(parameters.get(name), context):
+        return {}
     path = algorithm.parameterAsOutputLayer(parameters, name, context)
     write_rasters(Path(path), header, rasters, progress)
     style_on_load(path, "raster", context)
@@ -197,6 +206,8 @@ def _write(
     context: QgsProcessingContext,
 ) -> dict[str, str]:
     """Write features into the output called `name`, if the user wants it."""
+    if not is_wanted(parameters.get(name), context):
+        return {}
     columns, crs = fields(kind.columns), output_crs(frame.crs_wkt)
 
     def write(value: Any) -> tuple[str, int]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -72,7 +74,42 @@ def write_report(
     path = algorithm.parameterAsFileOutput(parameters, name, context)
     if not path:
         return {}
-    page = build_page(network, origin.gauges_m, origin.title, _facts(network, origin))
+    _write_page(path, build_page(network, origin.gauges_m, origin.title, _facts(network, origin)))
+    return {name: path}
+
+
+def write_check(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    verdict: str,
+    facts: Mapping[str, str],
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the result of Check Installation into the output called `name`, like `write_report`.
+
+    Parameters
+    ----------
+    algorithm : QgsProcessingAlgorithm
+    name : str
+    verdict : str
+        A sentence.
+    facts : mapping of str to str
+        What was found, by name.
+    parameters : dict
+    context : QgsProcessingContext
+    """
+    path = algorithm.parameterAsFileOutput(parameters, name, context)
+    if not path:
+        return {}
+    rows = "".join(f"<tr><th align='left'>{escape(key)}</th><td>{escape(facts[key])}</td></tr>" for key in facts)
+    title = f"<title>{escape(algorithm.displayName())}</title>"
+    _write_page(path, f'<!DOCTYPE html><meta charset="utf-8">{title}<h1>{escape(verdict)}</h1><table>{rows}</table>')
+    return {name: path}
+
+
+def _write_page(path: str, page: str) -> None:
+    """Write a page; an older file stays until it is complete."""
     part = Path(f"{path}.part")
     try:
         try:
@@ -82,7 +119,6 @@ def write_report(
             part.unlink(missing_ok=True)
     except OSError as error:
         raise RailExtractError(f"{path} can't be written ({error.strerror}): choose another place.") from error
-    return {name: path}
 
 
 def _facts(network: RailNetwork, origin: Origin) -> dict[str, str]:

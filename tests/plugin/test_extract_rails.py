@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from lines import farthest, read_features
 from osgeo import gdal
-from qgis.core import QgsProcessingUtils, QgsVectorLayer
+from qgis.core import QgsProcessingOutputLayerDefinition, QgsProcessingUtils, QgsVectorLayer
 from rail_extract.rail_extract_plugin.reading.geotiff import read_header
 
 
@@ -67,6 +67,20 @@ def test_outputs_may_be_skipped(run, scene):
     assert outcome.ok, outcome.error
     assert "RAILS" not in outcome.results
     assert outcome.results["CENTERLINE_COUNT"] > 0
+
+
+def test_outputs_left_blank_in_the_batch_dialog_are_skipped(run, scene, tmp_path):
+    blank = {name: QgsProcessingOutputLayerDefinition("", None) for name in ("CENTERLINES", "QUALITY", "CLEANED")}
+    outcome = run({**scene, **blank, "RAILS": tmp_path / "rails.gpkg", "REPORT": ""})
+    assert outcome.ok, outcome.error
+    assert {name: outcome.results.get(name) for name in (*blank, "REPORT", "SIGMA")} == dict.fromkeys(
+        (*blank, "REPORT", "SIGMA")
+    )
+    assert [path.name for path in tmp_path.glob("*.gpkg")] == ["rails.gpkg"]
+
+
+def test_report_is_no_output_that_stops_the_batch_dialog(algorithm):
+    assert algorithm.outputDefinition("REPORT").type() == "outputFile"
 
 
 def test_cleaned_raster_is_what_the_steps_make(run, run_step, scene, tmp_path):

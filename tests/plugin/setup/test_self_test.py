@@ -2,6 +2,7 @@ import hashlib
 
 import numpy as np
 import pytest
+from qgis.core import QgsApplication
 from rail_extract.core.frpdf.models import MODELS
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailNetwork
@@ -38,6 +39,27 @@ def test_run_without_a_package_says_which(run_step, monkeypatch):
     assert outcome.ok
     assert outcome.results["PASSED"] is False
     assert outcome.results["SELF_TEST"] == "failed: laspy, lazrs missing: run Install packages"
+
+
+def test_result_of_the_check_is_shown_and_written(run_step, new_feedback, tmp_path, monkeypatch):
+    """QGIS opens a dialog only for algorithms that have a visible parameter, if only an output."""
+    algorithm = QgsApplication.processingRegistry().createAlgorithmById("railextract:checkinstallation")
+    assert algorithm.countVisibleParameters() == 1
+    feedback = new_feedback()
+    outcome = run_step("checkinstallation", {"REPORT": tmp_path / "check.html"}, feedback)
+    assert outcome.ok
+    said = "Rail Extract works here. Self test passed: 100.0% of the true rails found"
+    assert said in feedback.textLog()
+    page = (tmp_path / "check.html").read_text(encoding="utf-8")
+    assert "<h1>Rail Extract works here.</h1>" in page
+    assert f"<td>{outcome.results['SELF_TEST']}</td>" in page
+    monkeypatch.setattr(
+        "rail_extract.rail_extract_plugin.setup.dependencies.is_installed", lambda name: name != "laspy"
+    )
+    feedback = new_feedback()
+    assert run_step("checkinstallation", {}, feedback).ok
+    (warning,) = feedback.warnings
+    assert warning == ("Rail Extract does not work here. Self test failed: laspy missing, run Install packages.")
 
 
 def test_installation_wants_no_cuda_on_macos(run_step, monkeypatch):
