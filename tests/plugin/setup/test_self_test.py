@@ -59,7 +59,7 @@ def test_result_of_the_check_is_shown_and_written(run_step, new_feedback, tmp_pa
     feedback = new_feedback()
     assert run_step("checkinstallation", {}, feedback).ok
     (warning,) = feedback.warnings
-    assert warning == ("Rail Extract does not work here. Self test failed: laspy missing, run Install packages.")
+    assert warning == ("Rail Extract does not work here. Self test failed: laspy missing: run Install packages.")
 
 
 def test_installation_wants_no_cuda_on_macos(run_step, monkeypatch):
