@@ -1,4 +1,4 @@
-"""The report: a page that says in ten seconds whether the result is good, and where it is not."""
+"""The report: a page that shows at a glance whether a result is good, and where it is not."""
 
 from .page import build_page
 

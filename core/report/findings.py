@@ -1,4 +1,4 @@
-"""What a reader of the report should know first: how much of the tracks is in doubt, why, and where."""
+"""Findings of the report: how much of the tracks is in doubt, why, and where."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ import numpy as np
 from ..rails import Centerline, RailNetwork, TrackGeometry, cell_borders
 
 GAUGE_OFF_MM = 10.0
-"""Further from its gauge no plain track is left lying; curves below 200 m are widened by more, and worth a look."""
+"""Plain track is not left in service with a larger deviation from its gauge. Curves of less than 200 m radius are
+widened by more, and deserve a look."""
 
 UNSURE_MM = 5.0
-"""Larger standard errors of a centerline are not what a survey of tracks puts up with."""
+"""A track survey does not accept larger standard errors of a centerline."""
 
 MERGE_M = 5.0
-"""Places closer together than this are one place to look at."""
+"""Doubtful places closer than this along the track count as one."""
 
 FEW, MANY = 0.05, 0.25
-"""Shares of the length in doubt up to which a result is good but for a few places, and from which it is poor."""
+"""Share of the length in doubt up to which a result is good with a few exceptions, and above which it is poor."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +30,9 @@ class Doubt:
     Attributes
     ----------
     name : str
-        Class of its marks in the pictures.
+        CSS class of its marks in the pictures.
     label : str
-        In words, for a list.
+        The reason in words, for lists.
     """
 
     name: str
@@ -42,12 +43,12 @@ UNSUPPORTED = Doubt("unsupported", "a rail has no points")
 OFF_GAUGE = Doubt("offgauge", f"gauge off by more than {GAUGE_OFF_MM:g} mm")
 UNSURE = Doubt("unsure", f"standard error above {UNSURE_MM:g} mm")
 DOUBTS = (UNSUPPORTED, OFF_GAUGE, UNSURE)
-"""The gravest first; a place is counted under one of them only."""
+"""In order of severity; a place counts under the first that applies."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """A stretch of a track to look at.
+    """A section of a track to look at.
 
     Attributes
     ----------
@@ -56,7 +57,7 @@ class Place:
     start_m, end_m : float
         Chainages.
     length_m : float
-        How much of the stretch is in doubt.
+        Length in doubt within the section.
     """
 
     track_id: int
@@ -68,16 +69,16 @@ class Place:
 
 @dataclass(frozen=True)
 class TrackFindings:
-    """One track, its gauge and what is in doubt on it.
+    """The findings on one track.
 
     Attributes
     ----------
     line : Centerline
     geometry : TrackGeometry
     nominal_mm : float
-        Of the gauges that were given, the nearest.
+        Nearest of the gauges that tracks may have.
     doubtful : dict of Doubt to (n,) bool array
-        Stations in doubt, each under one reason.
+        Stations in doubt, by reason; a station has at most one.
     """
 
     line: Centerline
@@ -91,17 +92,17 @@ class TrackFindings:
         return float(self.geometry.cells_m.sum())
 
     def length_of(self, doubt: Doubt) -> float:
-        """Length in doubt for a reason."""
+        """Return the length in doubt for a reason."""
         return float(self.geometry.cells_m[self.doubtful[doubt]].sum())
 
     def places(self, doubt: Doubt, merge_m: float = MERGE_M) -> list[Place]:
-        """List where the track is in doubt for a reason; places no further apart than `merge_m` count as one."""
+        """Return the places in doubt for a reason; those no more than `merge_m` apart are merged."""
         return list(_places(self.geometry, doubt, self.doubtful[doubt], merge_m))
 
 
 @dataclass(frozen=True)
 class Findings:
-    """All tracks, and the rails that belong to none."""
+    """The findings on all tracks, and the number and length of the rails that belong to none."""
 
     tracks: tuple[TrackFindings, ...]
     lonely_rails: int
@@ -113,31 +114,32 @@ class Findings:
         return sum(track.length_m for track in self.tracks)
 
     def length_of(self, doubt: Doubt) -> float:
-        """Length of all tracks in doubt for a reason."""
+        """Return the length of all tracks in doubt for a reason."""
         return sum(track.length_of(doubt) for track in self.tracks)
 
     @property
     def share(self) -> float:
-        """Part of the length in doubt for any reason."""
+        """Share of the length that is in doubt for any reason."""
         return sum(self.length_of(doubt) for doubt in DOUBTS) / self.length_m if self.tracks else 1.0
 
     def places(self) -> list[Place]:
-        """List all places to look at, those with most in doubt first."""
+        """Return all places to look at, in order of decreasing length in doubt."""
         found = [place for track in self.tracks for doubt in DOUBTS for place in track.places(doubt)]
         return sorted(found, key=lambda place: -place.length_m)
 
 
 def examine(network: RailNetwork, gauges_m: Sequence[float]) -> Findings:
-    """Find what is in doubt.
+    """Find where the tracks of a network are in doubt.
 
     Parameters
     ----------
     network : RailNetwork
-        With its geometry.
+        With the geometry of its tracks, in any order.
     gauges_m : sequence of float
         Gauges that tracks may have.
     """
-    tracks = tuple(_examine_track(*one, gauges_m) for one in zip(network.centerlines, network.geometry))
+    geometry = {track.track_id: track for track in network.geometry}
+    tracks = tuple(_examine_track(line, geometry[line.track_id], gauges_m) for line in network.centerlines)
     paired = {rail_id for line in network.centerlines for rail_id in (*line.left_ids, *line.right_ids)}
     lonely = [rail.length_m for rail in network.rails if rail.rail_id not in paired]
     return Findings(tracks, len(lonely), float(sum(lonely)))
@@ -153,7 +155,7 @@ def _examine_track(line: Centerline, geometry: TrackGeometry, gauges_m: Sequence
 
 
 def _places(geometry: TrackGeometry, doubt: Doubt, doubtful: np.ndarray, merge_m: float) -> Iterator[Place]:
-    """Join stations in doubt to places."""
+    """Join stations in doubt into places."""
     numbers = np.flatnonzero(doubtful)
     if not len(numbers):
         return

@@ -1,4 +1,4 @@
-"""HTML and SVG as text, with everything escaped in one place."""
+"""HTML and SVG as text, with all escaping in one place."""
 
 from __future__ import annotations
 
@@ -7,16 +7,21 @@ from html import escape
 
 
 def tag(name: str, *content: str, **attributes: object) -> str:
-    """Make an element.
+    """Return an element as markup.
 
     Parameters
     ----------
     name : str
     *content : str
-        Markup; make text safe with `text` before.
+        Markup; escape plain text with `text`.
     **attributes : object
-        Values by name; a hyphen is written as an underscore, and a name that Python keeps has one at its end. Numbers
-        get two decimals, None leaves an attribute out.
+        Values by name. Write an underscore for a hyphen, and append one to names that Python reserves. Floats are
+        written with two decimals, and attributes that are None are left out.
+
+    Examples
+    --------
+    >>> tag("line", x1=0.5, stroke_width=2, class_="grid", y1=None)
+    '<line x1="0.50" stroke-width="2" class="grid"></line>'
     """
     written = "".join(
         f' {key.rstrip("_").replace("_", "-")}="{escape(_value(value), quote=True)}"'
@@ -27,19 +32,19 @@ def tag(name: str, *content: str, **attributes: object) -> str:
 
 
 def text(content: object) -> str:
-    """Make text safe to stand in markup."""
+    """Escape text for use in markup."""
     return escape(str(content))
 
 
 def table(headings: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
-    """Make a table of texts."""
+    """Return a table of escaped texts."""
     head = tag("tr", *(tag("th", text(heading)) for heading in headings))
     body = (tag("tr", *(tag("td", text(cell)) for cell in row)) for row in rows)
     return tag("table", tag("thead", head), tag("tbody", *body))
 
 
 def metres(length_m: float) -> str:
-    """Write a length for a person: 0.4 m, 39 m, 1,234 m, 12.3 km."""
+    """Format a length for reading: 0.4 m, 39 m, 1,234 m, 12.3 km."""
     if length_m >= 10_000:
         return f"{length_m / 1000:,.1f} km"
     return f"{length_m:.1f} m" if length_m < 10 else f"{length_m:,.0f} m"

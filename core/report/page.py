@@ -1,4 +1,4 @@
-"""The report as one page of HTML that needs nothing else: no network, no other file."""
+"""The report as a single page of HTML that needs no network and no other file."""
 
 from __future__ import annotations
 
@@ -13,32 +13,32 @@ from .plan import draw_plan
 from .plots import draw_profiles
 from .style import STYLE
 
-MOST_PLACES = 5
-"""Places to look at that are listed for each reason; the pictures show all."""
+MAX_PLACES = 5
+"""Places listed for each reason; the pictures show all."""
 
 VERDICTS = (
-    (0.0, "good", "Good throughout: points support every metre, at gauge and with a small error."),
-    (FEW, "good", "Good, but for a few places to look at."),
+    (0.0, "good", "Good throughout: every metre is supported by points, at gauge, with a small standard error."),
+    (FEW, "good", "Good, except for a few places to look at."),
     (MANY, "fair", "Usable, but look at the places below before you rely on them."),
-    (np.inf, "poor", "Poor: large parts are in doubt. Check class, gauge and railhead width, and the cloud's density."),
+    (np.inf, "poor", "Poor: large parts are in doubt. Check classes, gauge, railhead width and the cloud's density."),
 )
-"""What is said up to which share of the length in doubt, and the colour it gets."""
+"""Share of the length in doubt up to which a verdict applies, CSS class of the verdict, and its words."""
 
 NOTES = (
-    "A rail line is the top of the railhead on the head's own axis. Gauge is the distance in space between the two "
-    "rail lines less the railhead width; it is not measured 14 mm below the top. Cant is the left rail minus the "
-    "right one, seen along the track; curvature is positive to the left. Chainage counts in plan from the western end "
-    "of the line, or from the southern one where it runs north.",
-    "The standard error is that of the centerline across the track: two thirds of the true positions should lie "
-    "within it. The report judges what was found. Whether a track was missed, only a look at the map and the cloud "
-    "can tell.",
+    "A rail line is the top of the railhead, on the axis of the railhead. Gauge is the 3D distance between the two "
+    "rail lines minus the railhead width; it is not measured 14 mm below the top. Cant is the height of the left rail "
+    "minus that of the right rail, seen along the track; curvature is positive in left-hand curves. Chainage is the "
+    "plan distance from the western end of the line, or from its southern end if it runs north.",
+    "The standard error is that of the centerline's lateral position: about two thirds of the true positions are "
+    "within it. The report judges the tracks that were found. To see whether one was missed, compare the map with the "
+    "cloud.",
 )
 
 
 def build_page(
     network: RailNetwork, gauges_m: Sequence[float], source: str, facts: Mapping[str, str] | None = None
 ) -> str:
-    """Write the report on a network.
+    """Return the report on a network.
 
     Parameters
     ----------
@@ -47,14 +47,14 @@ def build_page(
     gauges_m : sequence of float
         Gauges that tracks may have.
     source : str
-        What the rails were extracted from.
+        Name of the cloud.
     facts : mapping of str to str
-        What else to state, such as parameters, by name.
+        Further facts to state, such as parameters, by name.
 
     Returns
     -------
     str
-        A whole HTML document.
+        A complete HTML document.
     """
     findings = examine(network, gauges_m)
     heights = [_heights(network, track) for track in findings.tracks]
@@ -77,22 +77,22 @@ def build_page(
 
 
 def _verdict(findings: Findings, rail_count: int) -> str:
-    """Say in words how good the result is, and what is in doubt."""
+    """Write the verdict, and the reasons for doubt."""
     if not findings.tracks:
-        words = f"No track was found. There are {rail_count} rails, but no two of them run side by side at a gauge."
+        words = f"No track was found. There are {rail_count} rails, but no two of them are parallel at a gauge."
         return tag("div", tag("strong", text(words)), class_="verdict poor")
-    kind, headline = next((kind, words) for most, kind, words in VERDICTS if findings.share <= most)
+    kind, headline = next((kind, words) for limit, kind, words in VERDICTS if findings.share <= limit)
     reasons = [tag("li", text(_reason(findings, doubt))) for doubt in DOUBTS if findings.length_of(doubt) > 0]
     if findings.lonely_rails:
         count = findings.lonely_rails
-        belong = "1 rail belongs" if count == 1 else f"{count} rails belong"
-        reasons.append(tag("li", text(f"{belong} to no track ({metres(findings.lonely_m)}).")))
+        belong = "1 rail does not belong" if count == 1 else f"{count} rails do not belong"
+        reasons.append(tag("li", text(f"{belong} to a track ({metres(findings.lonely_m)}).")))
     listed = [tag("ul", *reasons)] if reasons else []
     return tag("div", tag("strong", text(headline)), *listed, class_=f"verdict {kind}")
 
 
 def _reason(findings: Findings, doubt: Doubt) -> str:
-    """Say how much is in doubt for a reason, and where most."""
+    """Write how much is in doubt for a reason, and where the longest place is."""
     length_m, place = findings.length_of(doubt), next(one for one in findings.places() if one.doubt == doubt)
     share = f"{metres(length_m)} of {metres(findings.length_m)} ({100 * length_m / findings.length_m:.1f} %)"
     where = f"track {place.track_id}, {place.start_m:,.0f} to {place.end_m:,.0f} m"
@@ -100,7 +100,7 @@ def _reason(findings: Findings, doubt: Doubt) -> str:
 
 
 def _tiles(network: RailNetwork, findings: Findings) -> str:
-    """State the figures that matter most."""
+    """Write the most important figures."""
     sigma = np.concatenate([track.geometry.sigma_mm for track in findings.tracks] or [np.empty(0)])
     known = sigma[np.isfinite(sigma)]
     tiles = [
@@ -108,8 +108,8 @@ def _tiles(network: RailNetwork, findings: Findings) -> str:
         (metres(findings.length_m), "of track"),
         (str(len(network.rails)), f"rails, {metres(sum(rail.length_m for rail in network.rails))}"),
         (f"{np.median(known):.1f} mm" if len(known) else "unknown", "standard error, median"),
-        (f"{100 * (1 - findings.share):.1f} %", "of it without any doubt"),
-        (f"{_density(findings):.0f}", "points a metre of track, median"),
+        (f"{100 * (1 - findings.share):.1f} %", "of it without doubt"),
+        (f"{_density(findings):.0f}", "points per metre of track, median"),
     ]
     return tag(
         "div",
@@ -119,7 +119,7 @@ def _tiles(network: RailNetwork, findings: Findings) -> str:
 
 
 def _density(findings: Findings) -> float:
-    """Points on both rails that are nearest to a metre of track, median; 0 without tracks."""
+    """Return the median number of points on both rails per metre of track; 0 without tracks."""
     density = [track.geometry.points / track.geometry.cells_m for track in findings.tracks]
     return float(np.median(np.concatenate(density))) if density else 0.0
 
@@ -129,29 +129,29 @@ def _map(findings: Findings) -> str:
 
 
 def _legend(*more: str) -> str:
-    keys = [tag("span", tag("i", class_="fine"), text("supported, at gauge, small error"))]
+    keys = [tag("span", tag("i", class_="fine"), text("not in doubt"))]
     keys += [tag("span", tag("i", class_=doubt.name), text(doubt.label)) for doubt in DOUBTS]
     return tag("div", *keys, *more, class_="legend")
 
 
 def _places(findings: Findings) -> str:
-    """List where to look."""
+    """Write the list of places to look at."""
     places = findings.places()
     if not places:
         return ""
     rows = [
         (place.track_id, f"{place.start_m:,.1f} to {place.end_m:,.1f} m", metres(place.length_m), place.doubt.label)
         for doubt in DOUBTS
-        for place in [one for one in places if one.doubt == doubt][:MOST_PLACES]
+        for place in [one for one in places if one.doubt == doubt][:MAX_PLACES]
     ]
     listed = tag("div", table(("Track", "Chainage", "In doubt", "Why"), rows), class_="scroll")
     more = len(places) - len(rows)
-    rest = [tag("p", text(f"{more} more places are marked below."), class_="notes")] if more else []
+    rest = [tag("p", text(f"{more} more places are marked in the profiles below."), class_="notes")] if more else []
     return _section("Where to look", listed.replace("<table>", '<table class="words">'), *rest)
 
 
 def _tracks(findings: Findings) -> str:
-    """Sum the tracks up."""
+    """Write the table of tracks."""
     headings = ("Track", "Length", "Gauge", "Cant", "Tightest radius", "Gradient", "Standard error", "No points")
     rows = [_row(track) for track in findings.tracks]
     return _section("Tracks", tag("div", table(headings, rows), class_="scroll"))
@@ -204,6 +204,6 @@ def _section(heading: str, *content: str) -> str:
 
 
 def _heights(network: RailNetwork, track: TrackFindings) -> np.ndarray:
-    """Heights of stations above the datum of the cloud, metres."""
+    """Return the heights of a track's stations above the cloud's datum in metres."""
     frame = network.frame
     return frame.to_crs(track.geometry.xyz)[:, 2] * frame.vertical_unit_m

@@ -1,4 +1,4 @@
-"""The map of the report: tracks seen from above, with what is in doubt marked on them."""
+"""The map of the report: the tracks in plan, with marks where they are in doubt."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from .findings import DOUBTS, Doubt, Findings, TrackFindings
 from .markup import tag, text
 from .plots import curve, round_up
 
-WIDTH, LOWEST, HIGHEST, MARGIN = 1040.0, 150.0, 520.0, 42.0
-"""Units of the picture: its width, the least and the largest height, and the margin around the tracks."""
+WIDTH, MIN_HEIGHT, MAX_HEIGHT, MARGIN = 1040.0, 150.0, 520.0, 42.0
+"""Width of the picture in its units, its smallest and its largest height, and the margin around the tracks."""
 
 BAR = 0.1
-"""Part of the width that the scale bar takes at least."""
+"""Smallest length of the scale bar as a share of the width."""
 
 LABEL_PLACES = 6
-"""Places along a track between which the labels of neighbours change."""
+"""Places along a track among which the labels of neighbouring tracks alternate."""
 
 
 def draw_plan(findings: Findings) -> str:
-    """Draw the tracks with north up, as SVG."""
+    """Return the map as SVG, north up."""
     xy = np.concatenate([track.geometry.xyz[:, :2] for track in findings.tracks])
     low, span = xy.min(axis=0), np.maximum(np.ptp(xy, axis=0), 1.0)
-    scale = min((WIDTH - 2 * MARGIN) / span[0], (HIGHEST - 2 * MARGIN) / span[1])
-    height = max(span[1] * scale + 2 * MARGIN, LOWEST)
+    scale = min((WIDTH - 2 * MARGIN) / span[0], (MAX_HEIGHT - 2 * MARGIN) / span[1])
+    height = max(span[1] * scale + 2 * MARGIN, MIN_HEIGHT)
     middle = low + span / 2
 
     def place(points: np.ndarray) -> np.ndarray:
@@ -43,13 +43,13 @@ def _mark(track: TrackFindings, places: np.ndarray, doubt: Doubt) -> str:
     doubtful = track.doubtful[doubt]
     if not doubtful.any():
         return ""
-    # A station stands for the way to both neighbours.
+    # A station represents the line half way to its neighbours: draw up to both.
     near = doubtful | np.append(doubtful[1:], False) | np.append(False, doubtful[:-1])
     return tag("path", d=curve(places[:, 0], np.where(near, places[:, 1], np.nan)), class_=f"{doubt.name} mark")
 
 
 def _label(track: TrackFindings, places: np.ndarray, number: int) -> str:
-    """Write a track's number on it, with an arrow along it; on neighbours at different places."""
+    """Write a track's number next to it, with an arrow in its direction; the place along it varies with `number`."""
     at = (len(places) - 1) * (1 + number % LABEL_PLACES) // (LABEL_PLACES + 2)
     place, after = places[at], places[at + 1]
     angle = float(np.degrees(np.arctan2(*(after - place)[::-1])))
@@ -60,7 +60,7 @@ def _label(track: TrackFindings, places: np.ndarray, number: int) -> str:
 
 
 def _scale_bar(scale: float, height: float) -> str:
-    """Draw a bar of a round length."""
+    """Draw a scale bar of a round length."""
     length_m = round_up(BAR * WIDTH / scale)
     end, y = MARGIN / 2 + length_m * scale, height - 14
     bar = tag("path", d=f"M{MARGIN / 2} {y - 5:.1f} V{y:.1f} H{end:.1f} V{y - 5:.1f}", class_="bar")

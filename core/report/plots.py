@@ -1,9 +1,10 @@
-"""Pictures of a track by chainage: one panel a quantity, all over one axis."""
+"""Profiles of a track by chainage: one panel per quantity, over a common axis."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,16 +12,16 @@ from .findings import DOUBTS, GAUGE_OFF_MM, TrackFindings
 from .markup import tag, text
 
 WIDTH, LEFT, RIGHT = 1040.0, 76.0, 24.0
-"""Units of a picture across, and its margins for labels."""
+"""Width of a picture in its units, and its margins for labels."""
 
 PANEL, SPACE, AXIS = 92.0, 26.0, 38.0
-"""Heights of a panel, of its heading, and of the axis below the last."""
+"""Heights of a panel, of its heading, and of the axis below the last panel."""
 
 TICKS_ACROSS, TICKS_UP = 10, 4
-"""About how many marks an axis gets."""
+"""Approximate number of ticks on an axis."""
 
 ROOM = 0.08
-"""Part of a panel that stays free above and below the curve."""
+"""Free share of a panel above and below the curve."""
 
 
 @dataclass(frozen=True)
@@ -31,41 +32,41 @@ class Panel:
     ----------
     heading, unit : str
     values : (n,) array
-    least_span : float
-        The panel shows at least so much, so that noise does not look like an alarm.
+    min_span : float
+        Smallest range of the panel, so that noise does not look alarming.
     band : tuple of float or None
-        From where to where values are as they should be.
+        Lower and upper limit of the values that are in order.
     floor : float or None
-        Lowest value shown.
+        Lower end of the panel, if fixed.
     """
 
     heading: str
     unit: str
     values: np.ndarray
-    least_span: float
+    min_span: float
     band: tuple[float, float] | None = None
     floor: float | None = None
 
     def limits(self) -> tuple[float, float]:
-        """Lowest and highest value to show; the middle of the band, or of the values, when there is little to see."""
+        """Return the lower and the upper end of the panel: band and values, widened to `min_span`, with some room."""
         known = self.values[np.isfinite(self.values)]
         low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
         if self.band:
             low, high = min(low, self.band[0]), max(high, self.band[1])
-        lacking = max(self.least_span - (high - low), 0.0) / 2
-        room = ROOM * max(high - low, self.least_span)
+        lacking = max(self.min_span - (high - low), 0.0) / 2
+        room = ROOM * max(high - low, self.min_span)
         low, high = low - lacking - room, high + lacking + room
         return (self.floor, high) if self.floor is not None else (low, high)
 
 
 def draw_profiles(track: TrackFindings, height_m: np.ndarray) -> str:
-    """Draw height, gauge, cant, curvature and standard error of a track by chainage, as SVG.
+    """Return the profiles of height, gauge, cant, curvature and standard error of a track as SVG.
 
     Parameters
     ----------
     track : TrackFindings
     height_m : (n,) array
-        Of the stations, above the datum of the cloud.
+        Heights of the stations above the cloud's datum.
     """
     along = track.geometry.chainage_m
     panels = _panels(track, height_m)
@@ -81,19 +82,27 @@ def draw_profiles(track: TrackFindings, height_m: np.ndarray) -> str:
 
 
 def ticks(low: float, high: float, count: int) -> np.ndarray:
-    """Round numbers from `low` to `high`, about `count` of them."""
+    """Return about `count` round numbers from `low` to `high`.
+
+    >>> ticks(0.3, 7.9, 4).tolist()
+    [2.0, 4.0, 6.0]
+    """
     step = round_up(max(high - low, 1e-9) / count)
     return np.round(np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step, 9) + 0.0
 
 
 def round_up(value: float) -> float:
-    """Find the least of 1, 2 and 5, and these times powers of ten, that is not smaller."""
+    """Round up to 1, 2 or 5 times a power of ten.
+
+    >>> round_up(23.0)
+    50.0
+    """
     power = 10.0 ** np.floor(np.log10(value))
     return float(power * next(factor for factor in (1, 2, 5, 10) if value <= power * factor))
 
 
 def curve(x: np.ndarray, y: np.ndarray) -> str:
-    """Write the path through points, (n,) each, broken where one is NaN; no more than a picture can show."""
+    """Return the SVG path through points, (n,) each; it breaks at NaN and is thinned to the picture's resolution."""
     x, y = _thinned(x, y)
     known = np.isfinite(y)
     moves = known & ~np.concatenate([[False], known[:-1]])
@@ -116,7 +125,7 @@ def _draw_panel(panel: Panel, track: TrackFindings, top: float) -> str:
     along, (low, high) = track.geometry.chainage_m, panel.limits()
     scale = PANEL / (high - low)
 
-    def up(value):
+    def up(value: Any) -> Any:
         return top + PANEL - (value - low) * scale
 
     parts = [tag("rect", x=LEFT, y=top, width=WIDTH - LEFT - RIGHT, height=PANEL, class_="panel")]
@@ -134,7 +143,7 @@ def _draw_panel(panel: Panel, track: TrackFindings, top: float) -> str:
 
 
 def _shades(track: TrackFindings, top: float) -> Iterator[str]:
-    """Mark what is in doubt, to a unit of the picture; a mark is at least as wide, so that it can be seen."""
+    """Mark the places in doubt; places less than a unit of the picture apart merge, and no mark is narrower."""
     along = track.geometry.chainage_m
     for doubt in DOUBTS:
         for place in track.places(doubt, merge_m=track.length_m / WIDTH):
@@ -143,12 +152,13 @@ def _shades(track: TrackFindings, top: float) -> Iterator[str]:
             yield tag("rect", title, x=start, y=top, width=max(end - start, 1.0), height=PANEL, class_=doubt.name)
 
 
-def _across(chainage, along: np.ndarray):
+def _across(chainage: Any, along: np.ndarray) -> Any:
+    """Return the x of one or several chainages."""
     return LEFT + (chainage - along[0]) / (along[-1] - along[0]) * (WIDTH - LEFT - RIGHT)
 
 
 def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Keep the lowest and the highest point of each unit across: the curve looks the same."""
+    """Keep the lowest and the highest point in each unit of x: the curve looks the same."""
     columns = int(WIDTH)
     if len(x) <= 4 * columns:
         return x, y

@@ -1,4 +1,4 @@
-"""How the report looks."""
+"""Style sheet of the report."""
 
 STYLE = """
 :root { --ink: #1d2733; --soft: #5d6b7a; --line: #dfe5ec; --paper: #ffffff; --wash: #f5f7fa; --track: #1565c0;

@@ -90,12 +90,21 @@ def test_every_metre_in_doubt_is_counted_once_and_under_the_gravest_reason():
     assert findings.length_m == pytest.approx(100)
 
 
+def test_geometry_is_matched_by_track_whatever_its_order():
+    """As with the classes (11, 10), whose geometry comes in the order of the classes."""
+    whole = network(track(1, bridged=at(101, 10, 11)), track(2))
+    for one in (whole, replace(whole, geometry=whole.geometry[::-1])):
+        findings = examine(one, (1.435,))
+        assert [(found.line.track_id, found.geometry.track_id) for found in findings.tracks] == [(1, 1), (2, 2)]
+        assert [place.track_id for place in findings.places()] == [1]
+
+
 def test_places_state_where_and_how_much():
     bridged = at(101, 10, 11, 14, 40)
     html = page(track(), track(2, bridged=bridged))
     found = examine(network(track(2, bridged=bridged)), (1.435,)).places()
     assert [(place.start_m, place.end_m, place.length_m) for place in found] == [(9.5, 14.5, 3.0), (39.5, 40.5, 1.0)]
-    assert headline(html) == "Good, but for a few places to look at."
+    assert headline(html) == "Good, except for a few places to look at."
     assert "4.0 m of 200 m (2.0 %): a rail has no points. Longest: track 2, 10 to 14 m." in html
     assert "9.5 to 14.5 m" in html
 
@@ -119,14 +128,14 @@ def test_the_longest_places_are_listed_for_each_reason():
     html = page(track(length_m=1000.0, sigma_mm=sigma, bridged=bridged))
     rows = elements(html, "tbody")[0].findall("tr")
     assert [row.findall("td")[3].text for row in rows] == ["a rail has no points"] + 5 * ["standard error above 5 mm"]
-    assert "35 more places are marked below." in html
+    assert "35 more places are marked in the profiles below." in html
     marks = [one.get("class") for one in elements(html, "svg")[0].iter("path") if "mark" in one.get("class")]
     assert marks == ["unsure mark", "unsupported mark"]  # the gravest on top
 
 
 def test_rails_without_a_track_are_told():
     alone = RailLine(np.array([[0.0, 50, 0], [35, 50, 0]]), 99, 10, 10, 1.0, 1.0, 0.0)
-    assert "1 rail belongs to no track (35 m)." in page(track(), more_rails=(alone,))
+    assert "1 rail does not belong to a track (35 m)." in page(track(), more_rails=(alone,))
     html = page(more_rails=(alone, replace(alone, rail_id=98)))
     assert headline(html).startswith("No track was found. There are 2 rails")
     assert not elements(html, "svg")
