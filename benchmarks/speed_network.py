@@ -134,7 +134,7 @@ def cells_table() -> Iterable[str]:
     raster = rasterize(np.concatenate([along + offset * across for offset in (0.0, 1.5, 4.0, 5.5)]), CELL_M)
     cells = raster.cells()
     height, width = (cells.max(axis=0) + 1 - cells.min(axis=0)).tolist()
-    fields = lay_fields(raster, TorchEngine.most_cells)
+    fields = lay_fields(raster, TorchEngine.max_cells)
     computed = sum(piece.height * piece.width for field in fields for piece in field.pieces)
     yield (
         f"Cells computed for {DIAGONAL_M / 1000:g} km of double track on the diagonal:"
@@ -149,7 +149,7 @@ def changes_table(cut: Cut) -> Iterable[str]:
     plain = _clean_whole(plain_network(cut.arrays), raster)
     pieces = clean(raster, exact)
     quick = clean(raster, fast)
-    exact.most_cells = SMALL_FIELD
+    exact.max_cells = SMALL_FIELD
     rows = {
         "pieces along the track": (pieces, plain),
         f"{len(lay_fields(raster, SMALL_FIELD))} fields instead of one": (clean(raster, exact), pieces),

@@ -9,7 +9,7 @@ from dataclasses import replace
 from .clouds.points import RailPoints
 from .errors import NoRailPointsError, NoTrackError, ParameterError
 from .frame import LocalFrame
-from .frpdf.cleanup import MARGIN, clean, most_passes
+from .frpdf.cleanup import MARGIN, clean, max_passes
 from .frpdf.engine import Engine, make_engine
 from .frpdf.models import choose
 from .frpdf.weights import load_arrays
@@ -168,7 +168,7 @@ def clean_square(
 ) -> RailRaster:
     """Rasterize the points of a stretch, have the network clean the raster, and keep what lies inside."""
     cell_m = cell_size(parameters.gauge_m, parameters.head_width_m)
-    points = source.near(stretch, most_passes(parameters.passes) * MARGIN * cell_m)
+    points = source.near(stretch, max_passes(parameters.passes) * MARGIN * cell_m)
     return own_tiles(clean(rasterize(points.xyz, cell_m), engine, parameters.passes, progress), stretch)
 
 

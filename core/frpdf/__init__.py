@@ -16,7 +16,7 @@ FEEDBACK_THRESHOLD = 0.75
 OUTPUT_THRESHOLD = 0.5
 """Probability from which the last pass calls a cell rail."""
 
-DEFAULT_PASSES, MOST_PASSES = Parameters.passes, 5
+DEFAULT_PASSES, MAX_PASSES = Parameters.passes, 5
 """Repairs have settled by the latter; so often it runs where the user leaves the number of passes to it."""
 STATISTICS = 2
 """Sets of batch statistics: the first pass sees a constant state, all later passes see a decided one."""

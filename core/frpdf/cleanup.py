@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import DeviceExhaustedError
 from ..progress import SILENT, Progress
 from ..raster import TILE, RailRaster
-from . import DEFAULT_PASSES, FEEDBACK_THRESHOLD, MOST_PASSES, OUTPUT_THRESHOLD, START
+from . import DEFAULT_PASSES, FEEDBACK_THRESHOLD, MAX_PASSES, OUTPUT_THRESHOLD, START
 from .corridor import Piece, lay_fields
 from .engine import Engine
 
@@ -19,9 +19,9 @@ STABLE_SHARE = 0.001
 """Passes end once fewer than this share of the rail cells change."""
 
 
-def most_passes(passes: int) -> int:
+def max_passes(passes: int) -> int:
     """Give the number of passes after which a run ends in any case."""
-    return MOST_PASSES if passes == UNTIL_STABLE else passes
+    return MAX_PASSES if passes == UNTIL_STABLE else passes
 
 
 def is_stable(changed: int, cells: int) -> bool:
@@ -45,7 +45,7 @@ def clean(raster: RailRaster, engine: Engine, passes: int = DEFAULT_PASSES, prog
     RailRaster
         On the same grid.
     """
-    most = most_passes(passes)
+    most = max_passes(passes)
     state, output = None, raster
     for number in range(most):
         step = progress.span(number / most, (number + 1) / most)
@@ -62,7 +62,7 @@ def _run_pass(
     """Compute one pass; give what the next pass is told, and what the user would get."""
     while True:
         told, output = _Canvas(raster), _Canvas(raster)
-        fields = lay_fields(raster, engine.most_cells)
+        fields = lay_fields(raster, engine.max_cells)
         try:
             for field, step in zip(fields, progress.split(len(fields))):
                 seen = [raster.read(*piece.window).astype(np.float32) for piece in field.pieces]

@@ -17,7 +17,7 @@ BESIDE = 1
 """Blocks around rail cells and gaps that are computed as well: 0.6 m, farther than the network moves a rail."""
 OVERHEAD = 16
 """What a rectangle costs beyond its own cells, as a frame of so many cells: the copies of what surrounds it."""
-MOST_IN_PIECE = 1 << 18
+MAX_PIECE_CELLS = 1 << 18
 """Cells in a rectangle: a layer takes a tenth of a second on it, so that a cancel is heard in time."""
 CONTEXT = 256
 """Cells around a field that only give context."""
@@ -69,15 +69,15 @@ class Field:
     pieces: list[Piece]
 
 
-def lay_fields(raster: RailRaster, most_cells: int) -> list[Field]:
-    """Lay fields of at most `most_cells` cells, but for their context, over all that the network may set."""
+def lay_fields(raster: RailRaster, max_cells: int) -> list[Field]:
+    """Lay fields of at most `max_cells` cells, but for their context, over all that the network may set."""
     blocks = corridor(raster)
     fields = []
-    for inside in _fields(blocks, most_cells // BLOCK**2):
+    for inside in _fields(blocks, max_cells // BLOCK**2):
         frame = CONTEXT // BLOCK
         wide = Piece(inside.row - frame, inside.column - frame, inside.height + 2 * frame, inside.width + 2 * frame)
         near = blocks[wide.holds(blocks)]
-        pieces = [_in_cells(piece) for piece in _partition(near, MOST_IN_PIECE // BLOCK**2)]
+        pieces = [_in_cells(piece) for piece in _partition(near, MAX_PIECE_CELLS // BLOCK**2)]
         fields.append(Field(_in_cells(inside), pieces))
     return fields
 

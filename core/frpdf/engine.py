@@ -22,11 +22,11 @@ class Engine(Protocol):
 
     Attributes
     ----------
-    most_cells : int
+    max_cells : int
         Cells to be computed at once.
     """
 
-    most_cells: int
+    max_cells: int
 
     @property
     def description(self) -> str:

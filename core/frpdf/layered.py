@@ -45,11 +45,11 @@ class LayeredEngine(ABC):
 
     Attributes
     ----------
-    most_cells : int
+    max_cells : int
         Cells to be computed at once.
     """
 
-    most_cells = 1 << 22
+    max_cells = 1 << 22
 
     def sweep(
         self,

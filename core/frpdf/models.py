@@ -10,7 +10,7 @@ from ..errors import ModelError
 
 FOLDER = Path(__file__).resolve().parents[2] / "models"
 
-LEAST_RATIO, GREATEST_RATIO = 13.4, 26.7
+MIN_RATIO, MAX_RATIO = 13.4, 26.7
 """Ratios of gauge to railhead the training covers (14.2 to 25.2), and 6 % beyond, which a model bears."""
 
 
@@ -55,9 +55,9 @@ def choose(gauge_m: float, head_width_m: float) -> Model:
         No model was trained for such a ratio.
     """
     ratio = gauge_m / head_width_m
-    if not LEAST_RATIO <= ratio <= GREATEST_RATIO:
+    if not MIN_RATIO <= ratio <= MAX_RATIO:
         raise ModelError(
             f"A gauge of {1000 * gauge_m:.0f} mm is {ratio:.1f} times a railhead of {1000 * head_width_m:.1f} mm, and"
-            f" the models cover {LEAST_RATIO} to {GREATEST_RATIO} times: check GAUGE and HEAD_WIDTH."
+            f" the models cover {MIN_RATIO} to {MAX_RATIO} times: check GAUGE and HEAD_WIDTH."
         )
     return min(MODELS, key=lambda model: abs(math.log(ratio / model.ratio)))

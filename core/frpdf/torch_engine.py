@@ -15,7 +15,7 @@ from .corridor import Piece
 from .folding import Convolution, FoldedLayer, fold
 from .layered import LayeredEngine, Step
 
-FEWEST_CELLS = 1 << 18
+MIN_CELLS = 1 << 18
 """Least number of cells at once; a device without memory for them is not used any more."""
 FIRST_FAST_HALF, FIRST_BFLOAT16 = (7, 0), (8, 0)
 """CUDA compute capabilities from which every card is faster in float16 than in float32, and supports bfloat16."""
@@ -81,10 +81,10 @@ class TorchEngine(LayeredEngine):
         self._scratch = self._scratch[:0].clone()
         if self._device == "cuda":
             torch.cuda.empty_cache()
-        if self.most_cells // 4 >= FEWEST_CELLS:
-            self.most_cells //= 4
+        if self.max_cells // 4 >= MIN_CELLS:
+            self.max_cells //= 4
             return "The graphics card has too little free memory: continuing with smaller parts."
-        self.most_cells = LayeredEngine.most_cells
+        self.max_cells = LayeredEngine.max_cells
         self._move("cpu")
         return "The graphics card has too little free memory: continuing on the CPU."
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..curves import Curve, Element, trace
 from .paths import STEP_M
 
-SHARPEST_RADIUS_M, WIDEST_RADIUS_M = 25.0, 4000.0
+MIN_RADIUS_M, MAX_RADIUS_M = 25.0, 4000.0
 """Tramways' smallest, and a main line's; anything wider looks straight in a raster."""
 
 WORLD_M = 60.0
@@ -18,7 +18,7 @@ WORLD_M = 60.0
 TRACK_SPACING_M = (3.5, 6.0)
 
 
-def random_radius(rng: np.random.Generator, sharpest_m: float, widest_m: float = WIDEST_RADIUS_M) -> float:
+def random_radius(rng: np.random.Generator, sharpest_m: float, widest_m: float = MAX_RADIUS_M) -> float:
     """Draw a radius; its logarithm is spread evenly."""
     return math.exp(rng.uniform(math.log(sharpest_m), math.log(widest_m)))
 
@@ -51,7 +51,7 @@ def bend(rng: np.random.Generator, radius_m: float, turns: tuple[int, ...]) -> C
     return centred(elements, rng.uniform(-math.pi, math.pi))
 
 
-def random_alignment(rng: np.random.Generator, sharpest_m: float = SHARPEST_RADIUS_M) -> Curve:
+def random_alignment(rng: np.random.Generator, sharpest_m: float = MIN_RADIUS_M) -> Curve:
     """Draw straights, arcs and clothoids in any order, around the origin."""
     elements: list[Element] = []
     curvature = 0.0

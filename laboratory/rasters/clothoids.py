@@ -19,10 +19,10 @@ from ..curves import Element
 SHARES = (0.15, 0.25, 0.35, 0.45)
 """Shares of the length that the first piece takes, and the last one: from nearly an arc to nearly two clothoids."""
 
-WIDEST_DEG, GRID_DEG = 70.0, 2.0
+MAX_DEFLECTION_DEG, GRID_DEG = 70.0, 2.0
 """Range and step of the deflections in the table; beyond that range curves turn back on themselves."""
 
-LONGEST = 2.0
+MAX_LENGTH_CHORDS = 2.0
 """Chords after which a combination counts as a detour."""
 
 TABLE_STEPS, POLISH_STEPS = 8, 2
@@ -74,21 +74,21 @@ class Table:
 
     def look_up(self, values: np.ndarray, share: int, first: np.ndarray, last: np.ndarray) -> np.ndarray:
         """Interpolate one of the arrays at deflections in radians; outside the table the border's value counts."""
-        places = [(np.degrees(np.ravel(angle)) + WIDEST_DEG) / GRID_DEG for angle in (first, last)]
+        places = [(np.degrees(np.ravel(angle)) + MAX_DEFLECTION_DEG) / GRID_DEG for angle in (first, last)]
         return ndimage.map_coordinates(values[share], places, order=1, mode="nearest").reshape(np.shape(first))
 
 
 @functools.lru_cache(maxsize=1)
 def table() -> Table:
     """Solve the combinations for the whole grid, once a process."""
-    angles = np.radians(np.arange(-WIDEST_DEG, WIDEST_DEG + GRID_DEG / 2, GRID_DEG))
+    angles = np.radians(np.arange(-MAX_DEFLECTION_DEG, MAX_DEFLECTION_DEG + GRID_DEG / 2, GRID_DEG))
     first, last = np.meshgrid(angles, angles, indexing="ij")
     columns = []
     for share in SHARES:
         skew = _solve(share, first, last, _first_guess(share, first, last), TABLE_STEPS)
         length, before, after = _shape(share, first, last, skew)
         values = skew, np.maximum(abs(before), abs(after)), _energy(share, length, before, after)
-        solved = (length > 0) & (length < LONGEST)
+        solved = (length > 0) & (length < MAX_LENGTH_CHORDS)
         columns.append([np.where(solved, value, UNSOLVED) for value in values])
     return Table(*(np.stack(values) for values in zip(*columns)))
 
@@ -103,12 +103,12 @@ def join(start: Pose, end: Pose, share: int = 1) -> list[Element] | None:
     """
     chord = math.hypot(end.x - start.x, end.y - start.y)
     first, last = _deflections(start, end)
-    if max(abs(first), abs(last)) > math.radians(WIDEST_DEG):
+    if max(abs(first), abs(last)) > math.radians(MAX_DEFLECTION_DEG):
         return None
     known = table()
     skew = _solve(SHARES[share], first, last, known.look_up(known.skew, share, first, last), POLISH_STEPS)
     length, before, after = (float(value) for value in _shape(SHARES[share], first, last, skew))
-    if not 0 < length < LONGEST or abs(_miss(SHARES[share], first, last, skew)) > CLOSED:
+    if not 0 < length < MAX_LENGTH_CHORDS or abs(_miss(SHARES[share], first, last, skew)) > CLOSED:
         return None
     outer, inner = SHARES[share] * length * chord, (1 - 2 * SHARES[share]) * length * chord
     before, after = before / chord, after / chord
@@ -141,7 +141,7 @@ def random_joins(
     shares = range(len(SHARES))
     sharpest = np.stack([known.look_up(known.sharpest, share, first, last) for share in shares]) / chord
     energy = np.stack([known.look_up(known.energy, share, first, last) for share in shares])
-    facing = np.maximum(abs(first), abs(last)) < math.radians(WIDEST_DEG)
+    facing = np.maximum(abs(first), abs(last)) < math.radians(MAX_DEFLECTION_DEG)
     weight = np.where(facing & (sharpest * sharpest_m < 1), 1 / (SOFT_ENERGY + energy), 0.0).ravel()
     if not weight.any():
         return []

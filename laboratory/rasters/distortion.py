@@ -17,13 +17,13 @@ from .noise import flip, gravity, lone_lines, scatter_blobs, shadows
 from .paths import STEP_M, Layout, RailPath
 
 LABEL_WAVELENGTH_M = 5.0
-LONGEST_WAVELENGTH_M = 20.0
-SHORTEST_WAVELENGTH_M = 1.0
+MAX_WAVELENGTH_M = 20.0
+MIN_WAVELENGTH_M = 1.0
 REGISTRATION_M = 0.010
 """Largest constant error of a whole rail."""
 
-LONGEST_GAP_M = 8.0
-LEAST_GAP_M = 0.2
+MAX_GAP_M = 8.0
+MIN_GAP_M = 0.2
 """Shorter stretches without points are told from sparse scanning by nobody, and do not count as gaps."""
 GAPPED_SHARE = 0.3
 """Largest share of a rail that is missing at full severity."""
@@ -165,9 +165,9 @@ class _Shift:
 def _shift(rng: np.random.Generator, count: int, severity: float) -> _Shift:
     """Lateral shift of a rail: a part long enough to be the track's own, and a part that is noise; (n,) metres."""
     amplitude = abs(rng.normal(0.0, 0.005 + 0.025 * severity))
-    long = amplitude * _waves(rng, count, LABEL_WAVELENGTH_M, LONGEST_WAVELENGTH_M)
+    long = amplitude * _waves(rng, count, LABEL_WAVELENGTH_M, MAX_WAVELENGTH_M)
     long += rng.uniform(-1, 1) * REGISTRATION_M * severity
-    short = 0.5 * amplitude * _waves(rng, count, SHORTEST_WAVELENGTH_M, LABEL_WAVELENGTH_M)
+    short = 0.5 * amplitude * _waves(rng, count, MIN_WAVELENGTH_M, LABEL_WAVELENGTH_M)
     return _Shift(long, short)
 
 
@@ -185,7 +185,7 @@ def _random_gaps(rng: np.random.Generator, length_m: float, severity: float) -> 
     missing = GAPPED_SHARE * severity * rng.random() * length_m
     gaps = []
     while missing > 0:
-        gap = min(rng.lognormal(math.log(0.8), 0.9), LONGEST_GAP_M)
+        gap = min(rng.lognormal(math.log(0.8), 0.9), MAX_GAP_M)
         start = rng.uniform(-gap, length_m)
         gaps.append((start, start + gap))
         missing -= gap
@@ -204,11 +204,11 @@ def _seen(rail: RailPath, window: Window, hidden: np.ndarray, gaps: list[tuple[f
 
 
 def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
-    """Find runs of true flags as (first, last + 1): those of `LEAST_GAP_M` or more that have both ends in sight."""
+    """Find runs of true flags as (first, last + 1): those of `MIN_GAP_M` or more that have both ends in sight."""
     borders = np.flatnonzero(np.diff(flags)) + 1
     starts, ends = borders[flags[borders - 1] == 0], borders[flags[borders - 1] == 1]
     ends = ends[ends > starts[0]] if len(starts) else ends[:0]
-    return [(a, b) for a, b in zip(starts.tolist(), ends.tolist()) if STEP_M * (b - a) >= LEAST_GAP_M]
+    return [(a, b) for a, b in zip(starts.tolist(), ends.tolist()) if STEP_M * (b - a) >= MIN_GAP_M]
 
 
 def _scan(

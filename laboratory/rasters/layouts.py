@@ -15,7 +15,7 @@ import numpy as np
 
 from ..curves import Curve, trace
 from .alignments import (
-    SHARPEST_RADIUS_M,
+    MIN_RADIUS_M,
     TRACK_SPACING_M,
     WORLD_M,
     bend,
@@ -64,7 +64,7 @@ def plain(rng: np.random.Generator, size: TrackSize) -> Layout:
 
 def curve(rng: np.random.Generator, size: TrackSize) -> Layout:
     """One track in a curve of 25 m radius or more, or in a reverse curve; sharp ones may have a check rail."""
-    turn, radius_m = int(rng.choice([-1, 1])), random_radius(rng, SHARPEST_RADIUS_M, 1500.0)
+    turn, radius_m = int(rng.choice([-1, 1])), random_radius(rng, MIN_RADIUS_M, 1500.0)
     axis = bend(rng, radius_m, (turn,) if rng.random() < 0.6 else (turn, -turn))
     checked = radius_m < CHECKED_RADIUS_M and rng.random() < 0.3
     lines = (check_rail(rng, axis, turn, size),) if checked else ()
@@ -86,7 +86,7 @@ def split(rng: np.random.Generator, size: TrackSize) -> Layout:
         toe_m = rng.uniform(0.3, 0.6) * main.length_m
         form, hand = FORMS[rng.integers(len(FORMS))], int(rng.choice([-1, 1]))
         inherited = main.curvature[int(toe_m / main.step_m)]
-        if abs(inherited + hand / form.radius_m) > 1 / SHARPEST_RADIUS_M:
+        if abs(inherited + hand / form.radius_m) > 1 / MIN_RADIUS_M:
             hand = -hand
         parts.append(turnout(rng, main, toe_m, form, hand, size))
     return combine([*(track(axis, size) for axis in axes), *parts])
@@ -149,7 +149,7 @@ def yard(rng: np.random.Generator, size: TrackSize) -> Layout:
 
 def dual_gauge(rng: np.random.Generator, size: TrackSize) -> Layout:
     """One track with a third rail for a second gauge; either gauge may be the one asked for."""
-    axis = random_alignment(rng, 2 * SHARPEST_RADIUS_M)
+    axis = random_alignment(rng, 2 * MIN_RADIUS_M)
     narrow, wide = GAUGE_PAIRS[rng.integers(len(GAUGE_PAIRS))]
     asked = narrow if rng.random() < 0.5 else wide
     third_m = (wide - narrow) / asked * (size.spacing_m - size.head_width_m)
@@ -172,7 +172,7 @@ def connections(rng: np.random.Generator, size: TrackSize) -> Layout:
     tracks: list[Layout] = []
     while not tracks:
         poses = [Pose(*rng.uniform(-AREA_M, AREA_M, size=2), rng.uniform(-math.pi, math.pi)) for _ in range(POSES)]
-        joins = random_joins(rng, poses, int(rng.integers(2, 7)), SHARPEST_RADIUS_M)
+        joins = random_joins(rng, poses, int(rng.integers(2, 7)), MIN_RADIUS_M)
         axes = [trace(elements, (start.x, start.y), start.heading, STEP_M) for start, elements in joins]
         tracks = [track(axis, size, spot=True) for axis in axes]
     return combine(tracks)
@@ -212,7 +212,7 @@ def _parallels(
     rng: np.random.Generator,
     count: int,
     spacing_m: tuple[float, float] = TRACK_SPACING_M,
-    sharpest_m: float = SHARPEST_RADIUS_M,
+    sharpest_m: float = MIN_RADIUS_M,
 ) -> tuple[Curve, list[Curve], tuple[float, ...]]:
     """Draw an alignment, axes parallel to it about the origin, and their offsets to its left."""
     offsets = np.concatenate([[0.0], np.cumsum(rng.uniform(*spacing_m, size=count - 1))])

@@ -13,7 +13,7 @@ UP = np.array([0.0, 0.0, 1.0])
 TRUTH_SAGITTA_M = 2e-5
 """How far a chord between two vertices of a truth line may run from the curve: nothing beside a millimetre."""
 
-LONGEST_CHORD_M = 0.5
+MAX_CHORD_M = 0.5
 """Vertex distance of truth lines on straight track."""
 
 
@@ -87,7 +87,7 @@ class Track:
     def thinned(self, line: np.ndarray) -> np.ndarray:
         """Keep as many of a line's (n, 3) vertices, one at each of the curve's samples, as the curvature asks for."""
         sharpest = max(float(np.abs(self.curve.curvature).max()), 1e-9)
-        chord_m = min(np.sqrt(8 * TRUTH_SAGITTA_M / sharpest), LONGEST_CHORD_M)
+        chord_m = min(np.sqrt(8 * TRUTH_SAGITTA_M / sharpest), MAX_CHORD_M)
         stride = max(int(chord_m / self.curve.step_m), 1)
         last = len(self.curve.xy) - 1
         return line[np.unique(np.append(np.arange(0, last, stride), last))]

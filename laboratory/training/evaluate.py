@@ -18,7 +18,7 @@ import numpy as np
 from scipy import ndimage
 
 from ...core.frpdf import DEFAULT_PASSES, FEEDBACK_THRESHOLD, OUTPUT_THRESHOLD, START
-from ...core.frpdf.cleanup import UNTIL_STABLE, is_stable, most_passes
+from ...core.frpdf.cleanup import UNTIL_STABLE, is_stable, max_passes
 from ...core.frpdf.models import MODELS
 from ..rasters.distortion import Pair
 from ..rasters.pairs import BASE_RATIO, random_pair
@@ -31,7 +31,7 @@ SIDE = 512
 COUNT = 48
 SEVERITIES = (0.2, 0.8)
 FAMILIES = ("plain", "curve", "parallel", "turnout", "connections")
-SMALLEST_PIECE = 30
+MIN_PIECE_CELLS = 30
 """Cells of a piece that the classical row keeps: about half a metre of rail."""
 
 Cleaner = Callable[[np.ndarray], np.ndarray]
@@ -106,7 +106,7 @@ def classical(observed: np.ndarray) -> np.ndarray:
     """Close and drop small pieces: what one does without a network."""
     closed = ndimage.binary_closing(np.pad(observed, 2), np.ones((3, 3)))[2:-2, 2:-2]
     pieces, count = ndimage.label(closed, np.ones((3, 3)))
-    large = np.bincount(pieces.ravel(), minlength=count + 1) >= SMALLEST_PIECE
+    large = np.bincount(pieces.ravel(), minlength=count + 1) >= MIN_PIECE_CELLS
     large[0] = False
     return large[pieces]
 
@@ -117,7 +117,7 @@ def cleaner_of(network: Passes, passes: int) -> Cleaner:
     def clean(observed: np.ndarray) -> np.ndarray:
         seen, found = observed.astype(np.float32), observed
         state = np.full_like(seen, START)
-        for number in range(most_passes(passes)):
+        for number in range(max_passes(passes)):
             before, probability = found, network.probabilities(seen, state, number)
             state, found = (probability >= FEEDBACK_THRESHOLD).astype(np.float32), probability >= OUTPUT_THRESHOLD
             if passes == UNTIL_STABLE and number > 0 and is_stable((before != found).sum(), found.sum()):

@@ -16,7 +16,7 @@ from torch.nn import functional
 
 from ...core.frpdf.network import PassBatchNorm2d
 
-LARGEST_PHASED_DILATION = 40
+MAX_PHASED_DILATION = 40
 """Beyond it the phases of a training crop are smaller than the kernel, and one product per kernel tap is faster."""
 
 COLUMNS_AT_ONCE = 4
@@ -40,7 +40,7 @@ class _DilatedConvolution(torch.autograd.Function):
         if ctx.needs_input_grad[0]:
             of_x = _convolve(gradient, weight.transpose(0, 1).flip(2, 3), ctx.dilation)
         if ctx.needs_input_grad[1]:
-            by = _weight_gradient_by_phases if ctx.dilation <= LARGEST_PHASED_DILATION else _weight_gradient_by_taps
+            by = _weight_gradient_by_phases if ctx.dilation <= MAX_PHASED_DILATION else _weight_gradient_by_taps
             of_weight = by(x, gradient, ctx.dilation, weight)
         return of_x, of_weight, None
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-MOST_BINS = 100
+MAX_BINS = 100
 """Points of a curve: single steps jump with the difficulty of their crops, means of some show the course."""
 
 
@@ -46,6 +46,6 @@ def read_log(path: Path) -> dict[str, np.ndarray]:
 
 
 def binned(steps: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Average runs of neighbouring steps, at most `MOST_BINS` of them."""
-    groups = np.array_split(np.arange(len(steps)), min(MOST_BINS, len(steps)))
+    """Average runs of neighbouring steps, at most `MAX_BINS` of them."""
+    groups = np.array_split(np.arange(len(steps)), min(MAX_BINS, len(steps)))
     return tuple(np.array([column[group].mean() for group in groups]) for column in (steps, values))

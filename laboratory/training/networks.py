@@ -137,7 +137,7 @@ def parameter_count(network: nn.Module) -> int:
     return sum(parameter.numel() for parameter in network.parameters())
 
 
-def head_of(network: Recurrent) -> nn.Conv2d:
+def output_layer(network: Recurrent) -> nn.Conv2d:
     """Give the last convolution, whose bias is the logit of a cell of which nothing is known."""
     return [module for module in network.modules() if isinstance(module, nn.Conv2d)][-1]
 

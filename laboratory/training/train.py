@@ -28,7 +28,7 @@ from ..rasters.distortion import Pair
 from ..rasters.pairs import random_pair, ratio_near
 from .gradients import train_on_cpu
 from .learning_curves import draw_curves
-from .networks import NETWORKS, head_of
+from .networks import NETWORKS, output_layer
 from .optimizers import Optimizers
 from .scores import Scores, score
 
@@ -45,16 +45,16 @@ HARD_WEIGHT, HARD_REACH = 5.0, 2
 lines hang on. The output finds too little for it, which `calibrate` makes good."""
 EARLY_PASS_WEIGHT = 0.5
 """Weight of the loss of a pass that is not the last one, which makes the result."""
-HEAD_BIAS = -4.0
+OUTPUT_BIAS = -4.0
 """Start near the share of rail cells in a raster, or the first hundred steps only learn that there are few."""
-LARGEST_GRADIENT = 1.0
+MAX_GRADIENT = 1.0
 WARM_UP_STEPS = 40
 STATISTICS_STEPS = 60
 """Steps over which the batch statistics of the final weights are averaged."""
 CHECKPOINT_STEPS = 50
 CALIBRATION_STEPS, CALIBRATION_ROUNDS = 30, 2
 """Steps of which the output's bias is told, and rounds of it: what one pass feeds back moves along."""
-LOGIT_BIN, GREATEST_LOGIT = 0.05, 8.0
+LOGIT_BIN, MAX_LOGIT = 0.05, 8.0
 """Steps and range in which the bias is sought: one moves F1 by less than 0.0005, and the range is all but certainty."""
 DATA, STATISTICS_DATA, CALIBRATION_DATA = 0, 1, 2
 """Streams of random numbers; evaluation has streams of its own."""
@@ -136,7 +136,7 @@ def train(settings: Settings, folder: Path, minutes: float) -> Recurrent | None:
 def new_network(settings: Settings) -> Recurrent:
     """Build the network, untrained or with the weights of a file, prepared for its device."""
     network = NETWORKS[settings.network]()
-    torch.nn.init.constant_(head_of(network).bias, HEAD_BIAS)
+    torch.nn.init.constant_(output_layer(network).bias, OUTPUT_BIAS)
     if settings.start is not None:
         set_weights(network, load_arrays(settings.start))
     if settings.device == "cpu":
@@ -207,7 +207,7 @@ def _learn(
         losses.append(float(loss.detach()))
         found = torch.sigmoid(logits.detach()) >= OUTPUT_THRESHOLD
         scores.append(score(found.cpu().numpy(), label.cpu().numpy() > 0.5))
-    torch.nn.utils.clip_grad_norm_(network.parameters(), LARGEST_GRADIENT)
+    torch.nn.utils.clip_grad_norm_(network.parameters(), MAX_GRADIENT)
     optimizer.step(rate)
     return losses, scores
 
@@ -229,18 +229,18 @@ def recompute_statistics(network: Recurrent, settings: Settings) -> None:
 def calibrate(network: Recurrent, settings: Settings) -> None:
     """Move the output's bias, in place, so that F1 by cell is largest at `OUTPUT_THRESHOLD`; see `HARD_WEIGHT`."""
     network.eval()
-    edges = torch.arange(-GREATEST_LOGIT, GREATEST_LOGIT, LOGIT_BIN)
+    edges = torch.arange(-MAX_LOGIT, MAX_LOGIT, LOGIT_BIN)
     for _ in range(CALIBRATION_ROUNDS):
         rails, others = np.zeros((2, len(edges) - 1))
         for step in range(CALIBRATION_STEPS):
             observed, label, _ = batch(settings, CALIBRATION_DATA, step)
             *_, logits = run_passes(network, observed, settings.passes)
-            logits = logits.clamp(-GREATEST_LOGIT + LOGIT_BIN, GREATEST_LOGIT - 2 * LOGIT_BIN).cpu()
+            logits = logits.clamp(-MAX_LOGIT + LOGIT_BIN, MAX_LOGIT - 2 * LOGIT_BIN).cpu()
             rails += torch.histogram(logits[label.cpu() > 0.5], edges)[0].numpy()
             others += torch.histogram(logits[label.cpu() <= 0.5], edges)[0].numpy()
         found, invented = (np.cumsum(counts[::-1])[::-1] for counts in (rails, others))
         best = float(edges[int(np.argmax(2 * found / (found + invented + rails.sum())))])
-        head_of(network).bias -= best - math.log(OUTPUT_THRESHOLD / (1 - OUTPUT_THRESHOLD))
+        output_layer(network).bias -= best - math.log(OUTPUT_THRESHOLD / (1 - OUTPUT_THRESHOLD))
 
 
 def _plain(settings: Settings) -> dict[str, str]:

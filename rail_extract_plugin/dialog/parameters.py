@@ -9,7 +9,7 @@ from qgis.core import (
     QgsProcessingParameterString,
 )
 
-from ...core.frpdf import AUTO, DEVICES, ENGINES, MOST_PASSES
+from ...core.frpdf import AUTO, DEVICES, ENGINES, MAX_PASSES
 from ...core.frpdf.models import MODELS
 from ...core.parameters import DEFAULT_STEP_M, Parameters
 from ...core.standards import CUSTOM, DEFAULT, STANDARDS, UNCONFIRMED_PROFILES
@@ -121,7 +121,7 @@ def cleanup() -> Definitions:
     """Define the passes, engine and device of the network."""
     return (
         advanced(
-            number("ITERATIONS", tr("Passes of the network"), Parameters.passes, maximum=MOST_PASSES, whole=True),
+            number("ITERATIONS", tr("Passes of the network"), Parameters.passes, maximum=MAX_PASSES, whole=True),
             tr(
                 "Each pass starts from the result of the pass before. 0 repeats until fewer than one rail cell in a "
                 "thousand changes, with at most five passes."

@@ -11,7 +11,7 @@ from rail_extract.core.raster import RailRaster
 class Copy:
     """An engine that returns its input and records the states it is given."""
 
-    description, most_cells = "copy", 1 << 22
+    description, max_cells = "copy", 1 << 22
 
     def __init__(self):
         self.states = []

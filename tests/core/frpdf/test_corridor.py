@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rail_extract.core.frpdf.corridor import BLOCK, CONTEXT, GAP, MOST_IN_PIECE, corridor, lay_fields
+from rail_extract.core.frpdf.corridor import BLOCK, CONTEXT, GAP, MAX_PIECE_CELLS, corridor, lay_fields
 from rail_extract.core.raster import RailRaster, rasterize
 
 CELL_M = 0.04
@@ -33,7 +33,7 @@ def test_pieces_hold_the_corridor_and_do_not_overlap(cells):
     holders = sum(piece.holds(blocks * BLOCK).astype(int) for piece in field.pieces)
     assert (holders == 1).all()
     assert field.inside.holds(blocks * BLOCK).all()
-    assert all(piece.height * piece.width <= MOST_IN_PIECE for piece in field.pieces)
+    assert all(piece.height * piece.width <= MAX_PIECE_CELLS for piece in field.pieces)
     near = np.array(cells)[:, None] + np.array([[-BLOCK, -BLOCK], [0, 0], [BLOCK, BLOCK]])
     assert sum(piece.holds(near.reshape(-1, 2)).astype(int) for piece in field.pieces).min() == 1
 

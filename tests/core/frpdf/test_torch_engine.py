@@ -10,7 +10,7 @@ from rail_extract.core.raster import RailRaster
 
 torch = pytest.importorskip("torch")
 
-from rail_extract.core.frpdf.torch_engine import FEWEST_CELLS, TorchEngine  # noqa: E402
+from rail_extract.core.frpdf.torch_engine import MIN_CELLS, TorchEngine  # noqa: E402
 
 
 def line(length):
@@ -51,8 +51,8 @@ def test_fields_with_context_give_the_result_of_one_field(arrays):
     engine = TorchEngine(arrays, "CPU", exact=True)
     raster = line(1000)
     whole = cleanup.clean(raster, engine, passes=1)
-    engine.most_cells = 20_000
-    assert len(lay_fields(raster, engine.most_cells)) > 2
+    engine.max_cells = 20_000
+    assert len(lay_fields(raster, engine.max_cells)) > 2
     parts = cleanup.clean(raster, engine, passes=1)
     assert whole.count() > 1000
     np.testing.assert_array_equal(parts.cells(), whole.cells())
@@ -60,7 +60,7 @@ def test_fields_with_context_give_the_result_of_one_field(arrays):
 
 @pytest.mark.parametrize("room, ends_on_cpu", [(50_000, False), (0, True)])
 def test_an_exhausted_device_is_asked_for_less_and_then_left(arrays, monkeypatch, room, ends_on_cpu):
-    monkeypatch.setattr("rail_extract.core.frpdf.torch_engine.FEWEST_CELLS", 1 << 10)
+    monkeypatch.setattr("rail_extract.core.frpdf.torch_engine.MIN_CELLS", 1 << 10)
     monkeypatch.setattr("rail_extract.core.frpdf.corridor.CONTEXT", 80)
     raster = line(1500)
     expected = cleanup.clean(raster, TorchEngine(arrays, "CPU", exact=True), passes=1)
@@ -72,7 +72,7 @@ def test_an_exhausted_device_is_asked_for_less_and_then_left(arrays, monkeypatch
     assert listener.warnings
     assert ("on the CPU" in listener.warnings[-1]) == ends_on_cpu
     assert all("smaller parts" in text for text in listener.warnings[:-1])
-    assert engine.most_cells == LayeredEngine.most_cells or engine.most_cells >= 1 << 10
+    assert engine.max_cells == LayeredEngine.max_cells or engine.max_cells >= 1 << 10
     np.testing.assert_array_equal(found.cells(), expected.cells())
 
 
@@ -81,4 +81,4 @@ def test_a_device_is_left_before_its_parts_get_too_small(arrays):
     messages = []
     while "on the CPU" not in (messages or [""])[-1]:
         messages.append(engine.retreat())
-    assert len(messages) == 1 + np.log2(LayeredEngine.most_cells / FEWEST_CELLS) // 2
+    assert len(messages) == 1 + np.log2(LayeredEngine.max_cells / MIN_CELLS) // 2

@@ -177,7 +177,7 @@ def test_short_and_lonely_lines_give_what_can_be_known():
 class RawRaster:
     """An engine that leaves the raster as it is."""
 
-    description, most_cells = "none", 1 << 22
+    description, max_cells = "none", 1 << 22
 
     def sweep(self, seen, *_):
         return seen

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from rail_extract.laboratory.curves import Element, trace, transition_curve
-from rail_extract.laboratory.rasters.alignments import SHARPEST_RADIUS_M, bend, bent, random_alignment, shifted
+from rail_extract.laboratory.rasters.alignments import MIN_RADIUS_M, bend, bent, random_alignment, shifted
 from rail_extract.laboratory.rasters.fittings import FLANGEWAY_M, crossing
 from rail_extract.laboratory.rasters.layouts import FAMILIES, WEIGHTS, ladder, random_layout
 from rail_extract.laboratory.rasters.paths import NO_TRACK, TrackSize, track
@@ -184,9 +184,9 @@ def test_rails_open_where_they_cross():
 @pytest.mark.parametrize("seed", range(10))
 def test_alignments_keep_to_the_sharpest_radius(seed):
     rng = np.random.default_rng(seed)
-    for alignment in (random_alignment(rng), bend(rng, SHARPEST_RADIUS_M, (1, -1))):
-        assert np.abs(alignment.curvature).max() <= 1 / SHARPEST_RADIUS_M + 1e-12
-        assert np.abs(np.diff(alignment.heading)).max() <= alignment.step_m / SHARPEST_RADIUS_M + 1e-9
+    for alignment in (random_alignment(rng), bend(rng, MIN_RADIUS_M, (1, -1))):
+        assert np.abs(alignment.curvature).max() <= 1 / MIN_RADIUS_M + 1e-12
+        assert np.abs(np.diff(alignment.heading)).max() <= alignment.step_m / MIN_RADIUS_M + 1e-9
 
 
 def test_a_reverse_curve_turns_both_ways():

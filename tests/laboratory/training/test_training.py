@@ -31,7 +31,7 @@ def small(monkeypatch):
     monkeypatch.setattr(train, "CHECKPOINT_STEPS", 1)
 
 
-@pytest.mark.parametrize("dilation", [3, 7, gradients.LARGEST_PHASED_DILATION, gradients.LARGEST_PHASED_DILATION + 1])
+@pytest.mark.parametrize("dilation", [3, 7, gradients.MAX_PHASED_DILATION, gradients.MAX_PHASED_DILATION + 1])
 def test_gradients_of_dilated_convolutions_are_those_of_torch(dilation):
     torch.manual_seed(0)
     x = torch.randn(2, 5, 50, 61, requires_grad=True)
@@ -191,7 +191,7 @@ def test_curves_average_neighbouring_steps_and_count_repeated_ones_once(tmp_path
     columns = learning_curves.read_log(log)
     assert len(columns["step"]) == 250
     steps, means = learning_curves.binned(columns["step"], columns["loss_1"])
-    assert len(steps) == learning_curves.MOST_BINS
+    assert len(steps) == learning_curves.MAX_BINS
     assert np.allclose(steps, means)
     learning_curves.draw_curves(log, tmp_path / "learning_curves.png")
     assert (tmp_path / "learning_curves.png").stat().st_size > 10_000

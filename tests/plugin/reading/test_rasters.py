@@ -119,7 +119,7 @@ def test_sparse_file_is_cleaned_and_vectorized_by_its_cells_alone(tmp_path):
     (found,) = read_rasters(path, header)
 
     class Copy:
-        description, most_cells, cells = "copy", 1 << 22, 0
+        description, max_cells, cells = "copy", 1 << 22, 0
 
         def sweep(self, seen, *_):
             self.cells += sum(piece.size for piece in seen)
