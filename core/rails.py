@@ -54,6 +54,12 @@ class Support:
         return Support(length_m - self.t[::-1], self.points[::-1], self.sigma_m[::-1])
 
 
+def _length(xyz: np.ndarray) -> float:
+    """Return the length of a line, (n, 3); in plan if it has no heights."""
+    has_heights = not np.isnan(xyz[:, 2]).any()
+    return float(length_along(xyz if has_heights else xyz[:, :2])[-1])
+
+
 @dataclass(frozen=True)
 class RailLine:
     """A rail: the top of its railhead, on the axis of the railhead.
@@ -91,8 +97,7 @@ class RailLine:
     @property
     def length_m(self) -> float:
         """Length in 3D; in plan if the line has no heights."""
-        flat = np.isnan(self.xyz[:, 2]).any()
-        return float(length_along(self.xyz[:, :2] if flat else self.xyz)[-1])
+        return _length(self.xyz)
 
     def bridged_before(self, t: np.ndarray) -> np.ndarray:
         """Return the length of gaps before chainages `t`, (n,) metres; everything beyond the line's ends is a gap."""
@@ -160,8 +165,7 @@ class Centerline:
     @property
     def length_m(self) -> float:
         """Length in 3D; in plan if the line has no heights."""
-        flat = np.isnan(self.xyz[:, 2]).any()
-        return float(length_along(self.xyz[:, :2] if flat else self.xyz)[-1])
+        return _length(self.xyz)
 
 
 def cell_borders(chainage: np.ndarray) -> np.ndarray:

@@ -1,3 +1,5 @@
+"""Replacement of files: companions of the old file, and files that can't be replaced."""
+
 import pytest
 from rail_extract.core.disk import take_names
 from rail_extract.core.errors import DiskError
@@ -27,7 +29,7 @@ def move(folder, path):
         ("a.geojson", (), ("a.qix",)),
     ],
 )
-def test_what_belonged_to_the_old_file_goes_with_it(tmp_path, name, companions, others):
+def test_companions_of_the_old_file_are_removed(tmp_path, name, companions, others):
     for file in (name, *companions, *others):
         (tmp_path / file).write_text("old")
     fill(tmp_path / "new", **{name.replace(".", "_"): "new"})
@@ -35,7 +37,7 @@ def test_what_belonged_to_the_old_file_goes_with_it(tmp_path, name, companions, 
     assert contents(tmp_path) == {name: "new", **dict.fromkeys(others, "old")}
 
 
-def test_companions_of_the_new_file_stay(tmp_path):
+def test_companions_of_the_new_file_are_kept(tmp_path):
     fill(tmp_path, a_shp="old", a_cpg="old", a_prj="old", a_dbf="old")
     fill(tmp_path / "new", a_shp="new", a_cpg="new", a_dbf="new")
     move(tmp_path, tmp_path / "a.shp")
@@ -43,7 +45,7 @@ def test_companions_of_the_new_file_stay(tmp_path):
 
 
 @pytest.mark.parametrize("log", ["a_gpkg__wal", "a_gpkg__journal"])
-def test_a_log_that_is_not_empty_keeps_the_old_file(tmp_path, log):
+def test_a_file_with_a_nonempty_log_is_kept(tmp_path, log):
     fill(tmp_path, a_gpkg="old", **{log: "not yet in it"})
     fill(tmp_path / "new", a_gpkg="new")
     with pytest.raises(DiskError, match=r"is open in another program .* The new file is .*a_new\.gpkg"):
@@ -52,7 +54,7 @@ def test_a_log_that_is_not_empty_keeps_the_old_file(tmp_path, log):
     assert contents(tmp_path)["a_new.gpkg"] == "new"
 
 
-def test_what_can_not_be_replaced_is_left_and_the_new_files_lie_beside(tmp_path):
+def test_a_locked_file_is_kept_and_the_new_files_are_left_next_to_it(tmp_path):
     fill(tmp_path, a_qix="old")
     (tmp_path / "a.shp").mkdir()  # stands for a file that Windows locks
     fill(tmp_path / "new", a_shp="new", a_dbf="new")

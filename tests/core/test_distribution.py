@@ -1,4 +1,4 @@
-"""What `pip install .` puts into a Python without this checkout; the tests themselves use it where it lies."""
+"""Packages that `pip install .` installs; the other tests import the checkout itself."""
 
 import ast
 import re

@@ -1,3 +1,5 @@
+"""Polylines in plan: stations, projection of points, normals and direction."""
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -24,7 +26,7 @@ def test_resampled_stations_are_even_and_keep_the_ends(seed, length, step):
 
 
 @given(ANGLES)
-def test_feet_of_points_beside_a_line_are_where_they_were_put(angle):
+def test_feet_have_the_chainage_and_the_offset_of_their_points(angle):
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     t, across = np.array([0.3, 2.5, 7.1, 9.9]), np.array([0.05, -0.08, 0.0, 0.02])
     line = np.array([[0.0, 0.0], [10.0, 0.0]]) @ turn.T
@@ -41,7 +43,7 @@ def test_points_out_of_reach_or_past_an_end_are_left_out():
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_feet_on_a_tight_curve_cover_both_of_its_sides(side):
+def test_no_point_on_either_side_of_a_tight_curve_is_lost(side):
     line = arc(25.0, 30.0)
     angle = np.random.default_rng(0).uniform(0.01, 1.19, 3000)
     radius = 25.0 - side * 0.08
@@ -52,7 +54,7 @@ def test_feet_on_a_tight_curve_cover_both_of_its_sides(side):
     np.testing.assert_allclose(feet.t, 25.0 * angle[feet.point], atol=1e-3)
 
 
-def test_points_go_to_the_nearest_of_several_lines_sorted_along_it():
+def test_points_are_assigned_to_the_nearest_line_and_sorted_along_it():
     lines = [np.array([[0.0, y], [20.0, y]]) for y in (0.0, 0.15, 3.0)]
     random = np.random.default_rng(4)
     xy = np.column_stack([random.uniform(0.1, 19.9, 500), random.uniform(-0.1, 3.1, 500)])
@@ -60,7 +62,7 @@ def test_points_go_to_the_nearest_of_several_lines_sorted_along_it():
     distance = np.abs(xy[:, 1][:, None] - np.array([0.0, 0.15, 3.0]))
     expected = np.flatnonzero(distance.min(axis=1) <= 0.1)
     assert sorted(feet.point) == expected.tolist()
-    # Where two lines lie about as near, the stations may decide for either.
+    # Where two lines are about equally near, either may be chosen.
     clear = np.abs(distance[feet.point, 0] - distance[feet.point, 1]) > 0.02
     np.testing.assert_array_equal(feet.line[clear], distance.argmin(axis=1)[feet.point][clear])
     for number in range(3):
@@ -90,14 +92,14 @@ def test_normals_point_to_the_left():
         ((0.2, -10), False),
     ],
 )
-def test_lines_start_in_the_west_or_in_the_south_when_they_run_north(step, turned):
+def test_lines_start_in_the_west_or_in_the_south_if_they_run_north(step, turned):
     assert starts_at_its_end(np.array([[5.0, 5.0], np.add([5.0, 5.0], step)])) is turned
 
 
-@pytest.mark.parametrize(("told", "number"), [("1", 1), ("12", 12), ("", -1), ("0", -1), ("4,2", -1), (None, -1)])
-def test_a_process_told_how_many_threads_it_may_use_uses_no_more(monkeypatch, told, number):
-    if told is None:
+@pytest.mark.parametrize(("variable", "number"), [("1", 1), ("12", 12), ("", -1), ("0", -1), ("4,2", -1), (None, -1)])
+def test_the_environment_limits_the_threads(monkeypatch, variable, number):
+    if variable is None:
         monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
     else:
-        monkeypatch.setenv("OMP_NUM_THREADS", told)
+        monkeypatch.setenv("OMP_NUM_THREADS", variable)
     assert threads() == number

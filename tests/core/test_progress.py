@@ -1,5 +1,7 @@
-"""Progress: the remaining time is told in turn, and by the speed of late."""
+"""Progress: estimates of the remaining time, and relaying of messages."""
 
+import pytest
+from rail_extract.core.errors import Cancelled
 from rail_extract.core.progress import Estimating, Progress
 
 
@@ -13,6 +15,8 @@ class Listener(Progress):
     def status(self, text):
         self.texts.append(text)
 
+    info = warning = status
+
 
 class Clock:
     now = 0.0
@@ -22,7 +26,7 @@ class Clock:
 
 
 def run(steps):
-    """Feed (second, fraction) pairs; give what was told."""
+    """Report (second, fraction) pairs and return the status messages."""
     listener, clock = Listener(), Clock()
     progress = Estimating(listener, clock)
     for clock.now, fraction in steps:
@@ -31,25 +35,34 @@ def run(steps):
     return listener.texts
 
 
-def test_even_work_is_foretold_exactly():
+def test_the_estimate_is_exact_at_constant_speed():
     texts = run([(second, second / 1000) for second in range(1, 1001)])
     assert texts[0] == "0 % done, about 17 minutes left"
     assert texts[99] == "50 % done, about 8 minutes left"
     assert texts[-1].startswith("100 % done") or texts[-1].endswith("about 10 seconds left")
 
 
-def test_work_that_slows_down_is_judged_by_its_latest_half():
+def test_the_estimate_follows_the_second_half_of_the_elapsed_time():
     fast = [(second, 0.5 * second / 100) for second in range(1, 101)]
     slow = [(100 + second, 0.5 + 0.5 * second / 1000) for second in range(1, 401)]
     assert run(fast + slow)[-1] == "70 % done, about 10 minutes left"
 
 
-def test_nothing_is_told_at_once_nor_too_often():
+def test_estimates_start_late_and_have_an_interval():
     assert run([(0.1 * step, step / 100) for step in range(1, 40)]) == []
     assert len(run([(0.1 * step, step / 1000) for step in range(1, 1000)])) <= 20
 
 
-def test_spans_pass_the_status_on():
+def test_spans_relay_everything():
     listener = Listener()
-    Estimating(listener).span(0.2, 0.6).status("reading")
-    assert listener.texts == ["reading"]
+    span = Estimating(listener).span(0.2, 0.6)
+    span.status("reading")
+    span.info("one file")
+    span.warning("no coordinate system")
+    span.set_fraction(0.5)
+    assert listener.texts == ["reading", "one file", "no coordinate system"]
+    assert listener.fractions == [pytest.approx(0.4)]
+    assert not span.is_cancelled()
+    listener.is_cancelled = lambda: True
+    with pytest.raises(Cancelled):
+        span.check()

@@ -1,4 +1,4 @@
-"""The sparse raster: windows, cells, georeference."""
+"""The sparse raster: windows, cells and coordinates."""
 
 import numpy as np
 import pytest
@@ -10,16 +10,16 @@ from scipy import ndimage
 CELLS = st.lists(st.tuples(st.integers(-600, 600), st.integers(-600, 600)), min_size=1, max_size=40)
 
 
-def test_cell_size_of_the_papers_standard_is_4_cm():
+def test_cell_size_of_132re_is_4_cm():
     assert cell_size(1.435, 0.0762) == pytest.approx(0.04, abs=1e-5)
 
 
-def test_a_point_sets_the_cell_it_lies_in():
+def test_a_point_sets_its_cell():
     raster = rasterize(np.array([[0.05, 0.03, 7.0], [0.07, 0.01, 7.0], [-0.01, -0.01, 7.0]]), 0.04)
     assert sorted(map(tuple, raster.cells().tolist())) == [(-1, 1), (0, -1)]
 
 
-def test_cell_centres_come_back_in_local_metres():
+def test_cell_centres_are_next_to_their_points():
     raster = rasterize(np.array([[12.345, -6.789, 0.0]]), 0.04)
     assert np.abs(raster.to_local(raster.cells()) - [[12.345, -6.789]]).max() <= 0.02
 
@@ -32,7 +32,7 @@ def test_cells_survive_tiling(cells):
 
 
 @given(CELLS, st.integers(-700, 500), st.integers(-700, 500), st.integers(1, 700), st.integers(1, 300))
-def test_a_window_holds_the_cells_in_it(cells, row, column, height, width):
+def test_a_window_contains_its_cells(cells, row, column, height, width):
     window = RailRaster({}, 0.04, 0.0, 0.0).with_cells(np.array(cells)).read(row, column, height, width)
     inside = {(r - row, c - column) for r, c in cells if row <= r < row + height and column <= c < column + width}
     assert set(map(tuple, np.argwhere(window).tolist())) == inside

@@ -1,4 +1,4 @@
-"""Rail standards: the table, and numbers that override it."""
+"""Rail standards: the table, and numbers that override its values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ IN_90R_1000 IN_75R_1000 IN_60R_1000 RU_R50_1520 RU_R65_1520 S33_1000 S41_1000 EN
 """
 
 
-def test_names_are_the_static_strings_of_the_interface():
+def test_names_never_change():
     assert set(STANDARDS) == set(INTERFACE.split())
     assert DEFAULT in STANDARDS
 
@@ -47,7 +47,7 @@ def test_each_gauge_is_the_one_in_the_name():
         assert 57 <= 1000 * standard.head_width_m <= 78
 
 
-def test_labels_are_for_people_and_own_up_to_unconfirmed_widths():
+def test_labels_mark_unconfirmed_widths():
     assert STANDARDS["EN_60E1_1435"].label == "EN 60E1 (UIC 60), 1435 mm"
     unconfirmed = {name for name, standard in STANDARDS.items() if standard.label.endswith(UNCONFIRMED)}
     assert unconfirmed == {
@@ -88,12 +88,12 @@ def test_an_unknown_name_is_refused():
         resolve("EN_61E1_1435")
 
 
-def test_gauges_to_pair_by_are_each_taken_once():
+def test_repeated_gauges_are_dropped():
     assert distinct_gauges((1.435, 1.0, 1.435), 0.05) == (1.435, 1.0)
 
 
 @pytest.mark.parametrize("gauges", [(1.520, 1.524), (1.435, 1.0, 1.48)])
-def test_gauges_that_the_tolerance_mixes_up_are_refused(gauges):
+def test_gauges_closer_than_the_tolerance_are_refused(gauges):
     with pytest.raises(ParameterError, match="CENTERLINE_TOLERANCE"):
         distinct_gauges(gauges, 0.05)
 

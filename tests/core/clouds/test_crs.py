@@ -19,12 +19,12 @@ def wkt(code, version="WKT2_2019"):
         ('LOCAL_CS["here",UNIT["metre",1]]', 'LOCAL_CS["here",UNIT["metre",1]]'),
     ],
 )
-def test_same_places(first, second):
+def test_descriptions_of_one_system_mean_the_same_place(first, second):
     assert same_plane(first, second, PLACE)
 
 
 @pytest.mark.parametrize(("first", "second"), [("32643", "32644"), ("2263", "32118"), ("32643", "4326")])
-def test_other_places(first, second):
+def test_other_systems_mean_another_place(first, second):
     assert not same_plane(wkt(f"EPSG:{first}"), wkt(f"EPSG:{second}"), PLACE)
 
 

@@ -1,4 +1,4 @@
-"""Damaged bytes of clouds: read, or explained in a sentence; never anything else."""
+"""Clouds with arbitrary damage are either read or refused in one sentence."""
 
 import laspy
 import numpy as np
@@ -21,7 +21,7 @@ BOUNDED = settings(
 
 @pytest.fixture(scope="module")
 def good(tmp_path_factory):
-    """Bytes of a LAS and of a LAZ file of a few points with a record in front and extra bytes."""
+    """The bytes of a LAS and of a LAZ file with a few points, a variable-length record and extra bytes."""
     header = laspy.LasHeader(version="1.4", point_format=6)
     header.scales, header.offsets = [0.001] * 3, [500_000, 3_000_000, 0]
     header.vlrs.append(laspy.VLR("someone", 7, "a record", b"x" * 40))
@@ -35,8 +35,8 @@ def good(tmp_path_factory):
     return {name: (folder / name).read_bytes() for name in ("a.las", "a.laz")}
 
 
-def read_or_explain(path, data):
-    """Points that are numbers, or one sentence."""
+def check_reading(path, data):
+    """Check that the file gives finite points or an error of one sentence."""
     path.write_bytes(data)
     try:
         clouds = read_rail_points(path, [RAIL])
@@ -52,24 +52,24 @@ def read_or_explain(path, data):
 @given(at=st.integers(4, HEADER + RECORD_HEADER), value=st.binary(min_size=1, max_size=8))
 def test_any_bytes_in_the_header_and_its_records(good, tmp_path, name, at, value):
     data = good[name]
-    read_or_explain(tmp_path / name, data[:at] + value + data[at + len(value) :])
+    check_reading(tmp_path / name, data[:at] + value + data[at + len(value) :])
 
 
 @pytest.mark.parametrize("name", ["a.las", "a.laz"])
 @BOUNDED
 @given(length=st.integers(0, 3000))
 def test_any_length(good, tmp_path, name, length):
-    read_or_explain(tmp_path / name, good[name][:length])
+    check_reading(tmp_path / name, good[name][:length])
 
 
 @BOUNDED
 @given(at=st.integers(HEADER, 3000), value=st.binary(min_size=1, max_size=16))
 def test_any_bytes_among_compressed_points(good, tmp_path, at, value):
     data = good["a.laz"]
-    read_or_explain(tmp_path / "a.laz", data[:at] + value + data[at + len(value) :])
+    check_reading(tmp_path / "a.laz", data[:at] + value + data[at + len(value) :])
 
 
 @BOUNDED
 @given(data=st.binary(max_size=600))
-def test_any_bytes_behind_the_signature(tmp_path, data):
-    read_or_explain(tmp_path / "a.las", b"LASF" + data)
+def test_any_bytes_after_the_signature(tmp_path, data):
+    check_reading(tmp_path / "a.las", b"LASF" + data)

@@ -29,7 +29,7 @@ PLACE = np.array([578123.0, 2494456.0, 556.0])
 
 
 def make_cloud(path, crs=UTM, version="1.4", point_format=6, count=3000, place=PLACE, codes=(1, 2, RAIL), spread=20.0):
-    """Write a cloud around a place and return its coordinates, as stored, and classes."""
+    """Write a cloud around a place; return its coordinates as stored, and its classes."""
     random = np.random.RandomState(1)
     header = laspy.LasHeader(version=version, point_format=point_format)
     header.scales = [0.001] * 3 if spread > 1 else [1e-9] * 3
@@ -62,7 +62,7 @@ class Listener(Progress):
     ("name", "version", "point_format"),
     [("a.las", "1.2", 3), ("a.laz", "1.2", 1), ("a.laz", "1.3", 3), ("a.las", "1.4", 6), ("a.LAZ", "1.4", 7)],
 )
-def test_every_format_gives_the_wanted_class_alone(tmp_path, name, version, point_format):
+def test_every_version_gives_only_the_rail_class(tmp_path, name, version, point_format):
     xyz, codes = make_cloud(tmp_path / name, version=version, point_format=point_format)
     (points,) = read_rail_points(tmp_path / name, [RAIL])
     assert points.class_code == RAIL
@@ -89,7 +89,7 @@ def test_a_stray_point_far_away_does_not_move_the_origin(tmp_path):
     assert np.abs(points.xyz[:2]).max() < 100
 
 
-def test_each_class_is_kept_apart_in_one_frame(tmp_path):
+def test_classes_are_separate_and_share_a_frame(tmp_path):
     _, codes = make_cloud(tmp_path / "a.laz", codes=(2, RAIL, 11))
     first, second = read_rail_points(tmp_path / "a.laz", [11, RAIL, 12])
     assert (first.class_code, second.class_code) == (RAIL, 11)
@@ -105,15 +105,15 @@ def test_a_file_named_twice_is_read_once(tmp_path, monkeypatch):
     assert len(points.xyz) == 3000
 
 
-def test_a_file_that_can_not_be_opened_is_named(tmp_path):
+def test_a_file_that_can_not_be_read_is_named(tmp_path):
     make_cloud(tmp_path / "a.laz", codes=(RAIL,))
     (tmp_path / "b.laz").symlink_to(tmp_path / "gone.laz")
     with pytest.raises(CloudError, match=r"^b\.laz can't be read \(No such file or directory\): check"):
         read_rail_points(tmp_path, [RAIL])
 
 
-def test_a_table_of_chunks_whose_place_stands_at_the_end_is_found(tmp_path):
-    """As writers leave it that can't go back, into a pipe."""
+def test_a_chunk_table_whose_position_is_at_the_end_of_the_file_is_found(tmp_path):
+    """Writers that can't seek back, for example into a pipe, put it there."""
     make_cloud(tmp_path / "a.laz", codes=(RAIL,))
     whole = bytearray((tmp_path / "a.laz").read_bytes())
     (points_at,) = struct.unpack("<I", whole[96:100])
@@ -142,7 +142,7 @@ def test_withheld_points_are_left_out(tmp_path):
         read_rail_points(tmp_path / "a.las", [RAIL])
 
 
-def test_chunks_join_without_loss(tmp_path, monkeypatch):
+def test_no_point_is_lost_between_chunks(tmp_path, monkeypatch):
     xyz, codes = make_cloud(tmp_path / "a.laz")
     monkeypatch.setattr(las, "CHUNK", 700)
     (points,) = read_rail_points(tmp_path / "a.laz", [RAIL])
@@ -189,7 +189,7 @@ def test_units_become_metres_and_back(tmp_path, crs, horizontal_m, vertical_m):
     ("keys", "vertical_m"),
     [({4099: 9001}, 1.0), ({4099: 9003}, 1200 / 3937), ({4096: 5703}, 1.0), ({4096: 6360, 4099: 9003}, 1200 / 3937)],
 )
-def test_vertical_geotiff_keys_count(tmp_path, keys, vertical_m):
+def test_vertical_geotiff_keys_set_the_unit_of_height(tmp_path, keys, vertical_m):
     path = tmp_path / "a.las"
     make_cloud(path, crs="EPSG:2222", version="1.2", point_format=1)
     cloud = laspy.read(path)
@@ -203,7 +203,7 @@ def test_vertical_geotiff_keys_count(tmp_path, keys, vertical_m):
     assert points.frame.vertical_unit_m == pytest.approx(vertical_m, rel=1e-9)
 
 
-def test_without_crs_it_goes_on_in_metres_with_a_warning(tmp_path):
+def test_without_a_coordinate_system_metres_are_assumed_with_a_warning(tmp_path):
     make_cloud(tmp_path / "a.las", crs=None)
     listener = Listener()
     (points,) = read_rail_points(tmp_path / "a.las", [RAIL], progress=listener)
@@ -212,7 +212,7 @@ def test_without_crs_it_goes_on_in_metres_with_a_warning(tmp_path):
     assert "no coordinate system" in listener.warnings[0]
 
 
-def test_a_given_crs_stands_in_only_where_the_cloud_has_none(tmp_path):
+def test_a_given_coordinate_system_applies_only_to_files_that_state_none(tmp_path):
     make_cloud(tmp_path / "bare.las", crs=None)
     make_cloud(tmp_path / "utm.las")
     (bare,) = read_rail_points(tmp_path / "bare.las", [RAIL], crs_wkt="EPSG:2227")
@@ -227,7 +227,7 @@ def test_a_given_crs_stands_in_only_where_the_cloud_has_none(tmp_path):
     ("place", "zone"),
     [([77.2, 13.1, 5.0], "43N (EPSG:32643)"), ([-58.4, -34.6, 5.0], "21S (EPSG:32721)")],
 )
-def test_degrees_are_refused_with_the_fitting_zone(tmp_path, place, zone):
+def test_degrees_are_refused_with_the_right_zone(tmp_path, place, zone):
     make_cloud(tmp_path / "a.las", crs="EPSG:4326", place=np.array(place), spread=1e-3)
     with pytest.raises(CrsError) as caught:
         read_rail_points(tmp_path / "a.las", [RAIL])
@@ -243,7 +243,7 @@ def test_a_folder_of_tiles_is_one_cloud(tmp_path):
     np.testing.assert_allclose(points.frame.to_crs(points.xyz), expected, rtol=0, atol=1e-9)
 
 
-def test_an_extent_cuts_points_and_spares_tiles(tmp_path):
+def test_an_extent_selects_points(tmp_path):
     xyz, codes = make_cloud(tmp_path / "1.las")
     make_cloud(tmp_path / "2.las", place=PLACE + [500, 0, 0])
     extent = (PLACE[0] - 5, PLACE[1] - 5, PLACE[0] + 5, PLACE[1] + 5)
@@ -268,7 +268,7 @@ def test_the_same_system_in_wkt_and_geotiff_keys_is_one(tmp_path):
     assert points.frame.horizontal_unit_m == 1.0
 
 
-def test_missing_class_names_the_classes_there(tmp_path):
+def test_a_missing_class_is_refused_with_the_classes_found(tmp_path):
     _, codes = make_cloud(tmp_path / "a.las", codes=(1, 2))
     with pytest.raises(NoRailPointsError) as caught:
         read_rail_points(tmp_path / "a.las", [RAIL])
@@ -283,7 +283,7 @@ def test_impossible_classes_are_refused(tmp_path, codes):
         read_rail_points(tmp_path / "a.las", codes)
 
 
-def test_progress_rises_to_the_end_and_a_cancel_is_heard(tmp_path, monkeypatch):
+def test_reading_reports_progress_and_can_be_cancelled(tmp_path, monkeypatch):
     make_cloud(tmp_path / "a.las")
     monkeypatch.setattr(las, "CHUNK", 500)
     listener = Listener()
@@ -348,7 +348,7 @@ BAD_FILES = {
 
 
 @pytest.mark.parametrize("fault", BAD_FILES)
-def test_bad_files_end_in_one_clear_sentence(tmp_path, fault):
+def test_bad_files_are_refused_in_one_sentence(tmp_path, fault):
     make, sentence = BAD_FILES[fault]
     with pytest.raises(CloudError) as caught:
         read_rail_points(make(tmp_path), [RAIL])
@@ -366,7 +366,7 @@ def test_laz_without_backend_names_the_package(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", ["a.las", "a.laz"])
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(changes=st.lists(st.tuples(st.floats(0, 1), st.integers(0, 255)), max_size=4), cut=st.floats(0.2, 1))
-def test_any_damage_is_read_or_explained(tmp_path, name, changes, cut):
+def test_damaged_files_are_read_or_refused(tmp_path, name, changes, cut):
     path = tmp_path / name
     if not (tmp_path / "good").exists():
         make_cloud(path, count=300)

@@ -1,4 +1,4 @@
-"""The report: what it finds, what it says, and that it is one sound page whatever the network."""
+"""The report: its findings, its words, and that it is a valid page for every network."""
 
 import re
 import xml.etree.ElementTree as ET
@@ -20,7 +20,7 @@ FRAME = LocalFrame(np.array([500_000.0, 3_000_000.0, 400.0]))
 
 
 def track(track_id=1, length_m=100.0, step_m=1.0, **profiles):
-    """A straight track to the east, with stations at which everything is well unless told otherwise."""
+    """Return a straight track to the east; nothing is in doubt at its stations except as set by `profiles`."""
     along = np.arange(0.0, length_m + step_m / 2, step_m)
     count = len(along)
     xyz = np.column_stack([along, np.full(count, 5.0 * track_id), 0.002 * along])
@@ -67,7 +67,7 @@ def at(count, *numbers):
     return marked
 
 
-def test_a_faultless_network_is_called_good():
+def test_a_network_without_doubt_is_called_good():
     html = page(track())
     assert headline(html).startswith("Good throughout")
     assert "Where to look" not in html
@@ -77,13 +77,13 @@ def test_a_faultless_network_is_called_good():
         assert words in html
 
 
-def test_every_metre_in_doubt_is_counted_once_and_under_the_gravest_reason():
+def test_every_metre_in_doubt_counts_once_under_the_most_severe_reason():
     gauge = np.full(101, GAUGE_MM)
     gauge[[20, 21, 50]] = GAUGE_MM + 15, GAUGE_MM - 15, np.nan
     sigma = np.full(101, 1.0)
     sigma[[20, 80, 81, 82]] = 9.0
     findings = examine(network(track(gauge_mm=gauge, sigma_mm=sigma, bridged=at(101, 21, 22))), (1.435,))
-    assert findings.length_of(UNSUPPORTED) == pytest.approx(3)  # 21, 22 and 50, where nothing is known
+    assert findings.length_of(UNSUPPORTED) == pytest.approx(3)  # 21, 22, and 50, where the gauge is unknown
     assert findings.length_of(OFF_GAUGE) == pytest.approx(1)
     assert findings.length_of(UNSURE) == pytest.approx(3)
     assert findings.share == pytest.approx(0.07)
@@ -91,7 +91,7 @@ def test_every_metre_in_doubt_is_counted_once_and_under_the_gravest_reason():
 
 
 def test_geometry_is_matched_by_track_whatever_its_order():
-    """As with the classes (11, 10), whose geometry comes in the order of the classes."""
+    """With the classes (11, 10), for example, the geometry is in the order of the classes."""
     whole = network(track(1, bridged=at(101, 10, 11)), track(2))
     for one in (whole, replace(whole, geometry=whole.geometry[::-1])):
         findings = examine(one, (1.435,))
@@ -130,10 +130,10 @@ def test_the_longest_places_are_listed_for_each_reason():
     assert [row.findall("td")[3].text for row in rows] == ["a rail has no points"] + 5 * ["standard error above 5 mm"]
     assert "35 more places are marked in the profiles below." in html
     marks = [one.get("class") for one in elements(html, "svg")[0].iter("path") if "mark" in one.get("class")]
-    assert marks == ["unsure mark", "unsupported mark"]  # the gravest on top
+    assert marks == ["unsure mark", "unsupported mark"]  # the most severe on top
 
 
-def test_rails_without_a_track_are_told():
+def test_rails_without_a_track_are_reported():
     alone = RailLine(np.array([[0.0, 50, 0], [35, 50, 0]]), 99, 10, 10, 1.0, 1.0, 0.0)
     assert "1 rail does not belong to a track (35 m)." in page(track(), more_rails=(alone,))
     html = page(more_rails=(alone, replace(alone, rail_id=98)))
@@ -141,16 +141,16 @@ def test_rails_without_a_track_are_told():
     assert not elements(html, "svg")
 
 
-def test_curves_and_heights_are_stated_as_in_the_cloud():
+def test_radii_and_heights_are_those_of_the_cloud():
     radius = np.where(np.arange(101) < 50, np.nan, -600.0)
     html = page(track(radius_m=radius))
     assert "600 m right" in html
-    assert ">400<" in html  # a mark on the axis of heights
+    assert ">400<" in html  # a tick on the axis of heights
     feet = replace(FRAME, horizontal_unit_m=0.3048, vertical_unit_m=0.3048)
     assert ">122<" in page(track(), frame=feet)
 
 
-def test_the_page_needs_nothing_else_and_is_sound():
+def test_the_page_needs_no_other_file_and_is_valid():
     unknown = np.full(101, np.nan)
     doubtful = track(2, gauge_mm=unknown, cant_mm=unknown, grade_pm=unknown, sigma_mm=unknown, bridged=at(101, 3, 4))
     html = page(track(), doubtful)
@@ -166,12 +166,12 @@ def test_all_text_is_escaped():
     nasty = '<script>alert("1")</script>&'
     html = page(track(), source=nasty, facts={nasty: nasty})
     assert "<script" not in html
-    assert html.count("&lt;script&gt;") == 4  # the page's title, its head, name and value of the fact
+    assert html.count("&lt;script&gt;") == 4  # title, heading, and name and value of the fact
     assert tag("p", text("<&>"), title='"<') == '<p title="&quot;&lt;">&lt;&amp;&gt;</p>'
     assert "<td>&lt;b&gt;</td>" in table(["a"], [["<b>"]])
 
 
-def test_marks_stand_in_every_panel_where_the_doubt_is():
+def test_every_panel_marks_the_places_in_doubt():
     html = page(track(bridged=at(101, *range(40, 60))))
     plan, profiles = elements(html, "svg")
     marks = [one for one in profiles.iter("rect") if one.get("class") == "unsupported"]
@@ -184,8 +184,8 @@ def test_marks_stand_in_every_panel_where_the_doubt_is():
     assert [one for one in plan.iter("path") if one.get("class") == "unsupported mark"]
 
 
-def test_a_long_line_stays_a_small_page():
-    """Fifty kilometres by the metre: peaks are kept, and the page loads at once."""
+def test_the_page_of_a_long_line_is_small():
+    """50 km with a station every metre: peaks are kept, and the page has less than 1.5 MB."""
     gauge = GAUGE_MM + np.random.default_rng(1).normal(0, 2, 50_001)
     gauge[31_234] = GAUGE_MM + 40
     html = page(track(length_m=50_000.0, gauge_mm=gauge, bridged=np.arange(50_001) % 100 == 0))
@@ -197,14 +197,14 @@ def test_a_long_line_stays_a_small_page():
     assert min(heights) < sorted(heights)[1] - 10
 
 
-def test_curves_break_where_nothing_is_known():
+def test_curves_break_at_unknown_values():
     x = np.arange(6.0)
     assert curve(x, np.array([np.nan, 1, 2, np.nan, 3, np.nan])) == "M1.0 1.0L2.0 2.0M4.0 3.0"
     assert curve(x, np.full(6, np.nan)) == ""
 
 
 @given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e6), st.integers(2, 12))
-def test_marks_of_an_axis_are_round_few_and_inside(low, span, count):
+def test_ticks_are_round_few_and_inside_the_axis(low, span, count):
     marks = ticks(low, low + span, count)
     assert len(marks) <= count + 1
     assert len(marks) >= count / 2.5 - 1
@@ -215,7 +215,7 @@ def test_marks_of_an_axis_are_round_few_and_inside(low, span, count):
 
 
 @given(st.floats(1e-6, 1e6))
-def test_rounding_up_gives_the_next_of_one_two_and_five(value):
+def test_rounding_up_gives_the_next_1_2_or_5(value):
     found = round_up(value)
     assert value <= found * (1 + 1e-9)
     assert found < 2.6 * value
@@ -225,5 +225,5 @@ def test_rounding_up_gives_the_next_of_one_two_and_five(value):
 @pytest.mark.parametrize(
     ("length_m", "words"), [(0.42, "0.4 m"), (39.4, "39 m"), (1234, "1,234 m"), (12345, "12.3 km")]
 )
-def test_lengths_are_written_for_a_person(length_m, words):
+def test_lengths_are_formatted_for_reading(length_m, words):
     assert metres(length_m) == words
