@@ -15,14 +15,14 @@ from ..polyline import interpolate, length_along, project, resample, runs
 from ..rails import RailLine
 from .grid import HALO_M, Square
 
-STATION_M = 0.25
+CUT_STEP_M = 0.25
 """Spacing of the stations at which lines are cut and compared."""
 
 MIN_MATCH_M = 1.0
 """Lines that are close together over a shorter length only cross or diverge."""
 
 HOLE_STATIONS = 3
-HOLE_M = HOLE_STATIONS * STATION_M
+HOLE_M = HOLE_STATIONS * CUT_STEP_M
 """Longest hole that can remain near a corner between the parts of a rail that two squares show; a longer one is filled
 by a third square."""
 
@@ -52,7 +52,7 @@ def trim(rails: Sequence[RailLine], square: Square) -> SquareRails:
     """Cut the lines of a square where they stop being valid."""
     parts: list[RailLine] = []
     for rail in rails:
-        stations, t = resample(rail.xyz[:, :2], STATION_M)
+        stations, t = resample(rail.xyz[:, :2], CUT_STEP_M)
         valid = square.holds(stations, HALO_M)
         if valid.all():
             found = [(rail, square.holds(stations))]
@@ -148,7 +148,7 @@ def new_parts(
     list of tuple of float
         Chainages of start and end of each part.
     """
-    stations, t = resample(rail.xyz[:, :2], STATION_M)
+    stations, t = resample(rail.xyz[:, :2], CUT_STEP_M)
     seen = np.zeros(len(t), dtype=bool)
     shared = np.flatnonzero(~square.holds(stations - corner, -HALO_M))
     seen[shared[project(known, stations[shared], SAME_RAIL_M).point]] = True
@@ -211,7 +211,7 @@ def blended(part: RailLine, side: int, following: RailLine) -> RailLine:
 def extended(line: np.ndarray) -> np.ndarray:
     """Extend a line, (n, 2) or (n, 3), by `HOLE_M` at both ends, with the curvature it has there."""
     along = length_along(line[:, :2])
-    out = np.arange(1, HOLE_STATIONS + 1) * STATION_M
+    out = np.arange(1, HOLE_STATIONS + 1) * CUT_STEP_M
     ends = [
         3 * line[end] - 3 * interpolate(line, along, abs(side - out)) + interpolate(line, along, abs(side - 2 * out))
         for end, side in ((0, 0.0), (-1, along[-1]))

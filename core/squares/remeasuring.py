@@ -20,7 +20,7 @@ CONTEXT_M = 10.0
 """Distance beyond a square over which its rails are measured as well: the disc reaches 1 m, the smoothing of heights
 over 1 m at most 3 m, and that of the lateral figures 2.4 m."""
 
-STATION_M = 1.0
+LOOKUP_STEP_M = 1.0
 """Spacing of the stations whose square is looked up."""
 
 
@@ -92,7 +92,7 @@ def _straight_across_gaps(rail: RailLine) -> RailLine:
 
 def _by_square(rail: RailLine, zero: np.ndarray, side_m: float) -> list[tuple[Key, float, float]]:
     """Divide a rail among the squares it crosses; returns square and chainages of start and end, without gaps."""
-    stations, t = resample(rail.xyz[:, :2], STATION_M)
+    stations, t = resample(rail.xyz[:, :2], LOOKUP_STEP_M)
     keys, number = unique_keys(stations - zero[:2], side_m)
     parts = []
     for place, key in enumerate(keys):

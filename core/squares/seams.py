@@ -20,9 +20,9 @@ from ..polyline import interpolate, length_along, project
 from ..rails import RailLine
 from .grid import HALO_M, Key, Square, around
 from .pieces import (
+    CUT_STEP_M,
     HOLE_M,
     MIN_MATCH_M,
-    STATION_M,
     Piece,
     PieceEnd,
     SquareRails,
@@ -33,7 +33,7 @@ from .pieces import (
     smooth_step,
 )
 
-LINK_M = MIN_MATCH_M + 2 * STATION_M
+LINK_M = MIN_MATCH_M + 2 * CUT_STEP_M
 """A piece continues an open end up to this distance away, even if the match between them is too short to count."""
 
 MAX_SHARED_M = 3 * HALO_M
@@ -74,7 +74,7 @@ class _Joiner:
         for rail in rails:
             feet = project([extended(rail.xyz[:, :2])], places, SAME_RAIL_M)
             on_rail = [(ends[point], t - HOLE_M) for point, t in zip(feet.point, feet.t)]
-            cut = ~square.holds(rail.xyz[[0, -1], :2] - corner, HALO_M - STATION_M)
+            cut = ~square.holds(rail.xyz[[0, -1], :2] - corner, HALO_M - CUT_STEP_M)
             for start, end in new_parts(rail, known, cut, square, corner):
                 self._add_piece(rail, start, end, cut, on_rail)
         self._rails[square.key], self._numbers[square.key] = list(rails), list(range(count_before, len(self._pieces)))
@@ -184,7 +184,7 @@ def _reattached(lines: Sequence[RailLine], nodes: np.ndarray) -> list[RailLine]:
     owner = np.repeat(np.arange(len(lines)), [len(line.xyz) for line in lines])
     tree = cKDTree(vertices)
     for (number, side), place in zip([end for end, node in zip(ends, at_node) if node], places[at_node]):
-        away, near = tree.query(place, k=min(8, len(vertices)), distance_upper_bound=STATION_M + SAME_RAIL_M)
+        away, near = tree.query(place, k=min(8, len(vertices)), distance_upper_bound=CUT_STEP_M + SAME_RAIL_M)
         others = [(gap, index) for gap, index in zip(away, near) if np.isfinite(gap) and owner[index] != number]
         if not others or others[0][0] == 0.0:
             continue

@@ -1,1 +1,1 @@
-"""From rails to tracks: which rails make a track, the line midway between them, and its geometry."""
+"""Tracks: pairs of rails at gauge, their centerlines and their geometry."""

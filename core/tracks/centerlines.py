@@ -8,47 +8,45 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import NoTrackError
+from ..lines.paek import REACH_SIGMAS
 from ..lines.smoothing import smooth_line
 from ..parameters import Parameters
 from ..polyline import is_closed, left_normals, length_along, resample, starts_at_its_end
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
 from ..standards import STANDARDS
-from .chaining import Chain, chain_pairs, reach_alone
+from .chaining import Chain, chain_pairs, single_rail_limit
 from .forking import fork_centerlines
-from .guide import STEP_M, guide_line
-from .leads import runs_on
-from .midline import ASTRAY_M, Meeting, Side, at_gauge, bridged_steps, midway
-from .pairing import MIN_LENGTH_M, pair_rails
-from .parallels import commonest_spacing
-from .rings import begun_abreast, closed_up, run_on
+from .midline import MAX_OFFSET_M, Meeting, Side, at_gauge, bridged_steps, midway
+from .pairing import MIN_SECTION_M, pair_rails
+from .parallels import most_common_spacing
+from .provisional import PROVISIONAL_STEP_M, provisional_centerline
+from .rails_ahead import runs_on
+from .rings import closed_centerline, extended_ring, started_abreast
 
 STATIONS_AT_ONCE = 8192
-"""Stations drawn in one go, 2 km of track: lets a cancel through several times a second."""
-
-MARGIN_SIGMAS = 40.0
-"""The smoothing's kernel falls off exponentially, to nothing in double precision this far away."""
+"""Stations processed at once, 2 km of track: lets the user cancel several times per second."""
 
 SAME_GAUGE_M = 0.04
-"""Gauges in use lie further apart than this, so that a measured spacing this near to one suggests it."""
+"""Gauges in use differ by more than this, so a measured spacing this close to one of them suggests it."""
 
 
 @dataclass(frozen=True)
 class CenterlineParameters:
-    """How centerlines are made; metres throughout.
+    """Parameters of the centerlines, in metres.
 
     Attributes
     ----------
     tolerance_m : float
-        Greatest deviation of the rails from the gauge.
+        Maximum deviation of the rails from the gauge.
     max_gap_m : float
-        Longest stretch without any rail that does not end a track.
+        Maximum length without any rail that does not end a track.
     smoothing_m : float
         Sigma of PAEK in plan.
     min_length_m : float
         Shorter centerlines are dropped.
     other_gauges_m : tuple of float
-        Gauges for which centerlines are made as well, so that what is nearer to one of them is left to it.
+        Other gauges for which centerlines are made: rails whose distance is closer to one of them are left to it.
     """
 
     tolerance_m: float = Parameters.centerline_tolerance_m
@@ -70,21 +68,21 @@ def build_centerlines(
     Parameters
     ----------
     rails : sequence of RailLine
-        Their ids name them in the result; rails without heights give centerlines without heights.
+        The result refers to them by their ids. Rails without heights give centerlines without heights.
     gauge_m, head_width_m : float
-        The rail lines of a track lie their sum apart.
+        Their sum is the distance between the rail lines of a track.
     parameters : CenterlineParameters
     progress : Progress
 
     Returns
     -------
     tuple of Centerline
-        By place of their starts from west to east, numbered from 1; none where no rails run parallel.
+        In order of their starts from west to east, numbered from 1; none if no rails are parallel.
 
     Raises
     ------
     NoTrackError
-        Rails run parallel, but at another spacing.
+        Rails are parallel, but at another spacing.
     """
     rails = _in_order(rails)
     others = parameters.other_gauges_m
@@ -101,14 +99,14 @@ def build_centerlines(
 
 
 def _in_order(rails: Sequence[RailLine]) -> list[RailLine]:
-    """Sort rails by place, and let all start in the west: the tracks must not depend on how rails come."""
+    """Sort rails by place and turn them to start in the west: tracks must not depend on the order of the rails."""
     turned = [rail.reversed() if starts_at_its_end(rail.xyz) else rail for rail in rails]
-    return begun_abreast(sorted(turned, key=lambda rail: (*rail.xyz[0, :2], *rail.xyz[-1, :2], rail.length_m)))
+    return started_abreast(sorted(turned, key=lambda rail: (*rail.xyz[0, :2], *rail.xyz[-1, :2], rail.length_m)))
 
 
 def _refuse_other_spacing(rails: Sequence[RailLine], gauge_m: float, head_width_m: float, tolerance_m: float) -> None:
-    """Raise NoTrackError if the rails lie at a spacing that is clearly another one than that asked for."""
-    spacing = commonest_spacing(rails, MIN_LENGTH_M)
+    """Raise NoTrackError if the spacing of the rails clearly differs from the one given."""
+    spacing = most_common_spacing(rails, MIN_SECTION_M)
     if spacing is None or abs(spacing - gauge_m - head_width_m) < tolerance_m:
         return
     message = f"No track of {1000 * gauge_m:.0f} mm gauge found: rails lie {1000 * spacing:.0f} mm apart"
@@ -129,25 +127,18 @@ def _draw(
 ) -> Centerline:
     """Draw the centerline of one track."""
     half = 0.5 * (gauge_m + head_width_m)
-    reach = reach_alone(parameters.max_gap_m)
-    guide, _ = resample(guide_line(rails, chain, half, reach), STEP_M)
-    normals = left_normals(guide)
-    lefts = _spans([pair.left for pair in chain.pairs], [pair.left_span for pair in chain.pairs])
-    rights = _spans([pair.right for pair in chain.pairs], [pair.right_span for pair in chain.pairs])
-    to_left, to_right, smoothing = progress.split(3)
-    # The guide runs half a gauge beside one rail, so that the other is off by all that the gauge is.
-    astray_m = max(ASTRAY_M, parameters.tolerance_m)
-    left = _met(Side.of(rails, lefts, reach), guide, normals, half, astray_m, to_left)
-    right = _met(Side.of(rails, rights, reach), guide, -normals, half, astray_m, to_right)
-    left, right = at_gauge(left, right, 2 * half, parameters.tolerance_m)
-    xyz = midway(guide, normals, left, right, 2 * half)
+    provisional = provisional_centerline(rails, chain, half, single_rail_limit(parameters.max_gap_m))
+    stations, _ = resample(provisional, PROVISIONAL_STEP_M)
+    normals = left_normals(stations)
+    left, right = _meetings(rails, chain, stations, normals, half, parameters, progress.span(0.0, 0.67))
+    xyz = midway(stations, normals, left, right, 2 * half)
     apart = left.distance_m + right.distance_m
     both = ~np.isnan(apart)
     cant = (left.height_m - right.height_m)[both]
     gauge = np.hypot(apart[both], np.nan_to_num(cant)) - head_width_m
     if all(is_closed(rails[number].xyz) for pair in chain.pairs for number in (pair.left, pair.right)):
-        xyz = closed_up(xyz)
-    xyz = _smoothed(xyz, parameters.smoothing_m, smoothing)
+        xyz = closed_centerline(xyz)
+    xyz = _smoothed(xyz, parameters.smoothing_m, progress.span(0.67, 1.0))
     flip = starts_at_its_end(xyz)
     sides = [_ids(rails, (pair.left for pair in chain.pairs)), _ids(rails, (pair.right for pair in chain.pairs))]
     return Centerline(
@@ -160,17 +151,38 @@ def _draw(
         gaugesd_mm=1000 * float(gauge.std()),
         cant_mm=(-1000 if flip else 1000) * float(cant.mean()),
         cantmax_mm=(-1000 if flip else 1000) * float(cant[np.argmax(np.abs(cant))]),
-        bridged_m=float(bridged_steps(rails, left, right, length_along(guide)).sum()),
+        bridged_m=float(bridged_steps(rails, left, right, length_along(stations)).sum()),
     )
 
 
+def _meetings(
+    rails: Sequence[RailLine],
+    chain: Chain,
+    stations: np.ndarray,
+    normals: np.ndarray,
+    half_m: float,
+    parameters: CenterlineParameters,
+    progress: Progress,
+) -> tuple[Meeting, Meeting]:
+    """Find the left and the right rail of a track from stations between them."""
+    reach_m = single_rail_limit(parameters.max_gap_m)
+    # The stations are half a gauge from one rail, so the other is off by the whole deviation of the gauge.
+    max_offset_m = max(MAX_OFFSET_M, parameters.tolerance_m)
+    lefts = _spans([pair.left for pair in chain.pairs], [pair.left_span for pair in chain.pairs])
+    rights = _spans([pair.right for pair in chain.pairs], [pair.right_span for pair in chain.pairs])
+    to_left, to_right = progress.split(2)
+    left = _met(Side.of(rails, lefts, reach_m), stations, normals, half_m, max_offset_m, to_left)
+    right = _met(Side.of(rails, rights, reach_m), stations, -normals, half_m, max_offset_m, to_right)
+    return at_gauge(left, right, 2 * half_m, parameters.tolerance_m)
+
+
 def _ids(rails: Sequence[RailLine], numbers: Iterable[int]) -> tuple[int, ...]:
-    """Ids of rails, each once, in the order they are met."""
+    """Return the ids of rails without repetition, in order of first occurrence."""
     return tuple(dict.fromkeys(rails[number].rail_id for number in numbers))
 
 
 def _spans(rails: Sequence[int], spans: Sequence[tuple[float, float]]) -> list[tuple[int, tuple[float, float]]]:
-    """List a track's rails on one side and the stretches of them, through to the next where a rail leads there."""
+    """List a track's rails on one side and their sections, merging sections between which the rail continues."""
     merged = [(rails[0], spans[0])]
     for rail, span in zip(rails[1:], spans[1:]):
         if rail == merged[-1][0] and runs_on(merged[-1][1], span):
@@ -181,28 +193,28 @@ def _spans(rails: Sequence[int], spans: Sequence[tuple[float, float]]) -> list[t
 
 
 def _met(
-    side: Side, guide: np.ndarray, directions: np.ndarray, half_m: float, astray_m: float, progress: Progress
+    side: Side, stations: np.ndarray, directions: np.ndarray, half_m: float, max_offset_m: float, progress: Progress
 ) -> Meeting:
-    """Meet the rails of one side from the stations of a guide."""
-    parts = range(0, len(guide), STATIONS_AT_ONCE)
+    """Find the rails of one side from stations, part by part."""
+    parts = range(0, len(stations), STATIONS_AT_ONCE)
     pieces = (slice(start, start + STATIONS_AT_ONCE) for start in progress.follow(parts))
-    return Meeting.joined([side.meet(guide[piece], directions[piece], half_m, astray_m) for piece in pieces])
+    return Meeting.joined([side.meet(stations[piece], directions[piece], half_m, max_offset_m) for piece in pieces])
 
 
 def _smoothed(xyz: np.ndarray, smoothing_m: float, progress: Progress) -> np.ndarray:
-    """Smooth in plan, and place vertices as close as the shape asks for."""
+    """Smooth a centerline, (n, 3), in plan, with vertices as close as its shape requires."""
     stations, t = resample(xyz, smoothing_m / 4)
-    margin_m = MARGIN_SIGMAS * smoothing_m
+    margin_m = REACH_SIGMAS * smoothing_m
     closed = is_closed(xyz)
     if closed:
-        xyz, lead_m = run_on(xyz, margin_m)
-        t = t + lead_m
+        xyz, added_m = extended_ring(xyz, margin_m)
+        t = t + added_m
     along = length_along(xyz[:, :2])
     plan = []
     for part in progress.follow(np.array_split(t, int(np.ceil(len(t) / STATIONS_AT_ONCE)))):
         first, last = np.searchsorted(along, [part[0] - margin_m, part[-1] + margin_m])
         first = max(first - 1, 0)
-        # Free ends: rails are smooth already, and a fixed end would straighten a curve.
+        # The ends are free, because rails are smooth already and a fixed end would straighten a curve.
         near = xyz[first : last + 1, :2]
         plan.append(smooth_line(near, smoothing_m, stations=part - along[first], ends="free"))
     smooth = np.column_stack([np.concatenate(plan), stations[:, 2]])

@@ -1,4 +1,4 @@
-"""Dynamic time warping of two polylines: the stretches that run within a tolerance of each other.
+"""Dynamic time warping of two polylines: the sections that are within a tolerance of each other.
 
 The matching of Gribov and Chang, section 9 (docs/method.md section 8.2): a vertex of one polyline paired with a
 segment of the other is an edge of the lattice of vertex pairs (i, j); a match is a path along edges, each step
@@ -15,22 +15,22 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 ADVANCE_SECOND, ADVANCE_FIRST = 0, 1
-"""Kinds of edges: vertex of the first with segment of the second, (i, j) to (i, j + 1), and the other way round."""
+"""Kinds of edges: a vertex of the first with a segment of the second, (i, j) to (i, j + 1), and vice versa."""
 
 TIE = 1e-9
-"""Lengths that differ by less, relative to their size (or to a metre), are summed from the same segments."""
+"""Lengths that differ by less, relative to their size (or to 1), are sums of the same segments."""
 
 
 @dataclass(frozen=True)
 class Match:
-    """A stretch of one polyline and the stretch of another that it matches.
+    """A section of one polyline and the section of another that it matches.
 
     Attributes
     ----------
     first, second : (k,) int arrays
-        Vertices met in turn; from one entry to the next, just one of the two advances by one.
+        Successive vertices; from one entry to the next, exactly one of the two advances by one.
     length : float
-        Sum of both stretches' lengths.
+        Sum of the lengths of both sections.
     penalty : float
         Squared distance between vertices and their segments, integrated over the segments.
     """
@@ -48,7 +48,7 @@ class Edges:
     Attributes
     ----------
     first, second : (n,) int arrays
-        Lattice node at which the edge begins.
+        Lattice node at which the edge starts.
     kind : (n,) int array
         ADVANCE_SECOND or ADVANCE_FIRST.
     length : (n,) array
@@ -64,19 +64,19 @@ class Edges:
 
 
 def match_polylines(first: np.ndarray, second: np.ndarray, tolerance: float) -> list[Match]:
-    """Find the matches of two polylines, both taken in the direction given; the longest comes first.
+    """Find the matches of two polylines in their given directions; the longest comes first.
 
-    Of several paths the longest wins, of equally long ones that of the lowest penalty. Paths that share or continue
-    an edge form a cluster, and each cluster gives one match. The paper says a pair does not "follow" one that lies
-    further along; any order in which pairs precede their continuations serves, here that of the lattice nodes.
+    The longest path wins, and of equally long ones the one with the lowest penalty. Paths that share or continue an
+    edge form a cluster, and each cluster gives one match. The paper says that a pair does not "follow" one further
+    along; any order works in which pairs precede their continuations, and that of the lattice nodes is used here.
 
     Parameters
     ----------
     first, second : (m, 2), (n, 2) arrays
-        Vertices, abreast of each other, or else at steps of at most half the tolerance: of a longer segment the middle
-        may be out of every vertex's reach.
+        Vertices that are abreast of each other, or else at steps of at most half the tolerance: the middle of a longer
+        segment may be too far from any vertex.
     tolerance : float
-        Largest distance between a vertex and a segment, exclusive, in the unit of the vertices.
+        Maximum distance between a vertex and a segment, exclusive, in the unit of the vertices.
 
     Returns
     -------
@@ -96,7 +96,13 @@ def match_polylines(first: np.ndarray, second: np.ndarray, tolerance: float) -> 
 
 
 def lattice_edges(first: np.ndarray, second: np.ndarray, tolerance: float) -> Edges:
-    """Pair every vertex with every segment of the other polyline nearer than the tolerance."""
+    """Pair every vertex with every segment of the other polyline that is closer than the tolerance.
+
+    Parameters
+    ----------
+    first, second : (m, 2), (n, 2) arrays
+    tolerance : float
+    """
     ahead, turned = _near_pairs(first, second, tolerance), _near_pairs(second, first, tolerance)
     turned = (turned[1], turned[0], *turned[2:])
     kind = np.repeat([ADVANCE_SECOND, ADVANCE_FIRST], [len(ahead[0]), len(turned[0])])
@@ -106,9 +112,9 @@ def lattice_edges(first: np.ndarray, second: np.ndarray, tolerance: float) -> Ed
 
 
 def _near_pairs(points: np.ndarray, line: np.ndarray, tolerance: float) -> tuple[np.ndarray, ...]:
-    """Vertices of `points` and segments of `line` in reach of each other: both numbers, segment length, penalty."""
+    """Return the vertices of `points` and segments of `line` that are close: both numbers, segment length, penalty."""
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    reach = tolerance + 0.5 * steps.max(initial=0.0)  # a segment in reach has an end this near
+    reach = tolerance + 0.5 * steps.max(initial=0.0)  # a close segment has an end within this distance
     near = cKDTree(points).sparse_distance_matrix(cKDTree(line), reach, output_type="ndarray")
     vertex = np.concatenate([near["i"], near["i"]])
     segment = np.concatenate([near["j"], near["j"] - 1])
@@ -120,7 +126,7 @@ def _near_pairs(points: np.ndarray, line: np.ndarray, tolerance: float) -> tuple
 
 
 def distance_to_segment(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Smallest distance of the segments p to q, (n, 2) each, from the origin; (n,)."""
+    """Return the distance of the segments from p to q, (n, 2) each, from the origin, (n,)."""
     along = q - p
     squared = np.einsum("ij,ij->i", along, along)
     share = np.clip(-np.einsum("ij,ij->i", p, along) / np.maximum(squared, np.finfo(float).tiny), 0.0, 1.0)
@@ -128,7 +134,7 @@ def distance_to_segment(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def squared_distance_integral(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Squared distance from the origin, integrated along the segments p to q, (n, 2) each; (n,).
+    """Integrate the squared distance from the origin along the segments from p to q, (n, 2) each; returns (n,).
 
     Gribov and Chang, appendix.
     """
@@ -137,7 +143,7 @@ def squared_distance_integral(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def _lattice_nodes(edges: Edges) -> tuple[np.ndarray, np.ndarray, int]:
-    """Find numbers for the lattice nodes that edges begin in, (n,), and end in, (n,); the third item is their count."""
+    """Find the lattice nodes, numbered from 0, where edges start, (n,), and end, (n,), and the number of nodes."""
     width = int(edges.second.max()) + 2
     begin = edges.first * width + edges.second
     end = begin + np.where(edges.kind == ADVANCE_FIRST, width, 1)
@@ -147,9 +153,9 @@ def _lattice_nodes(edges: Edges) -> tuple[np.ndarray, np.ndarray, int]:
 
 
 def _clusters(begin: np.ndarray, end: np.ndarray, node_count: int) -> np.ndarray:
-    """Give each edge the number of its cluster, the edges linked by continuation, (n,).
+    """Return the number of each edge's cluster, (n,): edges are linked where one continues another.
 
-    Edges that only begin, or only end, in one node do not continue each other: a node links them where it does both.
+    A node links its edges only if some end and some start there.
     """
     continued = np.zeros((2, node_count), dtype=bool)
     continued[0, end] = continued[1, begin] = True
@@ -163,9 +169,9 @@ def _clusters(begin: np.ndarray, end: np.ndarray, node_count: int) -> np.ndarray
 
 
 def _best_arrivals(edges: Edges, begin: np.ndarray, end: np.ndarray, node_count: int) -> tuple[np.ndarray, ...]:
-    """Length and penalty of the best path to each node and the edge it arrives by, -1 where none does; (k,) each.
+    """Return length and penalty of the best path to each node and its last edge, -1 if there is none; (k,) each.
 
-    Plain lists: the edges have to be taken one after the other, where numpy would cost ten times as much.
+    Plain lists are used because the edges must be taken one by one, for which numpy is ten times slower.
     """
     best_length, best_penalty, arrival = [0.0] * node_count, [0.0] * node_count, [-1] * node_count
     steps = zip(begin.tolist(), end.tolist(), edges.length.tolist(), edges.penalty.tolist())
@@ -180,7 +186,7 @@ def _best_arrivals(edges: Edges, begin: np.ndarray, end: np.ndarray, node_count:
 
 
 def _longest_then_cheapest(length: np.ndarray, penalty: np.ndarray) -> np.ndarray:
-    """Sort by falling length, and by rising penalty where lengths tie; returns numbers, (n,)."""
+    """Return the order, (n,), by descending length and, for equal lengths, by ascending penalty."""
     falling = np.argsort(-length, kind="stable")
     shorter = -np.diff(length[falling]) > TIE * np.maximum(length[falling][1:], 1.0)
     rank = np.concatenate([[0], np.cumsum(shorter)])
@@ -189,10 +195,10 @@ def _longest_then_cheapest(length: np.ndarray, penalty: np.ndarray) -> np.ndarra
 
 def _trace(edges: Edges, predecessor: np.ndarray, last: int, length: float, penalty: float) -> Match:
     """Follow the predecessors from a path's last edge to its first."""
-    path = [last]
-    while predecessor[path[-1]] >= 0:
-        path.append(int(predecessor[path[-1]]))
-    path = np.array(path[::-1])
+    backwards = [last]
+    while predecessor[backwards[-1]] >= 0:
+        backwards.append(int(predecessor[backwards[-1]]))
+    path = np.array(backwards[::-1])
     first = np.append(edges.first[path], edges.first[last] + (edges.kind[last] == ADVANCE_FIRST))
     second = np.append(edges.second[path], edges.second[last] + (edges.kind[last] == ADVANCE_SECOND))
     return Match(first, second, float(length), float(penalty))

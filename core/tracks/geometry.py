@@ -1,4 +1,7 @@
-"""Track geometry by chainage: gauge, cant, twist, radius and gradient, and how well the points support them."""
+"""Track geometry by chainage: gauge, cant, twist, radius and gradient, and how well the points support them.
+
+See docs/method.md section 9.1.
+"""
 
 from __future__ import annotations
 
@@ -12,32 +15,32 @@ from ..polyline import distance_to, interpolate, left_normals, length_along, res
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine, TrackGeometry, cell_borders
 from .midline import Meeting, Side, bridged_steps
-from .parallels import commonest_spacing
+from .parallels import most_common_spacing
 
-FINE_M = 0.25
+MEETING_STEP_M = 0.25
 """Spacing of the stations at which both rails are met."""
 
 PROFILE_SIGMA_M = 1.0
-"""Sigma of PAEK for gauge, cant and heights: a twist over 3 m keeps nearly all of its size."""
+"""Sigma of PAEK for gauge, cant and heights: a twist over 3 m keeps nearly its full size."""
 
-UNKNOWN_M = 1.5
-"""Farther from where both rails are there, gauge and cant can't be told: half the base of a twist."""
+MAX_EXTRAPOLATION_M = 1.5
+"""Distance from the nearest place with both rails up to which gauge and cant are given: half the base of a twist."""
 
 TWIST_BASE_M = 3.0
-"""Length over which the change of cant is stated, as the standards for track geometry do."""
+"""Length over which the change of cant is stated, as in the standards for track geometry."""
 
 HALF_CHORD_M = 10.0
-"""Radius is that of the circle through three points, the outer ones this far away: the versine on a chord of 20 m."""
+"""Distance of the outer ones of the three points that define the radius: it is measured on a chord of 20 m."""
 
 PLAN_SIGMA_M = 3.0
-"""Sigma of PAEK for these points: leaves half a millimetre, or 1 % at a radius of 600 m; a circle of 25 m shrinks by
-9 mm, which is less than 0.1 % of its radius."""
+"""Sigma of PAEK for these points: it leaves an error of half a millimetre, 1 % at a radius of 600 m. A circle of 25 m
+shrinks by 9 mm, less than 0.1 % of its radius."""
 
-LEAST_VERSINE_M = 0.005
-"""Flatter curves are not told from none: on a chord of 20 m those beyond 10 km, on that of a short piece others too."""
+MIN_VERSINE_M = 0.005
+"""Versine below which a curve cannot be distinguished from a straight: beyond a radius of 10 km on a chord of 20 m."""
 
 GRADE_BASE_M = 10.0
-"""Length over which the gradient is taken: 1 mm of height counts as 0.1 per mille."""
+"""Length over which the gradient is measured: 1 mm of height makes 0.1 per mille."""
 
 
 def measure_track_geometry(
@@ -52,35 +55,35 @@ def measure_track_geometry(
     Parameters
     ----------
     centerlines : sequence of Centerline
-        Their `left_ids` and `right_ids` name the rails; where they name none, the nearest at gauge are taken.
+        Their `left_ids` and `right_ids` refer to the rails; if none of those exist, the nearest rails at gauge serve.
     rails : sequence of RailLine
-        Best as `measuring.measure_in_squares` makes them from points: with heights that are smoothed over 1 m only,
-        and support by chainage. Of a rail without support, `sigma_mm` holds for all of it and `points` count as evenly
-        spread; without gaps, it counts as bridged only where it is missing.
+        Preferably from `remeasuring.measure_in_squares`, with heights smoothed over 1 m only and with support by
+        chainage. For a rail without support, `sigma_mm` is used everywhere and `points` are assumed to be evenly
+        spaced; without known gaps, it counts as bridged only where it is missing.
     head_width_m : float
     step_m : float
-        Distance of the stations, but for the last one, which is the end of the track.
+        Distance between stations; the last station is the end of the track.
     progress : Progress
 
     Returns
     -------
     tuple of TrackGeometry
-        One a centerline, in their order.
+        One per centerline, in the order given.
     """
-    beside = _Beside(rails)
-    return tuple(_measure(line, beside, head_width_m, step_m) for line in progress.follow(centerlines))
+    track_rails = _TrackRails(rails)
+    return tuple(_measure(line, track_rails, head_width_m, step_m) for line in progress.follow(centerlines))
 
 
-class _Beside:
-    """The rails that tracks may run between; what holds for all tracks is found once, and only if it is needed."""
+class _TrackRails:
+    """The rails between which tracks may run; properties of all of them are computed once, on demand."""
 
     def __init__(self, rails: Sequence[RailLine]) -> None:
         self.rails = rails
 
     @cached_property
     def spacing_m(self) -> float:
-        """Distance at which most rails lie."""
-        return commonest_spacing(self.rails, 0.0) or 0.0
+        """Most common distance of parallel rails."""
+        return most_common_spacing(self.rails, 0.0) or 0.0
 
     @cached_property
     def everyone(self) -> Side:
@@ -88,7 +91,7 @@ class _Beside:
         return self._side(range(len(self.rails)))
 
     def named(self, ids: Sequence[int]) -> Side:
-        """Rails of these ids, or all if none of them is there."""
+        """Return the rails with these ids, or all rails if there are none."""
         numbers = [number for number, rail in enumerate(self.rails) if rail.rail_id in ids]
         return self._side(numbers) if numbers else self.everyone
 
@@ -97,16 +100,16 @@ class _Beside:
         return Side.of(self.rails, spans, 0.0)
 
 
-def _measure(line: Centerline, beside: _Beside, head_width_m: float, step_m: float) -> TrackGeometry:
+def _measure(line: Centerline, track_rails: _TrackRails, head_width_m: float, step_m: float) -> TrackGeometry:
     """Measure one track."""
-    rails = beside.rails
-    fine, along = resample(line.xyz, FINE_M)
-    # The last station is the end, for what lies behind the last multiple of the step has to be stated too.
+    rails = track_rails.rails
+    fine, along = resample(line.xyz, MEETING_STEP_M)
+    # The last station is the end of the track, so that the part after the last multiple of the step is covered.
     chainage = np.append(np.arange(max(round(along[-1] / step_m), 1)) * step_m, along[-1])
     normals = left_normals(fine)
-    half = 0.5 * (line.gauge_mm / 1000 + head_width_m if np.isfinite(line.gauge_mm) else beside.spacing_m)
-    left = beside.named(line.left_ids).meet(fine[:, :2], normals, half)
-    right = beside.named(line.right_ids).meet(fine[:, :2], -normals, half)
+    half = 0.5 * (line.gauge_mm / 1000 + head_width_m if np.isfinite(line.gauge_mm) else track_rails.spacing_m)
+    left = track_rails.named(line.left_ids).meet(fine[:, :2], normals, half)
+    right = track_rails.named(line.right_ids).meet(fine[:, :2], -normals, half)
     cant = left.height_m - right.height_m
     gauge = np.hypot(left.distance_m + right.distance_m, np.nan_to_num(cant)) - head_width_m
     twist_at = np.add.outer(0.5 * TWIST_BASE_M * np.array([-1, 1]), chainage)
@@ -125,22 +128,22 @@ def _measure(line: Centerline, beside: _Beside, head_width_m: float, step_m: flo
         radius_m=_radius(line.xyz[:, :2], chainage),
         grade_pm=_grade(along, fine[:, 2], chainage),
         sigma_mm=1000 * np.interp(chainage, along, 0.5 * np.hypot(_sigma(rails, left), _sigma(rails, right))),
-        points=_whole(sum(_points(rails, side, along, cells) for side in (left, right))),
+        points=_whole(_points(rails, left, along, cells) + _points(rails, right, along, cells)),
         bridged=np.diff(np.interp(cells, along, bridged), axis=0)[0] > 0.5 * np.diff(cells, axis=0)[0],
     )
 
 
 def _profile(along: np.ndarray, values: np.ndarray, chainage: np.ndarray) -> np.ndarray:
-    """Smooth what is known of a profile; NaN where nothing near is."""
+    """Smooth the known values of a profile; NaN far from all of them."""
     known = np.isfinite(values)
     if not known.any():
         return np.full(len(chainage), np.nan)
     smooth = smooth_profile(along[known], values[known], PROFILE_SIGMA_M, chainage)
-    return np.where(distance_to(along[known], chainage) <= UNKNOWN_M, smooth, np.nan)
+    return np.where(distance_to(along[known], chainage) <= MAX_EXTRAPOLATION_M, smooth, np.nan)
 
 
 def _radius(xy: np.ndarray, chainage: np.ndarray) -> np.ndarray:
-    """Radius of the circle through three points; near the ends, of the nearest such circle on the line."""
+    """Return the radius of the circle through three points; near an end, of the last such circle on the line."""
     length = length_along(xy)[-1]
     half = min(HALF_CHORD_M, 0.5 * length)
     middle = np.clip(chainage, half, length - half)
@@ -150,18 +153,18 @@ def _radius(xy: np.ndarray, chainage: np.ndarray) -> np.ndarray:
     doubled_area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
     sides = np.prod([np.hypot(*side.T) for side in (first, second, chord)], axis=0)
     curvature = 2 * doubled_area / sides
-    bent = 0.5 * np.abs(curvature) * half**2 >= LEAST_VERSINE_M
+    bent = 0.5 * np.abs(curvature) * half**2 >= MIN_VERSINE_M
     return np.where(bent, 1 / np.where(bent, curvature, 1.0), np.nan)
 
 
 def _grade(along: np.ndarray, z: np.ndarray, chainage: np.ndarray) -> np.ndarray:
-    """Rise of the centerline in per mille; near the ends over what there is of the base."""
+    """Return the gradient in per mille; near the ends, over the part of the base that is on the line."""
     ends = np.clip([chainage - 0.5 * GRADE_BASE_M, chainage + 0.5 * GRADE_BASE_M], 0.0, along[-1])
     return 1000 * np.diff(np.interp(ends, along, z), axis=0)[0] / np.diff(ends, axis=0)[0]
 
 
 def _sigma(rails: Sequence[RailLine], side: Meeting) -> np.ndarray:
-    """Look up the standard deviation of the rails where they are met, (n,) metres; without support, of all the rail."""
+    """Look up the standard deviation of the rails at the meetings, (n,) metres; that of the whole rail if need be."""
     sigma = np.full(len(side.t), np.nan)
     for number in np.unique(side.rail):
         mine, rail = (side.rail == number) & np.isfinite(side.t), rails[number]
@@ -174,7 +177,7 @@ def _sigma(rails: Sequence[RailLine], side: Meeting) -> np.ndarray:
 
 
 def _points(rails: Sequence[RailLine], side: Meeting, along: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Tell how many points lie on the rails of one side in cells along the track, given their (2, n) borders."""
+    """Count the points on the rails of one side in cells along the track, given by their borders, (2, n)."""
     total = np.zeros(cells.shape[1])
     for number in np.unique(side.rail):
         mine = (side.rail == number) & np.isfinite(side.t)
@@ -182,21 +185,21 @@ def _points(rails: Sequence[RailLine], side: Meeting, along: np.ndarray, cells: 
             continue
         t = side.t[mine]
         steps = np.abs(np.diff(_points_before(rails[number], t)))
-        # Where a ring closes, or the rail is met again further on, what lies between was not passed.
-        steps[np.abs(np.diff(t)) > 2 * FINE_M] = 0.0
+        # Where a ring closes, or the rail is met again further on, the part in between was not passed.
+        steps[np.abs(np.diff(t)) > 2 * MEETING_STEP_M] = 0.0
         passed = np.concatenate([[0.0], np.cumsum(steps)])
         total += np.diff(np.interp(cells, along[mine], passed), axis=0)[0]
     return total
 
 
 def _whole(counts: np.ndarray) -> np.ndarray:
-    """Round counts so that any that follow each other add up to what they did, within one."""
-    total = np.round(np.cumsum(counts), 6)  # halves are common: which way they go must not hang on the last bit
+    """Round counts so that the sum of any successive ones changes by at most one."""
+    total = np.round(np.cumsum(counts), 6)  # halves are common: their rounding must not depend on the last bit
     return np.diff(np.round(total), prepend=0.0).astype(int)
 
 
 def _points_before(rail: RailLine, t: np.ndarray) -> np.ndarray:
-    """Count the points between the start of a rail and the chainages `t`, (n,); unknown support counts as even."""
+    """Count the points between the start of a rail and chainages, (n,); without support, as if evenly spaced."""
     support = rail.support
     if support is None:
         return rail.points * np.clip(t / length_along(rail.xyz[:, :2])[-1], 0.0, 1.0)

@@ -1,4 +1,7 @@
-"""Where both rails of a track are met on the normals of a guide line, and the middle between them."""
+"""The rails of a track on the normals of its provisional centerline, and the middle between them.
+
+See docs/method.md section 8.6.
+"""
 
 from __future__ import annotations
 
@@ -11,93 +14,115 @@ from scipy.spatial import cKDTree
 from ..polyline import interpolate, length_along
 from ..rails import RailLine
 
-PIECE_M = 0.1
-"""Pieces in which rails are searched; on a tram's curve of 25 m they deviate by 0.05 mm."""
+SEARCH_STEP_M = 0.1
+"""Length of the segments in which rails are searched; in a tram curve of 25 m they deviate by 0.05 mm."""
 
-ASTRAY_M = 0.2
-"""Rails are looked for this far from where the guide expects them: it runs straight across gaps of 5 m in curves."""
+MAX_OFFSET_M = 0.2
+"""Distance from the expected place within which a rail is searched: the provisional centerline is straight across gaps
+of 5 m in curves."""
 
 
 @dataclass(frozen=True)
 class Meeting:
-    """Where normals meet the rails of one side, (n,) arrays.
+    """Intersections of normals with the rails of one side, (n,) arrays.
 
     Attributes
     ----------
     distance_m, height_m : float
-        How far the rail is and how high; NaN where there is none near the expected distance.
+        Distance and height of the rail; NaN where there is none near the expected distance.
     rail : int
-        Number of the rail that was met.
+        Number of the rail.
     t : float
-        Plan chainage along it.
-    matched : bool
-        Whether it was matched there.
+        Plan chainage along the rail.
+    paired : bool
+        Whether the rail is paired there.
     """
 
     distance_m: np.ndarray
     height_m: np.ndarray
     rail: np.ndarray
     t: np.ndarray
-    matched: np.ndarray
+    paired: np.ndarray
 
     @classmethod
     def joined(cls, parts: Sequence[Meeting]) -> Meeting:
-        """Put meetings in a row."""
+        """Concatenate meetings."""
         return cls(*(np.concatenate(columns) for columns in zip(*(vars(part).values() for part in parts))))
 
     def without(self, which: np.ndarray) -> Meeting:
-        """Forget the rails met from some stations, (n,) bool."""
+        """Remove the rails met at the stations marked in `which`, (n,) bool."""
         values = [np.where(which, np.nan, column) for column in (self.distance_m, self.height_m, self.t)]
-        return Meeting(values[0], values[1], self.rail, values[2], self.matched)
+        return Meeting(values[0], values[1], self.rail, values[2], self.paired)
 
 
 @dataclass(frozen=True)
 class Side:
-    """The rails on one side of a track, in short pieces; piece k runs from point k to point k + 1 of one stretch.
+    """The rails on one side of a track, in short segments: segment k runs from point k to point k + 1 of a section.
 
     Attributes
     ----------
     xyz : (n, 3) array
-    stretch : (n,) int array
-        Number of the stretch that each point belongs to.
+    section : (n,) int array
+        Number of the section to which each point belongs.
     rail : (n,) int array
+        Number of the rail.
     t : (n,) array
-        Rail of each point, and plan chainage along it.
-    matched : (n,) bool array
-        Whether the point lies within the stretch, not in the margin.
+        Plan chainage along the rail.
+    paired : (n,) bool array
+        Whether the point is in the section itself, not in the margin.
     tree : cKDTree
-        Of the points in plan.
+        Index of the points in plan.
     """
 
     xyz: np.ndarray
-    stretch: np.ndarray
+    section: np.ndarray
     rail: np.ndarray
     t: np.ndarray
-    matched: np.ndarray
+    paired: np.ndarray
     tree: cKDTree
 
     @classmethod
     def of(cls, rails: Sequence[RailLine], spans: Sequence[tuple[int, tuple[float, float]]], margin_m: float) -> Side:
-        """Cut the spans out of their rails, with a margin that shows a rail on while its partner is broken."""
-        pieces, chainages, matched = [], [], []
+        """Cut sections out of their rails.
+
+        Parameters
+        ----------
+        rails : sequence of RailLine
+        spans : sequence of tuple
+            Number of the rail and chainages of start and end of each section.
+        margin_m : float
+            Length added at both ends, for a rail that continues while the other one has a gap.
+        """
+        pieces, chainages, paired = [], [], []
         for number, span in spans:
             line = rails[number].xyz
             along = length_along(line[:, :2])
             start, end = max(min(span) - margin_m, 0.0), min(max(span) + margin_m, along[-1])
-            chainages.append(np.linspace(start, end, int(np.ceil((end - start) / PIECE_M)) + 1))
+            chainages.append(np.linspace(start, end, int(np.ceil((end - start) / SEARCH_STEP_M)) + 1))
             pieces.append(interpolate(line, along, chainages[-1]))
-            matched.append((chainages[-1] >= min(span)) & (chainages[-1] <= max(span)))
+            paired.append((chainages[-1] >= min(span)) & (chainages[-1] <= max(span)))
         counts = [len(piece) for piece in pieces]
         rail = np.repeat([number for number, _ in spans], counts)
-        stretch = np.repeat(np.arange(len(pieces)), counts)
-        xyz, t, matched = (np.concatenate(parts) for parts in (pieces, chainages, matched))
-        return cls(xyz, stretch, rail, t, matched, cKDTree(xyz[:, :2]))
+        section = np.repeat(np.arange(len(pieces)), counts)
+        xyz, t, paired = (np.concatenate(parts) for parts in (pieces, chainages, paired))
+        return cls(xyz, section, rail, t, paired, cKDTree(xyz[:, :2]))
 
     def meet(
-        self, stations: np.ndarray, directions: np.ndarray, expected_m: float, astray_m: float = ASTRAY_M
+        self, stations: np.ndarray, directions: np.ndarray, expected_m: float, max_offset_m: float = MAX_OFFSET_M
     ) -> Meeting:
-        """Go from stations in their directions, (n, 2) unit vectors, to the rail."""
-        off, nearest = self.tree.query(stations + expected_m * directions, distance_upper_bound=astray_m)
+        """Find the rails in given directions from stations.
+
+        Parameters
+        ----------
+        stations : (n, 2) array
+        directions : (n, 2) array
+            Unit vectors.
+        expected_m : float
+            Expected distance of the rail.
+        max_offset_m : float
+            Maximum deviation from the expected place.
+        """
+        off, nearest = self.tree.query(stations + expected_m * directions, distance_upper_bound=max_offset_m)
         nearest = np.where(np.isfinite(off), nearest, 0)
         found = np.full((3, len(stations)), np.nan)
         for first in (nearest - 1, nearest):
@@ -105,33 +130,41 @@ class Side:
             ahead_a, ahead_b = (self._ahead(point, stations, directions) for point in (a, b))
             passed = ahead_a - ahead_b
             share = np.divide(ahead_a, passed, out=np.full(len(passed), np.inf), where=passed != 0)
-            # A rail is prolonged by a piece: two rails of a track hardly end abreast to the centimetre.
-            met = np.isfinite(off) & (self.stretch[a] == self.stretch[b]) & (share >= -1) & (share <= 2)
+            # A rail is extended by a segment, because two rails of a track do not end abreast to the centimetre.
+            met = np.isfinite(off) & (self.section[a] == self.section[b]) & (share >= -1) & (share <= 2)
             share = np.where(met, share, 0.0)
             point = self.xyz[a] + share[:, None] * (self.xyz[b] - self.xyz[a])
             distance = np.einsum("ij,ij->i", point[:, :2] - stations, directions)
             t = self.t[a] + share * (self.t[b] - self.t[a])
             found = np.where(met, [distance, point[:, 2], t], found)
         distance, height, t = found
-        return Meeting(distance, height, self.rail[nearest], t, self.matched[nearest])
+        return Meeting(distance, height, self.rail[nearest], t, self.paired[nearest])
 
     def _ahead(self, point: np.ndarray, stations: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """How far points lie to the left of the way from the stations in their directions, (n,)."""
+        """Return the offset of points to the left of the rays from the stations in their directions, (n,)."""
         step = self.xyz[point, :2] - stations
         return directions[:, 0] * step[:, 1] - directions[:, 1] * step[:, 0]
 
 
 def at_gauge(left: Meeting, right: Meeting, spacing_m: float, tolerance_m: float) -> tuple[Meeting, Meeting]:
-    """Believe in a rail beyond the stretch in which it was matched only where it keeps the distance to the other one.
+    """Remove rails outside their sections where they do not keep the distance to the other rail.
 
-    A stock rail that runs on into the branch soon leaves the through track.
+    A stock rail that continues into the branch, for example, soon leaves the through track.
+
+    Parameters
+    ----------
+    left, right : Meeting
+    spacing_m : float
+        Distance between the rail lines.
+    tolerance_m : float
+        Maximum deviation from it.
     """
     astray = np.abs(left.distance_m + right.distance_m - spacing_m) > tolerance_m
-    return left.without(astray & ~left.matched), right.without(astray & ~right.matched)
+    return left.without(astray & ~left.paired), right.without(astray & ~right.paired)
 
 
 def midway(
-    guide: np.ndarray,
+    stations: np.ndarray,
     normals: np.ndarray,
     left: Meeting,
     right: Meeting,
@@ -139,15 +172,16 @@ def midway(
 ) -> np.ndarray:
     """Find the middle between both rails at stations.
 
-    Where one rail is missing, the other and half the usual spacing tell; where both are, the station is left out.
+    Where one rail is missing, the middle is half the median spacing from the other; stations without any rail are left
+    out.
 
     Parameters
     ----------
-    guide, normals : (n, 2) arrays
+    stations, normals : (n, 2) arrays
         Stations between the rails and unit vectors to the left.
     left, right : Meeting
     spacing_m : float
-        Spacing to assume where no station meets both rails.
+        Spacing to use if no station meets both rails.
 
     Returns
     -------
@@ -159,37 +193,37 @@ def midway(
     shift = np.where(np.isnan(both), np.where(np.isnan(to_left), usual / 2 - to_right, to_left - usual / 2), 0.0)
     shift = np.where(np.isnan(both), shift, (to_left - to_right) / 2)
     known = ~np.isnan(shift)
-    return np.column_stack([guide + shift[:, None] * normals, _heights(left.height_m, right.height_m)])[known]
+    return np.column_stack([stations + shift[:, None] * normals, _heights(left.height_m, right.height_m)])[known]
 
 
 def _heights(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Find the height midway between both rails, (n,); where one is missing, the other and the cant around tell."""
+    """Find the height midway between both rails, (n,); where one is missing, from the other and the cant around."""
     half_cant = np.nan_to_num(_filled(left - right)) / 2
     return _filled(np.where(np.isnan(left), right + half_cant, left - half_cant))
 
 
 def bridged_steps(rails: Sequence[RailLine], left: Meeting, right: Meeting, along: np.ndarray) -> np.ndarray:
-    """Measure on how much of each step a rail has no points or is not there.
+    """Measure the length, between successive stations, over which a rail is missing or has no points.
 
     Parameters
     ----------
     rails : sequence of RailLine
-        The rails that the meetings number.
+        The rails to which the numbers in the meetings refer.
     left, right : Meeting
     along : (n,) array
-        Chainage of the stations from which rails are met.
+        Chainage of the stations.
 
     Returns
     -------
     (n - 1,) array
-        Metres between each two stations.
+        Metres.
     """
     steps = np.diff(along)
     return np.maximum(_bridged_on(rails, left, steps), _bridged_on(rails, right, steps))
 
 
 def _bridged_on(rails: Sequence[RailLine], side: Meeting, steps: np.ndarray) -> np.ndarray:
-    """Measure the same on one side only."""
+    """Return the same for one side only, given the distances between stations, (n - 1,)."""
     before = np.full(len(side.t), np.nan)
     for number in np.unique(side.rail):
         mine = side.rail == number
@@ -201,6 +235,6 @@ def _bridged_on(rails: Sequence[RailLine], side: Meeting, steps: np.ndarray) -> 
 
 
 def _filled(values: np.ndarray) -> np.ndarray:
-    """Interpolate what is missing from its neighbours; all NaN stays so."""
+    """Interpolate missing values from their neighbours; if all are NaN, they stay NaN."""
     known = np.flatnonzero(~np.isnan(values))
     return np.interp(np.arange(len(values)), known, values[known]) if len(known) else values

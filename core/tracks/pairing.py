@@ -1,4 +1,7 @@
-"""Which stretch of which rail makes a track with which: the paper's matching on offset curves."""
+"""Pairing of rails into sections of track: the matching of Gribov and Chang, applied to offset curves.
+
+See docs/method.md sections 8.3 and 8.4.
+"""
 
 from __future__ import annotations
 
@@ -12,46 +15,46 @@ from ..polyline import interpolate, left_normals, length_along, project
 from ..progress import SILENT, Progress
 from ..rails import RailLine
 from .dtw import match_polylines
-from .parallels import REACH_M, Parallels, find_parallels
+from .parallels import MAX_SPACING_M, Parallels, find_parallels
 
-MIN_LENGTH_M = 3.0
-"""Shorter stretches at gauge are chance meetings in a switch."""
+MIN_SECTION_M = 3.0
+"""Shorter sections at gauge occur by chance in a switch."""
 
-OVERLAP_M = 0.5
-"""Two matches may both claim this much of a rail's side: where a match ends is no sharper than that."""
+MAX_OVERLAP_M = 0.5
+"""Length of a rail's side that two matches may both claim: the end of a match is not known more exactly."""
 
 CHUNK_M = 1000.0
-"""Longest stretch matched in one go: bounds the memory."""
+"""Longest section matched at once: limits the memory."""
 
 MARGIN_M = 1.0
-"""Length added to a stretch found at stations, so that the exact matching finds its ends."""
+"""Length added to a section found at stations, so that the exact matching finds its ends."""
 
-COARSE_M = 0.5
-"""Spacing of the matched stations; on a tram's curve of 25 m their chords deviate by 1 mm."""
+COARSE_STEP_M = 0.5
+"""Spacing of the matched stations; in a tram curve of 25 m their chords deviate by 1 mm."""
 
-FINE_M = 0.025
-"""Their spacing where rails come within the tolerance or leave it: where a match ends is known to this."""
+FINE_STEP_M = 0.025
+"""Spacing of the stations where rails enter or leave the tolerance: the resolution of the ends of a match."""
 
-SPLIT_M = 5.0
-"""Stations abreast that lie further apart than this begin a new stretch: gaps in a rail are at most about as long."""
+MIN_BREAK_M = 5.0
+"""Distance between stations along a rail from which a new section begins: about the length of the longest gap."""
 
-SAME_LEVEL_M = 0.4
-"""Rails of a track differ in height by cant alone, 0.2 m at most; those of a bridge and those below it by metres."""
+MAX_LEVEL_M = 0.4
+"""Maximum height difference of the rails of a track: cant makes at most 0.2 m, a bridge several metres."""
 
 LEFT, RIGHT = 1, -1
 
 
 @dataclass(frozen=True)
 class RailPair:
-    """A stretch of track: two rails at gauge, seen in a direction in which `left` lies on the left.
+    """A section of track: two rails at gauge, in the direction in which `left` is on the left.
 
     Attributes
     ----------
     left, right : int
         Numbers of the rails in the sequence that was paired.
     left_span, right_span : tuple of float
-        Plan chainage along each rail, in its own direction, at the start and at the end of the stretch; the second is
-        the smaller where the rail runs against the stretch.
+        Plan chainage along each rail at the start and at the end of the section; the second is the smaller one if the
+        rail runs against the direction of the section.
     """
 
     left: int
@@ -65,7 +68,7 @@ class RailPair:
         return 0.5 * (abs(np.subtract(*self.left_span)) + abs(np.subtract(*self.right_span)))
 
     def reversed(self) -> RailPair:
-        """Look at the same stretch from its other end."""
+        """Return the same section in the opposite direction."""
         return RailPair(self.right, self.left, self.right_span[::-1], self.left_span[::-1])
 
 
@@ -77,10 +80,10 @@ def pair_rails(
     other_gauges_m: Sequence[float] = (),
     progress: Progress = SILENT,
 ) -> tuple[RailPair, ...]:
-    """Find the stretches along which two rails of one class lie a gauge apart (docs/method.md section 8.3).
+    """Find the sections along which two rails of one class are at gauge (docs/method.md section 8.3).
 
-    Each rail is moved half the spacing towards the other, and the moved curves are matched. Every rail has two sides;
-    a stretch of a side serves one track, that of the longest match.
+    Each rail is moved half the spacing towards the other, and the moved curves are matched. Every rail has two sides,
+    and each section of a side belongs to one track, that of the longest match.
 
     Parameters
     ----------
@@ -88,35 +91,35 @@ def pair_rails(
     gauge_m, head_width_m : float
         Their sum is the distance between the rail lines.
     tolerance_m : float
-        Largest deviation from that distance.
+        Maximum deviation from that distance.
     other_gauges_m : sequence of float
-        Gauges that rails are paired by as well: a match that is nearer to one of them belongs to that.
+        Other gauges for which rails are paired: a match that is closer to one of them is left to it.
     progress : Progress
 
     Returns
     -------
     tuple of RailPair
-        The longest first. A stretch longer than CHUNK_M comes in pieces.
+        The longest first. A section longer than CHUNK_M is returned in parts.
     """
     if len(rails) < 2:
         return ()
     spacing = gauge_m + head_width_m
-    reach_m = max(REACH_M, spacing + 2 * tolerance_m)
+    reach_m = max(MAX_SPACING_M, spacing + 2 * tolerance_m)
     parallels = find_parallels(rails, reach_m, progress.span(0.0, 0.3))
-    # Chords of stations and rails not quite abreast hide a little of the true distance, hence the doubled tolerance.
+    # Chords between stations, and stations not exactly abreast, distort the distance a little: double the tolerance.
     at_gauge = parallels[np.abs(np.abs(parallels.left_m) - spacing) < 2 * tolerance_m]
-    candidates = [stretch for group in at_gauge.groups() for stretch in _stretches(group)]
+    candidates = [section for group in at_gauge.groups() for section in _sections(group)]
     others_m = [gauge + head_width_m for gauge in other_gauges_m]
-    matches = []
-    for stretch in progress.span(0.3, 1.0).follow(candidates):
-        found = _match(rails, stretch, spacing, tolerance_m)
-        matches.extend(match for match in found if _is_nearest(match, stretch, spacing, others_m))
+    matches: list[_Match] = []
+    for section in progress.span(0.3, 1.0).follow(candidates):
+        found = _match(rails, section, spacing, tolerance_m)
+        matches.extend(match for match in found if _is_nearest(match, section, spacing, others_m))
     return tuple(match.pair() for match in _without_ghosts(_select(matches)))
 
 
 @dataclass(frozen=True)
 class _Match:
-    """Chainages of rails a and b at the nodes of one match, in the direction of a; side as in `LEFT`, `RIGHT`."""
+    """Chainages of rails a and b at the nodes of one match, in the direction of a; sides are `LEFT` or `RIGHT`."""
 
     a: int
     b: int
@@ -136,14 +139,14 @@ class _Match:
 
     def pair(self) -> RailPair:
         span_a, span_b = ((float(t[0]), float(t[-1])) for t in (self.t_a, self.t_b))
-        if self.side_a == LEFT:  # the partner lies on the left of a
+        if self.side_a == LEFT:  # b is on the left of a
             return RailPair(self.b, self.a, span_b, span_a)
         return RailPair(self.a, self.b, span_a, span_b)
 
 
-def _stretches(group: Parallels) -> Iterator[Parallels]:
-    """Cut the stations of two rails, sorted by t_a, where they leave a gap, and into chunks."""
-    gap = np.diff(group.t_a) > SPLIT_M
+def _sections(group: Parallels) -> Iterator[Parallels]:
+    """Divide the stations of two rails, sorted by t_a, at gaps and into chunks."""
+    gap = np.diff(group.t_a) > MIN_BREAK_M
     run = np.concatenate([[0], np.cumsum(gap)])
     starts = group.t_a[np.concatenate([[True], gap])][run]
     piece = ((group.t_a - starts) / CHUNK_M).astype(int)
@@ -152,41 +155,41 @@ def _stretches(group: Parallels) -> Iterator[Parallels]:
         yield group[mine]
 
 
-def _match(rails: Sequence[RailLine], stretch: Parallels, spacing: float, tolerance_m: float) -> Iterator[_Match]:
-    """Match the offset curves of two rails along one stretch."""
-    a, b, same = int(stretch.a[0]), int(stretch.b[0]), bool(stretch.same[0])
-    side_a = LEFT if stretch.left_m[0] > 0 else RIGHT
+def _match(rails: Sequence[RailLine], section: Parallels, spacing: float, tolerance_m: float) -> Iterator[_Match]:
+    """Match the offset curves of two rails along one section."""
+    a, b, same = int(section.a[0]), int(section.b[0]), bool(section.same[0])
+    side_a = LEFT if section.left_m[0] > 0 else RIGHT
     side_b = -side_a if same else side_a
-    curve_a = _OffsetCurve.along(rails[a].xyz[:, :2], stretch.t_a, side_a * spacing / 2)
-    curve_b = _OffsetCurve.along(rails[b].xyz[:, :2], stretch.t_b, side_b * spacing / 2)
+    curve_a = _OffsetCurve.along(rails[a].xyz[:, :2], section.t_a, side_a * spacing / 2)
+    curve_b = _OffsetCurve.along(rails[b].xyz[:, :2], section.t_b, side_b * spacing / 2)
     if not same:
         curve_b = curve_b.reversed()
     for s_a, s_b in _abreast(curve_a, curve_b, tolerance_m):
         for found in match_polylines(curve_a.at(s_a), curve_b.at(s_b), tolerance_m):
             t_a, t_b = curve_a.t_at(s_a[found.first]), curve_b.t_at(s_b[found.second])
             match = _Match(a, b, t_a, t_b, side_a, side_b, found.penalty / found.length)
-            if match.length_m >= MIN_LENGTH_M and _on_one_level(rails[a].xyz, t_a, rails[b].xyz, t_b):
+            if match.length_m >= MIN_SECTION_M and _on_one_level(rails[a].xyz, t_a, rails[b].xyz, t_b):
                 yield match
 
 
-def _is_nearest(match: _Match, stretch: Parallels, spacing: float, others_m: Sequence[float]) -> bool:
-    """Tell whether the rails of a match, found along a stretch, lie no nearer to another spacing."""
+def _is_nearest(match: _Match, section: Parallels, spacing: float, others_m: Sequence[float]) -> bool:
+    """Return whether no other spacing is closer to that of a match found along a section."""
     first, last = np.sort(match.t_a[[0, -1]])
-    inside = (stretch.t_a >= first) & (stretch.t_a <= last)
-    apart_m = np.abs(stretch.left_m[inside]).mean()
+    inside = (section.t_a >= first) & (section.t_a <= last)
+    apart_m = np.abs(section.left_m[inside]).mean()
     return all(abs(apart_m - spacing) <= abs(apart_m - other) for other in others_m)
 
 
 def _on_one_level(a: np.ndarray, t_a: np.ndarray, b: np.ndarray, t_b: np.ndarray) -> bool:
-    """Tell whether two rails, (n, 3) and (m, 3), lie on one level abreast of each other; unknown heights do."""
+    """Return whether two rails, (n, 3) and (m, 3), are on one level at chainages; unknown heights count as equal."""
     z_a, z_b = (np.interp(t, length_along(line[:, :2]), line[:, 2]) for line, t in ((a, t_a), (b, t_b)))
     apart = np.abs(z_a - z_b)[np.isfinite(z_a - z_b)]
-    return not len(apart) or bool(np.median(apart) <= SAME_LEVEL_M)
+    return not len(apart) or bool(np.median(apart) <= MAX_LEVEL_M)
 
 
 @dataclass(frozen=True)
 class _OffsetCurve:
-    """A stretch of a rail moved to its left: vertices, (m, 2), chainage along itself and along the rail, (m,) each."""
+    """Part of a rail moved to its left: vertices, (m, 2), chainage along the curve and along the rail, (m,) each."""
 
     xy: np.ndarray
     s: np.ndarray
@@ -194,78 +197,78 @@ class _OffsetCurve:
 
     @classmethod
     def along(cls, rail: np.ndarray, t: np.ndarray, left_m: float) -> _OffsetCurve:
-        """Move the stretch around the chainages `t` of a rail, (n, 2)."""
+        """Move the part of a rail, (n, 2), around the chainages `t` to the left by `left_m`."""
         along = length_along(rail)
         start, end = max(t.min() - MARGIN_M, 0.0), min(t.max() + MARGIN_M, along[-1])
-        stations = np.linspace(start, end, int(np.ceil((end - start) / COARSE_M)) + 1)
+        stations = np.linspace(start, end, int(np.ceil((end - start) / COARSE_STEP_M)) + 1)
         curve = interpolate(rail, along, stations)
         curve = curve + left_m * left_normals(curve)
         return cls(curve, length_along(curve), stations)
 
     def reversed(self) -> _OffsetCurve:
-        """Run along the same curve the other way."""
+        """Return the same curve in the opposite direction."""
         return _OffsetCurve(self.xy[::-1], self.s[-1] - self.s[::-1], self.t[::-1])
 
     def at(self, s: np.ndarray) -> np.ndarray:
-        """Places at chainages along the curve, (n, 2)."""
+        """Return the places at chainages along the curve, (n, 2)."""
         return interpolate(self.xy, self.s, s)
 
     def t_at(self, s: np.ndarray) -> np.ndarray:
-        """Chainages along the rail at chainages along the curve, (n,)."""
+        """Convert chainages along the curve to chainages along the rail, (n,)."""
         return np.interp(s, self.s, self.t)
 
 
 def _abreast(a: _OffsetCurve, b: _OffsetCurve, tolerance_m: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Place stations abreast of each other along stretches of two curves within the tolerance; chainages along both.
+    """Place stations abreast of each other where two curves are within the tolerance; yields chainages along both.
 
-    Vertices that lie abreast leave no segment without a neighbour, however long it is, and thus need not lie denser
-    than the shape of the curves asks for. Only where a stretch may end they do.
+    With vertices abreast of each other no segment, however long, is without a neighbour, so their spacing depends only
+    on the shape of the curves. It is finer only where a section may end.
     """
     near = np.zeros(len(a.s), dtype=bool)
     near[project([b.xy], a.xy, tolerance_m).point] = True
     changes = np.flatnonzero(np.diff(near))
-    share = np.arange(FINE_M / COARSE_M, 1.0, FINE_M / COARSE_M)
+    share = np.arange(FINE_STEP_M / COARSE_STEP_M, 1.0, FINE_STEP_M / COARSE_STEP_M)
     s = np.sort(np.append(a.s, a.s[changes, None] + share * np.diff(a.s)[changes, None]))
     feet = project([b.xy], a.at(s), tolerance_m)
     order = np.argsort(feet.point)
     point, t = feet.point[order], feet.t[order]
-    # A closed rail that begins elsewhere than its partner begins anew within the stretch.
-    apart = (np.diff(point) > 1) | (np.abs(np.diff(t)) > SPLIT_M)
+    # The start of a closed rail may be in the middle of the section.
+    apart = (np.diff(point) > 1) | (np.abs(np.diff(t)) > MIN_BREAK_M)
     for run in np.split(np.arange(len(point)), np.flatnonzero(apart) + 1):
         if len(run) > 1:
             yield s[point[run]], t[run]
 
 
 def _select(matches: Sequence[_Match]) -> list[_Match]:
-    """Give every stretch of a rail's side to the longest match that claims it."""
-    used = _Sides()
+    """Assign every section of a rail's side to the longest match that claims it."""
+    used = _PairedSides()
     selected = []
     for match in sorted(matches, key=lambda match: (-match.length_m, match.mean_penalty)):
-        for part in _free_runs(match, used.on_a(match) | used.on_b(match)):
+        for part in _free_runs(match, used.same_side_a(match) | used.same_side_b(match)):
             used.add(part)
             selected.append(part)
     return selected
 
 
 def _without_ghosts(matches: Sequence[_Match]) -> list[_Match]:
-    """Drop what lies between two tracks whose inner rails happen to be at gauge too, as of trams 3 m apart.
+    """Drop matches between two tracks whose inner rails are at gauge by chance, as with tram tracks 3 m apart.
 
-    A rail that has a single partner belongs to its track for sure. Where a match takes a rail away from such a track,
-    and the other one has a partner on its far side as well, nothing but chance speaks for it; one after the other, so
-    that of many tracks in a row every second match stays.
+    A rail with a single partner certainly belongs to its track. A match that takes a rail from such a track, and whose
+    other rail has a partner on its far side too, is due to chance. Matches are dropped in rounds, so that of many
+    tracks side by side every second match stays.
     """
     while True:
-        partners = _Sides(matches)
-        doubtful = [partners.beyond_a(match) & partners.beyond_b(match) for match in matches]
-        sure = _Sides(part for match, out in zip(matches, doubtful) for part in _free_runs(match, out))
-        ghosts = [out & (sure.beyond_a(match) | sure.beyond_b(match)) for match, out in zip(matches, doubtful)]
+        partners = _PairedSides(matches)
+        doubtful = [partners.far_side_a(match) & partners.far_side_b(match) for match in matches]
+        sure = _PairedSides(part for match, out in zip(matches, doubtful) for part in _free_runs(match, out))
+        ghosts = [out & (sure.far_side_a(match) | sure.far_side_b(match)) for match, out in zip(matches, doubtful)]
         if not any(ghost.any() for ghost in ghosts):
             return list(matches)
         matches = [part for match, ghost in zip(matches, ghosts) for part in _free_runs(match, ghost)]
 
 
-class _Sides:
-    """Which stretches of the sides of rails have partners."""
+class _PairedSides:
+    """The sections of the sides of rails that have partners."""
 
     def __init__(self, matches: Iterable[_Match] = ()) -> None:
         self._used: dict[tuple[int, int], list[tuple[float, float]]] = defaultdict(list)
@@ -273,39 +276,39 @@ class _Sides:
             self.add(match)
 
     def add(self, match: _Match) -> None:
-        """Take note of a match."""
+        """Add the rails of a match."""
         self._used[match.a, match.side_a].append(tuple(np.sort(match.t_a[[0, -1]])))
         self._used[match.b, match.side_b].append(tuple(np.sort(match.t_b[[0, -1]])))
 
-    def on_a(self, match: _Match) -> np.ndarray:
-        """Tell at which nodes of a match its first rail has a partner on this side, (n,) bool."""
+    def same_side_a(self, match: _Match) -> np.ndarray:
+        """Return the nodes of a match at which its first rail has a partner on the side of the match, (n,) bool."""
         return _inside(match.t_a, self._used[match.a, match.side_a])
 
-    def on_b(self, match: _Match) -> np.ndarray:
-        """Tell the same of its second rail."""
+    def same_side_b(self, match: _Match) -> np.ndarray:
+        """Return the same for the second rail."""
         return _inside(match.t_b, self._used[match.b, match.side_b])
 
-    def beyond_a(self, match: _Match) -> np.ndarray:
-        """Tell at which nodes its first rail has a partner on the other side, (n,) bool."""
+    def far_side_a(self, match: _Match) -> np.ndarray:
+        """Return the nodes at which the first rail has a partner on its other side, (n,) bool."""
         return _inside(match.t_a, self._used[match.a, -match.side_a])
 
-    def beyond_b(self, match: _Match) -> np.ndarray:
-        """Tell the same of its second rail."""
+    def far_side_b(self, match: _Match) -> np.ndarray:
+        """Return the same for the second rail."""
         return _inside(match.t_b, self._used[match.b, -match.side_b])
 
 
 def _inside(t: np.ndarray, intervals: Sequence[tuple[float, float]]) -> np.ndarray:
-    """Tell which chainages lie within the intervals by more than the tolerated overlap, (n,) bool."""
+    """Return the chainages that are within the intervals by more than the tolerated overlap, (n,) bool."""
     inside = np.zeros(len(t), dtype=bool)
     for start, end in intervals:
-        inside |= (t > start + OVERLAP_M) & (t < end - OVERLAP_M)
+        inside |= (t > start + MAX_OVERLAP_M) & (t < end - MAX_OVERLAP_M)
     return inside
 
 
 def _free_runs(match: _Match, taken: np.ndarray) -> Iterator[_Match]:
-    """Split a match into the parts between taken nodes that are long enough."""
+    """Return the parts of a match between the nodes marked in `taken` that are long enough."""
     borders = np.flatnonzero(np.diff(taken)) + 1
     for run in np.split(np.arange(len(taken)), borders):
         part = match[run[0] : run[-1] + 1]
-        if not taken[run[0]] and part.length_m >= MIN_LENGTH_M:
+        if not taken[run[0]] and part.length_m >= MIN_SECTION_M:
             yield part

@@ -1,4 +1,7 @@
-"""Where rails run beside each other: a cheap look at stations before any exact matching."""
+"""Where rails run next to each other: a quick comparison of stations before the exact matching.
+
+See docs/method.md section 8.1.
+"""
 
 from __future__ import annotations
 
@@ -12,39 +15,39 @@ from ..polyline import left_normals, resample, unit_tangents
 from ..progress import SILENT, Progress
 from ..rails import RailLine
 
-STEP_M = 0.5
-"""Spacing of the stations: six on the shortest match, and a railway curve stays within 2 mm of their chords."""
+SAMPLE_STEP_M = 0.5
+"""Spacing of the stations: six on the shortest section, and a railway curve is within 2 mm of the chords."""
 
-REACH_M = 2.2
-"""Rails further apart than this are of two tracks: the widest gauge in use is 1676 mm."""
+MAX_SPACING_M = 2.2
+"""Rails further apart than this belong to two tracks: the widest gauge in use is 1676 mm."""
 
-NEAREST_M = 0.45
-"""Lines nearer than this are no track: the narrowest gauge is 500 mm, less what it may vary."""
+MIN_SPACING_M = 0.45
+"""Lines closer than this are not a track: the narrowest gauge is 500 mm, less its tolerance."""
 
-SINE_PARALLEL = np.sin(np.radians(10.0))
-"""Rails of a track run in one direction; beyond ten degrees they cross."""
+MAX_SINE = np.sin(np.radians(10.0))
+"""Sine of the angle from which rails cross: those of a track are parallel within ten degrees."""
 
-BIN_M = 0.01
-"""Width of the bins in which the commonest spacing is sought: rails of one track vary by less."""
+SPACING_BIN_M = 0.01
+"""Width of the bins in which the most common spacing is sought: the spacing of one track varies by less."""
 
 STATIONS_AT_ONCE = 20_000
-"""Stations whose neighbours are sought in one go, a few hundred thousand: bounds the memory."""
+"""Stations searched at once, with a few hundred thousand neighbours: limits the memory."""
 
 
 @dataclass(frozen=True)
 class Parallels:
-    """Pairs of stations that lie abreast on two rails, (n,) arrays each.
+    """Pairs of stations that are abreast on two rails, (n,) arrays each.
 
     Attributes
     ----------
     a, b : int
-        Numbers of the rails, a before b.
+        Numbers of the rails, a < b.
     t_a, t_b : float
         Plan chainages of the stations, each along its own rail.
     left_m : float
-        Distance of the second rail, positive where it lies to the left of the first.
+        Distance of the second rail, positive if it is to the left of the first.
     same : bool
-        Whether both rails run the same way.
+        Whether both rails have the same direction.
     """
 
     a: np.ndarray
@@ -58,7 +61,7 @@ class Parallels:
         return Parallels(*(column[which] for column in vars(self).values()))
 
     def groups(self) -> Iterator[Parallels]:
-        """Split by rails, side and sense."""
+        """Split by rails, side and direction."""
         if not len(self.a):
             return
         key = np.column_stack([self.a, self.b, self.left_m > 0, self.same])
@@ -68,15 +71,23 @@ class Parallels:
             yield self[mine]
 
 
-def find_parallels(rails: Sequence[RailLine], reach_m: float = REACH_M, progress: Progress = SILENT) -> Parallels:
-    """Find stations that lie abreast on two rails of one class, up to `reach_m` apart."""
+def find_parallels(rails: Sequence[RailLine], reach_m: float = MAX_SPACING_M, progress: Progress = SILENT) -> Parallels:
+    """Find stations that are abreast on two rails of one class.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+    reach_m : float
+        Maximum distance of the rails.
+    progress : Progress
+    """
     codes = np.array([rail.class_code for rail in rails])
     number, stations, t, tangents, normals = _stations(rails)
     tree = cKDTree(stations)
     found = []
     for start in progress.follow(range(0, len(stations), STATIONS_AT_ONCE)):
         block = cKDTree(stations[start : start + STATIONS_AT_ONCE])
-        near = block.sparse_distance_matrix(tree, reach_m + STEP_M, output_type="ndarray")
+        near = block.sparse_distance_matrix(tree, reach_m + SAMPLE_STEP_M, output_type="ndarray")
         p, q = near["i"] + start, near["j"]
         other = (number[p] < number[q]) & (codes[number[p]] == codes[number[q]])
         p, q = p[other], q[other]
@@ -84,7 +95,7 @@ def find_parallels(rails: Sequence[RailLine], reach_m: float = REACH_M, progress
         along = np.einsum("ij,ij->i", between, tangents[p])
         left = np.einsum("ij,ij->i", between, normals[p])
         turn = tangents[p, 0] * tangents[q, 1] - tangents[p, 1] * tangents[q, 0]
-        abreast = (np.abs(along) <= STEP_M / 2) & (np.abs(left) <= reach_m) & (np.abs(turn) < SINE_PARALLEL)
+        abreast = (np.abs(along) <= SAMPLE_STEP_M / 2) & (np.abs(left) <= reach_m) & (np.abs(turn) < MAX_SINE)
         p, q = p[abreast], q[abreast]
         same = np.einsum("ij,ij->i", tangents[p], tangents[q]) > 0
         found.append((number[p], number[q], t[p], t[q], left[abreast], same))
@@ -92,35 +103,35 @@ def find_parallels(rails: Sequence[RailLine], reach_m: float = REACH_M, progress
 
 
 def _stations(rails: Sequence[RailLine]) -> tuple[np.ndarray, ...]:
-    """Rail number, place, chainage, direction and left normal of stations along all rails."""
-    sampled = [resample(rail.xyz[:, :2], STEP_M) for rail in rails]
+    """Return rail number, place, chainage, direction and left normal of the stations along all rails."""
+    sampled = [resample(rail.xyz[:, :2], SAMPLE_STEP_M) for rail in rails]
     number = np.repeat(np.arange(len(rails)), [len(t) for _, t in sampled])
     columns = zip(*((xy, t, unit_tangents(xy), left_normals(xy)) for xy, t in sampled))
     return (number, *(np.concatenate(column) for column in columns))
 
 
-def commonest_spacing(rails: Sequence[RailLine], least_length_m: float) -> float | None:
-    """Measure the distance at which most length of neighbouring rails runs parallel.
+def most_common_spacing(rails: Sequence[RailLine], min_length_m: float) -> float | None:
+    """Measure the distance at which the greatest length of neighbouring rails is parallel.
 
     Parameters
     ----------
     rails : sequence of RailLine
-    least_length_m : float
-        Length that has to run at this distance.
+    min_length_m : float
+        Minimum length at this distance.
 
     Returns
     -------
     float or None
-        Metres between the rail lines; None if no rails run parallel for long enough.
+        Distance between the rail lines in metres; None if no rails are parallel for the minimum length.
     """
     if len(rails) < 2:
         return None
     spacing = np.abs(find_parallels(rails).left_m)
-    spacing = spacing[spacing >= NEAREST_M]
-    if not len(spacing) or len(spacing) * STEP_M < least_length_m:
+    spacing = spacing[spacing >= MIN_SPACING_M]
+    if not len(spacing) or len(spacing) * SAMPLE_STEP_M < min_length_m:
         return None
-    counts = np.convolve(np.bincount((spacing / BIN_M).astype(int)), np.ones(3), mode="same")
-    if counts.max() * STEP_M < least_length_m:
+    counts = np.convolve(np.bincount((spacing / SPACING_BIN_M).astype(int)), np.ones(3), mode="same")
+    if counts.max() * SAMPLE_STEP_M < min_length_m:
         return None
-    middle = (np.argmax(counts) + 0.5) * BIN_M
-    return float(np.median(spacing[np.abs(spacing - middle) <= 2 * BIN_M]))
+    middle = (np.argmax(counts) + 0.5) * SPACING_BIN_M
+    return float(np.median(spacing[np.abs(spacing - middle) <= 2 * SPACING_BIN_M]))

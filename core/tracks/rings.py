@@ -1,4 +1,7 @@
-"""Closed rails, as of a turning loop: those of one track begin abreast, so that it is matched and drawn whole."""
+"""Closed rails, such as those of a turning loop: the rails of a track must start abreast to be paired all around.
+
+See docs/method.md section 8.8.
+"""
 
 from __future__ import annotations
 
@@ -10,43 +13,47 @@ from ..lines.uniting import united
 from ..polyline import MIN_RING_M, is_closed, length_along, resample
 from ..rails import RailLine
 
-STATION_M = 0.05
-"""Spacing of the places where a closed rail may begin: two of a track then begin abreast within half of it."""
+START_STEP_M = 0.05
+"""Spacing of the places where a closed rail may start: the rails of a track then start abreast to within half of it."""
 
-SEAM_M = 0.5
-"""The ends of a ring's centerline lie this close together, ahead of each other or past: matches end a little short."""
+MAX_SEAM_M = 0.5
+"""Maximum distance between the ends of a ring's centerline, which may overlap or leave a gap: matches end a little
+early."""
 
 
-def begun_abreast(rails: Sequence[RailLine]) -> list[RailLine]:
-    """Let closed rails begin where they are nearest to the beginning of the first: parallel lines have their normals.
+def started_abreast(rails: Sequence[RailLine]) -> list[RailLine]:
+    """Move the start of closed rails to the place nearest to the start of the first one.
 
-    Wherever each of a track's rails began before, none of the other rail is then left over at its beginning.
+    The rails of a track then start on a common normal, wherever they started before.
     """
     place = next((rail.xyz[0, :2] for rail in rails if is_closed(rail.xyz)), None)
-    return [_begun_near(rail, place) if is_closed(rail.xyz) else rail for rail in rails]
+    if place is None:
+        return list(rails)
+    return [_started_near(rail, place) if is_closed(rail.xyz) else rail for rail in rails]
 
 
-def _begun_near(rail: RailLine, place: np.ndarray) -> RailLine:
-    stations, t = resample(rail.xyz[:, :2], STATION_M)
+def _started_near(rail: RailLine, place: np.ndarray) -> RailLine:
+    """Move the start of a closed rail to the place nearest to a given one, (2,)."""
+    stations, t = resample(rail.xyz[:, :2], START_STEP_M)
     start = t[np.argmin(np.linalg.norm(stations - place, axis=1))]
     if start in (0.0, t[-1]):
         return rail
     return united([rail.between(start, t[-1]), rail.between(0.0, start)])
 
 
-def closed_up(xyz: np.ndarray) -> np.ndarray:
-    """Let a centerline, (n, d), drawn along closed rails end exactly where it begins; others stay as they are."""
+def closed_centerline(xyz: np.ndarray) -> np.ndarray:
+    """Close a centerline, (n, d), drawn along closed rails if its ends are close together."""
     away = np.linalg.norm(xyz[:, :2] - xyz[0, :2], axis=1)
     along = length_along(xyz[:, :2])
-    if away[-1] > SEAM_M or along[-1] <= MIN_RING_M:
+    if away[-1] > MAX_SEAM_M or along[-1] <= MIN_RING_M:
         return xyz
     ahead = (xyz[:, :2] - xyz[0, :2]) @ (xyz[1, :2] - xyz[0, :2])
-    past = (along > along[-1] - 2 * SEAM_M) & (away <= 2 * SEAM_M) & (ahead >= 0)
+    past = (along > along[-1] - 2 * MAX_SEAM_M) & (away <= 2 * MAX_SEAM_M) & (ahead >= 0)
     return np.concatenate([xyz[~past], xyz[:1]])
 
 
-def run_on(xyz: np.ndarray, margin_m: float) -> tuple[np.ndarray, float]:
-    """Let a closed line, (n, d), run on beyond both its ends by `margin_m` or a little more; gives also by how much."""
+def extended_ring(xyz: np.ndarray, margin_m: float) -> tuple[np.ndarray, float]:
+    """Extend a closed line, (n, d), at both ends by at least `margin_m`; returns it and the length before its start."""
     along = length_along(xyz[:, :2])
     margin_m = min(margin_m, along[-1])
     first, last = np.searchsorted(along, [along[-1] - margin_m, margin_m])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.pairing import pair_rails
-from rail_extract.core.tracks.parallels import commonest_spacing, find_parallels
+from rail_extract.core.tracks.parallels import find_parallels, most_common_spacing
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 
 GAUGE, WIDTH = 1.435, 0.072
@@ -142,10 +142,10 @@ def test_parallels_know_side_sense_and_place():
 @pytest.mark.parametrize("spacing", [1.0619, 1.507, 1.592, 1.743])
 def test_commonest_spacing_is_measured_to_the_millimetre(spacing):
     rails = rails_of(*tracks(CURVED, 0.0, 4.2, spacing=spacing))
-    assert commonest_spacing(rails, 3.0) == pytest.approx(spacing, abs=1e-3)
+    assert most_common_spacing(rails, 3.0) == pytest.approx(spacing, abs=1e-3)
 
 
 def test_rails_far_apart_or_crossing_have_no_spacing():
-    assert commonest_spacing(rails_of(*beside(STRAIGHT, 0.0, 4.0)), 3.0) is None
-    assert commonest_spacing(rails_of(STRAIGHT.xy, trace([Element(40.0)], heading=2.0).xy), 3.0) is None
-    assert commonest_spacing(rails_of(STRAIGHT.xy), 3.0) is None
+    assert most_common_spacing(rails_of(*beside(STRAIGHT, 0.0, 4.0)), 3.0) is None
+    assert most_common_spacing(rails_of(STRAIGHT.xy, trace([Element(40.0)], heading=2.0).xy), 3.0) is None
+    assert most_common_spacing(rails_of(STRAIGHT.xy), 3.0) is None
