@@ -42,7 +42,7 @@ class CloudSource:
     paths : tuple of Path
         Files, virtual point clouds, or folders of tiles.
     crs_wkt : str or None
-        Coordinate system set by the user, for files that state none.
+        Coordinate system set by the user, used where files state none.
     """
 
     paths: tuple[Path, ...]
