@@ -247,7 +247,7 @@ def test_what_the_user_should_look_at_is_on_the_error_output(tiles, client, tmp_
     ("words", "said"),
     [
         (["--rails", "out.shp"], "GeoPackage"),
-        (["--rails", "out.gpkg", "--other-gauges", "1430"], "told apart"),
+        (["--rails", "out.gpkg", "--other-gauges", "1430"], "distinguished"),
         (["--rails", "out.gpkg", "--other-gauges", "wide"], "numbers"),
         (["--rails", "out.gpkg", "--gauge", "300"], "gauge"),
         (["--rails", "out.gpkg", "--max-gap", "-1"], "--max-gap"),
