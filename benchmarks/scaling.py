@@ -19,13 +19,15 @@ import time
 from pathlib import Path
 
 import numpy as np
-from rail_extract.core import pipeline
+from rail_extract.core import pipeline, steps
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
-from rail_extract.core.cluster.run import connect, extract
-from rail_extract.core.pipeline import Parameters, extract_rails, square_side
+from rail_extract.core.cluster.runner import DaskRunner
+from rail_extract.core.cluster.workers import connect
+from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
 from rail_extract.core.squares.spool import spool
 from rail_extract.core.standards import STANDARDS
+from rail_extract.core.steps import engine_for, square_side
 from rail_extract.laboratory.curves import Element, trace
 from rail_extract.laboratory.scenes.plain import spacing
 from rail_extract.laboratory.scenes.scanner import Scanner
@@ -90,7 +92,8 @@ def compare_workers(tiles: Path, folder: Path) -> None:
             client.wait_for_workers(workers)
             client.run(engine_of_worker)
             start = time.perf_counter()
-            found = extract(client, [tiles], [RAIL], parameters(), folder / f"work{workers}")
+            runner = DaskRunner(client, folder / f"work{workers}")
+            found = extract_files(ask([tiles], [RAIL]), folder / f"work{workers}", parameters(), runner)
             seconds.append(time.perf_counter() - start)
         print(f"{workers} worker(s) of one thread: {seconds[-1]:.1f} s, {len(found.rails)} rails")
     print(f"Two workers are {seconds[0] / seconds[1]:.2f} times as fast as one")
@@ -98,18 +101,18 @@ def compare_workers(tiles: Path, folder: Path) -> None:
 
 def engine_of_worker() -> None:
     """Load what the network runs on, which a long run does but once."""
-    pipeline.engine_for(parameters())
+    engine_for(parameters())
 
 
 def print_costs(figures: dict, km: float) -> None:
     """State what a kilometre and a national network cost on cores like these."""
     track_km = 2 * km
     print("A kilometre of track, times in core-seconds:")
-    for name in ("reading_s", "stretches_s", "joining_s"):
+    for name in ("reading_s", "squares_s", "joining_s"):
         print(f"  {name[:-2]:12}{figures[name] / track_km:10.2f} s")
     for name in ("cloud_bytes", "spool_bytes", "lines_bytes"):
         print(f"  {name[:-6]:12}{figures[name] / track_km / 1e6:10.2f} MB")
-    parallel = (figures["reading_s"] + figures["stretches_s"]) / track_km * NETWORK_KM / 3600
+    parallel = (figures["reading_s"] + figures["squares_s"]) / track_km * NETWORK_KM / 3600
     serial = figures["joining_s"] / track_km * NETWORK_KM / 3600
     print(f"{NETWORK_KM} km of track, workers of one core each: hours of workers + hours of joining")
     for workers in WORKERS:
@@ -151,19 +154,19 @@ def in_own_process(folder: Path, network: str) -> dict:
 def measure(folder: Path, with_network: bool) -> dict:
     """Extract all that is in a folder; give core-seconds by step, peak of memory and bytes."""
     if not with_network:
-        pipeline.clean = lambda raster, *_: raster
-    walk = pipeline._walk
+        steps.clean = lambda raster, *_: raster
+    draw_squares = pipeline._draw_squares
     marks = []
 
     def marked(*arguments):
         marks.append(time.process_time())
         try:
-            return walk(*arguments)
+            return draw_squares(*arguments)
         finally:
             marks.append(time.process_time())
 
-    pipeline._walk = marked
-    pipeline.engine_for(parameters())  # loads the packages, which is done but once
+    pipeline._draw_squares = marked
+    engine_for(parameters())  # loads the packages, which is done but once
     start = time.perf_counter()
     with tempfile.TemporaryDirectory() as work:
         marks.append(time.process_time())
@@ -174,7 +177,7 @@ def measure(folder: Path, with_network: bool) -> dict:
     return {
         "seconds": time.perf_counter() - start,
         "reading_s": marks[1] - marks[0],
-        "stretches_s": marks[2] - marks[1],
+        "squares_s": marks[2] - marks[1],
         "joining_s": marks[3] - marks[2],
         "peak_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
         "cloud_bytes": size_of(folder),
@@ -193,7 +196,7 @@ def size_of(folder: Path) -> int:
 
 def show(what: str, figures: dict) -> dict:
     """Print one run."""
-    steps = ", ".join(f"{figures[f'{step}_s']:.1f} {step}" for step in ("reading", "stretches", "joining"))
+    steps = ", ".join(f"{figures[f'{step}_s']:.1f} {step}" for step in ("reading", "squares", "joining"))
     print(f"{what}: {figures['seconds']:.1f} s ({steps} core-seconds), peak {figures['peak_mib']:.0f} MiB", flush=True)
     print(f"  {figures['rails']} rails of {figures['rails_km']:.3f} km, {figures['engine']}", flush=True)
     return figures

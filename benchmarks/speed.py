@@ -18,7 +18,7 @@ from pathlib import Path
 
 START = time.perf_counter()
 
-from rail_extract.core import pipeline  # noqa: E402
+from rail_extract.core import pipeline, steps  # noqa: E402
 from rail_extract.core.clouds.points import read_rail_points  # noqa: E402
 from rail_extract.core.frpdf.models import choose  # noqa: E402
 from rail_extract.core.frpdf.weights import load_arrays  # noqa: E402
@@ -106,7 +106,7 @@ def stages(clock) -> tuple[dict[str, float], str]:
     standard = resolve(STANDARD)
     clouds = timed("read_rail_points", read_rail_points)(SAMPLE, [10])
     for name in STAGES:
-        setattr(pipeline, name, timed(name, getattr(pipeline, name)))
+        setattr(steps, name, timed(name, getattr(steps, name)))
     parameters = pipeline.Parameters(standard.gauge_m, standard.head_width_m)
     network = timed("whole walk", pipeline.extract_rails)(clouds, parameters)
     named = sum(spent[name] for name in STAGES)

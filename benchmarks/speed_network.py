@@ -22,11 +22,12 @@ from rail_extract.core.frpdf.network import FRPDF, set_weights
 from rail_extract.core.frpdf.onnx import to_onnx
 from rail_extract.core.frpdf.opencv_engine import OpenCvEngine
 from rail_extract.core.frpdf.torch_engine import TorchEngine
-from rail_extract.core.pipeline import Parameters, lines_of
+from rail_extract.core.pipeline import Parameters
 from rail_extract.core.polyline import interpolate, length_along, project, resample
 from rail_extract.core.progress import SILENT
 from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import RailRaster, cell_size, rasterize
+from rail_extract.core.steps import lines_of
 
 TILE = 512
 """Side of the tiles that plain PyTorch computes, in cells."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from itertools import accumulate
 from typing import TypeVar, overload
 
 from .errors import Cancelled
@@ -50,6 +51,11 @@ class Progress:
     def split(self, count: int) -> list[Progress]:
         """Return the progresses of `count` equal steps of this one."""
         return [self.span(number / count, (number + 1) / count) for number in range(count)]
+
+    def divide(self, weights: Sequence[float]) -> list[Progress]:
+        """Return the progresses of steps of this one, in proportion to their weights."""
+        ends = list(accumulate(weights))
+        return [self.span((end - weight) / ends[-1], end / ends[-1]) for weight, end in zip(weights, ends)]
 
     @overload
     def follow(self, items: Collection[Item]) -> Iterator[Item]: ...

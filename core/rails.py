@@ -245,6 +245,10 @@ class RailNetwork:
         One per centerline; empty unless requested. To find that of a centerline, compare `track_id`.
     cleaned : tuple of RailRaster
         Raster cleaned by the network, one per class; empty unless requested.
+    cleaned_classes : tuple of int
+        Class of each of these rasters.
+    failures : tuple of str
+        A sentence for each file or square that is missing from the result, if the run tolerates that.
     """
 
     rails: tuple[RailLine, ...]
@@ -253,3 +257,5 @@ class RailNetwork:
     engine: str = field(default="")
     geometry: tuple[TrackGeometry, ...] = ()
     cleaned: tuple[RailRaster, ...] = ()
+    cleaned_classes: tuple[int, ...] = ()
+    failures: tuple[str, ...] = ()

@@ -1,1 +1,1 @@
-"""The same walk on many machines: a Dask cluster works on the stretches, one process joins them."""
+"""The walk on many machines: workers of a Dask cluster execute its tasks and keep the results in files."""

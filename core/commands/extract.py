@@ -16,7 +16,7 @@ from ..errors import ParameterError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, RAIL_FIELDS
 from ..frpdf import DEVICES, ENGINES
 from ..frpdf.models import choose
-from ..pipeline import Parameters
+from ..pipeline import Parameters, extract_files
 from ..progress import Estimating, Progress
 from ..standards import DEFAULT, distinct_gauges, resolve
 
@@ -147,13 +147,17 @@ def parameters_of(args: argparse.Namespace) -> Parameters:
 
 def _run_in(folder: Path, args: argparse.Namespace, parameters: Parameters) -> int:
     """Extract with a folder for what is finished."""
-    from ..cluster.run import connect, extract
+    from ..clouds.points import ask
+    from ..cluster.runner import DaskRunner
+    from ..cluster.workers import connect
     from .geopackage import write
 
     codes = _numbers(args.rail_classes, "--rail-classes", int)
     progress = Estimating(_Console())
     with connect(args.scheduler, args.workers) as client:
-        found = extract(client, args.tiles, codes, parameters, folder, args.crs, progress)
+        runner = DaskRunner(client, folder)
+        request = ask(args.tiles, codes, args.crs, progress=progress, unreadable=runner.failures)
+        found = extract_files(request, folder.resolve(), parameters, runner, progress)
     layers = {"rails": (args.rails, found.rails, RAIL_FIELDS)}
     if args.centerlines is not None:
         layers["centerlines"] = (args.centerlines, found.centerlines, CENTERLINE_FIELDS)

@@ -7,7 +7,7 @@ squares share one raster grid. See docs/method.md section 7.1.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -104,6 +104,9 @@ class PointSource(Protocol):
     def near(self, square: Square, margin_m: float) -> RailPoints:
         """Read the points of a square and those at most `margin_m` outside, in the frame of the square."""
 
+    def part(self, square: Square) -> PointSource:
+        """Return the source without the squares that are neither `square` nor its neighbours, where that is smaller."""
+
 
 class MemorySource:
     """Points in memory, a `PointSource`."""
@@ -126,6 +129,10 @@ class MemorySource:
         chosen = np.sort(np.concatenate(parts)) if parts else np.empty(0, dtype=np.int64)
         xyz = self._points.xyz[chosen] - square.frame.shift_to(self.frame)
         return RailPoints(xyz[square.holds(xyz, margin_m)], square.frame, self.class_code)
+
+    def part(self, square: Square) -> MemorySource:
+        """See `PointSource`."""
+        return self
 
 
 def unique_keys(xyz_m: np.ndarray, side_m: float) -> tuple[list[Key], np.ndarray]:
@@ -159,31 +166,6 @@ def lay_out(sources: Sequence[PointSource], source: PointSource) -> list[Square]
     if max(one.span_m for one in sources) <= source.side_m:
         return [Square((0, 0), source.frame, np.inf)]
     return [Square.on_grid(key, source.side_m, source.frame) for key in sorted(source.counts)]
-
-
-def in_turn(keys: Iterable[Key]) -> Iterator[tuple[Key, list[Key], list[Key]]]:
-    """Visit squares in order.
-
-    Yields
-    ------
-    Key
-        The square to visit.
-    list of Key
-        Squares that have become ready: they and all their neighbours have been visited.
-    list of Key
-        Squares that are no longer needed: they and all their neighbours are ready.
-    """
-    all_keys, visited, done = set(keys), set(), set()
-
-    def neighbours_in(key: Key, subset: set[Key]) -> bool:
-        return all_keys & set(around(key)) <= subset
-
-    for key in sorted(all_keys):
-        visited.add(key)
-        ready = [one for one in around(key) if one in visited - done and neighbours_in(one, visited)]
-        done.update(ready)
-        affected = {near for one in ready for near in around(one) if near in done}
-        yield key, ready, sorted(near for near in affected if neighbours_in(near, done))
 
 
 def own_tiles(raster: RailRaster, square: Square) -> RailRaster:

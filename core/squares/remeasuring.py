@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,8 +13,9 @@ from ..lines.uniting import united
 from ..polyline import length_along, resample, runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine
+from ..tasks import Context, Runner, Task
 from ..tracks.geometry import PROFILE_SIGMA_M
-from .grid import Key, PointSource, Square, unique_keys
+from .grid import Key, PointSource, Square, lay_out, unique_keys
 
 CONTEXT_M = 10.0
 """Distance beyond a square over which its rails are measured as well: the disc reaches 1 m, the smoothing of heights
@@ -24,11 +25,20 @@ LOOKUP_STEP_M = 1.0
 """Spacing of the stations whose square is looked up."""
 
 
-def measure_in_squares(
+@dataclass(frozen=True)
+class _Section:
+    """The part of a rail that lies in a square: index of the rail, and chainages."""
+
+    number: int
+    start: float
+    end: float
+
+
+def measure_rails(
     rails: Sequence[RailLine],
-    source: PointSource,
-    squares: Sequence[Square],
+    sources: Sequence[PointSource],
     head_width_m: float,
+    runner: Runner,
     progress: Progress = SILENT,
 ) -> list[RailLine]:
     """Measure rails again for track geometry, like `elevation.measure_again`, using the points of one square at a time.
@@ -36,11 +46,12 @@ def measure_in_squares(
     Parameters
     ----------
     rails : sequence of RailLine
-        In the frame of the source.
-    source : PointSource
-    squares : sequence of Square
-        All squares that have points.
+        In the frame of the sources.
+    sources : sequence of PointSource
+        One per class; rails of other classes remain as they are.
     head_width_m : float
+    runner : Runner
+        Executes the measurement in each square; where it fails, rails keep the heights and support that they have.
     progress : Progress
 
     Returns
@@ -48,35 +59,72 @@ def measure_in_squares(
     list of RailLine
         In the order given.
     """
-    if squares[0].is_whole_plane:
-        points = source.near(squares[0], 0.0)
-        return measure_again(rails, points, head_width_m, PROFILE_SIGMA_M, progress)
-    zero = Square.on_grid((0, 0), source.side_m, source.frame).frame.shift_to(source.frame)
-    wanted: dict[Key, list[tuple[int, float, float]]] = {}
-    for number, rail in enumerate(rails):
-        for key, start, end in _by_square(rail, zero, source.side_m):
-            wanted.setdefault(key, []).append((number, start, end))
+    measured = list(rails)
+    for source, share in zip(sources, progress.split(len(sources))):
+        numbers = [number for number, rail in enumerate(rails) if rail.class_code == source.class_code]
+        squares = lay_out(sources, source)
+        measure = _measure_undivided if squares[0].is_whole_plane else _measure_in_squares
+        again = measure([rails[number] for number in numbers], source, squares, head_width_m, runner, share)
+        for number, rail in zip(numbers, again):
+            measured[number] = rail
+    return measured
+
+
+def _measure_undivided(
+    rails: Sequence[RailLine],
+    source: PointSource,
+    squares: Sequence[Square],
+    head_width_m: float,
+    runner: Runner,
+    progress: Progress,
+) -> Sequence[RailLine]:
+    task = Task("Measuring the rails", _measure, (source, squares[0], tuple(rails), head_width_m))
+    return dict(runner.run({"measure": task}, progress)).get("measure", rails)
+
+
+def _measure_in_squares(
+    rails: Sequence[RailLine],
+    source: PointSource,
+    squares: Sequence[Square],
+    head_width_m: float,
+    runner: Runner,
+    progress: Progress,
+) -> list[RailLine]:
     by_key = {square.key: square for square in squares}
-    measured: list[list[tuple[float, RailLine]]] = [[] for _ in rails]
-    for key in progress.follow(sorted(wanted)):
+    sections = _sections_by_square(rails, source)
+    tasks = {}
+    for key in sorted(sections):
         square = by_key.get(key) or Square.on_grid(key, source.side_m, source.frame)
-        shift = square.frame.shift_to(source.frame)
-        points = source.near(square, CONTEXT_M)
-        pieces = [
-            replace(piece, xyz=piece.xyz - shift)
-            for piece in (
-                rails[number].between(start - CONTEXT_M, end + CONTEXT_M) for number, start, end in wanted[key]
-            )
-        ]
-        again = measure_again(pieces, points, head_width_m, PROFILE_SIGMA_M)
-        for (number, start, end), piece in zip(wanted[key], again):
-            before = min(start, CONTEXT_M)
-            part = piece.between(before, before + end - start)
-            measured[number].append((start, replace(part, xyz=part.xyz + shift)))
-    return [
-        _straight_across_gaps(united([part for _, part in sorted(parts, key=lambda part: part[0])])) if parts else rail
-        for parts, rail in zip(measured, rails)
-    ]
+        pieces = tuple(_with_context(rails[one.number], one, square, source) for one in sections[key])
+        label = f"Measuring the rails of class {source.class_code} in square {key}"
+        tasks[key] = Task(label, _measure, (source.part(square), square, pieces, head_width_m))
+    parts: list[list[tuple[float, RailLine]]] = [[] for _ in rails]
+    for key, pieces in runner.run(tasks, progress):
+        shift = tasks[key].arguments[1].frame.shift_to(source.frame)
+        for section, piece in zip(sections[key], pieces):
+            before = min(section.start, CONTEXT_M)
+            part = piece.between(before, before + section.end - section.start)
+            parts[section.number].append((section.start, replace(part, xyz=part.xyz + shift)))
+    return [_joined(found) if found else rail for found, rail in zip(parts, rails)]
+
+
+def _measure(
+    source: PointSource, square: Square, rails: Sequence[RailLine], head_width_m: float, context: Context
+) -> tuple[RailLine, ...]:
+    """Measure the rails of a square, in its frame; a task."""
+    points = source.near(square, CONTEXT_M)
+    return tuple(measure_again(rails, points, head_width_m, PROFILE_SIGMA_M, context.progress))
+
+
+def _with_context(rail: RailLine, section: _Section, square: Square, source: PointSource) -> RailLine:
+    """Cut a section out of a rail, with `CONTEXT_M` on either side, and move it into the frame of the square."""
+    piece = rail.between(section.start - CONTEXT_M, section.end + CONTEXT_M)
+    return replace(piece, xyz=piece.xyz - square.frame.shift_to(source.frame))
+
+
+def _joined(parts: Sequence[tuple[float, RailLine]]) -> RailLine:
+    """Join the measured parts of a rail, given with their chainages."""
+    return _straight_across_gaps(united([part for _, part in sorted(parts, key=lambda part: part[0])]))
 
 
 def _straight_across_gaps(rail: RailLine) -> RailLine:
@@ -90,14 +138,16 @@ def _straight_across_gaps(rail: RailLine) -> RailLine:
     return replace(rail, xyz=xyz)
 
 
-def _by_square(rail: RailLine, zero: np.ndarray, side_m: float) -> list[tuple[Key, float, float]]:
-    """Divide a rail among the squares it crosses; returns square and chainages of start and end, without gaps."""
-    stations, t = resample(rail.xyz[:, :2], LOOKUP_STEP_M)
-    keys, number = unique_keys(stations - zero[:2], side_m)
-    parts = []
-    for place, key in enumerate(keys):
-        for first, last in runs(number == place):
-            start = 0.0 if first == 0 else 0.5 * (t[first - 1] + t[first])
-            end = t[-1] if last == len(t) - 1 else 0.5 * (t[last] + t[last + 1])
-            parts.append((key, float(start), float(end)))
-    return parts
+def _sections_by_square(rails: Sequence[RailLine], source: PointSource) -> Mapping[Key, list[_Section]]:
+    """Divide rails among the squares that they cross; the sections of a rail follow each other without gaps."""
+    zero = Square.on_grid((0, 0), source.side_m, source.frame).frame.shift_to(source.frame)
+    sections: dict[Key, list[_Section]] = {}
+    for number, rail in enumerate(rails):
+        stations, t = resample(rail.xyz[:, :2], LOOKUP_STEP_M)
+        keys, index = unique_keys(stations - zero[:2], source.side_m)
+        for place, key in enumerate(keys):
+            for first, last in runs(index == place):
+                start = 0.0 if first == 0 else 0.5 * (t[first - 1] + t[first])
+                end = t[-1] if last == len(t) - 1 else 0.5 * (t[last] + t[last + 1])
+                sections.setdefault(key, []).append(_Section(number, float(start), float(end)))
+    return sections

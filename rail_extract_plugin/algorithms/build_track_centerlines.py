@@ -71,7 +71,7 @@ class BuildTrackCenterlines(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Pair the rails of each class, then write the centerlines."""
-        from ...core.pipeline import tracks_of
+        from ...core.steps import tracks_of
         from ..reading.line_layers import read_rails
 
         values = ParameterValues(self, parameters, context)

@@ -68,14 +68,17 @@ class MeasureTrackGeometry(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Measure each track, then write the points."""
+        from ...core.squares.remeasuring import measure_rails
+        from ...core.tasks import InTurn
         from ...core.tracks.geometry import measure_track_geometry
-        from ..reading.track_inputs import check_gauges, measured_rails, read_inputs
+        from ..reading.track_inputs import check_gauges, read_inputs
 
         values = ParameterValues(self, parameters, context)
         lines = values.lines("INPUT"), values.lines("RAILS")
         with TemporaryDirectory(dir=QgsProcessingUtils.tempFolder()) as folder:
             tracks = read_inputs(*lines, job.cloud, Path(folder), progress.span(0, READING))
-            rails = measured_rails(tracks, job.head_width_m, progress.span(READING, MEASURING))
+            measuring = progress.span(READING, MEASURING)
+            rails = measure_rails(tracks.rails, tracks.clouds, job.head_width_m, InTurn(), measuring)
         share = progress.span(MEASURING, 1)
         measured = measure_track_geometry(tracks.centerlines, rails, job.head_width_m, values.number("STEP"), share)
         check_gauges(tracks, measured, progress)

@@ -72,7 +72,7 @@ class VectorizeRails(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Vectorize each class, then write the lines."""
-        from ...core.pipeline import lines_of
+        from ...core.steps import lines_of
         from ..reading.area_points import Area, read_points_in
         from ..reading.geotiff import read_rasters
         from ..reading.rasters import moved

@@ -13,8 +13,6 @@ from ...core.errors import RailExtractError
 from ...core.frame import LocalFrame
 from ...core.progress import Progress
 from ...core.rails import Centerline, RailLine, TrackGeometry
-from ...core.squares.grid import lay_out
-from ...core.squares.remeasuring import measure_in_squares
 from ...core.squares.spool import SpooledPoints
 from ...core.standards import RAIL_CLASS
 from .area_points import Area, check_same_plane, spool_points_in
@@ -83,18 +81,6 @@ def read_inputs(
     theirs = clouds[0].frame
     tracks, lines = _moved(tracks, frame, theirs), _moved(lines, frame, theirs)
     return TrackInputs(tracks, lines, clouds, frame.with_origin(theirs.shift_to(frame)))
-
-
-def measured_rails(tracks: TrackInputs, head_width_m: float, progress: Progress) -> list[RailLine]:
-    """Give the rails of each class heights and support from its points; without a cloud they stay as they are."""
-    measured = list(tracks.rails)
-    for points, share in zip(tracks.clouds, progress.split(len(tracks.clouds))):
-        mine = [number for number, rail in enumerate(tracks.rails) if rail.class_code == points.class_code]
-        stretches = lay_out(tracks.clouds, points)
-        again = measure_in_squares([tracks.rails[one] for one in mine], points, stretches, head_width_m, share)
-        for number, rail in zip(mine, again):
-            measured[number] = rail
-    return measured
 
 
 def check_gauges(tracks: TrackInputs, measured: Sequence[TrackGeometry], progress: Progress) -> None:

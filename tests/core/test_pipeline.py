@@ -4,16 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core import pipeline
+from rail_extract.core import steps
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.errors import Cancelled, NoTrackError, ParameterError
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.pipeline import Parameters, extract_rails, lines_of, overlap_tiles, tracks_of
+from rail_extract.core.pipeline import Parameters, extract_rails
 from rail_extract.core.polyline import length_along, project
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.standards import STANDARDS
+from rail_extract.core.steps import lines_of, overlap_tiles, tracks_of
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.plain import straight
 from rail_extract.laboratory.scenes.scanner import Scanner
@@ -114,7 +115,7 @@ def largest_step(xyz):
 
 def test_a_line_in_stretches_is_the_line_in_one_piece(monkeypatch):
     # Clean points need no network; without it the test sees what the seams change, and nothing else.
-    monkeypatch.setattr(pipeline, "clean", lambda raster, *_: raster)
+    monkeypatch.setattr(steps, "clean", lambda raster, *_: raster)
     points = straight().rail_points()
     whole_settings = Parameters(
         1.435, STANDARDS["EN_60E1_1435"].head_width_m, keep_cleaned=True, quality_step_m=1.0, simplify_xy_m=0.0
@@ -141,7 +142,7 @@ def test_a_line_in_stretches_is_the_line_in_one_piece(monkeypatch):
 
 def test_the_shortest_line_counts_whole_lines_not_what_a_stretch_sees_of_them(monkeypatch):
     """Two lines across a border of stretches at x = 0, of 120 m and of 90 m, of which 30 m lie before it."""
-    monkeypatch.setattr(pipeline, "clean", lambda raster, *_: raster)
+    monkeypatch.setattr(steps, "clean", lambda raster, *_: raster)
     lines = [np.arange(-30, end, 0.005) for end in (90, 60)]
     points = [np.column_stack([x, np.full(len(x), 5.0 + 4 * y), np.full(len(x), 100.0)]) for y, x in enumerate(lines)]
     cloud = RailPoints(np.concatenate(points), LocalFrame(np.zeros(3)), 10)
@@ -168,7 +169,7 @@ def test_stretches_overlap_by_what_borders_need(gauge, changed, tiles):
 @pytest.mark.parametrize("tiles", [4, 50])
 def test_a_ring_comes_back_closed(monkeypatch, tiles):
     """Over several stretches, of which one sees all of it and the others a part, and in one."""
-    monkeypatch.setattr(pipeline, "clean", lambda raster, *_: raster)
+    monkeypatch.setattr(steps, "clean", lambda raster, *_: raster)
     standard, radius = STANDARDS["EN_49E1_1435"], 39.5
     curve = trace([Element(2 * np.pi * radius, 1 / radius, 1 / radius)], start=(3.0, -2.0 - radius))
     height = 100 + 0.3 * np.sin(curve.heading)

@@ -15,22 +15,25 @@ import numpy as np
 import pyogrio
 import pytest
 import shapely
-import torch
 from distributed import Client, KilledWorker, LocalCluster
 from rail_extract.__main__ import main
 from rail_extract.core.clouds.points import ask, read_rail_points
-from rail_extract.core.cluster import run
-from rail_extract.core.cluster.run import connect, extract
-from rail_extract.core.cluster.tasks import clean
+from rail_extract.core.cluster import runner
+from rail_extract.core.cluster.runner import DaskRunner, Failure, execute
+from rail_extract.core.cluster.store import version
+from rail_extract.core.cluster.workers import connect
 from rail_extract.core.commands.extract import INCOMPLETE
 from rail_extract.core.commands.geopackage import write
 from rail_extract.core.errors import DiskError, RailExtractError
 from rail_extract.core.fields import RAIL_FIELDS
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.pipeline import Parameters, extract_rails, square_side
+from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
+from rail_extract.core.rails import RailLine
 from rail_extract.core.squares.grid import lay_out
 from rail_extract.core.squares.spool import spool
 from rail_extract.core.standards import STANDARDS
+from rail_extract.core.steps import square_side
+from rail_extract.core.tasks import Task
 from rail_extract.laboratory.curves import Element, trace
 from rail_extract.laboratory.scenes.plain import spacing
 from rail_extract.laboratory.scenes.scanner import Scanner
@@ -66,6 +69,12 @@ def client():
         yield client
 
 
+def extract(client, paths, codes, parameters, folder):
+    """Extract on workers, as the command does."""
+    on_workers = DaskRunner(client, folder)
+    return extract_files(ask(paths, codes, unreadable=on_workers.failures), folder, parameters, on_workers)
+
+
 def same(found, expected, frame, other):
     """Lines, ids and figures agree within a tenth of a millimetre."""
     assert len(found) == len(expected)
@@ -76,8 +85,8 @@ def same(found, expected, frame, other):
 
 
 def test_a_local_worker_keeps_to_its_core_and_its_memory(client):
-    found = client.run(lambda: (torch.get_num_threads(), os.environ["MALLOC_TRIM_THRESHOLD_"]))
-    assert list(found.values()) == [(1, "268435456")] * 2
+    found = client.run(lambda: (os.environ["OMP_NUM_THREADS"], os.environ["MALLOC_TRIM_THRESHOLD_"]))
+    assert list(found.values()) == [("1", "268435456")] * 2
 
 
 def test_workers_give_what_one_process_gives(tiles, one_process, client, tmp_path):
@@ -97,7 +106,7 @@ def test_a_restart_computes_only_what_changed(tiles, client, tmp_path):
     extract(client, [tiles], [RAIL], PARAMETERS, tmp_path)
     after = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()}
     assert before.items() <= after.items()
-    assert len([file for file in after.keys() - before.keys() if "raster" in file.name]) > 0
+    assert len([file for file in after.keys() - before.keys() if file.name.startswith("clean")]) > 0
 
 
 def test_a_killed_worker_is_replaced_and_its_stretches_run_again(tiles, one_process, client, tmp_path):
@@ -152,16 +161,16 @@ def lone_worker():
 
 
 def test_a_stretch_that_kills_its_workers_does_not_take_its_neighbours_along(tiles, lone_worker, tmp_path, monkeypatch):
-    def dying(task):
-        if task.stretch.key == doomed:
+    def dying(task, *arguments):
+        if task.label == f"Cleaning square {doomed} of class 10":
             raise KilledWorker("clean", None, 10)
-        return clean(task)
+        return execute(task, *arguments)
 
     doomed = max(lay_out_keys(tiles, tmp_path))
-    monkeypatch.setattr(run, "clean", dying)
+    monkeypatch.setattr(runner, "execute", dying)
     found = extract(lone_worker, [tiles], [RAIL], PARAMETERS, tmp_path / "work")
     assert len(found.failures) == 1
-    assert found.failures[0].startswith(f"Square {doomed} was given up")
+    assert found.failures[0].startswith(f"Cleaning square {doomed} of class 10 was abandoned")
     assert len(found.rails) == 2
     assert 20 < found.rails[0].length_m < 45
 
@@ -172,9 +181,10 @@ def lay_out_keys(tiles, folder):
 
 
 def test_a_worker_of_another_version_is_named(tiles, lone_worker, tmp_path, monkeypatch):
-    monkeypatch.setattr(run, "version", lambda weights: "older")
+    older = DaskRunner(lone_worker, tmp_path)
+    monkeypatch.setattr(older, "_version", "older")
     with pytest.raises(RailExtractError, match="A worker has another version of Rail Extract"):
-        extract(lone_worker, [tiles], [RAIL], PARAMETERS, tmp_path)
+        extract_files(ask([tiles], [RAIL]), tmp_path, PARAMETERS, older)
 
 
 def test_finished_stretches_of_another_cloud_are_not_taken(tiles, client, tmp_path):
@@ -298,3 +308,17 @@ def test_a_full_work_folder_is_one_sentence(tiles, tmp_path):
             spool(ask(tiles, [RAIL]), square_side(PARAMETERS), tmp_path)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def first_of(name, context):
+    """Stands for any step of the walk."""
+    return (RailLine(np.zeros((2, 3)), 1, 10, 5, 1.0, 1.0, 0.0),)
+
+
+def test_no_step_runs_on_a_worker_of_another_version(tmp_path):
+    for task in (Task("Cleaning", first_of, ("a",)), Task("Drawing", first_of, ("b",), needs=("a",))):
+        refused = execute(task, {}, str(tmp_path), "older")
+        assert isinstance(refused, Failure) and "another version" in refused.reason
+    assert list(tmp_path.iterdir()) == []
+    assert execute(task, {}, str(tmp_path), version()).path.endswith(".npz")
+    assert isinstance(execute(task, {}, str(tmp_path), "older"), Failure)  # although the result is there

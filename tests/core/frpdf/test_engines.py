@@ -9,9 +9,10 @@ from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.frpdf.engine import make_engine
 from rail_extract.core.frpdf.models import choose
 from rail_extract.core.frpdf.weights import load_arrays
-from rail_extract.core.pipeline import Parameters, lines_of
+from rail_extract.core.pipeline import Parameters
 from rail_extract.core.polyline import interpolate, length_along, project, resample
 from rail_extract.core.raster import cell_size, rasterize
+from rail_extract.core.steps import lines_of
 
 SAMPLE = Path(__file__).resolve().parents[3] / "resources" / "sample" / "sample.laz"
 GAUGE_M, HEAD_WIDTH_M = 1.0, 0.06191

@@ -1,17 +1,13 @@
-"""Stretches: the same squares however a cloud is cut, in an order that waits for neighbours, on one raster grid."""
+"""Stretches: the same however a cloud is cut, on one raster grid."""
 
 import numpy as np
-from hypothesis import given
-from hypothesis import strategies as st
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.raster import TILE, rasterize
 from rail_extract.core.squares.grid import (
     MemorySource,
     Square,
-    around,
     assembled,
-    in_turn,
     lay_out,
     mosaic,
     own_tiles,
@@ -22,24 +18,10 @@ CELL = 0.04
 SIDE = 4 * TILE * CELL
 FRAME = LocalFrame(np.array([387_600.0, 1_430_200.0, 500.0]), 0.3048, 0.3048)
 
-keys = st.sets(st.tuples(st.integers(-3, 3), st.integers(-3, 3)), min_size=1)
-
 
 def cloud(seed=0, count=4000, length=150.0):
     along = np.random.RandomState(seed).uniform(0, length, count)
     return RailPoints(np.column_stack([along, 0.4 * along, np.full(count, 3.0)]), FRAME, 10)
-
-
-@given(keys)
-def test_every_square_has_its_turn_and_comes_ready_once_after_its_neighbours(squares):
-    passed, finished, gone = set(), [], []
-    for key, ready, spent in in_turn(squares):
-        passed.add(key)
-        finished += ready
-        assert all(set(around(one)) & squares <= passed for one in ready)
-        assert not {near for one in ready for near in around(one)} & set(gone)
-        gone += spent
-    assert sorted(finished) == sorted(gone) == sorted(squares)
 
 
 def test_squares_part_the_points_and_margins_overlap():

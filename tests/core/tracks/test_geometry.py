@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core import pipeline
+from rail_extract.core import pipeline, steps
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.elevation import ElevationParameters, elevate, measure_again
@@ -184,19 +184,20 @@ class RawRaster:
 
 
 def test_one_run_measures_every_track_of_every_class_if_asked(monkeypatch):
-    monkeypatch.setattr(pipeline, "load_arrays", lambda path: {})
-    monkeypatch.setattr(pipeline, "make_engine", lambda *_: RawRaster())
+    monkeypatch.setattr(steps, "load_arrays", lambda path: {})
+    monkeypatch.setattr(steps, "make_engine", lambda *_: RawRaster())
     track = Track(trace([Element(30.0)], heading=0.3), GAUGE + WIDTH, cant_m=0.02)
     random = np.random.RandomState(1)
     heads = [scan(track.railhead(side), WIDTH, track.centerline, Scanner(), random) for side in (1, -1)]
     xyz, frame = np.concatenate(heads), LocalFrame(np.zeros(3))
-    clouds = [RailPoints(xyz, frame, 10), RailPoints(xyz + [0.0, 20.0, 0.0], frame, 11)]
+    clouds = [RailPoints(xyz, frame, 11), RailPoints(xyz + [0.0, 20.0, 0.0], frame, 10)]
     network = pipeline.extract_rails(clouds, pipeline.Parameters(GAUGE, WIDTH, quality_step_m=2.0))
     assert [found.track_id for found in network.geometry] == [line.track_id for line in network.centerlines] == [1, 2]
     for found, line in zip(network.geometry, network.centerlines):
         np.testing.assert_allclose(np.diff(found.chainage_m)[:-1], 2.0)
         assert rms(found.cant_mm - 20.0) < 1.0
         np.testing.assert_allclose(found.xyz[0], line.xyz[0])
+    assert network.rails[0].class_code == 11
     assert pipeline.extract_rails(clouds[:1], pipeline.Parameters(GAUGE, WIDTH)).geometry == ()
 
 

@@ -1,0 +1,169 @@
+"""A runner that executes tasks on the workers of a Dask cluster and keeps their results in files.
+
+Workers exchange the names of files instead of arrays. The name of a file is a fingerprint of everything that the result
+depends on, so that a restarted run computes only what is not finished.
+"""
+
+from __future__ import annotations
+
+import threading
+import uuid
+from collections.abc import Hashable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from distributed import Client, Future, as_completed
+
+from ..disk import writing
+from ..errors import CloudError, DiskError, RailExtractError
+from ..progress import SILENT, Progress
+from ..tasks import Context, Name, Once, Task, in_order
+from .store import CORE, Stored, can_store, fingerprint, load, save, version
+
+
+@dataclass(frozen=True)
+class Failure:
+    """The reason why a task has no result: one sentence."""
+
+    reason: str
+
+
+class DaskRunner:
+    """Executes tasks on the workers of a cluster; a task that fails is recorded, and the others continue.
+
+    Parameters
+    ----------
+    client : Client
+    folder : Path
+        Folder for the results, which workers must reach under the same path.
+
+    Attributes
+    ----------
+    failures : list of str
+        A sentence per failed task.
+    """
+
+    def __init__(self, client: Client, folder: Path) -> None:
+        self.failures: list[str] = []
+        self._client, self._folder, self._version = client, folder.resolve(), version()
+        with writing(self._folder):
+            self._folder.mkdir(parents=True, exist_ok=True)  # not by workers: a failed run may have removed it
+
+    def run(self, tasks: Mapping[Name, Task], progress: Progress = SILENT) -> Iterator[tuple[Name, Any]]:
+        """Execute tasks; see `Runner.run`.
+
+        Raises
+        ------
+        DiskError
+            A worker could not write its result.
+        """
+        order = in_order(tasks)
+        results: dict[Hashable, Any] = {}
+        running: dict[Future, Name] = {}
+        queue = as_completed()
+
+        def submit_ready() -> None:
+            while ready := order.get_ready():
+                for name in ready:
+                    if all(need in results for need in tasks[name].needs):
+                        inputs = {one: results[one] for one in tasks[name].inputs if one in results}
+                        future = self._submit(tasks[name], inputs)
+                        running[future] = name
+                        queue.add(future)
+                    else:
+                        order.done(name)
+
+        submit_ready()
+        done, total = 0.0, sum(task.weight for task in tasks.values())
+        for future in queue:
+            progress.check()
+            name = running.pop(future)
+            result = _result(future, tasks[name].label)
+            if isinstance(result, Failure):
+                self.failures.append(result.reason)
+            else:
+                results[name] = result
+            order.done(name)
+            submit_ready()
+            done += tasks[name].weight
+            progress.set_fraction(done / total)
+            if name in results and tasks[name].returned:
+                yield name, load(result) if isinstance(result, Stored) else result
+
+    def tolerate(self, error: RailExtractError) -> None:
+        """Record the error."""
+        self.failures.append(str(error))
+
+    def _submit(self, task: Task, inputs: Mapping[Hashable, Any]) -> Future:
+        """Send a task to a worker, under a name that shows in Dask's dashboard what it does."""
+        key = f"{task.function.__name__.strip('_')}-{uuid.uuid4().hex}"
+        return self._client.submit(execute, task, inputs, str(self._folder), self._version, key=key, pure=False)
+
+
+def execute(task: Task, inputs: Mapping[Hashable, Any], folder: str, expected_version: str) -> Any:
+    """Execute a task on a worker, unless its result is there already.
+
+    Parameters
+    ----------
+    task : Task
+    inputs : mapping of Hashable to Stored or Any
+        Results of the tasks that this one takes.
+    folder : str
+        Where results are kept.
+    expected_version : str
+        Version of the code and the weights that asks for the task; see `store.version`.
+
+    Returns
+    -------
+    Stored, Failure or Any
+        The file of the result; for a result that `store` does not keep, the result itself.
+
+    Raises
+    ------
+    DiskError
+        The result could not be written.
+    """
+    if version() != expected_version:
+        return Failure(f"A worker has another version of Rail Extract ({CORE.parent}): install the same everywhere.")
+    name = task.function.__name__.strip("_")
+    path = Path(folder) / f"{name}_{fingerprint(name, *task.arguments, inputs, expected_version)}.npz"
+    if path.exists():
+        return Stored(str(path))
+    try:
+        results = {one: load(given) if isinstance(given, Stored) else given for one, given in inputs.items()}
+        result = task.function(*task.arguments, Context(results, _once_of_thread(), SILENT))
+        if not can_store(result):
+            return result
+        save(path, result)
+    except DiskError:
+        raise
+    except CloudError as error:
+        return Failure(str(error))  # it names the file
+    except Exception as error:  # noqa: BLE001 - whatever the reason, one failing square must not stop the others
+        return Failure(f"{task.label} failed ({error}).")
+    return Stored(str(path))
+
+
+_OF_THREAD = threading.local()
+"""What the threads of this worker keep between tasks: engines of OpenCV cannot be shared between threads."""
+
+
+def _once_of_thread() -> Once:
+    if not hasattr(_OF_THREAD, "once"):
+        _OF_THREAD.once = Once()
+    return _OF_THREAD.once
+
+
+def _result(future: Future, label: str) -> Any:
+    """Return the result of a task, or a `Failure` if its workers died.
+
+    Raises
+    ------
+    DiskError
+        A worker could not write.
+    """
+    error = future.exception() if future.status == "error" else None
+    if isinstance(error, RailExtractError):
+        raise error
+    return future.result() if error is None else Failure(f"{label} was abandoned ({error}).")

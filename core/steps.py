@@ -1,0 +1,269 @@
+"""The steps of the walk, each on one square or one class: raster, network, lines, heights, tracks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from .clouds.points import RailPoints
+from .errors import NoTrackError, ParameterError
+from .frame import LocalFrame
+from .frpdf.cleanup import MARGIN, clean, max_passes
+from .frpdf.engine import Engine, make_engine
+from .frpdf.models import choose
+from .frpdf.weights import load_arrays
+from .heads.elevation import ElevationParameters, elevate, flat_rails, numbered
+from .heads.refinement import refine
+from .heads.smoothing_check import warn_if_out_of_reach
+from .lines.bridges import FIT_M
+from .lines.network_smoothing import smooth_network
+from .lines.thinning import thin
+from .parameters import Parameters
+from .progress import SILENT, Progress
+from .rails import Centerline, RailLine
+from .raster import TILE, RailRaster, cell_size, rasterize
+from .squares.grid import HALO_M, OVERLAP_M, Key, PointSource, Square, mosaic, own_tiles
+from .squares.pieces import SquareRails, trim
+from .squares.seams import join
+from .standards import distinct_gauges
+from .tracks.centerlines import CenterlineParameters, build_centerlines
+from .vectorize import vectorize
+
+VECTORIZE, SMOOTH, REFINE, ELEVATE = 0.45, 0.05, 0.25, 0.25
+"""Relative run times of the steps from a raster to lines, for the progress."""
+
+
+def square_side(parameters: Parameters) -> float:
+    """Return the side of the squares in metres.
+
+    Raises
+    ------
+    ParameterError
+        The squares would overlap with more than their neighbours.
+    """
+    tile_m = _tile_side(parameters)
+    smallest = math.ceil(OVERLAP_M / tile_m)
+    if parameters.square_tiles < smallest:
+        raise ParameterError(f"Squares of {parameters.square_tiles} tiles are too small: give {smallest} at least.")
+    return parameters.square_tiles * tile_m
+
+
+def overlap_tiles(parameters: Parameters) -> int:
+    """Return the number of tiles around a square from which its lines are drawn as well.
+
+    The squares on both sides of a border must see the same surroundings of it: twice a gap together with the lines that
+    its bridge is fitted to on either side, and three sigma of the smoothing in height. However long the gaps, only the
+    neighbours are included.
+    """
+    reach_m = HALO_M + max(2 * (parameters.max_gap_m + 2 * FIT_M), 3 * parameters.smoothing_z_m)
+    return min(math.ceil(max(reach_m, OVERLAP_M) / _tile_side(parameters)), parameters.square_tiles)
+
+
+def _tile_side(parameters: Parameters) -> float:
+    """Return the side of a raster tile in metres."""
+    return TILE * cell_size(parameters.gauge_m, parameters.head_width_m)
+
+
+def engine_for(parameters: Parameters) -> Engine:
+    """Set up the engine with the weights that fit the gauge and the railhead."""
+    arrays = load_arrays(choose(parameters.gauge_m, parameters.head_width_m).path)
+    return make_engine(arrays, parameters.engine, parameters.device)
+
+
+def clean_square(
+    source: PointSource, square: Square, parameters: Parameters, engine: Engine, progress: Progress = SILENT
+) -> RailRaster:
+    """Rasterize the points of a square, clean the raster with the network, and keep the tiles inside the square.
+
+    Parameters
+    ----------
+    source : PointSource
+    square : Square
+    parameters : Parameters
+    engine : Engine
+    progress : Progress
+    """
+    cell_m = cell_size(parameters.gauge_m, parameters.head_width_m)
+    points = source.near(square, max_passes(parameters.passes) * MARGIN * cell_m)
+    return own_tiles(clean(rasterize(points.xyz, cell_m), engine, parameters.passes, progress), square)
+
+
+def rails_of_square(
+    source: PointSource,
+    square: Square,
+    rasters: Mapping[Key, RailRaster],
+    parameters: Parameters,
+    progress: Progress = SILENT,
+) -> SquareRails:
+    """Draw the rails of a square.
+
+    Parameters
+    ----------
+    source : PointSource
+    square : Square
+    rasters : mapping of Key to RailRaster
+        Cleaned rasters of the square and of its neighbours; a neighbour may be missing.
+    parameters : Parameters
+    progress : Progress
+    """
+    tiles = overlap_tiles(parameters)
+    raster = mosaic(rasters, square, tiles)
+    overlap_m = tiles * _tile_side(parameters)
+    points = source.near(square, overlap_m)
+    if not square.is_whole_plane:
+        # A line may be longer than the part of it that the square shows; `whole_rails` drops the lines that are short.
+        parameters = replace(parameters, min_length_m=min(parameters.min_length_m, overlap_m - HALO_M))
+    return trim(_all_vertices(raster, source.class_code, points, parameters, progress), square)
+
+
+def whole_rails(
+    results: Sequence[SquareRails], frame: LocalFrame, parameters: Parameters, first_id: int = 1
+) -> list[RailLine]:
+    """Join the rails of all squares, drop the short ones, simplify and number them.
+
+    Parameters
+    ----------
+    results : sequence of SquareRails
+    frame : LocalFrame
+        Local frame of the result.
+    parameters : Parameters
+    first_id : int
+    """
+    rails = [rail for rail in join(results, frame) if rail.length_m >= parameters.min_length_m]
+    return _finished(numbered(rails), parameters, first_id)
+
+
+def lines_of(
+    raster: RailRaster,
+    class_code: int,
+    points: RailPoints | None,
+    parameters: Parameters,
+    progress: Progress = SILENT,
+    first_id: int = 1,
+) -> list[RailLine]:
+    """Turn the cleaned raster of one class into rails: vectorize, smooth, move onto the heads, add heights, simplify.
+
+    Parameters
+    ----------
+    raster : RailRaster
+    class_code : int
+    points : RailPoints or None
+        Without points the rails stay where the raster shows them, and have no heights.
+    parameters : Parameters
+    progress : Progress
+    first_id : int
+        `rail_id` of the first rail.
+    """
+    rails = _finished(_all_vertices(raster, class_code, points, parameters, progress), parameters, first_id)
+    warn_of_rails(rails, class_code, parameters, progress)
+    return rails
+
+
+def warn_of_rails(rails: Sequence[RailLine], class_code: int, parameters: Parameters, progress: Progress) -> None:
+    """Warn the user if a class has no rails, or if `smoothing_xy_m` moves lines off their rails.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+        Rails of the class.
+    class_code : int
+    parameters : Parameters
+    progress : Progress
+    """
+    if not rails:
+        progress.warning(f"Class {class_code} shows no rail: check the rail classes, the standard and MIN_LENGTH.")
+    warn_if_out_of_reach(rails, parameters.head_width_m, parameters.smoothing_xy_m, progress)
+
+
+def _all_vertices(
+    raster: RailRaster, class_code: int, points: RailPoints | None, parameters: Parameters, progress: Progress
+) -> tuple[RailLine, ...]:
+    """Turn the cleaned raster of one class into rails that have all their vertices."""
+    vectorizing, smoothing, refining, elevating = progress.divide((VECTORIZE, SMOOTH, REFINE, ELEVATE))
+    network = vectorize(
+        raster,
+        parameters.head_width_m,
+        parameters.max_gap_m,
+        parameters.gap_angle_deg,
+        parameters.min_length_m,
+        vectorizing,
+        None if points is None else rasterize(points.xyz, raster.cell_m),
+    )
+    network = smooth_network(network, parameters.smoothing_xy_m, smoothing)
+    elevation = ElevationParameters(
+        head_width_m=parameters.head_width_m,
+        tolerance_xy_m=parameters.tolerance_xy_m,
+        tolerance_z_m=parameters.tolerance_z_m,
+        crown_radius_m=parameters.crown_radius_m,
+        smoothing_xy_m=parameters.smoothing_xy_m,
+        smoothing_z_m=parameters.smoothing_z_m,
+        cell_m=raster.cell_m,
+        min_length_m=parameters.min_length_m,
+    )
+    if points is None:
+        return flat_rails(network, class_code, elevation)
+    network = refine(network, points, parameters.head_width_m, parameters.smoothing_xy_m, refining)
+    return elevate(network, points, elevation, elevating)
+
+
+def _finished(rails: Sequence[RailLine], parameters: Parameters, first_id: int) -> list[RailLine]:
+    """Simplify rails and number them from `first_id`."""
+    thinned = thin(rails, parameters.simplify_xy_m, parameters.simplify_z_m)
+    return [replace(rail, rail_id=number) for number, rail in enumerate(thinned, start=first_id)]
+
+
+def tracks_of(rails: Sequence[RailLine], parameters: Parameters, progress: Progress = SILENT) -> list[Centerline]:
+    """Pair the rails of each class at every gauge, and draw, simplify and number the centerlines.
+
+    Takes the rails as the user gets them, so that rails from a file give the same tracks.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+    parameters : Parameters
+    progress : Progress
+
+    Raises
+    ------
+    NoTrackError
+        Rails run parallel, but in no class at one of the gauges. If that is true of some classes only, the user is
+        warned instead.
+    """
+    codes = sorted({rail.class_code for rail in rails})
+    centerlines: list[Centerline] = []
+    errors: dict[int, NoTrackError] = {}
+    for code, share in zip(codes, progress.split(len(codes))):
+        try:
+            centerlines += _tracks_of_class([rail for rail in rails if rail.class_code == code], parameters, share)
+        except NoTrackError as error:
+            errors[code] = error
+    if errors and not centerlines:
+        raise next(iter(errors.values()))
+    for code, without_track in errors.items():
+        progress.warning(f"Class {code}: {without_track}")
+    return [replace(line, track_id=number) for number, line in enumerate(centerlines, start=1)]
+
+
+def _tracks_of_class(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> tuple[Centerline, ...]:
+    """Pair the rails of one class; see `tracks_of`."""
+    settings = CenterlineParameters(
+        tolerance_m=parameters.centerline_tolerance_m,
+        max_gap_m=parameters.max_gap_m,
+        smoothing_m=parameters.smoothing_xy_m,
+        min_length_m=parameters.min_length_m,
+    )
+    gauges = distinct_gauges((parameters.gauge_m, *parameters.other_gauges_m), parameters.centerline_tolerance_m)
+    centerlines: list[Centerline] = []
+    errors: list[NoTrackError] = []
+    for gauge_m, step in zip(gauges, progress.split(len(gauges))):
+        settings = replace(settings, other_gauges_m=tuple(other for other in gauges if other != gauge_m))
+        try:
+            centerlines += build_centerlines(rails, gauge_m, parameters.head_width_m, settings, step)
+        except NoTrackError as error:
+            errors.append(error)
+    if errors and not centerlines:
+        raise errors[0]
+    if not centerlines:
+        progress.warning("No two rails run parallel: there are rails but no track centerlines.")
+    return thin(centerlines, parameters.simplify_xy_m, parameters.simplify_z_m)
