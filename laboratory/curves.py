@@ -1,4 +1,4 @@
-"""Plan curves of tracks: straights, circular arcs and clothoids, which are pieces of linear curvature."""
+"""Plan curves of tracks: straights, circular arcs and clothoids, all of which have linear curvature."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Element:
-    """A piece of track whose curvature runs linearly from `start` to `end`: straight, arc or clothoid.
+    """A section of track whose curvature changes linearly from `start` to `end`: straight, arc or clothoid.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve sampled at equal steps of its own length.
+    """A curve, sampled at equal steps along its length.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Curve:
 
     @property
     def length_m(self) -> float:
-        """Length of the whole curve."""
+        """Length of the curve."""
         return self.step_m * (len(self.xy) - 1)
 
     @property
@@ -64,13 +64,13 @@ class Curve:
         return self.xy + np.asarray(left_m).reshape(-1, 1) * self.left_normal
 
     def piece(self, start_m: float, end_m: float) -> Curve:
-        """Cut out the part between two chainages, to the nearest samples."""
+        """Return the part between two chainages, to the nearest samples."""
         first = max(int(round(start_m / self.step_m)), 0)
         last = min(int(round(end_m / self.step_m)), len(self.xy) - 1) + 1
         return Curve(self.xy[first:last], self.heading[first:last], self.curvature[first:last], self.step_m)
 
     def reversed(self) -> Curve:
-        """Run along the same curve from its end."""
+        """Return the same curve, run from its end."""
         return Curve(self.xy[::-1], self.heading[::-1] + np.pi, -self.curvature[::-1], self.step_m)
 
 
@@ -80,10 +80,10 @@ def trace(
     heading: float = 0.0,
     step_m: float = 0.02,
 ) -> Curve:
-    """Draw a chain of elements.
+    """Compute the curve of a chain of elements.
 
-    The curvature is piecewise linear, so heading is integrated exactly and position by Simpson's rule on half steps:
-    the error is below a micrometre a kilometre at 2 cm steps and railway radii.
+    Because the curvature is piecewise linear, the heading is integrated exactly. The position is integrated by
+    Simpson's rule on half steps: at steps of 2 cm and railway radii the error is below one micrometre per kilometre.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def trace(
     heading : float
         Direction at the first point, radians.
     step_m : float
-        Wanted distance between samples; the last element is cut to a whole number of steps.
+        Distance between samples; the last element is shortened to a whole number of steps.
 
     Returns
     -------
@@ -116,7 +116,7 @@ def trace(
 
 
 def transition_curve(straight_m: float, clothoid_m: float, arc_m: float, curvature: float) -> list[Element]:
-    """Straight, clothoid, arc, clothoid, straight: the railway's classical curve (docs/method.md section 11.2)."""
+    """Straight, clothoid, arc, clothoid, straight: the classical railway curve (docs/method.md section 11.2)."""
     return [
         Element(straight_m),
         Element(clothoid_m, 0.0, curvature),

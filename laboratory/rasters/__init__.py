@@ -1,1 +1,1 @@
-"""Training rasters: random track layouts, drawn as they are and as a scanner distorts them."""
+"""Training rasters: random track layouts, drawn without errors and as a scanner shows them."""

@@ -1,8 +1,8 @@
 """Combinations of clothoids that join oriented points, from a table computed once (docs/method.md section 11.3).
 
-A combination is three pieces: its curvature rises from zero, runs linearly, and falls back to zero, so that chains of
-them have no jump of curvature. With the chord as unit of length, the curvature is fixed by the deflections at both
-ends and by the share of the length that each outer piece takes; what remains is one unknown, the skew.
+A combination has three elements: the curvature rises from zero, changes linearly, and falls back to zero, so that the
+curvature of a chain of combinations is continuous. With the chord as unit of length, the deflections at both ends and
+the share of each outer element in the length determine the curvature except for one unknown, the skew.
 """
 
 from __future__ import annotations
@@ -17,26 +17,26 @@ from scipy import ndimage
 from ..curves import Element
 
 SHARES = (0.15, 0.25, 0.35, 0.45)
-"""Shares of the length that the first piece takes, and the last one: from nearly an arc to nearly two clothoids."""
+"""Shares of the first and of the last element in the length: from nearly an arc to nearly two clothoids."""
 
 MAX_DEFLECTION_DEG, GRID_DEG = 70.0, 2.0
-"""Range and step of the deflections in the table; beyond that range curves turn back on themselves."""
+"""Range and step of the deflections in the table; beyond this range curves turn back on themselves."""
 
 MAX_LENGTH_CHORDS = 2.0
-"""Chords after which a combination counts as a detour."""
+"""Length, in chords, from which a combination is a detour."""
 
 TABLE_STEPS, POLISH_STEPS = 8, 2
 UNSOLVED = 1e6
-"""Stands in the table where Newton's method finds no curve worth having: too sharp to be drawn."""
+"""Value in the table where Newton's method finds no usable curve; as a curvature it is too sharp to be drawn."""
 
 CLOSED = 1e-9
-"""How far, in lengths of the curve, a combination may end beside its point."""
+"""Greatest distance between the end of a combination and its point, in lengths of the curve."""
 
 SOFT_ENERGY = 0.1
-"""Added to the bending energy before it is inverted, so that straight lines are not all that is ever drawn."""
+"""Added to the bending energy before it is inverted, so that not only straight lines are drawn."""
 
 DIRECTIONS = 4
-"""Ways to join two poses: each may be left or reached in either direction."""
+"""Number of ways to join two poses: each can be passed in either direction."""
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
@@ -50,18 +50,18 @@ class Pose:
     heading: float
 
     def turned(self) -> Pose:
-        """Look back."""
+        """Return the same point with the opposite direction."""
         return Pose(self.x, self.y, self.heading + math.pi)
 
 
 @dataclass(frozen=True)
 class Table:
-    """Combinations of unit chord, by share and by deflections of start and end, each (shares, n, n).
+    """Combinations with unit chord, by share and by the deflections at start and end; arrays are (shares, n, n).
 
     Attributes
     ----------
     skew : array
-        Solution of the unknown, from which an exact combination is polished.
+        Approximate solution, which is refined for the combination that is drawn.
     sharpest : array
         Largest curvature.
     energy : array
@@ -73,14 +73,28 @@ class Table:
     energy: np.ndarray
 
     def look_up(self, values: np.ndarray, share: int, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-        """Interpolate one of the arrays at deflections in radians; outside the table the border's value counts."""
+        """Interpolate one of the arrays; outside the table it has the value at the border.
+
+        Parameters
+        ----------
+        values : (shares, n, n) array
+            One of the attributes.
+        share : int
+            Index into `SHARES`.
+        first, last : array
+            Deflections at both ends, radians.
+
+        Returns
+        -------
+        array of the same shape as `first`
+        """
         places = [(np.degrees(np.ravel(angle)) + MAX_DEFLECTION_DEG) / GRID_DEG for angle in (first, last)]
         return ndimage.map_coordinates(values[share], places, order=1, mode="nearest").reshape(np.shape(first))
 
 
 @functools.lru_cache(maxsize=1)
 def table() -> Table:
-    """Solve the combinations for the whole grid, once a process."""
+    """Solve the combinations of the whole grid, once per process."""
     angles = np.radians(np.arange(-MAX_DEFLECTION_DEG, MAX_DEFLECTION_DEG + GRID_DEG / 2, GRID_DEG))
     first, last = np.meshgrid(angles, angles, indexing="ij")
     columns = []
@@ -94,15 +108,21 @@ def table() -> Table:
 
 
 def join(start: Pose, end: Pose, share: int = 1) -> list[Element] | None:
-    """Join two oriented points by the combination of one of `SHARES`.
+    """Join two oriented points by a combination.
+
+    Parameters
+    ----------
+    start, end : Pose
+    share : int
+        Index into `SHARES`.
 
     Returns
     -------
     list of Element or None
-        To be traced from `start`; None where the points do not face each other well enough.
+        For `trace` from `start`; None where the deflections are too large.
     """
     chord = math.hypot(end.x - start.x, end.y - start.y)
-    first, last = _deflections(start, end)
+    first, last = (np.asarray(angle) for angle in _deflections(start, end))
     if max(abs(first), abs(last)) > math.radians(MAX_DEFLECTION_DEG):
         return None
     known = table()
@@ -116,17 +136,24 @@ def join(start: Pose, end: Pose, share: int = 1) -> list[Element] | None:
 
 
 def random_joins(
-    rng: np.random.Generator, poses: list[Pose], count: int, sharpest_m: float
+    rng: np.random.Generator, poses: list[Pose], count: int, min_radius_m: float
 ) -> list[tuple[Pose, list[Element]]]:
-    """Join up to `count` pairs of poses, drawn with a chance that falls with the bending energy.
+    """Join up to `count` pairs of poses; the smaller the bending energy, the more likely a pair is drawn.
 
-    A pose may be passed in both directions, and two poses are joined once at most. Combinations with a radius below
-    `sharpest_m` are left out.
+    A pose can be passed in both directions, and two poses are joined at most once.
+
+    Parameters
+    ----------
+    rng : numpy Generator
+    poses : list of Pose
+    count : int
+    min_radius_m : float
+        Combinations with a smaller radius are excluded.
 
     Returns
     -------
     list of (Pose, list of Element)
-        Start and pieces of each joint curve.
+        Start and elements of each combination.
     """
     pairs = [
         (start, end)
@@ -142,31 +169,33 @@ def random_joins(
     sharpest = np.stack([known.look_up(known.sharpest, share, first, last) for share in shares]) / chord
     energy = np.stack([known.look_up(known.energy, share, first, last) for share in shares])
     facing = np.maximum(abs(first), abs(last)) < math.radians(MAX_DEFLECTION_DEG)
-    weight = np.where(facing & (sharpest * sharpest_m < 1), 1 / (SOFT_ENERGY + energy), 0.0).ravel()
+    weight = np.where(facing & (sharpest * min_radius_m < 1), 1 / (SOFT_ENERGY + energy), 0.0).ravel()
     if not weight.any():
         return []
     drawn = rng.choice(len(weight), size=np.count_nonzero(weight), replace=False, p=weight / weight.sum())
     joined: dict[int, tuple[Pose, list[Element]]] = {}
     for share, number in (divmod(place, len(pairs)) for place in drawn.tolist()):
-        elements = join(*pairs[number], share)
-        if elements and max(abs(elements[0].end), abs(elements[2].start)) * sharpest_m < 1:
-            joined.setdefault(number // DIRECTIONS, (pairs[number][0], elements))
+        start, end = pairs[number]
+        elements = join(start, end, share)
+        if elements and max(abs(elements[0].end), abs(elements[2].start)) * min_radius_m < 1:
+            joined.setdefault(number // DIRECTIONS, (start, elements))
         if len(joined) == count:
             break
     return list(joined.values())
 
 
 def _deflections(start: Pose, end: Pose) -> tuple[float, float]:
-    """Directions at both ends against the chord, radians in -pi to pi."""
+    """Return the directions at both ends relative to the chord, radians from -pi to pi."""
     chord = math.atan2(end.y - start.y, end.x - start.x)
     return math.remainder(start.heading - chord, 2 * math.pi), math.remainder(end.heading - chord, 2 * math.pi)
 
 
 @functools.lru_cache(maxsize=len(SHARES))
 def _basis(share: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """How the two inner curvatures turn the curve: even and odd part at the nodes of integration, and their weights.
+    """Return how the two inner curvatures turn the curve: their even and odd part, and the weights of integration.
 
-    Each inner curvature acts as a hat over the length, and turns the direction by the hat's integral.
+    An inner curvature is a hat function over the length; it turns the direction by the integral of the hat. Both parts
+    are given at the nodes of integration.
     """
     borders = np.array([0.0, share, 1 - share, 1.0])
     lengths = np.diff(borders)[:, None]
@@ -177,14 +206,14 @@ def _basis(share: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _hat_integral(t: np.ndarray, share: float) -> np.ndarray:
-    """Integral from 0 to t of the hat that is 0 at 0, 1 at `share`, and 0 from 1 - `share` on."""
+    """Integrate, from 0 to t, the hat function that is 0 at 0, 1 at `share`, and 0 from 1 - `share`."""
     inner = 1 - 2 * share
     past = np.clip(t - share, 0, inner)
     return 0.5 * np.minimum(t, share) ** 2 / share + past - 0.5 * past**2 / inner
 
 
 def _first_guess(share: float, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """Solve for small angles, where a sine is its angle."""
+    """Solve for small angles, where the sine equals the angle."""
     even, odd, weights = _basis(share)
     return -(first + (last - first) / (1 - share) * (weights @ even)) / (weights @ odd)
 
@@ -199,20 +228,20 @@ def _solve(share: float, first: np.ndarray, last: np.ndarray, skew: np.ndarray, 
 
 
 def _miss(share: float, first: np.ndarray, last: np.ndarray, skew: np.ndarray) -> np.ndarray:
-    """How far beside its chord a curve ends, in lengths of the curve."""
+    """Return the distance between the end of a curve and its chord, in lengths of the curve."""
     _, _, weights = _basis(share)
     return np.sin(_directions(share, first, last, skew)) @ weights
 
 
 def _directions(share: float, first: np.ndarray, last: np.ndarray, skew: np.ndarray) -> np.ndarray:
-    """Direction against the chord at the nodes of integration, (..., nodes)."""
+    """Return the directions relative to the chord at the nodes of integration, (..., nodes)."""
     even, odd, _ = _basis(share)
     mean = (np.asarray(last) - first) / (1 - share)
     return np.asarray(first)[..., None] + mean[..., None] * even + np.asarray(skew)[..., None] * odd
 
 
 def _shape(share: float, first: np.ndarray, last: np.ndarray, skew: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Length and the two inner curvatures of a combination of unit chord."""
+    """Return the length and the two inner curvatures of a combination with unit chord."""
     _, _, weights = _basis(share)
     length = 1 / (np.cos(_directions(share, first, last, skew)) @ weights)
     mean = (np.asarray(last) - first) / (1 - share)
@@ -220,6 +249,6 @@ def _shape(share: float, first: np.ndarray, last: np.ndarray, skew: np.ndarray) 
 
 
 def _energy(share: float, length: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Integral of the squared, piecewise linear curvature."""
+    """Integrate the squared curvature, which is piecewise linear."""
     outer = share / 3 * (before**2 + after**2)
     return length * (outer + (1 - 2 * share) / 3 * (before**2 + before * after + after**2))

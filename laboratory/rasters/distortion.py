@@ -1,7 +1,7 @@
-"""From a layout to a pair of rasters: as a scanner shows it at one severity from 0 to 1, and as it is.
+"""Pairs of rasters of a layout: as a scanner shows it at a severity from 0 to 1, and as it is.
 
 Gribov and Chang, section 4.3, name the kinds of distortion; docs/method.md section 3.7 has the principles, and
-docs/synthetic.md lists what each severity does. A label follows its rail's own shift at wavelengths above
+docs/synthetic.md states the effect of each severity. A label follows the shift of its rail at wavelengths above
 `LABEL_WAVELENGTH_M`: the network is to smooth noise, not to straighten track.
 """
 
@@ -13,50 +13,50 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .drawing import Window, draw_label, scan_coverage, scan_profiles
-from .noise import flip, gravity, lone_lines, scatter_blobs, shadows
+from .noise import flip, lone_lines, scatter_patches, shadows, worst_share
 from .paths import STEP_M, Layout, RailPath
 
 LABEL_WAVELENGTH_M = 5.0
 MAX_WAVELENGTH_M = 20.0
 MIN_WAVELENGTH_M = 1.0
 REGISTRATION_M = 0.010
-"""Largest constant error of a whole rail."""
+"""Largest shift of a whole rail."""
 
 MAX_GAP_M = 8.0
 MIN_GAP_M = 0.2
-"""Shorter stretches without points are told from sparse scanning by nobody, and do not count as gaps."""
+"""Shorter sections without points do not count as gaps: they cannot be distinguished from sparse scanning."""
 GAPPED_SHARE = 0.3
-"""Largest share of a rail that is missing at full severity."""
+"""Largest share of a rail without points at full severity."""
 
 COVERED_SHARE = 0.3
-"""Share of rasters that are drawn from complete coverage instead of a scanner's points."""
+"""Share of rasters that are drawn from complete coverage instead of the points of a scanner."""
 DENSITY = (20.0, 400.0)
-"""Points a metre of rail."""
-GRAVE_DENSITY = 0.3
-"""Factor on the densest scan at the top of the scale."""
+"""Points per metre of rail."""
+WORST_DENSITY = 0.3
+"""Factor of the densest scan at the top of the scale."""
 PROFILE_M = (0.03, 0.10)
-NOISE_M, GRAVE_NOISE_M = 0.012, 0.008
-"""Largest scatter of points in plan, and what the top of the scale adds."""
-TWO_PASSES_M = 0.03
-"""Scatter of half the offset between two passes of the scanner at full severity: each rail then shows twice."""
+NOISE_M, WORST_NOISE_M = 0.012, 0.008
+"""Largest scatter of points in plan, and what is added at the top of the scale."""
+TWO_SCANS_M = 0.03
+"""Scatter of half the offset between two scans at full severity: each rail then appears twice."""
 
 FASTENING_SPACING_M = 0.6
 FASTENING_REACH_M = 0.09
-"""How far from a rail's edge rail foot and fastenings are found."""
+"""Greatest distance of rail foot and fastenings from the edge of the head."""
 FASTENING_LENGTH_M = 0.15
 
 
 @dataclass(frozen=True)
 class Pair:
-    """A corrupted raster and the ideal one, and what happened to it.
+    """A corrupted raster, the ideal one, and what was done to it.
 
     Attributes
     ----------
     observed, label : (size, size) bool arrays
     distractor : (size, size) bool array
-        Cells of the observed raster set by guard rails and lone lines and not in the label.
+        Cells of the observed raster that guard rails and lone lines set, without those of the label.
     gap : (size, size) int array
-        Number of the gap that a cell of the label lies in, from 1; 0 elsewhere.
+        Number of the gap of each cell of the label that is in a gap, from 1; 0 elsewhere.
     gap_lengths_m : tuple of float
         Length of each gap.
     """
@@ -69,7 +69,7 @@ class Pair:
 
 
 def draw_pair(rng: np.random.Generator, layout: Layout, window: Window, head_width_m: float, severity: float) -> Pair:
-    """Draw a layout twice.
+    """Draw a layout as a scanner shows it and as it is.
 
     Parameters
     ----------
@@ -106,24 +106,24 @@ def draw_pair(rng: np.random.Generator, layout: Layout, window: Window, head_wid
         line = _crop(line, window)
         seen = _seen(line, window, hidden, _random_gaps(rng, STEP_M * len(line.xy), severity))
         distractor[window.cells_of(_scan(rng, line, seen, head_width_m, severity, scanner))] = True
-    noisy = scatter_blobs(rng, flip(rng, observed | distractor, label, severity, window.cell_m), severity) & ~hidden
+    noisy = scatter_patches(rng, flip(rng, observed | distractor, label, severity, window.cell_m), severity) & ~hidden
     return Pair(noisy, label, distractor & noisy & ~label, gap, tuple(lengths))
 
 
 @dataclass(frozen=True)
 class _Scanner:
-    """How the points of one raster were taken.
+    """How the points of one raster were scanned.
 
     Attributes
     ----------
     density : float or None
-        Points a metre of rail; None stands for complete coverage.
+        Points per metre of rail; None stands for complete coverage.
     profile_m, noise_m : float
         Distance of profiles, scatter of points.
     offset_m : (2,) array
-        Half of what lies between two passes; zero where there was one.
+        Half of the offset between two scans; zero where there is only one.
     fastenings : float
-        Points on each fastening that are taken for rail, on average.
+        Mean number of points on each fastening that are classified as rail.
     """
 
     density: float | None
@@ -137,20 +137,20 @@ def _random_scanner(rng: np.random.Generator, severity: float) -> _Scanner:
     density = None
     if rng.random() >= COVERED_SHARE:
         thinnest = DENSITY[1] * (DENSITY[0] / DENSITY[1]) ** severity
-        densest = DENSITY[1] * GRAVE_DENSITY ** gravity(severity)
+        densest = DENSITY[1] * WORST_DENSITY ** worst_share(severity)
         density = math.exp(rng.uniform(math.log(thinnest), math.log(densest)))
     twice = rng.random() < severity**2
     return _Scanner(
         density,
         rng.uniform(*PROFILE_M),
-        rng.random() * (NOISE_M * severity + GRAVE_NOISE_M * gravity(severity)),
-        twice * rng.normal(0.0, TWO_PASSES_M * severity, size=2),
+        rng.random() * (NOISE_M * severity + WORST_NOISE_M * worst_share(severity)),
+        twice * rng.normal(0.0, TWO_SCANS_M * severity, size=2),
         rng.random() ** 2 * 6.0 * severity**2,
     )
 
 
 def _crop(rail: RailPath, window: Window) -> RailPath:
-    """Keep the samples from the first to the last near the window."""
+    """Keep the samples from the first to the last one near the window."""
     near = np.flatnonzero(window.near(rail.xy, 1.0))
     kept = slice(near[0], near[-1] + 1) if len(near) else slice(0)
     return replace(rail, xy=rail.xy[kept], normal=rail.normal[kept])
@@ -163,7 +163,7 @@ class _Shift:
 
 
 def _shift(rng: np.random.Generator, count: int, severity: float) -> _Shift:
-    """Lateral shift of a rail: a part long enough to be the track's own, and a part that is noise; (n,) metres."""
+    """Draw the shift of a rail, (n,) m: long waves, which belong to the track, and short ones, which are noise."""
     amplitude = abs(rng.normal(0.0, 0.005 + 0.025 * severity))
     long = amplitude * _waves(rng, count, LABEL_WAVELENGTH_M, MAX_WAVELENGTH_M)
     long += rng.uniform(-1, 1) * REGISTRATION_M * severity
@@ -172,7 +172,7 @@ def _shift(rng: np.random.Generator, count: int, severity: float) -> _Shift:
 
 
 def _waves(rng: np.random.Generator, count: int, shortest_m: float, longest_m: float) -> np.ndarray:
-    """Random smooth function with unit standard deviation over the ensemble, (n,)."""
+    """Draw a smooth function with a standard deviation of 1 over all drawings, (n,)."""
     waves = 6
     wavelength = np.exp(rng.uniform(math.log(shortest_m), math.log(longest_m), size=(waves, 1)))
     phase = rng.uniform(0, 2 * math.pi, size=(waves, 1))
@@ -181,7 +181,7 @@ def _waves(rng: np.random.Generator, count: int, shortest_m: float, longest_m: f
 
 
 def _random_gaps(rng: np.random.Generator, length_m: float, severity: float) -> list[tuple[float, float]]:
-    """Missing stretches, lognormal in length, as (from, to) in metres along the rail."""
+    """Draw sections without points, lognormal in length, as (from, to) in metres along the rail."""
     missing = GAPPED_SHARE * severity * rng.random() * length_m
     gaps = []
     while missing > 0:
@@ -193,7 +193,7 @@ def _random_gaps(rng: np.random.Generator, length_m: float, severity: float) -> 
 
 
 def _seen(rail: RailPath, window: Window, hidden: np.ndarray, gaps: list[tuple[float, float]]) -> np.ndarray:
-    """Tell which samples lie in no gap and in no shadow, (n,) bool; what lies outside the window is in no shadow."""
+    """Return which samples are neither in a gap nor in a shadow, (n,) bool; there is no shadow outside the window."""
     position = STEP_M * np.arange(len(rail.xy))
     seen = np.ones(len(rail.xy), dtype=bool)
     for start, end in gaps:
@@ -204,7 +204,7 @@ def _seen(rail: RailPath, window: Window, hidden: np.ndarray, gaps: list[tuple[f
 
 
 def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
-    """Find runs of true flags as (first, last + 1): those of `MIN_GAP_M` or more that have both ends in sight."""
+    """Find runs of true flags as (first, last + 1); they are at least `MIN_GAP_M` long and end within the array."""
     borders = np.flatnonzero(np.diff(flags)) + 1
     starts, ends = borders[flags[borders - 1] == 0], borders[flags[borders - 1] == 1]
     ends = ends[ends > starts[0]] if len(starts) else ends[:0]
@@ -214,7 +214,7 @@ def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
 def _scan(
     rng: np.random.Generator, rail: RailPath, seen: np.ndarray, width_m: float, severity: float, scanner: _Scanner
 ) -> np.ndarray:
-    """Points found on one rail: its head thicker or thinner, one side lost at times, its foot now and then; (m, 2)."""
+    """Draw the points of one rail, (m, 2): the head varies in width, may lack a side, and may show its foot."""
     count = len(rail.xy)
     half = 0.5 * width_m * np.clip(1 + 0.35 * severity * _waves(rng, count, 0.5, 5.0), 0.5, 1.7)
     left, right = half.copy(), -half
@@ -238,7 +238,7 @@ def _scan(
 def _fastenings(
     rng: np.random.Generator, rail: RailPath, seen: np.ndarray, width_m: float, points: float
 ) -> np.ndarray:
-    """Points beside the head at every sleeper, on foot, clips and bolts, (m, 2)."""
+    """Draw points next to the head at every sleeper, on foot, clips and bolts, (m, 2)."""
     stride = int(FASTENING_SPACING_M / STEP_M)
     sleepers = np.arange(rng.integers(stride), len(rail.xy), stride)
     sleepers = np.repeat(sleepers, rng.poisson(points, size=len(sleepers)))

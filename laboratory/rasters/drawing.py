@@ -1,4 +1,4 @@
-"""Rails drawn into a square window of cells: as the ideal label, and as what a scanner hits."""
+"""Rails in a square window of cells: the ideal label, and the points that a scanner finds."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 LATERAL_STEP_M = 0.01
-"""Spacing across a rail of the points that stand for complete coverage: a quarter of a cell."""
+"""Distance across a rail between the points of complete coverage: a quarter of a cell."""
 
 
 @dataclass(frozen=True)
 class Window:
-    """A square of `size` cells of `cell_m`, with its north-west corner at (`x0`, `y0`)."""
+    """A square of `size` by `size` cells with sides of `cell_m` and the north-west corner at (`x0`, `y0`)."""
 
     size: int
     cell_m: float
@@ -25,12 +25,12 @@ class Window:
         return self.size * self.cell_m
 
     def near(self, xy: np.ndarray, margin_m: float) -> np.ndarray:
-        """Tell which points lie in the window or within a margin of it, (n,) bool."""
+        """Return which points are in the window or at most a margin away from it, (n,) bool."""
         x, y = xy[:, 0] - self.x0, self.y0 - xy[:, 1]
         return (np.minimum(x, y) > -margin_m) & (np.maximum(x, y) < self.extent_m + margin_m)
 
     def cells_of(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rows and columns of the points that lie in the window."""
+        """Return rows and columns of the points that are in the window."""
         rows = np.floor((self.y0 - xy[:, 1]) / self.cell_m).astype(int)
         columns = np.floor((xy[:, 0] - self.x0) / self.cell_m).astype(int)
         inside = (rows >= 0) & (rows < self.size) & (columns >= 0) & (columns < self.size)
@@ -40,14 +40,14 @@ class Window:
 def draw_label(
     target: np.ndarray, window: Window, xy: np.ndarray, normal: np.ndarray, width_m: float, value: int = 1
 ) -> None:
-    """Set the cells whose centre lies within half a railhead of the line to a value.
+    """Set the cells whose centre is at most half a railhead away from the line to a value.
 
     Parameters
     ----------
     target : (size, size) array of bool or int, changed
     window : Window
     xy, normal : (n, 2) arrays
-        Samples of the line no farther apart than a cell, and unit normals.
+        Samples of the line, at most a cell apart, and unit normals.
     width_m : float
         Railhead width.
     value : int
@@ -72,7 +72,7 @@ def draw_label(
 
 
 def scan_coverage(xy: np.ndarray, normal: np.ndarray, right_m: np.ndarray, left_m: np.ndarray) -> np.ndarray:
-    """Points that cover a rail completely, `LATERAL_STEP_M` apart across it.
+    """Return points that cover a rail completely, `LATERAL_STEP_M` apart across it.
 
     Parameters
     ----------
@@ -102,7 +102,20 @@ def scan_profiles(
     density: float,
     profile_m: float,
 ) -> np.ndarray:
-    """Points that a scanner finds on a rail: profiles `profile_m` apart, `density` points a metre where `seen`.
+    """Return points that a scanner finds on a rail, in profiles across it.
+
+    Parameters
+    ----------
+    rng : numpy Generator
+    xy, normal : (n, 2) arrays
+    right_m, left_m : (n,) arrays
+        Offsets of the head's two edges along the normal; the right one is negative.
+    seen : (n,) bool array
+        Where the rail has points.
+    density : float
+        Mean number of points per metre of rail.
+    profile_m : float
+        Distance between profiles.
 
     Returns
     -------

@@ -1,4 +1,8 @@
-"""What belongs to crossing rails and is no running rail: openings, guard, wing and check rails."""
+"""Openings, guard rails, wing rails and check rails, for layouts in plan.
+
+`scenes.frogs` lays guard rails in space. Both take their offset from `guard_offset` and their flangeway from
+`FLANGEWAY_M`. Lengths and positions are random and ends are flared here; there they are fixed, without flares.
+"""
 
 from __future__ import annotations
 
@@ -8,18 +12,19 @@ from ..curves import Curve
 from .paths import Layout, RailPath, TrackSize, beside
 
 FLANGEWAY_M = (0.038, 0.050)
+"""Smallest and largest clear width for wheel flanges next to a rail, in European, Indian and American practice."""
 OPENING_M = (0.030, 0.060)
-"""Gap of a rail where another one's flangeway cuts it."""
+"""Gap in a rail where the flangeway of another rail cuts it."""
 GUARD_LENGTH_M = (2.5, 5.0)
 WING_LENGTH_M = (0.8, 2.0)
 FLARE_M, FLARED_SHARE = 0.05, 0.2
-"""Guard rails bend away from their rail over this share of each half."""
+"""Distance by which the ends of a guard rail bend away from their rail, and share of each half that is bent."""
 COARSE = 25
-"""Samples between those compared first when a crossing is sought."""
+"""Step, in samples, of the first search for a crossing."""
 
 
 def crossing(first: np.ndarray, second: np.ndarray) -> tuple[int, int] | None:
-    """Find where two lines cross: the nearest samples of (n, 2) and (m, 2), or None where they stay apart."""
+    """Return the nearest samples of two lines, (n, 2) and (m, 2), where they cross, or None where they do not."""
     i, j = (COARSE * place for place in _nearest(first[::COARSE], second[::COARSE]))
     low, high = max(i - 2 * COARSE, 0), max(j - 2 * COARSE, 0)
     near, far = first[low : i + 2 * COARSE], second[high : j + 2 * COARSE]
@@ -34,47 +39,82 @@ def _nearest(first: np.ndarray, second: np.ndarray) -> tuple[int, int]:
     return int(i), int(j)
 
 
+def guard_offset(spacing_m: float, head_width_m: float, flangeway_m: float) -> float:
+    """Return the distance from the axis of a track to the axis of a guard rail: a head and a flangeway inside the rail.
+
+    Parameters
+    ----------
+    spacing_m : float
+        Distance between the two railhead centres.
+    head_width_m : float
+        Width of the rail and of the guard rail.
+    flangeway_m : float
+        Clear width between them.
+    """
+    return 0.5 * spacing_m - head_width_m - flangeway_m
+
+
 def guard(
     rng: np.random.Generator, axis: Curve, at: int, side: int, size: TrackSize, length_m: tuple[float, float]
 ) -> RailPath:
-    """Lay a rail inside one of a track's rails, a flangeway apart and flared at both ends.
+    """Lay a guard rail inside one of the rails of a track, flared at both ends.
 
     Parameters
     ----------
     rng : numpy Generator
     axis : Curve
-        Of the track.
+        Axis of the track.
     at : int
-        Sample beside which the guard's middle lies.
+        Sample of the axis at the middle of the guard rail.
     side : int
         1 for the left rail, -1 for the right one.
     size : TrackSize
     length_m : tuple of float
-        Least and greatest length.
+        Smallest and largest length.
     """
     half = int(0.5 * rng.uniform(*length_m) / axis.step_m)
     first, last = max(at - half, 0), min(at + half, len(axis.xy))
     piece = Curve(axis.xy[first:last], axis.heading[first:last], axis.curvature[first:last], axis.step_m)
     along = np.abs(np.linspace(-1, 1, len(piece.xy)))
     flare = FLARE_M * np.clip((along - 1 + FLARED_SHARE) / FLARED_SHARE, 0, 1)
-    return beside(piece, side * (0.5 * size.spacing_m - size.head_width_m - rng.uniform(*FLANGEWAY_M) - flare))
+    offset_m = guard_offset(size.spacing_m, size.head_width_m, rng.uniform(*FLANGEWAY_M))
+    return beside(piece, side * (offset_m - flare))
 
 
 def check_rail(rng: np.random.Generator, axis: Curve, side: int, size: TrackSize) -> RailPath:
-    """Lay a check rail along the inner rail of a sharp curve, `side` 1 where the curve turns left."""
+    """Lay a check rail along the inner rail of a sharp curve.
+
+    Parameters
+    ----------
+    rng : numpy Generator
+    axis : Curve
+        Axis of the track.
+    side : int
+        1 where the curve turns left, -1 where it turns right.
+    size : TrackSize
+    """
     length_m = rng.uniform(8.0, 40.0)
     return guard(rng, axis, len(axis.xy) // 2 + int(rng.uniform(-5.0, 5.0) / axis.step_m), side, size, (length_m,) * 2)
 
 
 def frog(rng: np.random.Generator, main: Curve, side: Curve, hand: int, size: TrackSize) -> tuple[Layout, int]:
-    """Fit out the crossing of a main track's rail with its branch's, both tracks running from the toe.
+    """Lay the opening, the guard rails and the wing rails of a turnout's frog.
+
+    Parameters
+    ----------
+    rng : numpy Generator
+    main, side : Curve
+        Axes of the main track and of the branch, both from the toe.
+    hand : int
+        1 where the branch leaves to the left, -1 where it leaves to the right.
+    size : TrackSize
 
     Returns
     -------
     Layout
-        The opening, and mostly two guard rails opposite the frog and two wing rails in it. The spot is the frog.
+        The opening and, in most cases, two guard rails opposite the frog and two wing rails. The frog is the spot.
     int
-        Sample of the main track beside the frog; the end where the rails do not cross.
+        Sample of the main track at the frog; its last one where the rails do not cross.
     """
     places = crossing(main.offset(0.5 * hand * size.spacing_m), side.offset(-0.5 * hand * size.spacing_m))
     if places is None:

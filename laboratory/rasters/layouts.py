@@ -1,9 +1,9 @@
 """Random track layouts by family: what a railway lays, from a plain track to a yard.
 
-Layouts are drawn at the scale of the base model: rail centres 1511.2 mm apart. Any other standard is the same picture
-at another scale (docs/method.md section 2.1), but for the ratio of gauge to railhead. The paper has two strategies:
-splits along random alignments, which most families vary, and random points joined by clothoids, `connections`. Like
-the paper's, the layouts hold more than railways build, so that they hold all that railways build.
+Layouts are drawn with rail centres 1511.2 mm apart. Any other standard is the same picture at another scale
+(docs/method.md section 2.1), except for the ratio of gauge to railhead. Gribov and Chang have two strategies: splits
+along random alignments, of which most families are variations, and random points joined by clothoids, `connections`.
+Like theirs, the layouts include many that no railway would build, so that they include all that railways do build.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 
 from ..curves import Curve, trace
 from .alignments import (
+    HALF_LENGTH_M,
     MIN_RADIUS_M,
     TRACK_SPACING_M,
-    WORLD_M,
     bend,
     random_alignment,
     random_radius,
@@ -30,26 +30,35 @@ from .paths import NO_TRACK, STEP_M, Layout, RailPath, TrackSize, beside, combin
 from .turnouts import FORMS, YARD_FORMS, crossover, turnout
 
 CHECKED_RADIUS_M = 200.0
-"""Curves sharper than this may have a check rail along their inner rail."""
+"""Radius below which a curve may have a check rail along its inner rail."""
 
 YARD_SPACING_M = (4.5, 6.0)
 
 CROSSING_ANGLES = (1 / 9, math.pi / 2)
-"""Angles of diamond crossings, radians: from the flattest with fixed frogs to a square one."""
+"""Smallest and largest angle of diamond crossings, radians: the flattest with fixed frogs, and a right angle."""
 
 GAUGE_PAIRS = ((0.914, 1.067), (1.000, 1.435), (1.067, 1.435), (1.435, 1.668), (1.435, 1.676))
-"""Gauges that share a rail, metres; closer ones need four rails."""
+"""Pairs of gauges that share a rail, metres; gauges closer to each other need four rails."""
 
 BUFFER_LENGTH_M = (1.8, 3.0)
 BUFFER_AHEAD_M = (0.0, 0.6)
-"""How far before the rails' ends the beam of a buffer stop lies."""
+"""Distance from the beam of a buffer stop to the ends of the rails."""
 
 AREA_M, POSES = 40.0, 14
-"""Points to be joined lie this far around the middle; of so many, some face each other well enough."""
+"""Half the side of the square in which points to be joined are drawn, and their number; with this number, some pairs
+can be joined."""
 
 
 def random_layout(rng: np.random.Generator, size: TrackSize, family: str | None = None) -> Layout:
-    """Draw a layout of a family, or of one drawn after `WEIGHTS`."""
+    """Draw a layout.
+
+    Parameters
+    ----------
+    rng : numpy Generator
+    size : TrackSize
+    family : str, optional
+        One of `FAMILIES`; by default, one is drawn by `WEIGHTS`.
+    """
     if family is None:
         names = list(WEIGHTS)
         family = names[rng.choice(len(names), p=np.array(list(WEIGHTS.values())) / sum(WEIGHTS.values()))]
@@ -57,13 +66,13 @@ def random_layout(rng: np.random.Generator, size: TrackSize, family: str | None 
 
 
 def plain(rng: np.random.Generator, size: TrackSize) -> Layout:
-    """One track, straight or nearly so."""
+    """Lay one track, straight or nearly straight."""
     axis = straight(rng) if rng.random() < 0.5 else bend(rng, random_radius(rng, 1500.0), (int(rng.choice([-1, 1])),))
     return track(axis, size, spot=True)
 
 
 def curve(rng: np.random.Generator, size: TrackSize) -> Layout:
-    """One track in a curve of 25 m radius or more, or in a reverse curve; sharp ones may have a check rail."""
+    """Lay one track in a curve of at least 25 m radius or in a reverse curve; sharp ones may have a check rail."""
     turn, radius_m = int(rng.choice([-1, 1])), random_radius(rng, MIN_RADIUS_M, 1500.0)
     axis = bend(rng, radius_m, (turn,) if rng.random() < 0.6 else (turn, -turn))
     checked = radius_m < CHECKED_RADIUS_M and rng.random() < 0.3
@@ -72,12 +81,12 @@ def curve(rng: np.random.Generator, size: TrackSize) -> Layout:
 
 
 def parallel(rng: np.random.Generator, size: TrackSize) -> Layout:
-    """Two to four parallel tracks along a random alignment."""
+    """Lay two to four parallel tracks along a random alignment."""
     return _tracks(_parallels(rng, int(rng.choice([2, 3, 4], p=[0.6, 0.3, 0.1])))[1], size)
 
 
 def split(rng: np.random.Generator, size: TrackSize) -> Layout:
-    """One track or two with one or two turnouts, of any form (the paper's first strategy)."""
+    """Lay one or two tracks with one or two turnouts of any form (the first strategy of Gribov and Chang)."""
     _, axes, _ = _parallels(rng, int(rng.choice([1, 2], p=[0.7, 0.3])))
     parts = []
     for _ in range(int(rng.choice([1, 2], p=[0.7, 0.3]))):
@@ -93,16 +102,16 @@ def split(rng: np.random.Generator, size: TrackSize) -> Layout:
 
 
 def crossed_over(rng: np.random.Generator, size: TrackSize) -> Layout:
-    """Two parallel tracks with a crossover, or two that cross each other."""
-    axis, axes, offsets = _parallels(rng, 2, sharpest_m=150.0)
+    """Lay two parallel tracks with one crossover, or with two that cross each other."""
+    axis, axes, (first, second) = _parallels(rng, 2, min_radius_m=150.0)
     form = YARD_FORMS[rng.integers(2, len(YARD_FORMS))]
-    ways = [offsets] if rng.random() < 0.7 else [offsets, offsets[::-1]]
-    parts = [crossover(rng, axis, way, WORLD_M, form, size) for way in ways]
+    ways = [(first, second)] if rng.random() < 0.7 else [(first, second), (second, first)]
+    parts = [crossover(rng, axis, way, HALF_LENGTH_M, form, size) for way in ways]
     return combine([*(track(one, size) for one in axes), *parts])
 
 
 def diamond(rng: np.random.Generator, size: TrackSize) -> Layout:
-    """Two tracks that cross; flat crossings have guard rails through their middle."""
+    """Lay two tracks that cross, in most cases with guard rails through the middle."""
     axis = straight(rng) if rng.random() < 0.6 else bend(rng, random_radius(rng, 190.0), (1,))
     angle = rng.choice([-1, 1]) * math.exp(rng.uniform(*np.log(CROSSING_ANGLES)))
     middle = len(axis.xy) // 2
@@ -122,7 +131,7 @@ def diamond(rng: np.random.Generator, size: TrackSize) -> Layout:
 
 
 def ladder(rng: np.random.Generator, size: TrackSize) -> Layout:
-    """Turnouts of one form one behind the other, whose branches run parallel."""
+    """Lay turnouts of one form in a row, with parallel branches."""
     form, hand = YARD_FORMS[rng.integers(1, len(YARD_FORMS))], int(rng.choice([-1, 1]))
     main = straight(rng)
     spacing_m = rng.uniform(*YARD_SPACING_M) / math.sin(form.angle)
@@ -131,24 +140,23 @@ def ladder(rng: np.random.Generator, size: TrackSize) -> Layout:
 
 
 def yard(rng: np.random.Generator, size: TrackSize) -> Layout:
-    """Four to seven tracks side by side; some end at buffers, some are linked by crossovers."""
-    axis, axes, offsets = _parallels(rng, int(rng.integers(4, 8)), YARD_SPACING_M, sharpest_m=150.0)
+    """Lay four to seven parallel tracks; some end at buffer stops, some are connected by crossovers."""
+    axis, axes, offsets = _parallels(rng, int(rng.integers(4, 8)), YARD_SPACING_M, min_radius_m=150.0)
     parts = []
     for one in axes:
         ends = rng.random() < 0.3
         parts.append(_buffered(rng, one, size) if ends else track(one, size, spot=True))
     for _ in range(int(rng.integers(1, 3))):
         first = int(rng.integers(len(axes) - 1))
-        pair = offsets[first], offsets[first + 1]
         form = YARD_FORMS[rng.integers(1, len(YARD_FORMS))]
-        parts.append(
-            crossover(rng, axis, pair[:: rng.choice([-1, 1])], rng.uniform(0.4, 0.6) * axis.length_m, form, size)
-        )
+        there, back = (offsets[first], offsets[first + 1]), (offsets[first + 1], offsets[first])
+        way = there if rng.choice([-1, 1]) == 1 else back
+        parts.append(crossover(rng, axis, way, rng.uniform(0.4, 0.6) * axis.length_m, form, size))
     return combine(parts)
 
 
 def dual_gauge(rng: np.random.Generator, size: TrackSize) -> Layout:
-    """One track with a third rail for a second gauge; either gauge may be the one asked for."""
+    """Lay one track with a third rail for a second gauge; either gauge may be that of `size`."""
     axis = random_alignment(rng, 2 * MIN_RADIUS_M)
     narrow, wide = GAUGE_PAIRS[rng.integers(len(GAUGE_PAIRS))]
     asked = narrow if rng.random() < 0.5 else wide
@@ -161,17 +169,17 @@ def dual_gauge(rng: np.random.Generator, size: TrackSize) -> Layout:
 
 
 def buffer_end(rng: np.random.Generator, size: TrackSize) -> Layout:
-    """One track that ends at a buffer stop, at times beside one that goes on."""
+    """Lay one track that ends at a buffer stop, in some cases next to one that continues."""
     _, axes, _ = _parallels(rng, int(rng.choice([1, 2])))
     ending = axes[0].reversed() if rng.random() < 0.5 else axes[0]
     return combine([_buffered(rng, ending, size), *(track(one, size) for one in axes[1:])])
 
 
 def connections(rng: np.random.Generator, size: TrackSize) -> Layout:
-    """Random points with random directions, joined by combinations of clothoids (the paper's second strategy)."""
+    """Join random points with random directions by clothoids (the second strategy of Gribov and Chang)."""
     tracks: list[Layout] = []
     while not tracks:
-        poses = [Pose(*rng.uniform(-AREA_M, AREA_M, size=2), rng.uniform(-math.pi, math.pi)) for _ in range(POSES)]
+        poses = [_random_pose(rng) for _ in range(POSES)]
         joins = random_joins(rng, poses, int(rng.integers(2, 7)), MIN_RADIUS_M)
         axes = [trace(elements, (start.x, start.y), start.heading, STEP_M) for start, elements in joins]
         tracks = [track(axis, size, spot=True) for axis in axes]
@@ -205,20 +213,25 @@ WEIGHTS = {
     "buffer end": 0.5,
     "connections": 2.5,
 }
-"""How often each family is drawn for training: what is common and what is hard, more often."""
+"""Frequency of each family in training: common and difficult ones are drawn more often."""
 
 
 def _parallels(
     rng: np.random.Generator,
     count: int,
     spacing_m: tuple[float, float] = TRACK_SPACING_M,
-    sharpest_m: float = MIN_RADIUS_M,
+    min_radius_m: float = MIN_RADIUS_M,
 ) -> tuple[Curve, list[Curve], tuple[float, ...]]:
-    """Draw an alignment, axes parallel to it about the origin, and their offsets to its left."""
+    """Draw an alignment, axes parallel to it, and their offsets to its left; the middle axis is at the origin."""
     offsets = np.concatenate([[0.0], np.cumsum(rng.uniform(*spacing_m, size=count - 1))])
     offsets -= offsets[count // 2]
-    axis = random_alignment(rng, sharpest_m + np.abs(offsets).max())
+    axis = random_alignment(rng, min_radius_m + np.abs(offsets).max())
     return axis, [shifted(axis, offset) for offset in offsets.tolist()], tuple(offsets.tolist())
+
+
+def _random_pose(rng: np.random.Generator) -> Pose:
+    x, y = rng.uniform(-AREA_M, AREA_M, size=2).tolist()
+    return Pose(x, y, rng.uniform(-math.pi, math.pi))
 
 
 def _tracks(axes: list[Curve], size: TrackSize) -> Layout:
@@ -226,7 +239,7 @@ def _tracks(axes: list[Curve], size: TrackSize) -> Layout:
 
 
 def _buffered(rng: np.random.Generator, axis: Curve, size: TrackSize) -> Layout:
-    """End a track near the middle, with a beam across that is no rail."""
+    """Lay a track that ends near its middle, with the beam of a buffer stop, which is not a rail."""
     axis = axis.piece(0.0, rng.uniform(0.4, 0.6) * axis.length_m)
     end, normal = axis.xy[-1], axis.left_normal[-1]
     forward = np.array([normal[1], -normal[0]])

@@ -1,6 +1,6 @@
-"""What goes wrong beside the rails or with all of them at once: shadows, patches, ballast, lost cells, lone lines.
+"""Distortions of the whole raster: shadows, patches, ballast, lost cells, lone lines.
 
-Every function takes a severity from 0 to 1; docs/synthetic.md lists what it does.
+Each function takes a severity from 0 to 1; docs/synthetic.md states its effect.
 """
 
 from __future__ import annotations
@@ -14,41 +14,42 @@ from .drawing import Window
 from .paths import STEP_M, RailPath
 
 LONE_LINE_M = 5.0
-"""Lines shorter than this beside the tracks are no rails."""
+"""Length below which a line next to the tracks is not a rail."""
 LONE_LINES = 1.5
-"""Their number on 20 x 20 m at full severity, on average."""
+"""Mean number of lone lines on 20 x 20 m at full severity."""
 
 SHADOWS = 0.8
-"""Number of shadows on 20 x 20 m at full severity, on average."""
+"""Mean number of shadows on 20 x 20 m at full severity."""
 SHADOW_WIDTH_M, SHADOW_LENGTH_M = (0.1, 2.5), (2.0, 15.0)
 SHADOW_SPREAD = 0.15
-"""By how much a shadow widens with the distance from what throws it."""
+"""Increase of the half width of a shadow per distance from the object that casts it."""
 
 LOST_SHARE = 0.4
-"""Largest share of single cells lost."""
+"""Largest share of cells that are lost."""
 STRAY_SHARE = 0.02
-"""Largest share of cells anywhere that are taken for rail."""
-BALLAST_SHARE, GRAVE_BALLAST = 0.06, 3.0
-"""Largest share of cells beside a rail that are taken for rail, and by how much of itself it grows at the top of the
-scale, where the classification has all but failed."""
+"""Largest share of cells, anywhere, that are set by mistake."""
+BALLAST_SHARE, WORST_BALLAST = 0.06, 3.0
+"""Largest share of cells next to a rail that are set because ballast was classified as rail, and its relative increase
+at the top of the scale, where the classification has nearly failed."""
 BALLAST_M = (0.1, 1.5)
-"""Distances over which that share decays."""
+"""Distances over which this share decays."""
 
-BLOBS, GRAVE_BLOBS = 300.0, 1.0
-"""Patches on 1024 x 1024 cells at full severity, at most on average, and their growth at the top of the scale."""
-BLOB_CELLS = (1.0, 12.0)
-"""Half axes of patches."""
+PATCHES, WORST_PATCHES = 300.0, 1.0
+"""Largest mean number of patches on 1024 x 1024 cells at full severity, and its relative increase at the top of the
+scale."""
+PATCH_CELLS = (1.0, 12.0)
+"""Smallest and largest half axis of a patch."""
 HIDING_SHARE = 0.25
-"""Share of patches that hide rail instead of feigning it."""
+"""Share of patches that clear cells instead of setting them."""
 
 
-def gravity(severity: float) -> float:
-    """How much of what only the worst clouds suffer from: next to nothing up to the middle of the scale."""
+def worst_share(severity: float) -> float:
+    """Return the share of the distortions that occur in the worst clouds only: small up to the middle of the scale."""
     return severity**3
 
 
 def lone_lines(rng: np.random.Generator, window: Window, severity: float) -> list[RailPath]:
-    """Draw short straight lines that belong to no track: cables, sleepers' ends, edges of platforms."""
+    """Draw short straight lines that belong to no track: cables, ends of sleepers, edges of platforms."""
     lines = []
     for _ in range(rng.poisson(LONE_LINES * severity * _area(window))):
         heading = rng.uniform(-math.pi, math.pi)
@@ -60,7 +61,7 @@ def lone_lines(rng: np.random.Generator, window: Window, severity: float) -> lis
 
 
 def shadows(rng: np.random.Generator, window: Window, severity: float) -> np.ndarray:
-    """Draw wedges that the scanner does not see behind masts, cabinets and trains, (size, size) bool."""
+    """Draw wedges that are hidden from the scanner by masts, cabinets and trains, (size, size) bool."""
     hidden = np.zeros((window.size, window.size), dtype=bool)
     centres = (np.arange(window.size) + 0.5) * window.cell_m
     for _ in range(rng.poisson(SHADOWS * severity * _area(window))):
@@ -79,10 +80,23 @@ def shadows(rng: np.random.Generator, window: Window, severity: float) -> np.nda
 def flip(
     rng: np.random.Generator, observed: np.ndarray, label: np.ndarray, severity: float, cell_m: float
 ) -> np.ndarray:
-    """Lose set cells, and set empty ones, more of them near the tracks where ballast is taken for rail."""
+    """Clear random cells and set others; near the rails more cells are set, because ballast is classified as rail.
+
+    Parameters
+    ----------
+    rng : numpy Generator
+    observed, label : (size, size) bool arrays
+    severity : float
+    cell_m : float
+        Side of a cell.
+
+    Returns
+    -------
+    (size, size) bool array
+    """
     lost = rng.random() * LOST_SHARE * severity
     stray = rng.random() ** 3 * STRAY_SHARE * severity
-    beside = rng.random() ** 2 * BALLAST_SHARE * severity * (1 + GRAVE_BALLAST * gravity(severity))
+    beside = rng.random() ** 2 * BALLAST_SHARE * severity * (1 + WORST_BALLAST * worst_share(severity))
     kept = observed & (rng.random(observed.shape, dtype=np.float32) >= lost)
     chance = stray
     if beside > 0 and label.any():
@@ -91,13 +105,14 @@ def flip(
     return kept | (rng.random(observed.shape, dtype=np.float32) < chance)
 
 
-def scatter_blobs(rng: np.random.Generator, observed: np.ndarray, severity: float) -> np.ndarray:
-    """Scatter elliptic patches: most are vegetation taken for rail and set cells, some hide rail and clear them."""
+def scatter_patches(rng: np.random.Generator, observed: np.ndarray, severity: float) -> np.ndarray:
+    """Scatter elliptic patches: most set cells, as vegetation classified as rail does; some clear cells."""
     size = len(observed)
     result = observed.copy()
-    most = BLOBS * severity * (1 + GRAVE_BLOBS * gravity(severity)) * (size / 1024) ** 2
+    most = PATCHES * severity * (1 + WORST_PATCHES * worst_share(severity)) * (size / 1024) ** 2
     for _ in range(rng.poisson(most * rng.random())):
-        axes = np.exp(rng.uniform(*np.log(BLOB_CELLS), size=2))
+        smallest, largest = np.log(PATCH_CELLS)
+        axes = np.exp(rng.uniform(smallest, largest, size=2))
         tilt = rng.uniform(0, math.pi)
         row, column = rng.integers(0, size, size=2)
         reach = int(axes.max()) + 1
@@ -116,10 +131,10 @@ def scatter_blobs(rng: np.random.Generator, observed: np.ndarray, severity: floa
 
 
 def _place(rng: np.random.Generator, window: Window) -> np.ndarray:
-    """Draw a point of the window, metres."""
+    """Draw a point in the window, metres."""
     return np.array([window.x0, window.y0]) + rng.random(2) * [window.extent_m, -window.extent_m]
 
 
 def _area(window: Window) -> float:
-    """Area of the window in units of 20 x 20 m, about 512 x 512 cells."""
+    """Return the area of the window in units of 20 x 20 m, about 512 x 512 cells."""
     return (window.extent_m / 20) ** 2

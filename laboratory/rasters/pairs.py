@@ -1,4 +1,4 @@
-"""Training pairs: a random layout, seen through a random window, at a random severity."""
+"""Training pairs: a random layout in a random window at a random severity."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from .layouts import random_layout
 from .paths import TrackSize
 
 SPACING_M = 1.5112
-"""Distance between railhead centres at which layouts are drawn: 132RE."""
+"""Distance between railhead centres in all layouts: that of 132RE."""
 CELL_M = 0.04
 
 RATIOS = (14.2, 25.2)
-"""Least and greatest ratio of gauge to railhead width among the world's rail standards (docs/method.md section 10)."""
+"""Smallest and largest ratio of gauge to railhead width among rail standards (docs/method.md section 10)."""
 BASE_RATIO = 18.83
-"""Ratio of 132RE, the paper's example."""
+"""Ratio of 132RE, the example of Gribov and Chang."""
 RATIO_TOLERANCE = 0.06
-"""Mismatch of the ratio that a model must bear, so that a handful of models serves all standards."""
+"""Mismatch of the ratio that a model must tolerate, so that a few models cover all standards."""
 ODD_SHARE = 0.4
-"""Share of pairs whose ratio is drawn from all of `RATIOS`: while the zoo holds one model, it serves every standard."""
+"""Share of pairs whose ratio is drawn from the whole range `RATIOS`, because the only model serves every standard."""
 
 EMPTY_SHARE = 0.05
 CLEAN_SHARE = 0.05
 FAR_M = 1e5
-"""Where no track is."""
+"""Distance at which there is no track."""
 
 
 def random_ratio(rng: np.random.Generator) -> float:
@@ -38,7 +38,7 @@ def random_ratio(rng: np.random.Generator) -> float:
 
 
 def ratio_near(rng: np.random.Generator, ratio: float) -> float:
-    """Draw a ratio that a model for `ratio` must bear."""
+    """Draw a ratio that a model for `ratio` must tolerate."""
     return ratio * math.exp(rng.uniform(-RATIO_TOLERANCE, RATIO_TOLERANCE))
 
 
@@ -54,15 +54,15 @@ def random_pair(
     Parameters
     ----------
     rng : numpy Generator
-        The pair is a function of its state alone.
+        The pair depends on its state alone.
     size : int
         Cells along the side.
     severity : float, optional
-        0 (clean) to 1; drawn evenly where it is not given, with some tiles clean.
+        0 (clean) to 1. By default it is drawn uniformly, and some pairs are clean.
     ratio : float, optional
-        Gauge over railhead width; see `random_ratio`.
+        Gauge divided by railhead width; by default, `random_ratio`.
     family : str, optional
-        One of `layouts.FAMILIES`, shown for certain; where it is not given, one is drawn, and some tiles are empty.
+        One of `layouts.FAMILIES`. By default it is drawn, and some pairs are empty.
     """
     if severity is None:
         severity = 0.0 if rng.random() < CLEAN_SHARE else rng.random()

@@ -1,4 +1,4 @@
-"""Rails in plan, and layouts of them: the running rails to be found, and the lines beside them to be dropped."""
+"""Rails in plan, and layouts: running rails that the network is to keep, and other lines that it is to remove."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ STEP_M = 0.02
 """Distance between samples of a rail: half a cell."""
 
 NO_TRACK = -1
-"""Track number of lines that belong to none."""
+"""Track number of lines that belong to no track."""
 
 
 @dataclass(frozen=True)
 class TrackSize:
-    """What tells one track from another in plan.
+    """The dimensions of a track in plan.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class RailPath:
     normal : (n, 2) array
         Unit vectors to the left.
     track : int
-        Number of the track it belongs to; the rails of a track share what happens to the track.
+        Number of its track; some distortions apply to all rails of a track.
     """
 
     xy: np.ndarray
@@ -52,18 +52,18 @@ class RailPath:
 
 @dataclass(frozen=True)
 class Layout:
-    """Rails to be found, lines to be dropped, and where to look.
+    """Rails to keep, lines to remove, and places to show.
 
     Attributes
     ----------
     rails : tuple of RailPath
         Running rails.
     distractors : tuple of RailPath
-        Guard, check and wing rails and other lines that are no running rail.
+        Guard, check and wing rails and other lines that are not running rails.
     openings : tuple of ((2,) array, float)
-        Centres and widths, metres, of the gaps that wheel flanges need where rails cross.
+        Centres and widths, metres, of the gaps for wheel flanges where rails cross.
     spots : tuple of (2,) array
-        Places worth showing, metres.
+        Places that a raster should show, metres.
     """
 
     rails: tuple[RailPath, ...] = ()
@@ -73,7 +73,7 @@ class Layout:
 
 
 def combine(layouts: Iterable[Layout]) -> Layout:
-    """Put layouts together, and number their tracks anew."""
+    """Join layouts into one and renumber their tracks."""
     rails: list[RailPath] = []
     distractors: list[RailPath] = []
     openings: list[tuple[np.ndarray, float]] = []
@@ -88,11 +88,28 @@ def combine(layouts: Iterable[Layout]) -> Layout:
 
 
 def beside(curve: Curve, left_m: float | np.ndarray, track: int = NO_TRACK) -> RailPath:
-    """Lay a rail `left_m` to the left of a curve along the exact normal."""
+    """Lay a rail parallel to a curve, offset along the exact normal.
+
+    Parameters
+    ----------
+    curve : Curve
+    left_m : float or (n,) array
+        Offset to the left.
+    track : int
+        Number of the track.
+    """
     return RailPath(curve.offset(left_m), curve.left_normal, track)
 
 
 def track(axis: Curve, size: TrackSize, spot: bool = False) -> Layout:
-    """Lay the two rails of a track; its middle is worth showing if `spot`."""
+    """Lay the two rails of a track.
+
+    Parameters
+    ----------
+    axis : Curve
+    size : TrackSize
+    spot : bool
+        Whether the middle of the track is a place that a raster should show.
+    """
     rails = beside(axis, size.spacing_m / 2, 0), beside(axis, -size.spacing_m / 2, 0)
     return Layout(rails, spots=(axis.xy[len(axis.xy) // 2],) if spot else ())

@@ -1,4 +1,4 @@
-"""Turnouts and crossovers: the forms railways build, and the rails they lay (docs/method.md section 11.4)."""
+"""Turnouts and crossovers: the forms that railways build, and their rails (docs/method.md section 11.4)."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from .paths import Layout, TrackSize, beside, combine
 
 FOOT_M = 0.3048
 HEEL_SPREAD_M = 6.0 / 12 * FOOT_M
-"""By how much an American switch rail diverges over its length."""
+"""Divergence of an American switch rail over its length."""
 
 BLADE_START = (0.2, 0.4)
-"""Where a switch blade becomes a rail of its own, as a share of its length: before it is thinner than the noise."""
+"""Share of a switch blade's length from which it shows as a rail of its own; before, it is thinner than the noise."""
 BLADE_LENGTH_M = (5.0, 12.0)
 
 
 @dataclass(frozen=True)
 class TurnoutForm:
-    """A turnout by its branch: a straight switch or none, an arc, then the leg behind it.
+    """A turnout, described by its branch: an optional straight switch, an arc, then the leg behind it.
 
     Attributes
     ----------
     name : str
     radius_m : float
-        Radius of the branch's arc, measured at its centerline.
+        Radius of the arc, at the axis of the branch.
     arc_m : float
         Length of the arc.
     switch_m, switch_angle : float
-        Length of a straight switch, and its angle with the main track in radians; 0 where the arc begins at the toe
-        and touches the main track.
+        Length of the straight switch, and its angle with the main track in radians; 0 where the arc begins at the toe,
+        tangent to the main track.
     """
 
     name: str
@@ -45,7 +45,7 @@ class TurnoutForm:
 
     @property
     def angle(self) -> float:
-        """Angle between both tracks behind the arc, radians."""
+        """Angle between the two tracks behind the arc, radians."""
         return self.switch_angle + self.arc_m / self.radius_m
 
 
@@ -79,28 +79,28 @@ FORMS = (
 )
 
 YARD_FORMS = tuple(form for form in FORMS if form.radius_m < 310)
-"""What ladders and crossovers of yards are made of: long turnouts would not fit between their tracks."""
+"""Forms for the ladders and crossovers of yards; longer turnouts would not fit between their tracks."""
 
 
 def branch(main: Curve, toe_m: float, form: TurnoutForm, hand: int, leg_m: float) -> Curve:
-    """Lay the branch centerline of a turnout into a track.
+    """Compute the axis of a turnout's branch.
 
     Parameters
     ----------
     main : Curve
-        The through track, run in facing direction.
+        Axis of the through track, in facing direction.
     toe_m : float
         Chainage of the toe.
     form : TurnoutForm
     hand : int
         1: the branch leaves to the left; -1: to the right.
     leg_m : float
-        Length behind the arc, along which the branch keeps the curvature of the main track.
+        Length behind the arc, where the branch has the curvature of the main track.
 
     Returns
     -------
     Curve
-        From the toe on. A turnout in a curve is bent: the main track's curvature is added to the form's.
+        Begins at the toe. A turnout in a curve is bent: the curvature of the main track is added to that of the form.
     """
     toe = int(round(toe_m / main.step_m))
     inherited = float(main.curvature[min(toe, len(main.curvature) - 1)])
@@ -113,11 +113,23 @@ def branch(main: Curve, toe_m: float, form: TurnoutForm, hand: int, leg_m: float
 def turnout(
     rng: np.random.Generator, main: Curve, toe_m: float, form: TurnoutForm, hand: int, size: TrackSize
 ) -> Layout:
-    """Lay what a turnout adds to its main track: the branch's rails and the frog's fittings.
+    """Lay the rails of a turnout's branch, with its guard rails and wing rails.
 
-    The branch's outer rail is the bent stock rail and begins at the toe; its inner one is a switch blade, then a
-    closure rail that crosses the main track's at the frog. The other blade is the main track's own rail. Spots are
-    the frog and a place between it and the toe.
+    The outer rail of the branch is the bent stock rail and begins at the toe. The inner one is a switch blade, then a
+    closure rail that crosses a rail of the main track at the frog. The other blade is a rail of the main track. Spots
+    are the frog and a place between it and the toe.
+
+    Parameters
+    ----------
+    rng : numpy Generator
+    main : Curve
+        Axis of the main track.
+    toe_m : float
+        Chainage of the toe.
+    form : TurnoutForm
+    hand : int
+        1: the branch leaves to the left; -1: to the right.
+    size : TrackSize
     """
     side = branch(main, toe_m, form, hand, rng.uniform(15.0, 45.0))
     ahead = main.piece(toe_m, main.length_m)
@@ -128,26 +140,26 @@ def turnout(
 
 
 def _visible_from(rng: np.random.Generator) -> float:
-    """Distance from the toe at which a blade shows, metres."""
+    """Draw the distance from the toe at which a blade begins to show, metres."""
     return rng.uniform(*BLADE_START) * rng.uniform(*BLADE_LENGTH_M)
 
 
 def crossover(
     rng: np.random.Generator, axis: Curve, offsets: tuple[float, float], at_m: float, form: TurnoutForm, size: TrackSize
 ) -> Layout:
-    """Lay what joins two parallel tracks: two turnouts of one form that share their branch.
+    """Lay a crossover between two parallel tracks: two turnouts of one form that share their branch.
 
     Parameters
     ----------
     rng : numpy Generator
     axis : Curve
-        Both tracks run parallel to it.
+        Axis to which both tracks are parallel.
     offsets : tuple of float
-        How far to its left the first and the second track lie, metres.
+        Offsets of the first and of the second track to its left, metres.
     at_m : float
         Chainage of the middle.
     form : TurnoutForm
-        Its arc is shortened where the tracks are too close for it; a straight switch is left out.
+        Its arc is shortened where the tracks are close together; a straight switch is left out.
     size : TrackSize
     """
     apart = abs(offsets[1] - offsets[0])

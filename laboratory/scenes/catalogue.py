@@ -1,4 +1,4 @@
-"""Every scene by its name: classified clouds with exact truth, for tests, benchmarks and the sample that ships."""
+"""Every scene by its name, for tests, benchmarks and the sample in the plugin."""
 
 from __future__ import annotations
 

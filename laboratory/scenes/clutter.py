@@ -1,41 +1,43 @@
-"""What surrounds rails in a classified cloud: weeds and ballast taken for rail, ground, and weeds told apart."""
+"""Points around the rails of a classified cloud: weeds and ballast, in part classified as rail, and ground."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 HEAD_ABOVE_GROUND_M = 0.15
-"""Railhead above sleepers and ballast (Gribov and Chang, section 3)."""
+"""Height of the railhead above sleepers and ballast (Gribov and Chang, section 3)."""
 
 BALLAST_WIDTH_M = 1.6
-"""From a track's axis to where its bed begins to fall."""
+"""Distance from the axis of a track to the shoulder of its bed."""
 
 BED_SLOPE, BED_HEIGHT_M = 1 / 1.5, 0.5
-"""Fall of the bed's shoulder and how deep it goes."""
+"""Slope and height of the shoulder of the bed."""
 
 GROUND_ROUGHNESS_M = 0.015
-"""Standard deviation of stones."""
+"""Standard deviation of the height of the ground."""
 
 WEED_POINTS = (5, 60)
-"""Points in one weed, fewest and most."""
+"""Smallest and largest number of points in a weed."""
 
 
 def weeds(
-    rng: np.random.RandomState, lines: list, count: int, reach_m: float, height_m: tuple[float, float]
+    rng: np.random.RandomState, lines: Sequence[np.ndarray], count: int, reach_m: float, height_m: tuple[float, float]
 ) -> np.ndarray:
-    """Let weeds grow beside lines: round tufts, some narrow, some as wide as a sleeper.
+    """Draw weeds next to lines: round tufts, some narrow, some as wide as a sleeper.
 
     Parameters
     ----------
     rng : RandomState
-    lines : list of (n, 3) array
+    lines : sequence of (n, 3) array
         Lines at the height of the railheads.
     count : int
     reach_m : float
-        Farthest a weed stands from its line.
+        Greatest distance from the line in x and in y.
     height_m : tuple of float
-        Lowest and highest point above the railheads.
+        Smallest and largest height above the railheads.
 
     Returns
     -------
@@ -51,24 +53,38 @@ def weeds(
     return points
 
 
-def stones(rng: np.random.RandomState, lines: list, count: int, reach_m: float) -> np.ndarray:
-    """Scatter single points of ballast and rail feet beside lines, (count, 3)."""
+def stones(rng: np.random.RandomState, lines: Sequence[np.ndarray], count: int, reach_m: float) -> np.ndarray:
+    """Draw single points of ballast and rail feet next to lines.
+
+    Parameters
+    ----------
+    rng : RandomState
+    lines : sequence of (n, 3) array
+        Lines at the height of the railheads.
+    count : int
+    reach_m : float
+        Greatest distance from the line in x and in y.
+
+    Returns
+    -------
+    (count, 3) array
+    """
     points = _beside(rng, lines, count, reach_m)
     points[:, 2] -= rng.uniform(0.6, 1.1, count) * HEAD_ABOVE_GROUND_M
     return points
 
 
-def ground(rng: np.random.RandomState, centerlines: list, margin_m: float, step_m: float) -> np.ndarray:
-    """Thin ground on a jittered grid around the tracks: a flat bed with falling shoulders.
+def ground(rng: np.random.RandomState, centerlines: Sequence[np.ndarray], margin_m: float, step_m: float) -> np.ndarray:
+    """Draw ground points on a jittered grid around the tracks: a flat bed with sloping shoulders.
 
     Parameters
     ----------
     rng : RandomState
-    centerlines : list of (n, 3) array
+    centerlines : sequence of (n, 3) array
     margin_m : float
-        How far the ground reaches beyond the outer tracks.
+        Width of the ground beyond the outer tracks.
     step_m : float
-        Grid of the thinning.
+        Step of the grid.
 
     Returns
     -------
@@ -86,8 +102,8 @@ def ground(rng: np.random.RandomState, centerlines: list, margin_m: float, step_
     return np.column_stack([xy[kept], axes[nearest[kept], 2] - HEAD_ABOVE_GROUND_M - fall + rough])
 
 
-def _beside(rng: np.random.RandomState, lines: list, count: int, reach_m: float) -> np.ndarray:
-    """Draw places around lines, each at most `reach_m` from its line in x and in y; (count, 3)."""
+def _beside(rng: np.random.RandomState, lines: Sequence[np.ndarray], count: int, reach_m: float) -> np.ndarray:
+    """Draw places around lines, at most `reach_m` from the line in x and in y; (count, 3)."""
     along = np.concatenate(lines)
     places = along[rng.randint(len(along), size=count)]
     places[:, :2] += rng.uniform(-reach_m, reach_m, (count, 2))

@@ -1,43 +1,48 @@
-"""Where rails of different tracks meet: shared blades, the flangeways of frogs and the guard rails around them."""
+"""Places where rails of different tracks meet: shared blades, flangeways and the guard rails at frogs.
+
+See `rasters.fittings` for the same guard rails in plan, and for the differences.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..rasters import fittings
+from ..rasters.fittings import guard_offset
 from .tracks import Railhead, Track
 
-FLANGEWAY_M = 0.044
-"""Clear width that a wheel's flange needs beside a rail at frogs and guard rails (38 to 50 mm)."""
+FLANGEWAY_M = sum(fittings.FLANGEWAY_M) / 2
+"""Clear width next to a rail at frogs and guard rails: 44 mm."""
 
 MEETING_M = 0.2
-"""Rails nearer than this are looked at: head, flangeway and some room."""
+"""Distance below which rails are compared: head, flangeway and some clearance."""
 
 CHECK_RAIL_M = 3.6
-"""Length of the guard rail opposite a frog; two thirds of it lie ahead of the nose."""
+"""Length of the guard rail opposite a frog; two thirds of it are ahead of the nose."""
 
 WING_RAIL_M = (0.2, 1.8)
-"""How far the wing rails of a frog reach before and behind the place where the axes of the rails cross."""
+"""Lengths of a wing rail before and behind the point where the axes of the rails cross."""
 
 COARSE_SAMPLES = 50
-"""Every so many samples of a head serve to tell whether two rails come near each other at all."""
+"""Step, in samples, of the search for rails that come near each other."""
 
 
 @dataclass(frozen=True)
 class Frog:
-    """A place where a rail crosses one of another track.
+    """A place where a rail crosses a rail of another track.
 
     Attributes
     ----------
     track, side : int
-        The rail; side is +1 for a left and -1 for a right one.
+        The rail; side is +1 for the left and -1 for the right one.
     sample : int
-        Where on its track's curve.
+        Sample of the curve of its track.
     behind : int
-        +1 if the nose lies ahead along the curve, seen from the crossing axes, -1 if it lies back.
+        +1 if the nose follows the crossing of the axes along the curve, -1 if it precedes it.
     """
 
     track: int
@@ -47,9 +52,9 @@ class Frog:
 
 
 def laid_together(tracks: Sequence[Track], clouds: Sequence[np.ndarray], head_width_m: float) -> list[np.ndarray]:
-    """Make the points of rails that were scanned one by one those of rails laid together.
+    """Remove from the points of rails, which were scanned one by one, those that other rails make impossible.
 
-    Where two heads overlap the later one gives no points; where two rails cross, the flangeway of either is cut through
+    Where two heads overlap, the later one has no points. Where two rails cross, the flangeway of each is cut through
     the other.
 
     Parameters
@@ -58,6 +63,11 @@ def laid_together(tracks: Sequence[Track], clouds: Sequence[np.ndarray], head_wi
     clouds : sequence of (n, 3) array
         Points of each running rail, in the order of the tracks and their sides.
     head_width_m : float
+
+    Returns
+    -------
+    list of (n, 3) array
+        In the same order.
     """
     clouds = list(clouds)
     rails = _rails(tracks)
@@ -74,9 +84,9 @@ def laid_together(tracks: Sequence[Track], clouds: Sequence[np.ndarray], head_wi
 
 
 def frog_guards(tracks: Sequence[Track], head_width_m: float) -> list[Railhead]:
-    """Lay a check rail beside the rail opposite each frog and a wing rail beside each rail that runs through it.
+    """Lay a check rail opposite each frog and a wing rail along each rail that passes through it.
 
-    Only crossings of a left and a right rail have them: the acute ones of turnouts and diamonds.
+    Only crossings of a left and a right rail have them: the acute crossings of turnouts and diamonds.
     """
     guards = []
     for frog in _frogs(tracks, head_width_m):
@@ -86,19 +96,19 @@ def frog_guards(tracks: Sequence[Track], head_width_m: float) -> list[Railhead]:
         check = ahead - CHECK_RAIL_M / 2, ahead + CHECK_RAIL_M / 2
         before, after = WING_RAIL_M if frog.behind > 0 else WING_RAIL_M[::-1]
         wing = frog.sample * step_m - before, frog.sample * step_m + after
-        inset_m = 2 * (head_width_m + FLANGEWAY_M)
-        guards.append(track.piece(*check).inset(inset_m).railhead(-frog.side))
-        guards.append(track.piece(*wing).inset(inset_m).railhead(frog.side))
+        inner = replace(track, spacing_m=2 * guard_offset(track.spacing_m, head_width_m, FLANGEWAY_M))
+        guards.append(inner.piece(*check).railhead(-frog.side))
+        guards.append(inner.piece(*wing).railhead(frog.side))
     return guards
 
 
 def _rails(tracks: Sequence[Track]) -> list[tuple[int, int, Railhead]]:
-    """List track, side and head of every running rail."""
+    """Return track, side and head of each running rail."""
     return [(number, side, track.railhead(side)) for number, track in enumerate(tracks) for side in track.sides]
 
 
 def _meetings(rails: Sequence[tuple[int, int, Railhead]]) -> Iterator[tuple[int, int]]:
-    """List ordered pairs of rails of different tracks that come near each other."""
+    """Yield the ordered pairs of rails of different tracks that come near each other."""
     coarse = [head.top[::COARSE_SAMPLES, :2] for _, _, head in rails]
     trees = [cKDTree(top) for top in coarse]
     for one, (track, _, head) in enumerate(rails):
@@ -109,7 +119,7 @@ def _meetings(rails: Sequence[tuple[int, int, Railhead]]) -> Iterator[tuple[int,
 
 
 def _offsets(points: np.ndarray, head: Railhead) -> tuple[np.ndarray, np.ndarray]:
-    """Find the points near a head, and how far to the left of its axis each lies."""
+    """Return which points are near a head, and their offsets to the left of its axis."""
     distance, sample = cKDTree(head.top).query(points, distance_upper_bound=MEETING_M)
     near = np.flatnonzero(np.isfinite(distance))
     sample = sample[near]
@@ -117,19 +127,19 @@ def _offsets(points: np.ndarray, head: Railhead) -> tuple[np.ndarray, np.ndarray
 
 
 def _crosses(own: Railhead, head: Railhead, head_width_m: float) -> bool:
-    """Tell whether a rail passes from one side of another to its other side."""
+    """Return whether a rail passes from one side of another rail to the other side."""
     _, left = _offsets(own.top, head)
     return len(left) > 0 and left.min() < -head_width_m / 2 and left.max() > head_width_m / 2
 
 
 def _frogs(tracks: Sequence[Track], head_width_m: float) -> Iterator[Frog]:
-    """Find the acute crossings of rails, each once for either rail."""
+    """Yield the acute crossings of rails, once for each of the two rails."""
     rails = _rails(tracks)
     for one, other in _meetings(rails):
         (track, side, own), (_, other_side, head) = rails[one], rails[other]
         if side != other_side and _crosses(own, head, head_width_m):
             near, left = _offsets(own.top, head)
             sample = int(near[np.argmin(np.abs(left))])
-            # Behind the nose each rail lies on the field side of the other.
+            # Behind the nose, each rail is on the field side of the other.
             behind = 1 if left[-1] * other_side > left[0] * other_side else -1
             yield Frog(track, side, sample, behind)

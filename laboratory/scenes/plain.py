@@ -1,4 +1,4 @@
-"""Scenes of tracks without switches: plain, canted, tram, noisy, sparse, with a third rail, in feet."""
+"""Scenes of tracks without switches: plain, canted, tram, noisy, sparse, dual gauge, in feet."""
 
 from __future__ import annotations
 
@@ -12,30 +12,42 @@ from .scene import Clutter, Gaps, Plan, Scene, build
 from .tracks import Track
 
 WHOLE_ENDS_M = 3.0
-"""Rails have no gap within this distance of their ends: nothing could tell how far they go on."""
+"""Length without gaps at either end of a rail: beyond a gap, the end of a rail would be unknown."""
 
 CALIFORNIA = LocalFrame(np.array([6100000.0, 2100000.0, 120.0]), 1200 / 3937, 1200 / 3937, "EPSG:2227")
 """Zone 3 of the state plane system, in US survey feet."""
 
 INDIA = LocalFrame(np.array([578200.0, 2494300.0, 500.0]), crs_wkt="EPSG:32643")
-"""South of Indore, where a metre-gauge line ran until it was rebuilt."""
+"""South of Indore, on the route of a former metre-gauge line."""
 
 PAPER_TRACKS = ((0.0, 0.0), (3.96, 0.03), (7.92, -0.02))
-"""Axis to the left of the ridden track's and height above it, metres: right, centre and left track."""
+"""Offset of each axis to the left of the scanner's track, and height above it, metres: right, centre and left track."""
 
 
 def spacing(standard: RailStandard) -> float:
-    """Distance between the tops of a track's two heads."""
+    """Return the distance between the tops of the two heads of a track."""
     return standard.gauge_m + standard.head_width_m
 
 
 def rolling(curve: Curve, gradient: float = 0.004, wave_m: float = 0.01, wave_length_m: float = 80.0) -> np.ndarray:
-    """Heights of a line that climbs and waves a little, as settled track does."""
+    """Return the heights of a track with a constant gradient and small waves, as settled track has them.
+
+    Parameters
+    ----------
+    curve : Curve
+    gradient : float
+    wave_m, wave_length_m : float
+        Amplitude and length of the waves.
+
+    Returns
+    -------
+    (n,) array
+    """
     return gradient * curve.chainage + wave_m * np.sin(2 * np.pi * curve.chainage / wave_length_m)
 
 
 def canted(curve: Curve, largest_m: float) -> np.ndarray:
-    """Cant in proportion to curvature, the outer rail high."""
+    """Return a cant in proportion to curvature, the outer rail high, up to `largest_m`."""
     sharpest = np.abs(curve.curvature).max()
     return -largest_m * curve.curvature / sharpest if sharpest > 0 else np.zeros(len(curve.xy))
 
@@ -43,7 +55,22 @@ def canted(curve: Curve, largest_m: float) -> np.ndarray:
 def random_gaps(
     rng: np.random.RandomState, track: int, length_m: float, count: int, longest_m: float = 3.0
 ) -> dict[tuple[int, int], Gaps]:
-    """Draw stretches without points for either rail of a track: one somewhere in each of `count` equal parts."""
+    """Draw sections without points for both rails of a track: one in each of `count` equal parts.
+
+    Parameters
+    ----------
+    rng : RandomState
+    track : int
+        Number of the track.
+    length_m : float
+        Length of the track.
+    count : int
+    longest_m : float
+
+    Returns
+    -------
+    dict of (track, side) to Gaps
+    """
     gaps: dict[tuple[int, int], Gaps] = {}
     part_m = (length_m - 2 * WHOLE_ENDS_M) / count
     for side in (1, -1):
@@ -54,7 +81,7 @@ def random_gaps(
 
 
 def straight(seed: int = 1) -> Scene:
-    """Plain straight track, 60E1, dense and clean, at an angle to the grid."""
+    """Build a straight track, 60E1, dense and clean, at an angle to the grid."""
     standard = STANDARDS["EN_60E1_1435"]
     curve = trace([Element(100.0)], heading=0.35)
     plan = Plan([Track(curve, spacing(standard), rolling(curve))], standard)
@@ -62,7 +89,7 @@ def straight(seed: int = 1) -> Scene:
 
 
 def curved(seed: int = 2) -> Scene:
-    """Plain curved track, 60E1: transitions into an arc of 600 m with 80 mm cant."""
+    """Build a curved track, 60E1: transitions and an arc of 600 m with 80 mm cant."""
     standard = STANDARDS["EN_60E1_1435"]
     curve = trace(transition_curve(20, 50, 60, 1 / 600), heading=1.1)
     plan = Plan([Track(curve, spacing(standard), rolling(curve), canted(curve, 0.08))], standard)
@@ -70,7 +97,7 @@ def curved(seed: int = 2) -> Scene:
 
 
 def paper_like(seed: int = 3) -> Scene:
-    """Three metre-gauge tracks like the paper's example: 160 m, the left one far from the scanner and full of gaps."""
+    """Build three metre-gauge tracks, as in Gribov and Chang; the left one is far from the scanner, with many gaps."""
     standard = STANDARDS["IN_75R_1000"]
     rng = np.random.RandomState(seed)
     curve = trace([Element(40), Element(40, 0, 1 / 1500), Element(80, 1 / 1500, 1 / 1500)], heading=0.42)
@@ -88,7 +115,7 @@ def paper_like(seed: int = 3) -> Scene:
 
 
 def noisy(seed: int = 4) -> Scene:
-    """Heavy noise: 8 mm in each direction, gaps up to 4 m, weeds and ballast everywhere along one 60E1 track."""
+    """Build a 60E1 track with noise of 8 mm in each direction, gaps up to 4 m, and weeds and ballast everywhere."""
     standard = STANDARDS["EN_60E1_1435"]
     rng = np.random.RandomState(seed)
     curve = trace([Element(150, 1 / 900, 1 / 900)], heading=0.2)
@@ -103,7 +130,7 @@ def noisy(seed: int = 4) -> Scene:
 
 
 def main_line(seed: int = 5) -> Scene:
-    """Double-track main line, 60E1: clothoids into an arc of 1200 m with 110 mm cant, on a gradient of 8 per mille."""
+    """Build a double-track main line, 60E1: clothoids, an arc of 1200 m with 110 mm cant, a gradient of 8 per mille."""
     standard = STANDARDS["EN_60E1_1435"]
     rng = np.random.RandomState(seed)
     curve = trace(transition_curve(20, 90, 60, -1 / 1200), heading=-0.6)
@@ -120,7 +147,7 @@ def main_line(seed: int = 5) -> Scene:
 
 
 def tram(seed: int = 6) -> Scene:
-    """Tramway round a corner of 30 m radius, 49E1, scanned from close by."""
+    """Build a tramway in a curve of 30 m radius, 49E1, scanned from a short distance."""
     standard = STANDARDS["EN_49E1_1435"]
     rng = np.random.RandomState(seed)
     curve = trace(transition_curve(15, 6, 38, 1 / 30), heading=2.2)
@@ -135,7 +162,7 @@ def tram(seed: int = 6) -> Scene:
 
 
 def dual_gauge(seed: int = 7) -> Scene:
-    """Dual gauge, standard and metre, on three rails, 49E1, in a curve of 400 m; the right rail serves both."""
+    """Build dual gauge, standard and metre, 49E1, with three rails in a curve of 400 m; the right rail is shared."""
     standard = STANDARDS["EN_49E1_1435"]
     rng = np.random.RandomState(seed)
     narrow = STANDARDS["EN_49E1_1000"]
@@ -159,7 +186,7 @@ def dual_gauge(seed: int = 7) -> Scene:
 
 
 def sparse(seed: int = 8) -> Scene:
-    """Track 10 m beside the scanner's, 60E1: some 20 points a metre, all from one side, with gaps."""
+    """Build a track 10 m from the one of the scanner, 60E1: about 20 points per metre, all from one side, with gaps."""
     standard = STANDARDS["EN_60E1_1435"]
     rng = np.random.RandomState(seed)
     curve = trace([Element(60), Element(80, 1 / 1500, 1 / 1500)], heading=0.05)
@@ -175,7 +202,7 @@ def sparse(seed: int = 8) -> Scene:
 
 
 def feet(seed: int = 9) -> Scene:
-    """Curve of 350 m, 115RE, in a cloud whose coordinates and heights are US survey feet."""
+    """Build a curve of 350 m, 115RE, with coordinates and heights in US survey feet."""
     standard = STANDARDS["US_115RE_1435"]
     curve = trace(transition_curve(15, 30, 40, -1 / 350), heading=-2.0)
     plan = Plan(

@@ -1,4 +1,4 @@
-"""A mobile laser scanner: profiles of rays that hit railheads, with noise, blind sides and lost returns."""
+"""A mobile laser scanner: profiles of rays that hit railheads, with noise, hidden sides and lost returns."""
 
 from __future__ import annotations
 
@@ -13,39 +13,39 @@ CROWN_RADIUS_M = 0.300
 """Radius of the running surface of new rails (EN 13674-1: 300 mm on 60E1)."""
 
 CORNER_RADIUS_M = 0.013
-"""Radius of the gauge corner, the last of the radii that EN 13674-1 chains there; the others are left out."""
+"""Radius of the gauge corner: the last of the radii in EN 13674-1; the others are left out."""
 
 FACE_DEPTH_M = 0.035
-"""How far below the top the side faces reach, about the height of a head less its fillets."""
+"""Depth of the side faces below the top, about the height of a head without its fillets."""
 
 FACE_TURN = np.pi / 4
-"""Surface that looks this far away from the head's axis, or farther, counts as side face."""
+"""Angle between the axis of the head and the normal of the surface from which the surface is a side face."""
 
 SPEED_SWING, SPEED_SWING_M = 0.2, 10.0
-"""How much the train's speed, and with it the distance of profiles, swings, and over which length (per radian)."""
+"""Relative variation of the distance between profiles, due to the speed of the train, and its length per radian."""
 
 PROFILE_SAMPLES = 24
-"""Samples on the crown, and half as many on either corner and face: below 0.1 mm from the true outline."""
+"""Twice the samples on half the crown, on a corner and on a face: at most 0.1 mm from the true outline."""
 
 
 @dataclass(frozen=True)
 class Scanner:
-    """How a scanner on a train sees rails; the defaults suit a good one.
+    """A scanner on a train; the defaults are those of a good one.
 
     Attributes
     ----------
     profile_step_m : float
-        Mean distance between profiles, 0.03 to 0.10 m by the train's speed.
+        Mean distance between profiles, 0.03 to 0.10 m depending on the speed of the train.
     ray_step_rad : float
         Angle between neighbouring rays of a profile.
     height_m, left_m : float
-        Place of the scanner above and left of the axis of the track it rides on.
+        Height above the axis of its track, and offset to the left.
     noise_m : float
-        Standard deviation of a point in each of x, y and z.
+        Standard deviation of points in each of x, y and z.
     half_range_m : float
-        Distance at which half the rays come back.
+        Distance at which half of the rays return.
     face_share : float
-        Share of the points on side faces that the classification kept as rail.
+        Share of the points on side faces that are classified as rail.
     """
 
     profile_step_m: float = 0.05
@@ -58,7 +58,7 @@ class Scanner:
 
 
 def head_outline(head_width_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Outline of a railhead in its own frame, from the bottom of the left face over the crown to that of the right.
+    """Return the outline of a railhead in its own frame, from the bottom of the left face to that of the right one.
 
     Parameters
     ----------
@@ -67,9 +67,9 @@ def head_outline(head_width_m: float) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     outline : (m, 2) array
-        Metres to the left of the axis and above the top (hence at most 0).
+        Metres to the left of the axis and above the top (0 or negative).
     turn : (m,) array
-        Angle between the surface's normal and the axis, radians, positive to the left.
+        Angle between the normal of the surface and the axis, radians, positive to the left.
     """
     half = head_width_m / 2
     reach = CROWN_RADIUS_M - CORNER_RADIUS_M
@@ -107,21 +107,21 @@ def scan(
     rng: np.random.RandomState,
     missing: tuple[tuple[float, float], ...] = (),
 ) -> np.ndarray:
-    """Scan one railhead from a train that passes by.
+    """Scan one railhead from a passing train.
 
-    Rays of one profile leave the scanner at equal angles; those that meet the visible side of the outline give
-    points, so that density falls with range, grazing tops get few points and the far face none.
+    The rays of a profile have equal angles between them. Those that hit the visible side of the outline become points,
+    so that density falls with distance, surfaces at a grazing angle get few points, and the far face gets none.
 
     Parameters
     ----------
     head : Railhead
     head_width_m : float
     path : (k, 3) array
-        Way of the track that the scanner rides on, metres.
+        Axis of the track on which the scanner rides, metres.
     scanner : Scanner
     rng : RandomState
     missing : tuple of (start, end)
-        Stretches without points, metres along the head.
+        Sections without points, metres along the head.
 
     Returns
     -------
@@ -148,7 +148,7 @@ def scan(
 def _stations(
     head: Railhead, scanner: Scanner, rng: np.random.RandomState, missing: tuple[tuple[float, float], ...]
 ) -> np.ndarray:
-    """Choose the samples of the head at which profiles cross it."""
+    """Return the samples of the head at which profiles cross it."""
     chainage = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(head.top, axis=0), axis=1))])
     count = int(chainage[-1] / scanner.profile_step_m / (1 - SPEED_SWING)) + 1
     phase = rng.random_sample() * 2 * np.pi
@@ -161,7 +161,7 @@ def _stations(
 
 
 def _scanner_positions(top: np.ndarray, path: np.ndarray, scanner: Scanner) -> np.ndarray:
-    """Place the scanner on its way where it passes each of the (n, 3) points."""
+    """Return the positions of the scanner as it passes each of the (n, 3) points."""
     along = np.gradient(path[:, :2], axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     left = np.column_stack([-along[:, 1], along[:, 0], np.zeros(len(path))])
@@ -172,17 +172,17 @@ def _scanner_positions(top: np.ndarray, path: np.ndarray, scanner: Scanner) -> n
 def _hits(
     head_width_m: float, across: np.ndarray, above: np.ndarray, ray_step_rad: float, rng: np.random.RandomState
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Send rays from scanners at (`across`, `above`) of the head's frame and find where they meet the outline.
+    """Find where the rays from scanner positions, (`across`, `above`) in the frame of the head, hit the outline.
 
     Returns
     -------
     profile : (n,) int array
-        Number of the scanner position.
+        Number of the scanner position of each hit.
     position : (n,) array
-        Fractional sample number along `head_outline`.
+        Position along `head_outline`, in samples.
     """
     outline, _ = head_outline(head_width_m)
-    # Seen from outside, the angle along a convex outline rises just where the surface faces the scanner.
+    # Seen from outside, the angle along a convex outline increases only where the surface faces the scanner.
     angle = np.arctan2(across[:, None] - outline[:, 0], above[:, None] - outline[:, 1])
     rows = np.arange(len(across))
     first, last = np.argmin(angle, axis=1), np.argmax(angle, axis=1)
@@ -196,13 +196,13 @@ def _hits(
     profile = np.repeat(rows, count)
     number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
     rays = (start[profile] + number + phase[profile]) * ray_step_rad
-    # One interpolation for all profiles: each is lifted by a full turn above the one before.
+    # One interpolation for all profiles: each is shifted by a full turn from the one before.
     lift = 2 * np.pi * rows
     flat = np.interp(rays + lift[profile], (angle + lift[:, None]).ravel(), np.arange(angle.size))
     return profile, flat - profile * len(outline)
 
 
 def _chance(distance_m: np.ndarray, turn: np.ndarray, scanner: Scanner) -> np.ndarray:
-    """Chance that a ray comes back and its point is classified as rail."""
+    """Return the probability that a ray returns and its point is classified as rail."""
     returned = 1 / (1 + (distance_m / scanner.half_range_m) ** 4)
     return returned * np.where(np.abs(turn) > FACE_TURN, scanner.face_share, 1.0)

@@ -1,6 +1,6 @@
 """A scene: a classified cloud of tracks with exact truth, scanned from a plan.
 
-Every scene is seeded. Random numbers come from `RandomState`, whose stream numpy promises never to change.
+Every scene has a fixed seed. Random numbers come from `RandomState`, whose stream NumPy promises never to change.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from .scanner import Scanner, scan
 from .tracks import Track
 
 UNCLASSIFIED, GROUND, RAIL = 1, 2, 10
-"""Classes of the LAS specification."""
+"""Class codes of the LAS specification."""
 
 Gaps = tuple[tuple[float, float], ...]
-"""Stretches of one rail without points: start and end along it, metres."""
+"""Sections of one rail without points: start and end along the rail, metres."""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A classified cloud and the truth about it.
+    """A classified cloud and its truth.
 
     Attributes
     ----------
@@ -36,14 +36,14 @@ class Scene:
         All points, local metres.
     classification : (n,) uint8 array
     rails : tuple of (k, 3) array
-        Tops of the heads on their own axes, local metres: left and right rail of the first track, of the second, ...
+        Tops of the heads on the axes of the heads, local metres: left and right rail of each track in turn.
     centerlines : tuple of (k, 3) array
-        Lines midway between the tops.
+        Midlines between the tops.
     standard : RailStandard
     frame : LocalFrame
-        Where in the world the scene lies.
+        Position of the scene in its coordinate system.
     other_gauges_m : tuple of float
-        Gauges of tracks that have another one than the standard's.
+        Gauges of tracks that do not have the gauge of the standard.
     """
 
     name: str
@@ -56,13 +56,13 @@ class Scene:
     other_gauges_m: tuple[float, ...] = ()
 
     def rail_points(self) -> RailPoints:
-        """Give what `read_rail_points` would read of the scene's file."""
+        """Return the points that `read_rail_points` would read from the file of the scene."""
         return RailPoints(self.xyz[self.classification == RAIL], self.frame, RAIL)
 
 
 @dataclass(frozen=True)
 class Clutter:
-    """How much of what is no rail a scene holds.
+    """Number of points in a scene that are not on rails.
 
     Attributes
     ----------
@@ -71,9 +71,9 @@ class Clutter:
     stones : int
         Points of ballast and rail feet classified as rail.
     other_weeds : int
-        Weeds that the classification told apart.
+        Weeds that are not classified as rail.
     ground_step_m : float or None
-        Grid of the thinned ground; None leaves the ground out.
+        Step of the grid of ground points; None leaves the ground out.
     """
 
     weeds_near: int = 0
@@ -85,18 +85,18 @@ class Clutter:
 
 @dataclass(frozen=True)
 class Plan:
-    """All that makes a scene, before chance comes in.
+    """Everything that defines a scene, apart from random numbers.
 
     Attributes
     ----------
     tracks : sequence of Track
-        A branch after the track that it leaves.
+        A branch follows the track from which it departs.
     standard : RailStandard
     scanner : Scanner
     ridden : int
-        Track that the scanner rides on.
+        Track on which the scanner rides.
     gaps : dict of (track, side) to Gaps
-        Where rails have no points; side is +1 for the left rail and -1 for the right one.
+        Sections without points; side is +1 for the left rail and -1 for the right one.
     clutter : Clutter
     frame : LocalFrame
     other_gauges_m : tuple of float
@@ -114,7 +114,18 @@ class Plan:
 
 
 def build(name: str, plan: Plan, rng: np.random.RandomState) -> Scene:
-    """Scan the rails of a plan, with the guard rails of its frogs, and strew its clutter."""
+    """Scan the rails of a plan, with the guard rails at its frogs, and add its clutter.
+
+    Parameters
+    ----------
+    name : str
+    plan : Plan
+    rng : RandomState
+
+    Returns
+    -------
+    Scene
+    """
     rails = tuple(rail for track in plan.tracks for rail in track.rails())
     centerlines = tuple(track.thinned(track.centerline) for track in plan.tracks)
     clouds = [(RAIL, points) for points in _scanned(plan, rng)] + _clutter(plan.clutter, rails, centerlines, rng)
@@ -133,7 +144,7 @@ def build(name: str, plan: Plan, rng: np.random.RandomState) -> Scene:
 
 
 def _scanned(plan: Plan, rng: np.random.RandomState) -> list[np.ndarray]:
-    """Scan every running rail, one rail's points where two share a place, and the guard rails."""
+    """Scan each running rail and each guard rail; where two rails share a place, one of them has points."""
     path = plan.tracks[plan.ridden].centerline
     head_width_m = plan.standard.head_width_m
     running = [
@@ -149,7 +160,7 @@ def _scanned(plan: Plan, rng: np.random.RandomState) -> list[np.ndarray]:
 def _clutter(
     amount: Clutter, rails: Sequence[np.ndarray], centerlines: Sequence[np.ndarray], rng: np.random.RandomState
 ) -> list[tuple[int, np.ndarray]]:
-    """Make the points of what is no rail, by class."""
+    """Draw the points that are not on rails, by class."""
     weed_height = (-clutter.HEAD_ABOVE_GROUND_M, 0.06)
     clouds = [
         (RAIL, clutter.weeds(rng, rails, amount.weeds_near, 0.3, weed_height)),

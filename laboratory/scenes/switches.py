@@ -16,11 +16,11 @@ STANDARD = STANDARDS["EN_60E1_1435"]
 SCANNER = Scanner(noise_m=0.004)
 TRACK_CENTRES_M = 4.5
 FREE_M = 30.0
-"""Plain track before the toe and behind the branch's arc."""
+"""Length of plain track before the toe and behind the arc of the branch."""
 
 
 def turnout(name: str, form: str, hand: int, heading: float, seed: int, curvature: float = 0.0) -> Scene:
-    """Lay one turnout into plain track.
+    """Build a turnout in plain track.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def turnout(name: str, form: str, hand: int, heading: float, seed: int, curvatur
         Direction of the main track, radians.
     seed : int
     curvature : float
-        Of the main track, 1/m.
+        Curvature of the main track, 1/m.
     """
     rng = np.random.RandomState(seed)
     shape = next(candidate for candidate in FORMS if candidate.name == form)
@@ -43,7 +43,7 @@ def turnout(name: str, form: str, hand: int, heading: float, seed: int, curvatur
 
 
 def crossover(seed: int = 20) -> Scene:
-    """Two parallel tracks, a crossover of two 300-1:9 turnouts between them."""
+    """Build two parallel tracks with a crossover of two 300-1:9 turnouts."""
     rng = np.random.RandomState(seed)
     main = trace([Element(120)], heading=0.5)
     second = Curve(main.offset(TRACK_CENTRES_M), main.heading, main.curvature, main.step_m)
@@ -51,7 +51,7 @@ def crossover(seed: int = 20) -> Scene:
 
 
 def diamond(seed: int = 21) -> Scene:
-    """Two straight tracks that cross at 1:9 without a switch."""
+    """Build two straight tracks that cross at 1:9 without a switch."""
     rng = np.random.RandomState(seed)
     half_m, angle = 45.0, np.arctan(1 / 9)
     tracks = [
@@ -62,7 +62,7 @@ def diamond(seed: int = 21) -> Scene:
 
 
 def throat(seed: int = 22) -> Scene:
-    """Throat of a yard: two ladders of 190-1:7.5 turnouts lead from one track to ten."""
+    """Build the throat of a yard: two ladders of 190-1:7.5 turnouts from one track to ten."""
     rng = np.random.RandomState(seed)
     form = next(candidate for candidate in FORMS if candidate.name == "190-1:7.5")
     turn = form.arc_m / form.radius_m
@@ -70,7 +70,7 @@ def throat(seed: int = 22) -> Scene:
     main = trace([Element(270.0)], heading=-0.2)
     curves = [main]
     for hand, toe_m, count in ((1, 10.0, 5), (-1, 40.0, 4)):
-        # The first yard track leaves the ladder where both arcs together lie one track centre beside the main track.
+        # The first yard track departs from the ladder where both arcs together are offset by one track spacing.
         first_m = form.arc_m + apart_m - 2 * form.radius_m * np.tan(turn / 2)
         ladder = branch(main, toe_m, form, hand, first_m + (count - 2) * apart_m)
         ladder = _turned_back(ladder, form.arc_m, first_m + (count - 1) * apart_m, hand / form.radius_m, main)
@@ -82,7 +82,7 @@ def throat(seed: int = 22) -> Scene:
 
 
 def _turned_back(ladder: Curve, arc_m: float, end_m: float, curvature: float, main: Curve) -> Curve:
-    """Draw a ladder anew that turns parallel to the main track at its end, as the last yard track."""
+    """Return a ladder that ends parallel to the main track, as the last yard track."""
     toe_m = float(main.step_m * np.argmin(np.linalg.norm(main.xy - ladder.xy[0], axis=1)))
     elements = [
         Element(arc_m, curvature, curvature),
@@ -94,7 +94,7 @@ def _turned_back(ladder: Curve, arc_m: float, end_m: float, curvature: float, ma
 
 
 def _link(main: Curve, toe_m: float, radius_m: float, angle: float) -> Curve:
-    """Lay a link from a straight track to its left neighbour: arc, straight, arc."""
+    """Compute the axis from a straight track to its left neighbour: arc, straight, arc."""
     toe = int(round(toe_m / main.step_m))
     straight_m = (TRACK_CENTRES_M - 2 * radius_m * (1 - np.cos(angle))) / np.sin(angle)
     elements = [
@@ -106,7 +106,7 @@ def _link(main: Curve, toe_m: float, radius_m: float, angle: float) -> Curve:
 
 
 def _build(name: str, curves: list[Curve], rng: np.random.RandomState, gaps: int, scanner: Scanner = SCANNER) -> Scene:
-    """Lay 60E1 rails on curves, the first one ridden and with gaps, all on one ground that rises and waves."""
+    """Build 60E1 tracks on curves, with gaps, at heights with a gradient and waves; the scanner rides on the first."""
     tracks = [Track(curve, spacing(STANDARD), _ground(curve)) for curve in curves]
     length_m = sum(curve.length_m for curve in curves)
     plan = Plan(
@@ -126,6 +126,6 @@ def _build(name: str, curves: list[Curve], rng: np.random.RandomState, gaps: int
 
 
 def _ground(curve: Curve) -> np.ndarray:
-    """Heights by place, so that tracks that meet lie equally high."""
+    """Return heights that depend on the position, so that tracks that meet have the same height."""
     x = curve.xy[:, 0]
     return 0.004 * x + 0.01 * np.sin(2 * np.pi * x / 80.0)

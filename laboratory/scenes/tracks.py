@@ -1,4 +1,4 @@
-"""Tracks in space: a plan curve with heights and cant, and the two railheads that lie on it."""
+"""Tracks in space: a plan curve with heights and cant, and the two railheads on it."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from ..curves import Curve
 UP = np.array([0.0, 0.0, 1.0])
 
 TRUTH_SAGITTA_M = 2e-5
-"""How far a chord between two vertices of a truth line may run from the curve: nothing beside a millimetre."""
+"""Greatest distance between a true line and the curve: negligible compared with a millimetre."""
 
 MAX_CHORD_M = 0.5
-"""Vertex distance of truth lines on straight track."""
+"""Distance between the vertices of true lines on straight track."""
 
 
 @dataclass(frozen=True)
@@ -24,9 +24,9 @@ class Railhead:
     Attributes
     ----------
     top : (n, 3) array
-        Top of the head on the head's own axis, metres.
+        Top of the head, on the axis of the head, metres.
     axis : (n, 3) array
-        Unit vectors up along the head's axis.
+        Unit vectors up along the axis of the head.
     across : (n, 3) array
         Unit vectors to the left across the head, perpendicular to the axis.
     """
@@ -43,17 +43,17 @@ class Track:
     Attributes
     ----------
     curve : Curve
-        Plan of the track's axis, or of a line parallel to it.
+        Axis of the track in plan, or a line parallel to it.
     spacing_m : float
         Distance between the tops of the two heads: gauge and one head width.
     height_m, cant_m : float or (n,) array
-        Height midway between the tops, and left top above right top, at the curve's samples.
+        Height of the midpoint between the tops, and height of the left top above the right one, at the samples.
     left_m : float
-        How far to the left of the curve the track's axis runs.
+        Offset of the track's axis to the left of the curve.
     inclination : float
-        Inward lean of the heads: 1/20 in most countries, 1/40 in some.
+        Inward inclination of the heads: 1/20 in most countries, 1/40 in some.
     sides : tuple of int
-        Rails that are the track's own, +1 left and -1 right; a third rail beside another track has one.
+        Rails of the track, +1 left and -1 right; a third rail is a track with one.
     """
 
     curve: Curve
@@ -66,12 +66,12 @@ class Track:
 
     @property
     def centerline(self) -> np.ndarray:
-        """Line midway between the tops, (n, 3)."""
+        """Midpoints between the tops, (n, 3)."""
         height = np.broadcast_to(self.height_m, len(self.curve.xy))
         return np.column_stack([self.curve.offset(self.left_m), height])
 
     def railhead(self, side: int) -> Railhead:
-        """Build one of the two railheads: `side` is +1 for the left and -1 for the right one."""
+        """Return one of the two railheads: `side` is +1 for the left and -1 for the right one."""
         left = np.column_stack([self.curve.left_normal, np.zeros(len(self.curve.xy))])
         tilt = np.broadcast_to(np.arcsin(np.asarray(self.cant_m) / self.spacing_m), len(left))
         top = self.centerline + side * 0.5 * self.spacing_m * _turned(left, tilt)
@@ -81,11 +81,11 @@ class Track:
         return Railhead(top, axis, across)
 
     def rails(self) -> tuple[np.ndarray, ...]:
-        """Tops of the track's own rails, each (k, 3), with as few vertices as the curvature allows."""
+        """Return the tops of the rails, each (k, 3), with as few vertices as the curvature allows."""
         return tuple(self.thinned(self.railhead(side).top) for side in self.sides)
 
     def thinned(self, line: np.ndarray) -> np.ndarray:
-        """Keep as many of a line's (n, 3) vertices, one at each of the curve's samples, as the curvature asks for."""
+        """Return as many vertices of a line as the curvature requires; its (n, 3) vertices are at the samples."""
         sharpest = max(float(np.abs(self.curve.curvature).max()), 1e-9)
         chord_m = min(np.sqrt(8 * TRUTH_SAGITTA_M / sharpest), MAX_CHORD_M)
         stride = max(int(chord_m / self.curve.step_m), 1)
@@ -93,18 +93,14 @@ class Track:
         return line[np.unique(np.append(np.arange(0, last, stride), last))]
 
     def piece(self, start_m: float, end_m: float) -> Track:
-        """Cut out the part between two chainages of the curve, to the nearest samples."""
+        """Return the part between two chainages of the curve, to the nearest samples."""
         height, cant = (np.broadcast_to(value, len(self.curve.xy)) for value in (self.height_m, self.cant_m))
         first = max(int(round(start_m / self.curve.step_m)), 0)
         curve = self.curve.piece(start_m, end_m)
         part = slice(first, first + len(curve.xy))
         return replace(self, curve=curve, height_m=height[part], cant_m=cant[part])
 
-    def inset(self, narrower_m: float) -> Track:
-        """Bring the two heads closer together, as guard rails lie inside running rails."""
-        return replace(self, spacing_m=self.spacing_m - narrower_m)
-
 
 def _turned(left: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Turn horizontal unit vectors up by an angle (radians) about the track's direction."""
+    """Rotate horizontal unit vectors upwards by an angle, radians, about the direction of the track."""
     return np.cos(angle)[:, None] * left + np.sin(angle)[:, None] * UP

@@ -1,4 +1,4 @@
-"""Scenes as files: a LAZ cloud and its truth lines; the command `python -m rail_extract scenes`."""
+"""Scenes as files: a LAZ cloud and its true lines; the command `python -m rail_extract scenes`."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from .catalogue import SCENES
 from .scene import Scene
 
 SCALE_M = 0.001
-"""Step of the coordinates in the file: a millimetre, as scanners write."""
+"""Resolution of the coordinates in the file: a millimetre, as that of scanners."""
 
 TRUTH_DECIMALS = 4
-"""Digits of truth coordinates behind the point: a tenth of a millimetre."""
+"""Decimals of the coordinates of true lines: a tenth of a millimetre."""
 
 MADE = date(2025, 1, 1)
-"""Date in the file's header; fixed, so that the same scene makes the same file."""
+"""Date in the header of the file, fixed so that the same scene gives the same file."""
 
 
 def write_cloud(scene: Scene, path: Path) -> None:
-    """Write a scene as LAS 1.4, compressed when the name ends in .laz."""
+    """Write a scene as LAS 1.4, compressed if the name ends in .laz."""
     header = laspy.LasHeader(version="1.4", point_format=6)
     header.scales = np.full(3, SCALE_M)
     header.offsets = scene.frame.origin
@@ -42,10 +42,10 @@ def write_cloud(scene: Scene, path: Path) -> None:
 
 
 def write_truth(scene: Scene, path: Path) -> None:
-    """Write true rails and centerlines as GeoJSON in the cloud's own coordinates and reference system."""
+    """Write true rails and centerlines as GeoJSON in the coordinate system of the cloud."""
     lines = [("rail", line) for line in scene.rails] + [("centerline", line) for line in scene.centerlines]
     features = [json.dumps(_feature(scene, kind, line)) for kind, line in lines]
-    head = {"type": "FeatureCollection", "name": path.stem}
+    head: dict[str, object] = {"type": "FeatureCollection", "name": path.stem}
     if scene.frame.crs_wkt:
         code = "::".join(parse_crs(scene.frame.crs_wkt).to_authority())
         head["crs"] = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:{code}"}}
@@ -65,7 +65,7 @@ def _feature(scene: Scene, kind: str, line: np.ndarray) -> dict:
 
 
 def read_truth(path: Path, kind: str) -> tuple[np.ndarray, ...]:
-    """Read back true lines of a kind, "rail" or "centerline": (n, 3) arrays in the cloud's coordinates."""
+    """Read the true lines of a kind, "rail" or "centerline": (n, 3) arrays in the coordinates of the cloud."""
     features = json.loads(path.read_text(encoding="ascii"))["features"]
     return tuple(
         np.array(feature["geometry"]["coordinates"]) for feature in features if feature["properties"]["kind"] == kind
@@ -76,25 +76,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help=f"any of {', '.join(SCENES)}; all by default")
     parser.add_argument("--into", type=Path, default=Path(), help="folder to write to (default: here)")
-    parser.add_argument("--name", help="name of the files, for a single scene (default: the scene's)")
+    parser.add_argument("--name", help="name of the files, for a single scene (default: that of the scene)")
 
 
 def run(args: argparse.Namespace) -> None:
-    """Write the wanted scenes, a cloud and a truth file each.
+    """Write the chosen scenes, each as a cloud and a file of true lines.
 
     Raises
     ------
     ParameterError
-        A scene is unknown, or several shall have one name.
+        A scene is unknown, or a name is given for several scenes.
     CloudError
-        The folder can't be written to.
+        The folder cannot be written to.
     """
     names: Sequence[str] = args.scenes or tuple(SCENES)
     unknown = [name for name in names if name not in SCENES]
     if unknown:
         raise ParameterError(f"There is no scene {unknown[0]!r}: choose from {', '.join(SCENES)}.")
     if args.name and len(names) > 1:
-        raise ParameterError("One name can't serve several scenes: name a single scene.")
+        raise ParameterError("--name is for a single scene: name one scene, or leave --name out.")
     for name in names:
         scene = SCENES[name]()
         stem = args.name or name
@@ -103,5 +103,5 @@ def run(args: argparse.Namespace) -> None:
             write_cloud(scene, args.into / f"{stem}.laz")
             write_truth(scene, args.into / f"{stem}_truth.geojson")
         except OSError as error:
-            raise CloudError(f"The folder {args.into} can't be written to ({error}): choose another.") from error
+            raise CloudError(f"The folder {args.into} cannot be written to ({error}): choose another.") from error
         print(f"{stem}.laz: {len(scene.xyz)} points, {len(scene.rails)} rails, {len(scene.centerlines)} tracks")

@@ -307,7 +307,7 @@ def test_the_sample_reads_back_as_the_scene(scenes):
 
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
-    [(["nowhere"], "no scene 'nowhere'"), (["straight", "curved", "--name", "x"], "single scene")],
+    [(["nowhere"], "no scene 'nowhere'"), (["straight", "curved", "--name", "x"], "for a single scene")],
 )
 def test_bad_arguments_end_in_one_sentence(tmp_path, capsys, arguments, sentence):
     assert commands.main(["scenes", *arguments, "--into", str(tmp_path / "out")]) == 1
