@@ -20,9 +20,9 @@ from qgis.core import (  # noqa: E402
     QgsProcessingModelChildParameterSource,
     QgsProcessingModelOutput,
     QgsProcessingModelParameter,
-    QgsProcessingParameterFile,
 )
 from qgis.PyQt.QtCore import QPointF  # noqa: E402
+from rail_extract.rail_extract_plugin.dialog.cloud_parameter import model_input  # noqa: E402
 
 MODEL = Path(__file__).resolve().parent.parent / "models" / "extract_rails.model3"
 
@@ -58,7 +58,7 @@ def build() -> QgsProcessingModelAlgorithm:
     model = QgsProcessingModelAlgorithm("Extract rails, step by step", "Rails and tracks", "railsandtracks")
     model.setHelpContent({"ALG_DESC": HELP})
     inputs = [definition.clone() for definition in whole.parameterDefinitions() if not definition.isDestination()]
-    inputs[0] = _file_instead_of(inputs[0])
+    inputs[0] = model_input(inputs[0])
     for number, definition in enumerate(inputs):
         component = QgsProcessingModelParameter(definition.name())
         component.setPosition(QPointF((number // 8) * COLUMN, (number % 8) * ROW / 2))
@@ -80,15 +80,6 @@ def build() -> QgsProcessingModelAlgorithm:
         model.addChildAlgorithm(child)
         before = step
     return model
-
-
-def _file_instead_of(cloud) -> QgsProcessingParameterFile:
-    """Replace the cloud's parameter with one for files: QGIS without PDAL refuses any path in a cloud parameter."""
-    made = QgsProcessingParameterFile(
-        cloud.name(), "Point cloud (LAS, LAZ or COPC file, folder of such files, or .vpc)"
-    )
-    made.setHelp("The path of a LAS, LAZ or COPC file, of a folder of such files, or of a virtual point cloud (.vpc).")
-    return made
 
 
 def _source(step: str, definition, inputs: set[str], before: str | None):

@@ -6,14 +6,12 @@ from typing import Any
 
 from qgis.core import (
     QgsApplication,
-    QgsPointCloudLayer,
     QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingException,
     QgsProcessingFeedback,
     QgsProcessingOutputFile,
     QgsProcessingParameterDefinition,
-    QgsProcessingParameterPointCloudLayer,
 )
 from qgis.PyQt.QtGui import QIcon
 
@@ -93,7 +91,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     def _check(self, parameters: dict[str, Any], context: QgsProcessingContext) -> tuple[bool, str]:
         """Check as QGIS does, then that the outputs can be written, then as `read` does."""
-        accepted, message = super().checkParameterValues(self._with_paths_accepted(parameters), context)
+        accepted, message = super().checkParameterValues(parameters, context)
         if not accepted:
             return False, self._refusal(parameters, context) or message
         accepted, message = self.canExecute()
@@ -154,22 +152,12 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     def _refusal(self, parameters: dict[str, Any], context: QgsProcessingContext) -> str | None:
         """Return what is wrong with the first input that QGIS does not accept."""
-        accepted = self._with_paths_accepted(parameters)
         reasons = (
-            explain_invalid(definition, accepted.get(definition.name()), context)
+            explain_invalid(definition, parameters.get(definition.name()), context)
             for definition in self.parameterDefinitions()
             if not definition.isDestination()
         )
         return next(filter(None, reasons), None)
-
-    def _with_paths_accepted(self, parameters: dict[str, Any]) -> dict[str, Any]:
-        """Replace paths of clouds with a layer object, because QGIS refuses formats that its build cannot open."""
-        stand_ins = {
-            definition.name(): QgsPointCloudLayer("", "", "")
-            for definition in self.parameterDefinitions()
-            if isinstance(definition, QgsProcessingParameterPointCloudLayer) and parameters.get(definition.name())
-        }
-        return {**parameters, **stand_ins}
 
     def canExecute(self) -> tuple[bool, str]:
         """Return whether the required packages are installed; the toolbox lists the algorithm in either case."""

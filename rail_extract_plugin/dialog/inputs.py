@@ -6,13 +6,13 @@ from qgis.core import (
     QgsProcessing,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterFeatureSource,
-    QgsProcessingParameterPointCloudLayer,
     QgsProcessingParameterRasterLayer,
     QgsProcessingParameterString,
 )
 
 from ...core.standards import RAIL_CLASS
 from ..i18n import tr
+from .cloud_parameter import CloudParameter
 from .definitions import Definitions, helped
 
 
@@ -20,11 +20,10 @@ def cloud() -> Definitions:
     """Define the parameters for the rail points."""
     return (
         helped(
-            QgsProcessingParameterPointCloudLayer("INPUT", tr("Point cloud (layer, file or folder)")),
+            CloudParameter("INPUT", tr("Point cloud (layer, file or folder)")),
             tr(
                 "A loaded point cloud layer, or the path of a LAS, LAZ or COPC file, of a folder of such files, or of "
-                "a virtual point cloud (.vpc). The button of the dialog selects a single file: for many files, select "
-                "their virtual point cloud."
+                "a virtual point cloud (.vpc)."
             ),
         ),
         helped(
@@ -45,7 +44,7 @@ def raster() -> QgsProcessingParameterDefinition:
 def points() -> QgsProcessingParameterDefinition:
     """Define the parameter for the points that give lines their heights."""
     return helped(
-        QgsProcessingParameterPointCloudLayer("POINTS", tr("Point cloud (layer, file or folder)"), optional=True),
+        CloudParameter("POINTS", tr("Point cloud (layer, file or folder)"), optional=True),
         tr("The cloud from which the raster was made: it moves the lines onto the railheads and gives them heights."),
     )
 
@@ -83,6 +82,6 @@ def rails_of_tracks() -> QgsProcessingParameterDefinition:
 def points_of_rails() -> QgsProcessingParameterDefinition:
     """Define the parameter for the points that support the rails."""
     return helped(
-        QgsProcessingParameterPointCloudLayer("POINTS", tr("Point cloud (layer, file or folder)"), optional=True),
+        CloudParameter("POINTS", tr("Point cloud (layer, file or folder)"), optional=True),
         tr("The cloud from which the rails were extracted: it gives heights, sigma_mm and points for each station."),
     )

@@ -42,7 +42,7 @@ OUTPUTS = {
     "CENTERLINES": "outputVector",
     "QUALITY": "outputVector",
     "CLEANED": "outputRaster",
-    "REPORT": "outputHtml",
+    "REPORT": "outputFile",
     "RAIL_COUNT": "outputNumber",
     "RAIL_LENGTH": "outputNumber",
     "CENTERLINE_COUNT": "outputNumber",
