@@ -13,6 +13,7 @@ import numpy as np
 
 from ..clouds.points import RailPoints
 from ..lines.network import LineNetwork
+from ..lines.smoothing import STATIONS_PER_SIGMA
 from ..parameters import Parameters
 from ..polyline import Feet, interpolate, length_along, project, resample, starts_at_its_end
 from ..progress import SILENT, Progress
@@ -203,7 +204,7 @@ def measure_again(
     list of RailLine
         In the order given. A rail without points keeps its heights and is a gap from end to end.
     """
-    plans = [resample(rail.xyz[:, :2], smoothing_z_m / 4)[0] for rail in rails]
+    plans = [resample(rail.xyz[:, :2], smoothing_z_m / STATIONS_PER_SIGMA)[0] for rail in rails]
     feet = project(plans, points.xyz[:, :2], search_distance(head_width_m), progress.span(0.0, 0.7))
     # Lines from a file are only known to be on their heads, so the head width takes the place of the cell size.
     parameters = ElevationParameters(head_width_m, smoothing_z_m=smoothing_z_m, cell_m=head_width_m)

@@ -13,7 +13,7 @@ import numpy as np
 from ..clouds.points import RailPoints
 from ..lines.bridges import bridge
 from ..lines.network import LineNetwork
-from ..lines.network_smoothing import lead
+from ..lines.network_smoothing import bend_through
 from ..lines.smoothing import smooth_profile
 from ..parameters import Parameters
 from ..polyline import interpolate, left_normals, length_along, project
@@ -131,7 +131,7 @@ def _joined(network: LineNetwork, lines: list[np.ndarray], smoothing_m: float) -
         anchors[number].append((node, vertex % len(lines[number])))
     for line, own in zip(lines, anchors):
         own_nodes, vertices = np.array(own).T
-        lead(line, length_along(line) / smoothing_m, vertices, nodes[own_nodes])
+        bend_through(line, length_along(line) / smoothing_m, vertices, nodes[own_nodes])
     return replace(network, lines=tuple(lines), nodes=nodes, passes=passes)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..lines.paek import filled
+from ..lines.paek import END_SHIFT, filled
 from ..lines.smoothing import STATIONS_PER_SIGMA, smooth_line
 from ..polyline import interpolate, is_closed, length_along
 from ..progress import Progress
@@ -19,10 +19,6 @@ head. For a head of 72 mm in an arc of 15 m radius, 40 mm are corrected and 90 m
 
 MIN_RADIUS_M = 10.0
 """Radius of the tightest tram curve; a line that bends more sharply is not following a rail."""
-
-END_SHIFT = 0.26
-"""Displacement by PAEK at the end of a line in an arc of radius R, in units of sigma² / R (docs/method.md section 5.4);
-half as much where an arc follows a straight."""
 
 
 def warn_if_out_of_reach(

@@ -11,15 +11,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from ..lines.paek import VARIANCE_FACTOR
 from ..lines.smoothing import smooth_profile
 from ..polyline import distance_to
 from ..rails import Support
 from .edges import BLUR_BINS, HALF_HEAD_BINS, STATION_STEP_M, CrossSections, histograms
 from .level import on_top
-
-VARIANCE_FACTOR = 0.33375
-"""Variance of PAEK's result for independent points with a variance of 1, in units of spacing / sigma (docs/method.md
-section 5.3)."""
 
 
 def measure_support(

@@ -1,1 +1,1 @@
-"""Polylines: smoothing that keeps curves and nodes, and the fewest vertices that still show them."""
+"""Lines in plan and the networks they form: ends, bridges, parting, joining, smoothing by PAEK and thinning."""

@@ -1,4 +1,7 @@
-"""Curves that a rail could follow from one line end to another, and how well they explain both."""
+"""Bridges: curves between two line ends that a rail could follow, and how well they explain both lines.
+
+See docs/method.md section 4.8.
+"""
 
 from __future__ import annotations
 
@@ -6,29 +9,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .ends import STEP_M, stretch
+from .ends import STEP_M, even_points
 
 FIT_M = 4.0
-"""Stretch on either side that the curve is fitted to."""
+"""Length of either line that the curve is fitted to."""
 
 STAIRS_M = 0.02
-"""How far a raster line strays from its rail: half a cell. What strays further is a weed or a hook."""
+"""Largest distance of a raster line from its rail: half a cell. Larger distances come from weeds or hooks."""
 
 MISFIT_M = 0.01
-"""Half of either line may lie this far beside the curve, no more. Across 4 m a shift of 0.2 m just passes; towards
-narrower gaps, where no other rail has room, twice as much is allowed, as far as the stairs go."""
+"""Up to half of the points of either line may be further from the curve. Across 4 m, a lateral shift of 0.2 m just
+passes. Towards narrower gaps, which leave no room for another rail, the limit rises to `STAIRS_M`."""
 
-TIGHTEST_RADIUS_M = 15.0
-"""No rail of a tram or railway is bent more sharply, turnouts included; 18 m is the least in use."""
+MIN_RADIUS_M = 15.0
+"""No rail of a tramway or railway has a smaller radius, turnouts included; the smallest in use is 18 m."""
 
 ROUNDS = 5
-"""Rounds of reweighting, in which what strays loses its say."""
+"""Rounds of reweighting, which reduce the weight of points far from the curve."""
 
 TRANSITION_M = 5.0
-"""Within this length the curvature may change from none to the tightest; a short clothoid of a tramway."""
+"""Shortest length in which the curvature may rise from 0 to 1 / `MIN_RADIUS_M`: a short clothoid of a tramway."""
 
 STEADY_TRANSITION_M = 500.0
-"""The same for curves that keep their bend as a main line does, which rules out a swerve to a neighbour."""
+"""The same for curves that keep their curvature as a main line does, which excludes a swerve to a neighbouring rail."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +41,12 @@ class Bridge:
     Attributes
     ----------
     cost : float
-        Its length in metres, made larger by what it misses and how it bends; 1 to 3 times the length.
+        Length in metres, times 1 to 3 depending on misfit and curvature.
     cuts_m : tuple of float
-        Lengths at the two ends that stray from the curve, as rails seem to beside weeds and other rails.
+        Lengths to remove from the first and the second line: the parts at their ends that are off the curve, as where
+        weeds or other rails have drawn the line aside.
     points : (n, 2) array
-        Between the ends so cut back, every `STEP_M`, from the first end to the second.
+        Points every `STEP_M` from the first end to the second, once these are cut; both ends excluded.
     """
 
     cost: float
@@ -57,60 +61,75 @@ def bridge(
     misfit_m: float = MISFIT_M,
     transition_m: float = TRANSITION_M,
 ) -> Bridge | None:
-    """Fit one smooth curve to two lines, each given from the end to be joined, and cut out what lies between them.
+    """Fit one smooth curve to the ends of two lines and return the part between them.
 
-    The curve is a cubic over the way across, its curvature held to what rails do. None if it misses either line, or
-    bends more than a rail. That rules out the neighbouring rail, for it takes a double bend. With `held` nothing is cut
-    off the first line; `misfit_m` is how far half of either line may lie beside the curve, and `transition_m` the
-    length in which its curvature may change from none to the tightest.
+    The curve is a cubic over the straight line across the gap, with the curvature of rails as prior. A connection to a
+    neighbouring rail is refused because it needs two opposite bends.
+
+    Parameters
+    ----------
+    one, other : (n, 2) arrays
+        Both lines, from the end to be connected inward.
+    held : bool
+        Whether the first line must not be cut.
+    misfit_m : float
+        Largest median distance of either line from the curve.
+    transition_m : float
+        Shortest length in which the curvature may rise from 0 to 1 / `MIN_RADIUS_M`.
+
+    Returns
+    -------
+    Bridge or None
+        None if the curve misses either line or bends more than a rail.
     """
-    before, after = stretch(one, FIT_M)[::-1], stretch(other, FIT_M)
+    before, after = even_points(one, FIT_M)[::-1], even_points(other, FIT_M)
     origin, axes = _frame(before, after)
     before, after = (before - origin) @ axes.T, (after - origin) @ axes.T
     gap = after[0, 0] - before[-1, 0]
     cubic = _fit(np.concatenate([before, after]), transition_m)
     off = [np.abs(points[:, 1] - _basis(points[:, 0]) @ cubic) for points in (before, after)]
     misfit = max(np.median(off[0]), np.median(off[1]))
-    bend = np.abs(cubic[2] + cubic[3] * np.array([before[0, 0], after[-1, 0]])).max() * TIGHTEST_RADIUS_M
+    bend = np.abs(cubic[2] + cubic[3] * np.array([before[0, 0], after[-1, 0]])).max() * MIN_RADIUS_M
     allowed = max(misfit_m, STAIRS_M * (1 - gap / (2 * FIT_M)))
     if gap <= 0 or misfit > allowed or bend > 1:
         return None
-    astray = 0 if held else _astray(off[0][::-1]), _astray(off[1])
-    first, last = before[-1 - astray[0], 0], after[astray[1], 0]
+    cut_before, cut_after = 0 if held else _astray(off[0][::-1]), _astray(off[1])
+    first, last = before[-1 - cut_before, 0], after[cut_after, 0]
     x = np.linspace(first, last, int((last - first) / STEP_M) + 2)[1:-1]
     points = origin + np.column_stack([x, _basis(x) @ cubic]) @ axes
-    cuts_m = tuple(
-        float(np.hypot(*np.diff(side[: count + 1], axis=0).T).sum())
-        for side, count in zip((before[::-1], after), astray)
-    )
+    cuts_m = _length(before[::-1][: cut_before + 1]), _length(after[: cut_after + 1])
     return Bridge(gap * (1 + misfit / MISFIT_M + bend), cuts_m, points)
 
 
 def curvature(points: np.ndarray) -> float:
-    """Measure the curvature of a stretch in its middle, 1/m, positive to the left of (n, 2) points in order."""
+    """Measure the curvature in the middle of (n, 2) points in order, 1/m, positive for a curve to the left."""
     half = len(points) // 2
     origin, axes = _frame(points[: half + 1], points[half:])
     return float(_fit((points - origin) @ axes.T)[2])
 
 
 def _astray(off_m: np.ndarray) -> int:
-    """Count the points from the end inward that stray from the curve; no more than half, for the rest bears it."""
+    """Count the points from the end inward up to the last one off the curve; at most half, as the rest supports it."""
     half = len(off_m) // 2
     far = np.flatnonzero(off_m[:half] > STAIRS_M)
     return int(far[-1]) + 1 if len(far) else 0
 
 
+def _length(points: np.ndarray) -> float:
+    return float(np.hypot(*np.diff(points, axis=0).T).sum())
+
+
 def _frame(before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Origin in the middle of the gap, and axes along and across the way from one stretch to the other, (2, 2)."""
+    """Return the middle of the gap, and unit vectors along and across the way from one part to the other, (2, 2)."""
     along = after.mean(axis=0) - before.mean(axis=0)
     along = along / np.hypot(*along)
     return (before[-1] + after[0]) / 2, np.array([along, [-along[1], along[0]]])
 
 
 def _fit(points: np.ndarray, transition_m: float = TRANSITION_M) -> np.ndarray:
-    """Fit y(x) robustly, the habits of rails as prior: value, slope, curvature and its change at x = 0."""
+    """Fit y(x) robustly with the curvature of rails as prior: value, slope, curvature and its change at x = 0."""
     basis, y = _basis(points[:, 0]), points[:, 1]
-    prior = np.diag([0.0, 0.0, 1.0, transition_m]) * STAIRS_M * TIGHTEST_RADIUS_M
+    prior = np.diag([0.0, 0.0, 1.0, transition_m]) * STAIRS_M * MIN_RADIUS_M
     weight = np.ones(len(points))
     for _ in range(ROUNDS):
         design = np.concatenate([weight[:, None] * basis, prior])

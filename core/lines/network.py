@@ -1,4 +1,4 @@
-"""Lines that meet in nodes: what vectorization makes and smoothing keeps together."""
+"""Lines that meet in nodes: what vectorization makes, and smoothing and refinement move."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from .ends import cut_back, turned
 
 @dataclass(frozen=True)
 class LineNetwork:
-    """Polylines in the plane and the nodes in which they meet.
+    """Polylines in plan and the nodes in which they meet.
 
-    A line end is addressed by the number 2 i for the start of line i and 2 i + 1 for its end.
+    A line end has the number 2 i for the start of line i and 2 i + 1 for its end.
 
     Attributes
     ----------
@@ -22,10 +22,10 @@ class LineNetwork:
         Vertices in local metres; the first and the last are copies of their nodes.
     nodes : (k, 2) array
     ends : (m, 2) int array
-        Node at the start and at the end of each line. Every line end is a node; a node of degree 1 is a free end; a
-        closed loop starts and ends in one node.
+        Node at the start and at the end of each line. Every line end is a node. A node of degree 1 is a free end; a
+        closed line starts and ends in the same node.
     passes : (p, 3) int array
-        Node, line and vertex number wherever a line runs through a node in which others end or which others cross.
+        Node, line and vertex number wherever a line passes through a node in which others end or which others cross.
     """
 
     lines: tuple[np.ndarray, ...]
@@ -34,7 +34,7 @@ class LineNetwork:
     passes: np.ndarray = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
 
     def degrees(self) -> np.ndarray:
-        """Count the line ends at each node, a passing line counting as two, (k,)."""
+        """Count the line ends at each node, (k,); a line that passes counts twice."""
         ending = np.bincount(self.ends.ravel(), minlength=len(self.nodes))
         passing = np.bincount(self.passes[:, 0], minlength=len(self.nodes))
         return ending + 2 * passing
@@ -44,11 +44,11 @@ class LineNetwork:
         return np.array([np.hypot(*np.diff(line, axis=0).T).sum() for line in self.lines], dtype=float)
 
     def from_end(self, end: int) -> np.ndarray:
-        """Vertices of the line seen from one of its ends."""
+        """Return the vertices of a line from one of its ends inward."""
         return turned(self.lines[end // 2], end)
 
     def select(self, keep: np.ndarray) -> LineNetwork:
-        """Keep the lines marked in `keep`, (m,) bool, and forget nodes and passes that nothing else touches."""
+        """Keep the lines marked in `keep`, (m,) bool, and drop nodes and passes that belong to no other line."""
         number = np.cumsum(keep) - 1
         passes = self.passes[keep[self.passes[:, 1]]]
         passes = np.column_stack([passes[:, 0], number[passes[:, 1]], passes[:, 2]])
@@ -56,7 +56,7 @@ class LineNetwork:
         return LineNetwork(lines, self.nodes, self.ends[keep], passes).tidy()
 
     def span(self, end: int, count: int) -> tuple[int, int]:
-        """Return the first of the `count` vertices next to a line end, and the one after the last."""
+        """Return the number of the first of the `count` vertices next to a line end, and one more than the last."""
         length = len(self.lines[end // 2])
         return (length - count, length) if end % 2 else (0, count)
 
@@ -65,16 +65,16 @@ class LineNetwork:
         return bool(self._passing(number, first, last).any())
 
     def with_piece(self, number: int, first: int, last: int, vertices: np.ndarray) -> LineNetwork:
-        """Redraw a line between two of its vertices; passes keep their places, those between the two are dropped.
+        """Redraw a line between two of its vertices; passes between them are dropped, all others stay in place.
 
         Parameters
         ----------
         number : int
             Line to edit.
         first, last : int
-            Its vertices next to the new ones; both stay.
+            Vertices on either side of the new ones; both stay.
         vertices : (n, 2) array
-            What replaces the vertices between them, in the line's direction.
+            New vertices in the direction of the line.
         """
         return self._spliced(number, first + 1, last, vertices)
 
@@ -86,12 +86,12 @@ class LineNetwork:
         end : int
             Line end to edit.
         vertices : (n, 2) array
-            New vertices seen from this end, before those that stay.
+            New vertices from the end inward.
         replaced : int
-            Number of vertices, seen from this end, that the new ones replace.
+            Number of vertices next to the end that the new ones replace.
         at : tuple of int, optional
-            Line and vertex where the edited line is to end; the vertex is put before the new ones. Without it the line
-            ends in the first new vertex, freely.
+            Line and vertex in which the edited line is to end; the vertex is put before the new ones. Without it the
+            first new vertex is a free end.
         """
         start, passes = vertices, self.passes
         if at is not None:
@@ -103,7 +103,7 @@ class LineNetwork:
         return network._spliced(end // 2, *self.span(end, replaced), turned(start, end))
 
     def cut_back(self, cuts_m: Mapping[int, float]) -> LineNetwork:
-        """Remove lengths from line ends; each end that is cut becomes free."""
+        """Remove lengths from line ends, given by end; each end that is cut becomes free."""
         network = self
         for end, length_m in cuts_m.items():
             if length_m > 0:
@@ -125,8 +125,10 @@ class LineNetwork:
         return (line == number) & (vertex >= first) & (vertex < last)
 
     def parted(self) -> tuple[LineNetwork, dict[int, int]]:
-        """Cut all lines at the nodes that they pass, and say which ends belong together, as `weld` takes it."""
-        lines, ends, partner = [], [], {}
+        """Cut all lines at the nodes that they pass; also return which ends belong together, for `weld`."""
+        lines: list[np.ndarray] = []
+        ends: list[list[int]] = []
+        partner: dict[int, int] = {}
         for number, (line, own) in enumerate(zip(self.lines, self.ends.tolist())):
             passes = self.passes[self.passes[:, 1] == number]
             passes = passes[np.argsort(passes[:, 2], kind="stable")]
@@ -139,22 +141,26 @@ class LineNetwork:
         return LineNetwork(tuple(lines), self.nodes, np.array(ends, dtype=np.int64).reshape(-1, 2)), partner
 
     def weld(self, partner: Mapping[int, int], bridges: Mapping[int, np.ndarray] | None = None) -> LineNetwork:
-        """Make one line of lines that continue each other.
+        """Join lines that continue each other into one.
 
         Parameters
         ----------
         partner : mapping of end to end
-            Which line end continues in which; holds both directions. Ends that share a node are welded in it.
+            The line end in which each end continues, in both directions. Ends that share a node are joined in it.
         bridges : mapping of end to (n, 2) array, optional
-            Points between an end and its partner, in this direction, for ends that lie apart; both directions.
+            Points from an end to its partner, for ends that are apart, in both directions.
         """
         bridges = bridges or {}
-        lines, ends, passes = [], [], []
+        lines: list[np.ndarray] = []
+        ends: list[tuple[int, int]] = []
+        passes: list[tuple[int, int, int]] = []
         place: dict[int, tuple[int, int, bool]] = {}
         for start in _starts(partner, len(self.lines)):
             if start // 2 in place:
                 continue
-            pieces, count, end = [], 0, start
+            pieces: list[np.ndarray] = []
+            count, last = 0, start
+            end: int | None = start
             while end is not None and end // 2 not in place:
                 vertices = self.from_end(end)
                 shared = count > 0 and end not in bridges
@@ -175,15 +181,15 @@ class LineNetwork:
         return LineNetwork(tuple(lines), self.nodes, welded_ends.reshape(-1, 2), welded_passes.reshape(-1, 3)).tidy()
 
     def _moved_passes(self, place: Mapping[int, tuple[int, int, bool]]) -> list[tuple[int, int, int]]:
-        """Say where the passes of welded lines are now, given each line's new number, first vertex and sense."""
+        """List the passes of joined lines, given each line's new number, first vertex there, and direction."""
         moved = []
         for node, line, vertex in self.passes.tolist():
-            number, first, turned = place[line]
-            moved.append((node, number, first + (len(self.lines[line]) - 1 - vertex if turned else vertex)))
+            number, first, is_reversed = place[line]
+            moved.append((node, number, first + (len(self.lines[line]) - 1 - vertex if is_reversed else vertex)))
         return moved
 
     def tidy(self) -> LineNetwork:
-        """Forget passes in which no second line takes part, and nodes that no line touches; number the rest anew."""
+        """Drop passes of a single line and nodes of no line, and renumber the nodes."""
         keep = self.degrees()[self.passes[:, 0]] > 2
         used = np.zeros(len(self.nodes), dtype=bool)
         used[self.ends.ravel()] = True
@@ -195,6 +201,6 @@ class LineNetwork:
 
 
 def _starts(partner: Mapping[int, int], count: int) -> list[int]:
-    """List ends to begin welding at: first the loose ones, then any, so that only closed loops are left for these."""
+    """List the ends at which joining begins: those without a partner, then any, so that closed loops come last."""
     loose = [end for end in range(2 * count) if end not in partner]
     return loose + list(range(0, 2 * count, 2))

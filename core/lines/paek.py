@@ -1,10 +1,10 @@
-"""PAEK: polynomial approximation with an exponential kernel, in closed form along a polyline.
+"""PAEK, polynomial approximation with an exponential kernel, in closed form along a polyline.
 
-At a station s of a piecewise linear P(t) the quadratic a + b u + e u² that fits P(s + u) best under the weight
-exp(-|u| / sigma) gives the smoothed position a. The needed moments are integrated exactly segment by segment, and the
-moments of a longer stretch follow from those of its two halves. That operation is associative, so all vertices are
-served at once by doubling scans. Idea: Bodansky, Gribov and Pilouk, "Smoothing and compression of lines obtained by
-raster-to-vector conversion", 2002; formulas: docs/method.md section 5.2.
+At a station s of a piecewise linear P(t), the quadratic a + b u + e u² is fitted to P(s + u) under the weight
+exp(-|u| / sigma); a is the smoothed position. The moments of each segment are integrated exactly, and the moments of
+two adjacent sections combine into those of both. This operation is associative, so doubling scans yield the moments at
+all vertices at once. Idea: Bodansky, Gribov and Pilouk, "Smoothing and compression of lines obtained by
+raster-to-vector conversion", 2002. Formulas: docs/method.md section 5.
 """
 
 from __future__ import annotations
@@ -15,13 +15,21 @@ import numpy as np
 from scipy.special import factorial, gammainc
 
 REACH_SIGMAS = 30.0
-"""Beyond this the kernel weighs less than 1e-11: far enough to look, in standard lengths."""
+"""Reach of the kernel: beyond, it weighs less than 1e-11."""
+
+VARIANCE_FACTOR = 0.33375
+"""Variance of the result for independent points with a variance of 1, in units of spacing / sigma: the integral of the
+squared equivalent kernel (docs/method.md section 5.3)."""
+
+END_SHIFT = 0.26
+"""Displacement of a line at a fixed end in an arc of radius R, in units of sigma² / R (docs/method.md section 5.4);
+half as much where an arc follows a straight."""
 
 _MOMENTS = 5
-"""Orders 0 to 4 of the kernel's own moments; those of the line are needed to order 2 only."""
+"""Moments of the kernel itself, orders 0 to 4; those of the line are needed up to order 2 only."""
 
-_SHORTEST_SIGMAS = 1e-2
-"""On shorter pieces the quadratic is ill-conditioned and pointless; they are replaced by their mean."""
+_MIN_LENGTH_SIGMAS = 1e-2
+"""On shorter pieces the quadratic is ill-conditioned; they are replaced by their mean."""
 
 
 def local_fit(t: np.ndarray, values: np.ndarray, stations: np.ndarray, sigma: float) -> np.ndarray:
@@ -30,7 +38,7 @@ def local_fit(t: np.ndarray, values: np.ndarray, stations: np.ndarray, sigma: fl
     Parameters
     ----------
     t : (n,) array
-        Position along the line, increasing; of equal positions one counts.
+        Position along the line, increasing; of equal positions only one counts.
     values : (n, d) array
         Linear between the positions; nothing is assumed beyond the ends.
     stations : (m,) array
@@ -43,7 +51,7 @@ def local_fit(t: np.ndarray, values: np.ndarray, stations: np.ndarray, sigma: fl
     (m, d) array
     """
     centre = values.mean(axis=0)
-    if len(t) < 2 or t[-1] - t[0] < _SHORTEST_SIGMAS * sigma:
+    if len(t) < 2 or t[-1] - t[0] < _MIN_LENGTH_SIGMAS * sigma:
         return np.tile(centre, (len(stations), 1))
     t, stations = np.asarray(t) / sigma, np.asarray(stations) / sigma
     inserted = np.union1d(t, stations)
@@ -59,21 +67,36 @@ def local_fit(t: np.ndarray, values: np.ndarray, stations: np.ndarray, sigma: fl
 
 
 def filled(t: np.ndarray, spacing: float) -> np.ndarray:
-    """Insert even stations so that none lie more than `spacing` apart."""
+    """Insert even stations between those in `t`, (n,), so that no two are more than `spacing` apart."""
     parts = np.maximum(np.ceil(np.diff(t) / spacing - 1e-9), 1).astype(int)
     return np.interp(np.arange(parts.sum() + 1), np.concatenate([[0], np.cumsum(parts)]), t)
 
 
 def reflected(t: np.ndarray, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Continue a line beyond its end by its point reflection there, once."""
+    """Extend a line beyond its end by its point reflection about that end."""
     mirrored = 2 * vertices[-1] - vertices[-2::-1]
     return np.concatenate([t, 2 * t[-1] - t[-2::-1]]), np.concatenate([vertices, mirrored])
 
 
 def repeated(t: np.ndarray, vertices: np.ndarray, end: float, sigma_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Set copies of a line end to end until they cover the kernel's reach around 0 to `end`.
+    """Chain copies of a line until they cover the reach of the kernel around the positions 0 to `end`.
 
-    A closed line repeats in place; a line with its reflection repeats with a shift, which reflects it at both ends.
+    A closed line repeats in place. A line followed by its reflection repeats with a shift, which reflects it at both
+    ends.
+
+    Parameters
+    ----------
+    t : (n,) array
+        Position along the line, from 0.
+    vertices : (n, d) array
+    end : float
+        Position up to which stations are wanted.
+    sigma_m : float
+
+    Returns
+    -------
+    t : (m,) array
+    vertices : (m, d) array
     """
     reach = REACH_SIGMAS * sigma_m
     period, shift = t[-1], vertices[-1] - vertices[0]
@@ -99,9 +122,9 @@ def _left_moments(t: np.ndarray, line: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def _scan(steps: np.ndarray, moments: np.ndarray) -> np.ndarray:
-    """Add up the moments of all segments before each vertex, (n segments, k, d) to (n + 1, k, d).
+    """Accumulate the moments of all segments before each vertex, (n segments, k, d) to (n + 1, k, d).
 
-    In every round each vertex takes in a stretch as long as all it has, until the stretches exceed the kernel's reach.
+    Each round doubles the section behind every vertex, until all sections exceed the reach of the kernel.
     """
     span, total = steps.copy(), moments.copy()
     offset = 1
@@ -113,7 +136,7 @@ def _scan(steps: np.ndarray, moments: np.ndarray) -> np.ndarray:
 
 
 def _shifted(moments: np.ndarray, by: np.ndarray) -> np.ndarray:
-    """Moments seen from a vertex that lies `by`, (n,), further on: (u + by)^k by the binomial theorem."""
+    """Convert moments to vertices that are `by`, (n,), further along: (u + by)^k by the binomial theorem."""
     powers = [np.ones_like(by)]
     for _ in range(moments.shape[1] - 1):
         powers.append(powers[-1] * by)

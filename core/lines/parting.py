@@ -1,4 +1,4 @@
-"""How two rails part: the law by which the distance between their axes grows along the way (docs/method.md 4.11)."""
+"""How two rails part: the law by which the distance between their axes grows (docs/method.md sections 4.11 and 6.3)."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 from ..polyline import interpolate, left_normals, length_along
 
 ARC, STRAIGHT = 2, 1
-"""Powers of the way by which the distance grows: where a branch begins on an arc, and where it begins at an angle."""
+"""Powers of the way by which the distance grows: the branch begins on an arc, or at an angle."""
 
 
 @dataclass(frozen=True)
 class PartingLaw:
-    """Distance between two axes, (slope * way + root)^power metres, from the place where it is 0.
+    """Distance between two axes over the way along one of them: (slope * way + root)^power, or 0 before they touch.
 
     Attributes
     ----------
     slope, root : float
-        Of the straight line that the root of the distance is over the way.
+        Of the straight line that the power-th root of the distance follows.
     power : int
         `ARC` or `STRAIGHT`.
     """
@@ -30,16 +30,16 @@ class PartingLaw:
 
     @classmethod
     def fitted(cls, way: np.ndarray, apart: np.ndarray, power: int, weights: np.ndarray | None = None) -> PartingLaw:
-        """Fit the law to distances; the root of the distance grows evenly, so the fit is a straight line.
+        """Fit the law to distances by a straight line through their roots.
 
         Parameters
         ----------
         way, apart : (n,) arrays
-            Way along one rail and the distance of the other one there, metres; negative distances count as 0.
+            Way along one rail, and distance of the other one there, metres; negative distances count as 0.
         power : int
             `ARC` or `STRAIGHT`.
         weights : (n,) array, optional
-            Weights of the roots, not of their squares.
+            Factors of the residuals before squaring.
         """
         slope, root = np.polyfit(way, np.maximum(apart, 0.0) ** (1 / power), 1, w=weights)
         return cls(float(slope), float(root), power)
@@ -55,7 +55,7 @@ class PartingLaw:
 
     @property
     def curvature(self) -> float:
-        """Curvature of one rail relative to the other on an arc, 1/m: the distance is half of it times way squared."""
+        """Relative curvature k of two rails that part on an arc, 1/m: their distance is k way² / 2."""
         return 2 * self.slope**2
 
     def __call__(self, way: np.ndarray) -> np.ndarray:
@@ -64,6 +64,17 @@ class PartingLaw:
 
 
 def left_of(line: np.ndarray, at: np.ndarray, left_m: np.ndarray) -> np.ndarray:
-    """Return the places at chainages `at` of a line, (n, 2), and `left_m` to its left, (k, 2); both are (k,) metres."""
+    """Return places next to a line.
+
+    Parameters
+    ----------
+    line : (n, 2) array
+    at, left_m : (k,) arrays
+        Chainage of each place, and its distance to the left of the line, metres.
+
+    Returns
+    -------
+    (k, 2) array
+    """
     along = length_along(line)
     return interpolate(line, along, at) + left_m[:, None] * interpolate(left_normals(line), along, at)

@@ -1,4 +1,4 @@
-"""Smoothing of lines and height profiles by PAEK; what it keeps and loses: docs/method.md section 5.3."""
+"""Smooth lines and height profiles by PAEK; what it keeps and loses: docs/method.md sections 5.3 to 5.5."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from ..polyline import length_along
 from .paek import filled, local_fit, reflected, repeated
 
 STATIONS_PER_SIGMA = 4
-"""The smoothed line has nothing shorter than sigma left in it; a quarter of it shows the curve."""
+"""A smoothed line has no detail shorter than sigma; stations a quarter of it apart show its shape."""
 
 GAP_SIGMAS = 3.0
-"""A profile is not smoothed across a gap between its points longer than this many sigma."""
+"""A profile is not smoothed across a gap between its points that is longer than this many sigma."""
 
 SAME_STATION_M = 1e-6
-"""Points of a profile that lie closer along the line than this are averaged."""
+"""Points of a profile closer together along the line than this are averaged."""
 
 
 def smooth_line(
@@ -33,12 +33,12 @@ def smooth_line(
     sigma_m : float
         Length of the kernel. Waves of 4.9 sigma are halved; a circle of radius R shrinks by 1.8 sigma⁴ / R³.
     stations : (m,) array, optional
-        Distances along the given polyline at which to evaluate; by default its vertices and at most a quarter of sigma
-        in between.
+        Distances along the given polyline at which to evaluate. Default: its vertices, and stations between them so
+        that no two are more than a quarter of sigma apart.
     ends : {"fixed", "free"}
-        Fixed ends stay where they are and are straight; free ones are fitted from the inside.
+        Fixed ends stay in place and have no curvature; free ends are fitted from the inside.
     closed : bool
-        Smooth across the seam of a closed line; `ends` then means nothing.
+        Whether the line is smoothed across its seam; `ends` is ignored then.
 
     Returns
     -------
@@ -58,8 +58,8 @@ def smooth_line(
 def smooth_profile(t: np.ndarray, z: np.ndarray, sigma_m: float, stations: np.ndarray) -> np.ndarray:
     """Smooth heights over the distance along a line; points weigh by the distance between them, not by their number.
 
-    The ends are free. Where points lie more than `GAP_SIGMAS` sigma apart, each side is smoothed alone and the profile
-    runs straight across; beyond its ends it keeps the last height.
+    The ends are free. Where points are more than `GAP_SIGMAS` sigma apart, each side is smoothed on its own and the
+    profile is straight in between. Beyond its ends it keeps the last height.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Thinning of finished lines: the last step of making them.
+"""Thin finished lines, the last step in making them (docs/method.md section 5.7).
 
-Chords between vertices of a curve all lie inside of it, by 1 mm on average at a tolerance of 2 mm. The vertices that
-stay are therefore moved to where the thinned line fits the whole one best.
+All chords between vertices of a curve are inside it, on average by 1 mm at a tolerance of 2 mm. The remaining vertices
+are therefore moved so that the thinned line fits the whole one best.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from ..rails import Centerline, RailLine
 Line = TypeVar("Line", RailLine, Centerline)
 
 EXACT_M = 1e-9
-"""A vertex nearer than this to the chord says nothing, even at a tolerance of zero."""
+"""Smallest effective tolerance: a vertex closer to the chord is dropped even at a tolerance of zero."""
 
 
 def thin(lines: Sequence[Line], tolerance_xy_m: float, tolerance_z_m: float) -> tuple[Line, ...]:
-    """Leave out needless vertices of lines, but none in which another line ends, so that lines stay connected.
+    """Drop needless vertices of lines, but none in which another line ends, so that lines stay connected.
 
     Parameters
     ----------
     lines : sequence of RailLine or Centerline
     tolerance_xy_m, tolerance_z_m : float
-        How far a vertex left out may lie beside the result in plan, and above or below it.
+        Largest distance of a dropped vertex from the result, in plan and in height.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def thin(lines: Sequence[Line], tolerance_xy_m: float, tolerance_z_m: float) -> 
 
 
 def _thinned(xyz: np.ndarray, ends: set[tuple[float, ...]], tolerance_xy_m: float, tolerance_z_m: float) -> np.ndarray:
-    """Thin the stretches between the vertices that other lines end in, (k, 3)."""
+    """Thin the pieces between the vertices in which other lines end, (k, 3)."""
     inner = [number for number, vertex in enumerate(xyz[:-1, :2].tolist()) if number and tuple(vertex) in ends]
     knots = [0, *inner, len(xyz) - 1]
     pieces = [xyz[first : last + 1] for first, last in zip(knots, knots[1:])]
@@ -48,16 +48,16 @@ def _thinned(xyz: np.ndarray, ends: set[tuple[float, ...]], tolerance_xy_m: floa
 
 
 def essential_vertices(xyz: np.ndarray, tolerance_xy_m: float, tolerance_z_m: float) -> np.ndarray:
-    """Mark vertices without which the line through the others leaves the tolerances (Douglas and Peucker, 1973).
+    """Mark the vertices needed to keep a line within the tolerances (Douglas and Peucker, 1973).
 
-    Plan and height are judged at once, so that the line keeps both tolerances.
+    Plan and height are judged together, so that the line keeps both tolerances.
 
     Parameters
     ----------
     xyz : (n, 3) array
-        Heights may be NaN; then the plan alone counts.
+        Heights may be NaN; then only the plan counts.
     tolerance_xy_m, tolerance_z_m : float
-        How far a vertex may lie beside the line in plan, and above or below it.
+        Largest distance of a vertex from the line, in plan and in height.
 
     Returns
     -------
@@ -81,7 +81,7 @@ def essential_vertices(xyz: np.ndarray, tolerance_xy_m: float, tolerance_z_m: fl
 
 
 def _deviation(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distance of the inner vertices from the segment between the outer ones, in plan and in height, (n - 2,) each."""
+    """Measure how far inner vertices are from the segment between the outer ones, in plan and height, (n - 2,) each."""
     chord, inner = xyz[-1] - xyz[0], xyz[1:-1] - xyz[0]
     length_squared = chord[0] ** 2 + chord[1] ** 2
     share = np.clip(inner[:, :2] @ chord[:2] / length_squared, 0, 1) if length_squared > 0 else np.zeros(len(inner))
@@ -90,9 +90,9 @@ def _deviation(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _fitted(xyz: np.ndarray, tolerance_xy_m: float, tolerance_z_m: float) -> np.ndarray:
-    """Thin one stretch, and move its vertices but the ends to where the line through them fits all others best, (k, 3).
+    """Thin one piece and move its inner vertices so that the line through them fits all vertices best, (k, 3).
 
-    Where the line would leave the tolerance, its vertices stay.
+    Vertices whose move would take the line out of the tolerance stay.
     """
     kept = np.flatnonzero(essential_vertices(xyz, tolerance_xy_m, tolerance_z_m))
     if len(kept) < 3 or len(kept) == len(xyz):
@@ -117,7 +117,7 @@ def _between(vertices: np.ndarray, span: np.ndarray, share: np.ndarray) -> np.nd
 
 
 def _least_squares(values: np.ndarray, span: np.ndarray, share: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Fit a polyline to (n, 3) values, 0 at both its ends; returns its vertices."""
+    """Fit a polyline that is 0 at both ends to (n, 3) values; returns its vertices."""
     count = int(span[-1]) + 2
     before, after = weight * (1 - share), weight * share
     diagonal = np.bincount(span, before * (1 - share), count) + np.bincount(span + 1, after * share, count)

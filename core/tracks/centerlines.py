@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import NoTrackError
 from ..lines.paek import REACH_SIGMAS
-from ..lines.smoothing import smooth_line
+from ..lines.smoothing import STATIONS_PER_SIGMA, smooth_line
 from ..parameters import Parameters
 from ..polyline import is_closed, left_normals, length_along, resample, starts_at_its_end
 from ..progress import SILENT, Progress
@@ -203,7 +203,7 @@ def _met(
 
 def _smoothed(xyz: np.ndarray, smoothing_m: float, progress: Progress) -> np.ndarray:
     """Smooth a centerline, (n, 3), in plan, with vertices as close as its shape requires."""
-    stations, t = resample(xyz, smoothing_m / 4)
+    stations, t = resample(xyz, smoothing_m / STATIONS_PER_SIGMA)
     margin_m = REACH_SIGMAS * smoothing_m
     closed = is_closed(xyz)
     if closed:

@@ -1,4 +1,4 @@
-"""Rasters of rail cells become polylines: closing, parity fix, veinerization, pruning, tracing, joining."""
+"""From a raster of rail cells to lines: closing, parity fix, veinerization, pruning, tracing, junctions and gaps."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..lines.ends import stretch, way_out
+from ..lines.ends import even_points, tip_and_direction
 from ..lines.network import LineNetwork
 from ..parameters import Parameters
 from ..progress import SILENT, Progress
 from ..raster import RailRaster
-from .attaching import attach_branches, drop_guards
+from .attaching import attach_branches
 from .branches import resolve_branches
 from .closing import close
 from .crossings import resolve_crossings
+from .guards import drop_guards
 from .joining import join_gaps
 from .junctions import clean_junctions, run_through, weld_pairs
 from .pixels import chamfer_distance, parity_fix, pixel_set
@@ -27,7 +28,8 @@ from .veinerization import prune, veinerize
 __all__ = ["LineNetwork", "vectorize"]
 
 SETTLING_M = 1.0
-"""A free end is led to the middle of this last stretch: shorter ones show the raster, longer ones a bend."""
+"""A free end moves onto the straight line through this last part of its line: a shorter part shows the raster, a longer
+one may bend."""
 
 
 def vectorize(
@@ -44,22 +46,22 @@ def vectorize(
     Parameters
     ----------
     raster : RailRaster
-        Cells of rail, as the network cleaned them.
+        Rail cells as cleaned by FRPDF.
     head_width_m : float
-        Railhead width; smaller detail at junctions is taken for noise.
+        Width of the railhead; smaller detail at junctions counts as noise.
     max_gap_m, gap_angle_deg : float
-        Ends at most this far apart are joined if both point at each other within this angle.
+        Ends at most this far apart are joined if each points at the other within this angle.
     min_length_m : float
-        Shorter lines are dropped unless they link two junctions.
+        Shorter lines are dropped unless they connect two junctions.
     progress : Progress
     raw : RailRaster, optional
-        Cells of all points. A stretch that the network left out for they are too few is no gap: what counts of it
-        towards `max_gap_m` is only where there is none of them either.
+        Cells of all points, including those that the cleaning dropped because they are few. Only length without any
+        point counts towards `max_gap_m`.
 
     Returns
     -------
     LineNetwork
-        Raw lines with the stairs of the raster in them, in local metres; smooth them next.
+        Lines in local metres that still have the stairs of the raster; smooth them next.
     """
     closed = close(raster, progress.span(0.0, 0.3))
     cells = pixel_set(closed.cells())
@@ -89,7 +91,7 @@ def vectorize(
 
 
 def _drop_short(network: LineNetwork, min_length_m: float) -> LineNetwork:
-    """Drop short lines with a free end, then weld what only they kept apart."""
+    """Drop short lines with a free end, and join lines that only a dropped one kept apart."""
     while True:
         loose = (network.degrees()[network.ends] == 1).any(axis=1)
         keep = ~loose | (network.lengths() >= min_length_m)
@@ -99,9 +101,9 @@ def _drop_short(network: LineNetwork, min_length_m: float) -> LineNetwork:
 
 
 def _settle_ends(network: LineNetwork) -> LineNetwork:
-    """Move free ends sideways onto the straight line through their last stretch, for smoothing will hold them there."""
+    """Move free ends sideways onto the straight line through their last part, because smoothing keeps them in place."""
     lines, nodes = [line.copy() for line in network.lines], network.nodes.copy()
     for end in np.flatnonzero(network.degrees()[network.ends.ravel()] == 1).tolist():
-        tip, _ = way_out(stretch(network.from_end(end), SETTLING_M))
+        tip, _ = tip_and_direction(even_points(network.from_end(end), SETTLING_M))
         lines[end // 2][-1 if end % 2 else 0] = nodes[network.ends.flat[end]] = tip
     return replace(network, lines=tuple(lines), nodes=nodes)

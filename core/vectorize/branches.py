@@ -1,4 +1,7 @@
-"""Where one rail leaves another the raster shows their mean; both are drawn back to where they part."""
+"""Where one rail leaves another, the raster shows their mean; both are redrawn from where they part.
+
+See docs/method.md section 4.11.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..lines.bridges import MISFIT_M, STAIRS_M, bridge, curvature
-from ..lines.ends import STEP_M, cut_back, stretch, turned
+from ..lines.ends import STEP_M, cut_back, even_points, turned
 from ..lines.network import LineNetwork
 from ..lines.parting import ARC, PartingLaw
 from ..polyline import length_along
@@ -15,49 +18,53 @@ from .crossings import MISFIT_M as KNOWN_MISFIT_M
 from .crossings import SKIP_M
 from .junctions import DEFLECTION_DEG, DIRECTION_M, deflections, ends_by_node
 
-FARTHEST_M = 40.0
-"""Farthest that a branch is drawn back: on 2500 m of radius, as at 1:26.5, two rails are 0.2 m apart after 32 m, and
-what is seen of them tells that length to a quarter."""
+MAX_BACK_M = 40.0
+"""Largest length by which a branch is extended back: on a radius of 2500 m, as at 1:26.5, two rails are 0.2 m apart
+after 32 m, and the visible part gives that length to within a quarter."""
 
 STEADY_M = 8.0
-"""Stretch of two rails over which is measured how they part."""
+"""Length over which the parting of two rails is measured."""
 
 SHARPER = 2.0
 UNSURE_CURVATURE = 16 * STAIRS_M / STEADY_M**2
-"""A branch begins on the arc that it goes on with: no more bent than so many times what is seen of it, and what stairs
-at both ends of that stretch may hide. This tells switches from frogs."""
+"""A branch begins on the arc on which it continues: the fitted curvature may be `SHARPER` times the visible one, plus
+what stairs at both ends of the visible part may hide. At a frog, where rails cross, it is larger."""
 
 
 def resolve_branches(network: LineNetwork) -> LineNetwork:
-    """Draw the rails of every branching as smooth curves from the common stem; which runs on is left open.
+    """Draw both rails of every branching as smooth curves from their common stem.
+
+    Which of them continues the stem is left open.
+
+    Parameters
+    ----------
+    network : LineNetwork
+        Lines without passes.
 
     Returns
     -------
     LineNetwork
-        Nodes of three lines, one of which continues in both others, lie where the two begin to part.
+        Nodes of three lines, one of which continues in both others, are where these two begin to part.
     """
     lines, nodes = list(network.lines), network.nodes.copy()
     for node, stem, legs in branchings(network):
         trunk, *rails = (turned(lines[end // 2], end) for end in (stem, *legs))
         if min(length_along(rail)[-1] for rail in rails) < SKIP_M + DIRECTION_M:
             continue
-        free = [cut_back(rail, SKIP_M) for rail in rails]
         trunk = _trunk(trunk, rails)
-        curves = (
-            [bridge(trunk, rail, held=True, misfit_m=KNOWN_MISFIT_M) for rail in free] if len(trunk) > 1 else [None]
-        )
-        if None in curves:
+        drawn = [_drawn(trunk, rail) for rail in rails] if len(trunk) > 1 else [None]
+        redrawn = [line for line in drawn if line is not None]
+        if len(redrawn) < len(drawn):
             continue
         nodes[node] = trunk[0]
         lines[stem // 2] = turned(trunk, stem)
-        for leg, curve, rail in zip(legs, curves, free):
-            rail = cut_back(rail, curve.cuts_m[1])
-            lines[leg // 2] = turned(np.concatenate([trunk[:1], curve.points, rail]), leg)
+        for leg, line in zip(legs, redrawn):
+            lines[leg // 2] = turned(line, leg)
     return LineNetwork(tuple(lines), nodes, network.ends, network.passes)
 
 
 def branchings(network: LineNetwork) -> Iterator[tuple[int, int, list[int]]]:
-    """List the nodes in which one line end, the stem, continues in two others, the legs."""
+    """Yield the nodes in which one line end, the stem, continues in two others, the legs."""
     for node, ends in ends_by_node(network):
         if len({end // 2 for end in ends}) == 3 == len(ends) and node not in network.passes[:, 0]:
             widest = deflections(network, ends).max(axis=1, where=~np.eye(3, dtype=bool), initial=0.0)
@@ -67,18 +74,27 @@ def branchings(network: LineNetwork) -> Iterator[tuple[int, int, list[int]]]:
 
 
 def _trunk(stem: np.ndarray, rails: list[np.ndarray]) -> np.ndarray:
-    """Cut the stem back to where the legs begin to part; nothing is left if that is too far, or the stem too short."""
-    one, other = (stretch(cut_back(rail, SKIP_M), STEADY_M) for rail in rails)
+    """Cut the stem back to where the legs begin to part; no vertices if that is too far or the stem too short."""
+    one, other = (even_points(cut_back(rail, SKIP_M), STEADY_M) for rail in rails)
     count = min(len(one), len(other))
     apart_m = np.hypot(*(one[:count] - other[:count]).T)
     law = PartingLaw.fitted(SKIP_M + STEP_M * np.arange(count), apart_m, ARC)
     back_m = -law.way_at(MISFIT_M)
     too_short = length_along(stem)[-1] < back_m + DIRECTION_M
-    if too_short or not 0 < back_m < FARTHEST_M or law.curvature > sharpest(curvature(one) - curvature(other)):
+    if too_short or not 0 < back_m < MAX_BACK_M or law.curvature > max_curvature(curvature(one) - curvature(other)):
         return stem[:0]
     return cut_back(stem, back_m)
 
 
-def sharpest(seen: float) -> float:
-    """Tell how sharply rails may bend apart where they merge if beyond they bend apart by `seen`, 1/m both."""
+def _drawn(trunk: np.ndarray, rail: np.ndarray) -> np.ndarray | None:
+    """Draw a leg from the end of the stem on, by a bridge to its free part; None if there is no bridge."""
+    free = cut_back(rail, SKIP_M)
+    curve = bridge(trunk, free, held=True, misfit_m=KNOWN_MISFIT_M)
+    if curve is None:
+        return None
+    return np.concatenate([trunk[:1], curve.points, cut_back(free, curve.cuts_m[1])])
+
+
+def max_curvature(seen: float) -> float:
+    """Return the largest relative curvature, 1/m, with which rails part whose visible relative curvature is `seen`."""
     return SHARPER * abs(seen) + UNSURE_CURVATURE

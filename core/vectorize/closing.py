@@ -9,10 +9,10 @@ from ..progress import SILENT, Progress
 from ..raster import RailRaster
 
 CLOSING_RADIUS_CELLS = 1
-"""A 3x3 square bridges gaps of two cells; a larger one would weld a rail to its guard rail."""
+"""A 3x3 square bridges gaps of two cells; a larger one would join a rail and its guard rail."""
 
 HOLE_CELLS = 20
-"""Largest hole that is filled; holes between diverging rails soon grow larger."""
+"""Largest hole that is filled. Holes between diverging rails soon grow larger."""
 
 _MARGIN = HOLE_CELLS + 2 * CLOSING_RADIUS_CELLS + 1
 
@@ -20,7 +20,7 @@ _MARGIN = HOLE_CELLS + 2 * CLOSING_RADIUS_CELLS + 1
 def close(raster: RailRaster, progress: Progress = SILENT) -> RailRaster:
     """Close the rail cells morphologically and fill holes of at most `HOLE_CELLS` cells.
 
-    The result does not depend on how the raster is tiled: every tile is seen with a margin wider than the largest hole.
+    The result does not depend on the tiles of the raster: each is processed with a margin wider than the largest hole.
     """
     return raster.map_tiles(_close_window, _MARGIN, progress=progress)
 

@@ -1,4 +1,7 @@
-"""Rails that cross at a small angle share a stretch of raster; it is taken apart into two rails again."""
+"""Rails that cross at a small angle share part of the raster; it is separated into two rails again.
+
+See docs/method.md section 4.10.
+"""
 
 from __future__ import annotations
 
@@ -8,35 +11,40 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..lines.bridges import Bridge, bridge
-from ..lines.ends import cut_back, stretch
+from ..lines.ends import cut_back, even_points
 from ..lines.network import LineNetwork
 from .junctions import ends_by_node
 from .steadiness import unsteadiness
 
-MERGED_M = 14.0
-"""Longest stretch that two crossing rails share: heads of 76 mm in cells of 40 mm do so for 9 m at 1:26.5, and wing
-rails lengthen it at both ends."""
+MAX_MERGED_M = 14.0
+"""Largest length that two crossing rails share. Heads of 76 mm in cells of 40 mm share 9 m at 1:26.5, and wing rails
+lengthen it at both ends."""
 
 SKIP_M = 0.5
-"""Length of a rail next to the shared stretch that is still drawn aside by the other one."""
+"""Length of a rail next to the shared part that the other rail still draws aside."""
 
 MISFIT_M = 0.015
-"""Legs of a crossing may stray further from a curve than ends across a gap: wing rails widen them, and four of them
-that meet are known to belong together."""
+"""Misfit allowed to the legs of a crossing. It is larger than across gaps because wing rails widen the legs, and
+because four legs that meet are known to belong together."""
 
 DECIDING_M = 12.0
-"""Stretch of each leg by which its continuation is told: a rail of a 1:26.5 frog that ran on as the other one would
-stray from one curvature by 16 mm over so long, where stairs make it stray by half as much."""
+"""Length of each leg that decides its continuation. A rail of a 1:26.5 frog that continued as the other rail would be
+off a constant curvature by 16 mm over this length; stairs make half as much."""
 
 _PAIRINGS = (((0, 2), (1, 3)), ((0, 3), (1, 2)), ((0, 1), (2, 3)))
 
 
 def resolve_crossings(network: LineNetwork) -> LineNetwork:
-    """Draw two rails through every stretch shared by two crossing ones, each a smooth curve between its own free parts.
+    """Draw two rails through every part that two crossing rails share, each a smooth curve between its own free parts.
 
-    A crossing is a node of four lines, or a short line between two nodes of three, or a node of three whose fourth leg
-    ends free before it, as flangeways of frogs cut it off. It is resolved if its four legs make two pairs that rails
-    could follow; the rails then cross without a node.
+    A crossing is a node of four lines; or a short line between two nodes of three; or a node of three whose fourth leg
+    ends freely before it, because a flangeway of the frog cuts it off. It is resolved if its four legs form two pairs
+    that rails could follow. The rails then cross without a node.
+
+    Parameters
+    ----------
+    network : LineNetwork
+        Lines without passes.
     """
     keep = np.ones(len(network.lines), dtype=bool)
     joins: dict[tuple[int, int], Bridge] = {}
@@ -53,7 +61,8 @@ def resolve_crossings(network: LineNetwork) -> LineNetwork:
     if not joins:
         return network
     number = np.cumsum(keep) - 1
-    partner, bridges = {}, {}
+    partner: dict[int, int] = {}
+    bridges: dict[int, np.ndarray] = {}
     for (one, other), found in joins.items():
         one, other = (2 * int(number[end // 2]) + end % 2 for end in (one, other))
         partner[one], partner[other] = other, one
@@ -62,13 +71,13 @@ def resolve_crossings(network: LineNetwork) -> LineNetwork:
 
 
 def _crossings(network: LineNetwork) -> Iterator[tuple[list[int], dict[int, float]]]:
-    """List the shared lines (one or none) and the four legs of every possible crossing, the most certain ones first.
+    """Yield the shared lines (one or none) and the four legs of every possible crossing, the most certain ones first.
 
-    With each leg stands the length of it next to the crossing that is not its rail's alone.
+    The value of each leg is the length of it next to the crossing that does not belong to its rail alone.
     """
     lengths, degrees, at_node = network.lengths(), network.degrees(), dict(ends_by_node(network))
-    places = [([], [node]) for node in np.flatnonzero(degrees == 4).tolist()]
-    shared = np.flatnonzero((degrees[network.ends] == 3).all(axis=1) & (lengths < MERGED_M))
+    places: list[tuple[list[int], list[int]]] = [([], [node]) for node in np.flatnonzero(degrees == 4).tolist()]
+    shared = np.flatnonzero((degrees[network.ends] == 3).all(axis=1) & (lengths < MAX_MERGED_M))
     places += [([line], network.ends[line].tolist()) for line in shared[np.argsort(lengths[shared])].tolist()]
     crossings = [
         (lines, {end: SKIP_M for node in nodes for end in at_node[node] if end // 2 not in lines})
@@ -84,36 +93,40 @@ def _crossings(network: LineNetwork) -> Iterator[tuple[list[int], dict[int, floa
 
 
 def _cut_off(network: LineNetwork) -> list[dict[int, float]]:
-    """List the crossings that a flangeway leaves only three legs, with every free end that may be the fourth.
+    """List the crossings to which a flangeway leaves only three legs, with every free end that may be the fourth.
 
-    The leg on the side of the free end is shared as far as there. Nearer ends come first.
+    The leg towards the free end is shared up to that end. Nearer free ends come first.
     """
     degrees, at_node = network.degrees(), dict(ends_by_node(network))
     free, forks = np.flatnonzero(degrees == 1), np.flatnonzero(degrees == 3)
     if not len(free) or not len(forks):
         return []
     near = cKDTree(network.nodes[forks]).sparse_distance_matrix(
-        cKDTree(network.nodes[free]), MERGED_M, output_type="coo_matrix"
+        cKDTree(network.nodes[free]), MAX_MERGED_M, output_type="coo_matrix"
     )
     found = []
     for fork, tip in np.column_stack([near.row, near.col])[np.argsort(near.data, kind="stable")].tolist():
         legs, across = at_node[int(forks[fork])], network.nodes[free[tip]] - network.nodes[forks[fork]]
         reach_m = float(np.hypot(*across))
-        ways = [stretch(network.from_end(end), max(reach_m, SKIP_M))[-1] - network.nodes[forks[fork]] for end in legs]
+        ways = [
+            even_points(network.from_end(end), max(reach_m, SKIP_M))[-1] - network.nodes[forks[fork]] for end in legs
+        ]
         stem = legs[int(np.argmax([way @ across for way in ways]))]
         found.append({**dict.fromkeys(legs, SKIP_M), stem: reach_m + SKIP_M, at_node[int(free[tip])][0]: SKIP_M})
     return found
 
 
 def _best_pairing(network: LineNetwork, legs: Mapping[int, float]) -> dict[tuple[int, int], Bridge]:
-    """Find the way of running two rails through four legs on which both keep their curvature best; empty if none."""
+    """Connect four legs in the two pairs that keep the curvature of both rails best; empty if no rails could follow."""
     cut = {end: cut_back(network.from_end(end), skip_m) for end, skip_m in legs.items()}
     options = []
-    for pairing in _PAIRINGS:
-        ends = [tuple(list(legs)[place] for place in pair) for pair in pairing]
-        found = {(one, other): bridge(cut[one], cut[other], misfit_m=MISFIT_M) for one, other in ends}
-        if None not in found.values():
-            options.append(found)
+    ends = list(legs)
+    for (a, b), (c, d) in _PAIRINGS:
+        pairs = (ends[a], ends[b]), (ends[c], ends[d])
+        found = {pair: bridge(cut[pair[0]], cut[pair[1]], misfit_m=MISFIT_M) for pair in pairs}
+        bridges = {pair: curve for pair, curve in found.items() if curve is not None}
+        if len(bridges) == len(pairs):
+            options.append(bridges)
     return min(
         options,
         key=lambda found: sum(unsteadiness(cut[one], cut[other], DECIDING_M) ** 2 for one, other in found),

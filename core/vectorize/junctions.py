@@ -1,4 +1,7 @@
-"""What the raster does to junctions is undone: spurs go, clusters become one node, rails run straight through."""
+"""Repair what the raster does to junctions: drop spurs, merge clusters into one node, straighten rails through nodes.
+
+See docs/method.md section 4.6.
+"""
 
 from __future__ import annotations
 
@@ -9,35 +12,35 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..lines.ends import stretch, way_out
+from ..lines.ends import even_points, tip_and_direction
 from ..lines.network import LineNetwork
 
 SPUR_M = 1.0
-"""A branch that ends free after less than this is a weed on the rail's flank; longer ones may go on beyond a gap."""
+"""A shorter branch with a free end is a weed on the side of the rail; a longer one may continue beyond a gap."""
 
 RUNG_HEADS = 3.0
 RUNG_DEG = 30.0
-"""A link shorter and steeper than this between two rails is a bridge of raster over the flangeway."""
+"""A shorter and steeper line between two rails is a rung: cells across the flangeway."""
 
 BUBBLE_M = 1.0
-"""A loop with sides shorter than this is a hole in a blot, not two rails."""
+"""A loop with shorter sides is a hole in a blot, not two rails."""
 
 SLIT_M = 10.0
-"""So long a loop is a slit that noise bridges once more if its sides lie no farther apart than a rung is long: where
-rails part on 2500 m of radius, heads come apart after 23 m, and after 33 m they are too far apart for a rung."""
+"""Loops up to this length are slits that noise has bridged twice, if their sides are at most a rung apart. Rails that
+part on a radius of 2500 m have separate heads after 23 m, and after 33 m they are too far apart for a rung."""
 
 DEFLECTION_DEG = 15.0
-"""A rail runs on through a node if it turns by less; the steepest turnouts in use branch off at about 14 degrees."""
+"""A rail turns by less where it passes through a node; the steepest turnouts in use leave at about 14 degrees."""
 
 TURNED_BACK_DEG = 90.0
-"""Two lines that meet more sharply are the legs of a switch that lost its stem, not one rail."""
+"""Two lines that meet more sharply are not one rail, but the legs of a switch whose stem is missing."""
 
 DIRECTION_M = 2.5
-"""Length over which directions at a node are compared: longer than the stretch in which rails of a 1:9 frog merge."""
+"""Length over which directions at a node are compared: longer than the merged part of a 1:9 frog."""
 
 
 def clean_junctions(network: LineNetwork, head_width_m: float) -> LineNetwork:
-    """Remove spurs, small loops and rungs between rails, contract short links, and weld what is left of degree 2."""
+    """Drop spurs, small loops and rungs between rails, contract short links, and join lines at nodes of degree 2."""
     network = contract_links(weld_pairs(network), head_width_m)
     network = weld_pairs(drop_bubbles(network, RUNG_HEADS * head_width_m))
     network = weld_pairs(drop_rungs(network, RUNG_HEADS * head_width_m))
@@ -45,7 +48,7 @@ def clean_junctions(network: LineNetwork, head_width_m: float) -> LineNetwork:
 
 
 def weld_pairs(network: LineNetwork) -> LineNetwork:
-    """Weld lines at nodes in which exactly two different lines end and none passes; part them if they turn back."""
+    """Join lines at nodes in which exactly two different lines end and none passes; separate them if they turn back."""
     plain = network.degrees() == 2
     plain[network.passes[:, 0]] = False
     partner: dict[int, int] = {}
@@ -60,9 +63,9 @@ def weld_pairs(network: LineNetwork) -> LineNetwork:
 
 
 def drop_spurs(network: LineNetwork, length_m: float) -> LineNetwork:
-    """Remove branches shorter than `length_m` that end free; of several at one junction the shortest goes first.
+    """Drop branches with a free end shorter than `length_m`; of several at one junction, the shortest first.
 
-    Removing it may turn the next one into the rail's own end, which must stay.
+    Dropping it may turn the next one into the rail's own end, which must stay.
     """
     while True:
         degrees, lengths = network.degrees()[network.ends], network.lengths()
@@ -79,7 +82,7 @@ def drop_spurs(network: LineNetwork, length_m: float) -> LineNetwork:
 
 
 def contract_links(network: LineNetwork, length_m: float) -> LineNetwork:
-    """Draw junctions together that are linked by a line shorter than `length_m`; the new node lies in their mean."""
+    """Merge junctions that a line shorter than `length_m` connects into one node, at their mean."""
     short = (network.degrees()[network.ends] > 2).all(axis=1) & (network.lengths() < length_m)
     if not short.any():
         return network
@@ -97,9 +100,9 @@ def contract_links(network: LineNetwork, length_m: float) -> LineNetwork:
 
 
 def drop_bubbles(network: LineNetwork, apart_m: float) -> LineNetwork:
-    """Of several lines between the same two junctions keep the shortest, and no short loop at a junction.
+    """Of several lines between the same two junctions, keep the shortest; drop short loops at a single junction.
 
-    The others go if they are short, or if they nowhere lie farther than `apart_m` from the shortest.
+    The other lines are dropped if they are short, or if no part of them is further than `apart_m` from the shortest.
     """
     lengths = network.lengths()
     degrees = network.degrees()
@@ -111,29 +114,31 @@ def drop_bubbles(network: LineNetwork, apart_m: float) -> LineNetwork:
         link = tuple(sorted(network.ends[number].tolist()))
         if degrees[list(link)].min() <= 2:
             continue
+        points = even_points(network.lines[number], SLIT_M)
         if lengths[number] < BUBBLE_M:
             keep[number] = link[0] != link[1] and link not in shortest
         elif link in shortest:
-            keep[number] = cKDTree(shortest[link]).query(stretch(network.lines[number], SLIT_M))[0].max() > apart_m
-        shortest.setdefault(link, stretch(network.lines[number], SLIT_M))
+            keep[number] = cKDTree(shortest[link]).query(points)[0].max() > apart_m
+        shortest.setdefault(link, points)
     return network.select(keep)
 
 
 def drop_rungs(network: LineNetwork, length_m: float) -> LineNetwork:
-    """Remove links shorter than `length_m` that continue no other line at either of their nodes."""
+    """Drop links shorter than `length_m` that do not continue another line at either of their nodes."""
     ends_at = dict(ends_by_node(network))
     keep = np.ones(len(network.lines), dtype=bool)
     short = (network.degrees()[network.ends] > 2).all(axis=1) & (network.lengths() < length_m)
     for line in np.flatnonzero(short).tolist():
+        steep = True
         for end in (2 * line, 2 * line + 1):
             others = [end, *(other for other in ends_at[network.ends.flat[end]] if other != end)]
-            keep[line] &= deflections(network, others)[0, 1:].min() > RUNG_DEG
-        keep[line] = not keep[line]
+            steep &= bool(deflections(network, others)[0, 1:].min() > RUNG_DEG)
+        keep[line] = not steep
     return network.select(keep)
 
 
 def run_through(network: LineNetwork) -> LineNetwork:
-    """Weld lines through nodes of degree 3 and more, the straightest continuation first; what is left ends there."""
+    """Join lines through nodes of degree 3 and more, straightest pairs first; the remaining lines end there."""
     partner: dict[int, int] = {}
     for _, ends in ends_by_node(network):
         if len(ends) > 2:
@@ -142,25 +147,25 @@ def run_through(network: LineNetwork) -> LineNetwork:
 
 
 def deflections(network: LineNetwork, ends: Sequence[int]) -> np.ndarray:
-    """Angles in degrees by which a line that comes in at one end would turn to run on at another, (k, k)."""
-    outward = np.array([way_out(stretch(network.from_end(end), DIRECTION_M))[1] for end in ends])
+    """Measure by how much a line that arrives at one end would turn to continue at another, (k, k) degrees."""
+    outward = np.array([tip_and_direction(even_points(network.from_end(end), DIRECTION_M))[1] for end in ends])
     return np.degrees(np.arccos(np.clip(-outward @ outward.T, -1.0, 1.0)))
 
 
 def _straightest(network: LineNetwork, ends: Sequence[int]) -> dict[int, int]:
-    """Couple the line ends of one node by smallest deflection."""
+    """Pair the line ends of one node by smallest deflection."""
     turn = deflections(network, ends)
     pairs = np.argwhere(np.triu(turn < DEFLECTION_DEG, 1))
-    coupled: dict[int, int] = {}
+    paired: dict[int, int] = {}
     for first, second in pairs[np.argsort(turn[tuple(pairs.T)])].tolist():
         one, other = ends[first], ends[second]
-        if one not in coupled and other not in coupled and one // 2 != other // 2:
-            coupled[one], coupled[other] = other, one
-    return coupled
+        if one not in paired and other not in paired and one // 2 != other // 2:
+            paired[one], paired[other] = other, one
+    return paired
 
 
 def ends_by_node(network: LineNetwork) -> Iterable[tuple[int, list[int]]]:
-    """Pair each node with the line ends in it."""
+    """Yield each node with the line ends in it."""
     flat = network.ends.ravel()
     order = np.argsort(flat, kind="stable")
     nodes, first = np.unique(flat[order], return_index=True)

@@ -1,6 +1,6 @@
-"""Sparse sets of pixels: who is whose neighbour, the parity fix and the distance to the background.
+"""Sparse sets of pixels: neighbours, the parity fix (docs/method.md section 4.2) and the distance to the background.
 
-Nothing here knows tiles or bounding boxes, so there are no seams and an empty plain costs nothing.
+Nothing here depends on tiles or bounding boxes, so there are no seams, and an empty plain costs nothing.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 RING = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
-"""Row and column steps to the eight neighbours in ring order from the east; the even ones share an edge."""
+"""Row and column steps to the eight neighbours, around from the east; those at even places share an edge."""
 
 EAST, SOUTH_EAST, SOUTH, SOUTH_WEST, WEST, NORTH = 0, 1, 2, 3, 4, 6
 
@@ -40,7 +40,7 @@ class Pixels:
 
 
 def pixel_set(cells: np.ndarray) -> Pixels:
-    """Sort cells, (n, 2) integer rows and columns in any order and repeated at will, and link the neighbours."""
+    """Sort cells, (n, 2) integer rows and columns in any order with any repetitions, and link the neighbours."""
     cells = np.asarray(cells, dtype=np.int64).reshape(-1, 2)
     if len(cells) == 0:
         return Pixels(cells, np.empty((0, len(RING)), dtype=np.int64))
@@ -51,7 +51,7 @@ def pixel_set(cells: np.ndarray) -> Pixels:
 
 
 def _link(keys: np.ndarray, stride: int) -> np.ndarray:
-    """Neighbour numbers of pixels with sorted `keys` = row * stride + column, an empty column at the row's end."""
+    """Find the neighbours of pixels with sorted `keys` = row * stride + column; the last column of a row is empty."""
     count = len(keys)
     neighbours = np.full((count, len(RING)), count, dtype=np.int32)
     padded = np.append(keys, np.full(3, np.iinfo(np.int64).max))
@@ -68,10 +68,10 @@ def _link(keys: np.ndarray, stride: int) -> np.ndarray:
 
 
 def parity_fix(pixels: Pixels) -> Pixels:
-    """Double the grid so that every run of n pixels becomes one of 2 n - 1, whose middle is a pixel.
+    """Double the grid so that every run of n pixels becomes a run of 2 n - 1, whose middle is a pixel.
 
-    A skeleton is made of pixels, so the axis of a line of even width would lie half a pixel off. Pixel (i, j) becomes
-    (2 i, 2 j); between neighbours, diagonal ones included, a new pixel is set. Components and holes stay as they are.
+    A skeleton consists of pixels, so that of a line of even width would be half a pixel off. Pixel (i, j) becomes
+    (2 i, 2 j); between neighbours, diagonal ones included, a new pixel is set. Components and holes stay the same.
     """
     doubled = 2 * pixels.cells
     between = [
@@ -82,10 +82,10 @@ def parity_fix(pixels: Pixels) -> Pixels:
 
 
 def chamfer_distance(pixels: Pixels) -> np.ndarray:
-    """Distance of each pixel to the background, edge steps 2 and diagonal steps 3, (n,) int array.
+    """Measure the distance of each pixel to the background, edge steps 2 and diagonal steps 3, (n,) int array.
 
-    After r rounds a distance is the shortest over paths of at most r steps; a longer path costs at least 2 (r + 1), so
-    pixels at or below that are settled and leave the rounds.
+    After r rounds, a distance is the shortest over paths of at most r steps. A longer path costs at least 2 (r + 1), so
+    pixels at or below that are final and leave the rounds.
     """
     count = len(pixels)
     distance = np.full(count + 1, _FAR)

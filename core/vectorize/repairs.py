@@ -1,6 +1,7 @@
-"""Where a rail's strip of cells is too wide for one head, or turns as no rail does, the line there is not the rail's.
+"""Repair lines where they do not show their rail: where the strip of cells is too wide, or turns as no rail does.
 
-Guard rails, weeds on the flank and remains of other rails draw the middle of the strip aside.
+Guard rails, weeds on the side of the rail and remains of other rails widen the strip and draw its middle aside. See
+docs/method.md section 4.7.
 """
 
 from __future__ import annotations
@@ -10,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..lines.bridges import STAIRS_M, TIGHTEST_RADIUS_M, bridge
-from ..lines.ends import STEP_M, cut_back, stretch
+from ..lines.bridges import MIN_RADIUS_M, STAIRS_M, bridge
+from ..lines.ends import STEP_M, cut_back, even_points
 from ..lines.network import LineNetwork
 from ..polyline import interpolate, length_along
 from ..progress import SILENT, Progress
@@ -19,25 +20,25 @@ from .crossings import SKIP_M
 from .junctions import DIRECTION_M, weld_pairs
 
 WIDE_HEADS = 2.0
-"""Strips wider than this many heads hold more than one: a cell and noise add less than one to a single head."""
+"""Strips wider than this many heads contain more than one: a cell and noise add less than one to a single head."""
 
-LONGEST_M = 8.0
+MAX_WIDE_M = 8.0
 """Longer wide strips are two rails that part; guard rails are 2.5 to 5 m long."""
 
 TOGETHER_M = 1.0
 """Wide places closer to each other than this are one."""
 
 KINK_DEG, KINK_M = 25.0, 0.5
-"""No rail turns by this angle between two stretches of this length; the stairs of a raster do so by 6 degrees."""
+"""No rail turns by this angle between two parts of this length; the stairs of a raster turn by 6 degrees."""
 
 BEND_M = 1.0
-BEND = BEND_M / TIGHTEST_RADIUS_M + 2 * STAIRS_M / BEND_M
-"""Between stretches of this length the tightest rail and the stairs of its raster together turn by this, radians."""
+BEND = BEND_M / MIN_RADIUS_M + 2 * STAIRS_M / BEND_M
+"""Angle in radians between parts of this length on the tightest rail, plus that of the stairs of its raster."""
 
 SWERVE_M = 0.05
 SWERVE_SEEN_M = 6.0, 2.0
-"""A line this far aside of what it is from 6 to 2 m before and behind has swerved to a guard rail or a weed; the stairs
-of a raster are less, and the tightest rail itself deviates by a centimetre."""
+"""A line this far from the cubic through its parts 6 to 2 m before and behind has swerved to a guard rail or a weed.
+The stairs of a raster are smaller, and the tightest rail itself deviates by a centimetre."""
 
 
 def straighten_blots(
@@ -47,16 +48,16 @@ def straighten_blots(
     head_width_m: float,
     progress: Progress = SILENT,
 ) -> LineNetwork:
-    """Draw lines as smooth curves past every place where they are wide, or bend or swerve as no rail does.
+    """Redraw lines as smooth curves wherever their strip is too wide, or they bend or swerve as no rail does.
 
     Parameters
     ----------
     network : LineNetwork
         Lines without passes.
     places : (n, 2) array
-        The strips' pixels, metres.
+        Pixels of the strips, metres.
     widths_m : (n,) array
-        Width of a strip that has its middle there.
+        Width of a strip whose middle is at the pixel.
     head_width_m : float
     progress : Progress
     """
@@ -74,7 +75,7 @@ def straighten_blots(
 
 
 def cut_kinks(network: LineNetwork, progress: Progress = SILENT) -> LineNetwork:
-    """Cut lines where they turn as no rail does, and leave out what is bent there; the new ends are free.
+    """Cut lines where they turn as no rail does, and drop the bent part; the new ends are free.
 
     Parameters
     ----------
@@ -113,25 +114,26 @@ def _without_kinks(line: np.ndarray) -> list[np.ndarray]:
 
 
 def _straightened(line: np.ndarray, runs: list[tuple[float, float]]) -> np.ndarray:
-    """Replace stretches of one line, the last one first, so that the chainage of the others stays.
+    """Redraw sections of a line, given by their chainages, from the last one, so that earlier chainages stay valid.
 
-    A stretch that no curve passes is tried together with those before it: a line swerves to a guard rail and back.
+    A section across which there is no curve is tried together with those before it: a line swerves to a guard rail and
+    back.
     """
     last = len(runs) - 1
     while last >= 0:
         first = last
-        while first >= 0 and runs[last][1] - runs[first][0] < LONGEST_M:
-            passed = _passed_by(line, runs[first][0] - SKIP_M, runs[last][1] + SKIP_M)
-            if passed is not None:
-                line, last = passed, first
+        while first >= 0 and runs[last][1] - runs[first][0] < MAX_WIDE_M:
+            redrawn = _redrawn(line, runs[first][0] - SKIP_M, runs[last][1] + SKIP_M)
+            if redrawn is not None:
+                line, last = redrawn, first
                 break
             first -= 1
         last -= 1
     return line
 
 
-def _passed_by(line: np.ndarray, start: float, end: float) -> np.ndarray | None:
-    """Replace what lies between two chainages by a curve that explains what is before and behind; None if none does."""
+def _redrawn(line: np.ndarray, start: float, end: float) -> np.ndarray | None:
+    """Replace the section between two chainages by a curve that explains both its sides; None if there is none."""
     t = length_along(line)
     if start < DIRECTION_M or end > t[-1] - DIRECTION_M:
         return None
@@ -144,7 +146,7 @@ def _passed_by(line: np.ndarray, start: float, end: float) -> np.ndarray | None:
 
 
 def _turns(points: np.ndarray, length_m: float) -> np.ndarray:
-    """Angle, radians, between the stretches of a length before and behind each of a line's even points, (n,)."""
+    """Measure the angle between the parts of a length before and behind each even point of a line, radians, (n,)."""
     reach = int(round(length_m / STEP_M))
     turn = np.zeros(len(points))
     if len(points) > 2 * reach:
@@ -155,14 +157,14 @@ def _turns(points: np.ndarray, length_m: float) -> np.ndarray:
 
 
 def _swerves(points: np.ndarray) -> np.ndarray:
-    """Distance of each even point from where the line before and behind it would have it, metres, (n,)."""
+    """Measure each even point's distance from where the line before and behind it predicts it, metres, (n,)."""
     reach, hidden = (int(round(length_m / STEP_M)) for length_m in SWERVE_SEEN_M)
     aside = np.zeros(len(points))
     if len(points) > 2 * reach:
         steps = np.arange(-reach, reach + 1)
         around = np.abs(steps) >= hidden
         weights = np.zeros(len(steps))
-        # The value at 0 of a cubic fitted to the points around, as a sum of these.
+        # The value at 0 of a cubic fitted to the points around is a weighted sum of these points.
         weights[around] = np.linalg.pinv(np.vander(steps[around] / reach, 4))[-1]
         expected = np.column_stack([np.convolve(axis, weights[::-1], mode="valid") for axis in points.T])
         aside[reach:-reach] = np.hypot(*(points[reach:-reach] - expected).T)
@@ -170,19 +172,19 @@ def _swerves(points: np.ndarray) -> np.ndarray:
 
 
 def _even(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points about every `STEP_M` of a line, and their chainages."""
-    points = stretch(line, np.inf)
+    """Return the even points of a line and their chainages."""
+    points = even_points(line)
     return points, np.linspace(0.0, length_along(line)[-1], len(points))
 
 
 def _between(line: np.ndarray, along: np.ndarray, start: float, end: float) -> np.ndarray:
     """Cut out the part of a line between two chainages."""
-    borders = interpolate(line, along, [start, end])
+    borders = interpolate(line, along, np.array([start, end]))
     return np.concatenate([borders[:1], line[(along > start) & (along < end)], borders[1:]])
 
 
 def _runs(marked: np.ndarray, along: np.ndarray) -> list[tuple[float, float]]:
-    """Chainages of the first and last of marked points that lie together."""
+    """Return the chainages of the first and the last point of each group of marked points."""
     t = along[marked]
     if not len(t):
         return []

@@ -1,23 +1,29 @@
-"""How well two lines fit into one rail, seen over a long way."""
+"""How well two lines fit together as one rail, judged over a long distance."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..lines.ends import STEP_M, stretch
+from ..lines.ends import STEP_M, even_points
 
 COARSE_M = 1.0
-"""Spacing of the points that stand for a stretch of such a length: directions between nearer ones show the stairs."""
+"""Spacing of the points that are compared: directions between closer ones show the stairs."""
 
 
 def unsteadiness(one: np.ndarray, other: np.ndarray, length_m: float) -> float:
-    """Tell how far two lines stray from one curve of constant curvature through both, metres rms.
+    """Measure how far two lines are off one curve of constant curvature through both, metres rms.
 
-    Both are given from the ends at which they face each other, and seen as far as `length_m`. Their headings are summed
-    up along the way, which unrolls tight curves as well.
+    Headings are summed along the way, which unrolls tight curves as well.
+
+    Parameters
+    ----------
+    one, other : (n, 2) arrays
+        Both lines, from the ends that face each other inward.
+    length_m : float
+        Length of each that counts.
     """
     coarse = int(round(COARSE_M / STEP_M))
-    points = np.concatenate([stretch(one, length_m)[::coarse][::-1], stretch(other, length_m)[::coarse]])
+    points = np.concatenate([even_points(one, length_m)[::coarse][::-1], even_points(other, length_m)[::coarse]])
     if len(points) < 4:
         return 0.0
     way = np.diff(points, axis=0)

@@ -12,7 +12,7 @@ from ..raster import RailRaster
 from .pixels import Pixels
 
 TANGENT_PIXELS = 25
-"""Length over which the direction of a line end is taken, to prolong it by the pixels that pruning took."""
+"""Length over which the direction of a line end is measured before it is extended by the pixels that pruning took."""
 
 
 def trace(raster: RailRaster, pixels: Pixels, edges: np.ndarray, tips: np.ndarray) -> LineNetwork:
@@ -21,11 +21,11 @@ def trace(raster: RailRaster, pixels: Pixels, edges: np.ndarray, tips: np.ndarra
     Parameters
     ----------
     raster : RailRaster
-        Grid whose doubled pixels these are.
+        Grid of which these are the doubled pixels.
     pixels : Pixels
     edges : (e, 2) int array
     tips : (n,) int array
-        Pixel as far as which a line that ends at a pixel is to be prolonged.
+        For each pixel, the pixel up to which a line that ends there is extended.
     """
     if len(edges) == 0:
         return LineNetwork((), np.empty((0, 2)), np.empty((0, 2), dtype=np.int64))
@@ -40,7 +40,7 @@ def trace(raster: RailRaster, pixels: Pixels, edges: np.ndarray, tips: np.ndarra
     for line, (start, end) in zip(positions, ends):
         for inward, node in ((line, start), (line[::-1], end)):
             if degree[node] == 1:
-                inward[0] += _prolongation(inward, pixels.cells[tips[used[node]]])
+                inward[0] += _extension(inward, pixels.cells[tips[used[node]]])
                 nodes[node] = inward[0]
     return LineNetwork(tuple(raster.to_local(line / 2) for line in positions), raster.to_local(nodes / 2), ends)
 
@@ -48,7 +48,7 @@ def trace(raster: RailRaster, pixels: Pixels, edges: np.ndarray, tips: np.ndarra
 def chains(edges: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Cut a graph into chains at all vertices whose degree is not 2; a closed loop is cut at one of its vertices.
 
-    Every edge is seen as two half-edges that each know the next one; doubling the jumps ranks them all at once.
+    Every edge is two half-edges, each with a pointer to the next one; pointer doubling ranks them all at once.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def chains(edges: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     vertices : (n,) int array
-        Vertices of all chains one after the other, both end nodes included.
+        Vertices of all chains in sequence, both end nodes included.
     borders : (c + 1,) int array
         Where each chain begins in `vertices`.
     """
@@ -99,7 +99,7 @@ def _seams(edges: np.ndarray, degree: np.ndarray) -> np.ndarray:
 
 
 def _corners(vertices: np.ndarray, borders: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Leave out vertices at which a chain runs straight on: the same line, of a fraction of the vertices."""
+    """Drop vertices at which a chain is straight: the same line with a fraction of the vertices."""
     step = np.diff(cells[vertices], axis=0)
     keep = np.ones(len(vertices), dtype=bool)
     keep[1:-1] = (step[1:] != step[:-1]).any(axis=1)
@@ -108,8 +108,8 @@ def _corners(vertices: np.ndarray, borders: np.ndarray, cells: np.ndarray) -> tu
     return vertices[keep], np.concatenate([[0], np.cumsum(keep)])[borders]
 
 
-def _prolongation(inward: np.ndarray, tip: np.ndarray) -> np.ndarray:
-    """Step out of a line, given from its end inward, along its direction there until it is level with `tip`."""
+def _extension(inward: np.ndarray, tip: np.ndarray) -> np.ndarray:
+    """Return the step out of a line, given from its end inward, along its direction there until level with `tip`."""
     along = length_along(inward)
     back = [np.interp(min(TANGENT_PIXELS, along[-1]), along, axis) for axis in inward.T]
     outward = (inward[0] - back) / np.hypot(*(inward[0] - back))

@@ -1,7 +1,7 @@
-"""The veinerization graph: every pixel climbs to deeper ones, and weak branches are peeled off.
+"""The veinerization graph: arcs from every pixel to deeper ones; weak branches are then pruned.
 
 Deseilligny, Stamon and Suen, "Veinerization: a new shape description for flexible skeletonization", IEEE PAMI 20(5),
-1998; the steps: docs/method.md section 4.3 and section 4.4.
+1998; the steps: docs/method.md sections 4.3 and 4.4.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import numpy as np
 from .pixels import EAST, NORTH, RING, SOUTH, WEST, Pixels
 
 AREA_PIXELS = 12
-"""A line end must drain at least this many (doubled) pixels: below, it is a bump of the border."""
+"""A line end must drain at least this many (doubled) pixels; with fewer it is a bump of the border."""
 
 SECTOR_ANGLE = np.pi
-"""A line end must drain a circular sector of its own disc with this angle, radians: pi asks for half a disc."""
+"""A line end must drain a sector of this angle, radians, of its own largest disc: half of the disc."""
 
 _BY_SUM = 1323
 _BY_EAST = _BY_SUM + 27
@@ -23,7 +23,7 @@ _BY_DISTANCE = 29 * _BY_SUM
 
 
 def veinerize(pixels: Pixels, distance: np.ndarray) -> np.ndarray:
-    """Link every pixel to its steepest deeper neighbours, one of each separate group of them.
+    """Link every pixel to its steepest deeper neighbours, one in each connected group of them.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def veinerize(pixels: Pixels, distance: np.ndarray) -> np.ndarray:
     Returns
     -------
     (e, 2) int array
-        Undirected edges; the graph has the components and, as independent cycles, the holes of the image.
+        Undirected edges; the graph has the components of the image and, as independent cycles, its holes.
     """
     count = len(pixels)
     depth = np.append(distance, 0)
@@ -50,27 +50,27 @@ def veinerize(pixels: Pixels, distance: np.ndarray) -> np.ndarray:
 
 
 def prune(edges: np.ndarray, distance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Peel leaves off the graph until every leaf drains enough area to be the end of a line.
+    """Remove leaves from the graph until every leaf drains enough area to be the end of a line.
 
     Parameters
     ----------
     edges : (e, 2) int array
     distance : (n,) int array
-        Chamfer distance; two units are a pixel.
+        Chamfer distance; two units per pixel.
 
     Returns
     -------
     edges : (f, 2) int array
-        Those left.
+        Remaining edges.
     tips : (n,) int array
-        For each pixel the far end of the longest peeled branch that hung on it, itself if none did: where a line
-        really ends.
+        For each pixel the far end of the longest branch removed from it, or the pixel itself: where a line that ends
+        at the pixel really ends.
     """
     count = len(distance)
     needed = np.maximum(AREA_PIXELS, SECTOR_ANGLE / 8 * distance.astype(float) ** 2)
     tail, head = np.concatenate([edges, edges[:, ::-1]]).T
     degree = np.bincount(tail, minlength=count)
-    # The sum of the neighbours left is, for a leaf, its only neighbour.
+    # The sum of the remaining neighbours of a leaf is its only neighbour.
     neighbour_sum = np.bincount(tail, weights=head, minlength=count).astype(np.int64)
     area = np.ones(count, dtype=np.int64)
     longest = np.arange(count, dtype=np.int64)  # steps * count + tip, so that the larger number is the longer branch
@@ -92,7 +92,7 @@ def prune(edges: np.ndarray, distance: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def _score(pixels: Pixels, depth: np.ndarray) -> np.ndarray:
-    """Refine the depth so that no two neighbours tie: depth, depth of the edge neighbours, south, east, position."""
+    """Refine the depth so that no two neighbours tie: by depth, depth of the edge neighbours, south, east, position."""
     around = pixels.neighbours
     rows, columns = (pixels.cells - pixels.cells.min(axis=0, initial=0)).T
     return (
@@ -108,9 +108,9 @@ def _score(pixels: Pixels, depth: np.ndarray) -> np.ndarray:
 def _steepest(
     source: np.ndarray, members: np.ndarray, neighbours: np.ndarray, depth: np.ndarray, score: np.ndarray
 ) -> np.ndarray:
-    """Neighbour with the largest gain of score among those whose bit is set in `members`, (n,).
+    """Find the neighbour with the largest gain of score among those whose bit is set in `members`, (n,).
 
-    A diagonal step is longer than an edge step, so a third of what it gains in depth is taken off.
+    A diagonal step is longer than an edge step, so a third of its gain in depth is subtracted.
     """
     best = np.full(len(source), np.iinfo(np.int64).min)
     chosen = np.zeros(len(source), dtype=np.int64)
@@ -125,12 +125,12 @@ def _steepest(
 
 
 def _groups_of(flags: int) -> list[int]:
-    """Split the set bits of a ring of neighbours into groups that are 8-connected among themselves, as bit masks."""
+    """Split the set bits of a ring of neighbours into 8-connected groups, as bit masks."""
     groups: list[int] = []
     for direction in range(len(RING)):
         if not flags >> direction & 1:
             continue
-        # Two edge neighbours on either side of a diagonal one touch each other, two diagonal ones do not.
+        # Edge neighbours on both sides of a diagonal neighbour touch each other; diagonal neighbours do not.
         reach = (1, 7) if direction % 2 else (1, 2, 6, 7)
         linked = sum(1 << (direction + step) % 8 for step in reach)
         touching = [group for group in groups if group & linked]
@@ -140,7 +140,7 @@ def _groups_of(flags: int) -> list[int]:
 
 
 def _group_table() -> np.ndarray:
-    """For each of 256 sets of neighbours the bit masks of its at most four groups, (256, 4)."""
+    """List the bit masks of the groups, at most four, in each of 256 sets of neighbours, (256, 4)."""
     table = np.zeros((256, 4), dtype=np.uint8)
     for flags in range(256):
         for number, group in enumerate(_groups_of(flags)):

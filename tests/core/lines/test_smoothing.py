@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial.legendre import leggauss
 from rail_extract.core.lines.network import LineNetwork
-from rail_extract.core.lines.network_smoothing import NETWORK_STATIONS_PER_SIGMA, lead, smooth_network
+from rail_extract.core.lines.network_smoothing import NETWORK_STATIONS_PER_SIGMA, bend_through, smooth_network
 from rail_extract.core.lines.smoothing import smooth_line, smooth_profile
 from rail_extract.core.polyline import length_along
 from rail_extract.laboratory.curves import trace, transition_curve
@@ -257,7 +257,7 @@ def test_a_line_is_led_to_its_nodes_smoothly_and_only_near_them():
     places = np.array([2900, 0, 800, 803, 1600, len(t) - 1])
     line = np.zeros((len(t), 2))
     targets = rng.normal(0, 0.01, (len(places), 2))
-    lead(line, t, places, targets)
+    bend_through(line, t, places, targets)
     np.testing.assert_array_equal(line[places], targets)
     assert np.abs(np.diff(line, 2, axis=0)).max() < 0.02 * 0.125  # no corner, though two nodes pull apart
     midway = np.abs(t[:, None] - t[places]).min(axis=1) > 25
@@ -276,5 +276,5 @@ def test_leading_a_line_equals_one_dense_system():
 
     weights = np.linalg.solve(fading(t[places][:, None] - t[places]), targets - line[places])
     expected = line + fading(t[:, None] - t[places]) @ weights
-    lead(line, t, places, targets)
+    bend_through(line, t, places, targets)
     np.testing.assert_allclose(line, expected, atol=1e-9)

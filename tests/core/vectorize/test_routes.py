@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rail_extract.core.lines.ends import stretch
+from rail_extract.core.lines.ends import even_points
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.vectorize import vectorize
@@ -117,7 +117,7 @@ def test_two_rails_cross_at_a_flat_frog_and_do_not_exchange(number, heading):
 
 def follows(line, rails):
     """Tell which rails a line follows where no other one is near it."""
-    distance = np.array([rail.query(stretch(line, np.inf))[0] for rail in rails])
+    distance = np.array([rail.query(even_points(line))[0] for rail in rails])
     alone = np.partition(distance, 1, axis=0)[1] > 0.2
     return set(distance[:, alone].argmin(axis=0).tolist())
 
@@ -129,7 +129,7 @@ def follows(line, rails):
 def test_every_line_of_a_scanned_turnout_follows_one_rail_alone(form, hand, heading, seed, curvature):
     scene = turnout("turnout", form, hand, heading, seed, curvature)
     head_m = scene.standard.head_width_m
-    rails = [cKDTree(stretch(rail[:, :2], np.inf)) for rail in scene.rails]
+    rails = [cKDTree(even_points(rail[:, :2])) for rail in scene.rails]
     xyz = scene.rail_points().xyz
     seen = np.min([rail.query(xyz[:, :2])[0] for rail in rails], axis=0) < head_m / 2
     network = vectorize(rasterize(xyz[seen], cell_size(scene.standard.gauge_m, head_m)), head_m)

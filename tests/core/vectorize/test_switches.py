@@ -8,9 +8,10 @@ from rail_extract.core.lines.bridges import MISFIT_M
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.raster import rasterize
 from rail_extract.core.vectorize import vectorize
-from rail_extract.core.vectorize.attaching import attach_branches, drop_guards
+from rail_extract.core.vectorize.attaching import attach_branches
 from rail_extract.core.vectorize.branches import resolve_branches
 from rail_extract.core.vectorize.crossings import resolve_crossings
+from rail_extract.core.vectorize.guards import drop_guards
 from rail_extract.core.vectorize.joining import join_gaps
 from rail_extract.core.vectorize.junctions import run_through, weld_pairs
 from rail_extract.core.vectorize.repairs import cut_kinks, straighten_blots
