@@ -1,0 +1,1 @@
+"""Rail points in raw clouds, by geometry alone (docs/classification.md)."""

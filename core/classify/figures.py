@@ -1,0 +1,60 @@
+"""What was found in a square, in figures that add up over squares."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass
+
+import numpy as np
+
+from .lines import Lines
+
+SPACING_M = 0.25
+"""Cells of one line within this distance share its length."""
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What was found.
+
+    Attributes
+    ----------
+    points : int
+        Points on rails.
+    paired_m, single_m : float
+        Length of rails with and without a partner.
+    cells : int
+        Cells of railheads.
+    squares, thin, paved : int
+        Squares with rails; those among them that are thin, and those with rails in pavement.
+    """
+
+    points: int = 0
+    paired_m: float = 0.0
+    single_m: float = 0.0
+    cells: int = 0
+    squares: int = 0
+    thin: int = 0
+    paved: int = 0
+
+    def __add__(self, other: Figures) -> Figures:
+        return Figures(*(one + more for one, more in zip(astuple(self), astuple(other))))
+
+    @property
+    def cells_per_m(self) -> float:
+        """Cells per metre of rail; FRPDF needs seven and more."""
+        length_m = self.paired_m + self.single_m
+        return self.cells / length_m if length_m else 0.0
+
+
+def shares_of_length(lines: Lines, pairs: np.ndarray) -> np.ndarray:
+    """Length of rail that each cell stands for, (n,) metres: cells close to each other share it.
+
+    Parameters
+    ----------
+    lines : Lines
+    pairs : (m, 2) int array
+        Cells that continue each other.
+    """
+    near = pairs[np.linalg.norm(lines.axis[pairs[:, 0]] - lines.axis[pairs[:, 1]], axis=1) < SPACING_M]
+    sharing = 1 + np.bincount(near.ravel(), minlength=len(lines.axis))
+    return 2 * SPACING_M / sharing

@@ -1,0 +1,128 @@
+"""From the cells of kept pieces to the points of railheads."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .lines import Lines
+from .settings import Tolerances
+from .tops import EMPTY, MILLIMETRES, Grid, Tops, Window
+
+HEAD_M = 0.11
+"""Distance within which a higher kept cell shows that a lower one is the foot of the rail or a fastening."""
+
+MEAN_M = 0.30
+"""Half the side of the window of the mean top."""
+
+NEAREST, MIN_AXES = 6, 2
+"""Axes that are looked at for a place, and how many of them it must lie on: where two heads part there are some of
+each, and single axes are led astray by a guard rail."""
+
+
+def whole_heads(tops: Tops, kept: np.ndarray, tolerances: Tolerances) -> np.ndarray:
+    """Spread kept cells over the other cells of their blocks of 2 x 2, and drop feet and fastenings.
+
+    Parameters
+    ----------
+    tops : Tops
+    kept : (k,) int array
+        One cell of each block.
+    tolerances : Tolerances
+
+    Returns
+    -------
+    (m,) int array
+        Cells in rising order.
+    """
+    rows, columns = tops.grid.shape
+    row, column = np.divmod(kept, columns)
+    image = np.zeros(tops.grid.shape, dtype=bool)
+    top = tops.top.astype(np.int32)
+    own = top[row, column]
+    spread = round(tolerances.spread_m * MILLIMETRES)
+    first_row, first_column = (row + tops.grid.row) // 2 * 2 - tops.grid.row, (column + tops.grid.column) // 2 * 2
+    first_column = first_column - tops.grid.column
+    for down in (0, 1):
+        for right in (0, 1):
+            r, c = np.clip(first_row + down, 0, rows - 1), np.clip(first_column + right, 0, columns - 1)
+            near = np.abs(top[r, c] - own) <= spread
+            image[r[near], c[near]] = True
+    cells = np.flatnonzero(image)
+    highest = _highest_around(np.where(image, top, int(EMPTY)), cells, HEAD_M / tops.grid.cell_m)
+    return cells[tops.top.ravel()[cells] >= highest - spread]
+
+
+def _highest_around(image: np.ndarray, cells: np.ndarray, reach: float) -> np.ndarray:
+    """Highest value of an image within `reach` cells of each cell, (k,)."""
+    rows, columns = image.shape
+    row, column = np.divmod(cells, columns)
+    highest = image.ravel()[cells]
+    whole = int(reach)
+    for down in range(-whole, whole + 1):
+        for right in range(-whole, whole + 1):
+            if down * down + right * right <= reach * reach:
+                r, c = np.clip(row + down, 0, rows - 1), np.clip(column + right, 0, columns - 1)
+                highest = np.maximum(highest, image[r, c])
+    return highest
+
+
+def label(tops: Tops, heads: np.ndarray, cell: np.ndarray, height: np.ndarray, tolerances: Tolerances) -> np.ndarray:
+    """Find the points in the height of railheads on their cells and the neighbouring ones, (k,) int numbers.
+
+    Parameters
+    ----------
+    tops : Tops
+    heads : (m,) int array
+        Cells of railheads.
+    cell, height : (n,) arrays
+        Cell of each point and its height above the bed.
+    tolerances : Tolerances
+    """
+    if not len(heads):
+        return np.empty(0, dtype=np.int64)
+    image = np.zeros(tops.grid.shape, dtype=bool)
+    image.ravel()[heads] = True
+    around = _with_neighbours(tops.grid, heads)
+    window = Window(tops.grid, around, round(MEAN_M / tops.grid.cell_m))
+    top = np.full(image.size, np.inf, dtype=np.float32)
+    top[around] = window.sums(np.where(image, tops.top, 0)) / window.sums(image) / MILLIMETRES
+    above = height - top[cell]
+    return np.flatnonzero((above >= -tolerances.below_m) & (above <= tolerances.above_m))
+
+
+def on_axes(xy: np.ndarray, height: np.ndarray, lines: Lines, half_m: float, height_m: float) -> np.ndarray:
+    """Return which places lie on the axes of `MIN_AXES` of the cells nearest to them, (k,) bool.
+
+    Parameters
+    ----------
+    xy : (k, 2) array
+    height : (k,) array
+        Above the bed.
+    lines : Lines
+    half_m : float
+        Largest distance across from an axis.
+    height_m : float
+        Largest difference in height.
+    """
+    if not len(xy) or len(lines.axis) < MIN_AXES:
+        return np.zeros(len(xy), dtype=bool)
+    count = np.arange(1, min(NEAREST, len(lines.axis)) + 1)
+    near = cKDTree(lines.axis).query(xy, k=count, distance_upper_bound=lines.reach_m)[1]
+    place, rank = np.nonzero(near < len(lines.axis))
+    cell = near[place, rank]
+    on = np.abs(np.einsum("ij,ij->i", xy[place] - lines.axis[cell], lines.across[cell])) <= half_m
+    on &= np.abs(height[place] - lines.height[cell]) <= height_m
+    return np.bincount(place[on], minlength=len(xy)) >= MIN_AXES
+
+
+def _with_neighbours(grid: Grid, cells: np.ndarray) -> np.ndarray:
+    """Cells and their eight neighbours, in rising order."""
+    rows, columns = grid.shape
+    row, column = np.divmod(cells, columns)
+    around = [
+        np.clip(row + down, 0, rows - 1) * columns + np.clip(column + right, 0, columns - 1)
+        for down in (-1, 0, 1)
+        for right in (-1, 0, 1)
+    ]
+    return np.unique(np.concatenate(around))

@@ -1,0 +1,215 @@
+"""Direction, axis and continuity of the line that each cell lies on, from the cells around it.
+
+No trajectory, seed or drawn line is needed: each cell votes with the directions to its neighbours of the same height.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+BINS = 32
+"""Bins of the histogram of directions, 5.6 degrees each."""
+
+NEAREST_M = 0.12
+"""Closer neighbours say nothing about the direction: the width of a head in cells."""
+
+WEIGHT_M = 0.6
+"""Distance up to which the weight of a neighbour grows with its distance."""
+
+SMOOTHING = (0.7, 1.0, 0.7)
+"""Kernel over neighbouring bins."""
+
+FIRST_FIT_M, FIT_ROUNDS = 0.075, 2
+"""Neighbours this near the line through the cell, which may be at the edge of the head, refine it; in later rounds
+those in the strip, which must not reach a guard rail."""
+
+FIT_SLOPE, FIT_NEAR_M = 0.25, 0.04
+"""They also lie within this slope of the line, from a cell's width on."""
+
+RIDGE_M2 = 0.01
+"""Keeps the direction where neighbours are few and near."""
+
+STATIONS = 10
+"""Parts of the line within reach of which some must hold a cell."""
+
+BESIDE_M = 0.10
+"""Neighbours further across than this are beside the line."""
+
+MAX_NEIGHBOURS = 400
+"""A cell with more neighbours within reach lies in an area, not on a line: a line of cells has 25 to 50 at 1 m reach,
+and with 0.2 of them on the line (see `MIN_PURE`) at most 250."""
+
+CHUNK = 4000
+"""Cells whose neighbours are held in memory at once."""
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Cells that may belong to lines.
+
+    Attributes
+    ----------
+    xy : (n, 2) array
+        Local metres.
+    height : (n,) array
+        Above the bed.
+    """
+
+    xy: np.ndarray
+    height: np.ndarray
+
+
+@dataclass(frozen=True)
+class Lines:
+    """The line through each cell.
+
+    Attributes
+    ----------
+    axis : (n, 2) array
+        The cell's place, moved across to the middle of what is on the line.
+    height : (n,) array
+        Above the bed.
+    theta : (n,) array
+        Direction, radians, from 0 to pi.
+    cover : (n,) array
+        Share of the parts of the line within reach that hold a cell.
+    pure : (n,) array
+        Share of the cells on the line among those on it and beside it: 0.07 to 0.12 in random surroundings.
+    reach_m : float
+    """
+
+    axis: np.ndarray
+    height: np.ndarray
+    theta: np.ndarray
+    cover: np.ndarray
+    pure: np.ndarray
+    reach_m: float
+
+    @property
+    def along(self) -> np.ndarray:
+        """Unit vectors along the lines, (n, 2)."""
+        return np.column_stack([np.cos(self.theta), np.sin(self.theta)])
+
+    @property
+    def across(self) -> np.ndarray:
+        """Unit vectors to the left, (n, 2)."""
+        return np.column_stack([-np.sin(self.theta), np.cos(self.theta)])
+
+    def of(self, chosen: np.ndarray) -> Lines:
+        """Choose some of the cells."""
+        return Lines(
+            self.axis[chosen],
+            self.height[chosen],
+            self.theta[chosen],
+            self.cover[chosen],
+            self.pure[chosen],
+            self.reach_m,
+        )
+
+
+def find_lines(marks: Marks, reach_m: float, along_m: float, strip_m: float) -> Lines:
+    """Find the line through each cell.
+
+    Parameters
+    ----------
+    marks : Marks
+    reach_m : float
+        Distance within which cells are compared.
+    along_m : float
+        Largest difference in height between neighbours on a line.
+    strip_m : float
+        Largest distance across from the line.
+    """
+    count = len(marks.xy)
+    theta, offset, cover, pure = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
+    for chosen, number, step in _neighbours(marks, reach_m, along_m):
+        theta[chosen], offset[chosen] = _fitted(_main_direction(len(chosen), number, step), number, step, strip_m)
+        cover[chosen], pure[chosen] = _measured(theta[chosen], offset[chosen], number, step, reach_m, strip_m)
+    axis = marks.xy + offset[:, None] * np.column_stack([-np.sin(theta), np.cos(theta)])
+    return Lines(axis, marks.height, theta, cover, pure, reach_m)
+
+
+def _neighbours(marks: Marks, reach_m: float, along_m: float) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield cells, chunk by chunk, with their neighbours of the same height.
+
+    Yields
+    ------
+    chosen : (k,) int array
+        Cells.
+    number : (m,) int array
+        Number of the cell in `chosen`.
+    step : (m, 2) array
+        From the cell to its neighbour.
+    """
+    if len(marks.xy) < 2:
+        return
+    tree = cKDTree(marks.xy)
+    crowd = tree.query_ball_point(marks.xy, reach_m, return_length=True)
+    lonely = np.flatnonzero(crowd <= MAX_NEIGHBOURS + 1)
+    for start in range(0, len(lonely), CHUNK):
+        chosen = lonely[start : start + CHUNK]
+        near = cKDTree(marks.xy[chosen]).sparse_distance_matrix(tree, reach_m, output_type="ndarray")
+        number, other = near["i"], near["j"]
+        level = np.abs(marks.height[other] - marks.height[chosen[number]]) < along_m
+        level &= near["v"] > 0
+        number, other = number[level], other[level]
+        yield chosen, number, marks.xy[other] - marks.xy[chosen[number]]
+
+
+def _main_direction(count: int, number: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Direction in which most neighbours lie, (count,) radians from 0 to pi."""
+    distance = np.hypot(*step.T)
+    angle = np.arctan2(step[:, 1], step[:, 0]) % np.pi
+    bins = np.minimum((angle * (BINS / np.pi)).astype(np.int64), BINS - 1)
+    weight = np.where(distance > NEAREST_M, np.minimum(distance, WEIGHT_M), 0.0)
+    votes = np.bincount(number * BINS + bins, weight, count * BINS).reshape(count, BINS)
+    before, here, after = SMOOTHING
+    votes = before * np.roll(votes, 1, axis=1) + here * votes + after * np.roll(votes, -1, axis=1)
+    return (np.argmax(votes, axis=1) + 0.5) * (np.pi / BINS)
+
+
+def _fitted(theta: np.ndarray, number: np.ndarray, step: np.ndarray, strip_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Fit a straight line to the neighbours near each line: its direction and its distance to the left, (count,) each.
+
+    The cell itself counts as well. Near the end of a rail, all neighbours lie on one side: a line that had to pass
+    through the cell, which may be at the edge of the head, would be turned.
+    """
+    count = len(theta)
+    offset = np.zeros(count)
+    for limit_m in (FIRST_FIT_M, *FIT_ROUNDS * (strip_m,)):
+        ahead, left = _turned(theta, number, step)
+        beside = np.abs(left - offset[number])
+        on = (beside < limit_m) & (beside < FIT_SLOPE * np.abs(ahead) + FIT_NEAR_M)
+        row, x, y = number[on], ahead[on], left[on]
+        some = 1 + np.bincount(row, minlength=count)
+        mean_x, mean_y = np.bincount(row, x, count) / some, np.bincount(row, y, count) / some
+        spread = np.bincount(row, x * x, count) - some * mean_x**2
+        common = np.bincount(row, x * y, count) - some * mean_x * mean_y
+        slope = common / np.maximum(spread, RIDGE_M2)
+        theta, offset = (theta + np.arctan(slope)) % np.pi, (mean_y - slope * mean_x) / np.sqrt(1 + slope**2)
+    return theta, offset
+
+
+def _turned(theta: np.ndarray, number: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Turn steps: along and across the line of their cell, (m,) each."""
+    cosine, sine = np.cos(theta)[number], np.sin(theta)[number]
+    return step[:, 0] * cosine + step[:, 1] * sine, step[:, 1] * cosine - step[:, 0] * sine
+
+
+def _measured(
+    theta: np.ndarray, offset: np.ndarray, number: np.ndarray, step: np.ndarray, reach_m: float, strip_m: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Cover and purity of the line of each cell, (count,) each."""
+    count = len(theta)
+    ahead, left = _turned(theta, number, step)
+    left = np.abs(left - offset[number])
+    on = left < strip_m
+    beside = np.bincount(number[left > BESIDE_M], minlength=count)
+    station = np.clip((ahead[on] + reach_m) * (STATIONS / (2 * reach_m)), 0, STATIONS - 1).astype(np.int64)
+    hits = np.bincount(number[on] * STATIONS + station, minlength=count * STATIONS).reshape(count, STATIONS)
+    members = hits.sum(axis=1)
+    return (hits > 0).mean(axis=1), members / np.maximum(members + beside, 1)

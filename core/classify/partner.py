@@ -1,0 +1,124 @@
+"""The other rail of the track, and what else runs inside a track.
+
+A rail has a parallel line at the distance of the two heads. Guard, check and third rails have none; they run beside a
+rail that has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .lines import Lines
+
+STATIONS = (-0.6, -0.3, 0.0, 0.3, 0.6)
+"""Places along the line, in reaches, where a partner is looked for: a gap or a frog hides some."""
+
+SEARCH_M = 0.16
+"""Distance from where the partner is expected: cells are found every 0.1 m and more on thin clouds."""
+
+SPACING_M = 0.055
+"""Deviation of the distance of the two heads: gauge widening of 35 mm, and 20 mm for both axes."""
+
+ANGLE_RAD = 0.12
+"""Angle between the two rails of a track: those of a turnout with a guard rail's mouth stay below."""
+
+CANDIDATES = 6
+"""Lines that are looked at for one station: other rails may be near at turnouts."""
+
+INSIDE_M = (0.02, 0.05)
+"""What runs inside a track lies this far beyond a head's width from the rail, and within the gauge by as much."""
+
+PARALLEL_RAD = 0.07
+"""Angle to the rail within which a line runs along it; the branch of a turnout leaves at 1:9 to 1:14."""
+
+LEVEL_WITH_M = 0.25
+"""Distance along the rail within which it is there beside a cell."""
+
+MAJORITY = 0.5
+"""Share of the cells of a line that decides for all."""
+
+
+def stations_with_partner(lines: Lines, spacings_m: Sequence[float], height_m: float) -> np.ndarray:
+    """Count the stations at which a cell's line has a partner, on the better side, (n,) from 0 to 5.
+
+    Parameters
+    ----------
+    lines : Lines
+    spacings_m : sequence of float
+        Distances of the two heads; the best one counts.
+    height_m : float
+        Largest difference in height above the bed.
+    """
+    best = np.zeros(len(lines.axis), dtype=np.int64)
+    if len(lines.axis) < 2:
+        return best
+    tree = cKDTree(lines.axis)
+    for spacing_m in spacings_m:
+        for side in (1, -1):
+            found = [_partnered(lines, tree, side * spacing_m, share, height_m) for share in STATIONS]
+            best = np.maximum(best, np.sum(found, axis=0))
+    return best
+
+
+def _partnered(lines: Lines, tree: cKDTree, left_m: float, share: float, height_m: float) -> np.ndarray:
+    """Return whether each cell's line has a partner to the left at one station, (n,) bool."""
+    places = lines.axis + share * lines.reach_m * lines.along + left_m * lines.across
+    _, near = tree.query(places, k=np.arange(1, min(CANDIDATES, tree.n) + 1), distance_upper_bound=SEARCH_M)
+    own, rank = np.nonzero(near < tree.n)
+    other = near[own, rank]
+    apart = np.einsum("ij,ij->i", lines.axis[other] - lines.axis[own], lines.across[own])
+    fits = np.abs(apart - left_m) < SPACING_M
+    fits &= np.abs(lines.height[other] - lines.height[own]) < height_m
+    fits &= _angle(lines.theta[other], lines.theta[own]) < ANGLE_RAD
+    found = np.zeros(len(lines.axis), dtype=bool)
+    found[own[fits]] = True
+    return found
+
+
+def runs_inside(
+    lines: Lines, paired: np.ndarray, links: np.ndarray, gauges_m: Sequence[float], head_width_m: float
+) -> np.ndarray:
+    """Return which cells belong to something that runs along a rail of a track, at less than the gauge, (n,) bool.
+
+    Parameters
+    ----------
+    lines : Lines
+    paired : (n,) bool array
+        Cells of rails that have their partner.
+    links : (m, 2) int array
+        Pairs of cells on one line.
+    gauges_m : sequence of float
+    head_width_m : float
+    """
+    inside = np.zeros(len(lines.axis), dtype=bool)
+    single, rails = np.flatnonzero(~paired), np.flatnonzero(paired)
+    if not len(single) or not len(rails):
+        return inside
+    reach_m = np.hypot(max(gauges_m), LEVEL_WITH_M)
+    near = cKDTree(lines.axis[single]).sparse_distance_matrix(
+        cKDTree(lines.axis[rails]), reach_m, output_type="ndarray"
+    )
+    own, rail = single[near["i"]], rails[near["j"]]
+    step = lines.axis[own] - lines.axis[rail]
+    left = np.abs(np.einsum("ij,ij->i", step, lines.across[rail]))
+    ahead = np.abs(np.einsum("ij,ij->i", step, lines.along[rail]))
+    beside = (left > head_width_m + INSIDE_M[0]) & (left < max(gauges_m) - INSIDE_M[1]) & (ahead < LEVEL_WITH_M)
+    beside &= _angle(lines.theta[own], lines.theta[rail]) < PARALLEL_RAD
+    inside[own[beside]] = True
+    return _majority(inside, links)
+
+
+def _majority(flag: np.ndarray, links: np.ndarray) -> np.ndarray:
+    """Give each cell the flag of most cells on its line."""
+    both = np.concatenate([links, links[:, ::-1]])
+    votes = flag + np.bincount(both[:, 0], flag[both[:, 1]], len(flag))
+    voters = 1 + np.bincount(both[:, 0], minlength=len(flag))
+    return votes > MAJORITY * voters
+
+
+def _angle(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Angle between directions, radians from 0 to a quarter turn."""
+    return np.abs((one - other + np.pi / 2) % np.pi - np.pi / 2)

@@ -1,0 +1,80 @@
+"""Pieces of line: cells that continue each other, and which of them are long enough to be kept."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from .lines import Lines
+
+ALIGNED_M = 0.03
+"""Two cells continue each other if the axis of each passes the other one this close."""
+
+LEAST_M = 1.5
+"""Shortest piece of a rail that has its partner."""
+
+LEAST_PAIRED = 0.4
+"""Share of a piece's cells with a partner from which the piece has one."""
+
+LEAST_SINGLE_M = 5.0
+"""Shortest piece without a partner: FRPDF is trained to remove shorter lone lines; a longer one may be the visible rail
+of a hidden pair."""
+
+
+def links(lines: Lines, aligned_m: float = ALIGNED_M) -> np.ndarray:
+    """Pairs of cells within reach that lie on each other's axis, (m, 2) int."""
+    if len(lines.axis) < 2:
+        return np.empty((0, 2), dtype=np.int64)
+    pairs = cKDTree(lines.axis).query_pairs(lines.reach_m, output_type="ndarray")
+    one, other = pairs.T
+    step = lines.axis[other] - lines.axis[one]
+    on = np.ones(len(pairs), dtype=bool)
+    for end in (one, other):
+        on &= np.abs(np.einsum("ij,ij->i", step, lines.across[end])) < aligned_m
+    return pairs[on]
+
+
+def pieces_of(count: int, pairs: np.ndarray) -> np.ndarray:
+    """Find the piece of each of `count` cells that pairs, (m, 2), connect, (count,) int numbers."""
+    ones = np.ones(len(pairs), dtype=bool)
+    return connected_components(coo_matrix((ones, tuple(pairs.T)), shape=(count, count)), directed=False)[1]
+
+
+def lengths(xy: np.ndarray, piece: np.ndarray) -> np.ndarray:
+    """Length of each piece: the diagonal of the rectangle around its cells, (pieces,) metres."""
+    count = int(piece.max()) + 1 if len(piece) else 0
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(low, piece, xy)
+    np.maximum.at(high, piece, xy)
+    return np.hypot(*(high - low).T)
+
+
+def long_enough(
+    lines: Lines, pairs: np.ndarray, paired: np.ndarray, open_ended: np.ndarray, keep_single: bool
+) -> np.ndarray:
+    """Return which cells belong to pieces that are kept, (n,) bool.
+
+    Parameters
+    ----------
+    lines : Lines
+    pairs : (m, 2) int array
+        See `links`.
+    paired : (n,) bool array
+    open_ended : (n,) bool array
+        Cells at the border of what the square sees: their pieces continue beyond it and are long enough, because they
+        already run through the whole margin.
+    keep_single : bool
+        Whether pieces without a partner are kept.
+    """
+    if not len(lines.axis):
+        return np.zeros(0, dtype=bool)
+    piece = pieces_of(len(lines.axis), pairs)
+    length_m = lengths(lines.axis, piece)
+    size = np.bincount(piece)
+    share = np.bincount(piece, paired, len(size)) / size
+    with_partner = share > LEAST_PAIRED
+    least_m = np.where(with_partner, LEAST_M, LEAST_SINGLE_M)
+    kept = (length_m >= least_m) | (np.bincount(piece, open_ended, len(size)) > 0)
+    return (kept & (with_partner | keep_single))[piece]

@@ -1,0 +1,90 @@
+"""What the classification is given: gauges, railhead, and tolerances that depend on how dense a cloud is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..raster import cell_size
+
+SQUARE_CELLS = 1024
+"""Side of the squares that are classified one after another, in cells: 41 m at 1435 mm, images of 2 to 4 MB."""
+
+MARGIN_M = 3.0
+"""Points around a square that are read with it: the largest reach of a rail's direction (2 m) and the window of the
+mean height of its top."""
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Tolerances in height and across, metres.
+
+    Attributes
+    ----------
+    along_m : float
+        Difference in height above the bed between two cells of one rail.
+    spread_m : float
+        Depth below the top of a neighbouring cell down to which a cell still belongs to the same head.
+    strip_m : float
+        Distance from a line within which a cell is on it: half a head, half a cell's diagonal and noise.
+    partner_m : float
+        Difference in height above the bed between the two rails of a track.
+    below_m, above_m : float
+        Heights of rail points relative to the mean top: half a head downwards, and noise with the waves of the bed
+        upwards.
+    beside_m : float
+        Distance beyond the side of the head within which a point is still on it: the axis is known to a centimetre, and
+        the beam is as wide.
+    """
+
+    along_m: float
+    spread_m: float
+    strip_m: float
+    partner_m: float
+    below_m: float
+    above_m: float
+    beside_m: float
+
+
+DENSE = Tolerances(
+    along_m=0.035, spread_m=0.045, strip_m=0.050, partner_m=0.05, below_m=0.040, above_m=0.025, beside_m=0.02
+)
+"""For scanners on vehicles: beams of a few millimetres, range noise up to 5 mm."""
+
+THIN = Tolerances(
+    along_m=0.060, spread_m=0.060, strip_m=0.065, partner_m=0.07, below_m=0.055, above_m=0.040, beside_m=0.035
+)
+"""For scanners in the air: a beam of 4 to 9 cm blends the head and the ballast."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the user chooses.
+
+    Attributes
+    ----------
+    gauges_m : tuple of float
+        Gauges to pair rails by; the first one sets the size of the cells.
+    head_width_m : float
+    keep_single : bool
+        Whether straight rails of some length without a partner are kept.
+    """
+
+    gauges_m: tuple[float, ...]
+    head_width_m: float
+    keep_single: bool = True
+
+    @property
+    def cell_m(self) -> float:
+        """Side of a cell, metres; the one of the rasters that FRPDF cleans."""
+        return cell_size(self.gauges_m[0], self.head_width_m)
+
+    @property
+    def side_m(self) -> float:
+        """Side of a square, metres."""
+        return SQUARE_CELLS * self.cell_m
+
+    def own(self, xy: np.ndarray) -> np.ndarray:
+        """Return which of (n, 2) or (n, 3) places, in metres from a square's corner, lie in the square, (n,) bool."""
+        return np.all((xy[:, :2] >= 0) & (xy[:, :2] < self.side_m), axis=1)

@@ -1,0 +1,191 @@
+"""One square classified: from its points to labels, cells and figures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..frame import ORIGIN_STEP
+from .bed import COARSE_M, Coarse, find_bed
+from .figures import Figures, shares_of_length
+from .labels import label, on_axes, whole_heads
+from .lines import Lines, Marks, find_lines
+from .partner import runs_inside, stations_with_partner
+from .pieces import links, long_enough
+from .settings import DENSE, MARGIN_M, THIN, Settings, Tolerances
+from .thin import drawn
+from .tops import HIGH_M, MILLIMETRES, Grid, Tops, highest_of_blocks, narrow_tops, tops_of
+
+THIN_PER_M2 = 400.0
+"""Points per square metre below which a square is thin: no scanner on a vehicle, or far from it."""
+
+REACH_POINTS_PER_M, REACH_M = 120.0, (1.0, 2.0)
+"""Reach of a line: this divided by the points per square metre, within limits. Thin clouds need more length to see a
+line; more than 2 m would bend out of the strip in curves."""
+
+DENSITY_QUANTILE = 0.75
+"""Quantile, over the coarse cells with candidates, of the points per square metre that stand for the square."""
+
+MIN_COVER, MIN_PURE = 0.35, 0.20
+"""Least cover and purity of a line. Random surroundings have a purity of 0.07 to 0.12, a rail that runs beside two
+others 0.25."""
+
+MIN_STATIONS = 2
+"""Stations with a partner from which a cell belongs to a pair of rails."""
+
+SINGLE_COVER = 0.75
+"""Cover of a line that may be a rail without a partner."""
+
+
+@dataclass(frozen=True)
+class Kept:
+    """Cells of railheads, one of each block of 2 x 2.
+
+    Attributes
+    ----------
+    lines : Lines
+    cell : (n,) int array
+        Their numbers in the grid.
+    paired : (n,) bool array
+        Cells with a partner.
+    pairs : (m, 2) int array
+        Cells that continue each other.
+    """
+
+    lines: Lines
+    cell: np.ndarray
+    paired: np.ndarray
+    pairs: np.ndarray
+
+    def of(self, chosen: np.ndarray) -> Kept:
+        """Choose some of the cells, (n,) bool, and the pairs among them."""
+        number = np.cumsum(chosen) - 1
+        pairs = number[self.pairs[chosen[self.pairs].all(axis=1)]]
+        return Kept(self.lines.of(chosen), self.cell[chosen], self.paired[chosen], pairs)
+
+
+@dataclass(frozen=True)
+class Classified:
+    """The answer for one square.
+
+    Attributes
+    ----------
+    rail : (n,) bool array
+        Points on railheads; False for those in the margin.
+    drawn : (k, 2) array
+        Places of cells on rails that are too thin for FRPDF, local metres; see `thin`.
+    figures : Figures
+    """
+
+    rail: np.ndarray
+    drawn: np.ndarray
+    figures: Figures
+
+
+def classify_square(xyz: np.ndarray, settings: Settings) -> Classified:
+    """Find the points on railheads in a square.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Metres from the square's south-western corner: all points of the square and those in a margin of `MARGIN_M`.
+        The corner lies at a multiple of `Settings.side_m` from the zero of the coordinate system.
+    settings : Settings
+    """
+    nothing = Classified(np.zeros(len(xyz), dtype=bool), np.empty((0, 2)), Figures())
+    if not len(xyz):
+        return nothing
+    x, y = (np.ascontiguousarray(values) for values in xyz.T[:2])
+    z = (xyz[:, 2] - ORIGIN_STEP * np.floor(xyz[:, 2].min() / ORIGIN_STEP)).astype(np.float32)
+    coarse = Coarse.around(x, y)
+    dx, dy = coarse.offsets(x, y)
+    height, _ = find_bed(coarse, dx, dy, z).heights(dx, dy, z)
+    near = np.flatnonzero(height <= HIGH_M)
+    if not len(near):
+        return nothing
+    height = height[near]
+    grid, cell = Grid.around(x[near], y[near], settings.cell_m)
+    tops = tops_of(grid, cell, height)
+    marks = highest_of_blocks(tops, narrow_tops(tops))
+    if not len(marks):
+        return nothing
+    density = _density(coarse, grid.middles(marks))
+    tolerances = THIN if density < THIN_PER_M2 else DENSE
+    kept = _kept(tops, marks, float(np.clip(REACH_POINTS_PER_M / density, *REACH_M)), tolerances, settings)
+    heads = whole_heads(tops, _completed(tops, marks, kept, settings, tolerances), tolerances)
+    rail = nothing.rail
+    chosen = label(tops, heads, cell, height, tolerances)
+    chosen = chosen[settings.own(xyz[near[chosen]])]
+    half_m = settings.head_width_m / 2 + tolerances.beside_m
+    rail[near[chosen[on_axes(xyz[near[chosen], :2], height[chosen], kept.lines, half_m, HIGH_M)]]] = True
+    drawn_places = drawn(kept.lines, kept.pairs, settings.cell_m)
+    return Classified(
+        rail, drawn_places[settings.own(drawn_places)], _figures(rail, kept, grid, heads, settings, density)
+    )
+
+
+def _figures(
+    rail: np.ndarray, kept: Kept, grid: Grid, heads: np.ndarray, settings: Settings, density: float
+) -> Figures:
+    """Sum up what was found in the square without its margin."""
+    share_m = np.where(settings.own(grid.middles(kept.cell)), shares_of_length(kept.lines, kept.pairs), 0.0)
+    there = bool(rail.any())
+    return Figures(
+        points=int(rail.sum()),
+        paired_m=float(share_m[kept.paired].sum()),
+        single_m=float(share_m[~kept.paired].sum()),
+        cells=int(settings.own(grid.middles(heads)).sum()),
+        squares=int(there),
+        thin=int(there and density < THIN_PER_M2),
+    )
+
+
+def _density(coarse: Coarse, xy: np.ndarray) -> float:
+    """Points per square metre around candidates, (k, 2) places."""
+    column, row = (np.floor(values / COARSE_M).astype(np.int64) for values in xy.T)
+    row, column = row - coarse.row, column - coarse.column
+    inside = (row >= 0) & (row < coarse.shape[0]) & (column >= 0) & (column < coarse.shape[1])
+    cells = np.unique(row[inside] * coarse.shape[1] + column[inside])
+    counts = coarse.count[cells]
+    return float(np.quantile(counts[counts > 0], DENSITY_QUANTILE)) / COARSE_M**2
+
+
+def _kept(tops: Tops, marks: np.ndarray, reach_m: float, tolerances: Tolerances, settings: Settings) -> Kept:
+    """Keep the candidates that lie on rails."""
+    places = Marks(tops.grid.middles(marks), tops.top.ravel()[marks] / MILLIMETRES)
+    lines = find_lines(places, reach_m, tolerances.along_m, tolerances.strip_m)
+    good = (lines.cover >= MIN_COVER) & (lines.pure >= MIN_PURE)
+    lines, marks = lines.of(good), marks[good]
+    spacings_m = [gauge_m + settings.head_width_m for gauge_m in settings.gauges_m]
+    paired = stations_with_partner(lines, spacings_m, tolerances.partner_m) >= MIN_STATIONS
+    pairs = links(lines)
+    kept = Kept(lines, marks, paired, pairs).of(_certain(lines, paired, pairs))
+    inside = runs_inside(kept.lines, kept.paired, kept.pairs, settings.gauges_m, settings.head_width_m)
+    kept = kept.of(~inside)
+    low, high = -MARGIN_M + reach_m / 2, settings.side_m + MARGIN_M - reach_m / 2
+    open_ended = np.any((kept.lines.axis < low) | (kept.lines.axis > high), axis=1)
+    return kept.of(long_enough(kept.lines, kept.pairs, kept.paired, open_ended, settings.keep_single))
+
+
+def _certain(lines: Lines, paired: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Return which cells have a partner or lie on a line without gaps, and those that continue one to its end."""
+    certain = paired | (lines.cover >= SINGLE_COVER)
+    reached = pairs[certain[pairs].any(axis=1)]
+    certain[reached.ravel()] = True
+    return certain
+
+
+def _completed(tops: Tops, marks: np.ndarray, kept: Kept, settings: Settings, tolerances: Tolerances) -> np.ndarray:
+    """Add to the kept cells the other candidates on their axes: the line that such a cell saw was a wrong one.
+
+    Returns
+    -------
+    (k,) int array
+        Cells.
+    """
+    others = np.setdiff1d(marks, kept.cell)
+    half_m = (settings.head_width_m + settings.cell_m) / 2
+    height = tops.top.ravel()[others] / MILLIMETRES
+    added = on_axes(tops.grid.middles(others), height, kept.lines, half_m, tolerances.along_m)
+    return np.union1d(kept.cell, others[added])

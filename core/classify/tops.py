@@ -1,0 +1,185 @@
+"""Tops of cells, and which of them are narrow: what stands out of the bed by the height of a rail and is not wider."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..raster import BORDER_CELLS
+
+LOW_M, TOP_M = 0.055, 0.40
+"""Heights of railheads above the bed: from yards that are filled with ballast to heavy rails on plates."""
+
+HIGH_M = 0.95
+"""Points between `TOP_M` and this mark walls, fences, masts, wheels and plants; wires and bridges are higher."""
+
+WINDOW_M = 0.26
+"""Half the side of the window in which a top must be narrow: the window holds one rail and its surroundings."""
+
+DEPTH_M = 0.045
+"""Cells up to this far below a top count as part of it: the height of a head."""
+
+MAX_SHARE = 0.50
+"""Largest share of the other seen cells of the window that the top may fill: a rail fills 0.14 to 0.25, with its foot
+or a guard rail 0.38, ballast and kerbs half and more."""
+
+SLAB_M = 0.025
+"""Tops are compared with their surroundings at thresholds this far apart."""
+
+EMPTY = np.int16(-32768)
+"""Top of a cell without points."""
+
+MILLIMETRES = 1000
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A window of the raster of rail cells; see `raster.rasterize`.
+
+    Attributes
+    ----------
+    cell_m : float
+    row, column : int
+        Cell of the raster at the window's north-western corner.
+    shape : tuple of int
+        Rows and columns.
+    """
+
+    cell_m: float
+    row: int
+    column: int
+    shape: tuple[int, int]
+
+    @classmethod
+    def around(cls, x: np.ndarray, y: np.ndarray, cell_m: float) -> tuple[Grid, np.ndarray]:
+        """Make the smallest window that holds the points; returns it and each point's cell in it, (n,) int32."""
+        rows = np.floor(-y / cell_m + BORDER_CELLS).astype(np.int32)
+        columns = np.floor(x / cell_m + BORDER_CELLS).astype(np.int32)
+        row, column = int(rows.min()), int(columns.min())
+        shape = int(rows.max()) - row + 1, int(columns.max()) - column + 1
+        return cls(cell_m, row, column, shape), (rows - row) * np.int32(shape[1]) + (columns - column)
+
+    def middles(self, cell: np.ndarray) -> np.ndarray:
+        """Middles of cells, (k,) numbers, in local metres, (k, 2)."""
+        row, column = np.divmod(cell, self.shape[1])
+        return np.column_stack([column + (self.column + 0.5), -(row + (self.row + 0.5))]) * self.cell_m
+
+    def blocks(self, cell: np.ndarray) -> np.ndarray:
+        """Find the blocks of 2 x 2 cells of the raster that the cells lie in, (k,) int64 numbers."""
+        row, column = np.divmod(cell, self.shape[1])
+        return ((row + self.row) // 2 - self.row // 2) * (self.shape[1] + 2) + (column + self.column) // 2
+
+
+@dataclass(frozen=True)
+class Tops:
+    """What stands on each cell.
+
+    Attributes
+    ----------
+    grid : Grid
+    top : (rows, columns) int16 array
+        Millimetres above the bed of the highest point up to `TOP_M`; `EMPTY` without any.
+    seen, high : (rows, columns) bool array
+        Cells with a point below `HIGH_M`, and between `TOP_M` and `HIGH_M`.
+    """
+
+    grid: Grid
+    top: np.ndarray
+    seen: np.ndarray
+    high: np.ndarray
+
+
+def tops_of(grid: Grid, cell: np.ndarray, height: np.ndarray) -> Tops:
+    """Find the tops of the cells.
+
+    Parameters
+    ----------
+    grid : Grid
+    cell : (n,) int array
+        Cell of each point.
+    height : (n,) array
+        Above the bed; those above `HIGH_M` are left out by the caller.
+    """
+    cells = grid.shape[0] * grid.shape[1]
+    seen, high = np.zeros(cells, dtype=bool), np.zeros(cells, dtype=bool)
+    top = np.full(cells, EMPTY, dtype=np.int16)
+    seen[cell] = True
+    high[cell[height > TOP_M]] = True
+    low = np.flatnonzero(height <= TOP_M)
+    millimetres = np.round(height[low] * MILLIMETRES).astype(np.int16)
+    # Written in rising order, the last value of a cell is its highest.
+    order = np.argsort((millimetres - np.int32(EMPTY)).astype(np.uint16), kind="stable")
+    top[cell[low[order]]] = millimetres[order]
+    return Tops(grid, *(values.reshape(grid.shape) for values in (top, seen, high)))
+
+
+def narrow_tops(tops: Tops) -> np.ndarray:
+    """Cells whose top is in the band of railheads, narrow, and free of high points, (k,) cell numbers in order."""
+    top = tops.top.ravel()
+    candidates = np.flatnonzero((top >= LOW_M * MILLIMETRES) & ~_around(tops.high).ravel())
+    if not len(candidates):
+        return candidates
+    window = Window(tops.grid, candidates, round(WINDOW_M / tops.grid.cell_m))
+    seen = window.sums(tops.seen)
+    slab = (top[candidates] - round(LOW_M * MILLIMETRES)) // round(SLAB_M * MILLIMETRES)
+    share = np.zeros(len(candidates))
+    for number in np.unique(slab).tolist():
+        threshold = (LOW_M + (number + 0.5) * SLAB_M - DEPTH_M) * MILLIMETRES
+        chosen = np.flatnonzero(slab == number)
+        others = window.of(chosen).sums((tops.top >= threshold) | tops.high) - 1
+        share[chosen] = others / np.maximum(seen[chosen] - 1, 1)
+    return candidates[share <= MAX_SHARE]
+
+
+@dataclass(frozen=True)
+class Window:
+    """Square windows around cells, for sums by integral images.
+
+    Attributes
+    ----------
+    grid : Grid
+    cell : (k,) int array
+        Middle cells.
+    reach : int
+        Cells from the middle to the window's border.
+    """
+
+    grid: Grid
+    cell: np.ndarray
+    reach: int
+
+    def of(self, chosen: np.ndarray) -> Window:
+        """Choose some of the windows."""
+        return Window(self.grid, self.cell[chosen], self.reach)
+
+    def sums(self, image: np.ndarray) -> np.ndarray:
+        """Sum an image of whole numbers in each window, (k,) int."""
+        rows, columns = self.grid.shape
+        integral = np.zeros((rows + 1, columns + 1), dtype=np.int32)
+        np.cumsum(image, axis=1, dtype=np.int32, out=integral[1:, 1:])
+        np.cumsum(integral[1:], axis=0, out=integral[1:])
+        row, column = np.divmod(self.cell, columns)
+        top, bottom = np.maximum(row - self.reach, 0), np.minimum(row + self.reach + 1, rows)
+        left, right = np.maximum(column - self.reach, 0), np.minimum(column + self.reach + 1, columns)
+        return integral[bottom, right] - integral[top, right] - integral[bottom, left] + integral[top, left]
+
+
+def highest_of_blocks(tops: Tops, cells: np.ndarray) -> np.ndarray:
+    """Thin cells, (k,) in order, to the highest of each block of 2 x 2 cells; the first among equals."""
+    order = np.lexsort((cells, -tops.top.ravel()[cells].astype(np.int32), tops.grid.blocks(cells)))
+    blocks = tops.grid.blocks(cells[order])
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = np.diff(blocks) != 0
+    return np.sort(cells[order[first]])
+
+
+def _around(image: np.ndarray) -> np.ndarray:
+    """Spread a bool image to the eight neighbours."""
+    wide = image.copy()
+    wide[:, 1:] |= image[:, :-1]
+    wide[:, :-1] |= image[:, 1:]
+    spread = wide.copy()
+    spread[1:] |= wide[:-1]
+    spread[:-1] |= wide[1:]
+    return spread

@@ -1,0 +1,387 @@
+"""Cross-sections of a railway: beds, sleepers, rails with head, web and foot, and what stands around them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..curves import Curve
+from .raw_scanner import Segments
+from .tracks import Track
+
+(GROUND, SLEEPER, FASTENING, HEAD, FOOT, GUARD, THIRD, PAVEMENT, PLATFORM, WALL, FENCE, MAST, WIRE, PLANT, TRAIN) = (
+    range(15)
+)
+"""Kinds of surfaces."""
+
+RAIL_HEIGHT_M = 0.172
+"""Height of a rail with a head of 72 mm (60E1); others are scaled by the width of their heads."""
+
+# Right half of 60E1, from the bottom's middle to the top's, in metres across and above the bottom
+_OUTLINE = np.array(
+    [
+        (0.0, 0.0),
+        (0.075, 0.0),
+        (0.075, 0.0115),
+        (0.030, 0.024),
+        (0.012, 0.036),
+        (0.00825, 0.060),
+        (0.00825, 0.105),
+        (0.012, 0.118),
+        (0.0355, 0.126),
+        (0.036, 0.158),
+        (0.033, 0.166),
+        (0.0225, 0.1703),
+        (0.010, 0.1718),
+        (0.0, 0.172),
+    ]
+)
+_HEAD_FROM = 8
+"""First point of the outline that belongs to the head."""
+
+SLEEPER_STEP_M, SLEEPER_WIDTH_M, SLEEPER_LENGTH_M = 0.60, 0.26, 2.6
+PAD_M = 0.010
+"""Gap between the rail's bottom and the sleeper's top."""
+
+SHOULDER_M, SLOPE = 0.45, 1 / 1.5
+"""Ballast beyond the ends of the sleepers, and the fall of its edge."""
+
+STONE_M, STONE_HEIGHT_M = 0.045, 0.013
+"""Size of the stones and standard deviation of their tops."""
+
+ACROSS_STEP_M = 0.025
+"""Distance of the places across at which the ground is sampled."""
+
+
+@dataclass(frozen=True)
+class Bedding:
+    """How the tracks lie.
+
+    Attributes
+    ----------
+    fill_m : float
+        Top of the ballast below the top of the sleepers; negative above it.
+    roughness_m : float
+        Standard deviation of the ballast's tops.
+    terrain_m : float
+        Ground beside the bed, below the top of the rails.
+    terrain_roughness_m : float
+    slab : bool
+        Whether the track lies on concrete, without ballast.
+    """
+
+    fill_m: float = 0.02
+    roughness_m: float = STONE_HEIGHT_M
+    terrain_m: float = 0.95
+    terrain_roughness_m: float = 0.02
+    slab: bool = False
+
+
+@dataclass(frozen=True)
+class Way:
+    """A track in the profiles: NaN where a profile does not cross it.
+
+    Attributes
+    ----------
+    left_m, top_m, slope : (profiles,) arrays
+        Place of the axis to the left of the reference line, height of the rails' tops, and rise of the plane of both
+        rails to the left.
+    spacing_m : float
+    """
+
+    left_m: np.ndarray
+    top_m: np.ndarray
+    slope: np.ndarray
+    spacing_m: float
+
+
+@dataclass
+class World:
+    """Cross-sections along a reference line, to which things are added.
+
+    Attributes
+    ----------
+    reference : Curve
+    station : (profiles,) array
+        Chainage of each profile.
+    ways : list of Way
+    head_width_m : float
+    bedding : Bedding
+    rng : RandomState
+    """
+
+    reference: Curve
+    station: np.ndarray
+    ways: list[Way]
+    head_width_m: float
+    bedding: Bedding
+    rng: np.random.RandomState
+    half_width_m: float = 14.0
+    paved: list[tuple[np.ndarray, float]] = field(default_factory=list)
+    _parts: list[Segments] = field(default_factory=list)
+
+    def add(self, across: np.ndarray, height: np.ndarray, kind: int, where: np.ndarray | None = None) -> None:
+        """Add polylines, (profiles, m) each, in the profiles `where`; NaN leaves a vertex out."""
+        across, height = np.broadcast_arrays(np.asarray(across, float), np.asarray(height, float))
+        across = np.broadcast_to(across, (len(self.station), across.shape[-1]))
+        height = np.broadcast_to(height, across.shape)
+        there = np.isfinite(across[:, :-1] + across[:, 1:] + height[:, :-1] + height[:, 1:])
+        if where is not None:
+            there &= where[:, None]
+        profile, number = np.nonzero(there)
+        start = np.column_stack([across[profile, number], height[profile, number]])
+        end = np.column_stack([across[profile, number + 1], height[profile, number + 1]])
+        self._parts.append(Segments(profile, start, end, np.full(len(profile), kind, dtype=np.uint8)))
+
+    def segments(self) -> Segments:
+        """All segments, by profile."""
+        parts = [[getattr(part, name) for part in self._parts] for name in ("profile", "start", "end", "kind")]
+        profile, start, end, kind = (np.concatenate(part) for part in parts)
+        order = np.argsort(profile, kind="stable")
+        return Segments(profile[order], start[order], end[order], kind[order])
+
+    def between(self, start_m: float, end_m: float) -> np.ndarray:
+        """Profiles in a section of the reference line, (profiles,) bool."""
+        return (self.station >= start_m) & (self.station <= end_m)
+
+    def every(self, step_m: float, length_m: float, phase_m: float = 0.0) -> np.ndarray:
+        """Profiles that cut something repeated, (profiles,) bool."""
+        return (self.station - phase_m) % step_m < length_m
+
+    def box(
+        self,
+        left_m: np.ndarray | float,
+        base_m: np.ndarray | float,
+        width_m: float,
+        height_m: float,
+        kind: int,
+        where: np.ndarray | None = None,
+    ) -> None:
+        """Add a box that stands on a base, given by its middle, in the profiles `where`."""
+        left = np.broadcast_to(np.asarray(left_m, float), len(self.station))[:, None]
+        base = np.broadcast_to(np.asarray(base_m, float), len(self.station))[:, None]
+        half = width_m / 2
+        self.add(
+            left + np.array([-half, -half, half, half, -half]), base + np.array([0, 1, 1, 0, 0]) * height_m, kind, where
+        )
+
+
+def ways_of(reference: Curve, station: np.ndarray, tracks: Sequence[Track]) -> list[Way]:
+    """Cut tracks with the profiles perpendicular to a reference line."""
+    ways = []
+    tree = cKDTree(reference.xy)
+    for track in tracks:
+        axis = track.centerline
+        cant = np.broadcast_to(track.cant_m, len(axis)) / track.spacing_m
+        if track.curve is reference:
+            at = reference.chainage
+            left = np.full(len(axis), float(track.left_m))
+        else:
+            sample = tree.query(axis[:, :2])[1]
+            step = axis[:, :2] - reference.xy[sample]
+            left = np.sum(step * reference.left_normal[sample], axis=1)
+            forward = np.column_stack([np.cos(reference.heading), np.sin(reference.heading)])[sample]
+            at = reference.chainage[sample] + np.sum(step * forward, axis=1)
+            order = np.argsort(at)
+            at, left, axis, cant = at[order], left[order], axis[order], cant[order]
+        place, top, slope = (
+            np.interp(station, at, values, left=np.nan, right=np.nan) for values in (left, axis[:, 2], cant)
+        )
+        ways.append(Way(place, top, slope, track.spacing_m))
+    return ways
+
+
+def outline(head_width_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Outline of a rail from the right end of its foot over the head to the left one; parts that are head.
+
+    Returns
+    -------
+    (m, 2) array
+        Metres across and above the top.
+    (m - 1,) bool array
+    """
+    scale = head_width_m / 0.072
+    right = (_OUTLINE[1:] - np.array([0.0, RAIL_HEIGHT_M])) * scale
+    left = right[-2::-1] * np.array([-1.0, 1.0])
+    whole = np.concatenate([right, left])
+    number = np.arange(len(whole) - 1)
+    first = _HEAD_FROM - 1
+    return whole, (number >= first) & (number < len(whole) - 1 - first)
+
+
+def rail(
+    world: World,
+    left_m: np.ndarray,
+    top_m: np.ndarray,
+    where: np.ndarray | None = None,
+    kinds: tuple[int, int] = (HEAD, FOOT),
+) -> None:
+    """Add a whole rail whose top lies at a place in each profile."""
+    shape, head = outline(world.head_width_m)
+    across = np.asarray(left_m)[:, None] + shape[:, 0]
+    height = np.asarray(top_m)[:, None] + shape[:, 1]
+    for kind, chosen in ((kinds[0], head), (kinds[1], ~head)):
+        for first, last in _runs(chosen):
+            world.add(across[:, first : last + 1], height[:, first : last + 1], kind, where)
+
+
+def running_rails(world: World, hidden: np.ndarray | None = None) -> None:
+    """Add the rails of all tracks with their fastenings; where heads overlap, the later one is left out."""
+    laid: list[np.ndarray] = []
+    middle = world.every(SLEEPER_STEP_M, 0.12, 0.07)
+    for way in world.ways:
+        for side in (1, -1):
+            left, top = rail_place(way, side)
+            for other in laid:
+                left = np.where(np.abs(left - other) < world.head_width_m, np.nan, left)
+            laid.append(left)
+            rail(world, left, top, hidden)
+            bottom = top - RAIL_HEIGHT_M * world.head_width_m / 0.072
+            if not world.bedding.slab:
+                for across in (-1, 1):
+                    clear = np.min(
+                        [np.where(np.isnan(one), 9.0, np.abs(left + across * 0.075 - one)) for one in laid[:-1]]
+                        or [np.full(len(left), 9.0)],
+                        axis=0,
+                    )
+                    world.box(
+                        np.where(clear > 0.09, left + across * 0.075, np.nan),
+                        bottom,
+                        0.07,
+                        0.065,
+                        FASTENING,
+                        middle if hidden is None else middle & hidden,
+                    )
+
+
+def rail_place(way: Way, side: int, inward_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Place and height of a rail's top in each profile; `inward_m` moves it towards the axis."""
+    from_axis = side * (way.spacing_m / 2 - inward_m)
+    return way.left_m + from_axis, way.top_m + from_axis * way.slope
+
+
+def ground(world: World, terrain_m: np.ndarray | None = None, where: np.ndarray | None = None) -> None:
+    """Add ballast, sleepers and terrain."""
+    across = np.arange(-world.half_width_m, world.half_width_m + ACROSS_STEP_M, ACROSS_STEP_M)
+    bedding = world.bedding
+    stones = _stones(world, across)
+    height = np.full((len(world.station), len(across)), -np.inf)
+    kind = np.full(height.shape, GROUND, dtype=np.uint8)
+    reference = world.ways[0].top_m[:, None] if world.ways else np.zeros((len(world.station), 1))
+    terrain = reference - bedding.terrain_m if terrain_m is None else terrain_m
+    terrain = np.broadcast_to(terrain, height.shape) + bedding.terrain_roughness_m / STONE_HEIGHT_M * stones
+    sleeper = world.every(SLEEPER_STEP_M, SLEEPER_WIDTH_M)[:, None]
+    below = RAIL_HEIGHT_M * world.head_width_m / 0.072 + PAD_M
+    for way in world.ways:
+        x = across - way.left_m[:, None]
+        plane = way.top_m[:, None] + x * way.slope[:, None] - below
+        beyond = np.maximum(np.abs(x) - SLEEPER_LENGTH_M / 2 - SHOULDER_M, 0.0)
+        bed = plane - bedding.fill_m - SLOPE * beyond
+        bed = bed + (0.0005 / STONE_HEIGHT_M if bedding.slab else bedding.roughness_m / STONE_HEIGHT_M) * stones
+        bed = np.where(np.isnan(bed), -np.inf, bed)
+        height = np.maximum(height, bed)
+        if not bedding.slab:
+            on = sleeper & (np.abs(x) < SLEEPER_LENGTH_M / 2) & (plane > height)
+            height, kind = np.where(on, plane, height), np.where(on, np.uint8(SLEEPER), kind)
+    kind = np.where(terrain > height, np.uint8(GROUND), kind)
+    height = np.maximum(height, terrain)
+    for one in (GROUND, SLEEPER):
+        _add_where(world, across, height, kind[:, :-1] == one, one, where)
+
+
+def pavement(
+    world: World,
+    where: np.ndarray,
+    groove_m: tuple[float, float],
+    gap_m: float = 0.0,
+    half_width_m: float | None = None,
+    roughness_m: float = 0.0015,
+    lift_m: float = 0.0,
+) -> None:
+    """Pave profiles up to the top of the rails, with a groove inside each rail.
+
+    Parameters
+    ----------
+    world : World
+    where : (profiles,) bool array
+    groove_m : tuple of float
+        Width and depth.
+    gap_m : float
+        Gap at the outer side of the rails.
+    half_width_m : float, optional
+        Of the pavement; the whole section by default.
+    """
+    half, head = half_width_m or world.half_width_m, world.head_width_m / 2
+    cuts = []
+    for way in world.ways:
+        for side in (1, -1):
+            left, top = rail_place(way, side)
+            inner = left - side * (head + groove_m[0])
+            outer = left + side * (head + gap_m)
+            cuts.append((np.minimum(inner, outer), np.maximum(inner, outer), left, top, side))
+    count = len(world.station)
+    level = np.mean([cut[3] for cut in cuts], axis=0) + lift_m
+    order = np.argsort([np.nanmean(cut[2]) for cut in cuts])
+    edge = np.full(count, -half)
+    for number in [*order, None]:
+        end = np.full(count, half) if number is None else cuts[number][0]
+        share = np.linspace(0, 1, 240)
+        across = edge[:, None] + (end - edge)[:, None] * share
+        rough = roughness_m * world.rng.standard_normal(across.shape)
+        world.add(across, level[:, None] + rough, PAVEMENT, where)
+        if number is not None:
+            low, high, left, top, side = cuts[number]
+            inner, wall = left - side * (head + groove_m[0]), left - side * head
+            world.add(
+                np.stack([inner, inner, wall, wall], axis=1),
+                np.stack([level, top - groove_m[1], top - groove_m[1], top - 0.014], axis=1),
+                PAVEMENT,
+                where,
+            )
+            crown = np.array([-1, -0.85, -0.5, 0, 0.5, 0.85, 1]) * head
+            drop = np.array([-0.014, -0.004, -0.001, 0, -0.001, -0.004, -0.014])
+            if gap_m == 0:
+                # The pavement joins the outer edge of the head.
+                drop = np.where(np.sign(crown) == side, np.where(np.abs(crown) > 0.9 * head, -0.004, drop), drop)
+            world.add(left[:, None] + crown, top[:, None] + drop, HEAD, where)
+            if gap_m > 0:
+                outer, face = left + side * (head + gap_m), left + side * head
+                world.add(
+                    np.stack([outer, outer, face, face], axis=1),
+                    np.stack([level, top - 0.02, top - 0.02, top - 0.014], axis=1),
+                    PAVEMENT,
+                    where,
+                )
+            edge = high
+
+
+def _add_where(
+    world: World, across: np.ndarray, height: np.ndarray, chosen: np.ndarray, kind: int, where: np.ndarray | None
+) -> None:
+    """Add the segments of polylines that are chosen, (profiles, m - 1)."""
+    if where is not None:
+        chosen = chosen & where[:, None]
+    profile, number = np.nonzero(chosen)
+    start = np.column_stack([across[number], height[profile, number]])
+    end = np.column_stack([across[number + 1], height[profile, number + 1]])
+    world._parts.append(Segments(profile, start, end, np.full(len(profile), kind, dtype=np.uint8)))
+
+
+def _stones(world: World, across: np.ndarray) -> np.ndarray:
+    """Heights of stones in all profiles, with the standard deviation `STONE_HEIGHT_M`, (profiles, m)."""
+    rows = world.station / STONE_M
+    columns = (across - across[0]) / STONE_M
+    grid = STONE_HEIGHT_M * 1.3 * world.rng.standard_normal((int(rows.max()) + 2, int(columns.max()) + 2))
+    row, down = rows.astype(int), (rows % 1)[:, None]
+    lines = (1 - down) * grid[row] + down * grid[row + 1]
+    column, right = columns.astype(int), columns % 1
+    return (1 - right) * lines[:, column] + right * lines[:, column + 1]
+
+
+def _runs(chosen: np.ndarray) -> list[tuple[int, int]]:
+    """First segment and the one after the last of each run of chosen segments."""
+    borders = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
+    return list(zip(borders[::2].tolist(), borders[1::2].tolist()))

@@ -1,0 +1,174 @@
+"""A square as a whole: what is labelled, and that order, place and cutting do not matter."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rail_extract.core.classify.cloud import classify_cloud
+from rail_extract.core.classify.settings import Settings
+from rail_extract.core.classify.square import classify_square
+from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, TOP_M, flat, rough, turned, with_bar, with_track
+
+GAUGE, WIDTH = 1.435, 0.072
+SPACING = GAUGE + WIDTH
+SETTINGS = Settings((GAUGE,), WIDTH)
+
+
+def inner(xyz, size=6.0):
+    return (np.abs(xyz[:, :2] - MIDDLE) < size / 2 - 0.3).all(axis=1)
+
+
+def ballasted(rng, angle=0.3, size=8.0, per_m2=2500):
+    xyz, on = with_track(flat(size, rng=rng, per_m2=per_m2), GAUGE, WIDTH, angle)
+    return rough(xyz, rng), on
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, np.pi / 4, 2.0])
+def test_two_rails_are_labelled(angle):
+    xyz, on = ballasted(np.random.RandomState(1), angle)
+    found = classify_square(xyz, SETTINGS).rail
+    assert (found & on)[inner(xyz, 8)].sum() / on[inner(xyz, 8)].sum() > 0.99
+    assert (found & on).sum() / found.sum() > 0.99
+
+
+def test_a_thin_cloud_is_labelled_and_drawn():
+    rng = np.random.RandomState(2)
+    xyz, on = with_track(flat(20.0, rng=rng, per_m2=80), GAUGE, WIDTH, 0.3)
+    xyz = rough(xyz, rng, 0.015, 0.012)
+    found = classify_square(xyz, SETTINGS)
+    here = inner(xyz, 18)
+    assert (found.rail & on)[here].sum() / on[here].sum() >= 0.93
+    assert found.figures.thin == 1
+    along, across = turned(found.drawn, 0.3)
+    left = (np.abs(across - SPACING / 2) < 0.03) & (np.abs(along) < 8)
+    cells = np.unique(np.floor(found.drawn[left] / SETTINGS.cell_m), axis=0)
+    assert len(cells) / 16 >= 25
+
+
+def test_a_dense_cloud_is_not_drawn():
+    xyz, _ = ballasted(np.random.RandomState(3))
+    assert not len(classify_square(xyz, SETTINGS).drawn)
+
+
+def test_canted_rails_on_their_canted_bed():
+    rng = np.random.RandomState(4)
+    xyz, on = ballasted(rng)
+    xyz[:, 2] += 0.1 * turned(xyz, 0.3)[1]
+    found = classify_square(xyz, SETTINGS).rail
+    assert (found & on)[inner(xyz, 8)].sum() / on[inner(xyz, 8)].sum() > 0.99
+
+
+@pytest.mark.parametrize("left", [SPACING / 2 - WIDTH - 0.045, SPACING / 2 + 0.4])
+def test_guard_and_third_rails_go_and_rails_stay(left):
+    rng = np.random.RandomState(5)
+    xyz, on = ballasted(rng)
+    xyz, bar = with_bar(xyz, WIDTH, 0.3, left, 0.18)
+    bar &= ~on
+    found = classify_square(xyz, SETTINGS).rail
+    assert (found & bar & inner(xyz, 8)).sum() < 0.03 * bar.sum()
+    assert (found & on)[inner(xyz, 8)].sum() / on[inner(xyz, 8)].sum() > 0.98
+
+
+@pytest.mark.parametrize(("length", "kept"), [(4.8, False), (5.2, True)])
+def test_lone_bars(length, kept):
+    xyz, on = with_bar(flat(8.0), WIDTH, 0.2, length_m=length)
+    found = classify_square(xyz, SETTINGS)
+    assert (found.rail & on).sum() / on.sum() > (0.95 if kept else -1)
+    assert found.rail.any() == kept
+    assert found.figures.single_m == pytest.approx(length if kept else 0, rel=0.08)
+
+
+@pytest.mark.parametrize(("length", "kept"), [(1.3, False), (1.8, True)])
+def test_paired_bars(length, kept):
+    xyz, _ = with_track(flat(6.0), GAUGE, WIDTH, 0.2, length_m=length)
+    found = classify_square(xyz, SETTINGS)
+    assert found.rail.any() == kept
+    assert found.figures.paired_m == pytest.approx(2 * length if kept else 0, rel=0.15)
+
+
+def test_feet_and_webs_are_not_labelled():
+    rng = np.random.RandomState(6)
+    ground = flat(6.0, rng=rng, per_m2=3000)
+    for side in (1, -1):
+        ground, _ = with_bar(ground, 0.15, 0.3, side * SPACING / 2, 0.03)
+    xyz, on = with_track(ground, GAUGE, WIDTH, 0.3)
+    xyz[on, 2] -= 0.03
+    low = on & (rng.random_sample(len(xyz)) < 0.3)
+    xyz[low, 2] -= rng.uniform(0.05, 0.12, low.sum())
+    found = classify_square(xyz, SETTINGS).rail
+    assert found.any()
+    assert xyz[found, 2].min() > TOP_M - 0.045
+
+
+@pytest.fixture(scope="module")
+def wide():
+    """A track across several squares."""
+    rng = np.random.RandomState(7)
+    x = rng.uniform(0, 100, 260_000)
+    y = rng.uniform(-3, 3, len(x))
+    on = np.abs(np.abs(y) - SPACING / 2) < WIDTH / 2
+    z = np.where(on, TOP_M, 0) + np.where(on, 0.002, 0.012) * rng.standard_normal(len(x))
+    return np.column_stack([x + 20.3, y + 40.1 + 0.05 * x, z + 311.0]), on
+
+
+def test_the_order_of_points_does_not_matter(wide):
+    xyz, on = wide
+    found = classify_cloud(xyz, SETTINGS)
+    assert found.rail[on].mean() > 0.99
+    order = np.random.RandomState(1).permutation(len(xyz))
+    again = classify_cloud(xyz[order], SETTINGS)
+    np.testing.assert_array_equal(again.rail, found.rail[order])
+    assert again.figures == found.figures
+
+
+@settings(max_examples=4, deadline=None)
+@given(right=st.integers(-90000, 90000), up=st.integers(-90000, 90000))
+def test_a_shift_by_squares_changes_nothing(wide, right, up):
+    xyz, _ = wide
+    near = xyz[:, 0] < 60
+    found = classify_cloud(xyz[near], SETTINGS)
+    moved = xyz[near] + np.array([right, up, 0]) * SETTINGS.side_m
+    np.testing.assert_array_equal(classify_cloud(moved, SETTINGS).rail, found.rail)
+
+
+def test_far_away_points_of_other_files_change_nothing(wide):
+    xyz, _ = wide
+    far = xyz[:, 0] > 20.3 + 50
+    found = classify_cloud(xyz, SETTINGS).rail
+    corner = np.floor(xyz[:, 0] / SETTINGS.side_m)
+    first = corner == corner.min()
+    part = xyz[:, 0] < (corner.min() + 1) * SETTINGS.side_m + 3.0
+    assert (far & ~part).any()
+    np.testing.assert_array_equal(classify_cloud(xyz[part], SETTINGS).rail[first[part]], found[first])
+
+
+def test_a_turn_changes_little(wide):
+    xyz, on = wide
+    for angle in (0.5, 1.2):
+        c, s = np.cos(angle), np.sin(angle)
+        moved = xyz @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+        found = classify_cloud(moved, SETTINGS).rail
+        assert found[on].mean() > 0.99
+        assert on[found].mean() > 0.99
+
+
+def test_figures_count_what_was_found(wide):
+    xyz, _ = wide
+    found = classify_cloud(xyz, SETTINGS)
+    assert found.figures.points == found.rail.sum()
+    assert found.figures.paired_m == pytest.approx(200, rel=0.05)
+    assert found.figures.single_m < 2
+    assert found.figures.squares >= 3
+    assert found.figures.cells_per_m > 20
+
+
+@pytest.mark.parametrize(
+    "xyz",
+    [np.empty((0, 3)), np.zeros((1, 3)), np.ones((500, 3)), np.full((500, 3), 0.001) * np.arange(500)[:, None]],
+    ids=["empty", "one", "equal", "line"],
+)
+def test_nothing_comes_of_nothing(xyz):
+    found = classify_cloud(xyz, SETTINGS)
+    assert not found.rail.any()
+    assert found.rail.shape == (len(xyz),)
+    assert np.isfinite(found.drawn).all()
