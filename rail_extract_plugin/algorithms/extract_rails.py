@@ -150,7 +150,7 @@ class ExtractRails(RailAlgorithm):
         context: QgsProcessingContext,
     ) -> dict[str, str]:
         """Write the network's output as Clean Rail Raster does; no file if no rail cell is left."""
-        from ..reading.rasters import header_for, on_one_grid
+        from ...core.raster_file import header_for, on_one_grid
 
         if not any(raster.tiles for raster in network.cleaned):
             return {}

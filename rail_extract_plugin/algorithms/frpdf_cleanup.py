@@ -19,7 +19,7 @@ from ..writing.layers import write_raster
 from .base import RAIL_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
-    from ..reading.rasters import RasterHeader
+    from ...core.raster_file import RasterHeader
 
 READING, WRITING = 0.05, 0.95
 """Fractions of the progress bar at which the network starts and ends."""

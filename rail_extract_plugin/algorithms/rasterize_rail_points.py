@@ -71,7 +71,7 @@ class RasterizeRailPoints(RailAlgorithm):
     ) -> dict[str, Any]:
         """Rasterize each class, then write the file."""
         from ...core.raster import cell_size, rasterize
-        from ..reading.rasters import header_for
+        from ...core.raster_file import header_for
 
         values = ParameterValues(self, parameters, context)
         clouds = read_points(job.cloud, job.class_codes, values.extent, progress.span(0, READING))

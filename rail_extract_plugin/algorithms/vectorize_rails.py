@@ -19,7 +19,7 @@ from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
     from ...core.rails import RailLine
-    from ..reading.rasters import RasterHeader
+    from ...core.raster_file import RasterHeader
 
 READING = 0.3
 """Fraction of the progress bar for reading raster and cloud."""

@@ -24,7 +24,7 @@ from ..writing.destinations import is_wanted
 
 if TYPE_CHECKING:
     from ...core.pipeline import Parameters
-    from ..reading.rasters import RasterHeader
+    from ...core.raster_file import RasterHeader
 
 NUMBERS = {
     "SMOOTHING_XY": "smoothing_xy_m",

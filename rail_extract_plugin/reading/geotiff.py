@@ -15,9 +15,9 @@ from ...core.disk import take_names
 from ...core.errors import RasterError
 from ...core.frame import LocalFrame
 from ...core.progress import SILENT, Progress
-from ...core.raster import TILE, RailRaster
+from ...core.raster import RailRaster
+from ...core.raster_file import BLOCK, EXTENT_TAG, GAUGE_TAG, HEAD_TAG, MODEL_TAG, NO_DATA, RasterHeader
 from ...core.standards import LAST_CLASS, RAIL_CLASS
-from .rasters import BLOCK, EXTENT_TAG, GAUGE_TAG, HEAD_TAG, MODEL_TAG, RasterHeader
 
 CREATION = (
     "TILED=YES",
@@ -227,56 +227,32 @@ def _write(path: Path, header: RasterHeader, rasters: Sequence[RailRaster], prog
     dataset = _create(path, header)
     if dataset is None:
         return
-    blocks = [
-        (number, block)
-        for number, raster in enumerate(rasters, start=1)
-        for block in sorted(_blocks_of(raster, header.window))
-    ]
-    row, column, height, width = header.window
     try:
-        for number, (top, left) in progress.follow(blocks):
-            size = min(BLOCK, height - top), min(BLOCK, width - left)
-            cells = rasters[number - 1].read(row + top, column + left, *size)
-            dataset.GetRasterBand(number).WriteRaster(left, top, size[1], size[0], cells.astype(np.uint8).tobytes())
+        for number, (raster, share) in enumerate(zip(rasters, progress.split(len(rasters))), start=1):
+            band = dataset.GetRasterBand(number)
+            for top, left in share.follow(header.filled_blocks(raster)):
+                cells = header.block(raster, top, left)
+                height, width = cells.shape
+                band.WriteRaster(left, top, width, height, cells.tobytes())
         dataset.FlushCache()
     finally:
-        del dataset  # else the traceback of a cancel keeps the file open, and Windows does not remove it then
-
-
-def _blocks_of(raster: RailRaster, window: tuple[int, int, int, int]) -> set[tuple[int, int]]:
-    """North-west corners of the file's blocks, counted from that of the window, that a raster has tiles in."""
-    row, column, height, width = window
-    corners = {
-        ((down * TILE - row) // BLOCK * BLOCK, (right * TILE - column) // BLOCK * BLOCK) for down, right in raster.tiles
-    }
-    return {(top, left) for top, left in corners if 0 <= top < height and 0 <= left < width}
+        del dataset  # otherwise the traceback of a cancel keeps the file open, and Windows cannot remove it
 
 
 def _create(path: Path, header: RasterHeader) -> gdal.Dataset | None:
-    """Make an empty file; None, with GDAL's error set, where that fails."""
-    row, column, height, width = header.window
+    """Create an empty file; None, with GDAL's error set, if that fails."""
+    _, _, height, width = header.window
     driver = gdal.GetDriverByName("GTiff")
     dataset = driver.Create(str(path), width, height, len(header.class_codes), gdal.GDT_Byte, list(CREATION))
     if dataset is None:
         return None
-    x, y, _ = header.frame.to_crs(np.array([column * header.cell_m, -row * header.cell_m, 0.0]))
-    side = header.cell_m / header.frame.horizontal_unit_m
-    dataset.SetGeoTransform((float(x), side, 0.0, float(y), 0.0, -side))
+    x, y = header.corner
+    dataset.SetGeoTransform((x, header.cell, 0.0, y, 0.0, -header.cell))
     if header.frame.crs_wkt:
         dataset.SetProjection(header.frame.crs_wkt)
-    tags = {
-        GAUGE_TAG: _millimetres(header.gauge_m),
-        HEAD_TAG: _millimetres(header.head_width_m),
-        MODEL_TAG: header.model,
-        EXTENT_TAG: ",".join(map(repr, header.extent or ())),
-    }
-    dataset.SetMetadata({tag: text for tag, text in tags.items() if text})
+    dataset.SetMetadata(header.tags)
     for number, code in enumerate(header.class_codes, start=1):
         band = dataset.GetRasterBand(number)
         band.SetDescription(str(code))
-        band.SetNoDataValue(0)
+        band.SetNoDataValue(NO_DATA)
     return dataset
-
-
-def _millimetres(length_m: float | None) -> str:
-    return "" if length_m is None else f"{1000 * length_m:.6g}"

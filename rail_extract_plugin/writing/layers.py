@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from ...core.frame import LocalFrame
     from ...core.rails import Centerline, RailLine, TrackGeometry
     from ...core.raster import RailRaster
-    from ..reading.rasters import RasterHeader
+    from ...core.raster_file import RasterHeader
 
 KINDS = {int: INTEGER, float: REAL, str: TEXT}
 

@@ -11,9 +11,9 @@ from rail_extract.core.clouds.crs import import_pyproj
 from rail_extract.core.errors import RailExtractError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.raster import rasterize
+from rail_extract.core.raster_file import header_for
 from rail_extract.core.standards import STANDARDS
 from rail_extract.rail_extract_plugin.reading.geotiff import read_header, read_rasters, write_rasters
-from rail_extract.rail_extract_plugin.reading.rasters import header_for
 
 BOUNDED = settings(
     max_examples=60,

@@ -5,17 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from osgeo import gdal
+from rail_extract.core import raster_file
 from rail_extract.core.clouds.crs import import_pyproj
 from rail_extract.core.errors import Cancelled, CrsError, ModelError, ParameterError, RasterError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.progress import Progress
 from rail_extract.core.raster import TILE, cell_size, rasterize
+from rail_extract.core.raster_file import BLOCK, header_for, on_one_grid
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.vectorize import vectorize
-from rail_extract.rail_extract_plugin.reading import rasters as rasters_module
 from rail_extract.rail_extract_plugin.reading.geotiff import filled_blocks, read_header, read_rasters, write_rasters
-from rail_extract.rail_extract_plugin.reading.rasters import BLOCK, choose_model, header_for, moved, on_one_grid
+from rail_extract.rail_extract_plugin.reading.rasters import choose_model, moved
 
 STANDARD = STANDARDS["EN_60E1_1435"]
 CELL_M = cell_size(STANDARD.gauge_m, STANDARD.head_width_m)
@@ -250,7 +251,7 @@ def test_cancelled_writing_leaves_no_file(tmp_path):
 
 def test_limit_counts_blocks(monkeypatch):
     raster = rasterize(strokes(), CELL_M)
-    monkeypatch.setattr(rasters_module, "MOST_BLOCKS", 3)
+    monkeypatch.setattr(raster_file, "MAX_BLOCKS", 3)
     with pytest.raises(RasterError, match="set EXTENT"):
         header_for([raster], (10,), frame_in("EPSG:32643"), STANDARD)
 
