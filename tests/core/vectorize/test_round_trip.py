@@ -1,7 +1,7 @@
 """Clean rasters of synthetic layouts, vectorized and smoothed, come back as the rails they were drawn from.
 
 A line nearly parallel to the grid, or at 45 degrees to it, is quantized by up to half a cell over its whole length,
-which no smoothing undoes (docs/method.md section 4.15); stretches more than 4 degrees away from both show what the
+which smoothing cannot undo (docs/method.md section 4.15); stretches more than 4 degrees away from both show what the
 vectorization itself adds. Rails that merge at a turnout's toe or cross at a small angle share their cells there: only
 stretches where a rail is apart from all others count.
 """

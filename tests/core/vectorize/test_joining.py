@@ -1,0 +1,81 @@
+"""Ends that are joined across gaps, and ends that must not be."""
+
+import numpy as np
+import pytest
+from rail_extract.core.lines.network import LineNetwork
+from rail_extract.core.vectorize.joining import join_gaps
+from rail_extract.core.vectorize.junctions import (
+    run_through,
+)
+from scipy.spatial import cKDTree
+
+
+def loose(*lines):
+    """Lines whose ends are all free."""
+    lines = tuple(np.asarray(line, dtype=float) for line in lines)
+    nodes = np.concatenate([line[[0, -1]] for line in lines])
+    return LineNetwork(lines, nodes, np.arange(2 * len(lines)).reshape(-1, 2))
+
+
+def along_x(start, end, y=0.0):
+    x = np.arange(start, end, 0.1)
+    return np.column_stack([x, np.full(len(x), y)])
+
+
+def check_invariants(network):
+    for line, (start, end) in zip(network.lines, network.ends):
+        np.testing.assert_array_equal(line[[0, -1]], network.nodes[[start, end]])
+    for node, line, vertex in network.passes:
+        np.testing.assert_array_equal(network.lines[line][vertex], network.nodes[node])
+    assert (network.degrees() > 0).all()
+
+
+def star(*tips):
+    """Straight lines from the origin with a vertex every metre."""
+    lines = tuple(np.outer(np.linspace(0, 1, max(int(np.hypot(*tip)), 1) + 1), tip) for tip in tips)
+    nodes = np.array([(0.0, 0.0), *tips])
+    return LineNetwork(lines, nodes, np.column_stack([np.zeros(len(tips), int), np.arange(1, len(tips) + 1)]))
+
+
+def test_rails_join_across_more_than_a_gap_where_cells_show_them_merged():
+    pieces = along_x(0, 20), along_x(28, 50)
+    assert len(join_gaps(loose(*pieces), 5.0, 10.0, cKDTree(np.concatenate(pieces))).lines) == 2
+    assert len(join_gaps(loose(*pieces), 5.0, 10.0, cKDTree(along_x(0, 50, 0.03))).lines) == 1
+
+
+def test_ends_bent_aside_beside_each_other_are_joined_without_their_hooks():
+    rail, wing = along_x(0, 20), along_x(20.2, 40)
+    rail[-15:, 1] += 0.1 * np.linspace(0, 1.5, 15)
+    (line,) = join_gaps(loose(rail, wing[:-1]), 5.0, 10.0, cKDTree(np.concatenate([rail, wing]))).lines
+    assert np.abs(line[:, 1]).max() < 0.05
+    beside = along_x(18, 40, 0.3)
+    assert len(join_gaps(loose(along_x(0, 20), beside), 5.0, 10.0).lines) == 2
+
+
+def test_welding_across_a_gap_keeps_the_passes_in_place():
+    left = run_through(star((-10.0, 0.0), (10.0, 0.0), (0.0, 8.0)))
+    right = np.column_stack([np.linspace(12, 22, 11), np.zeros(11)])
+    count = len(left.nodes)
+    network = LineNetwork(
+        (right[::-1], *left.lines),
+        np.concatenate([left.nodes, right[[0, -1]]]),
+        np.concatenate([[[count + 1, count]], left.ends]),
+        left.passes + [0, 1, 0],
+    )
+    joined = join_gaps(network, 5.0, 10.0)
+    check_invariants(joined)
+    assert len(joined.lines) == 2
+    assert max(joined.lengths()) == pytest.approx(32)
+
+
+@pytest.mark.parametrize("second_is_free", [False, True])
+def test_of_two_ends_that_are_joined_one_at_least_is_free(second_is_free):
+    """Two branches that end in nodes of other lines stay apart, though they face each other across a gap."""
+    first, second = along_x(-20, 0.05), along_x(3, 23)
+    walls = [np.array([[x, -9.0], [x, 0.0], [x, 9.0]]) for x in (first[-1, 0], second[0, 0])]
+    network = loose(first, second, *walls).with_end(1, first[-2:-1], 1, at=(2, 1))
+    if not second_is_free:
+        network = network.with_end(2, second[1:2], 1, at=(3, 1))
+    joined = join_gaps(network.tidy(), 5.0, 10.0)
+    assert len(joined.lines) == (3 if second_is_free else 4)
+    check_invariants(joined)
