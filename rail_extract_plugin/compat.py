@@ -1,6 +1,6 @@
-"""What differs between QGIS 3.22 and 4, in one place.
+"""The differences between QGIS 3.22 and 4, in one place.
 
-Everything else writes enums with their scope (``QgsProcessing.SourceType.TypeVectorLine``), which all of them know.
+All other modules write enums with their scope (``QgsProcessing.SourceType.TypeVectorLine``), which every version knows.
 """
 
 from __future__ import annotations
@@ -18,17 +18,32 @@ else:
 
 
 DIGITS = 20
-"""Room for a number with decimals: a shapefile makes it one digit if none is stated, and is written with 15 decimals
-if neither are those."""
+"""Width of a number with decimals. Without a width, a shapefile field would have one digit; without decimals either, 15
+decimals."""
 
 
 def field(name: str, kind, decimals: int = 0) -> QgsField:
-    """Make a field; `kind` is `INTEGER`, `REAL` or `TEXT`."""
+    """Define a field.
+
+    Parameters
+    ----------
+    name : str
+    kind
+        `INTEGER`, `REAL` or `TEXT`.
+    decimals : int
+    """
     return QgsField(name, kind, "", DIGITS if decimals else 0, decimals)
 
 
 def group_layer(details: QgsProcessingContext.LayerDetails, group: str, place: int) -> None:
-    """Have a layer loaded into a group, above those with a lower `place`; before QGIS 3.32 it stands by itself."""
+    """Load a layer into a group, above the layers with a lower `place`; without a group before QGIS 3.32.
+
+    Parameters
+    ----------
+    details : QgsProcessingContext.LayerDetails
+    group : str
+    place : int
+    """
     if Qgis.QGIS_VERSION_INT >= 33200:
         details.groupName = group
         details.layerSortKey = place

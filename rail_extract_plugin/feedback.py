@@ -1,4 +1,4 @@
-"""The core's progress, shown by QGIS."""
+"""Reports the core's progress to QGIS."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from .dialog.wording import for_user
 
 
 class QgisProgress(Progress):
-    """Passes what the core reports on to a QGIS feedback, and its cancel button back.
+    """Passes reports of the core to a QGIS feedback, and the state of its Cancel button back.
 
     Parameters
     ----------
     feedback : QgsProcessingFeedback
     definitions : sequence of QgsProcessingParameterDefinition
-        Parameters that what is reported may name.
+        Parameters whose names may occur in messages.
     """
 
     def __init__(
@@ -39,9 +39,9 @@ class QgisProgress(Progress):
         self._feedback.pushInfo(for_user(text, self._definitions))
 
     def warning(self, text: str) -> None:
-        """Write a marked line into the log."""
+        """Write a warning into the log."""
         self._feedback.pushWarning(for_user(text, self._definitions))
 
     def is_cancelled(self) -> bool:
-        """Tell whether the cancel button was pressed."""
+        """Return whether the Cancel button was pressed."""
         return self._feedback.isCanceled()

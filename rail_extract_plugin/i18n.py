@@ -1,4 +1,4 @@
-"""The hook through which every text that a user sees in QGIS passes."""
+"""The hook for translating the texts that users see in QGIS."""
 
 from __future__ import annotations
 
@@ -6,5 +6,5 @@ from qgis.PyQt.QtCore import QCoreApplication
 
 
 def tr(text: str) -> str:
-    """Translate `text` into the language of QGIS; English where there is no translation."""
+    """Translate `text` into the language of QGIS; English if there is no translation."""
     return QCoreApplication.translate("RailExtract", text)

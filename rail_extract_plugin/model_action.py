@@ -1,4 +1,4 @@
-"""An entry in the toolbox's context menu: Extract Rails as a model, to be changed in the model designer."""
+"""The entry of the toolbox's context menu that opens Extract Rails as a model, for editing in the model designer."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ EXTRACT_RAILS = "railextract:extractrails"
 
 
 class OpenModelAction(ContextAction):
-    """Opens a copy of the model: saving it asks for a name, so that the plugin's own file stays as it is."""
+    """Opens a copy of the model: saving it asks for a name, so the plugin's own file stays unchanged."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -24,16 +24,18 @@ class OpenModelAction(ContextAction):
         ProviderContextMenuActions.registerProviderContextMenuActions([self])
 
     def deregister(self) -> None:
-        """Take the entry away again."""
+        """Remove the entry."""
         ProviderContextMenuActions.deregisterProviderContextMenuActions([self])
 
     def isEnabled(self) -> bool:
-        """Tell whether the entry belongs to what was clicked: Extract Rails alone."""
+        """Return whether the entry applies to the clicked algorithm, which must be Extract Rails."""
         return isinstance(self.itemData, QgsProcessingAlgorithm) and self.itemData.id() == EXTRACT_RAILS
 
     def execute(self) -> None:
         """Open the model designer."""
-        from processing.modeler.ModelerDialog import ModelerDialog  # newer QGIS moves it, which must not stop a start
+        from processing.modeler.ModelerDialog import (
+            ModelerDialog,
+        )  # not at the top: newer QGIS moves it, and the plugin must still start
 
         model = QgsProcessingModelAlgorithm()
         model.fromFile(str(MODEL))

@@ -1,4 +1,4 @@
-"""The plugin: registers the provider, nothing else."""
+"""The plugin, which registers the provider."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class RailExtractPlugin:
         self.action: OpenModelAction | None = None
 
     def initProcessing(self) -> None:
-        """Offer the algorithms; all that ``qgis_process`` calls."""
+        """Register the algorithms; ``qgis_process`` calls only this."""
         package_folders.use()
         self.provider = RailExtractProvider()
         QgsApplication.processingRegistry().addProvider(self.provider)
 
     def initGui(self) -> None:
-        """Start in QGIS with windows."""
+        """Start in QGIS with windows: register the algorithms, the menu entry and the setting."""
         self.initProcessing()
 
         from .model_action import OpenModelAction
@@ -45,7 +45,7 @@ class RailExtractPlugin:
         package_setting.register()
 
     def unload(self) -> None:
-        """Take the algorithms away again."""
+        """Remove everything that was registered."""
         if self.action is not None:
             from .setup import package_setting
 

@@ -1,4 +1,4 @@
-"""The provider: the group of Rail Extract in the processing toolbox."""
+"""The provider: Rail Extract in the Processing toolbox."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from .paths import ICON
 
 
 class RailExtractProvider(QgsProcessingProvider):
-    """Offers every algorithm, also where packages they need are missing."""
+    """Lists all algorithms, even if packages that they need are missing."""
 
     def id(self) -> str:
-        """Give the identifier that scripts and models use; never changes."""
+        """Return the identifier for scripts and models; it never changes."""
         return "railextract"
 
     def name(self) -> str:
-        """Give the name shown in the toolbox."""
+        """Return the name shown in the toolbox."""
         return "Rail Extract"
 
     def icon(self) -> QIcon:
-        """Give the icon shown in the toolbox."""
+        """Return the icon shown in the toolbox."""
         return QIcon(str(ICON))
 
     def svgIconPath(self) -> str:
-        """Give the same icon, for places that draw it themselves."""
+        """Return the path of the icon, where QGIS draws it itself."""
         return str(ICON)
 
     def supportedOutputRasterLayerExtensions(self) -> list[str]:
-        """Give the one format that rail rasters are written in."""
+        """Return the suffixes of the only format in which rail rasters are written."""
         return ["tif", "tiff"]
 
     def loadAlgorithms(self) -> None:

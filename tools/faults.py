@@ -1,4 +1,4 @@
-"""Bad inputs and faults, each with what must come of it; the page that lists them is made of the tests themselves."""
+"""Faults and bad inputs with their expected results; writes the page that lists them from the tests."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "faults.md"
 
 REFUSED = "is refused"
-WARNED = "goes on with a warning"
-FINE = "gives the right result"
+WARNED = "continues with a warning"
+FINE = "gives the correct result"
 
-INTRODUCTION = """# What goes wrong, and what Rail Extract says
+INTRODUCTION = """# Faults and their messages
 
-Each row is a test: the fault is made, the algorithm is run in QGIS, and it must end as the row says. What is refused,
-in the dialog or in the run, is refused in the one sentence shown, without a traceback, and leaves no temporary file and
-no output but those that the sentence calls whole. In the sentences, … stands for what changes from case to case.
+Each row is a test: it creates the fault, runs the algorithm in QGIS, and checks the result. If the dialog or the run
+refuses an input, it shows exactly the message in the row, no traceback, and leaves no temporary file and no output
+except those that the message calls complete. In the messages, … stands for text that differs from case to case.
 
 `.venv/bin/python tools/faults.py` writes this page from the tables in `tests/plugin/test_faults_*.py`, and a test
 compares the two.
@@ -29,21 +29,21 @@ compares the two.
 
 @dataclass(frozen=True)
 class Fault:
-    """Something that goes wrong.
+    """A fault.
 
     Attributes
     ----------
     name : str
     prepare : callable
-        Makes the fault, given a bench (fixture of the tests), and gives the parameters of the run.
+        Creates the fault, given the fixture `bench`, and returns the parameters of the run.
     ends : str
         `REFUSED`, `WARNED` or `FINE`.
     says : str
-        The whole sentence; … stands for anything. Empty where nothing is said.
+        The expected message; … stands for any text. Empty if there is none.
     gives : dict
-        Some of the results.
+        Some of the expected results.
     run : str
-        Name of the algorithm, if not that of the whole table.
+        Name of the algorithm, if it differs from that of the table.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Fault:
     run: str = ""
 
     def matches(self, said: str) -> bool:
-        """Tell whether a sentence is the one expected."""
+        """Return whether a message is the expected one."""
         return re.fullmatch(".*".join(map(re.escape, self.says.split("…"))), said) is not None
 
 
@@ -69,13 +69,13 @@ def tables() -> Iterator[tuple[str, list[Fault]]]:
 
 
 def page() -> str:
-    """Put the page together."""
+    """Return the page."""
     parts, count = [], 0
     for title, faults in tables():
         count += len(faults)
-        parts += [f"\n## {title}\n\n| fault | what happens | the sentence |\n|---|---|---|\n"]
+        parts += [f"\n## {title}\n\n| fault | result | message |\n|---|---|---|\n"]
         parts += [f"| {fault.name} | {_outcome(fault)} | {fault.says} |\n" for fault in faults]
-    return f"{INTRODUCTION}\nThere are {count} of them.\n{''.join(parts)}"
+    return f"{INTRODUCTION}\nThe page lists {count} faults.\n{''.join(parts)}"
 
 
 def _outcome(fault: Fault) -> str:

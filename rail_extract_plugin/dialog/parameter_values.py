@@ -39,14 +39,14 @@ NUMBERS = {
     "MIN_LENGTH": "min_length_m",
     "CENTERLINE_TOLERANCE": "centerline_tolerance_m",
 }
-"""Attribute of the core's `Parameters` that a number of the interface goes into."""
+"""Attribute of the core's `Parameters` for each number of the interface."""
 
 NO_LINES = (
     QgsWkbTypes.GeometryType.PointGeometry,
     QgsWkbTypes.GeometryType.PolygonGeometry,
     QgsWkbTypes.GeometryType.NullGeometry,
 )
-"""Of a layer that may hold anything the type is unknown."""
+"""Types of layers without lines; a layer of unknown type may have lines."""
 
 CHOICES = {"ENGINE": "engine", "DEVICE": "device"}
 
@@ -58,7 +58,7 @@ class ParameterValues:
     ----------
     algorithm : QgsProcessingAlgorithm
     parameters : dict
-        Values by name, as QGIS hands them over.
+        Values by name, as QGIS passes them.
     context : QgsProcessingContext
     """
 
@@ -73,7 +73,7 @@ class ParameterValues:
         Raises
         ------
         ParameterError
-            It is NaN, which QGIS lets pass.
+            The value is NaN, which QGIS accepts.
         """
         number = self._algorithm.parameterAsDouble(self._parameters, name, self._context)
         if math.isnan(number):
@@ -93,7 +93,7 @@ class ParameterValues:
         return self._algorithm.parameterAsEnumString(self._parameters, name, self._context)
 
     def filled(self, name: str) -> bool:
-        """Tell whether there is a value."""
+        """Return whether a value was entered."""
         return self._parameters.get(name) not in (None, "")
 
     def wanted(self, name: str) -> bool:
@@ -101,51 +101,51 @@ class ParameterValues:
         return is_wanted(self._parameters.get(name), self._context)
 
     def raster(self, name: str) -> tuple[Path, RasterHeader]:
-        """Find the file of a raster, and read its header.
+        """Return the file of a raster and its header.
 
         Raises
         ------
         RasterError
-            It is no rail raster in a file.
+            The value is not a rail raster in a file.
         """
         from ..reading.geotiff import read_header
 
         layer = self._algorithm.parameterAsRasterLayer(self._parameters, name, self._context)
         if layer is None:
-            raise RasterError(f"{name} is no raster that can be read: give the output of Rasterize Rail Points.")
+            raise RasterError(f"{name} is not a readable raster: give the output of Rasterize Rail Points.")
         path = Path(layer.source())
         header = read_header(path)
         prepare_system(header.frame.crs_wkt)
         return path, header
 
     def lines(self, name: str) -> QgsProcessingFeatureSource:
-        """Find a layer of lines.
+        """Return a line layer.
 
         Raises
         ------
         RailExtractError
-            There is no such layer, it is one of points, polygons or nothing, or it is in degrees.
+            There is no such layer, it is not a line layer, or it is in degrees.
         """
         from ..reading.line_layers import check_system, wkt_of
 
         source = self._algorithm.parameterAsSource(self._parameters, name, self._context)
         if source is None:
-            raise RailExtractError(f"{name} is no layer that can be read: give a layer of lines.")
+            raise RailExtractError(f"{name} is not a readable layer: give a line layer.")
         kind = source.wkbType()
         if QgsWkbTypes.geometryType(kind) in NO_LINES:
             raise RailExtractError(
-                f"{name} is a layer of the type {QgsWkbTypes.displayString(kind)}: give a layer of lines."
+                f"{name} has the geometry type {QgsWkbTypes.displayString(kind)}: give a line layer."
             )
         check_system(source.sourceCrs())
         prepare_system(wkt_of(source.sourceCrs()))
         return source
 
     def cloud(self, name: str) -> CloudSource:
-        """Find the files of a cloud; CRS, where the algorithm has it, stands in for theirs."""
+        """Return the files of a cloud; the parameter CRS, if any, applies to files that state no coordinate system."""
         source = cloud_source(self._parameters.get(name), self._context)
         crs = self._algorithm.parameterAsCrs(self._parameters, "CRS", self._context)
         if self.filled("CRS") and not crs.isValid():
-            raise ParameterError(f"CRS {self._parameters['CRS']} is no coordinate system: choose one from the list.")
+            raise ParameterError(f"CRS {self._parameters['CRS']} is not a coordinate system: choose one from the list.")
         if crs.isGeographic():
             raise ParameterError(
                 f"CRS {crs.authid()} is in degrees, where lengths can't be measured: choose a projected one."
@@ -155,12 +155,12 @@ class ParameterValues:
         return source
 
     def extent(self, crs: QgsCoordinateReferenceSystem) -> tuple[float, float, float, float] | None:
-        """Read EXTENT in `crs`: smallest x, smallest y, largest x, largest y.
+        """Read EXTENT in `crs`: west, south, east and north limits.
 
         Raises
         ------
         ParameterError
-            It is a point or a line.
+            The extent has no area.
         """
         extent = self._algorithm.parameterAsExtent(self._parameters, "EXTENT", self._context, crs)
         if not self.filled("EXTENT") or extent.isNull():
@@ -170,7 +170,7 @@ class ParameterValues:
         return extent.xMinimum(), extent.yMinimum(), extent.xMaximum(), extent.yMaximum()
 
     def engine(self) -> str:
-        """Read ENGINE, and check that it is installed and can run on DEVICE."""
+        """Read ENGINE, and check that it is installed and runs on DEVICE."""
         from ...core.frpdf.engine import choose_engine
 
         return choose_engine(self.choice("ENGINE"), self.choice("DEVICE"))
@@ -180,60 +180,65 @@ class ParameterValues:
         return class_numbers(self.text("RAIL_CLASSES"), "RAIL_CLASSES")
 
     def standard(self) -> RailStandard:
-        """Read STANDARD, with GAUGE and HEAD_WIDTH in place of its own."""
+        """Read STANDARD; GAUGE and HEAD_WIDTH override its values."""
         return resolve(self.choice("STANDARD"), self.optional_number("GAUGE"), self.optional_number("HEAD_WIDTH"))
 
     def head_width_m(self) -> float:
-        """Read HEAD_WIDTH, or what STANDARD says of it."""
+        """Read HEAD_WIDTH, or the value of STANDARD."""
         head_width_mm = self.optional_number("HEAD_WIDTH")
         if head_width_mm is None and self.choice("STANDARD") == CUSTOM:
-            raise ParameterError("The standard CUSTOM needs the railhead width, in millimetres: fill HEAD_WIDTH.")
+            raise ParameterError("The standard CUSTOM needs the railhead width, in millimetres: fill in HEAD_WIDTH.")
         return resolve(DEFAULT if head_width_mm else self.choice("STANDARD"), None, head_width_mm).head_width_m
 
     def other_gauges_m(self, standard: RailStandard) -> tuple[float, ...]:
-        """Read OTHER_GAUGES, and check them beside the standard's gauge."""
+        """Read OTHER_GAUGES, and check that they can be distinguished from each other and from the standard's gauge."""
         others = gauges_m(self.text("OTHER_GAUGES"), "OTHER_GAUGES")
         return distinct_gauges((standard.gauge_m, *others), self.number("CENTERLINE_TOLERANCE"))[1:]
 
     def settings(self, standard: RailStandard, other_gauges_m: tuple[float, ...] = ()) -> Parameters:
-        """Gather what the algorithm's parameters tell the core; the core's defaults stand for the rest."""
+        """Return the algorithm's parameters for the core, with the core's defaults for all others."""
         from ...core.pipeline import Parameters
 
-        told: dict[str, Any] = {field: self.number(name) for name, field in NUMBERS.items() if self._has(name)}
-        told.update({field: self.choice(name) for name, field in CHOICES.items() if self._has(name)})
+        given: dict[str, Any] = {field: self.number(name) for name, field in NUMBERS.items() if self._has(name)}
+        given.update({field: self.choice(name) for name, field in CHOICES.items() if self._has(name)})
         if self._has("ITERATIONS"):
-            told["passes"] = int(self.number("ITERATIONS"))
-        return Parameters(standard.gauge_m, standard.head_width_m, other_gauges_m=other_gauges_m, **told)
+            given["passes"] = int(self.number("ITERATIONS"))
+        return Parameters(standard.gauge_m, standard.head_width_m, other_gauges_m=other_gauges_m, **given)
 
     def _has(self, name: str) -> bool:
         return self._algorithm.parameterDefinition(name) is not None
 
 
 def class_numbers(text: str, what: str) -> tuple[int, ...]:
-    """Classes from a text such as "10,11"; `what` names the parameter in the error.
+    """Parse classes such as "10,11"; `what` is the name of the parameter, for the error.
 
     Raises
     ------
     ParameterError
-        The text is no list of classes, or has none.
+        The text is not a list of classes, or is empty.
     """
     words = _words(text)
     if not words or not all(word.isdecimal() and int(word) <= LAST_CLASS for word in words):
-        raise ParameterError(f'{what} "{text}" should be whole numbers from 0 to {LAST_CLASS} such as 10 or 10,11.')
+        raise ParameterError(f'{what} "{text}" must be whole numbers from 0 to {LAST_CLASS} such as 10 or 10,11.')
     return tuple(dict.fromkeys(int(word) for word in words))
 
 
 def gauges_m(text: str, what: str) -> tuple[float, ...]:
-    """Metres from a text of millimetres such as "1000;1067"; `what` names the parameter in the error.
+    """Parse lengths in millimetres such as "1000;1067"; `what` is the name of the parameter, for the error.
+
+    Returns
+    -------
+    tuple of float
+        Metres.
 
     Raises
     ------
     ParameterError
-        The text holds something else than positive numbers.
+        The text contains something other than positive numbers.
     """
     words = _words(text)
     if not all(re.fullmatch(r"\d+(\.\d+)?", word) and float(word) > 0 for word in words):
-        raise ParameterError(f'{what} "{text}" should be millimetres such as 1000;1067.')
+        raise ParameterError(f'{what} "{text}" must be millimetres such as 1000;1067.')
     return tuple(float(word) / 1000 for word in words)
 
 

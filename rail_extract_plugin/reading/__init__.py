@@ -1,1 +1,1 @@
-"""Inputs: point clouds, rasters and line layers, as the core takes them."""
+"""Reads the inputs: point clouds, rasters and line layers, in the types that the core expects."""

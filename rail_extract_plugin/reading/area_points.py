@@ -1,4 +1,4 @@
-"""Points of a cloud in the area of a raster or of lines that were made from it."""
+"""Reads the points of a cloud in the area of a raster or of lines made from that cloud."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ Points = TypeVar("Points", RailPoints, "SpooledPoints")
 
 @dataclass(frozen=True)
 class Area:
-    """Where points of which classes are looked for.
+    """The area and the classes of the points to read.
 
     Attributes
     ----------
     what : str
-        What lies there, for messages: raster or rails.
+        What covers the area, for messages: "raster" or "rails".
     class_codes : tuple of int
     bounds : tuple of float
         Smallest x, smallest y, largest x, largest y, in units of the coordinate system.
@@ -44,16 +44,16 @@ class Area:
 
 
 def read_points_in(area: Area, cloud: CloudSource, progress: Progress) -> dict[int, RailPoints]:
-    """Read the points of an area's classes, by class, all in one local frame.
+    """Read the points of an area, by class, all in one local frame.
 
-    A cloud or an area that states no coordinate system is taken to be in that of the other.
+    If the cloud or the area states no coordinate system, that of the other is used.
 
     Raises
     ------
     CrsError
-        Cloud and area are in different coordinate systems.
+        Cloud and area have different coordinate systems.
     NoRailPointsError
-        The cloud has no points of a class there.
+        The cloud has no points of one of the classes in the area.
     """
     return _all_of(area, cloud, lambda source, codes, bounds: read_points(source, codes, bounds, progress))
 
@@ -61,7 +61,17 @@ def read_points_in(area: Area, cloud: CloudSource, progress: Progress) -> dict[i
 def spool_points_in(
     area: Area, cloud: CloudSource, side_m: float, folder: Path, progress: Progress
 ) -> dict[int, SpooledPoints]:
-    """Do as `read_points_in`, but leave the points on disk, sorted into squares: a cloud of any size fits."""
+    """Sort the points of an area into squares on disk, so that a cloud of any size fits.
+
+    Parameters
+    ----------
+    area, cloud, progress
+        See `read_points_in`.
+    side_m : float
+        Side of the squares.
+    folder : Path
+        Where to write them.
+    """
     return _all_of(
         area, cloud, lambda source, codes, bounds: spool_points(source, codes, bounds, side_m, folder, progress)
     )
@@ -70,7 +80,7 @@ def spool_points_in(
 def _all_of(
     area: Area, cloud: CloudSource, read: Callable[[CloudSource, Sequence[int], BoundsIn], Sequence[Points]]
 ) -> dict[int, Points]:
-    """Have points read, and see to it that there are some of every class."""
+    """Read points with `read`, and check that there are some of each class."""
     check_same_plane("POINTS", crs_of(cloud), f"the {area.what}", area.frame)
 
     def bounds(crs: QgsCoordinateReferenceSystem) -> Bounds:
@@ -85,23 +95,34 @@ def _all_of(
     if missing:
         raise NoRailPointsError(
             f"POINTS have no point of class {', '.join(missing)} in the area of the {area.what}: "
-            f"give the cloud that the {area.what} came from."
+            f"give the cloud from which the {area.what} came."
         )
     return clouds
 
 
 def check_same_plane(name: str, crs_wkt: str | None, other_name: str, other: LocalFrame) -> None:
-    """Refuse two coordinate systems that mean different places; an unknown one is taken to be the other.
+    """Check that two inputs have the same coordinate system in plan; an unknown one is taken to be the other.
+
+    Parameters
+    ----------
+    name : str
+        Name of the first input, for the message.
+    crs_wkt : str or None
+        Coordinate system of the first input.
+    other_name : str
+        Name of the second input.
+    other : LocalFrame
+        Frame of the second input.
 
     Raises
     ------
     CrsError
-        They are known and differ; both are named. Or the other is unknown, and was taken to be in metres wrongly.
+        Both systems are known and differ, or the second is unknown and the first is not in metres.
     """
     if crs_wkt and other.crs_wkt and not same_plane(crs_wkt, other.crs_wkt, tuple(other.origin[:2])):
         raise CrsError(
-            f"{name} are in {_title(crs_wkt)} but {other_name} in {_title(other.crs_wkt)}: give both in one "
-            "coordinate system."
+            f"{name} are in {_title(crs_wkt)} but {other_name} in {_title(other.crs_wkt)}: give both in the "
+            "same coordinate system."
         )
     if crs_wkt and not other.crs_wkt and units(parse_crs(crs_wkt))[0] != other.horizontal_unit_m:
         raise CrsError(

@@ -1,4 +1,4 @@
-"""Files of rail rasters: GeoTIFFs with one band a class, of which only blocks that hold rail cells are touched."""
+"""Reads and writes rail rasters: GeoTIFFs with one band per class; only blocks with rail cells are accessed."""
 
 from __future__ import annotations
 
@@ -30,24 +30,24 @@ CREATION = (
 )
 
 ALIKE = 1e-6
-"""Two sides of a cell may differ by this share: writers round."""
+"""Relative difference allowed between the two sides of a cell, because writers round."""
 
 
 def read_header(path: Path) -> RasterHeader:
-    """Read and check all but the cells.
+    """Read and check everything except the cells.
 
     Raises
     ------
     RasterError
-        It is no raster, is turned, has cells that are not square, or bands of which it is not known what they hold.
+        The file is not a raster or is rotated, its cells are not square, or the class of a band is unknown.
     CrsError
-        Its coordinates are no lengths.
+        Its coordinate system is not in units of length.
     """
     with _explained(path):
         dataset = _open(path)
         x, width, skew_x, y, skew_y, height = dataset.GetGeoTransform()
         if skew_x or skew_y or not math.isclose(width, -height, rel_tol=ALIKE) or width <= 0:
-            raise RasterError(f"{path.name} is turned or its cells are not square: warp it to square cells, north up.")
+            raise RasterError(f"{path.name} is rotated or its cells are not square: warp it to square cells, north up.")
         wkt = dataset.GetProjection() or None
         unit_m = units(parse_crs(wkt))[0] if wkt else 1.0
         return RasterHeader(
@@ -63,14 +63,14 @@ def read_header(path: Path) -> RasterHeader:
 
 
 def read_rasters(path: Path, header: RasterHeader, progress: Progress = SILENT) -> tuple[RailRaster, ...]:
-    """Read the cells of every band, block by block and only where the file holds any.
+    """Read the cells of all bands, block by block, skipping blocks that the file does not store.
 
-    A cell is rail where its value is neither 0 nor the band's value for no data.
+    A cell is rail if its value is neither 0 nor the band's nodata value.
 
     Raises
     ------
     RasterError
-        The file is damaged, or has no rail at all.
+        The file is damaged or has no rail cell.
     """
     with _explained(path):
         dataset = _open(path)
@@ -85,19 +85,19 @@ def read_rasters(path: Path, header: RasterHeader, progress: Progress = SILENT) 
                 cells.append(np.argwhere(block) + np.array([row, column]))
             rasters.append(grid.with_cells(np.concatenate(cells)))
     if not any(raster.tiles for raster in rasters):
-        raise RasterError(f"{path.name} holds no rail cell: give a raster with 1 where there is rail.")
+        raise RasterError(f"{path.name} has no rail cell: give a raster with 1 where there is rail.")
     return tuple(rasters)
 
 
 def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress = SILENT) -> None:
-    """Write rasters of the header's grid; cells outside its window are left out.
+    """Write rasters on the header's grid; cells outside its window are dropped.
 
-    The file takes its name when it is whole: what was there before stays until then, also if the program is killed.
+    The file is renamed when it is complete: an existing file stays until then, even if the program is killed.
 
     Raises
     ------
     RasterError, DiskError
-        The file can't be written.
+        The file cannot be written.
     Cancelled
         The user cancelled.
     """
@@ -115,12 +115,12 @@ def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster
 
 
 def _cause(error: Exception) -> str:
-    """Give what was first to fail: newer GDAL tells what failed of it too, a line each, and the cause last."""
+    """Return the first cause of an error: newer GDAL appends causes, one per line, the first cause last."""
     return str(error).rpartition("May be caused by: ")[2]
 
 
 def filled_blocks(dataset: gdal.Dataset, number: int) -> list[tuple[int, int, int, int]]:
-    """Find the blocks of a band that its file holds: row, column, height and width of each, in cells."""
+    """Find the blocks of a band that the file stores: row, column, height and width of each, in cells."""
     return list(_filled(dataset.GetRasterBand(number), 0, 0, dataset.RasterYSize, dataset.RasterXSize))
 
 
@@ -137,7 +137,7 @@ def _filled(band: gdal.Band, row: int, column: int, height: int, width: int) -> 
 
 
 def _halves(start: int, length: int) -> tuple[tuple[int, int], ...]:
-    """Split a stretch of cells between two blocks, near its middle."""
+    """Split a range of cells at a block border near its middle."""
     if length <= BLOCK:
         return ((start, length),)
     first = BLOCK * math.ceil(length / BLOCK / 2)
@@ -146,7 +146,7 @@ def _halves(start: int, length: int) -> tuple[tuple[int, int], ...]:
 
 @contextmanager
 def _explained(path: Path) -> Iterator[None]:
-    """Explain what GDAL raises of a damaged file where QGIS or another plugin has switched its exceptions on."""
+    """Translate the exceptions that GDAL raises for a damaged file if QGIS or another plugin has enabled them."""
     try:
         yield
     except RuntimeError as error:
@@ -161,27 +161,27 @@ def _open(path: Path) -> gdal.Dataset:
 
 
 def _unreadable(path: Path) -> RasterError:
-    return RasterError(f"{path} is no raster that can be read: give the output of Rasterize Rail Points.")
+    return RasterError(f"{path} is not a readable raster: give the output of Rasterize Rail Points.")
 
 
 def _class_codes(dataset: gdal.Dataset, name: str) -> tuple[int, ...]:
-    """Class of each band, by its description."""
+    """Return the class of each band from its description."""
     texts = [dataset.GetRasterBand(number).GetDescription() for number in range(1, dataset.RasterCount + 1)]
     if texts and all(text.isdecimal() and int(text) <= LAST_CLASS for text in texts):
         codes = tuple(int(text) for text in texts)
         if len(set(codes)) < len(codes):
-            raise RasterError(f"{name} has several bands of one class ({', '.join(texts)}): give each class one band.")
+            raise RasterError(f"{name} has several bands for one class ({', '.join(texts)}): give one band per class.")
         return codes
     if len(texts) == 1:
         return (RAIL_CLASS,)
     raise RasterError(
         f"{name} has {len(texts)} bands, and not every description is a class code: give a raster with one band, or "
-        "with one band a class like those of Rasterize Rail Points."
+        "with one band per class as from Rasterize Rail Points."
     )
 
 
 def _numbers(dataset: gdal.Dataset, tag: str, count: int) -> tuple[float, ...] | None:
-    """Numbers of a tag; None where it is missing."""
+    """Return the numbers of a tag, or None if it is missing."""
     text = dataset.GetMetadataItem(tag)
     if not text:
         return None
@@ -195,7 +195,7 @@ def _numbers(dataset: gdal.Dataset, tag: str, count: int) -> tuple[float, ...] |
 
 
 def _extent(dataset: gdal.Dataset) -> tuple[float, float, float, float] | None:
-    """West, south, east and north of the tag; None where it is missing."""
+    """Return west, south, east and north from the tag, or None if it is missing."""
     numbers = _numbers(dataset, EXTENT_TAG, 4)
     if numbers is None:
         return None
@@ -204,21 +204,21 @@ def _extent(dataset: gdal.Dataset) -> tuple[float, float, float, float] | None:
 
 
 def _length_m(dataset: gdal.Dataset, tag: str) -> float | None:
-    """Length of a tag in millimetres; None where it is missing."""
+    """Return the length of a tag in millimetres, or None if it is missing."""
     numbers = _numbers(dataset, tag, 1)
     return None if numbers is None else numbers[0] / 1000
 
 
 def _read(band: gdal.Band, row: int, column: int, height: int, width: int, name: str) -> np.ndarray:
-    """Rail cells of a block, (height, width) bool."""
+    """Read the rail cells of a block, (height, width) bool."""
     is_rail = np.ones((height, width), dtype=bool)
-    for cells in (band, band.GetMaskBand()):  # the mask is 0 where there are no data
+    for cells in (band, band.GetMaskBand()):  # the mask is 0 at nodata
         try:
             data = cells.ReadRaster(column, row, width, height, buf_type=gdal.GDT_Byte)
         except RuntimeError:
             data = None
         if data is None:
-            raise RasterError(f"{name} is damaged at row {row}, column {column}: make it again.")
+            raise RasterError(f"{name} is damaged at row {row}, column {column}: create it again.")
         is_rail &= np.frombuffer(data, dtype=np.uint8).reshape(height, width) != 0
     return is_rail
 

@@ -26,44 +26,52 @@ from ...core.progress import SILENT, Progress
 from ...core.rails import Centerline, RailLine
 
 CHORD_M = 0.0005
-"""How far the straight pieces that stand for a curved line may lie beside it: well below what a survey sees."""
+"""Greatest deviation of the chords that approximate a curved line: well below the accuracy of a survey."""
 
 LONGEST_M = 500_000.0
-"""Longer straight pieces have a stray vertex: the longest straight railway has 478 km."""
+"""A longer straight segment has a stray vertex: the longest straight railway has 478 km."""
 
 
 def read_rails(
     source: QgsProcessingFeatureSource, progress: Progress = SILENT, name: str = "INPUT", default_class: int = 0
 ) -> tuple[tuple[RailLine, ...], LocalFrame]:
-    """Read every part of every line, and find the local frame for them.
+    """Read all parts of all lines, in one local frame.
 
-    Lines without a `rail_id` are numbered by their feature; those without a `class_code` have `default_class`; other
-    fields of rails are used where they are there.
+    Lines without a `rail_id` get the id of their feature, and those without a `class_code` get `default_class`. Other
+    fields of rails are used if they exist.
+
+    Parameters
+    ----------
+    source : QgsProcessingFeatureSource
+    progress : Progress
+    name : str
+        Name of the layer's parameter, for messages.
+    default_class : int
 
     Raises
     ------
     CrsError
         The lines are in degrees.
     RailExtractError
-        There is no line; the message calls the layer `name`.
+        The layer has no line, or a line with an invalid vertex.
     """
     found, frame = _read(source, progress, name)
     rails = tuple(_rail(feature, xyz, default_class) for feature, xyz in found)
     flat = sum(bool(np.isnan(rail.xyz[0, 2])) for rail in rails)
     if flat:
-        progress.warning(f"{flat} of {len(rails)} lines have no heights: what is made of them has none either.")
+        progress.warning(f"{flat} of {len(rails)} lines have no heights, so their results have none.")
     copies = len(rails) - len({rail.xyz.tobytes() for rail in rails})
     if copies:
-        progress.warning(f"{copies} of {len(rails)} lines lie on another one: what is made of them comes twice.")
+        progress.warning(f"{copies} of {len(rails)} lines are duplicates: their results appear twice.")
     return rails, frame
 
 
 def read_centerlines(
     source: QgsProcessingFeatureSource, progress: Progress = SILENT, name: str = "INPUT"
 ) -> tuple[tuple[Centerline, ...], LocalFrame]:
-    """Read every part of every line, as `read_rails` does; figures that are in no field are NaN.
+    """Read all parts of all lines, as `read_rails` does; figures without a field are NaN.
 
-    Lines without a `track_id` are numbered by their feature; those without `left_ids` or `right_ids` name no rails.
+    Lines without a `track_id` get the id of their feature; those without `left_ids` or `right_ids` have none.
     """
     found, frame = _read(source, progress, name)
     return tuple(_centerline(feature, xyz) for feature, xyz in found), frame
@@ -72,7 +80,7 @@ def read_centerlines(
 def _read(
     source: QgsProcessingFeatureSource, progress: Progress, name: str
 ) -> tuple[list[tuple[QgsFeature, np.ndarray]], LocalFrame]:
-    """Read features and the vertices, (n, 3) local metres, of each of their parts."""
+    """Read the features, and the vertices of each of their parts, (n, 3) local metres."""
     crs_wkt, horizontal_unit_m, vertical_unit_m = _system(source.sourceCrs(), progress)
     request = QgsFeatureRequest()
     flags = QgsProcessingFeatureSource.Flag.FlagSkipGeometryValidityChecks
@@ -82,17 +90,17 @@ def _read(
         for vertices in _parts(feature.geometry(), CHORD_M / horizontal_unit_m)
     ]
     if not found:
-        raise RailExtractError(f"{name} holds no line: give a layer of lines.")
+        raise RailExtractError(f"{name} has no lines: give a line layer.")
     lost = next((feature.id() for feature, vertices in found if not np.isfinite(vertices[:, :2]).all()), None)
     if lost is not None:
         raise RailExtractError(
-            f"{name} has a line (feature {lost}) with a place that is no number: repair or delete it."
+            f"{name} has a line (feature {lost}) with a coordinate that is not a number: repair or delete it."
         )
     stray = next(
         (feature.id() for feature, vertices in found if _longest(vertices) * horizontal_unit_m > LONGEST_M), None
     )
     if stray is not None:
-        raise RailExtractError(f"{name} has a line (feature {stray}) with a vertex far away: repair or delete it.")
+        raise RailExtractError(f"{name} has a line (feature {stray}) with a stray vertex: repair or delete it.")
     middle = np.median(np.concatenate([vertices for _, vertices in found]), axis=0)
     origin = np.round(np.nan_to_num(middle) / ORIGIN_STEP) * ORIGIN_STEP
     if crs_wkt:
@@ -102,12 +110,12 @@ def _read(
 
 
 def _longest(vertices: np.ndarray) -> float:
-    """Length of the longest straight piece in plan, in units of the vertices."""
+    """Return the length of the longest straight segment in plan, in units of the vertices."""
     return float(np.hypot(*np.diff(vertices[:, :2], axis=0).T).max())
 
 
 def _system(crs: QgsCoordinateReferenceSystem, progress: Progress) -> tuple[str | None, float, float]:
-    """Coordinate system as WKT, and metres in its horizontal and vertical unit."""
+    """Return the coordinate system as WKT, and its horizontal and vertical units in metres."""
     if not crs.isValid():
         progress.warning("The lines have no coordinate system: their coordinates are taken as metres.")
         return None, 1.0, 1.0
@@ -122,12 +130,12 @@ def wkt_of(crs: QgsCoordinateReferenceSystem) -> str:
 
 
 def check_system(crs: QgsCoordinateReferenceSystem) -> None:
-    """Refuse lines in degrees.
+    """Check that lines are not in degrees.
 
     Raises
     ------
     CrsError
-        Lengths can't be measured there.
+        The coordinate system is in degrees.
     """
     if crs.isGeographic():
         raise CrsError(
@@ -137,7 +145,7 @@ def check_system(crs: QgsCoordinateReferenceSystem) -> None:
 
 
 def _parts(geometry: QgsGeometry, chord: float) -> Iterator[np.ndarray]:
-    """Vertices, (n, 3), of the parts of a line that have a length; heights are NaN unless all vertices have one."""
+    """Yield the vertices, (n, 3), of each part that has a length; heights are NaN unless all vertices have one."""
     if geometry.isNull():
         return
     straight = QgsGeometry(geometry)
@@ -190,7 +198,7 @@ def _attributes(
 
 
 def _number(feature: QgsFeature, name: str, default: float) -> float:
-    """Value of a field; `default` where there is no such field, or no finite number in it."""
+    """Return the number in a field, or `default` if the field is missing or holds no finite number."""
     try:
         value = float(_value(feature, name))
     except (TypeError, ValueError):
@@ -199,13 +207,13 @@ def _number(feature: QgsFeature, name: str, default: float) -> float:
 
 
 def _ids(feature: QgsFeature, name: str) -> tuple[int, ...]:
-    """Ids in a field such as "3,5"; none where there is no such field, or something else in it."""
+    """Return the ids in a field such as "3,5"; none if the field is missing or holds something else."""
     words = str(_value(feature, name) or "").split(",")
     return tuple(int(word) for word in words) if all(word.strip().isdecimal() for word in words) else ()
 
 
 def _value(feature: QgsFeature, name: str) -> Any:
-    """Value of a field; None where there is no such field, or no value in it."""
+    """Return the value of a field, or None if the field is missing or empty."""
     index = feature.fields().lookupField(name)
     value = feature.attribute(index) if index >= 0 else NULL
     return None if value == NULL else value

@@ -13,7 +13,7 @@ from ...core.raster_file import RasterHeader
 from ...core.standards import RailStandard
 
 CELL_TOLERANCE = 0.03
-"""Share by which cells may differ from what the network expects: between tracks that training gave it."""
+"""Relative deviation allowed from the cell size that the network expects; its training covered such a deviation."""
 
 
 def choose_model(header: RasterHeader, standard: RailStandard, name: str) -> Model:
@@ -32,7 +32,7 @@ def choose_model(header: RasterHeader, standard: RailStandard, name: str) -> Mod
     ModelError
         No model fits.
     RasterError
-        The cells are not as large as the network expects for such rails.
+        The cells do not have the size that the network expects for these rails.
     """
     expected_m = cell_size(standard.gauge_m, standard.head_width_m)
     if not math.isclose(header.cell_m, expected_m, rel_tol=CELL_TOLERANCE):
@@ -46,6 +46,6 @@ def choose_model(header: RasterHeader, standard: RailStandard, name: str) -> Mod
 
 
 def moved(raster: RailRaster, frame: LocalFrame, other: LocalFrame) -> RailRaster:
-    """Give a raster's place in another local frame of the same coordinate system."""
+    """Return a raster in another local frame of the same coordinate system."""
     right, up, _ = frame.shift_to(other)
     return replace(raster, x0=raster.x0 + float(right), y0=raster.y0 + float(up))

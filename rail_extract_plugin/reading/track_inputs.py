@@ -1,4 +1,4 @@
-"""What Measure Track Geometry takes: centerlines, their rails and the points of these, in one local frame."""
+"""The inputs of Measure Track Geometry: centerlines, rails and their points, in one local frame."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from .clouds import Bounds, CloudSource
 from .line_layers import read_centerlines, read_rails
 
 MARGIN_M = 1.0
-"""Points further outside the rails' extent say nothing about them: more than ten times the width of a head."""
+"""Margin around the rails' extent within which points are read: more than ten times the railhead width."""
 
 SQUARE_M = 500.0
-"""Side of the squares that points are taken by, about that of the stretches of Extract Rails."""
+"""Side of the squares in which points are processed: about that of the squares of Extract Rails."""
 
 SURE_GAUGE_MM = 1.0
-"""Difference between two mean gauges of a track that noise does not make, but another width of the railhead does."""
+"""Difference between two mean gauges of a track that is not due to noise but to a different railhead width."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,9 @@ class TrackInputs:
     centerlines : tuple of Centerline
     rails : tuple of RailLine
     clouds : tuple of SpooledPoints
-        One for each class of the rails; none where no cloud was given.
+        One for each class of the rails; empty without a cloud.
     frame : LocalFrame
-        Turns local metres into the centerlines' coordinates.
+        Converts between local metres and the centerlines' coordinates.
     """
 
     centerlines: tuple[Centerline, ...]
@@ -56,16 +56,23 @@ def read_inputs(
     folder: Path,
     progress: Progress,
 ) -> TrackInputs:
-    """Read lines, and put the points of the rails' classes around them into a folder, sorted into squares.
+    """Read the lines, and sort the points around the rails into squares in a folder.
+
+    Parameters
+    ----------
+    centerlines, rails : QgsProcessingFeatureSource
+    cloud : CloudSource or None
+    folder : Path
+    progress : Progress
 
     Raises
     ------
     CrsError
-        The coordinate systems differ, or are in degrees.
+        The coordinate systems differ or are in degrees.
     NoRailPointsError
-        The cloud has no points of a rail's class there.
+        The cloud has no points of a rail's class in the area.
     RailExtractError
-        A layer holds no line.
+        A layer has no line.
     """
     tracks, frame = read_centerlines(centerlines, progress.span(0.0, 0.1))
     lines, rail_frame = read_rails(rails, progress.span(0.1, 0.2), "RAILS", RAIL_CLASS)
@@ -73,7 +80,7 @@ def read_inputs(
     check_same_plane("INPUT", frame.crs_wkt, "RAILS", rail_frame)
     lines = _moved(lines, rail_frame, frame)
     if cloud is None:
-        progress.info("Without POINTS, each rail's sigma_mm and points are taken as even along it.")
+        progress.info("Without POINTS, sigma_mm and points of each rail are taken as uniform along it.")
         return TrackInputs(tracks, lines, (), frame)
     classes = tuple(sorted({rail.class_code for rail in lines}))
     area = Area("rails", classes, _bounds(lines, frame), frame)
@@ -84,7 +91,14 @@ def read_inputs(
 
 
 def check_gauges(tracks: TrackInputs, measured: Sequence[TrackGeometry], progress: Progress) -> None:
-    """Warn of tracks without two rails, and of a gauge that contradicts the fields: then the head width is another.
+    """Warn of tracks without two rails, and of a gauge that contradicts the fields because the head width is wrong.
+
+    Parameters
+    ----------
+    tracks : TrackInputs
+    measured : sequence of TrackGeometry
+        One for each centerline.
+    progress : Progress
 
     Raises
     ------
@@ -94,19 +108,19 @@ def check_gauges(tracks: TrackInputs, measured: Sequence[TrackGeometry], progres
     found = np.array([_mean(track.gauge_mm) for track in measured])
     lonely = [str(track.track_id) for track, gauge in zip(measured, found) if np.isnan(gauge)]
     if len(lonely) == len(measured):
-        raise RailExtractError("RAILS lie beside none of the lines of INPUT: give the rails that these run between.")
+        raise RailExtractError("None of RAILS is next to a line of INPUT: give the rails of these tracks.")
     if lonely:
-        progress.warning(f"Tracks {', '.join(lonely)} have no rails on both sides: their gauge and cant stay empty.")
+        progress.warning(f"Tracks {', '.join(lonely)} do not have rails on both sides: their gauge and cant are empty.")
     off = found - [line.gauge_mm for line in tracks.centerlines]
     off = off[np.isfinite(off)]
     if len(off) and abs(np.median(off)) > SURE_GAUGE_MM:
         progress.warning(
-            f"The gauge is {np.median(off):+.1f} mm off what gauge_mm of the centerlines says: check HEAD_WIDTH."
+            f"The gauge differs by {np.median(off):+.1f} mm from gauge_mm of the centerlines: check HEAD_WIDTH."
         )
 
 
 def _mean(values: np.ndarray) -> float:
-    """Mean of what is known; NaN where nothing is."""
+    """Return the mean of the finite values; NaN if there are none."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if len(known) else np.nan
 
@@ -117,7 +131,7 @@ def _moved(lines: Sequence, frame: LocalFrame, other: LocalFrame) -> tuple:
 
 
 def _bounds(rails: Sequence[RailLine], frame: LocalFrame) -> Bounds:
-    """Smallest x, smallest y, largest x, largest y around rails, in units of the coordinate system."""
+    """Return the west, south, east and north limits of rails, with a margin, in units of the coordinate system."""
     xyz = np.concatenate([rail.xyz for rail in rails])
     (west, south, _), (east, north, _) = frame.to_crs(
         np.array([xyz.min(axis=0) - MARGIN_M, xyz.max(axis=0) + MARGIN_M])

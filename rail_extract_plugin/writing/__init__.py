@@ -1,1 +1,1 @@
-"""Outputs: layers, files, styles and the report."""
+"""Writes the outputs: layers, files, styles and the report."""

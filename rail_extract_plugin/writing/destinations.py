@@ -1,4 +1,4 @@
-"""Whether outputs can be written where the user wants them."""
+"""Checks of destinations: whether the outputs can be written there."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from ...core.disk import check_closed
 from ...core.errors import RailExtractError
 
 TABLE = "ogr:"
-"""Begins destinations that are a table of a file."""
+"""Prefix of destinations that are a table of a file."""
 
 
 def check_writable(value: Any, context: QgsProcessingContext) -> None:
-    """Refuse an output that could not be written, before the work begins.
+    """Check before the run that an output can be written.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def check_writable(value: Any, context: QgsProcessingContext) -> None:
     Raises
     ------
     RailExtractError
-        The file or its folder does not let itself be written.
+        The file or its folder is not writable.
     """
     path = _output_file(value, context)
     if path is None:
@@ -55,7 +55,7 @@ def check_writable(value: Any, context: QgsProcessingContext) -> None:
 
 
 def _try_writing(path: Path) -> None:
-    """Open a file, or make one beside where it will be; path.exists() would hide a name too long from Python 3.14."""
+    """Open a file, or create one in its folder; from Python 3.14, path.exists() would hide a name that is too long."""
     try:
         path.stat()
     except FileNotFoundError:
@@ -65,12 +65,18 @@ def _try_writing(path: Path) -> None:
 
 
 def check_distinct(outputs: Mapping[str, Any], context: QgsProcessingContext) -> None:
-    """Refuse two outputs, values by name, that would overwrite each other.
+    """Check that no two outputs overwrite each other.
+
+    Parameters
+    ----------
+    outputs : mapping of str to value
+        Destinations by name.
+    context : QgsProcessingContext
 
     Raises
     ------
     RailExtractError
-        Two are the same file, or the same table of one.
+        Two outputs are the same file or the same table of a file.
     """
     seen: list[tuple[str, str, str]] = []
     for name, value in outputs.items():
@@ -80,7 +86,7 @@ def check_distinct(outputs: Mapping[str, Any], context: QgsProcessingContext) ->
         file, table = os.path.normcase(path.resolve()), _table(_text(value, context))
         for other, other_file, other_table in seen:
             if file == other_file and (not table or not other_table or table == other_table):
-                raise RailExtractError(f"{other} and {name} are one file: give each a name of its own.")
+                raise RailExtractError(f"{other} and {name} are the same file: give each its own name.")
         seen.append((name, file, table))
 
 
@@ -90,7 +96,7 @@ def is_wanted(value: Any, context: QgsProcessingContext) -> bool:
 
 
 def _text(value: Any, context: QgsProcessingContext) -> str:
-    """Destination as a user writes it; empty where there is none."""
+    """Return a destination as a user writes it; empty if there is none."""
     if isinstance(value, QgsProcessingOutputLayerDefinition):
         value = value.sink
     if isinstance(value, QgsProperty):
@@ -99,20 +105,20 @@ def _text(value: Any, context: QgsProcessingContext) -> str:
 
 
 def plain_file(value: Any, context: QgsProcessingContext) -> Path | None:
-    """File that a destination names by its path; None for memory layers, databases and tables of a file."""
+    """Return the file of a destination given as a path; None for memory layers, databases and tables of a file."""
     text = _text(value, context)
     is_file = text and text != QgsProcessing.TEMPORARY_OUTPUT and not re.match(r"\w{2,}:", text)
     return Path(text) if is_file else None
 
 
 def _output_file(value: Any, context: QgsProcessingContext) -> Path | None:
-    """File behind a destination; None for memory layers and databases."""
+    """Return the file of a destination; None for memory layers and databases."""
     text = _text(value, context)
     return plain_file(_uri(text).database() if text.startswith(TABLE) else text, context)
 
 
 def _table(text: str) -> str:
-    """Table that a destination names in a file; empty where it is the file itself."""
+    """Return the table that a destination names in a file; empty if it is the file itself."""
     return _uri(text).table() if text.startswith(TABLE) else ""
 
 

@@ -1,4 +1,4 @@
-"""From the core's lines to QGIS features, in the fields of the interface, and to the outputs that take them."""
+"""Converts the core's lines and rasters to QGIS features and files, and writes them to the outputs."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ KINDS = {int: INTEGER, float: REAL, str: TEXT}
 
 @dataclass(frozen=True)
 class LayerKind:
-    """Fields of a layer, and the style it gets when QGIS loads it."""
+    """The fields of a layer, and the style it gets when QGIS loads it."""
 
     columns: tuple[Field, ...]
     style: str
@@ -62,7 +62,7 @@ QUALITY = LayerKind(QUALITY_FIELDS, "quality")
 
 
 def fields(columns: Sequence[Field]) -> QgsFields:
-    """Make the fields of a layer."""
+    """Define the fields of a layer."""
     made = QgsFields()
     for column in columns:
         made.append(field(column.name, KINDS[column.kind], column.decimals))
@@ -72,7 +72,14 @@ def fields(columns: Sequence[Field]) -> QgsFields:
 def features(
     lines: Sequence[RailLine | Centerline], columns: Sequence[Field], frame: LocalFrame
 ) -> Iterator[QgsFeature]:
-    """Turn lines into features in the cloud's coordinates, with heights unless no line has any."""
+    """Convert lines to features in the cloud's coordinates, in 3D unless no line has heights.
+
+    Parameters
+    ----------
+    lines : sequence of RailLine or Centerline
+    columns : sequence of Field
+    frame : LocalFrame
+    """
     flat = is_flat(lines)
     for line in lines:
         coordinates = frame.to_crs(line.xyz).T[: 2 if flat else 3].tolist()
@@ -81,7 +88,7 @@ def features(
 
 
 def stations(tracks: Sequence[TrackGeometry], frame: LocalFrame) -> Iterator[QgsFeature]:
-    """Turn the stations of measured tracks into point features in the cloud's coordinates."""
+    """Convert the stations of measured tracks to point features in the cloud's coordinates."""
     for track in tracks:
         places = frame.to_crs(track.xyz).tolist()
         profiles = (getattr(track, column.name) for column in QUALITY.columns[1:])
@@ -90,22 +97,22 @@ def stations(tracks: Sequence[TrackGeometry], frame: LocalFrame) -> Iterator[Qgs
 
 
 def is_flat(lines: Sequence[RailLine | Centerline | TrackGeometry]) -> bool:
-    """Tell whether there are lines, but none with heights."""
+    """Return whether there are lines, and none has heights."""
     return bool(lines) and all(any(map(math.isnan, line.xyz[:, 2])) for line in lines)
 
 
 def add_features(sink: QgsFeatureSink, made: Iterator[QgsFeature]) -> int:
-    """Write features into a sink, and count them.
+    """Write features to a sink and return their number.
 
     Raises
     ------
     RailExtractError
-        The output does not take one, as on a full disk.
+        A feature cannot be written, for example because the disk is full.
     """
     count = 0
     for feature in made:
         if not sink.addFeature(feature, QgsFeatureSink.Flag.FastInsert):
-            raise RailExtractError(f"The output can't be written ({sink.lastError()}): check the disk's free space.")
+            raise RailExtractError(f"The output can't be written ({sink.lastError()}): check the free disk space.")
         count += 1
     return count
 
@@ -119,17 +126,28 @@ def write_lines(
     parameters: dict[str, Any],
     context: QgsProcessingContext,
 ) -> dict[str, str]:
-    """Write lines into the output called `name`.
+    """Write lines to an output.
+
+    Parameters
+    ----------
+    algorithm : QgsProcessingAlgorithm
+    name : str
+        Name of the output.
+    kind : LayerKind
+    lines : sequence of RailLine or Centerline
+    frame : LocalFrame
+    parameters : dict
+    context : QgsProcessingContext
 
     Returns
     -------
     dict of str to str
-        The layer's id by the output's name; empty where the user skipped the output.
+        The layer's id by the name of the output; empty if the user skipped it.
 
     Raises
     ------
     RailExtractError
-        The output can't be written.
+        The output cannot be written.
     """
     shape = QgsWkbTypes.Type.LineString if is_flat(lines) else QgsWkbTypes.Type.LineStringZ
     return _write(algorithm, name, kind, shape, features(lines, kind.columns, frame), frame, parameters, context)
@@ -143,7 +161,7 @@ def write_stations(
     parameters: dict[str, Any],
     context: QgsProcessingContext,
 ) -> dict[str, str]:
-    """Write the stations of measured tracks as points, like `write_lines`."""
+    """Write the stations of measured tracks as points; see `write_lines`."""
     shape = QgsWkbTypes.Type.Point if is_flat(tracks) else QgsWkbTypes.Type.PointZ
     made = stations(tracks, frame)
     return _write(algorithm, name, QUALITY, shape, made, frame, parameters, context)
@@ -158,12 +176,12 @@ def write_raster(
     context: QgsProcessingContext,
     progress: Progress = SILENT,
 ) -> dict[str, str]:
-    """Write rasters of rails, one per class, into the output called `name`.
+    """Write rail rasters, one per class, to an output; see `write_lines`.
 
     Returns
     -------
     dict of str to str
-        The file's path by the output's name; empty where the user skipped the output.
+        The path of the file by the name of the output; empty if the user skipped it.
     """
     from ..reading.geotiff import write_rasters
 
@@ -176,12 +194,12 @@ def write_raster(
 
 
 def figures_of(lines: Sequence[RailLine | Centerline], what: str) -> dict[str, Any]:
-    """Count lines and measure them, as the outputs RAIL_COUNT and RAIL_LENGTH for RAIL."""
+    """Return the number and length of lines as outputs: RAIL_COUNT and RAIL_LENGTH if `what` is RAIL."""
     return {f"{what}_COUNT": len(lines), f"{what}_LENGTH": LENGTH.value(sum(line.length_m for line in lines))}
 
 
 def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, Any]:
-    """Count stations, and tell how well the points support the tracks."""
+    """Return the number of stations, the standard error and the length without points, as outputs."""
     sigma = [value for track in tracks for value in track.sigma_mm if math.isfinite(value)]
     return {
         "STATION_COUNT": sum(len(track.chainage_m) for track in tracks),
@@ -191,7 +209,7 @@ def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, Any]:
 
 
 def output_crs(wkt: str | None) -> QgsCoordinateReferenceSystem:
-    """Coordinate system for an output, `UNKNOWN_IN_METRES` where the cloud has none."""
+    """Return the coordinate system for an output: `UNKNOWN_IN_METRES` if the cloud has none."""
     return system(wkt or UNKNOWN_IN_METRES)
 
 
@@ -205,7 +223,7 @@ def _write(
     parameters: dict[str, Any],
     context: QgsProcessingContext,
 ) -> dict[str, str]:
-    """Write features into the output called `name`, if the user wants it."""
+    """Write features to the output `name` unless the user skipped it."""
     if not is_wanted(parameters.get(name), context):
         return {}
     columns, crs = fields(kind.columns), output_crs(frame.crs_wkt)

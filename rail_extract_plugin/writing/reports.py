@@ -1,4 +1,4 @@
-"""The report, from an algorithm to a file."""
+"""Writes the reports."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Origin:
-    """What a result was made from, and how.
+    """The input and the command of a result.
 
     Attributes
     ----------
     paths : tuple of Path
-        Files or folders of the cloud.
+        Files and folders of the cloud.
     standard : RailStandard
     other_gauges_m : tuple of float
     command : str
-        What repeats the run.
+        Python command that repeats the run.
     """
 
     paths: tuple[Path, ...]
@@ -39,12 +39,12 @@ class Origin:
 
     @property
     def gauges_m(self) -> tuple[float, ...]:
-        """All gauges that tracks may have."""
+        """The gauges of all tracks."""
         return (self.standard.gauge_m, *self.other_gauges_m)
 
     @property
     def title(self) -> str:
-        """Name of the cloud."""
+        """The name of the cloud."""
         first, *more = self.paths
         return f"{first.name} and {len(more)} more" if more else first.name
 
@@ -57,17 +57,27 @@ def write_report(
     parameters: dict[str, Any],
     context: QgsProcessingContext,
 ) -> dict[str, str]:
-    """Write the report on a network, with its geometry, into the output called `name`; an older one stays till then.
+    """Write the report on a network with its geometry to an output; an existing file stays until it is complete.
+
+    Parameters
+    ----------
+    algorithm : QgsProcessingAlgorithm
+    name : str
+        Name of the output.
+    network : RailNetwork
+    origin : Origin
+    parameters : dict
+    context : QgsProcessingContext
 
     Returns
     -------
     dict of str to str
-        The file's path by the output's name; empty where the user skipped it.
+        The path of the file by the name of the output; empty if the user skipped it.
 
     Raises
     ------
     RailExtractError
-        The file can't be written.
+        The file cannot be written.
     """
     from ...core.report import build_page
 
@@ -86,7 +96,7 @@ def write_check(
     parameters: dict[str, Any],
     context: QgsProcessingContext,
 ) -> dict[str, str]:
-    """Write the result of Check Installation into the output called `name`, like `write_report`.
+    """Write the result of Check Installation to an output; see `write_report`.
 
     Parameters
     ----------
@@ -95,7 +105,7 @@ def write_check(
     verdict : str
         A sentence.
     facts : mapping of str to str
-        What was found, by name.
+        Findings by name.
     parameters : dict
     context : QgsProcessingContext
     """
@@ -122,7 +132,7 @@ def _write_page(path: str, page: str) -> None:
 
 
 def _facts(network: RailNetwork, origin: Origin) -> dict[str, str]:
-    """State what the figures hang on."""
+    """Return the settings on which the figures depend."""
     crs = system(network.frame.crs_wkt)
     return {
         "Rail": origin.standard.label,

@@ -1,4 +1,4 @@
-"""Styles that results get when QGIS loads them."""
+"""Applies styles to results when QGIS loads them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..i18n import tr
 from ..paths import STYLES
 
 BOTTOM_TO_TOP = ("raster", "rails", "centerlines", "quality")
-"""Order of the layers, by their styles."""
+"""Order of the layers in the group, by style."""
 
 
 class _Styler(QgsProcessingLayerPostProcessorInterface):
@@ -31,20 +31,27 @@ class _Styler(QgsProcessingLayerPostProcessorInterface):
 
 
 _kept: list[_Styler] = []
-"""QGIS calls these after the algorithm is gone, without holding a reference, and deletes them with its context."""
+"""QGIS calls these after the algorithm has been deleted, holds no reference, and deletes them with its context."""
 
 
 def _styler(style: str) -> _Styler:
-    """Make an object for one layer, and keep it until QGIS has deleted it."""
+    """Create the object for one layer, and keep it until QGIS deletes it."""
     _kept[:] = [one for one in _kept if not sip.isdeleted(one)]
     _kept.append(_Styler(style))
     return _kept[-1]
 
 
 def style_on_load(layer_id: str, style: str, context: QgsProcessingContext) -> None:
-    """Have QGIS apply `style` (a .qml file of the plugin) if it loads the layer when the run is done.
+    """Apply a style if QGIS loads the layer after the run.
 
-    All layers of a run go into one group, points above lines above rasters, where QGIS has groups for results.
+    All layers of a run go into one group, points above lines above rasters, if QGIS supports groups for results.
+
+    Parameters
+    ----------
+    layer_id : str
+    style : str
+        Name of a .qml file of the plugin, without its suffix.
+    context : QgsProcessingContext
     """
     if context.willLoadLayerOnCompletion(layer_id):
         details = context.layerToLoadOnCompletionDetails(layer_id)

@@ -1,4 +1,4 @@
-"""Vector files that take their name when they are whole: what was there before stays until then."""
+"""Writes vector files under a temporary name and renames them when complete; an existing file stays until then."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ PREFIX = "rail_extract_"
 
 
 def write_whole(value: Any, context: QgsProcessingContext, write: Callable[[Any], tuple[str, int]]) -> str:
-    """Write a layer in a folder beside its destination, and move its files there when they are complete.
+    """Write a layer in a temporary folder next to its destination, and move its files there when complete.
 
-    Memory layers and tables in databases and existing files are written where they belong.
+    Memory layers, and tables in databases and existing files, are written directly.
 
     Parameters
     ----------
@@ -34,22 +34,22 @@ def write_whole(value: Any, context: QgsProcessingContext, write: Callable[[Any]
         Value of the destination parameter.
     context : QgsProcessingContext
     write : callable
-        Writes to such a value, and gives the layer's id and the number of its features, or an empty id.
+        Writes to such a destination, and returns the layer's id and number of features; an empty id if skipped.
 
     Returns
     -------
     str
-        The layer's id, empty where the user skipped the output.
+        The layer's id; empty if the user skipped the output.
 
     Raises
     ------
     RailExtractError
-        The files can't be written, or not completely.
+        The files cannot be written completely.
     """
     path = plain_file(value, context)
     if path is None:
         return write(value)[0]
-    # With the rights of any new folder: its files keep them on Windows, where a temporary one is its maker's alone.
+    # An ordinary folder: files keep its access rights on Windows, where only its creator may read a temporary folder.
     folder = path.absolute().with_name(PREFIX + uuid4().hex[:8])
     try:
         folder.mkdir()
@@ -61,7 +61,7 @@ def write_whole(value: Any, context: QgsProcessingContext, write: Callable[[Any]
             f"The output {path} can't be written ({error.strerror}): choose another place."
         ) from error
     except (RailExtractError, QgsProcessingException) as error:
-        # What a traceback refers to keeps the file open, and Windows does not remove it then.
+        # The traceback would keep the file open, and Windows could not delete it.
         raise error.with_traceback(None) from error.__cause__
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -71,19 +71,19 @@ def write_whole(value: Any, context: QgsProcessingContext, write: Callable[[Any]
 def write_each(
     writers: Mapping[str, Callable[[], dict[str, str]]], parameters: dict[str, Any], context: QgsProcessingContext
 ) -> dict[str, str]:
-    """Write the outputs of a run one after the other; where one fails, the others are not lost.
+    """Write the outputs of a run one after the other; if one fails, the others are still written.
 
     Parameters
     ----------
     writers : mapping of str to callable
-        By the output's name what writes it, and gives the path or id by that name, or nothing if it is skipped.
+        Function that writes an output, by its name; returns the path or id by that name, or nothing if skipped.
     parameters : dict
     context : QgsProcessingContext
 
     Raises
     ------
     RailExtractError
-        Some could not be written; says which, why, and which files are whole.
+        An output could not be written; the message states which, why, and which files are complete.
     """
     written: dict[str, str] = {}
     failures: dict[str, Exception] = {}
@@ -98,15 +98,15 @@ def write_each(
 
 
 def _explain(failures: Mapping[str, Exception], whole: Sequence[str]) -> str:
-    """Give the first reason, and say which outputs are missing and which are whole."""
+    """Return the first reason, the outputs that failed and the outputs that are complete."""
     first = str(next(iter(failures.values())))
     if not whole:
         return first
-    return f"{first} Not written: {', '.join(failures)}. Written and whole: {', '.join(whole)}."
+    return f"{first} Not written: {', '.join(failures)}. Complete: {', '.join(whole)}."
 
 
 def _redirected(value: Any, path: Path) -> Any:
-    """Give the same value for another file."""
+    """Return the same destination for another file."""
     if not isinstance(value, QgsProcessingOutputLayerDefinition):
         return str(path)
     other = QgsProcessingOutputLayerDefinition(value)
@@ -115,25 +115,25 @@ def _redirected(value: Any, path: Path) -> Any:
 
 
 def _check_count(layer_id: str, count: int) -> None:
-    """Refuse a file that holds fewer features than were written: GDAL does not tell what fails on closing."""
+    """Check that a file has all its features, because GDAL does not report errors on closing."""
     found = _count(layer_id.partition("|layername=")[0])
     if found < count:
         raise RailExtractError(
-            f"The output can't be written ({found} of {count} features arrived): check the disk's free space."
+            f"The output can't be written ({found} of {count} features were written): check the free disk space."
         )
 
 
 def _count(path: str) -> int:
-    """Count the features of a file; with GDAL alone, for a layer would bring its coordinate system to this thread."""
+    """Count the features of a file, with GDAL: a QGIS layer would build its coordinate system in this thread."""
     try:
         dataset = gdal.OpenEx(path, gdal.OF_VECTOR)
         return dataset.GetLayer(0).GetFeatureCount() if dataset else 0
-    except RuntimeError:  # newer GDAL raises this
+    except RuntimeError:  # raised by newer GDAL
         return 0
 
 
 def _renamed(layer_id: str, other_id: str, context: QgsProcessingContext) -> str:
-    """Have QGIS load the layer from where it is now."""
+    """Make QGIS load the layer from its final path."""
     waiting = context.layersToLoadOnCompletion()
     context.setLayersToLoadOnCompletion({other_id if key == layer_id else key: waiting[key] for key in waiting})
     return other_id

@@ -1,4 +1,4 @@
-"""Clouds whose points or coordinate systems are odd."""
+"""Clouds with unusual points or coordinate systems."""
 
 import json
 
@@ -13,17 +13,17 @@ PLACE = np.array([500_000.0, 3_000_000.0, 100.0])
 
 
 def of(change):
-    """A cloud of points made from those of a track of 6 m."""
+    """A cloud made from the points of a track of 6 m."""
     return lambda bench: {"INPUT": bench.cloud(change(bench.track(length_m=6.0))), "ITERATIONS": 1}
 
 
 def scattered(*sides_m, count=3600):
-    """Points anywhere in a box."""
+    """Random points in a box."""
     return of(lambda points: PLACE + np.random.default_rng(2).uniform(0, sides_m, (count, 3)))
 
 
 def cross(points):
-    """The same track again, turned by a right angle about its middle."""
+    """The track, and a copy turned by a right angle about its middle."""
     middle = PLACE + [3, 0, 0]
     x, y, z = (points - middle).T
     return np.concatenate([points, middle + np.column_stack([-y, x, z])])
@@ -45,15 +45,15 @@ POINTS = [
         NOTHING,
     ),
     Fault(
-        "all points in one place",
+        "all points at one position",
         of(lambda points: np.tile(points[:1], (3000, 1))),
         WARNED,
         "Class 10 shows no rail: check the rail classes, the standard and MIN_LENGTH.",
         NOTHING,
     ),
-    Fault("every point twice", of(lambda points: np.repeat(points, 2, axis=0)), gives=TRACK),
+    Fault("all points duplicated", of(lambda points: np.repeat(points, 2, axis=0)), gives=TRACK),
     Fault(
-        "one rail only",
+        "only one rail",
         of(lambda points: points[:1800]),
         WARNED,
         "No two rails run parallel: there are rails but no track centerlines.",
@@ -73,14 +73,14 @@ POINTS = [
         NOTHING,
     ),
     Fault(
-        "heap of points",
+        "dense patch of points",
         scattered(2, 2, 0.1, count=20_000),
         WARNED,
         "Class 10 shows no rail: check the rail classes, the standard and MIN_LENGTH.",
     ),
-    Fault("tracks that cross at a right angle", of(cross), gives={"RAIL_COUNT": 4, "CENTERLINE_COUNT": 2}),
+    Fault("tracks crossing at a right angle", of(cross), gives={"RAIL_COUNT": 4, "CENTERLINE_COUNT": 2}),
     Fault(
-        "track shorter than the shortest line",
+        "track shorter than MIN_LENGTH",
         of(lambda points: points[points[:, 0] < 500_000.5]),
         WARNED,
         "Class 10 shows no rail: check the rail classes, the standard and MIN_LENGTH.",
@@ -95,13 +95,17 @@ POINTS = [
     Fault(
         "stray point 1000 km away", of(lambda points: np.append(points, points[:1] + [1e6, 0, 0], axis=0)), gives=TRACK
     ),
-    Fault("stray point 100 km up", of(lambda points: np.append(points, points[:1] + [0, 0, 1e5], axis=0)), gives=TRACK),
-    Fault("every height zero", of(lambda points: points * [1, 1, 0]), gives=TRACK),
+    Fault(
+        "stray point 100 km above the track",
+        of(lambda points: np.append(points, points[:1] + [0, 0, 1e5], axis=0)),
+        gives=TRACK,
+    ),
+    Fault("all heights zero", of(lambda points: points * [1, 1, 0]), gives=TRACK),
 ]
 
 
 def tiles(*systems, **parameters):
-    """A folder with half a track each in these coordinate systems."""
+    """A folder of tiles, each with half of the track's points, in these coordinate systems."""
 
     def prepare(bench):
         folder, points = bench.folder / "tiles", bench.track(length_m=6.0)
@@ -114,7 +118,7 @@ def tiles(*systems, **parameters):
 
 
 def in_system(epsg, scale=1.0, place=(0, 0, 0), **parameters):
-    """The points in another coordinate system: scaled, then moved."""
+    """The points in another coordinate system: scaled, then shifted."""
 
     def prepare(bench):
         points = (bench.track(length_m=6.0) - PLACE) * scale + place
@@ -150,33 +154,33 @@ SYSTEMS = [
         "The cloud states no coordinate system: its coordinates are taken as metres.",
     ),
     Fault(
-        "coordinate system that is not understood",
+        "unreadable coordinate system",
         with_broken_system,
         WARNED,
         "The cloud states no coordinate system: its coordinates are taken as metres.",
     ),
     Fault(
-        "degrees",
+        "coordinates in degrees",
         in_system(4326, (1e-5, 1e-5, 1), (75, 27, 100)),
         REFUSED,
         "cloud.las is in degrees (WGS 84), where lengths can't be measured: reproject it, for example to UTM "
         "zone 43N (EPSG:32643).",
     ),
     Fault(
-        "degrees beyond the earth",
+        "coordinates in degrees out of range",
         in_system(4326, 1, (500_000, 3_000_000, 100)),
         REFUSED,
         "cloud.las is in degrees (WGS 84), where lengths can't be measured: reproject it, for example to the "
         "UTM zone of the place.",
     ),
     Fault(
-        "degrees given for a cloud without a system",
+        "CRS in degrees for a cloud without a coordinate system",
         in_system(None, 1, HERE, CRS="EPSG:4326"),
         REFUSED,
         "CRS EPSG:4326 is in degrees, where lengths can't be measured: choose a projected one.",
     ),
     Fault(
-        "coordinates from the earth's centre",
+        "geocentric coordinates",
         in_system(4978, 1, (5e6, 3e6, 2e6)),
         REFUSED,
         "Lengths can't be computed in WGS 84: use a projected coordinate system.",
@@ -191,7 +195,7 @@ SYSTEMS = [
         "reproject it, for example to UTM zone 32N (EPSG:32632).",
     ),
     Fault(
-        "rails drawn in Web Mercator",
+        "rails digitized in Web Mercator",
         drawn_in_mercator,
         WARNED,
         "The lines are in WGS 84 / Pseudo-Mercator, whose scale factor of 1.557 there makes lengths and gauges "
@@ -206,13 +210,13 @@ SYSTEMS = [
         "coordinate system first.",
     ),
     Fault(
-        "one tile without a system",
+        "one tile without a coordinate system",
         tiles(32643, None),
         REFUSED,
         "tile0.las is in WGS 84 / UTM zone 43N but tile1.las is in no coordinate system: reproject all tiles to one "
         "coordinate system first.",
     ),
-    Fault("one tile without a system, which is given", tiles(32643, None, CRS="EPSG:32643")),
+    Fault("one tile without a coordinate system, CRS set", tiles(32643, None, CRS="EPSG:32643")),
 ]
 
 FAULTS = [*POINTS, *SYSTEMS]

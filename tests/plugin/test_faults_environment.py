@@ -1,4 +1,4 @@
-"""What can go wrong around a run: packages, weights, disks, other programs, and the user who cancels."""
+"""Faults of the environment: packages, weights, disks, other programs, cancelling."""
 
 import shutil
 import sqlite3
@@ -10,8 +10,7 @@ from faults import REFUSED, Fault
 from osgeo import ogr
 from qgis.core import QgsCoordinateTransformContext, QgsFeature, QgsGeometry, QgsVectorFileWriter, QgsVectorLayer
 from rail_extract.core import pipeline
-from rail_extract.core.frpdf import engine
-from rail_extract.core.frpdf import models as zoo
+from rail_extract.core.frpdf import engine, models
 from rail_extract.rail_extract_plugin.setup import dependencies
 
 resource = pytest.importorskip("resource", reason="only Unix limits the size of files")
@@ -27,7 +26,7 @@ def cloud(bench):
 
 
 def without(*modules):
-    """A Python that lacks packages."""
+    """A Python without some packages."""
 
     def prepare(bench):
         find_spec = dependencies.find_spec
@@ -43,12 +42,12 @@ def without_engine(bench):
 
 
 def with_weights(change):
-    """A plugin whose weights are not as they were shipped."""
+    """A plugin with changed weights."""
 
     def prepare(bench):
-        shutil.copytree(zoo.FOLDER, bench.folder / "models")
-        bench.patch.setattr(zoo, "FOLDER", bench.folder / "models")
-        change(zoo.MODELS[0].path)
+        shutil.copytree(models.FOLDER, bench.folder / "models")
+        bench.patch.setattr(models, "FOLDER", bench.folder / "models")
+        change(models.MODELS[0].path)
         return cloud(bench)
 
     return prepare
@@ -63,12 +62,12 @@ def put_others(path):
 
 
 def put_code(path):
-    """Weights that would run a program when unpickled."""
+    """Weights that would run code when unpickled."""
     np.savez(path, other=np.array([print], dtype=object))
 
 
 def output(make):
-    """An output where it can't be."""
+    """An output at an impossible path."""
     return lambda bench: {**cloud(bench), "RAILS": make(bench.folder)}
 
 
@@ -93,7 +92,7 @@ def cancelled(percent):
 
 
 def removed_on_the_way(bench):
-    """Somebody removes the folder of the outputs while the run goes on."""
+    """The folder of the outputs is deleted during the run."""
     bench.feedback.progressChanged.connect(lambda done: shutil.rmtree(bench.folder / "gone", ignore_errors=True))
     (bench.folder / "gone").mkdir()
     skipped = dict.fromkeys(("CENTERLINES", "QUALITY", "CLEANED"))
@@ -101,7 +100,7 @@ def removed_on_the_way(bench):
 
 
 def one_removed_on_the_way(bench):
-    """The same for one output of two."""
+    """The same for one of two outputs."""
     skipped = dict.fromkeys(("QUALITY", "CLEANED"))
     gone = removed_on_the_way(bench)["RAILS"].with_name("tracks.gpkg")
     return {**cloud(bench), **skipped, "RAILS": bench.folder / "rails.gpkg", "CENTERLINES": gone}
@@ -117,7 +116,7 @@ def lines(*texts):
 
 
 def long_track():
-    """Six kilometres, whose stations take a megabyte."""
+    """Six kilometres of track, with stations that take a megabyte."""
     left, middle, right = (
         f"LINESTRING Z (500000 {3000000 + across} 100, 506000 {3000000 + across} 100)" for across in (1.507, 0.7535, 0)
     )
@@ -125,7 +124,7 @@ def long_track():
 
 
 def full_disk(room, make, suffix):
-    """A disk that takes files up to so many bytes; what is written then fails as on a full one."""
+    """A disk that takes files of up to `room` bytes; further writing fails as on a full disk."""
 
     def prepare(bench):
         parameters = make(bench)
@@ -151,7 +150,7 @@ def earlier(path):
 
 
 def open_elsewhere(bench):
-    """An output of an earlier run that is still open."""
+    """An output of an earlier run that is open in another program."""
     path = earlier(bench.folder / "out" / "RAILS.gpkg")
     held = QgsVectorLayer(str(path), "held", "ogr").getFeatures()
     assert next(held).isValid()
@@ -160,7 +159,7 @@ def open_elsewhere(bench):
 
 
 def edited_elsewhere(bench):
-    """An output of an earlier run that is being edited: what is saved lies in a log until the program closes it."""
+    """An output of an earlier run that is being edited: changes stay in a log until the program closes the file."""
     path = earlier(bench.folder / "rails.gpkg")
     database = sqlite3.connect(path)
     bench.run.callback(database.close)
@@ -170,7 +169,7 @@ def edited_elsewhere(bench):
 
 
 def indexed_before(bench):
-    """A shapefile of an earlier run, with an index of its two lines elsewhere."""
+    """A shapefile of an earlier run with a spatial index of its old lines."""
     path = earlier(bench.folder / "out" / "RAILS.shp")
     ogr.Open(str(path), 1).ExecuteSQL("CREATE SPATIAL INDEX ON RAILS")
     assert path.with_suffix(".qix").exists()
@@ -178,7 +177,7 @@ def indexed_before(bench):
 
 
 def exhausted(bench):
-    """A cloud too large for the memory."""
+    """A cloud that is too large for the memory."""
 
     def fail(*arguments, **named):
         raise MemoryError
@@ -209,43 +208,43 @@ FAULTS = [
         "The engine TORCH needs the package torch: install it, or set ENGINE to AUTO.",
     ),
     Fault(
-        "no weights",
+        "missing weights",
         with_weights(lambda path: path.unlink()),
         REFUSED,
         "The weights file …/models/frpdf_base.npz is missing: reinstall the plugin.",
     ),
     Fault(
-        "weights cut off",
+        "truncated weights",
         with_weights(halve),
         REFUSED,
         "The weights file …/models/frpdf_base.npz cannot be read: reinstall the plugin.",
     ),
     Fault(
-        "weights that are text",
+        "text file as weights",
         with_weights(lambda path: path.write_text("weights")),
         REFUSED,
         "The weights file …/models/frpdf_base.npz cannot be read: reinstall the plugin.",
     ),
     Fault(
-        "weights of another network",
+        "weights of a different network",
         with_weights(put_others),
         REFUSED,
         "The weights file does not belong to FRPDF ('layer.0.0.1.running_mean'): reinstall the plugin.",
     ),
     Fault(
-        "weights that hold a program",
+        "weights that contain code",
         with_weights(put_code),
         REFUSED,
         "The weights file …/models/frpdf_base.npz cannot be read: reinstall the plugin.",
     ),
     Fault(
-        "output below a file",
+        "output in a folder that is a file",
         output(below_a_file),
         REFUSED,
         "The output …/file/rails.gpkg can't be written (Not a directory): choose another place.",
     ),
     Fault(
-        "output in a folder that is not there",
+        "output in a missing folder",
         output(lambda folder: folder / "gone" / "rails.gpkg"),
         REFUSED,
         "The output …/gone/rails.gpkg can't be written (No such file or directory): choose another place.",
@@ -257,13 +256,13 @@ FAULTS = [
         "The output …/rails.gpkg is a folder: give the name of a file in it.",
     ),
     Fault(
-        "output on a disk without writing",
+        "output on a read-only disk",
         output(lambda folder: "/proc/rails.gpkg"),
         REFUSED,
         "The output /proc/rails.gpkg can't be written (No such file or directory): choose another place.",
     ),
     Fault(
-        "output with a name too long",
+        "output with a name that is too long",
         output(lambda folder: folder / f"{'r' * 300}.gpkg"),
         REFUSED,
         "The output …/rrr….gpkg can't be written (File name too long): choose another place.",
@@ -275,26 +274,26 @@ FAULTS = [
         "“.docx” files are not supported as outputs for this algorithm: choose another one, such as .gpkg.",
     ),
     Fault(
-        "output whose folder goes away on the way",
+        "output folder deleted during the run",
         removed_on_the_way,
         REFUSED,
         "The output …/gone/rails.gpkg can't be written (No such file or directory): choose another place.",
     ),
     Fault(
-        "folder of one output goes away on the way",
+        "folder of one output deleted during the run",
         one_removed_on_the_way,
         REFUSED,
         "The output …/gone/tracks.gpkg can't be written (No such file or directory): choose another place. "
-        "Not written: CENTERLINES. Written and whole: RAILS.",
+        "Not written: CENTERLINES. Complete: RAILS.",
     ),
     Fault(
         "output with spaces, umlauts and kanji",
         output(lambda folder: folder / "Schienen größer 線路.gpkg"),
         gives=TRACK,
     ),
-    Fault("output of an earlier run, open elsewhere", open_elsewhere, gives=TRACK),
+    Fault("output of an earlier run, open in another program", open_elsewhere, gives=TRACK),
     Fault(
-        "output of an earlier run, edited elsewhere",
+        "output of an earlier run, being edited in another program",
         edited_elsewhere,
         REFUSED,
         "…/rails.gpkg is open in another program (rails.gpkg-wal exists): close it there, or choose another file.",
@@ -308,34 +307,34 @@ FAULTS = [
         run="rasterizerailpoints",
     ),
     Fault(
-        "full disk, GeoPackage that can't begin",
+        "full disk, GeoPackage that cannot be created",
         full_disk(50_000, lambda bench: long_track(), ".gpkg"),
         REFUSED,
-        "The output can't be written (…): check the disk's free space.",
+        "The output can't be written (…): check the free disk space.",
         run=MEASURE,
     ),
     Fault(
-        "full disk, GeoPackage that can't end",
+        "full disk, GeoPackage that cannot be completed",
         full_disk(200_000, lambda bench: long_track(), ".gpkg"),
         REFUSED,
-        "The output can't be written (0 of 6001 features arrived): check the disk's free space.",
+        "The output can't be written (0 of 6001 features were written): check the free disk space.",
         run=MEASURE,
     ),
     Fault(
         "full disk, shapefile",
         full_disk(50_000, lambda bench: long_track(), ".shp"),
         REFUSED,
-        "The output can't be written (…): check the disk's free space.",
+        "The output can't be written (…): check the free disk space.",
         run=MEASURE,
     ),
     Fault(
         "full disk, GeoJSON",
         full_disk(50_000, lambda bench: long_track(), ".geojson"),
         REFUSED,
-        "The output can't be written (…): check the disk's free space.",
+        "The output can't be written (…): check the free disk space.",
         run=MEASURE,
     ),
-    Fault("too little memory", exhausted, REFUSED, "Not enough memory: choose a smaller extent."),
+    Fault("not enough memory", exhausted, REFUSED, "Not enough memory: choose a smaller extent."),
     *(
         Fault(f"cancelled at {percent} %", cancelled(percent), REFUSED, "Cancelled; nothing was written.")
         for percent in (0, 10, 20, 40, 60, 80, 90)
@@ -348,7 +347,7 @@ def test_fault(meet, fault):
     meet(fault, "extractrails")
 
 
-def test_a_bad_cloud_in_a_batch_spoils_no_other(qgis, plugin, outcome, bench):
+def test_a_bad_cloud_in_a_batch_does_not_affect_the_others(qgis, plugin, outcome, bench):
     good, other = (bench.cloud(bench.track(length_m=6.0), name) for name in ("1.las", "3.las"))
     bad = bench.folder / "2.las"
     bad.write_bytes(b"no cloud")
@@ -362,10 +361,10 @@ def test_a_bad_cloud_in_a_batch_spoils_no_other(qgis, plugin, outcome, bench):
 
 
 def test_the_page_lists_every_fault():
-    """Else write it again: python tools/faults.py."""
+    """If this fails, run tools/faults.py."""
     assert faults.PAGE.read_text(encoding="utf-8") == faults.page()
 
 
-def test_no_two_faults_have_one_name():
+def test_fault_names_are_unique():
     names = [(title, fault.name) for title, table in faults.tables() for fault in table]
     assert len(names) == len(set(names)) >= 60

@@ -1,4 +1,4 @@
-"""Point cloud files that are not what they should be."""
+"""Invalid and unusual point cloud files."""
 
 import json
 import shutil
@@ -14,11 +14,11 @@ from rail_extract.rail_extract_plugin.setup import dependencies
 TITLE = "Point cloud files"
 
 HEADER, RECORDS_AT, SCALE_AT, OFFSET_AT, COUNT_AT, LATE_AT = 375, 100, 131, 155, 247, 235
-"""Bytes of a LAS 1.4 header, and where in it is what."""
+"""Length of a LAS 1.4 header, and offsets of its fields, in bytes."""
 
 
 def holding(data, name="cloud.las"):
-    """A file of these bytes."""
+    """A file with this content."""
 
     def prepare(bench):
         (bench.folder / name).write_bytes(data)
@@ -28,7 +28,7 @@ def holding(data, name="cloud.las"):
 
 
 def damaged(change, name="cloud.las"):
-    """A good file whose bytes are changed."""
+    """A valid file with changed bytes."""
 
     def prepare(bench):
         path = bench.cloud(bench.track(length_m=6.0), name)
@@ -47,7 +47,7 @@ def overwritten(at, value):
 
 
 def among_records(data):
-    """Within the record of the coordinate system."""
+    """Cut within the record of the coordinate system."""
     return data[: HEADER + 54 + 100]
 
 
@@ -69,13 +69,13 @@ def points_at(data):
 
 
 def with_late_record_cut(data):
-    """Announce a record behind the points, of which half is there."""
+    """Announce a record after the points, of which only half exists."""
     late = struct.pack("<QI", len(data), 1)
     return data[:LATE_AT] + late + data[LATE_AT + 12 :] + bytes(30)
 
 
 def rewritten(change, name="cloud.las", version=None, point_format=None):
-    """A cloud changed by laspy and written again."""
+    """A cloud changed and rewritten with laspy."""
 
     def prepare(bench):
         path = bench.cloud(bench.track(length_m=6.0), name)
@@ -139,19 +139,19 @@ ITEM = {"assets": {"data": {"href": "gone.laz"}}}
 FAULTS = [
     Fault("empty file", holding(b""), REFUSED, "cloud.las is empty (0 bytes): copy or export it again."),
     Fault(
-        "text file called .las",
+        "text file named .las",
         holding(b"x,y,z\n1,2,3\n"),
         REFUSED,
         'cloud.las is not a LAS or LAZ file (it does not begin with "LASF"): export the cloud as LAS or LAZ.',
     ),
     Fault(
-        "PDF called .las (wrong magic)",
+        "PDF file named .las (wrong signature)",
         holding(b"%PDF-1.4 " * 100),
         REFUSED,
         'cloud.las is not a LAS or LAZ file (it does not begin with "LASF"): export the cloud as LAS or LAZ.',
     ),
     Fault(
-        "folder called .las",
+        "folder named .las",
         lambda bench: (bench.folder / "a.las").mkdir() or {"INPUT": bench.folder / "a.las"},
         REFUSED,
         "The folder …/a.las contains no .las or .laz file: choose another folder.",
@@ -182,7 +182,7 @@ FAULTS = [
         "bad.las is cut off: it has room for 3596 of the 3600 points stated in its header; copy or export it again.",
     ),
     Fault(
-        "virtual point cloud that is no JSON",
+        "virtual point cloud that is not JSON",
         catalogue("{"),
         REFUSED,
         "all.vpc is not a virtual point cloud: build it again from its tiles.",
@@ -194,61 +194,61 @@ FAULTS = [
         "all.vpc names no tiles: build it again from existing tiles.",
     ),
     Fault(
-        "virtual point cloud of a missing tile",
+        "virtual point cloud with a missing tile",
         catalogue(json.dumps({"features": [ITEM]})),
         REFUSED,
         "all.vpc names …/gone.laz, which does not exist: build it again from its tiles.",
     ),
     Fault(
-        "cut in the header",
+        "truncated in the header",
         damaged(cut(200)),
         REFUSED,
         "cloud.las is cut off within its header: copy or export it again.",
     ),
     Fault(
-        "cut in the records",
+        "truncated in the variable-length records",
         damaged(among_records),
         REFUSED,
         "cloud.las is cut off before its first point: copy or export it again.",
     ),
     Fault(
-        "cut before the points",
+        "truncated before the points",
         damaged(at_points),
         REFUSED,
         "cloud.las is cut off: it has room for 0 of the 3600 points stated in its header; copy or export it again.",
     ),
     Fault(
-        "cut in the points",
+        "truncated in the points",
         damaged(cut(-1000)),
         REFUSED,
         "cloud.las is cut off: it has room for 3566 of the 3600 points stated in its header; copy or export it again.",
     ),
     Fault(
-        "cut in the records after the points",
+        "truncated in the records after the points",
         damaged(with_late_record_cut),
         REFUSED,
         "cloud.las is cut off: the records after its points are missing; copy or export it again.",
     ),
     Fault(
-        "LAZ cut in the header",
+        "LAZ truncated in the header",
         damaged(cut(200), "cloud.laz"),
         REFUSED,
         "cloud.laz is cut off within its header: copy or export it again.",
     ),
     Fault(
-        "LAZ cut before the points",
+        "LAZ truncated before the points",
         damaged(at_points, "cloud.laz"),
         REFUSED,
         "cloud.laz is cut off or damaged (unpack requires a buffer of 8 bytes): copy or export it again.",
     ),
     Fault(
-        "LAZ cut in the chunks",
+        "LAZ truncated in the chunks",
         damaged(in_chunks, "cloud.laz"),
         REFUSED,
         "cloud.laz is cut off: its table of chunks is missing; copy or export it again.",
     ),
     Fault(
-        "LAZ cut in the table of chunks",
+        "LAZ truncated in the chunk table",
         damaged(in_chunk_table, "cloud.laz"),
         REFUSED,
         "cloud.laz is cut off: its table of chunks is missing; copy or export it again.",
@@ -279,32 +279,32 @@ FAULTS = [
         "cloud.las has a damaged header (375 bytes and 4294967295 records stated before the points): export it again.",
     ),
     Fault(
-        "points said to lie beyond the end",
+        "point offset beyond the end of the file",
         damaged(overwritten(96, b"\xff\xff\xff\x7f")),
         REFUSED,
         "cloud.las is cut off before its first point: copy or export it again.",
     ),
     Fault(
-        "points said to lie in the header",
+        "point offset within the header",
         damaged(overwritten(96, struct.pack("<I", 10))),
         REFUSED,
         "cloud.las has a damaged header (375 bytes and 1 records stated before the points): export it again.",
     ),
     Fault(
-        "header said to be too short",
+        "header length of zero",
         damaged(overwritten(94, struct.pack("<H", 0))),
         REFUSED,
         "cloud.las is cut off or damaged (Incoherent header size): copy or export it again.",
     ),
     Fault(
-        "header said to be longer than the file",
+        "header length beyond the end of the file",
         damaged(overwritten(94, b"\xff\xff")),
         REFUSED,
         "cloud.las has a damaged header (65535 bytes and 1 records stated before the points): export it again.",
     ),
-    Fault("record said to reach into the points", damaged(overwritten(HEADER + 20, b"\xff\xff"))),
+    Fault("record length reaching into the points", damaged(overwritten(HEADER + 20, b"\xff\xff"))),
     Fault(
-        "point said to have no bytes",
+        "point length of zero",
         damaged(overwritten(105, bytes(2))),
         REFUSED,
         "cloud.las is cut off or damaged (Incoherent point size, header says 0 point_format created says "
@@ -323,7 +323,7 @@ FAULTS = [
         "cloud.las is LAS 3.7: export it as LAS 1.2 to 1.4.",
     ),
     Fault(
-        "scale that is not a number: NaN coordinates",
+        "scale of NaN",
         damaged(overwritten(SCALE_AT, NAN)),
         REFUSED,
         "cloud.las has a damaged header (coordinate scale or offset): export it again.",
@@ -346,15 +346,15 @@ FAULTS = [
         REFUSED,
         "cloud.las has a damaged header (coordinate scale or offset): export it again.",
     ),
-    Fault("bounds in the header that are no numbers", damaged(overwritten(179, NAN * 6))),
-    Fault("text that is no UTF-8 in the header", damaged(overwritten(26, b"\xff\xfe" * 16))),
-    Fault("bytes behind the points", damaged(lambda data: data + b"rubbish" * 99)),
-    Fault("extra bytes in the points", rewritten(add_extra_bytes)),
+    Fault("bounds of NaN in the header", damaged(overwritten(179, NAN * 6))),
+    Fault("text in the header that is not UTF-8", damaged(overwritten(26, b"\xff\xfe" * 16))),
+    Fault("additional bytes after the points", damaged(lambda data: data + b"rubbish" * 99)),
+    Fault("points with extra bytes", rewritten(add_extra_bytes)),
     Fault("LAZ with extra bytes", rewritten(add_extra_bytes, "cloud.laz")),
     Fault("oldest format, LAS 1.2 with point format 0", rewritten(unchanged, version="1.2", point_format=0)),
     Fault("waveforms, point format 4", rewritten(unchanged, version="1.3", point_format=4)),
     Fault(
-        "LAZ without the package that reads it",
+        "LAZ without the package lazrs",
         without_backend,
         REFUSED,
         "Rasterize rail points needs the Python package lazrs, which this QGIS does not have: run Install "

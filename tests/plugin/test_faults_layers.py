@@ -1,4 +1,4 @@
-"""Rasters and lines that are not what they should be."""
+"""Invalid and unusual rasters and lines."""
 
 import math
 
@@ -17,7 +17,7 @@ TAGS = {"RAIL_GAUGE_MM": "1435", "RAIL_HEAD_MM": "72", "RAIL_MODEL": "base"}
 
 
 def track_cells(bands=1, kind=np.uint8):
-    """Two rails, each two cells wide, 6 m from west to east, with a metre of nothing around."""
+    """Two rails from west to east, each 6 m long and two cells wide, with a margin of a metre."""
     cells = np.zeros((bands, 90, 200), kind)
     for row in (25, 25 + round((GAUGE_M + HEAD_M) / CELL_M)):
         cells[:, row : row + 2, 25:175] = 1
@@ -58,7 +58,7 @@ def raster(
 
 
 def of_raster(change=None, **given):
-    """A raster, whose bytes may be changed."""
+    """A raster, optionally with changed bytes."""
 
     def prepare(bench):
         parameters = raster(bench, **given)
@@ -70,7 +70,7 @@ def of_raster(change=None, **given):
 
 
 def damaged_cells(bench):
-    """A GeoTIFF that opens, with a first block that can't be unpacked, wherever GDAL has put it."""
+    """A GeoTIFF that opens, but with a first block that cannot be decompressed."""
     parameters = raster(bench, options=["COMPRESS=DEFLATE"])
     dataset = gdal.Open(str(parameters["INPUT"]))
     band = dataset.GetRasterBand(1)
@@ -89,7 +89,7 @@ def as_floats_with_nan():
 
 
 def inverted_nodata(nothing=255, kind=np.uint8):
-    """A value other than 0 where nothing is, as other programs write it."""
+    """A value other than 0 where there is no rail, as other programs write it."""
     cells = track_cells(kind=kind)
     cells[cells == 0] = nothing
     return cells
@@ -106,7 +106,7 @@ def text_file(bench):
 
 
 def over_itself(bench):
-    """Output onto the input."""
+    """Overwrites the input."""
     parameters = raster(bench)
     return {**parameters, "OUTPUT": parameters["INPUT"]}
 
@@ -123,7 +123,7 @@ FLAT_LEFT, FLAT_RIGHT = (text.replace(" Z", "").replace(" 100)", ")").replace(" 
 
 
 def lines(*texts, kind="LineStringZ", crs="EPSG:32643", fields="", values=()):
-    """A layer of lines in memory; the bench keeps it alive."""
+    """A line layer in memory."""
 
     def prepare(bench):
         layer = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "lines", "memory")
@@ -160,7 +160,7 @@ V, B = "vectorizerails", "buildtrackcenterlines"
 
 RASTERS = [
     Fault(
-        "no raster file",
+        "text file instead of a raster",
         text_file,
         REFUSED,
         "INPUT can't be …/rail.tif: give a raster layer, or a raster file that can be read.",
@@ -172,40 +172,40 @@ RASTERS = [
         "INPUT can't be …/gone.tif: give a raster layer, or a raster file that can be read.",
     ),
     Fault(
-        "GeoTIFF cut in its header",
+        "GeoTIFF truncated in the header",
         of_raster(lambda data: data[:60]),
         REFUSED,
         "INPUT can't be …/rail.tif: give a raster layer, or a raster file that can be read.",
     ),
     Fault(
-        "GeoTIFF damaged in its cells",
+        "GeoTIFF with damaged cells",
         damaged_cells,
         REFUSED,
-        "rail.tif is damaged at row 0, column 0: make it again.",
+        "rail.tif is damaged at row 0, column 0: create it again.",
     ),
     Fault(
-        "turned raster",
+        "rotated raster",
         of_raster(grid=(500_000, CELL_M, 0.001, 3_000_000, 0.001, -CELL_M)),
         REFUSED,
-        "rail.tif is turned or its cells are not square: warp it to square cells, north up.",
+        "rail.tif is rotated or its cells are not square: warp it to square cells, north up.",
     ),
     Fault(
-        "cells that are not square",
+        "non-square cells",
         of_raster(grid=(500_000, CELL_M, 0, 3_000_000, 0, -0.05)),
         REFUSED,
-        "rail.tif is turned or its cells are not square: warp it to square cells, north up.",
+        "rail.tif is rotated or its cells are not square: warp it to square cells, north up.",
     ),
     Fault(
-        "raster with south up",
+        "south-up raster",
         of_raster(grid=(500_000, CELL_M, 0, 3_000_000, 0, CELL_M)),
         REFUSED,
-        "rail.tif is turned or its cells are not square: warp it to square cells, north up.",
+        "rail.tif is rotated or its cells are not square: warp it to square cells, north up.",
     ),
     Fault(
-        "raster without a place",
+        "raster without georeference",
         of_raster(grid=None, epsg=None),
         REFUSED,
-        "rail.tif is turned or its cells are not square: warp it to square cells, north up.",
+        "rail.tif is rotated or its cells are not square: warp it to square cells, north up.",
     ),
     Fault(
         "raster in degrees",
@@ -214,34 +214,34 @@ RASTERS = [
         "Lengths can't be computed in WGS 84: use a projected coordinate system.",
     ),
     Fault(
-        "wrong number of bands (an RGB picture)",
+        "wrong number of bands (RGB image)",
         of_raster(cells=track_cells(3), texts=()),
         REFUSED,
         "rail.tif has 3 bands, and not every description is a class code: give a raster with one band, or "
-        "with one band a class like those of Rasterize Rail Points.",
+        "with one band per class as from Rasterize Rail Points.",
     ),
     Fault(
-        "band that is no class",
+        "band description that is not a class",
         of_raster(cells=track_cells(2), texts=("10", "300")),
         REFUSED,
         "rail.tif has 2 bands, and not every description is a class code: give a raster with one band, or "
-        "with one band a class like those of Rasterize Rail Points.",
+        "with one band per class as from Rasterize Rail Points.",
     ),
     Fault(
-        "two bands of one class",
+        "two bands for one class",
         of_raster(cells=track_cells(2), texts=("10", "10")),
         REFUSED,
-        "rail.tif has several bands of one class (10, 10): give each class one band.",
+        "rail.tif has several bands for one class (10, 10): give one band per class.",
     ),
     Fault(
-        "no tags",
+        "missing tags",
         of_raster(tags={}),
         REFUSED,
-        "The raster does not say for which rails it was made (tags RAIL_GAUGE_MM and RAIL_HEAD_MM): fill "
+        "The raster does not state its gauge and railhead width (tags RAIL_GAUGE_MM and RAIL_HEAD_MM): fill in "
         "GAUGE and HEAD_WIDTH.",
     ),
     Fault(
-        "tags that are no numbers",
+        "tags that are not numbers",
         of_raster(tags={"RAIL_GAUGE_MM": "wide", "RAIL_HEAD_MM": "72"}),
         REFUSED,
         "The tag RAIL_GAUGE_MM of the raster can't be 'wide': rasterize the points again.",
@@ -253,7 +253,7 @@ RASTERS = [
         "A gauge of nan mm is not possible: give millimetres from 500 to 2000.",
     ),
     Fault(
-        "tag of an extent that is none",
+        "tag with an invalid extent",
         of_raster(tags={**TAGS, "RAIL_EXTENT": "1,2"}),
         REFUSED,
         "The tag RAIL_EXTENT of the raster can't be '1,2': rasterize the points again.",
@@ -267,16 +267,16 @@ RASTERS = [
         run="frpdfcleanup",
     ),
     Fault(
-        "tag of an unknown model", of_raster(tags={**TAGS, "RAIL_MODEL": "gone"}), FINE, gives={}, run="frpdfcleanup"
+        "tag with an unknown model", of_raster(tags={**TAGS, "RAIL_MODEL": "gone"}), FINE, gives={}, run="frpdfcleanup"
     ),
     Fault(
         "empty raster",
         of_raster(cells=np.zeros((1, 90, 200), np.uint8)),
         REFUSED,
-        "rail.tif holds no rail cell: give a raster with 1 where there is rail.",
+        "rail.tif has no rail cell: give a raster with 1 where there is rail.",
     ),
     Fault(
-        "raster of one cell",
+        "raster with a single cell",
         of_raster(cells=np.ones((1, 1, 1), np.uint8)),
         WARNED,
         "Without POINTS, the rails have no heights and are only as accurate as the raster. "
@@ -284,35 +284,35 @@ RASTERS = [
         {"RAIL_COUNT": 0},
     ),
     Fault(
-        "raster full of rail",
+        "raster with rail in all cells",
         of_raster(cells=np.ones((1, 90, 200), np.uint8)),
         WARNED,
         "Without POINTS, the rails have no heights and are only as accurate as the raster.",
         {},
     ),
     Fault(
-        "real numbers, NaN for nothing",
+        "floating-point cells, NaN without rail",
         of_raster(cells=as_floats_with_nan(), nodata=None),
         WARNED,
         "Without POINTS, the rails have no heights and are only as accurate as the raster.",
         TWO_RAILS,
     ),
     Fault(
-        "255 for nothing",
+        "255 as the nodata value",
         of_raster(cells=inverted_nodata(), nodata=255),
         WARNED,
         "Without POINTS, the rails have no heights and are only as accurate as the raster.",
         TWO_RAILS,
     ),
     Fault(
-        "whole numbers, 32767 for nothing",
+        "16-bit cells, 32767 as the nodata value",
         of_raster(cells=inverted_nodata(32767, np.int16), nodata=32767),
         WARNED,
         "Without POINTS, the rails have no heights and are only as accurate as the raster.",
         TWO_RAILS,
     ),
     Fault(
-        "no value for nothing",
+        "no nodata value",
         of_raster(nodata=None),
         WARNED,
         "Without POINTS, the rails have no heights and are only as accurate as the raster.",
@@ -325,46 +325,46 @@ RASTERS = [
         "POINTS are in NAD83 / New York Long Island (ftUS), whose unit is not the metre: assign a coordinate system to "
         "the raster too.",
     ),
-    Fault("output onto the input", over_itself, run="frpdfcleanup"),
+    Fault("output that overwrites the input", over_itself, run="frpdfcleanup"),
 ]
 
 LINES = [
     Fault(
-        "no vector file",
+        "damaged vector file",
         no_vector_file,
         REFUSED,
         "INPUT can't be …/lines.gpkg: give a vector layer, or a vector file that can be read.",
     ),
     Fault(
-        "missing lines",
+        "missing vector file",
         lambda bench: {"INPUT": bench.folder / "gone.gpkg"},
         REFUSED,
         "INPUT can't be …/gone.gpkg: give a vector layer, or a vector file that can be read.",
     ),
-    Fault("layer without lines", lines(), REFUSED, "INPUT holds no line: give a layer of lines."),
-    Fault("table without shapes", table, REFUSED, "INPUT is a layer of the type NoGeometry: give a layer of lines."),
+    Fault("layer without lines", lines(), REFUSED, "INPUT has no lines: give a line layer."),
+    Fault("table without geometry", table, REFUSED, "INPUT has the geometry type NoGeometry: give a line layer."),
     Fault(
         "points instead of lines",
         lines("POINT (500000 3000000)", kind="Point"),
         REFUSED,
-        "INPUT is a layer of the type Point: give a layer of lines.",
+        "INPUT has the geometry type Point: give a line layer.",
     ),
     Fault(
         "polygons instead of lines",
         lines("POLYGON ((500000 3000000, 500001 3000000, 500001 3000001, 500000 3000000))", kind="Polygon"),
         REFUSED,
-        "INPUT is a layer of the type Polygon: give a layer of lines.",
+        "INPUT has the geometry type Polygon: give a line layer.",
     ),
-    Fault("empty and missing shapes among lines", lines(LEFT, "LINESTRING Z EMPTY", "", RIGHT), gives=ONE_TRACK),
-    Fault("only empty shapes", lines("LINESTRING Z EMPTY", ""), REFUSED, "INPUT holds no line: give a layer of lines."),
+    Fault("empty and missing geometries among lines", lines(LEFT, "LINESTRING Z EMPTY", "", RIGHT), gives=ONE_TRACK),
+    Fault("only empty geometries", lines("LINESTRING Z EMPTY", ""), REFUSED, "INPUT has no lines: give a line layer."),
     Fault(
-        "lines of one place",
+        "line of zero length",
         lines("LINESTRING Z (500000 3000000 1, 500000 3000000 1)"),
         REFUSED,
-        "INPUT holds no line: give a layer of lines.",
+        "INPUT has no lines: give a line layer.",
     ),
     Fault(
-        "parts in one feature",
+        "multi-part lines",
         lines(f"MULTILINESTRING Z ({LEFT[13:]}, {RIGHT[13:]})", kind="MultiLineStringZ"),
         gives=ONE_TRACK,
     ),
@@ -373,59 +373,59 @@ LINES = [
         "no heights",
         lines(FLAT_LEFT, FLAT_RIGHT, kind="LineString"),
         WARNED,
-        "2 of 2 lines have no heights: what is made of them has none either.",
+        "2 of 2 lines have no heights, so their results have none.",
         ONE_TRACK,
     ),
     Fault(
-        "one height that is no number",
+        "one height of NaN",
         lines(line((500000, 3000001.507, 100), (500006, 3000001.507, NAN)), RIGHT),
         WARNED,
-        "1 of 2 lines have no heights: what is made of them has none either.",
+        "1 of 2 lines have no heights, so their results have none.",
         ONE_TRACK,
     ),
     Fault(
-        "place that is no number",
+        "coordinate of NaN",
         lines(line((500000, 3000001.507, 100), (500003, NAN, 100), (500006, 3000001.507, 100)), RIGHT),
         REFUSED,
-        "INPUT has a line (feature 1) with a place that is no number: repair or delete it.",
+        "INPUT has a line (feature 1) with a coordinate that is not a number: repair or delete it.",
     ),
     Fault(
-        "infinite place",
+        "infinite coordinate",
         lines(line((500000, 3000001.507, 100), (INFINITE, 3000001.507, 100)), RIGHT),
         REFUSED,
-        "INPUT has a line (feature 1) with a place that is no number: repair or delete it.",
+        "INPUT has a line (feature 1) with a coordinate that is not a number: repair or delete it.",
     ),
     Fault(
         "stray vertex 1000 km away",
         lines(line((500000, 3000001.507, 100), (1_500_000, 3000001.507, 100)), RIGHT),
         REFUSED,
-        "INPUT has a line (feature 1) with a vertex far away: repair or delete it.",
+        "INPUT has a line (feature 1) with a stray vertex: repair or delete it.",
     ),
     Fault(
-        "every line twice",
+        "duplicate lines",
         lines(LEFT, RIGHT, LEFT, RIGHT),
         WARNED,
-        "2 of 4 lines lie on another one: what is made of them comes twice.",
+        "2 of 4 lines are duplicates: their results appear twice.",
         {"CENTERLINE_COUNT": 2},
     ),
     Fault(
-        "vertices that repeat",
+        "repeated vertices",
         lines(LEFT.replace("(", "(500000 3000001.507 100, 500000 3000001.507 100, "), RIGHT),
         gives=ONE_TRACK,
     ),
     Fault(
-        "line that crosses itself",
+        "self-intersecting line",
         lines(LEFT, RIGHT, "LINESTRING Z (500020 3000000 1, 500030 3000010 1, 500030 3000000 1, 500020 3000010 1)"),
         gives=ONE_TRACK,
     ),
     Fault(
-        "line that ends where it begins",
+        "closed line",
         lines(LEFT, RIGHT, "LINESTRING Z (500020 3000000 1, 500030 3000010 1, 500030 3000000 1, 500020 3000000 1)"),
         gives=ONE_TRACK,
     ),
     Fault("vertical line", lines(LEFT, RIGHT, "LINESTRING Z (500020 3000000 1, 500020 3000000 9)"), gives=ONE_TRACK),
     Fault(
-        "one rail alone",
+        "only one rail",
         lines(LEFT),
         WARNED,
         "No two rails run parallel: there are rails but no track centerlines.",
@@ -438,14 +438,14 @@ LINES = [
         "No track of 1435 mm gauge found: rails lie 1072 mm apart, is the gauge 1000 mm?",
     ),
     Fault(
-        "rails that cross at a right angle",
+        "rails crossing at a right angle",
         lines(LEFT, "LINESTRING Z (500003 2999997 100, 500003 3000004 100)"),
         WARNED,
         "No two rails run parallel: there are rails but no track centerlines.",
         NO_TRACKS,
     ),
     Fault(
-        "field class_code with text",
+        "text in the field class_code",
         lines(LEFT, RIGHT, fields="&field=class_code:string", values=[("ten",), ("ten",)]),
         gives=ONE_TRACK,
     ),

@@ -1,4 +1,4 @@
-"""Parameters that no run can be made of, or that contradict each other."""
+"""Invalid and contradictory parameters."""
 
 import numpy as np
 import pytest
@@ -13,11 +13,11 @@ POSITIVE = (
     *("CENTERLINE_TOLERANCE", "STEP"),
 )
 NUMBERS = (*POSITIVE, "ITERATIONS", "MAX_GAP", "GAP_ANGLE", "SIMPLIFY_XY", "SIMPLIFY_Z", "MIN_LENGTH")
-"""All numbers of Extract Rails, and those that can't be zero either."""
+"""All numbers of Extract Rails; those in `POSITIVE` must not be zero."""
 
 
 def with_(**parameters):
-    """A good cloud, and these parameters."""
+    """A valid cloud and these parameters."""
     return lambda bench: {"INPUT": bench.cloud(bench.track(length_m=6.0)), **parameters}
 
 
@@ -34,7 +34,7 @@ def file_and_table_of_it(bench):
 
 
 def in_a_sharp_curve(**parameters):
-    """The track in an arc of 25 m, and these parameters."""
+    """The track in a curve of radius 25 m, and these parameters."""
 
     def prepare(bench):
         along, across, z = (bench.track(length_m=24.0) - PLACE).T
@@ -54,7 +54,7 @@ FAULTS = [
         "to … m or less.",
         {"RAIL_COUNT": 2, "CENTERLINE_COUNT": 1},
     ),
-    Fault("SMOOTHING_XY that suits a sharp curve", in_a_sharp_curve(SMOOTHING_XY=1.5)),
+    Fault("SMOOTHING_XY suitable for a sharp curve", in_a_sharp_curve(SMOOTHING_XY=1.5)),
     *(
         Fault(f"{name} not a number", with_(**{name: NAN}), REFUSED, f"{name} can't be nan: give a number.")
         for name in NUMBERS
@@ -74,7 +74,7 @@ FAULTS = [
         "SMOOTHING_XY can't be wide: give ….",
     ),
     Fault(
-        "gauge that no railway has",
+        "impossible gauge",
         with_(GAUGE=300),
         REFUSED,
         "A gauge of 300 mm is not possible: give millimetres from 500 to 2000.",
@@ -86,29 +86,31 @@ FAULTS = [
         "A gauge of 1.435 mm is not possible: give millimetres from 500 to 2000.",
     ),
     Fault(
-        "railhead that no rail has",
+        "impossible railhead width",
         with_(HEAD_WIDTH=200),
         REFUSED,
         "A railhead width of 200 mm is not possible: give millimetres from 40 to 90.",
     ),
     Fault(
-        "gauge and railhead that no model covers",
+        "gauge and railhead width not covered by any model",
         with_(GAUGE=600, HEAD_WIDTH=75),
         REFUSED,
         "A gauge of 600 mm is 8.0 times a railhead of 75.0 mm, and the models cover 13.4 to 26.7 times: "
         "check GAUGE and HEAD_WIDTH.",
     ),
     Fault(
-        "CUSTOM without gauge and railhead",
+        "CUSTOM without gauge and railhead width",
         with_(STANDARD="CUSTOM"),
         REFUSED,
-        "The standard CUSTOM needs both the gauge and the railhead width, in millimetres: fill GAUGE and HEAD_WIDTH.",
+        "The standard CUSTOM needs both the gauge and the railhead width, in millimetres: fill in GAUGE and "
+        "HEAD_WIDTH.",
     ),
     Fault(
-        "CUSTOM with a gauge alone",
+        "CUSTOM without railhead width",
         with_(STANDARD="CUSTOM", GAUGE=1435),
         REFUSED,
-        "The standard CUSTOM needs both the gauge and the railhead width, in millimetres: fill GAUGE and HEAD_WIDTH.",
+        "The standard CUSTOM needs both the gauge and the railhead width, in millimetres: fill in GAUGE and "
+        "HEAD_WIDTH.",
     ),
     Fault(
         "unknown standard",
@@ -123,61 +125,61 @@ FAULTS = [
         "no class",
         with_(RAIL_CLASSES=""),
         REFUSED,
-        "RAIL_CLASSES can't be empty: give classes whose points lie on rails, such as 10 or 10,11.",
+        "RAIL_CLASSES can't be empty: give classes of the points on rails, such as 10 or 10,11.",
     ),
     Fault(
-        "class in words",
+        "class as a word",
         with_(RAIL_CLASSES="ten"),
         REFUSED,
-        'RAIL_CLASSES "ten" should be whole numbers from 0 to 255 such as 10 or 10,11.',
+        'RAIL_CLASSES "ten" must be whole numbers from 0 to 255 such as 10 or 10,11.',
     ),
     Fault(
         "range of classes",
         with_(RAIL_CLASSES="10-12"),
         REFUSED,
-        'RAIL_CLASSES "10-12" should be whole numbers from 0 to 255 such as 10 or 10,11.',
+        'RAIL_CLASSES "10-12" must be whole numbers from 0 to 255 such as 10 or 10,11.',
     ),
     Fault(
         "class above 255",
         with_(RAIL_CLASSES="300"),
         REFUSED,
-        'RAIL_CLASSES "300" should be whole numbers from 0 to 255 such as 10 or 10,11.',
+        'RAIL_CLASSES "300" must be whole numbers from 0 to 255 such as 10 or 10,11.',
     ),
     Fault(
-        "class that no point has",
+        "class without points",
         with_(RAIL_CLASSES="11"),
         REFUSED,
         "The cloud has no points of class 11; its classes, with the number of points, are 10 (3600): set the rail "
         "classes.",
     ),
     Fault(
-        "other gauges in words",
+        "other gauges as words",
         with_(OTHER_GAUGES="wide"),
         REFUSED,
-        'OTHER_GAUGES "wide" should be millimetres such as 1000;1067.',
+        'OTHER_GAUGES "wide" must be millimetres such as 1000;1067.',
     ),
     Fault(
         "other gauge of zero",
         with_(OTHER_GAUGES="0"),
         REFUSED,
-        'OTHER_GAUGES "0" should be millimetres such as 1000;1067.',
+        'OTHER_GAUGES "0" must be millimetres such as 1000;1067.',
     ),
     Fault(
-        "other gauge too near to the gauge",
+        "other gauge too close to the gauge",
         with_(OTHER_GAUGES="1440"),
         REFUSED,
         "Gauges of 1435 and 1440 mm can't be distinguished within CENTERLINE_TOLERANCE (0.05 m): give one of them, "
         "or a smaller tolerance.",
     ),
     Fault(
-        "tolerance as wide as the gauges differ",
+        "tolerance larger than the difference of the gauges",
         with_(OTHER_GAUGES="1067", CENTERLINE_TOLERANCE=0.5),
         REFUSED,
         "Gauges of 1067 and 1435 mm can't be distinguished within CENTERLINE_TOLERANCE (0.5 m): give one of them, or "
         "a smaller tolerance.",
     ),
     Fault(
-        "extent beside the cloud",
+        "extent outside the cloud",
         with_(EXTENT="0,1,0,1"),
         REFUSED,
         "The extent contains no points of class 10: choose a larger extent.",
@@ -189,22 +191,22 @@ FAULTS = [
         "EXTENT has no area: give a rectangle as xmin,xmax,ymin,ymax, or leave it empty.",
     ),
     Fault(
-        "extent that is none",
+        "invalid extent",
         with_(EXTENT="here"),
         REFUSED,
         "EXTENT can't be here: give four numbers: xmin,xmax,ymin,ymax.",
     ),
     Fault(
-        "extent in a coordinate system far away",
+        "extent outside the cloud, in another coordinate system",
         with_(EXTENT="0,1,0,1 [EPSG:4326]"),
         REFUSED,
         "The extent contains no points of class 10: choose a larger extent.",
     ),
     Fault(
-        "coordinate system that is none",
+        "invalid coordinate system",
         with_(CRS="EPSG:0"),
         REFUSED,
-        "CRS EPSG:0 is no coordinate system: choose one from the list.",
+        "CRS EPSG:0 is not a coordinate system: choose one from the list.",
     ),
     Fault(
         "OPENCV on a GPU",
@@ -216,26 +218,26 @@ FAULTS = [
         "no cloud",
         lambda bench: {"INPUT": None},
         REFUSED,
-        "INPUT can't be empty: give a loaded point cloud, or the path of a LAS, LAZ or COPC file, of a "
-        "folder of them or of a .vpc file.",
+        "INPUT can't be empty: give a loaded point cloud layer, or the path of a LAS, LAZ or COPC file, of a "
+        "folder of such files, or of a virtual point cloud (.vpc).",
     ),
     Fault(
         "two outputs in one file",
         same_file,
         REFUSED,
-        "RAILS and CENTERLINES are one file: give each a name of its own.",
+        "RAILS and CENTERLINES are the same file: give each its own name.",
     ),
     Fault(
-        "two outputs in one file, spelled in two ways",
+        "two outputs in one file, with different spellings",
         same_file_spelled_otherwise,
         REFUSED,
-        "RAILS and CENTERLINES are one file: give each a name of its own.",
+        "RAILS and CENTERLINES are the same file: give each its own name.",
     ),
     Fault(
-        "a file for one output, a table of it for another",
+        "a file for one output, a table in it for another",
         file_and_table_of_it,
         REFUSED,
-        "RAILS and CENTERLINES are one file: give each a name of its own.",
+        "RAILS and CENTERLINES are the same file: give each its own name.",
     ),
 ]
 

@@ -224,15 +224,15 @@ def test_inputs_that_do_not_fit_each_other_are_refused(qgis, run_step, write_clo
     on_rails = np.concatenate([left, right])
     for parameters, sentence in (
         ({"INPUT": degrees}, "The lines are in degrees"),
-        ({"INPUT": layer_of([])}, "INPUT holds no line"),
-        ({"RAILS": layer_of([])}, "RAILS holds no line"),
+        ({"INPUT": layer_of([])}, "INPUT has no lines"),
+        ({"RAILS": layer_of([])}, "RAILS has no lines"),
         ({"RAILS": layer_of([left], crs="EPSG:32644")}, "RAILS are in WGS 84 / UTM zone 44N but INPUT in WGS 84 / UTM"),
         (
             {"INPUT": layer_of([middle], crs="EPSG:2263"), "RAILS": layer_of([left, right], crs="")},
             "INPUT are in NAD83 / New York Long Island (ftUS), whose unit is not the metre: assign a coordinate "
             "system to RAILS too.",
         ),
-        ({"RAILS": layer_of([left + [0, 90, 0]])}, "RAILS lie beside none of the lines of INPUT"),
+        ({"RAILS": layer_of([left + [0, 90, 0]])}, "None of RAILS is next to a line of INPUT"),
         (
             {"POINTS": write_cloud(on_rails, "zone.las", epsg=32644)},
             "zone 44N but the rails in WGS 84",

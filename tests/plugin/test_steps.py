@@ -193,7 +193,7 @@ def test_raster_made_elsewhere_asks_for_its_rails(run_step, raster, cloud, tmp_p
     )
     for name in ("frpdfcleanup", "vectorizerails"):
         outcome = run_step(name, {"INPUT": other, "OUTPUT": "TEMPORARY_OUTPUT"})
-        assert "fill GAUGE and HEAD_WIDTH" in outcome.error
+        assert "fill in GAUGE and HEAD_WIDTH" in outcome.error
     outcome = run_step("vectorizerails", {"INPUT": other, "GAUGE": 1435, "HEAD_WIDTH": 72, "OUTPUT": "memory:"})
     assert outcome.ok, outcome.error
     assert outcome.results["RAIL_COUNT"] == 2

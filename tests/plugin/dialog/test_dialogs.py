@@ -120,12 +120,12 @@ def test_help_button_opens_the_guide(make, name, tmp_path, monkeypatch):
 
 CONTRADICTIONS = [
     ({"STANDARD": "CUSTOM"}, "CUSTOM needs both the gauge and the railhead width"),
-    ({"STANDARD": "CUSTOM", "GAUGE": 1435}, "fill GAUGE and HEAD_WIDTH"),
+    ({"STANDARD": "CUSTOM", "GAUGE": 1435}, "fill in GAUGE and HEAD_WIDTH"),
     ({"GAUGE": 1.435}, "A gauge of 1.44 mm is not possible: give millimetres from 500 to 2000"),
     ({"HEAD_WIDTH": 7.2}, "A railhead width of 7.2 mm is not possible"),
     ({"GAUGE": 600, "HEAD_WIDTH": 72}, "check GAUGE and HEAD_WIDTH"),
-    ({"RAIL_CLASSES": "rails"}, 'RAIL_CLASSES "rails" should be whole numbers from 0 to 255'),
-    ({"RAIL_CLASSES": "256"}, 'RAIL_CLASSES "256" should be whole numbers from 0 to 255'),
+    ({"RAIL_CLASSES": "rails"}, 'RAIL_CLASSES "rails" must be whole numbers from 0 to 255'),
+    ({"RAIL_CLASSES": "256"}, 'RAIL_CLASSES "256" must be whole numbers from 0 to 255'),
     ({"OTHER_GAUGES": "metre gauge"}, 'OTHER_GAUGES "metre gauge" should be millimetres'),
     ({"OTHER_GAUGES": "1450"}, "can't be distinguished within CENTERLINE_TOLERANCE"),
     ({"EXTENT": "500000,500000,3000000,3000010"}, "EXTENT has no area"),
@@ -148,7 +148,7 @@ def test_dialog_refuses_contradictions(open_dialog, context, write_cloud, track,
 def test_dialog_calls_parameters_by_their_labels(make):
     algorithm = make("extractrails")
     definitions = algorithm.parameterDefinitions()
-    said = "The standard CUSTOM needs both: fill GAUGE and HEAD_WIDTH, not MAX_GAPS or OUTPUT/CRS.gpkg."
+    said = "The standard CUSTOM needs both: fill in GAUGE and HEAD_WIDTH, not MAX_GAPS or OUTPUT/CRS.gpkg."
     shown = said.replace("GAUGE", '"Gauge [mm]"').replace("HEAD_WIDTH", '"Railhead width [mm]"')
     assert with_labels(said, definitions) == shown
     assert for_user(said, definitions) == said  # what runs here has no windows of QGIS

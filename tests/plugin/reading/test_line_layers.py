@@ -103,7 +103,7 @@ def test_points_and_empty_parts_are_passed_over(layer):
     repeated = "LINESTRING Z (500000 3000000 1, 500000 3000000 1, 500010 3000000 1)"
     rails, _ = rails_of(layer(still, "LINESTRING Z EMPTY", repeated))
     assert [len(rail.xyz) for rail in rails] == [2]
-    with pytest.raises(RailExtractError, match="holds no line"):
+    with pytest.raises(RailExtractError, match="has no lines"):
         rails_of(layer(still))
 
 

@@ -200,15 +200,15 @@ def test_empty_raster_is_refused(geotiff):
     dataset = gdal.Open(str(path), gdal.GA_Update)
     dataset.GetRasterBand(1).Fill(0)
     dataset = None
-    with pytest.raises(RasterError, match="holds no rail cell"):
+    with pytest.raises(RasterError, match="has no rail cell"):
         read_rasters(path, read_header(path))
 
 
 def test_standard_comes_from_the_user_else_from_the_tags(geotiff):
     untold = read_header(geotiff())
-    with pytest.raises(ParameterError, match="fill GAUGE and HEAD_WIDTH"):
+    with pytest.raises(ParameterError, match="fill in GAUGE and HEAD_WIDTH"):
         untold.standard(None, None)
-    with pytest.raises(ParameterError, match="fill GAUGE and HEAD_WIDTH"):
+    with pytest.raises(ParameterError, match="fill in GAUGE and HEAD_WIDTH"):
         untold.standard(1435, None)
     assert untold.standard(1435, 72).gauge_m == pytest.approx(1.435)
     told = read_header(geotiff(tags={"RAIL_GAUGE_MM": "1000", "RAIL_HEAD_MM": "61.91"}))
