@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from qgis.core import QgsCoordinateReferenceSystem, QgsFields, QgsMemoryProviderUtils, QgsWkbTypes
 
-from ..core.clouds.crs import parse_crs
 from ..core.fields import UNKNOWN_IN_METRES
 
 _built: dict[str, QgsCoordinateReferenceSystem] = {}
@@ -24,6 +23,8 @@ def prepare_system(wkt: str | None) -> None:
     wkt : str or None
         None for coordinates in metres in an unknown system.
     """
+    from ..core.clouds.crs import parse_crs
+
     for text in {wkt, parse_crs(wkt).to_wkt()} if wkt else {UNKNOWN_IN_METRES}:
         if text not in _built:
             _built[text] = QgsCoordinateReferenceSystem.fromWkt(text)

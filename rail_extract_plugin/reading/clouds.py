@@ -16,7 +16,6 @@ from qgis.core import (
     QgsProperty,
 )
 
-from ...core.clouds.readers import list_files, read_header
 from ...core.errors import CloudError
 from ...core.progress import Progress
 from ...core.standards import RAIL_CLASS
@@ -125,6 +124,8 @@ def spool_points(
 
 def crs_of(source: CloudSource) -> str | None:
     """Return the coordinate system of a cloud's first file as WKT; reading the points checks that all files agree."""
+    from ...core.clouds.readers import list_files, read_header
+
     return read_header(list_files(source.paths)[0]).crs_wkt or source.crs_wkt
 
 
@@ -139,6 +140,7 @@ def checked_crs(source: CloudSource) -> str | None:
         The coordinate system does not measure lengths.
     """
     from ...core.clouds.points import ask
+    from ...core.clouds.readers import list_files
 
     try:
         return ask(list_files(source.paths)[:1], (RAIL_CLASS,), source.crs_wkt).zero.crs_wkt
@@ -152,5 +154,7 @@ def _loaded_layer(name: str, context: QgsProcessingContext) -> QgsMapLayer | Non
 
 def _checked(source: CloudSource) -> CloudSource:
     """Raise a `CloudError` now if the paths don't lead to cloud files."""
+    from ...core.clouds.readers import list_files
+
     list_files(source.paths)
     return source

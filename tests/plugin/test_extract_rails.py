@@ -179,7 +179,7 @@ def test_where_one_output_fails_the_others_are_whole(run, scene, outputs, tmp_pa
     more = {"CENTERLINES": gone / "tracks.gpkg", "QUALITY": tmp_path / "quality.gpkg", "REPORT": tmp_path / "r.html"}
     outcome = run({**scene, **outputs, **more}, feedback)
     assert not outcome.ok
-    assert outcome.error.endswith("Not written: CENTERLINES. Written and whole: RAILS, QUALITY, REPORT.")
+    assert outcome.error.endswith("Not written: CENTERLINES. Complete: RAILS, QUALITY, REPORT.")
     assert len(lines_of(outputs["RAILS"])[1]) == 2
     assert len(lines_of(more["QUALITY"])[1]) > 10
     assert "Track 1" in more["REPORT"].read_text(encoding="utf-8")

@@ -184,7 +184,7 @@ def test_another_head_width_than_before_is_warned_of(measure, new_feedback):
     lines = layer_of([middle], fields="&field=gauge_mm:double", values=[(1435.0,)])
     feedback = new_feedback()
     measure(lines, layer_of([left, right]), feedback, HEAD_WIDTH=66)
-    assert "+6.0 mm off" in feedback.warnings[0]
+    assert "differs by +6.0 mm" in feedback.warnings[0]
     assert "check HEAD_WIDTH" in feedback.warnings[0]
 
 
@@ -192,7 +192,7 @@ def test_a_line_away_from_rails_is_warned_of(measure, new_feedback):
     middle, left, right = curved_track()
     feedback = new_feedback()
     _, _, values = measure(layer_of([middle, middle + [0, 50, 0]]), layer_of([left, right]), feedback)
-    assert "Tracks 2 have no rails on both sides" in feedback.warnings[0]
+    assert "Tracks 2 do not have rails on both sides" in feedback.warnings[0]
     away = values["track_id"] == 2
     assert np.isnan(values["gauge_mm"][away]).all()
     assert values["bridged"][away].all()
@@ -205,7 +205,7 @@ def test_a_line_away_from_rails_is_warned_of(measure, new_feedback):
         ({"RAILS": "gone.gpkg"}, "gone.gpkg"),
         ({"RAILS": None}, "RAILS"),
         ({"POINTS": "gone.laz"}, "gone.laz does not exist"),
-        ({"STANDARD": "CUSTOM"}, "fill HEAD_WIDTH"),
+        ({"STANDARD": "CUSTOM"}, "fill in HEAD_WIDTH"),
         ({"HEAD_WIDTH": 100}, "A railhead width of 100 mm is not possible"),
         ({"STEP": 0}, "STEP"),
         ({"OUTPUT": "/nowhere/q.gpkg"}, "can't be written"),

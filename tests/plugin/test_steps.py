@@ -203,7 +203,7 @@ def test_raster_made_elsewhere_asks_for_its_rails(run_step, raster, cloud, tmp_p
     ("name", "parameters", "sentence"),
     [
         ("frpdfcleanup", {"GAUGE": 1000, "HEAD_WIDTH": 61.91}, "cells are 39.9 mm wide, but a gauge of 1000 mm"),
-        ("frpdfcleanup", {"ENGINE": "OPENCV", "DEVICE": "CUDA"}, "processor alone"),
+        ("frpdfcleanup", {"ENGINE": "OPENCV", "DEVICE": "CUDA"}, "on the CPU only"),
         ("frpdfcleanup", {"INPUT": "gone.tif"}, "gone.tif"),
         ("frpdfcleanup", {"OUTPUT": "cleaned.jpg"}, "jpg"),
         ("frpdfcleanup", {"OUTPUT": "/nowhere/cleaned.tif"}, "can't be written"),

@@ -159,7 +159,7 @@ def test_three_rails_make_two_tracks_in_one_run(layer, run_step, context):
 @pytest.mark.parametrize(
     ("parameters", "sentence"),
     [
-        ({"OTHER_GAUGES": "wide"}, 'OTHER_GAUGES "wide" should be millimetres'),
+        ({"OTHER_GAUGES": "wide"}, 'OTHER_GAUGES "wide" must be millimetres'),
         ({"OTHER_GAUGES": "1440"}, "can't be distinguished within CENTERLINE_TOLERANCE"),
         ({"OTHER_GAUGES": "10"}, "A gauge of 10 mm is not possible"),
         ({"GAUGE": 1000}, "is the gauge 1435 mm?"),

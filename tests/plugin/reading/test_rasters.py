@@ -175,7 +175,7 @@ def test_raster_made_elsewhere(geotiff, nodata):
 @pytest.mark.parametrize(
     ("made", "error", "sentence"),
     [
-        ({"transform": (0, 0.04, 0.01, 0, 0, -0.04)}, RasterError, "turned"),
+        ({"transform": (0, 0.04, 0.01, 0, 0, -0.04)}, RasterError, "rotated"),
         ({"transform": (0, 0.04, 0, 0, 0, -0.05)}, RasterError, "not square"),
         ({"transform": (0, 0.04, 0, 0, 0, 0.04)}, RasterError, "north up"),
         ({"bands": 3}, RasterError, "has 3 bands"),
@@ -191,7 +191,7 @@ def test_unfit_raster_is_refused(geotiff, made, error, sentence):
 
 def test_no_raster_is_refused(tmp_path):
     (tmp_path / "text.tif").write_text("no raster")
-    with pytest.raises(RasterError, match="is no raster"):
+    with pytest.raises(RasterError, match="is not a readable raster"):
         read_header(tmp_path / "text.tif")
 
 
