@@ -126,7 +126,7 @@ CONTRADICTIONS = [
     ({"GAUGE": 600, "HEAD_WIDTH": 72}, "check GAUGE and HEAD_WIDTH"),
     ({"RAIL_CLASSES": "rails"}, 'RAIL_CLASSES "rails" must be whole numbers from 0 to 255'),
     ({"RAIL_CLASSES": "256"}, 'RAIL_CLASSES "256" must be whole numbers from 0 to 255'),
-    ({"OTHER_GAUGES": "metre gauge"}, 'OTHER_GAUGES "metre gauge" should be millimetres'),
+    ({"OTHER_GAUGES": "metre gauge"}, 'OTHER_GAUGES "metre gauge" must be millimetres'),
     ({"OTHER_GAUGES": "1450"}, "can't be distinguished within CENTERLINE_TOLERANCE"),
     ({"EXTENT": "500000,500000,3000000,3000010"}, "EXTENT has no area"),
     ({"CRS": "EPSG:4326"}, "CRS EPSG:4326 is in degrees, where lengths can't be measured: choose a projected one"),
