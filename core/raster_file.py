@@ -122,8 +122,8 @@ class RasterHeader:
         )
         if gauge_mm is None or head_width_mm is None:
             raise ParameterError(
-                f"The raster does not say for which rails it was made (tags {GAUGE_TAG} and {HEAD_TAG}): "
-                "fill GAUGE and HEAD_WIDTH."
+                f"The raster does not state its gauge and railhead width (tags {GAUGE_TAG} and {HEAD_TAG}): "
+                "fill in GAUGE and HEAD_WIDTH."
             )
         return resolve(CUSTOM, gauge_mm, head_width_mm)
 
@@ -160,8 +160,8 @@ def header_for(
     cell_m = rasters[0].cell_m
     if math.ceil(height / BLOCK) * math.ceil(width / BLOCK) > MAX_BLOCKS:
         raise RasterError(
-            f"The rail points are spread over {width * cell_m / 1000:.0f} by {height * cell_m / 1000:.0f} km, too far "
-            "for a raster: set EXTENT, which also leaves out stray points."
+            f"The rail points are spread over {width * cell_m / 1000:.0f} by {height * cell_m / 1000:.0f} km, too "
+            "large an area for a raster: set EXTENT, which also excludes stray points."
         )
     window = (*(first * TILE).tolist(), height, width)
     model = choose(standard.gauge_m, standard.head_width_m).name

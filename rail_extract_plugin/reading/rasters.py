@@ -1,4 +1,4 @@
-"""The model and the place of rail rasters that come from files."""
+"""Model and position of rail rasters from files."""
 
 from __future__ import annotations
 
