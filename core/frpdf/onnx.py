@@ -72,7 +72,7 @@ def layer_to_onnx(layer: FoldedLayer) -> bytes:
     graph.layer(layer, "around", "own", output="found", padded=False)
     side = 2 * layer.reach + 1
     channels_out, channels_in = layer.convolution.weight.shape[:2]
-    given = {"around": (1, channels_in, side, side)}
+    given: dict[str, tuple[int, ...]] = {"around": (1, channels_in, side, side)}
     if layer.reduction:
         given["own"] = (1, channels_in, 1, 1)
     return graph.model(given, {"found": (1, channels_out, 1, 1)})

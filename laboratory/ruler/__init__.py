@@ -1,1 +1,1 @@
-"""The ruler: extracted lines and tracks compared with the truth and with a plain script."""
+"""The ruler: it compares extracted lines and tracks with the truth, next to those of a plain script."""

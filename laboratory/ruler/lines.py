@@ -1,4 +1,4 @@
-"""Comparison of extracted lines with true ones: how much was found, how much is right, how far off it lies."""
+"""Comparison of extracted lines with true lines: completeness, correctness, lateral and height errors."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from scipy.spatial import cKDTree
 from ...core.polyline import length_along
 
 STEP_M = 0.05
-"""Length of the pieces in which lines are compared; a chord this long leaves an arc of 25 m by 0.01 mm."""
+"""Length of the pieces that are compared; a chord of this length deviates from an arc of 25 m by 0.01 mm."""
 
 CANDIDATES = 4
-"""Nearest pieces that are looked at: two of a line may share a place, and two lines may cross there."""
+"""Number of nearest pieces to search: near a place there may be two pieces of a line and a second line."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """What lines are worth against the truth.
+    """Result of a comparison of lines with the truth.
 
-    Errors are taken where line and truth are within the tolerance, once along the truth and once along the lines;
-    the worse of both stands here.
+    Errors are taken where line and truth are within the tolerance, once along the truth and once along the lines; the
+    larger of the two is stored.
 
     Attributes
     ----------
     completeness : float
-        Share of the true length with a line within the tolerance, in plan.
+        Share of the true length that has a line within the tolerance, in plan.
     correctness : float
-        Share of the lines' length within the tolerance of a true line, in plan.
+        Share of the length of the lines that is within the tolerance of a true line, in plan.
     lateral_rmse_m, lateral_p95_m, lateral_bias_m : float
         Offset of the line in plan, positive to the left of the truth.
     height_rmse_m, height_p95_m, height_bias_m : float
         Height of the line above the truth.
     line_count, truth_count : int
     length_ratio : float
-        Length of all lines over length of the truth, in space.
+        Length of all lines divided by the length of the truth, in space.
     """
 
     completeness: float
@@ -54,7 +54,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Offsets:
-    """Offsets of lines from the truth at many places, (n,) each; `weight` is the length a place stands for."""
+    """Offsets of lines from the truth at n places, (n,) each; `weight` is the length that a place represents."""
 
     distance: np.ndarray
     lateral: np.ndarray
@@ -63,31 +63,39 @@ class Offsets:
 
     @property
     def length_m(self) -> float:
-        """Length of all places together."""
+        """Length that all places together represent."""
         return float(self.weight.sum())
 
     @classmethod
     def between(cls, true: np.ndarray, line: np.ndarray, left: np.ndarray, weight: np.ndarray) -> Offsets:
-        """Offsets from true places to places on lines, (n, 3) each, where `left` is the truth's left."""
+        """Compute the offsets from true places to places on lines.
+
+        Parameters
+        ----------
+        true, line : (n, 3) array
+        left : (n, 2) array
+            Unit vectors to the left of the true line.
+        weight : (n,) array
+        """
         step = line - true
         return cls(np.hypot(step[:, 0], step[:, 1]), np.sum(step[:, :2] * left, axis=1), step[:, 2], weight)
 
     def within(self, tolerance_m: float) -> Offsets:
-        """Those whose line is near the truth."""
+        """Return the offsets at places where the line is near the truth."""
         near = self.distance <= tolerance_m
         return Offsets(self.distance[near], self.lateral[near], self.height[near], self.weight[near])
 
 
 @dataclass(frozen=True)
 class Match:
-    """Offsets between lines and truth, found once and judged by any tolerance.
+    """Offsets between lines and truth, which can be evaluated with any tolerance.
 
     Attributes
     ----------
     there, back : Offsets
         Along the truth, and along the lines.
     line : (n,) int array
-        Line that each place of `back` lies on.
+        Line of each place of `back`.
     t : (n,) array
         Plan distance of each place of `back` from the start of its line, metres.
     line_count, truth_count : int
@@ -101,7 +109,7 @@ class Match:
     truth_count: int
 
     def within(self, tolerance_m: float) -> Comparison:
-        """Compare, taking for the same thing what is at most this far apart in plan."""
+        """Compare lines and truth that are at most this distance apart in plan."""
         there, back = self.there.within(tolerance_m), self.back.within(tolerance_m)
         return Comparison(
             completeness=there.length_m / self.there.length_m,
@@ -118,7 +126,7 @@ class Match:
         )
 
     def share_within(self, sigma_m: np.ndarray, tolerance_m: float = 0.05) -> float:
-        """Share of the lateral errors along the lines that are at most the standard error at each place, (n,) m."""
+        """Return the share of lateral errors along the lines that are at most the standard error there, (n,) metres."""
         near = self.back.distance <= tolerance_m
         return float(_mean(np.abs(self.back.lateral[near]) <= sigma_m[near]))
 
@@ -132,9 +140,9 @@ class Pieces:
     start, end : (n, 3) array
         Metres.
     number : (n,) int array
-        Of their lines.
+        Number of the line of each piece.
     t : (n,) array
-        Plan distance of their middles from the starts of their lines.
+        Plan distance of the middle of each piece from the start of its line.
     """
 
     start: np.ndarray
@@ -167,9 +175,9 @@ def compare_lines(
     Parameters
     ----------
     extracted, truth : sequence of (n, 3) array
-        Polylines in metres; without extracted lines the errors are NaN, and without heights those of height.
+        Polylines in metres. Without extracted lines the errors are NaN; without heights, those of height.
     tolerance_m : float
-        How far apart, in plan, line and truth still are the same thing.
+        Greatest distance in plan at which a line is taken for the true one.
 
     Returns
     -------
@@ -179,7 +187,7 @@ def compare_lines(
 
 
 def match(extracted: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> Match:
-    """Find for every place of the truth the nearest line, and for every place of the lines the nearest truth.
+    """Find the nearest line for each place of the truth, and the nearest true line for each place of the lines.
 
     Parameters
     ----------
@@ -199,7 +207,7 @@ def match(extracted: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> Match
 
 
 def cut(lines: Sequence[np.ndarray]) -> Pieces:
-    """Cut polylines into pieces of equal length, `STEP_M` at most."""
+    """Cut polylines into pieces of equal length, at most `STEP_M`."""
     starts, ends, middles, counts = [np.empty((0, 3))], [np.empty((0, 3))], [np.empty(0)], []
     for line in lines:
         chainage = length_along(np.asarray(line)[:, :2])
@@ -215,18 +223,19 @@ def cut(lines: Sequence[np.ndarray]) -> Pieces:
 
 
 def nearest(places: np.ndarray, pieces: Pieces) -> tuple[np.ndarray, np.ndarray]:
-    """Find the nearest point, in plan, on any piece.
+    """Find the nearest point on any piece, in plan.
 
     Parameters
     ----------
     places : (n, 3) array
+    pieces : Pieces
 
     Returns
     -------
     feet : (n, 3) array
         Points on the pieces.
     numbers : (n,) int array
-        Their pieces.
+        Piece of each point.
     """
     count = min(CANDIDATES, len(pieces.start))
     _, candidates = cKDTree(pieces.middle[:, :2]).query(places[:, :2], k=np.arange(1, count + 1))

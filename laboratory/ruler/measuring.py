@@ -1,4 +1,4 @@
-"""One scene measured: our lines and a plain script's against the truth."""
+"""Measurement of one scene: our lines and those of a plain script, compared with the truth."""
 
 from __future__ import annotations
 
@@ -22,30 +22,31 @@ from .plain_script import script_lines
 from .tracks import GeometryErrors, TrackErrors, compare_geometry, compare_tracks
 
 SMOOTHING_M = 0.8
-"""Smoothing in plan, whose length holds the n points of w / sqrt(12 n)."""
+"""Smoothing in plan; the n of w / sqrt(12 n) is the number of points in this length."""
 
 QUALITY_STEP_M = 1.0
-"""Distance of the stations at which track geometry is measured."""
+"""Distance between the stations of track geometry."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What became of one scene.
+    """The measurements of one scene.
 
     Attributes
     ----------
     scene : str
     rails, centerlines, script : Match
-        Our lines and the plain script's rails against the truth.
+        Our lines, and the rails of the plain script, compared with the truth.
     tracks : TrackErrors
     geometry : GeometryErrors
     within_sigma, within_two_sigma : float
-        Share of our rails' lateral errors that are at most their standard error there, and at most twice that.
+        Share of the lateral errors of our rails that do not exceed the standard error there, and twice the standard
+        error.
     mean_error_m : float
-        Standard error of a mean of the points in the smoothing length, spread evenly across the head.
+        Standard error of the mean of the points in the smoothing length, if they are spread evenly across the head.
     seconds, script_seconds : float
     peak_mib : float
-        Most memory up to the end of our own extraction.
+        Peak memory up to the end of our extraction.
     """
 
     scene: str
@@ -63,7 +64,7 @@ class Result:
 
 
 def measure(scene: Scene) -> Result:
-    """Extract a scene's lines from its file, by us and by the plain script, and compare both with the truth."""
+    """Extract the lines of a scene by this project and by the plain script, and compare both with the truth."""
     clouds = _through_a_file(scene)
     standard = scene.standard
     start = time.perf_counter()
@@ -98,7 +99,7 @@ def measure(scene: Scene) -> Result:
 
 
 def _through_a_file(scene: Scene) -> tuple[RailPoints, ...]:
-    """Write a scene's cloud and read it back, as a user's run would."""
+    """Write the cloud of a scene to a file and read it, as a run by a user does."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cloud.laz"
         write_cloud(scene, path)
@@ -106,16 +107,18 @@ def _through_a_file(scene: Scene) -> tuple[RailPoints, ...]:
 
 
 def _local_sigma(rails: Sequence[RailLine], found: Match) -> np.ndarray:
-    """Look up the standard error of our own rails at each place that was compared, (n,) metres."""
+    """Interpolate the standard error of our rails at each place that was compared, (n,) metres."""
     sigma_m = np.empty(len(found.line))
     for number, rail in enumerate(rails):
+        if rail.support is None:
+            raise ValueError(f"The rail {rail.rail_id} has no standard error.")
         mine = found.line == number
         sigma_m[mine] = np.interp(found.t[mine], rail.support.t, rail.support.sigma_m)
     return sigma_m
 
 
 def _local(scene: Scene, network: RailNetwork, xyz: np.ndarray) -> np.ndarray:
-    """Bring a line of the network into the scene's local metres."""
+    """Transform a line of the result into the local metres of the scene."""
     return scene.frame.to_local(network.frame.to_crs(xyz))
 
 

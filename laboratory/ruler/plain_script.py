@@ -1,6 +1,6 @@
-"""What a plain script makes of rail points: closing, scikit-image's skeleton, Gaussian smoothing.
+"""A plain script that extracts rails by closing, scikit-image's skeleton and Gaussian smoothing.
 
-The baseline that every accuracy table prints beside our own lines.
+It is the baseline in each table of accuracy.
 """
 
 from __future__ import annotations
@@ -15,25 +15,30 @@ from ...core.polyline import length_along
 from ...core.raster import cell_size, rasterize
 
 SMOOTHING_M = 0.8
-"""Standard deviation of the Gaussian along a piece: the same number as our own smoothing's."""
+"""Standard deviation of the Gaussian along a piece: the same number as in our smoothing."""
 
 SHORTEST_M = 1.0
-"""Pieces below this are dropped, as ours are."""
+"""Length below which pieces are dropped, as in our lines."""
 
 REACH_M = 0.10
-"""Points this near in plan give a vertex its height, as in our own elevation."""
+"""Radius in plan of the points that give the height of a vertex, as in our elevation."""
 
 CLOSING = np.ones((5, 5), dtype=bool)
-"""Closes holes of up to four cells, the distance of profiles."""
+"""Closes holes of up to four cells, the distance between profiles."""
 
 SPUR_CELLS, PRUNINGS = 10, 3
-"""Branches below this length are spurs; each round can bare new ones."""
+"""Length below which branches are spurs, and rounds of pruning: each round can expose new spurs."""
 
 AROUND = np.ones((3, 3), dtype=int)
 
 
 def script_lines(points: RailPoints, gauge_m: float, head_width_m: float) -> list:
-    """Extract rail lines in the plain way.
+    """Extract rail lines with plain methods.
+
+    Parameters
+    ----------
+    points : RailPoints
+    gauge_m, head_width_m : float
 
     Returns
     -------
@@ -44,7 +49,8 @@ def script_lines(points: RailPoints, gauge_m: float, head_width_m: float) -> lis
     cells = raster.cells()
     corner = cells.min(axis=0) - 2
     height, width = cells.max(axis=0) + 3 - corner
-    skeleton = skeletonize(binary_closing(raster.read(*corner, height, width), CLOSING))
+    top, left = corner.tolist()
+    skeleton = skeletonize(binary_closing(raster.read(top, left, int(height), int(width)), CLOSING))
     for _ in range(PRUNINGS):
         skeleton = _pruned(skeleton)
     lines = []
@@ -59,7 +65,7 @@ def script_lines(points: RailPoints, gauge_m: float, head_width_m: float) -> lis
 
 
 def _pieces(skeleton: np.ndarray) -> list:
-    """Cut a skeleton at its junctions and order the cells of every piece: a list of (n, 2) arrays."""
+    """Cut a skeleton at its junctions and return the cells of each piece in order, a list of (n, 2) arrays."""
     chains, count = label(skeleton & (_neighbours(skeleton) <= 2), AROUND)
     cells = np.argwhere(chains)
     order = np.argsort(chains[tuple(cells.T)], kind="stable")
@@ -68,7 +74,7 @@ def _pieces(skeleton: np.ndarray) -> list:
 
 
 def _pruned(skeleton: np.ndarray) -> np.ndarray:
-    """Erase short branches that hang on a junction, and thin what is left of the junctions."""
+    """Delete short branches that start at a junction, and thin the junctions again."""
     neighbours = _neighbours(skeleton)
     junctions = skeleton & (neighbours > 2)
     chains, count = label(skeleton & ~junctions, AROUND)
@@ -81,12 +87,12 @@ def _pruned(skeleton: np.ndarray) -> np.ndarray:
 
 
 def _neighbours(skeleton: np.ndarray) -> np.ndarray:
-    """Count the set cells around each set cell; 0 elsewhere."""
+    """Count the set cells around each set cell; other cells have 0."""
     return skeleton * (convolve(skeleton.astype(int), AROUND, mode="constant") - 1)
 
 
 def _ordered(cells: np.ndarray) -> np.ndarray:
-    """Walk along a chain of cells from one of its ends."""
+    """Return the cells of a chain in order from one of its ends."""
     links = cKDTree(cells).query_ball_point(cells, 1.5)
     at = min(range(len(cells)), key=lambda number: len(links[number]))
     walk, seen = [at], {at}
@@ -100,7 +106,7 @@ def _ordered(cells: np.ndarray) -> np.ndarray:
 
 
 def _heights(xy: np.ndarray, points: np.ndarray) -> np.ndarray | None:
-    """Mean height of the points around each vertex, smoothed; gaps are filled linearly. None without any point."""
+    """Return the smoothed mean height of the points around each vertex, linear across gaps, or None without points."""
     near = cKDTree(points[:, :2]).query_ball_point(xy, REACH_M)
     z = np.array([points[numbers, 2].mean() if numbers else np.nan for numbers in near])
     known = np.flatnonzero(np.isfinite(z))

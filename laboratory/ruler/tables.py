@@ -1,4 +1,4 @@
-"""The accuracy tables as text: what was found, and how far off it lies."""
+"""The tables of accuracy as text: completeness and errors."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from .measuring import Result
 
 TOLERANCES_M = (0.01, 0.02, 0.05, 0.10)
 JUDGED_M = 0.05
-"""Tolerance within which errors are taken."""
+"""Tolerance of the errors."""
 
 
 def found_table(results: Sequence[Result]) -> str:
-    """Completeness and correctness at every tolerance, lengths, numbers of lines, time and memory."""
+    """Return completeness and correctness at each tolerance, lengths, numbers of lines, time and memory."""
     centimetres = "".join(f"{100 * tolerance:>7.0f}" for tolerance in TOLERANCES_M)
     lines = [
-        "Found: share of the true length with a line within 1, 2, 5 and 10 cm; right: share of the lines' length.",
+        "Found: share of the true length with a line within 1, 2, 5 and 10 cm.",
+        "Right: share of the length of the lines with a true line within the same distances.",
         f"{'':<27}{'found %':>28}{'right %':>28}  length",
         f"{'scene':<13}{'lines of':<14}{centimetres}{centimetres}  : true {'lines':>8}{'s':>8}{'MiB':>7}",
     ]
@@ -30,9 +31,9 @@ def found_table(results: Sequence[Result]) -> str:
 
 
 def error_table(results: Sequence[Result]) -> str:
-    """Errors across and in height, of gauge, cant and radius, and how honest the standard error is."""
+    """Return errors across and in height, of gauge, cant and radius, and the shares within the standard error."""
     lines = [
-        "Errors within 5 cm, in millimetres, the worse of truth to lines and lines to truth; measured: track geometry.",
+        "Errors within 5 cm, in millimetres, the larger of those along truth and lines. Measured: track geometry.",
         f"{'':<27}{'across':>18}{'height':>18}{'within':>12}{'gauge':>12}{'cant':>12}{'measured rms':>18}{'w/':>9}",
         f"{'scene':<13}{'lines of':<14}" + 2 * f"{'rms':>6}{'p95':>6}{'bias':>6}" + f"{'sigma':>6}{'2 s.':>6}"
         f"{'bias':>6}{'rms':>6}" + f"{'bias':>6}{'rms':>6}" + f"{'gauge':>6}{'cant':>6}{'rad.':>6}{'sqrt 12n':>9}",

@@ -1,4 +1,4 @@
-"""Gauge and cant between extracted rails, held against those between the true ones."""
+"""Gauge and cant between extracted rails, compared with those between the true rails."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from ...core.rails import Centerline, RailLine, TrackGeometry
 from .lines import cut, nearest
 
 ASTRAY_M = 0.10
-"""A rail this far from where the centerline has it is another one, or none."""
+"""Distance from its expected place, relative to the centerline, at which a line is not the rail of the track."""
 
 CURVED_M = 1500.0
-"""Radii above this are not judged: their versine on a chord of 20 m is below 35 mm."""
+"""Greatest radius that is compared: above it, the versine of a chord of 20 m is below 35 mm."""
 
 CHORD_M = 20.0
 STEADY = 0.02
-"""Radii are judged where the true curvature changes by less than this share within so much to either side: on arcs, the
-chord that measures them wholly among them."""
+"""Radii are compared where the true curvature changes by less than the share `STEADY` within `CHORD_M` on either side:
+on arcs that contain the whole chord of the measurement."""
 
 STEP_M = 0.5
-"""Distance between the places at which tracks are measured."""
+"""Distance between the places at which gauge and cant are compared."""
 
 
 @dataclass(frozen=True)
 class TrackErrors:
-    """Measured less true values along all centerlines, metres: mean and root mean square."""
+    """Measured minus true values along all centerlines, metres: mean and root mean square."""
 
     gauge_bias_m: float
     gauge_rmse_m: float
@@ -39,13 +39,13 @@ class TrackErrors:
 def compare_tracks(
     centerlines: Sequence[Centerline], rails: Sequence[RailLine], truth: Sequence[np.ndarray], head_width_m: float
 ) -> TrackErrors:
-    """Compare gauge and cant every `STEP_M` of the centerlines, where both lines and truth have both rails.
+    """Compare gauge and cant every `STEP_M` along the centerlines, where lines and truth have both rails.
 
     Parameters
     ----------
     centerlines : sequence of Centerline
     rails : sequence of RailLine
-        Those the centerlines were made of.
+        The rails of the centerlines.
     truth : sequence of (n, 3) array
         True rails, metres, in the same frame.
     head_width_m : float
@@ -67,13 +67,13 @@ def compare_tracks(
 
 @dataclass(frozen=True)
 class GeometryErrors:
-    """Errors of measured track geometry at its stations, root mean squares; NaN where the truth has nothing of a kind.
+    """Errors of measured track geometry at its stations, root mean squares; NaN without a true value to compare.
 
     Attributes
     ----------
     gauge_m, cant_m : float
     radius : float
-        In proportion to the true radius, where that is constant and below `CURVED_M`.
+        Relative to the true radius, where that is constant and below `CURVED_M`.
     """
 
     gauge_m: float
@@ -110,7 +110,7 @@ def compare_geometry(
 
 
 def _true_radius(places: np.ndarray, centerlines: Sequence[np.ndarray]) -> np.ndarray:
-    """Radius of the true centerlines beside places, (n,); NaN where it changes within a chord, or is large."""
+    """Return the radius of the true centerlines at places, (n,); NaN where it varies within a chord, or is large."""
     radius = np.full(len(places), np.nan)
     feet = project([line[:, :2] for line in centerlines], places, ASTRAY_M)
     for number in np.unique(feet.line):
@@ -127,7 +127,7 @@ def _true_radius(places: np.ndarray, centerlines: Sequence[np.ndarray]) -> np.nd
 
 
 def _curvature(places: np.ndarray) -> np.ndarray:
-    """Curvature of the circles through three places each, (n, 3, 2) to (n,), positive to the left."""
+    """Return the curvature of circles through three places each, (n, 3, 2) to (n,), positive to the left."""
     one, two, chord = places[:, 1] - places[:, 0], places[:, 2] - places[:, 1], places[:, 2] - places[:, 0]
     area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
     return 2 * area / np.prod([np.hypot(*side.T) for side in (one, two, chord)], axis=0)
@@ -138,15 +138,16 @@ def _rms(values: np.ndarray) -> float:
 
 
 def _places(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places every `STEP_M` of a line and unit vectors to its left there, (n, 2) each."""
+    """Return places every `STEP_M` of a line and unit vectors to the left there, (n, 2) each."""
     t = length_along(line[:, :2])
     at = np.arange(STEP_M / 2, t[-1], STEP_M)
     normals = left_normals(line[:, :2])
-    return tuple(np.column_stack([np.interp(at, t, c) for c in values[:, :2].T]) for values in (line, normals))
+    places, left = (np.column_stack([np.interp(at, t, c) for c in values[:, :2].T]) for values in (line, normals))
+    return places, left
 
 
 def _gauge_and_cant(middle: np.ndarray, to_left: np.ndarray, lines: Sequence[np.ndarray]) -> np.ndarray:
-    """Distance and difference in height of the rails to the left and right of places, (n, 2); NaN where one lacks."""
+    """Return distance and height difference of the rails left and right of places, (n, 2); NaN where one is missing."""
     pieces = cut(lines)
     sides = []
     for place in (middle + to_left, middle - to_left):

@@ -26,13 +26,13 @@ from .networks import TrainedNetwork
 from .scores import Scores, score
 
 EVALUATION_SEED = 20251
-"""Apart from the seeds of trainings, which are small."""
+"""Different from the seeds of training, which are small."""
 SIDE = 512
 COUNT = 48
 SEVERITIES = (0.2, 0.8)
 FAMILIES = ("plain", "curve", "parallel", "turnout", "connections")
 MIN_PIECE_CELLS = 30
-"""Cells of a piece that the classical row keeps: about half a metre of rail."""
+"""Smallest piece, in cells, that the row without a network keeps: about half a metre of rail."""
 
 Cleaner = Callable[[np.ndarray], np.ndarray]
 """Maps a raster, (height, width) bool, to a cleaned one."""
@@ -47,7 +47,7 @@ class Passes(Protocol):
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the table: what cleaned, its counts, and seconds a raster."""
+    """A row of the table: name of the cleaner, counts, and seconds per raster."""
 
     name: str
     scores: Scores
@@ -56,8 +56,8 @@ class Row:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("weights", type=Path, nargs="*", help=".npz files; the shipped models where none is named")
-    parser.add_argument("--count", type=int, default=COUNT, help=f"rasters of the set to use (default {COUNT})")
+    parser.add_argument("weights", type=Path, nargs="*", help=".npz files (default: the shipped models)")
+    parser.add_argument("--count", type=int, default=COUNT, help=f"number of rasters to use (default {COUNT})")
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def evaluation_pairs(count: int = COUNT) -> list[Pair]:
-    """Draw the first `count` pairs of the fixed set."""
+    """Draw `count` pairs of the fixed set."""
     severities = np.linspace(*SEVERITIES, COUNT)
     return [
         random_pair(
@@ -95,7 +95,15 @@ def evaluation_pairs(count: int = COUNT) -> list[Pair]:
 
 
 def evaluate(name: str, cleaner: Cleaner, pairs: list[Pair]) -> Row:
-    """Clean all rasters and add up their counts."""
+    """Clean all rasters and add up their counts.
+
+    Parameters
+    ----------
+    name : str
+        For the row of the table.
+    cleaner : Cleaner
+    pairs : list of Pair
+    """
     total, started = Scores(), time.perf_counter()
     for pair in pairs:
         total += score(cleaner(pair.observed), pair.label)
@@ -103,7 +111,7 @@ def evaluate(name: str, cleaner: Cleaner, pairs: list[Pair]) -> Row:
 
 
 def classical(observed: np.ndarray) -> np.ndarray:
-    """Close and drop small pieces: what one does without a network."""
+    """Clean a raster without a network: closing, and removal of small pieces."""
     closed = ndimage.binary_closing(np.pad(observed, 2), np.ones((3, 3)))[2:-2, 2:-2]
     pieces, count = ndimage.label(closed, np.ones((3, 3)))
     large = np.bincount(pieces.ravel(), minlength=count + 1) >= MIN_PIECE_CELLS

@@ -1,14 +1,16 @@
-"""Dilated convolutions and batch norm as they train fast on the CPU.
+"""Dilated convolutions, batch norm and ReLU that train fast on the CPU.
 
-PyTorch's bfloat16 kernels are fast forward at every dilation, and backward to the input, which is a forward convolution
-with the flipped kernel. Their weight gradient of a dilated kernel crashes (torch 2.13, channels last) or takes a slow
-path. Split into phases, a dilated convolution is a plain one: that has a fast weight gradient.
+PyTorch's bfloat16 kernels are fast at every dilation for the forward pass and for the gradient of the input, which is a
+forward convolution with the flipped kernel. The weight gradient of a dilated kernel crashes (torch 2.13, channels last)
+or takes a slow path. Split into phases, a dilated convolution is a plain one, which has a fast weight gradient.
 
-Batch norm runs along the channels, and the network's are too few to fill a vector register; taken by several columns
-at once it is four times as fast. The rectifier's gradient takes a tenth of its time once it is vectorized.
+Batch norm is vectorized along the channels, and 24 channels do not fill a vector register; for several columns at once
+it is four times as fast. The gradient of ReLU takes a tenth of the time once it is vectorized.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -17,14 +19,14 @@ from torch.nn import functional
 from ...core.frpdf.network import PassBatchNorm2d
 
 MAX_PHASED_DILATION = 40
-"""Beyond it the phases of a training crop are smaller than the kernel, and one product per kernel tap is faster."""
+"""Above this dilation the phases of a crop are smaller than the kernel, and one product per kernel tap is faster."""
 
 COLUMNS_AT_ONCE = 4
-"""Columns whose channels are normalized as one row of 96 numbers; they divide the sides of all crops."""
+"""Columns whose channels are normalized as one row of 96 numbers; it divides the sides of all crops."""
 
 
 class _DilatedConvolution(torch.autograd.Function):
-    """Convolution with `same` padding, without bias, whose weight gradient is computed by phases or by taps."""
+    """Convolution without bias, padded to the same size; its weight gradient is computed by phases or by taps."""
 
     @staticmethod
     def forward(ctx, x: Tensor, weight: Tensor, dilation: int) -> Tensor:
@@ -52,7 +54,7 @@ def _convolve(x: Tensor, weight: Tensor, dilation: int) -> Tensor:
 
 
 def _phases(x: Tensor, dilation: int) -> Tensor:
-    """Sort (batch, channels, height, width) into images of every `dilation`-th row and column."""
+    """Rearrange (batch, channels, height, width) into images of every `dilation`-th row and column."""
     batch, channels, height, width = x.shape
     rows, columns = -(-height // dilation), -(-width // dilation)
     x = functional.pad(x, (0, columns * dilation - width, 0, rows * dilation - height))
@@ -99,17 +101,17 @@ class CpuConv2d(nn.Conv2d):
     """A `Conv2d` that trains in bfloat16 on the CPU at every dilation."""
 
     def forward(self, x: Tensor) -> Tensor:
-        """Convolve in the autocast's type."""
+        """Convolve in the number type of autocast."""
         dtype = torch.get_autocast_dtype("cpu") if torch.is_autocast_enabled("cpu") else x.dtype
         with torch.autocast("cpu", enabled=False):
             return _DilatedConvolution.apply(x.to(dtype), self.weight.to(dtype), self.dilation[0])
 
 
 class CpuBatchNorm2d(PassBatchNorm2d):
-    """Batch norm with statistics over every fourth column: four sets of them, so alike that one keeps their means."""
+    """Batch norm with statistics over every fourth column; the running statistics keep the mean of the four sets."""
 
     def normalize(self, x: Tensor, mean: Tensor, variance: Tensor) -> Tensor:
-        """Normalize `COLUMNS_AT_ONCE` columns as if they were channels."""
+        """Normalize `COLUMNS_AT_ONCE` columns as if they were channels; see `PassBatchNorm2d.normalize`."""
         batch, channels, height, width = x.shape
         if not self.training or width % COLUMNS_AT_ONCE:
             return super().normalize(x, mean, variance)
@@ -123,7 +125,7 @@ class CpuBatchNorm2d(PassBatchNorm2d):
 
 
 class _Rectifier(torch.autograd.Function):
-    """ReLU whose gradient is vectorized in bfloat16 too: that of leaky ReLU is, at a slope of 0 the same."""
+    """ReLU with a vectorized gradient in bfloat16: that of leaky ReLU with a slope of 0."""
 
     @staticmethod
     def forward(ctx, x: Tensor) -> Tensor:
@@ -139,15 +141,15 @@ class _Rectifier(torch.autograd.Function):
 
 
 class CpuReLU(nn.ReLU):
-    """A `ReLU` that trains fast in bfloat16; not in place, which would copy the views of `CpuBatchNorm2d`."""
+    """A `ReLU` that trains fast in bfloat16; it is not in place, which would copy the views of `CpuBatchNorm2d`."""
 
     def forward(self, x: Tensor) -> Tensor:
-        """Set what is negative to 0."""
+        """Set negative values to 0."""
         return _Rectifier.apply(x)
 
 
-def train_on_cpu(network: nn.Module) -> nn.Module:
-    """Let a network use the layers of this module; its parameters stay the same."""
+def train_on_cpu(network: nn.Module) -> None:
+    """Replace the layers of a network by those of this module, in place; the parameters remain the same."""
     for module in network.modules():
         if type(module) is nn.ReLU:
             module.__class__ = CpuReLU
@@ -155,4 +157,10 @@ def train_on_cpu(network: nn.Module) -> nn.Module:
             module.__class__ = CpuBatchNorm2d
         if type(module) is nn.Conv2d and module.dilation[0] > 1 and module.bias is None:
             module.__class__ = CpuConv2d
-    return network.to(memory_format=torch.channels_last)
+    move(network, "cpu")
+
+
+def move(network: nn.Module, device: str) -> None:
+    """Move a network to a device, in place; in memory, channels are innermost."""
+    convert: Any = network.to  # the annotations of PyTorch lack memory_format
+    convert(device, memory_format=torch.channels_last)

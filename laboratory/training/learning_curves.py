@@ -1,4 +1,4 @@
-"""The course of a training, drawn from its log."""
+"""Loss and F1 during training, drawn from the log."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 MAX_BINS = 100
-"""Points of a curve: single steps jump with the difficulty of their crops, means of some show the course."""
+"""Largest number of points of a curve: single steps vary with the difficulty of their crops, means do not."""
 
 
 def draw_curves(log: Path, picture: Path) -> None:
-    """Draw loss and F1 of each pass against the step, as means over equal numbers of steps.
+    """Draw loss and F1 of each pass by step, as means over equal numbers of steps.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def draw_curves(log: Path, picture: Path) -> None:
 
 
 def read_log(path: Path) -> dict[str, np.ndarray]:
-    """Read a log's columns; of a step that a resumed training repeated, the last row counts."""
+    """Read the columns of a log; where a resumed training repeated a step, its last row counts."""
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
     last = {int(row["step"]): row for row in rows}
@@ -46,6 +46,7 @@ def read_log(path: Path) -> dict[str, np.ndarray]:
 
 
 def binned(steps: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Average runs of neighbouring steps, at most `MAX_BINS` of them."""
+    """Return the means of steps and values over at most `MAX_BINS` groups of consecutive steps."""
     groups = np.array_split(np.arange(len(steps)), min(MAX_BINS, len(steps)))
-    return tuple(np.array([column[group].mean() for group in groups]) for column in (steps, values))
+    middles, means = (np.array([column[group].mean() for group in groups]) for column in (steps, values))
+    return middles, means

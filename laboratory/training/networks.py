@@ -1,6 +1,7 @@
-"""Networks to compare FRPDF with, of as many parameters within 5 %, and FRPDF with one of its choices undone.
+"""The networks that can be trained: FRPDF, two other networks, and FRPDF with one of its choices undone.
 
-All have FRPDF's recurrence, batch norm and pass statistics, so that a comparison is of what lies in between.
+All have the same number of parameters within 5 %, and the recurrence, batch norm and statistics per pass of FRPDF, so
+that a comparison shows the effect of the architecture.
 """
 
 from __future__ import annotations
@@ -16,42 +17,42 @@ from torch.nn import functional
 from ...core.frpdf.architecture import CHANNELS, DILATIONS, KERNEL_RADIUS
 from ...core.frpdf.network import FRPDF, CustomConv2d, ProgressiveCombine2d, Recurrent, StackedConv2d, set_weights
 from ...core.frpdf.weights import load_arrays
-from .gradients import train_on_cpu
+from .gradients import move, train_on_cpu
 
 UNET_CHANNELS = (6, 13, 25, 50, 100)
 """Channels from full resolution to a sixteenth."""
 ATROUS_CHANNELS = 16
-"""As in ACNN."""
+"""The number in ACNN."""
 ATROUS_BLOCKS = 62
 """ACNN has 64 or 128."""
 ATROUS_RATES = (1, 3)
-"""Dilations of a block's two convolutions: without gaps, and the largest reach for their number."""
+"""Dilations of the two convolutions of a block: no gaps, and the largest reach for two convolutions."""
 POOLINGS = (1, 2, 4, 8, 16, 32, 64)
-"""Side of the cells that each block pools, in place of the dilations 1, 3, 7, 15, 31, 63, 127."""
+"""Side of the pooled cells in each block, in place of the dilations 1, 3, 7, 15, 31, 63, 127."""
 
 
 class UNetLayer(nn.Module):
-    """U-Net (Ronneberger, Fischer, Brox 2015): pooled fourfold on the way down, long skips on the way up."""
+    """U-Net (Ronneberger, Fischer, Brox 2015): four poolings on the way down, long skips on the way up."""
 
     def __init__(self, channels: Sequence[int] = UNET_CHANNELS) -> None:
         super().__init__()
         self.down = nn.ModuleList(StackedConv2d(a, b, 1, 1) for a, b in zip((2, *channels), channels))
         self.up = nn.ModuleList(StackedConv2d(a + b, a, 1, 1) for a, b in zip(channels, channels[1:]))
-        self.head = nn.Conv2d(channels[0], 1, 1)
+        self.output = nn.Conv2d(channels[0], 1, 1)
 
     def forward(self, x: Tensor) -> Tensor:
         """Map (batch, 2, height, width), sides multiples of 16, to logits."""
-        levels = []
+        levels: list[Tensor] = []
         for stacked in self.down:
             x = stacked(functional.max_pool2d(x, 2) if levels else x)
             levels.append(x)
         for stacked, level in zip(reversed(self.up), reversed(levels[:-1])):
             x = stacked(torch.cat([functional.interpolate(x, scale_factor=2.0), level], dim=1))
-        return self.head(x)
+        return self.output(x)
 
 
 class AtrousBlock(nn.Module):
-    """Two dilated convolutions, added to what went in."""
+    """Two dilated convolutions, added to their input."""
 
     def __init__(self, channels: int) -> None:
         super().__init__()
@@ -74,7 +75,7 @@ class AtrousLayer(nn.Sequential):
 
 
 class PooledCombine2d(ProgressiveCombine2d):
-    """FRPDF's block with pooling in place of dilation: as many parameters, a like reach, coarser cells."""
+    """`ProgressiveCombine2d` with pooling in place of dilation: as many parameters, a similar reach, coarser cells."""
 
     def __init__(self, channels: int, radius: int, pooling: int) -> None:
         super().__init__(channels, radius, 1)
@@ -99,7 +100,7 @@ class PooledLayer(nn.Sequential):
 
 
 class SkippingLayer(nn.Module):
-    """FRPDF with U-Net's long skips: the last blocks also see what came out of the first ones."""
+    """FRPDF with the long skips of U-Net: the last blocks also take the results of the first ones."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -107,7 +108,7 @@ class SkippingLayer(nn.Module):
         self.blocks = nn.ModuleList(ProgressiveCombine2d(CHANNELS, KERNEL_RADIUS, d) for d in DILATIONS)
         self.joins = nn.ModuleList(CustomConv2d(2 * CHANNELS, CHANNELS, 0, 1) for _ in range((len(DILATIONS) + 1) // 2))
         self.decoder = StackedConv2d(CHANNELS, CHANNELS, KERNEL_RADIUS, 1)
-        self.head = nn.Conv2d(CHANNELS, 1, 1)
+        self.output = nn.Conv2d(CHANNELS, 1, 1)
 
     def forward(self, x: Tensor) -> Tensor:
         """Map (batch, 2, height, width) to logits."""
@@ -119,7 +120,7 @@ class SkippingLayer(nn.Module):
                 first.append(x)
             else:
                 x = next(joins)(torch.cat([x, first.pop()], dim=1))
-        return self.head(self.decoder(x))
+        return self.output(self.decoder(x))
 
 
 NETWORKS: dict[str, Callable[[], Recurrent]] = {
@@ -129,17 +130,20 @@ NETWORKS: dict[str, Callable[[], Recurrent]] = {
     "pooled": lambda: Recurrent(PooledLayer()),
     "skipping": lambda: Recurrent(SkippingLayer()),
 }
-"""What can be trained, by name."""
+"""Constructors by name."""
 
 
 def parameter_count(network: nn.Module) -> int:
-    """Count what training learns."""
+    """Count the trained parameters."""
     return sum(parameter.numel() for parameter in network.parameters())
 
 
-def output_layer(network: Recurrent) -> nn.Conv2d:
-    """Give the last convolution, whose bias is the logit of a cell of which nothing is known."""
-    return [module for module in network.modules() if isinstance(module, nn.Conv2d)][-1]
+def output_bias(network: Recurrent) -> Tensor:
+    """Return the bias of the last convolution: the logit of a cell about which nothing is known."""
+    *_, last = (module for module in network.modules() if isinstance(module, nn.Conv2d))
+    if last.bias is None:
+        raise ValueError("The last convolution of a network needs a bias.")
+    return last.bias
 
 
 class TrainedNetwork:
@@ -162,7 +166,7 @@ class TrainedNetwork:
         self._device = "cuda" if torch.cuda.is_available() else "cpu"
         if self._device == "cpu":
             train_on_cpu(self._network)
-        self._network.eval().to(self._device, memory_format=torch.channels_last)
+        move(self._network.eval(), self._device)
 
     @property
     def parameter_count(self) -> int:

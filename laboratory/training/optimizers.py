@@ -1,7 +1,7 @@
-"""What moves the weights: Muon for the kernels, AdamW for batch norm and the head.
+"""Optimizers of the weights: Muon for the kernels, AdamW for batch norm and the output layer.
 
-Muon makes each step of a kernel, seen as a matrix, orthogonal (Jordan 2024, "Muon: an optimizer for hidden layers in
-neural networks"). Its steps are scaled to the size of AdamW's, so that one learning rate serves both.
+Muon makes each step of a kernel, taken as a matrix, orthogonal (Jordan 2024, "Muon: an optimizer for hidden layers in
+neural networks"). Its steps are scaled to the size of AdamW's, so that both use one learning rate.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ class Optimizers:
     Parameters
     ----------
     network : nn.Module
-        In channels-last memory, where a kernel is a matrix without copying.
+        With channels innermost in memory, where a kernel is a matrix without copying.
     """
 
     def __init__(self, network: nn.Module) -> None:
@@ -33,29 +33,29 @@ class Optimizers:
         )
 
     def zero_grad(self) -> None:
-        """Forget the gradients."""
+        """Delete the gradients."""
         for parameter in self._parameters:
             parameter.grad = None
 
     def step(self, rate: float) -> None:
-        """Move the weights along their gradients at a learning rate."""
+        """Change the weights by one step with a learning rate."""
         for matrix, kernel in zip(self._matrices, self._kernels):
-            matrix.grad = _matrix(kernel.grad)
+            matrix.grad = None if kernel.grad is None else _matrix(kernel.grad)
         for part in self._parts:
             for group in part.param_groups:
                 group["lr"] = rate
             part.step()
 
     def state_dict(self) -> list[dict]:
-        """Give what a checkpoint keeps."""
+        """Return the states of both optimizers for a checkpoint."""
         return [part.state_dict() for part in self._parts]
 
     def load_state_dict(self, states: list[dict]) -> None:
-        """Go on from a checkpoint."""
+        """Restore the states from a checkpoint."""
         for part, state in zip(self._parts, states):
             part.load_state_dict(state)
 
 
 def _matrix(kernel: Tensor) -> Tensor:
-    """See (out, in, side, side) as (out, side x side x in), one row a filter; a view where memory is channels-last."""
+    """View (out, in, side, side) as (out, side x side x in), one row per filter."""
     return kernel.permute(0, 2, 3, 1).flatten(1)

@@ -1,4 +1,4 @@
-"""Figures of cleaned rasters: the counts of the paper's table, gaps bridged, lines removed."""
+"""Scores of cleaned rasters: counts of cells as in Gribov and Chang, and bridged gaps."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import numpy as np
 from scipy import ndimage
 
 BRIDGED_SHARE = 0.9
-"""A gap is bridged where so many of its cells are found, or have a neighbour that is."""
+"""A gap is bridged where at least this share of its cells is found, or has a neighbour that is found."""
 
 _NEIGHBOURS = np.ones((3, 3), dtype=bool)
 
 
 @dataclass(frozen=True)
 class Scores:
-    """Counts of rail cells missed, invented and found; they add up over rasters.
+    """Counts of cells; they can be added up over rasters.
 
     Attributes
     ----------
@@ -32,12 +32,12 @@ class Scores:
 
     @property
     def precision(self) -> float:
-        """Share of the cells found that are rail."""
+        """Share of rail among the cells found."""
         return self.tp / max(self.tp + self.fp, 1)
 
     @property
     def recall(self) -> float:
-        """Share of the rail cells that are found."""
+        """Share of the rail cells that were found."""
         return self.tp / max(self.tp + self.fn, 1)
 
     @property
@@ -53,8 +53,7 @@ def score(found: np.ndarray, label: np.ndarray, tolerance: int = 0) -> Scores:
     ----------
     found, label : bool arrays of one shape
     tolerance : int
-        Cells by which what is found may miss its place: a cell of the label is found if one so near it is, and a cell
-        found is invented if no cell of the label is so near. Strict at 0.
+        Distance in cells up to which a cell found and a cell of the label match; 0 is strict.
     """
     around_found, around_label = (_grown(cells, tolerance) for cells in (found, label))
     return Scores(
@@ -65,13 +64,13 @@ def score(found: np.ndarray, label: np.ndarray, tolerance: int = 0) -> Scores:
 
 
 def bridged(found: np.ndarray, gap: np.ndarray) -> dict[int, bool]:
-    """Tell of each gap whether it is bridged, by its number.
+    """Return whether each gap is bridged, by its number.
 
     Parameters
     ----------
     found : bool array
     gap : int array of the same shape
-        Number of the gap that a cell lies in, 0 for none. Gaps at the border are left out: half of them is not shown.
+        Number of the gap of each cell, 0 for none. Gaps at the border are left out: a part of them is not shown.
     """
     cells = np.bincount(gap.ravel())
     met = np.bincount(gap[_grown(found, 1)], minlength=len(cells))

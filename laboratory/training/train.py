@@ -1,4 +1,4 @@
-"""Train FRPDF, or a network to compare it with, on synthetic pairs; on the CPU or CUDA, resumable, seeded, logged.
+"""Train FRPDF, or a network to compare it with, on synthetic pairs: seeded, logged and resumable, on the CPU or CUDA.
 
 Loss on every pass, no gradient through the feedback, shared weights, batch statistics per pass; see
 docs/method.md section 3.8.
@@ -26,43 +26,65 @@ from ...core.frpdf.network import PassBatchNorm2d, Recurrent, feedback, set_weig
 from ...core.frpdf.weights import load_arrays, save_arrays
 from ..rasters.distortion import Pair
 from ..rasters.pairs import random_pair, ratio_near
-from .gradients import train_on_cpu
+from .gradients import move, train_on_cpu
 from .learning_curves import draw_curves
-from .networks import NETWORKS, output_layer
+from .networks import NETWORKS, output_bias
 from .optimizers import Optimizers
 from .scores import Scores, score
 
 CROPS = ((256, 4), (384, 2), (512, 1))
-"""Side and number of a step's crops: of like cost; the large ones train the outer taps of the widest dilation."""
+"""Side and number of the crops of a step, of similar cost; the large ones train the outer taps of wide dilations."""
 CROP_SHARES = (0.2, 0.3, 0.5)
 LAST_CROP = 1024
-"""Side of the one crop of each of the last steps: the widest dilation reaches 381 cells each way, so that only here
-most cells see all of it."""
+"""Side of the single crop of each of the last steps. The widest dilation reaches 381 cells in each direction; only in
+such a crop do most cells have all of its inputs."""
 LAST_SHARE = 0.01
-"""Share of the steps with the last crop; such a step costs four of the others."""
+"""Share of the steps with this crop; each takes as long as four of the others."""
 HARD_WEIGHT, HARD_REACH = 5.0, 2
-"""Weight in the entropy of cells so near to a gap, a guard rail or a lone line, rail or not: they are few, and what
-lines hang on. The output finds too little for it, which `calibrate` makes good."""
+"""Weight in the entropy, and distance in cells, of cells near a gap, a guard rail or a lone line, whether rail or not:
+they are few, and lines depend on them. The weight makes the output find too few cells, which `calibrate` corrects."""
 EARLY_PASS_WEIGHT = 0.5
-"""Weight of the loss of a pass that is not the last one, which makes the result."""
+"""Weight of the loss of each pass before the last one."""
 OUTPUT_BIAS = -4.0
-"""Start near the share of rail cells in a raster, or the first hundred steps only learn that there are few."""
+"""Initial bias of the output layer, near the share of rail cells in a raster. From 0, the first hundred steps would
+only learn that there are few."""
 MAX_GRADIENT = 1.0
 WARM_UP_STEPS = 40
 STATISTICS_STEPS = 60
-"""Steps over which the batch statistics of the final weights are averaged."""
+"""Number of steps over which the batch statistics of the final weights are averaged."""
 CHECKPOINT_STEPS = 50
 CALIBRATION_STEPS, CALIBRATION_ROUNDS = 30, 2
-"""Steps of which the output's bias is told, and rounds of it: what one pass feeds back moves along."""
+"""Number of steps from which the bias of the output is determined, and rounds: the feedback between passes changes with
+the bias."""
 LOGIT_BIN, MAX_LOGIT = 0.05, 8.0
-"""Steps and range in which the bias is sought: one moves F1 by less than 0.0005, and the range is all but certainty."""
+"""Step and range of the search for the bias: a step changes F1 by less than 0.0005."""
 DATA, STATISTICS_DATA, CALIBRATION_DATA = 0, 1, 2
-"""Streams of random numbers; evaluation has streams of its own."""
+"""Streams of random numbers, different from those of evaluation."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """A training: the same settings give the same weights on the same processor; a GPU adds up in no fixed order."""
+    """Settings of a training.
+
+    The same settings give the same weights on the same CPU; a GPU adds up in varying order.
+
+    Attributes
+    ----------
+    steps : int
+        Steps of the whole training.
+    rate : float
+        Largest learning rate.
+    seed : int
+    device : str
+        "cpu" or "cuda".
+    start : Path, optional
+        Weights to start from.
+    network : str
+        One of `networks.NETWORKS`.
+    passes : int
+    ratio : float, optional
+        Gauge divided by railhead width, to train a specialized model.
+    """
 
     steps: int
     rate: float
@@ -76,25 +98,25 @@ class Settings:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("folder", type=Path, help="keeps checkpoint.pt, log.csv, curves.png and weights.npz")
+    parser.add_argument("folder", type=Path, help="for checkpoint.pt, log.csv, curves.png and weights.npz")
     parser.add_argument("--steps", type=int, default=1000, help="steps of the whole training (default 1000)")
-    parser.add_argument("--minutes", type=float, default=math.inf, help="stop after so long; the next call goes on")
+    parser.add_argument("--minutes", type=float, default=math.inf, help="stop after this time; the next call continues")
     parser.add_argument("--rate", type=float, default=3e-3, help="largest learning rate (default 0.003)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--start", type=Path, help="weights (.npz) to start from")
-    parser.add_argument("--ratio", type=float, help="gauge over railhead width to specialize in (default: all)")
-    parser.add_argument("--network", choices=NETWORKS, default="frpdf", help="what to train (default frpdf)")
+    parser.add_argument("--ratio", type=float, help="gauge divided by railhead width to specialize in (default: all)")
+    parser.add_argument("--network", choices=NETWORKS, default="frpdf", help="network to train (default frpdf)")
     parser.add_argument("--passes", type=int, default=DEFAULT_PASSES, help=f"passes (default {DEFAULT_PASSES})")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Train, go on with a training, or export one that is complete."""
+    """Start or continue a training, and export the weights once it is complete."""
     settings = Settings(**{field.name: getattr(arguments, field.name) for field in fields(Settings)})
     arguments.folder.mkdir(parents=True, exist_ok=True)
     network = train(settings, arguments.folder, arguments.minutes)
     if network is None:
-        print(f"Stopped before the end; the same command goes on from {arguments.folder / 'checkpoint.pt'}.")
+        print(f"Stopped before the last step; the same command continues from {arguments.folder / 'checkpoint.pt'}.")
         return
     recompute_statistics(network, settings)
     calibrate(network, settings)
@@ -103,12 +125,19 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def train(settings: Settings, folder: Path, minutes: float) -> Recurrent | None:
-    """Train up to the last step, or for so many minutes.
+    """Train up to the last step, or for a number of minutes.
+
+    Parameters
+    ----------
+    settings : Settings
+    folder : Path
+        For the checkpoint, from which a training continues, and the log.
+    minutes : float
 
     Returns
     -------
     Recurrent or None
-        None where the time was up before the last step.
+        None if the time was over before the last step.
     """
     torch.manual_seed(settings.seed)
     network = new_network(settings)
@@ -134,47 +163,70 @@ def train(settings: Settings, folder: Path, minutes: float) -> Recurrent | None:
 
 
 def new_network(settings: Settings) -> Recurrent:
-    """Build the network, untrained or with the weights of a file, prepared for its device."""
+    """Build the network, untrained or with the weights of a file, on its device."""
     network = NETWORKS[settings.network]()
-    torch.nn.init.constant_(output_layer(network).bias, OUTPUT_BIAS)
+    torch.nn.init.constant_(output_bias(network), OUTPUT_BIAS)
     if settings.start is not None:
         set_weights(network, load_arrays(settings.start))
     if settings.device == "cpu":
         train_on_cpu(network)
-    return network.to(settings.device, memory_format=torch.channels_last)
+    move(network, settings.device)
+    return network
 
 
 def learning_rate(step: int, settings: Settings) -> float:
-    """Rise over the warm-up, then fall as a cosine to a thousandth."""
+    """Return the rate of a step: it rises during the warm-up, then falls as a cosine to a thousandth."""
     rise = min((step + 1) / WARM_UP_STEPS, 1.0)
     fall = 0.5 * (1 + math.cos(math.pi * step / settings.steps))
     return settings.rate * rise * max(fall, 1e-3)
 
 
 def batch(settings: Settings, stream: int, step: int) -> tuple[Tensor, Tensor, Tensor]:
-    """Draw the pairs of a step: observed rasters, labels and weights of cells, (n, 1, side, side) float tensors."""
+    """Draw the pairs of a step.
+
+    Parameters
+    ----------
+    settings : Settings
+    stream : int
+        One of the streams of random numbers.
+    step : int
+
+    Returns
+    -------
+    observed, label, weight : (n, 1, side, side) float tensor
+        Rasters, labels and weights of the cells.
+    """
     rng = np.random.default_rng([settings.seed, stream, step])
     side, count = CROPS[rng.choice(len(CROPS), p=CROP_SHARES)]
     if stream == DATA and step >= (1 - LAST_SHARE) * settings.steps:
         side, count = LAST_CROP, 1
     ratios = [None if settings.ratio is None else ratio_near(rng, settings.ratio) for _ in range(count)]
     pairs = [random_pair(rng, side, ratio=ratio) for ratio in ratios]
-    return tuple(
-        torch.from_numpy(np.stack(rasters)[:, None].astype(np.float32))
+    rasters = zip(*((pair.observed, pair.label, cell_weights(pair)) for pair in pairs))
+    observed, label, weight = (
+        torch.from_numpy(np.stack(one)[:, None].astype(np.float32))
         .to(settings.device)
         .contiguous(memory_format=torch.channels_last)
-        for rasters in zip(*((pair.observed, pair.label, cell_weights(pair)) for pair in pairs))
+        for one in rasters
     )
+    return observed, label, weight
 
 
 def cell_weights(pair: Pair) -> np.ndarray:
-    """Weigh the cells of a pair: `HARD_WEIGHT` by gaps and by what looks like rails, else 1; (size, size)."""
+    """Return the weights of the cells of a pair, (size, size): `HARD_WEIGHT` near gaps and false rails, otherwise 1."""
     hard = ndimage.binary_dilation((pair.gap > 0) | pair.distractor, np.ones((3, 3)), iterations=HARD_REACH)
     return np.where(hard, HARD_WEIGHT, 1.0)
 
 
 def run_passes(network: Recurrent, observed: Tensor, passes: int) -> Iterator[Tensor]:
-    """Run pass after pass in bfloat16 and yield the float logits of each; the caller may go backward in between."""
+    """Run passes in bfloat16 and yield the float logits of each; the caller may compute gradients in between.
+
+    Parameters
+    ----------
+    network : Recurrent
+    observed : (n, 1, height, width) float tensor
+    passes : int
+    """
     state = torch.full_like(observed, START)
     for number in range(passes):
         with torch.autocast(observed.device.type, torch.bfloat16):
@@ -184,14 +236,19 @@ def run_passes(network: Recurrent, observed: Tensor, passes: int) -> Iterator[Te
 
 
 def loss_of(logits: Tensor, label: Tensor, weight: Tensor) -> Tensor:
-    """Weighted binary cross entropy, plus soft Dice: rail cells are so few that entropy alone starts slowly."""
+    """Compute weighted binary cross entropy plus soft Dice: with entropy alone, training starts slowly.
+
+    Parameters
+    ----------
+    logits, label, weight : (n, 1, height, width) float tensors
+    """
     probability = torch.sigmoid(logits)
     dice = 1 - (2 * (probability * label).sum() + 1) / (probability.sum() + label.sum() + 1)
     return functional.binary_cross_entropy_with_logits(logits, label, weight) * ENTROPY_WEIGHT + dice
 
 
 ENTROPY_WEIGHT = 5.0
-"""Makes the entropy, some hundredths a cell, about as large as Dice."""
+"""Makes the entropy, a few hundredths per cell, about as large as Dice."""
 
 
 def _learn(
@@ -214,7 +271,7 @@ def _learn(
 
 @torch.no_grad()
 def recompute_statistics(network: Recurrent, settings: Settings) -> None:
-    """Average the batch statistics of every pass anew over many batches: running averages trail the weights."""
+    """Average the batch statistics of each kind of pass over many batches, because running averages lag the weights."""
     network.train()
     layers = [module for module in network.modules() if isinstance(module, PassBatchNorm2d)]
     for step in range(STATISTICS_STEPS):
@@ -227,7 +284,7 @@ def recompute_statistics(network: Recurrent, settings: Settings) -> None:
 
 @torch.no_grad()
 def calibrate(network: Recurrent, settings: Settings) -> None:
-    """Move the output's bias, in place, so that F1 by cell is largest at `OUTPUT_THRESHOLD`; see `HARD_WEIGHT`."""
+    """Change the bias of the output, in place, so that F1 is largest at `OUTPUT_THRESHOLD`; see `HARD_WEIGHT`."""
     network.eval()
     edges = torch.arange(-MAX_LOGIT, MAX_LOGIT, LOGIT_BIN)
     for _ in range(CALIBRATION_ROUNDS):
@@ -240,29 +297,29 @@ def calibrate(network: Recurrent, settings: Settings) -> None:
             others += torch.histogram(logits[label.cpu() <= 0.5], edges)[0].numpy()
         found, invented = (np.cumsum(counts[::-1])[::-1] for counts in (rails, others))
         best = float(edges[int(np.argmax(2 * found / (found + invented + rails.sum())))])
-        output_layer(network).bias -= best - math.log(OUTPUT_THRESHOLD / (1 - OUTPUT_THRESHOLD))
+        output_bias(network).sub_(best - math.log(OUTPUT_THRESHOLD / (1 - OUTPUT_THRESHOLD)))
 
 
 def _plain(settings: Settings) -> dict[str, str]:
-    """Give the settings that decide what the weights become, as text."""
+    """Return the settings that determine the weights, as text."""
     return {field.name: str(getattr(settings, field.name)) for field in fields(settings) if field.name != "device"}
 
 
 def _resume(path: Path, settings: Settings, network: Recurrent, optimizer: Optimizers) -> int:
-    """Load a checkpoint where there is one, and give the number of the next step.
+    """Load a checkpoint if there is one, and return the number of the next step.
 
     Raises
     ------
     ParameterError
-        It is of another training.
+        It belongs to another training.
     """
     if not path.exists():
         return 0
     state = torch.load(path, weights_only=True)
     others = {name: value for name, value in _plain(settings).items() if state["settings"].get(name) != value}
     if others:
-        told = ", ".join(f"--{name} {state['settings'].get(name)}" for name in others)
-        raise ParameterError(f"{path.parent} holds a training with {told}: give the same, or another folder.")
+        stated = ", ".join(f"--{name} {state['settings'].get(name)}" for name in others)
+        raise ParameterError(f"{path.parent} has a training with {stated}: use the same values, or another folder.")
     network.load_state_dict(state["network"])
     optimizer.load_state_dict(state["optimizer"])
     return state["step"]

@@ -31,12 +31,19 @@ def small(monkeypatch):
     monkeypatch.setattr(train, "CHECKPOINT_STEPS", 1)
 
 
+def for_the_cpu(layer):
+    """Replace a layer by its fast form."""
+    network = torch.nn.Sequential(layer)
+    gradients.train_on_cpu(network)
+    return network[0]
+
+
 @pytest.mark.parametrize("dilation", [3, 7, gradients.MAX_PHASED_DILATION, gradients.MAX_PHASED_DILATION + 1])
 def test_gradients_of_dilated_convolutions_are_those_of_torch(dilation):
     torch.manual_seed(0)
     x = torch.randn(2, 5, 50, 61, requires_grad=True)
     plain = torch.nn.Conv2d(5, 5, 7, padding=3 * dilation, dilation=dilation, bias=False)
-    own = gradients.train_on_cpu(torch.nn.Sequential(plain))[0]
+    own = for_the_cpu(plain)
     assert type(own) is gradients.CpuConv2d
     upstream = torch.randn(2, 5, 50, 61)
     found = torch.autograd.grad(own(x), (x, own.weight), upstream)
@@ -50,7 +57,7 @@ def test_gradients_of_dilated_convolutions_are_those_of_torch(dilation):
 def test_batch_norm_of_several_columns_at_once_is_that_of_torch():
     torch.manual_seed(0)
     plain = PassBatchNorm2d(5)
-    own = gradients.train_on_cpu(torch.nn.Sequential(PassBatchNorm2d(5)))[0]
+    own = for_the_cpu(PassBatchNorm2d(5))
     assert type(own) is gradients.CpuBatchNorm2d
     x = (torch.randn(3, 5, 64, 96) * torch.rand(5, 1, 1) + torch.randn(5, 1, 1)).requires_grad_()
     upstream = torch.randn_like(x)
@@ -67,7 +74,7 @@ def test_batch_norm_of_several_columns_at_once_is_that_of_torch():
 
 def test_the_rectifier_and_its_gradient_are_those_of_torch():
     torch.manual_seed(0)
-    own = gradients.train_on_cpu(torch.nn.Sequential(torch.nn.ReLU(inplace=True)))[0]
+    own = for_the_cpu(torch.nn.ReLU(inplace=True))
     assert type(own) is gradients.CpuReLU
     x = torch.randn(2, 5, 8, 9, dtype=torch.bfloat16)
     x[0, 0, 0, :3] = 0
@@ -112,7 +119,7 @@ def test_a_resumed_training_ends_where_an_unbroken_one_does(small, tmp_path):
     for name, value in unbroken.state_dict().items():
         assert torch.allclose(value, resumed.state_dict()[name], atol=1e-6), name
     assert (tmp_path / "b" / "log.csv").read_text().count("\n") == 4
-    with pytest.raises(ParameterError, match="holds a training with --seed 7: give the same"):
+    with pytest.raises(ParameterError, match="has a training with --seed 7: use the same"):
         train.train(replace(settings, seed=8), tmp_path / "b", np.inf)
 
 
