@@ -108,7 +108,7 @@ $(ENVIRONMENT): tools/environment.py .venv/installed
 	@$(PYTHON) -m pip install --quiet --no-deps --editable . >&2
 	@touch $@
 
-# Made anew when the system's Python, numpy or scipy changes.
+# Made again when the system's Python, numpy or scipy changes.
 .venv/constraints.txt: system
 	@mkdir -p build
 	@$(SYSTEM_PYTHON) tools/constraints.py '$(TORCH)' > build/constraints.txt
