@@ -56,12 +56,20 @@ class LineNetwork:
         return LineNetwork(lines, self.nodes, self.ends[keep], passes).tidy()
 
     def span(self, end: int, count: int) -> tuple[int, int]:
-        """Return the number of the first of the `count` vertices next to a line end, and one more than the last."""
+        """Return the range of the `count` vertices next to a line end: its first vertex, and one more than its last."""
         length = len(self.lines[end // 2])
         return (length - count, length) if end % 2 else (0, count)
 
     def meets(self, number: int, first: int, last: int) -> bool:
-        """Return whether other lines meet line `number` at its vertices `first` to `last` - 1."""
+        """Return whether other lines meet a line at some of its vertices.
+
+        Parameters
+        ----------
+        number : int
+            The line.
+        first, last : int
+            First of the vertices, and one more than the last.
+        """
         return bool(self._passing(number, first, last).any())
 
     def with_piece(self, number: int, first: int, last: int, vertices: np.ndarray) -> LineNetwork:

@@ -1,4 +1,4 @@
-"""Forks: the centerline of a branch is extended back to the point where it leaves that of the through track.
+"""Forks: the centerline of a branch is extended back to the point where it leaves the through track.
 
 The rails of a branch become separate lines only where they are more than a head from the stock rails, some metres
 beyond the point where the centerlines part. In between, a track leaves another tangentially, so that its distance grows
@@ -35,7 +35,7 @@ MIN_LENGTH_M = 3.0
 """Shorter branches do not show where they begin."""
 
 MISFIT_M = 0.01
-"""Largest distance of a branch from the parabola: leads that begin straight, and stairs of the raster, make as much."""
+"""Largest distance of a branch from the parabola: that of a lead that begins straight, or of stairs of the raster."""
 
 BENT_M = 0.0025
 """A branch further from the parabola, root mean square, has a straight switch: a heel of 0.15 m leaves 3 mm."""
@@ -54,7 +54,7 @@ SEEN_M = 150.0
 it, where the widest branch is 1.6 m from the through track."""
 
 VERTEX_STEP_M = 0.2
-"""Spacing of the vertices of the extension, that of smoothed centerlines."""
+"""Spacing of the vertices of the extension, as on smoothed centerlines."""
 
 
 def fork_centerlines(lines: Sequence[Centerline], progress: Progress = SILENT) -> list[Centerline]:

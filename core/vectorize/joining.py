@@ -21,7 +21,7 @@ DIRECTION_M = 2.0
 
 HOOKS_M = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (2.0, 0.0), (0.0, 2.0))
 """Lengths cut off the two ends before a join is tried, in this order. Weeds, guard rails and wing rails may have bent
-the ends aside, so far that they are side by side."""
+the ends aside, even until they overlap side by side."""
 
 MIN_PIECE_M = 0.25
 """Shorter pieces have no direction and are not joined."""

@@ -70,8 +70,8 @@ def _link(keys: np.ndarray, stride: int) -> np.ndarray:
 def parity_fix(pixels: Pixels) -> Pixels:
     """Double the grid so that every run of n pixels becomes a run of 2 n - 1, whose middle is a pixel.
 
-    A skeleton consists of pixels, so that of a line of even width would be half a pixel off. Pixel (i, j) becomes
-    (2 i, 2 j); between neighbours, diagonal ones included, a new pixel is set. Components and holes stay the same.
+    A skeleton consists of pixels, so the skeleton of a line of even width would be half a pixel off. Pixel (i, j)
+    becomes (2 i, 2 j), and a new pixel is set between neighbours, diagonal ones included. Components and holes stay.
     """
     doubled = 2 * pixels.cells
     between = [

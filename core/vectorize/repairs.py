@@ -33,7 +33,7 @@ KINK_DEG, KINK_M = 25.0, 0.5
 
 BEND_M = 1.0
 BEND = BEND_M / MIN_RADIUS_M + 2 * STAIRS_M / BEND_M
-"""Angle in radians between parts of this length on the tightest rail, plus that of the stairs of its raster."""
+"""Largest angle, radians, between parts of this length on the tightest rail with the stairs of its raster."""
 
 SWERVE_M = 0.05
 SWERVE_SEEN_M = 6.0, 2.0

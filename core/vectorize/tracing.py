@@ -21,7 +21,7 @@ def trace(raster: RailRaster, pixels: Pixels, edges: np.ndarray, tips: np.ndarra
     Parameters
     ----------
     raster : RailRaster
-        Grid of which these are the doubled pixels.
+        Raster whose cells were doubled into the pixels.
     pixels : Pixels
     edges : (e, 2) int array
     tips : (n,) int array

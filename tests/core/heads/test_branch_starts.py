@@ -7,7 +7,7 @@ WIDTH, TOE, LENGTH = 0.072, 30.0, 80.0
 
 
 def network(offset, node_at, hand=1, turned=False, stock_turned=False):
-    """Stock rail along the x axis and a branch `offset(x - TOE)` beside it, joined by force at `node_at`."""
+    """Stock rail along the x axis and a branch `offset(x - TOE)` from it, connected at `node_at` by force."""
     x = np.arange(0, LENGTH + 0.05, 0.1)
     stock = np.column_stack([x, np.zeros_like(x)])
     vertex = int(round(node_at / 0.1))
@@ -22,7 +22,7 @@ def network(offset, node_at, hand=1, turned=False, stock_turned=False):
 
 
 def heads(offset, hand=1, density=100):
-    """Points on the heads of a stock rail along the x axis and of a branch beside it, with 3 mm of noise."""
+    """Points on the heads of a stock rail along the x axis and of a branch next to it, with 3 mm of noise."""
     rng = np.random.default_rng(5)
     x = rng.uniform(0, LENGTH, (2, int(density * LENGTH)))
     across = np.array([np.zeros_like(x[0]), np.where(x[1] > TOE, hand * offset(x[1] - TOE), 0.0)])
@@ -80,7 +80,7 @@ def test_a_straight_blade_begins_at_its_point(angle, hand, turned, sure):
     assert np.abs(branch[:, 1] - hand * offset(branch[:, 0] - TOE)).max() < 0.0005
 
 
-def test_heads_so_wide_that_they_hide_the_heel_are_no_obstacle():
+def test_heads_wide_enough_to_hide_the_heel_are_no_obstacle():
     slid = slide_branches(network(straight_switch(1 / 30), TOE - 2.8), NO_POINTS, 0.125, 1.3 * 0.125)
     assert slid.degrees().tolist().count(3) == 1
 

@@ -1,12 +1,11 @@
-"""PAEK against quadrature and closed formulas; networks that still meet."""
+"""PAEK against quadrature and closed formulas."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial.legendre import leggauss
-from rail_extract.core.lines.network import LineNetwork
-from rail_extract.core.lines.network_smoothing import NETWORK_STATIONS_PER_SIGMA, bend_through, smooth_network
+from rail_extract.core.lines.paek import END_SHIFT, VARIANCE_FACTOR
 from rail_extract.core.lines.smoothing import smooth_line, smooth_profile
 from rail_extract.core.polyline import length_along
 from rail_extract.laboratory.curves import trace, transition_curve
@@ -63,7 +62,7 @@ def test_straight_lines_stay(ends):
     np.testing.assert_allclose(smoothed[[0, -1]], line[[0, -1]], atol=1e-9)
 
 
-def test_parabolas_come_back_with_free_ends():
+def test_parabolas_stay_with_free_ends():
     t = np.arange(0, 30, 0.005)
     stations = np.linspace(0, t[-1], 50)
     smoothed = smooth_profile(t, 0.3 - 0.2 * t + 0.05 * t**2, 3.0, stations)
@@ -95,7 +94,7 @@ def test_an_80_m_wave_keeps_its_height_with_sigma_3_m():
 
 @pytest.mark.parametrize(("radius", "transition"), [(25, 5.0), (190, 20.0), (600, 50.0)])
 def test_no_kink_where_a_clothoid_meets_an_arc(radius, transition):
-    """Curvature that begins to change by c a metre moves the line by 0.41 c sigma³ at the joint, and nothing turns."""
+    """Where curvature begins to change by c per metre, the line moves by 0.41 c sigma³, and its heading has no step."""
     curve = trace(transition_curve(15, transition, 30, 1 / radius))
     thinner = curve.xy[::5]
     stations = np.arange(5, length_along(thinner)[-1] - 5, 0.1)
@@ -110,7 +109,7 @@ def test_no_kink_where_a_clothoid_meets_an_arc(radius, transition):
 
 
 @pytest.mark.parametrize(("radius", "sigma"), [(25, 0.8), (190, 5.0)])
-def test_closed_circles_shrink_as_foretold(radius, sigma):
+def test_closed_circles_shrink_as_predicted(radius, sigma):
     smoothed = smooth_line(circle(radius, 40_000), sigma, closed=True)
     shrunk = radius - np.hypot(*smoothed.T)
     np.testing.assert_allclose(shrunk, 1.8 * sigma**4 / radius**3, rtol=0.02, atol=2e-6)
@@ -175,106 +174,26 @@ def test_profile_of_one_point_is_level():
     np.testing.assert_allclose(smooth_profile([4.0], [7.0], 3.0, np.array([0.0, 4.0, 9.0])), 7.0)
 
 
-def test_profile_does_not_mind_density():
+def test_a_profile_does_not_depend_on_density():
     t = np.concatenate([np.arange(0, 20, 0.01), np.arange(20, 40, 0.1)])
     stations = np.linspace(13, 27, 31)
     smoothed = smooth_profile(t, np.sin(t / 4), 1.0, stations)
     np.testing.assert_allclose(smoothed, np.sin(stations / 4) * gain(8 * np.pi, 1.0), atol=1e-4)
 
 
-def wavy(x, y, seed):
-    return np.column_stack([x, y + 0.01 * np.random.default_rng(seed).normal(size=len(x))])
+def test_noise_is_reduced_by_the_variance_factor():
+    """A single displaced vertex shows the weights, whose squares add up to the variance."""
+    spacing = 0.1
+    t = np.arange(0, 60, spacing)
+    line = np.column_stack([t, np.where(np.arange(len(t)) == 300, 1.0, 0.0)])
+    weights = smooth_profile(t, line[:, 1], SIGMA, t)
+    assert np.sum(weights**2) == pytest.approx(VARIANCE_FACTOR * spacing / SIGMA, rel=0.01)
 
 
-def turnout():
-    """A through line whose vertex 200 is the node in which a branch of 1:9 starts."""
-    x = np.arange(0, 40, 0.1)
-    through = wavy(x, 0 * x, 1)
-    branch = wavy(x[200:], (x[200:] - x[200]) / 9, 2)
-    branch[0] = through[200]
-    nodes = np.array([through[0], through[-1], branch[0], branch[-1]])
-    return LineNetwork((through, branch), nodes, np.array([[0, 1], [2, 3]]), np.array([[2, 0, 200]]))
-
-
-def test_lines_of_a_network_still_meet_and_free_ends_stay():
-    network = turnout()
-    smoothed = smooth_network(network, SIGMA)
-    for line, (start, end) in zip(smoothed.lines, smoothed.ends):
-        np.testing.assert_array_equal(line[[0, -1]], smoothed.nodes[[start, end]])
-    for node, line, vertex in smoothed.passes:
-        np.testing.assert_array_equal(smoothed.lines[line][vertex], smoothed.nodes[node])
-    np.testing.assert_array_equal(smoothed.nodes[[0, 1, 3]], network.nodes[[0, 1, 3]])
-    np.testing.assert_array_equal(smoothed.ends, network.ends)
-
-
-def test_a_branch_does_not_bend_the_line_it_leaves():
-    network = turnout()
-    alone = LineNetwork(network.lines[:1], network.nodes[:2], network.ends[:1])
-    through, expected = smooth_network(network, SIGMA).lines[0], smooth_network(alone, SIGMA).lines[0]
-    t = length_along(expected)
-    np.testing.assert_allclose(through[:, 1], np.interp(through[:, 0], expected[:, 0], expected[:, 1]), atol=2e-5)
-    assert np.diff(t).max() <= SIGMA / NETWORK_STATIONS_PER_SIGMA + 1e-9
-
-
-def test_lines_cut_at_a_node_are_smoothed_as_one():
-    line = wavy(np.arange(0, 40, 0.1), np.zeros(400), 3)
-    whole = smooth_line(line, SIGMA, length_along(line)[[150, 200, 250]])
-    cut = LineNetwork((line[:201], line[200:][::-1]), line[[0, 200, -1]], np.array([[0, 1], [2, 1]]))
-    smoothed = smooth_network(cut, SIGMA)
-    np.testing.assert_allclose(smoothed.nodes[1], whole[1], atol=1e-9)
-
-
-def test_a_loop_in_a_network_is_smoothed_across_its_seam():
-    loop = circle(25, 4000)
-    smoothed = smooth_network(LineNetwork((loop,), loop[:1], np.array([[0, 0]])), SIGMA)
-    np.testing.assert_allclose(np.hypot(*smoothed.lines[0].T), 25, atol=1e-4)
-    np.testing.assert_array_equal(smoothed.lines[0][0], smoothed.lines[0][-1])
-
-
-def test_corners_at_a_node_are_not_smoothed_away():
-    first, second = np.array([[0.0, 0], [10, 0]]), np.array([[10.0, 0], [10, 10]])
-    nodes = np.array([[0.0, 0], [10, 0], [10, 10]])
-    smoothed = smooth_network(LineNetwork((first, second), nodes, np.array([[0, 1], [1, 2]])), SIGMA)
-    np.testing.assert_allclose(smoothed.nodes, nodes, atol=1e-9)
-
-
-def test_a_diamond_keeps_its_crossing_in_both_lines():
-    x = np.arange(-20, 20.05, 0.1)
-    lines = (wavy(x, x / 9, 5), wavy(x, -x / 9, 6))
-    for line in lines:
-        line[200] = 0
-    nodes = np.array([line[i] for line in lines for i in (0, -1)] + [[0.0, 0.0]])
-    network = LineNetwork(lines, nodes, np.array([[0, 1], [2, 3]]), np.array([[4, 0, 200], [4, 1, 200]]))
-    smoothed = smooth_network(network, SIGMA)
-    for node, line, vertex in smoothed.passes:
-        np.testing.assert_array_equal(smoothed.lines[line][vertex], smoothed.nodes[node])
-    assert np.hypot(*smoothed.nodes[4]) < 0.005
-
-
-def test_a_line_is_led_to_its_nodes_smoothly_and_only_near_them():
-    rng = np.random.default_rng(4)
-    t = np.arange(0, 400, 0.125)
-    places = np.array([2900, 0, 800, 803, 1600, len(t) - 1])
-    line = np.zeros((len(t), 2))
-    targets = rng.normal(0, 0.01, (len(places), 2))
-    bend_through(line, t, places, targets)
-    np.testing.assert_array_equal(line[places], targets)
-    assert np.abs(np.diff(line, 2, axis=0)).max() < 0.02 * 0.125  # no corner, though two nodes pull apart
-    midway = np.abs(t[:, None] - t[places]).min(axis=1) > 25
-    assert midway.sum() > 500
-    assert np.abs(line[midway]).max() < 1e-10
-
-
-def test_leading_a_line_equals_one_dense_system():
-    rng = np.random.default_rng(5)
-    t = np.cumsum(rng.uniform(0.05, 0.2, 4000))
-    places = np.sort(rng.choice(len(t), 40, replace=False))
-    line, targets = rng.normal(size=(len(t), 2)), rng.normal(size=(40, 2))
-
-    def fading(d):
-        return (1 + np.abs(d)) * np.exp(-np.abs(d))
-
-    weights = np.linalg.solve(fading(t[places][:, None] - t[places]), targets - line[places])
-    expected = line + fading(t[:, None] - t[places]) @ weights
-    bend_through(line, t, places, targets)
-    np.testing.assert_allclose(line, expected, atol=1e-9)
+def test_a_fixed_end_in_an_arc_moves_the_line_by_the_end_shift():
+    radius = 190.0
+    angle = np.arange(0, 60 / radius, 0.01 / radius)
+    arc = radius * np.column_stack([np.sin(angle), 1 - np.cos(angle)])
+    smoothed = smooth_line(arc, SIGMA, np.arange(0, 20, 0.02))
+    moved = np.abs(np.hypot(smoothed[:, 0], smoothed[:, 1] - radius) - radius).max()
+    assert moved == pytest.approx(END_SHIFT * SIGMA**2 / radius, rel=0.03)

@@ -35,7 +35,7 @@ def test_thinned_lines_are_short_and_near():
 
 @pytest.mark.parametrize("radius", [25.0, 190.0, 1200.0])
 def test_thinned_curves_neither_shrink_nor_shift(radius):
-    """Chords through vertices of the curve would lie inside of it, 1.3 mm on average."""
+    """Chords between vertices of the curve would be inside it, by 1.3 mm on average."""
     (line,) = thin([rail(arc(radius, 60.0, 0.01))], 0.002, 0.002)
     at = np.linspace(0, len(line.xyz) - 1, 20_001)
     x, y = (np.interp(at, np.arange(len(line.xyz)), column) for column in line.xyz.T[:2])
@@ -45,7 +45,7 @@ def test_thinned_curves_neither_shrink_nor_shift(radius):
     assert np.abs(off).max() < 0.002
 
 
-def test_what_is_left_out_lies_within_the_tolerance():
+def test_dropped_vertices_are_within_the_tolerance():
     random = np.random.default_rng(2)
     along = np.arange(0, 60, 0.1)
     rough = np.column_stack([along, np.cumsum(random.normal(0, 0.001, (600, 2)), axis=0)])
@@ -88,7 +88,7 @@ def test_simplified_lines_keep_both_tolerances(seed, tolerance_xy, tolerance_z):
             assert abs(off[2]) <= tolerance_z + 1e-12
 
 
-def test_thinning_sees_height_alone_and_plan_without_height():
+def test_height_counts_on_its_own_and_plan_without_height():
     hump = np.column_stack([np.arange(5.0), np.zeros(5), [0, 0, 0.01, 0, 0]])
     assert essential_vertices(hump, 0.002, 0.002).sum() > 2
     assert essential_vertices(hump, 0.002, 0.02).sum() == 2
@@ -108,7 +108,7 @@ def test_thinning_keeps_a_closed_line_closed():
     assert fewest <= kept.sum() <= 2.1 * fewest
 
 
-def test_thinning_by_nothing_drops_only_what_lies_on_the_line():
+def test_a_tolerance_of_zero_drops_only_vertices_on_the_line():
     assert essential_vertices(arc(25, 90.0, step=3.0), 0.0, 0.0).all()
     straight = np.column_stack([np.arange(9.0), np.zeros(9), np.zeros(9)])
     assert essential_vertices(straight, 0.0, 0.0).sum() == 2

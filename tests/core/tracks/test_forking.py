@@ -34,7 +34,7 @@ def turnout(form, hand, heading, shown_m, main=STRAIGHT, noise_m=0.0):
 
 
 def near_end(line, place):
-    """The end of a line that lies nearer to a place."""
+    """The end of a line that is nearer to a place."""
     ends = line.xyz[[0, -1]]
     return ends[np.argmin(np.hypot(*(ends[:, :2] - place).T))]
 
@@ -63,7 +63,7 @@ def test_branches_leave_the_through_track_at_the_toe(name, hand, heading, shown_
 @pytest.mark.parametrize("name", ["#6", "#10", "#20"])
 @pytest.mark.parametrize("shown_m", [0.02, 0.05])
 def test_branches_of_straight_switches_leave_at_an_angle(name, shown_m):
-    """As long as some of the straight shows: a parabola would lead back past the toe by up to 4 m."""
+    """If part of the straight is visible; a parabola would extend up to 4 m past the toe."""
     rails, toe, truth = turnout(FORM[name], 1, 0.3, shown_m)
     through, side = by_rails(build_centerlines(rails, GAUGE, WIDTH))
     start = near_end(side, toe)
@@ -75,7 +75,7 @@ def test_branches_of_straight_switches_leave_at_an_angle(name, shown_m):
 
 
 @pytest.mark.parametrize("early_m", [0.5, 2.0])
-def test_branches_that_begin_on_the_through_track_lose_what_they_share(early_m):
+def test_branches_that_begin_on_the_through_track_lose_the_shared_part(early_m):
     rails, toe, truth = turnout(FORM["300-1:9"], 1, 0.3, 0.0)
     lines = [rail.xyz for rail in rails]
     for through, side in ((0, 2), (1, 3)):
@@ -91,7 +91,7 @@ def test_branches_that_begin_on_the_through_track_lose_what_they_share(early_m):
     assert compare_lines([through.xyz, side.xyz], truth).length_ratio < 1.004
 
 
-def test_a_turnout_in_a_curve_forks_as_well_though_rails_are_not_exact():
+def test_a_turnout_in_a_curve_forks_although_rails_are_not_exact():
     rails, toe, truth = turnout(FORM["500-1:12"], 1, 1.0, 0.1, (Element(120.0, 1 / 900, 1 / 900),), noise_m=0.001)
     through, side = by_rails(build_centerlines(rails, GAUGE, WIDTH))
     start = near_end(side, toe)
@@ -115,7 +115,7 @@ def test_a_crossover_forks_at_both_ends():
     link = trace([*half, Element(20.0), *back], tuple(lower.xy[1000]), 0.0)
     upper = trace([Element(100.0)], (0.0, link.xy[-1, 1]), 0.0)
     tracks = [Track(curve, GAUGE + WIDTH) for curve in (lower, upper, link)]
-    shown = slice(300, -300)  # 6 m: 95 mm beside
+    shown = slice(300, -300)  # without 6 m at either end, where the branch is up to 95 mm from the track
     rails = [*tracks[0].rails(), *tracks[1].rails(), *(tracks[2].railhead(side).top[shown] for side in (1, -1))]
     first, second, crossover = by_rails(build_centerlines(rails_of(*rails), GAUGE, WIDTH))
     for track, place in ((first, link.xy[0]), (second, link.xy[-1])):
@@ -125,7 +125,7 @@ def test_a_crossover_forks_at_both_ends():
     assert compare_lines([crossover.xyz], [tracks[2].centerline]).lateral_p95_m < 0.002
 
 
-def test_tracks_that_only_run_or_end_beside_others_do_not_fork():
+def test_tracks_that_only_run_or_end_next_to_others_do_not_fork():
     long, short = trace([Element(60.0)]), trace([Element(20.0)], (20.0, 0.0))
     for left_m in (0.25, 4.0):  # dual gauge at one side, and a double track
         lines = [track.rails() for track in (Track(long, GAUGE + WIDTH), Track(short, GAUGE + WIDTH, left_m=left_m))]

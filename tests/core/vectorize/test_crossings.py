@@ -17,7 +17,7 @@ def test_two_rails_cross_at_a_flat_frog_and_do_not_exchange(number, heading):
     shared_m, half = 0.09 * number / 2, np.arctan(1 / number) / 2
     turned = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
     t = np.arange(shared_m, 40, 0.1)
-    # Wing rails keep the strip wide: its halves' middles lie too near each other for as long again.
+    # Wing rails keep the strip wide: for the same length again, the middles of its halves are too close together.
     aside = t * np.tan(half) * np.clip(t / shared_m - 1, 0, 1)
     forks = np.array([[-shared_m, 0.0], [shared_m, 0.0]])
     legs = [np.column_stack([side * t, up * aside]) for side in (-1, 1) for up in (-1, 1)]

@@ -86,7 +86,7 @@ def test_a_bar_becomes_one_straight_line_exactly_in_its_middle(width, turned):
     assert 0 <= 79 - np.ptp(along) <= width / 2
 
 
-def test_without_the_parity_fix_an_even_bar_lies_half_a_pixel_off():
+def test_without_the_parity_fix_an_even_bar_is_half_a_pixel_off():
     pixels = pixel_set(np.argwhere(np.ones((2, 80), dtype=bool)))
     distance = chamfer_distance(pixels)
     edges, _ = prune(veinerize(pixels, distance), distance)

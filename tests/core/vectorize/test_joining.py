@@ -37,13 +37,13 @@ def star(*tips):
     return LineNetwork(lines, nodes, np.column_stack([np.zeros(len(tips), int), np.arange(1, len(tips) + 1)]))
 
 
-def test_rails_join_across_more_than_a_gap_where_cells_show_them_merged():
+def test_rails_join_across_more_than_a_gap_where_they_share_cells():
     pieces = along_x(0, 20), along_x(28, 50)
     assert len(join_gaps(loose(*pieces), 5.0, 10.0, cKDTree(np.concatenate(pieces))).lines) == 2
     assert len(join_gaps(loose(*pieces), 5.0, 10.0, cKDTree(along_x(0, 50, 0.03))).lines) == 1
 
 
-def test_ends_bent_aside_beside_each_other_are_joined_without_their_hooks():
+def test_overlapping_ends_that_are_bent_aside_are_joined_without_their_hooks():
     rail, wing = along_x(0, 20), along_x(20.2, 40)
     rail[-15:, 1] += 0.1 * np.linspace(0, 1.5, 15)
     (line,) = join_gaps(loose(rail, wing[:-1]), 5.0, 10.0, cKDTree(np.concatenate([rail, wing]))).lines
@@ -69,8 +69,8 @@ def test_welding_across_a_gap_keeps_the_passes_in_place():
 
 
 @pytest.mark.parametrize("second_is_free", [False, True])
-def test_of_two_ends_that_are_joined_one_at_least_is_free(second_is_free):
-    """Two branches that end in nodes of other lines stay apart, though they face each other across a gap."""
+def test_at_least_one_of_two_joined_ends_is_free(second_is_free):
+    """Two branches that end in nodes of other lines stay apart, although they face each other across a gap."""
     first, second = along_x(-20, 0.05), along_x(3, 23)
     walls = [np.array([[x, -9.0], [x, 0.0], [x, 9.0]]) for x in (first[-1, 0], second[0, 0])]
     network = loose(first, second, *walls).with_end(1, first[-2:-1], 1, at=(2, 1))

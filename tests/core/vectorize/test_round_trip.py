@@ -1,9 +1,9 @@
 """Clean rasters of synthetic layouts, vectorized and smoothed, come back as the rails they were drawn from.
 
 A line nearly parallel to the grid, or at 45 degrees to it, is quantized by up to half a cell over its whole length,
-which smoothing cannot undo (docs/method.md section 4.15); stretches more than 4 degrees away from both show what the
-vectorization itself adds. Rails that merge at a turnout's toe or cross at a small angle share their cells there: only
-stretches where a rail is apart from all others count.
+which smoothing cannot undo (docs/method.md section 4.15). Sections more than 4 degrees away from both show what the
+vectorization itself adds. Rails that merge at a turnout's toe or cross at a small angle share cells there, so only
+sections where a rail is apart from all others count.
 """
 
 from dataclasses import replace
@@ -25,12 +25,12 @@ SIZE = TrackSize(SPACING_M, SPACING_M / (1 + BASE_RATIO))
 SIDE = 768
 SIGMA_M = 0.8
 END_M = 3 * SIGMA_M
-"""Free ends are left out as far as smoothing reaches from them."""
+"""Length that is ignored next to free ends: the reach of smoothing."""
 APART_M = 0.19
-"""Distance of railhead centres from which two rails have cells of their own; that of the narrowest third rail."""
+"""Distance between railhead centres from which two rails have separate cells, as at the narrowest third rail."""
 OFF_GRID_DEG = 4.0
 JUNCTION_M = 5 * SIGMA_M
-"""Where lines are led to a node, the correction fades over this length."""
+"""Length over which the correction fades where lines are bent to a node."""
 
 
 def clean_lines(layout, heading):
@@ -48,7 +48,7 @@ def clean_lines(layout, heading):
 
 
 def lateral_errors(lines, layout, heading):
-    """Distance across the nearest rail at every 0.1 m of lines, metres, where that rail is apart and off the grid."""
+    """Lateral distance, metres, from the nearest rail every 0.1 m along lines, where it is apart and off the grid."""
     errors = []
     trees = [cKDTree(rail.xy) for rail in layout.rails]
     for line in lines:
@@ -71,7 +71,7 @@ def lateral_errors(lines, layout, heading):
 
 
 def away_from_axes(layout):
-    """Find a turn that brings the first spot's track to 17 degrees with the grid."""
+    """Rotation that brings the first spot's track to 17 degrees with the grid."""
     rail = min(layout.rails, key=lambda rail: np.linalg.norm(rail.xy - layout.spots[0], axis=1).min())
     normal = rail.normal[np.linalg.norm(rail.xy - layout.spots[0], axis=1).argmin()]
     return np.radians(17.0) - np.arctan2(-normal[0], normal[1])
@@ -86,7 +86,7 @@ def away_from_axes(layout):
 )
 @pytest.mark.parametrize("seed", [1, 2])
 def test_clean_rasters_come_back_as_their_rails(family, limit_m, seed):
-    """Within 2 mm rms where rails cross or run alone; what is left of merging rails adds up to 1 mm."""
+    """Within 2 mm rms where rails cross or are alone; merging rails add up to 1 mm."""
     layout = random_layout(np.random.default_rng([40, seed]), SIZE, family)
     heading = away_from_axes(layout)
     errors = lateral_errors(clean_lines(layout, heading), layout, heading)
