@@ -82,6 +82,24 @@ def take_names(path: Path, names: Mapping[Path, Path]) -> None:
         raise DiskError(f"{reason} The new file is {path.with_name(f'{path.stem}_new{path.suffix}')}.") from error
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a text file; an older one stays until the new one is complete.
+
+    Raises
+    ------
+    DiskError
+    """
+    part = path.with_name(f"{path.name}.part")
+    try:
+        try:
+            part.write_text(text, encoding="utf-8")
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
+    except OSError as error:
+        raise DiskError(f"{path} can't be written ({error.strerror}): choose another place.") from error
+
+
 def _companions(path: Path) -> set[Path]:
     """Return the files that may accompany a file."""
     shapefile = SHAPEFILE_COMPANIONS if path.suffix.lower() == ".shp" else ()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,7 +18,7 @@ from ...core.standards import RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
-from ..reading.clouds import CloudSource, spool_points
+from ..reading.clouds import CloudSource, request_points
 from ..systems import system
 from ..writing.layers import (
     CENTERLINES,
@@ -30,15 +29,12 @@ from ..writing.layers import (
     write_raster,
     write_stations,
 )
-from ..writing.reports import Origin, write_report
+from ..writing.reports import write_report
 from ..writing.whole_files import write_each
 from .base import CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
     from ...core.rails import RailNetwork
-
-READING = 0.2
-"""Fraction of the progress bar for reading the cloud."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +108,9 @@ class ExtractRails(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Extract the rails and tracks, then write the outputs."""
-        from ...core.pipeline import extract_rails, square_side
+        from ...core.pipeline import extract_files
+        from ...core.report import Origin
+        from ...core.tasks import InTurn
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
         settings = values.settings(job.standard, job.other_gauges_m)
@@ -121,16 +119,14 @@ class ExtractRails(RailAlgorithm):
             quality_step_m=values.number("STEP") if values.wanted("QUALITY") or values.wanted("REPORT") else None,
             keep_cleaned=values.wanted("CLEANED"),
         )
-        side_m = square_side(settings)
+        request = request_points(job.cloud, job.class_codes, values.extent, progress)
         with TemporaryDirectory(dir=QgsProcessingUtils.tempFolder()) as folder:
-            reading = progress.span(0, READING)
-            clouds = spool_points(job.cloud, job.class_codes, values.extent, side_m, Path(folder), reading)
-            network = extract_rails(clouds, settings, progress.span(READING, 1))
+            network = extract_files(request, Path(folder), settings, InTurn(), progress)
         progress.check()
         origin = Origin(job.cloud.paths, job.standard, job.other_gauges_m, job.command)
-        class_codes, frame, rest = [one.class_code for one in clouds], network.frame, (parameters, context)
+        frame, rest = network.frame, (parameters, context)
         writers = {
-            "CLEANED": lambda: self._write_cleaned(job, network, class_codes, *rest),
+            "CLEANED": lambda: self._write_cleaned(job, network, *rest),
             "RAILS": lambda: write_lines(self, "RAILS", RAILS, network.rails, frame, *rest),
             "CENTERLINES": lambda: write_lines(self, "CENTERLINES", CENTERLINES, network.centerlines, frame, *rest),
             "QUALITY": lambda: write_stations(self, "QUALITY", network.geometry, frame, *rest),
@@ -145,7 +141,6 @@ class ExtractRails(RailAlgorithm):
         self,
         job: Job,
         network: RailNetwork,
-        class_codes: Sequence[int],
         parameters: dict[str, Any],
         context: QgsProcessingContext,
     ) -> dict[str, str]:
@@ -156,5 +151,5 @@ class ExtractRails(RailAlgorithm):
             return {}
         rasters, frame = on_one_grid(network.cleaned, network.frame)
         extent = ParameterValues(self, parameters, context).extent(system(network.frame.crs_wkt))
-        header = header_for(rasters, class_codes, frame, job.standard, extent)
+        header = header_for(rasters, network.cleaned_classes, frame, job.standard, extent)
         return write_raster(self, "CLEANED", header, rasters, parameters, context)

@@ -22,7 +22,7 @@ from ...core.standards import RAIL_CLASS
 from ..systems import system
 
 if TYPE_CHECKING:
-    from ...core.clouds.points import RailPoints
+    from ...core.clouds.points import RailPoints, Request
     from ...core.squares.spool import SpooledPoints
 
 Bounds = tuple[float, float, float, float]
@@ -115,11 +115,22 @@ def spool_points(
     folder : Path
         Where to write them.
     """
-    from ...core.clouds.points import ask
     from ...core.squares.spool import spool
 
-    request = ask(source.paths, class_codes, source.crs_wkt, bounds(system(crs_of(source))), progress)
-    return spool(request, side_m, folder, progress)
+    return spool(request_points(source, class_codes, bounds, progress), side_m, folder, progress)
+
+
+def request_points(source: CloudSource, class_codes: Sequence[int], bounds: BoundsIn, progress: Progress) -> Request:
+    """Check which points of which files are to be read, and read the headers of the files.
+
+    Parameters
+    ----------
+    source, class_codes, bounds, progress
+        See `read_points`.
+    """
+    from ...core.clouds.points import ask
+
+    return ask(source.paths, class_codes, source.crs_wkt, bounds(system(crs_of(source))), progress)
 
 
 def crs_of(source: CloudSource) -> str | None:
