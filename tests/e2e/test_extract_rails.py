@@ -6,8 +6,13 @@ from lines import read_features, read_lines
 from rail_extract.laboratory.ruler.lines import compare_lines
 
 STANDARD = "IN_75R_1000"
-TRUE_GAUGE_MM, GAUGE_TOLERANCE_MM = 1000, 5
-TRACKS = 3
+TRUE_GAUGE_MM = 1000
+MAX_LATERAL_M, MAX_HEIGHT_M, MAX_GAUGE_MM = 1.5 * 0.0019, 1.5 * 0.0004, 1.5 * 0.4
+"""Greatest RMSE of the rails in plan and in height, and greatest error of a track's gauge: 1.5 times the figures that
+the README states."""
+
+MIN_SHARE = 0.999
+"""Smallest share of the lines to be found and to be correct; the README states 100.0 %."""
 
 
 def test_results_are_those_of_the_files(extracted):
@@ -21,21 +26,22 @@ def test_results_are_those_of_the_files(extracted):
 
 def test_rails_against_truth(extracted, truth):
     comparison = compare_lines(read_lines(extracted.rails), truth("rail"))
-    assert comparison.completeness >= 0.97
-    assert comparison.correctness >= 0.99
-    assert comparison.lateral_rmse_m <= 0.010
-    assert comparison.height_rmse_m <= 0.006
-    assert comparison.line_count <= 2 * comparison.truth_count
+    assert comparison.completeness >= MIN_SHARE
+    assert comparison.correctness >= MIN_SHARE
+    assert comparison.lateral_rmse_m <= MAX_LATERAL_M
+    assert comparison.height_rmse_m <= MAX_HEIGHT_M
+    assert (comparison.line_count, comparison.truth_count) == (6, 6)
 
 
 def test_centerlines_against_truth(extracted, truth):
     comparison = compare_lines(read_lines(extracted.centerlines), truth("centerline"))
-    assert comparison.completeness >= 0.97
-    assert comparison.correctness >= 0.99
-    for true_line in truth("centerline"):
-        assert compare_lines(read_lines(extracted.centerlines), [true_line]).completeness >= 0.95
+    assert comparison.completeness >= MIN_SHARE
+    assert comparison.correctness >= MIN_SHARE
+    assert comparison.lateral_rmse_m <= MAX_LATERAL_M
+    assert comparison.height_rmse_m <= MAX_HEIGHT_M
+    assert (comparison.line_count, comparison.truth_count) == (3, 3)
     for _, items in read_features(extracted.centerlines):
-        assert items["gauge_mm"] == pytest.approx(TRUE_GAUGE_MM, abs=GAUGE_TOLERANCE_MM)
+        assert items["gauge_mm"] == pytest.approx(TRUE_GAUGE_MM, abs=MAX_GAUGE_MM)
 
 
 def test_centerlines_name_their_rails(extracted):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import reference
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+DOCS = Path(__file__).resolve().parents[3] / "docs"
 
 
 def algorithms(plugin):
