@@ -82,5 +82,5 @@ def _stations(lines: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.n
         columns.append((np.full(len(station), number), station, places, normals))
     if not columns:
         return np.empty(0, int), np.empty(0, int), np.empty((0, 2)), np.empty((0, 2))
-    number, station, place, normal = (np.concatenate(column) for column in zip(*columns))
-    return number, station, place, normal
+    numbers, stations, places, normals = (np.concatenate(column) for column in zip(*columns))
+    return numbers, stations, places, normals

@@ -106,15 +106,36 @@ def pair_rails(
     spacing = gauge_m + head_width_m
     reach_m = max(MAX_SPACING_M, spacing + 2 * tolerance_m)
     parallels = find_parallels(rails, reach_m, progress.span(0.0, 0.3))
-    # Chords between stations, and stations not exactly abreast, distort the distance a little: double the tolerance.
-    at_gauge = parallels[np.abs(np.abs(parallels.left_m) - spacing) < 2 * tolerance_m]
-    candidates = [section for group in at_gauge.groups() for section in _sections(group)]
+    candidates = find_candidates(parallels, spacing, tolerance_m)
     others_m = [gauge + head_width_m for gauge in other_gauges_m]
     matches: list[_Match] = []
     for section in progress.span(0.3, 1.0).follow(candidates):
         found = _match(rails, section, spacing, tolerance_m)
         matches.extend(match for match in found if _is_nearest(match, section, spacing, others_m))
     return tuple(match.pair() for match in _without_ghosts(_select(matches)))
+
+
+def find_candidates(parallels: Parallels, spacing_m: float, tolerance_m: float) -> list[Parallels]:
+    """Find the sections of rails that may be at gauge, for the exact matching.
+
+    Chords between stations, and stations that are not exactly abreast, distort the distance a little. Distances are
+    therefore compared with twice the tolerance.
+
+    Parameters
+    ----------
+    parallels : Parallels
+    spacing_m : float
+        Distance between the rail lines at gauge.
+    tolerance_m : float
+        Maximum deviation of a match from that distance.
+
+    Returns
+    -------
+    list of Parallels
+        The stations of each section.
+    """
+    near = parallels[np.abs(np.abs(parallels.left_m) - spacing_m) < 2 * tolerance_m]
+    return [section for group in near.groups() for section in _sections(group)]
 
 
 @dataclass(frozen=True)

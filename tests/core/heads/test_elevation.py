@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rail_extract.core.clouds.points import RailPoints
@@ -210,3 +212,14 @@ def test_scattered_points_give_a_finite_line_or_none(count, height):
         assert np.isfinite(rail.xyz).all()
         assert rail.points >= 10
         assert np.abs(rail.xyz[:, 2]).max() < 3 * height
+
+
+@pytest.mark.parametrize(("tolerance_m", "widest_m"), [(0.02, 0.02), (0.1, WIDTH / 2)])
+def test_points_count_within_the_tolerance_and_never_beyond_half_a_head(tolerance_m, widest_m):
+    """A check rail at the same height, just next to the head, is within the larger tolerance."""
+    random = np.random.default_rng(7)
+    check_rail = np.column_stack([random.uniform(0, 60, 2400), random.uniform(0.045, 0.09, 2400), np.zeros(2400)])
+    points = cloud(head(60, 100, low_share=0.0), check_rail)
+    (rail,) = elevate(network_of(straight_line(60)), points, replace(PARAMETERS, tolerance_xy_m=tolerance_m))
+    assert rail.resid_mm == pytest.approx(1000 * widest_m / np.sqrt(3), rel=0.05)
+    assert rail.points == pytest.approx(6000 * 2 * widest_m / WIDTH, rel=0.1)

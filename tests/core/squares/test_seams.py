@@ -151,3 +151,18 @@ def test_the_order_of_stretches_does_not_matter():
     results = seen_by_stretches([rail(curve(0.7, 0.01))], error_m=0.002)
     one, other = join(results, FRAME), join(results[::-1], FRAME)
     np.testing.assert_array_equal(one[0].xyz, other[0].xyz)
+
+
+def test_a_deviation_between_two_squares_adds_no_line():
+    """At the border the second square shows 2 m of the rail 5 cm off: a piece that continues nothing at either end."""
+    x = np.arange(5.0, 75.0, STEP_M)
+    bump = 0.05 * ((x > SIDE - 1.5) & (x < SIDE + 0.5))
+    true = np.column_stack([x, np.full(len(x), 5.0), np.zeros(len(x))])
+    results = []
+    for key, y in (((0, 0), 0 * x), ((1, 0), bump)):
+        square = Square.on_grid(key, SIDE, FRAME)
+        seen = square.holds(true - square.frame.shift_to(FRAME), REACH)
+        line = (true + np.column_stack([0 * x, y, 0 * x]))[seen]
+        results.append(trim([rail(line - square.frame.shift_to(FRAME))], square))
+    (line,) = join(results, FRAME)
+    assert line.length_m == pytest.approx(x[-1] - x[0], abs=0.01)

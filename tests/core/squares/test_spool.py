@@ -1,5 +1,7 @@
 """Points on disk: all of them, bit by bit as in memory, and read but once."""
 
+import os
+
 import numpy as np
 import pytest
 from rail_extract.core.clouds.las import laspy
@@ -92,3 +94,26 @@ def test_an_extent_and_classes_that_are_not_there(files, tmp_path):
     assert sum(part.counts.values()) == len(read_rail_points(files, [10], extent=extent)[0].xyz)
     with pytest.raises(NoRailPointsError, match="2 .*10 .*11"):
         spool(ask(files, [7]), SIDE, tmp_path)
+
+
+def test_a_file_of_the_same_size_that_has_changed_is_read_again(tmp_path):
+    file, folder = tmp_path / "cloud.las", tmp_path / "points"
+    folder.mkdir()
+
+    def write(count, time):
+        header = laspy.LasHeader(version="1.4", point_format=6)
+        header.scales, header.offsets = np.full(3, 0.001), [500_000, 5_400_000, 0]
+        cloud = laspy.LasData(header)
+        cloud.x, cloud.y, cloud.z = np.tile([[500_001.0], [5_400_001.0], [0.0]], 100)
+        cloud.classification = np.where(np.arange(100) < count, 10, 2).astype(np.uint8)
+        cloud.write(file)
+        os.utime(file, (time, time))
+        return file.stat().st_size
+
+    sizes, counts = [], []
+    for count, time in ((40, 1_000_000_000), (70, 1_000_000_001)):
+        sizes.append(write(count, time))
+        (source,) = spool(ask(file, [10]), SIDE, folder)
+        counts.append(sum(source.counts.values()))
+    assert sizes[0] == sizes[1]
+    assert counts == [40, 70]

@@ -235,3 +235,17 @@ def test_lone_rails_give_no_centerline():
     assert build_centerlines(rails_of(left), GAUGE, WIDTH) == ()
     assert build_centerlines(rails_of(left, right + [2.0, -2.0, 0.0]), GAUGE, WIDTH) == ()
     assert build_centerlines(rails_of(left[:4], right[:4]), GAUGE, WIDTH) == ()
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_cant_keeps_its_sign_on_a_centerline_that_is_turned_around(sign):
+    """The longer section of a horseshoe leads its chain, which therefore starts at the eastern one of the two ends."""
+    curve = trace([Element(60.0), Element(30 * np.pi, 1 / 30, 1 / 30), Element(50.0)])
+    left, right, _ = track(curve, cant=sign * np.linspace(0.02, 0.08, len(curve.xy)))
+    parts = [part for line in (left, right) for part in without(line, 0.12, 0.12)]
+    (line,) = build_centerlines(rails_of(*parts), GAUGE, WIDTH)
+    np.testing.assert_allclose(line.xyz[[0, -1], :2], curve.xy[[0, -1]], atol=0.05)
+    assert line.xyz[0, 0] < line.xyz[-1, 0]
+    assert line.cantmax_mm == pytest.approx(sign * 80, abs=0.5)
+    assert line.cant_mm == pytest.approx(sign * 50, abs=0.5)
+    assert (line.left_ids, line.right_ids) == ((1, 2), (3, 4))

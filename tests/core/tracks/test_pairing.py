@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rail_extract.core.rails import RailLine
-from rail_extract.core.tracks.pairing import pair_rails
+from rail_extract.core.tracks.pairing import find_candidates, pair_rails
 from rail_extract.core.tracks.parallels import find_parallels, most_common_spacing
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 
@@ -149,3 +149,9 @@ def test_rails_far_apart_or_crossing_have_no_spacing():
     assert most_common_spacing(rails_of(*beside(STRAIGHT, 0.0, 4.0)), 3.0) is None
     assert most_common_spacing(rails_of(STRAIGHT.xy, trace([Element(40.0)], heading=2.0).xy), 3.0) is None
     assert most_common_spacing(rails_of(STRAIGHT.xy), 3.0) is None
+
+
+@pytest.mark.parametrize(("deviation", "count"), [(0.09, 1), (-0.09, 1), (0.11, 0), (-0.11, 0)])
+def test_candidates_are_sought_within_twice_the_tolerance(deviation, count):
+    parallels = find_parallels(rails_of(*tracks(STRAIGHT, 0.0, spacing=SPACING + deviation)))
+    assert len(find_candidates(parallels, SPACING, 0.05)) == count
