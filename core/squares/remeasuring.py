@@ -27,7 +27,7 @@ LOOKUP_STEP_M = 1.0
 
 @dataclass(frozen=True)
 class _Section:
-    """The part of a rail that lies in a square: index of the rail, and chainages."""
+    """The part of a rail in a square: index of the rail, and chainages."""
 
     number: int
     start: float
@@ -94,13 +94,13 @@ def _measure_in_squares(
     sections = _sections_by_square(rails, source)
     tasks = {}
     for key in sorted(sections):
-        square = by_key.get(key) or Square.on_grid(key, source.side_m, source.frame)
+        square = by_key.setdefault(key, Square.on_grid(key, source.side_m, source.frame))
         pieces = tuple(_with_context(rails[one.number], one, square, source) for one in sections[key])
         label = f"Measuring the rails of class {source.class_code} in square {key}"
         tasks[key] = Task(label, _measure, (source.part(square), square, pieces, head_width_m))
     parts: list[list[tuple[float, RailLine]]] = [[] for _ in rails]
     for key, pieces in runner.run(tasks, progress):
-        shift = tasks[key].arguments[1].frame.shift_to(source.frame)
+        shift = by_key[key].frame.shift_to(source.frame)
         for section, piece in zip(sections[key], pieces):
             before = min(section.start, CONTEXT_M)
             part = piece.between(before, before + section.end - section.start)

@@ -109,7 +109,7 @@ def _refuse_other_spacing(rails: Sequence[RailLine], gauge_m: float, head_width_
     spacing = most_common_spacing(rails, MIN_SECTION_M)
     if spacing is None or abs(spacing - gauge_m - head_width_m) < tolerance_m:
         return
-    message = f"No track of {1000 * gauge_m:.0f} mm gauge found: rails lie {1000 * spacing:.0f} mm apart"
+    message = f"No track of {1000 * gauge_m:.0f} mm gauge found: rails are {1000 * spacing:.0f} mm apart"
     gauges = {standard.gauge_m for standard in STANDARDS.values()}
     likely = min(gauges, key=lambda gauge: abs(gauge - (spacing - head_width_m)))
     if abs(likely - (spacing - head_width_m)) < SAME_GAUGE_M and abs(likely - gauge_m) > 1e-9:

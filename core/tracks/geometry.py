@@ -86,14 +86,14 @@ class _TrackRails:
         return most_common_spacing(self.rails, 0.0) or 0.0
 
     @cached_property
-    def everyone(self) -> Side:
+    def all_rails(self) -> Side:
         """All rails."""
         return self._side(range(len(self.rails)))
 
     def named(self, ids: Sequence[int]) -> Side:
         """Return the rails with these ids, or all rails if there are none."""
         numbers = [number for number, rail in enumerate(self.rails) if rail.rail_id in ids]
-        return self._side(numbers) if numbers else self.everyone
+        return self._side(numbers) if numbers else self.all_rails
 
     def _side(self, numbers: Sequence[int]) -> Side:
         spans = [(number, (0.0, float(length_along(self.rails[number].xyz[:, :2])[-1]))) for number in numbers]

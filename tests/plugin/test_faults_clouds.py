@@ -90,7 +90,7 @@ POINTS = [
         "rails of another gauge",
         of(lambda points: points + np.where(points[:, 1:2] > 3_000_000, [0, 0.1, 0], 0)),
         REFUSED,
-        "No track of 1435 mm gauge found: rails lie 160… mm apart, is the gauge 1520 mm?",
+        "No track of 1435 mm gauge found: rails are 160… mm apart, is the gauge 1520 mm?",
     ),
     Fault(
         "stray point 1000 km away", of(lambda points: np.append(points, points[:1] + [1e6, 0, 0], axis=0)), gives=TRACK

@@ -435,7 +435,7 @@ LINES = [
         "rails of another gauge",
         lines(LEFT.replace("1.507", "1.072"), RIGHT),
         REFUSED,
-        "No track of 1435 mm gauge found: rails lie 1072 mm apart, is the gauge 1000 mm?",
+        "No track of 1435 mm gauge found: rails are 1072 mm apart, is the gauge 1000 mm?",
     ),
     Fault(
         "rails crossing at a right angle",

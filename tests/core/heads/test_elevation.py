@@ -23,7 +23,7 @@ def straight_line(length, step=0.1):
 
 
 def head(length, density, noise=0.003, low_share=0.1, slope=0.0, profile=lambda x: 0 * x, low_m=0.035, seed=0):
-    """Points of a head along the x axis: a crown of 300 mm radius, and a share of points low on its left face."""
+    """Points of a head along the x axis: a crown of 300 mm radius, and a share of points low on its left side face."""
     random = np.random.default_rng(seed)
     count = int(length * density)
     x, across = random.uniform(0, length, count), random.uniform(-WIDTH / 2, WIDTH / 2, count)
@@ -56,7 +56,7 @@ def height_error(rail, profile=lambda x: 0 * x):
     ],
 )
 @pytest.mark.parametrize("seed", [0, 1])
-def test_height_is_that_of_the_top_though_faces_and_noise_pull(noise, low_share, bias_limit, rms_limit, seed):
+def test_height_is_that_of_the_top_despite_side_faces_and_noise(noise, low_share, bias_limit, rms_limit, seed):
     points = cloud(head(160, 79, noise, low_share, seed=seed))
     (rail,) = elevate(network_of(straight_line(160)), points, PARAMETERS)
     bias, rms = height_error(rail)
@@ -65,14 +65,14 @@ def test_height_is_that_of_the_top_though_faces_and_noise_pull(noise, low_share,
 
 
 @pytest.mark.parametrize("slope", [-0.12, -0.05, 0.05, 0.12])
-def test_height_is_that_of_the_axis_though_the_head_leans(slope):
+def test_height_is_that_of_the_axis_on_an_inclined_head(slope):
     (rail,) = elevate(network_of(straight_line(100)), cloud(head(100, 100, slope=slope)), PARAMETERS)
     bias, rms = height_error(rail)
     assert abs(bias) < 0.0008
     assert rms < 0.0012
 
 
-def test_weeds_above_and_stones_below_leave_the_height_alone():
+def test_weeds_above_and_stones_below_do_not_change_the_height():
     random = np.random.default_rng(5)
     weeds = np.column_stack([random.uniform(0, 100, 200), random.normal(0, 0.03, 200), random.uniform(0.005, 0.2, 200)])
     bush = np.column_stack([random.uniform(40, 40.8, 300), random.normal(0, 0.03, 300), random.uniform(0.03, 0.2, 300)])
@@ -87,7 +87,7 @@ def test_weeds_above_and_stones_below_leave_the_height_alone():
     assert np.abs(error).max() < 0.005
 
 
-def test_a_settled_wave_keeps_its_height():
+def test_a_wave_in_the_track_keeps_its_height():
     def profile(x):
         return 0.02 * np.sin(2 * np.pi * x / 80)
 
@@ -107,7 +107,7 @@ def test_steep_gradients_reach_the_ends():
 
 
 @pytest.mark.parametrize("gap", [2.0, 5.0, 20.0])
-def test_heights_run_on_across_a_gap_which_counts_as_bridged(gap):
+def test_heights_continue_across_a_gap_that_counts_as_bridged(gap):
     def profile(x):
         return 0.01 * x
 
@@ -122,7 +122,7 @@ def test_heights_run_on_across_a_gap_which_counts_as_bridged(gap):
 @pytest.mark.parametrize("grade", [0.0, 0.04, 0.1])
 @pytest.mark.parametrize("crossing", [(40.0, 41.5), (38.0, 39.5, 42.0, 43.5), (36.5, 38.0, 40.0, 41.5, 43.5, 45.0)])
 def test_a_bridge_does_not_lift_the_rail_that_it_hides(grade, crossing):
-    """Where its rails cross, only their points are near the line below."""
+    """Where the rails of the bridge cross the line below, only their points are near it."""
 
     def profile(x):
         return grade * x
@@ -138,14 +138,14 @@ def test_a_bridge_does_not_lift_the_rail_that_it_hides(grade, crossing):
     assert rail.bridged_m == pytest.approx(10.0, abs=0.3)
 
 
-def test_gaps_are_long_stretches_without_points_and_unsupported_ends():
+def test_gaps_are_long_sections_without_points_including_ends():
     t = np.concatenate([np.arange(2.0, 5.01, 0.1), np.arange(5.4, 8.01, 0.1), [9.0]])
     np.testing.assert_allclose(find_gaps(t, 0.0, 10.0), [[0, 2], [8, 9], [9, 10]])
     assert find_gaps(np.arange(0, 10.01, 0.1), 0.0, 10.0).shape == (0, 2)
 
 
 @pytest.mark.parametrize("turn", [1, -1])
-def test_gaps_lie_where_the_finished_line_has_no_points(turn):
+def test_gaps_are_where_the_finished_line_has_no_points(turn):
     points = cloud(head(40, 80) + [5.0, 0.0, 0.0])
     points = RailPoints(points.xyz[np.abs(points.xyz[:, 0] - 21.0) > 1.5], points.frame, points.class_code)
     (rail,) = elevate(network_of(straight_line(60)[::turn]), points, PARAMETERS)
@@ -153,7 +153,7 @@ def test_gaps_lie_where_the_finished_line_has_no_points(turn):
     np.testing.assert_allclose(rail.gaps, [[14.5, 17.5]], atol=0.2)
 
 
-def test_lines_are_directed_numbered_and_carry_their_class():
+def test_lines_are_directed_and_numbered_and_have_their_class():
     lines = [straight_line(20)[::-1] + [30.0, 0.0], straight_line(20), straight_line(20)[:, ::-1] + [5.0, 10.0]]
     east = head(20, 80)
     north = east[:, [1, 0, 2]] * [-1, 1, 1]
@@ -181,7 +181,7 @@ def test_figures_of_support():
     assert denser.sigma_mm == pytest.approx(rail.sigma_mm / 2, rel=0.05)
 
 
-def test_rails_without_points_are_flat():
+def test_rails_without_points_have_no_heights():
     (rail,) = flat_rails(network_of(straight_line(10)[::-1]), 10, PARAMETERS)
     assert np.isnan(rail.xyz[:, 2]).all()
     assert rail.length_m == pytest.approx(10.0)
@@ -189,7 +189,7 @@ def test_rails_without_points_are_flat():
     assert rail.rail_id == 1
 
 
-def test_free_ends_without_points_are_cut_and_shared_ones_kept():
+def test_free_ends_without_points_are_cut_and_shared_ends_are_kept():
     line = straight_line(40)
     points = cloud(head(30, 100) + [4.0, 0.0, 0.0])
     (rail,) = elevate(network_of(line), points, PARAMETERS)

@@ -16,7 +16,7 @@ def upper_by_brute_force(points, radius, x):
 
 
 def closing_by_brute_force(points, radius, x):
-    # Near the points, and finely: between two samples the disc drops by far less than the tolerance of the test.
+    # Sampled finely near the points: between two samples the disc falls by much less than the test's tolerance.
     centres = np.linspace(-12, 24, 36001)
     heights = upper_by_brute_force(points, radius, centres)
     beside = radius**2 - (x[:, None] - centres[None, :]) ** 2
@@ -54,7 +54,7 @@ def test_closing_surface_equals_brute_force_on_rail_profiles(seed):
     assert np.all(boundary.closing(points[:, 0]) >= points[:, 1] - 1e-12)
 
 
-def test_contact_points_lie_on_the_closing_surface():
+def test_contact_points_are_on_the_closing_surface():
     random = np.random.default_rng(1)
     x, y = random.uniform(0, 50, 500), random.normal(0, 0.01, 500)
     boundary = extremal_boundary(x, y, 20.0)
@@ -73,10 +73,10 @@ def test_separate_components_hand_over_where_the_right_disc_begins():
     assert boundary.upper(np.array([50.0]))[0] == -np.inf
 
 
-def test_higher_of_two_points_at_one_place_counts():
+def test_the_higher_of_two_points_at_one_place_counts():
     boundary = extremal_boundary(np.array([0.0, 0.0, 1.0]), np.array([0.1, 0.4, 0.2]), 20.0)
     np.testing.assert_allclose(boundary.y, [0.4, 0.2])
 
 
-def test_lone_point_closes_at_its_own_height():
+def test_a_single_point_closes_at_its_own_height():
     assert extremal_boundary(np.array([3.0]), np.array([7.0]), 20.0).closing(np.array([3.0]))[0] == 7.0

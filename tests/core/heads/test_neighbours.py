@@ -14,12 +14,12 @@ def stations(free):
     return (np.arange(free.shape[1]) + 0.5) * 0.25
 
 
-def test_edges_are_free_of_heads_at_gauge():
+def test_edges_are_free_of_the_other_head_at_gauge():
     for free in free_edges([line(lambda x: 0 * x), line(lambda x: 0 * x + 1.5)], WIDTH):
         assert free.all()
 
 
-def test_a_branch_hides_the_inner_edges_up_to_where_the_heads_stand_apart():
+def test_a_branch_hides_the_inner_edges_until_the_heads_are_apart():
     stock, branch = free_edges([line(lambda x: 0 * x), line(lambda x: x**2 / 600)], WIDTH)
     apart = stations(stock) ** 2 / 600
     np.testing.assert_array_equal(stock[LEFT], apart > 1.5 * WIDTH)
@@ -34,7 +34,7 @@ def test_turned_lines_swap_their_edges():
     assert not branch[LEFT].all()
 
 
-def test_crossing_heads_hide_all_where_they_overlap_and_one_edge_beside():
+def test_crossing_heads_hide_both_edges_where_they_overlap_and_one_edge_next_to_that():
     first, second = free_edges([line(lambda x: 0 * x), line(lambda x: (x - 20) / 9)], WIDTH)
     offset = (stations(first) - 20) / 9
     overlap = np.abs(offset) < 0.5 * WIDTH
@@ -47,5 +47,5 @@ def test_crossing_heads_hide_all_where_they_overlap_and_one_edge_beside():
     assert not second[:, overlap].any()
 
 
-def test_no_lines_have_no_edges():
+def test_without_lines_there_are_no_edges():
     assert free_edges([], WIDTH) == []

@@ -27,7 +27,7 @@ def wavy_line(length, amplitude, period, step=0.1):
 
 
 def head(length, density, noise=0.004, lopsided=0.0, low_share=0.1, slope=0.0, seed=0, width=WIDTH):
-    """Points of a head whose axis is the x axis; `lopsided` moves density from its right to its left half."""
+    """Points of a head along the x axis; `lopsided` moves that share of the density from the right half to the left."""
     random = np.random.default_rng(seed)
     count = int(length * density)
     x, across = random.uniform(0, length, count), random.uniform(-width / 2, width / 2, count)
@@ -49,7 +49,7 @@ def rms(values):
 @pytest.mark.parametrize("density", [60, 120, 250])
 @pytest.mark.parametrize("noise", [0.003, 0.005])
 @pytest.mark.parametrize("slope", [0.0, 0.1])
-def test_lines_beside_the_head_are_led_to_its_axis(density, noise, slope):
+def test_lines_off_the_head_are_moved_to_its_axis(density, noise, slope):
     line = wavy_line(80, 0.015, 30) + [0.0, 0.003]
     refined = refine(network_of(line), cloud(head(80, density, noise, slope=slope)), WIDTH).lines[0]
     assert rms(line[:, 1]) > 0.01
@@ -66,15 +66,15 @@ def test_a_line_on_the_axis_stays_there(seed):
 
 
 @pytest.mark.parametrize("lopsided", [0.1, 0.3, 0.6])
-def test_a_fuller_side_does_not_pull(lopsided):
+def test_a_denser_side_does_not_bias_the_line(lopsided):
     refined = refine(network_of(wavy_line(80, 0.0, 30)), cloud(head(80, 120, lopsided=lopsided)), WIDTH).lines[0]
     assert rms(refined[:, 1]) < 0.003
 
 
 @pytest.mark.parametrize("elements", [[Element(80.0)], [Element(80.0, 1 / 600, 1 / 600)]])
 @pytest.mark.parametrize("left_m", [0.0, 4.0, 8.0])
-def test_scanned_heads_are_met_from_whichever_side_they_are_seen(elements, left_m):
-    """Along the grid, where the raster errs most; a scanner abreast, or beside and above of the track."""
+def test_lines_find_scanned_heads_from_whichever_side_they_are_seen(elements, left_m):
+    """Parallel to the grid, where the raster is least exact, with the scanner above the track or off to its side."""
     own = trace(elements)
     track = Track(own, GAUGE + WIDTH, left_m=left_m)
     path = Track(own, GAUGE + WIDTH).centerline
@@ -88,7 +88,7 @@ def test_scanned_heads_are_met_from_whichever_side_they_are_seen(elements, left_
     assert after < before + 0.0003
 
 
-def test_gaps_and_shadows_on_the_head_do_not_lead_astray():
+def test_gaps_and_shadows_on_the_head_do_not_mislead_the_line():
     xyz = head(80, 150)
     xyz = xyz[(xyz[:, 0] < 20) | (xyz[:, 0] > 24)]
     shadow = (xyz[:, 0] > 40) & (xyz[:, 0] < 60) & (xyz[:, 1] > 0.0)
@@ -97,7 +97,7 @@ def test_gaps_and_shadows_on_the_head_do_not_lead_astray():
     assert np.abs(refined[:, 1]).max() < 0.008
 
 
-def test_weeds_beside_the_head_do_not_pull():
+def test_weeds_next_to_the_head_do_not_bias_the_line():
     random = np.random.default_rng(3)
     weeds = np.column_stack(
         [random.uniform(0, 80, 600), random.uniform(0.03, 0.09, 600), random.uniform(-0.1, 0.1, 600)]
@@ -107,7 +107,7 @@ def test_weeds_beside_the_head_do_not_pull():
 
 
 @pytest.mark.parametrize("count", [0, 30])
-def test_lines_with_hardly_a_point_stay_as_they_are(count):
+def test_lines_with_few_points_stay_as_they_are(count):
     line = wavy_line(40, 0.01, 20)
     refined = refine(network_of(line), cloud(head(40, 100)[:count]), WIDTH).lines[0]
     np.testing.assert_array_equal(refined, line)
@@ -132,12 +132,12 @@ def arc(radius, length, step=0.1):
 
 
 def along_line(points, line):
-    """Lay points of a head on the x axis beside another line given over x."""
+    """Move points of a head on the x axis onto another line y(x)."""
     return points + np.column_stack([0 * points[:, 0], np.interp(points[:, 0], *line.T), 0 * points[:, 0]])
 
 
 def turnout(radius=300.0, toe=30.0, length=80.0, seed=0):
-    """Points of a straight head and of one that leaves it at `toe`, only one of them where they overlap."""
+    """Points of a straight head and of one that leaves it at `toe`; where the two overlap, only one has points."""
     branch = arc(radius, length - toe)
     leaving = head(length - toe, 150, seed=seed + 1)
     across = np.interp(leaving[:, 0], *branch.T) + leaving[:, 1]
@@ -147,8 +147,8 @@ def turnout(radius=300.0, toe=30.0, length=80.0, seed=0):
 
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_branch_is_led_to_its_head_and_back_to_where_it_touches_its_stock_rail(seed, turned):
-    """As the raster shows it: both lines midway between the rails, up to where the heads are a cell apart."""
+def test_a_branch_moves_to_its_head_and_starts_where_it_touches_its_stock_rail(seed, turned):
+    """As in the raster: both lines are midway between the rails until the heads are a cell apart."""
     points, branch = turnout(seed=seed)
     stock = wavy_line(80, 0.0, 30)
     apart = branch[:, 1]
@@ -192,7 +192,7 @@ def test_lines_that_cross_keep_crossing_in_one_place():
 
 
 @pytest.mark.parametrize("radius", [150.0, np.inf])
-def test_free_ends_run_on_as_the_rail_does_though_the_raster_curls(radius):
+def test_free_ends_follow_the_rail_although_the_raster_curls(radius):
     true = wavy_line(40, 0.0, 20)
     true[:, 1] = true[:, 0] ** 2 / (2 * radius)
     points = along_line(head(40, 150), true)[:, :3]

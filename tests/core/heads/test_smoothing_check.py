@@ -1,4 +1,4 @@
-"""Whether the smoothing leaves lines within reach of their heads."""
+"""The warning about smoothing that displaces lines too far from their heads."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def warned(line, smoothing_m):
 
 
 @pytest.mark.parametrize(("radius_m", "sigma_m"), [(25, 1.0), (60, 2.0), (300, 3.0)])
-def test_a_line_that_ends_in_an_arc_is_drawn_aside_by_a_share_of_sigma_squared(radius_m, sigma_m):
+def test_a_line_that_ends_in_an_arc_is_displaced_in_proportion_to_sigma_squared(radius_m, sigma_m):
     assert displacement(arc(radius_m), sigma_m) == pytest.approx(0.26 * sigma_m**2 / radius_m, rel=0.03)
 
 
@@ -45,7 +45,7 @@ def test_a_straight_line_stays():
     assert displacement(np.array([[0.0, 0.0], [30.0, 10.0]]), 3.0) == pytest.approx(0, abs=1e-9)
 
 
-def test_three_metres_are_too_many_in_a_tram_curve():
+def test_three_metres_are_too_much_in_a_tram_curve():
     assert warned(arc(25.0), 3.0) == [
         "SMOOTHING_XY of 3 m displaces lines in curves by up to 98 mm, more than points can correct: "
         "set it to 1.8 m or less."
@@ -57,7 +57,7 @@ def test_three_metres_do_no_harm_on_a_main_line():
     assert warned(arc(300.0, 200.0), 3.0) == []
 
 
-def test_what_no_rail_can_be_is_no_reason_to_warn_of_the_default():
+def test_a_corner_that_no_rail_has_does_not_cause_a_warning_about_the_default():
     corner = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]])
     assert displacement(corner, 0.8) > 0.1
     assert warned(corner, 0.8) == []

@@ -34,8 +34,8 @@ def support(t, across, z, length=60.0):
 
 
 @pytest.mark.parametrize(("left_m", "noise_m"), [(0.0, 0.003), (0.0, 0.008), (4.0, 0.005), (8.0, 0.005)])
-def test_two_thirds_of_a_line_lie_within_sigma(left_m, noise_m):
-    """Scanned from abreast and from the side, with little and much noise, and gaps in one rail."""
+def test_two_thirds_of_a_line_are_within_sigma(left_m, noise_m):
+    """Scanned from above the track and from the side, with little and much noise, and with gaps in one rail."""
     own = trace([Element(120.0, 1 / 900, 1 / 900)], heading=0.1)
     track, path = Track(own, GAUGE + WIDTH, left_m=left_m), Track(own, GAUGE + WIDTH).centerline
     random = np.random.RandomState(3)
@@ -59,15 +59,15 @@ def test_two_thirds_of_a_line_lie_within_sigma(left_m, noise_m):
 
 def test_four_times_the_points_halve_sigma():
     few, many = (support(*head(60, density)).rms_m for density in (100, 400))
-    assert many == pytest.approx(few / 2, rel=0.25)  # chance moves the middle, which counts as well
+    assert many == pytest.approx(few / 2, rel=0.25)  # the middle moves by chance, which counts as well
 
 
-def test_noise_makes_edges_vague():
+def test_noise_increases_sigma():
     clean, noisy = (support(*head(60, 150, noise)).rms_m for noise in (0.002, 0.008))
     assert noisy > 1.5 * clean
 
 
-def test_sigma_is_that_of_the_raster_where_no_edges_are_seen():
+def test_sigma_is_that_of_the_raster_where_no_edges_are_visible():
     t, across, z = head(60, 150)
     seen = (t < 30) | (np.abs(across) > 0.1)
     half = support(t[seen], across[seen], z[seen])
@@ -86,12 +86,12 @@ def test_sigma_grows_into_a_gap():
     assert middle.min() > 1.5 * np.median(sides)
 
 
-def test_a_line_beside_its_rail_knows():
+def test_a_line_off_its_rail_has_a_large_sigma():
     t, across, z = head(60, 150)
     assert support(t, across + 0.01, z).rms_m == pytest.approx(0.01, rel=0.15)
 
 
-def test_points_are_counted_where_they_lie():
+def test_points_are_counted_where_they_are():
     t, across, z = head(60, 150)
     there = (t > 20) & (t < 30)
     counted = support(t[there], across[there], z[there])

@@ -1,4 +1,4 @@
-"""Rails measured anew by the points of one square at a time."""
+"""Rails measured again with the points of one square at a time."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ LENGTH, TUNNEL = 300.0, (85.0, 215.0)
 
 
 def rail_and_points():
-    """A straight rail as a file holds it, and points on its head, but for a tunnel."""
+    """A straight rail as stored in a file, and points on its head except in a tunnel."""
     random = np.random.RandomState(3)
     t = np.sort(random.uniform(0, LENGTH, 30_000))
     t = t[(t < TUNNEL[0]) | (t > TUNNEL[1])]
@@ -24,7 +24,7 @@ def rail_and_points():
 
 
 @pytest.mark.parametrize("side", [1000.0, 100.0, 40.0])
-def test_a_tunnel_is_a_gap_whatever_squares_it_runs_through(side):
+def test_a_tunnel_is_a_gap_whichever_squares_it_crosses(side):
     rail, points = rail_and_points()
     source = MemorySource(points, side)
     (measured,) = measure_rails([rail], [source], WIDTH, InTurn())
@@ -40,7 +40,7 @@ def test_a_tunnel_is_a_gap_whatever_squares_it_runs_through(side):
 
 
 @pytest.mark.parametrize("side", [1000.0, 100.0, 50.0])
-def test_heights_run_straight_across_a_tunnel_on_a_gradient(side):
+def test_heights_are_interpolated_across_a_tunnel_on_a_gradient(side):
     rail, points = rail_and_points()
     lift = 0.03 * points.xyz[:, :1] * [0, 0, 1]
     source = MemorySource(RailPoints(points.xyz + lift, points.frame, 10), side)
@@ -50,7 +50,7 @@ def test_heights_run_straight_across_a_tunnel_on_a_gradient(side):
     np.testing.assert_allclose(height, 0.03 * x, atol=0.006)
 
 
-def test_a_rail_beside_all_points_is_a_gap_from_end_to_end():
+def test_a_rail_away_from_all_points_is_a_gap_from_end_to_end():
     rail, points = rail_and_points()
     away = RailPoints(points.xyz + [0, 5.0, 0], points.frame, 10)
     source = MemorySource(away, 1000.0)

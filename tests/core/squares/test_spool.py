@@ -1,4 +1,4 @@
-"""Points on disk: all of them, bit by bit as in memory, and read but once."""
+"""Points on disk: the same ones as in memory, read only once."""
 
 import os
 
@@ -16,7 +16,7 @@ SIDE = 30.0
 
 @pytest.fixture
 def files(tmp_path):
-    """Two files of two classes, on a slant."""
+    """Two files with points of two classes along a slanted line."""
     along = np.random.RandomState(0).uniform(0, 100, 6000)
     xyz = np.column_stack([500_000 + along, 5_400_000 - 0.7 * along, 300 + 0.01 * along])
     codes = np.random.RandomState(1).choice([2, 10, 11], 6000).astype(np.uint8)
@@ -41,8 +41,8 @@ def test_disk_and_memory_give_the_same_points_in_the_same_frame(files, tmp_path)
         memory = MemorySource(points, SIDE)
         assert source.counts == memory.counts
         assert source.span_m == pytest.approx(memory.span_m, abs=1e-6)
-        for stretch in lay_out([source], source):
-            one, two = source.near(stretch, 7.0).xyz, memory.near(stretch, 7.0).xyz
+        for square in lay_out([source], source):
+            one, two = source.near(square, 7.0).xyz, memory.near(square, 7.0).xyz
             np.testing.assert_allclose(one[np.lexsort(one.T)], two[np.lexsort(two.T)], rtol=0, atol=1e-8)
         whole = source.near(Square((0, 0), source.frame, np.inf), 0.0).xyz
         np.testing.assert_array_equal(whole[np.lexsort(whole.T)], points.xyz[np.lexsort(points.xyz.T)])
@@ -57,7 +57,7 @@ def test_files_that_have_not_changed_are_not_read_again(files, tmp_path):
     np.testing.assert_array_equal(second[0].frame.origin, first[0].frame.origin)
 
 
-def test_a_reading_that_was_cut_off_starts_anew(files, tmp_path):
+def test_an_interrupted_reading_starts_again(files, tmp_path):
     class Stopped(Progress):
         left = 1
 
@@ -71,7 +71,7 @@ def test_a_reading_that_was_cut_off_starts_anew(files, tmp_path):
     assert sum(again[0].counts.values()) == len(read_rail_points(files, [10])[0].xyz)
 
 
-def test_two_readers_of_one_file_leave_it_whole(files, tmp_path):
+def test_two_readers_of_one_file_do_not_disturb_each_other(files, tmp_path):
     class Racing(Progress):
         others = 0
 
@@ -88,7 +88,7 @@ def test_two_readers_of_one_file_leave_it_whole(files, tmp_path):
     assert len([folder for folder in tmp_path.iterdir() if folder != files]) == 2
 
 
-def test_an_extent_and_classes_that_are_not_there(files, tmp_path):
+def test_an_extent_and_missing_classes(files, tmp_path):
     extent = (500_000, 5_399_900, 500_020, 5_400_000)
     (part,) = spool(ask(files, [10], extent=extent), SIDE, tmp_path)
     assert sum(part.counts.values()) == len(read_rail_points(files, [10], extent=extent)[0].xyz)

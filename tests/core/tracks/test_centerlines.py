@@ -32,7 +32,7 @@ def track(curve, left_m=0.0, spacing=SPACING, height=0.0, cant=0.0):
 
 
 def without(line, start, end):
-    """The two parts of a line on both sides of a gap, by share of its vertices."""
+    """The parts of a line before and after a gap, given as shares of its vertices."""
     count = len(line)
     return line[: int(start * count)], line[int(end * count) :]
 
@@ -46,7 +46,7 @@ def test_centerline_of_concentric_arcs_is_the_arc_between(radius, turned):
         for ring in radius + SPACING * np.array([0.5, -0.5])
     ]
     (line,) = build_centerlines(rails_of(arcs[0], arcs[1][::-1] if turned else arcs[1]), GAUGE, WIDTH)
-    tolerance = 1e-4 if radius > 100 else 4e-4  # chords between stations show on the tightest curve
+    tolerance = 1e-4 if radius > 100 else 4e-4  # in the tightest curve the chords between stations show
     np.testing.assert_allclose(np.hypot(*line.xyz[:, :2].T), radius, atol=tolerance)
     assert line.gauge_mm == pytest.approx(1435.0, abs=0.2)
     assert line.gaugesd_mm < 0.2
@@ -55,7 +55,7 @@ def test_centerline_of_concentric_arcs_is_the_arc_between(radius, turned):
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("begins", [0.0, 0.03, 0.05, 2.0, 6.2])
 def test_a_ring_becomes_one_closed_centerline(begins, turned):
-    """Wherever its two rails begin, and whichever way they run."""
+    """Wherever its two rails start, and in whichever direction they run."""
     angle = np.linspace(0, 2 * np.pi, 1500)
     outer, inner = (
         flat(radius * np.column_stack([np.cos(angle + start), np.sin(angle + start)]))
@@ -89,7 +89,7 @@ def test_three_tracks_give_three_centerlines_at_gauge(curve):
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("heading", [0.5, 0.5 + np.pi])
 def test_cant_is_left_minus_right_along_the_line(sign, heading):
-    """Rails and curve may run either way: what counts is the line, which starts in the west."""
+    """Rails and curve may run in either direction: only that of the line counts, which starts in the west."""
     curve = trace([Element(50.0)], heading=heading)
     left, right, _ = track(curve, cant=sign * 0.1, height=0.002 * curve.chainage)
     (line,) = build_centerlines(rails_of(left, right[::-1]), GAUGE, WIDTH)
@@ -126,7 +126,7 @@ def test_rails_broken_in_different_places_give_one_centerline(curve):
 
 
 @pytest.mark.parametrize(("gap", "count"), [(4.0, 1), (8.0, 2)])
-def test_gaps_in_both_rails_are_bridged_up_to_the_longest_allowed(gap, count):
+def test_gaps_in_both_rails_are_bridged_up_to_the_maximum(gap, count):
     share = gap / CURVED.length_m
     left, right, middle = track(CURVED)
     parts = [*without(left, 0.5, 0.5 + share), *without(right, 0.5, 0.5 + share)]
@@ -150,7 +150,7 @@ def test_turnouts_fork_into_two_centerlines(form, hand):
     side = branch(main, 20.0, form, hand, 25.0)
     outer, inner, through = track(main)
     branch_left, branch_right, diverging = track(side)
-    # The branch's rails begin where they have left the stock rails by the width of a head.
+    # The rails of the branch start where they are a head's width away from the stock rails.
     rails = rails_of(
         outer, inner, *(line[np.linalg.norm(line - line[0], axis=1) > 8.0] for line in (branch_left, branch_right))
     )
@@ -162,7 +162,7 @@ def test_turnouts_fork_into_two_centerlines(form, hand):
     assert max(line.length_m for line in found) == pytest.approx(110.0, abs=1.0)
 
 
-def test_rails_without_heights_give_a_centerline_without():
+def test_rails_without_heights_give_a_centerline_without_heights():
     left, right, middle = track(CURVED)
     rails = rails_of(left * [1, 1, np.nan], right * [1, 1, np.nan])
     (line,) = build_centerlines(rails, GAUGE, WIDTH)
@@ -174,8 +174,8 @@ def test_rails_without_heights_give_a_centerline_without():
 
 @pytest.mark.parametrize("cant", [0.0, 0.1])
 @pytest.mark.parametrize("side", [0, 1])
-def test_where_one_rail_is_missing_the_other_tells_the_height(cant, side):
-    """Beyond its end on a gradient, and in a gap of it in a sag."""
+def test_where_one_rail_is_missing_the_other_gives_the_height(cant, side):
+    """Beyond the end of the rail on a gradient, and in a gap of the rail in a sag."""
     x = STRAIGHT.chainage
     for height, cut in ((0.04 * x, slice(0, -60)), (x**2 / 4000, slice(0, None))):
         left, right, middle = track(STRAIGHT, height=height, cant=cant)
@@ -189,18 +189,18 @@ def test_where_one_rail_is_missing_the_other_tells_the_height(cant, side):
         np.testing.assert_allclose(line.xyz[:, 2], expected, atol=0.002)
 
 
-def test_what_rails_bridged_counts_for_the_track():
+def test_gaps_of_rails_count_for_the_track():
     left, right, _ = track(STRAIGHT)
     (left_rail, right_rail) = rails_of(left, right)
     left_rail = replace(left_rail, gaps=np.array([[10.0, 13.0], [30.0, 31.0]]))
     right_rail = replace(right_rail, gaps=np.array([[12.0, 15.0]]))
-    # The gaps of both rails overlap by a metre, which counts once; a rail that runs the other way has the same gaps.
+    # The gaps of both rails overlap by one metre, which counts once. Reversing a rail does not change its gaps.
     for rails in ([left_rail, right_rail], [left_rail.reversed(), right_rail], [left_rail, right_rail.reversed()]):
         (line,) = build_centerlines(rails, GAUGE, WIDTH)
         assert line.bridged_m == pytest.approx(6.0, abs=0.01)
 
 
-def test_length_bridged_is_counted_along_the_rail():
+def test_bridged_length_is_counted_along_the_rail():
     (rail,) = rails_of([[0.0, 0, 0], [20.0, 0, 0]], gaps=np.array([[2.0, 5.0], [9.0, 10.0]]))
     t = np.array([-1.0, 0.0, 2.0, 3.5, 7.0, 9.5, 20.0, 21.0, np.nan])
     np.testing.assert_allclose(rail.bridged_before(t), [-1, 0, 0, 1.5, 3, 3.5, 4, 5, np.nan])
@@ -217,19 +217,19 @@ def test_another_gauge_is_refused_with_the_spacing_measured(gauge, width, questi
     with pytest.raises(NoTrackError) as refusal:
         build_centerlines(rails_of(left, right), GAUGE, WIDTH)
     apart = round(1000 * (gauge + width))
-    assert str(refusal.value) == f"No track of 1435 mm gauge found: rails lie {apart} mm apart{question}"
+    assert str(refusal.value) == f"No track of 1435 mm gauge found: rails are {apart} mm apart{question}"
 
 
 @pytest.mark.parametrize("curve", [STRAIGHT, CURVED])
 @pytest.mark.parametrize("off", [-0.35, -0.24, 0.24, 0.45])
-def test_rails_as_far_off_the_gauge_as_allowed_make_a_track(curve, off):
+def test_rails_off_the_gauge_within_the_tolerance_make_a_track(curve, off):
     left, right, middle = track(curve, spacing=SPACING + off)
     (line,) = build_centerlines(rails_of(left, right), GAUGE, WIDTH, CenterlineParameters(tolerance_m=0.5))
     assert line.gauge_mm == pytest.approx(1000 * (GAUGE + off), abs=0.5)
     assert compare_lines([line.xyz], [middle]).lateral_rmse_m < 0.001
 
 
-def test_lone_rails_give_no_centerline():
+def test_single_rails_give_no_centerline():
     left, right, _ = track(STRAIGHT)
     assert build_centerlines([], GAUGE, WIDTH) == ()
     assert build_centerlines(rails_of(left), GAUGE, WIDTH) == ()

@@ -1,4 +1,4 @@
-"""Tracks whose rails are cut as an extraction cuts them: one centerline a track, however the rails come."""
+"""Tracks with rails cut as in an extraction: one centerline per track, whatever the order of the rails."""
 
 from dataclasses import dataclass
 
@@ -31,7 +31,7 @@ def rails_of(*lines):
 
 
 def between(line, start_m, end_m):
-    """Cut a line out between two plan chainages."""
+    """Return the part of a line between two plan chainages."""
     along = length_along(line[:, :2])
     inner = along[(along > start_m) & (along < end_m)]
     t = np.concatenate([[start_m], inner, [min(end_m, along[-1])]])
@@ -50,7 +50,7 @@ def build(*lines, progress=None):
 
 
 def checked(lines, truth, count=None):
-    """Assert that lines are the true tracks, once each."""
+    """Assert that the lines are the true tracks, each once."""
     assert len(lines) == (len(truth) if count is None else count)
     result = compare_lines([line.xyz for line in lines], truth)
     assert result.completeness > 0.98
@@ -79,7 +79,7 @@ class Switch:
         return cls(*rails, tuple(track.centerline for track in tracks), toe_m, hand)
 
     def shown(self, rail, off_m):
-        """Part of a branch's rail that lies at least `off_m` beside its stock rail, and that chainage."""
+        """The part of a branch's rail at least `off_m` from its stock rail, and the chainage where it starts."""
         stock = between(self.through[rail], self.toe_m - 1.0, np.inf)
         away = np.min(np.hypot(*(self.side[rail][::5, None, :2] - stock[None, ::5, :2]).transpose(2, 0, 1)), axis=1)
         first = 5 * int(np.argmax(away > off_m))
@@ -97,7 +97,7 @@ SWITCHES = [
 
 @pytest.mark.parametrize("curve", [CURVED, TRAM])
 @pytest.mark.parametrize("hidden", [1, -1])
-def test_one_rail_leads_a_track_past_what_hides_the_other(curve, hidden):
+def test_one_rail_continues_a_track_where_the_other_is_hidden(curve, hidden):
     laid = Track(curve, SPACING)
     gap = (8.0, 33.0)
     lines = {side: without(rail, gap) if side == hidden else [rail] for side, rail in zip((1, -1), laid.rails())}
@@ -108,15 +108,15 @@ def test_one_rail_leads_a_track_past_what_hides_the_other(curve, hidden):
     assert line.gaugesd_mm < 0.5
 
 
-def test_one_rail_leads_only_so_far():
+def test_one_rail_continues_a_track_over_a_limited_length():
     left, right = Track(CURVED, SPACING).rails()
     assert len(build(*without(left, (40.0, 75.0)), right)) == 2
 
 
 @pytest.mark.parametrize("gap_m", [2.0, 5.0])
 @pytest.mark.parametrize("kept_m", [-1.0, 0.0, 2.5, 4.0])
-def test_rails_that_break_one_after_the_other_give_one_centerline(gap_m, kept_m):
-    """Where both rails are there for less than a stretch of track, or never, one of them leads at a time."""
+def test_rails_with_alternating_gaps_give_one_centerline(gap_m, kept_m):
+    """Where both rails exist over less than a section of track, or never, one rail at a time continues the track."""
     laid = Track(CURVED, SPACING)
     left, right = laid.rails()
     found = build(*without(left, (50, 50 + gap_m)), *without(right, (50 + gap_m + kept_m, 50 + 2 * gap_m + kept_m)))
@@ -134,8 +134,8 @@ def test_a_track_runs_to_the_end_of_its_longer_rail():
 
 @pytest.mark.parametrize("switch", SWITCHES)
 @pytest.mark.parametrize("swapped", [(1,), (-1,), (1, -1)])
-def test_stock_rails_that_run_on_into_the_branch_change_no_centerline(switch, swapped):
-    """The through track's rail then begins behind the toe."""
+def test_stock_rails_that_continue_into_the_branch_change_no_centerline(switch, swapped):
+    """The rail of the through track then starts behind the toe."""
     lines = []
     for rail, side in enumerate((1, -1)):
         own, chainage = switch.shown(rail, 0.08)
@@ -153,7 +153,7 @@ cuts = st.lists(st.tuples(st.floats(3.0, 30.0), st.floats(0.5, LONGEST_GAP_M)), 
 
 
 def gapped(line, steps):
-    """Cut gaps out of a line: each so far behind the last and so long."""
+    """Cut gaps out of a line, given by their distance from the previous gap and their length."""
     end, gaps = 3.0, []
     for distance, length in steps:
         gaps.append((end + distance, end + distance + length))
@@ -174,7 +174,7 @@ def test_a_turnout_of_broken_rails_gives_two_centerlines_that_fork(switch, steps
 
 
 def yard():
-    """Rails of a turnout and of the double track beside it, some of them broken."""
+    """Rails of a turnout and of the double track next to it, some of them broken."""
     switch = SWITCHES[0]
     curve = trace([Element(110.0)], heading=0.3)
     second = Track(Curve(curve.offset(-4.5), curve.heading, curve.curvature, curve.step_m), SPACING)
@@ -218,7 +218,7 @@ def test_cutting_a_rail_changes_nothing(places, number):
 
 @slow
 @given(st.floats(-np.pi, np.pi), st.floats(-1e4, 1e4), st.floats(-1e4, 1e4))
-def test_centerlines_turn_and_move_with_their_rails(angle, east, north):
+def test_centerlines_rotate_and_move_with_their_rails(angle, east, north):
     turn = np.array([[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     rails = yard()
     expected = [line.xyz @ turn + [east, north, 0] for line in build_centerlines(rails, GAUGE, WIDTH)]

@@ -26,7 +26,7 @@ def edge_between(first, second, node, target):
 
 
 def best_by_exhaustive_search(first, second, tolerance):
-    """Longest, then cheapest, of all lattice paths."""
+    """Length and penalty of the longest of all lattice paths, the cheapest if several are equally long."""
     edges = {}
     for node in itertools.product(range(len(first)), range(len(second))):
         for target in ((node[0], node[1] + 1), (node[0] + 1, node[1])):
@@ -83,7 +83,7 @@ def test_matches_are_monotone_lattice_paths_with_their_own_sums(seed, count_firs
         assert match.length == pytest.approx(both)
 
 
-def test_two_separate_stretches_give_two_matches():
+def test_two_separate_sections_give_two_matches():
     x = np.arange(0, 10, 0.1)
     straight = np.column_stack([x, np.zeros_like(x)])
     bulging = np.column_stack([x, np.where((x > 4) & (x < 6), 1.0, 0.01)])
@@ -93,7 +93,7 @@ def test_two_separate_stretches_give_two_matches():
     assert matches[0].first.max() < matches[1].first.min() or matches[1].first.max() < matches[0].first.min()
 
 
-def test_lines_out_of_reach_do_not_match():
+def test_lines_beyond_the_tolerance_do_not_match():
     x = np.arange(0, 5, 0.1)
     assert match_polylines(np.column_stack([x, 0 * x]), np.column_stack([x, 0 * x + 0.3]), 0.2) == []
 
@@ -104,7 +104,7 @@ def test_opposite_directions_match_only_where_they_cross():
     assert match_polylines(line, line[::-1], 0.05)[0].length < 0.2
 
 
-def test_midpoints_of_concentric_arcs_lie_on_the_arc_between():
+def test_midpoints_of_concentric_arcs_are_on_the_arc_between():
     radius, spacing = 200.0, 1.507
     arcs = []
     for ring, count in ((radius - spacing / 2, 1301), (radius + spacing / 2, 1307)):

@@ -48,7 +48,7 @@ def ramp(chainage, height):
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("turned", [False, True])
 def test_exact_rails_give_exact_geometry(sign, turned):
-    """Also with one rail that runs the other way: what counts is the centerline's direction."""
+    """One of the rails may be reversed: only the direction of the centerline counts."""
     left, right = curved_track(sign).rails()
     rails = rail_lines(left[::-1] if turned else left, right)
     lines = build_centerlines(rails, GAUGE, WIDTH)
@@ -57,7 +57,9 @@ def test_exact_rails_give_exact_geometry(sign, turned):
     assert found.track_id == lines[0].track_id
     np.testing.assert_allclose(np.diff(t[:-1]), 1.0)
     np.testing.assert_allclose(found.gauge_mm, 1435.0, atol=0.1)
-    np.testing.assert_allclose(found.cant_mm, ramp(t, -sign * CANT_MM), atol=0.7)  # smoothing rounds the kinks
+    np.testing.assert_allclose(
+        found.cant_mm, ramp(t, -sign * CANT_MM), atol=0.7
+    )  # smoothing rounds the corners of the ramp
     np.testing.assert_allclose(found.grade_pm, 4.0, atol=0.02)
     arc = (t > BORDERS[2] + 10) & (t < BORDERS[3] - 10)
     np.testing.assert_allclose(found.radius_m[arc], sign * RADIUS, rtol=0.003)
@@ -70,8 +72,8 @@ def test_exact_rails_give_exact_geometry(sign, turned):
 
 
 @pytest.mark.parametrize("stored", [False, True])
-def test_scanned_track_is_measured_to_millimetres(stored):
-    """In one run, and from thinned lines as files hold them."""
+def test_a_scanned_track_is_measured_to_millimetres(stored):
+    """Within one run, and from thinned lines as stored in files."""
     track = curved_track()
     random = np.random.RandomState(5)
     heads = [scan(track.railhead(side), WIDTH, track.centerline, Scanner(), random) for side in (1, -1)]
@@ -95,7 +97,7 @@ def test_scanned_track_is_measured_to_millimetres(stored):
 
 
 @pytest.mark.parametrize(("step", "chainage"), [(100, [0, 100, 199]), (150, [0, 199]), (300, [0, 199])])
-def test_stations_stand_for_all_of_the_track(step, chainage):
+def test_stations_cover_the_whole_track(step, chainage):
     left, right = Track(trace([Element(199.0)]), GAUGE + WIDTH).rails()
     line = Centerline(0.5 * (left + right), 1, 10, (1,), (2,), 1435.0, 0.0, 0.0, 0.0, 0.0)
     rails = [replace(rail, gaps=np.array([[0.0, 199.0]]), points=398) for rail in rail_lines(left, right)]
@@ -117,7 +119,7 @@ def test_gauge_and_cant_are_unknown_where_a_rail_is_missing():
     assert found.bridged[found.chainage_m > 30.6].all()
 
 
-def test_points_are_counted_once_round_a_ring():
+def test_points_are_counted_once_around_a_ring():
     angle = np.linspace(0, 2 * np.pi, 400)
     rings = [np.column_stack([r * np.cos(angle), r * np.sin(angle), 0 * angle]) for r in (9.2465, 10.7535, 10.0)]
     for ring, turn in zip(rings, (130, 40, 0)):
@@ -129,8 +131,8 @@ def test_points_are_counted_once_round_a_ring():
     assert found.points.max() < 2 * np.median(found.points)
 
 
-def test_support_is_told_by_chainage():
-    """Gaps in one rail, and few points on the other, along a centerline that runs against both."""
+def test_support_follows_the_chainage():
+    """Gaps in one rail and few points on the other, along a centerline in the opposite direction."""
     left, right = Track(trace([Element(40.0)]), GAUGE + WIDTH).rails()
     stations = np.arange(0.125, 40, 0.25)
     even = Support(stations, np.full(160, 10), np.full(160, 0.003))
@@ -148,20 +150,20 @@ def test_support_is_told_by_chainage():
     np.testing.assert_allclose(found.sigma_mm[t > 21], 0.5 * np.hypot(3, 8))
 
 
-def test_lines_of_other_makers_are_measured_without_ids_or_heights():
+def test_lines_from_other_software_are_measured_without_ids_or_heights():
     left, right = curved_track().rails()
     middle = curved_track().centerline[::50, :2]
     line = Centerline(np.column_stack([middle, np.full(len(middle), np.nan)]), 7, 0, (), (), *[np.nan] * 5)
     rails = rail_lines(left * [1, 1, np.nan], right * [1, 1, np.nan])
     (found,) = measure_track_geometry([line], rails, WIDTH)
     assert found.track_id == 7
-    np.testing.assert_allclose(found.gauge_mm, 1435.0, atol=2.5)  # in plan: cant hides 2 mm
+    np.testing.assert_allclose(found.gauge_mm, 1435.0, atol=2.5)  # in plan: cant accounts for 2 mm
     assert np.isnan(found.cant_mm).all()
     assert np.isnan(found.twist_mm).all()
     assert np.isnan(found.grade_pm).all()
 
 
-def test_short_and_lonely_lines_give_what_can_be_known():
+def test_short_and_single_lines_give_what_can_be_measured():
     left, right = Track(trace([Element(2.0)]), GAUGE + WIDTH).rails()
     line = Centerline(0.5 * (left + right), 1, 10, (1,), (2,), 1435.0, 0.0, 0.0, 0.0, 0.0)
     (short,) = measure_track_geometry([line], rail_lines(left, right), WIDTH)
@@ -183,7 +185,7 @@ class RawRaster:
         return seen
 
 
-def test_one_run_measures_every_track_of_every_class_if_asked(monkeypatch):
+def test_one_run_measures_every_track_of_every_class_on_request(monkeypatch):
     monkeypatch.setattr(steps, "load_arrays", lambda path: {})
     monkeypatch.setattr(steps, "make_engine", lambda *_: RawRaster())
     track = Track(trace([Element(30.0)], heading=0.3), GAUGE + WIDTH, cant_m=0.02)
@@ -209,7 +211,7 @@ def test_points_of_stations_add_up_to_those_of_the_rails(step_m):
     assert abs(found.points.sum() - 120) <= 1
 
 
-def test_a_short_piece_has_no_radius_that_a_millimetre_makes():
+def test_a_millimetre_does_not_make_a_radius_on_a_short_piece():
     x = np.arange(0, 3.3, 0.1)
     sag = 0.001 * np.sin(np.pi * x / x[-1])  # versine 1 mm: a radius of 1.3 km
     left, right = (np.column_stack([x, sag + side * 0.5 * (GAUGE + WIDTH), 0 * x]) for side in (1, -1))

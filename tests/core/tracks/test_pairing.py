@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.pairing import find_candidates, pair_rails
-from rail_extract.core.tracks.parallels import find_parallels, most_common_spacing
+from rail_extract.core.tracks.parallels import find_parallels
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 
 GAUGE, WIDTH = 1.435, 0.072
@@ -36,7 +36,7 @@ TRAM = trace([Element(10), Element(40, 1 / 25, 1 / 25), Element(10)])
 @pytest.mark.parametrize("curve", [STRAIGHT, CURVED, TRAM])
 @pytest.mark.parametrize("turned", [(False, False), (True, False), (False, True), (True, True)])
 @pytest.mark.parametrize("order", [1, -1])
-def test_two_rails_pair_along_their_whole_length_however_they_run(curve, turned, order):
+def test_two_rails_pair_along_their_whole_length_in_any_direction(curve, turned, order):
     lines = [line[::-1] if turn else line for line, turn in zip(tracks(curve, 0.0), turned)]
     rails = rails_of(*lines[::order])
     (pair,) = pair_rails(rails, GAUGE, WIDTH)
@@ -63,21 +63,21 @@ def test_rails_of_neighbouring_tracks_never_pair(distance):
 @pytest.mark.parametrize("curve", [STRAIGHT, CURVED, TRAM])
 @pytest.mark.parametrize("count", [2, 3, 4, 5])
 @pytest.mark.parametrize("off", [-0.03, 0.0, 0.03])
-def test_tracks_twice_as_far_apart_as_their_rails_stay_the_only_ones(curve, count, off):
-    """As those of trams in narrow streets: there the inner rails of neighbours lie at gauge as well."""
+def test_inner_rails_of_neighbouring_tracks_at_gauge_make_no_track(curve, count, off):
+    """As with trams in narrow streets, where the inner rails of neighbouring tracks are at gauge as well."""
     rails = rails_of(*tracks(curve, *((2 * SPACING + off) * np.arange(count))))
     pairs = pair_rails(rails, GAUGE, WIDTH)
     found = sorted(tuple(sorted((pair.left, pair.right))) for pair in pairs)
     assert found == [(2 * number, 2 * number + 1) for number in range(count)]
 
 
-def test_a_rail_that_two_tracks_share_serves_both():
+def test_a_rail_shared_by_two_tracks_belongs_to_both():
     rails = rails_of(*beside(STRAIGHT, 0.0, SPACING, 2 * SPACING))
     assert len(pair_rails(rails, GAUGE, WIDTH)) == 2
 
 
 @pytest.mark.parametrize(("height", "count"), [(0.0, 1), (0.18, 1), (6.5, 0), (np.nan, 1)])
-def test_rails_on_two_levels_are_no_track(height, count):
+def test_rails_on_two_levels_are_not_a_track(height, count):
     left, right = tracks(STRAIGHT, 0.0)
     assert len(pair_rails([rail(left), rail(right, 2, z=height)], GAUGE, WIDTH)) == count
 
@@ -88,13 +88,13 @@ def test_rails_pair_within_the_tolerance_of_the_gauge(widening, count):
     assert len(pair_rails(rails, GAUGE, WIDTH)) == count
 
 
-def test_each_stretch_of_a_side_serves_one_track():
+def test_each_section_of_a_side_belongs_to_one_track():
     left, right, double = beside(STRAIGHT, SPACING / 2, -SPACING / 2, -SPACING / 2 - 0.03)
     pairs = pair_rails(rails_of(left, right, double[100:300]), GAUGE, WIDTH)
     assert [(pair.left, pair.right) for pair in pairs] == [(0, 1)]
 
 
-def test_the_middle_rail_of_three_serves_a_track_on_either_side():
+def test_the_middle_rail_of_three_belongs_to_a_track_on_either_side():
     rails = rails_of(*beside(STRAIGHT, SPACING, 0.0, -SPACING))
     pairs = pair_rails(rails, GAUGE, WIDTH)
     assert {(pair.left, pair.right) for pair in pairs} == {(0, 1), (1, 2)}
@@ -106,7 +106,7 @@ def test_dual_gauge_pairs_by_gauge():
     assert [(p.left, p.right) for p in pair_rails(rails, 1.0, WIDTH)] == [(0, 1)]
 
 
-def test_short_meetings_do_not_pair():
+def test_short_sections_at_gauge_do_not_pair():
     crossing = trace([Element(60.0)], heading=0.7 + 0.05, start=(0.0, -2.0))
     pairs = pair_rails(rails_of(STRAIGHT.xy[::10], crossing.xy[::10]), GAUGE, WIDTH)
     assert pairs == ()
@@ -117,7 +117,7 @@ def test_rails_of_different_classes_do_not_pair():
     assert pair_rails([rails[0], replace(rails[1], class_code=11)], GAUGE, WIDTH) == ()
 
 
-def test_long_rails_come_in_pieces_that_cover_them():
+def test_long_rails_pair_in_parts_that_cover_them():
     curve = trace([Element(1500.0, 1 / 5000, 1 / 5000)], step_m=0.1)
     pairs = pair_rails(rails_of(*tracks(curve, 0.0)), GAUGE, WIDTH)
     assert len(pairs) == 2
@@ -127,28 +127,6 @@ def test_long_rails_come_in_pieces_that_cover_them():
 def test_fewer_than_two_rails_make_no_pair():
     assert pair_rails([], GAUGE, WIDTH) == ()
     assert pair_rails(rails_of(STRAIGHT.xy), GAUGE, WIDTH) == ()
-
-
-def test_parallels_know_side_sense_and_place():
-    left, right = tracks(STRAIGHT, 0.0)
-    parallels = find_parallels(rails_of(left, right[::-1]))
-    assert set(parallels.a) == {0}
-    assert set(parallels.b) == {1}
-    np.testing.assert_allclose(parallels.left_m, -SPACING, atol=1e-9)
-    assert not parallels.same.any()
-    np.testing.assert_allclose(parallels.t_a + parallels.t_b, 60.0, atol=0.3)
-
-
-@pytest.mark.parametrize("spacing", [1.0619, 1.507, 1.592, 1.743])
-def test_commonest_spacing_is_measured_to_the_millimetre(spacing):
-    rails = rails_of(*tracks(CURVED, 0.0, 4.2, spacing=spacing))
-    assert most_common_spacing(rails, 3.0) == pytest.approx(spacing, abs=1e-3)
-
-
-def test_rails_far_apart_or_crossing_have_no_spacing():
-    assert most_common_spacing(rails_of(*beside(STRAIGHT, 0.0, 4.0)), 3.0) is None
-    assert most_common_spacing(rails_of(STRAIGHT.xy, trace([Element(40.0)], heading=2.0).xy), 3.0) is None
-    assert most_common_spacing(rails_of(STRAIGHT.xy), 3.0) is None
 
 
 @pytest.mark.parametrize(("deviation", "count"), [(0.09, 1), (-0.09, 1), (0.11, 0), (-0.11, 0)])
