@@ -24,6 +24,15 @@ EPSG_CODES = range(1024, 32767)
 LENGTH_UNITS = {9001: ("metre", 1.0), 9002: ("foot", 0.3048), 9003: ("US survey foot", 1200 / 3937)}
 """Name and length in metres of EPSG's units of length."""
 
+MIN_UNIT_M, MAX_UNIT_M = 0.001, 2000.0
+"""Lengths between which a unit of length can be: a millimetre, and somewhat more than a nautical mile."""
+
+UNITS_OF_LENGTH = ("LinearUnit", "Unit")
+"""Types of unit in PROJJSON that are lengths; the other types are angles, scales, times and parameters."""
+
+MAX_NAME = 80
+"""Characters of a coordinate system's name that a message quotes: files may state any text."""
+
 MAX_SCALE_ERROR = 0.005
 """Largest deviation of the scale factor from 1. It shifts a gauge of 1435 mm by 7 mm; the report marks deviations of
 more than 10 mm. National grids stay below 0.0035; Web Mercator exceeds the limit even on the equator."""
@@ -125,7 +134,7 @@ def units(crs: pyproj.CRS) -> tuple[float, float]:
     Raises
     ------
     CrsError
-        The coordinates are degrees, or geocentric.
+        The coordinates are degrees, geocentric or no lengths at all, or a unit is impossible.
 
     Examples
     --------
@@ -133,13 +142,40 @@ def units(crs: pyproj.CRS) -> tuple[float, float]:
     (0.3048, 0.3048)
     """
     parts = [_unbound(part) for part in _unbound(crs).sub_crs_list or [crs]]
-    axes = parts[0].axis_info
-    if parts[0].is_geographic or parts[0].is_geocentric or not axes:
-        raise CrsError(f"Lengths can't be computed in {crs.name}: use a projected coordinate system.")
-    horizontal = axes[0].unit_conversion_factor
+    if parts[0].is_geographic or parts[0].is_geocentric or not all(part.axis_info for part in parts[:2]):
+        raise CrsError(f"Lengths can't be computed in {name_of(crs)}: use a projected coordinate system.")
+    horizontal, *others = _lengths(parts[0])
     if len(parts) > 1:
-        return horizontal, parts[1].axis_info[0].unit_conversion_factor
-    return horizontal, axes[2].unit_conversion_factor if len(axes) == 3 else horizontal
+        return horizontal, _lengths(parts[1])[0]
+    return horizontal, others[1] if len(others) == 2 else horizontal
+
+
+def _lengths(part: pyproj.CRS) -> list[float]:
+    """Return the length in metres of the unit of each axis.
+
+    Raises
+    ------
+    CrsError
+        An axis measures something else, or its unit is impossible, as in a damaged file.
+    """
+    kinds = [axis["unit"] for axis in part.to_json_dict()["coordinate_system"]["axis"]]
+    for axis, kind in zip(part.axis_info, kinds):
+        if kind != "metre" and (isinstance(kind, str) or kind["type"] not in UNITS_OF_LENGTH):
+            raise CrsError(
+                f"Lengths can't be computed in {name_of(part)}, which measures in {axis.unit_name[:MAX_NAME]}: use a "
+                "projected coordinate system."
+            )
+        if not MIN_UNIT_M <= axis.unit_conversion_factor <= MAX_UNIT_M:
+            raise CrsError(
+                f"{name_of(part)} states a unit of {axis.unit_conversion_factor:g} m, which is impossible: assign the "
+                "right coordinate system."
+            )
+    return [axis.unit_conversion_factor for axis in part.axis_info]
+
+
+def name_of(crs: pyproj.CRS) -> str:
+    """Return the name of a coordinate system as a message quotes it: on one line, and not too long."""
+    return " ".join(crs.name.split())[:MAX_NAME]
 
 
 def is_geographic(crs: pyproj.CRS) -> bool:
@@ -194,19 +230,25 @@ def warn_of_scale(
     factor, longitude, latitude = min(known, key=lambda one: abs(one[0] - 1))
     if abs(factor - 1) > MAX_SCALE_ERROR:
         progress.warning(
-            f"{what} in {plane.name}, whose scale factor of {factor:.3f} there makes lengths and gauges wrong: "
+            f"{what} in {name_of(plane)}, whose scale factor of {factor:.3f} there makes lengths and gauges wrong: "
             f"reproject {it}, for example to {utm_zone(longitude, latitude)}."
         )
 
 
 def _scale_at(plane: pyproj.CRS, x: float, y: float) -> tuple[float, float, float]:
-    """Return scale factor, longitude and latitude at a place; of the factors east and north, that farther from 1."""
+    """Return scale factor, longitude and latitude at a place; of the factors east and north, that farther from 1.
+
+    They are NaN or infinite where they are unknown: far outside the system, or in one that PROJ can't relate to others.
+    """
     pyproj = import_pyproj()
     half = BASELINE_M / 2 / plane.axis_info[0].unit_conversion_factor
-    to_degrees = pyproj.Transformer.from_crs(plane, WGS_84, always_xy=True)
-    longitudes, latitudes = to_degrees.transform([x - half, x, x + half, x], [y, y - half, y, y + half])
-    ground = pyproj.Geod(ellps="WGS84").inv(longitudes[:2], latitudes[:2], longitudes[2:], latitudes[2:])[2]
-    factors = [BASELINE_M / length_m for length_m in ground]
+    try:
+        to_degrees = pyproj.Transformer.from_crs(plane, WGS_84, always_xy=True)
+        longitudes, latitudes = to_degrees.transform([x - half, x, x + half, x], [y, y - half, y, y + half])
+        ground = pyproj.Geod(ellps="WGS84").inv(longitudes[:2], latitudes[:2], longitudes[2:], latitudes[2:])[2]
+    except pyproj.exceptions.ProjError:
+        return np.nan, np.nan, np.nan
+    factors = [BASELINE_M / length_m if length_m else np.nan for length_m in ground]
     return max(factors, key=lambda factor: abs(factor - 1)), longitudes[0], latitudes[0]
 
 
@@ -254,4 +296,4 @@ def same_plane(first_wkt: str, second_wkt: str, xy: tuple[float, float]) -> bool
 
 
 def _name(crs: pyproj.CRS | None) -> str:
-    return "no coordinate system" if crs is None else crs.name
+    return "no coordinate system" if crs is None else name_of(crs)

@@ -6,13 +6,13 @@ import struct
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from os import SEEK_END
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import CloudError
 from ..progress import SILENT, Progress
+from . import laz
 from .crs import crs_of_geokeys, import_pyproj
 from .readers import Chunk, CloudHeader
 
@@ -20,11 +20,7 @@ with warnings.catch_warnings():
     # In a virtual environment, pyproj (imported by laspy) warns about a data folder that PROJ finds by itself.
     warnings.simplefilter("ignore", UserWarning)
     import laspy
-
-try:
-    import lazrs
-except ImportError:
-    lazrs = None
+    from laspy.vlrs.vlrlist import VLRList
 
 CHUNK = 250_000
 """Points read at once: about 10 MB, and read in much less than the half second within which a run must react to a
@@ -42,24 +38,11 @@ MAX_OFFSET = 1e10
 MAX_POINT_FORMAT, FORMAT_BITS = 10, 0x3F
 """Last point format of LAS 1.4, and the bits of the byte that hold it; the others mark compressed points."""
 
-AT_THE_END = -1
-"""Stands in for the position of a LAZ file's chunk table if the writer could not seek back: the last 8 bytes of the
-file then hold the position."""
+MAX_READ = 2**26
+"""Largest block of points read at once, in bytes; a point may have up to 65,535."""
 
-MAX_LAZ_CHUNK = 2**30
-"""Largest unpacked chunk in bytes; writers use 50,000 points, about 2 MB."""
-
-READING_ERRORS = (
-    laspy.errors.LaspyException,
-    ValueError,
-    OSError,
-    LookupError,
-    EOFError,
-    RuntimeError,
-    MemoryError,
-    struct.error,
-)
-"""Errors that laspy and its backends raise on damaged files; lazrs' own error is a RuntimeError."""
+PROJECTION_USER = b"LASF_Projection"
+"""User of the records that state the coordinate system."""
 
 GEO_KEYS_RECORD = "GeoKeyDirectoryVlr"
 
@@ -69,6 +52,7 @@ def read_header(path: Path) -> CloudHeader:
     with _open(path) as reader:
         header = reader.header
         (xmin, ymin), (xmax, ymax) = header.mins[:2].tolist(), header.maxs[:2].tolist()
+        header.evlrs = _late_projection_records(path, header)
         return CloudHeader(path, int(header.point_count), (xmin, ymin, xmax, ymax), _crs_wkt(header))
 
 
@@ -77,15 +61,17 @@ def read_classes(path: Path, class_codes: Sequence[int], progress: Progress = SI
     wanted = np.zeros(256, dtype=bool)
     wanted[list(class_codes)] = True
     with _open(path) as reader:
-        total = reader.header.point_count
-        done = 0
-        for chunk in reader.chunk_iterator(CHUNK):
+        header, done = reader.header, 0
+        total = header.point_count
+        if header.are_points_compressed:
+            laz.check_layers(path, header, laz.read_chunk_table(path, header), progress)
+        for chunk in reader.chunk_iterator(max(1, min(CHUNK, MAX_READ // header.point_format.size))):
             progress.check()
             codes, valid = np.asarray(chunk.classification), np.asarray(chunk.withheld) == 0
             keep = np.flatnonzero(wanted[codes] & valid)
             raw = np.column_stack([chunk.X[keep], chunk.Y[keep], chunk.Z[keep]])
             census = np.bincount(codes[valid], minlength=256)
-            yield raw * reader.header.scales + reader.header.offsets, codes[keep], census
+            yield raw * header.scales + header.offsets, codes[keep], census
             done += len(codes)
             progress.set_fraction(done / total)
     if done < total:
@@ -94,21 +80,13 @@ def read_classes(path: Path, class_codes: Sequence[int], progress: Progress = SI
 
 @contextmanager
 def _open(path: Path) -> Iterator[laspy.LasReader]:
-    """Open a file and check it; every error while reading it becomes a `CloudError`."""
-    try:
-        _check_start(path)
-    except OSError as error:
-        raise CloudError(
-            f"{path.name} can't be read ({error.strerror}): check its permissions, the disk or the network drive."
-        ) from error
+    """Open a file and check it; what laspy and lazrs raise on a damaged file is left to `readers`."""
+    _check_start(path)
     fields = laspy.DecompressionSelection
     selection = fields.XY_RETURNS_CHANNEL | fields.Z | fields.CLASSIFICATION | fields.FLAGS
-    try:
-        with laspy.open(path, decompression_selection=selection) as reader:
-            _check_header(path, reader.header)
-            yield reader
-    except READING_ERRORS as error:
-        raise CloudError(f"{path.name} is cut off or damaged ({error}): copy or export it again.") from error
+    with laspy.open(path, read_evlrs=False, decompression_selection=selection) as reader:
+        _check_header(path, reader.header)
+        yield reader
 
 
 def _check_start(path: Path) -> None:
@@ -139,9 +117,11 @@ def _check_start(path: Path) -> None:
             f"{path.name} has a damaged header ({header_size} bytes and {records} records stated before the points): "
             "export it again."
         )
-    late_at, late = struct.unpack("<QI", start[235:247]) if start[25] == 4 else (0, 0)
-    if late and late_at + late * EVLR_HEADER > size:
-        raise CloudError(f"{path.name} is cut off: the records after its points are missing; copy or export it again.")
+    legacy, count = struct.unpack("<I", start[107:111])[0], int.from_bytes(start[247:255], "little")
+    if start[25] == 4 and legacy not in (0, count):
+        raise CloudError(
+            f"{path.name} has a damaged header (it states both {legacy} and {count} points): export it again."
+        )
 
 
 def _check_header(path: Path, header: laspy.LasHeader) -> None:
@@ -153,7 +133,7 @@ def _check_header(path: Path, header: laspy.LasHeader) -> None:
     if not scales_fit or (header.scales > MAX_SCALE).any() or not offsets_fit:
         raise CloudError(f"{path.name} has a damaged header (coordinate scale or offset): export it again.")
     if header.are_points_compressed:
-        _check_compressed(path, header)
+        laz.read_chunk_table(path, header)
         return
     held = (path.stat().st_size - header.offset_to_point_data) // header.point_format.size
     if held < header.point_count:
@@ -163,47 +143,39 @@ def _check_header(path: Path, header: laspy.LasHeader) -> None:
         )
 
 
-def _check_compressed(path: Path, header: laspy.LasHeader) -> None:
-    """Refuse LAZ files with impossible chunks: the decompressor would allocate memory for them and end the program."""
-    if lazrs is None:
-        raise CloudError(
-            f"{path.name} is compressed, and the Python package that reads LAZ is missing: run pip install lazrs, or "
-            "export the cloud as LAS."
-        )
-    size = path.stat().st_size
-    vlr = lazrs.LazVlr(header.vlrs.get("LasZipVlr")[0].record_data)
-    fits = vlr.item_size() == header.point_format.size
-    fits &= vlr.uses_variable_size_chunks() or vlr.chunk_size() * vlr.item_size() <= MAX_LAZ_CHUNK
+def _late_projection_records(path: Path, header: laspy.LasHeader) -> VLRList:
+    """Read the records after the points that state the coordinate system; others may hold gigabytes of waveforms."""
+    records, at, size = VLRList(), header.start_of_first_evlr, path.stat().st_size
     with path.open("rb") as file:
-        file.seek(header.offset_to_point_data)
-        (table_at,) = struct.unpack("<q", file.read(8))
-        if table_at == AT_THE_END:
-            file.seek(-8, SEEK_END)
-            (table_at,) = struct.unpack("<q", file.read(8))
-        if not header.offset_to_point_data < table_at <= size - 8:
-            raise CloudError(f"{path.name} is cut off: its table of chunks is missing; copy or export it again.")
-        file.seek(table_at)
-        _, chunks = struct.unpack("<II", file.read(8))
-        if fits and chunks <= size:
-            file.seek(header.offset_to_point_data)
-            table = lazrs.read_chunk_table(file, vlr)
-            fits = sum(held for _, held in table) <= size and sum(count for count, _ in table) >= header.point_count
-        if not fits or chunks > size:
-            raise CloudError(f"{path.name} is damaged: its compressed chunks don't fit the file; export it again.")
+        for _ in range(header.number_of_evlrs):
+            end = at + EVLR_HEADER
+            if end <= size:
+                file.seek(at)
+                start = file.read(EVLR_HEADER)
+                end += int.from_bytes(start[20:28], "little")
+            if end > size:
+                raise CloudError(
+                    f"{path.name} is cut off: the records after its points are missing; copy or export it again."
+                )
+            if start[2:18].rstrip(b"\0") == PROJECTION_USER:
+                file.seek(at)
+                records += VLRList.read_from(file, 1, extended=True)
+            at = end
+    return records
 
 
 def _crs_wkt(header: laspy.LasHeader) -> str | None:
     """Return the coordinate system of a header as WKT 2; None if there is none or PROJ does not understand it."""
-    if not header.vlrs.get_by_id("LASF_Projection") and not (header.evlrs or []):
+    if not header.vlrs.get_by_id(PROJECTION_USER.decode()) and not header.evlrs:
         return None
     pyproj = import_pyproj()
     try:
         crs = header.parse_crs()
         if crs is not None and not header.global_encoding.wkt:
             crs = crs_of_geokeys(crs, _geo_keys(header))
-    except (pyproj.exceptions.CRSError, UnicodeDecodeError):
+        return None if crs is None else crs.to_wkt()
+    except (pyproj.exceptions.ProjError, ValueError):  # a ValueError where the text is not UTF-8, or holds a zero byte
         return None
-    return None if crs is None else crs.to_wkt()
 
 
 def _geo_keys(header: laspy.LasHeader) -> dict[int, int]:

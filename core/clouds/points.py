@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +12,8 @@ from ..errors import CloudError, CrsError, NoRailPointsError, ParameterError
 from ..frame import ORIGIN_STEP, LocalFrame
 from ..progress import SILENT, Progress
 from ..standards import LAST_CLASS
-from .crs import common_crs, is_geographic, parse_crs, units, utm_zone, warn_of_scale
+from .crs import common_crs, is_geographic, name_of, parse_crs, units, utm_zone, warn_of_scale
 from .readers import Chunk, CloudHeader, Extent, Paths, list_files, read_classes, read_header
-
-if TYPE_CHECKING:
-    import pyproj
 
 
 @dataclass(frozen=True)
@@ -160,11 +156,7 @@ def ask(
     """
     _check_request(class_codes, extent)
     headers = _read_headers(paths, unreadable)
-    crs = _shared_crs(headers, crs_wkt, progress)
-    units_m = (1.0, 1.0) if crs is None else units(crs)
-    return Request(
-        headers, tuple(class_codes), extent, LocalFrame(np.zeros(3), *units_m, None if crs is None else crs.to_wkt())
-    )
+    return Request(headers, tuple(class_codes), extent, _shared_system(headers, crs_wkt, progress))
 
 
 def _read_headers(paths: Paths, unreadable: list[str] | None) -> tuple[CloudHeader, ...]:
@@ -198,22 +190,27 @@ def _check_request(class_codes: Sequence[int], extent: Extent | None) -> None:
         raise ParameterError(f"The extent {extent} is empty: give xmin, ymin, xmax, ymax.")
 
 
-def _shared_crs(headers: Sequence[CloudHeader], given: str | None, progress: Progress) -> pyproj.CRS | None:
-    """Return the coordinate system that all files share; `given` applies to files that state none."""
+def _shared_system(headers: Sequence[CloudHeader], given: str | None, progress: Progress) -> LocalFrame:
+    """Return the frame of the coordinate system that all files share; `given` applies to files that state none."""
     texts = [header.crs_wkt or given or "" for header in headers]
     parsed = {text: parse_crs(text) for text in set(texts) if text}
     crs = common_crs([(header.path.name, parsed.get(text)) for header, text in zip(headers, texts)])
     if crs is None:
         progress.warning("The cloud states no coordinate system: its coordinates are taken as metres.")
-    elif is_geographic(crs):
+        return LocalFrame(np.zeros(3))
+    name = headers[0].path.name
+    if is_geographic(crs):
         raise CrsError(
-            f"{headers[0].path.name} is in degrees ({crs.name}), where lengths can't be measured: "
-            f"reproject it, for example to {_fitting_zone(headers[0])}."
+            f"{name} is in degrees ({name_of(crs)}), where lengths can't be measured: reproject it, for example to "
+            f"{_fitting_zone(headers[0])}."
         )
-    else:
-        xmin, ymin, xmax, ymax = headers[0].extent
-        warn_of_scale(crs, list(product((xmin, xmax), (ymin, ymax))), f"{headers[0].path.name} is", progress)
-    return crs
+    try:
+        units_m = units(crs)
+    except CrsError as error:
+        raise CrsError(f"{name}: {error}") from error
+    xmin, ymin, xmax, ymax = headers[0].extent
+    warn_of_scale(crs, list(product((xmin, xmax), (ymin, ymax))), f"{name} is", progress)
+    return LocalFrame(np.zeros(3), *units_m, crs.to_wkt())
 
 
 def _fitting_zone(header: CloudHeader) -> str:

@@ -5,7 +5,9 @@ To add a format, write a module with the two functions of `Reader` and add its s
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -13,7 +15,7 @@ from typing import Protocol, Union, cast
 
 import numpy as np
 
-from ..errors import CloudError
+from ..errors import Cancelled, CloudError, RailExtractError
 from ..progress import SILENT, Progress
 from .vpc import list_tiles
 
@@ -23,6 +25,12 @@ packages that readers need. COPC files end in .copc.laz."""
 
 CATALOGUES: dict[str, Callable[[Path], Sequence[Path]]] = {".vpc": list_tiles}
 """Functions that list the clouds named in a file, by its suffix."""
+
+NOT_OF_THE_FILE = (RailExtractError, Cancelled, MemoryError, KeyboardInterrupt, SystemExit, GeneratorExit)
+"""What a reader raises for other reasons than an unforeseen damage of the file."""
+
+IMPOSSIBLE = (None, errno.EINVAL, errno.EOVERFLOW)
+"""Codes of an `OSError` that a damaged file causes, such as by a position before its start."""
 
 Extent = tuple[float, float, float, float]
 """Smallest x, smallest y, largest x, largest y, in units of the CRS."""
@@ -73,7 +81,8 @@ def read_header(path: Path) -> CloudHeader:
     CloudError
         The file has an unknown suffix, is damaged, is cut off or has no points.
     """
-    return _reader(path).read_header(path)
+    with _explained(path):
+        return _reader(path).read_header(path)
 
 
 def read_classes(path: Path, class_codes: Sequence[int], progress: Progress = SILENT) -> Iterator[Chunk]:
@@ -100,7 +109,24 @@ def read_classes(path: Path, class_codes: Sequence[int], progress: Progress = SI
     CloudError
         The file has an unknown suffix, or turns out to be cut off or damaged.
     """
-    return _reader(path).read_classes(path, class_codes, progress)
+    with _explained(path):
+        yield from _reader(path).read_classes(path, class_codes, progress)
+
+
+@contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    """Turn whatever a reader raises because of a file into a `CloudError` that names the file."""
+    try:
+        yield
+    except NOT_OF_THE_FILE:
+        raise
+    except BaseException as error:  # such as lazrs' PanicException, which is not an Exception
+        if isinstance(error, OSError) and error.errno not in IMPOSSIBLE:
+            raise CloudError(
+                f"{path.name} can't be read ({error.strerror}): check its permissions, the disk or the network drive."
+            ) from error
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise CloudError(f"{path.name} is cut off or damaged ({reason}): copy or export it again.") from error
 
 
 def list_files(paths: Paths) -> tuple[Path, ...]:

@@ -15,7 +15,6 @@ from qgis.core import (
 )
 from qgis.PyQt.QtGui import QIcon
 
-from ...core.errors import Cancelled, RailExtractError
 from ...core.progress import Progress
 from ..dialog.checks import check_values, explain_invalid
 from ..dialog.guide import guide
@@ -27,6 +26,7 @@ from ..i18n import tr
 from ..paths import ICONS, PICTURES
 from ..setup.dependencies import explain_missing, missing_packages
 from ..writing.destinations import check_distinct, check_writable
+from .sentences import COMMAND_LINE, sentence_for
 
 # Search terms, also in the languages of the larger railways: the toolbox search compares whole words.
 RAIL_WORDS = (
@@ -44,9 +44,6 @@ RAIL_WORDS = (
 )
 CLOUD_WORDS = ("lidar", "las", "laz", "copc", "point cloud", "laser scanning", "Punktwolke", "nuage de points")
 TRACK_WORDS = ("gauge", "cant", "superelevation", "alignment", "Spurweite", "Gleisachse", "Überhöhung", "écartement")
-
-COMMAND_LINE = "qgis_process"
-"""QGIS's name for the platform of its command line."""
 
 
 class RailAlgorithm(QgsProcessingAlgorithm):
@@ -86,8 +83,11 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     def checkParameterValues(self, parameters: dict[str, Any], context: QgsProcessingContext) -> tuple[bool, str]:
         """Check all values before a run; the message uses the terms of the user's platform."""
-        accepted, message = self._check(parameters, context)
-        return accepted, for_user(message, self.parameterDefinitions())
+        try:
+            accepted, message = self._check(parameters, context)
+            return accepted, for_user(message, self.parameterDefinitions())
+        except BaseException as error:
+            return False, sentence_for(error, self.parameterDefinitions())
 
     def _check(self, parameters: dict[str, Any], context: QgsProcessingContext) -> tuple[bool, str]:
         """Check as QGIS does, then that the outputs can be written, then as `read` does."""
@@ -97,18 +97,15 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         accepted, message = self.canExecute()
         if not accepted:
             return False, message
-        try:
-            for output in self.destinationParameterDefinitions():
-                value = parameters.get(output.name())
-                supported, message = self.provider().isSupportedOutputValue(value, output, context)
-                if not supported:
-                    return False, f"{message}: choose another one, such as .{output.defaultFileExtension()}."
-                check_writable(value, context)
-            outputs = self.destinationParameterDefinitions()
-            check_distinct({output.name(): parameters.get(output.name()) for output in outputs}, context)
-            self._read(parameters, context)
-        except RailExtractError as error:
-            return False, str(error)
+        for output in self.destinationParameterDefinitions():
+            value = parameters.get(output.name())
+            supported, message = self.provider().isSupportedOutputValue(value, output, context)
+            if not supported:
+                return False, f"{message}: choose another one, such as .{output.defaultFileExtension()}."
+            check_writable(value, context)
+        outputs = self.destinationParameterDefinitions()
+        check_distinct({output.name(): parameters.get(output.name()) for output in outputs}, context)
+        self._read(parameters, context)
         return True, ""
 
     def prepareAlgorithm(
@@ -120,23 +117,19 @@ class RailAlgorithm(QgsProcessingAlgorithm):
             raise QgsProcessingException(reason)
         try:
             self._job = self._read(parameters, context)
-        except RailExtractError as error:
-            raise QgsProcessingException(for_user(str(error), self.parameterDefinitions())) from None
+        except BaseException as error:
+            raise QgsProcessingException(sentence_for(error, self.parameterDefinitions())) from None
         return True
 
     def processAlgorithm(
         self, parameters: dict[str, Any], context: QgsProcessingContext, feedback: QgsProcessingFeedback
     ) -> dict:
-        """Compute in any thread; every error that a user can remedy becomes one sentence."""
+        """Compute in any thread; every error becomes one sentence."""
         progress = QgisProgress(feedback, self.parameterDefinitions())
         try:
             results = self.compute(self._job, parameters, context, progress)
-        except RailExtractError as error:
-            raise QgsProcessingException(for_user(str(error), self.parameterDefinitions())) from None
-        except Cancelled:
-            raise QgsProcessingException(tr("Cancelled; nothing was written.")) from None
-        except MemoryError:
-            raise QgsProcessingException(tr("Not enough memory: choose a smaller extent.")) from None
+        except BaseException as error:
+            raise QgsProcessingException(sentence_for(error, self.parameterDefinitions())) from None
         progress.set_fraction(1)
         return results
 
@@ -161,8 +154,11 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     def canExecute(self) -> tuple[bool, str]:
         """Return whether the required packages are installed; the toolbox lists the algorithm in either case."""
-        missing = missing_packages(self.NEEDS)
-        return (False, explain_missing(self.displayName(), missing, self._usable_labels())) if missing else (True, "")
+        try:
+            missing = missing_packages(self.NEEDS)
+            return (not missing, explain_missing(self.displayName(), missing, self._usable_labels()) if missing else "")
+        except BaseException as error:
+            return False, sentence_for(error, self.parameterDefinitions())
 
     def _usable_labels(self) -> list[str]:
         """Labels of the provider's algorithms in this group whose packages are all installed."""

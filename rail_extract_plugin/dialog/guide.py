@@ -1,4 +1,4 @@
-"""Addresses of the guide: in the zip, or, for a clone that was not built, on the web."""
+"""Addresses: of the guide, which is in the zip or, for a clone that was not built, on the web, and of the tracker."""
 
 from __future__ import annotations
 
@@ -17,6 +17,16 @@ def guide(page: str) -> str:
 
 def on_the_web(file: str) -> str:
     """Return the address of a file in the repository named in the plugin's metadata."""
+    return f"{_metadata('repository')}/blob/main/{file}"
+
+
+def tracker() -> str:
+    """Return the address where errors are reported."""
+    return _metadata("tracker")
+
+
+def _metadata(key: str) -> str:
+    """Return a value of the plugin's metadata."""
     metadata = ConfigParser(interpolation=None)
     metadata.read(METADATA, encoding="utf-8")
-    return f"{metadata['general']['repository']}/blob/main/{file}"
+    return metadata["general"][key]

@@ -6,15 +6,17 @@ import os
 import sys
 import tempfile
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import laspy
+import lazrs
 import numpy as np
 import pytest
 from faults import FINE, REFUSED, WARNED, Fault
+from laspy._compression import lazrsbackend
 from rail_extract.core.clouds.crs import import_pyproj
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -154,6 +156,7 @@ def write_cloud(tmp_path):
         class_code: int = 10,
         epsg: int | None = 32643,
         folder: Path = tmp_path,
+        any_chunk_size: bool = False,
     ) -> Path:
         header = laspy.LasHeader(point_format=6, version="1.4")
         header.scales = [1e-7, 1e-7, 1e-3] if epsg == 4326 else [0.001] * 3
@@ -163,10 +166,30 @@ def write_cloud(tmp_path):
         cloud = laspy.LasData(header)
         cloud.xyz = xyz
         cloud.classification = np.full(len(xyz), class_code, dtype=np.uint8)
-        cloud.write(folder / name)
+        with chunks_of_any_size() if any_chunk_size else nullcontext():
+            cloud.write(folder / name)
         return folder / name
 
     return write
+
+
+@contextmanager
+def chunks_of_any_size():
+    """Have laspy write compressed points as COPC files hold them: in chunks of several sizes."""
+
+    class Writer(lazrsbackend.LazrsPointWriter):
+        def __init__(self, dest, point_format, parallel):
+            super().__init__(dest, point_format, parallel=False)
+            self.vlr = lazrs.LazVlr.new_for_compression(point_format.id, point_format.num_extra_bytes, True)
+
+        def write_points(self, points):
+            for part in (points[:70], points[70:2000], points[2000:]):
+                super().write_points(part)
+                self.compressor.finish_current_chunk()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lazrsbackend, "LazrsPointWriter", Writer)
+        yield
 
 
 @pytest.fixture

@@ -2,9 +2,12 @@
 
 import json
 
+import laspy
 import numpy as np
 import pytest
 from faults import REFUSED, WARNED, Fault
+from laspy.vlrs.known import WktCoordinateSystemVlr
+from rail_extract.core.clouds.crs import import_pyproj
 
 TITLE = "Points and coordinate systems"
 
@@ -133,6 +136,38 @@ def with_broken_system(bench):
     return {"INPUT": path}
 
 
+def with_wkt(change):
+    """The coordinate system of the cloud, as WKT, changed."""
+
+    def prepare(bench):
+        cloud = laspy.read(bench.cloud(bench.track(length_m=6.0), epsg=None))
+        wkt = change(import_pyproj().CRS.from_epsg(32643).to_wkt("WKT1_GDAL"))
+        cloud.header.vlrs.append(WktCoordinateSystemVlr(wkt))
+        cloud.header.global_encoding.wkt = True
+        cloud.write(bench.folder / "cloud.las")
+        return {"INPUT": bench.folder / "cloud.las"}
+
+    return prepare
+
+
+def in_unit(length):
+    return with_wkt(lambda wkt: wkt.replace('UNIT["metre",1', f'UNIT["metre",{length}'))
+
+
+def beside(system):
+    """A compound of the system with another one."""
+    return with_wkt(lambda wkt: f'COMPOUNDCRS["both",{import_pyproj().CRS.from_wkt(wkt).to_wkt()},{system}]')
+
+
+TIME = (
+    'TIMECRS["when",TDATUM["x",CALENDAR["proleptic Gregorian"],TIMEORIGIN["0000-01-01"]],CS[TemporalCount,1],'
+    'AXIS["time",future],TIMEUNIT["s",1]]'
+)
+PRESSURE = (
+    'PARAMETRICCRS["air",PDATUM["Mean Sea Level"],CS[parametric,1],AXIS["pressure (hPa)",up],PARAMETRICUNIT["hPa",100]]'
+)
+
+
 def drawn_in_mercator(bench):
     rails = [[[1_024_000, y, 100], [1_024_050, y, 100]] for y in (6_446_000, 6_446_001.507)]
     shape = {"type": "MultiLineString", "coordinates": rails}
@@ -183,7 +218,37 @@ SYSTEMS = [
         "geocentric coordinates",
         in_system(4978, 1, (5e6, 3e6, 2e6)),
         REFUSED,
-        "Lengths can't be computed in WGS 84: use a projected coordinate system.",
+        "cloud.las: Lengths can't be computed in WGS 84: use a projected coordinate system.",
+    ),
+    Fault(
+        "coordinate system that has no way to WGS 84",
+        with_wkt(lambda wkt: wkt.replace("6378137,298.257223563", "1737400,0")),  # the ellipsoid is that of the Moon
+    ),
+    *(
+        Fault(
+            f"coordinate system with a unit of {length} m",
+            in_unit(length),
+            REFUSED,
+            f"cloud.las: WGS 84 / UTM zone 43N states a unit of {float(length):g} m, which is impossible: assign the "
+            "right coordinate system.",
+        )
+        for length in ("0", "-1", "1e300")
+    ),
+    *(
+        Fault(
+            f"{name} in place of a height",
+            beside(system),
+            REFUSED,
+            f"cloud.las: Lengths can't be computed in {title}, which measures in {unit}: use a projected coordinate "
+            "system.",
+        )
+        for name, system, title, unit in (("time", TIME, "when", "s"), ("pressure", PRESSURE, "air", "hPa"))
+    ),
+    Fault(
+        "time in place of coordinates",
+        with_wkt(lambda wkt: TIME),
+        REFUSED,
+        "cloud.las: Lengths can't be computed in when, which measures in s: use a projected coordinate system.",
     ),
     Fault("US survey feet", in_system(2263, FEET, (980_000, 200_000, 300))),
     Fault("feet in plan, metres in height", in_system("2263+5703", (FEET, FEET, 1), (980_000, 200_000, 100))),

@@ -8,9 +8,18 @@ import numpy as np
 import pytest
 from faults import REFUSED, Fault
 from osgeo import ogr
-from qgis.core import QgsCoordinateTransformContext, QgsFeature, QgsGeometry, QgsVectorFileWriter, QgsVectorLayer
+from qgis.core import (
+    Qgis,
+    QgsApplication,
+    QgsCoordinateTransformContext,
+    QgsFeature,
+    QgsGeometry,
+    QgsVectorFileWriter,
+    QgsVectorLayer,
+)
 from rail_extract.core import pipeline
 from rail_extract.core.frpdf import engine, models
+from rail_extract.rail_extract_plugin.algorithms import base
 from rail_extract.rail_extract_plugin.setup import dependencies
 
 resource = pytest.importorskip("resource", reason="only Unix limits the size of files")
@@ -176,14 +185,21 @@ def indexed_before(bench):
     return {**cloud(bench), "RAILS": path}
 
 
-def exhausted(bench):
-    """A cloud that is too large for the memory."""
+def failing(module, name, error):
+    """A function of a module raises an error."""
 
-    def fail(*arguments, **named):
-        raise MemoryError
+    def prepare(bench):
+        def fail(*arguments, **named):
+            raise error
 
-    bench.patch.setattr(pipeline, "clean_square", fail)
-    return cloud(bench)
+        bench.patch.setattr(module, name, fail)
+        return cloud(bench)
+
+    return prepare
+
+
+class Panic(BaseException):
+    """As libraries written in Rust raise it."""
 
 
 FAULTS = [
@@ -334,7 +350,28 @@ FAULTS = [
         "The output can't be written (…): check the free disk space.",
         run=MEASURE,
     ),
-    Fault("not enough memory", exhausted, REFUSED, "Not enough memory: choose a smaller extent."),
+    Fault(
+        "not enough memory",
+        failing(pipeline, "clean_square", MemoryError()),
+        REFUSED,
+        "Not enough memory: choose a smaller extent.",
+    ),
+    *(
+        Fault(
+            f"unforeseen error {when}",
+            failing(module, name, error),
+            REFUSED,
+            f"Rail Extract failed unexpectedly ({said}): report this at https://…/issues with the traceback from the "
+            "log.",
+        )
+        for when, module, name, error, said in (
+            ("in the search for packages", base, "missing_packages", OSError("gone"), "OSError: gone"),
+            ("in the check of the values", base, "check_values", ZeroDivisionError("by 0"), "ZeroDivisionError: by 0"),
+            ("in the run", pipeline, "clean_square", OverflowError("too large"), "OverflowError: too large"),
+            ("that is not an Exception", pipeline, "clean_square", Panic("two\nlines"), "Panic: two lines"),
+            ("that ends programs", pipeline, "clean_square", SystemExit(3), "SystemExit: 3"),
+        )
+    ),
     *(
         Fault(f"cancelled at {percent} %", cancelled(percent), REFUSED, "Cancelled; nothing was written.")
         for percent in (0, 10, 20, 40, 60, 80, 90)
@@ -358,6 +395,16 @@ def test_a_bad_cloud_in_a_batch_does_not_affect_the_others(qgis, plugin, outcome
     assert [run.ok for run in runs] == [True, False, True]
     assert runs[1].error.startswith("2.las is not a LAS or LAZ file")
     assert sorted(path.name for path in bench.folder.glob("*.tif")) == ["1.tif", "3.tif"]
+
+
+def test_the_traceback_of_an_unforeseen_error_goes_into_the_log(run_step, bench):
+    logged = []
+    log = QgsApplication.messageLog()
+    log.messageReceived[str, str, Qgis.MessageLevel].connect(lambda *message: logged.append(message))
+    run_step("extractrails", failing(pipeline, "clean_square", Panic("here"))(bench))
+    (text,) = [text for text, tab, _ in logged if tab == "Rail Extract"]
+    assert text.startswith("Traceback")
+    assert text.endswith("Panic: here\n")
 
 
 def test_the_page_lists_every_fault():

@@ -16,6 +16,9 @@ TITLE = "Point cloud files"
 HEADER, RECORDS_AT, SCALE_AT, OFFSET_AT, COUNT_AT, LATE_AT = 375, 100, 131, 155, 247, 235
 """Length of a LAS 1.4 header, and offsets of its fields, in bytes."""
 
+POINT_6 = 30
+"""Length of a point of format 6, in bytes."""
+
 
 def holding(data, name="cloud.las"):
     """A file with this content."""
@@ -72,6 +75,36 @@ def with_late_record_cut(data):
     """Announce a record after the points, of which only half exists."""
     late = struct.pack("<QI", len(data), 1)
     return data[:LATE_AT] + late + data[LATE_AT + 12 :] + bytes(30)
+
+
+def with_long_late_record(data):
+    """Announce a record behind the points that is longer than any file."""
+    start = bytes(2) + b"someone".ljust(16, b"\0") + struct.pack("<HQ", 7, 2**63) + bytes(32)
+    return data[:LATE_AT] + struct.pack("<QI", len(data), 1) + data[LATE_AT + 12 :] + start
+
+
+def copc(bench):
+    return bench.cloud(bench.track(length_m=6.0), "cloud.copc.laz", any_chunk_size=True)
+
+
+def with_one_point_stated(bench):
+    path = copc(bench)
+    path.write_bytes(overwritten(COUNT_AT, struct.pack("<Q", 1))(path.read_bytes()))
+    return {"INPUT": path}
+
+
+def with_broken_chunk_table(bench):
+    """A file with chunks of any size, as in COPC, on whose table of chunks lazrs panics."""
+    path = copc(bench)
+    data = path.read_bytes()
+    (table_at,) = struct.unpack("<q", data[points_at(data) : points_at(data) + 8])
+    path.write_bytes(overwritten(table_at + 8, b"\xff" * 4)(data))
+    return {"INPUT": path}
+
+
+def with_large_layer(data):
+    """State in the first chunk that its last layer has 3.8 GB."""
+    return overwritten(points_at(data) + 8 + POINT_6 + 4 + 8 * 4, b"\xff\xff\xff\xe4")(data)
 
 
 def rewritten(change, name="cloud.las", version=None, point_format=None):
@@ -239,7 +272,7 @@ FAULTS = [
         "LAZ truncated before the points",
         damaged(at_points, "cloud.laz"),
         REFUSED,
-        "cloud.laz is cut off or damaged (unpack requires a buffer of 8 bytes): copy or export it again.",
+        "cloud.laz is cut off: its table of chunks is missing; copy or export it again.",
     ),
     Fault(
         "LAZ truncated in the chunks",
@@ -270,7 +303,8 @@ FAULTS = [
         "LAZ with an absurd number of points",
         damaged(overwritten(COUNT_AT, b"\xff" * 6), "cloud.laz"),
         REFUSED,
-        "cloud.laz is damaged: its compressed chunks don't fit the file; export it again.",
+        "cloud.laz is damaged: the number of points is 281474976710655 in its header but 0 to 50000 in its compressed "
+        "chunks; export it again.",
     ),
     Fault(
         "absurd number of records",
@@ -346,6 +380,45 @@ FAULTS = [
         REFUSED,
         "cloud.las has a damaged header (coordinate scale or offset): export it again.",
     ),
+    Fault(
+        "record of 2^63 bytes after the points",
+        damaged(with_long_late_record),
+        REFUSED,
+        "cloud.las is cut off: the records after its points are missing; copy or export it again.",
+    ),
+    Fault(
+        "COPC with a chunk table on which lazrs panics",
+        with_broken_chunk_table,
+        REFUSED,
+        "cloud.copc.laz is cut off or damaged (index out of bounds: …): copy or export it again.",
+    ),
+    Fault(
+        "LAZ with a layer of 3.8 GB stated in a chunk",
+        damaged(with_large_layer, "cloud.laz"),
+        REFUSED,
+        "cloud.laz is damaged: its compressed chunks don't fit the file; export it again.",
+    ),
+    Fault(
+        "COPC with 1 point stated in the header and 3600 in the chunk table",
+        with_one_point_stated,
+        REFUSED,
+        "cloud.copc.laz is damaged: the number of points is 1 in its header but 3600 in its "
+        "compressed chunks; export it again.",
+    ),
+    Fault(
+        "LAZ with 1 point stated in the header and 3600 in its chunk",
+        damaged(overwritten(COUNT_AT, struct.pack("<Q", 1)), "cloud.laz"),
+        REFUSED,
+        "cloud.laz is damaged: the number of points is 1 in its header but 3600 in its "
+        "compressed chunks; export it again.",
+    ),
+    Fault(
+        "two different numbers of points in the header",
+        damaged(overwritten(107, struct.pack("<I", 7))),
+        REFUSED,
+        "cloud.las has a damaged header (it states both 7 and 3600 points): export it again.",
+    ),
+    Fault("bounds of 1e300 in the header", damaged(overwritten(195, struct.pack("<d", 1e300) * 2))),
     Fault("bounds of NaN in the header", damaged(overwritten(179, NAN * 6))),
     Fault("text in the header that is not UTF-8", damaged(overwritten(26, b"\xff\xfe" * 16))),
     Fault("additional bytes after the points", damaged(lambda data: data + b"rubbish" * 99)),

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from laspy._compression import lazrsbackend
-from rail_extract.core.clouds import las
+from rail_extract.core.clouds import las, laz
 from rail_extract.core.clouds.points import read_rail_points
 from rail_extract.core.errors import (
     Cancelled,
@@ -358,7 +358,7 @@ def test_bad_files_are_refused_in_one_sentence(tmp_path, fault):
 
 def test_laz_without_backend_names_the_package(tmp_path, monkeypatch):
     make_cloud(tmp_path / "a.laz")
-    monkeypatch.setattr(las, "lazrs", None)
+    monkeypatch.setattr(laz, "lazrs", None)
     with pytest.raises(CloudError, match="pip install lazrs"):
         read_rail_points(tmp_path / "a.laz", [RAIL])
 

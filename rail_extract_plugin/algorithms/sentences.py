@@ -1,0 +1,57 @@
+"""The one place where errors become sentences.
+
+PyQt ends QGIS if an exception leaves a method that QGIS calls, and shows a traceback in other places. Every such method
+of an algorithm therefore catches whatever is raised and passes it to `sentence_for`.
+"""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from collections.abc import Sequence
+
+from qgis.core import Qgis, QgsApplication, QgsMessageLog, QgsProcessingException, QgsProcessingParameterDefinition
+
+from ...core.errors import Cancelled, RailExtractError
+from ..dialog.guide import tracker
+from ..dialog.wording import for_user
+from ..i18n import tr
+
+LOG = "Rail Extract"
+"""Tab of QGIS's log panel."""
+
+COMMAND_LINE = "qgis_process"
+"""QGIS's name for the platform of its command line."""
+
+
+def sentence_for(error: BaseException, definitions: Sequence[QgsProcessingParameterDefinition]) -> str:
+    """Return the sentence that a user reads about an error; the traceback of an unforeseen one goes into the log.
+
+    Parameters
+    ----------
+    error : BaseException
+        Some libraries raise errors that are not an `Exception`: lazrs does so on damaged files.
+    definitions : sequence of QgsProcessingParameterDefinition
+        Parameters that the sentence may name.
+    """
+    if isinstance(error, RailExtractError):
+        return for_user(str(error), definitions)
+    if isinstance(error, QgsProcessingException):
+        return str(error)
+    if isinstance(error, (Cancelled, KeyboardInterrupt)):
+        return tr("Cancelled; nothing was written.")
+    if isinstance(error, MemoryError):
+        return tr("Not enough memory: choose a smaller extent.")
+    _log(error)
+    text = ": ".join(filter(None, (type(error).__name__, " ".join(str(error).split()))))
+    return tr("Rail Extract failed unexpectedly ({}): report this at {} with the traceback from the log.").format(
+        text, tracker()
+    )
+
+
+def _log(error: BaseException) -> None:
+    """Write a traceback into the log panel; a command line has none, so there it goes to the error output."""
+    text = "".join(traceback.format_exception(type(error), error, error.__traceback__))
+    QgsMessageLog.logMessage(text, LOG, Qgis.MessageLevel.Critical)
+    if QgsApplication.platform() == COMMAND_LINE:
+        print(text, file=sys.stderr)
