@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 
 STATION_STEP_M = 0.25
-"""Spacing of the stations along a line, the centers of the windows: a third of the smoothing's sigma."""
+"""Spacing of the stations along a line, the centres of the windows: a third of the smoothing's sigma."""
 
 WINDOWS = (5, 9, 17, 33)
 """Lengths of the windows in stations, 1.25 to 8.25 m: the shortest one with enough points is used."""
@@ -90,7 +90,7 @@ def histograms(
     Returns
     -------
     stations : (s,) array
-        Centers of the windows, metres.
+        Centres of the windows, metres.
     counts, wide_counts : (s, 2 HALF_RANGE_BINS) arrays
         Counts in the shortest window with enough points, and in the longest window. A bin is 1 / (2 HALF_HEAD_BINS) of
         a head wide; the first half of them is to the right of the line.
