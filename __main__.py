@@ -1,35 +1,47 @@
-"""Commands of the core: `python -m rail_extract --help` lists them."""
+"""The commands of Rail Extract outside QGIS."""
 
 from __future__ import annotations
 
 import argparse
 import importlib
+import shlex
 import sys
 from collections.abc import Sequence
+from pathlib import Path
+
+PROGRAM = "python -m rail_extract"
 
 COMMANDS = {
-    "extract": ("core.commands.extract", "extract rails and track centerlines on many workers"),
-    "train": ("laboratory.training.train", "train FRPDF on synthetic rasters"),
-    "evaluate": ("laboratory.training.evaluate", "compare weights on a fixed set of synthetic rasters"),
+    "extract": ("core.commands.extract", "extract rails and track centerlines on several cores or computers"),
     "onnx": ("core.frpdf.onnx", "write the network for other runtimes"),
+    "train": ("laboratory.training.train", "train the network on synthetic rasters"),
+    "evaluate": ("laboratory.training.evaluate", "compare weights on a fixed set of synthetic rasters"),
     "scenes": ("laboratory.scenes.write", "write synthetic clouds with their true lines"),
 }
-"""Module and help of each command; a module offers `add_arguments(parser)` and `run(args)`, that may give a code."""
+"""Module and help of each command; a module has `add_arguments(parser)` and `run(args)`, which may return a code."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command and return its exit code; only the chosen command's module is imported."""
+    """Run a command and return its exit code; only the module of this command is imported."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    parser = argparse.ArgumentParser(prog="python -m rail_extract", description=__doc__)
+    parser = argparse.ArgumentParser(prog=PROGRAM, description=__doc__)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    parsers = {name: commands.add_parser(name, help=text, description=text) for name, (_, text) in COMMANDS.items()}
-    chosen = arguments[0] if arguments and arguments[0] in COMMANDS else None
+    listed = {name: command for name, command in COMMANDS.items() if _is_installed(command[0])}
+    parsers = {name: commands.add_parser(name, help=text, description=text) for name, (_, text) in listed.items()}
+    chosen = arguments[0] if arguments and arguments[0] in listed else None
     if chosen is None:
         parser.parse_args(arguments)
         return 0
-    module = importlib.import_module(f".{COMMANDS[chosen][0]}", __package__)
+    module = importlib.import_module(f".{listed[chosen][0]}", __package__)
     module.add_arguments(parsers[chosen])
-    return _run(module, parser.parse_args(arguments))
+    args = parser.parse_args(arguments)
+    args.command_line = shlex.join([*PROGRAM.split(), *arguments])
+    return _run(module, args)
+
+
+def _is_installed(module: str) -> bool:
+    """Return whether the package of a command exists: the plugin's zip does not include the laboratory."""
+    return Path(__file__).with_name(module.split(".")[0]).is_dir()
 
 
 def _run(module, args: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""The command `python -m rail_extract extract`: from tiles to GeoPackages, on local workers or a Dask cluster."""
+"""The command `python -m rail_extract extract`: the outputs of Extract Rails, from local workers or a cluster."""
 
 from __future__ import annotations
 
@@ -7,26 +7,42 @@ import math
 import shutil
 import sys
 import tempfile
+from collections.abc import Callable
+from dataclasses import Field as ParameterField
 from dataclasses import fields
 from importlib.util import find_spec
 from pathlib import Path
 
-from ..disk import check_closed, writing
+from ..clouds.points import ask
+from ..disk import check_closed, write_text, writing
 from ..errors import ParameterError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, RAIL_FIELDS
 from ..frpdf import DEVICES, ENGINES
 from ..frpdf.models import choose
-from ..pipeline import Parameters, extract_files
+from ..parameters import DEFAULT_STEP_M, Parameters
+from ..pipeline import extract_files
 from ..progress import Estimating, Progress
-from ..standards import DEFAULT, distinct_gauges, resolve
+from ..rails import RailNetwork
+from ..raster_file import header_for, on_one_grid
+from ..report import Origin
+from ..standards import DEFAULT, RailStandard, distinct_gauges, resolve
 
-NEEDS = {"distributed": "distributed", "pyogrio": "pyogrio", "shapely": "shapely"}
-"""Modules and packages of the extra "cluster"."""
+NEEDS = {"distributed": "distributed", "pyogrio": "pyogrio", "shapely": "shapely", "rasterio": "rasterio"}
+"""Modules and packages of the extra "cluster"; rasterio is needed for `--cleaned` only."""
 
 INCOMPLETE = 2
-"""Exit code of a run that has written results, but without some files or stretches."""
+"""Exit code of a run that has written results in which some files or squares are missing."""
 
-TOLD_OTHERWISE = (
+SUFFIXES = {
+    "rails": (".gpkg",),
+    "centerlines": (".gpkg",),
+    "quality": (".gpkg",),
+    "cleaned": (".tif", ".tiff"),
+    "report": (".html", ".htm"),
+}
+"""File name suffixes of each output."""
+
+WITH_OWN_OPTION = (
     "gauge_m",
     "head_width_m",
     "passes",
@@ -34,12 +50,10 @@ TOLD_OTHERWISE = (
     "device",
     "other_gauges_m",
     "quality_step_m",
+    "square_tiles",
     "keep_cleaned",
 )
-"""Parameters that no option of their own name gives."""
-
-FORMER_NAMES = {"square_tiles": ("--stretch-tiles",)}
-"""Names that options had in earlier versions; batch files still use them."""
+"""Parameters that are not declared by `_number_fields`."""
 
 POSITIVE = (
     "smoothing_xy_m",
@@ -48,73 +62,89 @@ POSITIVE = (
     "tolerance_z_m",
     "crown_radius_m",
     "centerline_tolerance_m",
+    "step",
 )
-"""Parameters that can't be 0: nothing is smoothed over no length, and nothing lies within none."""
+"""Parameters that can't be 0: nothing is smoothed over no length, and no point lies within no distance."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument(
-        "tiles",
-        nargs="+",
-        type=Path,
-        metavar="TILE",
-        help="LAS, LAZ, COPC or .vpc files, or folders of tiles",
+    parser.add_argument("tiles", nargs="+", type=Path, metavar="TILE", help="point clouds, or folders of them")
+    output = parser.add_argument_group("outputs", "Existing files are replaced. GeoPackages may be the same file.")
+    output.add_argument("--rails", type=Path, required=True, help="GeoPackage for the rails")
+    output.add_argument("--centerlines", type=Path, help="GeoPackage for the track centerlines")
+    output.add_argument("--quality", type=Path, help="GeoPackage for the points with the track geometry")
+    output.add_argument("--cleaned", type=Path, help="GeoTIFF for the rail raster as the network cleaned it")
+    output.add_argument("--report", type=Path, help="HTML file for the report")
+    cloud = parser.add_argument_group("point cloud and rails")
+    cloud.add_argument("--rail-classes", default="10", help="classes of rail points, such as 10,11 (default: 10)")
+    cloud.add_argument("--standard", default=DEFAULT, help=f"rail standard (default: {DEFAULT})")
+    cloud.add_argument("--gauge", type=float, metavar="MM", help="gauge, instead of that of the standard")
+    cloud.add_argument("--head-width", type=float, metavar="MM", help="railhead width, instead of that of the standard")
+    cloud.add_argument("--other-gauges", default="", metavar="MM", help="further gauges to pair, such as 1000;1067")
+    cloud.add_argument("--crs", help="coordinate system of tiles that state none, such as EPSG:25832")
+    cloud.add_argument(
+        "--extent",
+        metavar="XMIN,YMIN,XMAX,YMAX",
+        help="read only the points in this rectangle, in units of the coordinate system; write --extent=-5,... if "
+        "the first number is negative",
     )
-    parser.add_argument("--rails", type=Path, required=True, help="GeoPackage for the rails; replaced if it is there")
-    parser.add_argument("--centerlines", type=Path, help="GeoPackage for the track centerlines; may be the same file")
-    parser.add_argument("--rail-classes", default="10", help="classes that mean rail, such as 10,11 (default: 10)")
-    parser.add_argument("--standard", default=DEFAULT, help=f"rail standard (default: {DEFAULT})")
-    parser.add_argument("--gauge", type=float, metavar="MM", help="gauge in place of the standard's")
-    parser.add_argument("--head-width", type=float, metavar="MM", help="railhead width in place of the standard's")
-    parser.add_argument("--other-gauges", default="", metavar="MM", help="further gauges to pair, such as 1000;1067")
-    parser.add_argument("--crs", help="coordinate system of tiles that state none, such as EPSG:25832")
-    parser.add_argument("--iterations", type=int, default=Parameters.passes, help="passes of the network (default: 2)")
-    parser.add_argument("--engine", choices=ENGINES, default=Parameters.engine, help="what runs the network")
-    parser.add_argument("--device", choices=DEVICES, default=Parameters.device, help="where the network runs")
-    for field in _plain_fields():
-        unit = {"_m": "metres, ", "eg": "degrees, "}.get(field.name[-2:], "")
-        text = f"as in QGIS ({unit}default: {field.default:g})"
-        names = [_option(field.name), *FORMER_NAMES.get(field.name, ())]
-        parser.add_argument(*names, type=type(field.default), default=field.default, metavar="N", help=text)
-    parser.add_argument(
-        "--scheduler", metavar="ADDRESS", help="use the Dask cluster at tcp://... instead of workers here"
+    method = parser.add_argument_group("method", "See docs/parameters.md.")
+    method.add_argument("--iterations", type=int, default=Parameters.passes, help="passes of the network (default: 2)")
+    method.add_argument("--engine", choices=ENGINES, default=Parameters.engine, help="what runs the network")
+    method.add_argument("--device", choices=DEVICES, default=Parameters.device, help="where the network runs")
+    for field in _number_fields():
+        unit = "degrees" if field.name.endswith("_deg") else "metres"
+        text = f"{_option(field.name)[2:].replace('-', '_').upper()} in {unit} (default: {field.default:g})"
+        method.add_argument(_option(field.name), type=float, default=field.default, metavar="N", help=text)
+    text = f"STEP of --quality and --report in metres (default: {DEFAULT_STEP_M:g})"
+    method.add_argument("--step", type=float, default=DEFAULT_STEP_M, metavar="N", help=text)
+    run = parser.add_argument_group("workers")
+    run.add_argument("--scheduler", metavar="ADDRESS", help="use the Dask cluster at tcp://... and not local workers")
+    run.add_argument("--workers", type=int, help="local workers (default: one per core, or fewer if memory is short)")
+    run.add_argument("--work", type=Path, help="folder that keeps finished results, so that a restart continues")
+    run.add_argument(
+        "--square-tiles",
+        "--stretch-tiles",  # the name in earlier versions, which batch files still use
+        type=int,
+        default=Parameters.square_tiles,
+        metavar="N",
+        help=f"side of the squares processed at a time, in raster tiles (default: {Parameters.square_tiles})",
     )
-    parser.add_argument("--workers", type=int, help="workers here (default: one a core, as far as memory suffices)")
-    parser.add_argument("--work", type=Path, help="folder that keeps what is finished, for a restart")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Extract and write; gives the exit code.
+    """Extract and write; returns the exit code.
 
     Raises
     ------
     RailExtractError
-        Nothing could be written.
+        A parameter is wrong, nothing could be extracted, or an output could not be written.
     """
-    missing = [package for module, package in NEEDS.items() if find_spec(module) is None]
+    missing = [
+        package
+        for module, package in NEEDS.items()
+        if find_spec(module) is None and (module != "rasterio" or args.cleaned)
+    ]
     if missing:
         raise RailExtractError(f"Packages are missing ({', '.join(missing)}): in a clone, run pip install .[cluster].")
-    parameters = parameters_of(args)
-    for path in (args.rails, args.centerlines or args.rails):
-        if path.suffix.lower() != ".gpkg":
-            raise ParameterError(f"Results are GeoPackages: give {path.name} the ending .gpkg.")
-        with writing(path.parent):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=path.parent).close()
-        check_closed(path)
+    standard = resolve(args.standard, args.gauge, args.head_width)
+    parameters = parameters_of(args, standard)
+    for name in SUFFIXES:
+        if getattr(args, name) is not None:
+            _check_output(name, getattr(args, name))
     if args.work is not None:
-        return _run_in(args.work, args, parameters)
-    # Beside the results, for there workers elsewhere find it as well.
+        return _run_in(args.work, args, standard, parameters)
+    # Next to the results, where workers on other computers find it too.
     folder = tempfile.mkdtemp(dir=args.rails.parent, prefix=".rail_extract_")
     try:
-        return _run_in(Path(folder), args, parameters)
+        return _run_in(Path(folder), args, standard, parameters)
     finally:
-        shutil.rmtree(folder, ignore_errors=True)  # workers of a cluster that are still at it may write meanwhile
+        shutil.rmtree(folder, ignore_errors=True)  # workers of a cluster may still be writing
 
 
-def parameters_of(args: argparse.Namespace) -> Parameters:
-    """Gather what the options tell.
+def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameters:
+    """Return the parameters that the options state.
 
     Raises
     ------
@@ -123,13 +153,12 @@ def parameters_of(args: argparse.Namespace) -> Parameters:
     ModelError
         No weights fit the standard.
     """
-    standard = resolve(args.standard, args.gauge, args.head_width)
     choose(standard.gauge_m, standard.head_width_m)
-    others = _numbers(args.other_gauges, "--other-gauges", float)
-    gauges_m = distinct_gauges((standard.gauge_m, *(mm / 1000 for mm in others)), args.centerline_tolerance)
-    plain = {field.name: getattr(args, _option(field.name)[2:].replace("-", "_")) for field in _plain_fields()}
+    others_mm = _numbers(args.other_gauges, "--other-gauges", float)
+    gauges_m = distinct_gauges((standard.gauge_m, *(mm / 1000 for mm in others_mm)), args.centerline_tolerance)
+    numbers = {field.name: getattr(args, _option(field.name)[2:].replace("-", "_")) for field in _number_fields()}
     workers = 0 if args.workers is None else args.workers - 1
-    for name, value in {**plain, "iterations": args.iterations, "workers": workers}.items():
+    for name, value in {**numbers, "iterations": args.iterations, "step": args.step, "workers": workers}.items():
         if not (math.isfinite(value) and value >= 0) or (name in POSITIVE and value == 0):
             raise ParameterError(
                 f"The option {_option(name)} can't be {getattr(args, name, value)}: give a larger number."
@@ -141,47 +170,103 @@ def parameters_of(args: argparse.Namespace) -> Parameters:
         args.engine,
         args.device,
         other_gauges_m=gauges_m[1:],
-        **plain,
+        quality_step_m=args.step if args.quality or args.report else None,
+        square_tiles=args.square_tiles,
+        keep_cleaned=args.cleaned is not None,
+        **numbers,
     )
 
 
-def _run_in(folder: Path, args: argparse.Namespace, parameters: Parameters) -> int:
-    """Extract with a folder for what is finished."""
-    from ..clouds.points import ask
+def _check_output(name: str, path: Path) -> None:
+    """Refuse an output that could not be written after the run."""
+    if path.suffix.lower() not in SUFFIXES[name]:
+        raise ParameterError(f"The option --{name} writes {SUFFIXES[name][0]} files: give {path.name} this suffix.")
+    with writing(path.parent):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=path.parent).close()
+    check_closed(path)
+
+
+def _run_in(folder: Path, args: argparse.Namespace, standard: RailStandard, parameters: Parameters) -> int:
+    """Extract with a folder for finished results, then write."""
     from ..cluster.runner import DaskRunner
     from ..cluster.workers import connect
-    from .geopackage import write
 
-    codes = _numbers(args.rail_classes, "--rail-classes", int)
+    codes, extent = _numbers(args.rail_classes, "--rail-classes", int), _extent(args.extent)
     progress = Estimating(_Console())
     with connect(args.scheduler, args.workers) as client:
         runner = DaskRunner(client, folder)
-        request = ask(args.tiles, codes, args.crs, progress=progress, unreadable=runner.failures)
-        found = extract_files(request, folder.resolve(), parameters, runner, progress)
-    layers = {"rails": (args.rails, found.rails, RAIL_FIELDS)}
-    if args.centerlines is not None:
-        layers["centerlines"] = (args.centerlines, found.centerlines, CENTERLINE_FIELDS)
-    write(layers, found.frame)
-    print(f"{len(found.rails)} rails, {sum(rail.length_m for rail in found.rails) / 1000:.3f} km")
-    print(f"{len(found.centerlines)} centerlines, {sum(line.length_m for line in found.centerlines) / 1000:.3f} km")
-    for failure in found.failures:
+        request = ask(args.tiles, codes, args.crs, extent, progress, unreadable=runner.failures)
+        network = extract_files(request, folder.resolve(), parameters, runner, progress)
+    _write(network, args, standard, parameters, extent)
+    print(f"{len(network.rails)} rails, {sum(rail.length_m for rail in network.rails) / 1000:.3f} km")
+    print(f"{len(network.centerlines)} centerlines, {sum(one.length_m for one in network.centerlines) / 1000:.3f} km")
+    for failure in network.failures:
         print(failure, file=sys.stderr)
-    return INCOMPLETE if found.failures else 0
+    return INCOMPLETE if network.failures else 0
 
 
-def _plain_fields() -> list:
-    return [field for field in fields(Parameters) if field.name not in TOLD_OTHERWISE]
+def _write(
+    network: RailNetwork,
+    args: argparse.Namespace,
+    standard: RailStandard,
+    parameters: Parameters,
+    extent: tuple[float, float, float, float] | None,
+) -> None:
+    """Write all outputs; one that fails does not stop the others.
+
+    Raises
+    ------
+    RailExtractError
+        An output could not be written.
+    """
+    from .geopackage import lines_layer, stations_layer, write_layers
+
+    layers = [lines_layer("rails", args.rails, RAIL_FIELDS, network.rails)]
+    if args.centerlines:
+        layers.append(lines_layer("centerlines", args.centerlines, CENTERLINE_FIELDS, network.centerlines))
+    if args.quality:
+        layers.append(stations_layer("quality", args.quality, network.geometry))
+    writers: list[Callable[[], None]] = [lambda: write_layers(layers, network.frame)]
+    if args.report:
+        origin = Origin(tuple(args.tiles), standard, parameters.other_gauges_m, args.command_line)
+        writers.append(lambda: write_text(args.report, origin.report(network)))
+    if args.cleaned and any(raster.tiles for raster in network.cleaned):
+        writers.append(lambda: _write_cleaned(network, args.cleaned, standard, extent))
+    errors: list[RailExtractError] = []
+    for write in writers:
+        try:
+            write()
+        except RailExtractError as error:
+            errors.append(error)
+    if errors:
+        raise RailExtractError(" ".join(map(str, errors)))
+
+
+def _write_cleaned(
+    network: RailNetwork, path: Path, standard: RailStandard, extent: tuple[float, float, float, float] | None
+) -> None:
+    """Write the cleaned rasters as Clean Rail Raster does."""
+    from .geotiff import write_rasters
+
+    rasters, frame = on_one_grid(network.cleaned, network.frame)
+    write_rasters(path, header_for(rasters, network.cleaned_classes, frame, standard, extent), rasters)
+
+
+def _number_fields() -> list[ParameterField]:
+    """List the parameters that are plain numbers, each with an option of its own name."""
+    return [field for field in fields(Parameters) if field.name not in WITH_OWN_OPTION]
 
 
 def _option(name: str) -> str:
-    """Name of the option for a parameter: that of the interface, which leaves the unit out."""
+    """Return the option of a parameter: its name in QGIS, which does not state the unit."""
     for unit in ("_m", "_deg"):
         name = name[: -len(unit)] if name.endswith(unit) else name
     return "--" + name.replace("_", "-")
 
 
 def _numbers(text: str, option: str, kind: type) -> tuple:
-    """Numbers from a text such as "10,11" or "1000;1067".
+    """Return the distinct numbers in a text such as "10,11" or "1000;1067".
 
     Raises
     ------
@@ -194,8 +279,25 @@ def _numbers(text: str, option: str, kind: type) -> tuple:
         raise ParameterError(f'{option} "{text}" should be numbers such as 10 or 10,11.') from None
 
 
+def _extent(text: str | None) -> tuple[float, float, float, float] | None:
+    """Return the numbers of `--extent`.
+
+    Raises
+    ------
+    ParameterError
+        The text does not hold four numbers.
+    """
+    if text is None:
+        return None
+    try:
+        xmin, ymin, xmax, ymax = (float(word) for word in text.split(","))
+    except ValueError:
+        raise ParameterError(f'--extent "{text}" should be four numbers: xmin,ymin,xmax,ymax.') from None
+    return xmin, ymin, xmax, ymax
+
+
 class _Console(Progress):
-    """Writes news of the remaining time, and what the user should look at, to the error output."""
+    """Prints the remaining time and the warnings to the error output."""
 
     def status(self, text: str) -> None:
         print(text, file=sys.stderr, flush=True)

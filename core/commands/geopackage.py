@@ -1,10 +1,12 @@
-"""Lines into GeoPackages, with the fields of the interface, without QGIS."""
+"""Layers of results in GeoPackages, with the fields of the interface, without QGIS."""
 
 from __future__ import annotations
 
 import uuid
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyogrio
@@ -12,76 +14,131 @@ import shapely
 
 from ..disk import take_names, writing
 from ..errors import DiskError
-from ..fields import UNKNOWN_IN_METRES, Field
+from ..fields import QUALITY_FIELDS, UNKNOWN_IN_METRES, Field
 from ..frame import LocalFrame
-from ..rails import Centerline, RailLine
+from ..rails import Centerline, RailLine, TrackGeometry
 
 KINDS = {int: np.int32, float: float, str: object}
 
 
-def write(layers: dict[str, tuple[Path, Sequence[RailLine | Centerline], Sequence[Field]]], frame: LocalFrame) -> None:
-    """Write layers into GeoPackages; those that are there are replaced once the new ones are whole.
+@dataclass(frozen=True)
+class Layer:
+    """A layer to write.
+
+    Attributes
+    ----------
+    name : str
+    path : Path
+        GeoPackage of the layer.
+    fields : sequence of Field
+    columns : sequence of sequence
+        Values of each field, one per feature.
+    geometry_type : str
+        "LineString Z" or "Point Z".
+    xyz : sequence of (n, 3) or (3,) array
+        Vertices of each line, or place of each point, in local metres.
+    """
+
+    name: str
+    path: Path
+    fields: Sequence[Field]
+    columns: Sequence[Sequence[Any]]
+    geometry_type: str
+    xyz: Sequence[np.ndarray]
+
+
+def lines_layer(
+    name: str, path: Path, fields: Sequence[Field], lines: Sequence[RailLine] | Sequence[Centerline]
+) -> Layer:
+    """Make a layer of lines.
 
     Parameters
     ----------
-    layers : dict
-        By the layer's name its file, its lines and their fields. Several layers may share a file.
+    name : str
+    path : Path
+    fields : sequence of Field
+    lines : sequence of RailLine or Centerline
+    """
+    columns = [[getattr(line, field.name) for line in lines] for field in fields]
+    return Layer(name, path, fields, columns, "LineString Z", [line.xyz for line in lines])
+
+
+def stations_layer(name: str, path: Path, tracks: Sequence[TrackGeometry]) -> Layer:
+    """Make a layer of the stations of tracks, with the fields of QUALITY.
+
+    Parameters
+    ----------
+    name : str
+    path : Path
+    tracks : sequence of TrackGeometry
+    """
+    columns = [
+        [value for track in tracks for value in np.broadcast_to(getattr(track, field.name), len(track.xyz))]
+        for field in QUALITY_FIELDS
+    ]
+    return Layer(name, path, QUALITY_FIELDS, columns, "Point Z", [place for track in tracks for place in track.xyz])
+
+
+def write_layers(layers: Sequence[Layer], frame: LocalFrame) -> None:
+    """Write layers into GeoPackages; existing ones are replaced once the new ones are complete.
+
+    Parameters
+    ----------
+    layers : sequence of Layer
+        Several may share a file.
     frame : LocalFrame
-        Of the lines.
+        Local frame of the layers.
 
     Raises
     ------
     DiskError
-        A file can't be written, as on a full disk; what was there before is left as it was. Or it is open elsewhere;
-        then the new one lies beside it.
+        A file can't be written, for example because the disk is full; the old file is left as it was. Or the old file
+        is open elsewhere; the new one is then left next to it.
     """
-    layers = {name: (path.resolve(), lines, fields) for name, (path, lines, fields) in layers.items()}
-    unfinished = {path: path.with_name(f".{uuid.uuid4().hex}.gpkg") for path, _, _ in layers.values()}
+    unfinished = {layer.path.resolve(): Path() for layer in layers}
+    for path in unfinished:
+        unfinished[path] = path.with_name(f".{uuid.uuid4().hex}.gpkg")
     try:
-        for name, (path, lines, fields) in layers.items():
-            with writing(path.parent):
-                path.parent.mkdir(parents=True, exist_ok=True)
-            _write_layer(unfinished[path], name, lines, fields, frame, path)
-        for path, whole in unfinished.items():
-            take_names(path, {whole: path})
+        for layer in layers:
+            with writing(layer.path.parent):
+                layer.path.parent.mkdir(parents=True, exist_ok=True)
+            _write_layer(layer, frame, unfinished[layer.path.resolve()])
+        for path, complete in unfinished.items():
+            take_names(path, {complete: path})
     finally:
         for leftover in unfinished.values():
             for file in leftover.parent.glob(f"{leftover.name}*"):
                 file.unlink()
 
 
-def _write_layer(
-    file: Path,
-    name: str,
-    lines: Sequence[RailLine | Centerline],
-    fields: Sequence[Field],
-    frame: LocalFrame,
-    path: Path,
-) -> None:
-    """Write one layer; `path` is the name that the file will have."""
+def _write_layer(layer: Layer, frame: LocalFrame, file: Path) -> None:
+    """Write a layer into a file that does not have its final name yet."""
     try:
         pyogrio.raw.write(
             str(file),
-            layer=name,
+            layer=layer.name,
             driver="GPKG",
-            geometry=_geometry(lines, frame),
-            geometry_type="LineString Z",
-            field_data=[_column(lines, field) for field in fields],
-            fields=[field.name for field in fields],
+            geometry=_geometry(layer, frame),
+            geometry_type=layer.geometry_type,
+            field_data=[_column(field, values) for field, values in zip(layer.fields, layer.columns)],
+            fields=[field.name for field in layer.fields],
             crs=frame.crs_wkt or UNKNOWN_IN_METRES,
             append=file.exists(),
             nan_as_null=True,
         )
     except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, RuntimeError) as error:
-        raise DiskError(f"{path} can't be written ({error}): make room on this disk, or choose another.") from error
+        raise DiskError(
+            f"{layer.path} can't be written ({error}): free space on the disk, or choose another file."
+        ) from error
 
 
-def _geometry(lines: Sequence[RailLine | Centerline], frame: LocalFrame) -> np.ndarray:
-    """Lines in the cloud's coordinates as well-known binary, (n,)."""
-    shapes = [shapely.linestrings(frame.to_crs(line.xyz)) for line in lines]
+def _geometry(layer: Layer, frame: LocalFrame) -> np.ndarray:
+    """Geometries in the coordinates of the cloud as well-known binary, (n,)."""
+    make = shapely.points if layer.geometry_type == "Point Z" else shapely.linestrings
+    shapes = [make(frame.to_crs(xyz)) for xyz in layer.xyz]
     return np.array([shapely.to_wkb(shape, output_dimension=3) for shape in shapes], dtype=object)
 
 
-def _column(lines: Sequence[RailLine | Centerline], field: Field) -> np.ndarray:
-    """Values of one field, (n,)."""
-    return np.array([field.value(getattr(line, field.name)) for line in lines], dtype=KINDS[field.kind])
+def _column(field: Field, values: Sequence[Any]) -> np.ndarray:
+    """Values of a field as they are written, (n,)."""
+    return np.array([field.value(value) for value in values], dtype=KINDS[field.kind])

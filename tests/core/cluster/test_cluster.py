@@ -4,8 +4,6 @@ import json
 import os
 import resource
 import signal
-import subprocess
-import sys
 import threading
 import time
 from dataclasses import replace
@@ -14,19 +12,13 @@ import laspy
 import numpy as np
 import pyogrio
 import pytest
-import shapely
 from distributed import Client, KilledWorker, LocalCluster
 from rail_extract.__main__ import main
 from rail_extract.core.clouds.points import ask, read_rail_points
 from rail_extract.core.cluster import runner
 from rail_extract.core.cluster.runner import DaskRunner, Failure, execute
 from rail_extract.core.cluster.store import version
-from rail_extract.core.cluster.workers import connect
-from rail_extract.core.commands.extract import INCOMPLETE
-from rail_extract.core.commands.geopackage import write
 from rail_extract.core.errors import DiskError, RailExtractError
-from rail_extract.core.fields import RAIL_FIELDS
-from rail_extract.core.frame import LocalFrame
 from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
 from rail_extract.core.rails import RailLine
 from rail_extract.core.squares.grid import lay_out
@@ -34,39 +26,15 @@ from rail_extract.core.squares.spool import spool
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.steps import square_side
 from rail_extract.core.tasks import Task
-from rail_extract.laboratory.curves import Element, trace
-from rail_extract.laboratory.scenes.plain import spacing
-from rail_extract.laboratory.scenes.scanner import Scanner
-from rail_extract.laboratory.scenes.scene import RAIL, Plan, build
-from rail_extract.laboratory.scenes.tracks import Track
-from rail_extract.laboratory.scenes.write import write_cloud
+from rail_extract.laboratory.scenes.scene import RAIL
 
 STANDARD = STANDARDS["EN_60E1_1435"]
 PARAMETERS = Parameters(STANDARD.gauge_m, STANDARD.head_width_m, passes=1, engine="OPENCV", square_tiles=4)
 
 
 @pytest.fixture(scope="module")
-def tiles(tmp_path_factory):
-    """A track of 50 m, in two stretches and three files."""
-    folder = tmp_path_factory.mktemp("tiles")
-    curve = trace([Element(50.0)], heading=0.05)
-    plan = Plan([Track(curve, spacing(STANDARD), np.zeros(len(curve.xy)))], STANDARD, Scanner(profile_step_m=0.08))
-    scene = build("short", plan, np.random.RandomState(4))
-    for number, part in enumerate(np.array_split(np.argsort(scene.xyz[:, 0]), 3)):
-        part = replace(scene, xyz=scene.xyz[part], classification=scene.classification[part])
-        write_cloud(part, folder / f"tile{number}.laz")
-    return folder
-
-
-@pytest.fixture(scope="module")
 def one_process(tiles):
     return extract_rails(read_rail_points(tiles, [RAIL]), PARAMETERS)
-
-
-@pytest.fixture(scope="module")
-def client():
-    with connect(None, 2) as client:
-        yield client
 
 
 def extract(client, paths, codes, parameters, folder):
@@ -132,27 +100,6 @@ def test_a_killed_worker_is_replaced_and_its_stretches_run_again(tiles, one_proc
     same(found.rails, one_process.rails, found.frame, one_process.frame)
 
 
-def test_on_a_running_cluster_a_corrupt_tile_is_named_and_the_rest_is_written(tiles, client, tmp_path, capsys):
-    for name in ("tile0.laz", "tile1.laz"):
-        (tmp_path / name).write_bytes((tiles / name).read_bytes())
-    whole = (tiles / "tile2.laz").read_bytes()
-    (tmp_path / "tile2.laz").write_bytes(whole[: len(whole) // 2])
-    out = tmp_path / "out.gpkg"
-    words = ["extract", str(tmp_path), "--rails", str(out), "--centerlines", str(out)]
-    words += ["--scheduler", client.scheduler.address]
-    code = main([*words, "--iterations", "1", "--stretch-tiles", "4", "--engine", "OPENCV"])
-    assert code == INCOMPLETE
-    assert "tile2.laz" in capsys.readouterr().err
-    meta, _, geometry, values = pyogrio.raw.read(out, layer="rails")
-    assert list(meta["fields"]) == ["rail_id", "class_code", "length_m", "points", "resid_mm", "sigma_mm", "bridged_m"]
-    assert meta["geometry_type"] == "LineString Z"
-    lines = shapely.from_wkb(geometry)
-    assert [shapely.get_num_coordinates(line) > 5 for line in lines] == [True, True]
-    assert 50 < values[2].sum() < 85
-    assert pyogrio.read_info(out, layer="centerlines")["features"] == 1
-    assert {file.name for file in tmp_path.iterdir()} == {"out.gpkg", "tile0.laz", "tile1.laz", "tile2.laz"}
-
-
 @pytest.fixture
 def lone_worker():
     """Tasks in this process, where they can be put others in the place of."""
@@ -205,23 +152,6 @@ def test_finished_stretches_of_another_cloud_are_not_taken(tiles, client, tmp_pa
     assert len(again) == len(alone.rails) == 2
 
 
-def test_two_names_of_one_file_hold_both_layers(tiles, client, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    words = ["extract", str(tiles), "--rails", "two.gpkg", "--centerlines", str(tmp_path / "two.gpkg")]
-    words += [
-        "--scheduler",
-        client.scheduler.address,
-        "--stretch-tiles",
-        "4",
-        "--engine",
-        "OPENCV",
-        "--iterations",
-        "1",
-    ]
-    assert main(words) == 0
-    assert {name for name, _ in pyogrio.list_layers("two.gpkg")} == {"rails", "centerlines"}
-
-
 def test_a_virtual_point_cloud_stands_for_its_tiles(tiles, client, tmp_path):
     catalogue, out = tmp_path / "all.vpc", tmp_path / "out.gpkg"
     items = [{"assets": {"data": {"href": str(tiles / f"tile{number}.laz")}}} for number in (0, 1)]
@@ -230,74 +160,6 @@ def test_a_virtual_point_cloud_stands_for_its_tiles(tiles, client, tmp_path):
     assert main([*words, "--stretch-tiles", "4", "--engine", "OPENCV", "--iterations", "1"]) == 0
     _, _, _, values = pyogrio.raw.read(out, layer="rails")
     assert 60 < values[2].sum() < 80  # two thirds of two rails of 50 m
-
-
-def test_a_geopackage_that_another_program_writes_to_is_left_alone(tiles, tmp_path, capsys):
-    out = tmp_path / "out.gpkg"
-    out.write_text("theirs")
-    (tmp_path / "out.gpkg-wal").write_text("not yet in it")
-    assert main(["extract", str(tiles), "--rails", str(out)]) == 1
-    assert f"{out} is open in another program" in capsys.readouterr().err
-    with pytest.raises(DiskError, match=r"The new file is .*out_new\.gpkg"):
-        write({"rails": (out, (), RAIL_FIELDS)}, LocalFrame(np.zeros(3)))
-    assert out.read_text() == "theirs"
-    assert pyogrio.read_info(tmp_path / "out_new.gpkg")["features"] == 0
-
-
-def test_what_the_user_should_look_at_is_on_the_error_output(tiles, client, tmp_path, capsys):
-    words = ["extract", str(tiles), "--rails", str(tmp_path / "out.gpkg"), "--min-length", "1000", "--iterations", "1"]
-    words += ["--scheduler", client.scheduler.address, "--stretch-tiles", "4", "--engine", "OPENCV"]
-    assert main(words) == 0
-    said = capsys.readouterr()
-    assert "Warning: Class 10 shows no rail" in said.err
-    assert said.out.startswith("0 rails, 0.000 km")
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--rails", "out.shp"], "GeoPackage"),
-        (["--rails", "out.gpkg", "--other-gauges", "1430"], "distinguished"),
-        (["--rails", "out.gpkg", "--other-gauges", "wide"], "numbers"),
-        (["--rails", "out.gpkg", "--gauge", "300"], "gauge"),
-        (["--rails", "out.gpkg", "--max-gap", "-1"], "--max-gap"),
-        (["--rails", "out.gpkg", "--workers", "0"], "--workers"),
-        (["--rails", "out.gpkg", "--smoothing-xy", "0"], "--smoothing-xy"),
-        (["--rails", "out.gpkg", "--rail-classes", "300"], "0 to 255"),
-        (["--rails", "out.gpkg", "--scheduler", "nonsense"], "scheduler"),
-    ],
-)
-def test_what_can_be_refused_is_refused_before_the_night(tiles, tmp_path, monkeypatch, capsys, words, said):
-    monkeypatch.chdir(tmp_path)
-    assert main(["extract", str(tiles), *words]) == 1
-    assert said in capsys.readouterr().err
-
-
-FULL_DISK = """
-import resource, sys
-from pathlib import Path
-from rail_extract.core.clouds.points import LocalFrame
-from rail_extract.core.fields import RAIL_FIELDS
-from rail_extract.core.commands.geopackage import write
-from rail_extract.core.errors import DiskError
-from rail_extract.core.rails import RailLine
-import numpy as np
-resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
-rails = [RailLine(np.random.rand(20_000, 3), 1, 10, 5, 1.0, 1.0, 0.0)]
-try:
-    write({"rails": (Path(sys.argv[1]), rails, RAIL_FIELDS)}, LocalFrame(np.zeros(3)))
-except DiskError as error:
-    print(error)
-"""
-
-
-def test_a_full_disk_leaves_what_was_there(tmp_path):
-    out = tmp_path / "out.gpkg"
-    out.write_bytes(b"before")
-    said = subprocess.run([sys.executable, "-c", FULL_DISK, str(out)], capture_output=True, text=True)
-    assert "make room" in said.stdout, said.stderr
-    assert out.read_bytes() == b"before"
-    assert [file.name for file in tmp_path.iterdir()] == ["out.gpkg"]
 
 
 def test_a_full_work_folder_is_one_sentence(tiles, tmp_path):

@@ -1,0 +1,72 @@
+"""Rail rasters as GeoTIFFs like those of QGIS, without QGIS."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import rasterio
+from rasterio.windows import Window
+
+from ..disk import take_names
+from ..errors import DiskError
+from ..raster import RailRaster
+from ..raster_file import BLOCK, NO_DATA, RasterHeader
+
+
+def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster]) -> None:
+    """Write rasters of one grid, one band each; empty blocks take no space.
+
+    Parameters
+    ----------
+    path : Path
+        An existing file stays until the new one is complete.
+    header : RasterHeader
+    rasters : sequence of RailRaster
+        On the grid of the header.
+
+    Raises
+    ------
+    DiskError
+        The file can't be written.
+    """
+    part = path.with_name(f"{path.name}.part")
+    try:
+        _write(part, header, rasters)
+        take_names(path, {part: path})
+    except rasterio.errors.RasterioError as error:
+        raise DiskError(
+            f"{path} can't be written ({error}): free space on the disk, or choose another file."
+        ) from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _write(path: Path, header: RasterHeader, rasters: Sequence[RailRaster]) -> None:
+    _, _, height, width = header.window
+    x, y = header.corner
+    with rasterio.open(
+        path,
+        "w",
+        driver="GTiff",
+        height=height,
+        width=width,
+        count=len(header.class_codes),
+        dtype="uint8",
+        crs=header.frame.crs_wkt,
+        transform=rasterio.Affine(header.cell, 0.0, x, 0.0, -header.cell, y),
+        nodata=NO_DATA,
+        tiled=True,
+        blockxsize=BLOCK,
+        blockysize=BLOCK,
+        sparse_ok=True,
+        interleave="band",
+        compress="deflate",
+        bigtiff="IF_SAFER",
+    ) as file:
+        file.update_tags(**header.tags)
+        for band, (code, raster) in enumerate(zip(header.class_codes, rasters), start=1):
+            file.set_band_description(band, str(code))
+            for top, left in header.filled_blocks(raster):
+                cells = header.block(raster, top, left)
+                file.write(cells, band, window=Window(left, top, cells.shape[1], cells.shape[0]))

@@ -1,0 +1,181 @@
+"""The command `extract`: its outputs are those of the walk, and what it refuses, it refuses before the run."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pyogrio = pytest.importorskip("pyogrio")
+rasterio = pytest.importorskip("rasterio")
+pytest.importorskip("distributed")
+
+from rail_extract.__main__ import main  # noqa: E402
+from rail_extract.core.clouds.points import read_rail_points  # noqa: E402
+from rail_extract.core.commands.extract import INCOMPLETE  # noqa: E402
+from rail_extract.core.fields import QUALITY_FIELDS, RAIL_FIELDS  # noqa: E402
+from rail_extract.core.pipeline import Parameters, extract_rails  # noqa: E402
+from rail_extract.core.report import Origin  # noqa: E402
+from rail_extract.core.standards import STANDARDS  # noqa: E402
+
+ROOT = Path(__file__).resolve().parents[3]
+STANDARD = STANDARDS["EN_60E1_1435"]
+FAST = ["--iterations", "1", "--square-tiles", "4", "--engine", "OPENCV"]
+PARAMETERS = Parameters(
+    STANDARD.gauge_m,
+    STANDARD.head_width_m,
+    passes=1,
+    engine="OPENCV",
+    square_tiles=4,
+    quality_step_m=2.0,
+    keep_cleaned=True,
+)
+
+
+def values(path, layer):
+    """Values by field."""
+    meta, _, _, columns = pyogrio.raw.read(path, layer=layer)
+    return dict(zip(meta["fields"], columns))
+
+
+def test_all_outputs_are_those_of_the_walk(tiles, client, tmp_path):
+    out, report, cleaned = tmp_path / "out.gpkg", tmp_path / "report.html", tmp_path / "cleaned.tif"
+    words = ["extract", str(tiles), *FAST, "--scheduler", client.scheduler.address, "--step", "2"]
+    words += ["--rails", str(out), "--centerlines", str(out), "--quality", str(out)]
+    words += ["--report", str(report), "--cleaned", str(cleaned)]
+    assert main(words) == 0
+    network = extract_rails(read_rail_points(tiles, [10]), PARAMETERS)
+    rails = values(out, "rails")
+    assert list(rails) == [field.name for field in RAIL_FIELDS]
+    assert rails["points"].tolist() == [rail.points for rail in network.rails]
+    (track,) = network.geometry
+    quality = values(out, "quality")
+    assert len(quality["track_id"]) == len(track.chainage_m) > 20
+    for field in QUALITY_FIELDS[1:]:
+        known = [field.value(value) for value in getattr(track, field.name)]
+        np.testing.assert_allclose(quality[field.name], np.array(known, dtype=float), atol=10.0**-field.decimals)
+    with rasterio.open(cleaned) as file:
+        assert np.count_nonzero(file.read(1)) == network.cleaned[0].count()
+        assert file.tags()["RAIL_GAUGE_MM"] == "1435"
+    command = " ".join(["python -m rail_extract", *words])
+    assert report.read_text(encoding="utf-8") == Origin((tiles,), STANDARD, (), command).report(network)
+    assert {file.name for file in tmp_path.iterdir()} == {"out.gpkg", "report.html", "cleaned.tif"}
+
+
+def test_an_extent_limits_the_points(tiles, client, tmp_path):
+    out, cleaned = tmp_path / "out.gpkg", tmp_path / "cleaned.tif"
+    south, north = -1000.0, 1000.0
+    (cloud,) = read_rail_points(tiles, [10])
+    x = cloud.frame.to_crs(cloud.xyz)[:, 0]
+    extent = f"{x.min() - 1},{south},{x.min() + 25},{north}"
+    words = ["extract", str(tiles), *FAST, "--scheduler", client.scheduler.address, f"--extent={extent}"]
+    assert main([*words, "--rails", str(out), "--cleaned", str(cleaned)]) == 0
+    np.testing.assert_allclose(values(out, "rails")["length_m"], 25, atol=0.5)
+    with rasterio.open(cleaned) as file:
+        assert [float(word) for word in file.tags()["RAIL_EXTENT"].split(",")] == pytest.approx(
+            [x.min() - 1, south, x.min() + 25, north]
+        )
+
+
+def test_a_corrupt_tile_is_named_and_the_rest_is_written(tiles, client, tmp_path, capsys):
+    for name in ("tile0.laz", "tile1.laz"):
+        (tmp_path / name).write_bytes((tiles / name).read_bytes())
+    whole = (tiles / "tile2.laz").read_bytes()
+    (tmp_path / "tile2.laz").write_bytes(whole[: len(whole) // 2])
+    out = tmp_path / "out.gpkg"
+    words = ["extract", str(tmp_path), "--rails", str(out), "--centerlines", str(out)]
+    assert main([*words, "--scheduler", client.scheduler.address, *FAST]) == INCOMPLETE
+    assert "tile2.laz" in capsys.readouterr().err
+    assert len(values(out, "rails")["length_m"]) == 2
+    assert 50 < values(out, "rails")["length_m"].sum() < 85
+    assert pyogrio.read_info(out, layer="centerlines")["features"] == 1
+    assert {file.name for file in tmp_path.iterdir()} == {"out.gpkg", "tile0.laz", "tile1.laz", "tile2.laz"}
+
+
+def test_two_names_of_one_file_hold_both_layers(tiles, client, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = ["extract", str(tiles), "--rails", "two.gpkg", "--centerlines", str(tmp_path / "two.gpkg")]
+    former = ["--stretch-tiles", "4", "--engine", "OPENCV", "--iterations", "1"]
+    assert main([*words, "--scheduler", client.scheduler.address, *former]) == 0
+    assert {name for name, _ in pyogrio.list_layers("two.gpkg")} == {"rails", "centerlines"}
+
+
+def test_warnings_are_on_the_error_output(tiles, client, tmp_path, capsys):
+    words = ["extract", str(tiles), "--rails", str(tmp_path / "out.gpkg"), "--min-length", "1000", *FAST]
+    assert main([*words, "--scheduler", client.scheduler.address]) == 0
+    said = capsys.readouterr()
+    assert "Warning: Class 10 shows no rail" in said.err
+    assert said.out.startswith("0 rails, 0.000 km")
+
+
+def test_rails_without_a_track_are_written_and_the_reason_is_named(tiles, client, tmp_path, capsys):
+    out = tmp_path / "out.gpkg"
+    words = ["extract", str(tiles), "--rails", str(out), "--standard", "AS_60_1600", *FAST]
+    assert main([*words, "--scheduler", client.scheduler.address]) == INCOMPLETE
+    assert "No track of 1600 mm gauge" in capsys.readouterr().err
+    assert len(values(out, "rails")["rail_id"]) == 2
+
+
+def test_an_output_that_fails_does_not_stop_the_others(tiles, client, tmp_path, capsys):
+    out, report = tmp_path / "out.gpkg", tmp_path / "report.html"
+    report.mkdir()  # a file cannot replace a folder
+    words = ["extract", str(tiles), "--rails", str(out), "--report", str(report)]
+    cleaned = tmp_path / "cleaned.tif"
+    assert main([*words, "--cleaned", str(cleaned), "--scheduler", client.scheduler.address, *FAST]) == 1
+    assert f"{report} can't be written" in capsys.readouterr().err
+    assert len(values(out, "rails")["rail_id"]) == 2
+    assert cleaned.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--rails", "out.shp"], "--rails writes .gpkg"),
+        (["--quality", "out.csv"], "--quality writes .gpkg"),
+        (["--cleaned", "out.png"], "--cleaned writes .tif"),
+        (["--report", "out.pdf"], "--report writes .html"),
+        (["--other-gauges", "1430"], "distinguished"),
+        (["--other-gauges", "wide"], "numbers"),
+        (["--gauge", "300"], "gauge"),
+        (["--max-gap", "-1"], "--max-gap"),
+        (["--step", "0"], "--step"),
+        (["--workers", "0"], "--workers"),
+        (["--smoothing-xy", "0"], "--smoothing-xy"),
+        (["--rail-classes", "300"], "0 to 255"),
+        (["--extent", "1,2,3"], "four numbers"),
+        (["--extent", "5,2,3,4"], "extent"),
+        (["--square-tiles", "2"], "too small"),
+        (["--scheduler", "nonsense"], "scheduler"),
+    ],
+)
+def test_a_wrong_option_is_refused_before_the_run(tiles, tmp_path, monkeypatch, capsys, words, said):
+    monkeypatch.chdir(tmp_path)
+    assert main(["extract", str(tiles), "--workers", "1", "--rails", "out.gpkg", *words]) == 1
+    assert said in capsys.readouterr().err
+
+
+def test_a_geopackage_in_use_is_refused_before_the_run(tiles, tmp_path, capsys):
+    out = tmp_path / "out.gpkg"
+    out.write_text("theirs")
+    (tmp_path / "out.gpkg-wal").write_text("pending")
+    assert main(["extract", str(tiles), "--rails", str(out)]) == 1
+    assert f"{out} is open in another program" in capsys.readouterr().err
+    assert out.read_text() == "theirs"
+
+
+def test_only_commands_that_are_installed_are_listed(tmp_path):
+    package = tmp_path / "rail_extract"
+    shutil.copytree(ROOT / "core", package / "core", ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("__init__.py", "__main__.py"):
+        shutil.copy(ROOT / name, package / name)
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    words = [sys.executable, "-m", "rail_extract", "--help"]
+    listed = subprocess.run(words, capture_output=True, text=True, env=environment, cwd=tmp_path).stdout
+    assert "extract" in listed and "onnx" in listed
+    assert "train" not in listed and "scenes" not in listed
+    shutil.copytree(ROOT / "laboratory", package / "laboratory", ignore=shutil.ignore_patterns("__pycache__"))
+    listed = subprocess.run(words, capture_output=True, text=True, env=environment, cwd=tmp_path).stdout
+    assert "train" in listed and "scenes" in listed

@@ -1,0 +1,106 @@
+"""GeoPackages: geometry and fields of each layer, and what happens to files that cannot be replaced."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+pyogrio = pytest.importorskip("pyogrio")
+shapely = pytest.importorskip("shapely")
+
+from rail_extract.core.commands.geopackage import lines_layer, stations_layer, write_layers  # noqa: E402
+from rail_extract.core.errors import DiskError  # noqa: E402
+from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS  # noqa: E402
+from rail_extract.core.frame import LocalFrame  # noqa: E402
+from rail_extract.core.rails import Centerline, RailLine, TrackGeometry  # noqa: E402
+
+FRAME = LocalFrame(np.array([500.0, 7100.0, 30.0]), 0.5, 0.25, "EPSG:2227")
+XYZ = np.array([[0.0, 0.0, 1.0], [3.0, 4.0, 1.0]])
+RAIL = RailLine(XYZ, 3, 10, 417, 1.54, 0.416, np.nan)
+TRACK = Centerline(XYZ, 1, 10, (3, 5), (4,), 1435.04, 0.26, -3.04, -7.11, 0.0)
+STATIONS = TrackGeometry(
+    1,
+    XYZ,
+    np.array([0.0, 5.0]),
+    np.array([1435.04, np.nan]),
+    np.array([-3.04, 2.0]),
+    np.array([np.nan, 0.1]),
+    np.array([350.26, np.nan]),
+    np.array([1.234, 5.678]),
+    np.array([0.416, 0.2]),
+    np.array([12, 0]),
+    np.array([False, True]),
+)
+
+
+def test_a_file_holds_lines_and_points_with_their_fields(tmp_path):
+    path = tmp_path / "new" / "all.gpkg"
+    layers = [
+        lines_layer("rails", path, RAIL_FIELDS, [RAIL]),
+        lines_layer("centerlines", path, CENTERLINE_FIELDS, [TRACK]),
+        stations_layer("quality", path, [STATIONS]),
+    ]
+    write_layers(layers, FRAME)
+    found = {name: pyogrio.raw.read(path, layer=name) for name, _ in pyogrio.list_layers(path)}
+    assert list(found) == ["rails", "centerlines", "quality"]
+    for (meta, _, geometry, _), fields, kind in zip(
+        found.values(), (RAIL_FIELDS, CENTERLINE_FIELDS, QUALITY_FIELDS), ("LineString Z", "LineString Z", "Point Z")
+    ):
+        assert list(meta["fields"]) == [field.name for field in fields]
+        assert (meta["geometry_type"], meta["crs"]) == (kind, "EPSG:2227")
+        places = shapely.get_coordinates(shapely.from_wkb(geometry), include_z=True)
+        np.testing.assert_array_equal(places, [[500.0, 7100.0, 34.0], [506.0, 7108.0, 34.0]])
+    rail, track, quality = ([column.tolist() for column in values] for _, _, _, values in found.values())
+    assert rail[:6] == [[3], [10], [5.0], [417], [1.5], [0.42]]
+    assert np.isnan(rail[6][0])
+    assert track[2:4] == [["3,5"], ["4"]]
+    assert track[5:] == [[1435.0], [0.3], [-3.0], [-7.1], [0.0]]
+    assert quality[:2] == [[1, 1], [0.0, 5.0]]
+    np.testing.assert_array_equal(quality[2:6], [[1435.0, np.nan], [-3.0, 2.0], [np.nan, 0.1], [350.3, np.nan]])
+    assert quality[6:] == [[1.23, 5.68], [0.42, 0.2], [12, 0], [0, 1]]
+
+
+def test_layers_without_features_keep_their_fields(tmp_path):
+    path = tmp_path / "empty.gpkg"
+    write_layers([lines_layer("rails", path, RAIL_FIELDS, []), stations_layer("quality", path, [])], FRAME)
+    assert [pyogrio.read_info(path, layer=name)["features"] for name in ("rails", "quality")] == [0, 0]
+    assert list(pyogrio.read_info(path, layer="quality")["fields"]) == [field.name for field in QUALITY_FIELDS]
+
+
+def test_a_file_in_use_is_left_alone_and_the_new_one_is_next_to_it(tmp_path):
+    out = tmp_path / "out.gpkg"
+    out.write_text("theirs")
+    (tmp_path / "out.gpkg-wal").write_text("pending")
+    with pytest.raises(DiskError, match=r"The new file is .*out_new\.gpkg"):
+        write_layers([lines_layer("rails", out, RAIL_FIELDS, [])], FRAME)
+    assert out.read_text() == "theirs"
+    assert pyogrio.read_info(tmp_path / "out_new.gpkg")["features"] == 0
+
+
+FULL_DISK = """
+import resource, sys
+from pathlib import Path
+import numpy as np
+from rail_extract.core.commands.geopackage import lines_layer, write_layers
+from rail_extract.core.errors import DiskError
+from rail_extract.core.fields import RAIL_FIELDS
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.rails import RailLine
+resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+rails = [RailLine(np.random.rand(20_000, 3), 1, 10, 5, 1.0, 1.0, 0.0)]
+try:
+    write_layers([lines_layer("rails", Path(sys.argv[1]), RAIL_FIELDS, rails)], LocalFrame(np.zeros(3)))
+except DiskError as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit on the size of files")
+def test_a_full_disk_leaves_the_old_file(tmp_path):
+    out = tmp_path / "out.gpkg"
+    out.write_bytes(b"before")
+    run = subprocess.run([sys.executable, "-c", FULL_DISK, str(out)], capture_output=True, text=True)
+    assert "free space" in run.stdout, run.stderr
+    assert out.read_bytes() == b"before"
+    assert [file.name for file in tmp_path.iterdir()] == ["out.gpkg"]

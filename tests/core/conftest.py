@@ -1,0 +1,36 @@
+"""A short cloud in several files and the workers of a cluster, for tests of several folders."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope="session")
+def tiles(tmp_path_factory):
+    """A track of 50 m, in two squares and three files."""
+    from rail_extract.core.standards import STANDARDS
+    from rail_extract.laboratory.curves import Element, trace
+    from rail_extract.laboratory.scenes.plain import spacing
+    from rail_extract.laboratory.scenes.scanner import Scanner
+    from rail_extract.laboratory.scenes.scene import Plan, build
+    from rail_extract.laboratory.scenes.tracks import Track
+    from rail_extract.laboratory.scenes.write import write_cloud
+
+    folder = tmp_path_factory.mktemp("tiles")
+    standard, curve = STANDARDS["EN_60E1_1435"], trace([Element(50.0)], heading=0.05)
+    plan = Plan([Track(curve, spacing(standard), np.zeros(len(curve.xy)))], standard, Scanner(profile_step_m=0.08))
+    scene = build("short", plan, np.random.RandomState(4))
+    for number, part in enumerate(np.array_split(np.argsort(scene.xyz[:, 0]), 3)):
+        part = replace(scene, xyz=scene.xyz[part], classification=scene.classification[part])
+        write_cloud(part, folder / f"tile{number}.laz")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def client():
+    """Two local workers."""
+    from rail_extract.core.cluster.workers import connect
+
+    with connect(None, 2) as client:
+        yield client
