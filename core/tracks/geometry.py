@@ -57,7 +57,7 @@ def measure_track_geometry(
     centerlines : sequence of Centerline
         Their `left_ids` and `right_ids` refer to the rails; if none of those exist, the nearest rails at gauge serve.
     rails : sequence of RailLine
-        Preferably from `remeasuring.measure_in_squares`, with heights smoothed over 1 m only and with support by
+        Preferably from `remeasuring.measure_rails`, with heights smoothed over 1 m only and with support by
         chainage. For a rail without support, `sigma_mm` is used everywhere and `points` are assumed to be evenly
         spaced; without known gaps, it counts as bridged only where it is missing.
     head_width_m : float
