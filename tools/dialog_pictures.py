@@ -1,4 +1,4 @@
-"""Pictures of the dialogs, taken from the widgets themselves: no screen is needed.
+"""Pictures of the dialogs, rendered from the widgets without a screen.
 
 Runs in the environment that `make env` prints: ``python tools/dialog_pictures.py FOLDER``.
 """
@@ -14,10 +14,10 @@ from qgis.core import QgsApplication, QgsProcessingAlgorithm
 from qgis.PyQt.QtWidgets import QGroupBox, QScrollArea, QSplitter, QWidget
 
 SIZES = {"wide": (1180, 860), "narrow": (760, 560)}
-"""Pixels of a dialog on a large screen, and of one that is as small as users make it."""
+"""Size of a dialog on a large screen, and of a small one, in pixels."""
 
 HELP_SHARE = 0.36
-"""Share of the width that the help panel gets."""
+"""Fraction of the width for the help panel."""
 
 PROVIDER = "railextract"
 
@@ -28,9 +28,9 @@ def dialog_pictures(folder: Path, filled: Mapping[str, Mapping[str, Any]] | None
     Parameters
     ----------
     folder : Path
-        Where ALGORITHM_SIZE.png goes for each of `SIZES`, and ALGORITHM_all.png with every field.
+        Folder for ALGORITHM_SIZE.png, for each of `SIZES`, and ALGORITHM_all.png with all fields.
     filled : mapping, optional
-        What stands in the fields instead of the defaults: values by parameter, by algorithm.
+        Values instead of the defaults, by parameter, by algorithm.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def _pictures(algorithm: QgsProcessingAlgorithm, values: Mapping[str, Any], fold
 
 
 def _fold(dialog: QWidget, folded: bool) -> None:
-    """Hide or show the advanced parameters; QGIS leaves them as they were in the last dialog."""
+    """Hide or show the advanced parameters; QGIS keeps the state of the last dialog."""
     for group in dialog.findChildren(QGroupBox):
         group.setProperty("collapsed", folded)
 
@@ -75,13 +75,13 @@ def _grab(dialog: QWidget, size: tuple[int, int], picture: Path) -> Path:
 
 
 def _hidden_height(dialog: QWidget) -> int:
-    """Pixels by which the fields do not fit into the dialog."""
+    """Return the height of the fields that does not fit into the dialog, in pixels."""
     QgsApplication.processEvents()
     return max(area.verticalScrollBar().maximum() for area in dialog.findChildren(QScrollArea))
 
 
 def start_qgis() -> QgsApplication:
-    """Start QGIS with widgets, its processing framework and the plugin."""
+    """Start QGIS with widgets, the processing framework and the plugin."""
     application = QgsApplication([], True)
     application.initQgis()
     sys.path.append(str(Path(application.pkgDataPath()) / "python" / "plugins"))

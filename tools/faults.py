@@ -22,8 +22,8 @@ Each row is a test: it creates the fault, runs the algorithm in QGIS, and checks
 refuses an input, it shows exactly the message in the row, no traceback, and leaves no temporary file and no output
 except those that the message calls complete. In the messages, … stands for text that differs from case to case.
 
-`.venv/bin/python tools/faults.py` writes this page from the tables in `tests/plugin/test_faults_*.py`, and a test
-compares the two.
+`.venv/bin/python tools/faults.py` writes this page from the tables in `tests/plugin/test_faults_*.py`; a test checks
+that it is up to date.
 """
 
 

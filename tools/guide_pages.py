@@ -1,4 +1,4 @@
-"""Turn the guide for users, pages of `docs`, into web pages that come with the plugin: help buttons open them."""
+"""Convert the user guide, pages of `docs`, to the web pages of the plugin that the Help buttons open."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from rail_extract.rail_extract_plugin.dialog.guide import on_the_web
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 FOLDER = "resources/guide"
-"""Where the pages lie in the plugin."""
+"""Folder of the pages in the plugin."""
 
 PAGES = ("README", "tutorial", "parameters", "reference", "limits", "troubleshooting", "faults", "accuracy", "scaling")
-"""What users read; the rest of the folder is for those who build."""
+"""Pages for users; the other pages of the folder are for developers."""
 
 EXTENSIONS = ("fenced_code", "sane_lists", "tables", "toc")
 
@@ -45,7 +45,7 @@ blockquote {{ margin-left: 0; padding-left: 1em; border-left: 3px solid #999 }}
 
 
 def guide_files() -> dict[str, bytes]:
-    """Make the files of the guide, by their names in the plugin: pages, and the pictures that they show."""
+    """Return the files of the guide, pages and pictures, by their names in the plugin."""
     files = {}
     for name in PAGES:
         text = (DOCS / f"{name}.md").read_text(encoding="utf-8")
@@ -62,7 +62,7 @@ def _page(text: str) -> str:
 
 
 def _target(link: re.Match) -> str:
-    """Lead a link to the page in the plugin, or where there is none into the repository."""
+    """Return the target of a link: the page in the plugin, or the file in the repository if there is no such page."""
     path, mark, place = link[0].partition("#")
     if path.removesuffix(".md") in PAGES:
         return path.removesuffix(".md") + ".html" + mark + place

@@ -1,6 +1,6 @@
-"""Refuse in the plugin's code what Qt 6, and with it QGIS 4, does not have any more.
+"""Find names in the plugin's code that Qt 6, and therefore QGIS 4, no longer has.
 
-QGIS 4 is not run here; this looks at the syntax tree of every file, and asks the installed QGIS which names are enums.
+QGIS 4 is not run: the check inspects the syntax tree of every file and asks the installed QGIS which names are enums.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ CODE = ROOT / "rail_extract_plugin"
 
 BINDINGS = ("PyQt5", "PyQt6", "PySide2", "PySide6", "sip")
 MOVED = ("QAction", "QActionGroup", "QShortcut")
-"""In QtGui of Qt 6 and in QtWidgets of Qt 5; qgis.PyQt.QtWidgets has them with both."""
+"""In QtGui of Qt 6 and in QtWidgets of Qt 5; qgis.PyQt.QtWidgets has them in both cases."""
 
 REMOVED = ("QRegExp", "QRegExpValidator", "QDesktopWidget", "QMatrix", "QStringRef", "QTextCodec", "QGLWidget")
 RENAMED_METHODS = ("exec_", "print_")
-"""Names of PyQt5 that avoided words of Python 2."""
+"""Names of PyQt5 that avoided keywords of Python 2."""
 
 VARIANTS_ALLOWED_IN = ("compat.py",)
-"""Where field types of QGIS before 3.38 are looked up."""
+"""Modules that may use the field types of QGIS before 3.38."""
 
 
 def findings(source: str, name: str) -> list[str]:
-    """Tell what Qt 6 refuses in a file: ``name:line what``."""
+    """List what Qt 6 lacks in a file, as ``name:line what``."""
     tree = ast.parse(source, name)
     imported = _imported(tree)
     outer = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
@@ -43,7 +43,7 @@ def findings(source: str, name: str) -> list[str]:
 
 
 def _imported(tree: ast.AST) -> dict[str, tuple[str, str]]:
-    """Names that come from QGIS, each with its module and its name there; a module's own name there is empty."""
+    """Return the names imported from QGIS, each with its module and its name in that module."""
     names = {}
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "qgis":
@@ -66,7 +66,7 @@ def _of_import(node: ast.Import | ast.ImportFrom) -> Iterator[str]:
 def _of_attribute(
     node: ast.Attribute, imported: dict[str, tuple[str, str]], is_scope: bool, name: str
 ) -> Iterator[str]:
-    """Look at one dot; `is_scope` where another dot follows it."""
+    """Check an attribute access; `is_scope` states whether another one follows."""
     if node.attr in RENAMED_METHODS:
         yield f"{node.attr} is not in PyQt6: leave out the underscore"
     path = _path(node)
@@ -84,7 +84,7 @@ def _of_attribute(
 
 
 def _path(node: ast.expr) -> list[str]:
-    """Split ``a.b.c`` into its names; empty where something else than names stands before a dot."""
+    """Split ``a.b.c`` into its names; empty if it does not consist of names."""
     names: list[str] = []
     while isinstance(node, ast.Attribute):
         names.insert(0, node.attr)
@@ -93,9 +93,9 @@ def _path(node: ast.expr) -> list[str]:
 
 
 def _is_unscoped_member(origin: tuple[str, str], names: list[str]) -> bool:
-    """Tell whether `names` lead from an import to a member of an enum, but not through the enum.
+    """Return whether `names` lead from an import to a member of an enum, but not through the enum.
 
-    What the installed QGIS does not know is judged by its spelling: enum members and classes begin with a capital.
+    Names unknown to the installed QGIS are judged by their spelling: enum members and classes begin with a capital.
     """
     scope, value = None, _resolve(*origin)
     for name in names:
@@ -114,7 +114,7 @@ def _resolve(module: str, name: str) -> Any:
 
 
 def main() -> int:
-    """Print the findings and tell whether there are any."""
+    """Print the findings; return 1 if there are any."""
     found = [
         finding
         for path in sorted(CODE.rglob("*.py"))

@@ -1,6 +1,6 @@
-"""Write docs/reference.md: algorithms, parameters, outputs, fields and rail standards, as they are in the code.
+"""Write docs/reference.md: the algorithms, parameters, outputs, fields and rail standards of the code.
 
-Run it after a change of any of these, in the environment that `make env` prints.
+Run it after a change to any of them, in the environment that `make env` prints.
 """
 
 from __future__ import annotations
@@ -28,25 +28,25 @@ PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference.md"
 
 INTRODUCTION = """# Reference
 
-Ids and names for models, batch files and `qgis_process`; they stay as they are. What parameters do is told with
-pictures in [parameters.md](parameters.md).
+Ids and names for models, batch files and `qgis_process`; they never change. [parameters.md](parameters.md) explains the
+parameters with pictures.
 
-`python tools/reference.py` writes this page from the code, and a test compares the two.
+`python tools/reference.py` writes this page from the code, and a test checks that it is up to date.
 """
 
 LAYERS = {"Rails": RAIL_FIELDS, "Centerlines": CENTERLINE_FIELDS, "Track geometry": QUALITY_FIELDS}
 
 
 def page(provider: QgsProcessingProvider) -> str:
-    """Put the page together."""
+    """Return the page."""
     parts = [INTRODUCTION, "\n## Algorithms\n"]
     for algorithm in (provider.algorithm(one.NAME) for one in ALGORITHMS):
         parts += [f"\n### {algorithm.displayName()}: `{algorithm.id()}`\n\n{algorithm.shortDescription()}\n"]
         parts += _table(("parameter", "in the dialog", "default", "values"), _inputs(algorithm))
-        parts += _table(("output", "what it is"), _outputs(algorithm))
+        parts += _table(("output", "meaning"), _outputs(algorithm))
     parts += ["\n## Fields\n"]
     for title, fields in LAYERS.items():
-        parts += [f"\n### {title}\n", *_table(("field", "type", "what it is"), map(_field, fields))]
+        parts += [f"\n### {title}\n", *_table(("field", "type", "meaning"), map(_field, fields))]
     parts += ["\n## Rail standards\n", *_table(("STANDARD", "rail", "gauge", "railhead"), _standards())]
     parts += [
         f"\n`{CUSTOM}` takes GAUGE and HEAD_WIDTH. A width marked * is not confirmed by a table of rail sections.\n"
@@ -55,14 +55,14 @@ def page(provider: QgsProcessingProvider) -> str:
 
 
 def _table(titles: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """Lines of a table, after an empty one; none where there are no rows."""
+    """Return an empty line and the lines of a table; nothing if there are no rows."""
     rows = list(rows)
     lines = [titles, ["---"] * len(titles), *rows] if rows else []
     return [*"\n" * bool(rows), *(f"| {' | '.join(cells)} |\n" for cells in lines)]
 
 
 def _inputs(algorithm: QgsProcessingAlgorithm) -> Iterator[tuple[str, ...]]:
-    """Name, label, default and values of each parameter but the destinations."""
+    """Yield name, label, default and values of each parameter except destinations."""
     for one in algorithm.parameterDefinitions():
         if not one.isDestination():
             flags = QgsProcessingParameterDefinition.Flag
@@ -73,7 +73,7 @@ def _inputs(algorithm: QgsProcessingAlgorithm) -> Iterator[tuple[str, ...]]:
 
 
 def _values(definition: QgsProcessingParameterDefinition) -> str:
-    """Which values a number or a choice takes."""
+    """Return the values that a number or a choice accepts."""
     if isinstance(definition, QgsProcessingParameterNumber):
         if definition.maximum() >= UNBOUNDED:
             return f"from {definition.minimum():g}"
@@ -85,7 +85,7 @@ def _values(definition: QgsProcessingParameterDefinition) -> str:
 
 
 def _outputs(algorithm: QgsProcessingAlgorithm) -> Iterator[tuple[str, str]]:
-    """Name and label of each output."""
+    """Yield the name and label of each output."""
     for one in algorithm.outputDefinitions():
         destination = algorithm.parameterDefinition(one.name())
         yield f"`{one.name()}`", destination.help() if destination and destination.help() else one.description()

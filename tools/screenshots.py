@@ -1,7 +1,6 @@
-"""Take pictures of the real dialogs and of the sample's result, for the guide: `docs/pictures`.
+"""Take the guide's pictures of the dialogs and of the sample's result: `docs/pictures`.
 
-Runs in the environment that `make env` prints; `make screenshots` does both. Chromium draws the report, where that is
-installed.
+Runs in the environment that `make env` prints; `make screenshots` does both. Chromium, if installed, draws the report.
 """
 
 from __future__ import annotations
@@ -47,34 +46,34 @@ OUTPUTS = {
     "RAILS": "rails.gpkg",
     "REPORT": "report.html",
 }
-"""The files of a run, from the layer on top down; layers are named as their styles."""
+"""The files of a run, from the top layer to the bottom; layers have the names of their styles."""
 
 DIALOGS = {
     "extractrails_wide": "dialog",
     "extractrails_all": "dialog_all",
     "installpackages_wide": "install_packages",
 }
-"""Pictures of dialogs that the guide shows, by their names here and there."""
+"""Names of the dialogs' pictures, and their names in the guide."""
 
 MAP_SIZE, TABLE_HEIGHT, REPORT_SIZE = QSize(1000, 480), 230, (1140, 2265)
 """Pixels."""
 
 REPORT_TOP = 1300
-"""Pixels of the report above the plots of the first track."""
+"""Height of the report above the plots of the first track, in pixels."""
 
 SPLITTER, BUTTONS = 27, 400
-"""Pixels of a dialog right of its fields without the help, and below them."""
+"""Width of a dialog to the right of its fields without the help, and height below them, in pixels."""
 
 DETAIL_M = 16.0
-"""Width of the ground in the detailed map: single measurements are seen in it."""
+"""Width of the detailed map on the ground, which shows individual stations, in metres."""
 
 
 COLORS = 128
-"""Colours that a picture keeps: none of them is off by more than a few parts of 255."""
+"""Colours of a picture's palette: no colour changes by more than a few of 255 levels."""
 
 
 def main() -> None:
-    """Take all pictures, in a QGIS that is started."""
+    """Take all pictures in a running QGIS."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -113,7 +112,7 @@ def _layer(path: Path) -> QgsMapLayer:
 
 
 def _detail(points: QgsVectorLayer) -> QgsRectangle:
-    """Choose a small part of the map, round the middle one of the measurements."""
+    """Choose a small part of the map around the middle station."""
     places = [feature.geometry().asPoint() for feature in points.getFeatures()]
     middle = places[len(places) // 2]
     height = DETAIL_M * MAP_SIZE.height() / MAP_SIZE.width()
@@ -121,7 +120,7 @@ def _detail(points: QgsVectorLayer) -> QgsRectangle:
 
 
 def _map(layers: Sequence[QgsMapLayer], extent: QgsRectangle, picture: Path) -> None:
-    """Draw a map as QGIS's own canvas does."""
+    """Draw a map as the canvas of QGIS does."""
     settings = QgsMapSettings()
     settings.setLayers(layers)
     settings.setDestinationCrs(layers[0].crs())
@@ -156,7 +155,7 @@ def _report(page: Path, picture: Path) -> None:
     """Draw the top of the report."""
     chromium = shutil.which("chromium")
     if chromium is None:
-        print(f"chromium is not installed: {picture.name} stays as it is (apt-get install chromium).")
+        print(f"chromium is not installed: {picture.name} is not updated (apt-get install chromium).")
         return
     size = ",".join(map(str, REPORT_SIZE))
     options = ("--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", f"--window-size={size}")
@@ -175,12 +174,12 @@ def _crop(picture: Path, top: int = 0, right: int = 0, bottom: int = 0) -> None:
 
 
 def _shrink(picture: Path) -> None:
-    """Store a picture with a palette that covers all colours, also those of thin lines."""
+    """Store a picture with a palette that covers all colours, including those of thin lines."""
     with Image.open(picture) as image:
         smaller = image.convert("RGB").quantize(COLORS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     smaller.save(picture, optimize=True)
 
 
 if __name__ == "__main__":
-    started = start_qgis()  # kept to the end, or QGIS falls while Python ends
+    started = start_qgis()  # kept until the end, because QGIS would crash at the exit of Python
     main()

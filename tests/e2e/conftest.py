@@ -1,4 +1,4 @@
-"""Real qgis_process, with the plugin as it is unpacked from the zip."""
+"""The real qgis_process, with the plugin unpacked from the zip."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from lines import read_lines
 EXTRACT_RAILS = "railextract:extractrails"
 
 STANDARD = "IN_75R_1000"
-"""Of the sample."""
+"""Rail standard of the sample."""
 
 
 def command(parameters: dict[str, object], *options: str, algorithm: object = EXTRACT_RAILS) -> list[str]:
-    """Words of a qgis_process call; the algorithm is an id, or the file of a model."""
+    """Arguments of a qgis_process call; the algorithm is an id or the file of a model."""
     words = [f"{name}={value}" for name, value in parameters.items()]
     return [os.environ["QGIS_PROCESS"], *options, "run", str(algorithm), "--", *words]
 
@@ -69,7 +69,7 @@ def truth(sample):
 
 @dataclass
 class Run:
-    """A run over the sample, and where it wrote."""
+    """A run on the sample, and the files that it wrote."""
 
     results: dict
     cloud: Path
@@ -82,7 +82,7 @@ class Run:
 
 @pytest.fixture(scope="session")
 def extracted(qgis_process, sample, tmp_path_factory):
-    """The sample, in a folder and with outputs whose names have a blank and umlauts."""
+    """The sample, extracted in a folder and into files whose names contain spaces and umlauts."""
     folder = tmp_path_factory.mktemp("Größe östlich 1")
     cloud = shutil.copy(sample / "sample.laz", folder / "Schienen 1.laz")
     names = ("Schiënen.gpkg", "Gleis achsen.shp", "Güte.shp", "gesäubert 1.tif", "Bericht ü.html")

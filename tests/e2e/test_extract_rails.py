@@ -15,7 +15,7 @@ MIN_SHARE = 0.999
 """Smallest share of the lines to be found and to be correct; the README states 100.0 %."""
 
 
-def test_results_are_those_of_the_files(extracted):
+def test_results_match_the_files(extracted):
     for path, figure in ((extracted.rails, "RAIL"), (extracted.centerlines, "CENTERLINE")):
         features = read_features(path)
         assert extracted.results[f"{figure}_COUNT"] == len(features)
@@ -44,7 +44,7 @@ def test_centerlines_against_truth(extracted, truth):
         assert items["gauge_mm"] == pytest.approx(TRUE_GAUGE_MM, abs=MAX_GAUGE_MM)
 
 
-def test_centerlines_name_their_rails(extracted):
+def test_centerlines_refer_to_their_rails(extracted):
     rail_ids = {items["rail_id"] for _, items in read_features(extracted.rails)}
     for _, items in read_features(extracted.centerlines):
         left, right = ({int(word) for word in items[side].split(",")} for side in ("left_ids", "right_ids"))

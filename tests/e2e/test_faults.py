@@ -1,4 +1,4 @@
-"""What only a program of its own shows: killed on the way, and parameters as JSON on standard input."""
+"""Faults that need a separate process: a killed run, and parameters as JSON on standard input."""
 
 import json
 import os
@@ -9,12 +9,12 @@ import subprocess
 import pytest
 
 CUT = "578214,578222,2494300,2494345"
-"""Eight metres of three tracks: few windows for the network."""
+"""Eight metres of three tracks, which the network processes quickly."""
 
 
 @pytest.fixture(scope="module")
 def speaks_json():
-    """Skip where qgis_process takes no JSON."""
+    """Skip if qgis_process does not accept JSON."""
     words = [os.environ["QGIS_PROCESS"], "--version"]
     shown = subprocess.run(words, capture_output=True, text=True).stdout
     major, minor = map(int, re.search(r"QGIS (\d+)\.(\d+)", shown).groups())
@@ -43,7 +43,7 @@ def test_bad_json_input_is_one_sentence_and_an_exit_code(speaks_json, tmp_path):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="only Unix has this signal")
-def test_killed_run_leaves_the_old_output_and_no_new_one(start_qgis_process, sample, tmp_path):
+def test_killed_run_keeps_the_old_output_and_leaves_no_new_one(start_qgis_process, sample, tmp_path):
     rails, tracks = tmp_path / "rails.gpkg", tmp_path / "tracks.shp"
     rails.write_bytes(b"of an earlier run")
     parameters = {"INPUT": sample / "sample.laz", "STANDARD": "IN_75R_1000", "RAILS": rails, "CENTERLINES": tracks}

@@ -1,4 +1,4 @@
-"""A QGIS whose Python has none of our packages installs them from the package index, and then extracts rails."""
+"""A QGIS without the packages installs them from the package index and then extracts rails."""
 
 import json
 import os
@@ -11,7 +11,7 @@ CUT = "578214,578222,2494300,2494345"
 
 
 class BareQgis:
-    """qgis_process with a profile of its own, and without the packages of the virtual environment."""
+    """qgis_process with a separate profile and without the packages of the virtual environment."""
 
     def __init__(self, profile: Path) -> None:
         self.profile = profile
@@ -64,12 +64,12 @@ def test_packages_are_installed_and_rails_extracted(bare, sample, tmp_path):
     assert bare.results("installpackages")["INSTALLED"] == ""
 
 
-def test_folder_of_packages_is_named_by_a_variable(bare):
+def test_folder_of_packages_from_the_environment_variable(bare):
     bare.environment["RAIL_EXTRACT_PACKAGES"] = bare.packages
     assert bare.results("checkinstallation")["SELF_TEST"].startswith("passed")
 
 
-def test_folder_of_packages_is_named_by_a_setting(bare):
+def test_folder_of_packages_from_the_setting(bare):
     with (bare.profile / "profiles" / "default" / "QGIS" / "QGIS3.ini").open("a") as settings:
         settings.write(f"\n[Processing]\nConfiguration\\RAIL_EXTRACT_PACKAGES={bare.packages}\n")
     assert bare.results("checkinstallation")["SELF_TEST"].startswith("passed")

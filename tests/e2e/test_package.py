@@ -23,18 +23,18 @@ def test_same_files_give_the_same_bytes(archive, tmp_path):
     assert (tmp_path / "again.zip").read_bytes() == archive.read_bytes()
 
 
-def test_zip_is_one_folder_that_qgis_knows(names):
+def test_zip_is_a_single_folder_that_qgis_recognizes(names):
     assert {name.split("/")[0] for name in names} == {"rail_extract"}
     assert {f"rail_extract/{name}" for name in ("__init__.py", "metadata.txt", "LICENSE")} <= set(names)
 
 
-def test_zip_holds_what_runs_and_no_more(names):
+def test_zip_contains_only_the_product(names):
     assert any(re.fullmatch(r"rail_extract/models/.*\.npz", name) for name in names)
     assert {"rail_extract/core/pipeline.py", "rail_extract/resources/styles/rails.qml"} <= set(names)
     assert not [name for name in names if re.search(r"/(tests|tools|benchmarks|\.ci)/|\.pyc$", name)]
 
 
-def test_help_buttons_open_pages_that_come_with_it(archive, names):
+def test_help_buttons_open_pages_of_the_zip(archive, names):
     pages = [name for name in names if name.endswith(".html")]
     assert {f"rail_extract/resources/guide/{page}.html" for page in ("README", "parameters", "troubleshooting")} <= set(
         pages

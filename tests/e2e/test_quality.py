@@ -1,4 +1,4 @@
-"""Track geometry of the sample against its truth, its report and the raster between, through qgis_process."""
+"""Track geometry, report and cleaned raster of the sample, compared with the truth, through qgis_process."""
 
 import json
 import re
@@ -13,11 +13,11 @@ HEAD_M = 0.06191
 GAUGE_MM = 1000.0
 
 DENSE, ALL = 2.0, 4.0
-"""Millimetres rms that gauge and cant may be off on the track with most points, and on any."""
+"""Greatest RMSE of gauge and cant, in millimetres, on the track with most points and on any track."""
 
 
 def read_points(path):
-    """Places, (n, 3), and values by field, (n,), of a layer of points."""
+    """Read the positions, (n, 3), and the values by field, (n,), of a point layer."""
     source = ogr.Open(str(path))
     features = [(feature.geometry().GetPoint(), feature.items()) for feature in source.GetLayer()]
     values = {
@@ -29,12 +29,12 @@ def read_points(path):
 
 @pytest.fixture(scope="module")
 def measured(extracted, truth):
-    """Stations of each true track from west to east: fields, and the truth beside them."""
+    """Stations of each true track from west to east: fields and the true values."""
     places, values = read_points(extracted.quality)
     rails, centerlines = truth("rail"), truth("centerline")
     tracks = []
     for line in centerlines:
-        # Of a track's rails, the middles lie half a spacing from that of its centerline.
+        # The middle of each rail is half the rail spacing from the middle of its centerline.
         mine = sorted(rails, key=lambda rail: np.hypot(*(rail[len(rail) // 2] - line[len(line) // 2])[:2]))[:2]
         left, right = sorted(mine, key=lambda rail: -sideways(line, rail[len(rail) // 2]))
         near = np.array([abs(sideways(line, place)) < 0.3 for place in places])
@@ -44,7 +44,7 @@ def measured(extracted, truth):
 
 
 def foot(line, place):
-    """Nearest place on a line, (3,), its chainage in plan, and how far to the left the place is from there."""
+    """Return the nearest point on a line, (3,), its plan chainage, and the offset of the given point to the left."""
     start, step = line[:-1], np.diff(line, axis=0)
     length = np.hypot(*step.T[:2])
     share = np.clip(((place - start)[:, :2] * step[:, :2]).sum(axis=1) / length**2, 0, 1)
@@ -63,7 +63,7 @@ def rms(values):
     return float(np.sqrt(np.nanmean(np.square(values))))
 
 
-def test_gauge_and_cant_are_those_of_the_truth(measured):
+def test_gauge_and_cant_match_the_truth(measured):
     off = []
     for values, _, left, right, places in measured:
         true_left, true_right = (np.array([foot(rail, place)[0] for place in places]) for rail in (left, right))
@@ -80,7 +80,7 @@ def test_gauge_and_cant_are_those_of_the_truth(measured):
     assert np.min(off, axis=0)[1] <= DENSE
 
 
-def test_radius_gradient_and_twist_are_those_of_the_truth(measured):
+def test_radius_gradient_and_twist_match_the_truth(measured):
     for values, line, left, right, places in measured:
         along = np.array([foot(line, place)[1] for place in places])
         vertices = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(line, axis=0).T[:2]))])
@@ -109,7 +109,7 @@ def test_radius_gradient_and_twist_are_those_of_the_truth(measured):
         assert rms((values["twist_mm"] - (cants[1] - cants[0]))[inner]) < 2
 
 
-def test_measured_anew_from_files_the_numbers_are_the_same(extracted, qgis_process, tmp_path):
+def test_measuring_from_files_gives_the_same_values(extracted, qgis_process, tmp_path):
     output = tmp_path / "quality.gpkg"
     parameters = {"INPUT": extracted.centerlines, "RAILS": extracted.rails, "POINTS": extracted.cloud}
     run = qgis_process(
@@ -126,7 +126,7 @@ def test_measured_anew_from_files_the_numbers_are_the_same(extracted, qgis_proce
     assert results["STATION_COUNT"] == len(again[0])
 
 
-def test_the_numbers_stand_in_the_results(extracted):
+def test_results_contain_the_figures(extracted):
     _, values = read_points(extracted.quality)
     assert extracted.results["STATION_COUNT"] == len(values["track_id"])
     assert extracted.results["SIGMA"] == pytest.approx(rms(values["sigma_mm"]), abs=0.011)
@@ -135,7 +135,7 @@ def test_the_numbers_stand_in_the_results(extracted):
         assert extracted.results[name] == str(getattr(extracted, name.lower()))
 
 
-def test_the_report_tells_what_the_figures_are(extracted):
+def test_report_states_the_figures(extracted):
     html = extracted.report.read_text(encoding="utf-8")
     assert re.search("<strong>(Good|Usable)", html)
     assert f"<b>{extracted.results['CENTERLINE_COUNT']}</b>" in html
@@ -144,7 +144,7 @@ def test_the_report_tells_what_the_figures_are(extracted):
         assert words in html
 
 
-def test_the_cleaned_raster_lies_under_the_rails(extracted):
+def test_cleaned_raster_covers_the_rails(extracted):
     dataset = gdal.Open(str(extracted.cleaned))
     assert dataset.GetRasterBand(1).GetDescription() == "10"
     x, side, _, y, _, _ = dataset.GetGeoTransform()

@@ -1,4 +1,4 @@
-"""The steps and the model through qgis_process, on a short cut of the sample."""
+"""The steps and the model through qgis_process, on a short part of the sample."""
 
 import json
 from importlib.util import find_spec
@@ -8,12 +8,12 @@ from lines import farthest, read_features, read_lines
 
 STANDARD = "IN_75R_1000"
 CUT = "578214,578222,2494300,2494345"
-"""Eight metres of three tracks: few windows for the network."""
+"""Eight metres of three tracks, which the network processes quickly."""
 
 
 @pytest.fixture(scope="module")
 def succeed(qgis_process):
-    """Run an algorithm or a model, and give its results by name."""
+    """Run an algorithm or a model, and return its results by name."""
 
     def run(algorithm, parameters):
         done = qgis_process(parameters, "--json", algorithm=algorithm)
@@ -45,7 +45,7 @@ def total_length(path):
     return sum(items["length_m"] for _, items in read_features(path))
 
 
-def test_chained_by_hand_the_steps_give_the_lines_of_extract_rails(succeed, source, folder, whole):
+def test_chained_steps_give_the_lines_of_extract_rails(succeed, source, folder, whole):
     raster, cleaned, rails, tracks = (folder / name for name in ("räster 1.tif", "cleaned.tif", "r.gpkg", "t.shp"))
     succeed("railextract:rasterizerailpoints", {**source, "OUTPUT": raster})
     found = succeed("railextract:frpdfcleanup", {"INPUT": raster, "ITERATIONS": 1, "OUTPUT": cleaned})
@@ -64,7 +64,7 @@ def test_the_model_gives_the_lines_of_extract_rails(succeed, source, folder, who
     outputs = {"rails:RAILS": folder / "mr.gpkg", "centerlines:CENTERLINES": folder / "mt.gpkg"}
     model = request.config.rootpath / "models" / "extract_rails.model3"
     written = succeed(model, {**source, "ITERATIONS": 1, **outputs})
-    # Newer QGIS names the outputs that were skipped as well.
+    # Newer QGIS also lists skipped outputs.
     assert {one: path for one, path in written.items() if path} == {one: str(path) for one, path in outputs.items()}
     for path, lines in zip(outputs.values(), whole):
         assert farthest(read_lines(path), lines) < 0.001

@@ -1,4 +1,4 @@
-"""A real QGIS, without windows on a screen, in which the plugin is registered."""
+"""A real QGIS without a screen, in which the plugin is registered."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SAMPLE = ROOT / "resources" / "sample" / "sample.laz"
 
 @pytest.fixture(scope="session")
 def qgis(tmp_path_factory):
-    """QGIS with its processing framework, in a profile of its own."""
+    """QGIS with its processing framework, in a separate profile."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("QGIS_CUSTOM_CONFIG_PATH", str(tmp_path_factory.mktemp("profile")))
         application = QgsApplication([], True)
@@ -46,7 +46,7 @@ def qgis(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def plugin(qgis):
-    """The plugin, as QGIS starts it."""
+    """The plugin, started as QGIS does."""
     from rail_extract import classFactory
 
     plugin = classFactory(None)
@@ -65,12 +65,12 @@ def context(qgis):
     context = QgsProcessingContext()
     context.setProject(QgsProject.instance())
     yield context
-    context.temporaryLayerStore().removeAllMapLayers()  # before QGIS itself may end
+    context.temporaryLayerStore().removeAllMapLayers()  # before QGIS exits
     QgsProject.instance().clear()
 
 
 class Feedback(QgsProcessingFeedback):
-    """Remembers what it is told, and cancels once the progress reaches a share."""
+    """Records messages, and cancels when the progress reaches a percentage."""
 
     def __init__(self, cancel_at: float | None = None) -> None:
         super().__init__(False)
@@ -99,7 +99,7 @@ def new_feedback(qgis):
 
 @dataclass
 class Outcome:
-    """What a run came to."""
+    """The result of a run."""
 
     ok: bool
     results: dict[str, Any] = field(default_factory=dict)
@@ -108,7 +108,7 @@ class Outcome:
 
 @pytest.fixture
 def run(algorithm, context):
-    """Check the parameters and run Extract Rails, as every front end of QGIS does."""
+    """Check the parameters and run Extract Rails, as all front ends of QGIS do."""
 
     def run(parameters: dict[str, Any], feedback: Feedback | None = None) -> Outcome:
         return outcome_of(algorithm, parameters, context, feedback or Feedback())
@@ -118,7 +118,7 @@ def run(algorithm, context):
 
 @pytest.fixture
 def run_step(qgis, plugin, context):
-    """The same for any algorithm of the plugin, by its name."""
+    """The same for any algorithm of the plugin, by name."""
 
     def run(name: str, parameters: dict[str, Any], feedback: Feedback | None = None) -> Outcome:
         algorithm = qgis.processingRegistry().createAlgorithmById(f"railextract:{name}")
@@ -129,7 +129,7 @@ def run_step(qgis, plugin, context):
 
 @pytest.fixture
 def outcome(context):
-    """The same for any algorithm at all."""
+    """The same for any algorithm."""
 
     def run(algorithm, parameters: dict[str, Any], feedback: Feedback | None = None) -> Outcome:
         return outcome_of(algorithm, parameters, context, feedback or Feedback())
@@ -148,7 +148,7 @@ def outcome_of(algorithm, parameters: dict[str, Any], context: QgsProcessingCont
 
 @pytest.fixture
 def write_cloud(tmp_path):
-    """Write a LAS or LAZ file of points, (n, 3), and give its path."""
+    """Write a LAS or LAZ file with points, (n, 3), and return its path."""
 
     def write(
         xyz: np.ndarray,
@@ -194,7 +194,7 @@ def chunks_of_any_size():
 
 @pytest.fixture
 def track():
-    """Points, (n, 3), on two straight railheads in UTM coordinates; the spacing is that of their axes."""
+    """Points, (n, 3), on two straight railheads in UTM coordinates; the spacing is between their axes."""
 
     def points(spacing_m: float = 1.507, length_m: float = 12.0) -> np.ndarray:
         rng = np.random.default_rng(1)
@@ -208,7 +208,7 @@ def track():
 
 @dataclass
 class Bench:
-    """Where faults are made: a folder, what makes clouds, changes the environment, and restores it after a run."""
+    """Tools to create faults: a folder, functions that create clouds, patches, and clean-up after a run."""
 
     folder: Path
     cloud: Callable[..., Path]
@@ -236,7 +236,7 @@ def bench(tmp_path, write_cloud, track, monkeypatch, new_feedback):
 
 @pytest.fixture
 def meet(bench, run_step, monkeypatch):
-    """Run into a fault: what comes of it must be what its row says, and no file may be left behind."""
+    """Run with a fault: the result must be that of its row, and no file may be left behind."""
 
     def meet(fault: Fault, algorithm: str) -> Outcome:
         algorithm, feedback = fault.run or algorithm, bench.feedback

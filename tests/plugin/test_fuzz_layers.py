@@ -1,4 +1,4 @@
-"""Damaged rasters and any lines: read, or explained in a sentence; never anything else."""
+"""Damaged rasters and arbitrary lines: they are read, or refused with a sentence."""
 
 import math
 
@@ -25,7 +25,7 @@ BOUNDED = settings(
 
 @pytest.fixture(scope="module")
 def good(qgis, tmp_path_factory):
-    """Bytes of a small rail raster."""
+    """The bytes of a small rail raster."""
     path = tmp_path_factory.mktemp("good") / "r.tif"
     wkt = import_pyproj().CRS.from_epsg(32643).to_wkt()
     raster = rasterize(np.random.default_rng(0).uniform(0, 4, (200, 2)), 0.04)
@@ -49,13 +49,13 @@ def read_or_explain(path, data):
 
 @BOUNDED
 @given(at=st.integers(2, 1200), value=st.binary(min_size=1, max_size=4))
-def test_any_bytes_in_a_raster(good, tmp_path, at, value):
+def test_changed_bytes_in_a_raster(good, tmp_path, at, value):
     read_or_explain(tmp_path / "r.tif", good[:at] + value + good[at + len(value) :])
 
 
 @BOUNDED
 @given(length=st.integers(0, 3000))
-def test_any_length_of_a_raster(good, tmp_path, length):
+def test_truncated_raster(good, tmp_path, length):
     read_or_explain(tmp_path / "r.tif", good[:length])
 
 
@@ -67,7 +67,7 @@ LINE = st.lists(st.tuples(NUMBER, NUMBER, NUMBER), min_size=0, max_size=6)
 
 @BOUNDED
 @given(lines=st.lists(LINE, min_size=0, max_size=4))
-def test_any_lines(qgis, plugin, outcome, lines):
+def test_arbitrary_lines(qgis, plugin, outcome, lines):
     layer = QgsVectorLayer("LineStringZ?crs=EPSG:32643", "lines", "memory")
     for line in lines:
         feature = QgsFeature()

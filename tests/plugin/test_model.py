@@ -1,4 +1,4 @@
-"""The model: the steps chained in QGIS's own graphical modeler."""
+"""The model: the steps chained in the model designer of QGIS."""
 
 from pathlib import Path
 
@@ -23,19 +23,19 @@ def model(plugin):
 
 
 def content(model):
-    """What a model holds, but for the format's number and the outputs' names, which newer QGIS writes otherwise."""
+    """Return the content of a model, except the format number and the output names, which differ in newer QGIS."""
     content = model.toVariant()
     content.pop("internal_version", None)
     definitions = content.pop("parameterDefinitions")
     return content, {name.split(":")[0]: {**one, "name": ""} for name, one in definitions.items()}
 
 
-def test_model_is_what_its_command_writes(model, tmp_path):
+def test_model_is_up_to_date(model, tmp_path):
     assert make_model.build().toFile(str(tmp_path / "made.model3"))
     assert content(load(tmp_path / "made.model3")) == content(model)
 
 
-def test_model_is_sound_and_takes_what_extract_rails_takes(model, algorithm):
+def test_model_is_valid_and_has_the_parameters_of_extract_rails(model, algorithm):
     valid, problems = model.validate()
     assert valid, problems
     assert all(child.algorithm() for child in model.childAlgorithms().values())
@@ -48,7 +48,7 @@ def test_model_is_sound_and_takes_what_extract_rails_takes(model, algorithm):
         assert model.parameterDefinition(name).defaultValue() == algorithm.parameterDefinition(name).defaultValue()
 
 
-def test_graphical_modeler_opens_it(model):
+def test_model_designer_opens_it(model):
     from processing.modeler.ModelerDialog import ModelerDialog
 
     dialog = ModelerDialog()

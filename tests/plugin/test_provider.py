@@ -40,7 +40,7 @@ def test_help_shows_what_gauge_and_railhead_are(qgis, plugin, name):
     text = qgis.processingRegistry().createAlgorithmById(f"railextract:{name}").shortHelpString()
     (address,) = re.findall('<img src="(.*?)">', text)
     picture = QImage(QUrl(address).toLocalFile())
-    assert 200 < picture.width() < 250  # the panel is as narrow as that
+    assert 200 < picture.width() < 250  # width of the panel
     assert {picture.pixelColor(x, 50).name() for x in range(picture.width())} >= {"#1565c0", "#e64a19"}
 
 

@@ -37,7 +37,7 @@ ACCEPTED = [
 
 
 @pytest.mark.parametrize(("source", "name"), REFUSED)
-def test_what_qt6_lacks_is_refused(source, name):
+def test_names_missing_in_qt6_are_refused(source, name):
     (finding,) = qt6.findings(source, "module.py")
     line, text = finding.split(" ", 1)
     assert line == f"module.py:{len(source.splitlines())}"
@@ -45,7 +45,7 @@ def test_what_qt6_lacks_is_refused(source, name):
 
 
 @pytest.mark.parametrize("source", ACCEPTED)
-def test_what_both_have_is_accepted(source):
+def test_names_of_both_versions_are_accepted(source):
     assert qt6.findings(source, "module.py") == []
 
 

@@ -15,15 +15,15 @@ from qgis.core import (
 from qgis.PyQt.QtCore import QEventLoop, QThread, QThreadPool
 
 ZONES = iter(range(32601, 32660))
-"""Systems that no other test has used: QGIS keeps what it once built."""
+"""Systems that no other test uses, because QGIS caches them."""
 
 SETTLING_MS = 500
-"""A thread that counts as ended has yet to take leave of PROJ."""
+"""Time for an ended thread to release its objects of PROJ, seconds."""
 
 
 @pytest.fixture
 def run_apart(qgis, plugin, context, new_feedback):
-    """Run an algorithm as the dialog does, in a thread of the pool, which then ends; gives its results."""
+    """Run an algorithm as the dialog does, in a thread of the pool, end the thread, and return the results."""
 
     def run(name, parameters):
         algorithm = qgis.processingRegistry().createAlgorithmById(f"railextract:{name}")
@@ -35,7 +35,7 @@ def run_apart(qgis, plugin, context, new_feedback):
         qgis.taskManager().addTask(task)
         loop.exec()
         for pool in (QThreadPool.globalInstance(), *own_pools()):
-            pool.waitForDone()  # ends the threads too, as Qt does after 30 s without work
+            pool.waitForDone()  # also ends the threads, as Qt does after 30 s without work
         QThread.msleep(SETTLING_MS)
         ((ok, results),) = ended
         assert ok, feedback.errors
@@ -49,7 +49,7 @@ def run_apart(qgis, plugin, context, new_feedback):
 
 
 def own_pools():
-    """Pools of threads that newer QGIS has for tasks."""
+    """Thread pools that newer QGIS uses for tasks."""
     manager = QgsApplication.taskManager()
     return [manager.threadPool()] if hasattr(manager, "threadPool") else []
 
@@ -61,7 +61,7 @@ def cloud(write_cloud, track):
 
 
 def assert_whole(layer, name):
-    """Check what QGIS writes into files, and what it now gives for the same code."""
+    """Check the system in files, and the system that QGIS now returns for the same code."""
     assert layer.crs().authid() == name
     assert "UTM zone" in layer.crs().toWkt()
     assert "UTM zone" in QgsCoordinateReferenceSystem(name).toWkt()

@@ -14,7 +14,7 @@ from rail_extract.rail_extract_plugin.reading.geotiff import read_header
 
 @pytest.fixture
 def scene(write_cloud, track):
-    """A short track, and one pass of the network: quick."""
+    """A short track and a single pass of the network, for a quick run."""
     return {"INPUT": write_cloud(track()), "ITERATIONS": 1}
 
 
@@ -83,7 +83,7 @@ def test_report_is_no_output_that_stops_the_batch_dialog(algorithm):
     assert algorithm.outputDefinition("REPORT").type() == "outputFile"
 
 
-def test_cleaned_raster_is_what_the_steps_make(run, run_step, scene, tmp_path):
+def test_cleaned_raster_equals_that_of_the_steps(run, run_step, scene, tmp_path):
     raster, cleaned, whole = (tmp_path / name for name in ("raster.tif", "cleaned.tif", "whole.tif"))
     assert run({**scene, "CLEANED": whole}).ok
     assert run_step("rasterizerailpoints", {"INPUT": scene["INPUT"], "OUTPUT": raster}).ok
@@ -97,7 +97,7 @@ def test_cleaned_raster_is_what_the_steps_make(run, run_step, scene, tmp_path):
 
 
 def places_of(path):
-    """Centres of the rail cells of a file in its coordinates, (n, 2)."""
+    """Return the centres of the rail cells of a file in its coordinates, (n, 2)."""
     dataset = gdal.Open(str(path))
     x, side, _, y, _, _ = dataset.GetGeoTransform()
     rows, columns = np.nonzero(dataset.ReadAsArray())
@@ -120,7 +120,7 @@ def test_report_and_its_figures(run, scene, tmp_path):
     assert outcome.results["BRIDGED_LENGTH"] == 0
 
 
-def test_one_rail_alone_is_no_track_and_the_report_says_so(run, write_cloud, track, outputs, tmp_path):
+def test_a_single_rail_is_not_a_track_and_the_report_says_so(run, write_cloud, track, outputs, tmp_path):
     points = track()
     more = {"QUALITY": tmp_path / "quality.gpkg", "REPORT": tmp_path / "report.html"}
     outcome = run({"INPUT": write_cloud(points[points[:, 1] < 3_000_000]), "ITERATIONS": 1, **outputs, **more})
@@ -153,7 +153,7 @@ def test_progress_advances_to_the_end(run, scene, new_feedback):
 
 
 @pytest.mark.parametrize("share", [0, 20, 50, 90])
-def test_cancelled_run_writes_nothing_and_leaves_no_points(run, scene, outputs, new_feedback, share):
+def test_cancelled_run_writes_nothing_and_deletes_temporary_points(run, scene, outputs, new_feedback, share):
     temporary, points, feedback = Path(QgsProcessingUtils.tempFolder()), [], new_feedback(cancel_at=share)
     before = set(temporary.iterdir())
     feedback.progressChanged.connect(lambda _: points.extend(temporary.glob("*/*/10_*")))
@@ -165,14 +165,14 @@ def test_cancelled_run_writes_nothing_and_leaves_no_points(run, scene, outputs, 
     assert set(temporary.iterdir()) == before
 
 
-def test_failed_run_leaves_the_old_output(run, outputs, write_cloud, track):
+def test_failed_run_keeps_the_old_output(run, outputs, write_cloud, track):
     outputs["RAILS"].write_bytes(b"old")
     outcome = run({"INPUT": write_cloud(track(), class_code=2), **outputs})
     assert not outcome.ok
     assert outputs["RAILS"].read_bytes() == b"old"
 
 
-def test_where_one_output_fails_the_others_are_whole(run, scene, outputs, tmp_path, new_feedback):
+def test_if_one_output_fails_the_others_are_complete(run, scene, outputs, tmp_path, new_feedback):
     gone, feedback = tmp_path / "gone", new_feedback()
     gone.mkdir()
     feedback.progressChanged.connect(lambda done: shutil.rmtree(gone, ignore_errors=True))
@@ -269,7 +269,7 @@ def test_cloud_without_coordinate_system_is_taken_in_metres(run, outputs, write_
     assert lines_of(outputs["RAILS"])[0].crs().description() == "Undefined Cartesian SRS"
 
 
-def test_coordinate_system_can_be_given(run, outputs, write_cloud, track):
+def test_coordinate_system_can_be_set(run, outputs, write_cloud, track):
     outcome = run({"INPUT": write_cloud(track(), epsg=None), "CRS": "EPSG:32643", "ITERATIONS": 1, **outputs})
     assert outcome.ok, outcome.error
     assert lines_of(outputs["RAILS"])[0].crs().authid() == "EPSG:32643"
@@ -289,7 +289,7 @@ def test_folder_of_tiles_is_one_cloud(run, tmp_path, write_cloud, track):
 
 
 def assert_refused(outcome, message, outputs):
-    """The run ended with one sentence, and nothing was written."""
+    """Check that the run ended with one sentence and wrote nothing."""
     assert not outcome.ok
     assert message in outcome.error
     assert "Traceback" not in outcome.error

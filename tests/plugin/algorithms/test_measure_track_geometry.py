@@ -1,4 +1,4 @@
-"""Track geometry of lines in layers: numbers, signs, units, and inputs that do not fit each other."""
+"""Track geometry of line layers: values, signs, units, and inconsistent inputs."""
 
 import numpy as np
 import pytest
@@ -11,11 +11,11 @@ CANT_MM = 60.0
 PLACE = np.array([500_000.0, 3_000_000.0, 100.0])
 
 LAST_DIGIT = 0.11
-"""Numbers that differ by less than shows may be rounded up and down."""
+"""Numbers that differ by less than the last decimal may be rounded differently."""
 
 
 def layer_of(lines, kind="LineStringZ", crs="EPSG:32643", fields="", values=()):
-    """A layer in memory of lines, (n, 3) each, with the fields and values given."""
+    """Create a memory layer of lines, (n, 3) each, with the given fields and values."""
     layer = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "lines", "memory")
     for number, line in enumerate(lines):
         feature = QgsFeature(layer.fields())
@@ -27,7 +27,7 @@ def layer_of(lines, kind="LineStringZ", crs="EPSG:32643", fields="", values=()):
 
 
 def curve(offset_m, rise_m, radius_m=RADIUS_M, length_m=60.0, unit_m=1.0):
-    """Line beside a curve to the left, further left by the offset and higher by the rise; 4 per mille uphill."""
+    """Create a line parallel to a left-hand curve, offset to the left and raised; 4 per mille uphill."""
     angle = np.linspace(0, length_m / radius_m, 121)
     r = radius_m - offset_m
     xyz = np.column_stack([r * np.sin(angle), radius_m - r * np.cos(angle), 0.004 * radius_m * angle + rise_m])
@@ -35,7 +35,7 @@ def curve(offset_m, rise_m, radius_m=RADIUS_M, length_m=60.0, unit_m=1.0):
 
 
 def curved_track(**kind):
-    """Centerline, left rail, right rail of a curve to the left, whose left rail is the lower one."""
+    """Centerline, left rail and right rail of a left-hand curve, in which the left rail is the lower one."""
     half = 0.5 * np.sqrt((SPACING_MM / 1000) ** 2 - (CANT_MM / 1000) ** 2)
     rise = CANT_MM / 2000
     return curve(0, 0, **kind), curve(half, -rise, **kind), curve(-half, rise, **kind)
@@ -43,7 +43,7 @@ def curved_track(**kind):
 
 @pytest.fixture
 def measure(qgis, run_step, context):
-    """Measure tracks, and give the outcome and the values of the points by field."""
+    """Measure tracks, and return the outcome and the values of the points by field."""
 
     def run(centerlines, rails, feedback=None, **parameters):
         given = {"INPUT": centerlines, "RAILS": rails, "OUTPUT": "memory:", **parameters}
@@ -60,7 +60,7 @@ def measure(qgis, run_step, context):
     return run
 
 
-def test_points_have_the_fields_of_the_interface_and_the_numbers_of_the_track(measure):
+def test_points_have_the_fields_of_the_interface_and_the_values_of_the_track(measure):
     middle, left, right = curved_track()
     results, layer, values = measure(layer_of([middle]), layer_of([left, right]))
     assert " ".join(values) == (
@@ -128,7 +128,7 @@ def test_lines_without_heights_have_gauge_and_radius_only(measure):
         assert np.isnan(values[name]).all()
 
 
-def test_without_a_cloud_support_is_that_of_the_rails_fields(measure):
+def test_without_a_cloud_support_comes_from_the_fields_of_the_rails(measure):
     middle, left, right = curved_track()
     fields = "&field=rail_id:integer&field=class_code:integer&field=points:integer&field=sigma_mm:double"
     rails = layer_of([left, right], fields=fields, values=[(4, 10, 600, 3.0), (9, 10, 1200, 4.0)])
@@ -141,7 +141,7 @@ def test_without_a_cloud_support_is_that_of_the_rails_fields(measure):
     np.testing.assert_allclose(values["points"][1:-1], 30, atol=1)
 
 
-def test_rails_that_end_early_leave_the_rest_bridged(measure):
+def test_beyond_the_end_of_a_rail_the_track_is_bridged(measure):
     middle, left, right = curved_track()
     results, _, values = measure(layer_of([middle]), layer_of([left, right[:61]]))
     half_way = values["chainage_m"] < 30
@@ -150,7 +150,7 @@ def test_rails_that_end_early_leave_the_rest_bridged(measure):
     assert results["BRIDGED_LENGTH"] == pytest.approx(29, abs=1)
 
 
-def test_layers_and_cloud_give_the_numbers_of_extract_rails(run, measure, write_cloud, track, tmp_path):
+def test_layers_and_cloud_give_the_values_of_extract_rails(run, measure, write_cloud, track, tmp_path):
     cloud = write_cloud(track())
     paths = {name: tmp_path / f"{name}.gpkg" for name in ("RAILS", "CENTERLINES", "QUALITY")}
     outcome = run({"INPUT": cloud, "ITERATIONS": 1, "STEP": 0.5, **paths})
@@ -166,7 +166,7 @@ def test_layers_and_cloud_give_the_numbers_of_extract_rails(run, measure, write_
 
 
 def test_a_cloud_is_measured_square_by_square(run, measure, write_cloud, track, tmp_path, monkeypatch):
-    """In squares of four metres the numbers are those of the whole."""
+    """Squares of four metres give the same values as a single square."""
     cloud = write_cloud(track())
     paths = {name: tmp_path / f"{name}.gpkg" for name in ("RAILS", "CENTERLINES")}
     assert run({"INPUT": cloud, "ITERATIONS": 1, **paths}).ok
@@ -179,7 +179,7 @@ def test_a_cloud_is_measured_square_by_square(run, measure, write_cloud, track, 
         np.testing.assert_allclose(parts[name], values, rtol=1e-4, atol=off, err_msg=name)
 
 
-def test_another_head_width_than_before_is_warned_of(measure, new_feedback):
+def test_a_different_head_width_gives_a_warning(measure, new_feedback):
     middle, left, right = curved_track()
     lines = layer_of([middle], fields="&field=gauge_mm:double", values=[(1435.0,)])
     feedback = new_feedback()
@@ -188,7 +188,7 @@ def test_another_head_width_than_before_is_warned_of(measure, new_feedback):
     assert "check HEAD_WIDTH" in feedback.warnings[0]
 
 
-def test_a_line_away_from_rails_is_warned_of(measure, new_feedback):
+def test_a_line_without_rails_gives_a_warning(measure, new_feedback):
     middle, left, right = curved_track()
     feedback = new_feedback()
     _, _, values = measure(layer_of([middle, middle + [0, 50, 0]]), layer_of([left, right]), feedback)
@@ -217,7 +217,7 @@ def test_bad_parameter_is_one_sentence(qgis, run_step, parameters, sentence):
     assert_refused(run_step("measuretrackgeometry", given), sentence)
 
 
-def test_inputs_that_do_not_fit_each_other_are_refused(qgis, run_step, write_cloud):
+def test_inconsistent_inputs_are_refused(qgis, run_step, write_cloud):
     middle, left, right = curved_track()
     lines, rails = layer_of([middle]), layer_of([left, right])
     degrees = layer_of([[[75, 27, 0], [75.1, 27, 0]]], crs="EPSG:4326")
@@ -259,7 +259,7 @@ def test_output_may_be_skipped(qgis, run_step):
 
 
 def assert_refused(outcome, sentence):
-    """The run ended with one sentence."""
+    """Check that the run ended with one sentence."""
     assert not outcome.ok
     assert sentence in outcome.error
     assert "Traceback" not in outcome.error

@@ -1,4 +1,4 @@
-"""The four steps, alone and chained by hand."""
+"""The four steps, individually and chained."""
 
 import json
 from dataclasses import replace
@@ -14,7 +14,7 @@ from rail_extract.rail_extract_plugin.paths import STYLES
 from rail_extract.rail_extract_plugin.reading.geotiff import read_header, read_rasters
 
 LAST_DIGIT = 0.11
-"""Numbers that differ by less than shows may be rounded up and down."""
+"""Numbers that differ by less than the last decimal may be rounded differently."""
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def cloud(write_cloud, track):
 
 @pytest.fixture
 def chain(run_step, tmp_path):
-    """Run the steps one after the other, and give the paths of what they wrote."""
+    """Run the steps one after the other, and return the paths of their outputs."""
 
     def run(cloud, standard=None, folder=tmp_path):
         standard = standard or {}
@@ -42,7 +42,7 @@ def chain(run_step, tmp_path):
     return run
 
 
-def test_chained_by_hand_the_steps_give_the_lines_of_extract_rails(chain, run, cloud, tmp_path):
+def test_chained_steps_give_the_lines_of_extract_rails(chain, run, cloud, tmp_path):
     whole = {"RAILS": tmp_path / "rails.gpkg", "CENTERLINES": tmp_path / "tracks.gpkg"}
     assert run({"INPUT": cloud, "ITERATIONS": 1, **whole}).ok
     _, _, rails, tracks = chain(cloud)
@@ -81,11 +81,11 @@ INTERFACE = {
         },
     ),
 }
-"""Parameters with their defaults, and outputs: the interface, which other people's scripts depend on."""
+"""Parameters with their defaults, and outputs: the interface on which users' scripts depend."""
 
 
 @pytest.mark.parametrize("name", INTERFACE)
-def test_parameters_and_outputs_are_those_of_the_interface(qgis, plugin, name):
+def test_parameters_and_outputs_match_the_interface(qgis, plugin, name):
     algorithm = qgis.processingRegistry().createAlgorithmById(f"railextract:{name}")
     parameters, outputs = INTERFACE[name]
     found = [(one.name(), one.defaultValue()) for one in algorithm.parameterDefinitions()]
@@ -95,7 +95,7 @@ def test_parameters_and_outputs_are_those_of_the_interface(qgis, plugin, name):
 
 @pytest.fixture
 def raster(run_step, cloud, tmp_path):
-    """The raster of a dense short track, fit to be vectorized as it is."""
+    """The raster of a short track with dense points, which can be vectorized without the network."""
     outcome = run_step("rasterizerailpoints", {"INPUT": cloud, "OUTPUT": tmp_path / "raster.tif"})
     assert outcome.ok, outcome.error
     return tmp_path / "raster.tif"
@@ -106,7 +106,7 @@ def test_rasterize_alone(raster, track):
     assert (header.class_codes, header.cell_m) == ((10,), pytest.approx(cell_size(1.435, 0.072)))
     (found,) = read_rasters(raster, header)
     cells = np.floor((track()[:, :2] - header.frame.origin[:2]) / header.cell_m)
-    # Coordinates in the file are rounded to millimetres, so that a point may change its cell.
+    # Coordinates in the file are rounded to millimetres, so a point may move to the next cell.
     assert found.count() == pytest.approx(len(np.unique(cells, axis=0)), rel=0.02)
     layer = QgsRasterLayer(str(raster), "raster")
     assert layer.crs().authid() == "EPSG:32643"
@@ -126,7 +126,7 @@ def test_one_algorithm_serves_a_batch_over_a_folder(qgis, plugin, outcome, write
     assert counts[2] / counts[0] == pytest.approx(3, rel=0.1)
 
 
-def test_rasterize_makes_a_band_a_class(run_step, write_cloud, track, tmp_path):
+def test_rasterize_makes_one_band_per_class(run_step, write_cloud, track, tmp_path):
     for code in (11, 10):
         write_cloud(track() + [0, 0.2 * code, 0], f"{code}.las", class_code=code)
     outcome = run_step(
@@ -167,7 +167,7 @@ def test_vectorize_without_points_gives_flat_lines_with_a_warning(run_step, rast
 
 
 @pytest.mark.parametrize(("epsg", "unit_m", "south_m"), [(32643, 1.0, 0.0), (2263, 1200 / 3937, 2_940_000.0)])
-def test_vectorize_with_points_is_on_the_heads_in_every_unit(
+def test_vectorize_with_points_follows_the_railheads_in_every_unit(
     run_step, write_cloud, track, tmp_path, epsg, unit_m, south_m
 ):
     points = track() - [0.0, south_m, 0.0]
@@ -183,7 +183,7 @@ def test_vectorize_with_points_is_on_the_heads_in_every_unit(
     assert all(items["class_code"] == 10 and items["points"] > 1000 for _, items in read_features(rails))
 
 
-def test_raster_made_elsewhere_asks_for_its_rails(run_step, raster, cloud, tmp_path):
+def test_raster_from_other_software_needs_gauge_and_head_width(run_step, raster, cloud, tmp_path):
     other = tmp_path / "other.tif"
     gdal.Translate(
         str(other),
@@ -219,7 +219,7 @@ def test_bad_input_is_one_sentence(run_step, raster, tmp_path, name, parameters,
     assert not (tmp_path / f"output.{suffix}").exists()
 
 
-def test_points_that_do_not_belong_to_the_raster_are_refused(run_step, raster, write_cloud, track, tmp_path):
+def test_points_of_another_area_are_refused(run_step, raster, write_cloud, track, tmp_path):
     for points, given, sentence in (
         (track(), {"epsg": 32644}, "POINTS are in WGS 84 / UTM zone 44N but the raster in WGS 84 / UTM zone 43N"),
         (track() + [5000, 0, 0], {}, "POINTS have no point of class 10 in the area of the raster"),

@@ -1,4 +1,4 @@
-"""What a user sees before a run: names, icons, fields, the help beside them, and what is refused."""
+"""The dialogs before a run: labels, icons, fields, help, and refused values."""
 
 import re
 from pathlib import Path
@@ -53,7 +53,7 @@ def test_dialog_shows_every_parameter_at_its_default(open_dialog, name):
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("name", NAMES)
-def test_nothing_is_cut_at_the_side(qgis, open_dialog, name, size):
+def test_nothing_is_cut_off_at_the_side(qgis, open_dialog, name, size):
     dialog = open_dialog(name)
     dialog.resize(*SIZES[size])
     splitter = dialog.findChild(QSplitter)
@@ -63,7 +63,7 @@ def test_nothing_is_cut_at_the_side(qgis, open_dialog, name, size):
     assert [area.horizontalScrollBar().maximum() for area in areas] == [0] * len(areas)
 
 
-def test_arrows_of_fields_go_in_steps_that_fit_the_range(open_dialog):
+def test_arrow_steps_of_fields_suit_the_range(open_dialog):
     wrappers = open_dialog("extractrails").mainWidget().wrappers
     for name, largest in {"TOLERANCE_XY": 0.1, "TOLERANCE_Z": 0.1, "CENTERLINE_TOLERANCE": 0.1, "MAX_GAP": 1}.items():
         assert 0 < wrappers[name].wrappedWidget().singleStep() <= largest
@@ -93,7 +93,7 @@ def test_panel_shows_its_picture(open_dialog):
     assert {"#1565c0", "#e64a19", "#b0bec5"} <= colours
 
 
-def test_every_algorithm_has_an_icon_of_its_own(make):
+def test_every_algorithm_has_its_own_icon(make):
     drawn = [make(name).icon().pixmap(SMALLEST_ICON).toImage() for name in NAMES]
     assert {(image.width(), image.height()) for image in drawn} == {(SMALLEST_ICON, SMALLEST_ICON)}
     assert all(first != second for i, first in enumerate(drawn) for second in drawn[:i])
@@ -145,13 +145,13 @@ def test_dialog_refuses_contradictions(open_dialog, context, write_cloud, track,
     assert message in said
 
 
-def test_dialog_calls_parameters_by_their_labels(make):
+def test_messages_in_dialogs_use_labels(make):
     algorithm = make("extractrails")
     definitions = algorithm.parameterDefinitions()
     said = "The standard CUSTOM needs both: fill in GAUGE and HEAD_WIDTH, not MAX_GAPS or OUTPUT/CRS.gpkg."
     shown = said.replace("GAUGE", '"Gauge [mm]"').replace("HEAD_WIDTH", '"Railhead width [mm]"')
     assert with_labels(said, definitions) == shown
-    assert for_user(said, definitions) == said  # what runs here has no windows of QGIS
+    assert for_user(said, definitions) == said  # no QGIS with windows runs here
 
 
 def test_dialog_refuses_a_cloud_in_degrees(open_dialog, context, write_cloud, track):
@@ -164,7 +164,7 @@ def test_dialog_refuses_a_cloud_in_degrees(open_dialog, context, write_cloud, tr
     assert "is in degrees (WGS 84)" in said
 
 
-def test_dialog_accepts_what_is_right(open_dialog, context, write_cloud, track):
+def test_dialog_accepts_valid_values(open_dialog, context, write_cloud, track):
     dialog = open_dialog("extractrails")
     dialog.mainWidget().setParameters({"INPUT": str(write_cloud(track())), "OTHER_GAUGES": "1000"})
     parameters = dialog.mainWidget().createProcessingParameters()

@@ -1,4 +1,4 @@
-"""The guide beside the real algorithms: each parameter is explained, and no command uses one that is not there."""
+"""The guide and the algorithms: every parameter is explained, and commands use only existing parameters."""
 
 import re
 from pathlib import Path
@@ -32,5 +32,5 @@ def test_commands_name_algorithms_and_parameters_that_exist(plugin):
         assert not set(re.findall(r"\b([A-Z_]+)=", words)) - known, name
 
 
-def test_reference_is_what_its_command_writes(plugin):
+def test_reference_is_up_to_date(plugin):
     assert reference.page(plugin.provider) == reference.PAGE.read_text(encoding="utf-8")

@@ -35,7 +35,7 @@ PARAMETERS = [
     ("CLEANED", "rasterDestination", None),
     ("REPORT", "fileDestination", None),
 ]
-"""The interface, which other people's scripts depend on."""
+"""The interface on which users' scripts depend."""
 
 OUTPUTS = {
     "RAILS": "outputVector",
@@ -66,12 +66,12 @@ def having(algorithm, flag):
     return {definition.name() for definition in algorithm.parameterDefinitions() if definition.flags() & flag}
 
 
-def test_parameters_are_those_of_the_interface(algorithm):
+def test_parameters_match_the_interface(algorithm):
     found = [(one.name(), one.type(), one.defaultValue()) for one in algorithm.parameterDefinitions()]
     assert found == PARAMETERS
 
 
-def test_outputs_are_those_of_the_interface(algorithm):
+def test_outputs_match_the_interface(algorithm):
     assert {output.name(): output.type() for output in algorithm.outputDefinitions()} == OUTPUTS
 
 
@@ -130,7 +130,7 @@ def test_gauges_refuses(text):
         gauges_m(text, "OTHER_GAUGES")
 
 
-def test_the_defaults_are_those_of_the_core(plugin):
+def test_defaults_match_the_core(plugin):
     seen = set()
     for algorithm in plugin.provider.algorithms():
         for definition in algorithm.parameterDefinitions():

@@ -13,7 +13,7 @@ def path(write_cloud, track):
 
 @pytest.fixture
 def layer(path):
-    """A layer as QGIS holds it; this QGIS may have no PDAL to open it with, which a plugin can't change."""
+    """A point cloud layer of QGIS; it may be invalid here, because this QGIS may lack PDAL."""
     layer = QgsPointCloudLayer(str(path), "my cloud", "pdal")
     layer.setCrs(QgsCoordinateReferenceSystem("EPSG:32643"))
     return layer
@@ -31,7 +31,7 @@ def test_property_of_a_batch(path, context):
     assert cloud_source(QgsProperty.fromValue(str(path)), context).paths == (path,)
 
 
-def test_layer_brings_its_coordinate_system(path, layer, context):
+def test_layer_has_its_coordinate_system(path, layer, context):
     source = cloud_source(layer, context)
     assert source.paths == (path,)
     assert "UTM zone 43N" in source.crs_wkt
@@ -56,7 +56,7 @@ def test_virtual_point_cloud_of_a_missing_tile_is_refused_at_once(tmp_path, cont
 
 
 @pytest.mark.parametrize("value", [None, ""])
-def test_nothing_given(context, value):
+def test_missing_value(context, value):
     with pytest.raises(CloudError, match="No point cloud was given"):
         cloud_source(value, context)
 

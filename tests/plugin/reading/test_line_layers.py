@@ -1,4 +1,4 @@
-"""Lines that users have: drawn by hand, curved, in parts, without heights, in feet, in degrees."""
+"""Line layers of users: drawn by hand, curved, multi-part, without heights, in feet, in degrees."""
 
 import math
 
@@ -10,12 +10,12 @@ from rail_extract.rail_extract_plugin.reading.line_layers import read_rails
 
 LEFT = "LINESTRING Z (500000 3000001.507 100, 500020 3000001.507 100)"
 RIGHT = "LINESTRING Z (500020 3000000 100.02, 500000 3000000 100.02)"
-"""A track of 1435 mm with heads of 72 mm; the right rail runs against the left, 20 mm higher."""
+"""A track of 1435 mm gauge with railheads of 72 mm; the right rail has the opposite direction and is 20 mm higher."""
 
 
 @pytest.fixture
 def layer(qgis):
-    """A layer in memory with a line for each WKT text, and the fields and values given."""
+    """Create a memory layer with a line for each WKT text and the given fields and values."""
 
     def make(*texts, kind="LineStringZ", crs="EPSG:32643", fields="", values=()):
         layer = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "lines", "memory")
@@ -31,7 +31,7 @@ def layer(qgis):
 
 
 class Source:
-    """A layer as an algorithm sees it."""
+    """A layer in the form in which algorithms get it."""
 
     def __init__(self, layer):
         self._layer = layer
@@ -50,7 +50,7 @@ def rails_of(layer):
     return read_rails(Source(layer))
 
 
-def test_lines_keep_their_places(layer):
+def test_lines_keep_their_coordinates(layer):
     rails, frame = rails_of(layer(LEFT, RIGHT))
     assert [(rail.rail_id, rail.class_code, rail.points) for rail in rails] == [(1, 0, 0), (2, 0, 0)]
     np.testing.assert_allclose(
@@ -59,7 +59,7 @@ def test_lines_keep_their_places(layer):
     assert np.abs(rails[0].xyz).max() < 200
 
 
-def test_fields_are_used_where_they_are_there(layer):
+def test_existing_fields_are_used(layer):
     fields = "&field=rail_id:integer&field=class_code:integer&field=bridged_m:double&field=points:string(5)"
     rails, _ = rails_of(layer(LEFT, RIGHT, fields=fields, values=[(7, 11, 1.5, "many"), (None, None, None, None)]))
     assert [(rail.rail_id, rail.class_code, rail.bridged_m, rail.points) for rail in rails] == [
@@ -68,7 +68,7 @@ def test_fields_are_used_where_they_are_there(layer):
     ]
 
 
-def test_every_part_is_a_rail_with_the_number_of_its_feature(layer):
+def test_every_part_is_a_rail_with_the_id_of_its_feature(layer):
     parts = "MULTILINESTRING Z ((500000 3000000 1, 500010 3000000 1), (500012 3000000 1, 500020 3000000 1))"
     rails, _ = rails_of(layer(parts, LEFT, kind="MultiLineStringZ"))
     assert [(rail.rail_id, round(rail.length_m)) for rail in rails] == [(1, 10), (1, 8), (2, 20)]
@@ -98,7 +98,7 @@ def test_feet_become_metres(layer):
     assert rail.length_m == pytest.approx(100 * 1200 / 3937)
 
 
-def test_points_and_empty_parts_are_passed_over(layer):
+def test_lines_of_zero_length_and_empty_parts_are_skipped(layer):
     still = "LINESTRING Z (500000 3000000 1, 500000 3000000 1)"
     repeated = "LINESTRING Z (500000 3000000 1, 500000 3000000 1, 500010 3000000 1)"
     rails, _ = rails_of(layer(still, "LINESTRING Z EMPTY", repeated))

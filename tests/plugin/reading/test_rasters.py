@@ -1,4 +1,4 @@
-"""Rail rasters in files: what comes back, what is touched, and what is refused."""
+"""Files of rail rasters: contents, sparse access, and invalid files."""
 
 from dataclasses import replace
 
@@ -28,12 +28,12 @@ def frame_in(code, unit_m=1.0):
 
 
 def strokes(count=200, reach_m=30.0, seed=0):
-    """Points scattered around the local origin, (n, 2)."""
+    """Random points around the local origin, (n, 2)."""
     return np.random.default_rng(seed).uniform(-reach_m, reach_m, (count, 2))
 
 
 def places(raster, frame):
-    """Cell centres in CRS units, sorted."""
+    """Return the cell centres in CRS units, sorted."""
     xy = raster.to_local(raster.cells())
     crs = frame.to_crs(np.column_stack([xy, np.zeros(len(xy))]))[:, :2]
     return crs[np.lexsort(crs.round(4).T)]
@@ -42,7 +42,7 @@ def places(raster, frame):
 @pytest.mark.parametrize(
     ("code", "unit_m"), [(None, 1.0), ("EPSG:32643", 1.0), ("EPSG:2227", 1200 / 3937), ("EPSG:2227+6360", 1200 / 3937)]
 )
-def test_cells_come_back_where_they_were(tmp_path, code, unit_m):
+def test_cells_keep_their_position(tmp_path, code, unit_m):
     frame, path = frame_in(code, unit_m), tmp_path / "räster 1.tif"
     rasters = [rasterize(strokes(seed=seed), CELL_M) for seed in (1, 2)]
     extent = (500_000.1, 3_000_100.0, 500_200.123456789, 3_000_300.0)
@@ -57,14 +57,14 @@ def test_cells_come_back_where_they_were(tmp_path, code, unit_m):
     for before, after in zip(rasters, read_rasters(path, found)):
         np.testing.assert_allclose(places(after, found.frame), places(before, frame), atol=1e-8)
         back = moved(after, found.frame, frame)
-        # The same cells, counted from a corner whole tiles away: windows of the network fall on the same places.
+        # The same cells, counted from a corner whole tiles away, so the windows of the network are the same.
         assert ((before.cells() - after.cells()) % TILE == 0).all()
         np.testing.assert_allclose(
             np.sort(back.to_local(back.cells()), axis=0), np.sort(before.to_local(before.cells()), axis=0), atol=1e-7
         )
 
 
-def test_file_is_a_plain_geotiff_with_a_band_a_class(tmp_path):
+def test_file_is_a_plain_geotiff_with_one_band_per_class(tmp_path):
     rasters = [rasterize(strokes(seed=seed), CELL_M) for seed in (1, 2)]
     write_rasters(tmp_path / "r.tif", header_for(rasters, (10, 11), frame_in("EPSG:32643"), STANDARD), rasters)
     dataset = gdal.Open(str(tmp_path / "r.tif"))
@@ -79,7 +79,7 @@ def test_file_is_a_plain_geotiff_with_a_band_a_class(tmp_path):
 
 @pytest.fixture
 def corridor(tmp_path):
-    """A diagonal of 10 km: its bounding box has 31 gigapixels."""
+    """A diagonal of 10 km, with a bounding box of 31 gigapixels."""
     along = np.arange(0, 10_000, 0.02)
     raster = rasterize(np.column_stack([along, along]) / np.sqrt(2), CELL_M)
     path = tmp_path / "corridor.tif"
@@ -87,7 +87,7 @@ def corridor(tmp_path):
     return raster, path
 
 
-def test_bounds_are_those_of_the_file_where_all_points_were_taken(tmp_path):
+def test_without_an_extent_the_bounds_are_those_of_the_file(tmp_path):
     raster = rasterize(strokes(), CELL_M)
     header = header_for([raster], (10,), frame_in("EPSG:2227", 1200 / 3937), STANDARD)
     write_rasters(tmp_path / "r.tif", header, [raster])
@@ -98,7 +98,7 @@ def test_bounds_are_those_of_the_file_where_all_points_were_taken(tmp_path):
         np.testing.assert_allclose(bounds, expected, atol=1e-6)
 
 
-def test_corridor_takes_no_room_and_no_time_for_what_is_empty(corridor):
+def test_empty_areas_of_a_corridor_take_no_space_and_no_time(corridor):
     raster, path = corridor
     header = read_header(path)
     assert header.window[2] * header.window[3] > 31e9
@@ -110,8 +110,8 @@ def test_corridor_takes_no_room_and_no_time_for_what_is_empty(corridor):
     assert len(found.tiles) == len(raster.tiles)
 
 
-def test_sparse_file_is_cleaned_and_vectorized_by_its_cells_alone(tmp_path):
-    """Ten metres of rail at both ends of the 10 km."""
+def test_only_rail_cells_of_a_sparse_file_are_cleaned_and_vectorized(tmp_path):
+    """Ten metres of rail at each end of 10 km."""
     along = np.arange(0, 10, 0.02)
     xy = np.concatenate([np.column_stack([along, along / 3]), np.column_stack([7000 + along, 7000 + along / 3])])
     raster, path = rasterize(xy, CELL_M), tmp_path / "ends.tif"
@@ -135,7 +135,7 @@ def test_sparse_file_is_cleaned_and_vectorized_by_its_cells_alone(tmp_path):
     assert [round(line) for line in network.lengths()] == [11, 11]
 
 
-def test_points_a_world_apart_make_no_file():
+def test_points_too_far_apart_for_a_file_are_refused():
     raster = rasterize(np.array([[0.0, 0.0], [1e6, 1e6]]), CELL_M)
     with pytest.raises(RasterError, match="spread over 1000 by 1000 km"):
         header_for([raster], (10,), frame_in("EPSG:32643"), STANDARD)
@@ -143,7 +143,7 @@ def test_points_a_world_apart_make_no_file():
 
 @pytest.fixture
 def geotiff(tmp_path):
-    """Write a raster as other programs might."""
+    """Write a raster as other programs may do."""
 
     def write(bands=1, transform=(0, 0.04, 0, 0, 0, -0.04), epsg=32643, tags=None, descriptions=(), nodata=None):
         path = tmp_path / "other.tif"
@@ -165,7 +165,7 @@ def geotiff(tmp_path):
 
 
 @pytest.mark.parametrize("nodata", [None, 0, 255])
-def test_raster_made_elsewhere(geotiff, nodata):
+def test_raster_from_other_software(geotiff, nodata):
     path = geotiff(nodata=nodata)
     header = read_header(path)
     assert (header.class_codes, header.gauge_m, header.model) == ((10,), None, None)
@@ -184,12 +184,12 @@ def test_raster_made_elsewhere(geotiff, nodata):
         ({"tags": {"RAIL_GAUGE_MM": "wide"}}, RasterError, "RAIL_GAUGE_MM of the raster can't be 'wide'"),
     ],
 )
-def test_unfit_raster_is_refused(geotiff, made, error, sentence):
+def test_unsuitable_raster_is_refused(geotiff, made, error, sentence):
     with pytest.raises(error, match=sentence):
         read_header(geotiff(**made))
 
 
-def test_no_raster_is_refused(tmp_path):
+def test_other_files_are_refused(tmp_path):
     (tmp_path / "text.tif").write_text("no raster")
     with pytest.raises(RasterError, match="is not a readable raster"):
         read_header(tmp_path / "text.tif")
@@ -204,7 +204,7 @@ def test_empty_raster_is_refused(geotiff):
         read_rasters(path, read_header(path))
 
 
-def test_standard_comes_from_the_user_else_from_the_tags(geotiff):
+def test_standard_comes_from_the_user_or_from_the_tags(geotiff):
     untold = read_header(geotiff())
     with pytest.raises(ParameterError, match="fill in GAUGE and HEAD_WIDTH"):
         untold.standard(None, None)
@@ -256,8 +256,8 @@ def test_limit_counts_blocks(monkeypatch):
         header_for([raster], (10,), frame_in("EPSG:32643"), STANDARD)
 
 
-def test_rasters_of_stretches_come_onto_one_grid():
-    """Two rasters that begin tiles apart, as those of classes with other stretches do."""
+def test_rasters_of_two_classes_get_one_grid():
+    """Two rasters whose origins differ by whole tiles, as those of two classes may."""
     side_m = TILE * CELL_M
     frame = frame_in("EPSG:32643")
     first = replace(rasterize(strokes(), CELL_M), x0=3 * side_m, y0=-2 * side_m)

@@ -48,7 +48,7 @@ os._exit(0 if sys.stdout.flush() is None else 1)
 
 @pytest.fixture
 def reasons_without(tmp_path):
-    """What each algorithm lacks in a QGIS whose Python has no such packages, by the algorithm's name."""
+    """Message of each algorithm about missing packages, by name, in a QGIS without some packages."""
 
     def run(*absent: str) -> dict[str, str]:
         words = [sys.executable, "-c", QGIS_WITHOUT, *absent]
@@ -78,14 +78,14 @@ def test_missing_package_is_named_with_its_remedy(algorithm, without_laspy):
     assert reason.endswith("Build track centerlines and Clean rail raster (FRPDF) work without it.")
 
 
-def test_missing_package_ends_a_run_before_it_begins(algorithm, context, new_feedback, without_laspy, tmp_path):
+def test_missing_package_stops_a_run_at_its_start(algorithm, context, new_feedback, without_laspy, tmp_path):
     feedback = new_feedback()
     results, ok = algorithm.run({"INPUT": str(tmp_path)}, context, feedback)
     assert not ok
     assert feedback.errors[0].startswith("Extract rails needs the Python package laspy")
 
 
-def test_two_packages_make_a_plural():
+def test_wording_depends_on_the_number_of_packages_and_algorithms():
     reason = explain_missing("This", PACKAGES[-2:], ["One", "Two", "Three"])
     assert "needs the Python packages pyproj, torch, which" in reason
     assert reason.endswith(" One, Two and Three work without them.")
@@ -97,18 +97,18 @@ def test_two_packages_make_a_plural():
     ("absent", "missing"),
     [({"cv2", "laspy"}, ["laspy"]), ({"torch"}, []), ({"torch", "cv2"}, ["cv2"]), ({"scipy"}, [])],
 )
-def test_a_need_is_met_by_any_of_its_modules(monkeypatch, absent, missing):
+def test_one_module_of_a_need_is_enough(monkeypatch, absent, missing):
     monkeypatch.setattr(dependencies, "find_spec", lambda name: None if name in absent else name)
     assert [package.module for package in missing_packages((("laspy",), ("cv2", "torch")))] == missing
 
 
-def test_requirements_file_lists_the_same():
+def test_requirements_file_lists_the_same_packages():
     lines = (ROOT / "requirements.txt").read_text().splitlines()
     listed = {line for line in lines if line and not line.startswith("#")}
     assert listed == {package.requirement for package in PACKAGES} - set(dependencies.OWNED_BY_QGIS)
 
 
-def test_pins_are_what_qgis_has():
+def test_pins_are_the_versions_of_qgis():
     assert pins() == [f"numpy=={numpy.__version__}", f"scipy=={scipy.__version__}"]
 
 
@@ -120,7 +120,7 @@ def test_toolbox_loads_without_any_package(reasons_without):
     assert "numpy, scipy, laspy, lazrs, cv2, pyproj" in reasons["extractrails"]
 
 
-def test_toolbox_says_what_works_without_laspy(reasons_without):
+def test_message_lists_algorithms_that_work_without_laspy(reasons_without):
     reasons = reasons_without("laspy", "lazrs")
     assert "Python packages laspy, lazrs, which" in reasons["extractrails"]
     assert "Clean rail raster (FRPDF)" in reasons["extractrails"]

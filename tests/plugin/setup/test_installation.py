@@ -1,4 +1,4 @@
-"""Real pip, with wheels from a folder in place of the network."""
+"""The real pip, with wheels from a folder instead of the network."""
 
 import sys
 import zipfile
@@ -16,7 +16,7 @@ from rail_extract.rail_extract_plugin.setup.interpreter import Interpreter, find
 
 @pytest.fixture
 def add_wheel(monkeypatch, tmp_path):
-    """Put a package of one module into the folder that pip alone looks in."""
+    """Add a package with one module to the only folder in which pip looks."""
     index = tmp_path / "index"
     index.mkdir()
     for name in ("PIP_FIND_LINKS", "PIP_EXTRA_INDEX_URL", "PIP_CONFIG_FILE"):
@@ -44,7 +44,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def put(folder):
-    """Install one package by its name, which is its module's as well."""
+    """Install a package by its name, which is also the name of its module."""
 
     def put(name: str, progress: Progress = SILENT) -> str:
         return install(Order((name,), (name,)), find_interpreter(), folder, [folder], progress)
@@ -56,7 +56,7 @@ def names_in(folder: Path) -> set[str]:
     return {entry.name for entry in folder.iterdir()} - {"__pycache__"}
 
 
-def test_package_and_what_it_needs_go_into_the_folder(put, add_wheel, folder):
+def test_package_and_its_dependencies_go_into_the_folder(put, add_wheel, folder):
     add_wheel("railfirst", requires=("railsecond", "numpy"))
     add_wheel("railsecond", "2.1")
     assert sorted(put("railfirst").split(", ")) == ["railfirst 1.0", "railsecond 2.1"]
@@ -65,21 +65,21 @@ def test_package_and_what_it_needs_go_into_the_folder(put, add_wheel, folder):
     assert list(folder.parent.iterdir()) == [folder]
 
 
-def test_what_is_there_is_not_installed_again(put, add_wheel):
+def test_installed_packages_are_not_installed_again(put, add_wheel):
     add_wheel("railfirst", requires=("railsecond",))
     add_wheel("railsecond")
     assert put("railsecond") == "railsecond 1.0"
     assert put("railfirst") == "railfirst 1.0"
 
 
-def test_numpy_of_qgis_decides_which_version_is_taken(put, add_wheel):
+def test_numpy_of_qgis_determines_the_version(put, add_wheel):
     add_wheel("railfirst", "2.0", requires=("numpy>=99",))
     add_wheel("railfirst", "1.0", requires=("numpy>=1",))
     assert put("railfirst") == "railfirst 1.0"
     assert put("railfirst") == ""
 
 
-def test_other_packages_of_qgis_stay(put, add_wheel, folder):
+def test_other_packages_of_qgis_are_kept(put, add_wheel, folder):
     class Listener(Progress):
         def warning(self, text):
             warnings.append(text)
@@ -130,7 +130,7 @@ def test_cancel_changes_nothing(put, add_wheel, folder):
     assert not list(folder.parent.iterdir())
 
 
-def test_folder_that_cannot_be_made(put, folder):
+def test_folder_that_cannot_be_created(put, folder):
     folder.parent.write_text("a file")
     with pytest.raises(RailExtractError, match="can't be written"):
         put("railfirst")
@@ -141,7 +141,7 @@ def test_python_without_pip(folder):
         install(Order(("one",), ("one",)), Interpreter("/bin/false"), folder, [], SILENT)
 
 
-def test_old_pip_asks_for_a_newer_one(add_wheel, folder, tmp_path):
+def test_old_pip_installs_a_newer_one(add_wheel, folder, tmp_path):
     program = tmp_path / "python"
     script = f'if test "$3" = --version; then echo "pip 21.1 from x"; else exec {sys.executable} "$@"; fi'
     program.write_text(f"#!/bin/sh\n{script}\n")
@@ -151,7 +151,7 @@ def test_old_pip_asks_for_a_newer_one(add_wheel, folder, tmp_path):
         install(Order(("railfirst",), ("railfirst",)), Interpreter(str(program)), folder, [], SILENT)
 
 
-def test_what_is_kept_is_told_where_pytorch_fails(add_wheel, folder, monkeypatch):
+def test_failure_of_pytorch_lists_what_was_installed_before(add_wheel, folder, monkeypatch):
     add_wheel("railone")
     monkeypatch.setattr(package_folders, "own_folder", lambda: folder)
     monkeypatch.setitem(install_packages.BUILDS, ("CPU", sys.platform), ("--no-such-option",))

@@ -12,7 +12,7 @@ VERSION = "python{}.{}".format(*sys.version_info)
 
 @pytest.fixture
 def fake_qgis(monkeypatch, tmp_path):
-    """Another prefix, with programs that answer what they are told."""
+    """Another prefix, with programs that print a given answer."""
     monkeypatch.setattr(sys, "prefix", str(tmp_path))
     monkeypatch.setattr(sys, "executable", str(tmp_path / "MacOS" / "QGIS"))
 
@@ -36,7 +36,7 @@ def fake_qgis(monkeypatch, tmp_path):
         ("C:/O/bin/qgis-bin.exe", "C:/O/apps/Python312", "win32", "C:/O/bin/python3.exe"),
     ],
 )
-def test_places_on_each_system(executable, prefix, platform, expected):
+def test_candidates_on_each_system(executable, prefix, platform, expected):
     places = list(candidates(Path(executable), Path(prefix), platform))
     assert Path(expected) in places
     assert Path(executable) not in places or "python" in executable
@@ -48,13 +48,13 @@ def test_program_found_here_has_the_packages_of_qgis():
     assert answer.output.strip() == numpy.__version__
 
 
-def test_another_python_is_passed_over(fake_qgis):
+def test_another_python_is_skipped(fake_qgis):
     fake_qgis("bin/python3", "echo 2 7 None")
     right = fake_qgis("MacOS/python3", f"echo {sys.version_info[0]} {sys.version_info[1]} {numpy.__version__}")
     assert find_interpreter().program == str(right)
 
 
-def test_program_that_does_not_know_its_library_is_told(fake_qgis):
+def test_program_that_does_not_find_its_library_gets_its_home(fake_qgis):
     answer = f"echo {sys.version_info[0]} {sys.version_info[1]} {numpy.__version__}"
     fake_qgis("MacOS/python", f'test "$PYTHONHOME" && {answer}')
     assert find_interpreter().changes == {"PYTHONHOME": sys.prefix}

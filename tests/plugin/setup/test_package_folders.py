@@ -13,14 +13,14 @@ def clean_path(monkeypatch, qgis):
     QgsSettings().remove(package_folders.SETTING_KEY)
 
 
-def test_own_folder_lies_in_the_profile(clean_path):
+def test_own_folder_is_in_the_profile(clean_path):
     folder = package_folders.own_folder()
     assert str(folder).startswith(QgsApplication.qgisSettingsDirPath())
     assert folder.name == f"cpython-{sys.version_info[0]}{sys.version_info[1]}"
     assert package_folders.folders() == [folder]
 
 
-def test_folders_are_named_by_variable_and_by_setting(clean_path, monkeypatch, tmp_path):
+def test_folders_from_the_variable_and_the_setting(clean_path, monkeypatch, tmp_path):
     named = [tmp_path / name for name in ("one", "two", "three", "gone")]
     for folder in named[:3]:
         folder.mkdir()
@@ -32,7 +32,7 @@ def test_folders_are_named_by_variable_and_by_setting(clean_path, monkeypatch, t
     assert sys.path == [*before, str(named[0]), str(named[1]), str(named[2])]
 
 
-def test_what_qgis_has_comes_first(clean_path, monkeypatch, tmp_path):
+def test_packages_of_qgis_come_first(clean_path, monkeypatch, tmp_path):
     (tmp_path / "numpy.py").write_text("")
     (tmp_path / "railfirst.py").write_text("")
     monkeypatch.setenv("RAIL_EXTRACT_PACKAGES", str(tmp_path))
@@ -43,7 +43,7 @@ def test_what_qgis_has_comes_first(clean_path, monkeypatch, tmp_path):
     assert find_spec("numpy").origin != str(tmp_path / "numpy.py")
 
 
-def test_setting_stands_among_those_of_the_providers(plugin, clean_path, tmp_path):
+def test_setting_is_listed_with_those_of_the_providers(plugin, clean_path, tmp_path):
     from processing.core.ProcessingConfig import ProcessingConfig
 
     plugin.unload()

@@ -7,7 +7,7 @@ from rail_extract.rail_extract_plugin.setup.processes import run
 
 
 class Listener(Progress):
-    """Keeps the lines it hears, and cancels after as many as it is told."""
+    """Records lines, and cancels after a given number."""
 
     def __init__(self, most: int = 1000) -> None:
         self.lines: list[str] = []
@@ -20,7 +20,7 @@ class Listener(Progress):
         return len(self.lines) >= self._most
 
 
-def test_output_comes_line_by_line_with_errors_among_it():
+def test_output_including_errors_comes_line_by_line():
     code = "import sys; print('one'); print(); print('zwei ü', file=sys.stderr, end='')"
     listener = Listener()
     ended = run(sys.executable, ["-u", "-c", code], {"PYTHONIOENCODING": "utf-8"}, listener)
@@ -29,17 +29,17 @@ def test_output_comes_line_by_line_with_errors_among_it():
     assert ended.output == "one\n\nzwei ü\n"
 
 
-def test_environment_is_changed_where_asked(monkeypatch):
+def test_environment_is_changed_as_requested(monkeypatch):
     monkeypatch.setenv("RAIL_KEPT", "kept")
     code = "import os; print(os.environ['RAIL_KEPT'], os.environ['RAIL_CHANGED'])"
     assert run(sys.executable, ["-c", code], {"RAIL_CHANGED": "changed"}).output == "kept changed\n"
 
 
-def test_exit_code_is_handed_out():
+def test_exit_code_is_returned():
     assert run(sys.executable, ["-c", "raise SystemExit(3)"]).code == 3
 
 
-def test_program_that_is_not_there_or_crashes_has_no_exit_code():
+def test_missing_or_crashed_program_has_no_exit_code():
     assert run("/nowhere/python", []).code is None
     assert run(sys.executable, ["-c", "import os; os.abort()"]).code is None
 

@@ -9,12 +9,12 @@ from rail_extract.core.rails import RailNetwork
 from rail_extract.rail_extract_plugin.setup import self_test
 
 
-def test_weights_are_those_that_the_checksums_are_of():
+def test_weights_match_their_checksums():
     states = self_test.model_states()
     assert states == {model.name: "ok" for model in MODELS}, "run `sha256sum *.npz > SHA256SUMS` in models"
 
 
-def test_changed_and_missing_weights_are_told(monkeypatch, tmp_path):
+def test_changed_and_missing_weights_are_detected(monkeypatch, tmp_path):
     monkeypatch.setattr(self_test, "CHECKSUMS", tmp_path / "SHA256SUMS")
     assert set(self_test.model_states().values()) == {"changed"}
     (tmp_path / "SHA256SUMS").write_text(f"{hashlib.sha256(b'').hexdigest()}  {MODELS[0].file}\n")
@@ -23,7 +23,7 @@ def test_changed_and_missing_weights_are_told(monkeypatch, tmp_path):
     assert set(self_test.model_states().values()) == {"missing"}
 
 
-def test_version_tells_what_is_missing_or_broken(monkeypatch, tmp_path):
+def test_version_of_missing_and_broken_packages(monkeypatch, tmp_path):
     (tmp_path / "railbroken.py").write_text("raise OSError('no such library')")
     monkeypatch.syspath_prepend(tmp_path)
     assert self_test.version("railmissing") == "not installed"
@@ -31,7 +31,7 @@ def test_version_tells_what_is_missing_or_broken(monkeypatch, tmp_path):
     assert self_test.version("numpy")[0].isdigit()
 
 
-def test_run_without_a_package_says_which(run_step, monkeypatch):
+def test_missing_packages_are_listed(run_step, monkeypatch):
     monkeypatch.setattr(
         "rail_extract.rail_extract_plugin.setup.dependencies.is_installed", lambda name: name not in ("lazrs", "laspy")
     )
@@ -62,7 +62,7 @@ def test_result_of_the_check_is_shown_and_written(run_step, new_feedback, tmp_pa
     assert warning == ("Rail Extract does not work here. Self test failed: laspy missing: run Install packages.")
 
 
-def test_installation_wants_no_cuda_on_macos(run_step, monkeypatch):
+def test_cuda_on_macos_is_refused(run_step, monkeypatch):
     monkeypatch.setattr("sys.platform", "darwin")
     outcome = run_step("installpackages", {"TORCH": "CUDA"})
     assert not outcome.ok

@@ -57,7 +57,7 @@ def test_fields_have_their_types(qgis, columns):
 
 
 @pytest.mark.parametrize("suffix", [".gpkg", ".shp", ".geojson", ".csv"])
-def test_numbers_are_shown_with_the_decimals_that_mean_something(tmp_path, context, suffix):
+def test_numbers_have_the_decimals_of_their_fields(tmp_path, context, suffix):
     line = Centerline(XYZ, 1, 10, (1, 4), (2,), 1435.2189, 1 / 3, -20.04, -0.01, 123456.789)
     path = str(tmp_path / f"lines{suffix}")
     shape, crs = QgsWkbTypes.Type.LineStringZ, output_crs(None)
@@ -90,7 +90,7 @@ def test_unknown_coordinate_system_is_cartesian_metres(qgis):
 @pytest.mark.parametrize(
     "value", [None, "", "memory:", QgsProcessing.TEMPORARY_OUTPUT, "postgres:dbname='x' table=\"y\" (geom)"]
 )
-def test_outputs_that_are_no_files_are_let_through(context, value):
+def test_outputs_that_are_not_files_are_accepted(context, value):
     check_writable(value, context)
 
 
@@ -127,7 +127,7 @@ def test_output_is_a_folder(tmp_path, context):
         check_writable(str(tmp_path), context)
 
 
-def test_existing_output_stays_as_it_is(tmp_path, context):
+def test_existing_output_is_not_changed(tmp_path, context):
     path = tmp_path / "rails.gpkg"
     path.write_bytes(b"old")
     check_writable(str(path), context)

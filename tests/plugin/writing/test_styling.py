@@ -1,4 +1,4 @@
-"""How results look when QGIS loads them."""
+"""The appearance of results that QGIS loads."""
 
 import gc
 
@@ -36,7 +36,7 @@ KINDS = {
 
 @pytest.fixture
 def styled(context, new_feedback):
-    """A layer in memory with these rows, styled as QGIS does after a run."""
+    """A memory layer with these rows, styled as QGIS does after a run."""
 
     def make(style, rows=()):
         shape, columns = KINDS[style]
@@ -61,7 +61,7 @@ def styled(context, new_feedback):
 
 
 def colours(layer):
-    """Colour of each feature's symbol."""
+    """Return the colour of each feature's symbol."""
     rendering = QgsRenderContext()
     rendering.setExpressionContext(QgsExpressionContext(QgsExpressionContextUtils.globalProjectLayerScopes(layer)))
     renderer = layer.renderer()
@@ -90,7 +90,7 @@ def test_rails_are_coloured_by_their_standard_error(styled):
     ]
 
 
-def test_quality_is_coloured_by_how_far_the_gauge_is_off_that_of_its_track(styled):
+def test_quality_is_coloured_by_the_deviation_from_the_median_gauge_of_the_track(styled):
     gauges = {1: (1435, 1435, 1435, 1443, 1420, None), 2: (1000, 1000, 1001, 985, 1012)}
     rows = [
         ("POINT Z (500000 3000000 1)", {"track_id": track, "gauge_mm": gauge, "bridged": 0})
@@ -104,7 +104,7 @@ def test_quality_is_coloured_by_how_far_the_gauge_is_off_that_of_its_track(style
     ]
 
 
-def test_centerlines_carry_their_number_and_direction(styled):
+def test_centerlines_show_their_number_and_direction(styled):
     layer = styled("centerlines", [(LINE, {"track_id": 7})])
     assert colours(layer) == ["#e64a19"]
     arrows = layer.renderer().symbol().symbolLayer(1)
@@ -120,7 +120,7 @@ def test_centerlines_carry_their_number_and_direction(styled):
 
 @pytest.mark.parametrize("style", KINDS)
 def test_layers_can_be_drawn(styled, style):
-    """What is drawn is neither nothing nor QGIS's random colour."""
+    """Something is drawn, and not in a random colour of QGIS."""
     rows = {
         "rails": (LINE, {"sigma_mm": 1.0}),
         "centerlines": (LINE, {"track_id": 1}),
@@ -142,7 +142,7 @@ def test_layers_can_be_drawn(styled, style):
 
 
 @pytest.mark.parametrize("style", ["rails", "centerlines"])
-def test_lines_lie_at_their_height_in_3d(styled, style):
+def test_lines_are_at_their_heights_in_3d(styled, style):
     module = pytest.importorskip("qgis._3d")
     module.Qgs3D.initialize()
     document = QDomDocument()  # what is written lives as long
@@ -156,7 +156,7 @@ def test_lines_lie_at_their_height_in_3d(styled, style):
 
 @pytest.mark.skipif(Qgis.QGIS_VERSION_INT < 32600, reason="vector layers have no elevation properties")
 @pytest.mark.parametrize("style", KINDS)
-def test_layers_know_that_their_heights_are_heights(styled, style):
+def test_elevation_of_layers_is_absolute(styled, style):
     layer = styled(style)
     properties = layer.elevationProperties()
     assert properties.clamping() == Qgis.AltitudeClamping.Absolute
@@ -171,7 +171,7 @@ def test_layers_of_a_run_share_a_group_points_on_top(styled, context):
     assert details[0].layerSortKey > details[2].layerSortKey > details[1].layerSortKey
 
 
-def test_rasters_are_black_on_nothing(qgis, write_cloud, track, run_step, tmp_path):
+def test_rasters_are_black_on_transparent(qgis, write_cloud, track, run_step, tmp_path):
     path = tmp_path / "raster.tif"
     assert run_step("rasterizerailpoints", {"INPUT": write_cloud(track()), "OUTPUT": path}).ok
     layer = QgsRasterLayer(str(path), "raster")
@@ -181,8 +181,8 @@ def test_rasters_are_black_on_nothing(qgis, write_cloud, track, run_step, tmp_pa
     assert layer.dataProvider().sourceNoDataValue(1) == 0  # drawn as nothing
 
 
-def test_styles_are_there_again_after_a_run_has_ended(qgis, new_feedback):
-    """QGIS deletes with its context what styles layers; two layers of one run have one each."""
+def test_styles_are_applied_again_in_a_second_run(qgis, new_feedback):
+    """QGIS deletes the stylers with its context; each of two layers of a run has its own."""
     for _ in range(2):
         context = QgsProcessingContext()
         layers = [QgsVectorLayer("LineStringZ?field=sigma_mm:double", "rails", "memory") for _ in range(2)]
@@ -199,6 +199,6 @@ def test_styles_are_there_again_after_a_run_has_ended(qgis, new_feedback):
         gc.collect()
 
 
-def test_layer_that_is_not_loaded_is_left_alone(context):
+def test_layer_that_is_not_loaded_is_not_styled(context):
     style_on_load("unknown", "rails", context)
     assert not context.layersToLoadOnCompletion()
