@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import astuple, dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from .lines import Lines
 
 SPACING_M = 0.25
-"""Cells of one line within this distance share its length."""
+"""Cells of one line within this distance along it share its length."""
 
 
 @dataclass(frozen=True)
@@ -46,15 +47,21 @@ class Figures:
         return self.cells / length_m if length_m else 0.0
 
 
-def shares_of_length(lines: Lines, pairs: np.ndarray) -> np.ndarray:
+def shares_of_length(lines: Lines, half_m: float) -> np.ndarray:
     """Length of rail that each cell stands for, (n,) metres: cells close to each other share it.
 
     Parameters
     ----------
     lines : Lines
-    pairs : (m, 2) int array
-        Cells that continue each other.
+    half_m : float
+        Distance across within which two cells are on one line.
     """
-    near = pairs[np.linalg.norm(lines.axis[pairs[:, 0]] - lines.axis[pairs[:, 1]], axis=1) < SPACING_M]
-    sharing = 1 + np.bincount(near.ravel(), minlength=len(lines.axis))
+    count = len(lines.axis)
+    if not count:
+        return np.zeros(0)
+    one, other = cKDTree(lines.axis).query_pairs(np.hypot(SPACING_M, half_m), output_type="ndarray").T
+    step = lines.axis[other] - lines.axis[one]
+    beside = np.abs(np.einsum("ij,ij->i", step, lines.across[one])) < half_m
+    beside &= np.abs(np.einsum("ij,ij->i", step, lines.along[one])) < SPACING_M
+    sharing = 1 + np.bincount(one[beside], minlength=count) + np.bincount(other[beside], minlength=count)
     return 2 * SPACING_M / sharing

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -18,6 +20,11 @@ MEAN_M = 0.30
 NEAREST, MIN_AXES = 6, 2
 """Axes that are looked at for a place, and how many of them it must lie on: where two heads part there are some of
 each, and single axes are led astray by a guard rail."""
+
+WIDEST_M = 0.075
+"""Distance from the axis within which points count towards the width of a top: short of a guard rail."""
+
+TENTHS_OF_MM = 10_000
 
 
 def whole_heads(tops: Tops, kept: np.ndarray, tolerances: Tolerances) -> np.ndarray:
@@ -91,29 +98,58 @@ def label(tops: Tops, heads: np.ndarray, cell: np.ndarray, height: np.ndarray, t
     return np.flatnonzero((above >= -tolerances.below_m) & (above <= tolerances.above_m))
 
 
-def on_axes(xy: np.ndarray, height: np.ndarray, lines: Lines, half_m: float, height_m: float) -> np.ndarray:
-    """Return which places lie on the axes of `MIN_AXES` of the cells nearest to them, (k,) bool.
+@dataclass(frozen=True)
+class Near:
+    """Places and the cells nearest to them.
 
-    Parameters
+    Attributes
     ----------
-    xy : (k, 2) array
-    height : (k,) array
-        Above the bed.
-    lines : Lines
-    half_m : float
-        Largest distance across from an axis.
-    height_m : float
-        Largest difference in height.
+    count : int
+        Number of places.
+    place, cell : (m,) int arrays
+        Pairs; the nearest cell of each place comes first.
+    across : (m,) array
+        How far the place lies across from the axis of the cell, metres.
     """
-    if not len(xy) or len(lines.axis) < MIN_AXES:
-        return np.zeros(len(xy), dtype=bool)
-    count = np.arange(1, min(NEAREST, len(lines.axis)) + 1)
-    near = cKDTree(lines.axis).query(xy, k=count, distance_upper_bound=lines.reach_m)[1]
-    place, rank = np.nonzero(near < len(lines.axis))
-    cell = near[place, rank]
-    on = np.abs(np.einsum("ij,ij->i", xy[place] - lines.axis[cell], lines.across[cell])) <= half_m
-    on &= np.abs(height[place] - lines.height[cell]) <= height_m
-    return np.bincount(place[on], minlength=len(xy)) >= MIN_AXES
+
+    count: int
+    place: np.ndarray
+    cell: np.ndarray
+    across: np.ndarray
+
+    @classmethod
+    def find(cls, xy: np.ndarray, lines: Lines) -> Near:
+        """Find the `NEAREST` cells around places, (k, 2)."""
+        if not len(xy) or not len(lines.axis):
+            return cls(len(xy), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0))
+        count = np.arange(1, min(NEAREST, len(lines.axis)) + 1)
+        near = cKDTree(lines.axis).query(xy, k=count, distance_upper_bound=lines.reach_m)[1]
+        place, rank = np.nonzero(near < len(lines.axis))
+        cell = near[place, rank]
+        across = np.einsum("ij,ij->i", xy[place] - lines.axis[cell], lines.across[cell])
+        return cls(len(xy), place, cell, across)
+
+    def on(self, half_m: float, fits: np.ndarray) -> np.ndarray:
+        """Return which places lie within `half_m` of `MIN_AXES` axes that fit, (m,) bool; (count,) bool."""
+        on = (np.abs(self.across) <= half_m) & fits
+        return np.bincount(self.place[on], minlength=self.count) >= MIN_AXES
+
+    def widths(self, piece: np.ndarray) -> np.ndarray:
+        """Width of the top of each piece: that of a bar whose points scatter across as much, (pieces,) metres.
+
+        Parameters
+        ----------
+        piece : (cells,) int array
+            Piece of each cell.
+        """
+        inside = np.abs(self.across) < WIDEST_M
+        # Whole numbers add up to the same sum in any order of the points.
+        across = np.round(self.across[inside] * TENTHS_OF_MM)
+        number, count = piece[self.cell[inside]], int(piece.max()) + 1
+        points = np.maximum(np.bincount(number, minlength=count), 1)
+        mean = np.bincount(number, across, count) / points
+        variance = np.bincount(number, across**2, count) / points - mean**2
+        return np.sqrt(12 * np.maximum(variance, 0)) / TENTHS_OF_MM
 
 
 def _with_neighbours(grid: Grid, cells: np.ndarray) -> np.ndarray:

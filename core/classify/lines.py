@@ -6,7 +6,7 @@ No trajectory, seed or drawn line is needed: each cell votes with the directions
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -42,6 +42,9 @@ BESIDE_M = 0.10
 MAX_NEIGHBOURS = 400
 """A cell with more neighbours within reach lies in an area, not on a line: a line of cells has 25 to 50 at 1 m reach,
 and with 0.2 of them on the line (see `MIN_PURE`) at most 250."""
+
+CENTRE_M, CENTRE_ROUNDS = 0.5, 3
+"""Distance within which the cells of a head give the middle of its axis, and rounds to find them."""
 
 CHUNK = 4000
 """Cells whose neighbours are held in memory at once."""
@@ -213,3 +216,32 @@ def _measured(
     hits = np.bincount(number[on] * STATIONS + station, minlength=count * STATIONS).reshape(count, STATIONS)
     members = hits.sum(axis=1)
     return (hits > 0).mean(axis=1), members / np.maximum(members + beside, 1)
+
+
+def centred(lines: Lines, cells: Marks, half_m: float, along_m: float) -> Lines:
+    """Move the axes to the middle of all cells of their heads: those that were thinned lie to one side or the other.
+
+    Parameters
+    ----------
+    lines : Lines
+    cells : Marks
+        All narrow cells.
+    half_m : float
+        Largest distance of a cell of the head from its axis: half the head and half a cell, short of a guard rail.
+    along_m : float
+        Largest difference in height.
+    """
+    if not len(lines.axis):
+        return lines
+    near = cKDTree(lines.axis).sparse_distance_matrix(cKDTree(cells.xy), CENTRE_M, output_type="ndarray")
+    own, other = near["i"], near["j"]
+    level = np.abs(cells.height[other] - lines.height[own]) < along_m
+    own, other = own[level], other[level]
+    step = cells.xy[other] - lines.axis[own]
+    left = np.einsum("ij,ij->i", step, lines.across[own])
+    offset = np.zeros(len(lines.axis))
+    for _ in range(CENTRE_ROUNDS):
+        on = np.abs(left - offset[own]) < half_m
+        members = np.bincount(own[on], minlength=len(offset))
+        offset = np.bincount(own[on], left[on], len(offset)) / np.maximum(members, 1)
+    return replace(lines, axis=lines.axis + offset[:, None] * lines.across)

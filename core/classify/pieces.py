@@ -12,6 +12,10 @@ from .lines import Lines
 ALIGNED_M = 0.03
 """Two cells continue each other if the axis of each passes the other one this close."""
 
+HEAD_M = 0.15
+"""Distance within which a higher cell shows that a lower one is the foot of the rail or a fastening: half a foot, and
+the errors of both axes."""
+
 LEAST_M = 1.5
 """Shortest piece of a rail that has its partner."""
 
@@ -34,6 +38,17 @@ def links(lines: Lines, aligned_m: float = ALIGNED_M) -> np.ndarray:
     for end in (one, other):
         on &= np.abs(np.einsum("ij,ij->i", step, lines.across[end])) < aligned_m
     return pairs[on]
+
+
+def lower_than_beside(lines: Lines, depth_m: float) -> np.ndarray:
+    """Return which cells have one near them that is higher by more than `depth_m`, (n,) bool: feet and fastenings."""
+    lower = np.zeros(len(lines.axis), dtype=bool)
+    if len(lower) > 1:
+        one, other = cKDTree(lines.axis).query_pairs(HEAD_M, output_type="ndarray").T
+        rise = lines.height[other] - lines.height[one]
+        lower[one[rise > depth_m]] = True
+        lower[other[rise < -depth_m]] = True
+    return lower
 
 
 def pieces_of(count: int, pairs: np.ndarray) -> np.ndarray:

@@ -9,11 +9,12 @@ import numpy as np
 from ..frame import ORIGIN_STEP
 from .bed import COARSE_M, Coarse, find_bed
 from .figures import Figures, shares_of_length
-from .labels import label, on_axes, whole_heads
-from .lines import Lines, Marks, find_lines
+from .labels import Near, label, whole_heads
+from .lines import Lines, Marks, centred, find_lines
 from .partner import runs_inside, stations_with_partner
-from .pieces import links, long_enough
+from .pieces import LEAST_PAIRED, links, long_enough, lower_than_beside, pieces_of
 from .settings import DENSE, MARGIN_M, THIN, Settings, Tolerances
+from .sides import stands_free
 from .thin import drawn
 from .tops import HIGH_M, MILLIMETRES, Grid, Tops, highest_of_blocks, narrow_tops, tops_of
 
@@ -36,6 +37,9 @@ MIN_STATIONS = 2
 
 SINGLE_COVER = 0.75
 """Cover of a line that may be a rail without a partner."""
+
+SINGLE_HEIGHT_M = 0.12
+"""Least height above the bed of a rail without a partner: lower things are edges of slopes, kerbs and boards."""
 
 
 @dataclass(frozen=True)
@@ -106,20 +110,31 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> Classified:
         return nothing
     height = height[near]
     grid, cell = Grid.around(x[near], y[near], settings.cell_m)
-    tops = tops_of(grid, cell, height)
-    marks = highest_of_blocks(tops, narrow_tops(tops))
+    tops = tops_of(grid, cell, height, z[near])
+    cells = narrow_tops(tops)
+    marks = highest_of_blocks(tops, cells)
     if not len(marks):
         return nothing
     density = _density(coarse, grid.middles(marks))
     tolerances = THIN if density < THIN_PER_M2 else DENSE
-    kept = _kept(tops, marks, float(np.clip(REACH_POINTS_PER_M / density, *REACH_M)), tolerances, settings)
+    kept = _kept(tops, cells, marks, float(np.clip(REACH_POINTS_PER_M / density, *REACH_M)), tolerances, settings)
     heads = whole_heads(tops, _completed(tops, marks, kept, settings, tolerances), tolerances)
-    rail = nothing.rail
     chosen = label(tops, heads, cell, height, tolerances)
-    chosen = chosen[settings.own(xyz[near[chosen]])]
-    half_m = settings.head_width_m / 2 + tolerances.beside_m
-    rail[near[chosen[on_axes(xyz[near[chosen], :2], height[chosen], kept.lines, half_m, HIGH_M)]]] = True
-    drawn_places = drawn(kept.lines, kept.pairs, settings.cell_m)
+    xy = xyz[near[chosen], :2]
+    beside = Near.find(xy, kept.lines)
+    narrow = _narrow(kept, beside, settings, tolerances)
+    on = beside.on(settings.head_width_m / 2 + tolerances.beside_m, narrow[beside.cell]) & settings.own(xy)
+    rail = nothing.rail
+    rail[near[chosen[on]]] = True
+    kept = kept.of(narrow)
+    heads = heads[_near_axes(tops, heads, kept, settings, HIGH_M)]
+    drawn_places = drawn(
+        kept.lines,
+        kept.pairs,
+        grid.middles(heads),
+        (settings.head_width_m + settings.cell_m) / 2,
+        settings.cell_m,
+    )
     return Classified(
         rail, drawn_places[settings.own(drawn_places)], _figures(rail, kept, grid, heads, settings, density)
     )
@@ -129,7 +144,7 @@ def _figures(
     rail: np.ndarray, kept: Kept, grid: Grid, heads: np.ndarray, settings: Settings, density: float
 ) -> Figures:
     """Sum up what was found in the square without its margin."""
-    share_m = np.where(settings.own(grid.middles(kept.cell)), shares_of_length(kept.lines, kept.pairs), 0.0)
+    share_m = np.where(settings.own(grid.middles(kept.cell)), shares_of_length(kept.lines, settings.head_width_m), 0.0)
     there = bool(rail.any())
     return Figures(
         points=int(rail.sum()),
@@ -151,18 +166,25 @@ def _density(coarse: Coarse, xy: np.ndarray) -> float:
     return float(np.quantile(counts[counts > 0], DENSITY_QUANTILE)) / COARSE_M**2
 
 
-def _kept(tops: Tops, marks: np.ndarray, reach_m: float, tolerances: Tolerances, settings: Settings) -> Kept:
+def _kept(
+    tops: Tops, cells: np.ndarray, marks: np.ndarray, reach_m: float, tolerances: Tolerances, settings: Settings
+) -> Kept:
     """Keep the candidates that lie on rails."""
-    places = Marks(tops.grid.middles(marks), tops.top.ravel()[marks] / MILLIMETRES)
+    top_m = tops.top.ravel() / MILLIMETRES
+    places = Marks(tops.grid.middles(marks), top_m[marks])
     lines = find_lines(places, reach_m, tolerances.along_m, tolerances.strip_m)
-    good = (lines.cover >= MIN_COVER) & (lines.pure >= MIN_PURE)
-    lines, marks = lines.of(good), marks[good]
+    good = np.flatnonzero((lines.cover >= MIN_COVER) & (lines.pure >= MIN_PURE))
+    half_m = (settings.head_width_m + settings.cell_m) / 2
+    lines = centred(lines.of(good), Marks(tops.grid.middles(cells), top_m[cells]), half_m, tolerances.along_m)
+    free = stands_free(tops, marks[good], lines)
+    lines, marks = lines.of(free), marks[good[free]]
     spacings_m = [gauge_m + settings.head_width_m for gauge_m in settings.gauges_m]
     paired = stations_with_partner(lines, spacings_m, tolerances.partner_m) >= MIN_STATIONS
     pairs = links(lines)
     kept = Kept(lines, marks, paired, pairs).of(_certain(lines, paired, pairs))
     inside = runs_inside(kept.lines, kept.paired, kept.pairs, settings.gauges_m, settings.head_width_m)
     kept = kept.of(~inside)
+    kept = kept.of(~lower_than_beside(kept.lines, tolerances.spread_m))
     low, high = -MARGIN_M + reach_m / 2, settings.side_m + MARGIN_M - reach_m / 2
     open_ended = np.any((kept.lines.axis < low) | (kept.lines.axis > high), axis=1)
     return kept.of(long_enough(kept.lines, kept.pairs, kept.paired, open_ended, settings.keep_single))
@@ -185,7 +207,29 @@ def _completed(tops: Tops, marks: np.ndarray, kept: Kept, settings: Settings, to
         Cells.
     """
     others = np.setdiff1d(marks, kept.cell)
-    half_m = (settings.head_width_m + settings.cell_m) / 2
-    height = tops.top.ravel()[others] / MILLIMETRES
-    added = on_axes(tops.grid.middles(others), height, kept.lines, half_m, tolerances.along_m)
-    return np.union1d(kept.cell, others[added])
+    return np.union1d(kept.cell, others[_near_axes(tops, others, kept, settings, tolerances.along_m)])
+
+
+def _near_axes(tops: Tops, cells: np.ndarray, kept: Kept, settings: Settings, height_m: float) -> np.ndarray:
+    """Return which cells lie on the axes of kept ones, and within `height_m` of them in height, (k,) bool."""
+    near = Near.find(tops.grid.middles(cells), kept.lines)
+    top = tops.top.ravel()[cells] / MILLIMETRES
+    level = np.abs(kept.lines.height[near.cell] - top[near.place]) < height_m
+    return near.on((settings.head_width_m + settings.cell_m) / 2, level)
+
+
+def _narrow(kept: Kept, points: Near, settings: Settings, tolerances: Tolerances) -> np.ndarray:
+    """Return which cells belong to pieces whose tops are as narrow as a railhead, (n,) bool.
+
+    Those without a partner must also stand as high as a rail does that is not buried in ballast.
+    """
+    if not len(kept.cell):
+        return np.zeros(0, dtype=bool)
+    piece = pieces_of(len(kept.cell), kept.pairs)
+    width_m = points.widths(piece)
+    size = np.bincount(piece)
+    height_m = np.bincount(piece, kept.lines.height) / size
+    single = np.bincount(piece, kept.paired) <= LEAST_PAIRED * size
+    wider_m = width_m - settings.head_width_m
+    alone = (wider_m < tolerances.wider_single_m) & (height_m >= SINGLE_HEIGHT_M)
+    return np.where(single, alone, wider_m < tolerances.wider_m)[piece]

@@ -65,6 +65,13 @@ class Grid:
         row, column = np.divmod(cell, self.shape[1])
         return np.column_stack([column + (self.column + 0.5), -(row + (self.row + 0.5))]) * self.cell_m
 
+    def cells(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Cells of places, (k, 2): their numbers, and whether they lie in the window, (k,) each; 0 outside."""
+        row = np.floor(-xy[:, 1] / self.cell_m + BORDER_CELLS).astype(np.int64) - self.row
+        column = np.floor(xy[:, 0] / self.cell_m + BORDER_CELLS).astype(np.int64) - self.column
+        inside = (row >= 0) & (row < self.shape[0]) & (column >= 0) & (column < self.shape[1])
+        return np.where(inside, row * self.shape[1] + column, 0), inside
+
     def blocks(self, cell: np.ndarray) -> np.ndarray:
         """Find the blocks of 2 x 2 cells of the raster that the cells lie in, (k,) int64 numbers."""
         row, column = np.divmod(cell, self.shape[1])
@@ -80,17 +87,21 @@ class Tops:
     grid : Grid
     top : (rows, columns) int16 array
         Millimetres above the bed of the highest point up to `TOP_M`; `EMPTY` without any.
+    z : (rows, columns) float32 array
+        Height of that point, metres; -inf without any. Heights above the bed compare along a rail; across they do not
+        where the bed bends.
     seen, high : (rows, columns) bool array
         Cells with a point below `HIGH_M`, and between `TOP_M` and `HIGH_M`.
     """
 
     grid: Grid
     top: np.ndarray
+    z: np.ndarray
     seen: np.ndarray
     high: np.ndarray
 
 
-def tops_of(grid: Grid, cell: np.ndarray, height: np.ndarray) -> Tops:
+def tops_of(grid: Grid, cell: np.ndarray, height: np.ndarray, z: np.ndarray) -> Tops:
     """Find the tops of the cells.
 
     Parameters
@@ -100,18 +111,22 @@ def tops_of(grid: Grid, cell: np.ndarray, height: np.ndarray) -> Tops:
         Cell of each point.
     height : (n,) array
         Above the bed; those above `HIGH_M` are left out by the caller.
+    z : (n,) array
+        Height, metres.
     """
     cells = grid.shape[0] * grid.shape[1]
     seen, high = np.zeros(cells, dtype=bool), np.zeros(cells, dtype=bool)
-    top = np.full(cells, EMPTY, dtype=np.int16)
+    top, highest = np.full(cells, EMPTY, dtype=np.int16), np.full(cells, -np.inf, dtype=np.float32)
     seen[cell] = True
     high[cell[height > TOP_M]] = True
     low = np.flatnonzero(height <= TOP_M)
     millimetres = np.round(height[low] * MILLIMETRES).astype(np.int16)
     # Written in rising order, the last value of a cell is its highest.
     order = np.argsort((millimetres - np.int32(EMPTY)).astype(np.uint16), kind="stable")
-    top[cell[low[order]]] = millimetres[order]
-    return Tops(grid, *(values.reshape(grid.shape) for values in (top, seen, high)))
+    low_cell = cell[low[order]]
+    top[low_cell] = millimetres[order]
+    highest[low_cell] = z[low[order]]
+    return Tops(grid, *(values.reshape(grid.shape) for values in (top, highest, seen, high)))
 
 
 def narrow_tops(tops: Tops) -> np.ndarray:

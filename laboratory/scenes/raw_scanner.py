@@ -15,6 +15,9 @@ MIXED_STEP_M = 0.02
 ECHO_M = 0.25
 """Parts of a footprint this close in range come back as one echo; those behind make a second one."""
 
+MIXED = 15
+"""Kind of a point between two surfaces."""
+
 SECOND_ECHO = 0.3
 """Least share of the footprint that makes a second echo."""
 
@@ -139,6 +142,7 @@ def _sharp(
     edge = np.isfinite(other) & (np.abs(other - own) > MIXED_STEP_M) & (rng.random_sample(len(own)) < chance)
     share = np.where(edge, rng.random_sample(len(own)), 0.0)
     blended = np.where(edge, (1 - share) * own + share * np.where(edge, other, 0.0), own)
+    kind = np.where(edge, MIXED, kind)
     return profile, ray + _first_ray(scanner), blended, kind, _returned(facing[profile, ray])
 
 

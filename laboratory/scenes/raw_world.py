@@ -12,10 +12,14 @@ from ..curves import Curve
 from .raw_scanner import Segments
 from .tracks import Track
 
-(GROUND, SLEEPER, FASTENING, HEAD, FOOT, GUARD, THIRD, PAVEMENT, PLATFORM, WALL, FENCE, MAST, WIRE, PLANT, TRAIN) = (
-    range(15)
+KINDS = (
+    *("ground", "sleeper", "fastening", "head", "foot", "guard", "third", "pavement"),
+    *("platform", "wall", "fence", "mast", "wire", "plant", "train", "mixed"),
 )
-"""Kinds of surfaces."""
+"""Kinds of points; mixed ones lie between two surfaces, see `raw_scanner.MIXED`."""
+
+GROUND, SLEEPER, FASTENING, HEAD, FOOT, GUARD, THIRD, PAVEMENT = range(8)
+PLATFORM, WALL, FENCE, MAST, WIRE, PLANT, TRAIN = range(8, 15)
 
 RAIL_HEIGHT_M = 0.172
 """Height of a rail with a head of 72 mm (60E1); others are scaled by the width of their heads."""
@@ -134,6 +138,10 @@ class World:
         profile, number = np.nonzero(there)
         start = np.column_stack([across[profile, number], height[profile, number]])
         end = np.column_stack([across[profile, number + 1], height[profile, number + 1]])
+        self.add_segments(profile, start, end, kind)
+
+    def add_segments(self, profile: np.ndarray, start: np.ndarray, end: np.ndarray, kind: int) -> None:
+        """Add segments, (k,) profiles and (k, 2) ends."""
         self._parts.append(Segments(profile, start, end, np.full(len(profile), kind, dtype=np.uint8)))
 
     def segments(self) -> Segments:
@@ -367,7 +375,7 @@ def _add_where(
     profile, number = np.nonzero(chosen)
     start = np.column_stack([across[number], height[profile, number]])
     end = np.column_stack([across[number + 1], height[profile, number + 1]])
-    world._parts.append(Segments(profile, start, end, np.full(len(profile), kind, dtype=np.uint8)))
+    world.add_segments(profile, start, end, kind)
 
 
 def _stones(world: World, across: np.ndarray) -> np.ndarray:

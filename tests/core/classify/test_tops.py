@@ -10,7 +10,7 @@ WIDTH, CELL = 0.072, 0.04
 def tops(xyz):
     grid, cell = Grid.around(xyz[:, 0], xyz[:, 1], CELL)
     low = xyz[:, 2] < 0.95
-    return tops_of(grid, cell[low], xyz[low, 2].astype(np.float32)), cell
+    return tops_of(grid, cell[low], *2 * (xyz[low, 2].astype(np.float32),)), cell
 
 
 def inner(xyz):
