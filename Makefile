@@ -31,6 +31,12 @@ check: lint  ## lint, types, import rules and the tests that need neither QGIS n
 test: check plugin  ## run every test: check, core with PyTorch, plugin and, through qgis_process, the whole
 	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest -n auto tests/core tests/laboratory tests/benchmarks
 	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest tests/plugin tests/e2e
+	@$(MAKE) --no-print-directory test-desktop
+
+.PHONY: test-desktop
+test-desktop: plugin  ## test the real QGIS application on a virtual display
+	@command -v xvfb-run > /dev/null || $(SUDO) apt-get install -q -y --no-install-recommends xvfb xauth >&2
+	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest tests/desktop
 
 .PHONY: test-qgis
 test-qgis: plugin  ## run the tests that need QGIS: plugin and, through qgis_process, the whole

@@ -21,6 +21,9 @@ from .cloud_parameter import file_filter
 LAST_FOLDER = "/Processing/LastInputPath"
 """Setting in which QGIS's own widgets keep the folder of the last input."""
 
+BATCH_WIDTH = 300
+"""Pixels for the path in the batch dialog, as many as QGIS gives paths of outputs there."""
+
 MODEL_INPUTS = ["pointcloud", "layer", "file", "string"]
 MODEL_OUTPUTS = ["outputPointCloud", "outputLayer", "outputFile", "outputFolder", "outputString"]
 """Types of a model's inputs, and of the outputs of its steps, that may name a cloud."""
@@ -110,6 +113,8 @@ class CloudWidgetWrapper(WidgetWrapper):
         project = QgsProject.instance()
         project.layersAdded.connect(widget.list_choices)
         project.layersRemoved.connect(widget.list_choices)
+        if self.dialogType == QgsProcessingGui.WidgetType.Batch:
+            widget.combo.setMinimumWidth(BATCH_WIDTH)
         optional = self.parameterDefinition().flags() & QgsProcessingParameterDefinition.Flag.FlagOptional
         if self.dialogType == QgsProcessingGui.WidgetType.Standard and not optional:
             widget.combo.setCurrentIndex(0)

@@ -85,7 +85,8 @@ def test_files_loaded_later_have_theirs(run_apart, cloud, tmp_path):
     for output in ("RAILS", "CENTERLINES"):
         assert_whole(QgsVectorLayer(str(files[output])), name)
     assert_whole(QgsRasterLayer(str(files["CLEANED"])), name)
-    assert ogr.Open(str(files["RAILS"])).GetLayer(0).GetSpatialRef().GetAuthorityCode(None) == name[5:]
+    dataset = ogr.Open(str(files["RAILS"]))
+    assert dataset.GetLayer(0).GetSpatialRef().GetAuthorityCode(None) == name[5:]
 
 
 def test_every_step_keeps_its_own(run_apart, context, cloud, tmp_path):

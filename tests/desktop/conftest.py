@@ -1,0 +1,83 @@
+"""The real QGIS on a virtual display, with a fresh profile in which the plugin is installed from its zip."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+
+SCREEN = "-screen 0 1600x1000x24"
+
+LIMIT_S = 600
+"""After which QGIS is ended; a scenario takes a tenth of this."""
+
+BEGIN = """
+import sys
+sys.path.insert(0, {here!r})
+import driver, scenarios
+driver.start(scenarios.{scenario}, {folder!r})
+"""
+
+
+@dataclass
+class Session:
+    """What a scenario found.
+
+    Attributes
+    ----------
+    results : dict
+        As the scenario kept them.
+    folder : Path
+        Contains the files that it wrote, and its pictures.
+    code : int
+        How QGIS ended: 0, or the number of a signal below 0.
+    said : str
+        What QGIS wrote to the terminal.
+    """
+
+    results: dict[str, Any]
+    folder: Path
+    code: int
+    said: str
+
+    def __getitem__(self, name: str) -> Any:
+        return self.results[name]
+
+
+@pytest.fixture(scope="session")
+def run_scenario(tmp_path_factory):
+    """Run a scenario, once: tests share what it found."""
+    programs = {name: shutil.which(name) for name in ("qgis", "xvfb-run")}
+    if not all(programs.values()) or "QGIS_PROCESS" not in os.environ:
+        pytest.exit("These tests need QGIS, Xvfb and the environment of make: run `make test-desktop`.", 1)
+
+    @cache
+    def run(scenario: str) -> Session:
+        folder = tmp_path_factory.mktemp(scenario)
+        begin = folder / "begin.py"
+        begin.write_text(BEGIN.format(here=str(HERE), scenario=scenario, folder=str(folder)), encoding="utf-8")
+        environment = {
+            **os.environ,
+            "QT_QPA_PLATFORM": "xcb",
+            "RAIL_EXTRACT_SAMPLE": str(ROOT / "resources" / "sample" / "sample.laz"),
+            "RAIL_EXTRACT_ZIP": str(ROOT / "build" / "rail_extract.zip"),
+        }
+        for name in ("QGIS_PLUGINPATH", "QGIS_CUSTOM_CONFIG_PATH"):
+            environment.pop(name, None)
+        qgis = [programs["qgis"], "--profiles-path", folder / "profiles", "--noversioncheck", "--nologo"]
+        command = [programs["xvfb-run"], "-a", "-s", SCREEN, *qgis, "--code", begin]
+        ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=LIMIT_S)
+        results = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+        return Session(results, folder, ended.returncode, ended.stdout + ended.stderr)
+
+    return run

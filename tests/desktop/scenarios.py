@@ -1,0 +1,208 @@
+"""What a new user does in QGIS, and what is then found; `conftest.py` has each run in an application of its own."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from driver import Driver, algorithm, choose, close, install, later, open_batch, open_dialog, press_run, window
+from qgis.core import (
+    QgsCoordinateReferenceSystem,
+    QgsPointCloudLayer,
+    QgsProject,
+    QgsVectorFileWriter,
+    QgsVectorLayer,
+)
+from qgis.PyQt.QtCore import QObject, QUrl, pyqtSlot
+from qgis.PyQt.QtGui import QDesktopServices
+from qgis.PyQt.QtWidgets import QDialogButtonBox, QFileDialog, QGroupBox, QLineEdit
+
+SAMPLE, ARCHIVE = os.environ["RAIL_EXTRACT_SAMPLE"], os.environ["RAIL_EXTRACT_ZIP"]
+
+NAMES = (
+    *("extractrails", "rasterizerailpoints", "frpdfcleanup", "vectorizerails", "buildtrackcenterlines"),
+    *("measuretrackgeometry", "installpackages", "checkinstallation"),
+)
+
+PART = {
+    "STANDARD": "IN_75R_1000",
+    "EXTENT": "578215,578235,2494290,2494390 [EPSG:32643]",
+    "ITERATIONS": 1,
+}
+"""Parameters for 20 m of the sample's three tracks, for runs of a second or two."""
+
+POOL_S = 35.0
+"""Time after which Qt has ended the thread of a run: 30 s without work, and some more."""
+
+
+class Browser(QObject):
+    """Stands in for the web browser, and keeps what it is told to show."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.urls: list[str] = []
+        for scheme in ("file", "http", "https"):
+            QDesktopServices.setUrlHandler(scheme, self, "show")
+
+    @pyqtSlot(QUrl)
+    def show(self, url: QUrl) -> None:
+        """Keep an address."""
+        self.urls.append(url.toString())
+
+
+def dialogs(driver: Driver) -> Iterator:
+    """Install the plugin, open every dialog, press its buttons, and run Check installation."""
+    yield from install(ARCHIVE)
+    browser = Browser()
+    for name in NAMES:
+        dialog = yield from open_dialog(name)
+        for group in dialog.findChildren(QGroupBox):
+            group.setProperty("collapsed", False)
+        yield 0.3
+        driver.picture(f"dialog_{name}")
+        dialog.buttonBox().button(QDialogButtonBox.StandardButton.Help).click()
+        yield from close(dialog)
+        dialog = yield from open_batch(name)
+        driver.picture(f"batch_{name}")
+        yield from close(dialog)
+        driver.keep("dialogs", [*driver.results.get("dialogs", []), name])
+    driver.keep("help", browser.urls)
+    yield from _select_clouds(driver)
+    dialog = yield from open_dialog("checkinstallation")
+    driver.keep("check", (yield from press_run(dialog)))
+    driver.picture("check")
+    yield from close(dialog)
+
+
+def _select_clouds(driver: Driver) -> Iterator:
+    """Use the widget for the cloud: its list, its two buttons, and a typed path."""
+    project = QgsProject.instance()
+    project.addMapLayer(QgsVectorLayer("LineString?crs=EPSG:32643", "not a cloud", "memory"))
+    dialog = yield from open_dialog("extractrails")
+    widget = dialog.mainWidget().wrappers["INPUT"].widget
+    driver.keep("list without clouds", [widget.combo.itemText(i) for i in range(widget.combo.count())])
+    cloud = project.addMapLayer(QgsPointCloudLayer("", "my cloud", ""))
+    driver.keep("list with a cloud", [widget.combo.itemText(i) for i in range(widget.combo.count())])
+    widget.combo.setCurrentIndex(0)
+    driver.keep("chosen layer", dialog.mainWidget().wrappers["INPUT"].parameterValue() == cloud.id())
+    later(widget.file_button.click)
+    chooser = yield lambda: window("QFileDialog")
+    driver.keep("file filters", chooser.nameFilters())
+    driver.picture("file_dialog")
+    yield from _answer(chooser, SAMPLE)
+    driver.keep("selected file", widget.value())
+    later(widget.folder_button.click)
+    chooser = yield lambda: window("QFileDialog")
+    driver.keep("folders only", chooser.testOption(QFileDialog.Option.ShowDirsOnly))
+    yield from _answer(chooser, str(Path(SAMPLE).parent))
+    driver.keep("selected folder", widget.value())
+    widget.combo.lineEdit().selectAll()
+    widget.combo.lineEdit().insert("/data/typed.laz")
+    driver.keep("typed path", widget.value())
+    driver.picture("cloud_widget")
+    yield from close(dialog)
+    project.clear()
+
+
+def _answer(chooser: QFileDialog, path: str) -> Iterator:
+    """Type a path into a dialog that selects one, and accept it."""
+    chooser.findChild(QLineEdit, "fileNameEdit").setText(path)
+    later(chooser.findChild(QDialogButtonBox).button(QDialogButtonBox.StandardButton.Open).click)
+    yield lambda: window("QFileDialog") is None
+    yield 0.5
+
+
+def rails(driver: Driver) -> Iterator:
+    """Extract the sample's rails, wait, save them, and go on working with them."""
+    yield from install(ARCHIVE)
+    dialog = yield from open_dialog("extractrails")
+    dialog.mainWidget().wrappers["INPUT"].widget.combo.lineEdit().insert(SAMPLE)
+    outputs = dict.fromkeys(("RAILS", "CENTERLINES", "QUALITY", "REPORT"), "TEMPORARY_OUTPUT")
+    dialog.setParameters({**PART, **outputs, "CLEANED": str(driver.folder / "cleaned.tif")})
+    driver.keep("log", (yield from press_run(dialog)))
+    results = dialog.results()
+    driver.keep("results", results)
+    yield from close(dialog)
+    layers = {layer.name(): layer for layer in QgsProject.instance().mapLayers().values()}
+    driver.keep("layers", sorted(layers))
+    driver.picture("rails")
+    yield POOL_S
+    driver.keep("systems", {name: layer.crs().toWkt() for name, layer in layers.items()})
+    driver.keep("project's system", QgsProject.instance().crs().toWkt())
+    driver.keep("new system", QgsCoordinateReferenceSystem("EPSG:32643").toWkt())
+    options = QgsVectorFileWriter.SaveVectorOptions()
+    saved = str(driver.folder / "saved.gpkg")
+    context = QgsProject.instance().transformContext()
+    QgsVectorFileWriter.writeAsVectorFormatV3(layers["Rails"], saved, context, options)
+    driver.picture("rails_later")
+    dialog = yield from open_dialog("buildtrackcenterlines")
+    parameters = {"INPUT": layers["Rails"].id(), "STANDARD": PART["STANDARD"]}
+    dialog.setParameters({**parameters, "OUTPUT": str(driver.folder / "tracks.gpkg")})
+    driver.keep("second log", (yield from press_run(dialog)))
+    yield from close(dialog)
+
+
+def batch(driver: Driver) -> Iterator:
+    """Fill two rows of the batch dialog, with an output left blank, and a report."""
+    yield from install(ARCHIVE)
+    dialog = yield from open_batch("extractrails")
+    panel = dialog.mainWidget()
+    panel.checkLoadLayersOnCompletion.setChecked(True)
+    panel.addRow()
+    for row in range(2):
+        values = {"INPUT": SAMPLE, **PART}
+        for name, value in values.items():
+            panel.wrappers[row][panel.parameter_to_column[name]].setParameterValue(value, panel.processing_context)
+        for name, ending in {"RAILS": "gpkg", "REPORT": "html"}.items():
+            cell = panel.tblParameters.cellWidget(row + 1, panel.parameter_to_column[name])
+            cell.setValue(str(driver.folder / f"{name}{row}.{ending}"))
+    driver.picture("batch_filled")
+    driver.keep("log", (yield from press_run(dialog)))
+    driver.picture("batch_ran")
+    driver.keep("files", sorted(path.name for path in driver.folder.glob("R*")))
+    driver.keep("layers", [layer.name() for layer in QgsProject.instance().mapLayers().values()])
+    yield from close(dialog)
+
+
+def model(driver: Driver) -> Iterator:
+    """Open Extract Rails as a model, look at a step, and run the model on a folder."""
+    from processing.gui.ProviderActions import ProviderContextMenuActions
+
+    yield from install(ARCHIVE)
+    choose("extractrails")
+    action = next(one for one in ProviderContextMenuActions.actions if one.name == "Open as Model…")
+    action.setData(algorithm("extractrails"), None)
+    later(action.execute)
+    designer = yield lambda: window("ModelerDialog")
+    yield 1.0
+    driver.picture("model")
+    later(lambda: _edit(designer, "raster"))
+    dialog = yield lambda: window("ModelerParametersDialog")
+    wrapper = dialog.widget.widget.wrappers["INPUT"]
+    driver.keep("choices of a step", [wrapper.widget.combo.itemText(i) for i in range(wrapper.widget.combo.count())])
+    driver.keep("choice of a step", wrapper.widget.combo.currentText())
+    driver.picture("model_step")
+    dialog.buttonBox.button(QDialogButtonBox.StandardButton.Ok).click()
+    yield lambda: window("ModelerParametersDialog") is None
+    later(designer.actionRun().trigger)
+    dialog = yield lambda: window("AlgorithmDialog")
+    dialog.mainWidget().wrappers["INPUT"].widget.combo.lineEdit().insert(str(Path(SAMPLE).parent))
+    dialog.setParameters(PART)
+    driver.picture("model_dialog")
+    driver.keep("log", (yield from press_run(dialog)))
+    driver.picture("model_ran")
+    driver.keep("results", {name: value for name, value in dialog.results().items() if ":" in name})
+    yield from close(dialog)
+    designer.setDirty(False)
+    yield from close(designer)
+    layers = QgsProject.instance().mapLayers().values()
+    yield POOL_S
+    driver.keep("systems", {layer.name(): layer.crs().toWkt() for layer in layers})
+
+
+def _edit(designer, step: str) -> None:
+    """Open the dialog of a model's step, as a double click does."""
+    scene = designer.view().scene()
+    items = (item for item in scene.items() if hasattr(item, "editComponent") and hasattr(item, "component"))
+    next(item for item in items if getattr(item.component(), "childId", lambda: None)() == step).editComponent()

@@ -1,0 +1,93 @@
+"""What a new user meets in the real QGIS; each test looks at what one of the scenarios found."""
+
+from pathlib import Path
+
+import pytest
+from osgeo import gdal, ogr
+
+SCENARIOS = ("dialogs", "rails", "batch", "model")
+NAMES = [
+    *("extractrails", "rasterizerailpoints", "frpdfcleanup", "vectorizerails", "buildtrackcenterlines"),
+    *("measuretrackgeometry", "installpackages", "checkinstallation"),
+]
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_no_error_and_no_crash(run_scenario, scenario):
+    session = run_scenario(scenario)
+    assert session["exceptions"] == []
+    assert session["ended"]
+    assert session.code == 0, session.said
+
+
+def test_every_dialog_opens_and_its_help(run_scenario):
+    session = run_scenario("dialogs")
+    assert session["dialogs"] == NAMES
+    pages = [Path(address.replace("file://", "")).name for address in session["help"]]
+    assert pages == ["parameters.html"] * 6 + ["troubleshooting.html"] * 2
+
+
+def test_cloud_is_chosen_from_clouds_alone(run_scenario):
+    session = run_scenario("dialogs")
+    assert session["list without clouds"] == []
+    assert session["list with a cloud"] == ["my cloud"]
+    assert session["chosen layer"]
+
+
+def test_cloud_is_selected_as_file_or_folder_or_typed(run_scenario):
+    session = run_scenario("dialogs")
+    assert session["file filters"][0] == "Point clouds (*.las *.LAS *.laz *.LAZ *.vpc *.VPC)"
+    assert Path(session["selected file"]).name == "sample.laz"
+    assert session["folders only"]
+    assert Path(session["selected folder"]).name == "sample"
+    assert session["typed path"] == "/data/typed.laz"
+
+
+def test_check_of_the_installation_shows_its_result(run_scenario):
+    log = run_scenario("dialogs")["check"]
+    assert "Rail Extract works here. Self test passed: 100.0% of the true rails found" in log
+    assert "'PASSED': True" in log
+
+
+def test_rails_are_found_and_loaded(run_scenario):
+    session = run_scenario("rails")
+    assert session["results"]["RAIL_COUNT"] == 6
+    assert session["results"]["CENTERLINE_COUNT"] == 3
+    assert session["layers"] == ["Cleaned rail raster", "Rails", "Track centerlines", "Track geometry"]
+
+
+def test_systems_outlive_the_thread_of_the_run(run_scenario):
+    session = run_scenario("rails")
+    systems = [*session["systems"].values(), session["project's system"], session["new system"]]
+    assert ["UTM zone 43N" in wkt for wkt in systems] == [True] * 6
+    assert ["UTM zone 43N" in wkt for wkt in run_scenario("model")["systems"].values()] == [True] * 3
+
+
+@pytest.mark.parametrize(("name", "count"), [("saved.gpkg", 6), ("tracks.gpkg", 3)])
+def test_saved_lines_are_complete(run_scenario, name, count):
+    dataset = ogr.Open(str(run_scenario("rails").folder / name))  # GDAL crashes if nothing refers to it
+    layer = dataset.GetLayer(0)
+    assert layer.GetSpatialRef().GetAuthorityCode(None) == "32643"
+    assert layer.GetFeatureCount() == count
+    assert layer.GetGeomType() == ogr.wkbLineString25D
+
+
+def test_saved_raster_has_its_system(run_scenario):
+    dataset = gdal.Open(str(run_scenario("rails").folder / "cleaned.tif"))
+    assert dataset.GetSpatialRef().GetAuthorityCode(None) == "32643"
+
+
+def test_batch_writes_what_is_named_and_skips_what_is_blank(run_scenario):
+    session = run_scenario("batch")
+    assert session["log"].count("correctly executed") == 2
+    assert "Batch execution completed" in session["log"]
+    assert session["files"] == ["RAILS0.gpkg", "RAILS1.gpkg", "REPORT0.html", "REPORT1.html"]
+    assert session["layers"] == ["Rails", "Rails"]
+
+
+def test_model_takes_a_folder_and_runs(run_scenario):
+    session = run_scenario("model")
+    assert session["choice of a step"] == "Point cloud (layer, file or folder)"
+    assert session["choice of a step"] in session["choices of a step"]
+    assert set(session["results"]) == {"rails:RAILS", "centerlines:CENTERLINES", "quality:QUALITY"}
+    assert "Execution completed" in session["log"]
