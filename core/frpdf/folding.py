@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import ModelError
 from . import STATISTICS
-from .architecture import STAGES, Combined, Stacked
+from .architecture import CHANNELS, KERNEL_RADIUS, STAGES, Combined, Stacked
 
 EPSILON = 1e-5
 """Added to the variance in batch norm."""
@@ -83,20 +83,61 @@ def _fold_pass(arrays: dict[str, np.ndarray], number: int) -> list[FoldedLayer]:
     for position, stage in enumerate(STAGES):
         name = f"layer.{position}"
         if isinstance(stage, Stacked):
-            layers += [FoldedLayer(_fold(arrays, f"{name}.{place}", number)) for place in (0, 1)]
+            for place, channels_in in enumerate((stage.channels_in, CHANNELS)):
+                layers.append(FoldedLayer(_fold(arrays, f"{name}.{place}", number, channels_in)))
         elif isinstance(stage, Combined):
-            dilated = _fold(arrays, f"{name}.dilated", number, stage.dilation)
-            layers.append(FoldedLayer(dilated, _fold(arrays, f"{name}.reduce", number)))
+            dilated = _fold(arrays, f"{name}.dilated", number, CHANNELS, stage.dilation)
+            layers.append(FoldedLayer(dilated, _fold(arrays, f"{name}.reduce", number, 2 * CHANNELS, radius=0)))
         else:
-            output = Convolution(arrays[f"{name}.weight"], arrays[f"{name}.bias"])
-            layers.append(FoldedLayer(output, is_output=True))
+            weight = _checked(arrays, f"{name}.weight", (1, CHANNELS, 1, 1))
+            layers.append(FoldedLayer(Convolution(weight, _checked(arrays, f"{name}.bias", (1,))), is_output=True))
     return layers
 
 
-def _fold(arrays: dict[str, np.ndarray], name: str, number: int, dilation: int = 1) -> Convolution:
-    """Fold the batch norm that follows a convolution into it."""
+def _fold(
+    arrays: dict[str, np.ndarray],
+    name: str,
+    number: int,
+    channels_in: int,
+    dilation: int = 1,
+    radius: int = KERNEL_RADIUS,
+) -> Convolution:
+    """Fold the batch norm that follows a convolution into it.
+
+    Parameters
+    ----------
+    arrays : dict of str to array
+    name : str
+        Name of the two in the network.
+    number : int
+        Number of the batch statistics.
+    channels_in, dilation, radius : int
+        Channels of the convolution's input, distance between the cells of its kernel, and reach of the kernel.
+    """
     suffix = f"_{number}" if number else ""
-    mean, variance = arrays[f"{name}.1.running_mean{suffix}"], arrays[f"{name}.1.running_var{suffix}"]
-    scale = arrays[f"{name}.1.weight"] / np.sqrt(variance + EPSILON)
-    weight = arrays[f"{name}.0.weight"] * scale[:, None, None, None]
-    return Convolution(weight, arrays[f"{name}.1.bias"] - mean * scale, dilation)
+    side = 2 * radius + 1
+    kernel = _checked(arrays, f"{name}.0.weight", (CHANNELS, channels_in, side, side))
+    mean, variance, weight, bias = (
+        _checked(arrays, f"{name}.1.{part}", (CHANNELS,))
+        for part in (f"running_mean{suffix}", f"running_var{suffix}", "weight", "bias")
+    )
+    if (variance < 0).any():
+        raise ValueError(f"{name} has a negative variance")
+    scale = weight / np.sqrt(variance + EPSILON)
+    return Convolution(kernel * scale[:, None, None, None], bias - mean * scale, dilation)
+
+
+def _checked(arrays: dict[str, np.ndarray], name: str, shape: tuple[int, ...]) -> np.ndarray:
+    """Return an array of finite numbers with the expected shape.
+
+    Raises
+    ------
+    KeyError, ValueError
+        It is missing, or different.
+    """
+    array = arrays[name]
+    if array.shape != shape:
+        raise ValueError(f"{name} has the shape {array.shape} instead of {shape}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} contains a value that is not a number")
+    return array

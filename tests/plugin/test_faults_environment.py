@@ -2,6 +2,7 @@
 
 import shutil
 import sqlite3
+import zipfile
 
 import faults
 import numpy as np
@@ -67,7 +68,24 @@ def halve(path):
 
 
 def put_others(path):
-    np.savez(path, other=np.zeros(3))
+    np.savez(path, other=np.zeros(3, np.float32))
+
+
+def put_bomb(path):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("layer.9.bias.npy", "w") as member:
+        for _ in range(256):
+            member.write(bytes(2**20))
+
+
+def replacing(name, change):
+    """Weights of which one array is changed."""
+
+    def replace(path):
+        with np.load(path) as archive:
+            arrays = dict(archive)
+        np.savez(path, **{**arrays, name: change(arrays[name])})
+
+    return replace
 
 
 def put_code(path):
@@ -245,7 +263,34 @@ FAULTS = [
         "weights of a different network",
         with_weights(put_others),
         REFUSED,
-        "The weights file does not belong to FRPDF ('layer.0.0.1.running_mean'): reinstall the plugin.",
+        "The weights file does not belong to FRPDF ('layer.0.0.0.weight'): reinstall the plugin.",
+    ),
+    Fault(
+        "weights that take 256 MB when they are unpacked",
+        with_weights(put_bomb),
+        REFUSED,
+        "The weights file …/models/frpdf_base.npz cannot be read: reinstall the plugin.",
+    ),
+    *(
+        Fault(
+            f"weights with {what}",
+            with_weights(replacing("layer.9.bias", change)),
+            REFUSED,
+            f"The weights file {said}: reinstall the plugin.",
+        )
+        for what, change, said in (
+            (
+                "NaN",
+                lambda array: array * np.nan,
+                "does not belong to FRPDF (layer.9.bias contains a value that is not a number)",
+            ),
+            ("complex numbers", lambda array: array * 1j, "…/models/frpdf_base.npz cannot be read"),
+            (
+                "values missing",
+                lambda array: array[:0],
+                "does not belong to FRPDF (layer.9.bias has the shape (0,) instead of (1,))",
+            ),
+        )
     ),
     Fault(
         "weights that contain code",

@@ -1,9 +1,12 @@
 """Weights on disk: half precision, and what is refused."""
 
+import tracemalloc
+import zipfile
+
 import numpy as np
 import pytest
 from rail_extract.core.errors import ModelError
-from rail_extract.core.frpdf.weights import load_arrays, save_arrays
+from rail_extract.core.frpdf.weights import MAX_BYTES, load_arrays, save_arrays
 
 
 def test_weights_survive_the_file_in_half_precision(random_arrays, tmp_path):
@@ -23,3 +26,43 @@ def test_missing_and_damaged_weights_are_named(tmp_path):
     (tmp_path / "cut.npz").write_bytes(b"PK\x03\x04 cut")
     with pytest.raises(ModelError, match="cut.npz cannot be read"):
         load_arrays(tmp_path / "cut.npz")
+
+
+def npy(header, data=b""):
+    """An array in numpy's format with any header."""
+    text = repr(header).encode().ljust(118) + b"\n"
+    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + data
+
+
+BAD_ARRAYS = {
+    "gigabytes of zeros": npy({"descr": "<f4", "fortran_order": False, "shape": (2**26,)}, bytes(2**28)),
+    "gigabytes stated": npy({"descr": "<f4", "fortran_order": False, "shape": (2**40,)}, bytes(96)),
+    "values missing": npy({"descr": "<f4", "fortran_order": False, "shape": (24,)}, bytes(92)),
+    "negative length": npy({"descr": "<f4", "fortran_order": False, "shape": (-24,)}, bytes(96)),
+    "complex numbers": npy({"descr": "<c8", "fortran_order": False, "shape": (24,)}, bytes(192)),
+    "text": npy({"descr": "<U100000000", "fortran_order": False, "shape": (24,)}, bytes(96)),
+    "objects": npy({"descr": "|O", "fortran_order": False, "shape": (24,)}, b"\x80\x04]."),
+    "no array": b"weights",
+    "nothing": b"",
+}
+
+
+@pytest.mark.parametrize("fault", BAD_ARRAYS)
+def test_what_is_not_an_array_of_weights_is_refused_within_little_memory(tmp_path, fault):
+    path = tmp_path / "weights.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("layer.9.bias.npy", BAD_ARRAYS[fault])
+    assert path.stat().st_size < 300_000
+    tracemalloc.start()
+    try:
+        with pytest.raises(ModelError, match="weights.npz cannot be read"):
+            load_arrays(path)
+        assert tracemalloc.get_traced_memory()[1] < 2 * MAX_BYTES
+    finally:
+        tracemalloc.stop()
+
+
+def test_arrays_by_columns_are_read_as_numpy_reads_them(tmp_path):
+    array = np.asfortranarray(np.arange(6, dtype=np.float32).reshape(2, 3))
+    np.savez(tmp_path / "weights.npz", here=array)
+    assert np.array_equal(load_arrays(tmp_path / "weights.npz")["here"], array)
