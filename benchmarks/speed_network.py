@@ -23,19 +23,21 @@ from rail_extract.core.frpdf.onnx import to_onnx
 from rail_extract.core.frpdf.opencv_engine import OpenCvEngine
 from rail_extract.core.frpdf.torch_engine import TorchEngine
 from rail_extract.core.pipeline import Parameters
-from rail_extract.core.polyline import interpolate, length_along, project, resample
 from rail_extract.core.progress import SILENT
 from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import RailRaster, cell_size, rasterize
 from rail_extract.core.steps import lines_of
+from rail_extract.laboratory.ruler.lines import match
 
 TILE = 512
 """Side of the tiles that plain PyTorch computes, in cells."""
 SMALL_FIELD = 100_000
 """Cells at once that cut a short scene into several fields."""
 DIAGONAL_M, CELL_M = 3000.0, 0.04
-END_M, SAMPLING_M, NEAR_M = 0.5, 0.05, 0.1
-"""Left out at either end of a line, where it may end a few centimetres apart; spacing and reach of the comparison."""
+END_M = 0.5
+"""Length left out at either end of a line, because lines may end a few centimetres apart."""
+NEAR_M = 0.1
+"""Distance in plan up to which lines are compared."""
 
 
 @dataclass(frozen=True)
@@ -207,13 +209,11 @@ def _apart(cut: Cut, found: RailRaster, reference: RailRaster) -> float:
 
 
 def _distance_m(line: RailLine, other: RailLine) -> float:
-    xyz, t = resample(line.xyz, SAMPLING_M)
-    xyz = xyz[(t > END_M) & (t < t[-1] - END_M)]
-    feet = project([other.xyz[:, :2]], xyz[:, :2], NEAR_M)
-    if len(feet.t) < len(xyz):
-        return np.inf
-    height = interpolate(other.xyz[:, 2:], length_along(other.xyz[:, :2]), feet.t)[:, 0]
-    return float(np.sqrt(np.mean(feet.across**2 + (xyz[feet.point, 2] - height) ** 2)))
+    """Return the rms distance of a line from another one, without its ends; infinite where it is too far away."""
+    found = match([line.xyz], [other.xyz])
+    inside = (found.t > END_M) & (found.t < found.t[-1] - END_M)
+    distance, height = found.back.distance[inside], found.back.height[inside]
+    return float(np.sqrt(np.mean(distance**2 + height**2))) if distance.max() <= NEAR_M else np.inf
 
 
 CLOCKS = {"wall": time.perf_counter, "cpu": time.process_time}

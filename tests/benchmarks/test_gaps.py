@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from rail_extract.laboratory.rasters.pairs import CELL_M
 
+pytest.importorskip("torch")
+
 
 @pytest.fixture(scope="module")
 def gaps():
