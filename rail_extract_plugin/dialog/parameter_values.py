@@ -41,7 +41,7 @@ NUMBERS = {
 }
 """Attribute of the core's `Parameters` for each number of the interface."""
 
-NO_LINES = (
+TYPES_WITHOUT_LINES = (
     QgsWkbTypes.GeometryType.PointGeometry,
     QgsWkbTypes.GeometryType.PolygonGeometry,
     QgsWkbTypes.GeometryType.NullGeometry,
@@ -132,7 +132,7 @@ class ParameterValues:
         if source is None:
             raise RailExtractError(f"{name} is not a readable layer: give a line layer.")
         kind = source.wkbType()
-        if QgsWkbTypes.geometryType(kind) in NO_LINES:
+        if QgsWkbTypes.geometryType(kind) in TYPES_WITHOUT_LINES:
             raise RailExtractError(
                 f"{name} has the geometry type {QgsWkbTypes.displayString(kind)}: give a line layer."
             )

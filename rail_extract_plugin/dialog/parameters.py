@@ -20,19 +20,19 @@ TORCH_BUILDS = ("NONE", "CPU", "CUDA")
 
 # The maxima below only reject values that must be millimetres in a field of metres; they are not recommendations.
 
-WIDEST_REACH_M = 0.5
+MAX_TOLERANCE_M = 0.5
 """Points further away than about half of the narrowest gauge in use (600 mm) may belong to another rail."""
 
-COARSEST_M = 1.0
+MAX_SIMPLIFICATION_M = 1.0
 """A line simplified with a larger tolerance no longer represents a rail, which is about 0.07 m wide."""
 
-LONGEST_SMOOTHING_M = 100.0
+MAX_SMOOTHING_M = 100.0
 """Removes even the tightest curves and dips of a railway."""
 
-FLATTEST_CROWN_M = 10_000.0
+MAX_CROWN_RADIUS_M = 10_000.0
 """A disc of this radius is practically flat over any dip."""
 
-LONGEST_M = 100_000.0
+MAX_LENGTH_M = 100_000.0
 """Longer than any gap to close, any minimum line length and any step between stations."""
 
 
@@ -89,7 +89,7 @@ def model() -> QgsProcessingParameterDefinition:
 def step() -> QgsProcessingParameterDefinition:
     """Define the spacing of the stations of the track geometry."""
     return advanced(
-        number("STEP", tr("Step of the track geometry [m]"), DEFAULT_STEP_M, 0.1, LONGEST_M),
+        number("STEP", tr("Step of the track geometry [m]"), DEFAULT_STEP_M, 0.1, MAX_LENGTH_M),
         tr(
             "Distance between the stations along each track at which gauge, cant, twist, radius and gradient are given."
         ),
@@ -152,7 +152,7 @@ def torch() -> QgsProcessingParameterDefinition:
 def smoothing_xy() -> QgsProcessingParameterDefinition:
     """Define the smoothing in plan."""
     return advanced(
-        number("SMOOTHING_XY", tr("Smoothing in plan [m]"), Parameters.smoothing_xy_m, 0.05, LONGEST_SMOOTHING_M),
+        number("SMOOTHING_XY", tr("Smoothing in plan [m]"), Parameters.smoothing_xy_m, 0.05, MAX_SMOOTHING_M),
         tr("Standard deviation of the smoothing: bends shorter than a few times this length are flattened."),
     )
 
@@ -162,18 +162,18 @@ def lines() -> Definitions:
     return (
         smoothing_xy(),
         advanced(
-            number("SMOOTHING_Z", tr("Smoothing in height [m]"), Parameters.smoothing_z_m, 0.05, LONGEST_SMOOTHING_M),
+            number("SMOOTHING_Z", tr("Smoothing in height [m]"), Parameters.smoothing_z_m, 0.05, MAX_SMOOTHING_M),
             tr("Standard deviation of the smoothing: dips shorter than a few times this length are flattened."),
         ),
         advanced(
-            number("TOLERANCE_XY", tr("Tolerance in plan [m]"), Parameters.tolerance_xy_m, 0.005, WIDEST_REACH_M),
+            number("TOLERANCE_XY", tr("Tolerance in plan [m]"), Parameters.tolerance_xy_m, 0.005, MAX_TOLERANCE_M),
             tr(
                 "Only points within this distance of the line determine its height. Half the railhead width is the "
                 "limit in any case."
             ),
         ),
         advanced(
-            number("TOLERANCE_Z", tr("Tolerance in height [m]"), Parameters.tolerance_z_m, 0.001, WIDEST_REACH_M),
+            number("TOLERANCE_Z", tr("Tolerance in height [m]"), Parameters.tolerance_z_m, 0.001, MAX_TOLERANCE_M),
             tr("Only points within this distance below the top of the rail determine the height of the line."),
         ),
         advanced(
@@ -182,7 +182,7 @@ def lines() -> Definitions:
                 tr("Crown radius of the rolling disc [m]"),
                 Parameters.crown_radius_m,
                 1.0,
-                FLATTEST_CROWN_M,
+                MAX_CROWN_RADIUS_M,
             ),
             tr(
                 "A disc of this radius, rolled along the points from above, finds the top of the rail. The value "
@@ -202,7 +202,7 @@ def lines() -> Definitions:
 def max_gap() -> QgsProcessingParameterDefinition:
     """Define the longest gap to close."""
     return helped(
-        number("MAX_GAP", tr("Longest gap to close [m]"), Parameters.max_gap_m, maximum=LONGEST_M),
+        number("MAX_GAP", tr("Longest gap to close [m]"), Parameters.max_gap_m, maximum=MAX_LENGTH_M),
         tr(
             "Line ends up to this distance apart are joined if they point at each other; 0 joins none. Where only one "
             "rail of a track continues, the centerline follows it for up to 30 m, regardless of this value."
@@ -214,11 +214,15 @@ def simplification() -> Definitions:
     """Define the tolerances of the simplification."""
     return (
         advanced(
-            number("SIMPLIFY_XY", tr("Simplification in plan [m]"), Parameters.simplify_xy_m, maximum=COARSEST_M),
+            number(
+                "SIMPLIFY_XY", tr("Simplification in plan [m]"), Parameters.simplify_xy_m, maximum=MAX_SIMPLIFICATION_M
+            ),
             tr("Vertices are removed while the line stays within this distance in plan."),
         ),
         advanced(
-            number("SIMPLIFY_Z", tr("Simplification in height [m]"), Parameters.simplify_z_m, maximum=COARSEST_M),
+            number(
+                "SIMPLIFY_Z", tr("Simplification in height [m]"), Parameters.simplify_z_m, maximum=MAX_SIMPLIFICATION_M
+            ),
             tr("Vertices are removed while the line stays within this distance in height."),
         ),
     )
@@ -227,7 +231,7 @@ def simplification() -> Definitions:
 def min_length() -> QgsProcessingParameterDefinition:
     """Define the minimum length of lines."""
     return advanced(
-        number("MIN_LENGTH", tr("Shortest line [m]"), Parameters.min_length_m, maximum=LONGEST_M),
+        number("MIN_LENGTH", tr("Shortest line [m]"), Parameters.min_length_m, maximum=MAX_LENGTH_M),
         tr("Shorter lines are dropped."),
     )
 
@@ -245,7 +249,7 @@ def pairing() -> Definitions:
                 tr("Gauge tolerance of tracks [m]"),
                 Parameters.centerline_tolerance_m,
                 0.001,
-                WIDEST_REACH_M,
+                MAX_TOLERANCE_M,
             ),
             tr("Rails whose gauge deviates by more than this do not make a track."),
         ),

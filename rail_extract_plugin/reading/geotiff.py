@@ -29,7 +29,7 @@ CREATION = (
     "BIGTIFF=IF_SAFER",
 )
 
-ALIKE = 1e-6
+SIDE_TOLERANCE = 1e-6
 """Relative difference allowed between the two sides of a cell, because writers round."""
 
 
@@ -46,7 +46,7 @@ def read_header(path: Path) -> RasterHeader:
     with _explained(path):
         dataset = _open(path)
         x, width, skew_x, y, skew_y, height = dataset.GetGeoTransform()
-        if skew_x or skew_y or not math.isclose(width, -height, rel_tol=ALIKE) or width <= 0:
+        if skew_x or skew_y or not math.isclose(width, -height, rel_tol=SIDE_TOLERANCE) or width <= 0:
             raise RasterError(f"{path.name} is rotated or its cells are not square: warp it to square cells, north up.")
         wkt = dataset.GetProjection() or None
         unit_m = units(parse_crs(wkt))[0] if wkt else 1.0

@@ -25,10 +25,10 @@ from ...core.frame import ORIGIN_STEP, LocalFrame
 from ...core.progress import SILENT, Progress
 from ...core.rails import Centerline, RailLine
 
-CHORD_M = 0.0005
+CHORD_TOLERANCE_M = 0.0005
 """Greatest deviation of the chords that approximate a curved line: well below the accuracy of a survey."""
 
-LONGEST_M = 500_000.0
+MAX_SEGMENT_M = 500_000.0
 """A longer straight segment has a stray vertex: the longest straight railway has 478 km."""
 
 
@@ -87,7 +87,7 @@ def _read(
     found = [
         (feature, vertices)
         for feature in progress.follow(source.getFeatures(request, flags), source.featureCount())
-        for vertices in _parts(feature.geometry(), CHORD_M / horizontal_unit_m)
+        for vertices in _parts(feature.geometry(), CHORD_TOLERANCE_M / horizontal_unit_m)
     ]
     if not found:
         raise RailExtractError(f"{name} has no lines: give a line layer.")
@@ -97,7 +97,7 @@ def _read(
             f"{name} has a line (feature {lost}) with a coordinate that is not a number: repair or delete it."
         )
     stray = next(
-        (feature.id() for feature, vertices in found if _longest(vertices) * horizontal_unit_m > LONGEST_M), None
+        (feature.id() for feature, vertices in found if _longest(vertices) * horizontal_unit_m > MAX_SEGMENT_M), None
     )
     if stray is not None:
         raise RailExtractError(f"{name} has a line (feature {stray}) with a stray vertex: repair or delete it.")

@@ -25,8 +25,8 @@ MARGIN_M = 1.0
 SQUARE_M = 500.0
 """Side of the squares in which points are processed: about that of the squares of Extract Rails."""
 
-SURE_GAUGE_MM = 1.0
-"""Difference between two mean gauges of a track that is not due to noise but to a different railhead width."""
+MAX_GAUGE_NOISE_MM = 1.0
+"""A larger difference between two mean gauges of a track is not noise but due to a different railhead width."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def check_gauges(tracks: TrackInputs, measured: Sequence[TrackGeometry], progres
         progress.warning(f"Tracks {', '.join(lonely)} do not have rails on both sides: their gauge and cant are empty.")
     off = found - [line.gauge_mm for line in tracks.centerlines]
     off = off[np.isfinite(off)]
-    if len(off) and abs(np.median(off)) > SURE_GAUGE_MM:
+    if len(off) and abs(np.median(off)) > MAX_GAUGE_NOISE_MM:
         progress.warning(
             f"The gauge differs by {np.median(off):+.1f} mm from gauge_mm of the centerlines: check HEAD_WIDTH."
         )

@@ -18,7 +18,7 @@ from . import processes
 from .dependencies import OWNED_BY_QGIS, is_installed, pins
 from .interpreter import Interpreter
 
-OLDEST_PIP = (22, 2)
+MIN_PIP = (22, 2)
 """The first version that can report what it would install."""
 
 PIP_ENVIRONMENT = {
@@ -66,15 +66,15 @@ class Pip:
     Parameters
     ----------
     interpreter : Interpreter
-    workshop : Path
+    temporary : Path
         Folder for temporary files.
     folders : sequence of Path
         Folders of packages in addition to those of QGIS.
     """
 
-    def __init__(self, interpreter: Interpreter, workshop: Path, folders: Sequence[Path]) -> None:
+    def __init__(self, interpreter: Interpreter, temporary: Path, folders: Sequence[Path]) -> None:
         self._program = interpreter.program
-        self._workshop = workshop
+        self._temporary = temporary
         self._paths = [*filter(None, [_inherited()]), *map(str, folders)]
         self._changes = {**interpreter.changes, **PIP_ENVIRONMENT}
 
@@ -92,14 +92,14 @@ class Pip:
                 f"The Python of this QGIS, {self._program}, has no pip: install it (Debian and Ubuntu: the package "
                 "python3-pip; OSGeo4W: the package python3-pip) and run Install packages again."
             )
-        if tuple(map(int, version.groups())) < OLDEST_PIP:
-            newer = self._workshop / "pip"
+        if tuple(map(int, version.groups())) < MIN_PIP:
+            newer = self._temporary / "pip"
             self.install(["pip"], ["--target", str(newer)], progress)
             self._paths.insert(0, str(newer))
 
     def resolve(self, order: Order, progress: Progress) -> dict[str, str]:
         """Return the packages that an order would add: versions by normalized name."""
-        report, constraints = self._workshop / "report.json", self._workshop / "constraints.txt"
+        report, constraints = self._temporary / "report.json", self._temporary / "constraints.txt"
         constraints.write_text("\n".join(pins()), encoding="utf-8")
         options = ["--dry-run", "--report", str(report), "--constraint", str(constraints), *order.options]
         self.install(order.requirements, options, progress)
@@ -114,9 +114,9 @@ class Pip:
         RailExtractError
             It failed.
         """
-        ended = self._run("install", BINARIES, *options, *requirements, progress=progress)
-        if ended.code != 0:
-            reasons = re.findall(r"^ERROR: (.*)$", ended.output, re.MULTILINE) or ["see the log"]
+        completed = self._run("install", BINARIES, *options, *requirements, progress=progress)
+        if completed.code != 0:
+            reasons = re.findall(r"^ERROR: (.*)$", completed.output, re.MULTILINE) or ["see the log"]
             raise RailExtractError(
                 f"pip could not install {', '.join(requirements)} ({reasons[-1].rstrip('.')}): check the connection to "
                 "the package index and the free disk space. No files were kept."
@@ -132,14 +132,14 @@ class Pip:
         """
         paths = list(map(str, folders))
         arguments = ["-c", IMPORT, str(len(paths) + 2), *paths, *modules]
-        ended = processes.run(self._program, arguments, self._changes)
-        if ended.code != 0:
-            reason = ended.output.strip().splitlines()[-1:] or ["it crashed"]
+        completed = processes.run(self._program, arguments, self._changes)
+        if completed.code != 0:
+            reason = completed.output.strip().splitlines()[-1:] or ["it crashed"]
             raise RailExtractError(
                 f"{', '.join(modules)} does not work in the Python of this QGIS ({reason[0]}). No files were kept."
             )
 
-    def _run(self, *arguments: str, progress: Progress = SILENT) -> processes.Ended:
+    def _run(self, *arguments: str, progress: Progress = SILENT) -> processes.Completed:
         changes = {**self._changes, "PYTHONPATH": os.pathsep.join(self._paths)}
         return processes.run(self._program, ["-m", "pip", *arguments], changes, progress)
 
@@ -167,13 +167,13 @@ def install(order: Order, interpreter: Interpreter, folder: Path, others: Sequen
     RailExtractError
         pip failed, the folder cannot be written, or the packages do not work with those of QGIS.
     """
-    with _workshop(folder) as workshop:
-        pip = Pip(interpreter, workshop, [*others, folder])
+    with _temporary_folder(folder) as temporary:
+        pip = Pip(interpreter, temporary, [*others, folder])
         pip.prepare(progress.span(0, 0.1))
         found = pip.resolve(order, progress)
         progress.set_fraction(0.3)
         wanted = _beyond_qgis(found, progress)
-        staging = workshop / "packages"
+        staging = temporary / "packages"
         if wanted:
             pip.install(wanted, ["--no-deps", "--target", str(staging), *order.options], progress)
         progress.set_fraction(0.8)
@@ -212,19 +212,19 @@ def _inherited() -> str:
 
 
 @contextmanager
-def _workshop(folder: Path) -> Iterator[Path]:
+def _temporary_folder(folder: Path) -> Iterator[Path]:
     """Create a folder next to `folder`, and delete it afterwards in any case."""
-    workshop = folder.with_name(f"{folder.name}.unfinished")
+    temporary = folder.with_name(f"{folder.name}.unfinished")
     try:
-        shutil.rmtree(workshop, ignore_errors=True)
-        workshop.mkdir(parents=True)
-        yield workshop
+        shutil.rmtree(temporary, ignore_errors=True)
+        temporary.mkdir(parents=True)
+        yield temporary
     except OSError as error:
         raise RailExtractError(
             f"{folder} can't be written ({error}): free disk space, or make the folder writable."
         ) from error
     finally:
-        shutil.rmtree(workshop, ignore_errors=True)
+        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def _move(staging: Path, folder: Path) -> None:

@@ -14,7 +14,7 @@ POLL_MS = 200
 
 
 @dataclass(frozen=True)
-class Ended:
+class Completed:
     """The result of a program.
 
     Attributes
@@ -31,7 +31,7 @@ class Ended:
 
 def run(
     program: str, arguments: Sequence[str], changes: Mapping[str, str] | None = None, progress: Progress = SILENT
-) -> Ended:
+) -> Completed:
     """Run a program to its end.
 
     Parameters
@@ -65,7 +65,7 @@ def run(
         process.waitForFinished()
     log.add(bytes(process.readAll()), last=True)
     failed = process.error() in (QProcess.ProcessError.FailedToStart, QProcess.ProcessError.Crashed)
-    return Ended(None if failed else process.exitCode(), log.text)
+    return Completed(None if failed else process.exitCode(), log.text)
 
 
 class _Log:

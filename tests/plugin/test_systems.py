@@ -18,7 +18,7 @@ ZONES = iter(range(32601, 32660))
 """Systems that no other test uses, because QGIS caches them."""
 
 SETTLING_MS = 500
-"""Time for an ended thread to release its objects of PROJ, seconds."""
+"""Time for an ended thread to release its objects of PROJ."""
 
 
 @pytest.fixture
