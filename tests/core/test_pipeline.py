@@ -203,3 +203,30 @@ def test_a_run_in_stretches_hears_a_cancel():
 def test_stretches_smaller_than_their_overlap_are_refused():
     with pytest.raises(ParameterError, match="4"):
         extract_rails([straight().rail_points()], Parameters(1.435, WIDTH, square_tiles=2))
+
+
+class Listener(Progress):
+    def __init__(self):
+        self.fractions = [0.0]
+
+    def set_fraction(self, fraction):
+        self.fractions.append(fraction)
+
+
+def test_the_progress_rises_to_the_end_and_cleaning_has_seven_tenths_of_it(monkeypatch):
+    """Until the tracks are paired, at nine tenths, squares of equal points have equal shares."""
+    cleaning, listener = [], Listener()
+
+    def clean(raster, engine, passes, progress):
+        start = listener.fractions[-1]
+        progress.set_fraction(1.0)
+        cleaning.append(listener.fractions[-1] - start)
+        return raster
+
+    monkeypatch.setattr(steps, "clean", clean)
+    settings = Parameters(1.435, STANDARDS["EN_60E1_1435"].head_width_m, square_tiles=4, quality_step_m=1.0)
+    extract_rails([straight().rail_points()], settings, listener)
+    assert len(cleaning) > 2
+    assert sum(cleaning) == pytest.approx(0.7 * 0.9, abs=1e-9)
+    assert (np.diff(listener.fractions) >= -1e-12).all()
+    assert min(listener.fractions) >= 0.0 and listener.fractions[-1] == max(listener.fractions) == 1.0

@@ -1,3 +1,4 @@
+import re
 import shutil
 import subprocess
 import sys
@@ -10,6 +11,8 @@ from lines import farthest, read_features
 from osgeo import gdal
 from qgis.core import QgsProcessingOutputLayerDefinition, QgsProcessingUtils, QgsVectorLayer
 from rail_extract.rail_extract_plugin.reading.geotiff import read_header
+
+ALL_OUTPUTS = ("RAILS", "CENTERLINES", "QUALITY", "CLEANED", "REPORT")
 
 
 @pytest.fixture
@@ -43,17 +46,51 @@ def test_rails_and_centerlines_are_written_as_reported(run, scene, outputs):
     assert outcome.results["ENGINE_USED"].startswith("PyTorch" if find_spec("torch") else "OpenCV")
 
 
-@pytest.mark.skipif(not find_spec("distributed"), reason="needs the packages of the cluster")
-def test_the_command_writes_what_qgis_writes(run, write_cloud, track, outputs, tmp_path):
-    cloud, other = write_cloud(track()), tmp_path / "command.gpkg"
-    assert run({"INPUT": cloud, "ITERATIONS": 1, "ENGINE": "OPENCV", **outputs}).ok
-    words = ["extract", cloud, "--rails", other, "--centerlines", other, "--iterations", "1", "--engine", "OPENCV"]
+@pytest.mark.skipif(not find_spec("rasterio"), reason="needs the packages of the cluster")
+def test_the_command_writes_what_qgis_writes(run, run_step, write_cloud, track, tmp_path):
+    points = track()
+    west, south = points[:, :2].min(axis=0) + [3.0, -5.0]
+    east, north = points[:, :2].max(axis=0) + 5.0
+    cloud, suffixes = write_cloud(points), {"CLEANED": "tif", "REPORT": "html"}
+    mine, theirs = (
+        {name: tmp_path / f"{who}_{name.lower()}.{suffixes.get(name, 'gpkg')}" for name in ALL_OUTPUTS}
+        for who in ("qgis", "command")
+    )
+    settings = {"INPUT": cloud, "ITERATIONS": 1, "ENGINE": "OPENCV", "EXTENT": f"{west},{east},{south},{north}"}
+    assert run({**settings, **mine}).ok
+    words = ["extract", cloud, "--iterations", "1", "--engine", "OPENCV", f"--extent={west},{south},{east},{north}"]
+    words += [word for name, path in theirs.items() for word in (f"--{name.lower()}", path)]
     told = subprocess.run([sys.executable, "-m", "rail_extract", *words, "--workers", "1"], capture_output=True)
     assert told.returncode == 0, told.stderr
-    for name, path in outputs.items():
-        mine, theirs = read_features(path), read_features(other, name.lower())
-        assert farthest([line for line, _ in mine], [line for line, _ in theirs]) < 0.0001
-        assert [items for _, items in mine] == [items for _, items in theirs]
+    for name in ("RAILS", "CENTERLINES"):
+        lines, others = read_features(mine[name]), read_features(theirs[name], name.lower())
+        assert farthest([line for line, _ in lines], [line for line, _ in others]) < 0.0001
+        assert [items for _, items in lines] == [items for _, items in others]
+    (_, stations), (_, others) = (lines_of(path["QUALITY"]) for path in (mine, theirs))
+    assert [one.attributes()[1:] for one in stations] == [one.attributes()[1:] for one in others]
+    assert [one.geometry().asWkt(3) for one in stations] == [one.geometry().asWkt(3) for one in others]
+    same_rasters(mine["CLEANED"], theirs["CLEANED"])
+    pages = (path["REPORT"].read_text(encoding="utf-8") for path in (mine, theirs))
+    page, other = (re.sub("<dt>Command</dt><dd>.*?</dd>", "", page) for page in pages)
+    assert page == other
+    vectorized = run_step(
+        "vectorizerails", {"INPUT": theirs["CLEANED"], "POINTS": cloud, "OUTPUT": tmp_path / "v.gpkg"}
+    )
+    assert vectorized.ok and vectorized.results["RAIL_COUNT"] == 2
+
+
+def same_rasters(path, other):
+    """Cells, place, coordinate system and tags agree."""
+    first, second = gdal.Open(str(path)), gdal.Open(str(other))
+    assert (first.ReadAsArray() == second.ReadAsArray()).all()
+    np.testing.assert_allclose(first.GetGeoTransform(), second.GetGeoTransform(), rtol=1e-15)
+    assert first.GetSpatialRef().IsSame(second.GetSpatialRef())
+    assert first.GetMetadata() == second.GetMetadata()
+    one, two = first.GetRasterBand(1), second.GetRasterBand(1)
+    for name in ("GetDescription", "GetNoDataValue", "GetBlockSize", "DataType"):
+        values = [getattr(band, name) for band in (one, two)]
+        values = [value() if callable(value) else value for value in values]
+        assert values[0] == values[1], name
 
 
 def test_extent_in_another_coordinate_system(run, scene):
