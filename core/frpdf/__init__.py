@@ -1,6 +1,6 @@
-"""FRPDF, the network that cleans rail rasters: its layers, its weights, its engines and its passes.
+"""FRPDF, the network that cleans rail rasters: its architecture, weights, engines and passes.
 
-The constants here are those of Gribov and Chang, section 5; they stand apart from `network`, which needs PyTorch.
+The constants here are those of Gribov and Chang, section 5 (docs/method.md section 3.2).
 """
 
 from ..parameters import Parameters
@@ -12,11 +12,11 @@ DEVICES = (AUTO, "CPU", "CUDA")
 START = 0.5
 """State before the first pass: undecided."""
 FEEDBACK_THRESHOLD = 0.75
-"""Probability from which a pass hands a cell on as rail to the next."""
+"""Probability from which a cell is rail in the state of the next pass."""
 OUTPUT_THRESHOLD = 0.5
-"""Probability from which the last pass calls a cell rail."""
+"""Probability from which a cell is rail in the result."""
 
 DEFAULT_PASSES, MAX_PASSES = Parameters.passes, 5
-"""Repairs have settled by the latter; so often it runs where the user leaves the number of passes to it."""
+"""Default number of passes, and the number after which a run that continues until the result is stable ends."""
 STATISTICS = 2
-"""Sets of batch statistics: the first pass sees a constant state, all later passes see a decided one."""
+"""Sets of batch statistics: one for the first pass, whose state is constant, and one for all later passes."""

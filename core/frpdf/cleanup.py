@@ -1,4 +1,4 @@
-"""FRPDF over a whole raster: pass after pass, each along the rails only."""
+"""Cleaning of a raster with FRPDF in several passes, each along the rails only."""
 
 from __future__ import annotations
 
@@ -12,38 +12,39 @@ from .corridor import Piece, lay_fields
 from .engine import Engine
 
 MARGIN = 64
-"""Cells around a raster that was cut out of a larger one that only give context, for each pass."""
+"""Width in cells, per pass, of the frame of context around a raster that was cut out of a larger one."""
 
 UNTIL_STABLE = 0
+"""Number of passes with which a run continues until the result is stable."""
 STABLE_SHARE = 0.001
-"""Passes end once fewer than this share of the rail cells change."""
+"""Share of the rail cells below which a change ends the passes."""
 
 
 def max_passes(passes: int) -> int:
-    """Give the number of passes after which a run ends in any case."""
+    """Return the number of passes after which a run ends in any case."""
     return MAX_PASSES if passes == UNTIL_STABLE else passes
 
 
 def is_stable(changed: int, cells: int) -> bool:
-    """Tell whether a pass that changed so many cells, and found so many, changed next to nothing."""
+    """Return whether the number of cells that a pass changed is negligible compared with the number of rail cells."""
     return changed < STABLE_SHARE * max(cells, 1)
 
 
 def clean(raster: RailRaster, engine: Engine, passes: int = DEFAULT_PASSES, progress: Progress = SILENT) -> RailRaster:
-    """Remove noise and bridge gaps with the network (Gribov and Chang, sections 5 and 7).
+    """Remove noise and close gaps with the network (Gribov and Chang, sections 5 and 7).
 
     Parameters
     ----------
     raster : RailRaster
     engine : Engine
     passes : int
-        Number of passes; 0 runs until the result is stable, five at most.
+        Number of passes; with 0, passes run until the result is stable, at most `MAX_PASSES`.
     progress : Progress
 
     Returns
     -------
     RailRaster
-        On the same grid.
+        The cleaned raster, on the same grid.
     """
     most = max_passes(passes)
     state, output = None, raster
@@ -59,9 +60,9 @@ def clean(raster: RailRaster, engine: Engine, passes: int = DEFAULT_PASSES, prog
 def _run_pass(
     raster: RailRaster, state: RailRaster | None, engine: Engine, number: int, progress: Progress
 ) -> tuple[RailRaster, RailRaster]:
-    """Compute one pass; give what the next pass is told, and what the user would get."""
+    """Run one pass; return the state of the next pass, and the result if this pass is the last one."""
     while True:
-        told, output = _Canvas(raster), _Canvas(raster)
+        following, output = _Canvas(raster), _Canvas(raster)
         fields = lay_fields(raster, engine.max_cells)
         try:
             for field, step in zip(fields, progress.split(len(fields))):
@@ -69,16 +70,16 @@ def _run_pass(
                 known = [_state(state, piece) for piece in field.pieces]
                 found = engine.sweep(seen, known, number, field.pieces, step)
                 for piece, probability in zip(field.pieces, found):
-                    told.paint(piece, probability >= FEEDBACK_THRESHOLD, field.inside)
+                    following.paint(piece, probability >= FEEDBACK_THRESHOLD, field.inside)
                     output.paint(piece, probability >= OUTPUT_THRESHOLD, field.inside)
-            return told.raster(), output.raster()
+            return following.raster(), output.raster()
         except DeviceExhaustedError:
-            pass  # and let go of the error first: what it passed through still holds the device's memory
+            pass  # outside this block the error is released, and with it the memory that its frames hold
         progress.warning(engine.retreat())
 
 
 def _state(state: RailRaster | None, piece: Piece) -> np.ndarray:
-    """Give what the network is told of a piece."""
+    """Return the state of a piece."""
     if state is None:
         return np.full((piece.height, piece.width), START, dtype=np.float32)
     return state.read(*piece.window).astype(np.float32)
@@ -91,18 +92,18 @@ def _changed(before: RailRaster, after: RailRaster) -> int:
 
 
 class _Canvas:
-    """A raster under construction, on another one's grid."""
+    """A raster under construction, on the grid of another one."""
 
     def __init__(self, grid: RailRaster) -> None:
         self._grid = grid
         self._cells: list[np.ndarray] = []
 
     def paint(self, piece: Piece, block: np.ndarray, inside: Piece) -> None:
-        """Set the cells of a piece that count."""
+        """Set the cells of a block at a piece that are inside a rectangle."""
         cells = np.argwhere(block) + np.array([piece.row, piece.column])
         self._cells.append(cells[inside.holds(cells)])
 
     def raster(self) -> RailRaster:
-        """Finish."""
+        """Return the raster."""
         cells = np.concatenate(self._cells) if self._cells else np.empty((0, 2), dtype=np.int64)
         return self._grid.with_cells(cells)

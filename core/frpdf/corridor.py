@@ -1,4 +1,4 @@
-"""Where the network computes: rectangles that follow the rails and the gaps between them."""
+"""The cells that the network computes: rectangles along the rails and the gaps between them."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ import numpy as np
 from ..raster import RailRaster
 
 BLOCK = 16
-"""Side, in cells, of the blocks that the corridor is made of."""
+"""Side in cells of the blocks that form the corridor."""
 GAP = 8
-"""Blocks so far apart may have a gap between them that the network bridges: 4 m at 4 cm. What is longer is left to the
-vectorizer."""
+"""Largest distance in blocks between which the network may close a gap: gaps of 4 m at cells of 4 cm. Longer gaps are
+left to the vectorizer."""
 BESIDE = 1
-"""Blocks around rail cells and gaps that are computed as well: 0.6 m, farther than the network moves a rail."""
+"""Blocks computed around rail cells and gaps: 0.6 m, further than the network moves a rail."""
 OVERHEAD = 16
-"""What a rectangle costs beyond its own cells, as a frame of so many cells: the copies of what surrounds it."""
+"""Cost of a rectangle beyond its own cells, as the width of a frame in cells: its surroundings are copied."""
 MAX_PIECE_CELLS = 1 << 18
-"""Cells in a rectangle: a layer takes a tenth of a second on it, so that a cancel is heard in time."""
+"""Largest number of cells in a rectangle: a layer takes 0.1 s on it, so that a cancel takes effect in time."""
 CONTEXT = 256
-"""Cells around a field that only give context."""
+"""Width in cells of the frame of context around a field."""
 
 _ROW = 1 << 32
-"""Distance of two rows in the numbers of blocks."""
+"""Difference between the numbers of blocks in neighbouring rows."""
 
 
 @dataclass(frozen=True)
@@ -44,25 +44,25 @@ class Piece:
 
     @property
     def window(self) -> tuple[int, int, int, int]:
-        """As `RailRaster.read` takes it."""
+        """Row, column, height and width, as `RailRaster.read` takes them."""
         return self.row, self.column, self.height, self.width
 
     def holds(self, cells: np.ndarray) -> np.ndarray:
-        """Tell which of (n, 2) rows and columns lie inside, (n,) bool."""
+        """Return which of (n, 2) rows and columns are inside, (n,) bool."""
         corner = np.array([self.row, self.column])
         return ((cells >= corner) & (cells < corner + [self.height, self.width])).all(axis=1)
 
 
 @dataclass(frozen=True)
 class Field:
-    """What is computed at once.
+    """Pieces that are computed together.
 
     Attributes
     ----------
     inside : Piece
-        Results count here; the fields of a raster do not overlap.
+        Rectangle whose results count; those of a raster do not overlap.
     pieces : list of Piece
-        Rectangles, none of which overlap, that hold the corridor inside and, for context, `CONTEXT` around.
+        Rectangles, without overlap, that cover the corridor inside and, for context, up to `CONTEXT` cells outside.
     """
 
     inside: Piece
@@ -70,7 +70,7 @@ class Field:
 
 
 def lay_fields(raster: RailRaster, max_cells: int) -> list[Field]:
-    """Lay fields of at most `max_cells` cells, but for their context, over all that the network may set."""
+    """Cover the corridor with fields of at most `max_cells` cells, not counting their context."""
     blocks = corridor(raster)
     fields = []
     for inside in _fields(blocks, max_cells // BLOCK**2):
@@ -83,10 +83,10 @@ def lay_fields(raster: RailRaster, max_cells: int) -> list[Field]:
 
 
 def corridor(raster: RailRaster) -> np.ndarray:
-    """Give the blocks, (n, 2) rows and columns, in which the network may set a cell, sorted.
+    """Return the blocks in which the network may set a cell, (n, 2) rows and columns, sorted.
 
-    These are the blocks with rail cells, the blocks between any two of them no farther apart than a gap, and the
-    blocks beside.
+    These are the blocks with rail cells, the blocks between two of them that are at most `GAP` apart, and the blocks
+    around both.
     """
     occupied = np.unique(_numbers(raster.cells() // BLOCK))
     filled = [occupied]
@@ -103,7 +103,7 @@ def corridor(raster: RailRaster) -> np.ndarray:
 
 
 def _directions() -> list[tuple[int, int]]:
-    """Half of the steps from a block to another that lies across a gap; the other half are the ways back."""
+    """Return the steps from a block to another one across a gap, one of each pair of opposite steps."""
     span = range(-GAP, GAP + 1)
     steps = [(down, right) for down in range(GAP + 1) for right in span if (down, right) > (0, 0)]
     return [(down, right) for down, right in steps if max(down, abs(right)) > 1 and down**2 + right**2 <= GAP**2]
@@ -118,7 +118,7 @@ def _in_cells(blocks: Piece) -> Piece:
 
 
 def _fields(blocks: np.ndarray, most: int) -> list[Piece]:
-    """Halve the bounding rectangle of blocks until no part holds more than `most` of them."""
+    """Halve the bounding rectangle of blocks until no part has more than `most` of them."""
     rectangles, waiting = [], [blocks] if len(blocks) else []
     while waiting:
         group = waiting.pop()
@@ -130,7 +130,7 @@ def _fields(blocks: np.ndarray, most: int) -> list[Piece]:
 
 
 def _partition(blocks: np.ndarray, most: int) -> list[Piece]:
-    """Cut blocks apart along rows and columns while their bounding rectangles get cheaper, or are too large."""
+    """Divide blocks along rows and columns while that reduces the cost, or their bounding rectangle is too large."""
     rectangles, waiting = [], [blocks] if len(blocks) else []
     while waiting:
         group = waiting.pop()
@@ -151,7 +151,7 @@ def _bounds(blocks: np.ndarray) -> Piece:
 
 
 def _halves(blocks: np.ndarray) -> list[np.ndarray]:
-    """Cut blocks across the longer side of their bounding rectangle."""
+    """Divide blocks across the longer side of their bounding rectangle."""
     bounds = _bounds(blocks)
     axis = int(bounds.width > bounds.height)
     first = blocks[:, axis] < bounds.window[axis] + bounds.window[2 + axis] // 2
@@ -159,7 +159,7 @@ def _halves(blocks: np.ndarray) -> list[np.ndarray]:
 
 
 def _best_cut(blocks: np.ndarray) -> tuple[float, list[np.ndarray]]:
-    """Cut blocks in two where the two bounding rectangles cost least; give the cost and the parts."""
+    """Divide blocks in two where the two bounding rectangles cost least; return the cost and the parts."""
     best, parts = np.inf, []
     for axis in (0, 1):
         along = blocks[np.argsort(blocks[:, axis], kind="stable")]
@@ -179,5 +179,5 @@ def _best_cut(blocks: np.ndarray) -> tuple[float, list[np.ndarray]]:
 
 
 def _cost(height, width):
-    """Cells that a rectangle of blocks costs, frame included."""
+    """Return the cost of a rectangle of blocks in cells, with its frame."""
     return (height * BLOCK + 2 * OVERHEAD) * (width * BLOCK + 2 * OVERHEAD)

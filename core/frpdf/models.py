@@ -1,4 +1,4 @@
-"""Which trained weights serve which rail standard."""
+"""The trained models, and the choice of one for a rail standard."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from ..errors import ModelError
 FOLDER = Path(__file__).resolve().parents[2] / "models"
 
 MIN_RATIO, MAX_RATIO = 13.4, 26.7
-"""Ratios of gauge to railhead the training covers (14.2 to 25.2), and 6 % beyond, which a model bears."""
+"""Ratios of gauge to railhead: those of the training, 14.2 to 25.2, and 6 % beyond, which a model tolerates."""
 
 
 @dataclass(frozen=True)
 class Model:
-    """Trained weights and the rail standard they were trained on.
+    """Trained weights and their rail standard.
 
     Attributes
     ----------
     name : str
-        As shown in MODEL enums and written into raster tags.
+        Option of the parameter MODEL, and value in raster tags.
     gauge_m, head_width_m : float
     file : str
         Name of the .npz file in the folder `models`.
@@ -34,12 +34,12 @@ class Model:
 
     @property
     def ratio(self) -> float:
-        """Gauge over railhead width: all that tells one standard from another at equal cell counts."""
+        """Gauge divided by railhead width: the only difference between standards once cells are scaled."""
         return self.gauge_m / self.head_width_m
 
     @property
     def path(self) -> Path:
-        """Where the weights are."""
+        """Path of the weights file."""
         return FOLDER / self.file
 
 

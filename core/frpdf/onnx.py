@@ -1,8 +1,8 @@
-"""FRPDF as an ONNX model, made from the folded weights: what OpenCV reads, and any other runtime can.
+"""FRPDF in the format ONNX, which OpenCV and other runtimes read, made from the folded weights.
 
-The format is protobuf, of which a model needs four kinds of field; writing them takes less than a dependency would.
-The command `python -m rail_extract onnx` writes files for use elsewhere; the plugin makes the models it needs in
-memory, so that the .npz files are the only weights there are.
+The format is protobuf, of which ONNX needs four kinds of field here; writing them takes less code than a dependency.
+The command `python -m rail_extract onnx` writes files for other programs. The OpenCV engine makes what it needs in
+memory, so that the .npz files are the only weights.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .models import MODELS
 from .weights import load_arrays
 
 IR_VERSION, OPERATOR_SET = 8, 13
-"""Versions every runtime since 2021 reads."""
+"""Versions that runtimes since 2021 read."""
 
 _VARINT, _BYTES = 0, 2
 _FLOAT, _INT_ATTRIBUTE, _INTS_ATTRIBUTE = 1, 2, 7
@@ -26,7 +26,7 @@ _FLOAT, _INT_ATTRIBUTE, _INTS_ATTRIBUTE = 1, 2, 7
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("folder", type=Path, help="where to write NAME_pass1.onnx and NAME_pass2.onnx for each model")
+    parser.add_argument("folder", type=Path, help="folder for NAME_pass1.onnx and NAME_pass2.onnx of each model")
     parser.add_argument("--side", type=int, default=512, help="side of the rasters (default 512)")
 
 
@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def to_onnx(layers: Sequence[FoldedLayer], height: int, width: int) -> bytes:
-    """Write one pass as a model from `input`, (1, 2, height, width) in -1 to 1, to `logits`, (1, 1, height, width).
+    """Return one pass as ONNX, from `input`, (1, 2, height, width) in -1 to 1, to `logits`, (1, 1, height, width).
 
     Parameters
     ----------
@@ -63,10 +63,10 @@ def to_onnx(layers: Sequence[FoldedLayer], height: int, width: int) -> bytes:
 
 
 def layer_to_onnx(layer: FoldedLayer) -> bytes:
-    """Write one layer as a model from the arrays that `layered.Step.run` takes, `around` and `own`, to `found`.
+    """Return one layer as ONNX, from `around` and `own`, as `layered.Step.run` takes them, to `found`.
 
-    Arrays are (1, channels, height, width). Only layers with a reduction have the input `own`. The shapes in the model
-    are those of a single cell; a runtime also takes larger arrays.
+    Arrays are (1, channels, height, width). Only layers with a reduction have the input `own`. The stated shapes are
+    those of a single cell; a runtime also takes larger arrays.
     """
     graph = _Graph()
     graph.layer(layer, "around", "own", output="found", padded=False)
@@ -79,7 +79,7 @@ def layer_to_onnx(layer: FoldedLayer) -> bytes:
 
 
 class _Graph:
-    """Nodes and weights of a model under construction; every method returns the name of its result."""
+    """Nodes and weights of an ONNX graph under construction; methods that add a node return the name of its result."""
 
     def __init__(self) -> None:
         self._nodes: list[bytes] = []
@@ -126,7 +126,7 @@ class _Graph:
         return self._node("Concat", [first, second], (axis,))
 
     def model(self, given: dict[str, tuple[int, ...]], results: dict[str, tuple[int, ...]]) -> bytes:
-        """Finish, with the shapes of what goes in and what comes out."""
+        """Return the graph as bytes, with the shapes of its inputs and results."""
         parts = [_message(1, node) for node in self._nodes] + [_text(2, "FRPDF")]
         parts += [_message(5, weight) for weight in self._weights]
         parts += [_message(11, _value(*one)) for one in given.items()]
@@ -169,7 +169,7 @@ def _message(field: int, content: bytes) -> bytes:
 
 
 def _varint(value: int) -> bytes:
-    """Seven bits a byte, the lowest first, the eighth bit set on all but the last."""
+    """Return seven bits per byte, the lowest first, with the eighth bit set in all bytes but the last."""
     encoded = bytearray()
     while value > 0x7F:
         encoded.append(value & 0x7F | 0x80)
