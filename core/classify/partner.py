@@ -52,29 +52,61 @@ def stations_with_partner(lines: Lines, spacings_m: Sequence[float], height_m: f
     height_m : float
         Largest difference in height above the bed.
     """
-    best = np.zeros(len(lines.axis), dtype=np.int64)
-    if len(lines.axis) < 2:
-        return best
+    return np.max([partners(lines, spacing_m, SPACING_M, height_m)[0] for spacing_m in spacings_m], axis=0)
+
+
+def partners(
+    lines: Lines, spacing_m: float, tolerance_m: float, height_m: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find the partners of each cell's line on the better side.
+
+    Parameters
+    ----------
+    lines : Lines
+    spacing_m, tolerance_m : float
+        Distance of the two lines, and its largest deviation.
+    height_m : float
+        Largest difference in height above the bed.
+
+    Returns
+    -------
+    stations : (n,) int array
+        Stations with a partner, 0 to 5.
+    side : (n,) int array
+        1: the partner is to the left; -1: to the right.
+    apart_m : (n,) array
+        Mean distance of the partner; NaN without one.
+    """
+    count = len(lines.axis)
+    if count < 2:
+        return np.zeros(count, dtype=np.int64), np.ones(count, dtype=np.int64), np.full(count, np.nan)
     tree = cKDTree(lines.axis)
-    for spacing_m in spacings_m:
-        for side in (1, -1):
-            found = [_partnered(lines, tree, side * spacing_m, share, height_m) for share in STATIONS]
-            best = np.maximum(best, np.sum(found, axis=0))
-    return best
+    left, right = (
+        np.array([_partnered(lines, tree, side * spacing_m, share, tolerance_m, height_m) for share in STATIONS])
+        for side in (1, -1)
+    )
+    better = np.isfinite(left).sum(axis=0) >= np.isfinite(right).sum(axis=0)
+    apart = np.abs(np.where(better, left, right))
+    stations = np.isfinite(apart).sum(axis=0)
+    mean = np.where(stations > 0, np.nansum(apart, axis=0) / np.maximum(stations, 1), np.nan)
+    return stations, np.where(better, 1, -1), mean
 
 
-def _partnered(lines: Lines, tree: cKDTree, left_m: float, share: float, height_m: float) -> np.ndarray:
-    """Return whether each cell's line has a partner to the left at one station, (n,) bool."""
+def _partnered(
+    lines: Lines, tree: cKDTree, left_m: float, share: float, tolerance_m: float, height_m: float
+) -> np.ndarray:
+    """Distance to the left of each line's partner at one station, (n,); NaN without one."""
     places = lines.axis + share * lines.reach_m * lines.along + left_m * lines.across
     _, near = tree.query(places, k=np.arange(1, min(CANDIDATES, tree.n) + 1), distance_upper_bound=SEARCH_M)
     own, rank = np.nonzero(near < tree.n)
     other = near[own, rank]
     apart = np.einsum("ij,ij->i", lines.axis[other] - lines.axis[own], lines.across[own])
-    fits = np.abs(apart - left_m) < SPACING_M
+    fits = np.abs(apart - left_m) < tolerance_m
     fits &= np.abs(lines.height[other] - lines.height[own]) < height_m
     fits &= _angle(lines.theta[other], lines.theta[own]) < ANGLE_RAD
-    found = np.zeros(len(lines.axis), dtype=bool)
-    found[own[fits]] = True
+    found = np.full(len(lines.axis), np.nan)
+    # Written from the farthest to the nearest, the nearest one stays.
+    found[own[fits][::-1]] = apart[fits][::-1]
     return found
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from ..frame import ORIGIN_STEP
 from .bed import COARSE_M, Coarse, find_bed
 from .figures import Figures, shares_of_length
+from .flush import Flush, flush_rails
 from .labels import Near, label, whole_heads
 from .lines import Lines, Marks, centred, find_lines
 from .partner import runs_inside, stations_with_partner
@@ -111,48 +112,75 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> Classified:
     height = height[near]
     grid, cell = Grid.around(x[near], y[near], settings.cell_m)
     tops = tops_of(grid, cell, height, z[near])
+    standing = _standing(xyz[near, :2], cell, height, coarse, tops, settings)
+    flush = flush_rails(coarse, near, xyz[near, :2], height, grid, cell, settings.gauges_m, settings.head_width_m)
+    rail = nothing.rail
+    rail[near[standing.points]] = True
+    rail[near[flush.points]] = True
+    rail &= settings.own(xyz)
+    places = standing.drawn[settings.own(standing.drawn)]
+    return Classified(rail, places, _figures(rail, standing, flush, grid, cell[rail[near]], settings))
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Rails that stand out of their bed.
+
+    Attributes
+    ----------
+    points : (k,) int array
+        Numbers of the points on heads.
+    kept : Kept
+    drawn : (m, 2) array
+        See `Classified`.
+    thin : bool
+        Whether the square is thin.
+    """
+
+    points: np.ndarray
+    kept: Kept
+    drawn: np.ndarray
+    thin: bool
+
+
+def _standing(
+    xy: np.ndarray, cell: np.ndarray, height: np.ndarray, coarse: Coarse, tops: Tops, settings: Settings
+) -> Standing:
+    """Find rails that stand out of their bed."""
     cells = narrow_tops(tops)
     marks = highest_of_blocks(tops, cells)
-    if not len(marks):
-        return nothing
-    density = _density(coarse, grid.middles(marks))
+    density = _density(coarse, tops.grid.middles(marks))
     tolerances = THIN if density < THIN_PER_M2 else DENSE
-    kept = _kept(tops, cells, marks, float(np.clip(REACH_POINTS_PER_M / density, *REACH_M)), tolerances, settings)
+    reach_m = float(np.clip(REACH_POINTS_PER_M / density, *REACH_M))
+    kept = _kept(tops, cells, marks, reach_m, tolerances, settings)
     heads = whole_heads(tops, _completed(tops, marks, kept, settings, tolerances), tolerances)
     chosen = label(tops, heads, cell, height, tolerances)
-    xy = xyz[near[chosen], :2]
-    beside = Near.find(xy, kept.lines)
+    beside = Near.find(xy[chosen], kept.lines)
     narrow = _narrow(kept, beside, settings, tolerances)
-    on = beside.on(settings.head_width_m / 2 + tolerances.beside_m, narrow[beside.cell]) & settings.own(xy)
-    rail = nothing.rail
-    rail[near[chosen[on]]] = True
+    on = beside.on(settings.head_width_m / 2 + tolerances.beside_m, narrow[beside.cell])
     kept = kept.of(narrow)
     heads = heads[_near_axes(tops, heads, kept, settings, HIGH_M)]
-    drawn_places = drawn(
-        kept.lines,
-        kept.pairs,
-        grid.middles(heads),
-        (settings.head_width_m + settings.cell_m) / 2,
-        settings.cell_m,
-    )
-    return Classified(
-        rail, drawn_places[settings.own(drawn_places)], _figures(rail, kept, grid, heads, settings, density)
-    )
+    half_m = (settings.head_width_m + settings.cell_m) / 2
+    places = drawn(kept.lines, kept.pairs, tops.grid.middles(heads), half_m, settings.cell_m)
+    return Standing(chosen[on], kept, places, tolerances is THIN)
 
 
 def _figures(
-    rail: np.ndarray, kept: Kept, grid: Grid, heads: np.ndarray, settings: Settings, density: float
+    rail: np.ndarray, standing: Standing, flush: Flush, grid: Grid, cell: np.ndarray, settings: Settings
 ) -> Figures:
-    """Sum up what was found in the square without its margin."""
-    share_m = np.where(settings.own(grid.middles(kept.cell)), shares_of_length(kept.lines, settings.head_width_m), 0.0)
+    """Sum up what was found in the square without its margin; `cell` are those of the rail points."""
+    kept = standing.kept
+    share_m = np.where(settings.own(kept.lines.axis), shares_of_length(kept.lines, settings.head_width_m), 0.0)
+    flush_m = shares_of_length(flush.lines, settings.head_width_m)[settings.own(flush.lines.axis)]
     there = bool(rail.any())
     return Figures(
         points=int(rail.sum()),
-        paired_m=float(share_m[kept.paired].sum()),
+        paired_m=float(share_m[kept.paired].sum() + flush_m.sum()),
         single_m=float(share_m[~kept.paired].sum()),
-        cells=int(settings.own(grid.middles(heads)).sum()),
+        cells=len(np.unique(cell)),
         squares=int(there),
-        thin=int(there and density < THIN_PER_M2),
+        thin=int(there and standing.thin),
+        paved=int(len(flush_m) > 0),
     )
 
 
@@ -163,7 +191,8 @@ def _density(coarse: Coarse, xy: np.ndarray) -> float:
     inside = (row >= 0) & (row < coarse.shape[0]) & (column >= 0) & (column < coarse.shape[1])
     cells = np.unique(row[inside] * coarse.shape[1] + column[inside])
     counts = coarse.count[cells]
-    return float(np.quantile(counts[counts > 0], DENSITY_QUANTILE)) / COARSE_M**2
+    counts = counts[counts > 0]
+    return float(np.quantile(counts, DENSITY_QUANTILE)) / COARSE_M**2 if len(counts) else np.inf
 
 
 def _kept(

@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+from rail_extract.core.classify.settings import Settings
+from rail_extract.core.classify.square import classify_square
+from rail_extract.laboratory.scenes.raw_shapes import flat, turned
+
+GAUGE, WIDTH, GROOVE, DEPTH = 1.435, 0.072, 0.042, 0.045
+SETTINGS = Settings((GAUGE,), WIDTH)
+
+
+def street(noise, angle=0.3, seed=1):
+    """Pavement with two grooves inside the heads of two rails; returns the points, those on heads, and their offsets."""
+    rng = np.random.RandomState(seed)
+    xyz = flat(8.0, 0.01)
+    xyz[:, :2] += 0.003 * rng.standard_normal((len(xyz), 2))
+    across = turned(xyz, angle)[1]
+    inside = GAUGE / 2 - np.abs(across)
+    xyz[(inside > 0) & (inside < GROOVE), 2] -= DEPTH
+    xyz[:, 2] += noise * rng.standard_normal(len(xyz))
+    return xyz, (inside <= 0) & (inside >= -WIDTH), inside
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 1.4])
+def test_heads_beside_grooves_are_labelled(angle):
+    xyz, on, inside = street(0.003, angle)
+    found = classify_square(xyz, SETTINGS)
+    here = np.abs(turned(xyz, angle)[0]) < 3
+    assert (found.rail & on & here).sum() / (on & here).sum() > 0.93
+    assert (found.rail & on).sum() / found.rail.sum() > 0.93
+    # The middle of each strip lies where the axis of the head does.
+    assert np.mean(inside[found.rail & here]) == pytest.approx(-WIDTH / 2, abs=0.005)
+    assert found.figures.paved == 1
+
+
+def test_noise_hides_the_grooves():
+    xyz, _, _ = street(0.012)
+    found = classify_square(xyz, SETTINGS)
+    assert not found.rail.any()
+    assert found.figures.paved == 0
+
+
+def test_grooves_at_another_distance_are_not_rails():
+    xyz, _, _ = street(0.003)
+    assert not classify_square(xyz, Settings((1.0,), WIDTH)).rail.any()
+
+
+def test_the_order_of_points_does_not_matter():
+    xyz, _, _ = street(0.003)
+    order = np.random.RandomState(2).permutation(len(xyz))
+    found = classify_square(xyz, SETTINGS).rail
+    np.testing.assert_array_equal(classify_square(xyz[order], SETTINGS).rail, found[order])
