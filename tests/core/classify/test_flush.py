@@ -9,7 +9,7 @@ SETTINGS = Settings((GAUGE,), WIDTH)
 
 
 def street(noise, angle=0.3, seed=1):
-    """Pavement with two grooves inside the heads of two rails; returns the points, those on heads, and their offsets."""
+    """Pave around two rails with a groove inside each: points, those on heads, and distances inside the gauge faces."""
     rng = np.random.RandomState(seed)
     xyz = flat(8.0, 0.01)
     xyz[:, :2] += 0.003 * rng.standard_normal((len(xyz), 2))
