@@ -72,9 +72,12 @@ def read_rail_points(
 
     Examples
     --------
-    >>> for points in read_rail_points("cloud.laz", [10]):  # doctest: +SKIP
-    ...     print(points.class_code, len(points.xyz))
-    10 151204
+    >>> from pathlib import Path
+    >>> import rail_extract
+    >>> sample = Path(rail_extract.__file__).parent / "resources" / "sample" / "sample.laz"
+    >>> (points,) = read_rail_points(sample, class_codes=[10])
+    >>> points.class_code, points.xyz.shape
+    (10, (75004, 3))
     """
     request = ask(paths, class_codes, crs_wkt, extent, progress)
     xyz, codes = _collect(request, progress)
