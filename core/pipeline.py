@@ -60,8 +60,6 @@ def extract_rails(
         No points were given.
     ModelError
         No weights fit the rail standard, or the engine is not installed.
-    NoTrackError
-        Rails run parallel, but in no class at one of the gauges.
     Cancelled
         The user cancelled.
     """
@@ -85,7 +83,7 @@ def extract_files(
         Existing folder for the points of the squares, 24 bytes each. The caller removes it.
     parameters : Parameters
     runner : Runner
-        Whether errors of single files and squares, and a `NoTrackError`, end the run is for the runner to decide.
+        Whether errors of single files and squares end the run is for the runner to decide.
     progress : Progress
 
     Returns
@@ -100,7 +98,7 @@ def extract_files(
         No point of the requested classes lies in the files and the extent.
     DiskError
         The disk is full.
-    ModelError, NoTrackError, Cancelled
+    ModelError, Cancelled
         See `extract_rails`.
     RailExtractError
         Every square failed.
@@ -160,7 +158,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
     try:
         centerlines = tracks_of(rails, parameters, pairing)
     except NoTrackError as error:
-        runner.tolerate(error)
+        runner.failures.append(str(error))
     geometry = _measure_tracks(centerlines, rails, sources, parameters, runner, measuring)
     described = dict(runner.run({"engine": Task("Describing the engine", _describe_engine, (parameters,))}))
     progress.set_fraction(1.0)

@@ -248,7 +248,8 @@ class RailNetwork:
     cleaned_classes : tuple of int
         Class of each of these rasters.
     failures : tuple of str
-        A sentence for each file or square that is missing from the result, if the run tolerates that.
+        A sentence for each file or square that is missing from the result, if the run tolerates that, and one if no
+        two rails have the gauge.
     """
 
     rails: tuple[RailLine, ...]

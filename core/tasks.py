@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from graphlib import TopologicalSorter
 from typing import Any, Protocol, TypeVar
 
-from .errors import RailExtractError
 from .progress import SILENT, Progress
 
 Name = TypeVar("Name", bound=Hashable)
@@ -107,9 +106,6 @@ class Runner(Protocol):
             Its result.
         """
 
-    def tolerate(self, error: RailExtractError) -> None:
-        """Record an error that leaves part of the result missing, or raise it if the runner does not accept that."""
-
 
 class InTurn:
     """Executes tasks in this process, one after another; the first error ends the run.
@@ -141,10 +137,6 @@ class InTurn:
             waiting.extendleft(reversed(order.get_ready()))
             if task.returned:
                 yield name, result
-
-    def tolerate(self, error: RailExtractError) -> None:
-        """Raise the error."""
-        raise error
 
 
 class _Results:

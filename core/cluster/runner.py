@@ -91,10 +91,6 @@ class DaskRunner:
             if name in results and tasks[name].returned:
                 yield name, load(result) if isinstance(result, Stored) else result
 
-    def tolerate(self, error: RailExtractError) -> None:
-        """Record the error."""
-        self.failures.append(str(error))
-
     def _submit(self, task: Task, inputs: Mapping[Hashable, Any]) -> Future:
         """Send a task to a worker, under a name that shows in Dask's dashboard what it does."""
         key = f"{task.function.__name__.strip('_')}-{uuid.uuid4().hex}"

@@ -123,6 +123,8 @@ class ExtractRails(RailAlgorithm):
         with TemporaryDirectory(dir=QgsProcessingUtils.tempFolder()) as folder:
             network = extract_files(request, Path(folder), settings, InTurn(), progress)
         progress.check()
+        for failure in network.failures:
+            progress.warning(failure)
         origin = Origin(job.cloud.paths, job.standard, job.other_gauges_m, job.command)
         frame, rest = network.frame, (parameters, context)
         writers = {

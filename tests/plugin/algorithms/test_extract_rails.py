@@ -280,9 +280,14 @@ def test_bad_parameter(run, outputs, write_cloud, track, parameters, message):
     assert_refused(outcome, message, outputs)
 
 
-def test_no_track_of_the_gauge(run, outputs, write_cloud, track):
-    outcome = run({"INPUT": write_cloud(track(spacing_m=1.592)), "STANDARD": "EN_60E1_1435", **outputs})
-    assert_refused(outcome, "is the gauge 15", outputs)
+def test_rails_of_another_gauge_are_written_without_tracks(run, outputs, write_cloud, track, new_feedback):
+    feedback = new_feedback()
+    outcome = run({"INPUT": write_cloud(track(spacing_m=1.592)), "STANDARD": "EN_60E1_1435", **outputs}, feedback)
+    assert outcome.ok, outcome.error
+    assert (outcome.results["RAIL_COUNT"], outcome.results["CENTERLINE_COUNT"]) == (2, 0)
+    assert any("is the gauge 15" in warning for warning in feedback.warnings)
+    assert lines_of(outputs["RAILS"])[0].featureCount() == 2
+    assert lines_of(outputs["CENTERLINES"])[0].featureCount() == 0
 
 
 def test_degrees_are_refused_with_a_zone(run, outputs, write_cloud, track):
