@@ -67,6 +67,11 @@ class Engine(Protocol):
         """Demand less memory, or change to the CPU, and return a message for the user.
 
         Call it after `sweep` raised `DeviceExhaustedError`.
+
+        Raises
+        ------
+        MemoryError
+            There is no smaller demand left.
         """
 
 

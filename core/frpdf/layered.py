@@ -22,6 +22,9 @@ from .corridor import Piece
 Array = Any
 """(channels, height, width) array of the library that computes."""
 
+MIN_CELLS = 1 << 18
+"""Fewest cells to be computed at once; a device without memory for them is not used any more."""
+
 
 @dataclass(frozen=True)
 class Step:
@@ -60,6 +63,21 @@ class LayeredEngine(ABC):
         progress: Progress,
     ) -> list[np.ndarray]:
         """Run one pass over pieces; see `Engine.sweep`."""
+        try:
+            return self._sweep(seen, known, number, pieces, progress)
+        except Exception as error:
+            if self._means_no_memory(error):
+                raise DeviceExhaustedError from error
+            raise
+
+    def _sweep(
+        self,
+        seen: Sequence[np.ndarray],
+        known: Sequence[np.ndarray],
+        number: int,
+        pieces: Sequence[Piece],
+        progress: Progress,
+    ) -> list[np.ndarray]:
         held = [self._load(np.stack([raster, state]) * 2 - 1) for raster, state in zip(seen, known)]
         empty = np.array([0.0, 0.0 if number else START], dtype=np.float32)[:, None, None]
         outside = self._load(empty * 2 - 1)
@@ -69,8 +87,20 @@ class LayeredEngine(ABC):
         return [self._probabilities(logits) for logits in held]
 
     def retreat(self) -> str:
-        """Refuse: this engine has no smaller demand to fall back on; see `Engine.retreat`."""
-        raise DeviceExhaustedError
+        """Compute fewer cells at once; see `Engine.retreat`."""
+        if self.max_cells // 4 < MIN_CELLS:
+            raise MemoryError
+        self.max_cells //= 4
+        return f"{self._place} has too little free memory: continuing with smaller parts."
+
+    @property
+    def _place(self) -> str:
+        """What computes, as the subject of a sentence."""
+        return "The computer"
+
+    def _means_no_memory(self, error: Exception) -> bool:
+        """Return whether an error says that there is not enough memory; libraries have their own ways to say so."""
+        return isinstance(error, MemoryError)
 
     def _advance(
         self, step: Step, held: Sequence[Array], outside: Array, pieces: Sequence[Piece], progress: Progress

@@ -20,6 +20,15 @@ class OpenCvEngine(LayeredEngine):
         self._scratch = np.empty(0, dtype=np.float32)
         self.description = f"OpenCV {cv2.__version__}, CPU, float32"
 
+    def retreat(self) -> str:
+        """Compute fewer cells at once; see `Engine.retreat`."""
+        self._scratch = self._scratch[:0].copy()
+        return super().retreat()
+
+    def _means_no_memory(self, error: Exception) -> bool:
+        no_memory = isinstance(error, cv2.error) and getattr(error, "code", None) == cv2.Error.StsNoMem
+        return no_memory or super()._means_no_memory(error)
+
     def _steps(self, number: int) -> Sequence[Step]:
         return self._passes[number]
 

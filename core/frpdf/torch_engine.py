@@ -9,14 +9,14 @@ import torch
 from torch import Tensor
 from torch.nn.functional import conv2d
 
-from ..errors import DeviceExhaustedError, ModelError
+from ..errors import ModelError
 from ..progress import Progress
 from .corridor import Piece
 from .folding import Convolution, FoldedLayer, fold
 from .layered import LayeredEngine, Step
 
-MIN_CELLS = 1 << 18
-"""Least number of cells at once; a device without memory for them is not used any more."""
+NO_MEMORY = ("DefaultCPUAllocator", "bad_alloc", "could not create a primitive", "could not create a memory object")
+"""Words of the `RuntimeError`s that PyTorch and oneDNN raise if the computer has too little memory."""
 FIRST_FAST_HALF, FIRST_BFLOAT16 = (7, 0), (8, 0)
 """CUDA compute capabilities from which every card is faster in float16 than in float32, and supports bfloat16."""
 
@@ -45,10 +45,11 @@ class TorchEngine(LayeredEngine):
             raise ModelError("There is no CUDA device that PyTorch can use: choose AUTO or CPU.")
         self._folded = fold(arrays)
         self._exact = exact
+        self._others = ["cpu"] if has_cuda and device != "CPU" else []
         try:
-            self._move("cuda" if has_cuda and device != "CPU" else "cpu")
+            self._move("cuda" if self._others else "cpu")
         except RuntimeError:  # other programs use so much of the graphics card's memory that not even the weights fit
-            self._move("cpu")
+            self._move(self._others.pop() if self._others else "cpu")
 
     def _move(self, device: str) -> None:
         self._device = device
@@ -70,23 +71,31 @@ class TorchEngine(LayeredEngine):
         progress: Progress,
     ) -> list[np.ndarray]:
         """Run one pass over pieces; see `Engine.sweep`."""
-        try:
-            with torch.inference_mode():
-                return super().sweep(seen, known, number, pieces, progress)
-        except torch.cuda.OutOfMemoryError as error:
-            raise DeviceExhaustedError from error
+        with torch.inference_mode():
+            return super().sweep(seen, known, number, pieces, progress)
 
     def retreat(self) -> str:
         """Compute fewer cells at once, and at last change to the CPU; see `Engine.retreat`."""
         self._scratch = self._scratch[:0].clone()
         if self._device == "cuda":
             torch.cuda.empty_cache()
-        if self.max_cells // 4 >= MIN_CELLS:
-            self.max_cells //= 4
-            return "The graphics card has too little free memory: continuing with smaller parts."
+        try:
+            return super().retreat()
+        except MemoryError:
+            if not self._others:
+                raise
+        sentence = f"{self._place} has too little free memory: continuing on the CPU."
         self.max_cells = LayeredEngine.max_cells
-        self._move("cpu")
-        return "The graphics card has too little free memory: continuing on the CPU."
+        self._move(self._others.pop())
+        return sentence
+
+    @property
+    def _place(self) -> str:
+        return "The graphics card" if self._device == "cuda" else super()._place
+
+    def _means_no_memory(self, error: Exception) -> bool:
+        words = isinstance(error, RuntimeError) and any(word in str(error) for word in NO_MEMORY)
+        return words or isinstance(error, torch.cuda.OutOfMemoryError) or super()._means_no_memory(error)
 
     def _steps(self, number: int) -> Sequence[Step]:
         return self._passes[number]

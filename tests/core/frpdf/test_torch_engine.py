@@ -2,15 +2,16 @@
 
 import numpy as np
 import pytest
+from rail_extract.core.errors import DeviceExhaustedError
 from rail_extract.core.frpdf import cleanup
-from rail_extract.core.frpdf.corridor import lay_fields
-from rail_extract.core.frpdf.layered import LayeredEngine
+from rail_extract.core.frpdf.corridor import Piece, lay_fields
+from rail_extract.core.frpdf.layered import MIN_CELLS, LayeredEngine
 from rail_extract.core.progress import Progress
 from rail_extract.core.raster import RailRaster
 
 torch = pytest.importorskip("torch")
 
-from rail_extract.core.frpdf.torch_engine import MIN_CELLS, TorchEngine  # noqa: E402
+from rail_extract.core.frpdf.torch_engine import TorchEngine  # noqa: E402
 
 
 def line(length):
@@ -60,13 +61,13 @@ def test_fields_with_context_give_the_result_of_one_field(arrays):
 
 @pytest.mark.parametrize("room, ends_on_cpu", [(50_000, False), (0, True)])
 def test_an_exhausted_device_is_asked_for_less_and_then_left(arrays, monkeypatch, room, ends_on_cpu):
-    monkeypatch.setattr("rail_extract.core.frpdf.torch_engine.MIN_CELLS", 1 << 10)
+    monkeypatch.setattr("rail_extract.core.frpdf.layered.MIN_CELLS", 1 << 10)
     monkeypatch.setattr("rail_extract.core.frpdf.corridor.CONTEXT", 80)
     raster = line(1500)
     expected = cleanup.clean(raster, TorchEngine(arrays, "CPU", exact=True), passes=1)
     assert expected.count() > 1000
     engine, listener = Small(arrays, "CPU", exact=True), Listener()
-    engine.room = room
+    engine.room, engine._others = room, ["cpu"]
     found = cleanup.clean(raster, engine, passes=1, progress=listener)
     assert engine.moved == ends_on_cpu
     assert listener.warnings
@@ -77,8 +78,23 @@ def test_an_exhausted_device_is_asked_for_less_and_then_left(arrays, monkeypatch
 
 
 def test_a_device_is_left_before_its_parts_get_too_small(arrays):
-    engine = TorchEngine(arrays, "CPU")
-    messages = []
+    engine, messages = TorchEngine(arrays, "CPU"), []
+    engine._others = ["cpu"]
     while "on the CPU" not in (messages or [""])[-1]:
         messages.append(engine.retreat())
     assert len(messages) == 1 + np.log2(LayeredEngine.max_cells / MIN_CELLS) // 2
+
+
+def test_a_computer_without_memory_for_small_parts_ends_the_run(arrays):
+    engine = Small(arrays, "CPU", exact=True)
+    with pytest.raises(MemoryError):
+        cleanup.clean(line(100), engine, passes=1)
+    assert MIN_CELLS <= engine.max_cells < 4 * MIN_CELLS
+
+
+def test_memory_that_pytorch_does_not_get_asks_for_smaller_parts(arrays):
+    engine = TorchEngine(arrays, "CPU")
+    piece = Piece(0, 0, 1 << 24, 1 << 24)  # 3e14 cells: no computer has memory for them
+    engine._load = lambda array: torch.empty((2, piece.height, piece.width))
+    with pytest.raises(DeviceExhaustedError):
+        engine.sweep([np.zeros((1, 1))], [np.zeros((1, 1))], 0, [piece], Progress())
