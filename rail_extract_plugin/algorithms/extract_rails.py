@@ -20,6 +20,7 @@ from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource, request_points
 from ..systems import system
+from ..writing.destinations import is_wanted
 from ..writing.layers import (
     CENTERLINES,
     RAILS,
@@ -114,10 +115,13 @@ class ExtractRails(RailAlgorithm):
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
         settings = values.settings(job.standard, job.other_gauges_m)
+        quality, report, cleaned = (
+            is_wanted(parameters.get(name), context) for name in ("QUALITY", "REPORT", "CLEANED")
+        )
         settings = replace(
             settings,
-            quality_step_m=values.number("STEP") if values.wanted("QUALITY") or values.wanted("REPORT") else None,
-            keep_cleaned=values.wanted("CLEANED"),
+            quality_step_m=values.number("STEP") if quality or report else None,
+            keep_cleaned=cleaned,
         )
         request = request_points(job.cloud, job.class_codes, values.extent, progress)
         with TemporaryDirectory(dir=QgsProcessingUtils.tempFolder()) as folder:

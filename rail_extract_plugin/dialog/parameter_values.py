@@ -20,7 +20,6 @@ from ...core.errors import ParameterError, RailExtractError, RasterError
 from ...core.standards import CUSTOM, DEFAULT, LAST_CLASS, RailStandard, distinct_gauges, resolve
 from ..reading.clouds import CloudSource, checked_crs, cloud_source
 from ..systems import prepare_system
-from ..writing.destinations import is_wanted
 
 if TYPE_CHECKING:
     from ...core.pipeline import Parameters
@@ -95,10 +94,6 @@ class ParameterValues:
     def filled(self, name: str) -> bool:
         """Return whether a value was entered."""
         return self._parameters.get(name) not in (None, "")
-
-    def wanted(self, name: str) -> bool:
-        """Return whether an output is to be written."""
-        return is_wanted(self._parameters.get(name), self._context)
 
     def raster(self, name: str) -> tuple[Path, RasterHeader]:
         """Return the file of a raster and its header.
