@@ -1,4 +1,4 @@
-"""Print how far extracted lines lie from the truth on synthetic scenes, beside what a plain script reaches.
+"""Print the errors of extracted lines on synthetic scenes, next to those of a plain script.
 
 Run `python benchmarks/accuracy.py [SCENE ...]`.
 """
@@ -16,7 +16,7 @@ from rail_extract.laboratory.scenes.catalogue import SCENES
 
 
 def main() -> None:
-    """Print the tables for the scenes named on the command line, or all."""
+    """Print the tables for the scenes named on the command line, or for all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scenes", nargs="*", choices=[*SCENES, []], metavar="SCENE", help=f"of {', '.join(SCENES)}")
     arguments = parser.parse_args()
@@ -25,7 +25,7 @@ def main() -> None:
 
 
 def _measured(name: str) -> Result:
-    """Measure one scene in a process of its own, whose peak memory is the scene's."""
+    """Measure one scene in a separate process, so that its peak memory is that of the scene."""
     print(name, file=sys.stderr, flush=True)
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         return pool.submit(measure, SCENES[name]()).result()

@@ -1,17 +1,18 @@
-"""Compare networks that clean rail rasters: the paper's table on a fixed set of synthetic rasters, and what it hides.
+"""Compare networks that clean rail rasters on a fixed set of synthetic rasters.
 
-Run `python benchmarks/frpdf.py [NETWORK ...]`. A network is one of
+The tables have the figures of Gribov and Chang, F1 by severity and by family, bridged gaps and removed lines. Run
+`python benchmarks/frpdf.py [NETWORK ...]`. A network is one of
 
-- `weights.npz`: weights of FRPDF, after one pass and after two (`weights.npz@3`: after three alone; `@0`: once less
-  than a thousandth of the rail cells changes from pass to pass, five passes at most);
-- `unet=weights.npz`: weights of a rival, from `python -m rail_extract train FOLDER --network unet`;
+- `weights.npz`: weights of FRPDF, with one pass and with two (`weights.npz@3`: with three only; `@0`: until fewer than
+  0.1 % of the rail cells change from pass to pass, at most five passes);
+- `unet=weights.npz`: weights of another network, from `python -m rail_extract train FOLDER --network unet`;
 - `network.onnx`: from `(1, 1, height, width)`, 0 or 1, to the same shape, probability of rail;
 - `pass1.onnx+pass2.onnx`: passes of FRPDF as `python -m rail_extract onnx` writes them (with `--side 1024`);
-- `module:function`: a Python function from a `(height, width)` bool array to one of bools or probabilities; its
-  attribute `parameters`, where it has one, goes into the table.
+- `module:function`: a Python function from a `(height, width)` bool array to an array of bools or probabilities; the
+  table shows its attribute `parameters` if it has one.
 
-Every row runs in a process of its own, so that its memory is its own. The set: 1024 x 1024 cells of 4 cm, 132RE, each
-family of layouts at each severity from 0.1 to 0.9. Nothing is trained or tuned on its seeds.
+Each row runs in a separate process, so that its memory can be measured. The set: 1024 x 1024 cells of 4 cm, 132RE, each
+family of layouts at each severity from 0.1 to 0.9. Nothing is trained or tuned with its seeds.
 """
 
 from __future__ import annotations
@@ -38,11 +39,11 @@ from rail_extract.laboratory.training.networks import TrainedNetwork
 from rail_extract.laboratory.training.scores import Scores, bridged, score
 
 SEED = 1024_2026
-"""Apart from the seeds of trainings and of `rail_extract evaluate`."""
+"""Different from the seeds of training and of `rail_extract evaluate`."""
 SIDE = 1024
 SEVERITIES = tuple(number / 10 for number in range(1, 10))
 GAP_LENGTHS_M = (0.2, 0.5, 1.0, 2.0, 4.0, 8.0)
-"""Borders of the classes of gaps; overlapping gaps that are longer still count in the last one."""
+"""Limits of the classes of gaps; the last class also has overlapping gaps that are longer."""
 TOLERANCES = (0, 1)
 
 
@@ -56,12 +57,12 @@ class Tally:
         The key is a severity, the name of a family, or "all".
     gaps : dict of class to [bridged, all]
     lines : list of int
-        Cells of guard rails and lone lines: cleared, all.
+        Cells of guard rails and lone lines: removed ones, all.
     parameters : int or None
     seconds : float
-        A raster.
+        Per raster.
     memory_mib : float
-        Peak of the whole process, or of the GPU where one is used.
+        Peak of the process, or of the GPU if one is used.
     """
 
     name: str
@@ -74,10 +75,10 @@ class Tally:
 
 
 def main() -> None:
-    """Measure row by row and print the tables."""
+    """Measure each row and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("networks", nargs="*", metavar="NETWORK", help="rows beside the standard ones")
-    parser.add_argument("--count", type=int, default=set_size(), help="use the first so many rasters (default: all)")
+    parser.add_argument("networks", nargs="*", metavar="NETWORK", help="further rows")
+    parser.add_argument("--count", type=int, default=set_size(), help="number of rasters to use (default: all)")
     parser.add_argument("--only", action="store_true", help="leave the standard rows out")
     arguments = parser.parse_args()
     standard = ["input", "closing", *(str(model.path) for model in MODELS)]
@@ -91,18 +92,18 @@ def main() -> None:
 
 
 def set_size() -> int:
-    """Give the number of rasters in the set: each family at each severity once."""
+    """Return the number of rasters in the set: each family at each severity once."""
     return len(FAMILIES) * len(SEVERITIES)
 
 
 def benchmark_pair(number: int) -> tuple[str, float, Pair]:
-    """Draw a raster of the set, with its family and severity; any first few of the set are spread over both."""
+    """Return family, severity and pair of a raster; the first rasters of the set vary in both."""
     family, severity = list(FAMILIES)[number % len(FAMILIES)], SEVERITIES[number % len(SEVERITIES)]
     return family, severity, random_pair(np.random.default_rng([SEED, number]), SIDE, severity, BASE_RATIO, family)
 
 
 def expand(networks: Iterable[str]) -> Iterable[str]:
-    """Make a row for each number of passes of weights: `weights.npz@2`."""
+    """Yield a row for each number of passes of weights: `weights.npz@2`."""
     for network in networks:
         if network.endswith(".npz"):
             yield from (f"{network}@{passes}" for passes in range(1, DEFAULT_PASSES + 1))
@@ -111,7 +112,7 @@ def expand(networks: Iterable[str]) -> Iterable[str]:
 
 
 def measure(row: str, count: int) -> Tally:
-    """Clean the first `count` rasters of the set and add up what comes out."""
+    """Clean the first `count` rasters of the set and add up the figures."""
     cleaner, parameters = make_cleaner(row)
     cleaner(np.zeros((SIDE, SIDE), dtype=bool))
     tally = Tally(_title(row), parameters=parameters)
@@ -136,7 +137,7 @@ def measure(row: str, count: int) -> Tally:
 
 
 def make_cleaner(row: str) -> tuple[Cleaner, int | None]:
-    """Make what cleans a raster, and count its parameters where they can be counted."""
+    """Return the function of a row that cleans a raster, and its number of parameters if it is known."""
     if row == "input":
         return (lambda observed: observed), 0
     if row == "closing":
@@ -155,7 +156,7 @@ def make_cleaner(row: str) -> tuple[Cleaner, int | None]:
 
 
 def _onnx_cleaner(paths: Sequence[str]) -> tuple[Cleaner, int]:
-    """Run ONNX files on OpenCV: one network from raster to probability, or the passes of FRPDF."""
+    """Return a cleaner from ONNX files on OpenCV: a network from raster to probability, or the passes of FRPDF."""
     import cv2
 
     nets = [cv2.dnn.readNetFromONNX(path) for path in paths]
@@ -198,7 +199,7 @@ def _title(row: str) -> str:
 
 
 def report(tallies: Sequence[Tally], count: int) -> Iterable[str]:
-    """Write the tables, line by line."""
+    """Yield the lines of the tables."""
     yield f"{count} of {set_size()} rasters of {SIDE} x {SIDE}; counts by cell"
     for tolerance in TOLERANCES:
         yield ""

@@ -1,8 +1,7 @@
-"""Print how long a gap the network bridges on one rail and on both, and what a mismatch of the rail standard costs.
+"""Print the share of gaps that the network bridges, by length, and its F1 at other ratios of gauge to railhead.
 
 Run `python benchmarks/gaps.py [WEIGHTS.npz]`. Gaps: plain, curved and parallel tracks at severity 0.1, each with one
-gap cut square across a rail or a track. Mismatch: rasters of the main benchmark's kind, drawn at other ratios of gauge
-to railhead.
+rectangular gap in a rail or in both rails. Ratios: rasters as in the main benchmark.
 """
 
 from __future__ import annotations
@@ -22,16 +21,16 @@ from rail_extract.laboratory.training.networks import TrainedNetwork
 from rail_extract.laboratory.training.scores import Scores, bridged, score
 
 SEED = 3_2026
-"""Apart from the seeds of trainings and of the other benchmarks."""
+"""Different from the seeds of training and of the other benchmarks."""
 SIDE = 512
 SEVERITY = 0.1
 TRACKS = ("plain", "curve", "parallel")
 LENGTHS_M = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0)
 RAIL_REACH_M = 0.3
-"""How far from a rail's axis its gap clears points: foot and noise with it, and not the next rail."""
+"""Half the width of a gap in one rail: it clears foot and noise, but not the next rail."""
 TRACK_REACH_M = 0.5 * SPACING_M + RAIL_REACH_M
 DIRECTION_M = 1.0
-"""Reach of the cells that give a rail's direction at its gap."""
+"""Distance of the cells that determine the direction of a rail at its gap."""
 FACTORS = (1.0, 1 - RATIO_TOLERANCE, 1 + RATIO_TOLERANCE)
 STANDARDS = (RATIOS[0], 16.5, 20.2, 22.2, 24.5, RATIOS[1])
 
@@ -40,7 +39,7 @@ def main() -> None:
     """Print the two tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("weights", nargs="?", type=Path, default=MODELS[0].path)
-    parser.add_argument("--count", type=int, default=60, help="rasters of each kind (default 60)")
+    parser.add_argument("--count", type=int, default=60, help="number of rasters of each kind (default 60)")
     arguments = parser.parse_args()
     cleaner = cleaner_of(TrainedNetwork("frpdf", arguments.weights), DEFAULT_PASSES)
     print("gaps bridged, %".ljust(24) + "".join(f"{length:>7g} m" for length in LENGTHS_M))
@@ -54,7 +53,16 @@ def main() -> None:
 
 
 def bridged_share(cleaner: Cleaner, length_m: float, reach_m: float, count: int) -> float:
-    """Cut a gap into `count` rasters and give the share of gaps that the network bridges, those at borders left out."""
+    """Return the share of gaps that are bridged; gaps at the border of a raster are left out.
+
+    Parameters
+    ----------
+    cleaner : Cleaner
+    length_m, reach_m : float
+        See `cut`.
+    count : int
+        Number of rasters.
+    """
     results = [
         bridged(np.asarray(cleaner(observed)) >= 0.5, gap).values()
         for observed, gap in gapped_rasters(length_m, reach_m, count)
@@ -63,7 +71,7 @@ def bridged_share(cleaner: Cleaner, length_m: float, reach_m: float, count: int)
 
 
 def gapped_rasters(length_m: float, reach_m: float, count: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Draw rasters with one gap each: what is observed, and the label's cells in the gap, numbered 1."""
+    """Yield rasters with one gap each; see `cut`."""
     for number in range(count):
         rng = np.random.default_rng([SEED, number])
         pair = random_pair(rng, SIDE, SEVERITY, BASE_RATIO, TRACKS[number % len(TRACKS)])
@@ -71,22 +79,22 @@ def gapped_rasters(length_m: float, reach_m: float, count: int) -> Iterator[tupl
 
 
 def cut(pair: Pair, rng: np.random.Generator, length_m: float, reach_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Clear a rectangle along a rail near the raster's middle.
+    """Clear a rectangle along a rail near the middle of the raster.
 
     Parameters
     ----------
     pair : Pair
     rng : numpy Generator
     length_m : float
-        Along the rail.
+        Length along the rail.
     reach_m : float
-        To each side; for both rails of a track, from the track's axis.
+        Half the width; for both rails of a track, measured from the axis of the track.
 
     Returns
     -------
     observed : bool array
     gap : int array
-        1 on the label's cells in the rectangle; 0 elsewhere.
+        1 in the cells of the label in the rectangle; 0 elsewhere.
     """
     cells = np.argwhere(pair.label)
     middle = np.array(pair.label.shape) / 2
@@ -103,14 +111,28 @@ def cut(pair: Pair, rng: np.random.Generator, length_m: float, reach_m: float) -
 
 
 def _to_the_axis(cells: np.ndarray, place: np.ndarray, across: np.ndarray) -> float:
-    """Give the signed distance in cells from a rail to the axis of its track: to the side where the other rail is."""
+    """Return the distance in cells from a rail to the axis of its track, positive if the other rail is in `across`."""
     sides = [place + side * across * SPACING_M / CELL_M for side in (1, -1)]
     nearest = [np.linalg.norm(cells - side, axis=1).min() for side in sides]
     return (1 if nearest[0] < nearest[1] else -1) * 0.5 * SPACING_M / CELL_M
 
 
 def ratio_scores(cleaner: Cleaner, ratio: float, count: int) -> tuple[Scores, Scores]:
-    """Clean rasters of every family and severity at a ratio; strict counts, and counts within one cell."""
+    """Clean rasters of each family and severity at a ratio.
+
+    Parameters
+    ----------
+    cleaner : Cleaner
+    ratio : float
+        Gauge divided by railhead width.
+    count : int
+        Number of rasters.
+
+    Returns
+    -------
+    strict, tolerant : Scores
+        Strict counts, and counts within one cell.
+    """
     strict = tolerant = Scores()
     for number in range(count):
         family = list(FAMILIES)[number % len(FAMILIES)]

@@ -1,9 +1,9 @@
-"""Print how time and memory grow with length, what a second worker brings, and what a national network costs.
+"""Print how time and memory grow with length, the gain from a second worker, and the cost of a national network.
 
-`python benchmarks/scaling.py` measures a synthetic double track of 1 km and of 10 km, each in a process of its own, and
-on the longer one a worker against two, of one thread each. `--km 0.6` is quicker; half a kilometre can't be split.
-`--memory 100` adds a run over so many kilometres for its memory alone: the network does not clean the raster,
-and so its time means nothing. Compare rows of one run only.
+`python benchmarks/scaling.py` measures a synthetic double track of 1 km and of 10 km, each in a separate process, and
+one worker against two on the longer one, with one thread each. `--km 0.6` is faster; half a kilometre cannot be
+divided. `--memory 100` adds a run over 100 km to measure its memory: it skips the network, so its time has no meaning.
+Compare rows of the same run only.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ from rail_extract.laboratory.scenes.tracks import Track
 
 STANDARD = STANDARDS["EN_60E1_1435"]
 PIECE_M = 100.0
-"""A straight piece of this length is scanned once and laid end to end, a file each."""
+"""Length of the straight piece that is scanned once and repeated end to end, with one file per repetition."""
 
 HEADING = 0.35
-"""At an angle to the squares, so that borders are crossed in both directions."""
+"""Direction at an angle to the squares, so that borders are crossed in both directions."""
 
 POINTS_PER_M = 500
-"""Rail points on a metre of double track: 50 million on 100 km."""
+"""Rail points per metre of double track: 50 million on 100 km."""
 
 NETWORK_KM = 70_000
-"""Track of a large national network; a kilometre of double track is two of these."""
+"""Length of track of a large national network; a kilometre of double track has two kilometres of track."""
 
 WORKERS = (2, 16, 64, 256)
 
@@ -54,8 +54,8 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--km", type=float, default=1.0, help="shorter of the two lengths (default 1)")
-    parser.add_argument("--times", type=int, default=10, help="how many times as long the longer is (default 10)")
-    parser.add_argument("--memory", type=float, metavar="KM", help="length of a further run for its memory")
+    parser.add_argument("--times", type=int, default=10, help="ratio of the two lengths (default 10)")
+    parser.add_argument("--memory", type=float, metavar="KM", help="length of a further run that measures memory")
     parser.add_argument("--skip-workers", action="store_true", help="leave the workers out")
     parser.add_argument("--measure", nargs=2, metavar=("FOLDER", "NETWORK"), help=argparse.SUPPRESS)
     args = parser.parse_args()
@@ -74,7 +74,7 @@ def main() -> None:
 
 
 def compare_lengths(folder: Path, km: float, times: int) -> dict:
-    """Run a short and a long track, each in a process of its own."""
+    """Run a short and a long track, each in a separate process, and return the figures of the long one."""
     lay_track(folder / "short", km)
     lay_track(folder / "long", km * times)
     short = show(f"{km:g} km", in_own_process(folder / "short", "with"))
@@ -85,7 +85,7 @@ def compare_lengths(folder: Path, km: float, times: int) -> dict:
 
 
 def compare_workers(tiles: Path, folder: Path) -> None:
-    """Run one worker of one thread, then two."""
+    """Run one worker with one thread, then two."""
     seconds = []
     for workers in (1, 2):
         with connect(None, workers) as client:
@@ -95,32 +95,32 @@ def compare_workers(tiles: Path, folder: Path) -> None:
             runner = DaskRunner(client, folder / f"work{workers}")
             found = extract_files(ask([tiles], [RAIL]), folder / f"work{workers}", parameters(), runner)
             seconds.append(time.perf_counter() - start)
-        print(f"{workers} worker(s) of one thread: {seconds[-1]:.1f} s, {len(found.rails)} rails")
+        print(f"{workers} worker(s) with one thread: {seconds[-1]:.1f} s, {len(found.rails)} rails")
     print(f"Two workers are {seconds[0] / seconds[1]:.2f} times as fast as one")
 
 
 def engine_of_worker() -> None:
-    """Load what the network runs on, which a long run does but once."""
+    """Load the engine, which a long run does only once."""
     engine_for(parameters())
 
 
 def print_costs(figures: dict, km: float) -> None:
-    """State what a kilometre and a national network cost on cores like these."""
+    """Print the cost of a kilometre and of a national network on cores like these."""
     track_km = 2 * km
-    print("A kilometre of track, times in core-seconds:")
+    print("Per kilometre of track, times in core-seconds:")
     for name in ("reading_s", "squares_s", "joining_s"):
         print(f"  {name[:-2]:12}{figures[name] / track_km:10.2f} s")
     for name in ("cloud_bytes", "spool_bytes", "lines_bytes"):
         print(f"  {name[:-6]:12}{figures[name] / track_km / 1e6:10.2f} MB")
     parallel = (figures["reading_s"] + figures["squares_s"]) / track_km * NETWORK_KM / 3600
     serial = figures["joining_s"] / track_km * NETWORK_KM / 3600
-    print(f"{NETWORK_KM} km of track, workers of one core each: hours of workers + hours of joining")
+    print(f"{NETWORK_KM} km of track, workers with one core each: hours of workers + hours of joining")
     for workers in WORKERS:
         print(f"  {workers:4} workers {parallel / workers:8.1f} + {serial:.1f} h")
 
 
 def lay_track(folder: Path, km: float) -> None:
-    """Write files of a straight double track."""
+    """Write the files of a straight double track."""
     folder.mkdir()
     curve = trace([Element(PIECE_M)], heading=HEADING)
     tracks = [Track(curve, spacing(STANDARD), np.full(len(curve.xy), 100.0), left_m=left) for left in (0.0, 4.5)]
@@ -138,12 +138,12 @@ def lay_track(folder: Path, km: float) -> None:
 
 
 def parameters() -> Parameters:
-    """Give the settings of all runs."""
+    """Return the parameters of all runs."""
     return Parameters(STANDARD.gauge_m, STANDARD.head_width_m)
 
 
 def in_own_process(folder: Path, network: str) -> dict:
-    """Measure in a process of its own, for the peak of memory is one of the process."""
+    """Measure in a separate process, because peak memory is that of a process."""
     words = [sys.executable, __file__, "--measure", str(folder), network]
     run = subprocess.run(words, capture_output=True, text=True)
     if run.returncode:
@@ -152,7 +152,7 @@ def in_own_process(folder: Path, network: str) -> dict:
 
 
 def measure(folder: Path, with_network: bool) -> dict:
-    """Extract all that is in a folder; give core-seconds by step, peak of memory and bytes."""
+    """Extract the clouds in a folder; return core-seconds by step, peak memory and sizes in bytes."""
     if not with_network:
         steps.clean = lambda raster, *_: raster
     draw_squares = pipeline._draw_squares
@@ -166,7 +166,7 @@ def measure(folder: Path, with_network: bool) -> dict:
             marks.append(time.process_time())
 
     pipeline._draw_squares = marked
-    engine_for(parameters())  # loads the packages, which is done but once
+    engine_for(parameters())  # loads the packages, which happens only once
     start = time.perf_counter()
     with tempfile.TemporaryDirectory() as work:
         marks.append(time.process_time())
@@ -190,12 +190,12 @@ def measure(folder: Path, with_network: bool) -> dict:
 
 
 def size_of(folder: Path) -> int:
-    """Add up the files in a folder, in bytes."""
+    """Return the size of the files in a folder, bytes."""
     return sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
 
 
 def show(what: str, figures: dict) -> dict:
-    """Print one run."""
+    """Print the figures of a run, and return them."""
     steps = ", ".join(f"{figures[f'{step}_s']:.1f} {step}" for step in ("reading", "squares", "joining"))
     print(f"{what}: {figures['seconds']:.1f} s ({steps} core-seconds), peak {figures['peak_mib']:.0f} MiB", flush=True)
     print(f"  {figures['rails']} rails of {figures['rails_km']:.3f} km, {figures['engine']}", flush=True)

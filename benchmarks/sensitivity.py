@@ -1,7 +1,7 @@
-"""Print and draw how errors grow with density, noise, gaps, curvature and angle to the grid, beside a plain script's.
+"""Print and draw how errors depend on density, noise, gaps, curvature and angle to the grid, next to a plain script.
 
-Run `python benchmarks/sensitivity.py [SWEEP ...] [--plots FOLDER]`. Each value of a sweep is one seeded scene: plain
-60E1 track of 40 m, scanned as in the other scenes, with all but one property at its usual value.
+Run `python benchmarks/sensitivity.py [SWEEP ...] [--plots FOLDER]`. Each value of a sweep is one scene with a fixed
+seed: plain 60E1 track of 40 m, scanned as in the other scenes, with all but one property at the usual value.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ LENGTH_M = 40.0
 STANDARD = STANDARDS["EN_60E1_1435"]
 SCANNER = Scanner(noise_m=0.004)
 HEADING = 0.35
-"""Radians to the grid's axes; far from the angles at which rasters err most."""
+"""Angle to the axes of the grid, radians; far from the angles at which rasters have the largest errors."""
 COLUMNS = 3
-"""Panels side by side, so that they can be read on a page."""
+"""Panels per row, so that they can be read on a page."""
 TICKS_MM, TICKS_DENSITY = (0.3, 1, 3, 10, 30), (30, 100, 300)
 GAPS_AT_M = (8.0, 20.0, 32.0)
-"""Middles of the gaps in the left rail; those of the right one lie 4 m further on."""
+"""Middles of the gaps in the left rail; those in the right rail are 4 m further along."""
 
 RAY_STEPS_RAD = (0.0158, 0.0079, 0.004, 0.002, 0.001, 0.0005)
 NOISES_M = (0.002, 0.004, 0.006, 0.008, 0.010)
@@ -45,7 +45,7 @@ SLOPES = (0.0, 1 / 200, 1 / 50, 1 / 9, 0.36, 1.0)
 
 @dataclass(frozen=True)
 class Sweep:
-    """One property, its values, and the scene for each."""
+    """A property, its values, and the scene for each value."""
 
     title: str
     unit: str
@@ -56,7 +56,7 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one scene: the value that is drawn, and both comparisons with the truth."""
+    """The figures of one scene: the value that is drawn, and both comparisons with the truth."""
 
     value: float
     ours: Comparison
@@ -66,7 +66,18 @@ class Outcome:
 def track_scene(
     scanner: Scanner = SCANNER, curvature: float = 0.0, heading: float = HEADING, gap_m: float = 0.0
 ) -> Scene:
-    """Lay and scan one plain track."""
+    """Build a scene of one plain track.
+
+    Parameters
+    ----------
+    scanner : Scanner
+    curvature : float
+        1/m.
+    heading : float
+        Direction at the start, radians.
+    gap_m : float
+        Length of the gaps; 0 leaves them out.
+    """
     curve = trace([Element(LENGTH_M, curvature, curvature)], heading=heading)
     gaps: dict[tuple[int, int], Gaps] = {}
     if gap_m > 0:
@@ -79,18 +90,22 @@ def track_scene(
 
 
 def density(scene: Scene) -> float:
-    """Rail points a metre of rail."""
+    """Return the number of rail points per metre of rail."""
     return len(scene.rail_points().xyz) / sum(length_along(rail)[-1] for rail in scene.rails)
 
 
 SWEEPS = {
     "density": Sweep(
-        "density", "points a metre", RAY_STEPS_RAD, lambda step: track_scene(replace(SCANNER, ray_step_rad=step)), True
+        "density",
+        "points per metre",
+        RAY_STEPS_RAD,
+        lambda step: track_scene(replace(SCANNER, ray_step_rad=step)),
+        True,
     ),
     "noise": Sweep(
         "noise", "mm", [1000 * noise for noise in NOISES_M], lambda mm: track_scene(replace(SCANNER, noise_m=mm / 1000))
     ),
-    "gap": Sweep("gaps, three a rail", "m", GAPS_M, lambda gap_m: track_scene(gap_m=gap_m)),
+    "gap": Sweep("gaps, three per rail", "m", GAPS_M, lambda gap_m: track_scene(gap_m=gap_m)),
     "curvature": Sweep(
         "curvature", "1/km", [1000 / radius for radius in RADII_M], lambda k: track_scene(curvature=k / 1000)
     ),
@@ -104,7 +119,7 @@ SWEEPS = {
 
 
 def main() -> None:
-    """Print a table for each sweep named on the command line, or all, and draw them if asked."""
+    """Print a table for each sweep named on the command line, or for all, and draw them on request."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sweeps", nargs="*", choices=[*SWEEPS, []], metavar="SWEEP", help=f"of {', '.join(SWEEPS)}")
     parser.add_argument("--plots", type=Path, help="folder for accuracy_across.png and accuracy_height.png")
@@ -122,7 +137,7 @@ def main() -> None:
 
 
 def measure(sweep: Sweep, value: float) -> Outcome:
-    """Extract one scene by us and by the plain script."""
+    """Extract one scene by this project and by the plain script."""
     scene = sweep.scene(value)
     points = scene.rail_points()
     network = extract_rails((points,), Parameters(STANDARD.gauge_m, STANDARD.head_width_m))
@@ -147,7 +162,18 @@ def _row(outcome: Outcome) -> str:
 
 
 def draw(outcomes: dict[str, list[Outcome]], figure: str, label: str, path: Path) -> None:
-    """Draw one error over every sweep, ours and the plain script's."""
+    """Draw one kind of error over all sweeps.
+
+    Parameters
+    ----------
+    outcomes : dict of name to list of Outcome
+    figure : str
+        Name of an attribute of `Comparison`.
+    label : str
+        Of the vertical axis.
+    path : Path
+        PNG to write.
+    """
     import matplotlib
 
     matplotlib.use("Agg")

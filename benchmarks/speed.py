@@ -1,7 +1,7 @@
-"""Print where the time goes on the sample, and how fast and how exact the network's shortcuts are.
+"""Print the time of each step on the sample, and the speed and exactness of the shortcuts in the network.
 
-Run `make -s env` and set what it prints, then `python benchmarks/speed.py`. Times are of this machine at this moment:
-compare rows of one run, not of two. On a machine that others use, `--clock cpu` counts this process's own time.
+Run `eval "$(make -s env)"`, then `python benchmarks/speed.py`. Times depend on the machine and its load: compare rows
+of one run only. On a shared machine, `--clock cpu` counts the processor time of this process.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ IMPORT_SECONDS = time.perf_counter() - START
 SAMPLE = Path(__file__).resolve().parent.parent / "resources" / "sample" / "sample.laz"
 STANDARD = "IN_75R_1000"
 CUT = (578_204.0, 2_494_295.0, 578_228.0, 2_494_309.5)
-"""Some 24 m of the sample's southern track."""
+"""About 24 m of the southern track of the sample."""
 STAGES = (
     "load_arrays",
     "make_engine",
@@ -47,11 +47,13 @@ PARTS = ("stages", "network", "changes", "calls")
 
 
 def main() -> None:
-    """Print the parts asked for."""
+    """Print the chosen parts."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("parts", nargs="*", choices=[*PARTS, []], help=f"of {', '.join(PARTS)} (default all)")
-    parser.add_argument("--runs", type=int, default=3, help="whole calls, and rounds of the network (default 3)")
-    parser.add_argument("--clock", choices=CLOCKS, default="wall", help="how stages and the network are timed")
+    parser.add_argument(
+        "--runs", type=int, default=3, help="number of whole calls and rounds of the network (default 3)"
+    )
+    parser.add_argument("--clock", choices=CLOCKS, default="wall", help="clock for steps and network")
     arguments = parser.parse_args()
     parts, clock = arguments.parts or PARTS, CLOCKS[arguments.clock]
     spent = 0.0
@@ -66,10 +68,10 @@ def main() -> None:
 
 
 def print_stages(clock) -> float:
-    """Print seconds by stage of the walk, imports included; give their sum."""
+    """Print the seconds of each step, imports included, and return their sum."""
     seconds, description = stages(clock)
     seconds = {"import": IMPORT_SECONDS, **seconds}
-    print(f"Stages on the sample, with {description}")
+    print(f"Steps on the sample, with {description}")
     for name, spent in seconds.items():
         print(f"  {name:20}{spent:7.2f} s")
     print(f"  {'sum':20}{sum(seconds.values()):7.2f} s")
@@ -78,19 +80,19 @@ def print_stages(clock) -> float:
 
 
 def print_calls(runs: int, walk_s: float) -> None:
-    """Print seconds of whole calls, and what of them is not the walk."""
+    """Print the seconds of whole calls, and the part of them outside the extraction."""
     if "QGIS_PROCESS" not in os.environ:
-        sys.exit("QGIS_PROCESS is not set: run `make -s env` and set what it prints to time whole calls.")
+        sys.exit('QGIS_PROCESS is not set: run `eval "$(make -s env)"` to time whole calls.')
     starts = sorted(_call("help", "railextract:extractrails") for _ in range(runs))
     whole = sorted(whole_call() for _ in range(runs))
     print(f"Whole qgis_process calls: {', '.join(f'{spent:.1f}' for spent in whole)} s")
-    print(f"  QGIS and the plugin start: {starts[0]:.1f} s")
+    print(f"  start of QGIS and the plugin: {starts[0]:.1f} s")
     if walk_s:
-        print(f"  reading parameters, and writing: {whole[0] - starts[0] - walk_s:.1f} s")
+        print(f"  reading parameters and writing: {whole[0] - starts[0] - walk_s:.1f} s")
 
 
 def stages(clock) -> tuple[dict[str, float], str]:
-    """Run the walk with a clock on each of its steps; give seconds by step and what ran the network."""
+    """Extract the sample with a clock on each step; return seconds by step and the engine."""
     spent: Counter[str] = Counter()
 
     def timed(name, function):
@@ -115,7 +117,7 @@ def stages(clock) -> tuple[dict[str, float], str]:
 
 
 def sample_cut() -> Cut:
-    """Read the short piece of the sample that the network is measured on."""
+    """Read the section of the sample on which the network is measured."""
     standard = resolve(STANDARD)
     parameters = pipeline.Parameters(standard.gauge_m, standard.head_width_m, simplify_xy_m=0.0, simplify_z_m=0.0)
     arrays = load_arrays(choose(standard.gauge_m, standard.head_width_m).path)
@@ -123,7 +125,7 @@ def sample_cut() -> Cut:
 
 
 def whole_call() -> float:
-    """Run Extract Rails in real QGIS, from its start to its end; give seconds."""
+    """Run Extract Rails in QGIS, from start to end, and return the seconds."""
     with tempfile.TemporaryDirectory() as folder:
         outputs = [f"{name}={Path(folder) / name.lower()}.gpkg" for name in ("RAILS", "CENTERLINES")]
         words = [f"INPUT={SAMPLE}", f"STANDARD={STANDARD}", *outputs]
@@ -131,7 +133,7 @@ def whole_call() -> float:
 
 
 def _call(*words: str) -> float:
-    """Run `qgis_process`; give seconds."""
+    """Run `qgis_process` and return the seconds."""
     start = time.perf_counter()
     run = subprocess.run([os.environ["QGIS_PROCESS"], *words], capture_output=True, text=True)
     if run.returncode:

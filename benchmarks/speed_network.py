@@ -1,4 +1,4 @@
-"""What `speed.py` prints of the network: how fast it is beside plain PyTorch, and what each shortcut changes."""
+"""The tables of `speed.py` about the network: speed compared with plain PyTorch, and the effect of each shortcut."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ from rail_extract.core.steps import lines_of
 from rail_extract.laboratory.ruler.lines import match
 
 TILE = 512
-"""Side of the tiles that plain PyTorch computes, in cells."""
+"""Side in cells of the tile that plain PyTorch computes."""
 SMALL_FIELD = 100_000
-"""Cells at once that cut a short scene into several fields."""
+"""Number of cells per field that divides a short scene into several fields."""
 DIAGONAL_M, CELL_M = 3000.0, 0.04
 END_M = 0.5
 """Length left out at either end of a line, because lines may end a few centimetres apart."""
@@ -42,13 +42,13 @@ NEAR_M = 0.1
 
 @dataclass(frozen=True)
 class Cut:
-    """A short piece of the sample, with its weights.
+    """A short section of the sample, with the weights for it.
 
     Attributes
     ----------
     points : RailPoints
     parameters : Parameters
-        Lines are not thinned: thinning by 2 mm may keep other vertices of the same curve.
+        Without thinning, which may keep different vertices of the same curve.
     arrays : dict
     """
 
@@ -58,12 +58,12 @@ class Cut:
 
     @property
     def raster(self) -> RailRaster:
-        """Rail cells."""
+        """Its rail raster."""
         return rasterize(self.points.xyz, cell_size(self.parameters.gauge_m, self.parameters.head_width_m))
 
 
 def plain_network(arrays: dict[str, np.ndarray]) -> FRPDF:
-    """Make the paper's network as it is written down, in float32."""
+    """Return the network as it is trained, in float32."""
     network = FRPDF()
     set_weights(network, arrays)
     return network.eval()
@@ -72,7 +72,21 @@ def plain_network(arrays: dict[str, np.ndarray]) -> FRPDF:
 def open_vino(
     arrays: dict[str, np.ndarray], number_type: str, height: int, width: int
 ) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-    """Make the first pass run on OpenVINO, on as many threads as PyTorch has; takes a raster and its state."""
+    """Return a function that runs the first pass on OpenVINO, with as many threads as PyTorch has.
+
+    Parameters
+    ----------
+    arrays : dict
+        Weights.
+    number_type : {"float32", "bfloat16"}
+    height, width : int
+        Size of the raster.
+
+    Returns
+    -------
+    callable
+        From raster and state to probabilities.
+    """
     from openvino import Core
 
     settings = {
@@ -86,7 +100,15 @@ def open_vino(
 
 
 def speed_table(cut: Cut, rounds: int, clock: Callable[[], float]) -> Iterable[str]:
-    """Time the first pass, contestants in turn, `rounds` times; print medians of seconds a megacell."""
+    """Time the first pass, with the variants in turn, and yield the medians of seconds per megacell.
+
+    Parameters
+    ----------
+    cut : Cut
+    rounds : int
+    clock : callable
+        Returns seconds.
+    """
     raster = cut.raster
     (field,) = lay_fields(raster, 1 << 40)
     row, column = raster.cells().min(axis=0)
@@ -95,7 +117,7 @@ def speed_table(cut: Cut, rounds: int, clock: Callable[[], float]) -> Iterable[s
     seen = [raster.read(*piece.window).astype(np.float32) for piece in field.pieces]
     network, exact = plain_network(cut.arrays), TorchEngine(cut.arrays, "CPU", exact=True)
     fast, opencv = TorchEngine(cut.arrays, "CPU"), OpenCvEngine(cut.arrays)
-    contestants = {
+    variants = {
         "eager PyTorch, float32, tile": (TILE**2, lambda: _eager(network, tile)),
         "folded, float32, tile": (TILE**2, lambda: _sweep(exact, [tile], [whole])),
         f"folded, {_number_type(fast)}, tile": (TILE**2, lambda: _sweep(fast, [tile], [whole])),
@@ -104,7 +126,7 @@ def speed_table(cut: Cut, rounds: int, clock: Callable[[], float]) -> Iterable[s
         for engine in (exact, fast):
             run = open_vino(cut.arrays, _number_type(engine), *tile.shape)
             title = f"OpenVINO, {_number_type(engine)}, tile"
-            contestants[title] = (TILE**2, lambda run=run: run(tile, _start(tile)))
+            variants[title] = (TILE**2, lambda run=run: run(tile, _start(tile)))
     else:
         yield "OpenVINO is not installed and is left out: pip install openvino."
     cells = sum(one.size for one in seen)
@@ -113,15 +135,15 @@ def speed_table(cut: Cut, rounds: int, clock: Callable[[], float]) -> Iterable[s
         (f"PyTorch, {_number_type(fast)}", fast),
         ("OpenCV, float32", opencv),
     ):
-        contestants[f"{title}, along the track"] = (cells, lambda engine=engine: _sweep(engine, seen, field.pieces))
-    seconds: dict[str, list[float]] = {title: [] for title in contestants}
+        variants[f"{title}, along the track"] = (cells, lambda engine=engine: _sweep(engine, seen, field.pieces))
+    seconds: dict[str, list[float]] = {title: [] for title in variants}
     for _ in range(rounds + 1):
-        for title, (size, run) in contestants.items():
+        for title, (size, run) in variants.items():
             gc.collect()
             start = clock()
             run()
             seconds[title].append((clock() - start) / size * 1e6)
-    middle = {title: median(spent[1:]) for title, spent in seconds.items()}  # the first round warms up
+    middle = {title: median(spent[1:]) for title, spent in seconds.items()}  # the first round is a warm-up
     eager = next(iter(middle.values()))
     yield f"{'One pass':40}{'s/Mcell':>9}{'times faster than eager':>25}"
     for title, spent in middle.items():
@@ -131,7 +153,7 @@ def speed_table(cut: Cut, rounds: int, clock: Callable[[], float]) -> Iterable[s
 
 
 def cells_table() -> Iterable[str]:
-    """Print how much of its bounding box is computed for a double track on the diagonal."""
+    """Yield the share of the bounding box that is computed for a double track on the diagonal."""
     along = np.arange(0.0, DIAGONAL_M, CELL_M / 2)[:, None] * [np.sqrt(0.5), np.sqrt(0.5)]
     across = np.array([-np.sqrt(0.5), np.sqrt(0.5)])
     raster = rasterize(np.concatenate([along + offset * across for offset in (0.0, 1.5, 4.0, 5.5)]), CELL_M)
@@ -146,7 +168,7 @@ def cells_table() -> Iterable[str]:
 
 
 def changes_table(cut: Cut) -> Iterable[str]:
-    """Print what each shortcut changes beside the plain network in float32 that sees the whole cut at once."""
+    """Yield the change that each shortcut makes, compared with the plain network in float32 on the whole cut."""
     raster = cut.raster
     exact, fast = TorchEngine(cut.arrays, "CPU", exact=True), TorchEngine(cut.arrays, "CPU")
     plain = _clean_whole(plain_network(cut.arrays), raster)
@@ -158,7 +180,7 @@ def changes_table(cut: Cut) -> Iterable[str]:
         f"{len(lay_fields(raster, SMALL_FIELD))} fields instead of one": (clean(raster, exact), pieces),
         f"{_number_type(fast)} instead of float32": (quick, pieces),
         "OpenCV instead of PyTorch": (clean(raster, OpenCvEngine(cut.arrays)), pieces),
-        "all that AUTO does": (quick, plain),
+        "all shortcuts of AUTO": (quick, plain),
     }
     yield f"{'Shortcut':40}{'cells, %':>9}{'lines, mm rms (worst line)':>28}"
     for title, (found, reference) in rows.items():
@@ -184,7 +206,7 @@ def _number_type(engine: Engine) -> str:
 
 
 def _clean_whole(network: FRPDF, raster: RailRaster) -> RailRaster:
-    """Run the plain network over the bounding box and all around that it can see."""
+    """Run the plain network on the bounding box and on everything around it that it can see."""
     cells = raster.cells()
     corner = cells.min(axis=0) - RECEPTIVE_RADIUS
     height, width = (cells.max(axis=0) + 1 + RECEPTIVE_RADIUS - corner).tolist()
@@ -195,13 +217,13 @@ def _clean_whole(network: FRPDF, raster: RailRaster) -> RailRaster:
 
 
 def _changed(found: RailRaster, reference: RailRaster) -> float:
-    """Share of the rail cells that differ."""
+    """Return the share of rail cells that differ."""
     ours, theirs = (set(map(tuple, one.cells().tolist())) for one in (found, reference))
     return len(ours ^ theirs) / len(theirs)
 
 
 def _apart(cut: Cut, found: RailRaster, reference: RailRaster) -> float:
-    """How far the lines of two rasters lie apart, the worst line's rms in millimetres; nan if there are not as many."""
+    """Return the rms distance between the lines of two rasters, mm, for the worst line; NaN if their numbers differ."""
     ours, theirs = (lines_of(one, 10, cut.points, cut.parameters) for one in (found, reference))
     if len(ours) != len(theirs):
         return np.nan

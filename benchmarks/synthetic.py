@@ -1,4 +1,4 @@
-"""Print how many synthetic training pairs a second are drawn, by family of layouts.
+"""Print the number of synthetic training pairs drawn per second, by family of layouts.
 
 Run `python benchmarks/synthetic.py`.
 """
@@ -20,7 +20,7 @@ PAIRS = 40
 def main() -> None:
     """Print the table."""
     print(f"Pairs of {SIDE} x {SIDE}, {PROCESSES} processes")
-    print(f"{'family':16}{'a second':>10}{'ms of CPU':>10}{'weight':>10}")
+    print(f"{'family':16}{'per second':>10}{'CPU, ms':>10}{'weight':>10}")
     with multiprocessing.get_context("spawn").Pool(PROCESSES) as processes:
         processes.map(draw, [(None, number) for number in range(PROCESSES)])
         for family in (None, *FAMILIES):
@@ -32,7 +32,7 @@ def main() -> None:
 
 
 def draw(task: tuple[str | None, int]) -> float:
-    """Draw a pair of a family and give the processor time it took, seconds."""
+    """Draw a pair of a family and return its processor time, seconds."""
     family, number = task
     start = time.process_time()
     random_pair(np.random.default_rng([PAIRS, number]), SIDE, family=family)

@@ -1,6 +1,6 @@
-"""Run the tests of plugin and qgis_process in another Debian, with its QGIS and Python, beside this system.
+"""Run the tests of plugin and qgis_process in another version of Debian, with its QGIS and Python.
 
-The other system lies in .chroots/NAME, is made once by mmdebstrap, and is removed by `make clean-chroots`. Needs root.
+The other system is in .chroots/NAME; mmdebstrap builds it once, and `make clean-chroots` removes it. It needs root.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 CHROOTS = ROOT / ".chroots"
 TREE = "rail_extract"
-"""Folder in the other system that holds a copy of the working tree, with a .venv and a build folder of its own."""
+"""Folder in the other system with a copy of the working tree, a .venv and a build folder."""
 
 MIRROR = "http://deb.debian.org/debian"
 BASE_PACKAGES = ("ca-certificates", "git", "make")
@@ -31,11 +31,11 @@ SHARED = (
 VIRTUAL = ("/proc", "/sys", "/dev")
 
 RELEASES = {"latest": ("forky",), "3.40": ("bookworm", "bookworm-backports")}
-"""Suites of Debian, the last one preferred: testing has QGIS 3.44, the backports to Debian 12 have QGIS 3.40."""
+"""Suites of Debian, the last one preferred: testing has QGIS 3.44, the backports for Debian 12 have QGIS 3.40."""
 
 
 def make_system(name: str, packages: list[str]) -> Path:
-    """Build the system `name` with `packages`, or take the one that was built before."""
+    """Build the system `name` with `packages`, unless it exists, and return its folder."""
     folder = CHROOTS / name
     if folder.exists():
         return folder
@@ -66,7 +66,7 @@ def make_system(name: str, packages: list[str]) -> Path:
 
 
 def copy_tree(tree: Path) -> None:
-    """Copy the working tree, as it is, into `tree`; its .venv and build stay."""
+    """Copy the working tree into `tree`, whose .venv and build folder are kept."""
     listing = ["git", "-c", f"safe.directory={ROOT}", "ls-files", "-z", "-co", "--exclude-standard"]
     names = subprocess.run(listing, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split("\0")
     tree.mkdir(exist_ok=True)
@@ -80,7 +80,7 @@ def copy_tree(tree: Path) -> None:
 
 
 def run_inside(system: Path, script: str) -> int:
-    """Run a shell script in the copied tree; mounts live in a namespace of their own and end with it."""
+    """Run a shell script in the copied tree and return its exit code; mounts are in a namespace that ends with it."""
     mounts = [(path, "--rbind") for path in VIRTUAL]
     mounts += [(str(Path(path).expanduser()), "--bind") for path in SHARED if Path(path).expanduser().exists()]
     lines = ["set -e"]
@@ -100,22 +100,22 @@ def run_inside(system: Path, script: str) -> int:
 
 
 def test_script(torch: str, builds: str) -> str:
-    """Script that runs the tests, with PyTorch where its processor build is there for this Python."""
+    """Return a script that runs the tests, with PyTorch if there is a CPU build for the Python of the system."""
     probe = f"pip install --dry-run --quiet --break-system-packages --no-deps --retries 0 --index-url {builds}"
     return f"""
 git init --quiet .; git -c safe.directory=/{TREE} add --all
 if {probe} --only-binary=:all: "{torch}" >/dev/null 2>&1; then torch="{torch}"; else torch=""
-    echo "There is no processor build of PyTorch for this Python: the network runs with OpenCV."
+    echo "There is no CPU build of PyTorch for this Python: the network runs with OpenCV."
 fi
 make TORCH="$torch" TORCH_BUILDS="{builds}" test-qgis
 """
 
 
 def main() -> int:
-    """Test in the system named first on the command line; PyTorch, where its builds are, and packages follow."""
+    """Run the tests; the command line has the system, a version of PyTorch, the address of its builds, and packages."""
     name, torch, builds, *packages = sys.argv[1:]
     if os.geteuid() != 0:
-        sys.exit("Another system is built and entered by root: run make as root, or with sudo.")
+        sys.exit("Only root can build and enter another system: run make as root, or with sudo.")
     system = make_system(name, packages)
     copy_tree(system / TREE)
     return run_inside(system, test_script(torch, builds))

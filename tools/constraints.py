@@ -1,4 +1,4 @@
-"""Print pip constraints: the system's numpy and scipy, and those given on the command line."""
+"""Print constraints for pip: the versions of the system's numpy and scipy, and those on the command line."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Draw synthetic training pairs, each family of layouts at rising severity: `docs/contact_sheet.png`."""
+"""Draw synthetic training pairs, each family of layouts at increasing severity: `docs/contact_sheet.png`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt  # noqa: E402
 PATH = Path(__file__).resolve().parents[1] / "docs" / "contact_sheet.png"
 SEVERITIES = (0.1, 0.4, 0.7, 0.95)
 SEED, STEP, THUMBNAIL = 6, 3, 170
-"""A pixel shows `STEP` cells a side: a raster of 20 m takes `THUMBNAIL` pixels."""
+"""A pixel has `STEP` cells per side: a raster of 20 m has `THUMBNAIL` pixels."""
 SIDE, CELL = STEP * THUMBNAIL, THUMBNAIL + 3
 DPI, HEAD, MARGIN = 100, 24, 24
 RAIL, DISTRACTOR, PAPER, FRAME = (20, 20, 20), (210, 40, 40), (255, 255, 255), (150, 150, 150)
@@ -41,7 +41,7 @@ def main() -> None:
 
 
 def rasters() -> Iterator[Iterator[np.ndarray]]:
-    """Draw the sheet's rows: the labels at a severity, then below them the corrupted rasters."""
+    """Yield the rows of the sheet: the labels at a severity, then the corrupted rasters."""
     for number, severity in enumerate(SEVERITIES):
         pairs = [random_pair(np.random.default_rng([SEED, number]), SIDE, severity, BASE_RATIO, f) for f in FAMILIES]
         yield (thumbnail(pair.label, np.zeros_like(pair.label)) for pair in pairs)
@@ -49,7 +49,7 @@ def rasters() -> Iterator[Iterator[np.ndarray]]:
 
 
 def thumbnail(cells: np.ndarray, distractor: np.ndarray) -> np.ndarray:
-    """Shrink a raster so that no thin line is lost, the distractors in colour; with a frame around it."""
+    """Shrink a raster without losing thin lines, with distractors in colour and a frame."""
     image = np.full((CELL, CELL, 3), FRAME, dtype=np.uint8)
     inner = image[1 : 1 + THUMBNAIL, 1 : 1 + THUMBNAIL]
     inner[:] = PAPER

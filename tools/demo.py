@@ -1,6 +1,6 @@
 """Extract the rails of the sample through qgis_process, compare them with the truth and draw them.
 
-Runs in the environment that `make env` prints; `make demo` does both.
+It needs the environment that `make env` prints; `make demo` sets it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ HEADER = (
 
 
 def extract() -> dict:
-    """Run the algorithm in real QGIS and return its results by name."""
+    """Run the algorithm in QGIS and return its results by name."""
     inputs = {
         "INPUT": SAMPLE,
         "STANDARD": STANDARD,
@@ -49,7 +49,7 @@ def extract() -> dict:
 
 
 def row(name: str, length_m: float, result: Comparison) -> str:
-    """Format a line of the table."""
+    """Return a row of the table."""
     return (
         f"{name:12}{result.line_count:6}{result.truth_count:6}{length_m:8.1f} m"
         f"{result.completeness:8.1%} {result.correctness:8.1%} {result.lateral_rmse_m * 1000:10.1f} mm"

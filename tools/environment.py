@@ -1,4 +1,4 @@
-"""Print the lines that let any shell run the plugin in qgis_process, with a profile of its own under build/."""
+"""Print shell lines that set up qgis_process with the plugin and a separate profile under build/."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ BUILD = ROOT / "build"
 
 
 def environment() -> dict[str, str]:
-    """Variables that qgis_process needs, by name.
+    """Return the variables that qgis_process needs, by name.
 
     Raises
     ------
     SystemExit
         There is no qgis_process.
     """
-    # Debian 12's wrapper passes an option that its own program refuses.
+    # The wrapper in Debian 12 passes an option that its program refuses.
     qgis_process = shutil.which("qgis_process.bin") or shutil.which("qgis_process")
     if qgis_process is None:
         sys.exit("QGIS has no qgis_process on the PATH: install the distribution's package qgis.")
@@ -29,7 +29,7 @@ def environment() -> dict[str, str]:
         "QGIS_PLUGINPATH": str(BUILD / "plugins"),
         "QGIS_CUSTOM_CONFIG_PATH": str(BUILD / "profile"),
         "PYTHONPATH": sysconfig.get_path("purelib"),
-        # pyproj looks for PROJ's data beside its Python, which in a virtual environment is the wrong place.
+        # pyproj looks for the data of PROJ next to its Python, which is the wrong place in a virtual environment.
         "PROJ_DATA": str(Path(sys.base_prefix) / "share" / "proj"),
         "QT_QPA_PLATFORM": "offscreen",
         "XDG_RUNTIME_DIR": str(BUILD / "runtime"),

@@ -1,4 +1,4 @@
-"""Exit with 0 where there is a qgis_process and Python finds every module named on the command line, else with 1."""
+"""Exit with 0 if there is a qgis_process and Python finds every module named on the command line, otherwise with 1."""
 
 import shutil
 import sys
@@ -6,7 +6,7 @@ from importlib.util import find_spec
 
 
 def is_found(module: str) -> bool:
-    """Tell whether `module` can be imported; packages above it are."""
+    """Return whether `module` can be imported; its parent packages are imported."""
     try:
         return find_spec(module) is not None
     except ImportError:

@@ -11,7 +11,21 @@ ogr.UseExceptions()
 
 
 def read_features(path: Path, layer: str | None = None, where: str | None = None) -> list[tuple[np.ndarray, dict]]:
-    """Vertices, (n, 3), and attributes of the lines of a layer; `where` filters as in SQL."""
+    """Read the lines of a layer.
+
+    Parameters
+    ----------
+    path : Path
+    layer : str, optional
+        By default, the first layer.
+    where : str, optional
+        Filter as in SQL.
+
+    Returns
+    -------
+    list of ((n, 3) array, dict)
+        Vertices and attributes.
+    """
     source = ogr.Open(str(path))
     table = source.GetLayerByName(layer) if layer else source.GetLayer()
     table.SetAttributeFilter(where)
@@ -19,14 +33,14 @@ def read_features(path: Path, layer: str | None = None, where: str | None = None
 
 
 def read_lines(path: Path, layer: str | None = None, where: str | None = None) -> list[np.ndarray]:
-    """Read the vertices alone."""
+    """Read the vertices only; see `read_features`."""
     return [line for line, _ in read_features(path, layer, where)]
 
 
 def farthest(lines: list[np.ndarray], others: list[np.ndarray]) -> float:
-    """Measure how far lines, (n, 3) each, lie from others in the same order, at most, in plan or in height.
+    """Return the greatest distance, in plan or in height, between lines, (n, 3) each, and others in the same order.
 
-    Where one of two lines runs on beyond the other, the shorter one counts.
+    Where one of two lines extends beyond the other, this part is left out.
     """
     if len(lines) != len(others):
         return np.inf
@@ -34,7 +48,7 @@ def farthest(lines: list[np.ndarray], others: list[np.ndarray]) -> float:
 
 
 def _offset(line: np.ndarray, other: np.ndarray) -> float:
-    """Greatest distance of the vertices of a line from another line beside them, in plan or in height."""
+    """Return the greatest distance of the vertices of a line from another line, in plan or in height."""
     start, step = other[:-1], np.diff(other, axis=0)
     share = np.einsum("nij,ij->ni", (line[:, None] - start)[..., :2], step[:, :2]) / (step[:, :2] ** 2).sum(axis=1)
     away = line[:, None] - start - np.clip(share, 0, 1)[..., None] * step

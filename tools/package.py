@@ -1,6 +1,6 @@
 """Build the plugin's zip from the files that git tracks and the guide, and unpack it where QGIS finds it.
 
-The same files give the same bytes: entries are sorted and carry no time and no rights of this computer.
+The same files give the same bytes: entries are sorted, without the times and permissions of this computer.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ FILES = (
 FOLDERS = ("core", "models", "rail_extract_plugin", "resources")
 
 EARLIEST = (1980, 1, 1, 0, 0, 0)
-"""The first time a zip can state."""
+"""The earliest time in a zip."""
 
 READABLE = 0o100644 << 16
-"""A regular file that everyone may read, where a zip keeps it."""
+"""A regular file that everyone may read, as a zip stores it."""
 
 
 def product_files() -> list[str]:
-    """Names of the tracked files that a user gets, relative to the root."""
+    """Return the names of the tracked files in the plugin, relative to the root."""
     listing = ["git", "-c", f"safe.directory={ROOT}", "ls-files", "-z", "--", *FILES, *FOLDERS]
     names = subprocess.run(listing, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split("\0")
     return sorted(name for name in names if name and (ROOT / name).is_file())
@@ -55,7 +55,7 @@ def build(archive: Path) -> None:
 
 
 def unpack(archive: Path, plugins: Path) -> None:
-    """Put the plugin into a plugin folder, in place of an older one."""
+    """Unpack the plugin into a plugin folder, replacing an older one."""
     shutil.rmtree(plugins / PLUGIN, ignore_errors=True)
     with zipfile.ZipFile(archive) as file:
         file.extractall(plugins)

@@ -1,4 +1,4 @@
-"""Short synthetic scenes on which the parameters are tried."""
+"""Short synthetic scenes for pictures of the parameters."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from rail_extract.laboratory.scenes.tracks import Track
 STANDARD = STANDARDS["EN_60E1_1435"]
 SCANNER = Scanner()
 HEADING = 0.3
-"""The tracks' direction, so that none lies along the raster's rows."""
+"""Direction of the tracks, so that none is parallel to the rows of the raster."""
 
 
 class Bench:
-    """A scene on which parameters are tried; the network runs once for all of them."""
+    """A scene with variable parameters; the network runs once for all of them."""
 
     def __init__(self, scene: Scene) -> None:
         standard = scene.standard
@@ -36,24 +36,35 @@ class Bench:
         self._cleaned: dict[int, RailRaster] = {}
 
     def cleaned(self, passes: int = DEFAULT_PASSES) -> RailRaster:
-        """Give what the network makes of the raster."""
+        """Return the cleaned raster."""
         if passes not in self._cleaned:
             self._cleaned[passes] = clean(self.raster, engine_for(self.defaults), passes)
         return self._cleaned[passes]
 
     def rails(self, **changes: object) -> list[RailLine]:
-        """Give rails that the defaults give with some changes."""
+        """Return the rails with the default parameters and some changes."""
         return lines_of(self.cleaned(), 10, self.points, replace(self.defaults, **changes))
 
     def tracks(self, rails: Sequence[RailLine], **changes: object) -> list[Centerline]:
-        """Give centerlines that the defaults give with some changes."""
+        """Return the centerlines with the default parameters and some changes."""
         return tracks_of(rails, replace(self.defaults, **changes))
 
 
 def bench(
     curve: Curve, heights: np.ndarray | float = 0.0, gaps: Gaps = (), scanner: Scanner = SCANNER, **clutter: int
 ) -> Bench:
-    """Lay one track along a curve and scan it; both rails have the gaps."""
+    """Build a scene of one track along a curve.
+
+    Parameters
+    ----------
+    curve : Curve
+    heights : float or (n,) array
+    gaps : Gaps
+        In both rails.
+    scanner : Scanner
+    **clutter
+        Attributes of `Clutter`.
+    """
     plan = Plan(
         [Track(curve, spacing(STANDARD), heights)],
         STANDARD,
@@ -65,5 +76,5 @@ def bench(
 
 
 def bend(length_m: float, curvature: float = 0.0) -> Curve:
-    """Make an arc, or a straight where the curvature is 0."""
+    """Return an arc, or a straight where the curvature is 0."""
     return trace([Element(length_m, curvature, curvature)], heading=HEADING)

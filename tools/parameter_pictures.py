@@ -1,4 +1,4 @@
-"""Draw what the parameters do, from short synthetic scenes and real runs of the core: `docs/pictures/parameters`.
+"""Draw the effects of the parameters on short synthetic scenes: `docs/pictures/parameters`.
 
 ``python tools/parameter_pictures.py [NAME ...]`` draws all pictures, or those named.
 """
@@ -33,7 +33,7 @@ DPI = 80
 
 POINTS, RAIL, TRACK, TRUTH = "#9e9e9e", "#1565c0", "#e64a19", "black"
 SERIES, WIDTHS = ("#f28e2b", "#4fb3bf", "#1565c0"), (5.0, 3.0, 1.2)
-"""Of the lines of three values, the smallest first: where lines coincide, all of them are seen."""
+"""Colours and widths of the lines of three values, the smallest value first; coinciding lines remain visible."""
 
 
 def smoothing_xy() -> Figure:
@@ -112,7 +112,7 @@ def simplify_xy() -> Figure:
 
 
 def iterations() -> Figure:
-    """Draw a stretch of raster before the network and after each number of passes."""
+    """Draw a section of raster before the network and after each number of passes."""
     case = bench(
         bend(14), gaps=((4.0, 6.2), (9.0, 9.6)), scanner=Scanner(profile_step_m=0.08, noise_m=0.01),
         weeds_near=8, weeds_between=25, stones=120,
@@ -132,7 +132,7 @@ def centerline_tolerance() -> Figure:
     t = np.linspace(0, 40, 81)
     sides = [np.column_stack([t, s * 0.5 * (spacing(STANDARD) + 0.1 * t / 40), 0 * t]) for s in (1, -1)]
     rails = [RailLine(xyz, number, 10, 0, 0.0, 0.0, 0.0) for number, xyz in enumerate(sides, start=1)]
-    figure, axes = _figure("along the track [m]", "across [m], stretched")
+    figure, axes = _figure("along the track [m]", "across [m], exaggerated")
     for number, xyz in enumerate(sides):
         axes.plot(xyz[:, 0], xyz[:, 1], color="0.4", label=None if number else "rails; the gauge grows by 100 mm")
     for number, (value, color) in enumerate(zip((0.02, 0.05, 0.08), SERIES)):
@@ -194,7 +194,7 @@ def _maps(case: Bench, field: str, name: str, values: Sequence[float], unit: str
 
 
 def _draw(axes: Axes, case: Bench, rails: Sequence[RailLine], tracks: Sequence[Centerline]) -> None:
-    """Draw points and lines, each rail in a colour of its own; the ends are marked."""
+    """Draw points and lines, neighbouring rails in different colours, with marks at the ends."""
     across, along = _turned(case.points.xyz)
     axes.plot(along, across, ".", color=POINTS, markersize=1)
     for lines, colors, style in ((rails, (RAIL, "#2e7d32", "#6a1b9a"), "-"), (tracks, (TRACK,), "--")):
@@ -206,7 +206,7 @@ def _draw(axes: Axes, case: Bench, rails: Sequence[RailLine], tracks: Sequence[C
 
 
 def _on(truth: np.ndarray, rails: Sequence[RailLine]) -> list[RailLine]:
-    """Rails that lie on a true one."""
+    """Return the rails that coincide with a true one."""
     return [rail for rail in rails if np.median(match([rail.xyz], [truth]).back.distance) < 0.1]
 
 
@@ -215,7 +215,7 @@ def _longest(rails: Sequence[RailLine]) -> RailLine:
 
 
 def _turned(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates across and along the tracks' direction."""
+    """Return coordinates across and along the direction of the tracks."""
     return xy[:, 1] * np.cos(HEADING) - xy[:, 0] * np.sin(HEADING), xy[:, 0] * np.cos(HEADING) + xy[:, 1] * np.sin(
         HEADING
     )

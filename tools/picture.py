@@ -1,4 +1,4 @@
-"""A picture of what was extracted from a cloud."""
+"""A picture of the lines that were extracted from a cloud."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rail_extract.core.clouds.points import read_rail_points
 
 RAIL_CLASS = 10
 DETAIL_M = 12.0
-"""Length of the stretch shown in detail: single points are seen in it."""
+"""Length of the section shown in detail, in which single points can be seen."""
 
 POINTS, RAIL, TRACK = "#9e9e9e", "#1565c0", "#e64a19"
 
@@ -23,9 +23,9 @@ def draw_map(cloud: Path, rails: Sequence[np.ndarray], centerlines: Sequence[np.
     Parameters
     ----------
     cloud : Path
-        The rail points' file.
+        File of the rail points.
     rails, centerlines : sequence of (n, 3) array
-        In the cloud's coordinates.
+        In the coordinates of the cloud.
     picture : Path
         PNG to write.
     """
@@ -60,13 +60,13 @@ def _draw(axes: Axes, lines: Sequence[np.ndarray], color: str, label: str, lines
 
 
 def _direction(xyz: np.ndarray) -> np.ndarray:
-    """Find the plan direction, (2,), in which points, (n, 3), reach farthest."""
+    """Return the direction in plan, (2,), in which points, (n, 3), have the greatest extent."""
     _, axes = np.linalg.eigh(np.cov(xyz[:, :2].T))
     return axes[:, 1] * np.sign(axes[0, 1])
 
 
 def _zoom(axes: Axes, lines: Sequence[np.ndarray]) -> None:
-    """Show a stretch in the middle of the middle line."""
+    """Show a section at the middle of the middle line."""
     if not lines:
         return
     line = lines[len(lines) // 2]

@@ -1,4 +1,4 @@
-"""Apply the plugin site's rules to the zip: its layout, size and metadata, and what bandit and detect-secrets find."""
+"""Apply the rules of the plugin site to the zip: layout, size, metadata, and findings of bandit and detect-secrets."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from pathlib import Path
 
 from package import ARCHIVE, PLUGIN, unpack
 
-LARGEST = 25_000_000
-"""Bytes the site takes, read strictly."""
+MAX_BYTES = 25_000_000
+"""Largest size that the site accepts."""
 
 KEYS = (
     "name",
@@ -31,7 +31,7 @@ KEYS = (
 
 
 def layout_findings(plugin: Path) -> list[str]:
-    """Tell what the site refuses before it looks at the code."""
+    """List what the site refuses apart from code."""
     metadata = configparser.ConfigParser(interpolation=None)
     metadata.read(plugin / "metadata.txt", encoding="utf-8")
     findings = [f"metadata.txt lacks {key}" for key in KEYS if not metadata.get("general", key, fallback="")]
@@ -39,13 +39,13 @@ def layout_findings(plugin: Path) -> list[str]:
     if not (plugin / metadata.get("general", "icon", fallback="-")).is_file():
         findings.append("the icon that metadata.txt names is missing")
     findings += [f"{path} does not belong in a zip" for path in plugin.rglob("*") if path.suffix in (".pyc", ".so")]
-    if ARCHIVE.stat().st_size > LARGEST:
-        findings.append(f"the zip has {ARCHIVE.stat().st_size} bytes, more than {LARGEST}")
+    if ARCHIVE.stat().st_size > MAX_BYTES:
+        findings.append(f"the zip has {ARCHIVE.stat().st_size} bytes, more than {MAX_BYTES}")
     return findings
 
 
 def bandit_findings(plugin: Path) -> list[str]:
-    """Tell what bandit says of the code."""
+    """List the findings of bandit in the code."""
     report = _json_of("bandit", "--recursive", "--format", "json", "--quiet", str(plugin))
     return [
         f"{issue['filename']}:{issue['line_number']} {issue['test_id']} {issue['issue_text']}"
@@ -54,7 +54,7 @@ def bandit_findings(plugin: Path) -> list[str]:
 
 
 def secret_findings(plugin: Path) -> list[str]:
-    """Tell what detect-secrets takes for a password or key."""
+    """List what detect-secrets takes for a password or a key."""
     report = _json_of("detect_secrets", "scan", "--all-files", str(plugin))
     return [
         f"{path}:{item['line_number']} {item['type']}" for path, items in report["results"].items() for item in items
@@ -62,7 +62,7 @@ def secret_findings(plugin: Path) -> list[str]:
 
 
 def _json_of(module: str, *options: str) -> dict:
-    """Run a Python tool that prints JSON; bandit exits with 1 where it finds something."""
+    """Run a Python tool that prints JSON; bandit exits with 1 if it finds something."""
     run = subprocess.run([sys.executable, "-m", module, *options], capture_output=True, text=True)
     if run.returncode not in (0, 1):
         sys.exit(f"{module} failed: {run.stderr}")

@@ -59,7 +59,7 @@ def to_onnx(layers: Sequence[FoldedLayer], height: int, width: int) -> bytes:
     x = "input"
     for layer in layers:
         x = graph.layer(layer, x, x, output="logits" if layer.is_output else None)
-    return graph.model({"input": (1, 2, height, width)}, {"logits": (1, 1, height, width)})
+    return graph.proto({"input": (1, 2, height, width)}, {"logits": (1, 1, height, width)})
 
 
 def layer_to_onnx(layer: FoldedLayer) -> bytes:
@@ -75,7 +75,7 @@ def layer_to_onnx(layer: FoldedLayer) -> bytes:
     given: dict[str, tuple[int, ...]] = {"around": (1, channels_in, side, side)}
     if layer.reduction:
         given["own"] = (1, channels_in, 1, 1)
-    return graph.model(given, {"found": (1, channels_out, 1, 1)})
+    return graph.proto(given, {"found": (1, channels_out, 1, 1)})
 
 
 class _Graph:
@@ -125,7 +125,7 @@ class _Graph:
         axis = _text(1, "axis") + _number(3, 1) + _number(20, _INT_ATTRIBUTE)
         return self._node("Concat", [first, second], (axis,))
 
-    def model(self, given: dict[str, tuple[int, ...]], results: dict[str, tuple[int, ...]]) -> bytes:
+    def proto(self, given: dict[str, tuple[int, ...]], results: dict[str, tuple[int, ...]]) -> bytes:
         """Return the graph as bytes, with the shapes of its inputs and results."""
         parts = [_message(1, node) for node in self._nodes] + [_text(2, "FRPDF")]
         parts += [_message(5, weight) for weight in self._weights]
