@@ -48,7 +48,7 @@ class TorchEngine(LayeredEngine):
         self._others = ["cpu"] if has_cuda and device != "CPU" else []
         try:
             self._move("cuda" if self._others else "cpu")
-        except RuntimeError:  # other programs use so much of the graphics card's memory that not even the weights fit
+        except RuntimeError:  # other programs have filled the graphics card, and not even the weights fit
             self._move(self._others.pop() if self._others else "cpu")
 
     def _move(self, device: str) -> None:

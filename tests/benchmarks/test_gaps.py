@@ -1,4 +1,4 @@
-"""The benchmark of gaps: what it cuts, and what it counts."""
+"""The benchmark of gaps: the gaps it cuts, and the ones it counts as bridged."""
 
 import importlib.util
 import sys
@@ -31,7 +31,7 @@ def test_a_cut_has_its_length_and_clears_one_rail_or_both(gaps):
     assert np.ptp(cells @ along) * CELL_M == pytest.approx(3.0, abs=0.1)
 
 
-def test_an_oracle_bridges_all_and_the_input_none(gaps, monkeypatch):
+def test_the_label_bridges_all_gaps_and_the_input_none(gaps, monkeypatch):
     labels = iter([gap > 0 for _, gap in gaps.gapped_rasters(1.0, gaps.RAIL_REACH_M, 4)])
     assert gaps.bridged_share(lambda observed: observed | next(labels), 1.0, gaps.RAIL_REACH_M, 4) == 1.0
     assert gaps.bridged_share(lambda observed: observed, 1.0, gaps.RAIL_REACH_M, 4) == 0.0

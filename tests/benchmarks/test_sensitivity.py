@@ -1,4 +1,4 @@
-"""The benchmark of what errors depend on: each scene has the property that its sweep names, and the table's row."""
+"""The benchmark of the causes of errors: the scenes of its sweeps, its table and its pictures."""
 
 import importlib.util
 import sys
@@ -25,7 +25,7 @@ def sensitivity():
     return module
 
 
-def test_gaps_are_free_of_points(sensitivity):
+def test_gaps_have_no_points(sensitivity):
     scene = sensitivity.track_scene(Scanner(noise_m=0.001), heading=0.0, gap_m=3.0)
     left = scene.rail_points().xyz
     left = left[np.abs(left[:, 1] - scene.rails[0][0, 1]) < 0.04]

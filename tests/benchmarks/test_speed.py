@@ -1,4 +1,4 @@
-"""The benchmark of speed: its references and its measures of change."""
+"""The benchmark of speed: its reference networks and its measures of change."""
 
 import importlib.util
 import sys
@@ -55,19 +55,19 @@ def test_open_vino_computes_the_same_pass(benchmark, network, tile):
     np.testing.assert_allclose(found, first_pass(network, tile), atol=1e-5)
 
 
-def test_changed_cells_are_counted_either_way(benchmark):
+def test_added_and_removed_cells_are_counted(benchmark):
     reference = raster_of([[0, column] for column in range(100)])
     found = raster_of([[0, column] for column in range(2, 103)])
     assert benchmark._changed(found, reference) == pytest.approx(0.05)
 
 
-def test_lines_lie_as_far_apart_as_they_were_moved(benchmark):
+def test_the_distance_of_lines_is_the_distance_by_which_one_was_moved(benchmark):
     assert benchmark._distance_m(rail(), rail(left_m=0.003, up_m=0.004)) == pytest.approx(0.005)
     assert benchmark._distance_m(rail(), rail(left_m=1.0)) == np.inf
     assert benchmark._distance_m(rail(), rail(length_m=15.0)) == np.inf
 
 
-def test_little_of_the_diagonal_is_computed(benchmark, monkeypatch):
+def test_a_small_share_of_the_diagonal_is_computed(benchmark, monkeypatch):
     monkeypatch.setattr(benchmark, "DIAGONAL_M", 300.0)
     (line,) = benchmark.cells_table()
     share = float(line.split(": ")[1].split(" %")[0])

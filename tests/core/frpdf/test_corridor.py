@@ -1,4 +1,4 @@
-"""Pieces and fields hold what may be set, once, and little else."""
+"""Pieces and fields cover the cells that the network may set, once, and few others."""
 
 import numpy as np
 import pytest
@@ -39,19 +39,19 @@ def test_pieces_hold_the_corridor_and_do_not_overlap(cells):
 
 
 @given(st.floats(2, GAP - np.sqrt(2)), st.floats(0, 2 * np.pi))
-def test_what_lies_in_a_gap_is_computed(length, heading):
+def test_gaps_are_computed(length, heading):
     end = np.rint(length * BLOCK * np.array([np.sin(heading), np.cos(heading)])).astype(int)
     between = np.rint(np.linspace(0, 1, 200)[:, None] * end).astype(int)
     blocks = set(map(tuple, corridor(raster_of([[0, 0], end])).tolist()))
     assert set(map(tuple, (between // BLOCK).tolist())) <= blocks
 
 
-def test_nothing_is_computed_between_places_too_far_apart_for_a_gap():
+def test_nothing_is_computed_in_longer_gaps():
     far = corridor(raster_of([[0, 0], [0, (GAP + 2) * BLOCK]]))
     assert len(far) == 18
 
 
-def test_fields_share_the_corridor_out_and_see_context():
+def test_fields_divide_the_corridor_and_have_context():
     raster = double_track(100.0, 0.4)
     blocks = corridor(raster)
     fields = lay_fields(raster, 100_000)
@@ -66,7 +66,7 @@ def test_fields_share_the_corridor_out_and_see_context():
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.4, np.pi / 4, np.pi / 2])
-def test_pieces_follow_a_track_whatever_its_heading(heading):
+def test_pieces_follow_a_track_in_any_direction(heading):
     raster = double_track(300.0, heading)
     (field,) = lay_fields(raster, 1 << 40)
     cells = sum(piece.height * piece.width for piece in field.pieces)

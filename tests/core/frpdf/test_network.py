@@ -39,7 +39,7 @@ def test_a_cell_is_influenced_from_at_most_753_cells_away():
     assert (seen.min(), seen.max()) == (-RECEPTIVE_RADIUS, RECEPTIVE_RADIUS)
 
 
-def test_the_first_pass_has_batch_statistics_of_its_own(network):
+def test_the_first_pass_has_separate_batch_statistics(network):
     raster = torch.full((1, 1, 16, 16), 1.0)
     with torch.no_grad():
         first, second, third = (network.logits(raster, raster, number) for number in range(3))

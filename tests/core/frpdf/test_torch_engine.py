@@ -60,7 +60,7 @@ def test_fields_with_context_give_the_result_of_one_field(arrays):
 
 
 @pytest.mark.parametrize("room, ends_on_cpu", [(50_000, False), (0, True)])
-def test_an_exhausted_device_is_asked_for_less_and_then_left(arrays, monkeypatch, room, ends_on_cpu):
+def test_an_exhausted_device_gets_fewer_cells_and_is_then_replaced_by_the_cpu(arrays, monkeypatch, room, ends_on_cpu):
     monkeypatch.setattr("rail_extract.core.frpdf.layered.MIN_CELLS", 1 << 10)
     monkeypatch.setattr("rail_extract.core.frpdf.corridor.CONTEXT", 80)
     raster = line(1500)
@@ -77,7 +77,7 @@ def test_an_exhausted_device_is_asked_for_less_and_then_left(arrays, monkeypatch
     np.testing.assert_array_equal(found.cells(), expected.cells())
 
 
-def test_a_device_is_left_before_its_parts_get_too_small(arrays):
+def test_a_device_is_replaced_before_its_parts_get_too_small(arrays):
     engine, messages = TorchEngine(arrays, "CPU"), []
     engine._others = ["cpu"]
     while "on the CPU" not in (messages or [""])[-1]:

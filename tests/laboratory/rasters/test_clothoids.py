@@ -18,7 +18,7 @@ def test_a_combination_reaches_its_end_in_its_direction(first, last, chord, dire
     end = Pose(3.0 + chord * math.cos(direction), -2.0 + chord * math.sin(direction), direction + last)
     elements = join(start, end, share)
     if elements is None:
-        # two equal quarter turns to the same side are more than the widest shares can do
+        # even the largest shares cannot make two equal quarter turns to the same side
         assert share >= 2
         assert abs(first + last) > 1.5
         return
@@ -62,7 +62,7 @@ def test_the_table_is_solved_everywhere():
     assert known.energy[:, centre, centre] == pytest.approx(0.0)
     assert (known.energy > -1e-12).all()
     assert (known.energy == UNSOLVED).mean() < 0.01
-    # all of these mirror: a curve from the other end, and one to the other side
+    # each has a mirror image: the curve from the other end, and the curve to the other side
     assert known.sharpest[1] == pytest.approx(known.sharpest[1].T)
     assert known.sharpest[1] == pytest.approx(known.sharpest[1][::-1, ::-1])
 

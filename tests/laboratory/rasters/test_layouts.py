@@ -36,7 +36,7 @@ def test_a_railway_curve_turns_by_arc_and_half_of_each_clothoid():
     assert curve.curvature.max() == pytest.approx(1 / 500)
 
 
-def test_an_offset_lies_at_its_distance_along_the_normal():
+def test_an_offset_is_along_the_normal():
     curve = trace([Element(50.0, 0.0, 1 / 200)])
     assert np.linalg.norm(curve.offset(0.75) - curve.xy, axis=1) == pytest.approx(0.75)
     side = np.cross(np.gradient(curve.xy, axis=0), curve.offset(0.75) - curve.xy)
@@ -52,13 +52,13 @@ def test_a_reversed_curve_runs_back_with_opposite_curvature():
     assert back.curvature[0] == pytest.approx(-1 / 100)
 
 
-def test_a_300_1_9_turnout_ends_where_the_form_says():
+def test_a_300_1_9_turnout_ends_where_its_tangent_says():
     form = next(form for form in FORMS if form.name == "300-1:9")
     main = trace([Element(80.0)])
     side = branch(main, 10.0, form, 1, 20.0)
     assert form.arc_m == pytest.approx(33.197, abs=0.001)
     assert side.heading[-1] == pytest.approx(math.atan(1 / 9), abs=1e-4)
-    # the tangent length t = R tan(alpha / 2) = 16.616 m places the arc's end
+    # the end of the arc follows from the tangent length t = R tan(alpha / 2) = 16.616 m
     end = side.xy[int(round(form.arc_m / side.step_m))] - main.xy[int(round(10.0 / main.step_m))]
     assert end == pytest.approx(
         [16.616 * (1 + math.cos(math.atan(1 / 9))), 16.616 * math.sin(math.atan(1 / 9))], abs=0.02
@@ -94,7 +94,7 @@ def test_a_parallel_axis_has_the_parallel_radius():
     assert 1 / axis.curvature == pytest.approx(196.0)
 
 
-def test_crossing_lines_meet_where_they_cross_and_parallels_nowhere():
+def test_crossings_are_found_and_parallel_lines_have_none():
     along = np.linspace(0, 20, 1001)
     first = np.column_stack([along, np.zeros_like(along)])
     second = np.column_stack([along, 0.1 * (along - 12.0)])
@@ -137,7 +137,7 @@ def test_every_family_has_a_weight_and_all_are_drawn_at_random():
     assert len(counts) > 4
 
 
-def test_what_only_some_families_have():
+def test_openings_guard_rails_and_third_rails_are_in_some_families_only():
     def lay(family):
         return [random_layout(np.random.default_rng(seed), SIZE, family) for seed in range(8)]
 
@@ -151,7 +151,7 @@ def test_what_only_some_families_have():
     assert any(layout.distractors for layout in lay("crossover"))
 
 
-def test_the_branches_of_a_ladder_run_parallel():
+def test_the_branches_of_a_ladder_are_parallel():
     layout = ladder(np.random.default_rng(2), SIZE)
     headings = [np.arctan2(*(rail.xy[-1] - rail.xy[-2])[::-1]) for rail in layout.rails[2:]]
     assert len(headings) >= 4
@@ -182,7 +182,7 @@ def test_rails_open_where_they_cross():
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_alignments_keep_to_the_sharpest_radius(seed):
+def test_alignments_have_the_smallest_radius_or_a_larger_one(seed):
     rng = np.random.default_rng(seed)
     for alignment in (random_alignment(rng), bend(rng, MIN_RADIUS_M, (1, -1))):
         assert np.abs(alignment.curvature).max() <= 1 / MIN_RADIUS_M + 1e-12

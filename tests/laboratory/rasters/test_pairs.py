@@ -25,7 +25,7 @@ def track_layout():
     return Layout((straight(left_m=0.7556), straight(left_m=-0.7556)))
 
 
-def test_a_label_is_the_cells_whose_centre_lies_within_half_a_railhead():
+def test_a_label_has_the_cells_whose_centre_is_within_half_a_railhead():
     rail = straight()
     label = np.zeros((256, 256), dtype=bool)
     draw_label(label, WINDOW, rail.xy, rail.normal, WIDTH)
@@ -43,7 +43,7 @@ def test_complete_coverage_reaches_both_edges_of_the_head():
     assert np.diff(np.unique(across.round(6))).max() <= 0.01 + 1e-9
 
 
-def test_profiles_have_the_wanted_density_and_skip_what_is_unseen():
+def test_profiles_have_the_stated_density_and_skip_unseen_samples():
     rail = straight()
     seen = np.arange(len(rail.xy)) < len(rail.xy) // 2
     edge = np.full(len(rail.xy), WIDTH / 2)
@@ -53,14 +53,14 @@ def test_profiles_have_the_wanted_density_and_skip_what_is_unseen():
     assert along.max() < 15.05
 
 
-def test_severity_zero_loses_nothing_but_width():
+def test_severity_zero_changes_only_the_width():
     pair = draw_pair(np.random.default_rng(2), track_layout(), WINDOW, WIDTH, 0.0)
     reached = ndimage.binary_dilation(pair.label, np.ones((3, 3)))
     assert (pair.observed & ~reached).sum() == 0
     assert ndimage.binary_dilation(pair.observed, np.ones((3, 3)))[pair.label].mean() > 0.99
 
 
-def test_the_worse_the_severity_the_worse_the_raster():
+def test_the_higher_the_severity_the_worse_the_raster():
     f1 = []
     for severity in (0.0, 0.3, 0.6, 0.9):
         total = Scores()
@@ -73,14 +73,14 @@ def test_the_worse_the_severity_the_worse_the_raster():
     assert f1[-1] < 0.5
 
 
-def test_a_pair_is_a_function_of_its_seed():
+def test_a_pair_depends_on_its_seed_alone():
     first, second = (random_pair(np.random.default_rng([4, 2]), 128) for _ in range(2))
     assert np.array_equal(first.observed, second.observed)
     assert np.array_equal(first.label, second.label)
 
 
-def test_the_label_follows_the_long_waves_of_a_rail_alone():
-    """In fine cells the label's centre strays from the ideal line, and has no power below the label's wavelength."""
+def test_the_label_follows_the_long_waves_of_a_rail_only():
+    """In fine cells the middle of the label follows the rail's shift, without power below the label's wavelength."""
     window = Window(1024, 0.01, 0.0, 10.24)
     layout, rows = Layout((straight(heading=0.0),)), np.arange(1024)[:, None]
     labels = [draw_pair(np.random.default_rng(seed), layout, window, WIDTH, 1.0).label for seed in range(5)]
@@ -103,7 +103,7 @@ def test_masks_agree_with_the_rasters(family):
     assert all(length >= 0.2 for length in pair.gap_lengths_m)
 
 
-def test_a_gap_has_as_many_cells_as_its_length_asks_for():
+def test_a_gap_has_the_number_of_cells_of_its_length():
     layout = Layout((straight(),))
     cells, expected, unseen = [], [], []
     for seed in range(12):
@@ -130,7 +130,7 @@ def test_distractors_are_seen_and_not_in_the_label():
     assert pair.distractor[ideal].mean() > 0.8
 
 
-def test_rails_are_open_at_frogs_in_what_is_seen_alone():
+def test_rails_have_openings_at_frogs_in_the_observed_raster_only():
     rail = straight()
     layout = Layout((rail,), openings=((rail.xy[600], 0.3),))
     pair = draw_pair(np.random.default_rng(3), layout, WINDOW, WIDTH, 0.0)
@@ -147,7 +147,7 @@ def test_nothing_is_seen_in_a_shadow():
     assert not shadows(np.random.default_rng(0), window, 0.0).any()
 
 
-def test_ballast_lies_beside_the_rails():
+def test_ballast_is_next_to_the_rails():
     label = np.zeros((256, 256), dtype=bool)
     label[:, 128:130] = True
     strays = np.mean(

@@ -57,15 +57,15 @@ def test_missing_and_false_length_count_by_length():
     assert result.length_ratio == pytest.approx(1.0)
 
 
-def test_the_worse_direction_counts():
-    # Beside a perfect line runs a stray piece 4 cm off: the truth sees the perfect one, the lines see both.
+def test_the_larger_error_of_both_directions_counts():
+    # Next to a perfect line there is a piece 4 cm away: along the truth only the perfect line counts, along the lines both.
     result = compare_lines([straight(), straight(left=0.04)], [straight()])
     assert result.lateral_rmse_m == pytest.approx(0.04 / np.sqrt(2), rel=1e-6)
     assert result.lateral_bias_m == pytest.approx(0.02, rel=1e-6)
     assert result.completeness == 1.0
 
 
-def test_the_tolerance_parts_found_from_missed():
+def test_lines_beyond_the_tolerance_are_missed():
     lines, truth = [straight(left=0.03)], [straight()]
     assert compare_lines(lines, truth, tolerance_m=0.031).completeness == 1.0
     missed = compare_lines(lines, truth, tolerance_m=0.029)
@@ -73,22 +73,22 @@ def test_the_tolerance_parts_found_from_missed():
     assert np.isnan(missed.lateral_rmse_m)
 
 
-def test_lines_that_cross_do_not_disturb_each_other():
+def test_lines_that_cross_do_not_affect_each_other():
     lines = [straight(-50, 50, left=0.01, heading=0.0), straight(-50, 50, left=0.01, heading=0.1)]
     truth = [straight(-50, 50, heading=0.0), straight(-50, 50, heading=0.1)]
     result = compare_lines(lines, truth)
     assert result.completeness == 1.0
-    # A few centimetres around the crossing lie nearer to the other line; nowhere else.
+    # Only a few centimetres around the crossing are closer to the other line.
     assert result.lateral_bias_m == pytest.approx(0.01, abs=2e-4)
 
 
-def test_nothing_extracted_is_nothing_found():
+def test_without_lines_nothing_is_found():
     result = compare_lines([], [straight()])
     assert (result.completeness, result.correctness, result.line_count) == (0.0, 0.0, 0)
     assert np.isnan(result.lateral_rmse_m)
 
 
-def test_lines_without_height_still_compare_in_plan():
+def test_lines_without_heights_are_compared_in_plan():
     flat = straight(left=0.01)
     flat[:, 2] = np.nan
     result = compare_lines([flat], [straight()])
@@ -97,7 +97,7 @@ def test_lines_without_height_still_compare_in_plan():
     assert np.isnan(result.height_rmse_m)
 
 
-def test_the_share_within_sigma_takes_each_place_by_its_own():
+def test_the_share_within_sigma_uses_the_standard_error_of_each_place():
     found = match([straight(left=0.004), straight(left=2.012, end=50)], [straight(), straight(left=2)])
     assert found.share_within(np.array([0.005, 0.005])[found.line]) == pytest.approx(2 / 3, abs=0.001)
     assert found.share_within(np.array([0.005, 0.015])[found.line]) == 1.0
@@ -118,8 +118,8 @@ def test_gauge_and_cant_are_measured_along_the_track():
     assert np.isnan(compare_tracks([], rails, truth, 0.072).gauge_bias_m)
 
 
-def test_measured_geometry_is_held_against_the_truth():
-    """A straight of 60 m into an arc of 600 m, measured with known errors."""
+def test_measured_geometry_is_compared_with_the_truth():
+    """A straight of 60 m and an arc of 600 m radius, measured with known errors."""
     curve = trace([Element(60.0), Element(80.0, 1 / 600, 1 / 600)])
     rails = [np.column_stack([curve.offset(left), np.full(len(curve.xy), left / 100)]) for left in (0.75, -0.75)]
     middle = np.column_stack([curve.xy, np.zeros(len(curve.xy))])

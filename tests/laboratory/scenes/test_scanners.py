@@ -1,4 +1,4 @@
-"""Lines on the heads that different scanners see: dense and sparse, near and far, noisy, in one pass and in two."""
+"""Lines from the points of different scanners: dense and sparse, near and far, noisy, in one scan and in two."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SPARSE = {"profile_step_m": 0.10, "ray_step_rad": 0.01, "noise_m": 0.004}
 
 
 def scanned(scanner, cant_m=0.0, left_m=0.0, radius_m=900.0, length_m=80.0, passes=((0.0, 0.0, 0.0),), seed=3):
-    """Rails from lines that stray by 12 mm like a raster's, and the truth."""
+    """Rails from lines with errors of 12 mm, like those of a raster, and the truth."""
     curve = trace([Element(length_m, 1 / radius_m, 1 / radius_m)], heading=0.1)
     track = Track(curve, GAUGE + WIDTH, rolling(curve), canted(curve, cant_m), left_m=left_m)
     path = Track(curve, GAUGE + WIDTH, rolling(curve)).centerline
@@ -54,7 +54,7 @@ def scanned(scanner, cant_m=0.0, left_m=0.0, radius_m=900.0, length_m=80.0, pass
         ({"noise_m": 0.004, "height_m": 1.5, "left_m": 6.0, "half_range_m": 25.0}, 0.0, 0.0, 0.004, 0.0025),
     ],
 )
-def test_errors_of_other_scanners_stay_within_millimetres(scanner, cant_m, left_m, across_m, height_m):
+def test_errors_with_other_scanners_are_millimetres(scanner, cant_m, left_m, across_m, height_m):
     rails, truth = scanned(Scanner(**scanner), cant_m, left_m)
     found = compare_lines([rail.xyz for rail in rails], truth)
     assert found.completeness > 0.99
@@ -63,8 +63,8 @@ def test_errors_of_other_scanners_stay_within_millimetres(scanner, cant_m, left_
     assert abs(found.height_bias_m) < 0.0015
 
 
-def test_two_passes_that_do_not_agree_give_the_line_midway():
-    """Registration put the second pass 6 mm to the side and 5 mm up: nothing in the points tells which is right."""
+def test_two_scans_that_disagree_give_the_line_midway():
+    """The second scan is registered 6 mm to the side and 5 mm up; the points do not show which scan is right."""
     rails, truth = scanned(Scanner(**GOOD), passes=((0.0, 0.0, 0.0), (0.0, 0.006, 0.005)))
     found = compare_lines([rail.xyz for rail in rails], truth)
     assert found.lateral_bias_m == pytest.approx(0.003, abs=0.0015)

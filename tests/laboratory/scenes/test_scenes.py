@@ -1,4 +1,4 @@
-"""Scenes: their truth obeys the geometry of tracks, and their points lie where a scanner would find them."""
+"""Scenes: the truth has the geometry of tracks, and the points are where a scanner would find them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PLAIN = ("straight", "curved", "main_line", "paper_like", "tram", "noisy", "spar
 
 
 class Built(dict):
-    """Scenes by name, built when first asked for."""
+    """Scenes by name, built on first use."""
 
     def __missing__(self, name):
         self[name] = SCENES[name]()
@@ -45,7 +45,7 @@ def canted_curve():
     return Track(curve, SPACING_M, 0.004 * curve.chainage, -0.08 * curve.curvature * 600)
 
 
-def test_heads_lie_half_the_spacing_off_the_centerline_and_cant_is_left_minus_right():
+def test_heads_are_half_the_spacing_from_the_centerline_and_cant_is_left_minus_right():
     track = canted_curve()
     left, right = track.railhead(1).top, track.railhead(-1).top
     np.testing.assert_allclose(np.linalg.norm(left - right, axis=1), SPACING_M, rtol=0, atol=1e-12)
@@ -93,7 +93,7 @@ def test_the_head_has_a_crown_two_faces_and_its_width():
     from_centre = np.hypot(outline[crown, 0], outline[crown, 1] + CROWN_RADIUS_M)
     np.testing.assert_allclose(from_centre, CROWN_RADIUS_M, atol=1e-12)
     np.testing.assert_allclose(outline, outline[::-1] * [-1, 1], atol=1e-12)
-    # The surface turns by the angle that `turn` says: its normal is perpendicular to its chords.
+    # The normal, turned from the axis by `turn`, is perpendicular to the chords of the surface.
     chords = np.diff(outline, axis=0)
     middle_turn = 0.5 * (turn[1:] + turn[:-1])
     normal = np.column_stack([np.sin(middle_turn), np.cos(middle_turn)])
@@ -102,7 +102,7 @@ def test_the_head_has_a_crown_two_faces_and_its_width():
 
 
 @pytest.mark.parametrize("inclination", [1 / 20, 1 / 40])
-def test_points_without_noise_lie_on_the_head_and_only_where_the_scanner_looks(inclination):
+def test_points_without_noise_are_on_the_head_and_only_where_the_scanner_sees_it(inclination):
     track = Track(trace([Element(60)], heading=0.7), SPACING_M, inclination=inclination)
     ridden = Track(track.curve, SPACING_M, left_m=6.0).centerline
     head = track.railhead(-1)
@@ -139,7 +139,7 @@ def test_points_come_in_profiles():
     assert 0.03 < np.diff(stations).min() < np.diff(stations).max() < 0.1
 
 
-def test_gaps_hold_no_point():
+def test_gaps_have_no_points():
     curve = trace([Element(60)])
     track = Track(curve, SPACING_M)
     arguments = track.railhead(1), WIDTH_M, track.centerline, Scanner(noise_m=0.0), np.random.RandomState(1)
@@ -153,13 +153,13 @@ def test_gaps_hold_no_point():
 @pytest.mark.parametrize("name", ["paper_like", "noisy", "turnout_9", "diamond"])
 def test_scenes_repeat_exactly(scenes, name):
     again = SCENES[name]()
-    # Sums may differ in the last bit by where arrays happen to lie in memory.
+    # Sums can differ in the last bit, depending on the position of arrays in memory.
     np.testing.assert_allclose(again.xyz, scenes[name].xyz, rtol=0, atol=1e-9)
     np.testing.assert_array_equal(again.classification, scenes[name].classification)
 
 
 @pytest.mark.parametrize("name", PLAIN)
-def test_gauge_of_the_truth_is_the_standards(scenes, name):
+def test_the_true_gauge_is_that_of_the_standard(scenes, name):
     scene = scenes[name]
     for left, right, middle in zip(scene.rails[::2], scene.rails[1::2], scene.centerlines):
         gauge = np.linalg.norm(left - right, axis=1) - scene.standard.head_width_m
@@ -168,7 +168,7 @@ def test_gauge_of_the_truth_is_the_standards(scenes, name):
 
 
 def nearest(points, line, step=0.05):
-    """Distance in plan of points to a line."""
+    """Distances in plan of points from a line."""
     t = length_along(line)
     dense = np.column_stack([np.interp(np.arange(0, t[-1], step), t, column) for column in line[:, :2].T])
     return cKDTree(dense).query(points[:, :2])[0]
@@ -178,7 +178,7 @@ def nearest(points, line, step=0.05):
     ("name", "rails", "tracks"),
     [("turnout_7", 4, 2), ("turnout_26", 4, 2), ("crossover", 6, 3), ("diamond", 4, 2), ("dual_gauge", 3, 2)],
 )
-def test_scenes_of_several_tracks_have_each_rail_once(scenes, name, rails, tracks):
+def test_scenes_with_several_tracks_have_each_rail_once(scenes, name, rails, tracks):
     scene = scenes[name]
     assert (len(scene.rails), len(scene.centerlines)) == (rails, tracks)
     for number, rail in enumerate(scene.rails):
@@ -243,7 +243,7 @@ def test_a_diamond_has_check_and_wing_rails_inside_its_acute_frogs():
 
 
 def near_rail(scene, rail, reach_m=0.045):
-    """Offsets in height of the rail points around a true rail."""
+    """Heights of the rail points around a true rail, above it."""
     fine = np.linspace(0, len(rail) - 1, 20 * len(rail))
     dense = np.column_stack([np.interp(fine, np.arange(len(rail)), column) for column in rail.T])
     points = scene.rail_points().xyz
@@ -252,7 +252,7 @@ def near_rail(scene, rail, reach_m=0.045):
     return points[kept, 2] - dense[number[kept], 2]
 
 
-def test_the_paper_like_scene_is_like_the_papers(scenes):
+def test_the_paper_like_scene_has_the_figures_of_the_paper(scenes):
     scene = scenes["paper_like"]
     count = np.count_nonzero(scene.classification == RAIL)
     assert abs(count - 75_500) < 1000

@@ -1,4 +1,4 @@
-"""Counts of cells, and gaps bridged."""
+"""Counts of cells, and bridged gaps."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ def test_scores_count_by_cell():
 
 
 @pytest.mark.parametrize(("shift", "strict", "tolerant"), [(0, 40, 40), (1, 0, 40), (2, 0, 0)])
-def test_one_cell_of_tolerance_forgives_one_cell(shift, strict, tolerant):
+def test_a_tolerance_of_one_cell_accepts_a_shift_by_one_cell(shift, strict, tolerant):
     label, found = np.zeros((2, 9, 40), dtype=bool)
     label[4], found[4 + shift] = True, True
     assert score(found, label) == Scores(40 - strict, 40 - strict, strict)

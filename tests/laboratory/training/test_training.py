@@ -23,7 +23,7 @@ from rail_extract.laboratory.training.optimizers import Optimizers  # noqa: E402
 
 @pytest.fixture
 def small(monkeypatch):
-    """Make steps and statistics cost little."""
+    """Make steps and statistics fast."""
     monkeypatch.setattr(train, "CROPS", ((48, 1),))
     monkeypatch.setattr(train, "CROP_SHARES", (1.0,))
     monkeypatch.setattr(train, "STATISTICS_STEPS", 2)
@@ -99,7 +99,7 @@ def test_the_loss_of_a_perfect_answer_is_small_and_of_the_opposite_large():
     assert train.loss_of(20 - 40 * label, label, even) > 10
 
 
-def test_cells_by_gaps_and_by_what_looks_like_rails_weigh_more_whether_rail_or_not():
+def test_cells_near_gaps_and_false_rails_weigh_more_whether_rail_or_not():
     pair = random_pair(np.random.default_rng(3), 256, 0.8, family="turnout")
     weights = train.cell_weights(pair)
     hard = (pair.gap > 0) | pair.distractor
@@ -109,7 +109,7 @@ def test_cells_by_gaps_and_by_what_looks_like_rails_weigh_more_whether_rail_or_n
     assert (near & pair.label).any() and (near & ~pair.label).any()
 
 
-def test_a_resumed_training_ends_where_an_unbroken_one_does(small, tmp_path):
+def test_a_resumed_training_gives_the_weights_of_an_unbroken_one(small, tmp_path):
     settings = train.Settings(3, 0.003, 7, "cpu")
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
@@ -124,7 +124,7 @@ def test_a_resumed_training_ends_where_an_unbroken_one_does(small, tmp_path):
 
 
 def test_the_output_is_calibrated_to_the_largest_f1(monkeypatch):
-    """Rail cells read 1 and others 0, with noise: an output that finds too little is moved to where F1 is largest."""
+    """Logits are high in rail cells, with noise: calibration corrects an output that finds too few cells."""
     label = (torch.rand(1, 1, 200, 200, generator=torch.manual_seed(1)) < 0.1).float()
     observed = label + 0.4 * torch.randn(label.shape, generator=torch.manual_seed(2))
     monkeypatch.setattr(train, "batch", lambda *_: (observed, label, torch.ones_like(label)))
@@ -158,12 +158,12 @@ def test_the_command_leaves_weights_that_the_engines_take(small, tmp_path):
 
 
 @pytest.mark.parametrize("name", NETWORKS)
-def test_networks_to_compare_are_of_one_size(name):
+def test_the_networks_have_the_same_number_of_parameters(name):
     assert parameter_count(NETWORKS[name]()) == pytest.approx(parameter_count(NETWORKS["frpdf"]()), rel=0.05)
 
 
 @pytest.mark.parametrize("name", ["unet", "acnn", "pooled", "skipping"])
-def test_a_rival_is_trained_and_run_like_frpdf(small, tmp_path, name, monkeypatch):
+def test_other_networks_are_trained_and_run_like_frpdf(small, tmp_path, name, monkeypatch):
     monkeypatch.setattr(train, "CROPS", ((128, 1),))
     settings = train.Settings(1, 0.003, 3, "cpu", network=name, passes=1)
     before = train.new_network(settings).state_dict()
@@ -192,7 +192,7 @@ def test_muon_moves_every_direction_of_a_kernel_alike():
     assert sizes.max() < 1.3
 
 
-def test_curves_average_neighbouring_steps_and_count_repeated_ones_once(tmp_path):
+def test_learning_curves_average_consecutive_steps_and_count_repeated_ones_once(tmp_path):
     log = tmp_path / "log.csv"
     log.write_text("step,loss_1,f1_1\n" + "".join(f"{n},{n},0.5\n" for n in [*range(250), 248, 249]))
     columns = learning_curves.read_log(log)
@@ -213,7 +213,7 @@ def test_a_training_for_a_ratio_draws_rails_of_that_width(small, monkeypatch):
     assert len(set(drawn)) == 5
 
 
-def test_the_evaluation_set_is_fixed_and_its_input_poor():
+def test_the_evaluation_set_is_fixed_and_its_rasters_are_poor():
     pairs = evaluate.evaluation_pairs(6)
     again = evaluate.evaluation_pairs(6)
     assert all(np.array_equal(a.observed, b.observed) for a, b in zip(pairs, again))
@@ -221,7 +221,7 @@ def test_the_evaluation_set_is_fixed_and_its_input_poor():
     assert 0.1 < evaluate.evaluate("input", lambda x: x, pairs).scores.f1 < 0.5
 
 
-def test_the_classical_row_closes_and_drops_specks():
+def test_cleaning_without_a_network_closes_gaps_and_drops_specks():
     observed = np.zeros((64, 64), bool)
     observed[20, 5:60] = True
     observed[20, 30:32] = False
@@ -232,7 +232,7 @@ def test_the_classical_row_closes_and_drops_specks():
 
 
 class Filling:
-    """An engine that finds one cell of a row more in each pass, up to the last."""
+    """A network that finds one more cell of a row in each pass, up to the pass `last`."""
 
     def __init__(self, cells, last):
         self.cells, self.last, self.passes = cells, last, 0
