@@ -58,7 +58,7 @@ def test_missing_and_false_length_count_by_length():
 
 
 def test_the_larger_error_of_both_directions_counts():
-    # Next to a perfect line there is a piece 4 cm away: along the truth only the perfect line counts, along the lines both.
+    # One line is perfect and one is 4 cm away: along the truth only the perfect line counts, along the lines both do.
     result = compare_lines([straight(), straight(left=0.04)], [straight()])
     assert result.lateral_rmse_m == pytest.approx(0.04 / np.sqrt(2), rel=1e-6)
     assert result.lateral_bias_m == pytest.approx(0.02, rel=1e-6)
