@@ -1,13 +1,26 @@
-"""Replacement of files by new ones, and errors of a full or write-protected disk."""
+"""Files that a run writes: complete in a temporary folder first, then moved to the names that the user chose.
+
+Whenever a run is interrupted, the old file or the new one is there, never part of each. A shapefile consists of several
+files: between the old set and the new one there is a moment without the file that opens the set, and the next run that
+writes to the folder completes an interrupted move.
+"""
 
 from __future__ import annotations
 
 import errno
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+import json
+import os
+import shutil
+import stat
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from .errors import DiskError
+from .scratch import lock, scratch_folder, sweep
 
 LOGS = ("-wal", "-journal")
 """Suffixes, added to a GeoPackage's name, of files with changes that are not yet in it."""
@@ -17,6 +30,13 @@ COMPANIONS = (*LOGS, "-shm", ".ovr", ".msk", ".aux.xml")
 
 SHAPEFILE_COMPANIONS = (".qix", ".sbn", ".sbx", ".cpg", ".prj", ".qpj")
 """Suffixes that replace .shp: indexes, encoding, coordinate system."""
+
+NEW, OLD, MOVING = "new", "old", "moving"
+"""In the temporary folder: the new files, the files they replace, and the names of all, the main one first."""
+
+LOCK_S, LOCK_STEP_S = 5.0, 0.05
+"""How long a run waits for another that moves files into the same folder, which takes milliseconds, and how often it
+tries. Then it continues: anybody who can read a folder can lock it."""
 
 
 @contextmanager
@@ -51,53 +71,266 @@ def check_closed(path: Path) -> None:
             )
 
 
-def take_names(path: Path, names: Mapping[Path, Path]) -> None:
-    """Rename finished files to their final names, and remove the companions of the file they replace.
+@dataclass(frozen=True)
+class Destination:
+    """A file that a run will write, and the file that was there when the run began.
 
-    Parameters
+    Attributes
     ----------
     path : Path
-        Final name of the main file, the one the user chose.
-    names : mapping of Path to Path
-        Final name by finished file, `path` among them.
-
-    Raises
-    ------
-    DiskError
-        The old file can't be replaced because it is open elsewhere. It is kept, and the new files are left next to it
-        with `_new` in their names.
+        As the user named it.
+    file : Path
+        The file itself, if `path` is a symbolic link.
+    before : tuple of int or None
+        Identity of the old file.
     """
-    try:
-        check_closed(path)
-        for file in sorted(names, key=lambda file: names[file] != path):  # the main file first: it is the one locked
-            file.replace(names[file])
-        for stale in _companions(path) - set(names.values()):
-            stale.unlink(missing_ok=True)
-    except (DiskError, OSError) as error:
-        kept = {file: name.with_name(f"{path.stem}_new{name.name[len(path.stem) :]}") for file, name in names.items()}
-        with writing(path.parent):
-            for file in filter(Path.exists, kept):
-                file.replace(kept[file])
-        reason = error if isinstance(error, DiskError) else f"{path} can't be replaced ({error.strerror})."
-        raise DiskError(f"{reason} The new file is {path.with_name(f'{path.stem}_new{path.suffix}')}.") from error
+
+    path: Path
+    file: Path
+    before: tuple[int, int] | None
+
+    @classmethod
+    def at(cls, path: Path) -> Destination:
+        """Check that a file can be written, as far as that can be known before, and remember the old one.
+
+        Raises
+        ------
+        DiskError
+            Its folder or the old file is not writable, something other than a file has this name, or the old file is
+            open in another program.
+        """
+        file = Path(os.path.realpath(path))
+        sweep(file.parent, _complete)
+        try:
+            _check_writable(path, file)
+        except OSError as error:
+            raise _unwritable(path, error) from error
+        check_closed(file)
+        return cls(path, file, _identity(file))
+
+    @contextmanager
+    def replacing(self, edit: bool = False) -> Iterator[Path]:
+        """Move a file, and all files that are written next to it, to their names when the block ends without an error.
+
+        Parameters
+        ----------
+        edit : bool
+            Whether to begin with a copy of the old file.
+
+        Yields
+        ------
+        Path
+            The name in an empty temporary folder under which to write the file.
+
+        Raises
+        ------
+        DiskError
+            The disk is full, the old file is open elsewhere, or another run has replaced it in the meantime. The old
+            file is then kept, and the new files are left next to it with `_new` in their names.
+        """
+        try:
+            with scratch_folder(self.file.parent) as folder:
+                new = folder / NEW / self.file.name
+                new.parent.mkdir()
+                copied = _state(self.file) if edit else None
+                if edit:
+                    shutil.copyfile(self.file, new)
+                yield new
+                if any(new.parent.iterdir()):
+                    self._move_in(folder, copied)
+        except OSError as error:
+            raise _unwritable(self.path, error) from error
+
+    def write_text(self, text: str) -> None:
+        """Write a text file.
+
+        Raises
+        ------
+        DiskError
+            See `replacing`.
+        """
+        with self.replacing() as new:
+            new.write_text(text, encoding="utf-8")
+
+    def _move_in(self, folder: Path, copied: tuple[int, int] | None) -> None:
+        """Move the files of a temporary folder to their names, if the old file is still the one that was copied."""
+        new = sorted((folder / NEW).iterdir())
+        for file in filter(Path.is_file, new):
+            _flush(file)
+            _keep_rights(file, self.file.with_name(file.name), self.file)
+        with _alone_in(self.file.parent):
+            try:
+                is_other = _identity(self.file) not in (None, self.before)
+                if is_other or (copied is not None and copied != _state(self.file)):
+                    raise DiskError(f"{self.path} was changed by another program in the meantime.")
+                check_closed(self.file)
+                names = sorted(self.file.with_name(file.name) for file in new)
+                journal = json.dumps([self.file.name, *(name.name for name in names)])
+                (folder / MOVING).write_text(journal, encoding="utf-8")
+                _swap(folder, self.file, names)
+            except (DiskError, OSError) as error:
+                kept = _keep_beside(new, self.file)
+                reason = error if isinstance(error, DiskError) else f"{self.path} can't be replaced ({_reason(error)})."
+                raise DiskError(f"{reason} The new file is {kept}.") from error
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file; an older one stays until the new one is complete.
+    """Write a text file; see `Destination.write_text`."""
+    Destination.at(path).write_text(text)
+
+
+def take_names(path: Path, names: Mapping[Path, Path]) -> None:
+    """Rename finished files to their final names; see `Destination.replacing`."""
+    file = Path(os.path.realpath(path))
+    with Destination(path, file, _identity(file)).replacing() as new:
+        for finished, name in names.items():
+            finished.replace(new.with_name(name.name))
+
+
+def _check_writable(path: Path, file: Path) -> None:
+    """Open the old file, create one in its folder, and rename the old file to itself."""
+    try:
+        kind = file.stat().st_mode  # from Python 3.14, path.exists() would hide a name that is too long
+    except FileNotFoundError:
+        kind = stat.S_IFREG
+    if stat.S_ISDIR(kind):
+        raise DiskError(f"The output {path} is a folder: give the name of a file in it.")
+    if not stat.S_ISREG(kind):
+        raise DiskError(f"The output {path} is a pipe or a device, not a file: give the name of a file.")
+    tempfile.TemporaryFile(dir=file.parent).close()
+    if file.exists():
+        file.open("r+b").close()
+        file.replace(file)  # refused on Windows while another program has it open
+
+
+def _identity(file: Path) -> tuple[int, int] | None:
+    """Return what changes if a file is replaced but not if its content is edited; None if there is no file."""
+    try:
+        state = file.stat()
+    except OSError:
+        return None
+    return state.st_dev, state.st_ino
+
+
+def _state(file: Path) -> tuple[int, int]:
+    """Return what changes if the content of a file is edited."""
+    state = file.stat()
+    return state.st_mtime_ns, state.st_size
+
+
+def _unwritable(path: Path, error: OSError) -> DiskError:
+    return DiskError(f"The output {path} can't be written ({_reason(error)}): choose another place.")
+
+
+def _reason(error: OSError) -> str:
+    """Return the operating system's words; some errors of Python's own have none."""
+    return error.strerror or str(error)
+
+
+def _keep_rights(file: Path, old: Path, main: Path) -> None:
+    """Give a new file the access rights of the one it replaces, so that nobody else can read it."""
+    for model in (old, main):
+        if model.exists():
+            shutil.copymode(model, file)
+            return
+
+
+def _flush(file: Path) -> None:
+    """Wait until a file is on the disk: otherwise it may be empty after a power cut, although it was renamed."""
+    with file.open("r+b") as opened:
+        os.fsync(opened.fileno())
+
+
+def _swap(folder: Path, main: Path, names: Sequence[Path]) -> None:
+    """Replace files by the new ones from a temporary folder, and remove companions of the old file.
+
+    If there are several new files, the main one is missing from the first move to the last: a set that is not complete
+    cannot be opened.
+
+    Parameters
+    ----------
+    folder : Path
+    main : Path
+        Final name of the file that opens the set, or of the only file.
+    names : sequence of Path
+        Final names of all new files. Those that are no longer in the temporary folder have been moved already.
 
     Raises
     ------
-    DiskError
+    OSError
+        A file can't be replaced because it is open elsewhere. All old files are in their places again.
     """
-    part = path.with_name(f"{path.name}.part")
+    new, old = folder / NEW, folder / OLD
+    waiting = [name for name in names if (new / name.name).exists()]
+    others = [name for name in waiting if name != main]
+    replaced = [*([main] if others else []), *others, *sorted(_companions(main).difference(names))]
+    if any(name.is_dir() for name in replaced):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    moves = [(name, old / name.name) for name in replaced if os.path.lexists(name)]
+    moves += [(new / name.name, name) for name in (*others, *([main] if main in waiting else []))]
+    old.mkdir(exist_ok=True)
+    done = []
     try:
-        try:
-            part.write_text(text, encoding="utf-8")
-            part.replace(path)
-        finally:
-            part.unlink(missing_ok=True)
-    except OSError as error:
-        raise DiskError(f"{path} can't be written ({error.strerror}): choose another place.") from error
+        for source, target in moves:
+            source.replace(target)
+            done.append((source, target))
+    except OSError:
+        for source, target in reversed(done):
+            target.replace(source)
+        raise
+
+
+def _complete(folder: Path) -> None:
+    """Complete the move that a killed run had begun in its temporary folder, or take it back."""
+    journal, parent = folder / MOVING, folder.parent
+    with suppress(OSError, ValueError), _alone_in(parent):
+        main, *names = (parent / Path(name).name for name in json.loads(journal.read_text(encoding="utf-8")))
+        if not (folder / NEW / main.name).exists():
+            return  # it was complete
+        if not os.path.lexists(main):
+            _swap(folder, main, names)
+        elif main.stat().st_mtime <= journal.stat().st_mtime:  # nobody has replaced it since
+            for old in (folder / OLD).iterdir():
+                if not os.path.lexists(parent / old.name):
+                    old.replace(parent / old.name)
+
+
+def _keep_beside(files: Sequence[Path], main: Path) -> Path:
+    """Move new files next to the old one, under a name that no file has; returns the name of the main one."""
+    number = 1
+    while True:
+        stem = f"{main.stem}_new" if number == 1 else f"{main.stem}_new{number}"
+        names = {file: main.with_name(stem + file.name[len(main.stem) :]) for file in files}
+        if not any(map(os.path.lexists, names.values())):
+            break
+        number += 1
+    with writing(main.parent):
+        for file, name in names.items():
+            file.replace(name)
+    return main.with_name(stem + main.suffix)
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Keep other runs from moving files into the same folder, where the operating system can lock folders."""
+    try:
+        opened = os.open(folder, os.O_RDONLY)
+    except OSError:  # Windows opens no folders
+        yield
+        return
+    try:
+        end = time.monotonic() + LOCK_S
+        while time.monotonic() < end:
+            try:
+                lock(opened)
+                break
+            except BlockingIOError:
+                time.sleep(LOCK_STEP_S)
+            except OSError:
+                break
+        yield
+    finally:
+        os.close(opened)
 
 
 def _companions(path: Path) -> set[Path]:

@@ -6,7 +6,6 @@ import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import Any
 
 from qgis.core import (
@@ -17,73 +16,43 @@ from qgis.core import (
     QgsProperty,
 )
 
-from ...core.disk import check_closed
+from ...core.disk import Destination
 from ...core.errors import RailExtractError
 
 TABLE = "ogr:"
 """Prefix of destinations that are a table of a file."""
 
 
-def check_writable(value: Any, context: QgsProcessingContext) -> None:
-    """Check before the run that an output can be written.
+def destinations(values: Mapping[str, Any], context: QgsProcessingContext) -> dict[str, Destination]:
+    """Check before the run that the outputs can be written, and remember what they replace.
 
     Parameters
     ----------
-    value : str, QgsProperty, QgsProcessingOutputLayerDefinition or None
-        Value of a destination parameter.
+    values : mapping of str to str, QgsProperty, QgsProcessingOutputLayerDefinition or None
+        Value of each destination parameter.
     context : QgsProcessingContext
+
+    Returns
+    -------
+    dict of str to Destination
+        The outputs that go into files.
 
     Raises
     ------
     RailExtractError
-        The file or its folder is not writable.
+        A file cannot be written, or two outputs overwrite each other.
     """
-    path = _output_file(value, context)
-    if path is None:
-        return
-    try:
-        if path.is_dir():
-            raise RailExtractError(f"The output {path} is a folder: give the name of a file in it.")
-        _try_writing(path)
-        if plain_file(value, context) and path.exists():
-            path.replace(path)  # refused on Windows while another program has it open
-            check_closed(path)
-    except OSError as error:
-        raise RailExtractError(
-            f"The output {path} can't be written ({error.strerror}): choose another place."
-        ) from error
+    files = {name: output_file(value, context) for name, value in values.items()}
+    found = {name: Destination.at(file) for name, file in files.items() if file is not None}
+    _check_distinct({name: (found[name].file, outputoutput_table(values[name], context)) for name in found})
+    return found
 
 
-def _try_writing(path: Path) -> None:
-    """Open a file, or create one in its folder; from Python 3.14, path.exists() would hide a name that is too long."""
-    try:
-        path.stat()
-    except FileNotFoundError:
-        TemporaryFile(dir=path.absolute().parent).close()
-    else:
-        path.open("r+b").close()
-
-
-def check_distinct(outputs: Mapping[str, Any], context: QgsProcessingContext) -> None:
-    """Check that no two outputs overwrite each other.
-
-    Parameters
-    ----------
-    outputs : mapping of str to value
-        Destinations by name.
-    context : QgsProcessingContext
-
-    Raises
-    ------
-    RailExtractError
-        Two outputs are the same file or the same table of a file.
-    """
+def _check_distinct(outputs: Mapping[str, tuple[Path, str]]) -> None:
+    """Check that no two outputs are the same file, or the same table of a file."""
     seen: list[tuple[str, str, str]] = []
-    for name, value in outputs.items():
-        path = _output_file(value, context)
-        if path is None:
-            continue
-        file, table = os.path.normcase(path.resolve()), _table(_text(value, context))
+    for name, (path, table) in outputs.items():
+        file = os.path.normcase(path)
         for other, other_file, other_table in seen:
             if file == other_file and (not table or not other_table or table == other_table):
                 raise RailExtractError(f"{other} and {name} are the same file: give each its own name.")
@@ -111,13 +80,13 @@ def plain_file(value: Any, context: QgsProcessingContext) -> Path | None:
     return Path(text) if is_file else None
 
 
-def _output_file(value: Any, context: QgsProcessingContext) -> Path | None:
+def output_file(value: Any, context: QgsProcessingContext) -> Path | None:
     """Return the file of a destination; None for memory layers and databases."""
     text = _text(value, context)
     return plain_file(_uri(text).database() if text.startswith(TABLE) else text, context)
 
 
-def _table(text: str) -> str:
+def output_table(text: str) -> str:
     """Return the table that a destination names in a file; empty if it is the file itself."""
     return _uri(text).table() if text.startswith(TABLE) else ""
 

@@ -1,8 +1,17 @@
-"""Replacement of files: companions of the old file, and files that can't be replaced."""
+"""Replacement of files: old or new, never part of each, whoever else is at work in the folder."""
+
+import os
+import signal
+import stat
+import subprocess
+import sys
+import threading
+from pathlib import Path
 
 import pytest
-from rail_extract.core.disk import take_names
+from rail_extract.core.disk import Destination
 from rail_extract.core.errors import DiskError
+from rail_extract.core.scratch import MIN_AGE_S, PREFIX
 
 
 def fill(folder, **files):
@@ -16,8 +25,21 @@ def contents(folder):
     return {file.name: file.read_text() for file in folder.iterdir() if file.is_file()}
 
 
-def move(folder, path):
-    take_names(path, {file: path.with_name(file.name) for file in (folder / "new").iterdir()})
+def write(destination, text="new", *others):
+    with destination.replacing() as new:
+        for name in (new, *map(new.with_suffix, others)):
+            name.write_text(text)
+
+
+def temporary(folder):
+    return [entry.name for entry in folder.iterdir() if entry.name.startswith(PREFIX)]
+
+
+def age(folder):
+    """Make temporary folders old enough to be removed."""
+    for name in temporary(folder):
+        mark = folder / name / "in_use"
+        os.utime(mark, (0, mark.stat().st_mtime - MIN_AGE_S - 1))
 
 
 @pytest.mark.parametrize(
@@ -32,32 +54,222 @@ def move(folder, path):
 def test_companions_of_the_old_file_are_removed(tmp_path, name, companions, others):
     for file in (name, *companions, *others):
         (tmp_path / file).write_text("old")
-    fill(tmp_path / "new", **{name.replace(".", "_"): "new"})
-    move(tmp_path, tmp_path / name)
+    write(Destination.at(tmp_path / name))
     assert contents(tmp_path) == {name: "new", **dict.fromkeys(others, "old")}
 
 
 def test_companions_of_the_new_file_are_kept(tmp_path):
     fill(tmp_path, a_shp="old", a_cpg="old", a_prj="old", a_dbf="old")
-    fill(tmp_path / "new", a_shp="new", a_cpg="new", a_dbf="new")
-    move(tmp_path, tmp_path / "a.shp")
+    write(Destination.at(tmp_path / "a.shp"), "new", ".cpg", ".dbf")
     assert contents(tmp_path) == {"a.shp": "new", "a.cpg": "new", "a.dbf": "new"}
 
 
 @pytest.mark.parametrize("log", ["a_gpkg__wal", "a_gpkg__journal"])
 def test_a_file_with_a_nonempty_log_is_kept(tmp_path, log):
-    fill(tmp_path, a_gpkg="old", **{log: "not yet in it"})
-    fill(tmp_path / "new", a_gpkg="new")
+    fill(tmp_path, a_gpkg="old")
+    destination = Destination.at(tmp_path / "a.gpkg")
+    fill(tmp_path, **{log: "not yet in it"})
     with pytest.raises(DiskError, match=r"is open in another program .* The new file is .*a_new\.gpkg"):
-        move(tmp_path, tmp_path / "a.gpkg")
+        write(destination)
     assert contents(tmp_path)["a.gpkg"] == "old"
     assert contents(tmp_path)["a_new.gpkg"] == "new"
+    with pytest.raises(DiskError, match="is open in another program"):
+        Destination.at(tmp_path / "a.gpkg")
 
 
-def test_a_locked_file_is_kept_and_the_new_files_are_left_next_to_it(tmp_path):
-    fill(tmp_path, a_qix="old")
-    (tmp_path / "a.shp").mkdir()  # stands for a file that Windows locks
-    fill(tmp_path / "new", a_shp="new", a_dbf="new")
+def test_a_set_with_a_locked_file_is_kept_and_the_new_files_are_left_next_to_it(tmp_path):
+    fill(tmp_path, a_shp="old", a_dbf="old", a_qix="old")
+    destination = Destination.at(tmp_path / "a.shp")
+    (tmp_path / "a.sbx").mkdir()  # stands for a file that Windows locks
     with pytest.raises(DiskError, match=r"a\.shp can't be replaced \(Is a directory\)\. The new file is .*a_new\.shp"):
-        move(tmp_path, tmp_path / "a.shp")
-    assert contents(tmp_path) == {"a.qix": "old", "a_new.shp": "new", "a_new.dbf": "new"}
+        write(destination, "new", ".dbf")
+    assert contents(tmp_path) == {
+        **dict.fromkeys(("a.shp", "a.dbf", "a.qix"), "old"),
+        **dict.fromkeys(("a_new.shp", "a_new.dbf"), "new"),
+    }
+
+
+def test_a_new_name_that_is_taken_is_not_used(tmp_path):
+    fill(tmp_path, a_gpkg="old")
+    (tmp_path / "a_new.gpkg").write_text("mine")
+    destination = Destination.at(tmp_path / "a.gpkg")
+    write(Destination.at(tmp_path / "a.gpkg"), "first")
+    with pytest.raises(DiskError, match=r"a_new2\.gpkg"):
+        write(destination, "second")
+    assert contents(tmp_path) == {"a.gpkg": "first", "a_new.gpkg": "mine", "a_new2.gpkg": "second"}
+
+
+def test_of_two_runs_onto_one_file_the_first_to_finish_wins_and_the_other_is_told(tmp_path):
+    for name in ("absent.tif", "present.tif"):
+        path = tmp_path / name
+        if name == "present.tif":
+            path.write_text("old")
+        one, two = Destination.at(path), Destination.at(path)
+        write(one, "one")
+        with pytest.raises(DiskError, match=r"changed by another program in the meantime\. The new file is .*_new"):
+            write(two, "two")
+        assert path.read_text() == "one"
+        assert path.with_name(f"{path.stem}_new.tif").read_text() == "two"
+
+
+def test_two_runs_that_finish_at_once_do_not_mix_their_files(tmp_path):
+    suffixes = (".dbf", ".shx", ".prj", ".cpg")
+    fill(tmp_path, **{f"a_{suffix[1:]}": "old" for suffix in (".shp", *suffixes)})
+    for _ in range(20):
+        destinations = [Destination.at(tmp_path / "a.shp") for _ in range(4)]
+        start, refused = threading.Barrier(4), []
+
+        def run(number, destinations=destinations, start=start, refused=refused):
+            try:
+                with destinations[number].replacing() as new:
+                    for name in (new, *map(new.with_suffix, suffixes)):
+                        name.write_text(f"run {number}")
+                    start.wait()
+            except DiskError as error:
+                refused.append(str(error))
+
+        threads = [threading.Thread(target=run, args=(number,)) for number in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        texts = {(tmp_path / f"a{suffix}").read_text() for suffix in (".shp", *suffixes)}
+        assert len(texts) == 1
+        assert len(refused) == 3
+        for file in tmp_path.glob("a_new*"):
+            file.unlink()
+
+
+def test_an_edited_copy_does_not_replace_a_file_that_has_changed_since(tmp_path):
+    fill(tmp_path, a_gpkg="old")
+    with pytest.raises(DiskError, match="in the meantime"), Destination.at(tmp_path / "a.gpkg").replacing(True) as new:
+        new.write_text(new.read_text() + " and new")
+        (tmp_path / "a.gpkg").write_text("edited meanwhile")
+    assert contents(tmp_path) == {"a.gpkg": "edited meanwhile", "a_new.gpkg": "old and new"}
+
+
+def test_an_error_on_the_way_leaves_the_old_file_only(tmp_path):
+    fill(tmp_path, a_tif="old")
+    with pytest.raises(KeyError), Destination.at(tmp_path / "a.tif").replacing() as new:
+        new.write_text("half")
+        raise KeyError
+    assert contents(tmp_path) == {"a.tif": "old"}
+    assert temporary(tmp_path) == []
+
+
+def test_files_of_the_user_with_names_like_ours_are_left_alone(tmp_path):
+    mine = {f"x.html{end}": "mine" for end in (".part", "~", ".tmp", ".new")}
+    for name, text in mine.items():
+        (tmp_path / name).write_text(text)
+    Destination.at(tmp_path / "x.html").write_text("page")
+    assert contents(tmp_path) == {**mine, "x.html": "page"}
+
+
+def test_temporary_names_are_unpredictable_and_private(tmp_path):
+    names = set()
+    for _ in range(3):
+        with Destination.at(tmp_path / "a.tif").replacing() as new:
+            folder = new.parent.parent
+            names.add(folder.name)
+            assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    assert len(names) == 3
+
+
+def test_a_symbolic_link_keeps_pointing_to_its_file_which_is_new(tmp_path):
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "real.gpkg").write_text("old")
+    (tmp_path / "link.gpkg").symlink_to(tmp_path / "data" / "real.gpkg")
+    write(Destination.at(tmp_path / "link.gpkg"))
+    assert (tmp_path / "link.gpkg").is_symlink()
+    assert (tmp_path / "data" / "real.gpkg").read_text() == "new"
+    (tmp_path / "later.gpkg").symlink_to(tmp_path / "data" / "none.gpkg")
+    write(Destination.at(tmp_path / "later.gpkg"))
+    assert contents(tmp_path / "data") == {"real.gpkg": "new", "none.gpkg": "new"}
+    (tmp_path / "loop.gpkg").symlink_to(tmp_path / "loop.gpkg")
+    with pytest.raises(DiskError, match="symbolic links"):
+        Destination.at(tmp_path / "loop.gpkg")
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o664])
+def test_access_rights_of_the_old_file_are_kept(tmp_path, mode):
+    fill(tmp_path, a_shp="old", a_dbf="old")
+    for name in ("a.shp", "a.dbf"):
+        (tmp_path / name).chmod(mode)
+    write(Destination.at(tmp_path / "a.shp"), "new", ".dbf", ".cpg")
+    assert {stat.S_IMODE(file.stat().st_mode) for file in tmp_path.iterdir()} == {mode}
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no named pipes in folders")
+def test_a_pipe_is_refused_in_one_sentence(tmp_path):
+    os.mkfifo(tmp_path / "a.html")
+    with pytest.raises(DiskError, match=r"a\.html is a pipe or a device, not a file: give the name of a file\."):
+        Destination.at(tmp_path / "a.html")
+    with pytest.raises(DiskError, match="is a pipe or a device"):
+        Destination.at(Path(os.devnull))
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from rail_extract.core.disk import Destination
+
+main, moves = Path(sys.argv[1]), int(sys.argv[2])
+replace, done = Path.replace, []
+
+def count(self, target):
+    if self.parent.name != main.parent.name or self != Path(target):  # not the check of the old file
+        if len(done) == moves:
+            os.kill(os.getpid(), signal.SIGKILL)
+        done.append(target)
+    return replace(self, target)
+
+destination = Destination.at(main)
+with destination.replacing() as new:
+    for suffix in sys.argv[3:]:
+        new.with_suffix(suffix).write_text("new")
+    Path.replace = count
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "before", "after"),
+    [
+        ("a.shp", (".shp", ".dbf", ".prj", ".qix"), (".shp", ".dbf", ".prj", ".cpg")),
+        ("a.shp", (), (".shp", ".dbf", ".prj", ".cpg")),
+        ("a.tif", (".tif", ".tif.ovr", ".tif.aux.xml"), (".tif",)),
+    ],
+)
+def test_killed_at_any_move_a_set_is_old_or_new_or_cannot_be_opened_until_the_next_run(tmp_path, name, before, after):
+    """The set that opens has files of one age, and the next run into the folder leaves a complete set."""
+    survived = False
+    for moves in range(12):
+        folder = tmp_path / f"{moves}"
+        folder.mkdir()
+        for suffix in before:
+            (folder / f"a{suffix}").write_text("old")
+        call = [sys.executable, "-c", KILLED, str(folder / name), str(moves), *after]
+        survived = subprocess.run(call).returncode != -signal.SIGKILL
+        if (folder / name).exists():
+            assert len(set(contents(folder).values())) == 1
+        elif before:
+            assert len(after) > 1  # a single file is never absent
+        age(folder)
+        write(Destination.at(folder / "other.txt"))
+        (folder / "other.txt").unlink()
+        sets = [{f"a{suffix}": text for suffix in suffixes} for suffixes, text in ((before, "old"), (after, "new"))]
+        assert contents(folder) in sets
+        assert temporary(folder) == []
+        if survived:
+            break
+    assert survived and moves >= len(after)
+
+
+def test_an_interrupted_move_does_not_overwrite_what_the_user_has_written_since(tmp_path):
+    call = [sys.executable, "-c", KILLED, str(tmp_path / "a.shp"), "1", ".shp", ".dbf"]
+    assert subprocess.run(call).returncode == -signal.SIGKILL
+    (tmp_path / "a.shp").write_text("mine")
+    (tmp_path / "a.dbf").write_text("mine")
+    age(tmp_path)
+    Destination.at(tmp_path / "other.txt")
+    assert contents(tmp_path) == {"a.shp": "mine", "a.dbf": "mine"}
+    assert temporary(tmp_path) == []

@@ -1,0 +1,107 @@
+"""Temporary folders of a run, and the removal of those that killed runs have left."""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import secrets
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+PREFIX = ".rail_extract_"
+NAME = re.compile(re.escape(PREFIX) + "[0-9a-f]{12}")
+
+MARK = "in_use"
+"""File in a temporary folder that its process keeps locked; it holds the name of the computer."""
+
+MIN_AGE_S = 60.0
+"""Younger folders are not removed: their process may not have locked them yet."""
+
+OWNER_ONLY = 0o777 if sys.platform == "win32" else 0o700
+"""Rights of a temporary folder. On Windows, files moved out of a folder keep its rights, so that it gets the usual ones."""
+
+
+@contextmanager
+def scratch_folder(parent: Path) -> Iterator[Path]:
+    """Create a folder that no other process knows or uses, and delete it in any case.
+
+    Its name is unpredictable, and creating it fails if anything has this name, so that nobody can direct the files
+    elsewhere with a symbolic link.
+
+    Parameters
+    ----------
+    parent : Path
+        Existing folder.
+
+    Yields
+    ------
+    Path
+
+    Raises
+    ------
+    OSError
+        The folder cannot be created.
+    """
+    folder = parent / f"{PREFIX}{secrets.token_hex(6)}"
+    folder.mkdir(OWNER_ONLY)
+    try:
+        with (folder / MARK).open("x", encoding="utf-8") as mark:
+            mark.write(platform.node())
+            mark.flush()
+            with suppress(OSError):  # on a drive without locks, no folder is ever taken for abandoned
+                lock(mark.fileno())
+            yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def sweep(parent: Path, rescue: Callable[[Path], None] | None = None) -> None:
+    """Remove the temporary folders that killed processes of this user have left.
+
+    Parameters
+    ----------
+    parent : Path
+    rescue : callable, optional
+        Called with each such folder before it is removed.
+    """
+    with suppress(OSError):
+        for entry in os.scandir(parent):
+            if NAME.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False) and _is_abandoned(Path(entry)):
+                if rescue is not None:
+                    rescue(Path(entry))
+                shutil.rmtree(entry, ignore_errors=True)
+
+
+def _is_abandoned(folder: Path) -> bool:
+    """Return whether a folder belongs to this user and the process that created it on this computer is gone."""
+    if hasattr(os, "getuid") and folder.stat().st_uid != os.getuid():
+        return False
+    try:
+        with (folder / MARK).open("r+", encoding="utf-8") as mark:
+            if time.time() - os.fstat(mark.fileno()).st_mtime < MIN_AGE_S or mark.read() != platform.node():
+                return False
+            lock(mark.fileno())
+            return True
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def lock(number: int) -> None:
+        """Lock an open file, given by its number, until it is closed; `OSError` if another process has locked it."""
+        os.lseek(number, 0, os.SEEK_SET)
+        msvcrt.locking(number, msvcrt.LK_NBLCK, 1)
+
+else:
+    import fcntl
+
+    def lock(number: int) -> None:
+        """Lock an open file, given by its number, until it is closed; `OSError` if another process has locked it."""
+        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
