@@ -14,7 +14,7 @@ import shutil
 import stat
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +30,9 @@ COMPANIONS = (*LOGS, "-shm", ".ovr", ".msk", ".aux.xml")
 
 SHAPEFILE_COMPANIONS = (".qix", ".sbn", ".sbx", ".cpg", ".prj", ".qpj")
 """Suffixes that replace .shp: indexes, encoding, coordinate system."""
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Errors of a disk without space for more. Libraries that report no number mostly mean these."""
 
 NEW, OLD, MOVING = "new", "old", "moving"
 """In the temporary folder: the new files, the files they replace, and the names of all, the main one first."""
@@ -50,8 +53,7 @@ def writing(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-        remedy = "free space on the disk" if full else "check the folder's permissions"
+        remedy = "free space on the disk" if error.errno in FULL else "check the folder's permissions"
         raise DiskError(
             f"{folder} can't be written to ({error.strerror}): {remedy}, or choose another folder."
         ) from error
@@ -71,9 +73,11 @@ def check_closed(path: Path) -> None:
             )
 
 
-@dataclass(frozen=True)
+@dataclass
 class Destination:
     """A file that a run will write, and the file that was there when the run began.
+
+    Several outputs that go into one file share one destination.
 
     Attributes
     ----------
@@ -82,7 +86,7 @@ class Destination:
     file : Path
         The file itself, if `path` is a symbolic link.
     before : tuple of int or None
-        Identity of the old file.
+        Identity of the file that this run found, or has written.
     """
 
     path: Path
@@ -120,7 +124,8 @@ class Destination:
         Yields
         ------
         Path
-            The name in an empty temporary folder under which to write the file.
+            The name in a temporary folder under which to write the file. An `OSError` in the block becomes a
+            `DiskError`; one that states only a text may stand for the error of a library.
 
         Raises
         ------
@@ -138,6 +143,7 @@ class Destination:
                 yield new
                 if any(new.parent.iterdir()):
                     self._move_in(folder, copied)
+                    self.before = _identity(self.file)
         except OSError as error:
             raise _unwritable(self.path, error) from error
 
@@ -174,19 +180,6 @@ class Destination:
                 raise DiskError(f"{reason} The new file is {kept}.") from error
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a text file; see `Destination.write_text`."""
-    Destination.at(path).write_text(text)
-
-
-def take_names(path: Path, names: Mapping[Path, Path]) -> None:
-    """Rename finished files to their final names; see `Destination.replacing`."""
-    file = Path(os.path.realpath(path))
-    with Destination(path, file, _identity(file)).replacing() as new:
-        for finished, name in names.items():
-            finished.replace(new.with_name(name.name))
-
-
 def _check_writable(path: Path, file: Path) -> None:
     """Open the old file, create one in its folder, and rename the old file to itself."""
     try:
@@ -219,7 +212,8 @@ def _state(file: Path) -> tuple[int, int]:
 
 
 def _unwritable(path: Path, error: OSError) -> DiskError:
-    return DiskError(f"The output {path} can't be written ({_reason(error)}): choose another place.")
+    remedy = "free space on the disk, or choose" if error.errno in (None, *FULL) else "choose"
+    return DiskError(f"The output {path} can't be written ({_reason(error)}): {remedy} another place.")
 
 
 def _reason(error: OSError) -> str:

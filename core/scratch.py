@@ -23,7 +23,7 @@ MIN_AGE_S = 60.0
 """Younger folders are not removed: their process may not have locked them yet."""
 
 OWNER_ONLY = 0o777 if sys.platform == "win32" else 0o700
-"""Rights of a temporary folder. On Windows, files moved out of a folder keep its rights, so that it gets the usual ones."""
+"""Rights of a temporary folder. On Windows, files that are moved keep the rights of the folder they come from."""
 
 
 @contextmanager

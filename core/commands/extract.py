@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import argparse
 import math
-import shutil
 import sys
-import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import Field as ParameterField
 from dataclasses import fields
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
 from ..clouds.points import ask
-from ..disk import check_closed, write_text, writing
+from ..disk import Destination, writing
 from ..errors import ParameterError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, RAIL_FIELDS
 from ..frpdf import DEVICES, ENGINES
@@ -25,6 +24,7 @@ from ..progress import Estimating, Progress
 from ..rails import RailNetwork
 from ..raster_file import header_for, on_one_grid
 from ..report import Origin
+from ..scratch import scratch_folder
 from ..standards import DEFAULT, RailStandard, distinct_gauges, resolve
 
 NEEDS = {"distributed": "distributed", "pyogrio": "pyogrio", "shapely": "shapely", "rasterio": "rasterio"}
@@ -130,17 +130,12 @@ def run(args: argparse.Namespace) -> int:
         raise RailExtractError(f"Packages are missing ({', '.join(missing)}): in a clone, run pip install .[cluster].")
     standard = resolve(args.standard, args.gauge, args.head_width)
     parameters = parameters_of(args, standard)
-    for name in SUFFIXES:
-        if getattr(args, name) is not None:
-            _check_output(name, getattr(args, name))
+    outputs = _outputs(args)
     if args.work is not None:
-        return _run_in(args.work, args, standard, parameters)
+        return _run_in(args.work, args, standard, parameters, outputs)
     # Next to the results, where workers on other computers find it too.
-    folder = tempfile.mkdtemp(dir=args.rails.parent, prefix=".rail_extract_")
-    try:
-        return _run_in(Path(folder), args, standard, parameters)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)  # workers of a cluster may still be writing
+    with scratch_folder(outputs["rails"].file.parent) as folder:
+        return _run_in(folder, args, standard, parameters, outputs)
 
 
 def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameters:
@@ -177,17 +172,36 @@ def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameter
     )
 
 
-def _check_output(name: str, path: Path) -> None:
-    """Refuse an output that could not be written after the run."""
-    if path.suffix.lower() not in SUFFIXES[name]:
-        raise ParameterError(f"The option --{name} writes {SUFFIXES[name][0]} files: give {path.name} this suffix.")
-    with writing(path.parent):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=path.parent).close()
-    check_closed(path)
+def _outputs(args: argparse.Namespace) -> dict[str, Destination]:
+    """Check that the outputs can be written, and return the destination of each.
+
+    Raises
+    ------
+    ParameterError, DiskError
+        An output could not be written after the run.
+    """
+    files: dict[Path, Destination] = {}
+    outputs: dict[str, Destination] = {}
+    for name, suffixes in SUFFIXES.items():
+        path = getattr(args, name)
+        if path is None:
+            continue
+        if path.suffix.lower() not in suffixes:
+            raise ParameterError(f"The option --{name} writes {suffixes[0]} files: give {path.name} this suffix.")
+        with writing(path.parent):
+            path.parent.mkdir(parents=True, exist_ok=True)
+        destination = Destination.at(path)
+        outputs[name] = files.setdefault(destination.file, destination)
+    return outputs
 
 
-def _run_in(folder: Path, args: argparse.Namespace, standard: RailStandard, parameters: Parameters) -> int:
+def _run_in(
+    folder: Path,
+    args: argparse.Namespace,
+    standard: RailStandard,
+    parameters: Parameters,
+    outputs: Mapping[str, Destination],
+) -> int:
     """Extract with a folder for finished results, then write."""
     from ..cluster.runner import DaskRunner
     from ..cluster.workers import connect
@@ -198,7 +212,7 @@ def _run_in(folder: Path, args: argparse.Namespace, standard: RailStandard, para
         runner = DaskRunner(client, folder)
         request = ask(args.tiles, codes, args.crs, extent, progress, unreadable=runner.failures)
         network = extract_files(request, folder.resolve(), parameters, runner, progress)
-    _write(network, args, standard, parameters, extent)
+    _write(network, args, standard, parameters, extent, outputs)
     print(f"{len(network.rails)} rails, {sum(rail.length_m for rail in network.rails) / 1000:.3f} km")
     print(f"{len(network.centerlines)} centerlines, {sum(one.length_m for one in network.centerlines) / 1000:.3f} km")
     for failure in network.failures:
@@ -212,6 +226,7 @@ def _write(
     standard: RailStandard,
     parameters: Parameters,
     extent: tuple[float, float, float, float] | None,
+    outputs: Mapping[str, Destination],
 ) -> None:
     """Write all outputs; one that fails does not stop the others.
 
@@ -222,17 +237,20 @@ def _write(
     """
     from .geopackage import lines_layer, stations_layer, write_layers
 
-    layers = [lines_layer("rails", args.rails, RAIL_FIELDS, network.rails)]
-    if args.centerlines:
-        layers.append(lines_layer("centerlines", args.centerlines, CENTERLINE_FIELDS, network.centerlines))
-    if args.quality:
-        layers.append(stations_layer("quality", args.quality, network.geometry))
-    writers: list[Callable[[], None]] = [lambda: write_layers(layers, network.frame)]
-    if args.report:
+    layers = [lines_layer("rails", outputs["rails"], RAIL_FIELDS, network.rails)]
+    if "centerlines" in outputs:
+        layers.append(lines_layer("centerlines", outputs["centerlines"], CENTERLINE_FIELDS, network.centerlines))
+    if "quality" in outputs:
+        layers.append(stations_layer("quality", outputs["quality"], network.geometry))
+    of_files = {
+        layer.destination.file: [one for one in layers if one.destination is layer.destination] for layer in layers
+    }
+    writers: list[Callable[[], None]] = [partial(write_layers, same, network.frame) for same in of_files.values()]
+    if "report" in outputs:
         origin = Origin(tuple(args.tiles), standard, parameters.other_gauges_m, args.command_line)
-        writers.append(lambda: write_text(args.report, origin.report(network)))
-    if args.cleaned and any(raster.tiles for raster in network.cleaned):
-        writers.append(lambda: _write_cleaned(network, args.cleaned, standard, extent))
+        writers.append(lambda: outputs["report"].write_text(origin.report(network)))
+    if "cleaned" in outputs and any(raster.tiles for raster in network.cleaned):
+        writers.append(lambda: _write_cleaned(network, outputs["cleaned"], standard, extent))
     errors: list[RailExtractError] = []
     for write in writers:
         try:
@@ -244,13 +262,18 @@ def _write(
 
 
 def _write_cleaned(
-    network: RailNetwork, path: Path, standard: RailStandard, extent: tuple[float, float, float, float] | None
+    network: RailNetwork,
+    destination: Destination,
+    standard: RailStandard,
+    extent: tuple[float, float, float, float] | None,
 ) -> None:
     """Write the cleaned rasters as Clean Rail Raster does."""
     from .geotiff import write_rasters
 
     rasters, frame = on_one_grid(network.cleaned, network.frame)
-    write_rasters(path, header_for(rasters, network.cleaned_classes, frame, standard, extent), rasters)
+    header = header_for(rasters, network.cleaned_classes, frame, standard, extent)
+    with destination.replacing() as new:
+        write_rasters(new, header, rasters)
 
 
 def _number_fields() -> list[ParameterField]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import uuid
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,10 +11,10 @@ import numpy as np
 import pyogrio
 import shapely
 
-from ..disk import take_names, writing
-from ..errors import DiskError
+from ..disk import Destination
 from ..fields import QUALITY_FIELDS, UNKNOWN_IN_METRES, Field
 from ..frame import LocalFrame
+from ..geopackage import tables_in
 from ..rails import Centerline, RailLine, TrackGeometry
 
 KINDS = {int: np.int32, float: float, str: object}
@@ -28,7 +27,7 @@ class Layer:
     Attributes
     ----------
     name : str
-    path : Path
+    destination : Destination
         GeoPackage of the layer.
     fields : sequence of Field
     columns : sequence of sequence
@@ -40,7 +39,7 @@ class Layer:
     """
 
     name: str
-    path: Path
+    destination: Destination
     fields: Sequence[Field]
     columns: Sequence[Sequence[Any]]
     geometry_type: str
@@ -48,71 +47,63 @@ class Layer:
 
 
 def lines_layer(
-    name: str, path: Path, fields: Sequence[Field], lines: Sequence[RailLine] | Sequence[Centerline]
+    name: str, destination: Destination, fields: Sequence[Field], lines: Sequence[RailLine] | Sequence[Centerline]
 ) -> Layer:
     """Make a layer of lines.
 
     Parameters
     ----------
     name : str
-    path : Path
+    destination : Destination
     fields : sequence of Field
     lines : sequence of RailLine or Centerline
     """
     columns = [[getattr(line, field.name) for line in lines] for field in fields]
-    return Layer(name, path, fields, columns, "LineString Z", [line.xyz for line in lines])
+    return Layer(name, destination, fields, columns, "LineString Z", [line.xyz for line in lines])
 
 
-def stations_layer(name: str, path: Path, tracks: Sequence[TrackGeometry]) -> Layer:
+def stations_layer(name: str, destination: Destination, tracks: Sequence[TrackGeometry]) -> Layer:
     """Make a layer of the stations of tracks, with the fields of QUALITY.
 
     Parameters
     ----------
     name : str
-    path : Path
+    destination : Destination
     tracks : sequence of TrackGeometry
     """
     columns = [
         [value for track in tracks for value in np.broadcast_to(getattr(track, field.name), len(track.xyz))]
         for field in QUALITY_FIELDS
     ]
-    return Layer(name, path, QUALITY_FIELDS, columns, "Point Z", [place for track in tracks for place in track.xyz])
+    return Layer(
+        name, destination, QUALITY_FIELDS, columns, "Point Z", [place for track in tracks for place in track.xyz]
+    )
 
 
 def write_layers(layers: Sequence[Layer], frame: LocalFrame) -> None:
-    """Write layers into GeoPackages; existing ones are replaced once the new ones are complete.
+    """Write layers into one GeoPackage; its other layers stay.
 
     Parameters
     ----------
     layers : sequence of Layer
-        Several may share a file.
+        All with the same destination.
     frame : LocalFrame
         Local frame of the layers.
 
     Raises
     ------
     DiskError
-        A file can't be written, for example because the disk is full; the old file is left as it was. Or the old file
-        is open elsewhere; the new one is then left next to it.
+        See `Destination.replacing`.
     """
-    unfinished = {layer.path.resolve(): Path() for layer in layers}
-    for path in unfinished:
-        unfinished[path] = path.with_name(f".{uuid.uuid4().hex}.gpkg")
-    try:
+    names = {layer.name for layer in layers}
+    destination = layers[0].destination
+    with destination.replacing(edit=bool(tables_in(destination.file) - names)) as new:
         for layer in layers:
-            with writing(layer.path.parent):
-                layer.path.parent.mkdir(parents=True, exist_ok=True)
-            _write_layer(layer, frame, unfinished[layer.path.resolve()])
-        for path, complete in unfinished.items():
-            take_names(path, {complete: path})
-    finally:
-        for leftover in unfinished.values():
-            for file in leftover.parent.glob(f"{leftover.name}*"):
-                file.unlink()
+            _write_layer(layer, frame, new)
 
 
 def _write_layer(layer: Layer, frame: LocalFrame, file: Path) -> None:
-    """Write a layer into a file that does not have its final name yet."""
+    """Write a layer, in place of the one of this name that the file has."""
     try:
         pyogrio.raw.write(
             str(file),
@@ -123,13 +114,10 @@ def _write_layer(layer: Layer, frame: LocalFrame, file: Path) -> None:
             field_data=[_column(field, values) for field, values in zip(layer.fields, layer.columns)],
             fields=[field.name for field in layer.fields],
             crs=frame.crs_wkt or UNKNOWN_IN_METRES,
-            append=file.exists(),
             nan_as_null=True,
         )
     except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, RuntimeError) as error:
-        raise DiskError(
-            f"{layer.path} can't be written ({error}): free space on the disk, or choose another file."
-        ) from error
+        raise OSError(str(error)) from error
 
 
 def _geometry(layer: Layer, frame: LocalFrame) -> np.ndarray:

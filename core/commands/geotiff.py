@@ -8,8 +8,6 @@ from pathlib import Path
 import rasterio
 from rasterio.windows import Window
 
-from ..disk import take_names
-from ..errors import DiskError
 from ..raster import RailRaster
 from ..raster_file import BLOCK, NO_DATA, RasterHeader
 
@@ -20,26 +18,20 @@ def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster
     Parameters
     ----------
     path : Path
-        An existing file stays until the new one is complete.
+        New file.
     header : RasterHeader
     rasters : sequence of RailRaster
         On the grid of the header.
 
     Raises
     ------
-    DiskError
+    OSError
         The file can't be written.
     """
-    part = path.with_name(f"{path.name}.part")
     try:
-        _write(part, header, rasters)
-        take_names(path, {part: path})
+        _write(path, header, rasters)
     except rasterio.errors.RasterioError as error:
-        raise DiskError(
-            f"{path} can't be written ({error}): free space on the disk, or choose another file."
-        ) from error
-    finally:
-        part.unlink(missing_ok=True)
+        raise OSError(str(error)) from error
 
 
 def _write(path: Path, header: RasterHeader, rasters: Sequence[RailRaster]) -> None:

@@ -15,6 +15,7 @@ from qgis.core import (
 )
 from qgis.PyQt.QtGui import QIcon
 
+from ...core.disk import Destination
 from ...core.progress import Progress
 from ..dialog.checks import check_values, explain_invalid
 from ..dialog.guide import guide
@@ -25,7 +26,7 @@ from ..feedback import QgisProgress
 from ..i18n import tr
 from ..paths import ICONS, PICTURES
 from ..setup.dependencies import explain_missing, missing_packages
-from ..writing.destinations import check_distinct, check_writable
+from ..writing.destinations import destinations
 from .sentences import COMMAND_LINE, sentence_for
 
 # Search terms, also in the languages of the larger railways: the toolbox search compares whole words.
@@ -102,9 +103,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
             supported, message = self.provider().isSupportedOutputValue(value, output, context)
             if not supported:
                 return False, f"{message}: choose another one, such as .{output.defaultFileExtension()}."
-            check_writable(value, context)
-        outputs = self.destinationParameterDefinitions()
-        check_distinct({output.name(): parameters.get(output.name()) for output in outputs}, context)
+        self._destinations(parameters, context)
         self._read(parameters, context)
         return True, ""
 
@@ -116,6 +115,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         if not executable:
             raise QgsProcessingException(reason)
         try:
+            self.destinations = self._destinations(parameters, context)
             self._job = self._read(parameters, context)
         except BaseException as error:
             raise QgsProcessingException(sentence_for(error, self.parameterDefinitions())) from None
@@ -137,6 +137,11 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         """Declare a report as a file: the batch dialog of several QGIS versions never ends after a web page."""
         self.addParameter(definition, False)
         self.addOutput(QgsProcessingOutputFile(definition.name(), definition.description()))
+
+    def _destinations(self, parameters: dict[str, Any], context: QgsProcessingContext) -> dict[str, Destination]:
+        """Check the files of the outputs, and remember what they replace."""
+        names = [output.name() for output in self.destinationParameterDefinitions()]
+        return destinations({name: parameters.get(name) for name in names}, context)
 
     def _read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Any:
         """Check the values that need no file, then read the parameters."""

@@ -3,14 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import (
-    QgsProcessingContext,
-    QgsProcessingUtils,
-)
+from qgis.core import QgsProcessingContext
 
 from ...core.frpdf.models import choose as choose_model
 from ...core.progress import Estimating, Progress
@@ -18,7 +13,7 @@ from ...core.standards import RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
-from ..reading.clouds import CloudSource, request_points
+from ..reading.clouds import CloudSource, points_folder, request_points
 from ..systems import system
 from ..writing.destinations import is_wanted
 from ..writing.layers import (
@@ -124,8 +119,8 @@ class ExtractRails(RailAlgorithm):
             keep_cleaned=cleaned,
         )
         request = request_points(job.cloud, job.class_codes, values.extent, progress)
-        with TemporaryDirectory(dir=QgsProcessingUtils.tempFolder()) as folder:
-            network = extract_files(request, Path(folder), settings, InTurn(), progress)
+        with points_folder() as folder:
+            network = extract_files(request, folder, settings, InTurn(), progress)
         progress.check()
         for failure in network.failures:
             progress.warning(failure)

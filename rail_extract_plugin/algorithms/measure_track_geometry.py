@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
-from qgis.core import QgsProcessingContext, QgsProcessingUtils
+from qgis.core import QgsProcessingContext
 
 from ...core.fields import QUALITY_FIELDS
 from ...core.progress import Progress
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
-from ..reading.clouds import CloudSource
+from ..reading.clouds import CloudSource, points_folder
 from ..writing.layers import figures_of_stations, write_stations
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
@@ -75,8 +73,8 @@ class MeasureTrackGeometry(RailAlgorithm):
 
         values = ParameterValues(self, parameters, context)
         lines = values.lines("INPUT"), values.lines("RAILS")
-        with TemporaryDirectory(dir=QgsProcessingUtils.tempFolder()) as folder:
-            tracks = read_inputs(*lines, job.cloud, Path(folder), progress.span(0, READING))
+        with points_folder() as folder:
+            tracks = read_inputs(*lines, job.cloud, folder, progress.span(0, READING))
             measuring = progress.span(READING, MEASURING)
             rails = measure_rails(tracks.rails, tracks.clouds, job.head_width_m, InTurn(), measuring)
         share = progress.span(MEASURING, 1)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Optional
@@ -18,6 +19,7 @@ from qgis.core import (
 
 from ...core.errors import CloudError
 from ...core.progress import Progress
+from ...core.scratch import scratch_folder, sweep
 from ...core.standards import RAIL_CLASS
 from ..systems import system
 
@@ -131,6 +133,15 @@ def request_points(source: CloudSource, class_codes: Sequence[int], bounds: Boun
     from ...core.clouds.points import ask
 
     return ask(source.paths, class_codes, source.crs_wkt, bounds(system(crs_of(source))), progress)
+
+
+@contextmanager
+def points_folder() -> Iterator[Path]:
+    """Create a temporary folder for the points of a run, next to that of QGIS, and remove those of killed runs."""
+    parent = Path(QgsProcessingUtils.tempFolder()).parent
+    sweep(parent)
+    with scratch_folder(parent) as folder:
+        yield folder
 
 
 def crs_of(source: CloudSource) -> str | None:

@@ -11,7 +11,6 @@ import numpy as np
 from osgeo import gdal
 
 from ...core.clouds.crs import parse_crs, units
-from ...core.disk import take_names
 from ...core.errors import RasterError
 from ...core.frame import LocalFrame
 from ...core.progress import SILENT, Progress
@@ -90,28 +89,22 @@ def read_rasters(path: Path, header: RasterHeader, progress: Progress = SILENT) 
 
 
 def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress = SILENT) -> None:
-    """Write rasters on the header's grid; cells outside its window are dropped.
-
-    The file is renamed when it is complete: an existing file stays until then, even if the program is killed.
+    """Write rasters on the header's grid into a new file; cells outside its window are dropped.
 
     Raises
     ------
-    RasterError, DiskError
+    OSError
         The file cannot be written.
     Cancelled
         The user cancelled.
     """
-    part = path.with_name(f"{path.name}.part")
     gdal.ErrorReset()
     try:
-        _write(part, header, rasters, progress)
+        _write(path, header, rasters, progress)
         if gdal.GetLastErrorType() >= gdal.CE_Failure:
             raise RuntimeError(gdal.GetLastErrorMsg())
-        take_names(path, {part: path})
     except RuntimeError as error:
-        raise RasterError(f"{path} can't be written ({_cause(error)}): choose another place.") from error
-    finally:
-        part.unlink(missing_ok=True)
+        raise OSError(_cause(error)) from error
 
 
 def _cause(error: Exception) -> str:

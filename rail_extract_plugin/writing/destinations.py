@@ -23,6 +23,10 @@ TABLE = "ogr:"
 """Prefix of destinations that are a table of a file."""
 
 
+ESCAPE = "%[0-9A-Fa-f]{2}"
+"""SQLite decodes these in the path of a GeoPackage that GDAL opens for reading."""
+
+
 def destinations(values: Mapping[str, Any], context: QgsProcessingContext) -> dict[str, Destination]:
     """Check before the run that the outputs can be written, and remember what they replace.
 
@@ -42,9 +46,20 @@ def destinations(values: Mapping[str, Any], context: QgsProcessingContext) -> di
     RailExtractError
         A file cannot be written, or two outputs overwrite each other.
     """
-    files = {name: output_file(value, context) for name, value in values.items()}
-    found = {name: Destination.at(file) for name, file in files.items() if file is not None}
-    _check_distinct({name: (found[name].file, outputoutput_table(values[name], context)) for name in found})
+    files: dict[Path, Destination] = {}
+    found: dict[str, Destination] = {}
+    for name, value in values.items():
+        path = output_file(value, context)
+        if path is not None:
+            escape = re.search(ESCAPE, str(path)) if path.suffix.lower() == ".gpkg" else None
+            if escape:
+                raise RailExtractError(
+                    f"The output {path} can't be opened after it is written, because {escape[0]} stands for another "
+                    "character in the path of a GeoPackage: choose another name."
+                )
+            destination = Destination.at(path)
+            found[name] = files.setdefault(destination.file, destination)
+    _check_distinct({name: (found[name].file, table_of(values[name], context)) for name in found})
     return found
 
 
@@ -73,21 +88,17 @@ def _text(value: Any, context: QgsProcessingContext) -> str:
     return value or ""
 
 
-def plain_file(value: Any, context: QgsProcessingContext) -> Path | None:
-    """Return the file of a destination given as a path; None for memory layers, databases and tables of a file."""
-    text = _text(value, context)
-    is_file = text and text != QgsProcessing.TEMPORARY_OUTPUT and not re.match(r"\w{2,}:", text)
-    return Path(text) if is_file else None
-
-
 def output_file(value: Any, context: QgsProcessingContext) -> Path | None:
-    """Return the file of a destination; None for memory layers and databases."""
+    """Return the file of a destination; None for memory layers and databases on servers."""
     text = _text(value, context)
-    return plain_file(_uri(text).database() if text.startswith(TABLE) else text, context)
+    path = _uri(text).database() if text.startswith(TABLE) else text
+    is_file = path and path != QgsProcessing.TEMPORARY_OUTPUT and not re.match(r"\w{2,}:", path)
+    return Path(path) if is_file else None
 
 
-def output_table(text: str) -> str:
+def table_of(value: Any, context: QgsProcessingContext) -> str:
     """Return the table that a destination names in a file; empty if it is the file itself."""
+    text = _text(value, context)
     return _uri(text).table() if text.startswith(TABLE) else ""
 
 

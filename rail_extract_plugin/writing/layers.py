@@ -22,6 +22,7 @@ from qgis.core import (
     QgsWkbTypes,
 )
 
+from ...core.disk import Destination
 from ...core.errors import RailExtractError
 from ...core.fields import (
     BRIDGED,
@@ -188,7 +189,9 @@ def write_raster(
     if not is_wanted(parameters.get(name), context):
         return {}
     path = algorithm.parameterAsOutputLayer(parameters, name, context)
-    write_rasters(Path(path), header, rasters, progress)
+    destination = algorithm.destinations.get(name) or Destination.at(Path(path))
+    with destination.replacing() as new:
+        write_rasters(new, header, rasters, progress)
     style_on_load(path, "raster", context)
     return {name: path}
 
@@ -232,7 +235,7 @@ def _write(
         sink, layer_id = algorithm.parameterAsSink({**parameters, name: value}, name, context, columns, shape, crs)
         return (layer_id, add_features(sink, made)) if sink else ("", 0)
 
-    layer_id = write_whole(parameters.get(name), context, write)
+    layer_id = write_whole(parameters.get(name), context, algorithm.destinations.get(name), write)
     if not layer_id:
         return {}
     style_on_load(layer_id, kind.style, context)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsProcessingAlgorithm, QgsProcessingContext
 
-from ...core.disk import write_text
+from ...core.disk import Destination
 
 if TYPE_CHECKING:
     from ...core.rails import RailNetwork
@@ -49,8 +49,7 @@ def write_report(
     path = algorithm.parameterAsFileOutput(parameters, name, context)
     if not path:
         return {}
-    write_text(Path(path), origin.report(network))
-    return {name: path}
+    return _write(algorithm, name, path, origin.report(network))
 
 
 def write_check(
@@ -79,7 +78,12 @@ def write_check(
         return {}
     rows = "".join(f"<tr><th align='left'>{escape(key)}</th><td>{escape(facts[key])}</td></tr>" for key in facts)
     title = f"<title>{escape(algorithm.displayName())}</title>"
-    write_text(
-        Path(path), f'<!DOCTYPE html><meta charset="utf-8">{title}<h1>{escape(verdict)}</h1><table>{rows}</table>'
-    )
+    page = f'<!DOCTYPE html><meta charset="utf-8">{title}<h1>{escape(verdict)}</h1><table>{rows}</table>'
+    return _write(algorithm, name, path, page)
+
+
+def _write(algorithm: QgsProcessingAlgorithm, name: str, path: str, page: str) -> dict[str, str]:
+    """Write a page to an output; QGIS chooses the path of a temporary one during the run."""
+    destination = algorithm.destinations.get(name) or Destination.at(Path(path))
+    destination.write_text(page)
     return {name: path}

@@ -1,12 +1,10 @@
-"""Writes vector files under a temporary name and renames them when complete; an existing file stays until then."""
+"""Writes vector files under a temporary name and moves them when complete; an existing file stays until then."""
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
 
 from osgeo import gdal
 from qgis.core import (
@@ -16,25 +14,29 @@ from qgis.core import (
     QgsProperty,
 )
 
-from ...core.disk import take_names
+from ...core.disk import Destination
 from ...core.errors import RailExtractError
-from .destinations import plain_file
+from ...core.geopackage import tables_in
+from ...core.scratch import scratch_folder
+from .destinations import output_file, table_of
 
-PREFIX = "rail_extract_"
+Write = Callable[[Any], tuple[str, int]]
 
 
-def write_whole(value: Any, context: QgsProcessingContext, write: Callable[[Any], tuple[str, int]]) -> str:
+def write_whole(value: Any, context: QgsProcessingContext, destination: Destination | None, write: Write) -> str:
     """Write a layer in a temporary folder next to its destination, and move its files there when complete.
 
-    Memory layers, and tables in databases and existing files, are written directly.
+    The other tables of a GeoPackage stay. Memory layers, and tables in databases on servers, are written directly.
 
     Parameters
     ----------
     value : str, QgsProperty, QgsProcessingOutputLayerDefinition or None
         Value of the destination parameter.
     context : QgsProcessingContext
+    destination : Destination or None
+        The file that the value names.
     write : callable
-        Writes to such a destination, and returns the layer's id and number of features; an empty id if skipped.
+        Writes to such a value, and returns the layer's id and number of features; an empty id if skipped.
 
     Returns
     -------
@@ -46,26 +48,20 @@ def write_whole(value: Any, context: QgsProcessingContext, write: Callable[[Any]
     RailExtractError
         The files cannot be written completely.
     """
-    path = plain_file(value, context)
-    if path is None:
+    if destination is None:
         return write(value)[0]
-    # An ordinary folder: files keep its access rights on Windows, where only its creator may read a temporary folder.
-    folder = path.absolute().with_name(PREFIX + uuid4().hex[:8])
-    try:
-        folder.mkdir()
-        layer_id, count = write(_redirected(value, folder / path.name))
-        _check_count(layer_id, count)
-        take_names(path, {file: path.with_name(file.name) for file in folder.iterdir()})
-    except OSError as error:
-        raise RailExtractError(
-            f"The output {path} can't be written ({error.strerror}): choose another place."
-        ) from error
-    except (RailExtractError, QgsProcessingException) as error:
-        # The traceback would keep the file open, and Windows could not delete it.
-        raise error.with_traceback(None) from error.__cause__
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    return _renamed(layer_id, str(path) + layer_id.rsplit(path.name, 1)[1], context)
+    table = table_of(value, context)
+    others = tables_in(destination.file) - {table or destination.file.stem}
+    if not table and not others:
+        with destination.replacing() as new:
+            layer_id = _write_file(value, new, write)
+        name = layer_id.rsplit(new.name, 1)[1]
+    else:
+        name = f"|layername={table or destination.file.stem}"
+        with destination.replacing(edit=bool(others)) as new, scratch_folder(new.parent.parent) as aside:
+            layer_id = _write_file(value, aside / new.name, write)
+            _copy_table(aside / new.name, new, table or destination.file.stem)
+    return _renamed(layer_id, f"{destination.path}{name}", context)
 
 
 def write_each(
@@ -93,7 +89,7 @@ def write_each(
         except (RailExtractError, QgsProcessingException) as error:
             failures[name] = error
     if failures:
-        raise RailExtractError(_explain(failures, [name for name in written if plain_file(parameters[name], context)]))
+        raise RailExtractError(_explain(failures, [name for name in written if output_file(parameters[name], context)]))
     return written
 
 
@@ -114,22 +110,49 @@ def _redirected(value: Any, path: Path) -> Any:
     return other
 
 
-def _check_count(layer_id: str, count: int) -> None:
-    """Check that a file has all its features, because GDAL does not report errors on closing."""
-    found = _count(layer_id.partition("|layername=")[0])
+def _write_file(value: Any, file: Path, write: Write) -> str:
+    """Write a layer to a new file and check that it has all its features: GDAL does not report errors on closing."""
+    try:
+        layer_id, count = write(_redirected(value, file))
+    except (RailExtractError, QgsProcessingException) as error:
+        # The traceback would keep the file open, and Windows could not delete it.
+        raise error.with_traceback(None) from error.__cause__
+    found = _count(file)
     if found < count:
         raise RailExtractError(
             f"The output can't be written ({found} of {count} features were written): check the free disk space."
         )
+    return layer_id
 
 
-def _count(path: str) -> int:
+def _count(file: Path) -> int:
     """Count the features of a file, with GDAL: a QGIS layer would build its coordinate system in this thread."""
     try:
-        dataset = gdal.OpenEx(path, gdal.OF_VECTOR)
+        dataset = gdal.OpenEx(str(file), gdal.OF_VECTOR)
         return dataset.GetLayer(0).GetFeatureCount() if dataset else 0
     except RuntimeError:  # raised by newer GDAL
         return 0
+
+
+def _copy_table(source: Path, target: Path, table: str) -> None:
+    """Copy the only table of a file into another file, in place of the table of this name.
+
+    Raises
+    ------
+    OSError
+        The other file cannot be written.
+    """
+    gdal.ErrorReset()
+    mode = "overwrite" if target.exists() else None
+    try:
+        options = gdal.VectorTranslateOptions(accessMode=mode, layerName=table)
+        copied = gdal.VectorTranslate(str(target), str(source), options=options)
+        del copied  # closes the file
+        failed = gdal.GetLastErrorType() >= gdal.CE_Failure
+    except RuntimeError as error:
+        raise OSError(str(error)) from error
+    if failed:
+        raise OSError(gdal.GetLastErrorMsg())
 
 
 def _renamed(layer_id: str, other_id: str, context: QgsProcessingContext) -> str:

@@ -1,5 +1,6 @@
 """Faults of the environment: packages, weights, disks, other programs, cancelling."""
 
+import os
 import shutil
 import sqlite3
 import zipfile
@@ -19,6 +20,7 @@ from qgis.core import (
     QgsVectorLayer,
 )
 from rail_extract.core import pipeline
+from rail_extract.core.disk import Destination
 from rail_extract.core.frpdf import engine, models
 from rail_extract.rail_extract_plugin.algorithms import base
 from rail_extract.rail_extract_plugin.setup import dependencies
@@ -106,6 +108,35 @@ def below_a_file(folder):
 def a_folder(folder):
     (folder / "rails.gpkg").mkdir()
     return folder / "rails.gpkg"
+
+
+def a_pipe(folder):
+    os.mkfifo(folder / "rails.gpkg")
+    return folder / "rails.gpkg"
+
+
+def a_loop(folder):
+    (folder / "rails.gpkg").symlink_to(folder / "rails.gpkg")
+    return folder / "rails.gpkg"
+
+
+def a_link(folder):
+    (folder / "data").mkdir()
+    (folder / "rails.gpkg").symlink_to(folder / "data" / "later.gpkg")
+    return folder / "rails.gpkg"
+
+
+def replaced_on_the_way(bench):
+    """Another run writes the same output during this one."""
+
+    def replace(percent):
+        if not (bench.folder / "rails.gpkg").exists():
+            with Destination.at(bench.folder / "rails.gpkg").replacing() as new:
+                earlier(new)
+
+    bench.feedback.progressChanged.connect(replace)
+    skipped = dict.fromkeys(("CENTERLINES", "QUALITY"))
+    return {**cloud(bench), **skipped, "RAILS": bench.folder / "rails.gpkg", "CLEANED": bench.folder / "cleaned.tif"}
 
 
 def cancelled(percent):
@@ -317,6 +348,33 @@ FAULTS = [
         "The output …/rails.gpkg is a folder: give the name of a file in it.",
     ),
     Fault(
+        "output that is a named pipe",
+        output(a_pipe),
+        REFUSED,
+        "The output …/rails.gpkg is a pipe or a device, not a file: give the name of a file.",
+    ),
+    Fault(
+        "output that is a symbolic link to itself",
+        output(a_loop),
+        REFUSED,
+        "The output …/rails.gpkg can't be written (Too many levels of symbolic links): choose another place.",
+    ),
+    Fault("output that is a symbolic link to a file", output(a_link), gives=TRACK),
+    Fault(
+        "output replaced by another run during the run",
+        replaced_on_the_way,
+        REFUSED,
+        "…/rails.gpkg was changed by another program in the meantime. The new file is …/rails_new.gpkg. "
+        "Not written: RAILS. Complete: …",
+    ),
+    Fault(
+        "GeoPackage with an escaped space in its name",
+        output(lambda folder: folder / "a%20b.gpkg"),
+        REFUSED,
+        "The output …/a%20b.gpkg can't be opened after it is written, because %20 stands for another character in the "
+        "path of a GeoPackage: choose another name.",
+    ),
+    Fault(
         "output on a read-only disk",
         output(lambda folder: "/proc/rails.gpkg"),
         REFUSED,
@@ -364,7 +422,7 @@ FAULTS = [
         "full disk, GeoTIFF",
         full_disk(1000, points_only, ".tif"),
         REFUSED,
-        "…/out/OUTPUT.tif can't be written (…): choose another place.",
+        "The output …/out/OUTPUT.tif can't be written (…): free space on the disk, or choose another place.",
         run="rasterizerailpoints",
     ),
     Fault(

@@ -15,9 +15,10 @@ pytest.importorskip("distributed")
 
 from rail_extract.__main__ import main  # noqa: E402
 from rail_extract.core.clouds.points import read_rail_points  # noqa: E402
+from rail_extract.core.commands import extract  # noqa: E402
 from rail_extract.core.commands.extract import INCOMPLETE  # noqa: E402
 from rail_extract.core.fields import QUALITY_FIELDS, RAIL_FIELDS  # noqa: E402
-from rail_extract.core.pipeline import Parameters, extract_rails  # noqa: E402
+from rail_extract.core.pipeline import Parameters, extract_files, extract_rails  # noqa: E402
 from rail_extract.core.report import Origin  # noqa: E402
 from rail_extract.core.standards import STANDARDS  # noqa: E402
 
@@ -119,15 +120,26 @@ def test_rails_without_a_track_are_written_and_the_reason_is_named(tiles, client
     assert len(values(out, "rails")["rail_id"]) == 2
 
 
-def test_an_output_that_fails_does_not_stop_the_others(tiles, client, tmp_path, capsys):
-    out, report = tmp_path / "out.gpkg", tmp_path / "report.html"
-    report.mkdir()  # a file cannot replace a folder
+def test_an_output_that_fails_does_not_stop_the_others(tiles, client, tmp_path, monkeypatch, capsys):
+    out, report, cleaned = tmp_path / "out.gpkg", tmp_path / "pages" / "report.html", tmp_path / "cleaned.tif"
+
+    def remove_folder(*arguments):
+        shutil.rmtree(report.parent)
+        return extract_files(*arguments)
+
+    monkeypatch.setattr(extract, "extract_files", remove_folder)
     words = ["extract", str(tiles), "--rails", str(out), "--report", str(report)]
-    cleaned = tmp_path / "cleaned.tif"
     assert main([*words, "--cleaned", str(cleaned), "--scheduler", client.scheduler.address, *FAST]) == 1
     assert f"{report} can't be written" in capsys.readouterr().err
     assert len(values(out, "rails")["rail_id"]) == 2
     assert cleaned.exists()
+
+
+def test_an_output_that_is_a_folder_is_refused_before_the_run(tiles, tmp_path, capsys):
+    (tmp_path / "report.html").mkdir()
+    words = ["extract", str(tiles), "--rails", str(tmp_path / "out.gpkg"), "--report", str(tmp_path / "report.html")]
+    assert main(words) == 1
+    assert "report.html is a folder: give the name of a file in it." in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,11 @@ pyogrio = pytest.importorskip("pyogrio")
 shapely = pytest.importorskip("shapely")
 
 from rail_extract.core.commands.geopackage import lines_layer, stations_layer, write_layers  # noqa: E402
+from rail_extract.core.disk import Destination  # noqa: E402
 from rail_extract.core.errors import DiskError  # noqa: E402
 from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS  # noqa: E402
 from rail_extract.core.frame import LocalFrame  # noqa: E402
+from rail_extract.core.geopackage import tables_in  # noqa: E402
 from rail_extract.core.rails import Centerline, RailLine, TrackGeometry  # noqa: E402
 
 FRAME = LocalFrame(np.array([500.0, 7100.0, 30.0]), 0.5, 0.25, "EPSG:2227")
@@ -35,11 +37,12 @@ STATIONS = TrackGeometry(
 
 
 def test_a_file_holds_lines_and_points_with_their_fields(tmp_path):
-    path = tmp_path / "new" / "all.gpkg"
+    path = tmp_path / "all.gpkg"
+    destination = Destination.at(path)
     layers = [
-        lines_layer("rails", path, RAIL_FIELDS, [RAIL]),
-        lines_layer("centerlines", path, CENTERLINE_FIELDS, [TRACK]),
-        stations_layer("quality", path, [STATIONS]),
+        lines_layer("rails", destination, RAIL_FIELDS, [RAIL]),
+        lines_layer("centerlines", destination, CENTERLINE_FIELDS, [TRACK]),
+        stations_layer("quality", destination, [STATIONS]),
     ]
     write_layers(layers, FRAME)
     found = {name: pyogrio.raw.read(path, layer=name) for name, _ in pyogrio.list_layers(path)}
@@ -63,7 +66,10 @@ def test_a_file_holds_lines_and_points_with_their_fields(tmp_path):
 
 def test_layers_without_features_keep_their_fields(tmp_path):
     path = tmp_path / "empty.gpkg"
-    write_layers([lines_layer("rails", path, RAIL_FIELDS, []), stations_layer("quality", path, [])], FRAME)
+    destination = Destination.at(path)
+    write_layers(
+        [lines_layer("rails", destination, RAIL_FIELDS, []), stations_layer("quality", destination, [])], FRAME
+    )
     assert [pyogrio.read_info(path, layer=name)["features"] for name in ("rails", "quality")] == [0, 0]
     assert list(pyogrio.read_info(path, layer="quality")["fields"]) == [field.name for field in QUALITY_FIELDS]
 
@@ -71,11 +77,30 @@ def test_layers_without_features_keep_their_fields(tmp_path):
 def test_a_file_in_use_is_left_alone_and_the_new_one_is_next_to_it(tmp_path):
     out = tmp_path / "out.gpkg"
     out.write_text("theirs")
+    destination = Destination.at(out)
     (tmp_path / "out.gpkg-wal").write_text("pending")
     with pytest.raises(DiskError, match=r"The new file is .*out_new\.gpkg"):
-        write_layers([lines_layer("rails", out, RAIL_FIELDS, [])], FRAME)
+        write_layers([lines_layer("rails", destination, RAIL_FIELDS, [])], FRAME)
     assert out.read_text() == "theirs"
     assert pyogrio.read_info(tmp_path / "out_new.gpkg")["features"] == 0
+
+
+def test_the_other_tables_of_a_file_stay(tmp_path):
+    path = tmp_path / "all.gpkg"
+    destination = Destination.at(path)
+    write_layers([lines_layer("signals", destination, RAIL_FIELDS, [RAIL] * 3)], FRAME)
+    write_layers([lines_layer("rails", destination, RAIL_FIELDS, [RAIL] * 2)], FRAME)
+    before = path.read_bytes()
+    layers = [
+        lines_layer("rails", destination, RAIL_FIELDS, [RAIL]),
+        stations_layer("quality", destination, [STATIONS]),
+    ]
+    write_layers(layers, FRAME)
+    assert path.read_bytes() != before
+    counts = {name: pyogrio.read_info(path, layer=name)["features"] for name, _ in pyogrio.list_layers(path)}
+    assert counts == {"signals": 3, "rails": 1, "quality": 2}
+    assert tables_in(path) == set(counts)
+    assert [file.name for file in tmp_path.iterdir()] == ["all.gpkg"]
 
 
 FULL_DISK = """
@@ -83,6 +108,7 @@ import resource, sys
 from pathlib import Path
 import numpy as np
 from rail_extract.core.commands.geopackage import lines_layer, write_layers
+from rail_extract.core.disk import Destination
 from rail_extract.core.errors import DiskError
 from rail_extract.core.fields import RAIL_FIELDS
 from rail_extract.core.frame import LocalFrame
@@ -90,7 +116,7 @@ from rail_extract.core.rails import RailLine
 resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
 rails = [RailLine(np.random.rand(20_000, 3), 1, 10, 5, 1.0, 1.0, 0.0)]
 try:
-    write_layers([lines_layer("rails", Path(sys.argv[1]), RAIL_FIELDS, rails)], LocalFrame(np.zeros(3)))
+    write_layers([lines_layer("rails", Destination.at(Path(sys.argv[1])), RAIL_FIELDS, rails)], LocalFrame(np.zeros(3)))
 except DiskError as error:
     print(error)
 """

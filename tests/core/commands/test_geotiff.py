@@ -65,6 +65,7 @@ import resource, sys
 from pathlib import Path
 import numpy as np
 from rail_extract.core.commands.geotiff import write_rasters
+from rail_extract.core.disk import Destination
 from rail_extract.core.errors import DiskError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.raster import rasterize
@@ -74,7 +75,8 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 raster = rasterize(np.random.RandomState(1).uniform(0, 80, (200_000, 2)), 0.04)
 try:
     header = header_for([raster], (10,), LocalFrame(np.zeros(3)), STANDARDS["EN_60E1_1435"])
-    write_rasters(Path(sys.argv[1]), header, [raster])
+    with Destination.at(Path(sys.argv[1])).replacing() as new:
+        write_rasters(new, header, [raster])
 except DiskError as error:
     print(error)
 """

@@ -14,7 +14,7 @@ from rail_extract.core.errors import RailExtractError
 from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.rails import Centerline, RailLine
-from rail_extract.rail_extract_plugin.writing.destinations import check_writable
+from rail_extract.rail_extract_plugin.writing.destinations import destinations
 from rail_extract.rail_extract_plugin.writing.layers import add_features, features, fields, output_crs
 
 FEET = LocalFrame(np.array([1000.0, 2000.0, 10.0]), horizontal_unit_m=0.3048, vertical_unit_m=0.3048)
@@ -91,7 +91,7 @@ def test_unknown_coordinate_system_is_cartesian_metres(qgis):
     "value", [None, "", "memory:", QgsProcessing.TEMPORARY_OUTPUT, "postgres:dbname='x' table=\"y\" (geom)"]
 )
 def test_outputs_that_are_not_files_are_accepted(context, value):
-    check_writable(value, context)
+    assert destinations({"RAILS": value}, context) == {}
 
 
 def as_text(path):
@@ -112,23 +112,24 @@ def as_property(path):
 
 @pytest.mark.parametrize("form", [as_text, as_table, as_definition, as_property])
 def test_writable_output(tmp_path, context, form):
-    check_writable(form(tmp_path / "räils 1.gpkg"), context)
+    found = destinations({"RAILS": form(tmp_path / "räils 1.gpkg")}, context)
+    assert found["RAILS"].file == tmp_path / "räils 1.gpkg"
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("form", [as_text, as_table, as_definition, as_property])
 def test_folder_of_the_output_is_missing(tmp_path, context, form):
     with pytest.raises(RailExtractError, match="can't be written"):
-        check_writable(form(tmp_path / "gone" / "rails.gpkg"), context)
+        destinations({"RAILS": form(tmp_path / "gone" / "rails.gpkg")}, context)
 
 
 def test_output_is_a_folder(tmp_path, context):
     with pytest.raises(RailExtractError, match="is a folder"):
-        check_writable(str(tmp_path), context)
+        destinations({"RAILS": str(tmp_path)}, context)
 
 
 def test_existing_output_is_not_changed(tmp_path, context):
     path = tmp_path / "rails.gpkg"
     path.write_bytes(b"old")
-    check_writable(str(path), context)
+    destinations({"RAILS": str(path)}, context)
     assert path.read_bytes() == b"old"

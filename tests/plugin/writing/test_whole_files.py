@@ -1,0 +1,130 @@
+"""Files of an algorithm: whole, alone in their place, and without harm to the tables next to them."""
+
+import sqlite3
+import stat
+
+import pytest
+from osgeo import ogr
+from qgis.core import QgsFeature, QgsGeometry, QgsProcessingOutputLayerDefinition, QgsVectorLayer
+
+CENTERLINES = "buildtrackcenterlines"
+
+
+@pytest.fixture
+def rails():
+    """Two rails of 20 m."""
+    layer = QgsVectorLayer("LineStringZ?crs=EPSG:32643", "rails", "memory")
+    for y in (3000000, 3000001.507):
+        feature = QgsFeature()
+        feature.setGeometry(QgsGeometry.fromWkt(f"LINESTRING Z (500000 {y} 100, 500020 {y} 100)"))
+        assert layer.dataProvider().addFeature(feature)
+    return layer
+
+
+@pytest.fixture
+def build(run_step, rails):
+    """Build the centerline of a track into a destination."""
+
+    def build(destination):
+        outcome = run_step(CENTERLINES, {"INPUT": rails, "OUTPUT": destination})
+        assert outcome.ok, outcome.error
+        return outcome.results["OUTPUT"]
+
+    return build
+
+
+def tables(path):
+    """Number of features by table."""
+    dataset = ogr.Open(str(path))
+    layers = (dataset.GetLayer(number) for number in range(dataset.GetLayerCount()))
+    return {layer.GetName(): layer.GetFeatureCount() for layer in layers}
+
+
+def others_in(path):
+    """A GeoPackage with tables of other people, and one row of ours."""
+    dataset = ogr.GetDriverByName("GPKG").CreateDataSource(str(path))
+    for name, count in (("signals", 3), ("tracks", 5), ("notes", 2)):
+        kind = ogr.wkbNone if name == "notes" else ogr.wkbPoint
+        layer = dataset.CreateLayer(name, geom_type=kind)
+        for _ in range(count):
+            layer.CreateFeature(ogr.Feature(layer.GetLayerDefn()))
+    return path
+
+
+def as_path(path):
+    return str(path)
+
+
+def as_definition(path):
+    return QgsProcessingOutputLayerDefinition(str(path))
+
+
+def as_table(path):
+    return f"ogr:dbname='{path}' table=\"tracks\" (geom)"
+
+
+@pytest.mark.parametrize("form", [as_path, as_definition, as_table])
+def test_the_other_tables_of_a_geopackage_stay(build, tmp_path, form):
+    path = others_in(tmp_path / "tracks.gpkg")
+    found = build(form(path))
+    assert found == f"{path}|layername=tracks"
+    assert tables(path) == {"signals": 3, "tracks": 1, "notes": 2}
+    layer = QgsVectorLayer(found, "tracks", "ogr")
+    (feature,) = layer.getFeatures()
+    assert layer.crs().authid() == "EPSG:32643"
+    assert feature.geometry().asWkt(4) == "LineStringZ (500000 3000000.7535 100, 500020 3000000.7535 100)"
+    assert feature["gauge_mm"] == 1435.0
+    assert [file.name for file in tmp_path.iterdir()] == ["tracks.gpkg"]
+
+
+def test_a_table_is_the_same_in_a_file_of_its_own_and_next_to_others(build, tmp_path):
+    (tmp_path / "alone").mkdir()
+    alone, among = tmp_path / "alone" / "tracks.gpkg", others_in(tmp_path / "tracks.gpkg")
+    build(alone), build(among)
+    rows = []
+    for path in (alone, among):
+        database = sqlite3.connect(path)
+        columns = [row[1:] for row in database.execute("PRAGMA table_info(tracks)")]
+        rows.append((columns, database.execute("SELECT * FROM tracks").fetchall()))
+        (kind,) = database.execute(
+            "SELECT geometry_type_name, z FROM gpkg_geometry_columns WHERE table_name = 'tracks'"
+        )
+        assert kind == ("LINESTRING", 1)
+        database.close()
+    assert rows[0] == rows[1]
+
+
+def test_two_tables_of_one_file_in_one_run(run_step, bench, tmp_path):
+    path = tmp_path / "both.gpkg"
+    outputs = {name: f"ogr:dbname='{path}' table=\"{name.lower()}\" (geom)" for name in ("RAILS", "CENTERLINES")}
+    cloud = bench.cloud(bench.track(length_m=6.0))
+    outcome = run_step("extractrails", {"INPUT": cloud, "ITERATIONS": 1, **outputs})
+    assert outcome.ok, outcome.error
+    assert tables(path) == {"rails": 2, "centerlines": 1}
+
+
+def test_a_link_stays_and_its_file_is_new(build, tmp_path):
+    (tmp_path / "data").mkdir()
+    target, link = tmp_path / "data" / "real.gpkg", tmp_path / "link.gpkg"
+    target.write_text("old")
+    link.symlink_to(target)
+    found = build(link)
+    assert QgsVectorLayer(found, "tracks", "ogr").featureCount() == 1
+    assert link.is_symlink()
+    assert tables(target) == {"real": 1}
+
+
+@pytest.mark.parametrize("name", ["tracks.gpkg", "tracks.shp", "tracks.geojson"])
+def test_a_file_that_only_its_owner_may_read_stays_so(build, tmp_path, name):
+    build(tmp_path / name)
+    for file in tmp_path.iterdir():
+        file.chmod(0o600)
+    build(tmp_path / name)
+    assert {stat.S_IMODE(file.stat().st_mode) for file in tmp_path.iterdir()} == {0o600}
+
+
+@pytest.mark.parametrize("name", ["100 % ä#1.gpkg", "a?b='c'.gpkg"])
+def test_any_name_of_a_geopackage(build, tmp_path, name):
+    found = build(tmp_path / name)
+    assert QgsVectorLayer(found, "tracks", "ogr").featureCount() == 1
+    assert [file.name for file in tmp_path.iterdir()] == [name]
