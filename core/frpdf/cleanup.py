@@ -88,7 +88,7 @@ def _state(state: RailRaster | None, piece: Piece) -> np.ndarray:
 def _changed(before: RailRaster, after: RailRaster) -> int:
     """Count the cells that differ."""
     windows = [(*(TILE * np.array(index)), TILE, TILE) for index in set(before.tiles) | set(after.tiles)]
-    return sum(np.count_nonzero(before.read(*window) != after.read(*window)) for window in windows)
+    return sum(int(np.count_nonzero(before.read(*window) != after.read(*window))) for window in windows)
 
 
 class _Canvas:

@@ -50,7 +50,7 @@ class Piece:
     def holds(self, cells: np.ndarray) -> np.ndarray:
         """Return which of (n, 2) rows and columns are inside, (n,) bool."""
         corner = np.array([self.row, self.column])
-        return ((cells >= corner) & (cells < corner + [self.height, self.width])).all(axis=1)
+        return np.all((cells >= corner) & (cells < corner + [self.height, self.width]), axis=1)
 
 
 @dataclass(frozen=True)

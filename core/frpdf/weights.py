@@ -6,6 +6,7 @@ import io
 import math
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -69,5 +70,7 @@ def _array(data: bytes) -> np.ndarray:
 def save_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
     """Write weights, compressed; kernels, which have four dimensions, as float16, which halves the size of the file."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    halved = {name: array.astype(np.float16) if array.ndim == 4 else array for name, array in arrays.items()}
+    halved: dict[str, Any] = {
+        name: array.astype(np.float16) if array.ndim == 4 else array for name, array in arrays.items()
+    }
     np.savez_compressed(path, **halved)
