@@ -1,0 +1,126 @@
+"""Labels of raw scenes compared with the truth, point by point, and the lines that follow from them."""
+
+from __future__ import annotations
+
+import resource
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core.classify.cloud import classify_cloud
+from ...core.classify.figures import Figures
+from ...core.classify.settings import Settings
+from ...core.clouds.points import RailPoints
+from ...core.errors import RailExtractError
+from ...core.parameters import Parameters
+from ...core.pipeline import extract_rails
+from ..scenes.raw import RawScene
+from ..scenes.scene import RAIL
+from .lines import Match, cut, match, nearest
+
+FACE_M = 0.035
+"""Depth of the side faces that count as head, as in the classified scenes."""
+
+BESIDE_M, BESIDE_WIDE_M = 0.03, 0.05
+"""Points this close beside a head, at its height, count as right: mixed pixels of a narrow and of a wide beam."""
+
+NEAR_TOP_M = (-0.07, 0.05)
+"""Heights that such points have above the top of the rail."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """Labels compared with the truth.
+
+    Attributes
+    ----------
+    scene : str
+    points : int
+    recall : float
+        Share of the points on heads that are labelled; NaN without any.
+    precision : float
+        Share of the labelled points that are on heads or right beside; NaN without any.
+    wrong : int
+        Labelled points elsewhere.
+    seconds : float
+        Processor time of the classification.
+    peak_mib : float
+        Peak memory of the process.
+    figures : Figures
+    """
+
+    scene: str
+    points: int
+    recall: float
+    precision: float
+    wrong: int
+    seconds: float
+    peak_mib: float
+    figures: Figures
+
+
+def settings_of(scene: RawScene) -> Settings:
+    """Make the settings that fit a scene."""
+    return Settings((scene.standard.gauge_m, *scene.other_gauges_m), scene.standard.head_width_m)
+
+
+def score(scene: RawScene, wide: bool = False) -> tuple[Score, np.ndarray]:
+    """Classify a scene and compare the labels with the truth.
+
+    Parameters
+    ----------
+    scene : RawScene
+    wide : bool
+        Whether the beam is as wide as a head.
+
+    Returns
+    -------
+    Score
+    (n,) bool array
+        The labels.
+    """
+    start = time.process_time()
+    found = classify_cloud(scene.xyz, settings_of(scene))
+    seconds = time.process_time() - start
+    peak_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    head, beside = _truth(scene, found.rail, wide)
+    right = found.rail & (head | beside)
+    result = Score(
+        scene=scene.name,
+        points=len(scene.xyz),
+        recall=float((found.rail & head).sum() / head.sum()) if head.any() else np.nan,
+        precision=float(right.sum() / found.rail.sum()) if found.rail.any() else np.nan,
+        wrong=int((found.rail & ~right).sum()),
+        seconds=seconds,
+        peak_mib=peak_mib,
+        figures=found.figures,
+    )
+    return result, found.rail
+
+
+def lines_from(scene: RawScene, rail: np.ndarray) -> Match | None:
+    """Extract rails from labelled points and compare them with the truth; None where there is nothing to extract."""
+    points = RailPoints(scene.xyz[rail], scene.frame, RAIL)
+    parameters = Parameters(scene.standard.gauge_m, scene.standard.head_width_m, other_gauges_m=scene.other_gauges_m)
+    try:
+        network = extract_rails([points], parameters)
+    except RailExtractError:
+        return None
+    return match([line.xyz for line in network.rails], scene.rails)
+
+
+def _truth(scene: RawScene, rail: np.ndarray, wide: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Points on heads down to `FACE_M`, and labelled points right beside a head, (n,) bool each."""
+    head, beside = np.zeros(len(rail), dtype=bool), np.zeros(len(rail), dtype=bool)
+    if not scene.rails:
+        return head, beside
+    chosen = np.flatnonzero(scene.head | rail)
+    feet, _ = nearest(scene.xyz[chosen], cut(scene.rails))
+    across = np.linalg.norm((scene.xyz[chosen] - feet)[:, :2], axis=1)
+    above = scene.xyz[chosen, 2] - feet[:, 2]
+    head[chosen] = scene.head[chosen] & (above > -FACE_M)
+    half_m = scene.standard.head_width_m / 2 + (BESIDE_WIDE_M if wide else BESIDE_M)
+    low_m, high_m = NEAR_TOP_M
+    beside[chosen] = (across < half_m) & (above > low_m) & (above < high_m)
+    return head, beside
