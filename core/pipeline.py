@@ -62,6 +62,20 @@ def extract_rails(
         No weights fit the rail standard, or the engine is not installed.
     Cancelled
         The user cancelled.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rail_extract.core.frame import LocalFrame
+    >>> random = np.random.RandomState(0)
+    >>> x, side = random.uniform(0, 15, 5000), random.randint(2, size=5000)
+    >>> y = 1.507 * side + random.uniform(-0.036, 0.036, 5000)
+    >>> cloud = RailPoints(np.column_stack([x, y, np.zeros(5000)]), LocalFrame(np.zeros(3)), class_code=10)
+    >>> network = extract_rails([cloud], Parameters(gauge_m=1.435, head_width_m=0.072, engine="OPENCV"))
+    >>> [round(rail.length_m) for rail in network.rails]
+    [15, 15]
+    >>> abs(network.centerlines[0].gauge_mm - 1435) < 2
+    True
     """
     if not points:
         raise NoRailPointsError("There is no point to extract rails from.")

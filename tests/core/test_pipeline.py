@@ -1,4 +1,4 @@
-"""The steps of the walk: what each gives alone, and several gauges in one run."""
+"""The walk: several gauges in one run, lines with and without points, and squares compared with an undivided run."""
 
 from dataclasses import replace
 
@@ -51,14 +51,14 @@ def test_the_shared_rail_of_a_three_rail_track_serves_both_gauges(curve, narrow)
     assert wide.length_m == pytest.approx(small.length_m, rel=0.02)
 
 
-def test_four_rails_of_two_gauges_on_one_axis_make_two_tracks():
+def test_four_rails_of_two_gauges_on_one_axis_are_two_tracks():
     rails = rails_at(CURVES[0], *((side * (gauge + WIDTH) / 2) for gauge in (1.435, 1.0) for side in (-1, 1)))
     tracks = tracks_of(rails, Parameters(1.435, WIDTH, other_gauges_m=(1.0,)))
     assert [round(track.gauge_mm) for track in tracks] == [1435, 1000]
     assert [sorted(track.left_ids + track.right_ids) for track in tracks] == [[1, 2], [3, 4]]
 
 
-def test_tracks_of_two_gauges_side_by_side_are_numbered_through():
+def test_tracks_of_two_gauges_side_by_side_have_consecutive_numbers():
     lefts = (0.0, 1.435 + WIDTH, 5.0, 5.0 + 1.0 + WIDTH)
     tracks = tracks_of(rails_at(CURVES[0], *lefts), Parameters(1.435, WIDTH, other_gauges_m=(1.0, 1.435)))
     assert [(track.track_id, round(track.gauge_mm)) for track in tracks] == [(1, 1435), (2, 1000)]
@@ -74,14 +74,14 @@ def test_a_track_between_two_gauges_is_one_track(gauge):
     assert first[0].length_m == pytest.approx(second[0].length_m, abs=1e-6)
 
 
-def test_a_gauge_that_nothing_has_is_no_error_beside_one_that_something_has():
+def test_a_gauge_without_track_is_an_error_only_if_no_gauge_has_one():
     rails = rails_at(CURVES[0], 0.0, 1.0 + WIDTH)
     assert len(tracks_of(rails, Parameters(1.435, WIDTH, other_gauges_m=(1.0,)))) == 1
     with pytest.raises(NoTrackError):
         tracks_of(rails, Parameters(1.435, WIDTH))
 
 
-def test_a_class_of_another_gauge_does_not_cost_the_others_their_tracks():
+def test_a_class_without_track_is_a_warning_if_another_class_has_one():
     fits, other = rails_at(CURVES[0], 0.0, 1.435 + WIDTH), rails_at(CURVES[0], 5.0, 6.0 + WIDTH)
     other = [replace(rail, class_code=11) for rail in other]
     heard = Warnings()
@@ -91,7 +91,7 @@ def test_a_class_of_another_gauge_does_not_cost_the_others_their_tracks():
     assert said.startswith("Class 11: No track of 1435 mm gauge found")
 
 
-def test_lines_without_points_stay_where_the_raster_shows_them():
+def test_lines_without_points_stay_in_their_cells_and_have_no_heights():
     along = np.arange(0, 20, 0.005)
     xyz = np.column_stack([along, 0.3 * along, np.full(len(along), 100.0)])
     raster = rasterize(xyz, cell_size(1.435, WIDTH))
@@ -107,14 +107,14 @@ def test_lines_without_points_stay_where_the_raster_shows_them():
 
 
 def largest_step(xyz):
-    """How far a vertex lies beside the chord between its neighbours."""
+    """Return the largest distance of a vertex from the chord between its neighbours."""
     t = length_along(xyz[:, :2])
     share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
     return np.abs(xyz[1:-1] - xyz[:-2] - share * (xyz[2:] - xyz[:-2])).max()
 
 
-def test_a_line_in_stretches_is_the_line_in_one_piece(monkeypatch):
-    # Clean points need no network; without it the test sees what the seams change, and nothing else.
+def test_a_line_in_squares_is_the_line_of_an_undivided_run(monkeypatch):
+    # Clean points need no network; without it, the test sees only what the seams change.
     monkeypatch.setattr(steps, "clean", lambda raster, *_: raster)
     points = straight().rail_points()
     whole_settings = Parameters(
@@ -140,8 +140,8 @@ def test_a_line_in_stretches_is_the_line_in_one_piece(monkeypatch):
     np.testing.assert_allclose(two.cant_mm[:count], one.cant_mm[:count], atol=0.5)
 
 
-def test_the_shortest_line_counts_whole_lines_not_what_a_stretch_sees_of_them(monkeypatch):
-    """Two lines across a border of stretches at x = 0, of 120 m and of 90 m, of which 30 m lie before it."""
+def test_the_minimum_length_is_that_of_whole_lines_not_of_their_parts_in_squares(monkeypatch):
+    """Two lines of 120 m and 90 m that cross a border of squares, at x = 0, after 30 m."""
     monkeypatch.setattr(steps, "clean", lambda raster, *_: raster)
     lines = [np.arange(-30, end, 0.005) for end in (90, 60)]
     points = [np.column_stack([x, np.full(len(x), 5.0 + 4 * y), np.full(len(x), 100.0)]) for y, x in enumerate(lines)]
@@ -162,13 +162,13 @@ def test_the_shortest_line_counts_whole_lines_not_what_a_stretch_sees_of_them(mo
         (1.435, {"max_gap_m": 1e5}, 50),
     ],
 )
-def test_stretches_overlap_by_what_borders_need(gauge, changed, tiles):
+def test_squares_overlap_as_far_as_both_sides_of_a_border_need(gauge, changed, tiles):
     assert overlap_tiles(Parameters(gauge, WIDTH, **changed)) == tiles
 
 
 @pytest.mark.parametrize("tiles", [4, 50])
-def test_a_ring_comes_back_closed(monkeypatch, tiles):
-    """Over several stretches, of which one sees all of it and the others a part, and in one."""
+def test_a_ring_stays_closed(monkeypatch, tiles):
+    """In several squares, one of which sees all of it and the others a part, and undivided."""
     monkeypatch.setattr(steps, "clean", lambda raster, *_: raster)
     standard, radius = STANDARDS["EN_49E1_1435"], 39.5
     curve = trace([Element(2 * np.pi * radius, 1 / radius, 1 / radius)], start=(3.0, -2.0 - radius))
@@ -191,7 +191,7 @@ def _by_length(lines):
     return sorted(lines, key=lambda line: line.length_m)
 
 
-def test_a_run_in_stretches_hears_a_cancel():
+def test_a_run_in_squares_can_be_cancelled():
     class Stopped(Progress):
         def is_cancelled(self):
             return True
@@ -200,7 +200,7 @@ def test_a_run_in_stretches_hears_a_cancel():
         extract_rails([straight().rail_points()], Parameters(1.435, WIDTH, square_tiles=4), Stopped())
 
 
-def test_stretches_smaller_than_their_overlap_are_refused():
+def test_squares_smaller_than_their_overlap_are_refused():
     with pytest.raises(ParameterError, match="4"):
         extract_rails([straight().rail_points()], Parameters(1.435, WIDTH, square_tiles=2))
 

@@ -1,4 +1,4 @@
-"""Extraction on real workers: the same lines as in one process, whatever dies in between."""
+"""Extraction on real workers: the lines of one process, even if workers die, disks are full or versions differ."""
 
 import json
 import os
@@ -29,7 +29,15 @@ from rail_extract.core.tasks import Task
 from rail_extract.laboratory.scenes.scene import RAIL
 
 STANDARD = STANDARDS["EN_60E1_1435"]
-PARAMETERS = Parameters(STANDARD.gauge_m, STANDARD.head_width_m, passes=1, engine="OPENCV", square_tiles=4)
+PARAMETERS = Parameters(
+    STANDARD.gauge_m,
+    STANDARD.head_width_m,
+    passes=1,
+    engine="OPENCV",
+    square_tiles=4,
+    quality_step_m=1.0,
+    keep_cleaned=True,
+)
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +52,7 @@ def extract(client, paths, codes, parameters, folder):
 
 
 def same(found, expected, frame, other):
-    """Lines, ids and figures agree within a tenth of a millimetre."""
+    """Check that lines, ids and figures agree, coordinates to a tenth of a millimetre."""
     assert len(found) == len(expected)
     for one, two in zip(found, expected):
         np.testing.assert_allclose(frame.to_crs(one.xyz), other.to_crs(two.xyz), rtol=0, atol=1e-4)
@@ -52,18 +60,25 @@ def same(found, expected, frame, other):
             assert getattr(one, name, None) == pytest.approx(getattr(two, name, None), abs=0.01)
 
 
-def test_a_local_worker_keeps_to_its_core_and_its_memory(client):
+def test_a_local_worker_uses_one_core_and_keeps_its_memory(client):
     found = client.run(lambda: (os.environ["OMP_NUM_THREADS"], os.environ["MALLOC_TRIM_THRESHOLD_"]))
     assert list(found.values()) == [("1", "268435456")] * 2
 
 
-def test_workers_give_what_one_process_gives(tiles, one_process, client, tmp_path):
+def test_workers_give_the_results_of_one_process(tiles, one_process, client, tmp_path):
     found = extract(client, [tiles], [RAIL], PARAMETERS, tmp_path)
     assert found.failures == ()
     same(found.rails, one_process.rails, found.frame, one_process.frame)
     same(found.centerlines, one_process.centerlines, found.frame, one_process.frame)
     assert len(found.rails) == 2 and len(found.centerlines) == 1
     assert sum(rail.length_m for rail in found.rails) == pytest.approx(100, abs=1)
+    assert found.engine == one_process.engine
+    for one, two in zip(found.geometry, one_process.geometry):
+        for name in ("chainage_m", "gauge_mm", "cant_mm", "radius_m", "sigma_mm", "points"):
+            np.testing.assert_allclose(getattr(one, name), getattr(two, name), rtol=1e-4, atol=0.01)
+    assert len(found.geometry) == 1
+    assert found.cleaned_classes == one_process.cleaned_classes == (RAIL,)
+    np.testing.assert_array_equal(found.cleaned[0].cells(), one_process.cleaned[0].cells())
 
 
 def test_a_restart_computes_only_what_changed(tiles, client, tmp_path):
@@ -77,7 +92,7 @@ def test_a_restart_computes_only_what_changed(tiles, client, tmp_path):
     assert len([file for file in after.keys() - before.keys() if file.name.startswith("clean")]) > 0
 
 
-def test_a_killed_worker_is_replaced_and_its_stretches_run_again(tiles, one_process, client, tmp_path):
+def test_a_killed_worker_is_replaced_and_its_tasks_run_again(tiles, one_process, client, tmp_path):
     killed = []
 
     def kill(client):
@@ -102,18 +117,18 @@ def test_a_killed_worker_is_replaced_and_its_stretches_run_again(tiles, one_proc
 
 @pytest.fixture
 def lone_worker():
-    """Tasks in this process, where they can be put others in the place of."""
+    """A worker in this process, whose functions a test can replace."""
     with LocalCluster(processes=False, n_workers=1, dashboard_address=":0") as cluster, Client(cluster) as client:
         yield client
 
 
-def test_a_stretch_that_kills_its_workers_does_not_take_its_neighbours_along(tiles, lone_worker, tmp_path, monkeypatch):
+def test_the_neighbours_of_a_square_that_kills_its_workers_are_drawn(tiles, lone_worker, tmp_path, monkeypatch):
     def dying(task, *arguments):
         if task.label == f"Cleaning square {doomed} of class 10":
             raise KilledWorker("clean", None, 10)
         return execute(task, *arguments)
 
-    doomed = max(lay_out_keys(tiles, tmp_path))
+    doomed = max(square_keys(tiles, tmp_path))
     monkeypatch.setattr(runner, "execute", dying)
     found = extract(lone_worker, [tiles], [RAIL], PARAMETERS, tmp_path / "work")
     assert len(found.failures) == 1
@@ -122,9 +137,9 @@ def test_a_stretch_that_kills_its_workers_does_not_take_its_neighbours_along(til
     assert 20 < found.rails[0].length_m < 45
 
 
-def lay_out_keys(tiles, folder):
+def square_keys(tiles, folder):
     (source,) = spool(ask([tiles], [RAIL]), square_side(PARAMETERS), folder)
-    return [stretch.key for stretch in lay_out([source], source)]
+    return [square.key for square in lay_out([source], source)]
 
 
 def test_a_worker_of_another_version_is_named(tiles, lone_worker, tmp_path, monkeypatch):
@@ -134,8 +149,8 @@ def test_a_worker_of_another_version_is_named(tiles, lone_worker, tmp_path, monk
         extract_files(ask([tiles], [RAIL]), tmp_path, PARAMETERS, older)
 
 
-def test_finished_stretches_of_another_cloud_are_not_taken(tiles, client, tmp_path):
-    """An undivided cloud has its own middle for its origin, which further files of another class move."""
+def test_finished_squares_of_another_cloud_are_not_used(tiles, client, tmp_path):
+    """The origin of an undivided cloud is near its middle; more files, even of another class, move it."""
     parameters = replace(PARAMETERS, square_tiles=50)
     alone = extract(client, [tiles / "tile0.laz"], [RAIL], parameters, tmp_path)
     others = [tmp_path / f"other{number}.laz" for number in (1, 2)]
@@ -173,7 +188,7 @@ def test_a_full_work_folder_is_one_sentence(tiles, tmp_path):
 
 
 def first_of(name, context):
-    """Stands for any step of the walk."""
+    """Stand for any step of the walk."""
     return (RailLine(np.zeros((2, 3)), 1, 10, 5, 1.0, 1.0, 0.0),)
 
 
