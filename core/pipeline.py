@@ -161,7 +161,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
         squares = {square.key: square for square in lay_out(sources, source)}
         parts, rasters = _draw_squares(source, squares, parameters, runner, share)
         any_square |= bool(parts)
-        found = whole_rails(parts, source.frame, parameters, first_id=len(rails) + 1) if parts else []
+        found = whole_rails(parts, source.frame, parameters, len(rails) + 1, progress) if parts else []
         warn_of_rails(found, source.class_code, parameters, progress)
         rails += found
         if rasters:

@@ -125,6 +125,13 @@ class RailLine:
             share = support.points.sum() / max(self.support.points.sum(), 1)
         return replace(self, xyz=xyz, points=self.points * share, gaps=gaps, support=support)
 
+    def part(self, start: float, end: float) -> RailLine:
+        """Return the part between two plan chainages as a rail of its own, with its own figures."""
+        part = self.between(start, end)
+        sigma_mm = self.sigma_mm if part.support is None else 1000 * part.support.rms_m
+        bridged_m = float(np.sum(part.gaps[:, 1] - part.gaps[:, 0]))
+        return replace(part, sigma_mm=sigma_mm, bridged_m=bridged_m)
+
     def reversed(self) -> RailLine:
         """Return the line in the other direction."""
         plan_length = length_along(self.xyz[:, :2])[-1]
@@ -166,6 +173,14 @@ class Centerline:
     def length_m(self) -> float:
         """Length in 3D; in plan if the line has no heights."""
         return _length(self.xyz)
+
+    def part(self, start: float, end: float) -> Centerline:
+        """Return the part between two plan chainages, with the means of the whole line."""
+        along = length_along(self.xyz[:, :2])
+        inner = along[(along > start + SAME_PLACE_M) & (along < end - SAME_PLACE_M)]
+        t = np.concatenate([[start], inner, [end]])
+        xyz = np.column_stack([np.interp(t, along, column) for column in self.xyz.T])
+        return replace(self, xyz=xyz, bridged_m=self.bridged_m * (end - start) / along[-1])
 
 
 def cell_borders(chainage: np.ndarray) -> np.ndarray:

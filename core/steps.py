@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
 
 from .clouds.points import RailPoints
 from .errors import NoTrackError, ParameterError
@@ -19,7 +22,9 @@ from .heads.smoothing_check import warn_if_out_of_reach
 from .lines.bridges import FIT_M
 from .lines.network_smoothing import smooth_network
 from .lines.thinning import thin
+from .lines.turning import MAX_TURN_DEG, parts_without_turns
 from .parameters import Parameters
+from .polyline import length_along
 from .progress import SILENT, Progress
 from .rails import Centerline, RailLine
 from .raster import TILE, RailRaster, cell_size, rasterize
@@ -118,9 +123,13 @@ def rails_of_square(
 
 
 def whole_rails(
-    results: Sequence[SquareRails], frame: LocalFrame, parameters: Parameters, first_id: int = 1
+    results: Sequence[SquareRails],
+    frame: LocalFrame,
+    parameters: Parameters,
+    first_id: int = 1,
+    progress: Progress = SILENT,
 ) -> list[RailLine]:
-    """Join the rails of all squares, drop the short ones, simplify and number them.
+    """Join the rails of all squares, drop the short ones, cut turns that no rail has, simplify and number them.
 
     Parameters
     ----------
@@ -129,9 +138,11 @@ def whole_rails(
         Local frame of the result.
     parameters : Parameters
     first_id : int
+    progress : Progress
+        Receives a warning if lines had to be cut.
     """
     rails = [rail for rail in join(results, frame) if rail.length_m >= parameters.min_length_m]
-    return _finished(numbered(rails), parameters, first_id)
+    return _finished(numbered(rails), parameters, first_id, progress)
 
 
 def lines_of(
@@ -155,7 +166,7 @@ def lines_of(
     first_id : int
         `rail_id` of the first rail.
     """
-    rails = _finished(_all_vertices(raster, class_code, points, parameters, progress), parameters, first_id)
+    rails = _finished(_all_vertices(raster, class_code, points, parameters, progress), parameters, first_id, progress)
     warn_of_rails(rails, class_code, parameters, progress)
     return rails
 
@@ -207,10 +218,33 @@ def _all_vertices(
     return elevate(network, points, elevation, elevating)
 
 
-def _finished(rails: Sequence[RailLine], parameters: Parameters, first_id: int) -> list[RailLine]:
-    """Simplify rails and number them from `first_id`."""
-    thinned = thin(rails, parameters.simplify_xy_m, parameters.simplify_z_m)
+def _finished(rails: Sequence[RailLine], parameters: Parameters, first_id: int, progress: Progress) -> list[RailLine]:
+    """Cut turns that no rail has, simplify rails and number them from `first_id`."""
+    thinned = thin(_without_turns(rails, parameters, progress), parameters.simplify_xy_m, parameters.simplify_z_m)
     return [replace(rail, rail_id=number) for number, rail in enumerate(thinned, start=first_id)]
+
+
+Line = TypeVar("Line", RailLine, Centerline)
+
+
+def _without_turns(lines: Sequence[Line], parameters: Parameters, progress: Progress) -> list[Line]:
+    """Split lines where they turn as no rail can, and warn the user."""
+    kept: list[Line] = []
+    turned: list[Line] = []
+    for line in lines:
+        parts = parts_without_turns(line.xyz[:, :2], parameters.min_length_m, parameters.smoothing_xy_m)
+        whole = len(parts) == 1 and np.ptp(parts[0]) >= length_along(line.xyz[:, :2])[-1]
+        kept += [line] if whole else [line.part(*part) for part in parts]
+        turned += [] if whole else [line]
+    if turned:
+        what = "rail" if isinstance(turned[0], RailLine) else "centerline"
+        count = f"1 {what} turned" if len(turned) == 1 else f"{len(turned)} {what}s turned"
+        before_m, after_m = (sum(line.length_m for line in some) for some in (lines, kept))
+        progress.warning(
+            f"{count} by more than {MAX_TURN_DEG:g}° within a metre, as no rail does: split there, and "
+            f"{before_m - after_m:.1f} m left out."
+        )
+    return kept
 
 
 def tracks_of(rails: Sequence[RailLine], parameters: Parameters, progress: Progress = SILENT) -> list[Centerline]:
@@ -266,4 +300,5 @@ def _tracks_of_class(rails: Sequence[RailLine], parameters: Parameters, progress
         raise errors[0]
     if not centerlines:
         progress.warning("No two rails run parallel: there are rails but no track centerlines.")
-    return thin(centerlines, parameters.simplify_xy_m, parameters.simplify_z_m)
+    whole = _without_turns(centerlines, parameters, progress)
+    return thin(whole, parameters.simplify_xy_m, parameters.simplify_z_m)

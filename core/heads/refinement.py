@@ -173,8 +173,13 @@ def _redrawn(line: np.ndarray, along: np.ndarray, unseen: list[tuple[float, floa
     line = line.copy()
     for start, end in unseen:
         first, last = np.searchsorted(along, [start, end])
-        found = bridge(line[first::-1], line[last:], held=True) if 0 < first < last < len(line) - 1 else None
+        found = bridge(line[first::-1], line[last:]) if 0 < first < last < len(line) - 1 else None
         if found is not None:
+            # The curve leaves out what strays from it on either side: closed to a vertex there, it would turn back.
+            first = int(np.searchsorted(along, along[first] - found.cuts_m[0], side="right")) - 1
+            last = int(np.searchsorted(along, along[last] + found.cuts_m[1]))
+            if not 0 <= first < last < len(line):
+                continue
             curve = np.concatenate([line[[first]], found.points, line[[last]]])
             share = (along[first : last + 1] - along[first]) / (along[last] - along[first])
             t = length_along(curve)

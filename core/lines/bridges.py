@@ -80,18 +80,20 @@ def bridge(
     Returns
     -------
     Bridge or None
-        None if the curve misses either line or bends more than a rail.
+        None if the curve misses either line, bends more than a rail, or would have to turn back along a line.
     """
     before, after = even_points(one, FIT_M)[::-1], even_points(other, FIT_M)
     origin, axes = _frame(before, after)
     before, after = (before - origin) @ axes.T, (after - origin) @ axes.T
     gap = after[0, 0] - before[-1, 0]
+    if min(gap, before[-1, 0] - before[0, 0], after[-1, 0] - after[0, 0]) <= 0:
+        return None
     cubic = _fit(np.concatenate([before, after]), transition_m)
     off = [np.abs(points[:, 1] - _basis(points[:, 0]) @ cubic) for points in (before, after)]
     misfit = max(np.median(off[0]), np.median(off[1]))
     bend = np.abs(cubic[2] + cubic[3] * np.array([before[0, 0], after[-1, 0]])).max() * MIN_RADIUS_M
     allowed = max(misfit_m, STAIRS_M * (1 - gap / (2 * FIT_M)))
-    if gap <= 0 or misfit > allowed or bend > 1:
+    if misfit > allowed or bend > 1:
         return None
     cut_before, cut_after = 0 if held else _astray(off[0][::-1]), _astray(off[1])
     first, last = before[-1 - cut_before, 0], after[cut_after, 0]

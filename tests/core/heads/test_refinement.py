@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.heads.refinement import refine
+from rail_extract.core.heads.refinement import _redrawn, refine
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.polyline import project
@@ -202,3 +202,14 @@ def test_free_ends_follow_the_rail_although_the_raster_curls(radius):
     refined = refine(network_of(line), cloud(points), WIDTH).lines[0]
     off = refined[:, 1] - np.interp(refined[:, 0], *true.T)
     assert np.abs(off[-8:]).max() < 0.006
+
+
+def test_a_redrawn_section_does_not_overshoot_what_strays_behind_it():
+    """Other rails draw the line aside for another metre: the curve leaves that out, and the line must not turn back."""
+    x = np.arange(0, 24, 0.1)
+    aside = 0.05 * np.exp(-(((x - 14.5) / 0.4) ** 2))
+    line = np.column_stack([x, aside])
+    redrawn = _redrawn(line, x, [(10.0, 14.2)])
+    assert (np.diff(redrawn[:, 0]) > 0).all()
+    assert np.abs(redrawn[:, 1]).max() < 0.021
+    assert len(redrawn) == len(line)
