@@ -77,6 +77,14 @@ def sweep(parent: Path, rescue: Callable[[Path], None] | None = None) -> None:
                 shutil.rmtree(entry, ignore_errors=True)
 
 
+def discard(path: Path) -> None:
+    """Delete whatever has a name, a folder with all its content."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
 def _is_abandoned(folder: Path) -> bool:
     """Return whether a folder belongs to this user and the process that created it on this computer is gone."""
     if hasattr(os, "getuid") and folder.stat().st_uid != os.getuid():

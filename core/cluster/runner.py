@@ -6,10 +6,12 @@ depends on, so that a restarted run computes only what is not finished.
 
 from __future__ import annotations
 
+import os
 import threading
 import uuid
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +20,9 @@ from distributed import Client, Future, as_completed
 from ..disk import writing
 from ..errors import CloudError, DiskError, RailExtractError
 from ..progress import SILENT, Progress
+from ..scratch import discard, sweep
 from ..tasks import Context, Name, Once, Task, in_order
-from .store import CORE, Stored, can_store, fingerprint, load, save, version
+from .store import CORE, DamagedError, Stored, can_store, fingerprint, load, save, version
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,14 @@ class Failure:
     """The reason why a task has no result: one sentence."""
 
     reason: str
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a worker returns: a `Stored`, a `Failure` or a result that `store` does not keep, and its warnings."""
+
+    result: Any
+    warnings: tuple[str, ...] = ()
 
 
 class DaskRunner:
@@ -47,6 +58,7 @@ class DaskRunner:
     def __init__(self, client: Client, folder: Path) -> None:
         self.failures: list[str] = []
         self._client, self._folder, self._version = client, folder.resolve(), version()
+        self._warned: set[str] = set()
         with writing(self._folder):
             self._folder.mkdir(parents=True, exist_ok=True)  # not by workers: a failed run may have removed it
 
@@ -79,7 +91,9 @@ class DaskRunner:
         for future in queue:
             progress.check()
             name = running.pop(future)
-            result = _result(future, tasks[name].label)
+            answer = _answer(future, tasks[name].label)
+            self._warn(answer.warnings, progress)
+            result = answer.result
             if isinstance(result, Failure):
                 self.failures.append(result.reason)
             else:
@@ -89,7 +103,17 @@ class DaskRunner:
             done += tasks[name].weight
             progress.set_fraction(done / total)
             if name in results and tasks[name].returned:
-                yield name, load(result) if isinstance(result, Stored) else result
+                try:
+                    yield name, load(result) if isinstance(result, Stored) else result
+                except DamagedError as error:
+                    self.failures.append(f"{tasks[name].label} failed ({error}): start the run again.")
+
+    def _warn(self, warnings: Iterable[str], progress: Progress) -> None:
+        """Pass each warning on once, however many workers have it."""
+        for warning in warnings:
+            if warning not in self._warned:
+                self._warned.add(warning)
+                progress.warning(warning)
 
     def _submit(self, task: Task, inputs: Mapping[Hashable, Any]) -> Future:
         """Send a task to a worker, under a name that shows in Dask's dashboard what it does."""
@@ -97,7 +121,7 @@ class DaskRunner:
         return self._client.submit(execute, task, inputs, str(self._folder), self._version, key=key, pure=False)
 
 
-def execute(task: Task, inputs: Mapping[Hashable, Any], folder: str, expected_version: str) -> Any:
+def execute(task: Task, inputs: Mapping[Hashable, Any], folder: str, expected_version: str) -> Answer:
     """Execute a task on a worker, unless its result is there already.
 
     Parameters
@@ -112,8 +136,7 @@ def execute(task: Task, inputs: Mapping[Hashable, Any], folder: str, expected_ve
 
     Returns
     -------
-    Stored, Failure or Any
-        The file of the result; for a result that `store` does not keep, the result itself.
+    Answer
 
     Raises
     ------
@@ -121,24 +144,55 @@ def execute(task: Task, inputs: Mapping[Hashable, Any], folder: str, expected_ve
         The result could not be written.
     """
     if version() != expected_version:
-        return Failure(f"A worker has another version of Rail Extract ({CORE.parent}): install the same everywhere.")
-    name = task.function.__name__.strip("_")
-    path = Path(folder) / f"{name}_{fingerprint(name, *task.arguments, inputs, expected_version)}.npz"
-    if path.exists():
-        return Stored(str(path))
+        return Answer(
+            Failure(f"A worker has another version of Rail Extract ({CORE.parent}): install the same everywhere.")
+        )
+    _sweep_once(folder)
+    heard = _Warnings()
     try:
-        results = {one: load(given) if isinstance(given, Stored) else given for one, given in inputs.items()}
-        result = task.function(*task.arguments, Context(results, _once_of_thread(), SILENT))
-        if not can_store(result):
-            return result
-        save(path, result)
+        return Answer(_result(task, inputs, Path(folder), expected_version, heard), tuple(heard.texts))
     except DiskError:
         raise
     except CloudError as error:
-        return Failure(str(error))  # it names the file
+        return Answer(Failure(str(error)), tuple(heard.texts))  # it names the file
     except Exception as error:  # noqa: BLE001 - whatever the reason, one failing square must not stop the others
-        return Failure(f"{task.label} failed ({error}).")
+        return Answer(Failure(f"{task.label} failed ({error})."), tuple(heard.texts))
+
+
+def _result(task: Task, inputs: Mapping[Hashable, Any], folder: Path, expected_version: str, progress: Progress) -> Any:
+    """Return the file of a result that is kept and intact; otherwise compute it, and keep it if `store` can."""
+    name = task.function.__name__.strip("_")
+    path = folder / f"{name}_{fingerprint(name, *task.arguments, inputs, expected_version)}.npz"
+    if os.path.lexists(path):
+        try:
+            load(Stored(str(path)))
+            return Stored(str(path))
+        except DamagedError:
+            progress.warning(f"{task.label}: the stored result is damaged, so it is computed again.")
+            with writing(folder):
+                discard(path)
+    results = {one: load(given) if isinstance(given, Stored) else given for one, given in inputs.items()}
+    result = task.function(*task.arguments, Context(results, _once_of_thread(), progress))
+    if not can_store(result):
+        return result
+    save(path, result)
     return Stored(str(path))
+
+
+class _Warnings(Progress):
+    """Keeps the warnings of a task."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+
+    def warning(self, text: str) -> None:
+        self.texts.append(text)
+
+
+@lru_cache
+def _sweep_once(folder: str) -> None:
+    """Remove what killed workers of this computer have left in a folder."""
+    sweep(Path(folder))
 
 
 _OF_THREAD = threading.local()
@@ -151,8 +205,8 @@ def _once_of_thread() -> Once:
     return _OF_THREAD.once
 
 
-def _result(future: Future, label: str) -> Any:
-    """Return the result of a task, or a `Failure` if its workers died.
+def _answer(future: Future, label: str) -> Answer:
+    """Return what a worker has answered, or a `Failure` if its workers died.
 
     Raises
     ------
@@ -162,4 +216,4 @@ def _result(future: Future, label: str) -> Any:
     error = future.exception() if future.status == "error" else None
     if isinstance(error, RailExtractError):
         raise error
-    return future.result() if error is None else Failure(f"{label} was abandoned ({error}).")
+    return future.result() if error is None else Answer(Failure(f"{label} was abandoned ({error})."))

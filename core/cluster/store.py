@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import uuid
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import lru_cache
@@ -21,6 +20,7 @@ from ..frame import LocalFrame
 from ..frpdf.models import MODELS
 from ..rails import RailLine, Support
 from ..raster import TILE, RailRaster
+from ..scratch import scratch_folder
 from ..squares.grid import Square
 from ..squares.pieces import SquareRails
 from ..squares.spool import SpooledPoints
@@ -99,12 +99,25 @@ def save(path: Path, result: RailRaster | SquareRails | tuple[RailLine, ...]) ->
         _write(path, _rail_arrays(result))
 
 
+class DamagedError(Exception):
+    """A file does not hold what `save` wrote."""
+
+
 def load(stored: Stored) -> RailRaster | SquareRails | tuple[RailLine, ...]:
-    """Read what `save` wrote."""
-    with np.load(stored.path, allow_pickle=False) as arrays:
-        if "bits" in arrays:
-            return _raster(arrays)
-        return SquareRails(_square(arrays), _rails(arrays), arrays["nodes"]) if "nodes" in arrays else _rails(arrays)
+    """Read what `save` wrote.
+
+    Raises
+    ------
+    DamagedError
+    """
+    try:
+        with np.load(stored.path, allow_pickle=False) as arrays:
+            if "bits" in arrays:
+                return _raster(arrays)
+            rails = _rails(arrays)
+            return SquareRails(_square(arrays), rails, arrays["nodes"]) if "nodes" in arrays else rails
+    except Exception as error:  # damage shows as an error of the file, of the compression or of the arrays
+        raise DamagedError(f"{Path(stored.path).name} is damaged ({error})") from error
 
 
 def _raster_arrays(raster: RailRaster) -> dict[str, np.ndarray]:
@@ -183,14 +196,11 @@ def _unpacked(arrays: Mapping[str, np.ndarray], name: str) -> list[np.ndarray]:
 
 
 def _write(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
-    """Write arrays under another name first, so that a full disk or a killed worker leaves no incomplete file."""
-    unfinished = path.with_name(f"{uuid.uuid4().hex}.unfinished")
-    with writing(path.parent):
-        try:
-            with unfinished.open("wb") as file:
-                np.savez_compressed(file, **arrays)
-                file.flush()
-                os.fsync(file.fileno())  # otherwise the file may be empty after a power cut
-            unfinished.replace(path)
-        finally:
-            unfinished.unlink(missing_ok=True)
+    """Write arrays in a temporary folder first, so that a full disk or a killed worker leaves no incomplete file."""
+    with writing(path.parent), scratch_folder(path.parent) as scratch:
+        unfinished = scratch / path.name
+        with unfinished.open("xb") as file:
+            np.savez_compressed(file, **arrays)
+            file.flush()
+            os.fsync(file.fileno())  # otherwise the file may be empty after a power cut
+        unfinished.replace(path)

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
-import uuid
+import os
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +20,7 @@ from ..clouds.readers import CloudHeader
 from ..disk import writing
 from ..frame import LocalFrame
 from ..progress import SILENT, Progress
+from ..scratch import discard, scratch_folder
 from .grid import Key, Square, around, unique_keys
 
 REPORT = "report.json"
@@ -34,9 +35,9 @@ class SpooledFile:
     folder : str
         Folder that holds the points.
     report : dict
-        "classes": for each class code, the number of points by square and the smallest and largest x and y in units of
-        the CRS. "census": number of all points by class. "steps": for each axis, the number of points of the requested
-        classes by `origin_steps`.
+        "classes": for each class code, the number of points by square, the checksum of each square's file, and the
+        smallest and largest x and y in units of the CRS. "census": number of all points by class. "steps": for each
+        axis, the number of points of the requested classes by `origin_steps`.
     """
 
     folder: str
@@ -113,7 +114,7 @@ def spool(request: Request, side_m: float, folder: Path, progress: Progress = SI
 def spool_file(
     request: Request, header: CloudHeader, side_m: float, folder: Path, progress: Progress = SILENT
 ) -> SpooledFile:
-    """Sort the points of one file into squares, unless that has been done and the file has not changed since.
+    """Sort the points of one file into squares, unless that has been done and nothing has changed since.
 
     Two processes may sort the same file at the same time: each writes to its own folder, and the first to finish
     provides the result.
@@ -137,29 +138,59 @@ def spool_file(
         The disk is full.
     """
     mine = folder / _fingerprint(request, header, side_m)
-    if not mine.exists():
-        unfinished = folder / f"{mine.name}.{uuid.uuid4().hex}"
+    if os.path.lexists(mine):
         try:
-            with writing(folder):
-                unfinished.mkdir()
-            _sort(request, header, side_m, unfinished, progress)
-            with writing(folder):
-                _name_first(unfinished, mine)
-        finally:
-            shutil.rmtree(unfinished, ignore_errors=True)
-    return SpooledFile(str(mine), json.loads((mine / REPORT).read_text(encoding="ascii")))
+            return SpooledFile(str(mine), _checked_report(mine))
+        except ValueError:
+            progress.warning(f"The stored points of {header.path.name} are damaged: the file is read again.")
+            discard(mine)
+    with writing(folder), scratch_folder(folder) as scratch:
+        unfinished = scratch / mine.name
+        unfinished.mkdir()
+        found = _sort(request, header, side_m, unfinished, progress)
+        _name_first(unfinished, mine)
+    return SpooledFile(str(mine), found)
 
 
-def _sort(request: Request, header: CloudHeader, side_m: float, folder: Path, progress: Progress) -> None:
-    """Write the points of a file to the files of their squares, and the report."""
+def _sort(request: Request, header: CloudHeader, side_m: float, folder: Path, progress: Progress) -> dict:
+    """Write the points of a file to the files of their squares, and the report; returns the report."""
     found = _Census()
     for xyz, codes, census in request.read(header, progress):
         found.census += census
         with writing(folder.parent):
             for code in np.unique(codes).tolist():
                 found.add(code, xyz[codes == code], request.zero, side_m, folder)
+    report = found.report()
+    text = json.dumps(report)
     with writing(folder.parent):
-        (folder / REPORT).write_text(json.dumps(found.report()), encoding="ascii")
+        (folder / REPORT).write_text(f"{_digest(text)}\n{text}", encoding="ascii")
+    return report
+
+
+def _checked_report(folder: Path) -> dict:
+    """Read the report of sorted points, and check that all of them are still what was written.
+
+    Raises
+    ------
+    ValueError
+        Something is missing or damaged.
+    """
+    try:
+        digest, text = (folder / REPORT).read_text(encoding="ascii").split("\n")
+        if digest != _digest(text):
+            raise ValueError(REPORT)
+        report = json.loads(text)
+        for found in report["classes"].values():
+            for name, check in found["checks"].items():
+                if zlib.crc32((folder / name).read_bytes()) != check:
+                    raise ValueError(name)
+    except OSError as error:
+        raise ValueError(str(error)) from error
+    return report
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _name_first(folder: Path, name: Path) -> None:
@@ -192,12 +223,15 @@ class _Census:
     def add(self, code: int, xyz: np.ndarray, zero: LocalFrame, side_m: float, folder: Path) -> None:
         """Append points of one class, (n, 3) in units of the CRS, to the files of their squares."""
         keys, number = unique_keys(zero.to_local(xyz), side_m)
-        mine = self._classes.setdefault(code, {"squares": {}, "low": [np.inf] * 2, "high": [-np.inf] * 2})
+        new = {"squares": {}, "checks": {}, "low": [np.inf] * 2, "high": [-np.inf] * 2}
+        mine = self._classes.setdefault(code, new)
         for place, key in enumerate(keys):
             part = xyz[number == place]
             name = f"{code}_{key[0]}_{key[1]}"
+            data = part.tobytes()
             with (folder / name).open("ab") as file:
-                file.write(part.tobytes())
+                file.write(data)
+            mine["checks"][name] = zlib.crc32(data, mine["checks"].get(name, 0))
             mine["squares"][name] = mine["squares"].get(name, 0) + len(part)
         mine["low"] = np.minimum(mine["low"], xyz[:, :2].min(axis=0)).tolist()
         mine["high"] = np.maximum(mine["high"], xyz[:, :2].max(axis=0)).tolist()

@@ -20,6 +20,7 @@ from rail_extract.core.cluster.runner import DaskRunner, Failure, execute
 from rail_extract.core.cluster.store import version
 from rail_extract.core.errors import DiskError, RailExtractError
 from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
+from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
 from rail_extract.core.squares.grid import lay_out
 from rail_extract.core.squares.spool import spool
@@ -149,6 +150,36 @@ def test_a_worker_of_another_version_is_named(tiles, lone_worker, tmp_path, monk
         extract_files(ask([tiles], [RAIL]), tmp_path, PARAMETERS, older)
 
 
+class Heard(Progress):
+    """Keeps warnings."""
+
+    def __init__(self):
+        self.texts = []
+
+    def warning(self, text):
+        self.texts.append(text)
+
+
+def test_damaged_results_are_computed_again_with_a_warning(tiles, one_process, client, tmp_path):
+    extract(client, [tiles], [RAIL], PARAMETERS, tmp_path)
+    sizes = {file: file.stat().st_size for file in tmp_path.glob("*.npz")}
+    cleaned, drawn = (sorted(tmp_path.glob(f"{step}_*"))[0] for step in ("clean", "draw"))
+    cleaned.write_bytes(cleaned.read_bytes()[:-30])
+    drawn.write_bytes(b"not an archive")
+    points = sorted(tmp_path.glob("*/10_*"))[0]
+    points.write_bytes(points.read_bytes()[:-24])
+    heard = Heard()
+    for _ in range(2):
+        on_workers = DaskRunner(client, tmp_path)
+        found = extract_files(ask([tiles], [RAIL]), tmp_path, PARAMETERS, on_workers, heard)
+        assert found.failures == ()
+        same(found.rails, one_process.rails, found.frame, one_process.frame)
+    assert len(heard.texts) == 3  # all from the first restart
+    assert len([text for text in heard.texts if "the stored result is damaged, so it is computed again" in text]) == 2
+    assert len([text for text in heard.texts if text.startswith("The stored points of tile")]) == 1
+    assert {file: file.stat().st_size for file in tmp_path.glob("*.npz")} == sizes
+
+
 def test_finished_squares_of_another_cloud_are_not_used(tiles, client, tmp_path):
     """The origin of an undivided cloud is near its middle; more files, even of another class, move it."""
     parameters = replace(PARAMETERS, square_tiles=50)
@@ -194,8 +225,8 @@ def first_of(name, context):
 
 def test_no_step_runs_on_a_worker_of_another_version(tmp_path):
     for task in (Task("Cleaning", first_of, ("a",)), Task("Drawing", first_of, ("b",), needs=("a",))):
-        refused = execute(task, {}, str(tmp_path), "older")
+        refused = execute(task, {}, str(tmp_path), "older").result
         assert isinstance(refused, Failure) and "another version" in refused.reason
     assert list(tmp_path.iterdir()) == []
-    assert execute(task, {}, str(tmp_path), version()).path.endswith(".npz")
-    assert isinstance(execute(task, {}, str(tmp_path), "older"), Failure)  # although the result is there
+    assert execute(task, {}, str(tmp_path), version()).result.path.endswith(".npz")
+    assert isinstance(execute(task, {}, str(tmp_path), "older").result, Failure)  # although the result is there

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core.cluster.store import Stored, can_store, fingerprint, load, save
+from rail_extract.core.cluster.store import DamagedError, Stored, can_store, fingerprint, load, save
+from rail_extract.core.errors import DiskError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.rails import RailLine, Support
@@ -93,3 +94,40 @@ def test_a_name_does_not_change_with_the_place_of_the_folder_or_the_order_of_inp
         {(0, n): Stored(f"/{root}/{n}.npz") for n in order} for root, order in (("a", (1, 2)), ("b", (2, 1)))
     )
     assert fingerprint(here, fingerprint) == fingerprint(there, fingerprint)
+
+
+@pytest.mark.parametrize("result", [RAILS, SquareRails(Square.on_grid((3, -4), 512.0, FRAME), RAILS, XYZ[:4, :2])])
+def test_a_damaged_file_is_recognized_wherever_the_damage_is(tmp_path, result):
+    path = tmp_path / "result.npz"
+    save(path, result)
+    whole = path.read_bytes()
+    noticed = 0
+    for place in range(0, len(whole), 7):
+        path.write_bytes(whole[:place])
+        with pytest.raises(DamagedError, match=r"^result\.npz is damaged"):
+            load(Stored(str(path)))
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 0x55]) + whole[place + 1 :])
+        try:
+            again = load(Stored(str(path)))
+        except DamagedError:
+            noticed += 1
+        else:  # dates and other remarks of the archive do not matter
+            same_rails(getattr(again, "rails", again), RAILS)
+    assert noticed > 0.5 * len(whole) / 7
+
+
+@pytest.mark.parametrize("make", [lambda path: path.mkdir(), lambda path: np.savez(path, other=np.zeros(3))])
+def test_something_else_of_this_name_is_recognized(tmp_path, make):
+    make(tmp_path / "result.npz")
+    with pytest.raises(DamagedError):
+        load(Stored(str(tmp_path / "result.npz")))
+
+
+def test_an_unfinished_result_is_never_left_behind(tmp_path, monkeypatch):
+    def fail(*arguments, **named):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np, "savez_compressed", fail)
+    with pytest.raises(DiskError, match="free space"):
+        save(tmp_path / "result.npz", RAILS)
+    assert list(tmp_path.iterdir()) == []

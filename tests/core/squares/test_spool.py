@@ -1,6 +1,8 @@
 """Points on disk: the same ones as in memory, read only once."""
 
 import os
+import re
+import shutil
 
 import numpy as np
 import pytest
@@ -117,3 +119,50 @@ def test_a_file_of_the_same_size_that_has_changed_is_read_again(tmp_path):
         counts.append(sum(source.counts.values()))
     assert sizes[0] == sizes[1]
     assert counts == [40, 70]
+
+
+def cut(path):
+    path.write_bytes(path.read_bytes()[:-24])
+
+
+def change(path):
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+
+
+def put_a_folder(path):
+    path.unlink()
+    path.mkdir()
+
+
+@pytest.mark.parametrize(
+    "damage", [cut, change, put_a_folder, lambda path: path.unlink(), lambda path: path.write_text("{}")]
+)
+@pytest.mark.parametrize("what", ["report.json", "10_*"])
+def test_damaged_points_are_read_again_with_a_warning(files, tmp_path, damage, what):
+    class Heard(Progress):
+        def warning(self, text):
+            warnings.append(text)
+
+    warnings = []
+    work = tmp_path / "work"
+    work.mkdir()
+    first = spool(ask(files, [10]), SIDE, work)
+    before = {file: file.read_bytes() for file in work.rglob("*") if file.is_file()}
+    damage(sorted(work.rglob(what))[0])
+    second = spool(ask(files, [10]), SIDE, work, Heard())
+    (warning,) = warnings
+    assert re.fullmatch(r"The stored points of [01]\.laz are damaged: the file is read again\.", warning)
+    assert second[0].counts == first[0].counts
+    assert {file: file.read_bytes() for file in work.rglob("*") if file.is_file()} == before
+
+
+def test_a_file_in_place_of_the_points_is_replaced(files, tmp_path):
+    work = tmp_path / "work"
+    work.mkdir()
+    first = spool(ask(files, [10]), SIDE, work)
+    for folder in list(work.iterdir()):
+        shutil.rmtree(folder)
+        folder.write_text("no folder")
+    assert spool(ask(files, [10]), SIDE, work)[0].counts == first[0].counts
