@@ -12,7 +12,8 @@ from pathlib import Path
 
 from .clouds.las import CloudHeader
 from .clouds.points import RailPoints, Request
-from .errors import CloudError, NoRailPointsError, NoTrackError, RailExtractError
+from .errors import CloudError, NoRailPointsError, NoTrackError, ParameterError, RailExtractError
+from .heads.gauge_estimate import measure_spacings
 from .parameters import Parameters
 from .progress import SILENT, Progress
 from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
@@ -21,6 +22,7 @@ from .squares.grid import Key, MemorySource, PointSource, Square, around, assemb
 from .squares.pieces import SquareRails
 from .squares.remeasuring import measure_rails
 from .squares.spool import SpooledFile, SpooledPoints, gather, spool_file
+from .standards import RailStandard, closest_standard
 from .steps import clean_square, engine_for, rails_of_square, square_side, tracks_of, warn_of_rails, whole_rails
 from .tasks import Context, InTurn, Runner, Task
 from .tracks.geometry import measure_track_geometry
@@ -118,8 +120,58 @@ def extract_files(
         Every square failed.
     """
     side_m = square_side(parameters)
+    _warn_of_gauge(request, parameters, progress)
     reading, rest = progress.divide((READING, DRAWING + PAIRING + MEASURING))
     return _walk(_sorted_points(request, side_m, folder, runner, reading), parameters, runner, rest)
+
+
+def detect_standard(request: Request, progress: Progress = SILENT) -> RailStandard:
+    """Find the rail standard that fits the first points of a cloud.
+
+    Parameters
+    ----------
+    request : Request
+    progress : Progress
+        Is told the standard, and what was measured.
+
+    Raises
+    ------
+    CloudError
+        A file is damaged.
+    ParameterError
+        The points are too sparse, or no standard fits.
+    """
+    measured = measure_spacings(request.sample()).most_common()
+    standard = closest_standard(*measured) if measured else None
+    if measured is None or standard is None:
+        found = "" if measured is None else f": rails are {_in_words(*measured)}"
+        raise ParameterError(
+            f"No rail standard could be detected{found}: choose STANDARD, or fill in GAUGE and HEAD_WIDTH."
+        )
+    progress.info(f"Detected {standard.label} ({standard.name}): rails are {_in_words(*measured)}.")
+    return standard
+
+
+def _warn_of_gauge(request: Request, parameters: Parameters, progress: Progress) -> None:
+    """Warn the user at once if the first points show another gauge: the run takes minutes until no track is found."""
+    try:
+        spacings = measure_spacings(request.sample())
+    except CloudError:
+        return  # reported when the points are sorted
+    measured = spacings.most_common()
+    gauges = (parameters.gauge_m, *parameters.other_gauges_m)
+    tolerance_m = parameters.centerline_tolerance_m
+    if measured is None or any(spacings.include(one + parameters.head_width_m, tolerance_m) for one in gauges):
+        return
+    standard = closest_standard(*measured)
+    question = f": is it {standard.label} ({standard.name})?" if standard else "."
+    expected = 1000 * (parameters.gauge_m + parameters.head_width_m)
+    progress.warning(f"Rails are {_in_words(*measured)}; {expected:.0f} mm apart are expected{question}")
+
+
+def _in_words(spacing_m: float, head_width_m: float) -> str:
+    """State what was measured."""
+    return f"{1000 * spacing_m:.0f} mm apart, with heads {1000 * head_width_m:.0f} mm wide"
 
 
 def _sorted_points(

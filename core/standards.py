@@ -16,7 +16,8 @@ from dataclasses import dataclass
 from .errors import ParameterError
 
 DEFAULT = "EN_60E1_1435"
-CUSTOM = "CUSTOM"
+CUSTOM, DETECT = "CUSTOM", "DETECT"
+"""Choices that are not standards: both numbers are given, or the standard is detected from the points."""
 
 RAIL_CLASS, LAST_CLASS = 10, 255
 """Class of rail points in the LAS specification, and the largest class: a class is one byte."""
@@ -101,6 +102,13 @@ def _standards() -> dict[str, RailStandard]:
     return table
 
 
+SAME_GAUGE_M = 0.02
+"""Largest deviation of a measured gauge from a nominal one: half the difference between the closest two, and worn track
+deviates less."""
+
+SAME_M = 0.002
+"""Difference between two standards that measuring does not show: the default one is preferred by this much."""
+
 STANDARDS = _standards()
 """All standards by name, except CUSTOM."""
 
@@ -150,6 +158,37 @@ def resolve(name: str, gauge_mm: float | None = None, head_width_mm: float | Non
         standard.gauge_m if gauge_mm is None else gauge_mm / 1000,
         standard.head_width_m if head_width_mm is None else head_width_mm / 1000,
     )
+
+
+def closest_standard(spacing_m: float, head_width_m: float) -> RailStandard | None:
+    """Find the standard that fits rails as they were measured.
+
+    Parameters
+    ----------
+    spacing_m : float
+        Distance between the axes of the two rails.
+    head_width_m : float
+
+    Returns
+    -------
+    RailStandard or None
+        None if no standard has such a gauge.
+
+    Examples
+    --------
+    >>> closest_standard(1.0619, 0.0622).name
+    'IN_75R_1000'
+    """
+    gauge_m = spacing_m - head_width_m
+    nearest_m = min((one.gauge_m for one in STANDARDS.values()), key=lambda one: abs(one - gauge_m))
+    if abs(nearest_m - gauge_m) > SAME_GAUGE_M:
+        return None
+
+    def misfit(standard: RailStandard) -> float:
+        spacing_off_m = abs(standard.gauge_m + standard.head_width_m - spacing_m)
+        return spacing_off_m + abs(standard.head_width_m - head_width_m) - SAME_M * (standard.name == DEFAULT)
+
+    return min((one for one in STANDARDS.values() if one.gauge_m == nearest_m), key=misfit)
 
 
 def _custom(gauge_m: float, head_width_m: float) -> RailStandard:

@@ -22,6 +22,7 @@ from qgis.core import (  # noqa: E402
     QgsProcessingModelParameter,
 )
 from qgis.PyQt.QtCore import QPointF  # noqa: E402
+from rail_extract.core.standards import DETECT  # noqa: E402
 from rail_extract.rail_extract_plugin.dialog.cloud_parameter import model_input  # noqa: E402
 
 MODEL = Path(__file__).resolve().parent.parent / "models" / "extract_rails.model3"
@@ -59,6 +60,9 @@ def build() -> QgsProcessingModelAlgorithm:
     model.setHelpContent({"ALG_DESC": HELP})
     inputs = [definition.clone() for definition in whole.parameterDefinitions() if not definition.isDestination()]
     inputs[0] = model_input(inputs[0])
+    for definition in inputs:
+        if definition.name() == "STANDARD":  # each step reads it, and those after the first have no points
+            definition.setOptions([one for one in definition.options() if one != DETECT])
     for number, definition in enumerate(inputs):
         component = QgsProcessingModelParameter(definition.name())
         component.setPosition(QPointF((number // 8) * COLUMN, (number % 8) * ROW / 2))

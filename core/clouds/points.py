@@ -15,6 +15,12 @@ from ..standards import LAST_CLASS
 from .crs import common_crs, is_geographic, name_of, parse_crs, units, utm_zone, warn_of_scale
 from .readers import Chunk, CloudHeader, Extent, Paths, list_files, read_classes, read_header
 
+SAMPLE_POINTS = 200_000
+"""Number of points in a sample: at least some ten metres of the densest track."""
+
+MAX_PASSED = 5_000_000
+"""Number of points of any class after which a sample ends."""
+
 
 @dataclass(frozen=True)
 class RailPoints:
@@ -112,6 +118,26 @@ class Request:
         for xyz, codes, census in read_classes(header.path, self.class_codes, progress):
             inside = slice(None) if self.extent is None else _inside(xyz, self.extent)
             yield xyz[inside], codes[inside], census
+
+    def sample(self) -> np.ndarray:
+        """Read the first points requested, (n, 3) metres from one of them; takes a few seconds for a cloud of any size.
+
+        Raises
+        ------
+        CloudError
+            A file is damaged.
+        """
+        found, count, passed = [np.empty((0, 3))], 0, 0
+        for header in self.headers:
+            for xyz, _, census in self.read(header):
+                found.append(xyz)
+                count, passed = count + len(xyz), passed + int(census.sum())
+                if count >= SAMPLE_POINTS or passed >= MAX_PASSED:
+                    break
+            if count >= SAMPLE_POINTS or passed >= MAX_PASSED:
+                break
+        xyz = self.zero.to_local(np.concatenate(found))
+        return xyz - xyz[:1]
 
     def shares(self, progress: Progress) -> list[Progress]:
         """Split the progress among the files in proportion to their points."""

@@ -9,7 +9,7 @@ from qgis.core import QgsProcessingContext
 
 from ...core.frpdf.models import choose as choose_model
 from ...core.progress import Estimating, Progress
-from ...core.standards import RailStandard
+from ...core.standards import DEFAULT, RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
@@ -30,6 +30,7 @@ from ..writing.whole_files import write_each
 from .base import CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
+    from ...core.clouds.points import Request
     from ...core.rails import RailNetwork
 
 
@@ -69,7 +70,7 @@ class ExtractRails(RailAlgorithm):
         """Declare the parameters and outputs in the order of the interface."""
         for definition in (
             *inputs.cloud(),
-            *groups.rail(),
+            *groups.rail(detect=True),
             *groups.area(),
             *groups.cleanup(),
             *groups.lines(),
@@ -90,7 +91,7 @@ class ExtractRails(RailAlgorithm):
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read and check the parameters, in the main thread."""
         values = ParameterValues(self, parameters, context)
-        standard = values.standard()
+        standard = values.standard(DEFAULT if values.detects() else None)
         choose_model(standard.gauge_m, standard.head_width_m)
         return Job(
             values.cloud("INPUT"),
@@ -99,6 +100,14 @@ class ExtractRails(RailAlgorithm):
             values.other_gauges_m(standard),
             self.asPythonCommand(parameters, context),
         )
+
+    def _detected(self, job: Job, request: Request, values: ParameterValues, progress: Progress) -> Job:
+        """Return the job with the rail standard that fits the points."""
+        from ...core.pipeline import detect_standard
+
+        standard = values.standard(detect_standard(request, progress).name)
+        choose_model(standard.gauge_m, standard.head_width_m)
+        return replace(job, standard=standard, other_gauges_m=values.other_gauges_m(standard))
 
     def compute(
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
@@ -109,6 +118,9 @@ class ExtractRails(RailAlgorithm):
         from ...core.tasks import InTurn
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
+        request = request_points(job.cloud, job.class_codes, values.extent, progress)
+        if values.detects():
+            job = self._detected(job, request, values, progress)
         settings = values.settings(job.standard, job.other_gauges_m)
         quality, report, cleaned = (
             is_wanted(parameters.get(name), context) for name in ("QUALITY", "REPORT", "CLEANED")
@@ -118,7 +130,6 @@ class ExtractRails(RailAlgorithm):
             quality_step_m=values.number("STEP") if quality or report else None,
             keep_cleaned=cleaned,
         )
-        request = request_points(job.cloud, job.class_codes, values.extent, progress)
         with points_folder() as folder:
             network = extract_files(request, folder, settings, InTurn(), progress)
         progress.check()

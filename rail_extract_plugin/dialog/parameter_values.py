@@ -17,7 +17,7 @@ from qgis.core import (
 )
 
 from ...core.errors import ParameterError, RailExtractError, RasterError
-from ...core.standards import CUSTOM, DEFAULT, LAST_CLASS, RailStandard, distinct_gauges, resolve
+from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RailStandard, distinct_gauges, resolve
 from ..reading.clouds import CloudSource, checked_crs, cloud_source
 from ..systems import prepare_system
 
@@ -174,9 +174,14 @@ class ParameterValues:
         """Read RAIL_CLASSES."""
         return class_numbers(self.text("RAIL_CLASSES"), "RAIL_CLASSES")
 
-    def standard(self) -> RailStandard:
-        """Read STANDARD; GAUGE and HEAD_WIDTH override its values."""
-        return resolve(self.choice("STANDARD"), self.optional_number("GAUGE"), self.optional_number("HEAD_WIDTH"))
+    def detects(self) -> bool:
+        """Return whether the points are to tell the rail standard."""
+        return self.choice("STANDARD") == DETECT
+
+    def standard(self, detected: str | None = None) -> RailStandard:
+        """Read STANDARD, or take the one that was detected; GAUGE and HEAD_WIDTH override its values."""
+        name = detected or self.choice("STANDARD")
+        return resolve(name, self.optional_number("GAUGE"), self.optional_number("HEAD_WIDTH"))
 
     def head_width_m(self) -> float:
         """Read HEAD_WIDTH, or the value of STANDARD."""

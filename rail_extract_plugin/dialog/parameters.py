@@ -12,7 +12,7 @@ from qgis.core import (
 from ...core.frpdf import AUTO, DEVICES, ENGINES, MAX_PASSES
 from ...core.frpdf.models import MODELS
 from ...core.parameters import DEFAULT_STEP_M, Parameters
-from ...core.standards import CUSTOM, DEFAULT, STANDARDS, UNCONFIRMED_PROFILES
+from ...core.standards import CUSTOM, DEFAULT, DETECT, STANDARDS, UNCONFIRMED_PROFILES
 from ..i18n import tr
 from .definitions import MM_DECIMALS, Definitions, advanced, choice, helped, number
 
@@ -36,16 +36,18 @@ MAX_LENGTH_M = 100_000.0
 """Longer than any gap to close, any minimum line length and any step between stations."""
 
 
-def rail() -> Definitions:
-    """Define the rail standard, gauge and railhead width."""
+def rail(detect: bool = False) -> Definitions:
+    """Define the rail standard, gauge and railhead width; with `detect`, the points may tell them."""
+    hint = tr(" DETECT measures the rails in part of the points and takes the standard that fits.") if detect else ""
     return (
         helped(
-            choice("STANDARD", tr("Rail standard"), (*STANDARDS, CUSTOM), DEFAULT),
+            choice("STANDARD", tr("Rail standard"), (*STANDARDS, CUSTOM, *([DETECT] if detect else [])), DEFAULT),
             tr(
                 "Rail profile and gauge, which give the rail spacing and the railhead width: EN_60E1_1435 is the "
                 "profile 60E1 of EN 13674 on 1435 mm gauge. CUSTOM takes both from the two fields below. Widths not "
                 "confirmed by a table: {}."
-            ).format(", ".join(UNCONFIRMED_PROFILES)),
+            ).format(", ".join(UNCONFIRMED_PROFILES))
+            + hint,
         ),
         helped(
             number("GAUGE", tr("Gauge [mm]"), minimum=1.0, optional=True, decimals=MM_DECIMALS),

@@ -116,7 +116,7 @@ FAULTS = [
         "unknown standard",
         with_(STANDARD="EN_99"),
         REFUSED,
-        "STANDARD can't be EN_99: give one of its 47 choices, such as US_90ARAA_1435.",
+        "STANDARD can't be EN_99: give one of its 48 choices, such as US_90ARAA_1435.",
     ),
     Fault(
         "unknown engine", with_(ENGINE="JAX"), REFUSED, "ENGINE can't be JAX: give one of its 3 choices, such as AUTO."

@@ -290,6 +290,30 @@ def test_rails_of_another_gauge_are_written_without_tracks(run, outputs, write_c
     assert lines_of(outputs["CENTERLINES"])[0].featureCount() == 0
 
 
+def test_another_gauge_is_reported_before_the_run(run, write_cloud, track, new_feedback):
+    feedback = new_feedback(cancel_at=0.1)
+    outcome = run({"INPUT": write_cloud(track(spacing_m=1.072)), "STANDARD": "EN_60E1_1435"}, feedback)
+    assert not outcome.ok
+    (warning,) = feedback.warnings
+    assert warning.startswith("Rails are 1072 mm apart, with heads 7")
+    assert "; 1507 mm apart are expected: is it EN 54E1 (UIC 54), 1000 mm (EN_54E1_1000)?" in warning
+
+
+def test_rail_standard_is_detected(run, write_cloud, track, new_feedback, tmp_path):
+    feedback, rails = new_feedback(), tmp_path / "rails.gpkg"
+    outcome = run({"INPUT": write_cloud(track()), "STANDARD": "DETECT", "ITERATIONS": 1, "RAILS": rails}, feedback)
+    assert outcome.ok, outcome.error
+    assert outcome.results["CENTERLINE_COUNT"] == 1
+    assert "Detected EN 60E1 (UIC 60), 1435 mm (EN_60E1_1435): rails are 1507 mm apart" in feedback.textLog()
+
+
+def test_points_of_one_rail_detect_nothing(run, write_cloud, track):
+    points = track()
+    outcome = run({"INPUT": write_cloud(points[points[:, 1] > 3_000_000]), "STANDARD": "DETECT"})
+    assert not outcome.ok
+    assert "No rail standard could be detected: choose STANDARD" in outcome.error
+
+
 def test_degrees_are_refused_with_a_zone(run, outputs, write_cloud, track):
     degrees = track() * [1e-5, 1e-6, 1] + [70, 20, 0]
     assert_refused(run({"INPUT": write_cloud(degrees, epsg=4326), **outputs}), "UTM zone 43N", outputs)

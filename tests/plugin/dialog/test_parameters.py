@@ -87,7 +87,7 @@ def test_optional_parameters(algorithm):
 @pytest.mark.parametrize(
     ("name", "options"),
     [
-        ("STANDARD", [*STANDARDS, "CUSTOM"]),
+        ("STANDARD", [*STANDARDS, "CUSTOM", "DETECT"]),
         ("ENGINE", ["AUTO", "TORCH", "OPENCV"]),
         ("DEVICE", ["AUTO", "CPU", "CUDA"]),
     ],

@@ -1,0 +1,157 @@
+"""Gauge and railhead width, estimated from part of the points before anything else is computed.
+
+See docs/method.md section 1.5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..standards import GAUGE_RANGE_MM, HEAD_WIDTH_RANGE_MM
+
+PLACES = 300
+"""Number of places where the rails are looked at."""
+
+HALF_LENGTH_M = 1.0
+"""Points this far along the rail from a place are seen with it: a rail of 150 m radius is 3 mm off straight there."""
+
+REACH_M = 0.15
+"""Points this close across the rail are on it: guard rails are closer only where they end the gauge face."""
+
+SEPARATE_M = 0.05
+"""Gap across the track between the points of two rails; heads seen by few scan lines have smaller ones."""
+
+MIN_POINTS = 12
+"""Points on a head that give its axis to 6 mm."""
+
+TOP_M = 0.030
+"""Depth below the top that is part of the head on all profiles; web and foot are deeper."""
+
+TOP_PERCENT = 95
+"""Percentile of the heights that stands for the top."""
+
+MIN_SPACING_M = (GAUGE_RANGE_MM[0] + HEAD_WIDTH_RANGE_MM[0]) / 1000
+MAX_SPACING_M = (GAUGE_RANGE_MM[1] + HEAD_WIDTH_RANGE_MM[1]) / 1000
+"""Range of the distances between the axes of a track's rails."""
+
+BIN_M, HALF_PEAK_M = 0.005, 0.015
+"""Bin of the histogram of distances, and half the width of its peak: most track is within 15 mm of its gauge."""
+
+MIN_SHARE = 0.1
+"""Share of the places at which a distance must be found."""
+
+SEEN_SHARE = 0.96
+"""Width that `_head` finds, relative to the true one: it loses the rounded edges. Measured on the synthetic scenes."""
+
+
+@dataclass(frozen=True)
+class Spacings:
+    """Distances between rails, seen from places on them.
+
+    Attributes
+    ----------
+    distance_m : (n,) array
+        Distances between the axes of two rails.
+    head_width_m : (n,) array
+        Width of the head on which the place is.
+    places : int
+        Number of places, of which some see several rails and some none.
+    """
+
+    distance_m: np.ndarray
+    head_width_m: np.ndarray
+    places: int
+
+    def include(self, spacing_m: float, tolerance_m: float) -> bool:
+        """Return whether rails are found at this distance."""
+        return self._often(np.abs(self.distance_m - spacing_m) <= tolerance_m)
+
+    def most_common(self) -> tuple[float, float] | None:
+        """Return the most frequent distance and the width of the heads there; None if no distance is frequent."""
+        if not len(self.distance_m):
+            return None
+        counts = np.convolve(np.bincount((self.distance_m / BIN_M).astype(int)), np.ones(3), mode="same")
+        peak = np.abs(self.distance_m - (np.argmax(counts) + 0.5) * BIN_M) <= HALF_PEAK_M
+        if not self._often(peak):
+            return None
+        return float(np.median(self.distance_m[peak])), float(np.median(self.head_width_m[peak])) / SEEN_SHARE
+
+    def _often(self, mask: np.ndarray) -> bool:
+        return bool(mask.sum() >= max(1.0, MIN_SHARE * self.places))
+
+
+def measure_spacings(xyz: np.ndarray) -> Spacings:
+    """Measure the distances between rails at some of their points.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Rail points in local metres.
+    """
+    if len(xyz) < MIN_POINTS:
+        return Spacings(np.empty(0), np.empty(0), 0)
+    tree = cKDTree(xyz[:, :2])
+    places = xyz[np.linspace(0, len(xyz) - 1, min(PLACES, len(xyz))).astype(int)]
+    found = np.array([one for place in places for one in _spacings(xyz[_near(tree, place)] - place)]).reshape(-1, 2)
+    return Spacings(found[:, 0], found[:, 1], len(places))
+
+
+def _near(tree: cKDTree, place: np.ndarray) -> list[int]:
+    """Return the points that may be on the rail of a place or on its partner."""
+    return tree.query_ball_point(place[:2], np.hypot(MAX_SPACING_M + REACH_M, HALF_LENGTH_M))
+
+
+def _spacings(near: np.ndarray) -> Iterator[tuple[float, float]]:
+    """Yield the distances of other rails from the rail at the origin, with the width of that rail's head.
+
+    Parameters
+    ----------
+    near : (n, 3) array
+        Points around the origin, which is a point on a rail.
+    """
+    direction = _direction(near)
+    if direction is None:
+        return
+    along, across = (near[:, :2] @ np.column_stack([direction, [-direction[1], direction[0]]])).T
+    beside = np.flatnonzero(np.abs(along) < HALF_LENGTH_M)
+    beside = beside[np.argsort(across[beside])]
+    rails = np.split(beside, np.flatnonzero(np.diff(across[beside]) > SEPARATE_M) + 1)
+    found = (_head(along[rail], across[rail], near[rail, 2]) for rail in rails if len(rail) >= MIN_POINTS)
+    heads = [head for head in found if head is not None]
+    own = [head for head in heads if abs(head[0]) < REACH_M]
+    if len(own) != 1:
+        return
+    for axis, _ in heads:
+        if MIN_SPACING_M <= abs(axis - own[0][0]) <= MAX_SPACING_M:
+            yield abs(axis - own[0][0]), own[0][1]
+
+
+def _direction(near: np.ndarray) -> np.ndarray | None:
+    """Return the direction in plan of the rail at the origin, (2,); None if it has too few points."""
+    mine = near[np.hypot(*near[:, :2].T) < HALF_LENGTH_M / 2, :2]
+    for _ in range(2):  # the second time with the points of the whole length
+        if len(mine) < MIN_POINTS:
+            return None
+        direction = np.linalg.eigh(np.cov(mine.T))[1][:, 1]
+        along, across = near[:, :2] @ direction, near[:, :2] @ [-direction[1], direction[0]]
+        mine = near[(np.abs(along) < HALF_LENGTH_M) & (np.abs(across) < REACH_M), :2]
+    return direction
+
+
+def _head(along: np.ndarray, across: np.ndarray, height: np.ndarray) -> tuple[float, float] | None:
+    """Return the axis and the width of a railhead from the points of a rail; None if too few are on top.
+
+    Points that are spread evenly over a width have a standard deviation of this width over the root of twelve, and
+    noise of a few millimetres hardly adds to it.
+    """
+    along = along - along.mean()
+    length = along @ along
+    height = height - along * (along @ height / length if length else 0.0)
+    top = across[height > np.percentile(height, TOP_PERCENT) - TOP_M]
+    if len(top) < MIN_POINTS or np.ptp(top) > REACH_M:
+        return None
+    return 0.5 * float(np.percentile(top, 1) + np.percentile(top, 99)), float(np.sqrt(12) * top.std())
