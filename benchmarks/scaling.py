@@ -74,7 +74,16 @@ def main() -> None:
 
 
 def compare_lengths(folder: Path, km: float, times: int) -> dict:
-    """Run a short and a long track, each in a separate process, and return the figures of the long one."""
+    """Run a short and a long track, each in a separate process, and return the figures of the long one.
+
+    Parameters
+    ----------
+    folder : Path
+    km : float
+        Length of the short track.
+    times : int
+        Ratio of the two lengths.
+    """
     lay_track(folder / "short", km)
     lay_track(folder / "long", km * times)
     short = show(f"{km:g} km", in_own_process(folder / "short", "with"))

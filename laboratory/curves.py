@@ -116,7 +116,21 @@ def trace(
 
 
 def transition_curve(straight_m: float, clothoid_m: float, arc_m: float, curvature: float) -> list[Element]:
-    """Straight, clothoid, arc, clothoid, straight: the classical railway curve (docs/method.md section 11.2)."""
+    """Return the elements of the classical railway curve (docs/method.md section 11.2).
+
+    Parameters
+    ----------
+    straight_m, clothoid_m : float
+        Length of each of the two straights and of the two clothoids.
+    arc_m : float
+    curvature : float
+        Of the arc, 1/m, positive to the left.
+
+    Returns
+    -------
+    list of Element
+        Straight, clothoid, arc, clothoid, straight.
+    """
     return [
         Element(straight_m),
         Element(clothoid_m, 0.0, curvature),

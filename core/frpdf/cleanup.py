@@ -99,7 +99,15 @@ class _Canvas:
         self._cells: list[np.ndarray] = []
 
     def paint(self, piece: Piece, block: np.ndarray, inside: Piece) -> None:
-        """Set the cells of a block at a piece that are inside a rectangle."""
+        """Set the cells of a piece that are inside a rectangle.
+
+        Parameters
+        ----------
+        piece : Piece
+        block : (height, width) bool array
+            Cells of the piece.
+        inside : Piece
+        """
         cells = np.argwhere(block) + np.array([piece.row, piece.column])
         self._cells.append(cells[inside.holds(cells)])
 

@@ -107,6 +107,7 @@ class _Graph:
         return self.relu(self.convolve(joined, layer.reduction), output)
 
     def convolve(self, x: str, convolution: Convolution, padded: bool = True, output: str | None = None) -> str:
+        """Add a convolution; see `layer`."""
         number = len(self._nodes)
         names = [x, f"weight{number}", f"bias{number}"]
         self._weights += [_tensor(names[1], convolution.weight), _tensor(names[2], convolution.bias)]

@@ -19,7 +19,13 @@ TRACK_SPACING_M = (3.5, 6.0)
 
 
 def random_radius(rng: np.random.Generator, min_radius_m: float, max_radius_m: float = MAX_RADIUS_M) -> float:
-    """Draw a radius between two limits; its logarithm is uniformly distributed."""
+    """Draw a radius whose logarithm is uniformly distributed.
+
+    Parameters
+    ----------
+    rng : numpy Generator
+    min_radius_m, max_radius_m : float
+    """
     return math.exp(rng.uniform(math.log(min_radius_m), math.log(max_radius_m)))
 
 

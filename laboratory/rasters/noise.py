@@ -49,7 +49,14 @@ def worst_share(severity: float) -> float:
 
 
 def lone_lines(rng: np.random.Generator, window: Window, severity: float) -> list[RailPath]:
-    """Draw short straight lines that belong to no track: cables, ends of sleepers, edges of platforms."""
+    """Draw short straight lines that belong to no track: cables, ends of sleepers, edges of platforms.
+
+    Parameters
+    ----------
+    rng : numpy Generator
+    window : Window
+    severity : float
+    """
     lines = []
     for _ in range(rng.poisson(LONE_LINES * severity * _area(window))):
         heading = rng.uniform(-math.pi, math.pi)
@@ -61,7 +68,18 @@ def lone_lines(rng: np.random.Generator, window: Window, severity: float) -> lis
 
 
 def shadows(rng: np.random.Generator, window: Window, severity: float) -> np.ndarray:
-    """Draw wedges that are hidden from the scanner by masts, cabinets and trains, (size, size) bool."""
+    """Draw wedges that are hidden from the scanner by masts, cabinets and trains.
+
+    Parameters
+    ----------
+    rng : numpy Generator
+    window : Window
+    severity : float
+
+    Returns
+    -------
+    (size, size) bool array
+    """
     hidden = np.zeros((window.size, window.size), dtype=bool)
     centres = (np.arange(window.size) + 0.5) * window.cell_m
     for _ in range(rng.poisson(SHADOWS * severity * _area(window))):
@@ -106,7 +124,18 @@ def flip(
 
 
 def scatter_patches(rng: np.random.Generator, observed: np.ndarray, severity: float) -> np.ndarray:
-    """Scatter elliptic patches: most set cells, as vegetation classified as rail does; some clear cells."""
+    """Scatter elliptic patches: most set cells, as vegetation classified as rail does; some clear cells.
+
+    Parameters
+    ----------
+    rng : numpy Generator
+    observed : (size, size) bool array
+    severity : float
+
+    Returns
+    -------
+    (size, size) bool array
+    """
     size = len(observed)
     result = observed.copy()
     most = PATCHES * severity * (1 + WORST_PATCHES * worst_share(severity)) * (size / 1024) ** 2
