@@ -122,7 +122,7 @@ def load(stored: Stored) -> RailRaster | SquareRails | tuple[RailLine, ...]:
 
 def _raster_arrays(raster: RailRaster) -> dict[str, np.ndarray]:
     index = np.array(sorted(raster.tiles), dtype=np.int32).reshape(-1, 2)
-    bits = [np.packbits(raster.tiles[place]) for place in map(tuple, index.tolist())]
+    bits = [np.packbits(raster.tiles[place]) for place in sorted(raster.tiles)]
     return {
         "index": index,
         "bits": np.array(bits, dtype=np.uint8).reshape(-1, TILE * TILE // 8),
@@ -195,7 +195,7 @@ def _unpacked(arrays: Mapping[str, np.ndarray], name: str) -> list[np.ndarray]:
     return np.split(arrays[name], np.cumsum(counts)[:-1]) if len(counts) else []
 
 
-def _write(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
+def _write(path: Path, arrays: Mapping[str, Any]) -> None:
     """Write arrays in a temporary folder first, so that a full disk or a killed worker leaves no incomplete file."""
     with writing(path.parent), scratch_folder(path.parent) as scratch:
         unfinished = scratch / path.name
