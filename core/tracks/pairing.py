@@ -41,6 +41,22 @@ MIN_BREAK_M = 5.0
 MAX_LEVEL_M = 0.4
 """Maximum height difference of the rails of a track: cant makes at most 0.2 m, a bridge several metres."""
 
+WANDER_STATIONS = 11
+"""Stations, 5 m of them, over which the distance of two rails is compared with a steady change: gauge widening and cant
+transitions are steady over this length."""
+
+WANDER_WEIGHT = 3.0
+"""Weight of the wander of a partner, in distance and in height, relative to its deviation from the gauge. Rails wander
+by 1 mm and are up to 30 mm off where the gauge is widened; lids of a cable trough wander by 5 mm in both."""
+
+CLEARLY_WORSE = 1.5
+CLEARLY_WORSE_M = 0.01
+"""A partner is worse than one on the other side of its rail if its misfit is larger by this factor and by this length:
+two tracks that share a rail are alike to within what is measured."""
+
+MAX_LOST_SHARE = 0.5
+"""Share of a match that may be lost to better partners on the other side of its rails; see `_without_rivals`."""
+
 LEFT, RIGHT = 1, -1
 
 
@@ -112,7 +128,9 @@ def pair_rails(
     for section in progress.span(0.3, 1.0).follow(candidates):
         found = _match(rails, section, spacing, tolerance_m)
         matches.extend(match for match in found if _is_nearest(match, section, spacing, others_m))
-    return tuple(match.pair() for match in _without_ghosts(_select(matches)))
+    sure = _without_ghosts(_select(matches))
+    misfits_m = [_misfit_m(rails, match, spacing) for match in sure]
+    return tuple(match.pair() for match in _without_rivals(sure, misfits_m))
 
 
 def find_candidates(parallels: Parallels, spacing_m: float, tolerance_m: float) -> list[Parallels]:
@@ -286,6 +304,50 @@ def _without_ghosts(matches: Sequence[_Match]) -> list[_Match]:
         if not any(ghost.any() for ghost in ghosts):
             return list(matches)
         matches = [part for match, ghost in zip(matches, ghosts) for part in _free_runs(match, ghost)]
+
+
+def _misfit_m(rails: Sequence[RailLine], match: _Match, spacing: float) -> float:
+    """Return how unlike two rails of a track the rails of a match are: off the gauge, and wandering."""
+    a, b = rails[match.a].xyz, rails[match.b].xyz
+    t = np.arange(*np.sort(match.t_a[[0, -1]]), COARSE_STEP_M)
+    places = interpolate(a, length_along(a[:, :2]), t)
+    feet = project([b[:, :2]], places[:, :2], 2 * spacing)
+    order = np.argsort(feet.point)
+    apart = np.abs(feet.across[order])
+    heights = np.interp(feet.t[order], length_along(b[:, :2]), b[:, 2])
+    level = np.nan_to_num(places[feet.point[order], 2] - heights)
+    off = float(np.sqrt(np.mean((apart - spacing) ** 2)))
+    return off + WANDER_WEIGHT * (_wander(apart) + _wander(level))
+
+
+def _wander(values: np.ndarray) -> float:
+    """Return the median RMS deviation of values at stations, (n,), from a steady change over `WANDER_STATIONS`."""
+    count = min(WANDER_STATIONS, len(values))
+    if count < 3:
+        return 0.0
+    windows = np.lib.stride_tricks.sliding_window_view(values, count)
+    steady = np.column_stack([np.ones(count), np.arange(count)])
+    unsteady = np.eye(count) - steady @ np.linalg.pinv(steady)
+    return float(np.median(np.sqrt(np.mean((windows @ unsteady) ** 2, axis=1))))
+
+
+def _without_rivals(matches: Sequence[_Match], misfits_m: Sequence[float]) -> list[_Match]:
+    """Drop matches with a rail that has a clearly better partner on its other side, as the edge of a cable trough.
+
+    A match that loses over more than `MAX_LOST_SHARE` of its length is dropped, so that a wrong partner does not stay
+    where the right one is interrupted.
+    """
+    kept: list[_Match] = []
+    for match, misfit_m in zip(matches, misfits_m):
+        better = _PairedSides(
+            other
+            for other, other_m in zip(matches, misfits_m)
+            if misfit_m > CLEARLY_WORSE * other_m and misfit_m > other_m + CLEARLY_WORSE_M
+        )
+        lost = better.far_side_a(match) | better.far_side_b(match)
+        if np.mean(lost) <= MAX_LOST_SHARE:
+            kept += _free_runs(match, lost)
+    return kept
 
 
 class _PairedSides:

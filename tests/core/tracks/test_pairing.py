@@ -133,3 +133,37 @@ def test_fewer_than_two_rails_make_no_pair():
 def test_candidates_are_sought_within_twice_the_tolerance(deviation, count):
     parallels = find_parallels(rails_of(*tracks(STRAIGHT, 0.0, spacing=SPACING + deviation)))
     assert len(find_candidates(parallels, SPACING, 0.05)) == count
+
+
+def wandering(rng, curve, offset, sigma_m):
+    """A line beside a curve that wanders as lids of 1 m do once smoothed."""
+    chainage = curve.chainage[::10]
+    knots = np.arange(0, chainage[-1] + 2)
+    return curve.offset(np.interp(curve.chainage, knots, offset + sigma_m * rng.standard_normal(len(knots))))[::10]
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("widening", [0.0, 0.02])
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_edge_of_a_cable_trough_is_no_partner(seed, widening, side):
+    """It is 1475 mm from the rail, within the tolerance, and wanders by 6 mm."""
+    rng = np.random.default_rng(seed)
+    spacing = SPACING + widening
+    edge = wandering(rng, CURVED, side * (spacing / 2 + 1.475), 0.006)
+    lines = [*tracks(CURVED, 0.0, spacing=spacing), edge]
+    (pair,) = pair_rails(rails_of(*lines), GAUGE, WIDTH)
+    assert {pair.left, pair.right} == {0, 1}
+
+
+def test_a_wrong_partner_does_not_stay_where_the_right_one_is_interrupted():
+    left, right = tracks(CURVED, 0.0)
+    edge = wandering(np.random.default_rng(9), CURVED, -SPACING / 2 - 1.475, 0.006)
+    broken = left[:150], left[400:]
+    pairs = pair_rails(rails_of(right, edge, *broken), GAUGE, WIDTH)
+    assert {frozenset((pair.left, pair.right)) for pair in pairs} == {frozenset((0, 2)), frozenset((0, 3))}
+
+
+def test_a_rail_whose_other_partner_is_as_good_keeps_both():
+    """Where three rails are exactly at gauge, nothing tells which two are a track."""
+    widths = beside(CURVED, SPACING, 0.0, -SPACING - 0.005)
+    assert len(pair_rails(rails_of(*widths), GAUGE, WIDTH)) == 2
