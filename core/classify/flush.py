@@ -57,7 +57,7 @@ HEAD_LEVEL_M = 0.012
 
 TENTHS_OF_MM = 10_000
 
-NO_LINES = Lines(np.empty((0, 2)), *(np.empty(0) for _ in range(4)), REACH_M)
+NO_LINES = Lines(np.empty((0, 2)), np.empty(0), np.empty(0), np.empty(0), np.empty(0), REACH_M)
 
 
 @dataclass(frozen=True)

@@ -115,9 +115,8 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> Classified:
     standing = _standing(xyz[near, :2], cell, height, coarse, tops, settings)
     flush = flush_rails(coarse, near, xyz[near, :2], height, grid, cell, settings.gauges_m, settings.head_width_m)
     rail = nothing.rail
-    rail[near[standing.points]] = True
-    rail[near[flush.points]] = True
-    rail &= settings.own(xyz)
+    found = near[np.union1d(standing.points, flush.points)]
+    rail[found[settings.own(xyz[found])]] = True
     places = standing.drawn[settings.own(standing.drawn)]
     return Classified(rail, places, _figures(rail, standing, flush, grid, cell[rail[near]], settings))
 

@@ -58,7 +58,7 @@ def parallel(curve: Curve, lefts_m: tuple[float, ...], cant_m: float = 0.0, stan
     return [Track(curve, spacing(standard), rolling(curve), cant, left) for left in lefts_m]
 
 
-def thing(make: Callable, *args: float) -> Thing:
+def thing(make: Callable[..., None], *args: object) -> Thing:
     """Hand arguments to something that is added to a world."""
     return lambda world: make(world, *args)
 
@@ -68,7 +68,13 @@ def double_track(
 ) -> RawScene:
     """Double track in a curve of 700 m with cant, masts and wires, a trough, plants beside the bed."""
     curve = line(60.0, 1 / 700, 0.35)
-    things = [ground, running_rails, masts_at(-3.4), thing(trough, 0, 2.1, 0.0, 60.0), thing(plants, 60, (-9.0, -4.5))]
+    things: list[Thing] = [
+        ground,
+        running_rails,
+        masts_at(-3.4),
+        thing(trough, 0, 2.1, 0.0, 60.0),
+        thing(plants, 60, (-9.0, -4.5)),
+    ]
     scanners = [scanner] if second is None else [scanner, second]
     return scan_world(name, parallel(curve, (0.0, 4.2), 0.09), STANDARD, scanners, things, seed)
 
@@ -81,7 +87,7 @@ def masts_at(left_m: float) -> Thing:
 def station(seed: int) -> RawScene:
     """Three tracks, platforms on both sides, and a train parked on the far track."""
     curve = line(70.0, 0.0, 1.2)
-    things = [
+    things: list[Thing] = [
         ground,
         running_rails,
         thing(platform, 0, -1, 5.0, 65.0),
@@ -99,14 +105,14 @@ def turnout(seed: int, form: str = "300-1:9", scanner: RawScanner = TRAIN) -> Ra
     side = branch(main, 15.0, shape, 1, 25.0)
     tracks = [Track(curve, spacing(STANDARD)) for curve in (main, side)]
     frog_m = 15.0 + np.sqrt(2 * shape.radius_m * spacing(STANDARD))
-    things = [ground, running_rails, thing(guard_rail, 0, -1, frog_m - 2.0, frog_m + 1.6)]
+    things: list[Thing] = [ground, running_rails, thing(guard_rail, 0, -1, frog_m - 2.0, frog_m + 1.6)]
     return scan_world(f"turnout {form}", tracks, STANDARD, [scanner], things, seed)
 
 
 def yard(seed: int) -> RawScene:
     """Yard filled with ballast to 9 cm below the tops, overgrown."""
     curve = line(60.0, 1 / 400, 2.6)
-    things = [
+    things: list[Thing] = [
         ground,
         running_rails,
         thing(plants, 500, (-2.5, 11.0), (0.03, 0.35), (0.04, 0.2)),
@@ -120,14 +126,19 @@ def narrow(seed: int) -> RawScene:
     """Metre gauge on 49E1 in a curve of 90 m with 60 mm cant."""
     standard = STANDARDS["EN_49E1_1000"]
     curve = line(50.0, -1 / 90, 0.2)
-    things = [ground, running_rails, thing(plants, 60, (-6.0, -3.0)), thing(wall, 3.2, -0.9, 1.8, 0.0, 50.0)]
+    things: list[Thing] = [
+        ground,
+        running_rails,
+        thing(plants, 60, (-6.0, -3.0)),
+        thing(wall, 3.2, -0.9, 1.8, 0.0, 50.0),
+    ]
     return scan_world("narrow", parallel(curve, (0.0,), 0.06, standard), standard, [TRAIN], things, seed)
 
 
 def metro(seed: int) -> RawScene:
     """Tunnel with slab track, a third rail and a guard rail along a curve of 150 m."""
     curve = line(50.0, 1 / 150, 0.9)
-    things = [
+    things: list[Thing] = [
         ground,
         running_rails,
         thing(third_rail, 0, 1, 3.0, 50.0),
@@ -167,7 +178,7 @@ def bridge(seed: int, second: RawScanner | None = None) -> RawScene:
     """Viaduct with parapets, seen from the train and from a road below."""
     curve = line(60.0, -1 / 900, 1.9)
     below = RawScanner(left_m=8.0, height_m=-6.5, profile_step_m=0.07)
-    things = [thing(viaduct, 5.5, 2.0), ground_above, running_rails]
+    things: list[Thing] = [thing(viaduct, 5.5, 2.0), ground_above, running_rails]
     return scan_world("viaduct", parallel(curve, (0.0, 4.0)), STANDARD, [TRAIN, second or below], things, seed)
 
 
@@ -180,7 +191,12 @@ def far_track(seed: int) -> RawScene:
     """Three tracks, the outer one 10 m from the scanner, in long profiles."""
     curve = line(60.0, 1 / 1500, -0.4)
     scanner = RawScanner(profile_step_m=0.08, ray_step_rad=0.0024, noise_m=0.005, height_m=4.2, left_m=-0.3)
-    things = [ground, running_rails, thing(plants, 80, (1.5, 12.0), (0.03, 0.25)), thing(fence, -5.0, -0.9, 0.0, 60.0)]
+    things: list[Thing] = [
+        ground,
+        running_rails,
+        thing(plants, 80, (1.5, 12.0), (0.03, 0.25)),
+        thing(fence, -5.0, -0.9, 0.0, 60.0),
+    ]
     return scan_world("far track", parallel(curve, (0.0, 4.6, 9.8)), STANDARD, [scanner], things, seed)
 
 
@@ -190,14 +206,14 @@ def dual_gauge(seed: int) -> RawScene:
     curve = line(50.0, 1 / 400, 0.9)
     third = Track(curve, spacing(narrow_one), left_m=-(spacing(standard) - spacing(narrow_one)) / 2, sides=(1,))
     tracks = [Track(curve, spacing(standard)), third]
-    things = [ground, running_rails, masts_at(3.3)]
+    things: list[Thing] = [ground, running_rails, masts_at(3.3)]
     return scan_world("dual gauge", tracks, standard, [TRAIN], things, seed, other_gauges_m=(narrow_one.gauge_m,))
 
 
 def air(seed: int, per_m2: float, noise_m: float) -> RawScene:
     """Double track with a turnout's length of wires, plants and a train on a siding, from the air."""
     curve = line(60.0, 1 / 700, 0.35)
-    things = [
+    things: list[Thing] = [
         ground,
         running_rails,
         masts_at(-3.4),

@@ -1,0 +1,86 @@
+import numpy as np
+import pytest
+from rail_extract.core.standards import STANDARDS
+from rail_extract.laboratory.ruler.classification import lines_from, score
+from rail_extract.laboratory.scenes.raw import scan_world
+from rail_extract.laboratory.scenes.raw_catalogue import MOBILE, NEGATIVE, parallel
+from rail_extract.laboratory.scenes.raw_catalogue import line as plan
+from rail_extract.laboratory.scenes.raw_scanner import RawScanner, Segments, cast
+from rail_extract.laboratory.scenes.raw_world import FASTENING, FOOT, HEAD, SLEEPER, ground, outline, running_rails
+
+
+@pytest.fixture(scope="module")
+def plain():
+    curve = plan(15.0, 1 / 300, 0.4)
+    return scan_world(
+        "plain", parallel(curve, (0.0,)), STANDARDS["EN_60E1_1435"], [RawScanner()], [ground, running_rails], 3
+    )
+
+
+def test_rays_hit_what_comes_first():
+    number = np.zeros(3, dtype=int)
+    start, end = np.array([[-5.0, 0.0], [-0.5, 1.0], [2.0, 0.0]]), np.array([[5.0, 0.0], [0.5, 1.0], [2.0, 3.0]])
+    segments = Segments(number, start, end, np.array([1, 2, 3], dtype=np.uint8))
+    scanner = RawScanner(ray_step_rad=0.001, noise_m=0.0, footprint_m=0.0, half_range_m=1e9)
+    hits = cast(segments, np.array([[0.0, 2.0]]), scanner, np.random.RandomState(1))
+    across, height = hits.place.T
+    assert (np.abs(height[hits.kind == 2] - 1.0) < 1e-9).all()
+    assert (np.abs(across[hits.kind == 3] - 2.0) < 1e-9).all()
+    shadow = np.abs(across[hits.kind == 1])
+    assert shadow.min() == pytest.approx(1.0, abs=0.01)
+    assert across[hits.kind == 1].max() == pytest.approx(2.0, abs=0.01)
+
+
+def test_a_rail_has_the_width_of_its_head_and_a_foot():
+    shape, head = outline(0.072)
+    assert np.ptp(shape[:, 0]) == pytest.approx(0.150)
+    assert np.ptp(shape[np.append(head, False) | np.insert(head, 0, False), 0]) == pytest.approx(0.072)
+    assert shape[:, 1].max() == pytest.approx(0.0)
+    assert shape[:, 1].min() == pytest.approx(-0.172)
+
+
+def test_points_lie_where_their_kind_says(plain):
+    def above(kind):
+        return plain.xyz[plain.kind == kind, 2] - np.interp(0, [0], [0])
+
+    assert {HEAD, FOOT, SLEEPER, FASTENING} <= set(np.unique(plain.kind))
+    assert np.median(above(HEAD)) == pytest.approx(0.0, abs=0.08)
+    assert np.median(above(SLEEPER)) == pytest.approx(np.median(above(HEAD)) - 0.18, abs=0.02)
+
+
+def test_a_scene_is_the_same_each_time():
+    one, other = (MOBILE["narrow"](4) for _ in range(2))
+    np.testing.assert_array_equal(one.xyz, other.xyz)
+
+
+def test_heads_are_found_and_nothing_else(plain):
+    result, rail = score(plain)
+    assert result.recall > 0.99
+    assert result.precision > 0.99
+    assert rail.sum() == result.figures.points
+
+
+def test_labels_of_everything_score_badly(plain, monkeypatch):
+    from rail_extract.core.classify.figures import Figures
+    from rail_extract.core.classify.square import Classified
+    from rail_extract.laboratory.ruler import classification
+
+    everything = Classified(np.ones(len(plain.xyz), dtype=bool), np.empty((0, 2)), Figures())
+    monkeypatch.setattr(classification, "classify_cloud", lambda *_: everything)
+    result, _ = score(plain)
+    assert result.recall == 1.0
+    assert result.precision < 0.1
+
+
+def test_lines_of_the_labels_lie_on_the_rails(plain):
+    pytest.importorskip("torch")
+    found = lines_from(plain, plain.head).within(0.05)
+    assert found.completeness > 0.98
+    assert lines_from(plain, np.zeros(len(plain.xyz), dtype=bool)) is None
+
+
+@pytest.mark.parametrize("name", ["street", "car park", "quarry from the air"])
+def test_nothing_is_found_where_there_are_no_rails(name):
+    result, _ = score(NEGATIVE[name](5))
+    assert result.wrong == 0
+    assert np.isnan(result.recall)
