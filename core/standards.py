@@ -40,12 +40,20 @@ class RailStandard:
     label : str
         Name to show to users.
     gauge_m, head_width_m : float
+    region : str
+        Where the profile is laid; empty for CUSTOM.
     """
 
     name: str
     label: str
     gauge_m: float
     head_width_m: float
+    region: str = ""
+
+    @property
+    def description(self) -> str:
+        """Region, profile, gauge and head width, as a list sorts them by region."""
+        return f"{self.region}: {self.label}, head {1000 * self.head_width_m:g} mm"
 
 
 UNCONFIRMED = " (unconfirmed width)"
@@ -92,13 +100,29 @@ _PROFILES = (
 )
 
 
+_REGIONS = {
+    "US": "North America",
+    "EN": "Europe",
+    "S33": "Europe",
+    "S41": "Europe",
+    "BS": "Great Britain",
+    "GB": "China",
+    "AS": "Australia",
+    "JIS": "Japan",
+    "IN": "India",
+    "RU": "Russia",
+}
+"""Regions by the first word of a profile."""
+
+
 def _standards() -> dict[str, RailStandard]:
     table = {}
     for profile, label, head_width_mm, confirmed, gauges_mm in _PROFILES:
         for gauge_mm in gauges_mm:
             name = f"{profile}_{gauge_mm}"
             text = f"{label}, {gauge_mm} mm" + ("" if confirmed else UNCONFIRMED)
-            table[name] = RailStandard(name, text, gauge_mm / 1000, head_width_mm / 1000)
+            region = _REGIONS[profile.split("_")[0]]
+            table[name] = RailStandard(name, text, gauge_mm / 1000, head_width_mm / 1000, region)
     return table
 
 
@@ -131,8 +155,8 @@ def resolve(name: str, gauge_mm: float | None = None, head_width_mm: float | Non
 
     Examples
     --------
-    >>> resolve("EN_60E1_1435")
-    RailStandard(name='EN_60E1_1435', label='EN 60E1 (UIC 60), 1435 mm', gauge_m=1.435, head_width_m=0.072)
+    >>> resolve("EN_60E1_1435").description
+    'Europe: EN 60E1 (UIC 60), 1435 mm, head 72 mm'
     >>> resolve("EN_60E1_1435", gauge_mm=1440).gauge_m
     1.44
     >>> resolve("CUSTOM", 600, 50).label

@@ -36,12 +36,18 @@ MAX_LENGTH_M = 100_000.0
 """Longer than any gap to close, any minimum line length and any step between stations."""
 
 
+STANDARD_WIDGET = {"widget_wrapper": {"class": f"{__package__}.standard_widget.StandardWidgetWrapper"}}
+"""Metadata by which QGIS finds the list of standards. Models contain it: the class never changes its place."""
+
+
 def rail(detect: bool = False) -> Definitions:
     """Define the rail standard, gauge and railhead width; with `detect`, the points may tell them."""
     hint = tr(" DETECT measures the rails in part of the points and takes the standard that fits.") if detect else ""
+    standard = choice("STANDARD", tr("Rail standard"), (*STANDARDS, CUSTOM, *([DETECT] if detect else [])), DEFAULT)
+    standard.setMetadata(STANDARD_WIDGET)
     return (
         helped(
-            choice("STANDARD", tr("Rail standard"), (*STANDARDS, CUSTOM, *([DETECT] if detect else [])), DEFAULT),
+            standard,
             tr(
                 "Rail profile and gauge, which give the rail spacing and the railhead width: EN_60E1_1435 is the "
                 "profile 60E1 of EN 13674 on 1435 mm gauge. CUSTOM takes both from the two fields below. Widths not "
