@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
 
 import dask
 from distributed import Client, LocalCluster
+from distributed.security import Security
 from distributed.system import MEMORY_LIMIT
 
-from ..errors import RailExtractError
+from ..errors import ParameterError, RailExtractError
+from ..scratch import scratch_folder, sweep
 
 MAX_DEATHS = 10
 """Local workers that may die while they execute a task, for whatever reason, before the task is abandoned."""
@@ -22,31 +27,94 @@ MEMORY_KEPT = {"MALLOC_TRIM_THRESHOLD_": 256 << 20, "MALLOC_MMAP_THRESHOLD_": 32
 """Bytes of freed memory that glibc keeps in a local worker, and the largest array that it takes from them. With Dask's
 64 KiB every array returns to the system, which clears the memory before it lends it again: a tenth of the run time."""
 
+HERE = "127.0.0.1"
+"""Address that only programs on this computer reach."""
+
+PAGES = ("distributed.scheduler.http.routes", "distributed.worker.http.routes")
+"""Settings of Dask that list the web pages about a run."""
+
+TIMEOUT_S = 20
+"""How long a scheduler may take to answer."""
+
 WORKER_BYTES = 3 << 29
 """Memory per local worker: its peak is a gigabyte (docs/scaling.md), and the joining process needs some."""
 
 
+@dataclass(frozen=True)
+class Certificates:
+    """Files with which a scheduler and its clients recognize each other, all PEM.
+
+    Attributes
+    ----------
+    authority, certificate, key : Path
+        Certificate of the authority that signs for the cluster; own certificate and its private key.
+    """
+
+    authority: Path
+    certificate: Path
+    key: Path
+
+    def security(self) -> Security:
+        """Return Dask's form of these files.
+
+        Raises
+        ------
+        ParameterError
+            A file is missing or is not what it should be.
+        """
+        security = Security(
+            require_encryption=True,
+            tls_ca_file=str(self.authority),
+            tls_client_cert=str(self.certificate),
+            tls_client_key=str(self.key),
+        )
+        try:
+            security.get_connection_args("client")
+        except OSError as error:  # as are those of SSL
+            names = ", ".join(map(str, (self.authority, self.certificate, self.key)))
+            raise ParameterError(
+                f"The certificates ({names}) can't be used ({error.strerror or error}): give PEM files."
+            ) from error
+        return security
+
+
 @contextmanager
-def connect(scheduler: str | None, workers: int | None = None) -> Iterator[Client]:
+def connect(
+    scheduler: str | None,
+    workers: int | None = None,
+    certificates: Certificates | None = None,
+    dashboard_port: int | None = None,
+) -> Iterator[Client]:
     """Use a running Dask scheduler, or start workers with one thread each on this computer.
+
+    Whoever can talk to a scheduler can run programs on its workers. Local workers therefore only accept the certificate
+    that is made for this run and never leaves memory.
 
     Parameters
     ----------
     scheduler : str or None
-        Address of the scheduler, such as tcp://10.0.0.1:8786.
+        Address of the scheduler, such as tls://10.0.0.1:8786.
     workers : int, optional
         Number of workers to start; by default one per core, or fewer if the memory is not enough for them.
+    certificates : Certificates, optional
+        For a scheduler at a tls:// address.
+    dashboard_port : int, optional
+        Port of this computer at which Dask shows what local workers do, to all users of this computer; 0 for any free
+        one. Without a port there is no dashboard.
 
     Raises
     ------
     RailExtractError
-        There is no scheduler at this address.
+        There is no scheduler at this address, or the certificates can't be used.
     """
     if scheduler is not None:
+        security = None if certificates is None else certificates.security()
         try:
-            client = Client(scheduler, timeout="20s")
-        except (OSError, ValueError) as error:
-            raise RailExtractError(f"No Dask scheduler answers at {scheduler} ({error}): check the address.") from error
+            client = Client(scheduler, timeout=TIMEOUT_S, security=security)
+        except (OSError, ValueError, TypeError) as error:
+            raise RailExtractError(
+                f"No Dask scheduler answers at {scheduler} ({error}): check the address and the certificates."
+            ) from error
         with client:
             yield client
         return
@@ -55,8 +123,19 @@ def connect(scheduler: str | None, workers: int | None = None) -> Iterator[Clien
     environment = {**dict.fromkeys(ONE_THREAD, 1), **MEMORY_KEPT}
     settings = {f"distributed.nanny.pre-spawn-environ.{name}": value for name, value in environment.items()}
     settings["distributed.scheduler.allowed-failures"] = MAX_DEATHS
-    with dask.config.set(settings):
-        # Without a memory limit: Dask's own, an even share of the memory, kills workers at their peak.
-        cluster = LocalCluster(n_workers=workers, threads_per_worker=1, memory_limit=None, dashboard_address=":0")
-    with cluster, Client(cluster) as client:
-        yield client
+    if dashboard_port is None:  # Dask serves pages without a dashboard, too
+        settings.update(dict.fromkeys(PAGES, []))
+    temporary = Path(tempfile.gettempdir())
+    sweep(temporary)
+    with scratch_folder(temporary) as folder, dask.config.set({**settings, "temporary-directory": str(folder)}):
+        cluster = LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            memory_limit=None,  # Dask's own, an even share of the memory, kills workers at their peak
+            host=HERE,
+            security=Security.temporary(),
+            dashboard_address=f"{HERE}:{dashboard_port or 0}",
+            scheduler_kwargs={"dashboard": dashboard_port is not None},
+        )
+        with cluster, Client(cluster) as client:
+            yield client

@@ -27,7 +27,7 @@ from ..report import Origin
 from ..scratch import scratch_folder
 from ..standards import DEFAULT, RailStandard, distinct_gauges, resolve
 
-NEEDS = {"distributed": "distributed", "pyogrio": "pyogrio", "shapely": "shapely", "rasterio": "rasterio"}
+NEEDS = {name: name for name in ("distributed", "cryptography", "pyogrio", "shapely", "rasterio")}
 """Modules and packages of the extra "cluster"; rasterio is needed for `--cleaned` only."""
 
 INCOMPLETE = 2
@@ -100,7 +100,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = f"STEP of --quality and --report in metres (default: {DEFAULT_STEP_M:g})"
     method.add_argument("--step", type=float, default=DEFAULT_STEP_M, metavar="N", help=text)
     run = parser.add_argument_group("workers")
-    run.add_argument("--scheduler", metavar="ADDRESS", help="use the Dask cluster at tcp://... and not local workers")
+    text = "use the Dask cluster at tls://HOST:PORT and not local workers; see docs/scaling.md on trust"
+    run.add_argument("--scheduler", metavar="ADDRESS", help=text)
+    run.add_argument("--tls-ca", type=Path, metavar="PEM", help="certificate of the cluster's authority")
+    run.add_argument(
+        "--tls-cert", type=Path, metavar="PEM", help="certificate of this computer, signed by the authority"
+    )
+    run.add_argument("--tls-key", type=Path, metavar="PEM", help="private key of this certificate")
+    text = "show what local workers do at http://127.0.0.1:PORT, to all users of this computer (default: nowhere)"
+    run.add_argument("--dashboard", type=int, metavar="PORT", help=text)
     run.add_argument("--workers", type=int, help="local workers (default: one per core, or fewer if memory is short)")
     run.add_argument("--work", type=Path, help="folder that keeps finished results, so that a restart continues")
     run.add_argument(
@@ -204,11 +212,13 @@ def _run_in(
 ) -> int:
     """Extract with a folder for finished results, then write."""
     from ..cluster.runner import DaskRunner
-    from ..cluster.workers import connect
+    from ..cluster.workers import Certificates, connect
 
     codes, extent = _numbers(args.rail_classes, "--rail-classes", int), _extent(args.extent)
     progress = Estimating(_Console())
-    with connect(args.scheduler, args.workers) as client:
+    files = _certificate_files(args, progress)
+    certificates = Certificates(*files) if files else None
+    with connect(args.scheduler, args.workers, certificates, args.dashboard) as client:
         runner = DaskRunner(client, folder)
         request = ask(args.tiles, codes, args.crs, extent, progress, unreadable=runner.failures)
         network = extract_files(request, folder.resolve(), parameters, runner, progress)
@@ -218,6 +228,30 @@ def _run_in(
     for failure in network.failures:
         print(failure, file=sys.stderr)
     return INCOMPLETE if network.failures else 0
+
+
+def _certificate_files(args: argparse.Namespace, progress: Progress) -> tuple[Path, ...]:
+    """Return authority, certificate and key for a scheduler; none for local workers, or for a tcp:// address.
+
+    Raises
+    ------
+    ParameterError
+        An option is missing, or has nothing to apply to.
+    """
+    files = args.tls_ca, args.tls_cert, args.tls_key
+    secured = (args.scheduler or "").startswith("tls://")
+    if secured and None in files:
+        raise ParameterError("A scheduler at tls:// needs the options --tls-ca, --tls-cert and --tls-key.")
+    if not secured and files != (None, None, None):
+        raise ParameterError("The options --tls-ca, --tls-cert and --tls-key need a --scheduler at tls://.")
+    if args.scheduler and args.dashboard is not None:
+        raise ParameterError("The option --dashboard is for local workers: a running scheduler has its own.")
+    if args.scheduler and not secured:
+        progress.warning(
+            f"{args.scheduler} is not secured: everybody who reaches it can run programs on its workers. "
+            "docs/scaling.md describes tls://."
+        )
+    return files if secured else ()
 
 
 def _write(

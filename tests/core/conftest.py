@@ -34,3 +34,15 @@ def client():
 
     with connect(None, 2) as client:
         yield client
+
+
+@pytest.fixture(scope="session")
+def scheduler(client, tmp_path_factory):
+    """Options that name the scheduler of these workers, with its certificates in files."""
+    folder, words = tmp_path_factory.mktemp("certificates"), ["--scheduler", client.scheduler.address]
+    security = client.security
+    texts = {"ca": security.tls_ca_file, "cert": security.tls_client_cert, "key": security.tls_client_key}
+    for name, text in texts.items():
+        (folder / f"{name}.pem").write_text(text)
+        words += [f"--tls-{name}", str(folder / f"{name}.pem")]
+    return words

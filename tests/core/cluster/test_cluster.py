@@ -198,11 +198,11 @@ def test_finished_squares_of_another_cloud_are_not_used(tiles, client, tmp_path)
     assert len(again) == len(alone.rails) == 2
 
 
-def test_a_virtual_point_cloud_stands_for_its_tiles(tiles, client, tmp_path):
+def test_a_virtual_point_cloud_stands_for_its_tiles(tiles, scheduler, tmp_path):
     catalogue, out = tmp_path / "all.vpc", tmp_path / "out.gpkg"
     items = [{"assets": {"data": {"href": str(tiles / f"tile{number}.laz")}}} for number in (0, 1)]
     catalogue.write_text(json.dumps({"features": items}))
-    words = ["extract", str(catalogue), "--rails", str(out), "--scheduler", client.scheduler.address]
+    words = ["extract", str(catalogue), "--rails", str(out), *scheduler]
     assert main([*words, "--stretch-tiles", "4", "--engine", "OPENCV", "--iterations", "1"]) == 0
     _, _, _, values = pyogrio.raw.read(out, layer="rails")
     assert 60 < values[2].sum() < 80  # two thirds of two rails of 50 m

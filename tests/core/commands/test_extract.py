@@ -42,9 +42,9 @@ def values(path, layer):
     return dict(zip(meta["fields"], columns))
 
 
-def test_all_outputs_are_those_of_the_walk(tiles, client, tmp_path):
+def test_all_outputs_are_those_of_the_walk(tiles, scheduler, tmp_path):
     out, report, cleaned = tmp_path / "out.gpkg", tmp_path / "report.html", tmp_path / "cleaned.tif"
-    words = ["extract", str(tiles), *FAST, "--scheduler", client.scheduler.address, "--step", "2"]
+    words = ["extract", str(tiles), *FAST, *scheduler, "--step", "2"]
     words += ["--rails", str(out), "--centerlines", str(out), "--quality", str(out)]
     words += ["--report", str(report), "--cleaned", str(cleaned)]
     assert main(words) == 0
@@ -66,13 +66,13 @@ def test_all_outputs_are_those_of_the_walk(tiles, client, tmp_path):
     assert {file.name for file in tmp_path.iterdir()} == {"out.gpkg", "report.html", "cleaned.tif"}
 
 
-def test_an_extent_limits_the_points(tiles, client, tmp_path):
+def test_an_extent_limits_the_points(tiles, scheduler, tmp_path):
     out, cleaned = tmp_path / "out.gpkg", tmp_path / "cleaned.tif"
     south, north = -1000.0, 1000.0
     (cloud,) = read_rail_points(tiles, [10])
     x = cloud.frame.to_crs(cloud.xyz)[:, 0]
     extent = f"{x.min() - 1},{south},{x.min() + 25},{north}"
-    words = ["extract", str(tiles), *FAST, "--scheduler", client.scheduler.address, f"--extent={extent}"]
+    words = ["extract", str(tiles), *FAST, *scheduler, f"--extent={extent}"]
     assert main([*words, "--rails", str(out), "--cleaned", str(cleaned)]) == 0
     np.testing.assert_allclose(values(out, "rails")["length_m"], 25, atol=0.5)
     with rasterio.open(cleaned) as file:
@@ -81,14 +81,14 @@ def test_an_extent_limits_the_points(tiles, client, tmp_path):
         )
 
 
-def test_a_corrupt_tile_is_named_and_the_rest_is_written(tiles, client, tmp_path, capsys):
+def test_a_corrupt_tile_is_named_and_the_rest_is_written(tiles, scheduler, tmp_path, capsys):
     for name in ("tile0.laz", "tile1.laz"):
         (tmp_path / name).write_bytes((tiles / name).read_bytes())
     whole = (tiles / "tile2.laz").read_bytes()
     (tmp_path / "tile2.laz").write_bytes(whole[: len(whole) // 2])
     out = tmp_path / "out.gpkg"
     words = ["extract", str(tmp_path), "--rails", str(out), "--centerlines", str(out)]
-    assert main([*words, "--scheduler", client.scheduler.address, *FAST]) == INCOMPLETE
+    assert main([*words, *scheduler, *FAST]) == INCOMPLETE
     assert "tile2.laz" in capsys.readouterr().err
     assert len(values(out, "rails")["length_m"]) == 2
     assert 50 < values(out, "rails")["length_m"].sum() < 85
@@ -96,31 +96,31 @@ def test_a_corrupt_tile_is_named_and_the_rest_is_written(tiles, client, tmp_path
     assert {file.name for file in tmp_path.iterdir()} == {"out.gpkg", "tile0.laz", "tile1.laz", "tile2.laz"}
 
 
-def test_two_names_of_one_file_hold_both_layers(tiles, client, tmp_path, monkeypatch):
+def test_two_names_of_one_file_hold_both_layers(tiles, scheduler, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     words = ["extract", str(tiles), "--rails", "two.gpkg", "--centerlines", str(tmp_path / "two.gpkg")]
     former = ["--stretch-tiles", "4", "--engine", "OPENCV", "--iterations", "1"]
-    assert main([*words, "--scheduler", client.scheduler.address, *former]) == 0
+    assert main([*words, *scheduler, *former]) == 0
     assert {name for name, _ in pyogrio.list_layers("two.gpkg")} == {"rails", "centerlines"}
 
 
-def test_warnings_are_on_the_error_output(tiles, client, tmp_path, capsys):
+def test_warnings_are_on_the_error_output(tiles, scheduler, tmp_path, capsys):
     words = ["extract", str(tiles), "--rails", str(tmp_path / "out.gpkg"), "--min-length", "1000", *FAST]
-    assert main([*words, "--scheduler", client.scheduler.address]) == 0
+    assert main([*words, *scheduler]) == 0
     said = capsys.readouterr()
     assert "Warning: Class 10 shows no rail" in said.err
     assert said.out.startswith("0 rails, 0.000 km")
 
 
-def test_rails_without_a_track_are_written_and_the_reason_is_named(tiles, client, tmp_path, capsys):
+def test_rails_without_a_track_are_written_and_the_reason_is_named(tiles, scheduler, tmp_path, capsys):
     out = tmp_path / "out.gpkg"
     words = ["extract", str(tiles), "--rails", str(out), "--standard", "AS_60_1600", *FAST]
-    assert main([*words, "--scheduler", client.scheduler.address]) == INCOMPLETE
+    assert main([*words, *scheduler]) == INCOMPLETE
     assert "No track of 1600 mm gauge" in capsys.readouterr().err
     assert len(values(out, "rails")["rail_id"]) == 2
 
 
-def test_an_output_that_fails_does_not_stop_the_others(tiles, client, tmp_path, monkeypatch, capsys):
+def test_an_output_that_fails_does_not_stop_the_others(tiles, scheduler, tmp_path, monkeypatch, capsys):
     out, report, cleaned = tmp_path / "out.gpkg", tmp_path / "pages" / "report.html", tmp_path / "cleaned.tif"
 
     def remove_folder(*arguments):
@@ -129,7 +129,7 @@ def test_an_output_that_fails_does_not_stop_the_others(tiles, client, tmp_path, 
 
     monkeypatch.setattr(extract, "extract_files", remove_folder)
     words = ["extract", str(tiles), "--rails", str(out), "--report", str(report)]
-    assert main([*words, "--cleaned", str(cleaned), "--scheduler", client.scheduler.address, *FAST]) == 1
+    assert main([*words, "--cleaned", str(cleaned), *scheduler, *FAST]) == 1
     assert f"{report} can't be written" in capsys.readouterr().err
     assert len(values(out, "rails")["rail_id"]) == 2
     assert cleaned.exists()
@@ -161,6 +161,14 @@ def test_an_output_that_is_a_folder_is_refused_before_the_run(tiles, tmp_path, c
         (["--extent", "5,2,3,4"], "extent"),
         (["--square-tiles", "2"], "too small"),
         (["--scheduler", "nonsense"], "scheduler"),
+        (["--scheduler", "tls://127.0.0.1:1"], "needs the options --tls-ca, --tls-cert and --tls-key"),
+        (["--scheduler", "tcp://127.0.0.1:1", "--tls-ca", "ca.pem"], "need a --scheduler at tls://"),
+        (["--tls-key", "key.pem"], "need a --scheduler at tls://"),
+        (["--scheduler", "tcp://127.0.0.1:1", "--dashboard", "0"], "--dashboard is for local workers"),
+        (
+            ["--scheduler", "tls://127.0.0.1:1", *(f"--tls-{one}=gone.pem" for one in ("ca", "cert", "key"))],
+            "can't be used (No such file or directory): give PEM files",
+        ),
     ],
 )
 def test_a_wrong_option_is_refused_before_the_run(tiles, tmp_path, monkeypatch, capsys, words, said):
