@@ -30,7 +30,7 @@ def sentence_for(error: BaseException, definitions: Sequence[QgsProcessingParame
     Parameters
     ----------
     error : BaseException
-        Some libraries raise errors that are not an `Exception`: lazrs does so on damaged files.
+        Some libraries raise errors that are not an `Exception`: lazrs raises one on damaged files.
     definitions : sequence of QgsProcessingParameterDefinition
         Parameters that the sentence may name.
     """
