@@ -13,6 +13,7 @@ from ...core.standards import DEFAULT, RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
+from ..dialog.passwords import masked
 from ..reading.clouds import CloudSource, points_folder, request_points
 from ..systems import system
 from ..writing.destinations import is_wanted
@@ -98,7 +99,7 @@ class ExtractRails(RailAlgorithm):
             values.class_codes(),
             standard,
             values.other_gauges_m(standard),
-            self.asPythonCommand(parameters, context),
+            masked(self.asPythonCommand(parameters, context)),
         )
 
     def _detected(self, job: Job, request: Request, values: ParameterValues, progress: Progress) -> Job:

@@ -14,6 +14,7 @@ from qgis.core import Qgis, QgsApplication, QgsMessageLog, QgsProcessingExceptio
 
 from ...core.errors import Cancelled, RailExtractError
 from ..dialog.guide import tracker
+from ..dialog.passwords import masked
 from ..dialog.wording import for_user
 from ..i18n import tr
 
@@ -37,13 +38,13 @@ def sentence_for(error: BaseException, definitions: Sequence[QgsProcessingParame
     if isinstance(error, RailExtractError):
         return for_user(str(error), definitions)
     if isinstance(error, QgsProcessingException):
-        return str(error)
+        return masked(str(error))
     if isinstance(error, (Cancelled, KeyboardInterrupt)):
         return tr("Cancelled; nothing was written.")
     if isinstance(error, MemoryError):
         return tr("Not enough memory: choose a smaller extent.")
     _log(error)
-    text = ": ".join(filter(None, (type(error).__name__, " ".join(str(error).split()))))
+    text = masked(": ".join(filter(None, (type(error).__name__, " ".join(str(error).split())))))
     return tr("Rail Extract failed unexpectedly ({}): report this at {} with the traceback from the log.").format(
         text, tracker()
     )
@@ -51,7 +52,7 @@ def sentence_for(error: BaseException, definitions: Sequence[QgsProcessingParame
 
 def _log(error: BaseException) -> None:
     """Write a traceback into the log panel; a command line has none, so there it goes to the error output."""
-    text = "".join(traceback.format_exception(type(error), error, error.__traceback__))
+    text = masked("".join(traceback.format_exception(type(error), error, error.__traceback__)))
     QgsMessageLog.logMessage(text, LOG, Qgis.MessageLevel.Critical)
     if QgsApplication.platform() == COMMAND_LINE:
         print(text, file=sys.stderr)

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 
 from qgis.core import QgsApplication, QgsProcessingParameterDefinition
 
+from .passwords import masked
+
 WITH_DIALOGS = "desktop"
 """QGIS's name for the platform with windows."""
 
@@ -15,7 +17,8 @@ NAME = r"(?<![\w./\\])[A-Z][A-Z_]+(?![\w/\\]|\.\w)"
 
 
 def for_user(sentence: str, definitions: Sequence[QgsProcessingParameterDefinition]) -> str:
-    """Return the sentence with labels in place of parameter names if this QGIS has windows, else unchanged."""
+    """Return the sentence without passwords, and with labels for parameter names if this QGIS has windows."""
+    sentence = masked(sentence)
     return with_labels(sentence, definitions) if QgsApplication.platform() == WITH_DIALOGS else sentence
 
 
