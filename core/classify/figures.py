@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 
 from .lines import Lines
 
-SPACING_M = 0.5
-"""Cells of one line within this distance along it share its length: thin clouds show a rail every 0.2 to 0.4 m."""
+GAP_M = 1.0
+"""Longest gap between two cells of a rail that counts towards its length."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Figures:
 
 
 def shares_of_length(lines: Lines, half_m: float) -> np.ndarray:
-    """Length of rail that each cell stands for, (n,) metres: cells close to each other share it.
+    """Length of rail that each cell stands for, (n,) metres: half the way to the next cell ahead and behind.
 
     Parameters
     ----------
@@ -57,11 +57,17 @@ def shares_of_length(lines: Lines, half_m: float) -> np.ndarray:
         Distance across within which two cells are on one line.
     """
     count = len(lines.axis)
-    if not count:
-        return np.zeros(0)
-    one, other = cKDTree(lines.axis).query_pairs(np.hypot(SPACING_M, half_m), output_type="ndarray").T
-    step = lines.axis[other] - lines.axis[one]
-    beside = np.abs(np.einsum("ij,ij->i", step, lines.across[one])) < half_m
-    beside &= np.abs(np.einsum("ij,ij->i", step, lines.along[one])) < SPACING_M
-    sharing = 1 + np.bincount(one[beside], minlength=count) + np.bincount(other[beside], minlength=count)
-    return 2 * SPACING_M / sharing
+    if count < 2:
+        return np.zeros(count)
+    pairs = cKDTree(lines.axis).query_pairs(np.hypot(GAP_M, half_m), output_type="ndarray")
+    own, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+    step = lines.axis[other] - lines.axis[own]
+    along = np.einsum("ij,ij->i", step, lines.along[own])
+    beside = np.abs(np.einsum("ij,ij->i", step, lines.across[own])) < half_m
+    share_m = np.zeros(count)
+    for ahead in (True, False):
+        mine = beside & ((along > 0) == ahead)
+        gap_m = np.full(count, GAP_M)
+        np.minimum.at(gap_m, own[mine], np.abs(along[mine]))
+        share_m += np.where(gap_m < GAP_M, gap_m / 2, 0.0)
+    return share_m

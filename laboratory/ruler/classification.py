@@ -12,7 +12,6 @@ from ...core.classify.cloud import classify_cloud
 from ...core.classify.figures import Figures
 from ...core.classify.settings import Settings
 from ...core.clouds.points import RailPoints
-from ...core.errors import RailExtractError
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_rails
 from ..scenes.raw import RawScene
@@ -99,14 +98,11 @@ def score(scene: RawScene, wide: bool = False) -> tuple[Score, np.ndarray]:
     return result, found.rail
 
 
-def lines_from(scene: RawScene, rail: np.ndarray) -> Match | None:
-    """Extract rails from labelled points and compare them with the truth; None where there is nothing to extract."""
+def lines_from(scene: RawScene, rail: np.ndarray) -> Match:
+    """Extract rails from labelled points, (n,) bool, and compare them with the truth."""
     points = RailPoints(scene.xyz[rail], scene.frame, RAIL)
     parameters = Parameters(scene.standard.gauge_m, scene.standard.head_width_m, other_gauges_m=scene.other_gauges_m)
-    try:
-        network = extract_rails([points], parameters)
-    except RailExtractError:
-        return None
+    network = extract_rails([points], parameters)
     return match([line.xyz for line in network.rails], scene.rails)
 
 
