@@ -79,7 +79,17 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         raise NotImplementedError
 
     def compute(self, job: Any, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress) -> dict:
-        """Compute, write the outputs and return the results by name."""
+        """Compute, write the outputs and return the results by name.
+
+        Parameters
+        ----------
+        job : object
+            What `read` returned.
+        parameters : dict
+            Values by name, as QGIS passes them.
+        context : QgsProcessingContext
+        progress : Progress
+        """
         raise NotImplementedError
 
     def checkParameterValues(self, parameters: dict[str, Any], context: QgsProcessingContext) -> tuple[bool, str]:

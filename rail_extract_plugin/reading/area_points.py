@@ -48,6 +48,12 @@ def read_points_in(area: Area, cloud: CloudSource, progress: Progress) -> dict[i
 
     If the cloud or the area states no coordinate system, that of the other is used.
 
+    Parameters
+    ----------
+    area : Area
+    cloud : CloudSource
+    progress : Progress
+
     Raises
     ------
     CrsError

@@ -66,6 +66,13 @@ def read_rasters(path: Path, header: RasterHeader, progress: Progress = SILENT) 
 
     A cell is rail if its value is neither 0 nor the band's nodata value.
 
+    Parameters
+    ----------
+    path : Path
+    header : RasterHeader
+        From `read_header`.
+    progress : Progress
+
     Raises
     ------
     RasterError
@@ -90,6 +97,14 @@ def read_rasters(path: Path, header: RasterHeader, progress: Progress = SILENT) 
 
 def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster], progress: Progress = SILENT) -> None:
     """Write rasters on the header's grid into a new file; cells outside its window are dropped.
+
+    Parameters
+    ----------
+    path : Path
+    header : RasterHeader
+    rasters : sequence of RailRaster
+        One for each class of the header.
+    progress : Progress
 
     Raises
     ------

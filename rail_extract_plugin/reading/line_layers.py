@@ -72,6 +72,11 @@ def read_centerlines(
     """Read all parts of all lines, as `read_rails` does; figures without a field are NaN.
 
     Lines without a `track_id` get the id of their feature; those without `left_ids` or `right_ids` have none.
+
+    Parameters
+    ----------
+    source, progress, name
+        See `read_rails`.
     """
     found, frame = _read(source, progress, name)
     return tuple(_centerline(feature, xyz) for feature, xyz in found), frame

@@ -46,6 +46,13 @@ def choose_model(header: RasterHeader, standard: RailStandard, name: str) -> Mod
 
 
 def moved(raster: RailRaster, frame: LocalFrame, other: LocalFrame) -> RailRaster:
-    """Return a raster in another local frame of the same coordinate system."""
+    """Return a raster in another local frame of the same coordinate system.
+
+    Parameters
+    ----------
+    raster : RailRaster
+    frame, other : LocalFrame
+        Present frame and new frame.
+    """
     right, up, _ = frame.shift_to(other)
     return replace(raster, x0=raster.x0 + float(right), y0=raster.y0 + float(up))

@@ -109,6 +109,12 @@ class Pip:
     def install(self, requirements: Sequence[str], options: Sequence[str], progress: Progress) -> None:
         """Run pip install.
 
+        Parameters
+        ----------
+        requirements, options : sequence of str
+            Further arguments of pip.
+        progress : Progress
+
         Raises
         ------
         RailExtractError

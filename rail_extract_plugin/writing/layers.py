@@ -162,7 +162,14 @@ def write_stations(
     parameters: dict[str, Any],
     context: QgsProcessingContext,
 ) -> dict[str, str]:
-    """Write the stations of measured tracks as points; see `write_lines`."""
+    """Write the stations of measured tracks as points.
+
+    Parameters
+    ----------
+    tracks : sequence of TrackGeometry
+    algorithm, name, frame, parameters, context
+        See `write_lines`.
+    """
     shape = QgsWkbTypes.Type.Point if is_flat(tracks) else QgsWkbTypes.Type.PointZ
     made = stations(tracks, frame)
     return _write(algorithm, name, QUALITY, shape, made, frame, parameters, context)
@@ -177,7 +184,15 @@ def write_raster(
     context: QgsProcessingContext,
     progress: Progress = SILENT,
 ) -> dict[str, str]:
-    """Write rail rasters, one per class, to an output; see `write_lines`.
+    """Write rail rasters, one per class, to an output.
+
+    Parameters
+    ----------
+    header : RasterHeader
+    rasters : sequence of RailRaster
+    algorithm, name, parameters, context
+        See `write_lines`.
+    progress : Progress
 
     Returns
     -------
