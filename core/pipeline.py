@@ -18,7 +18,8 @@ from .parameters import Parameters
 from .progress import SILENT, Progress
 from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from .raster import RailRaster
-from .squares.grid import Key, MemorySource, PointSource, Square, around, assembled, lay_out
+from .squares.density import occupied_squares, plausible, warn_of_unexplained
+from .squares.grid import Key, MemorySource, PointSource, Square, around, assembled
 from .squares.pieces import SquareRails
 from .squares.remeasuring import measure_rails
 from .squares.spool import SpooledFile, SpooledPoints, gather, spool_file
@@ -209,12 +210,15 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
     rails: list[RailLine] = []
     cleaned: dict[int, RailRaster] = {}
     any_square = False
+    sources = plausible(sources, progress)
     for source, share in zip(sources, drawing.split(len(sources))):
-        squares = {square.key: square for square in lay_out(sources, source)}
+        squares = {square.key: square for square in occupied_squares(sources, source)}
         parts, rasters = _draw_squares(source, squares, parameters, runner, share)
-        any_square |= bool(parts)
+        any_square |= bool(parts) or not squares
         found = whole_rails(parts, source.frame, parameters, len(rails) + 1, progress) if parts else []
         warn_of_rails(found, source.class_code, parameters, progress)
+        if found:
+            warn_of_unexplained(source, found, progress)
         rails += found
         if rasters:
             cleaned[source.class_code] = assembled(rasters, squares, source.frame)

@@ -16,11 +16,11 @@ from ..lines.network import LineNetwork
 from ..lines.network_smoothing import bend_through
 from ..lines.smoothing import smooth_profile
 from ..parameters import Parameters
-from ..polyline import interpolate, left_normals, length_along, project
+from ..polyline import Feet, interpolate, left_normals, length_along, project
 from ..progress import SILENT, Progress
 from .branch_starts import APART_HEADS, slide_branches
 from .edges import HALF_HEAD_BINS, histograms, middles, search_distance
-from .level import on_top
+from .level import MIN_ON_HEAD, on_top
 from .neighbours import free_edges
 
 MIN_SEEN_SHARE = 0.25
@@ -30,6 +30,10 @@ MAX_UNSEEN_M = 6.0
 """Longest section without visible edges that is redrawn from the line on either side, because other rails distort the
 raster there: heads that cross at 1:26.5 cover each other over this length. Where an arc of 190 m begins abruptly, the
 redrawn line is 3 mm off."""
+
+NARROW_SHARE, NARROW_PERCENTILES = 0.25, (5.0, 95.0)
+"""Width of a band of points, in head widths and between these percentiles, in which no edges are looked for: points
+that were drawn or computed on the axis, not scanned, all have one offset."""
 
 CURL_M, STEADY_M = 0.8, 3.5
 """Length of a free end that is redrawn, and of the part before it that it continues. The raster curls over two head
@@ -89,6 +93,9 @@ def _shifted(
     lines = []
     for number, line in enumerate(progress.span(0.7, 1.0).follow(network.lines)):
         mine = feet.of(number)
+        if _is_narrow(mine.across, head_width_m):
+            lines.append(_moved_onto(line, mine))
+            continue
         top, _ = on_top(mine.t, mine.across, points.xyz[mine.point, 2], head_width_m)
         along = length_along(line)
         stations, middle = _middles(mine.t[top], mine.across[top], along[-1], head_width_m, edges[number])
@@ -101,6 +108,19 @@ def _shifted(
         moved = _redrawn(moved, along, _unseen(stations, known))
         lines.append(_with_redrawn_ends(moved, along, free_ends[number]))
     return _joined(network, lines, smoothing_m)
+
+
+def _is_narrow(across: np.ndarray, head_width_m: float) -> bool:
+    """Return whether all points near a line, by their offsets from it, form a band in which no edges can be seen."""
+    if len(across) < MIN_ON_HEAD:
+        return False
+    low, high = np.percentile(across, NARROW_PERCENTILES)
+    return bool(high - low < NARROW_SHARE * head_width_m)
+
+
+def _moved_onto(line: np.ndarray, feet: Feet) -> np.ndarray:
+    """Move a line sideways onto the middle of its points."""
+    return line + np.median(feet.across) * left_normals(line)
 
 
 def _with_redrawn_ends(line: np.ndarray, along: np.ndarray, free_ends: np.ndarray) -> np.ndarray:

@@ -25,6 +25,22 @@ def scattered(*sides_m, count=3600):
     return of(lambda points: PLACE + np.random.default_rng(2).uniform(0, sides_m, (count, 3)))
 
 
+def strays(count):
+    """Points anywhere within 1000 km."""
+    return PLACE + np.random.default_rng(3).uniform(-5e5, 5e5, (count, 3)) * [1, 1, 0]
+
+
+def grating():
+    """Points along lines that are closer together than rails can be."""
+    rng = np.random.default_rng(5)
+    return np.concatenate(
+        [
+            np.column_stack([rng.uniform(0, 10, 1000), 0.3 * number + rng.uniform(-0.036, 0.036, 1000), np.zeros(1000)])
+            for number in range(100)
+        ]
+    )
+
+
 def cross(points):
     """The track, and a copy turned by a right angle about its middle."""
     middle = PLACE + [3, 0, 0]
@@ -33,6 +49,19 @@ def cross(points):
 
 
 POINTS = [
+    Fault(
+        "100 lines of points 0.3 m apart",
+        lambda bench: {"INPUT": bench.cloud(PLACE + grating(), "cloud.laz"), "ITERATIONS": 1},
+        WARNED,
+        "Only … % of the points of class 10 are within 0.2 m of a rail: check the rail classes and the rail standard.…",
+    ),
+    Fault(
+        "points exactly on a line",
+        of(lambda points: PLACE + np.column_stack([np.linspace(0, 20, 2000), np.zeros((2000, 2))])),
+        WARNED,
+        "No two rails run parallel: there are rails but no track centerlines.",
+        {"RAIL_COUNT": 1, "CENTERLINE_COUNT": 0},
+    ),
     Fault(
         "one point",
         of(lambda points: points[:1]),
@@ -51,7 +80,8 @@ POINTS = [
         "all points at one position",
         of(lambda points: np.tile(points[:1], (3000, 1))),
         WARNED,
-        "Class 10 shows no rail: check the rail classes, the standard and MIN_LENGTH.",
+        "All points of class 10 are within 0 m of each other: if the coordinates are in kilometres, assign a "
+        "coordinate system that says so. Class 10 shows no rail: check the rail classes, the standard and MIN_LENGTH.",
         NOTHING,
     ),
     Fault("all points duplicated", of(lambda points: np.repeat(points, 2, axis=0)), gives=TRACK),
@@ -104,6 +134,32 @@ POINTS = [
         "stray point 100 km above the track",
         of(lambda points: np.append(points, points[:1] + [0, 0, 1e5], axis=0)),
         gives=TRACK,
+    ),
+    Fault("5,000 stray points over 1000 km", of(lambda points: np.concatenate([points, strays(5000)])), gives=TRACK),
+    Fault(
+        "5,000 stray points over 1000 km, and nothing else",
+        of(lambda points: strays(5000)),
+        REFUSED,
+        "The points of class 10 are … m apart over … m, too far for rails: if the coordinates are in centimetres or "
+        "millimetres, assign a coordinate system that says so.",
+    ),
+    *(
+        Fault(
+            f"coordinates in {unit}, which the file does not state",
+            of(lambda points, factor=factor: PLACE + (points - PLACE) * factor),
+            REFUSED,
+            "The points of class 10 are … m apart over … m, too far for rails: if the coordinates are in centimetres "
+            "or millimetres, assign a coordinate system that says so.",
+        )
+        for unit, factor in (("centimetres", 100), ("millimetres", 1000))
+    ),
+    Fault(
+        "coordinates in kilometres, which the file does not state",
+        of(lambda points: PLACE + (points - PLACE) / 1000),
+        WARNED,
+        "All points of class 10 are within 0.006 m of each other: if the coordinates are in kilometres, assign a "
+        "coordinate system that says so. Class 10 shows no rail: check the rail classes, the standard and MIN_LENGTH.",
+        NOTHING,
     ),
     Fault("all heights zero", of(lambda points: points * [1, 1, 0]), gives=TRACK),
 ]

@@ -57,6 +57,20 @@ def test_lines_off_the_head_are_moved_to_its_axis(density, noise, slope):
     assert abs(refined[:, 1].mean()) < 0.002
 
 
+@pytest.mark.parametrize("offset", [-0.05, -0.01, 0.0, 0.03, 0.06])
+def test_a_line_moves_onto_points_that_all_have_one_offset(offset):
+    exact = np.column_stack([np.linspace(0, 20, 500), np.full(500, offset), np.zeros(500)])
+    refined = refine(network_of(wavy_line(20, 0.0, 30)), cloud(exact), WIDTH).lines[0]
+    np.testing.assert_allclose(refined[:, 1], offset, atol=1e-6)
+
+
+def test_a_band_of_points_as_wide_as_half_a_head_is_not_taken_for_a_line():
+    strip = head(40, 150, width=WIDTH / 2) + [0.0, 0.01, 0.0]
+    line = wavy_line(40, 0.0, 30)
+    refined = refine(network_of(line), cloud(strip), WIDTH).lines[0]
+    assert rms(refined[:, 1] - 0.01) > 0.004  # one of its edges is taken for that of the head
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_line_on_the_axis_stays_there(seed):
     line = wavy_line(80, 0.0, 30)
