@@ -58,6 +58,12 @@ RAIL_FIELDS = (
     Field("resid_mm", float, "lateral scatter of these points about the line (RMS), millimetres", 1),
     SIGMA,
     BRIDGED,
+    Field(
+        "track_ids",
+        str,
+        "track_id of the tracks that the rail belongs to, separated by commas; empty for a lone rail, and before rails "
+        "are paired",
+    ),
 )
 CENTERLINE_FIELDS = (
     Field("track_id", int, "number of the track, counted from west to east by the start of the line"),

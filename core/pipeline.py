@@ -15,7 +15,7 @@ from .clouds.points import RailPoints, Request
 from .errors import CloudError, NoRailPointsError, NoTrackError, ParameterError, RailExtractError
 from .heads.gauge_estimate import measure_spacings
 from .parameters import Parameters
-from .progress import SILENT, Progress
+from .progress import SILENT, Progress, Recording
 from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from .raster import RailRaster
 from .squares.density import occupied_squares, plausible, warn_of_unexplained
@@ -24,7 +24,16 @@ from .squares.pieces import SquareRails
 from .squares.remeasuring import measure_rails
 from .squares.spool import SpooledFile, SpooledPoints, gather, spool_file
 from .standards import RailStandard, closest_standard
-from .steps import clean_square, engine_for, rails_of_square, square_side, tracks_of, warn_of_rails, whole_rails
+from .steps import (
+    clean_square,
+    engine_for,
+    rails_of_square,
+    square_side,
+    tracks_of,
+    warn_of_rails,
+    whole_rails,
+    with_tracks,
+)
 from .tasks import Context, InTurn, Runner, Task
 from .tracks.geometry import measure_track_geometry
 
@@ -206,6 +215,7 @@ def _sort_file(request: Request, header: CloudHeader, side_m: float, folder: Pat
 
 def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner, progress: Progress) -> RailNetwork:
     """Extract rails, centerlines and track geometry from points that are sorted into squares."""
+    progress = Recording(progress)
     drawing, pairing, measuring = progress.divide((DRAWING, PAIRING, MEASURING))
     rails: list[RailLine] = []
     cleaned: dict[int, RailRaster] = {}
@@ -229,6 +239,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
         centerlines = tracks_of(rails, parameters, pairing)
     except NoTrackError as error:
         runner.failures.append(str(error))
+    rails = with_tracks(rails, centerlines, progress)
     geometry = _measure_tracks(centerlines, rails, sources, parameters, runner, measuring)
     described = dict(runner.run({"engine": Task("Describing the engine", _describe_engine, (parameters,))}))
     progress.set_fraction(1.0)
@@ -241,6 +252,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
         tuple(cleaned.values()),
         tuple(cleaned),
         tuple(runner.failures),
+        progress.warnings,
     )
 
 

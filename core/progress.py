@@ -112,6 +112,24 @@ class _Span(_Relay):
         super().set_fraction(self._start + (self._end - self._start) * fraction)
 
 
+class Recording(_Relay):
+    """Passes everything on, and keeps the warnings, each once."""
+
+    def __init__(self, listener: Progress) -> None:
+        super().__init__(listener)
+        self._warnings: dict[str, None] = {}
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The warnings, in order."""
+        return tuple(self._warnings)
+
+    def warning(self, text: str) -> None:
+        """Pass a warning on and keep it."""
+        super().warning(text)
+        self._warnings[text] = None
+
+
 class Estimating(_Relay):
     """Passes everything on, and reports the remaining time, estimated from the second half of the elapsed time.
 

@@ -82,6 +82,8 @@ class RailLine:
         Plan chainages at which the sections without points start and end; empty for lines read from files.
     support : Support or None
         Support along the line; None for lines read from files.
+    track_ids : tuple of int
+        Tracks of the rail; empty for a lone rail, and before rails are paired.
     """
 
     xyz: np.ndarray
@@ -93,6 +95,7 @@ class RailLine:
     bridged_m: float
     gaps: np.ndarray = field(default_factory=NO_GAPS.copy)
     support: Support | None = None
+    track_ids: tuple[int, ...] = ()
 
     @property
     def length_m(self) -> float:
@@ -275,3 +278,4 @@ class RailNetwork:
     cleaned: tuple[RailRaster, ...] = ()
     cleaned_classes: tuple[int, ...] = ()
     failures: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()

@@ -33,6 +33,7 @@ from .squares.pieces import SquareRails, trim
 from .squares.seams import join
 from .standards import distinct_gauges
 from .tracks.centerlines import CenterlineParameters, build_centerlines
+from .tracks.lone import assign_tracks
 from .vectorize import vectorize
 
 VECTORIZE, SMOOTH, REFINE, ELEVATE = 0.45, 0.05, 0.25, 0.25
@@ -277,6 +278,36 @@ def tracks_of(rails: Sequence[RailLine], parameters: Parameters, progress: Progr
     for code, without_track in errors.items():
         progress.warning(f"Class {code}: {without_track}")
     return [replace(line, track_id=number) for number, line in enumerate(centerlines, start=1)]
+
+
+def with_tracks(
+    rails: Sequence[RailLine], centerlines: Sequence[Centerline], progress: Progress = SILENT
+) -> list[RailLine]:
+    """State the tracks of each rail, and leave out lone lines that are too high or too low to be rails.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+    centerlines : sequence of Centerline
+        All tracks of these rails.
+    progress : Progress
+        Receives a warning if lines are left out.
+
+    Returns
+    -------
+    list of RailLine
+        With their numbers as before.
+    """
+    kept, left_out = assign_tracks(rails, centerlines)
+    if left_out:
+        length_m = sum(line.length_m for line, _ in left_out)
+        lines = "1 line" if len(left_out) == 1 else f"{len(left_out)} lines"
+        heights = ", ".join(f"{height:+.1f} m" for height in sorted({round(above_m, 1) for _, above_m in left_out}))
+        progress.warning(
+            f"{lines} ({length_m:.0f} m) left out: too high or too low for a rail, compared with the tracks alongside "
+            f"({heights}). Check the classification there."
+        )
+    return kept
 
 
 def _tracks_of_class(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> tuple[Centerline, ...]:

@@ -40,7 +40,12 @@ CLOUDS = {("raster", "INPUT"), ("rails", "POINTS"), ("quality", "POINTS")}
 RAILS = ("quality", "RAILS")
 TOLD_BY_RASTER = {(step, name) for step in ("cleaned", "rails") for name in ("GAUGE", "HEAD_WIDTH")}
 
-RESULTS = {"rails": "RAILS", "centerlines": "CENTERLINES", "quality": "QUALITY"}
+RESULTS = {
+    "rails": {"RAILS": "OUTPUT"},
+    "centerlines": {"CENTERLINES": "OUTPUT", "PAIRED_RAILS": "RAILS"},
+    "quality": {"QUALITY": "OUTPUT"},
+}
+"""Results of the model by step, and the output of the step that each is; rails know their tracks once paired."""
 
 COLUMN, ROW = 260, 130
 """Spacing of the boxes in the model designer."""
@@ -80,7 +85,7 @@ def build() -> QgsProcessingModelAlgorithm:
             if source is not None:
                 child.addParameterSources(definition.name(), [source])
         if step in RESULTS:
-            child.setModelOutputs({RESULTS[step]: _output(step, number)})
+            child.setModelOutputs({result: _output(step, result, number) for result in RESULTS[step]})
         model.addChildAlgorithm(child)
         before = step
     return model
@@ -102,12 +107,12 @@ def _source(step: str, definition, inputs: set[str], before: str | None):
     return QgsProcessingModelChildParameterSource.fromStaticValue(definition.defaultValue())
 
 
-def _output(step: str, number: int) -> QgsProcessingModelOutput:
-    """Define the result of a step as an output of the model."""
-    output = QgsProcessingModelOutput(RESULTS[step], RESULTS[step].capitalize())
+def _output(step: str, result: str, number: int) -> QgsProcessingModelOutput:
+    """Define a result of a step as an output of the model."""
+    output = QgsProcessingModelOutput(result, result.replace("_", " ").capitalize())
     output.setChildId(step)
-    output.setChildOutputName("OUTPUT")
-    output.setPosition(QPointF((number + 0.5) * COLUMN, 6 * ROW))
+    output.setChildOutputName(RESULTS[step][result])
+    output.setPosition(QPointF((number + 0.5) * COLUMN, (6 + list(RESULTS[step]).index(result)) * ROW))
     return output
 
 

@@ -12,7 +12,8 @@ from ...core.standards import RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
-from ..writing.layers import CENTERLINES, figures_of, write_lines
+from ..writing.destinations import is_wanted
+from ..writing.layers import CENTERLINES, RAILS, figures_of, write_lines
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
 READING = 0.1
@@ -41,7 +42,9 @@ class BuildTrackCenterlines(RailAlgorithm):
         "multi-part ones. The fields rail_id and class_code are used if they exist. Both rails of a track have the "
         "same class.\n\n"
         "For mixed and dual gauge, fill in Other gauges: on track with three rails, the common rail belongs to both "
-        "tracks. Lines without heights give centerlines without heights."
+        "tracks. Lines without heights give centerlines without heights.\n\n"
+        "RAILS, if asked for, has the rails again, with the tracks of each in track_ids. Lone lines that are too high "
+        "or too low for a rail, compared with the tracks alongside, are left out of it."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
@@ -57,6 +60,9 @@ class BuildTrackCenterlines(RailAlgorithm):
         ):
             self.addParameter(definition)
         self.addParameter(outputs.centerlines())
+        paired = outputs.rails("RAILS", optional=True)
+        paired.setCreateByDefault(False)
+        self.addParameter(paired)
         for output in outputs.centerline_figures():
             self.addOutput(output)
 
@@ -71,7 +77,7 @@ class BuildTrackCenterlines(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Pair the rails of each class, then write the centerlines."""
-        from ...core.steps import tracks_of
+        from ...core.steps import tracks_of, with_tracks
         from ..reading.line_layers import read_rails
 
         values = ParameterValues(self, parameters, context)
@@ -79,5 +85,9 @@ class BuildTrackCenterlines(RailAlgorithm):
         settings = values.settings(job.standard, job.other_gauges_m)
         tracks = tracks_of(rails, settings, progress.span(READING, 1))
         progress.check()
-        written = write_lines(self, "OUTPUT", CENTERLINES, tracks, frame, parameters, context)
+        rest = (frame, parameters, context)
+        written = write_lines(self, "OUTPUT", CENTERLINES, tracks, *rest)
+        if is_wanted(parameters.get("RAILS"), context):
+            paired = with_tracks(rails, tracks, progress)
+            written.update(write_lines(self, "RAILS", RAILS, paired, *rest))
         return {**written, **figures_of(tracks, "CENTERLINE")}

@@ -1,11 +1,12 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
 <qgis styleCategories="Symbology|Symbology3D|Elevation" version="3.22.0">
-  <renderer-v2 type="graduatedSymbol" attr="coalesce(&quot;sigma_mm&quot;, 999999)" graduatedMethod="GraduatedColor">
+  <renderer-v2 type="graduatedSymbol" attr="CASE WHEN coalesce(&quot;track_ids&quot;, '') = '' AND coalesce(maximum(length(&quot;track_ids&quot;)), 0) &gt; 0 THEN -1 ELSE coalesce(&quot;sigma_mm&quot;, 999999) END" graduatedMethod="GraduatedColor">
     <ranges>
       <range lower="0" upper="2" symbol="0" label="standard error up to 2 mm" render="true"/>
       <range lower="2" upper="5" symbol="1" label="2 to 5 mm" render="true"/>
       <range lower="5" upper="10" symbol="2" label="5 to 10 mm" render="true"/>
       <range lower="10" upper="1000000" symbol="3" label="above 10 mm, or unknown" render="true"/>
+      <range lower="-1" upper="-0.5" symbol="4" label="lone rail: belongs to no track" render="true"/>
     </ranges>
     <symbols>
       <symbol name="0" type="line" alpha="1">
@@ -51,6 +52,18 @@
             <Option name="line_width" type="QString" value="0.6"/>
             <Option name="line_width_unit" type="QString" value="MM"/>
             <Option name="line_style" type="QString" value="solid"/>
+            <Option name="capstyle" type="QString" value="round"/>
+            <Option name="joinstyle" type="QString" value="round"/>
+          </Option>
+        </layer>
+      </symbol>
+      <symbol name="4" type="line" alpha="1">
+        <layer class="SimpleLine" enabled="1" pass="0" locked="0">
+          <Option type="Map">
+            <Option name="line_color" type="QString" value="130,90,160,255"/>
+            <Option name="line_width" type="QString" value="0.6"/>
+            <Option name="line_width_unit" type="QString" value="MM"/>
+            <Option name="line_style" type="QString" value="dash"/>
             <Option name="capstyle" type="QString" value="round"/>
             <Option name="joinstyle" type="QString" value="round"/>
           </Option>

@@ -82,7 +82,7 @@ def test_context_menu_of_extract_rails_opens_a_copy(qgis, plugin, model):
 def test_model_gives_the_lines_of_extract_rails(model, run, outcome, write_cloud, track, tmp_path):
     inputs = {"INPUT": write_cloud(track()), "ITERATIONS": 1, "STEP": 0.5}
     whole = {name: tmp_path / f"{name}.gpkg" for name in ("RAILS", "CENTERLINES", "QUALITY")}
-    names = ("rails:RAILS", "centerlines:CENTERLINES", "quality:QUALITY")
+    names = ("rails:RAILS", "centerlines:CENTERLINES", "quality:QUALITY", "centerlines:PAIRED_RAILS")
     steps = {name: tmp_path / f"{number}.gpkg" for number, name in enumerate(names)}
     assert {definition.name() for definition in model.destinationParameterDefinitions()} == set(steps)
     assert model.parameterDefinition("quality:QUALITY").flags() & QgsProcessingParameterDefinition.Flag.FlagOptional
@@ -90,6 +90,8 @@ def test_model_gives_the_lines_of_extract_rails(model, run, outcome, write_cloud
         assert made.ok, made.error
     for mine, theirs in list(zip(steps.values(), whole.values()))[:2]:
         assert farthest(read_lines(mine), read_lines(theirs)) < 0.001
+    for paired in (steps[names[3]], whole["RAILS"]):
+        assert [items["track_ids"] for _, items in read_features(paired)] == ["1", "1"]
     measured = [read_features(paths[name]) for paths, name in ((steps, names[2]), (whole, "QUALITY"))]
     assert len(measured[0]) == len(measured[1]) > 20
     for (mine, _), (theirs, _) in zip(*measured):

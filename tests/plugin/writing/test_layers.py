@@ -23,11 +23,20 @@ COLUMNS = [column for column in CENTERLINE_FIELDS if column.kind is float]
 
 
 def test_rail_becomes_a_feature_in_the_units_of_the_cloud(qgis):
-    rail = RailLine(XYZ, rail_id=3, class_code=10, points=812, resid_mm=4.5, sigma_mm=np.float64(0.7), bridged_m=0.0)
+    rail = RailLine(
+        XYZ,
+        rail_id=3,
+        class_code=10,
+        points=812,
+        resid_mm=4.5,
+        sigma_mm=np.float64(0.7),
+        bridged_m=0.0,
+        track_ids=(2, 5),
+    )
     (feature,) = features([rail], RAIL_FIELDS, FEET)
     vertices = [(point.x(), point.y(), point.z()) for point in feature.geometry().vertices()]
     assert np.allclose(vertices, [(1000, 2000, 10), (1010, 2000, 11)])
-    assert feature.attributes() == [3, 10, 3.063, 812, 4.5, 0.7, 0.0]
+    assert feature.attributes() == [3, 10, 3.063, 812, 4.5, 0.7, 0.0, "2,5"]
 
 
 def test_centerline_becomes_a_feature(qgis):
@@ -53,7 +62,11 @@ def test_fields_have_their_types(qgis, columns):
     layer = QgsVectorLayer("LineStringZ", "lines", "memory")
     assert layer.dataProvider().addAttributes(fields(columns).toList())
     found = layer.dataProvider().fields()
-    assert {column.name for column in columns if not found.field(column.name).isNumeric()} <= {"left_ids", "right_ids"}
+    assert {column.name for column in columns if not found.field(column.name).isNumeric()} <= {
+        "left_ids",
+        "right_ids",
+        "track_ids",
+    }
 
 
 @pytest.mark.parametrize("suffix", [".gpkg", ".shp", ".geojson", ".csv"])

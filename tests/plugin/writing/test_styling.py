@@ -90,6 +90,12 @@ def test_rails_are_coloured_by_their_standard_error(styled):
     ]
 
 
+def test_lone_rails_are_coloured_apart_unless_no_rail_has_been_paired(styled):
+    rows = [(LINE, {"sigma_mm": 0.5, "track_ids": tracks}) for tracks in ("1", "1,2", "", None)]
+    assert colours(styled("rails", rows)) == ["#1565c0", "#1565c0", "#825aa0", "#825aa0"]
+    assert colours(styled("rails", rows[2:])) == ["#1565c0", "#1565c0"]
+
+
 def test_quality_is_coloured_by_the_deviation_from_the_median_gauge_of_the_track(styled):
     gauges = {1: (1435, 1435, 1435, 1443, 1420, None), 2: (1000, 1000, 1001, 985, 1012)}
     rows = [
