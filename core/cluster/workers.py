@@ -121,10 +121,12 @@ def connect(
     if workers is None:
         workers = max(min(os.cpu_count() or 1, MEMORY_LIMIT // WORKER_BYTES), 1)
     environment = {**dict.fromkeys(ONE_THREAD, 1), **MEMORY_KEPT}
-    settings = {f"distributed.nanny.pre-spawn-environ.{name}": value for name, value in environment.items()}
+    settings: dict[str, object] = {
+        f"distributed.nanny.pre-spawn-environ.{name}": value for name, value in environment.items()
+    }
     settings["distributed.scheduler.allowed-failures"] = MAX_DEATHS
     if dashboard_port is None:  # Dask serves pages without a dashboard, too
-        settings.update(dict.fromkeys(PAGES, []))
+        settings.update({page: [] for page in PAGES})
     temporary = Path(tempfile.gettempdir())
     sweep(temporary)
     with scratch_folder(temporary) as folder, dask.config.set({**settings, "temporary-directory": str(folder)}):

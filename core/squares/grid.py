@@ -75,7 +75,8 @@ class Square:
         """
         if self.is_whole_plane:
             return np.ones(len(xyz), dtype=bool)
-        return ((xyz[:, :2] >= -margin_m) & (xyz[:, :2] < self.side_m + margin_m)).all(axis=1)
+        inside = (xyz[:, :2] >= -margin_m) & (xyz[:, :2] < self.side_m + margin_m)
+        return inside[:, 0] & inside[:, 1]
 
 
 class PointSource(Protocol):

@@ -159,7 +159,7 @@ def _clusters(begin: np.ndarray, end: np.ndarray, node_count: int) -> np.ndarray
     """
     continued = np.zeros((2, node_count), dtype=bool)
     continued[0, end] = continued[1, begin] = True
-    through = continued.all(axis=0)
+    through = continued[0] & continued[1]
     arriving, leaving = np.flatnonzero(through[end]), np.flatnonzero(through[begin])
     edge = np.concatenate([arriving, leaving])
     node = len(begin) + np.concatenate([end[arriving], begin[leaving]])

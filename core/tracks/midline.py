@@ -104,8 +104,8 @@ class Side:
         counts = [len(piece) for piece in pieces]
         rail = np.repeat([number for number, _ in spans], counts)
         section = np.repeat(np.arange(len(pieces)), counts)
-        xyz, t, paired = (np.concatenate(parts) for parts in (pieces, chainages, paired))
-        return cls(xyz, section, rail, t, paired, cKDTree(xyz[:, :2]))
+        xyz, t = np.concatenate(pieces), np.concatenate(chainages)
+        return cls(xyz, section, rail, t, np.concatenate(paired), cKDTree(xyz[:, :2]))
 
     def meet(
         self, stations: np.ndarray, directions: np.ndarray, expected_m: float, max_offset_m: float = MAX_OFFSET_M

@@ -309,7 +309,8 @@ def _without_ghosts(matches: Sequence[_Match]) -> list[_Match]:
 def _misfit_m(rails: Sequence[RailLine], match: _Match, spacing: float) -> float:
     """Return how unlike two rails of a track the rails of a match are: off the gauge, and wandering."""
     a, b = rails[match.a].xyz, rails[match.b].xyz
-    t = np.arange(*np.sort(match.t_a[[0, -1]]), COARSE_STEP_M)
+    start, end = np.sort(match.t_a[[0, -1]]).tolist()
+    t = np.arange(start, end, COARSE_STEP_M)
     places = interpolate(a, length_along(a[:, :2]), t)
     feet = project([b[:, :2]], places[:, :2], 2 * spacing)
     order = np.argsort(feet.point)

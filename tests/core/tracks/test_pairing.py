@@ -164,6 +164,6 @@ def test_a_wrong_partner_does_not_stay_where_the_right_one_is_interrupted():
 
 
 def test_a_rail_whose_other_partner_is_as_good_keeps_both():
-    """Where three rails are exactly at gauge, nothing tells which two are a track."""
+    """Where three rails are at the gauge, nothing shows which two are a track."""
     widths = beside(CURVED, SPACING, 0.0, -SPACING - 0.005)
     assert len(pair_rails(rails_of(*widths), GAUGE, WIDTH)) == 2
