@@ -24,14 +24,27 @@ def own_folder() -> Path:
 
 
 def folders() -> list[Path]:
-    """Return all folders in the order in which Python searches them."""
-    named = [*os.environ.get(VARIABLE, "").split(os.pathsep), QgsSettings().value(SETTING_KEY) or ""]
-    return [*(Path(name) for name in named if name), own_folder()]
+    """Return all folders in the order in which Python searches them.
+
+    Names that are not absolute are left out: in the current folder, anybody's files may be found.
+    """
+    setting = QgsSettings().value(SETTING_KEY)
+    # A comma in a settings file makes a list.
+    named = [*os.environ.get(VARIABLE, "").split(os.pathsep), *(setting if isinstance(setting, list) else [setting])]
+    return [*(Path(name) for name in named if isinstance(name, str) and Path(name).is_absolute()), own_folder()]
 
 
 def use() -> None:
     """Add the existing folders to the end of Python's path, so that no package of QGIS is replaced."""
     for folder in folders():
-        if folder.is_dir() and str(folder) not in sys.path:
+        if _is_folder(folder) and str(folder) not in sys.path:
             sys.path.append(str(folder))
     importlib.invalidate_caches()
+
+
+def _is_folder(path: Path) -> bool:
+    """Return whether a folder exists, whatever the name consists of."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):  # too long, or without access
+        return False

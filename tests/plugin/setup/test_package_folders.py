@@ -2,6 +2,7 @@ import sys
 
 import pytest
 from qgis.core import QgsApplication, QgsSettings
+from rail_extract.rail_extract_plugin.algorithms import ALGORITHMS
 from rail_extract.rail_extract_plugin.setup import package_folders
 
 
@@ -18,6 +19,20 @@ def test_own_folder_is_in_the_profile(clean_path):
     assert str(folder).startswith(QgsApplication.qgisSettingsDirPath())
     assert folder.name == f"cpython-{sys.version_info[0]}{sys.version_info[1]}"
     assert package_folders.folders() == [folder]
+
+
+@pytest.mark.parametrize(
+    "names", ["/" + 5000 * "x", "/x" * 3000, "\udcff/\udcfe", "relative", ".", ":::", "~", "/etc/passwd", "/proc/1/cwd/x"]
+)
+@pytest.mark.parametrize("value", ["", ["/a", "b"], {"a": 1}, 5, True, 2.5, "/" + 5000 * "x", "\0"])
+def test_no_value_stops_the_plugin(plugin, clean_path, monkeypatch, names, value):
+    plugin.unload()
+    monkeypatch.setenv("RAIL_EXTRACT_PACKAGES", names)
+    QgsSettings().setValue(package_folders.SETTING_KEY, value)
+    before = list(sys.path)
+    plugin.initProcessing()
+    assert len(plugin.provider.algorithms()) == len(ALGORITHMS)
+    assert sys.path == before
 
 
 def test_folders_from_the_variable_and_the_setting(clean_path, monkeypatch, tmp_path):
