@@ -6,17 +6,20 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 from ...core.errors import RailExtractError
 from ...core.progress import SILENT, Progress
+from ...core.scratch import scratch_folder, sweep
 from . import processes
 from .dependencies import OWNED_BY_QGIS, is_installed, pins
 from .interpreter import Interpreter
+from .locked import Locked, locked_packages
 
 MIN_PIP = (22, 2)
 """The first version that can report what it would install."""
@@ -25,13 +28,18 @@ PIP_ENVIRONMENT = {
     "PIP_DISABLE_PIP_VERSION_CHECK": "1",
     "PIP_NO_INPUT": "1",
     "PIP_PROGRESS_BAR": "off",
+    "PIP_REQUIRE_HASHES": "0",
     "PIP_REQUIRE_VIRTUALENV": "0",
     "PIP_RETRIES": "2",
     "PIP_ROOT_USER_ACTION": "ignore",
     "PIP_USER": "0",
     "PYTHONIOENCODING": "utf-8",
+    "PYTHONSAFEPATH": "1",
 }
 """Settings that override the user's own, where those would conflict with a separate folder or a run without a shell."""
+
+WRONG_FILE = "DO NOT MATCH THE HASHES"
+"""What pip says about a file with another checksum."""
 
 BINARIES = "--only-binary=:all:"
 """No user should need a compiler."""
@@ -78,7 +86,7 @@ class Pip:
         self._paths = [*filter(None, [_inherited()]), *map(str, folders)]
         self._changes = {**interpreter.changes, **PIP_ENVIRONMENT}
 
-    def prepare(self, progress: Progress) -> None:
+    def prepare(self, locked: Mapping[str, Locked], progress: Progress) -> None:
         """Check that pip is installed, and get a newer one if it is too old.
 
         Raises
@@ -94,25 +102,38 @@ class Pip:
             )
         if tuple(map(int, version.groups())) < MIN_PIP:
             newer = self._temporary / "pip"
-            self.install(["pip"], ["--target", str(newer)], progress)
+            if "pip" in locked:
+                self.download([locked["pip"]], newer, [], progress)
+            else:
+                self._install(["pip"], ["--target", str(newer), "pip"], progress)
             self._paths.insert(0, str(newer))
 
-    def resolve(self, order: Order, progress: Progress) -> dict[str, str]:
-        """Return the packages that an order would add: versions by normalized name."""
+    def resolve(self, order: Order, locked: Mapping[str, Locked], progress: Progress) -> list[Locked]:
+        """Return the files that an order would add: those that are locked, otherwise those that the index names."""
         report, constraints = self._temporary / "report.json", self._temporary / "constraints.txt"
-        constraints.write_text("\n".join(pins()), encoding="utf-8")
+        versions = [package.requirement for name, package in locked.items() if _version_in_qgis(name) is None]
+        constraints.write_text("\n".join([*pins(), *versions]), encoding="utf-8")
         options = ["--dry-run", "--report", str(report), "--constraint", str(constraints), *order.options]
-        self.install(order.requirements, options, progress)
-        found = json.loads(report.read_text(encoding="utf-8"))["install"]
-        return {normalized(item["metadata"]["name"]): item["metadata"]["version"] for item in found}
+        self._install(order.requirements, [*options, *order.requirements], progress)
+        found = [_found(item) for item in json.loads(report.read_text(encoding="utf-8"))["install"]]
+        originals = {package.requirement: package for package in locked.values()}
+        return [originals.get(package.requirement, package) for package in found]
 
-    def install(self, requirements: Sequence[str], options: Sequence[str], progress: Progress) -> None:
+    def download(self, packages: Sequence[Locked], target: Path, options: Sequence[str], progress: Progress) -> None:
+        """Install packages into a folder if their files have the right checksums."""
+        listed = self._temporary / "requirements.txt"
+        listed.write_text("\n".join(package.checked_requirement for package in packages), encoding="utf-8")
+        call = ["--no-deps", "--require-hashes", "--requirement", str(listed), "--target", str(target), *options]
+        self._install([package.requirement for package in packages], call, progress)
+
+    def _install(self, names: Sequence[str], arguments: Sequence[str], progress: Progress) -> None:
         """Run pip install.
 
         Parameters
         ----------
-        requirements, options : sequence of str
-            Further arguments of pip.
+        names : sequence of str
+            What is installed, for the message.
+        arguments : sequence of str
         progress : Progress
 
         Raises
@@ -120,13 +141,19 @@ class Pip:
         RailExtractError
             It failed.
         """
-        completed = self._run("install", BINARIES, *options, *requirements, progress=progress)
-        if completed.code != 0:
-            reasons = re.findall(r"^ERROR: (.*)$", completed.output, re.MULTILINE) or ["see the log"]
+        completed = self._run("install", BINARIES, *arguments, progress=progress)
+        if completed.code == 0:
+            return
+        if WRONG_FILE in completed.output:
             raise RailExtractError(
-                f"pip could not install {', '.join(requirements)} ({reasons[-1].rstrip('.')}): check the connection to "
-                "the package index and the free disk space. No files were kept."
+                f"The downloaded files of {', '.join(names)} are not the original ones and may be harmful: check the "
+                "package index in the settings of pip. No files were kept."
             )
+        reasons = re.findall(r"^ERROR: (.*)$", completed.output, re.MULTILINE) or ["see the log"]
+        raise RailExtractError(
+            f"pip could not install {', '.join(names)} ({reasons[-1].rstrip('.')}): check the connection to "
+            "the package index and the free disk space. No files were kept."
+        )
 
     def check_imports(self, modules: Sequence[str], folders: Sequence[Path]) -> None:
         """Check that QGIS will be able to import modules.
@@ -173,20 +200,21 @@ def install(order: Order, interpreter: Interpreter, folder: Path, others: Sequen
     RailExtractError
         pip failed, the folder cannot be written, or the packages do not work with those of QGIS.
     """
+    locked = locked_packages()
     with _temporary_folder(folder) as temporary:
         pip = Pip(interpreter, temporary, [*others, folder])
-        pip.prepare(progress.span(0, 0.1))
-        found = pip.resolve(order, progress)
+        pip.prepare(locked, progress.span(0, 0.1))
+        found = pip.resolve(order, locked, progress)
         progress.set_fraction(0.3)
         wanted = _beyond_qgis(found, progress)
         staging = temporary / "packages"
         if wanted:
-            pip.install(wanted, ["--no-deps", "--target", str(staging), *order.options], progress)
+            pip.download(wanted, staging, order.options, progress)
         progress.set_fraction(0.8)
         pip.check_imports(order.modules, [*others, folder, staging])
         if wanted:
             _move(staging, folder)
-    return ", ".join(requirement.replace("==", " ") for requirement in wanted)
+    return ", ".join(f"{package.name} {package.version}" for package in wanted)
 
 
 def normalized(name: str) -> str:
@@ -194,15 +222,22 @@ def normalized(name: str) -> str:
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
-def _beyond_qgis(found: dict[str, str], progress: Progress) -> list[str]:
+def _found(item: Mapping[str, Any]) -> Locked:
+    """Return a package of pip's report, with the checksum that the index names; pip before 23.1 writes it as "hash"."""
+    facts, archive = item["metadata"], item["download_info"]["archive_info"]
+    checksum = f"sha256:{archive['hashes']['sha256']}" if "hashes" in archive else archive["hash"].replace("=", ":")
+    return Locked(normalized(facts["name"]), facts["version"], (checksum,))
+
+
+def _beyond_qgis(found: Sequence[Locked], progress: Progress) -> list[Locked]:
     """Leave out packages that QGIS has: they come first on the path, and stay."""
     wanted = []
-    for name, version in found.items():
-        present = _version_in_qgis(name)
+    for package in found:
+        present = _version_in_qgis(package.name)
         if present is None:
-            wanted.append(f"{name}=={version}")
+            wanted.append(package)
         else:
-            progress.warning(f"QGIS has {name} {present}, which is used instead of {version}.")
+            progress.warning(f"QGIS has {package.name} {present}, which is used instead of {package.version}.")
     return wanted
 
 
@@ -219,18 +254,16 @@ def _inherited() -> str:
 
 @contextmanager
 def _temporary_folder(folder: Path) -> Iterator[Path]:
-    """Create a folder next to `folder`, and delete it afterwards in any case."""
-    temporary = folder.with_name(f"{folder.name}.unfinished")
+    """Create a temporary folder next to `folder`, and delete it afterwards in any case."""
     try:
-        shutil.rmtree(temporary, ignore_errors=True)
-        temporary.mkdir(parents=True)
-        yield temporary
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        sweep(folder.parent)
+        with scratch_folder(folder.parent) as temporary:
+            yield temporary
     except OSError as error:
         raise RailExtractError(
             f"{folder} can't be written ({error}): free disk space, or make the folder writable."
         ) from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def _move(staging: Path, folder: Path) -> None:

@@ -39,7 +39,9 @@ def find_interpreter() -> Interpreter:
         No such program was found.
     """
     expected = " ".join(map(str, (*sys.version_info[:2], version_of("numpy"))))
-    tried = list(dict.fromkeys(candidates(Path(sys.executable), Path(sys.prefix), sys.platform)))
+    # A relative path would be looked up in the current folder, or along PATH.
+    found = filter(Path.is_absolute, candidates(Path(sys.executable), Path(sys.prefix), sys.platform))
+    tried = list(dict.fromkeys(found))
     # In an app bundle, the program does not find its library by itself.
     for changes in ({}, {"PYTHONHOME": sys.prefix}):
         for program in filter(Path.is_file, tried):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from qgis.PyQt.QtCore import QProcess, QProcessEnvironment
 
 from ...core.progress import SILENT, Progress
+from ...core.scratch import scratch_folder
 
 POLL_MS = 200
 """Interval at which output is shown and cancellation is checked, milliseconds."""
@@ -32,11 +35,12 @@ class Completed:
 def run(
     program: str, arguments: Sequence[str], changes: Mapping[str, str] | None = None, progress: Progress = SILENT
 ) -> Completed:
-    """Run a program to its end.
+    """Run a program to its end, in a folder of its own: Python would import modules from the current folder.
 
     Parameters
     ----------
     program : str
+        Absolute path.
     arguments : sequence of str
     changes : mapping, optional
         Environment variables that differ from those of QGIS.
@@ -54,15 +58,18 @@ def run(
     process = QProcess()
     process.setProcessEnvironment(environment)
     process.setProcessChannelMode(QProcess.ProcessChannelMode.MergedChannels)
-    process.start(program, list(arguments))
     log = _Log(progress)
-    try:
-        while process.state() != QProcess.ProcessState.NotRunning and not process.waitForFinished(POLL_MS):
-            log.add(bytes(process.readAll()))
-            progress.check()
-    finally:
-        process.kill()
-        process.waitForFinished()
+    with scratch_folder(Path(tempfile.gettempdir())) as folder:
+        process.setWorkingDirectory(str(folder))
+        process.start(program, list(arguments))
+        try:
+            not_running = QProcess.ProcessState.NotRunning
+            while process.state() != not_running and not process.waitForFinished(POLL_MS):
+                log.add(bytes(process.readAll()))
+                progress.check()
+        finally:
+            process.kill()
+            process.waitForFinished()
     log.add(bytes(process.readAll()), last=True)
     failed = process.error() in (QProcess.ProcessError.FailedToStart, QProcess.ProcessError.Crashed)
     return Completed(None if failed else process.exitCode(), log.text)

@@ -1,5 +1,9 @@
 """The real pip, with wheels from a folder instead of the network."""
 
+import hashlib
+import os
+import platform
+import re
 import sys
 import zipfile
 from pathlib import Path
@@ -9,9 +13,11 @@ from rail_extract.core.errors import Cancelled, RailExtractError
 from rail_extract.core.progress import SILENT, Progress
 from rail_extract.rail_extract_plugin.algorithms import install_packages
 from rail_extract.rail_extract_plugin.algorithms.install_packages import InstallPackages, Job
-from rail_extract.rail_extract_plugin.setup import package_folders
+from rail_extract.rail_extract_plugin.setup import installation, locked, package_folders
+from rail_extract.rail_extract_plugin.setup.dependencies import OPTIONAL, OWNED_BY_QGIS, PACKAGES
 from rail_extract.rail_extract_plugin.setup.installation import Order, install
 from rail_extract.rail_extract_plugin.setup.interpreter import Interpreter, find_interpreter
+from rail_extract.rail_extract_plugin.setup.locked import Locked
 
 
 @pytest.fixture
@@ -128,6 +134,89 @@ def test_cancel_changes_nothing(put, add_wheel, folder):
     with pytest.raises(Cancelled):
         put("railfirst", Impatient())
     assert not list(folder.parent.iterdir())
+
+
+STRANGER = "import os; open(os.environ['RAIL_STRANGER'], 'w').close(); raise SystemExit(1)"
+
+
+@pytest.fixture
+def stranger(tmp_path, monkeypatch):
+    """A current folder with a stranger's modules; returns the file that they write if they run."""
+    folder, sign = tmp_path / "downloads", tmp_path / "stranger was here"
+    folder.mkdir()
+    for name in ("pip", "numpy", "json", "railfirst", "sitecustomize", "encodings"):
+        (folder / f"{name}.py").write_text(STRANGER)
+    for name in ("python3", "python"):
+        (folder / name).write_text(f"#!/bin/sh\ntouch '{sign}'\n")
+        (folder / name).chmod(0o755)
+    monkeypatch.setenv("RAIL_STRANGER", str(sign))
+    monkeypatch.chdir(folder)
+    return sign
+
+
+def test_modules_in_the_current_folder_are_not_run(put, add_wheel, stranger, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", f"{os.environ.get('PYTHONPATH', '')}{os.pathsep}{os.pathsep}.")
+    add_wheel("railfirst")
+    assert put("railfirst") == "railfirst 1.0"
+    assert not stranger.exists()
+
+
+def test_programs_in_the_current_folder_and_along_path_are_not_run(stranger, monkeypatch, tmp_path):
+    monkeypatch.setenv("PATH", f".{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setattr(sys, "executable", "")
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    with pytest.raises(RailExtractError, match="The Python program of this QGIS was not found"):
+        find_interpreter()
+    assert not stranger.exists()
+
+
+def lock(monkeypatch, *packages):
+    monkeypatch.setattr(installation, "locked_packages", lambda: {package.name: package for package in packages})
+
+
+def checksum(tmp_path, name, version="1.0"):
+    wheel = tmp_path / "index" / f"{name}-{version}-py3-none-any.whl"
+    return f"sha256:{hashlib.sha256(wheel.read_bytes()).hexdigest()}"
+
+
+def test_the_locked_version_is_installed(put, add_wheel, monkeypatch, tmp_path):
+    for version in ("1.0", "1.1", "2.0"):
+        add_wheel("railfirst", version)
+    lock(
+        monkeypatch,
+        Locked("railfirst", "1.1", (checksum(tmp_path, "railfirst"), checksum(tmp_path, "railfirst", "1.1"))),
+    )
+    assert put("railfirst") == "railfirst 1.1"
+
+
+def test_a_file_with_another_checksum_is_refused(put, add_wheel, monkeypatch, tmp_path, folder):
+    add_wheel("railfirst", requires=("railsecond",))
+    add_wheel("railsecond")
+    lock(monkeypatch, Locked("railsecond", "1.0", (checksum(tmp_path, "railfirst"),)))
+    with pytest.raises(RailExtractError, match="files of railfirst==1.0, railsecond==1.0 are not the original ones"):
+        put("railfirst")
+    assert not list(folder.parent.iterdir())
+
+
+def test_the_list_covers_every_package_and_python():
+    """If this fails, run tools/lock.py."""
+    needed = {package.requirement.partition("[")[0] for package in PACKAGES if package.module not in OPTIONAL}
+    listed = list(locked._listed())
+    for python in ("3.9", "3.10", "3.11", "3.12", "3.13", "3.14"):
+        names = [package.name for package, pythons in listed if python in pythons]
+        assert len(names) == len(set(names))
+        assert needed - set(OWNED_BY_QGIS) | {"lazrs", "pip"} <= set(names)
+    for package, _ in listed:
+        assert package.name == installation.normalized(package.name)
+        assert all(re.fullmatch("sha256:[0-9a-f]{64}", one) for one in package.checksums)
+    assert all(len(package.checksums) >= 5 for package, _ in listed if package.name in ("lazrs", "pyproj"))
+
+
+def test_the_list_applies_to_the_systems_it_was_made_for(monkeypatch):
+    here = locked.locked_packages()
+    assert {"laspy", "lazrs", "opencv-python-headless", "pyproj"} <= set(here)
+    monkeypatch.setattr(platform, "machine", lambda: "riscv64")
+    assert locked.locked_packages() == {}
 
 
 def test_folder_that_cannot_be_created(put, folder):

@@ -22,7 +22,8 @@ def test_own_folder_is_in_the_profile(clean_path):
 
 
 @pytest.mark.parametrize(
-    "names", ["/" + 5000 * "x", "/x" * 3000, "\udcff/\udcfe", "relative", ".", ":::", "~", "/etc/passwd", "/proc/1/cwd/x"]
+    "names",
+    ["/" + 5000 * "x", "/x" * 3000, "\udcff/\udcfe", "relative", ".", ":::", "~", "/etc/passwd", "/proc/1/cwd/x"],
 )
 @pytest.mark.parametrize("value", ["", ["/a", "b"], {"a": 1}, 5, True, 2.5, "/" + 5000 * "x", "\0"])
 def test_no_value_stops_the_plugin(plugin, clean_path, monkeypatch, names, value):

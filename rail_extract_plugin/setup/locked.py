@@ -1,0 +1,56 @@
+"""The versions of packages that are installed, and the checksums of their files; tools/lock.py writes the list."""
+
+from __future__ import annotations
+
+import platform
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+LIST = Path(__file__).with_name("locked.txt")
+
+SYSTEMS = (
+    ("win32", "amd64"),
+    ("linux", "x86_64"),
+    ("linux", "aarch64"),
+    ("darwin", "x86_64"),
+    ("darwin", "arm64"),
+)
+"""Systems and processors of which the list has the files."""
+
+
+@dataclass(frozen=True)
+class Locked:
+    """A version of a package, and the checksums of its files for all systems."""
+
+    name: str
+    version: str
+    checksums: tuple[str, ...]
+
+    @property
+    def requirement(self) -> str:
+        """The version in the syntax of pip."""
+        return f"{self.name}=={self.version}"
+
+    @property
+    def checked_requirement(self) -> str:
+        """A line of a requirements file by which pip accepts only these files."""
+        return " ".join([self.requirement, *(f"--hash={checksum}" for checksum in self.checksums)])
+
+
+def locked_packages() -> dict[str, Locked]:
+    """Return the packages of the list for this Python, by name; none on a system of which the list has no files."""
+    if (sys.platform, platform.machine().lower()) not in SYSTEMS:
+        return {}
+    python = "{}.{}".format(*sys.version_info)
+    return {locked.name: locked for locked, pythons in _listed() if python in pythons}
+
+
+def _listed() -> Iterator[tuple[Locked, list[str]]]:
+    """Yield each version in the list, and the Pythons it is for."""
+    for line in LIST.read_text(encoding="ascii").splitlines():
+        if not line.startswith("#"):
+            requirement, pythons, *checksums = line.split()
+            name, version = requirement.split("==")
+            yield Locked(name, version, tuple(checksums)), pythons.split(",")
