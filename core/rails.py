@@ -248,6 +248,14 @@ class TrackGeometry:
 
 
 @dataclass(frozen=True)
+class HeadWidths:
+    """Width of the railheads as the points show it, NaN if they do not, and as it is stated, metres."""
+
+    seen_m: float
+    stated_m: float
+
+
+@dataclass(frozen=True)
 class RailNetwork:
     """All results of an extraction from one cloud.
 
@@ -279,3 +287,4 @@ class RailNetwork:
     cleaned_classes: tuple[int, ...] = ()
     failures: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    heads: HeadWidths | None = None

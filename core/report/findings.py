@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..rails import Centerline, RailNetwork, TrackGeometry, cell_borders
+from ..polyline import interpolate, length_along, project
+from ..rails import Centerline, HeadWidths, RailNetwork, TrackGeometry, cell_borders
 
 GAUGE_OFF_MM = 10.0
 """Plain track is not left in service with a larger deviation from its gauge. Curves of less than 200 m radius are
@@ -18,6 +19,23 @@ UNSURE_MM = 5.0
 
 MERGE_M = 5.0
 """Doubtful places closer than this along the track count as one."""
+
+SILENT_SHARE = 0.02
+"""Share of the length in doubt for a reason that the stations of tracks do not show, above which a result is not good
+throughout."""
+
+HEAD_OFF_MM = 6.0
+"""Difference between the seen and the stated head width that is in doubt: noise makes heads look up to 5 mm wider."""
+
+MAX_HOLE_M = 200.0
+"""Longest section without any rail across which two tracks are recognized as one: longer ones may hide a switch."""
+
+END_M = 20.0
+"""Length of the end of a track that shows its direction."""
+
+HOLE_RADIUS_M, HOLE_MISS_DEG = 150.0, 1.5
+"""Smallest radius of a curve in a hole, and largest angle by which its chord may differ from the mean direction of the
+two tracks, which it equals on an arc."""
 
 FEW, MANY = 0.05, 0.25
 """Share of the length in doubt up to which a result is good with a few exceptions, and above which it is poor."""
@@ -101,12 +119,45 @@ class TrackFindings:
 
 
 @dataclass(frozen=True)
+class Hole:
+    """A section without rails between two tracks that are likely one: their numbers, and its length in metres."""
+
+    first: int
+    second: int
+    length_m: float
+
+
+@dataclass(frozen=True)
 class Findings:
-    """The findings on all tracks, and the number and length of the rails that belong to none."""
+    """The findings on all tracks, and on what the stations of tracks do not show.
+
+    Attributes
+    ----------
+    tracks : tuple of TrackFindings
+    lonely_rails : int
+        Number of rails that belong to no track.
+    lonely_m, rails_m : float
+        Length of these, and of all rails.
+    holes : tuple of Hole
+    heads : HeadWidths or None
+        Width of the heads; only if another one is stated.
+    """
 
     tracks: tuple[TrackFindings, ...]
     lonely_rails: int
     lonely_m: float
+    rails_m: float = 0.0
+    holes: tuple[Hole, ...] = ()
+    heads: HeadWidths | None = None
+
+    @property
+    def silent_share(self) -> float:
+        """Share of the length that is in doubt although every station of the tracks is good."""
+        if self.heads is not None:
+            return 1.0
+        hole_m = sum(hole.length_m for hole in self.holes)
+        lonely = self.lonely_m / self.rails_m if self.rails_m else 0.0
+        return max(lonely, hole_m / (self.length_m + hole_m) if hole_m else 0.0)
 
     @property
     def length_m(self) -> float:
@@ -142,7 +193,67 @@ def examine(network: RailNetwork, gauges_m: Sequence[float]) -> Findings:
     tracks = tuple(_examine_track(line, geometry[line.track_id], gauges_m) for line in network.centerlines)
     paired = {rail_id for line in network.centerlines for rail_id in (*line.left_ids, *line.right_ids)}
     lonely = [rail.length_m for rail in network.rails if rail.rail_id not in paired]
-    return Findings(tracks, len(lonely), float(sum(lonely)))
+    heads = network.heads
+    wrong = heads is not None and 1000 * abs(heads.seen_m - heads.stated_m) > HEAD_OFF_MM
+    return Findings(
+        tracks,
+        len(lonely),
+        float(sum(lonely)),
+        float(sum(rail.length_m for rail in network.rails)),
+        tuple(_holes(network.centerlines)),
+        heads if wrong else None,
+    )
+
+
+def _holes(lines: Sequence[Centerline]) -> Iterator[Hole]:
+    """Find ends of tracks that lead to each other on an arc, the nearest first; each end leads to one other."""
+    ends = [
+        (number, end[0, :2], _outward(end))
+        for number, line in enumerate(lines)
+        for end in (line.xyz, line.xyz[::-1])
+        if not _is_met(end[0, :2], number, lines)
+    ]
+    found = []
+    for one, (first, place, outward) in enumerate(ends):
+        for other, (second, target, back) in enumerate(ends[:one]):
+            way = target - place
+            length_m = float(np.hypot(*way))
+            if first == second or not 0 < length_m <= MAX_HOLE_M:
+                continue
+            leaving, arriving = _angle(outward, way), _angle(way, -back)
+            bend = length_m / HOLE_RADIUS_M
+            if abs(leaving - arriving) / 2 <= np.radians(HOLE_MISS_DEG) and abs(leaving + arriving) <= bend:
+                found.append((length_m, one, other))
+    used: set[int] = set()
+    for length_m, one, other in sorted(found):
+        if one not in used and other not in used:
+            used |= {one, other}
+            first, second = sorted((lines[ends[one][0]].track_id, lines[ends[other][0]].track_id))
+            yield Hole(first, second, length_m)
+
+
+def _outward(end: np.ndarray) -> np.ndarray:
+    """Return the unit vector out of a line at its first vertex, from the vertices, (n, 3), within `END_M` of it.
+
+    An arc through the end, the middle and the last of them gives the direction at the end itself.
+    """
+    along = length_along(end[:, :2])
+    reach_m = min(END_M, float(along[-1]))
+    near, far = interpolate(end[:, :2], along, np.array([reach_m / 2, reach_m]))
+    outward = 3 * end[0, :2] - 4 * near + far
+    return outward / np.hypot(*outward)
+
+
+def _angle(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the angle from one direction to another, radians, positive to the left."""
+    return float(np.arctan2(one[0] * other[1] - one[1] * other[0], one @ other))
+
+
+def _is_met(place: np.ndarray, number: int, lines: Sequence[Centerline]) -> bool:
+    """Return whether another track passes an end of track `number` or begins there."""
+    return any(
+        len(project([line.xyz[:, :2]], place[None], 1.0).t) > 0 for other, line in enumerate(lines) if other != number
+    )
 
 
 def _examine_track(line: Centerline, geometry: TrackGeometry, gauges_m: Sequence[float]) -> TrackFindings:

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from ..rails import RailNetwork
-from .findings import DOUBTS, FEW, GAUGE_OFF_MM, MANY, UNSUPPORTED, Doubt, Findings, TrackFindings, examine
+from .findings import (
+    DOUBTS,
+    FEW,
+    GAUGE_OFF_MM,
+    MANY,
+    SILENT_SHARE,
+    UNSUPPORTED,
+    Doubt,
+    Findings,
+    TrackFindings,
+    examine,
+)
 from .markup import metres, table, tag, text
 from .plan import draw_plan
 from .plots import draw_profiles
@@ -61,7 +72,7 @@ def build_page(
     body = [
         tag("h1", text("Rail Extract report")),
         tag("p", text(source), class_="source"),
-        _verdict(findings, len(network.rails)),
+        _verdict(findings, len(network.rails), network.warnings),
         _tiles(network, findings),
         *([_map(findings), _places(findings), _tracks(findings)] if findings.tracks else []),
         *(_profiles(track, height) for track, height in zip(findings.tracks, heights)),
@@ -76,19 +87,34 @@ def build_page(
     return f"<!DOCTYPE html>\n{tag('html', tag('head', *head), tag('body', tag('main', *body)), lang='en')}\n"
 
 
-def _verdict(findings: Findings, rail_count: int) -> str:
-    """Write the verdict, and the reasons for doubt."""
+def _verdict(findings: Findings, rail_count: int, warnings: Sequence[str]) -> str:
+    """Write the verdict, the reasons for doubt, and what the user was warned of."""
     if not findings.tracks:
         words = f"No track was found. There are {rail_count} rails, but no two of them are parallel at a gauge."
-        return tag("div", tag("strong", text(words)), class_="verdict poor")
-    kind, headline = next((kind, words) for limit, kind, words in VERDICTS if findings.share <= limit)
-    reasons = [tag("li", text(_reason(findings, doubt))) for doubt in DOUBTS if findings.length_of(doubt) > 0]
+        return tag("div", tag("strong", text(words)), *_listed(warnings), class_="verdict poor")
+    # What no station shows is a reason to look, not to discard: conductor rails are lone lines, too.
+    silent = min(findings.silent_share, MANY) if findings.silent_share > SILENT_SHARE else 0.0
+    share = max(findings.share, silent)
+    kind, headline = next((kind, words) for limit, kind, words in VERDICTS if share <= limit)
     if findings.lonely_rails:
         count = findings.lonely_rails
         belong = "1 rail does not belong" if count == 1 else f"{count} rails do not belong"
-        reasons.append(tag("li", text(f"{belong} to a track ({metres(findings.lonely_m)}).")))
-    listed = [tag("ul", *reasons)] if reasons else []
+        headline += f" {belong} to a track ({metres(findings.lonely_m)})."
+    reasons = [_reason(findings, doubt) for doubt in DOUBTS if findings.length_of(doubt) > 0]
+    listed = _listed([*reasons, *_hole_reasons(findings), *warnings])
     return tag("div", tag("strong", text(headline)), *listed, class_=f"verdict {kind}")
+
+
+def _listed(sentences: Sequence[str]) -> list[str]:
+    """Write a list, if there is something to list."""
+    return [tag("ul", *(tag("li", text(sentence)) for sentence in sentences))] if sentences else []
+
+
+def _hole_reasons(findings: Findings) -> Iterator[str]:
+    """Write which tracks are likely one."""
+    for hole in findings.holes:
+        between = metres(hole.length_m)
+        yield f"Track {hole.first} likely goes on as track {hole.second}: no rails were found in the {between} between."
 
 
 def _reason(findings: Findings, doubt: Doubt) -> str:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..clouds.points import RailPoints
 from ..errors import CloudError
 from ..polyline import project
 from ..progress import SILENT, Progress
@@ -111,6 +112,11 @@ def warn_of_unexplained(source: PointSource, rails: Sequence[RailLine], progress
             f"Only {100 * near / total:.0f} % of the points of class {source.class_code} are within {EXPLAINED_M} m of "
             "a rail: check the rail classes and the rail standard."
         )
+
+
+def fullest_square(source: PointSource) -> RailPoints:
+    """Return the points of the square of a class that has the most."""
+    return source.near(_fullest(source)[0], 0.0)
 
 
 def _fullest(source: PointSource) -> list[Square]:

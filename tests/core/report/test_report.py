@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.rails import Centerline, RailLine, RailNetwork, TrackGeometry
+from rail_extract.core.rails import Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry
 from rail_extract.core.report import build_page
 from rail_extract.core.report.findings import OFF_GAUGE, UNSUPPORTED, UNSURE, examine
 from rail_extract.core.report.markup import metres, table, tag, text
@@ -227,3 +227,64 @@ def test_rounding_up_gives_the_next_1_2_or_5(value):
 )
 def test_lengths_are_formatted_for_reading(length_m, words):
     assert metres(length_m) == words
+
+
+def lone(length_m, rail_id=99):
+    return RailLine(np.column_stack([[0.0, length_m], [9.0, 9.0], [0.0, 0.0]]), rail_id, 10, 900, 3.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("length_m", "words"),
+    [
+        (3.0, "Good throughout: every metre is supported by points, at gauge, with a small standard error. 1 rail "),
+        (9.0, "Good, except for a few places to look at. 1 rail does not belong to a track (9.0 m)."),
+        (90.0, "Usable, but look at the places below before you rely on them. 1 rail does not belong to a track "),
+    ],
+)
+def test_the_headline_counts_lone_rails(length_m, words):
+    assert headline(page(track(), more_rails=[lone(length_m)])).startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("seen_m", "words"), [(0.062, "Usable"), (0.082, "Usable"), (0.0765, "Good thr"), (np.nan, "Good thr")]
+)
+def test_heads_of_another_width_than_stated_are_not_good(seen_m, words):
+    whole = replace(network(track()), heads=HeadWidths(seen_m, 0.072))
+    assert headline(build_page(whole, (1.435,), "cloud.laz")).startswith(words)
+
+
+def on_arc(track_id, start_m, end_m, radius_m=600.0, left_m=0.0):
+    t = np.arange(start_m, end_m + 0.5, 1.0) / radius_m
+    radius_m -= left_m
+    xyz = np.column_stack([radius_m * np.sin(t), 600.0 - radius_m * np.cos(t), np.zeros(len(t))])
+    line, geometry = track(track_id, len(t) - 1.0)
+    return replace(line, xyz=xyz), replace(geometry, xyz=xyz)
+
+
+@pytest.mark.parametrize("radius_m", [250.0, -600.0, 1e6])
+@pytest.mark.parametrize("turned", [False, True])
+def test_two_tracks_that_end_on_one_curve_are_likely_one(radius_m, turned):
+    one, other = on_arc(1, 0, 60, radius_m), on_arc(2, 140, 200, radius_m)
+    if turned:
+        other = (replace(other[0], xyz=other[0].xyz[::-1]), other[1])
+    html = page(one, other)
+    assert "Track 1 likely goes on as track 2: no rails were found in the " in html
+    assert re.search(r"in the (79|80)(\.\d)? m between", html)
+    assert not headline(html).startswith("Good")
+
+
+def test_the_next_track_is_not_the_continuation():
+    shifted = on_arc(2, 140, 200, 600.0, 4.5)
+    assert examine(network(on_arc(1, 0, 60), shifted), (1.435,)).holes == ()
+    assert examine(network(on_arc(1, 0, 60), on_arc(2, 300, 360)), (1.435,)).holes == ()
+    (hole,) = examine(network(on_arc(1, 0, 60), shifted, on_arc(3, 100, 200)), (1.435,)).holes
+    assert (hole.first, hole.second) == (1, 3)
+
+
+def test_a_track_that_ends_on_another_one_has_no_hole():
+    assert examine(network(on_arc(1, 0, 100), on_arc(2, 60, 100), on_arc(3, 0, 30)), (1.435,)).holes == ()
+
+
+def test_warnings_of_the_run_are_listed():
+    whole = replace(network(track()), warnings=("1 rail turned by more than 10° within a metre.",))
+    assert "<li>1 rail turned by more than 10° within a metre.</li>" in build_page(whole, (1.435,), "cloud.laz")
