@@ -12,14 +12,17 @@ from pathlib import Path
 
 import numpy as np
 
+from .classify.settings import Settings
 from .clouds.las import CloudHeader
 from .clouds.points import RailPoints, Request
 from .errors import CloudError, NoRailPointsError, NoTrackError, ParameterError, RailExtractError
 from .heads.gauge_estimate import measure_spacings
+from .labelling.spooling import spool_found
 from .parameters import Parameters
 from .progress import SILENT, Progress, Recording
 from .rails import Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry
 from .raster import RailRaster
+from .scratch import scratch_folder
 from .squares.density import fullest_square, occupied_squares, plausible, warn_of_unexplained
 from .squares.grid import Key, MemorySource, PointSource, Square, around, assembled
 from .squares.pieces import SquareRails
@@ -110,9 +113,14 @@ def extract_rails(
 
 
 def extract_files(
-    request: Request, folder: Path, parameters: Parameters, runner: Runner, progress: Progress = SILENT
+    request: Request,
+    folder: Path,
+    parameters: Parameters,
+    runner: Runner,
+    progress: Progress = SILENT,
+    classify: bool = False,
 ) -> RailNetwork:
-    """Extract rails and centerlines from files of classified points, however large, with any runner.
+    """Extract rails and centerlines from files of points, however large, with any runner.
 
     Parameters
     ----------
@@ -124,6 +132,9 @@ def extract_files(
     runner : Runner
         Whether errors of single files and squares end the run is for the runner to decide.
     progress : Progress
+    classify : bool
+        Whether the cloud is a raw one, whose rail points are to be found first; the request is for the classes
+        `finding.SEARCHED` then. This process finds them, whatever the runner.
 
     Returns
     -------
@@ -143,8 +154,13 @@ def extract_files(
         Every square failed.
     """
     side_m = square_side(parameters)
-    _warn_of_gauge(request, parameters, progress)
     reading, rest = progress.divide((READING, DRAWING + PAIRING + MEASURING))
+    if classify:
+        settings = Settings((parameters.gauge_m, *parameters.other_gauges_m), parameters.head_width_m)
+        with scratch_folder(folder) as scratch:
+            source = spool_found(request, settings, side_m, scratch, reading)
+            return _walk([source], parameters, runner, rest)
+    _warn_of_gauge(request, parameters, progress)
     return _walk(_sorted_points(request, side_m, folder, runner, reading), parameters, runner, rest)
 
 

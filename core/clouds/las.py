@@ -14,7 +14,7 @@ from ..errors import CloudError
 from ..progress import SILENT, Progress
 from . import laz
 from .crs import crs_of_geokeys, import_pyproj
-from .readers import Chunk, CloudHeader
+from .readers import Chunk, CloudHeader, Points
 
 with warnings.catch_warnings():
     # In a virtual environment, pyproj (imported by laspy) warns about a data folder that PROJ finds by itself.
@@ -60,22 +60,42 @@ def read_classes(path: Path, class_codes: Sequence[int], progress: Progress = SI
     """Read the points of some classes chunk by chunk; see `readers.read_classes`."""
     wanted = np.zeros(256, dtype=bool)
     wanted[list(class_codes)] = True
+    for chunk, codes, valid in _chunks(path, progress):
+        keep = np.flatnonzero(wanted[codes] & valid)
+        yield _coordinates(chunk, keep), codes[keep], np.bincount(codes[valid], minlength=256)
+
+
+def read_points(path: Path, progress: Progress = SILENT) -> Iterator[Points]:
+    """Read all points chunk by chunk; see `readers.read_points`."""
+    for chunk, codes, valid in _chunks(path, progress):
+        yield _coordinates(chunk, slice(None)), codes, valid
+
+
+def _chunks(path: Path, progress: Progress) -> Iterator[tuple[laspy.ScaleAwarePointRecord, np.ndarray, np.ndarray]]:
+    """Check a file and read it chunk by chunk: the points, their classes, and which of them are not withheld."""
     with _open(path) as reader:
         header, done = reader.header, 0
         total = header.point_count
         if header.are_points_compressed:
             laz.check_layers(path, header, laz.read_chunk_table(path, header), progress)
-        for chunk in reader.chunk_iterator(max(1, min(CHUNK, MAX_READ // header.point_format.size))):
+        for chunk in reader.chunk_iterator(chunk_size(header)):
             progress.check()
-            codes, valid = np.asarray(chunk.classification), np.asarray(chunk.withheld) == 0
-            keep = np.flatnonzero(wanted[codes] & valid)
-            raw = np.column_stack([chunk.X[keep], chunk.Y[keep], chunk.Z[keep]])
-            census = np.bincount(codes[valid], minlength=256)
-            yield raw * header.scales + header.offsets, codes[keep], census
-            done += len(codes)
+            yield chunk, np.asarray(chunk.classification), np.asarray(chunk.withheld) == 0
+            done += len(chunk)
             progress.set_fraction(done / total)
     if done < total:
         raise CloudError(f"{path.name} is cut off: it holds {done} of the {total} points stated in its header.")
+
+
+def chunk_size(header: laspy.LasHeader) -> int:
+    """Return the number of points to read at once."""
+    return max(1, min(CHUNK, MAX_READ // header.point_format.size))
+
+
+def _coordinates(chunk: laspy.ScaleAwarePointRecord, keep: np.ndarray | slice) -> np.ndarray:
+    """Return the coordinates of some points of a chunk, (n, 3) in units of the CRS."""
+    raw = np.column_stack([chunk.X[keep], chunk.Y[keep], chunk.Z[keep]])
+    return raw * chunk.scales + chunk.offsets
 
 
 @contextmanager

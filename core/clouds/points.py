@@ -116,8 +116,12 @@ class Request:
         if self.extent is not None and not _overlap(header.extent, self.extent):
             return
         for xyz, codes, census in read_classes(header.path, self.class_codes, progress):
-            inside = slice(None) if self.extent is None else _inside(xyz, self.extent)
+            inside = slice(None) if self.extent is None else self.holds(xyz)
             yield xyz[inside], codes[inside], census
+
+    def holds(self, xyz: np.ndarray) -> np.ndarray:
+        """Return which places, (n, 3) in units of the CRS, lie in the extent, (n,) bool."""
+        return np.ones(len(xyz), dtype=bool) if self.extent is None else _inside(xyz, self.extent)
 
     def sample(self) -> np.ndarray:
         """Read the first points requested, (n, 3) metres from one of them; takes a few seconds for a cloud of any size.

@@ -39,6 +39,9 @@ Chunk = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Coordinates (n, 3) in units of the CRS and classes (n,) of the points that were kept, and the number of points read
 by class (256,), kept or not."""
 
+Points = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Coordinates (n, 3) in units of the CRS, classes (n,), and which points are not withheld, (n,) bool."""
+
 Paths = Union[str, Path, Sequence[Union[str, Path]]]
 """Files, or folders of them."""
 
@@ -72,6 +75,9 @@ class Reader(Protocol):
     def read_classes(self, path: Path, class_codes: Sequence[int], progress: Progress = SILENT) -> Iterator[Chunk]:
         """Read a file chunk by chunk and keep the points of some classes; see `read_classes`."""
 
+    def read_points(self, path: Path, progress: Progress = SILENT) -> Iterator[Points]:
+        """Read all points of a file chunk by chunk; see `read_points`."""
+
 
 def read_header(path: Path) -> CloudHeader:
     """Read and check the header of one file, without its points.
@@ -81,7 +87,7 @@ def read_header(path: Path) -> CloudHeader:
     CloudError
         The file has an unknown suffix, is damaged, is cut off or has no points.
     """
-    with _explained(path):
+    with explained(path):
         return _reader(path).read_header(path)
 
 
@@ -109,12 +115,33 @@ def read_classes(path: Path, class_codes: Sequence[int], progress: Progress = SI
     CloudError
         The file has an unknown suffix, or turns out to be cut off or damaged.
     """
-    with _explained(path):
+    with explained(path):
         yield from _reader(path).read_classes(path, class_codes, progress)
 
 
+def read_points(path: Path, progress: Progress = SILENT) -> Iterator[Points]:
+    """Read all points of a file chunk by chunk, in the order of the file.
+
+    Yields
+    ------
+    xyz : (n, 3) array
+        In units of the CRS.
+    codes : (n,) uint8 array
+        Classes.
+    valid : (n,) bool array
+        Points that are not withheld.
+
+    Raises
+    ------
+    CloudError
+        See `read_classes`.
+    """
+    with explained(path):
+        yield from _reader(path).read_points(path, progress)
+
+
 @contextmanager
-def _explained(path: Path) -> Iterator[None]:
+def explained(path: Path) -> Iterator[None]:
     """Turn whatever a reader raises because of a file into a `CloudError` that names the file."""
     try:
         yield

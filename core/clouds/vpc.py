@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
 
 from ..errors import CloudError
 
@@ -29,3 +31,63 @@ def list_tiles(catalogue: Path) -> tuple[Path, ...]:
         if not os.path.exists(tile):  # noqa: PTH110 - Path.exists raises an error where a name is too long
             raise CloudError(f"{catalogue.name} names {tile}, which does not exist: build it again from its tiles.")
     return tiles
+
+
+@dataclass(frozen=True)
+class CatalogueTile:
+    """A tile of a virtual point cloud.
+
+    Attributes
+    ----------
+    href : str
+        Path from the folder of the catalogue.
+    point_count : int
+    extent : tuple of float
+        Smallest x, smallest y, largest x, largest y.
+    """
+
+    href: str
+    point_count: int
+    extent: tuple[float, float, float, float]
+
+
+def catalogue_text(tiles: Sequence[CatalogueTile], crs_wkt: str | None) -> str:
+    """Return the text of a virtual point cloud.
+
+    Parameters
+    ----------
+    tiles : sequence of CatalogueTile
+    crs_wkt : str or None
+        Coordinate system of all tiles.
+    """
+    features = [_feature(tile, crs_wkt) for tile in tiles]
+    return json.dumps({"type": "FeatureCollection", "features": features}, indent=1)
+
+
+def _feature(tile: CatalogueTile, crs_wkt: str | None) -> dict:
+    """Describe a tile as an item of STAC."""
+    west, south, east, north = tile.extent
+    ring = [[west, south], [east, south], [east, north], [west, north], [west, south]]
+    outline = {"type": "Polygon", "coordinates": [ring]}
+    return {
+        "type": "Feature",
+        "stac_version": "1.0.0",
+        "stac_extensions": [
+            "https://stac-extensions.github.io/pointcloud/v1.0.0/schema.json",
+            "https://stac-extensions.github.io/projection/v1.1.0/schema.json",
+        ],
+        "id": PurePosixPath(tile.href).stem,
+        "geometry": outline,
+        "bbox": [west, south, east, north],
+        "properties": {
+            "datetime": None,
+            "pc:count": tile.point_count,
+            "pc:type": "lidar",
+            "pc:encoding": PurePosixPath(tile.href).suffix,
+            "proj:bbox": [west, south, east, north],
+            "proj:geometry": outline,
+            **({"proj:wkt2": crs_wkt} if crs_wkt else {}),
+        },
+        "links": [],
+        "assets": {"data": {"href": tile.href, "roles": ["data"]}},
+    }

@@ -18,6 +18,7 @@ from ..errors import ParameterError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, RAIL_FIELDS
 from ..frpdf import DEVICES, ENGINES
 from ..frpdf.models import choose
+from ..labelling.finding import SEARCHED
 from ..parameters import DEFAULT_STEP_M, Parameters
 from ..pipeline import extract_files
 from ..progress import Estimating, Progress
@@ -26,6 +27,7 @@ from ..raster_file import header_for, on_one_grid
 from ..report import Origin
 from ..scratch import scratch_folder
 from ..standards import DEFAULT, RailStandard, distinct_gauges, resolve
+from .options import Console, extent_of, numbers_in
 
 NEEDS = {name: name for name in ("distributed", "cryptography", "pyogrio", "shapely", "rasterio")}
 """Modules and packages of the extra "cluster"; rasterio is needed for `--cleaned` only."""
@@ -77,6 +79,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     output.add_argument("--cleaned", type=Path, help="GeoTIFF for the rail raster as the network cleaned it")
     output.add_argument("--report", type=Path, help="HTML file for the report")
     cloud = parser.add_argument_group("point cloud and rails")
+    text = "find the rail points of a raw cloud first; --rail-classes is ignored"
+    cloud.add_argument("--classify", action="store_true", help=text)
     cloud.add_argument("--rail-classes", default="10", help="classes of rail points, such as 10,11 (default: 10)")
     cloud.add_argument("--standard", default=DEFAULT, help=f"rail standard (default: {DEFAULT})")
     cloud.add_argument("--gauge", type=float, metavar="MM", help="gauge, instead of that of the standard")
@@ -157,7 +161,7 @@ def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameter
         No weights fit the standard.
     """
     choose(standard.gauge_m, standard.head_width_m)
-    others_mm = _numbers(args.other_gauges, "--other-gauges", float)
+    others_mm = numbers_in(args.other_gauges, "--other-gauges", float)
     gauges_m = distinct_gauges((standard.gauge_m, *(mm / 1000 for mm in others_mm)), args.centerline_tolerance)
     numbers = {field.name: getattr(args, _option(field.name)[2:].replace("-", "_")) for field in _number_fields()}
     workers = 0 if args.workers is None else args.workers - 1
@@ -214,14 +218,15 @@ def _run_in(
     from ..cluster.runner import DaskRunner
     from ..cluster.workers import Certificates, connect
 
-    codes, extent = _numbers(args.rail_classes, "--rail-classes", int), _extent(args.extent)
-    progress = Estimating(_Console())
+    codes, extent = numbers_in(args.rail_classes, "--rail-classes", int), extent_of(args.extent)
+    codes = SEARCHED if args.classify else codes
+    progress = Estimating(Console())
     files = _certificate_files(args, progress)
     certificates = Certificates(*files) if files else None
     with connect(args.scheduler, args.workers, certificates, args.dashboard) as client:
         runner = DaskRunner(client, folder)
         request = ask(args.tiles, codes, args.crs, extent, progress, unreadable=runner.failures)
-        network = extract_files(request, folder.resolve(), parameters, runner, progress)
+        network = extract_files(request, folder.resolve(), parameters, runner, progress, args.classify)
     _write(network, args, standard, parameters, extent, outputs)
     print(f"{len(network.rails)} rails, {sum(rail.length_m for rail in network.rails) / 1000:.3f} km")
     print(f"{len(network.centerlines)} centerlines, {sum(one.length_m for one in network.centerlines) / 1000:.3f} km")
@@ -320,44 +325,3 @@ def _option(name: str) -> str:
     for unit in ("_m", "_deg"):
         name = name[: -len(unit)] if name.endswith(unit) else name
     return "--" + name.replace("_", "-")
-
-
-def _numbers(text: str, option: str, kind: type) -> tuple:
-    """Return the distinct numbers in a text such as "10,11" or "1000;1067".
-
-    Raises
-    ------
-    ParameterError
-        The text holds something else.
-    """
-    try:
-        return tuple(dict.fromkeys(kind(word) for word in text.replace(";", ",").split(",") if word.strip()))
-    except ValueError:
-        raise ParameterError(f'{option} "{text}" should be numbers such as 10 or 10,11.') from None
-
-
-def _extent(text: str | None) -> tuple[float, float, float, float] | None:
-    """Return the numbers of `--extent`.
-
-    Raises
-    ------
-    ParameterError
-        The text does not hold four numbers.
-    """
-    if text is None:
-        return None
-    try:
-        xmin, ymin, xmax, ymax = (float(word) for word in text.split(","))
-    except ValueError:
-        raise ParameterError(f'--extent "{text}" should be four numbers: xmin,ymin,xmax,ymax.') from None
-    return xmin, ymin, xmax, ymax
-
-
-class _Console(Progress):
-    """Prints the remaining time and the warnings to the error output."""
-
-    def status(self, text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
-    def warning(self, text: str) -> None:
-        print(f"Warning: {text}", file=sys.stderr, flush=True)

@@ -153,8 +153,12 @@ def unique_keys(xyz_m: np.ndarray, side_m: float) -> tuple[list[Key], np.ndarray
     number : (n,) int array
         Index into `keys` for each point.
     """
-    rows, number = np.unique(np.floor(xyz_m[:, :2] / side_m).astype(np.int64), axis=0, return_inverse=True)
-    return [(column, row) for column, row in rows.tolist()], number.ravel()
+    if not len(xyz_m):
+        return [], np.empty(0, dtype=np.int64)
+    column, row = np.floor(xyz_m[:, :2] / side_m).astype(np.int64).T
+    first_column, first_row, height = int(column.min()), int(row.min()), int(np.ptp(row)) + 1
+    found, number = np.unique((column - first_column) * height + row - first_row, return_inverse=True)
+    return [(first_column + one // height, first_row + one % height) for one in found.tolist()], number.ravel()
 
 
 def around(key: Key) -> list[Key]:

@@ -154,7 +154,7 @@ def spool_file(
 
 def _sort(request: Request, header: CloudHeader, side_m: float, folder: Path, progress: Progress) -> dict:
     """Write the points of a file to the files of their squares, and the report; returns the report."""
-    found = _Census()
+    found = Census()
     for xyz, codes, census in request.read(header, progress):
         found.census += census
         with writing(folder.parent):
@@ -212,7 +212,7 @@ def gather(request: Request, side_m: float, found: Sequence[SpooledFile]) -> tup
     return tuple(_source(code, found, frame, side_m) for code in codes)
 
 
-class _Census:
+class Census:
     """Counts of the points written to disk, in JSON types."""
 
     def __init__(self) -> None:

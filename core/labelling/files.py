@@ -1,0 +1,311 @@
+"""Classified copies of the files of a raw cloud: one file, or a folder of the same tiles with a catalogue."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..classify.figures import Figures
+from ..classify.settings import Settings
+from ..clouds.points import Request
+from ..clouds.readers import CATALOGUES, READERS, list_files
+from ..clouds.rewriting import check_class, rewrite
+from ..clouds.vpc import CatalogueTile, catalogue_text
+from ..disk import Destination, writing
+from ..errors import DiskError, ParameterError
+from ..progress import SILENT, Progress
+from ..scratch import scratch_folder
+from ..standards import RAIL_CLASS
+from .finding import Found, find_rail_points, report
+
+UNCLASSIFIED = 1
+"""Class of a point that loses the rail class."""
+
+CATALOGUE = ".vpc"
+COPC = ".copc"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is written.
+
+    Attributes
+    ----------
+    class_code : int
+        Class of rail points.
+    only_rails : bool
+        Whether other points are left out.
+    reset : bool
+        Whether points that have the rail class and are not found lose it.
+    """
+
+    class_code: int = RAIL_CLASS
+    only_rails: bool = False
+    reset: bool = True
+
+
+@dataclass(frozen=True)
+class Output:
+    """Files to write.
+
+    Attributes
+    ----------
+    file : Path
+        The file that opens the result: the only one, or the catalogue of the tiles.
+    names : tuple of str
+        Name of each tile; empty for a single file.
+    """
+
+    file: Path
+    names: tuple[str, ...] = ()
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the tiles."""
+        return self.file.with_suffix("")
+
+
+@dataclass(frozen=True)
+class Result:
+    """What was written.
+
+    Attributes
+    ----------
+    file : Path
+        See `Output`.
+    point_count : int
+        Points in the files that were read.
+    figures : Figures
+    """
+
+    file: Path
+    point_count: int
+    figures: Figures
+
+
+def plan_output(paths: Sequence[Path], output: Path, class_code: int, progress: Progress = SILENT) -> Output:
+    """Decide which files to write for an input, and check that this is possible.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        The input: files, folders or virtual point clouds.
+    output : Path
+        Where the user wants the result. For tiles, its name without the suffix is that of their folder.
+    class_code : int
+        Class of rail points.
+    progress : Progress
+        Receives a warning if a COPC file was asked for.
+
+    Raises
+    ------
+    CloudError
+        A path does not lead to cloud files.
+    DiskError
+        Nothing can be written there.
+    ParameterError
+        The output has no suffix of a cloud, would replace the input, or its format lacks the class.
+    """
+    files = list_files(paths)
+    for file in files:
+        check_class(file, class_code)
+    is_single = len(files) == 1 and Path(paths[0]).is_file() and Path(paths[0]).suffix.lower() not in CATALOGUES
+    suffixes = tuple(READERS) if is_single else (*READERS, *CATALOGUES)
+    if output.suffix.lower() not in suffixes:
+        raise ParameterError(
+            f"{output.name} is not a name for the classified cloud: let it end in {' or '.join(suffixes)}."
+        )
+    if is_single:
+        planned = Output(_without_copc(output, progress))
+        written = [planned.file]
+    else:
+        planned = Output(
+            output.with_name(_without_copc(output, progress).stem + CATALOGUE), _tile_names(files, progress)
+        )
+        written = [planned.folder / name for name in planned.names]
+    if {file.resolve() for file in files} & {file.resolve() for file in written}:
+        raise ParameterError("The classified cloud would replace the cloud that is read: choose another name.")
+    _check_folder(planned)
+    Destination.at(planned.file)
+    return planned
+
+
+def classify_files(
+    request: Request, settings: Settings, choice: Choice, output: Output, folder: Path, progress: Progress = SILENT
+) -> Result:
+    """Find the rail points of a cloud and write its files with their classes.
+
+    Parameters
+    ----------
+    request : Request
+        Files, `finding.SEARCHED` classes and extent.
+    settings : Settings
+    choice : Choice
+    output : Output
+        From `plan_output`, for the files of the request.
+    folder : Path
+        Existing folder for temporary files, 32 bytes per point; the caller removes it.
+    progress : Progress
+
+    Raises
+    ------
+    CloudError
+        A file is damaged, or its points are too far apart.
+    NoRailPointsError
+        The extent contains no points.
+    DiskError
+        The disk is full, or another program has changed an output.
+    """
+    finding, rewriting = progress.divide((2.0, 1.0))
+    labels = _Labels(request, folder)
+    figures = Figures()
+    with writing(folder):
+        squares = folder / "squares"
+        squares.mkdir()
+    for found in find_rail_points(request, settings, squares, finding):
+        with writing(folder):
+            labels.add(found)
+        figures += found.figures
+    report(figures, progress)
+    writer = _Writer(request, choice, labels)
+    if output.names:
+        writer.write_tiles(output, rewriting)
+    else:
+        with Destination.at(output.file).replacing() as new:
+            writer.write(0, new, rewriting)
+    return Result(output.file, int(labels.starts[-1]), figures)
+
+
+class _Labels:
+    """Numbers of the rail points of each file, on disk.
+
+    Parameters
+    ----------
+    request : Request
+    folder : Path
+    """
+
+    def __init__(self, request: Request, folder: Path) -> None:
+        counts = [header.point_count for header in request.headers]
+        self.starts = np.append(0, np.cumsum(counts)).astype(np.int64)
+        self._folder = folder
+
+    def add(self, found: Found) -> None:
+        """Append the rail points of a square."""
+        file = np.searchsorted(self.starts, found.number, side="right") - 1
+        for place in np.unique(file).tolist():
+            with self._file(place).open("ab") as stream:
+                stream.write((found.number[file == place] - self.starts[place]).tobytes())
+
+    def of(self, place: int) -> np.ndarray:
+        """Return the numbers of a file's rail points within the file, ascending."""
+        file = self._file(place)
+        return np.sort(np.fromfile(file, np.int64)) if file.exists() else np.empty(0, np.int64)
+
+    def _file(self, place: int) -> Path:
+        return self._folder / f"labels_{place}"
+
+
+class _Writer:
+    """Writes the files of a cloud with their new classes.
+
+    Parameters
+    ----------
+    request : Request
+    choice : Choice
+    labels : _Labels
+    """
+
+    def __init__(self, request: Request, choice: Choice, labels: _Labels) -> None:
+        self._request, self._choice, self._labels = request, choice, labels
+
+    def write(self, place: int, new: Path, progress: Progress) -> int:
+        """Write one file; returns how many points it has."""
+        numbers, done = self._labels.of(place), 0
+
+        def change(xyz: np.ndarray, codes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            nonlocal done
+            rail = np.zeros(len(codes), dtype=bool)
+            first, last = np.searchsorted(numbers, (done, done + len(codes)))
+            rail[numbers[first:last] - done] = True
+            done += len(codes)
+            return self._classes(xyz, codes, rail), rail | (not self._choice.only_rails)
+
+        return rewrite(self._request.headers[place].path, new, change, progress)
+
+    def write_tiles(self, output: Output, progress: Progress) -> None:
+        """Write all tiles into a temporary folder, then move it to its name and write the catalogue."""
+        catalogue = Destination.at(output.file)
+        with writing(output.file.parent), scratch_folder(output.file.parent) as scratch:
+            new = scratch / "tiles"
+            new.mkdir()
+            tiles = []
+            for place, share in enumerate(self._request.shares(progress)):
+                name = output.names[place]
+                count = self.write(place, new / name, share)
+                href = f"./{output.folder.name}/{name}"
+                tiles.append(CatalogueTile(href, count, self._request.headers[place].extent))
+            _check_folder(output)
+            _replace_folder(output.folder, new, scratch / "old")
+        catalogue.write_text(catalogue_text(tiles, self._request.zero.crs_wkt))
+
+    def _classes(self, xyz: np.ndarray, codes: np.ndarray, rail: np.ndarray) -> np.ndarray:
+        """Return the new classes of points, (n,)."""
+        choice, changed = self._choice, codes.copy()
+        if choice.reset:
+            changed[(codes == choice.class_code) & self._request.holds(xyz)] = UNCLASSIFIED
+        changed[rail] = choice.class_code
+        return changed
+
+
+def _without_copc(file: Path, progress: Progress) -> Path:
+    """Return the name without the part that marks a COPC file, which can't be written."""
+    if Path(file.stem).suffix.lower() != COPC:
+        return file
+    plain = file.with_name(Path(file.stem).stem + file.suffix)
+    progress.warning(f"{file.name} is written as {plain.name}: COPC files can't be written.")
+    return plain
+
+
+def _tile_names(files: Sequence[Path], progress: Progress) -> tuple[str, ...]:
+    """Return the name of each new tile.
+
+    Raises
+    ------
+    ParameterError
+        Two tiles have the same name.
+    """
+    names = tuple(_without_copc(file, progress).name for file in files)
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice:
+        raise ParameterError(f"Two tiles are called {twice}: classify them one folder at a time.")
+    return names
+
+
+def _check_folder(output: Output) -> None:
+    """Refuse to replace a folder that holds anything else than tiles of these names.
+
+    Raises
+    ------
+    DiskError
+    """
+    if output.names and output.folder.exists():
+        strange = not output.folder.is_dir() or {one.name for one in output.folder.iterdir()} - set(output.names)
+        if strange:
+            raise DiskError(f"{output.folder} exists and holds other files: choose another name.")
+
+
+def _replace_folder(folder: Path, new: Path, old: Path) -> None:
+    """Move a new folder to its name; the old one is back in its place if that fails."""
+    if not folder.exists():
+        new.replace(folder)
+        return
+    folder.replace(old)
+    try:
+        new.replace(folder)
+    except OSError:
+        old.replace(folder)
+        raise

@@ -1,0 +1,170 @@
+"""Sorts the points of a raw cloud into squares on disk and finds the rail points square by square.
+
+The files are read once; memory holds one square and its margin (docs/classification.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..classify.figures import Figures
+from ..classify.settings import MARGIN_M, Settings
+from ..classify.square import classify_square
+from ..clouds.points import Request
+from ..clouds.readers import read_points
+from ..disk import writing
+from ..errors import CloudError, NoRailPointsError
+from ..frame import LocalFrame
+from ..progress import SILENT, Progress
+from ..squares.grid import Key, Square, around, unique_keys
+from ..standards import LAST_CLASS
+
+NOISE = (7, 18)
+"""Classes of low and high noise in LAS 1.4."""
+
+SEARCHED = tuple(code for code in range(LAST_CLASS + 1) if code not in NOISE)
+"""Classes in which rails are looked for: whatever the cloud has been classified for."""
+
+POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8")])
+"""A point on disk: coordinates in units of the CRS, and its number among all points of all files."""
+
+FEW_IN_SQUARE, MANY_SQUARES = 20, 100
+"""Chunks of points that are spread over more squares than this, with fewer points in each, are not in the unit that the
+file states: a square of 41 m with rails has thousands of points, and each square becomes a file."""
+
+ENOUGH_CELLS_PER_M = 10.0
+"""Cells per metre of rail below which the lines have gaps: FRPDF needs about seven everywhere."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """The rail points of a square.
+
+    Attributes
+    ----------
+    xyz : (k, 3) array
+        Units of the CRS.
+    number : (k,) int array
+        Their numbers among all points of all files.
+    figures : Figures
+    """
+
+    xyz: np.ndarray
+    number: np.ndarray
+    figures: Figures
+
+
+def find_rail_points(
+    request: Request, settings: Settings, folder: Path, progress: Progress = SILENT
+) -> Iterator[Found]:
+    """Find the points on railheads, square by square.
+
+    Parameters
+    ----------
+    request : Request
+        Files, searched classes and extent.
+    settings : Settings
+    folder : Path
+        Empty folder for the points of the squares, 32 bytes each; the caller removes it.
+    progress : Progress
+
+    Yields
+    ------
+    Found
+        Only for squares with rail points.
+
+    Raises
+    ------
+    CloudError
+        A file is damaged, or its points are too far apart.
+    NoRailPointsError
+        The extent contains no points.
+    DiskError
+        The disk is full.
+    """
+    reading, searching = progress.divide((1.0, 1.0))
+    counts = _sort(request, settings.side_m, folder, reading)
+    if not counts:
+        where = "cloud" if request.extent is None else "extent"
+        raise NoRailPointsError(f"The {where} contains no points that are neither noise nor withheld: choose another.")
+    for key in searching.follow(sorted(counts)):
+        found = _find_in(Square.on_grid(key, settings.side_m, request.zero), counts, settings, folder)
+        if len(found.number):
+            yield found
+
+
+def report(figures: Figures, progress: Progress) -> None:
+    """Tell the user what was found and what to doubt."""
+    if not figures.points:
+        progress.warning(
+            "No rail was found: check the rail standard and the unit of the coordinates. A cloud that contains only "
+            "rail points needs no classification."
+        )
+        return
+    progress.info(
+        f"Found {figures.points} rail points: {figures.paired_m:.0f} m of rails with a partner and "
+        f"{figures.single_m:.0f} m of single rails. Of {figures.squares} squares with rails, {figures.thin} are thin "
+        f"and {figures.paved} have rails in pavement."
+    )
+    if figures.cells_per_m < ENOUGH_CELLS_PER_M:
+        progress.warning(
+            f"The rails have {figures.cells_per_m:.1f} cells with points per metre; below {ENOUGH_CELLS_PER_M:.0f}, "
+            "lines have gaps: use a denser cloud."
+        )
+
+
+def _sort(request: Request, side_m: float, folder: Path, progress: Progress) -> dict[Key, int]:
+    """Append all points to the files of their squares; returns the number of points by square."""
+    counts: dict[Key, int] = {}
+    wanted = np.zeros(LAST_CLASS + 1, dtype=bool)
+    wanted[list(request.class_codes)] = True
+    first = 0
+    for header, share in zip(request.headers, request.shares(progress)):
+        for xyz, codes, valid in read_points(header.path, share):
+            kept = np.flatnonzero(valid & wanted[codes] & request.holds(xyz))
+            points = np.empty(len(kept), POINT)
+            points["xyz"], points["number"] = xyz[kept], kept + first
+            first += len(xyz)
+            _append(points, request.zero, side_m, folder, counts, header.path.name)
+    return counts
+
+
+def _append(
+    points: np.ndarray, zero: LocalFrame, side_m: float, folder: Path, counts: dict[Key, int], name: str
+) -> None:
+    """Append points to the files of their squares, and count them."""
+    keys, square = unique_keys(zero.to_local(points["xyz"]), side_m)
+    if len(keys) > MANY_SQUARES and len(points) < FEW_IN_SQUARE * len(keys):
+        raise CloudError(
+            f"The points of {name} are too far apart for rails: if the coordinates are in centimetres or millimetres, "
+            "assign a coordinate system that says so."
+        )
+    order = np.argsort(square, kind="stable")
+    ends = np.searchsorted(square[order], np.arange(len(keys) + 1))
+    with writing(folder):
+        for place, key in enumerate(keys):
+            part = points[order[ends[place] : ends[place + 1]]]
+            with _file(folder, key).open("ab") as file:
+                file.write(part.tobytes())
+            counts[key] = counts.get(key, 0) + len(part)
+
+
+def _find_in(square: Square, counts: Mapping[Key, int], settings: Settings, folder: Path) -> Found:
+    """Find the rail points of a square."""
+    parts = []
+    for key in around(square.key):
+        if key in counts:
+            points = np.fromfile(_file(folder, key), POINT)
+            inside = square.holds(square.frame.to_local(points["xyz"]), MARGIN_M)
+            parts.append(points[inside])
+    near = np.concatenate(parts)
+    found = classify_square(square.frame.to_local(near["xyz"]), settings)
+    return Found(near["xyz"][found.rail], near["number"][found.rail], found.figures)
+
+
+def _file(folder: Path, key: Key) -> Path:
+    return folder / f"{key[0]}_{key[1]}"

@@ -1,0 +1,52 @@
+"""Rail points found in a raw cloud, sorted into the squares of the extraction."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..classify.figures import Figures
+from ..classify.settings import Settings
+from ..clouds.points import Request
+from ..disk import writing
+from ..errors import NoRailPointsError
+from ..progress import Progress
+from ..scratch import scratch_folder
+from ..squares.spool import Census, SpooledFile, SpooledPoints, gather
+from ..standards import RAIL_CLASS
+from .finding import find_rail_points, report
+
+
+def spool_found(request: Request, settings: Settings, side_m: float, folder: Path, progress: Progress) -> SpooledPoints:
+    """Find the rail points of a raw cloud and sort them into the squares of the extraction, as class `RAIL_CLASS`.
+
+    Parameters
+    ----------
+    request : Request
+        Files, `finding.SEARCHED` classes and extent.
+    settings : Settings
+    side_m : float
+        Side of the squares of the extraction.
+    folder : Path
+        Folder to write to; the caller removes it.
+    progress : Progress
+
+    Raises
+    ------
+    NoRailPointsError
+        No rail was found, or the extent contains no points.
+    CloudError, DiskError
+        See `find_rail_points`.
+    """
+    census, figures = Census(), Figures()
+    with writing(folder), scratch_folder(folder) as squares:
+        for found in find_rail_points(request, settings, squares, progress):
+            census.add(RAIL_CLASS, found.xyz, request.zero, side_m, folder)
+            figures += found.figures
+    if not figures.points:
+        raise NoRailPointsError(
+            "No rail was found in the raw cloud: check the rail standard and the unit of the coordinates, or classify "
+            "the rail points yourself."
+        )
+    report(figures, progress)
+    (source,) = gather(request, side_m, [SpooledFile(str(folder), census.report())])
+    return source

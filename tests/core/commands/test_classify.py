@@ -1,0 +1,67 @@
+"""The command `classify`: it writes classified copies; and extraction from a raw cloud."""
+
+import laspy
+import numpy as np
+import pytest
+from rail_extract.__main__ import main
+from rail_extract.core.clouds.points import ask
+from rail_extract.core.errors import NoRailPointsError
+from rail_extract.core.labelling.finding import SEARCHED
+from rail_extract.core.pipeline import Parameters, extract_files
+from rail_extract.core.tasks import InTurn
+from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
+
+CORNER = np.array([500_000.0, 5_000_000.0, 100.0])
+
+
+@pytest.fixture
+def save(tmp_path):
+    def save(xyz, name="raw.laz"):
+        header = laspy.LasHeader(point_format=6, version="1.4")
+        header.scales, header.offsets = [0.0005] * 3, CORNER
+        cloud = laspy.LasData(header)
+        cloud.x, cloud.y, cloud.z = (xyz + CORNER).T
+        cloud.write(tmp_path / name)
+        return tmp_path / name
+
+    return save
+
+
+def scene(size=10.0):
+    rng = np.random.RandomState(3)
+    xyz, on = with_track(flat(size, rng=rng, per_m2=2500), 1.435, 0.072, 0.3)
+    return rough(xyz, rng), on
+
+
+def test_a_classified_copy_is_written(save, tmp_path, capsys):
+    xyz, on = scene()
+    new = tmp_path / "out" / "new.las"
+    assert main(["classify", str(save(xyz)), "--output", str(new), "--rail-class", "20"]) == 0
+    found = laspy.read(new).classification == 20
+    assert (found & on).sum() / on.sum() > 0.97
+    assert f"{found.sum()} of {len(xyz)} points are on rails" in capsys.readouterr().out
+    assert [one.name for one in new.parent.iterdir()] == ["new.las"]
+
+
+def test_a_class_out_of_range_is_refused(save, tmp_path, capsys):
+    assert main(["classify", str(save(scene()[0])), "--output", str(tmp_path / "o.las"), "--rail-class", "256"]) == 1
+    assert "--rail-class must be a number from 0 to 255, not 256." in capsys.readouterr().err
+
+
+def test_rails_are_extracted_from_a_raw_cloud(save, tmp_path):
+    request = ask([save(scene()[0])], SEARCHED)
+    parameters = Parameters(1.435, 0.072, passes=1, engine="OPENCV")
+    folder = tmp_path / "work"
+    folder.mkdir()
+    network = extract_files(request, folder, parameters, InTurn(), classify=True)
+    assert [rail.class_code for rail in network.rails] == [10, 10]
+    (track,) = network.centerlines
+    assert track.gauge_mm == pytest.approx(1435, abs=3)
+    assert not list(folder.iterdir())
+
+
+def test_ground_has_no_rails_to_extract(save, tmp_path):
+    rng = np.random.RandomState(1)
+    request = ask([save(rough(flat(8.0, rng=rng, per_m2=500), rng))], SEARCHED)
+    with pytest.raises(NoRailPointsError, match="No rail was found in the raw cloud: check the rail standard"):
+        extract_files(request, tmp_path, Parameters(1.435, 0.072, engine="OPENCV"), InTurn(), classify=True)

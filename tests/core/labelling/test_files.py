@@ -1,0 +1,174 @@
+"""Classified copies of files: classes change, everything else stays; tiles and catalogue."""
+
+import numpy as np
+import pytest
+from rail_extract.core.classify.settings import Settings
+from rail_extract.core.clouds.las import laspy
+from rail_extract.core.clouds.points import ask
+from rail_extract.core.clouds.vpc import list_tiles
+from rail_extract.core.errors import Cancelled, CloudError, DiskError, ParameterError
+from rail_extract.core.labelling.files import Choice, classify_files, plan_output
+from rail_extract.core.labelling.finding import SEARCHED
+from rail_extract.core.progress import Progress, Recording
+from rail_extract.core.scratch import scratch_folder
+from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
+
+GAUGE, WIDTH = 1.435, 0.072
+SETTINGS = Settings((GAUGE,), WIDTH)
+TEN = Choice(10)
+CORNER = np.array([500_000.0, 5_000_000.0, 100.0])
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """8 m of track across the border of two squares, shuffled; which points are on heads."""
+    rng = np.random.RandomState(3)
+    xyz, on = with_track(flat(8.0, rng=rng, per_m2=2500), GAUGE, WIDTH, 0.3)
+    order = rng.permutation(len(xyz))
+    corner = np.round(CORNER / SETTINGS.side_m) * SETTINGS.side_m * [1, 1, 0] + [0, 0, 100]
+    return (rough(xyz, rng) + corner - [4, 4, 0])[order], on[order]
+
+
+def save(path, xyz, point_format=6, codes=None):
+    rng = np.random.RandomState(5)
+    header = laspy.LasHeader(point_format=point_format, version="1.4" if point_format > 5 else "1.2")
+    header.scales, header.offsets = [0.0005] * 3, CORNER
+    header.add_extra_dim(laspy.ExtraBytesParams("tie", np.uint16, description="sleepers"))
+    header.vlrs.append(laspy.VLR("someone", 77, "notes", b"\x01\x02\x00"))
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = xyz.T
+    cloud.classification = np.full(len(xyz), 2) if codes is None else codes
+    for name, most in (("intensity", 60_000), ("tie", 60_000), ("gps_time", 1000), ("key_point", 2), ("user_data", 99)):
+        if name in header.point_format.dimension_names:
+            cloud[name] = rng.randint(0, most, len(xyz))
+    if point_format > 5:
+        cloud.evlrs = laspy.vlrs.vlrlist.VLRList([laspy.VLR("someone", 78, "late", b"late")])
+    cloud.write(path)
+    return path
+
+
+def classify(tmp_path, paths, output, choice=TEN, progress=None):
+    """Plan and write; returns the result and the progress."""
+    progress = progress or Recording(Progress())
+    planned = plan_output(paths, output, choice.class_code, progress)
+    request = ask(paths, SEARCHED, None, None, progress)
+    with scratch_folder(tmp_path) as work:
+        return classify_files(request, SETTINGS, choice, planned, work, progress), progress
+
+
+@pytest.mark.parametrize(
+    ("suffix", "point_format", "new"),
+    [(".las", 6, ".laz"), (".laz", 6, ".las"), (".las", 1, ".las"), (".laz", 7, ".laz")],
+)
+def test_only_the_classes_change(tmp_path, scene, suffix, point_format, new):
+    xyz, on = scene
+    source = save(tmp_path / f"raw{suffix}", xyz, point_format)
+    result, _ = classify(tmp_path, [source], tmp_path / f"new{new}")
+    before, after = laspy.read(source), laspy.read(result.file)
+    found = np.asarray(after.classification) == 10
+    assert result.point_count == len(xyz)
+    assert result.figures.points == found.sum()
+    assert (found & on).sum() / on.sum() > 0.97
+    assert (found & on).sum() / found.sum() > 0.97
+    assert np.all(np.asarray(after.classification)[~found] == 2)
+    for name in before.point_format.dimension_names:
+        if name != "classification":
+            assert np.array_equal(np.asarray(before[name]), np.asarray(after[name])), name
+    assert np.array_equal(before.header.scales, after.header.scales)
+    assert np.array_equal(before.header.offsets, after.header.offsets)
+    records = [
+        [(one.user_id, one.record_id, one.record_data_bytes()) for one in cloud.vlrs] for cloud in (before, after)
+    ]
+    assert records[0] == records[1]
+    assert [one.record_data_bytes() for one in after.evlrs or ()] == [
+        one.record_data_bytes() for one in before.evlrs or ()
+    ]
+
+
+def test_the_rail_class_is_reset_or_kept_and_other_points_are_left_out(tmp_path, scene):
+    xyz, on = scene
+    codes = np.where(np.arange(len(xyz)) % 2, 10, 7)
+    codes[on] = 2
+    source = save(tmp_path / "raw.las", xyz, codes=codes)
+    counts = {}
+    for name, choice in {
+        "reset": Choice(11),
+        "kept": Choice(10, reset=False),
+        "ten": TEN,
+        "only": Choice(12, only_rails=True),
+    }.items():
+        result, _ = classify(tmp_path, [source], tmp_path / f"{name}.las", choice)
+        counts[name] = np.bincount(laspy.read(result.file).classification, minlength=20), result.figures.points
+    assert counts["only"][0].sum() == counts["only"][0][12] == counts["only"][1]
+    assert counts["kept"][0][1] == 0
+    assert counts["ten"][0][10] == counts["ten"][1]
+    assert counts["ten"][0][7] == (codes == 7).sum()
+
+
+def test_tiles_are_classified_as_one_cloud(tmp_path, scene):
+    xyz, _ = scene
+    west = xyz[:, 0] < np.median(xyz[:, 0])
+    raw = tmp_path / "raw"
+    raw.mkdir()
+    save(raw / "west.laz", xyz[west])
+    save(raw / "east.las", xyz[~west])
+    whole, _ = classify(tmp_path, [save(tmp_path / "whole.las", xyz)], tmp_path / "one.las")
+    for _ in range(2):  # the second run replaces the tiles of the first
+        result, _ = classify(tmp_path, [raw], tmp_path / "new.laz")
+    assert result.file == tmp_path / "new.vpc"
+    assert [tile.resolve() for tile in list_tiles(result.file)] == [
+        tmp_path / "new/east.las",
+        tmp_path / "new/west.laz",
+    ]
+    codes = np.empty(len(xyz), dtype=int)
+    codes[west] = laspy.read(tmp_path / "new/west.laz").classification
+    codes[~west] = laspy.read(tmp_path / "new/east.las").classification
+    assert np.array_equal(codes, laspy.read(whole.file).classification)
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["new", "new.vpc", "one.las", "raw", "whole.las"]
+    (tmp_path / "new" / "diary.txt").write_text("mine")
+    with pytest.raises(DiskError, match="new exists and holds other files: choose another name"):
+        classify(tmp_path, [raw], tmp_path / "new.laz")
+
+
+def test_ground_has_no_rail(tmp_path):
+    xyz = rough(flat(8.0, rng=np.random.RandomState(1), per_m2=500), np.random.RandomState(2)) + CORNER
+    result, progress = classify(tmp_path, [save(tmp_path / "raw.las", xyz)], tmp_path / "new.copc.laz")
+    assert result.file == tmp_path / "new.laz"
+    assert (laspy.read(result.file).classification == 2).all()
+    assert [one.split(":")[0] for one in progress.warnings] == [
+        "new.copc.laz is written as new.laz",
+        "The cloud states no coordinate system",
+        "No rail was found",
+    ]
+
+
+def test_what_cannot_be_done_is_refused(tmp_path, scene):
+    source = save(tmp_path / "raw.las", scene[0], point_format=1)
+    with pytest.raises(ParameterError, match="raw.las has point format 1, whose classes end at 31"):
+        plan_output([source], tmp_path / "new.las", 40)
+    with pytest.raises(ParameterError, match="would replace the cloud that is read"):
+        plan_output([source], source, 10)
+    with pytest.raises(ParameterError, match="new.txt is not a name for the classified cloud"):
+        plan_output([source], tmp_path / "new.txt", 10)
+
+
+def test_coordinates_in_another_unit_are_refused(tmp_path, scene):
+    source = save(tmp_path / "raw.las", (scene[0] - CORNER) * 1000 + CORNER)
+    with pytest.raises(CloudError, match="too far apart for rails: if the coordinates are in centimetres"):
+        classify(tmp_path, [source], tmp_path / "new.las")
+
+
+def test_a_cancelled_run_leaves_nothing(tmp_path, scene):
+    class Impatient(Progress):
+        fraction = 0.0
+
+        def set_fraction(self, fraction):
+            self.fraction = fraction
+
+        def is_cancelled(self):
+            return self.fraction > 0.6
+
+    source = save(tmp_path / "raw.las", scene[0])
+    with pytest.raises(Cancelled):
+        classify(tmp_path, [source], tmp_path / "new.las", progress=Impatient())
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["raw.las"]
