@@ -38,6 +38,10 @@ test-desktop: plugin  ## test the real QGIS application on a virtual display
 	@command -v xvfb-run > /dev/null || $(SUDO) apt-get install -q -y --no-install-recommends xvfb xauth >&2
 	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest tests/desktop
 
+.PHONY: fuzz
+fuzz: plugin  ## read damaged files of every kind for MINUTES=5, from SEED=0; `tools/fuzz.py KIND:SEED` repeats one
+	@. ./$(ENVIRONMENT) && $(PYTHON) tools/fuzz.py --minutes $(or $(MINUTES),5) --seed $(or $(SEED),0)
+
 .PHONY: test-qgis
 test-qgis: plugin  ## run the tests that need QGIS: plugin and, through qgis_process, the whole
 	@. ./$(ENVIRONMENT) && "$$QGIS_PROCESS" --version | head -n 1 && $(PYTHON) -m pytest tests/plugin tests/e2e

@@ -6,17 +6,16 @@ import os
 import sys
 import tempfile
 from collections.abc import Callable
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import laspy
-import lazrs
 import numpy as np
 import pytest
 from faults import FINE, REFUSED, WARNED, Fault
-from laspy._compression import lazrsbackend
+from fuzzing.clouds import chunks_of_any_size
 from rail_extract.core.clouds.crs import import_pyproj
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -171,25 +170,6 @@ def write_cloud(tmp_path):
         return folder / name
 
     return write
-
-
-@contextmanager
-def chunks_of_any_size():
-    """Have laspy write compressed points as COPC files hold them: in chunks of several sizes."""
-
-    class Writer(lazrsbackend.LazrsPointWriter):
-        def __init__(self, dest, point_format, parallel):
-            super().__init__(dest, point_format, parallel=False)
-            self.vlr = lazrs.LazVlr.new_for_compression(point_format.id, point_format.num_extra_bytes, True)
-
-        def write_points(self, points):
-            for part in (points[:70], points[70:2000], points[2000:]):
-                super().write_points(part)
-                self.compressor.finish_current_chunk()
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(lazrsbackend, "LazrsPointWriter", Writer)
-        yield
 
 
 @pytest.fixture

@@ -2,18 +2,12 @@
 
 import math
 
-import numpy as np
+import fuzz
 import pytest
+from fuzzing.kinds import PLUGIN
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from qgis.core import QgsFeature, QgsGeometry, QgsLineString, QgsPoint, QgsVectorLayer
-from rail_extract.core.clouds.crs import import_pyproj
-from rail_extract.core.errors import RailExtractError
-from rail_extract.core.frame import LocalFrame
-from rail_extract.core.raster import rasterize
-from rail_extract.core.raster_file import header_for
-from rail_extract.core.standards import STANDARDS
-from rail_extract.rail_extract_plugin.reading.geotiff import read_header, read_rasters, write_rasters
 
 BOUNDED = settings(
     max_examples=60,
@@ -23,40 +17,11 @@ BOUNDED = settings(
 )
 
 
-@pytest.fixture(scope="module")
-def good(qgis, tmp_path_factory):
-    """The bytes of a small rail raster."""
-    path = tmp_path_factory.mktemp("good") / "r.tif"
-    wkt = import_pyproj().CRS.from_epsg(32643).to_wkt()
-    raster = rasterize(np.random.default_rng(0).uniform(0, 4, (200, 2)), 0.04)
-    frame = LocalFrame(np.array([500_000.0, 3_000_000.0, 0.0]), crs_wkt=wkt)
-    write_rasters(path, header_for([raster], (10,), frame, STANDARDS["EN_60E1_1435"]), [raster])
-    return path.read_bytes()
-
-
-def read_or_explain(path, data):
-    path.write_bytes(data)
-    try:
-        header = read_header(path)
-        rasters = read_rasters(path, header)
-    except RailExtractError as error:
-        assert str(error)
-        assert "\n" not in str(error)
-    else:
-        assert any(raster.count() for raster in rasters)
-        assert math.isfinite(header.cell_m)
-
-
-@BOUNDED
-@given(at=st.integers(2, 1200), value=st.binary(min_size=1, max_size=4))
-def test_changed_bytes_in_a_raster(good, tmp_path, at, value):
-    read_or_explain(tmp_path / "r.tif", good[:at] + value + good[at + len(value) :])
-
-
-@BOUNDED
-@given(length=st.integers(0, 3000))
-def test_truncated_raster(good, tmp_path, length):
-    read_or_explain(tmp_path / "r.tif", good[:length])
+@pytest.mark.parametrize("kind", PLUGIN, ids=lambda kind: kind.name)
+def test_damaged_files_are_read_or_refused(kind):
+    counts, failures = fuzz.fuzz(kind, range(60))
+    assert failures == {}
+    assert counts[fuzz.READ] + counts[fuzz.REFUSED] == 60
 
 
 NUMBER = st.one_of(

@@ -8,9 +8,9 @@ import laspy
 import numpy as np
 import pyproj
 import pytest
+from fuzzing.clouds import chunks_of_any_size
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from laspy._compression import lazrsbackend
 from rail_extract.core.clouds import las, laz
 from rail_extract.core.clouds.points import read_rail_points
 from rail_extract.core.errors import (
@@ -149,19 +149,8 @@ def test_no_point_is_lost_between_chunks(tmp_path, monkeypatch):
     np.testing.assert_allclose(points.frame.to_crs(points.xyz), xyz[codes == RAIL], rtol=0, atol=1e-9)
 
 
-def test_chunks_of_any_size_as_in_copc(tmp_path, monkeypatch):
-    class Writer(lazrsbackend.LazrsPointWriter):
-        def __init__(self, dest, point_format, parallel):
-            super().__init__(dest, point_format, parallel=False)
-            self.vlr = lazrsbackend.lazrs.LazVlr.new_for_compression(point_format.id, 0, True)
-
-        def write_points(self, points):
-            for part in (points[:70], points[70:2000], points[2000:]):
-                super().write_points(part)
-                self.compressor.finish_current_chunk()
-
-    with monkeypatch.context() as patch:
-        patch.setattr(lazrsbackend, "LazrsPointWriter", Writer)
+def test_chunks_of_any_size_as_in_copc(tmp_path):
+    with chunks_of_any_size():
         xyz, codes = make_cloud(tmp_path / "a.copc.laz")
     (points,) = read_rail_points(tmp_path / "a.copc.laz", [RAIL])
     np.testing.assert_allclose(points.frame.to_crs(points.xyz), xyz[codes == RAIL], rtol=0, atol=1e-9)
