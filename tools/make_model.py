@@ -47,6 +47,9 @@ RESULTS = {
 }
 """Results of the model by step, and the output of the step that each is; rails know their tracks once paired."""
 
+WITHOUT_STEP = ("CLASSIFY",)
+"""Parameters of Extract Rails that no step of the model has: Classify Rail Points can be put before it."""
+
 COLUMN, ROW = 260, 130
 """Spacing of the boxes in the model designer."""
 
@@ -63,7 +66,11 @@ def build() -> QgsProcessingModelAlgorithm:
     whole = registry.algorithmById("railextract:extractrails")
     model = QgsProcessingModelAlgorithm("Extract rails, step by step", "Rails and tracks", "railsandtracks")
     model.setHelpContent({"ALG_DESC": HELP})
-    inputs = [definition.clone() for definition in whole.parameterDefinitions() if not definition.isDestination()]
+    inputs = [
+        definition.clone()
+        for definition in whole.parameterDefinitions()
+        if not definition.isDestination() and definition.name() not in WITHOUT_STEP
+    ]
     inputs[0] = model_input(inputs[0])
     for definition in inputs:
         if definition.name() == "STANDARD":  # each step reads it, and those after the first have no points

@@ -2,6 +2,7 @@
 
 from .build_track_centerlines import BuildTrackCenterlines
 from .check_installation import CheckInstallation
+from .classify_rail_points import ClassifyRailPoints
 from .extract_rails import ExtractRails
 from .frpdf_cleanup import FrpdfCleanup
 from .install_packages import InstallPackages
@@ -11,6 +12,7 @@ from .vectorize_rails import VectorizeRails
 
 ALGORITHMS = (
     ExtractRails,
+    ClassifyRailPoints,
     RasterizeRailPoints,
     FrpdfCleanup,
     VectorizeRails,

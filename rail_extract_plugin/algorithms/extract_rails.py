@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsProcessingContext
 
+from ...core.errors import ParameterError
 from ...core.frpdf.models import choose as choose_model
 from ...core.progress import Estimating, Progress
 from ...core.standards import DEFAULT, RailStandard
@@ -57,7 +58,8 @@ class ExtractRails(RailAlgorithm):
     PICTURE = "gauge.svg"
     HELP = (
         "Choose the point cloud, the classes of its rail points and the rail standard, then run; the other defaults "
-        "suit most clouds. The cloud must be in a projected coordinate system; the results are in the same system.\n\n"
+        "suit most clouds. For a cloud that nobody has classified, tick the box that finds the rail points first. The "
+        "cloud must be in a projected coordinate system; the results are in the same system.\n\n"
         "A rail line follows the top of the railhead on the axis of the head. The gauge in the results is the 3D "
         "distance between the two rail lines minus the railhead width; it is not measured 14 mm below the top. Left "
         "and right are as seen along the line, and cant is left minus right.\n\n"
@@ -71,6 +73,7 @@ class ExtractRails(RailAlgorithm):
         """Declare the parameters and outputs in the order of the interface."""
         for definition in (
             *inputs.cloud(),
+            inputs.classify(),
             *groups.rail(detect=True),
             *groups.area(),
             *groups.cleanup(),
@@ -91,12 +94,17 @@ class ExtractRails(RailAlgorithm):
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read and check the parameters, in the main thread."""
+        from ...core.labelling.finding import SEARCHED
+
         values = ParameterValues(self, parameters, context)
+        classify = values.flag("CLASSIFY")
+        if classify and values.detects():
+            raise ParameterError("DETECT measures classified points, which CLASSIFY does not need: choose STANDARD.")
         standard = values.standard(DEFAULT if values.detects() else None)
         choose_model(standard.gauge_m, standard.head_width_m)
         return Job(
             values.cloud("INPUT"),
-            values.class_codes(),
+            SEARCHED if classify else values.class_codes(),
             standard,
             values.other_gauges_m(standard),
             masked(self.asPythonCommand(parameters, context)),
@@ -132,7 +140,7 @@ class ExtractRails(RailAlgorithm):
             keep_cleaned=cleaned,
         )
         with points_folder() as folder:
-            network = extract_files(request, folder, settings, InTurn(), progress)
+            network = extract_files(request, folder, settings, InTurn(), progress, values.flag("CLASSIFY"))
         progress.check()
         for failure in network.failures:
             progress.warning(failure)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from qgis.core import (
     QgsProcessing,
+    QgsProcessingParameterBoolean,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterFeatureSource,
     QgsProcessingParameterRasterLayer,
@@ -29,6 +30,28 @@ def cloud() -> Definitions:
         helped(
             QgsProcessingParameterString("RAIL_CLASSES", tr("Rail classes"), defaultValue=str(RAIL_CLASS)),
             tr("Classes of the points on rails, such as 10 or 10,11. Each class is processed separately."),
+        ),
+    )
+
+
+def raw_cloud() -> QgsProcessingParameterDefinition:
+    """Define the parameter for a cloud that nobody has classified."""
+    return helped(
+        CloudParameter("INPUT", tr("Point cloud (layer, file or folder)")),
+        tr(
+            "A loaded point cloud layer, or the path of a LAS, LAZ or COPC file, of a folder of such files, or of a "
+            "virtual point cloud (.vpc). It needs no classes."
+        ),
+    )
+
+
+def classify() -> QgsProcessingParameterDefinition:
+    """Define whether the rail points are to be found first."""
+    return helped(
+        QgsProcessingParameterBoolean("CLASSIFY", tr("Find the rail points of a raw cloud"), defaultValue=False),
+        tr(
+            "For clouds that nobody has classified: finds the rail points first, as Classify Rail Points does. The "
+            "rail classes are ignored."
         ),
     )
 

@@ -53,6 +53,29 @@ def cleaned() -> QgsProcessingParameterDefinition:
     )
 
 
+def classified(name: str = "OUTPUT") -> QgsProcessingParameterDefinition:
+    """Define the classified copy of a cloud."""
+    kinds = tr("LAZ files (*.laz);;LAS files (*.las);;Virtual point clouds (*.vpc)")
+    return helped(
+        QgsProcessingParameterFileDestination(name, tr("Classified point cloud"), kinds),
+        tr(
+            "A LAZ or LAS file. For a folder of tiles or a virtual point cloud, a virtual point cloud (.vpc) and, next "
+            "to it, a folder of the same name with the tiles."
+        ),
+    )
+
+
+def classified_figures() -> Numbers:
+    """Define the figures about classified points."""
+    return (
+        QgsProcessingOutputNumber("POINT_COUNT", tr("Number of points in the cloud")),
+        QgsProcessingOutputNumber("RAIL_POINTS", tr("Number of points on rails")),
+        QgsProcessingOutputNumber("PAIRED_LENGTH", tr("Length of the rails with a partner [m]")),
+        QgsProcessingOutputNumber("SINGLE_LENGTH", tr("Length of the rails without a partner [m]")),
+        QgsProcessingOutputNumber("CELLS_PER_M", tr("Cells with points per metre of rail")),
+    )
+
+
 def report() -> QgsProcessingParameterDefinition:
     """Define the report."""
     return helped(_page(), tr("A web page with an assessment of the result, a map, and plots of each track."))

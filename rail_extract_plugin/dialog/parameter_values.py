@@ -17,12 +17,12 @@ from qgis.core import (
 )
 
 from ...core.errors import ParameterError, RailExtractError, RasterError
+from ...core.parameters import Parameters
 from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RailStandard, distinct_gauges, resolve
 from ..reading.clouds import CloudSource, checked_crs, cloud_source
 from ..systems import prepare_system
 
 if TYPE_CHECKING:
-    from ...core.pipeline import Parameters
     from ...core.raster_file import RasterHeader
 
 NUMBERS = {
@@ -82,6 +82,10 @@ class ParameterValues:
     def optional_number(self, name: str) -> float | None:
         """Read a number that may be left empty."""
         return self.number(name) if self.filled(name) else None
+
+    def flag(self, name: str) -> bool:
+        """Read a choice of yes or no."""
+        return self._algorithm.parameterAsBoolean(self._parameters, name, self._context)
 
     def text(self, name: str) -> str:
         """Read a text."""
@@ -193,12 +197,12 @@ class ParameterValues:
     def other_gauges_m(self, standard: RailStandard) -> tuple[float, ...]:
         """Read OTHER_GAUGES, and check that they can be distinguished from each other and from the standard's gauge."""
         others = gauges_m(self.text("OTHER_GAUGES"), "OTHER_GAUGES")
-        return distinct_gauges((standard.gauge_m, *others), self.number("CENTERLINE_TOLERANCE"))[1:]
+        own = self._has("CENTERLINE_TOLERANCE")
+        tolerance_m = self.number("CENTERLINE_TOLERANCE") if own else Parameters.centerline_tolerance_m
+        return distinct_gauges((standard.gauge_m, *others), tolerance_m)[1:]
 
     def settings(self, standard: RailStandard, other_gauges_m: tuple[float, ...] = ()) -> Parameters:
         """Return the algorithm's parameters for the core, with the core's defaults for all others."""
-        from ...core.pipeline import Parameters
-
         given: dict[str, Any] = {field: self.number(name) for name, field in NUMBERS.items() if self._has(name)}
         given.update({field: self.choice(name) for name, field in CHOICES.items() if self._has(name)})
         if self._has("ITERATIONS"):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from qgis.core import (
+    QgsProcessingParameterBoolean,
     QgsProcessingParameterCrs,
     QgsProcessingParameterDefinition,
+    QgsProcessingParameterEnum,
     QgsProcessingParameterExtent,
     QgsProcessingParameterString,
 )
@@ -12,7 +14,7 @@ from qgis.core import (
 from ...core.frpdf import AUTO, DEVICES, ENGINES, MAX_PASSES
 from ...core.frpdf.models import MODELS
 from ...core.parameters import DEFAULT_STEP_M, Parameters
-from ...core.standards import CUSTOM, DEFAULT, DETECT, STANDARDS, UNCONFIRMED_PROFILES
+from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS, UNCONFIRMED_PROFILES
 from ..i18n import tr
 from .definitions import MM_DECIMALS, Definitions, advanced, choice, helped, number
 
@@ -244,13 +246,47 @@ def min_length() -> QgsProcessingParameterDefinition:
     )
 
 
+def other_gauges() -> QgsProcessingParameterDefinition:
+    """Define the gauges of other tracks."""
+    return advanced(
+        QgsProcessingParameterString("OTHER_GAUGES", tr("Other gauges [mm]"), optional=True),
+        tr("Gauges of other tracks in the same cloud, such as 1000;1067, for mixed and dual gauge."),
+    )
+
+
+def labels() -> Definitions:
+    """Define which points are labelled as rails, and what is written."""
+    contents = [tr("Whole cloud"), tr("Rail points only")]
+    return (
+        helped(
+            QgsProcessingParameterBoolean("KEEP_SINGLE", tr("Keep rails without a partner"), defaultValue=True),
+            tr(
+                "Straight rails of 5 m and more are kept although no other rail runs at the distance of the gauge, for "
+                "example because it is hidden. Otherwise only pairs of rails are kept."
+            ),
+        ),
+        helped(
+            number("RAIL_CLASS", tr("Class of rail points"), RAIL_CLASS, maximum=LAST_CLASS, whole=True),
+            tr("The class that points on rails get. In point formats 0 to 5, classes end at 31."),
+        ),
+        helped(
+            QgsProcessingParameterEnum("CONTENT", tr("Content of the output"), contents, defaultValue=0),
+            tr("0 writes the whole cloud, 1 only the points on rails."),
+        ),
+        advanced(
+            QgsProcessingParameterBoolean("RESET", tr("Reset the class of other points"), defaultValue=True),
+            tr(
+                "Points that already have the class of rail points, but are not found on rails, become class 1 "
+                "(unclassified). Otherwise they keep it."
+            ),
+        ),
+    )
+
+
 def pairing() -> Definitions:
     """Define which rails make a track."""
     return (
-        advanced(
-            QgsProcessingParameterString("OTHER_GAUGES", tr("Other gauges [mm]"), optional=True),
-            tr("Gauges of other tracks in the same cloud, such as 1000;1067, for mixed and dual gauge."),
-        ),
+        other_gauges(),
         advanced(
             number(
                 "CENTERLINE_TOLERANCE",

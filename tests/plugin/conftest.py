@@ -200,6 +200,7 @@ class Bench:
 
 OUTPUTS = {
     "extractrails": ("RAILS.gpkg", "CENTERLINES.shp", "QUALITY.gpkg", "CLEANED.tif"),
+    "classifyrailpoints": ("OUTPUT.laz",),
     "rasterizerailpoints": ("OUTPUT.tif",),
     "frpdfcleanup": ("OUTPUT.tif",),
     "vectorizerails": ("OUTPUT.gpkg",),

@@ -13,6 +13,7 @@ def test_toolbox_offers_the_algorithms(qgis, plugin):
         f"railextract:{name}"
         for name in (
             "extractrails",
+            "classifyrailpoints",
             "rasterizerailpoints",
             "frpdfcleanup",
             "vectorizerails",

@@ -12,7 +12,14 @@ from rail_extract.rail_extract_plugin.dialog import guide
 from rail_extract.rail_extract_plugin.dialog.wording import for_user, with_labels
 
 NAMES = (
-    *("extractrails", "rasterizerailpoints", "frpdfcleanup", "vectorizerails", "buildtrackcenterlines"),
+    *(
+        "extractrails",
+        "classifyrailpoints",
+        "rasterizerailpoints",
+        "frpdfcleanup",
+        "vectorizerails",
+        "buildtrackcenterlines",
+    ),
     *("measuretrackgeometry", "installpackages", "checkinstallation"),
 )
 SMALLEST_ICON = 16
@@ -102,7 +109,7 @@ def test_every_algorithm_has_its_own_icon(make):
 
 @pytest.mark.parametrize(
     ("word", "found"),
-    [("rail", 8), ("gleis", 6), ("voie", 6), ("vía", 6), ("railway", 6), ("laz", 3), ("gauge", 3), ("torch", 1)],
+    [("rail", 9), ("gleis", 7), ("voie", 7), ("vía", 7), ("railway", 7), ("laz", 4), ("gauge", 3), ("torch", 1)],
 )
 def test_toolbox_search(make, word, found):
     assert sum(any(word in tag.lower() for tag in make(name).tags()) for name in NAMES) == found

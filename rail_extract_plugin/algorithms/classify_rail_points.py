@@ -1,0 +1,106 @@
+"""Classify Rail Points: finds the points on railheads in a raw cloud and writes a classified copy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from qgis.core import QgsProcessingContext
+
+from ...core.progress import Estimating, Progress
+from ...core.standards import RailStandard
+from ..dialog import inputs, outputs
+from ..dialog import parameters as groups
+from ..dialog.parameter_values import ParameterValues
+from ..reading.clouds import CloudSource, points_folder, request_points
+from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
+
+
+@dataclass(frozen=True)
+class Job:
+    """The values of the parameters."""
+
+    cloud: CloudSource
+    standard: RailStandard
+    other_gauges_m: tuple[float, ...]
+    class_code: int
+    output: Path
+
+
+class ClassifyRailPoints(RailAlgorithm):
+    """The algorithm ``railextract:classifyrailpoints``."""
+
+    NAME = "classifyrailpoints"
+    LABEL = "Classify rail points"
+    TAGS = (*RAIL_WORDS, *CLOUD_WORDS, "classification", "raw", "segmentation", "Klassifizierung")
+    PICTURE = "gauge.svg"
+    NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
+    SUMMARY = "Finds the points on railheads in a lidar cloud that nobody has classified, and writes a classified copy."
+    HELP = (
+        "Choose the point cloud and the rail standard, then run. Rails are found by their shape: no classes of the "
+        "ground, no trajectory and no training are needed. Classes of low and high noise (7 and 18) and withheld "
+        "points are left out of the search.\n\n"
+        "The copy has the same points in the same order with the same attributes; only classes differ. Where the "
+        "input is a folder or a virtual point cloud, a folder of the same tiles is written, with a virtual point "
+        "cloud (.vpc) of the same name next to it.\n\n"
+        "The log states how many metres of rail were found with and without a partner. Below 10 cells with points "
+        "per metre of rail (CELLS_PER_M), lines have gaps. The page about the classification describes the method "
+        "and its limits; it was tested on simulated clouds only."
+    )
+
+    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
+        """Declare the parameters and outputs in the order of the interface."""
+        for definition in (
+            inputs.raw_cloud(),
+            *groups.rail(),
+            groups.other_gauges(),
+            *groups.area(),
+            *groups.labels(),
+            outputs.classified(),
+        ):
+            self.addParameter(definition)
+        for output in outputs.classified_figures():
+            self.addOutput(output)
+
+    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+        """Read and check the parameters, in the main thread."""
+        from ...core.labelling.files import plan_output
+
+        values = ParameterValues(self, parameters, context)
+        standard = values.standard()
+        output = Path(self.parameterAsFileOutput(parameters, "OUTPUT", context))
+        job = Job(
+            values.cloud("INPUT"),
+            standard,
+            values.other_gauges_m(standard),
+            int(values.number("RAIL_CLASS")),
+            output,
+        )
+        plan_output(job.cloud.paths, output, job.class_code)
+        return job
+
+    def compute(
+        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
+    ) -> dict[str, Any]:
+        """Classify the cloud and write the copy."""
+        from ...core.classify.settings import Settings
+        from ...core.labelling.files import Choice, classify_files, plan_output
+        from ...core.labelling.finding import SEARCHED
+
+        values, progress = ParameterValues(self, parameters, context), Estimating(progress)
+        gauges_m = (job.standard.gauge_m, *job.other_gauges_m)
+        settings = Settings(gauges_m, job.standard.head_width_m, values.flag("KEEP_SINGLE"))
+        choice = Choice(job.class_code, int(values.number("CONTENT")) == 1, values.flag("RESET"))
+        output = plan_output(job.cloud.paths, job.output, job.class_code, progress)
+        request = request_points(job.cloud, SEARCHED, values.extent, progress)
+        with points_folder() as folder:
+            result = classify_files(request, settings, choice, output, folder, progress)
+        return {
+            "OUTPUT": str(result.file),
+            "POINT_COUNT": result.point_count,
+            "RAIL_POINTS": result.figures.points,
+            "PAIRED_LENGTH": result.figures.paired_m,
+            "SINGLE_LENGTH": result.figures.single_m,
+            "CELLS_PER_M": result.figures.cells_per_m,
+        }
