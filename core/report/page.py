@@ -87,15 +87,20 @@ def build_page(
     return f"<!DOCTYPE html>\n{tag('html', tag('head', *head), tag('body', tag('main', *body)), lang='en')}\n"
 
 
+def verdict(findings: Findings) -> tuple[str, str]:
+    """Return the CSS class and the words of the verdict on tracks that were found."""
+    # What no station shows is a reason to look, not to discard: conductor rails are lone lines, too.
+    silent = min(findings.silent_share, MANY) if findings.silent_share > SILENT_SHARE else 0.0
+    share = max(findings.share, silent)
+    return next((kind, words) for limit, kind, words in VERDICTS if share <= limit)
+
+
 def _verdict(findings: Findings, rail_count: int, warnings: Sequence[str]) -> str:
     """Write the verdict, the reasons for doubt, and what the user was warned of."""
     if not findings.tracks:
         words = f"No track was found. There are {rail_count} rails, but no two of them are parallel at a gauge."
         return tag("div", tag("strong", text(words)), *_listed(warnings), class_="verdict poor")
-    # What no station shows is a reason to look, not to discard: conductor rails are lone lines, too.
-    silent = min(findings.silent_share, MANY) if findings.silent_share > SILENT_SHARE else 0.0
-    share = max(findings.share, silent)
-    kind, headline = next((kind, words) for limit, kind, words in VERDICTS if share <= limit)
+    kind, headline = verdict(findings)
     if findings.lonely_rails:
         count = findings.lonely_rails
         belong = "1 rail does not belong" if count == 1 else f"{count} rails do not belong"

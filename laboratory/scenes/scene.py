@@ -44,6 +44,8 @@ class Scene:
         Position of the scene in its coordinate system.
     other_gauges_m : tuple of float
         Gauges of tracks that do not have the gauge of the standard.
+    gaps_m : float
+        Length of rail without points.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Scene:
     standard: RailStandard
     frame: LocalFrame
     other_gauges_m: tuple[float, ...] = ()
+    gaps_m: float = 0.0
 
     def rail_points(self) -> RailPoints:
         """Return the points that `read_rail_points` would read from the file of the scene."""
@@ -140,6 +143,7 @@ def build(name: str, plan: Plan, rng: np.random.RandomState) -> Scene:
         plan.standard,
         plan.frame,
         plan.other_gauges_m,
+        sum(end - start for own in plan.gaps.values() for start, end in own),
     )
 
 
