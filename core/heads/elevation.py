@@ -23,8 +23,12 @@ from .neighbours import free_edges
 from .top import MIN_POINTS, find_top
 from .uncertainty import measure_support
 
-MIN_GAP_M = 0.5
-"""Length without points from which a line counts as bridged: five profiles of the fastest train's scanner."""
+MIN_GAP_M, MAX_CHANCE_GAP_M = 0.5, 0.9
+"""Length without points from which a line counts as bridged: five profiles of the fastest train's scanner. Where points
+are few, shorter sections than the second length are bridged only if chance does not explain them."""
+
+CHANCE_GAPS = 0.002
+"""Gaps per metre of line that may be due to chance."""
 
 MAX_UNSUPPORTED_END_M = 0.15
 """Length without points from which a free end is cut off: the raster's lines curl where a rail ends."""
@@ -237,7 +241,10 @@ def _supported(t: np.ndarray, length_m: float, free_ends: np.ndarray) -> tuple[f
 
 
 def find_gaps(t: np.ndarray, start: float, end: float) -> np.ndarray:
-    """Find the gaps, longer than MIN_GAP_M, between the points of a line.
+    """Find the gaps between the points of a line: longer than MIN_GAP_M, and than chance makes them.
+
+    Of n points per metre at random places, n exp(-n g) per metre are followed by a gap longer than g. The median of the
+    spacings gives n; it is 0.69 / n.
 
     Parameters
     ----------
@@ -252,5 +259,7 @@ def find_gaps(t: np.ndarray, start: float, end: float) -> np.ndarray:
         Start and end of each gap.
     """
     borders = np.concatenate([[start], np.clip(np.sort(t), start, end), [end]])
-    wide = np.flatnonzero(np.diff(borders) > MIN_GAP_M)
+    per_m = np.log(2) / max(float(np.median(np.diff(borders))), 1e-3)
+    by_chance_m = np.log(max(per_m / CHANCE_GAPS, 1.0)) / per_m
+    wide = np.flatnonzero(np.diff(borders) > np.clip(by_chance_m, MIN_GAP_M, MAX_CHANCE_GAP_M))
     return np.column_stack([borders[wide], borders[wide + 1]])

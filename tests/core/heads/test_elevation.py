@@ -144,6 +144,17 @@ def test_gaps_are_long_sections_without_points_including_ends():
     assert find_gaps(np.arange(0, 10.01, 0.1), 0.0, 10.0).shape == (0, 2)
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("per_m", [6, 10, 100])
+def test_few_points_make_no_gaps_by_chance(seed, per_m):
+    """60 m at 10 points per metre have 2.5 m in chance gaps of more than 0.5 m; five gaps of 1.5 m are true."""
+    random = np.random.default_rng(seed)
+    t = random.uniform(0, 60, 60 * per_m)
+    t = t[(t % 12 < 6) | (t % 12 > 7.5)]
+    gaps = find_gaps(t, 0.0, 60.0)
+    assert 7.4 < np.sum(gaps[:, 1] - gaps[:, 0]) < 7.5 + 5 * 3 / per_m + 1.0
+
+
 @pytest.mark.parametrize("turn", [1, -1])
 def test_gaps_are_where_the_finished_line_has_no_points(turn):
     points = cloud(head(40, 80) + [5.0, 0.0, 0.0])

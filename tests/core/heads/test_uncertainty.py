@@ -5,7 +5,7 @@ from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.edges import station_count
 from rail_extract.core.heads.elevation import ElevationParameters, elevate
 from rail_extract.core.heads.refinement import refine
-from rail_extract.core.heads.uncertainty import measure_support
+from rail_extract.core.heads.uncertainty import UNSURE_CURVATURE, measure_support
 from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.polyline import interpolate, length_along, project
 from rail_extract.core.rails import Support
@@ -67,12 +67,19 @@ def test_noise_increases_sigma():
     assert noisy > 1.5 * clean
 
 
-def test_sigma_is_that_of_the_raster_where_no_edges_are_visible():
+def test_sigma_is_that_of_the_raster_where_no_edges_are_visible_and_grows_where_no_points_are():
     t, across, z = head(60, 150)
     seen = (t < 30) | (np.abs(across) > 0.1)
     half = support(t[seen], across[seen], z[seen])
     assert half.sigma_m[(half.t > 2) & (half.t < 28)].max() < 0.003
-    np.testing.assert_allclose(half.sigma_m[half.t > 36], UNSEEN)
+    beyond = half.t > 36
+    expected = np.hypot(UNSEEN, UNSURE_CURVATURE * (half.t[beyond] - 30) ** 2 / 2)
+    np.testing.assert_allclose(half.sigma_m[beyond], expected, rtol=0.02)
+    foot = t[t > 30]
+    covered = support(
+        np.append(t[seen], foot), np.append(across[seen], np.full(len(foot), 0.09)), np.append(z[seen], 0 * foot)
+    )
+    np.testing.assert_allclose(covered.sigma_m[beyond], UNSEEN, rtol=0.01)
     nothing = support(*np.empty((3, 0)))
     np.testing.assert_allclose(nothing.sigma_m, UNSEEN)
     assert nothing.points.sum() == 0
@@ -84,6 +91,16 @@ def test_sigma_grows_into_a_gap():
     broken = support(t[there], across[there], z[there])
     sides, middle = broken.sigma_m[np.abs(broken.t - 27) < 0.5], broken.sigma_m[np.abs(broken.t - 30) < 0.3]
     assert middle.min() > 1.5 * np.median(sides)
+
+
+@pytest.mark.parametrize("gap_m", [1.5, 3.0, 4.5])
+def test_a_bridge_errs_with_its_length_squared_and_no_cell_limits_it(gap_m):
+    t, across, z = head(60, 150)
+    there = np.abs(t - 30) > gap_m / 2
+    broken = support(t[there], across[there], z[there])
+    middle = broken.sigma_m[np.abs(broken.t - 30).argmin()]
+    assert middle**2 - (0.007 * gap_m**2 / 8) ** 2 < 0.006**2
+    assert middle >= 0.95 * 0.007 * gap_m**2 / 8
 
 
 def test_a_line_off_its_rail_has_a_large_sigma():
