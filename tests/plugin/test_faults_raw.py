@@ -1,0 +1,172 @@
+"""Faults of raw clouds, in Classify Rail Points and in Extract Rails with CLASSIFY."""
+
+import resource
+
+import laspy
+import numpy as np
+import pytest
+from faults import REFUSED, WARNED, Fault
+from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
+
+TITLE = "Raw clouds"
+
+CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
+NO_RAIL = (
+    "No rail was found: check the rail standard and the unit of the coordinates. A cloud that contains only rail "
+    "points needs no classification."
+)
+STRIP = "500016,500016.2,3000000,3000100"
+"""Extent that holds few points of the cloud: they take less space than the copy of the cloud."""
+
+NOTHING = {"RAIL_POINTS": 0, "PAIRED_LENGTH": 0.0}
+
+
+def ballast(per_m2=1500, tracks=True):
+    """Points of 8 m of track, or of the ground only."""
+    rng = np.random.RandomState(3)
+    xyz = flat(8.0, rng=rng, per_m2=per_m2)
+    if tracks:
+        xyz, _ = with_track(xyz, 1.435, 0.072, 0.3)
+    return rough(xyz, rng)
+
+
+def raw(change=lambda xyz: xyz, name="raw.laz", **parameters):
+    """A raw cloud, changed, and these parameters."""
+    return lambda bench: {"INPUT": bench.cloud(change(ballast()) + CORNER, name, 2), **parameters}
+
+
+def ground(bench):
+    return {"INPUT": bench.cloud(ballast(tracks=False) + CORNER, "raw.laz", 2)}
+
+
+def only_rails(bench):
+    return {"INPUT": bench.cloud(bench.track(), "raw.laz", 10)}
+
+
+def old_format(bench):
+    header = laspy.LasHeader(point_format=1, version="1.2")
+    header.scales, header.offsets = [0.001] * 3, CORNER
+    cloud = laspy.LasData(header)
+    cloud.xyz = ballast() + CORNER
+    cloud.write(bench.folder / "old.las")
+    return {"INPUT": bench.folder / "old.las", "CRS": "EPSG:32643", "RAIL_CLASS": 40}
+
+
+def two_names(bench):
+    """Tiles a.laz and a.copc.laz, which becomes a.laz."""
+    tiles = bench.folder / "tiles"
+    tiles.mkdir()
+    for name in ("a.laz", "a.copc.laz"):
+        bench.cloud(ballast() + CORNER, name, 2, folder=tiles)
+    return {"INPUT": tiles}
+
+
+def in_its_place(bench):
+    path = bench.cloud(ballast() + CORNER, "raw.laz", 2)
+    return {"INPUT": path, "OUTPUT": path}
+
+
+def full_disk(room, suffix=".laz", **parameters):
+    """A disk that takes files of up to `room` bytes; further writing fails as on a full disk."""
+
+    def prepare(bench):
+        values = raw(**parameters)(bench)
+        soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+        bench.run.callback(lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard)))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
+        return {**values, "OUTPUT": bench.folder / "out" / f"OUTPUT{suffix}"}
+
+    return prepare
+
+
+def cancelled(percent):
+    def prepare(bench):
+        bench.feedback.progressChanged.connect(lambda done: bench.feedback.cancel() if done >= percent else None)
+        return raw()(bench)
+
+    return prepare
+
+
+FAULTS = [
+    Fault("raw cloud with ground only", ground, WARNED, NO_RAIL, NOTHING),
+    Fault("raw cloud that contains only rail points", only_rails, WARNED, NO_RAIL, NOTHING),
+    Fault(
+        "raw cloud with coordinates in millimetres",
+        raw(lambda xyz: 1000 * xyz),
+        REFUSED,
+        "The points of raw.laz are too far apart for rails: if the coordinates are in centimetres or millimetres, "
+        "assign a coordinate system that says so.",
+    ),
+    Fault(
+        "raw cloud with an extent elsewhere",
+        raw(EXTENT="600000,600010,3000000,3000010"),
+        REFUSED,
+        "The extent contains no points that are neither noise nor withheld: choose another.",
+    ),
+    Fault(
+        "class beyond the range of an old point format",
+        old_format,
+        REFUSED,
+        "old.las has point format 1, whose classes end at 31: choose a class up to 31, or export the cloud with point "
+        "format 6.",
+    ),
+    Fault(
+        "classified cloud in the place of the raw one",
+        in_its_place,
+        REFUSED,
+        "The classified cloud would replace the cloud that is read: choose another name.",
+    ),
+    Fault(
+        "two tiles with one name",
+        two_names,
+        REFUSED,
+        "Two tiles are called a.laz: classify them one folder at a time.",
+    ),
+    Fault(
+        "classified cloud with the suffix .txt",
+        raw(OUTPUT="new.txt"),
+        REFUSED,
+        "new.txt is not a name for the classified cloud: let it end in .las or .laz.",
+    ),
+    *(
+        Fault(
+            f"full disk, classified {suffix[1:].upper()} file",
+            full_disk(200_000, suffix, EXTENT=STRIP),
+            REFUSED,
+            "The output …/out/OUTPUT… can't be written (…): free space on the disk, or choose another place.",
+        )
+        for suffix in (".las", ".laz")
+    ),
+    Fault(
+        "full disk, temporary points of a raw cloud",
+        full_disk(1000),
+        REFUSED,
+        "… can't be written to (…): free space on the disk, or choose another folder.",
+    ),
+    *(
+        Fault(
+            f"classification cancelled at {percent} %", cancelled(percent), REFUSED, "Cancelled; nothing was written."
+        )
+        for percent in (5, 50, 66)
+    ),
+    Fault(
+        "extraction from a raw cloud with ground only",
+        lambda bench: {**ground(bench), "CLASSIFY": True},
+        REFUSED,
+        "No rail was found in the raw cloud: check the rail standard and the unit of the coordinates, or classify the "
+        "rail points yourself.",
+        run="extractrails",
+    ),
+    Fault(
+        "rail standard to be detected from a raw cloud",
+        raw(CLASSIFY=True, STANDARD="DETECT"),
+        REFUSED,
+        "DETECT measures classified points, which CLASSIFY does not need: choose STANDARD.",
+        run="extractrails",
+    ),
+]
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_fault(meet, fault):
+    meet(fault, "classifyrailpoints")
