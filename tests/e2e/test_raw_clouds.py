@@ -1,0 +1,64 @@
+"""From a raw cloud to rails through qgis_process: classified and then extracted, and in one call."""
+
+import json
+
+import laspy
+import numpy as np
+import pytest
+from lines import farthest, read_lines
+from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
+
+CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("Größe östlich 3")
+
+
+@pytest.fixture(scope="module")
+def raw(folder):
+    """Ten metres of track on ballast; which points are on heads."""
+    rng = np.random.RandomState(3)
+    xyz, on = with_track(flat(10.0, rng=rng, per_m2=2500), 1.435, 0.072, 0.3)
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.scales, header.offsets = [0.001] * 3, CORNER
+    cloud = laspy.LasData(header)
+    cloud.xyz = rough(xyz, rng) + CORNER
+    cloud.intensity = rng.randint(0, 60_000, len(xyz))
+    cloud.write(folder / "roh 1.laz")
+    return folder / "roh 1.laz", on
+
+
+@pytest.fixture(scope="module")
+def succeed(qgis_process):
+    def run(algorithm, parameters):
+        done = qgis_process({**parameters, "CRS": "EPSG:32643"}, "--json", algorithm=f"railextract:{algorithm}")
+        assert done.returncode == 0, done.stdout + done.stderr
+        return json.loads(done.stdout[done.stdout.index("{") :])["results"]
+
+    return run
+
+
+def test_a_raw_cloud_becomes_rails_in_two_steps_and_in_one(succeed, folder, raw):
+    path, on = raw
+    classified, chained, direct = folder / "klassifiziert.laz", folder / "zwei.gpkg", folder / "eins.gpkg"
+    found = succeed("classifyrailpoints", {"INPUT": path, "OUTPUT": classified})
+    before, after = laspy.read(path), laspy.read(classified)
+    rail = after.classification == 10
+    assert found["RAIL_POINTS"] == rail.sum()
+    assert (rail & on).sum() / on.sum() > 0.97
+    assert np.array_equal(before.intensity, after.intensity)
+    assert np.array_equal(before.X, after.X)
+    succeed("extractrails", {"INPUT": classified, "ITERATIONS": 1, "RAILS": chained})
+    done = succeed("extractrails", {"INPUT": path, "CLASSIFY": True, "ITERATIONS": 1, "RAILS": direct})
+    assert done["RAIL_COUNT"] == 2
+    assert farthest(read_lines(chained), read_lines(direct)) < 0.0001
+
+
+def test_a_cloud_that_does_not_exist_is_one_sentence(qgis_process, tmp_path):
+    run = qgis_process({"INPUT": "gone.laz", "OUTPUT": tmp_path / "o.laz"}, algorithm="railextract:classifyrailpoints")
+    assert run.returncode == 1
+    assert "gone.laz does not exist" in run.stdout + run.stderr
+    assert "Traceback" not in run.stdout + run.stderr
+    assert not list(tmp_path.iterdir())
