@@ -155,15 +155,20 @@ def _append(
 
 def _find_in(square: Square, counts: Mapping[Key, int], settings: Settings, folder: Path) -> Found:
     """Find the rail points of a square."""
-    parts = []
-    for key in around(square.key):
-        if key in counts:
-            points = np.fromfile(_file(folder, key), POINT)
-            inside = square.holds(square.frame.to_local(points["xyz"]), MARGIN_M)
-            parts.append(points[inside])
-    near = np.concatenate(parts)
-    found = classify_square(square.frame.to_local(near["xyz"]), settings)
-    return Found(near["xyz"][found.rail], near["number"][found.rail], found.figures)
+    parts = [_near(square, key, folder) for key in around(square.key) if key in counts]
+    xyz, number = (np.concatenate(values) for values in zip(*parts))
+    found = classify_square(square.frame.to_local(xyz), settings)
+    return Found(xyz[found.rail], number[found.rail], found.figures)
+
+
+def _near(square: Square, key: Key, folder: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Read the points of a square or of a neighbour that lie in the square or its margin: coordinates and numbers."""
+    points = np.fromfile(_file(folder, key), POINT)
+    xyz, number = np.ascontiguousarray(points["xyz"]), np.ascontiguousarray(points["number"])
+    if key == square.key:
+        return xyz, number
+    near = square.holds(square.frame.to_local(xyz), MARGIN_M)
+    return xyz[near], number[near]
 
 
 def _file(folder: Path, key: Key) -> Path:
