@@ -172,3 +172,16 @@ def test_a_cancelled_run_leaves_nothing(tmp_path, scene):
     with pytest.raises(Cancelled):
         classify(tmp_path, [source], tmp_path / "new.las", progress=Impatient())
     assert sorted(one.name for one in tmp_path.iterdir()) == ["raw.las"]
+
+
+def test_a_copc_file_loses_only_the_records_of_its_octree(tmp_path, scene):
+    source = save(tmp_path / "plain.las", scene[0])
+    cloud = laspy.read(source)
+    cloud.header.vlrs.append(laspy.VLR("copc", 1, "copc info", bytes(160)))
+    cloud.evlrs.append(laspy.VLR("copc", 1000, "hierarchy", b"octree"))
+    cloud.write(tmp_path / "raw.copc.laz")
+    result, _ = classify(tmp_path, [tmp_path / "raw.copc.laz"], tmp_path / "new.laz")
+    after = laspy.read(result.file)
+    assert {one.user_id for one in after.vlrs} == {"LASF_Spec", "someone"}
+    assert [one.user_id for one in after.evlrs] == ["someone"]
+    assert len(after.points) == len(scene[0])
