@@ -8,6 +8,7 @@ from rail_extract.rail_extract_plugin.dialog.parameter_values import CHOICES, NU
 PARAMETERS = [
     ("INPUT", "pointcloud", None),
     ("RAIL_CLASSES", "string", "10"),
+    ("CLASSIFY", "boolean", False),
     ("STANDARD", "enum", "EN_60E1_1435"),
     ("GAUGE", "number", None),
     ("HEAD_WIDTH", "number", None),
@@ -54,7 +55,7 @@ OUTPUTS = {
 }
 
 RESULTS = {"RAILS", "CENTERLINES", "QUALITY", "CLEANED", "REPORT"}
-ESSENTIAL = {"INPUT", "RAIL_CLASSES", "STANDARD", "GAUGE", "HEAD_WIDTH", "EXTENT", "MAX_GAP"} | RESULTS
+ESSENTIAL = {"INPUT", "RAIL_CLASSES", "CLASSIFY", "STANDARD", "GAUGE", "HEAD_WIDTH", "EXTENT", "MAX_GAP"} | RESULTS
 OPTIONAL = {"GAUGE", "HEAD_WIDTH", "EXTENT", "CRS", "OTHER_GAUGES"} | RESULTS
 
 
