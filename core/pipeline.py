@@ -306,7 +306,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
     except NoTrackError as error:
         runner.failures.append(str(error))
     rails = with_tracks(rails, centerlines, progress)
-    seen_m = _head_width(sources, parameters, progress)
+    seen_m = _head_width(sources, parameters, progress) if rails else float("nan")
     geometry = _measure_tracks(centerlines, rails, sources, parameters, runner, measuring)
     described = dict(runner.run({"engine": Task("Describing the engine", _describe_engine, (parameters,))}))
     progress.set_fraction(1.0)

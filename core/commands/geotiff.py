@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import rasterio
@@ -29,9 +31,21 @@ def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster
         The file can't be written.
     """
     try:
-        _write(path, header, rasters)
+        with _own_proj_data():
+            _write(path, header, rasters)
     except rasterio.errors.RasterioError as error:
         raise OSError(str(error)) from error
+
+
+@contextmanager
+def _own_proj_data() -> Iterator[None]:
+    """Let rasterio find the data of its own PROJ: the variables may name those of QGIS, which is another version."""
+    hidden = {name: os.environ.pop(name) for name in ("PROJ_DATA", "PROJ_LIB") if name in os.environ}
+    try:
+        with rasterio.Env():
+            yield
+    finally:
+        os.environ.update(hidden)
 
 
 def _write(path: Path, header: RasterHeader, rasters: Sequence[RailRaster]) -> None:
