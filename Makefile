@@ -31,7 +31,6 @@ check: lint  ## lint, types, import rules and the tests that need neither QGIS n
 test: check plugin  ## run every test: check, core with PyTorch, plugin and, through qgis_process, the whole
 	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest -n auto tests/core tests/laboratory tests/benchmarks
 	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest tests/plugin tests/e2e
-	@$(MAKE) --no-print-directory test-desktop
 
 .PHONY: test-desktop
 test-desktop: plugin  ## test the real QGIS application on a virtual display
