@@ -20,7 +20,7 @@ from ..disk import writing
 from ..errors import CloudError, NoRailPointsError
 from ..frame import LocalFrame
 from ..progress import SILENT, Progress
-from ..squares.grid import Key, Square, around, unique_keys
+from ..squares.grid import Key, Square, around, points_by_square
 from ..standards import LAST_CLASS
 
 NOISE = (7, 18)
@@ -137,20 +137,17 @@ def _append(
     points: np.ndarray, zero: LocalFrame, side_m: float, folder: Path, counts: dict[Key, int], name: str
 ) -> None:
     """Append points to the files of their squares, and count them."""
-    keys, square = unique_keys(zero.to_local(points["xyz"]), side_m)
-    if len(keys) > MANY_SQUARES and len(points) < FEW_IN_SQUARE * len(keys):
+    members = points_by_square(zero.to_local(points["xyz"]), side_m)
+    if len(members) > MANY_SQUARES and len(points) < FEW_IN_SQUARE * len(members):
         raise CloudError(
             f"The points of {name} are too far apart for rails: if the coordinates are in centimetres or millimetres, "
             "assign a coordinate system that says so."
         )
-    order = np.argsort(square, kind="stable")
-    ends = np.searchsorted(square[order], np.arange(len(keys) + 1))
     with writing(folder):
-        for place, key in enumerate(keys):
-            part = points[order[ends[place] : ends[place + 1]]]
+        for key, numbers in members.items():
             with _file(folder, key).open("ab") as file:
-                file.write(part.tobytes())
-            counts[key] = counts.get(key, 0) + len(part)
+                file.write(points[numbers].tobytes())
+            counts[key] = counts.get(key, 0) + len(numbers)
 
 
 def _find_in(square: Square, counts: Mapping[Key, int], settings: Settings, folder: Path) -> Found:

@@ -115,18 +115,15 @@ class MemorySource:
     def __init__(self, points: RailPoints, side_m: float) -> None:
         self.frame, self.class_code, self.side_m = points.frame, points.class_code, side_m
         origin = Square.on_grid((0, 0), side_m, points.frame).frame.shift_to(points.frame)
-        keys, number = unique_keys(points.xyz - origin, side_m)
-        self._points, self._order = points, np.argsort(number, kind="stable")
-        borders = np.searchsorted(number[self._order], np.arange(len(keys) + 1))
-        self._ranges = {key: slice(*borders[place : place + 2]) for place, key in enumerate(keys)}
-        self.counts = {key: part.stop - part.start for key, part in self._ranges.items()}
+        self._points, self._members = points, points_by_square(points.xyz - origin, side_m)
+        self.counts = {key: len(part) for key, part in self._members.items()}
         self.span_m = float(np.ptp(points.xyz[:, :2], axis=0).max()) if len(points.xyz) else 0.0
 
     def near(self, square: Square, margin_m: float) -> RailPoints:
         """See `PointSource`."""
         if square.is_whole_plane:
             return self._points
-        parts = [self._order[self._ranges[key]] for key in around(square.key) if key in self._ranges]
+        parts = [self._members[key] for key in around(square.key) if key in self._members]
         chosen = np.sort(np.concatenate(parts)) if parts else np.empty(0, dtype=np.int64)
         xyz = self._points.xyz[chosen] - square.frame.shift_to(self.frame)
         return RailPoints(xyz[square.holds(xyz, margin_m)], square.frame, self.class_code)
@@ -159,6 +156,27 @@ def unique_keys(xyz_m: np.ndarray, side_m: float) -> tuple[list[Key], np.ndarray
     first_column, first_row, height = int(column.min()), int(row.min()), int(np.ptp(row)) + 1
     found, number = np.unique((column - first_column) * height + row - first_row, return_inverse=True)
     return [(first_column + one // height, first_row + one % height) for one in found.tolist()], number.ravel()
+
+
+def points_by_square(xyz_m: np.ndarray, side_m: float) -> dict[Key, np.ndarray]:
+    """Sort points into squares.
+
+    Parameters
+    ----------
+    xyz_m : (n, 2) or (n, 3) array
+        Metres from the zero of the coordinate system.
+    side_m : float
+        Side of the squares.
+
+    Returns
+    -------
+    dict of Key to (k,) int array
+        Numbers of the points of each square, ascending; the squares are in ascending order, too.
+    """
+    keys, square = unique_keys(xyz_m, side_m)
+    order = np.argsort(square, kind="stable")
+    borders = np.searchsorted(square[order], np.arange(1, len(keys)))
+    return dict(zip(keys, np.split(order, borders)))
 
 
 def around(key: Key) -> list[Key]:

@@ -21,7 +21,7 @@ from ..disk import writing
 from ..frame import LocalFrame
 from ..progress import SILENT, Progress
 from ..scratch import discard, scratch_folder
-from .grid import Key, Square, around, unique_keys
+from .grid import Key, Square, around, points_by_square
 
 REPORT = "report.json"
 
@@ -222,11 +222,10 @@ class Census:
 
     def add(self, code: int, xyz: np.ndarray, zero: LocalFrame, side_m: float, folder: Path) -> None:
         """Append points of one class, (n, 3) in units of the CRS, to the files of their squares."""
-        keys, number = unique_keys(zero.to_local(xyz), side_m)
         new = {"squares": {}, "checks": {}, "low": [np.inf] * 2, "high": [-np.inf] * 2}
         mine = self._classes.setdefault(code, new)
-        for place, key in enumerate(keys):
-            part = xyz[number == place]
+        for key, numbers in points_by_square(zero.to_local(xyz), side_m).items():
+            part = xyz[numbers]
             name = f"{code}_{key[0]}_{key[1]}"
             data = part.tobytes()
             with (folder / name).open("ab") as file:

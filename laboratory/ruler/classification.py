@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.classify.cloud import classify_cloud
 from ...core.classify.figures import Figures
 from ...core.classify.settings import Settings
 from ...core.clouds.points import RailPoints
+from ...core.labelling.cloud import classify_cloud
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_rails
 from ..scenes.raw import RawScene

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rail_extract.core.classify.cloud import classify_cloud
 from rail_extract.core.classify.settings import Settings
 from rail_extract.core.classify.square import classify_square
+from rail_extract.core.labelling.cloud import classify_cloud
 from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, TOP_M, flat, rough, turned, with_bar, with_track
 
 GAUGE, WIDTH = 1.435, 0.072

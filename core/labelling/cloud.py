@@ -1,0 +1,42 @@
+"""A whole raw cloud in memory, classified square by square."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..classify.figures import Figures
+from ..classify.settings import MARGIN_M, Settings
+from ..classify.square import Classified, classify_square
+from ..frame import LocalFrame
+from ..progress import SILENT, Progress
+from ..squares.grid import Square, around, points_by_square
+
+
+def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SILENT) -> Classified:
+    """Find the points on railheads in a cloud of any size.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Metres from the zero of the coordinate system, so that the squares do not depend on how files are cut.
+    settings : Settings
+    progress : Progress
+
+    Returns
+    -------
+    Classified
+        Of the whole cloud; `drawn` in the metres of `xyz`.
+    """
+    zero = LocalFrame(np.zeros(3))
+    rail = np.zeros(len(xyz), dtype=bool)
+    places, figures = [np.empty((0, 2))], Figures()
+    members = points_by_square(xyz, settings.side_m)
+    for key in progress.follow(list(members)):
+        square = Square.on_grid(key, settings.side_m, zero)
+        around_it = [members[one] for one in around(key) if one in members]
+        number = np.concatenate([part[square.holds(square.frame.to_local(xyz[part]), MARGIN_M)] for part in around_it])
+        found = classify_square(square.frame.to_local(xyz[number]), settings)
+        rail[number[found.rail]] = True
+        places.append(found.drawn + square.frame.origin[:2])
+        figures += found.figures
+    return Classified(rail, np.concatenate(places), figures)
