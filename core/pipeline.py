@@ -10,25 +10,22 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from .classify.settings import Settings
 from .clouds.las import CloudHeader
 from .clouds.points import RailPoints, Request
-from .errors import CloudError, NoRailPointsError, NoTrackError, ParameterError, RailExtractError
-from .heads.gauge_estimate import measure_spacings
+from .errors import CloudError, NoRailPointsError, NoTrackError, RailExtractError
 from .labelling.spooling import spool_found
 from .parameters import Parameters
 from .progress import SILENT, Progress, Recording
-from .rails import Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry
+from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from .raster import RailRaster
 from .scratch import scratch_folder
-from .squares.density import fullest_square, occupied_squares, plausible, warn_of_unexplained
+from .squares.density import occupied_squares, plausible, warn_of_unexplained
 from .squares.grid import Key, MemorySource, PointSource, Square, around, assembled
 from .squares.pieces import SquareRails
 from .squares.remeasuring import measure_rails
 from .squares.spool import SpooledFile, SpooledPoints, gather, spool_file
-from .standards import RailStandard, closest_standard
+from .standard_checks import head_widths, warn_of_gauge
 from .steps import (
     clean_square,
     engine_for,
@@ -50,17 +47,6 @@ CLEAN, DRAW = 0.7, 0.3
 
 REMEASURE, STATIONS = 0.8, 0.2
 """Run times of the two steps of the track geometry: the heights of the rails, and the stations."""
-
-
-HEAD_OFF_M = 0.006
-"""Difference between the head widths that points show and that is stated from which the user is warned: noise of 8 mm
-makes heads look 5 mm too wide."""
-
-SAMPLE_M = 50.0
-"""Half the side of the area whose points show the width of the heads."""
-
-FEET = (0.3048, 1 / 0.3048)
-"""Factors by which coordinates are wrong if feet are stated as metres, or metres as feet."""
 
 
 def extract_rails(
@@ -160,94 +146,8 @@ def extract_files(
         with scratch_folder(folder) as scratch:
             source = spool_found(request, settings, side_m, scratch, reading)
             return _walk([source], parameters, runner, rest)
-    _warn_of_gauge(request, parameters, progress)
+    warn_of_gauge(request, parameters, progress)
     return _walk(_sorted_points(request, side_m, folder, runner, reading), parameters, runner, rest)
-
-
-def detect_standard(request: Request, progress: Progress = SILENT) -> RailStandard:
-    """Find the rail standard that fits the first points of a cloud.
-
-    Parameters
-    ----------
-    request : Request
-    progress : Progress
-        Is told the standard, and what was measured.
-
-    Raises
-    ------
-    CloudError
-        A file is damaged.
-    ParameterError
-        The points are too sparse, or no standard fits.
-    """
-    measured = measure_spacings(request.sample()).most_common()
-    standard = closest_standard(*measured) if measured else None
-    if measured is None or standard is None:
-        found = "" if measured is None else f": rails are {_in_words(*measured)}"
-        raise ParameterError(
-            f"No rail standard could be detected{found}: choose STANDARD, or fill in GAUGE and HEAD_WIDTH."
-        )
-    progress.info(f"Detected {standard.label} ({standard.name}): rails are {_in_words(*measured)}.")
-    return standard
-
-
-def _warn_of_gauge(request: Request, parameters: Parameters, progress: Progress) -> None:
-    """Warn the user at once if the first points show another gauge: the run takes minutes until no track is found."""
-    try:
-        sample = request.sample()
-    except CloudError:
-        return  # reported when the points are sorted
-    spacings = measure_spacings(sample)
-    measured = spacings.most_common()
-    gauges = (parameters.gauge_m, *parameters.other_gauges_m)
-    tolerance_m = parameters.centerline_tolerance_m
-    if any(spacings.include(one + parameters.head_width_m, tolerance_m) for one in gauges):
-        return
-    for factor, stated, real in zip(FEET, ("metres", "feet"), ("feet", "metres")):
-        if _is_off_by(factor, sample, gauges, parameters):
-            progress.warning(
-                f"Rails are {1 / factor:.3g} times as far apart as the gauge: the coordinates are said to be {stated}, "
-                f"are these {real}? Assign a coordinate system that says so."
-            )
-            return
-    if measured is None:
-        return
-    standard = closest_standard(*measured)
-    question = f": is it {standard.label} ({standard.name})?" if standard else "."
-    expected = 1000 * (parameters.gauge_m + parameters.head_width_m)
-    progress.warning(f"Rails are {_in_words(*measured)}; {expected:.0f} mm apart are expected{question}")
-
-
-def _is_off_by(factor: float, xyz: np.ndarray, gauges_m: Sequence[float], parameters: Parameters) -> bool:
-    """Return whether rails are at a gauge, with heads of the stated width, once coordinates are multiplied."""
-    measured = measure_spacings(factor * xyz).most_common()
-    if measured is None or abs(measured[1] - parameters.head_width_m) > 2 * HEAD_OFF_M:
-        return False
-    spacings_m = [gauge_m + parameters.head_width_m for gauge_m in gauges_m]
-    return min(abs(measured[0] - one) for one in spacings_m) <= parameters.centerline_tolerance_m
-
-
-def _head_width(sources: Sequence[PointSource], parameters: Parameters, progress: Progress) -> float:
-    """Measure how wide heads look, NaN if it cannot be seen, and warn the user if another width is stated."""
-    xyz = fullest_square(sources[0]).xyz
-    place = xyz[np.argmin(np.abs(xyz[:, :2] - np.median(xyz[:, :2], axis=0)).max(axis=1)), :2]
-    measured = measure_spacings(xyz[np.abs(xyz[:, :2] - place).max(axis=1) <= SAMPLE_M]).most_common()
-    if measured is None:
-        return float("nan")
-    seen_m, stated_m = measured[1], parameters.head_width_m
-    if abs(seen_m - stated_m) > HEAD_OFF_M:
-        standard = closest_standard(*measured)
-        question = f": is it {standard.label} ({standard.name})?" if standard else "."
-        progress.warning(
-            f"Heads look {1000 * seen_m:.0f} mm wide, {1000 * stated_m:.0f} mm are stated{question} Every gauge is off "
-            "by the difference."
-        )
-    return seen_m
-
-
-def _in_words(spacing_m: float, head_width_m: float) -> str:
-    """State what was measured."""
-    return f"{1000 * spacing_m:.0f} mm apart, with heads {1000 * head_width_m:.0f} mm wide"
 
 
 def _sorted_points(
@@ -306,7 +206,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
     except NoTrackError as error:
         runner.failures.append(str(error))
     rails = with_tracks(rails, centerlines, progress)
-    seen_m = _head_width(sources, parameters, progress) if rails else float("nan")
+    heads = head_widths(sources[0], parameters.head_width_m, progress) if rails else None
     geometry = _measure_tracks(centerlines, rails, sources, parameters, runner, measuring)
     described = dict(runner.run({"engine": Task("Describing the engine", _describe_engine, (parameters,))}))
     progress.set_fraction(1.0)
@@ -320,7 +220,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
         tuple(cleaned),
         tuple(runner.failures),
         progress.warnings,
-        HeadWidths(seen_m, parameters.head_width_m),
+        heads,
     )
 
 

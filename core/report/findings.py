@@ -24,9 +24,6 @@ SILENT_SHARE = 0.02
 """Share of the length in doubt for a reason that the stations of tracks do not show, above which a result is not good
 throughout."""
 
-HEAD_OFF_MM = 6.0
-"""Difference between the seen and the stated head width that is in doubt: noise makes heads look up to 5 mm wider."""
-
 MAX_HOLE_M = 200.0
 """Longest section without any rail across which two tracks are recognized as one: longer ones may hide a switch."""
 
@@ -194,14 +191,13 @@ def examine(network: RailNetwork, gauges_m: Sequence[float]) -> Findings:
     paired = {rail_id for line in network.centerlines for rail_id in (*line.left_ids, *line.right_ids)}
     lonely = [rail.length_m for rail in network.rails if rail.rail_id not in paired]
     heads = network.heads
-    wrong = heads is not None and 1000 * abs(heads.seen_m - heads.stated_m) > HEAD_OFF_MM
     return Findings(
         tracks,
         len(lonely),
         float(sum(lonely)),
         float(sum(rail.length_m for rail in network.rails)),
         tuple(_holes(network.centerlines)),
-        heads if wrong else None,
+        heads if heads is not None and heads.differ else None,
     )
 
 

@@ -112,7 +112,7 @@ class ExtractRails(RailAlgorithm):
 
     def _detected(self, job: Job, request: Request, values: ParameterValues, progress: Progress) -> Job:
         """Return the job with the rail standard that fits the points."""
-        from ...core.pipeline import detect_standard
+        from ...core.standard_checks import detect_standard
 
         standard = values.standard(detect_standard(request, progress).name)
         choose_model(standard.gauge_m, standard.head_width_m)

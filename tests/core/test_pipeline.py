@@ -8,13 +8,11 @@ from rail_extract.core import steps
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.errors import Cancelled, NoTrackError, ParameterError
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.heads.gauge_estimate import SEEN_SHARE
-from rail_extract.core.pipeline import Parameters, _head_width, _warn_of_gauge, extract_rails
+from rail_extract.core.pipeline import Parameters, extract_rails
 from rail_extract.core.polyline import length_along, project
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import cell_size, rasterize
-from rail_extract.core.squares.grid import MemorySource
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.steps import lines_of, overlap_tiles, tracks_of
 from rail_extract.laboratory.curves import Element, trace, transition_curve
@@ -232,50 +230,3 @@ def test_the_progress_rises_to_the_end_and_cleaning_has_seven_tenths_of_it(monke
     assert sum(cleaning) == pytest.approx(0.7 * 0.9, abs=1e-9)
     assert (np.diff(listener.fractions) >= -1e-12).all()
     assert min(listener.fractions) >= 0.0 and listener.fractions[-1] == max(listener.fractions) == 1.0
-
-
-class Sampled:
-    """A request whose files hold these points."""
-
-    def __init__(self, xyz):
-        self._xyz = xyz
-
-    def sample(self):
-        return self._xyz
-
-
-def heads_of(curve, width_m, gauge_m=1.435, count=40_000):
-    """Points spread evenly over the two heads of a track."""
-    random = np.random.RandomState(3)
-    at = random.randint(len(curve.xy), size=count)
-    left_m = random.choice([-0.5, 0.5], count) * (gauge_m + width_m) + width_m * random.uniform(-0.5, 0.5, count)
-    xy = curve.xy[at] + left_m[:, None] * curve.left_normal[at]
-    return np.column_stack([xy, 0.003 * random.standard_normal(count)])
-
-
-@pytest.mark.parametrize(
-    ("factor", "stated"),
-    [(1 / 0.3048, "said to be metres, are these feet?"), (0.3048, "said to be feet, are these metres?")],
-)
-def test_coordinates_in_the_wrong_unit_are_recognized(factor, stated):
-    heard = Warnings()
-    _warn_of_gauge(Sampled(factor * heads_of(CURVES[1], WIDTH)), Parameters(1.435, WIDTH), heard)
-    (warning,) = heard.said
-    assert stated in warning
-    assert ("3.28 times" in warning) == (factor > 1)
-
-
-def test_coordinates_in_the_right_unit_are_no_warning():
-    heard = Warnings()
-    _warn_of_gauge(Sampled(heads_of(CURVES[1], WIDTH)), Parameters(1.435, WIDTH), heard)
-    assert heard.said == []
-
-
-@pytest.mark.parametrize(("width_m", "count"), [(0.062, 1), (0.068, 0), (0.072, 0), (0.076, 0), (0.084, 1)])
-def test_heads_of_another_width_than_stated_are_said(width_m, count):
-    points = RailPoints(heads_of(CURVES[0], SEEN_SHARE * width_m), LocalFrame(np.zeros(3)), 10)
-    heard = Warnings()
-    seen_m = _head_width([MemorySource(points, 500.0)], Parameters(1.435, 0.072), heard)
-    assert seen_m == pytest.approx(width_m, abs=0.002)
-    assert len(heard.said) == count
-    assert all("72 mm are stated: is it " in one for one in heard.said)

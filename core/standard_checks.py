@@ -1,0 +1,130 @@
+"""Whether the points fit the rail standard that is stated, and which standard they fit.
+
+See docs/method.md section 1.5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .clouds.points import Request
+from .errors import CloudError, ParameterError
+from .heads.gauge_estimate import measure_spacings
+from .parameters import Parameters
+from .progress import SILENT, Progress
+from .rails import HEAD_OFF_M, HeadWidths
+from .squares.density import fullest_square
+from .squares.grid import PointSource
+from .standards import RailStandard, closest_standard
+
+SAMPLE_M = 50.0
+"""Half the side of the area whose points show the width of the heads."""
+
+FEET = (0.3048, 1 / 0.3048)
+"""Factors by which coordinates are wrong if feet are stated as metres, or metres as feet."""
+
+
+def detect_standard(request: Request, progress: Progress = SILENT) -> RailStandard:
+    """Find the rail standard that fits the first points of a cloud.
+
+    Parameters
+    ----------
+    request : Request
+    progress : Progress
+        Is told the standard, and what was measured.
+
+    Raises
+    ------
+    CloudError
+        A file is damaged.
+    ParameterError
+        The points are too sparse, or no standard fits.
+    """
+    measured = measure_spacings(request.sample()).most_common()
+    standard = closest_standard(*measured) if measured else None
+    if measured is None or standard is None:
+        found = "" if measured is None else f": rails are {_in_words(*measured)}"
+        raise ParameterError(
+            f"No rail standard could be detected{found}: choose STANDARD, or fill in GAUGE and HEAD_WIDTH."
+        )
+    progress.info(f"Detected {standard.label} ({standard.name}): rails are {_in_words(*measured)}.")
+    return standard
+
+
+def warn_of_gauge(request: Request, parameters: Parameters, progress: Progress) -> None:
+    """Warn the user at once if the first points show another gauge: the run takes minutes until no track is found.
+
+    Parameters
+    ----------
+    request : Request
+    parameters : Parameters
+    progress : Progress
+    """
+    try:
+        sample = request.sample()
+    except CloudError:
+        return  # reported when the points are sorted
+    spacings = measure_spacings(sample)
+    measured = spacings.most_common()
+    gauges = (parameters.gauge_m, *parameters.other_gauges_m)
+    tolerance_m = parameters.centerline_tolerance_m
+    if any(spacings.include(one + parameters.head_width_m, tolerance_m) for one in gauges):
+        return
+    for factor, stated, real in zip(FEET, ("metres", "feet"), ("feet", "metres")):
+        if _is_off_by(factor, sample, gauges, parameters):
+            progress.warning(
+                f"Rails are {1 / factor:.3g} times as far apart as the gauge: the coordinates are said to be {stated}, "
+                f"are these {real}? Assign a coordinate system that says so."
+            )
+            return
+    if measured is None:
+        return
+    expected = 1000 * (parameters.gauge_m + parameters.head_width_m)
+    progress.warning(f"Rails are {_in_words(*measured)}; {expected:.0f} mm apart are expected{_question(*measured)}")
+
+
+def _is_off_by(factor: float, xyz: np.ndarray, gauges_m: Sequence[float], parameters: Parameters) -> bool:
+    """Return whether rails are at a gauge, with heads of the stated width, once coordinates are multiplied."""
+    measured = measure_spacings(factor * xyz).most_common()
+    if measured is None or abs(measured[1] - parameters.head_width_m) > 2 * HEAD_OFF_M:
+        return False
+    spacings_m = [gauge_m + parameters.head_width_m for gauge_m in gauges_m]
+    return min(abs(measured[0] - one) for one in spacings_m) <= parameters.centerline_tolerance_m
+
+
+def head_widths(source: PointSource, stated_m: float, progress: Progress) -> HeadWidths:
+    """Measure how wide heads look, and warn the user if another width is stated.
+
+    Parameters
+    ----------
+    source : PointSource
+        Points of one class; those in the middle of its fullest square are looked at.
+    stated_m : float
+        Stated width of a railhead.
+    progress : Progress
+    """
+    xyz = fullest_square(source).xyz
+    place = xyz[np.argmin(np.abs(xyz[:, :2] - np.median(xyz[:, :2], axis=0)).max(axis=1)), :2]
+    measured = measure_spacings(xyz[np.abs(xyz[:, :2] - place).max(axis=1) <= SAMPLE_M]).most_common()
+    if measured is None:
+        return HeadWidths(float("nan"), stated_m)
+    widths = HeadWidths(measured[1], stated_m)
+    if widths.differ:
+        progress.warning(
+            f"Heads look {1000 * widths.seen_m:.0f} mm wide, {1000 * stated_m:.0f} mm are stated{_question(*measured)} "
+            "Every gauge is off by the difference."
+        )
+    return widths
+
+
+def _question(spacing_m: float, head_width_m: float) -> str:
+    """End a sentence with the question for the standard that fits what was measured, if one does."""
+    standard = closest_standard(spacing_m, head_width_m)
+    return f": is it {standard.label} ({standard.name})?" if standard else "."
+
+
+def _in_words(spacing_m: float, head_width_m: float) -> str:
+    """State what was measured."""
+    return f"{1000 * spacing_m:.0f} mm apart, with heads {1000 * head_width_m:.0f} mm wide"

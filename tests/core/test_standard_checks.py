@@ -1,0 +1,72 @@
+"""Points compared with the stated rail standard: units, gauge and width of the heads."""
+
+import numpy as np
+import pytest
+from rail_extract.core.clouds.points import RailPoints
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.heads.gauge_estimate import SEEN_SHARE
+from rail_extract.core.parameters import Parameters
+from rail_extract.core.progress import Progress
+from rail_extract.core.squares.grid import MemorySource
+from rail_extract.core.standard_checks import head_widths, warn_of_gauge
+from rail_extract.laboratory.curves import Element, trace, transition_curve
+
+WIDTH = 0.072
+LINE = trace([Element(40.0)], heading=0.4)
+CURVE = trace(transition_curve(15, 20, 15, 1 / 300), heading=-0.6)
+
+
+class Warnings(Progress):
+    def __init__(self):
+        self.said = []
+
+    def warning(self, text):
+        self.said.append(text)
+
+
+class Sampled:
+    """A request whose files hold these points."""
+
+    def __init__(self, xyz):
+        self._xyz = xyz
+
+    def sample(self):
+        return self._xyz
+
+
+def heads_of(curve, width_m, gauge_m=1.435, count=40_000):
+    """Points spread evenly over the two heads of a track."""
+    random = np.random.RandomState(3)
+    at = random.randint(len(curve.xy), size=count)
+    left_m = random.choice([-0.5, 0.5], count) * (gauge_m + width_m) + width_m * random.uniform(-0.5, 0.5, count)
+    xy = curve.xy[at] + left_m[:, None] * curve.left_normal[at]
+    return np.column_stack([xy, 0.003 * random.standard_normal(count)])
+
+
+@pytest.mark.parametrize(
+    ("factor", "stated"),
+    [(1 / 0.3048, "said to be metres, are these feet?"), (0.3048, "said to be feet, are these metres?")],
+)
+def test_coordinates_in_the_wrong_unit_are_recognized(factor, stated):
+    heard = Warnings()
+    warn_of_gauge(Sampled(factor * heads_of(CURVE, WIDTH)), Parameters(1.435, WIDTH), heard)
+    (warning,) = heard.said
+    assert stated in warning
+    assert ("3.28 times" in warning) == (factor > 1)
+
+
+def test_coordinates_in_the_right_unit_are_no_warning():
+    heard = Warnings()
+    warn_of_gauge(Sampled(heads_of(CURVE, WIDTH)), Parameters(1.435, WIDTH), heard)
+    assert heard.said == []
+
+
+@pytest.mark.parametrize(("width_m", "count"), [(0.062, 1), (0.068, 0), (0.072, 0), (0.076, 0), (0.084, 1)])
+def test_heads_of_another_width_than_stated_are_said(width_m, count):
+    points = RailPoints(heads_of(LINE, SEEN_SHARE * width_m), LocalFrame(np.zeros(3)), 10)
+    heard = Warnings()
+    widths = head_widths(MemorySource(points, 500.0), 0.072, heard)
+    assert widths.seen_m == pytest.approx(width_m, abs=0.002)
+    assert widths.differ == (count == 1)
+    assert len(heard.said) == count
+    assert all("72 mm are stated: is it " in one for one in heard.said)
