@@ -14,8 +14,8 @@ from ..labelling.finding import SEARCHED
 from ..parameters import Parameters
 from ..progress import Estimating
 from ..scratch import scratch_folder
-from ..standards import DEFAULT, LAST_CLASS, RAIL_CLASS, distinct_gauges, resolve
-from .options import Console, extent_of, numbers_in
+from ..standards import LAST_CLASS, RAIL_CLASS, resolve
+from .options import Console, add_cloud_arguments, extent_of, gauges_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,15 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("tiles", nargs="+", type=Path, metavar="TILE", help="point clouds, or folders of them")
     text = "LAZ or LAS file; for several tiles, the name of their new folder, with .vpc added for the catalogue"
     parser.add_argument("--output", type=Path, required=True, help=text)
-    parser.add_argument("--standard", default=DEFAULT, help=f"rail standard (default: {DEFAULT})")
-    parser.add_argument("--gauge", type=float, metavar="MM", help="gauge, instead of that of the standard")
-    parser.add_argument(
-        "--head-width", type=float, metavar="MM", help="railhead width, instead of that of the standard"
-    )
-    parser.add_argument("--other-gauges", default="", metavar="MM", help="further gauges to pair, such as 1000;1067")
-    parser.add_argument("--crs", help="coordinate system of tiles that state none, such as EPSG:25832")
-    text = "search only in this rectangle, in units of the coordinate system"
-    parser.add_argument("--extent", metavar="XMIN,YMIN,XMAX,YMAX", help=text)
+    add_cloud_arguments(parser)
     parser.add_argument("--pairs-only", action="store_true", help="leave out rails without a partner")
     text = f"class of the rail points that are found (default: {RAIL_CLASS})"
     parser.add_argument("--rail-class", type=int, default=RAIL_CLASS, metavar="N", help=text)
@@ -51,8 +43,7 @@ def run(args: argparse.Namespace) -> None:
     if not 0 <= args.rail_class <= LAST_CLASS:
         raise ParameterError(f"--rail-class must be a number from 0 to {LAST_CLASS}, not {args.rail_class}.")
     standard = resolve(args.standard, args.gauge, args.head_width)
-    others_m = [mm / 1000 for mm in numbers_in(args.other_gauges, "--other-gauges", float)]
-    gauges_m = distinct_gauges((standard.gauge_m, *others_m), Parameters.centerline_tolerance_m)
+    gauges_m = gauges_of(args, standard, Parameters.centerline_tolerance_m)
     settings = Settings(gauges_m, standard.head_width_m, keep_single=not args.pairs_only)
     choice = Choice(args.rail_class, args.rails_only, not args.no_reset)
     progress = Estimating(Console())

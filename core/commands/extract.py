@@ -26,8 +26,8 @@ from ..rails import RailNetwork
 from ..raster_file import header_for, on_one_grid
 from ..report import Origin
 from ..scratch import scratch_folder
-from ..standards import DEFAULT, RailStandard, distinct_gauges, resolve
-from .options import Console, extent_of, numbers_in
+from ..standards import RailStandard, resolve
+from .options import Console, add_cloud_arguments, extent_of, gauges_of, numbers_in
 
 NEEDS = {name: name for name in ("distributed", "cryptography", "pyogrio", "shapely", "rasterio")}
 """Modules and packages of the extra "cluster"; rasterio is needed for `--cleaned` only."""
@@ -82,17 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "find the rail points of a raw cloud first; --rail-classes is ignored"
     cloud.add_argument("--classify", action="store_true", help=text)
     cloud.add_argument("--rail-classes", default="10", help="classes of rail points, such as 10,11 (default: 10)")
-    cloud.add_argument("--standard", default=DEFAULT, help=f"rail standard (default: {DEFAULT})")
-    cloud.add_argument("--gauge", type=float, metavar="MM", help="gauge, instead of that of the standard")
-    cloud.add_argument("--head-width", type=float, metavar="MM", help="railhead width, instead of that of the standard")
-    cloud.add_argument("--other-gauges", default="", metavar="MM", help="further gauges to pair, such as 1000;1067")
-    cloud.add_argument("--crs", help="coordinate system of tiles that state none, such as EPSG:25832")
-    cloud.add_argument(
-        "--extent",
-        metavar="XMIN,YMIN,XMAX,YMAX",
-        help="read only the points in this rectangle, in units of the coordinate system; write --extent=-5,... if "
-        "the first number is negative",
-    )
+    add_cloud_arguments(cloud)
     method = parser.add_argument_group("method", "See docs/parameters.md.")
     method.add_argument("--iterations", type=int, default=Parameters.passes, help="passes of the network (default: 2)")
     method.add_argument("--engine", choices=ENGINES, default=Parameters.engine, help="what runs the network")
@@ -161,8 +151,7 @@ def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameter
         No weights fit the standard.
     """
     choose(standard.gauge_m, standard.head_width_m)
-    others_mm = numbers_in(args.other_gauges, "--other-gauges", float)
-    gauges_m = distinct_gauges((standard.gauge_m, *(mm / 1000 for mm in others_mm)), args.centerline_tolerance)
+    gauges_m = gauges_of(args, standard, args.centerline_tolerance)
     numbers = {field.name: getattr(args, _option(field.name)[2:].replace("-", "_")) for field in _number_fields()}
     workers = 0 if args.workers is None else args.workers - 1
     for name, value in {**numbers, "iterations": args.iterations, "step": args.step, "workers": workers}.items():

@@ -1,11 +1,49 @@
-"""What the commands share: options with several numbers, and progress on the console."""
+"""What the commands share: options of the cloud and its rails, and progress on the console."""
 
 from __future__ import annotations
 
+import argparse
 import sys
 
 from ..errors import ParameterError
 from ..progress import Progress
+from ..standards import DEFAULT, RailStandard, distinct_gauges
+
+
+def add_cloud_arguments(parser: argparse._ActionsContainer) -> None:
+    """Declare the rails and the coordinate system of the cloud, and the area to read, in a parser or in a group."""
+    parser.add_argument("--standard", default=DEFAULT, help=f"rail standard (default: {DEFAULT})")
+    parser.add_argument("--gauge", type=float, metavar="MM", help="gauge, instead of that of the standard")
+    parser.add_argument(
+        "--head-width", type=float, metavar="MM", help="railhead width, instead of that of the standard"
+    )
+    parser.add_argument("--other-gauges", default="", metavar="MM", help="further gauges to pair, such as 1000;1067")
+    parser.add_argument("--crs", help="coordinate system of tiles that state none, such as EPSG:25832")
+    parser.add_argument(
+        "--extent",
+        metavar="XMIN,YMIN,XMAX,YMAX",
+        help="read only the points in this rectangle, in units of the coordinate system; write --extent=-5,... if "
+        "the first number is negative",
+    )
+
+
+def gauges_of(args: argparse.Namespace, standard: RailStandard, tolerance_m: float) -> tuple[float, ...]:
+    """Return the gauge of the standard and those of `--other-gauges`, metres.
+
+    Parameters
+    ----------
+    args : Namespace
+    standard : RailStandard
+    tolerance_m : float
+        Largest deviation of a track from its gauge.
+
+    Raises
+    ------
+    ParameterError
+        The text holds something else than numbers, or the gauges can't be distinguished.
+    """
+    others_mm = numbers_in(args.other_gauges, "--other-gauges", float)
+    return distinct_gauges((standard.gauge_m, *(mm / 1000 for mm in others_mm)), tolerance_m)
 
 
 def numbers_in(text: str, option: str, kind: type) -> tuple:
