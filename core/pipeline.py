@@ -120,7 +120,7 @@ def extract_files(
     progress : Progress
     classify : bool
         Whether the cloud is a raw one, whose rail points are to be found first; the request is for the classes
-        `finding.SEARCHED` then. This process finds them, whatever the runner.
+        `standards.SEARCHED_CLASSES` then. This process finds them, whatever the runner.
 
     Returns
     -------

@@ -22,6 +22,12 @@ CUSTOM, DETECT = "CUSTOM", "DETECT"
 RAIL_CLASS, LAST_CLASS = 10, 255
 """Class of rail points in the LAS specification, and the largest class: a class is one byte."""
 
+NOISE_CLASSES = (7, 18)
+"""Classes of low and high noise in LAS 1.4."""
+
+SEARCHED_CLASSES = tuple(code for code in range(LAST_CLASS + 1) if code not in NOISE_CLASSES)
+"""Classes in which the rails of a raw cloud are looked for: whatever it has been classified for."""
+
 GAUGE_RANGE_MM = (500.0, 2000.0)
 """From below the narrowest public railways (600 mm) to above the widest gauge in use (1676 mm)."""
 

@@ -10,11 +10,10 @@ from ..clouds.points import ask
 from ..disk import writing
 from ..errors import ParameterError
 from ..labelling.files import Choice, classify_files, plan_output
-from ..labelling.finding import SEARCHED
 from ..parameters import Parameters
 from ..progress import Estimating
 from ..scratch import scratch_folder
-from ..standards import LAST_CLASS, RAIL_CLASS, resolve
+from ..standards import LAST_CLASS, RAIL_CLASS, SEARCHED_CLASSES, resolve
 from .options import Console, add_cloud_arguments, extent_of, gauges_of
 
 
@@ -51,7 +50,7 @@ def run(args: argparse.Namespace) -> None:
     with writing(output.parent):
         output.parent.mkdir(parents=True, exist_ok=True)
     planned = plan_output(args.tiles, output, choice.class_code, progress)
-    request = ask(args.tiles, SEARCHED, args.crs, extent_of(args.extent), progress)
+    request = ask(args.tiles, SEARCHED_CLASSES, args.crs, extent_of(args.extent), progress)
     with writing(output.parent), scratch_folder(planned.file.parent) as folder:
         result = classify_files(request, settings, choice, planned, folder, progress)
     figures = result.figures

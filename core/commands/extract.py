@@ -18,7 +18,6 @@ from ..errors import ParameterError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, RAIL_FIELDS
 from ..frpdf import DEVICES, ENGINES
 from ..frpdf.models import choose
-from ..labelling.finding import SEARCHED
 from ..parameters import DEFAULT_STEP_M, Parameters
 from ..pipeline import extract_files
 from ..progress import Estimating, Progress
@@ -26,7 +25,7 @@ from ..rails import RailNetwork
 from ..raster_file import header_for, on_one_grid
 from ..report import Origin
 from ..scratch import scratch_folder
-from ..standards import RailStandard, resolve
+from ..standards import SEARCHED_CLASSES, RailStandard, resolve
 from .options import Console, add_cloud_arguments, extent_of, gauges_of, numbers_in
 
 NEEDS = {name: name for name in ("distributed", "cryptography", "pyogrio", "shapely", "rasterio")}
@@ -208,7 +207,7 @@ def _run_in(
     from ..cluster.workers import Certificates, connect
 
     codes, extent = numbers_in(args.rail_classes, "--rail-classes", int), extent_of(args.extent)
-    codes = SEARCHED if args.classify else codes
+    codes = SEARCHED_CLASSES if args.classify else codes
     progress = Estimating(Console())
     files = _certificate_files(args, progress)
     certificates = Certificates(*files) if files else None

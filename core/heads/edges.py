@@ -147,7 +147,7 @@ class Edges:
 
     @classmethod
     def initial(cls, free: np.ndarray) -> Edges:
-        """Give all edges that are `free`, (2, s) bool, the same weight, for the first round."""
+        """Return equal weights for all edges that are `free`, (2, s) bool: those of the first round."""
         return cls(np.ones(free.shape), free.astype(float), free[0] | free[1], np.zeros(free.shape[1]))
 
     def equally_weighted(self, free: np.ndarray) -> Edges:

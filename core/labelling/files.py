@@ -141,7 +141,7 @@ def classify_files(
     Parameters
     ----------
     request : Request
-        Files, `finding.SEARCHED` classes and extent.
+        Files, `standards.SEARCHED_CLASSES` classes and extent.
     settings : Settings
     choice : Choice
     output : Output

@@ -23,12 +23,6 @@ from ..progress import SILENT, Progress
 from ..squares.grid import Key, Square, around, points_by_square
 from ..standards import LAST_CLASS
 
-NOISE = (7, 18)
-"""Classes of low and high noise in LAS 1.4."""
-
-SEARCHED = tuple(code for code in range(LAST_CLASS + 1) if code not in NOISE)
-"""Classes in which rails are looked for: whatever the cloud has been classified for."""
-
 POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8")])
 """A point on disk: coordinates in units of the CRS, and its number among all points of all files."""
 
@@ -98,7 +92,7 @@ def find_rail_points(
 
 
 def report(figures: Figures, progress: Progress) -> None:
-    """Tell the user what was found and what to doubt."""
+    """Inform the user of what was found and of what to doubt."""
     if not figures.points:
         progress.warning(
             "No rail was found: check the rail standard and the unit of the coordinates. A cloud that contains only "

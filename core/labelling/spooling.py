@@ -22,7 +22,7 @@ def spool_found(request: Request, settings: Settings, side_m: float, folder: Pat
     Parameters
     ----------
     request : Request
-        Files, `finding.SEARCHED` classes and extent.
+        Files, `standards.SEARCHED_CLASSES` classes and extent.
     settings : Settings
     side_m : float
         Side of the squares of the extraction.

@@ -51,7 +51,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     """An algorithm of Rail Extract in the toolbox.
 
     A subclass states its name and its needs in the class attributes, declares its parameters in `initAlgorithm`, reads
-    them in `read` and computes in `compute`. Only `compute` may import modules that depend on `NEEDS`.
+    them in `read` and computes in `compute`. Modules that depend on `NEEDS` are imported inside these two only.
     """
 
     NAME = ""

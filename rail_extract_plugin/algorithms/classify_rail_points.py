@@ -9,7 +9,7 @@ from typing import Any
 from qgis.core import QgsProcessingContext
 
 from ...core.progress import Estimating, Progress
-from ...core.standards import RailStandard
+from ...core.standards import SEARCHED_CLASSES, RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
@@ -86,14 +86,13 @@ class ClassifyRailPoints(RailAlgorithm):
         """Classify the cloud and write the copy."""
         from ...core.classify.settings import Settings
         from ...core.labelling.files import Choice, classify_files, plan_output
-        from ...core.labelling.finding import SEARCHED
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
         gauges_m = (job.standard.gauge_m, *job.other_gauges_m)
         settings = Settings(gauges_m, job.standard.head_width_m, values.flag("KEEP_SINGLE"))
         choice = Choice(job.class_code, int(values.number("CONTENT")) == 1, values.flag("RESET"))
         output = plan_output(job.cloud.paths, job.output, job.class_code, progress)
-        request = request_points(job.cloud, SEARCHED, values.extent, progress)
+        request = request_points(job.cloud, SEARCHED_CLASSES, values.extent, progress)
         with points_folder() as folder:
             result = classify_files(request, settings, choice, output, folder, progress)
         return {

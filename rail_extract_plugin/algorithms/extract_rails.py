@@ -10,7 +10,7 @@ from qgis.core import QgsProcessingContext
 from ...core.errors import ParameterError
 from ...core.frpdf.models import choose as choose_model
 from ...core.progress import Estimating, Progress
-from ...core.standards import DEFAULT, RailStandard
+from ...core.standards import DEFAULT, SEARCHED_CLASSES, RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
@@ -94,8 +94,6 @@ class ExtractRails(RailAlgorithm):
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read and check the parameters, in the main thread."""
-        from ...core.labelling.finding import SEARCHED
-
         values = ParameterValues(self, parameters, context)
         classify = values.flag("CLASSIFY")
         if classify and values.detects():
@@ -104,7 +102,7 @@ class ExtractRails(RailAlgorithm):
         choose_model(standard.gauge_m, standard.head_width_m)
         return Job(
             values.cloud("INPUT"),
-            SEARCHED if classify else values.class_codes(),
+            SEARCHED_CLASSES if classify else values.class_codes(),
             standard,
             values.other_gauges_m(standard),
             masked(self.asPythonCommand(parameters, context)),

@@ -6,8 +6,8 @@ import pytest
 from rail_extract.__main__ import main
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.errors import NoRailPointsError
-from rail_extract.core.labelling.finding import SEARCHED
 from rail_extract.core.pipeline import Parameters, extract_files
+from rail_extract.core.standards import SEARCHED_CLASSES
 from rail_extract.core.tasks import InTurn
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
@@ -49,7 +49,7 @@ def test_a_class_out_of_range_is_refused(save, tmp_path, capsys):
 
 
 def test_rails_are_extracted_from_a_raw_cloud(save, tmp_path):
-    request = ask([save(scene()[0])], SEARCHED)
+    request = ask([save(scene()[0])], SEARCHED_CLASSES)
     parameters = Parameters(1.435, 0.072, passes=1, engine="OPENCV")
     folder = tmp_path / "work"
     folder.mkdir()
@@ -62,6 +62,6 @@ def test_rails_are_extracted_from_a_raw_cloud(save, tmp_path):
 
 def test_ground_has_no_rails_to_extract(save, tmp_path):
     rng = np.random.RandomState(1)
-    request = ask([save(rough(flat(8.0, rng=rng, per_m2=500), rng))], SEARCHED)
+    request = ask([save(rough(flat(8.0, rng=rng, per_m2=500), rng))], SEARCHED_CLASSES)
     with pytest.raises(NoRailPointsError, match="No rail was found in the raw cloud: check the rail standard"):
         extract_files(request, tmp_path, Parameters(1.435, 0.072, engine="OPENCV"), InTurn(), classify=True)

@@ -8,9 +8,9 @@ from rail_extract.core.clouds.points import ask
 from rail_extract.core.clouds.vpc import list_tiles
 from rail_extract.core.errors import Cancelled, CloudError, DiskError, ParameterError
 from rail_extract.core.labelling.files import Choice, classify_files, plan_output
-from rail_extract.core.labelling.finding import SEARCHED
 from rail_extract.core.progress import Progress, Recording
 from rail_extract.core.scratch import scratch_folder
+from rail_extract.core.standards import SEARCHED_CLASSES
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
 GAUGE, WIDTH = 1.435, 0.072
@@ -51,7 +51,7 @@ def classify(tmp_path, paths, output, choice=TEN, progress=None):
     """Plan and write; returns the result and the progress."""
     progress = progress or Recording(Progress())
     planned = plan_output(paths, output, choice.class_code, progress)
-    request = ask(paths, SEARCHED, None, None, progress)
+    request = ask(paths, SEARCHED_CLASSES, None, None, progress)
     with scratch_folder(tmp_path) as work:
         return classify_files(request, SETTINGS, choice, planned, work, progress), progress
 
