@@ -32,6 +32,10 @@ class RailExtractProvider(QgsProcessingProvider):
         """Return the suffixes of the only format in which rail rasters are written."""
         return ["tif", "tiff"]
 
+    def supportedOutputVectorLayerExtensions(self) -> list[str]:
+        """Return the suffixes of the formats that keep heights, fields, coordinates and the coordinate system."""
+        return ["gpkg", "shp", "geojson", "fgb", "gml"]
+
     def loadAlgorithms(self) -> None:
         """Create the algorithms."""
         for algorithm in ALGORITHMS:

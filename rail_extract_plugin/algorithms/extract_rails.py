@@ -94,6 +94,9 @@ class ExtractRails(RailAlgorithm):
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read and check the parameters, in the main thread."""
+        names = [output.name() for output in self.destinationParameterDefinitions()]
+        if not any(is_wanted(parameters.get(name), context) for name in names):
+            raise ParameterError(f"No output is chosen: name at least one of {', '.join(names)}.")
         values = ParameterValues(self, parameters, context)
         classify = values.flag("CLASSIFY")
         if classify and values.detects():

@@ -14,7 +14,7 @@ NEXT_KEYS = (
 IN_CONNECTION = re.compile(rf"(?i)\b(password|passwd|pwd)\s*=.*?(?=\s(?:{'|'.join(NEXT_KEYS)})\s*=|\n|\Z)")
 """From a password's key to the next key, or to the end of the line: a password may contain any character."""
 
-IN_ADDRESS = re.compile(r"(://[^:/@\s]+):[^/\s]*@")
+IN_ADDRESS = re.compile(r"(://[^:/@\s]+):[^\s]*@")
 """The user in an address such as postgresql://user:password@host."""
 
 
@@ -25,7 +25,7 @@ def masked(text: str) -> str:
     --------
     >>> masked("host=h user=me password=secret sslmode=disable")
     'host=h user=me password=*** sslmode=disable'
-    >>> masked("postgresql://me:s@crt@host/base")
+    >>> masked("postgresql://me:s@c/rt@host/base")
     'postgresql://me:***@host/base'
     """
     return IN_ADDRESS.sub(r"\1:***@", IN_CONNECTION.sub(r"\1=***", text))

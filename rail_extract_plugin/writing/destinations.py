@@ -18,6 +18,7 @@ from qgis.core import (
 
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
+from .databases import check_database
 
 TABLE = "ogr:"
 """Prefix of destinations that are a table of a file."""
@@ -49,6 +50,7 @@ def destinations(values: Mapping[str, Any], context: QgsProcessingContext) -> di
     files: dict[Path, Destination] = {}
     found: dict[str, Destination] = {}
     for name, value in values.items():
+        check_database(name, _text(value, context))
         path = output_file(value, context)
         if path is not None:
             escape = re.search(ESCAPE, str(path)) if path.suffix.lower() == ".gpkg" else None

@@ -115,8 +115,8 @@ def _write_file(value: Any, file: Path, write: Write) -> str:
     try:
         layer_id, count = write(_redirected(value, file))
     except (RailExtractError, QgsProcessingException) as error:
-        # The traceback would keep the file open, and Windows could not delete it.
-        raise error.with_traceback(None) from error.__cause__
+        # Without the traceback, which would keep the file open: Windows could not delete it.
+        raise RailExtractError(str(error).replace(str(file), file.name)) from None
     found = _count(file)
     if found < count:
         raise RailExtractError(

@@ -110,7 +110,7 @@ def run(algorithm, context):
     """Check the parameters and run Extract Rails, as all front ends of QGIS do."""
 
     def run(parameters: dict[str, Any], feedback: Feedback | None = None) -> Outcome:
-        return outcome_of(algorithm, parameters, context, feedback or Feedback())
+        return outcome_of(algorithm, {"RAILS": "memory:", **parameters}, context, feedback or Feedback())
 
     return run
 

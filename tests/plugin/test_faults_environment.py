@@ -110,6 +110,10 @@ def a_folder(folder):
     return folder / "rails.gpkg"
 
 
+def without_outputs(bench):
+    return {**cloud(bench), **dict.fromkeys(("RAILS", "CENTERLINES", "QUALITY", "CLEANED"))}
+
+
 def a_pipe(folder):
     os.mkfifo(folder / "rails.gpkg")
     return folder / "rails.gpkg"
@@ -386,11 +390,26 @@ FAULTS = [
         REFUSED,
         "The output …/rrr….gpkg can't be written (File name too long): choose another place.",
     ),
+    *(
+        Fault(
+            f"output of {what}",
+            output(lambda folder, suffix=suffix: folder / f"rails.{suffix}"),
+            REFUSED,
+            f"“.{suffix}” files are not supported as outputs for this algorithm: choose another one, such as .gpkg.",
+        )
+        for suffix, what in (
+            ("docx", "an unknown format"),
+            ("dxf", "a format without fields"),
+            ("csv", "a format without geometry"),
+            ("tab", "a format without heights"),
+            ("kml", "a format with a coordinate system of its own"),
+        )
+    ),
     Fault(
-        "output of an unknown format",
-        output(lambda folder: folder / "rails.docx"),
+        "no output at all",
+        without_outputs,
         REFUSED,
-        "“.docx” files are not supported as outputs for this algorithm: choose another one, such as .gpkg.",
+        "No output is chosen: name at least one of RAILS, CENTERLINES, QUALITY, CLEANED, REPORT.",
     ),
     Fault(
         "output folder deleted during the run",
@@ -504,7 +523,7 @@ def test_the_traceback_of_an_unforeseen_error_goes_into_the_log(run_step, bench)
     logged = []
     log = QgsApplication.messageLog()
     log.messageReceived[str, str, Qgis.MessageLevel].connect(lambda *message: logged.append(message))
-    run_step("extractrails", failing(pipeline, "clean_square", Panic("here"))(bench))
+    run_step("extractrails", {**failing(pipeline, "clean_square", Panic("here"))(bench), "RAILS": "memory:"})
     (text,) = [text for text, tab, _ in logged if tab == "Rail Extract"]
     assert text.startswith("Traceback")
     assert text.endswith("Panic: here\n")

@@ -100,9 +100,7 @@ def test_unknown_coordinate_system_is_cartesian_metres(qgis):
     assert crs.mapUnits() == QgsUnitTypes.DistanceUnit.DistanceMeters
 
 
-@pytest.mark.parametrize(
-    "value", [None, "", "memory:", QgsProcessing.TEMPORARY_OUTPUT, "postgres:dbname='x' table=\"y\" (geom)"]
-)
+@pytest.mark.parametrize("value", [None, "", "memory:", QgsProcessing.TEMPORARY_OUTPUT])
 def test_outputs_that_are_not_files_are_accepted(context, value):
     assert destinations({"RAILS": value}, context) == {}
 

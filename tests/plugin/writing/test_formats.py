@@ -1,0 +1,48 @@
+"""Every vector format that is offered keeps heights, fields, coordinates and the coordinate system."""
+
+import numpy as np
+import pytest
+from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from rail_extract.core.fields import CENTERLINE_FIELDS
+
+FORMATS = ("gpkg", "shp", "geojson", "fgb", "gml")
+
+
+@pytest.fixture
+def rails():
+    layer = QgsVectorLayer("LineStringZ?crs=EPSG:32643", "rails", "memory")
+    for y in (3000000.1234, 3000001.6304):
+        feature = QgsFeature()
+        line = f"LINESTRING Z (500000.12345 {y} 100.4321, 500020.98765 {y} 101.2345)"
+        feature.setGeometry(QgsGeometry.fromWkt(line))
+        assert layer.dataProvider().addFeature(feature)
+    return layer
+
+
+def test_the_formats_are_those_of_the_dialog(plugin):
+    assert tuple(plugin.provider.supportedOutputVectorLayerExtensions()) == FORMATS
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_nothing_is_lost(run_step, rails, tmp_path, suffix):
+    outcome = run_step("buildtrackcenterlines", {"INPUT": rails, "OUTPUT": tmp_path / f"tracks.{suffix}"})
+    assert outcome.ok, outcome.error
+    layer = QgsVectorLayer(outcome.results["OUTPUT"], "tracks", "ogr")
+    assert layer.crs().authid() == "EPSG:32643"
+    (feature,) = layer.getFeatures()
+    vertices = [(vertex.x(), vertex.y(), vertex.z()) for vertex in feature.geometry().vertices()]
+    expected = [(500000.12345, 3000000.8769, 100.4321), (500020.98765, 3000000.8769, 101.2345)]
+    np.testing.assert_allclose([vertices[0], vertices[-1]], expected, rtol=0, atol=1e-4)
+    values = {column.name: feature[column.name] for column in CENTERLINE_FIELDS}
+    assert values == {
+        "track_id": 1,
+        "class_code": 0,
+        "left_ids": "2",
+        "right_ids": "1",
+        "length_m": 20.88,
+        "gauge_mm": 1435.0,
+        "gaugesd_mm": 0.0,
+        "cant_mm": 0.0,
+        "cantmax_mm": 0.0,
+        "bridged_m": 0.0,
+    }
