@@ -22,6 +22,9 @@ MARK = "in_use"
 MIN_AGE_S = 60.0
 """Younger folders are not removed: their process may not have locked them yet."""
 
+MIN_UNMARKED_AGE_S = 86_400.0
+"""The same for folders whose process was killed before it had marked them."""
+
 OWNER_ONLY = 0o777 if sys.platform == "win32" else 0o700
 """Rights of a temporary folder. On Windows, files that are moved keep the rights of the folder they come from."""
 
@@ -50,8 +53,9 @@ def scratch_folder(parent: Path) -> Iterator[Path]:
     folder = parent / f"{PREFIX}{secrets.token_hex(6)}"
     folder.mkdir(OWNER_ONLY)
     try:
+        computer = platform.node()
         with (folder / MARK).open("x", encoding="utf-8") as mark:
-            mark.write(platform.node())
+            mark.write(computer)
             mark.flush()
             with suppress(OSError):  # on a drive without locks, no folder is ever taken for abandoned
                 lock(mark.fileno())
@@ -87,13 +91,17 @@ def discard(path: Path) -> None:
 
 def _is_abandoned(folder: Path) -> bool:
     """Return whether a folder belongs to this user and the process that created it on this computer is gone."""
-    if hasattr(os, "getuid") and folder.stat().st_uid != os.getuid():
-        return False
+    mark, now = folder / MARK, time.time()
     try:
-        with (folder / MARK).open("r+", encoding="utf-8") as mark:
-            if time.time() - os.fstat(mark.fileno()).st_mtime < MIN_AGE_S or mark.read() != platform.node():
+        state = folder.stat()
+        if hasattr(os, "getuid") and state.st_uid != os.getuid():
+            return False
+        if not mark.exists() or not mark.stat().st_size:
+            return now - state.st_mtime > MIN_UNMARKED_AGE_S
+        with mark.open("r+", encoding="utf-8") as opened:
+            if opened.read() != platform.node() or now - mark.stat().st_mtime < MIN_AGE_S:
                 return False
-            lock(mark.fileno())
+            lock(opened.fileno())
             return True
     except (OSError, UnicodeDecodeError):
         return False

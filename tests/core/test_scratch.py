@@ -5,9 +5,10 @@ import shutil
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
-from rail_extract.core.scratch import MARK, MIN_AGE_S, scratch_folder, sweep
+from rail_extract.core.scratch import MARK, MIN_AGE_S, MIN_UNMARKED_AGE_S, scratch_folder, sweep
 
 KILLED = """
 import os, signal, sys
@@ -92,10 +93,14 @@ def test_folders_of_other_computers_and_users_and_other_names_stay(tmp_path, kil
     assert (other / "points").exists()
 
 
-def test_a_folder_without_a_mark_stays(tmp_path, killed):
-    (killed / MARK).unlink()
+@pytest.mark.parametrize("unmark", [Path.unlink, lambda mark: mark.write_text("")])
+def test_a_folder_without_a_mark_stays_for_a_day(tmp_path, killed, unmark):
+    unmark(killed / MARK)
     sweep(tmp_path)
     assert killed.exists()
+    os.utime(killed, (0, killed.stat().st_mtime - MIN_UNMARKED_AGE_S - 1))
+    sweep(tmp_path)
+    assert not killed.exists()
 
 
 def test_a_folder_is_rescued_before_it_is_removed(tmp_path, killed):

@@ -1,0 +1,215 @@
+"""Kill runs while they write: an output is then the old one or the new one, never part of each.
+
+`. build/environment.sh; .venv/bin/python tools/kills.py 50` kills fifty times for each format, at random moments. A run
+writes one version after another, in each of which all features, cells and words state the version, so that it is always
+at work on a file when it is killed. After each kill, the version is read, and the next run must remove what is left.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import re
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from osgeo import gdal, ogr
+from qgis.core import QgsApplication, QgsProcessingContext
+from rail_extract.core.disk import Destination
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.rails import RailLine
+from rail_extract.core.raster import rasterize
+from rail_extract.core.raster_file import header_for
+from rail_extract.core.scratch import MARK, MIN_UNMARKED_AGE_S, PREFIX
+from rail_extract.core.standards import resolve
+from rail_extract.rail_extract_plugin.algorithms.frpdf_cleanup import FrpdfCleanup
+from rail_extract.rail_extract_plugin.algorithms.vectorize_rails import VectorizeRails
+from rail_extract.rail_extract_plugin.writing.layers import RAILS, write_lines, write_raster
+
+MAX_S = 0.3
+"""Longest time from the first complete version to the kill."""
+
+COUNT = 40
+"""Features of a layer."""
+
+FRAME = LocalFrame(np.array([500_000.0, 3_000_000.0, 0.0]), 1.0, 1.0, None)
+
+LEFT_OVER = re.compile(rf"{re.escape(PREFIX)}\w+")
+
+
+def write_layer(path: Path, version: int) -> None:
+    """Write rails whose number and place are the version."""
+    xyz = np.array([[version, 0.0, version], [version, 10.0, version]], dtype=float)
+    rails = [RailLine(xyz, version, 10, version, 1.0, 1.0, 0.0) for _ in range(COUNT)]
+    _write(VectorizeRails(), path, lambda *rest: write_lines(rest[0], "OUTPUT", RAILS, rails, FRAME, *rest[1:]))
+
+
+def read_layer(path: Path) -> set[int]:
+    """Return the versions in a layer: of each feature's number and of its geometry."""
+    dataset = ogr.Open(str(path))
+    layer = dataset.GetLayerByName("rails") or dataset.GetLayer(0)
+    features = list(layer)
+    found = {feature.GetField("rail_id") for feature in features}
+    found |= {round(feature.GetGeometryRef().GetZ(0)) for feature in features}
+    return found if len(features) == COUNT else {-len(features)}
+
+
+def write_table(path: Path, version: int) -> None:
+    """Write rails into a GeoPackage that has a table of other people."""
+    if not path.exists():
+        dataset = ogr.GetDriverByName("GPKG").CreateDataSource(str(path))
+        dataset.CreateLayer("signals", geom_type=ogr.wkbPoint)
+        del dataset
+    write_layer(path, version)
+
+
+def read_table(path: Path) -> set[int]:
+    """Read a layer as `read_layer` does; -1 if the table of other people is gone."""
+    dataset = ogr.Open(str(path))
+    return read_layer(path) if dataset.GetLayerByName("signals") else {-1}
+
+
+def write_cells(path: Path, version: int) -> None:
+    """Write a raster whose cells and gauge are the version."""
+    across = version % 50 * 0.1
+    points = np.column_stack([np.linspace(0, 40, 4000), np.full(4000, across), np.zeros(4000)])
+    standard = resolve("CUSTOM", 1435.0, 72.0)
+    raster = rasterize(points, 0.04)
+    header = header_for([raster], (10 + version % 50,), FRAME, standard)
+    _write(FrpdfCleanup(), path, lambda *rest: write_raster(rest[0], "OUTPUT", header, [raster], *rest[1:]))
+
+
+def read_cells(path: Path) -> set[int]:
+    """Return the versions, modulo 50, of a raster's band and cells."""
+    dataset = gdal.Open(str(path))
+    band = dataset.GetRasterBand(1)
+    rows = np.argwhere(band.ReadAsArray() == 1)[:, 0]
+    _, _, _, top, _, step = dataset.GetGeoTransform()
+    across = {round((top + step * (row + 0.5) - FRAME.origin[1]) * 10) for row in np.unique(rows).tolist()}
+    return {int(band.GetDescription()) - 10} | across
+
+
+def write_page(path: Path, version: int) -> None:
+    """Write a page of 4 MB on which every word is the version."""
+    Destination.at(path).write_text(f"{version} " * 600_000)
+
+
+def read_page(path: Path) -> set[int]:
+    """Return the versions on a page."""
+    words = path.read_text(encoding="utf-8").split()
+    return set(map(int, set(words))) if len(words) == 600_000 else {-len(words)}
+
+
+FORMATS: dict[str, tuple[str, Callable[[Path, int], None], Callable[[Path], set[int]]]] = {
+    **{suffix: (f"rails.{suffix}", write_layer, read_layer) for suffix in ("gpkg", "shp", "geojson", "fgb", "gml")},
+    "gpkg table": ("rails.gpkg", write_table, read_table),
+    "tif": ("rails.tif", write_cells, read_cells),
+    "html": ("rails.html", write_page, read_page),
+}
+"""By format: name of the file, and how a version is written and read."""
+
+
+def _write(algorithm: Any, path: Path, write: Callable[..., Any]) -> None:
+    """Write an output as the algorithm does."""
+    context = QgsProcessingContext()
+    algorithm.initAlgorithm()
+    algorithm.destinations = {"OUTPUT": Destination.at(path)}
+    write(algorithm, {"OUTPUT": str(path)}, context)
+
+
+def kill_once(name: str, folder: Path, first: int, after_s: float) -> str:
+    """Write versions from `first` on in a process of its own, kill it, and return what is there.
+
+    Parameters
+    ----------
+    name : str
+        Key of `FORMATS`.
+    folder : Path
+        Folder of the file, with the version before `first`.
+    first : int
+    after_s : float
+        Seconds from the first write to the kill.
+
+    Returns
+    -------
+    str
+        "whole", "absent until the next run" or what is wrong.
+    """
+    file, write, read = FORMATS[name]
+    reader, writer = os.pipe()
+    process = os.fork()
+    if process == 0:
+        try:
+            os.write(writer, b"x")
+            for version in range(first, first + 10_000):
+                write(folder / file, version)
+        except BaseException as error:
+            print(f"{name}: {error!r}", flush=True)
+        os._exit(1)
+    os.read(reader, 1)
+    time.sleep(after_s)
+    os.kill(process, signal.SIGKILL)
+    os.waitpid(process, 0)
+    os.close(reader), os.close(writer)
+    absent = not (folder / file).exists()
+    before = None if absent else _versions(read, folder / file)
+    for left in folder.iterdir():
+        if LEFT_OVER.fullmatch(left.name):
+            for entry in filter(Path.exists, (left / MARK, left)):
+                os.utime(entry, (0, time.time() - MIN_UNMARKED_AGE_S - 1))
+    Destination.at(folder / "next.txt")
+    left = [one.name for one in folder.iterdir() if LEFT_OVER.fullmatch(one.name)]
+    after = _versions(read, folder / file)
+    if len(after) != 1 or min(after) < 0 or left or (before not in (None, after)):
+        return f"{name}: versions {before} and then {after}, left {left}"
+    if absent:
+        return "absent until the next run" if file.endswith(".shp") else f"{name}: absent"
+    return "whole"
+
+
+def _versions(read: Callable[[Path], set[int]], path: Path) -> set[int]:
+    try:
+        return read(path)
+    except Exception as error:
+        return {-1, hash(repr(error)) % 1000}
+
+
+def kill_often(name: str, times: int, seed: int = 1) -> Counter[str]:
+    """Kill runs that write a format, and count what is there afterwards."""
+    moments, found = random.Random(seed), Counter[str]()
+    file, write, _ = FORMATS[name]
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        write(folder / file, 1)
+        for number in range(times):
+            found[kill_once(name, folder, 2 + number, MAX_S * moments.random())] += 1
+    return found
+
+
+def main() -> None:
+    """Kill, print the counts, and exit with 1 if anything was half."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("times", type=int, nargs="?", default=50, help="kills per format (default: 50)")
+    times = parser.parse_args().times
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    application = QgsApplication([], False)
+    application.initQgis()
+    wrong = False
+    for name in FORMATS:
+        found = kill_often(name, times)
+        print(name, dict(found), flush=True)
+        wrong |= any(outcome not in ("whole", "absent until the next run") for outcome in found)
+    sys.stdout.flush()
+    os._exit(int(wrong))  # QGIS does not end well in a process that has forked
+
+
+if __name__ == "__main__":
+    main()
