@@ -31,6 +31,9 @@ COMPANIONS = (*LOGS, "-shm", ".ovr", ".msk", ".aux.xml")
 SHAPEFILE_COMPANIONS = (".qix", ".sbn", ".sbx", ".cpg", ".prj", ".qpj")
 """Suffixes that replace .shp: indexes, encoding, coordinate system."""
 
+SHAPEFILE_PARTS = (".shx", ".dbf", ".cpg", ".prj", ".qpj")
+"""Suffixes of the files that state what is in a .shp; the others are indexes."""
+
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Errors of a disk without space for more. Libraries that report no number mostly mean these."""
 
@@ -119,7 +122,7 @@ class Destination:
         Parameters
         ----------
         edit : bool
-            Whether to begin with a copy of the old file.
+            Whether to begin with a copy of the old file, or of the files of a shapefile.
 
         Yields
         ------
@@ -138,8 +141,8 @@ class Destination:
                 new = folder / NEW / self.file.name
                 new.parent.mkdir()
                 copied = _state(self.file) if edit else None
-                if edit:
-                    shutil.copyfile(self.file, new)
+                for old in self._parts() if edit else ():
+                    shutil.copyfile(old, new.with_name(old.name))
                 yield new
                 if any(new.parent.iterdir()):
                     self._move_in(folder, copied)
@@ -157,6 +160,11 @@ class Destination:
         """
         with self.replacing() as new:
             new.write_text(text, encoding="utf-8")
+
+    def _parts(self) -> list[Path]:
+        """List the old file, and the other files of which a shapefile consists."""
+        others = SHAPEFILE_PARTS if self.file.suffix.lower() == ".shp" else ()
+        return [self.file, *filter(Path.is_file, (self.file.with_suffix(end) for end in others))]
 
     def _move_in(self, folder: Path, copied: tuple[int, int] | None) -> None:
         """Move the files of a temporary folder to their names, if the old file is still the one that was copied."""

@@ -26,7 +26,7 @@ from ..feedback import QgisProgress
 from ..i18n import tr
 from ..paths import ICONS, PICTURES
 from ..setup.dependencies import explain_missing, missing_packages
-from ..writing.destinations import destinations
+from ..writing.destinations import appends, destinations
 from .sentences import COMMAND_LINE, sentence_for
 
 # Search terms, also in the languages of the larger railways: the toolbox search compares whole words.
@@ -111,7 +111,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         for output in self.destinationParameterDefinitions():
             value = parameters.get(output.name())
             supported, message = self.provider().isSupportedOutputValue(value, output, context)
-            if not supported:
+            if not supported and not appends(value):  # which QGIS compares as if it were a file name
                 return False, f"{message}: choose another one, such as .{output.defaultFileExtension()}."
         self._destinations(parameters, context)
         self._read(parameters, context)

@@ -22,7 +22,7 @@ def rails(name: str = "OUTPUT", optional: bool = False) -> QgsProcessingParamete
     """Define the layer of rails."""
     line = QgsProcessing.SourceType.TypeVectorLine
     return helped(
-        QgsProcessingParameterFeatureSink(name, tr("Rails"), line, optional=optional),
+        _layer(name, tr("Rails"), line, optional=optional),
         tr("Lines along the top of the railheads, with length, support by points and standard error."),
     )
 
@@ -31,7 +31,7 @@ def centerlines(name: str = "OUTPUT", optional: bool = False) -> QgsProcessingPa
     """Define the layer of track centerlines."""
     line = QgsProcessing.SourceType.TypeVectorLine
     return helped(
-        QgsProcessingParameterFeatureSink(name, tr("Track centerlines"), line, optional=optional),
+        _layer(name, tr("Track centerlines"), line, optional=optional),
         tr("Lines midway between the two rails of each track, with gauge and cant."),
     )
 
@@ -40,9 +40,16 @@ def quality(name: str = "OUTPUT") -> QgsProcessingParameterDefinition:
     """Define the layer of points along tracks."""
     point = QgsProcessing.SourceType.TypeVectorPoint
     return helped(
-        QgsProcessingParameterFeatureSink(name, tr("Track geometry"), point, optional=True),
+        _layer(name, tr("Track geometry"), point, optional=True),
         tr("Points along each track with gauge, cant, twist, radius, gradient, standard error and support."),
     )
+
+
+def _layer(name: str, label: str, kind: QgsProcessing.SourceType, optional: bool) -> QgsProcessingParameterFeatureSink:
+    """Define a layer; features may also be added to an existing one."""
+    made = QgsProcessingParameterFeatureSink(name, label, kind, optional=optional)
+    made.setSupportsAppend(True)
+    return made
 
 
 def cleaned() -> QgsProcessingParameterDefinition:

@@ -14,10 +14,14 @@ from qgis.core import (
     QgsProcessingContext,
     QgsProcessingOutputLayerDefinition,
     QgsProperty,
+    QgsProviderRegistry,
+    QgsVectorDataProvider,
+    QgsVectorLayer,
 )
 
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
+from ..systems import prepare_system
 from .databases import check_database
 
 TABLE = "ogr:"
@@ -53,6 +57,8 @@ def destinations(values: Mapping[str, Any], context: QgsProcessingContext) -> di
         check_database(name, _text(value, context))
         path = output_file(value, context)
         if path is not None:
+            if appends(value):
+                _prepare_layer(name, path, table_of(value, context))
             escape = re.search(ESCAPE, str(path)) if path.suffix.lower() == ".gpkg" else None
             if escape:
                 raise RailExtractError(
@@ -63,6 +69,18 @@ def destinations(values: Mapping[str, Any], context: QgsProcessingContext) -> di
             found[name] = files.setdefault(destination.file, destination)
     _check_distinct({name: (found[name].file, table_of(values[name], context)) for name in found})
     return found
+
+
+def _prepare_layer(name: str, path: Path, table: str) -> None:
+    """Check that features can be added to a layer, and build its coordinate system in this thread (see `systems`)."""
+    source = f"{path}|layername={table}" if table else str(path)
+    layer = QgsVectorLayer(source, name, "ogr")
+    if (
+        not layer.dataProvider()
+        or not layer.dataProvider().capabilities() & QgsVectorDataProvider.Capability.AddFeatures
+    ):
+        raise RailExtractError(f"Nothing can be added to {source}: choose another layer for {name}.")
+    prepare_system(layer.crs().toWkt() or None)
 
 
 def _check_distinct(outputs: Mapping[str, tuple[Path, str]]) -> None:
@@ -90,18 +108,32 @@ def _text(value: Any, context: QgsProcessingContext) -> str:
     return value or ""
 
 
+def appends(value: Any) -> bool:
+    """Return whether features are to be added to an existing layer."""
+    return isinstance(value, QgsProcessingOutputLayerDefinition) and value.useRemapping()
+
+
 def output_file(value: Any, context: QgsProcessingContext) -> Path | None:
     """Return the file of a destination; None for memory layers and databases on servers."""
-    text = _text(value, context)
-    path = _uri(text).database() if text.startswith(TABLE) else text
+    path, _ = _file_and_table(value, context)
     is_file = path and path != QgsProcessing.TEMPORARY_OUTPUT and not re.match(r"\w{2,}:", path)
-    return Path(path) if is_file else None
+    return Path(path) if is_file and not (appends(value) and not Path(path).is_file()) else None
 
 
 def table_of(value: Any, context: QgsProcessingContext) -> str:
     """Return the table that a destination names in a file; empty if it is the file itself."""
+    return _file_and_table(value, context)[1]
+
+
+def _file_and_table(value: Any, context: QgsProcessingContext) -> tuple[str, str]:
+    """Return path and table of a destination; an existing layer is named as in QGIS's layer properties."""
     text = _text(value, context)
-    return _uri(text).table() if text.startswith(TABLE) else ""
+    if text.startswith(TABLE):
+        return _uri(text).database(), _uri(text).table()
+    if appends(value):
+        parts = QgsProviderRegistry.instance().decodeUri("ogr", text)
+        return parts.get("path") or text, parts.get("layerName") or ""
+    return text, ""
 
 
 def _uri(text: str) -> QgsDataSourceUri:

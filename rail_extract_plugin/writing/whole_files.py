@@ -18,7 +18,7 @@ from ...core.disk import Destination
 from ...core.errors import RailExtractError
 from ...core.geopackage import tables_in
 from ...core.scratch import scratch_folder
-from .destinations import output_file, table_of
+from .destinations import appends, output_file, table_of
 
 Write = Callable[[Any], tuple[str, int]]
 
@@ -26,7 +26,8 @@ Write = Callable[[Any], tuple[str, int]]
 def write_whole(value: Any, context: QgsProcessingContext, destination: Destination | None, write: Write) -> str:
     """Write a layer in a temporary folder next to its destination, and move its files there when complete.
 
-    The other tables of a GeoPackage stay. Memory layers, and tables in databases on servers, are written directly.
+    The other tables of a GeoPackage stay, and so do the features of a layer to which new ones are added. Memory layers,
+    and tables in databases on servers, are written directly.
 
     Parameters
     ----------
@@ -51,17 +52,28 @@ def write_whole(value: Any, context: QgsProcessingContext, destination: Destinat
     if destination is None:
         return write(value)[0]
     table = table_of(value, context)
-    others = tables_in(destination.file) - {table or destination.file.stem}
-    if not table and not others:
-        with destination.replacing() as new:
+    if table or (not appends(value) and tables_in(destination.file) - {destination.file.stem}):
+        layer_id, name = _write_table(value, destination, table or destination.file.stem, write)
+    else:
+        with destination.replacing(edit=appends(value)) as new:
             layer_id = _write_file(value, new, write)
         name = layer_id.rsplit(new.name, 1)[1]
-    else:
-        name = f"|layername={table or destination.file.stem}"
-        with destination.replacing(edit=bool(others)) as new, scratch_folder(new.parent.parent) as aside:
-            layer_id = _write_file(value, aside / new.name, write)
-            _copy_table(aside / new.name, new, table or destination.file.stem)
     return _renamed(layer_id, f"{destination.path}{name}", context)
+
+
+def _write_table(value: Any, destination: Destination, table: str, write: Write) -> tuple[str, str]:
+    """Write a table of a file that has others; returns the layer's id, and what follows the path in the final one.
+
+    The table is written in a file of its own first: QGIS takes the coordinate system from the first table of a file.
+    """
+    keep = bool(tables_in(destination.file) - {table}) or appends(value)
+    with destination.replacing(edit=keep) as new, scratch_folder(new.parent.parent) as aside:
+        alone = aside / f"{table}{new.suffix}"
+        if appends(value):
+            _copy_table(new, alone, table)
+        layer_id = _write_file(value, alone, write)
+        _copy_table(alone, new, table)
+    return layer_id, f"|layername={table}"
 
 
 def write_each(
@@ -101,24 +113,25 @@ def _explain(failures: Mapping[str, Exception], whole: Sequence[str]) -> str:
     return f"{first} Not written: {', '.join(failures)}. Complete: {', '.join(whole)}."
 
 
-def _redirected(value: Any, path: Path) -> Any:
-    """Return the same destination for another file."""
+def _redirected(value: Any, sink: str) -> Any:
+    """Return the same destination for another file or layer."""
     if not isinstance(value, QgsProcessingOutputLayerDefinition):
-        return str(path)
+        return sink
     other = QgsProcessingOutputLayerDefinition(value)
-    other.sink = QgsProperty.fromValue(str(path))
+    other.sink = QgsProperty.fromValue(sink)
     return other
 
 
 def _write_file(value: Any, file: Path, write: Write) -> str:
-    """Write a layer to a new file and check that it has all its features: GDAL does not report errors on closing."""
+    """Write a layer to another file than its own; returns the layer's id."""
+    before = _count(file)
     try:
-        layer_id, count = write(_redirected(value, file))
+        layer_id, count = write(_redirected(value, str(file)))
     except (RailExtractError, QgsProcessingException) as error:
         # Without the traceback, which would keep the file open: Windows could not delete it.
         raise RailExtractError(str(error).replace(str(file), file.name)) from None
-    found = _count(file)
-    if found < count:
+    found = _count(file) - before
+    if found < count:  # GDAL does not report errors on closing
         raise RailExtractError(
             f"The output can't be written ({found} of {count} features were written): check the free disk space."
         )
@@ -128,14 +141,14 @@ def _write_file(value: Any, file: Path, write: Write) -> str:
 def _count(file: Path) -> int:
     """Count the features of a file, with GDAL: a QGIS layer would build its coordinate system in this thread."""
     try:
-        dataset = gdal.OpenEx(str(file), gdal.OF_VECTOR)
+        dataset = gdal.OpenEx(str(file), gdal.OF_VECTOR) if file.exists() else None
         return dataset.GetLayer(0).GetFeatureCount() if dataset else 0
     except RuntimeError:  # raised by newer GDAL
         return 0
 
 
 def _copy_table(source: Path, target: Path, table: str) -> None:
-    """Copy the only table of a file into another file, in place of the table of this name.
+    """Copy a table of a file into another file, in place of the table of this name.
 
     Raises
     ------
@@ -145,7 +158,7 @@ def _copy_table(source: Path, target: Path, table: str) -> None:
     gdal.ErrorReset()
     mode = "overwrite" if target.exists() else None
     try:
-        options = gdal.VectorTranslateOptions(accessMode=mode, layerName=table)
+        options = gdal.VectorTranslateOptions(accessMode=mode, layers=[table], layerName=table)
         copied = gdal.VectorTranslate(str(target), str(source), options=options)
         del copied  # closes the file
         failed = gdal.GetLastErrorType() >= gdal.CE_Failure

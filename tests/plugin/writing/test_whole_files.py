@@ -5,7 +5,14 @@ import stat
 
 import pytest
 from osgeo import ogr
-from qgis.core import QgsFeature, QgsGeometry, QgsProcessingOutputLayerDefinition, QgsVectorLayer
+from qgis.core import (
+    QgsFeature,
+    QgsGeometry,
+    QgsProcessingOutputLayerDefinition,
+    QgsProperty,
+    QgsRemappingSinkDefinition,
+    QgsVectorLayer,
+)
 
 CENTERLINES = "buildtrackcenterlines"
 
@@ -128,3 +135,57 @@ def test_any_name_of_a_geopackage(build, tmp_path, name):
     found = build(tmp_path / name)
     assert QgsVectorLayer(found, "tracks", "ogr").featureCount() == 1
     assert [file.name for file in tmp_path.iterdir()] == [name]
+
+
+def adding_to(source, crs, sink=None):
+    """A destination to whose layer features are added."""
+    layer = QgsVectorLayer(source, "tracks", "ogr")
+    definition = QgsRemappingSinkDefinition()
+    definition.setSourceCrs(crs)
+    definition.setDestinationCrs(layer.crs())
+    definition.setDestinationFields(layer.fields())
+    definition.setDestinationWkbType(layer.wkbType())
+    names = [field.name() for field in layer.fields() if field.name() != "fid"]
+    definition.setFieldMap({name: QgsProperty.fromField(name) for name in names})
+    value = QgsProcessingOutputLayerDefinition(sink or source)
+    value.setRemappingDefinition(definition)
+    return value
+
+
+@pytest.mark.parametrize("name", ["tracks.gpkg", "it's.gpkg", "tracks.shp", "tracks.geojson"])
+def test_features_can_be_added_to_a_layer(build, rails, tmp_path, name):
+    path = tmp_path / name
+    if name.endswith("gpkg"):
+        others_in(path)
+    first = as_table(path).replace("it's", "it\\'s") if name.endswith("gpkg") else path
+    build(first)
+    before = {file.name for file in tmp_path.iterdir()}
+    source = f"{path}|layername=tracks" if name.endswith("gpkg") else str(path)
+    for count, sink in ((2, source), (3, first if name.endswith("gpkg") else source)):
+        found = build(adding_to(source, rails.crs(), sink))
+        layer = QgsVectorLayer(found, "tracks", "ogr")
+        features = list(layer.getFeatures())
+        assert len(features) == count
+        assert {feature["gauge_mm"] for feature in features} == {1435.0}
+        assert len({feature.geometry().asWkt(4) for feature in features}) == 1
+        assert layer.crs().authid() == "EPSG:32643"
+        del layer
+    assert {file.name for file in tmp_path.iterdir()} == before
+    if name.endswith("gpkg"):
+        assert tables(path) == {"signals": 3, "tracks": 3, "notes": 2}
+
+
+def test_a_layer_that_takes_no_features_is_refused(run_step, rails, tmp_path):
+    path = tmp_path / "tracks.gpkg"
+    others_in(path)
+    value = adding_to(f"{path}|layername=gone", rails.crs())
+    outcome = run_step(CENTERLINES, {"INPUT": rails, "OUTPUT": value})
+    assert not outcome.ok
+    assert "Nothing can be added to" in outcome.error
+
+
+def test_every_layer_can_be_an_existing_one(plugin):
+    outputs = [output for one in plugin.provider.algorithms() for output in one.destinationParameterDefinitions()]
+    layers = [output for output in outputs if output.type() == "sink"]
+    assert len(layers) >= 6
+    assert all(output.supportsAppend() for output in layers)
