@@ -35,3 +35,6 @@ Two rails of 12 m, scanned at 1000 points per metre:
 
 From a file, the points are `read_rail_points("cloud.laz", [10])`.
 """
+
+VERSION = "0.1.0"
+"""Version of the plugin and of the package; a test compares it with `metadata.txt` and `pyproject.toml`."""

@@ -33,9 +33,11 @@ class Field:
     decimals: int = 0
 
     def value(self, known: Any) -> int | float | str | None:
-        """Return what is written for an attribute: rounded numbers, ids separated by commas, None for NaN."""
+        """Return what is written for an attribute: rounded numbers, ids separated by commas, None if unknown."""
+        if known is None:
+            return None
         if self.kind is str:
-            return ",".join(map(str, known))
+            return known if isinstance(known, str) else ",".join(map(str, known))
         if self.kind is int:
             return int(known)
         # Adding zero turns -0.0, which rounding may leave, into 0.0.
@@ -101,3 +103,24 @@ QUALITY_FIELDS = (
     Field("bridged", int, "1 where a rail has no points, or is missing, for most of the step; else 0"),
 )
 """In a `TrackGeometry`, the first is a single value and the others have a value for each station."""
+
+FINDING_FIELDS = (
+    Field(
+        "finding",
+        int,
+        "number of the finding, from 1 for the one that may do most harm: whose possible error, times its length, is "
+        "largest",
+    ),
+    Field("reason", str, "why to look there"),
+    Field("track_id", int, "number of the track; empty for a lone rail"),
+    Field("rail_id", int, "number of the lone rail; else empty"),
+    Field("from_m", float, "chainage at which the section begins, along the track or the lone rail, metres", 1),
+    Field("to_m", float, "chainage at which it ends, metres", 1),
+    Field("doubt_m", float, "length in doubt within the section, metres", 1),
+    Field("worst_m", float, "chainage of the worst place, metres", 1),
+    Field("gauge_mm", float, "gauge there, millimetres", 1),
+    Field("cant_mm", float, "cant there, millimetres", 1),
+    Field("sigma_mm", float, "standard error there, millimetres", 2),
+    Field("points", int, "points on the rails of the section"),
+    Field("review", str, "decision of the user: accepted or rejected; empty before"),
+)

@@ -43,7 +43,7 @@ TOLD_BY_RASTER = {(step, name) for step in ("cleaned", "rails") for name in ("GA
 RESULTS = {
     "rails": {"RAILS": "OUTPUT"},
     "centerlines": {"CENTERLINES": "OUTPUT", "PAIRED_RAILS": "RAILS"},
-    "quality": {"QUALITY": "OUTPUT"},
+    "quality": {"QUALITY": "OUTPUT", "FINDINGS": "FINDINGS", "REPORT": "REPORT"},
 }
 """Results of the model by step, and the output of the step that each is; rails know their tracks once paired."""
 

@@ -19,7 +19,7 @@ from qgis.core import (  # noqa: E402
     QgsProcessingParameterNumber,
     QgsProcessingProvider,
 )
-from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS, Field  # noqa: E402
+from rail_extract.core.fields import CENTERLINE_FIELDS, FINDING_FIELDS, QUALITY_FIELDS, RAIL_FIELDS, Field  # noqa: E402
 from rail_extract.core.standards import CUSTOM, STANDARDS, UNCONFIRMED  # noqa: E402
 from rail_extract.rail_extract_plugin.algorithms import ALGORITHMS  # noqa: E402
 from rail_extract.rail_extract_plugin.dialog.definitions import UNBOUNDED  # noqa: E402
@@ -34,7 +34,12 @@ parameters with pictures.
 `python tools/reference.py` writes this page from the code, and a test checks that it is up to date.
 """
 
-LAYERS = {"Rails": RAIL_FIELDS, "Centerlines": CENTERLINE_FIELDS, "Track geometry": QUALITY_FIELDS}
+LAYERS = {
+    "Rails": RAIL_FIELDS,
+    "Centerlines": CENTERLINE_FIELDS,
+    "Track geometry": QUALITY_FIELDS,
+    "Findings": FINDING_FIELDS,
+}
 
 
 def page(provider: QgsProcessingProvider) -> str:

@@ -15,7 +15,7 @@ from pathlib import Path
 from ..clouds.points import ask
 from ..disk import Destination, writing
 from ..errors import ParameterError, RailExtractError
-from ..fields import CENTERLINE_FIELDS, RAIL_FIELDS
+from ..fields import CENTERLINE_FIELDS, FINDING_FIELDS, RAIL_FIELDS
 from ..frpdf import DEVICES, ENGINES
 from ..frpdf.models import choose
 from ..parameters import DEFAULT_STEP_M, Parameters
@@ -23,7 +23,7 @@ from ..pipeline import extract_files
 from ..progress import Estimating, Progress
 from ..rails import RailNetwork
 from ..raster_file import header_for, on_one_grid
-from ..report import Origin
+from ..report import Origin, list_findings
 from ..scratch import scratch_folder
 from ..standards import SEARCHED_CLASSES, RailStandard, resolve
 from .options import Console, add_cloud_arguments, extent_of, gauges_of, numbers_in
@@ -38,6 +38,7 @@ SUFFIXES = {
     "rails": (".gpkg",),
     "centerlines": (".gpkg",),
     "quality": (".gpkg",),
+    "findings": (".gpkg",),
     "cleaned": (".tif", ".tiff"),
     "report": (".html", ".htm"),
 }
@@ -75,6 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     output.add_argument("--rails", type=Path, required=True, help="GeoPackage for the rails")
     output.add_argument("--centerlines", type=Path, help="GeoPackage for the track centerlines")
     output.add_argument("--quality", type=Path, help="GeoPackage for the points with the track geometry")
+    output.add_argument("--findings", type=Path, help="GeoPackage for the places to look at")
     output.add_argument("--cleaned", type=Path, help="GeoTIFF for the rail raster as the network cleaned it")
     output.add_argument("--report", type=Path, help="HTML file for the report")
     cloud = parser.add_argument_group("point cloud and rails")
@@ -90,7 +92,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         unit = "degrees" if field.name.endswith("_deg") else "metres"
         text = f"{_option(field.name)[2:].replace('-', '_').upper()} in {unit} (default: {field.default:g})"
         method.add_argument(_option(field.name), type=float, default=field.default, metavar="N", help=text)
-    text = f"STEP of --quality and --report in metres (default: {DEFAULT_STEP_M:g})"
+    text = f"STEP of --quality, --findings and --report in metres (default: {DEFAULT_STEP_M:g})"
     method.add_argument("--step", type=float, default=DEFAULT_STEP_M, metavar="N", help=text)
     run = parser.add_argument_group("workers")
     text = "use the Dask cluster at tls://HOST:PORT and not local workers; see docs/scaling.md on trust"
@@ -165,7 +167,7 @@ def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameter
         args.engine,
         args.device,
         other_gauges_m=gauges_m[1:],
-        quality_step_m=args.step if args.quality or args.report else None,
+        quality_step_m=args.step if args.quality or args.findings or args.report else None,
         square_tiles=args.square_tiles,
         keep_cleaned=args.cleaned is not None,
         **numbers,
@@ -269,12 +271,15 @@ def _write(
         layers.append(lines_layer("centerlines", outputs["centerlines"], CENTERLINE_FIELDS, network.centerlines))
     if "quality" in outputs:
         layers.append(stations_layer("quality", outputs["quality"], network.geometry))
+    if "findings" in outputs:
+        found = list_findings(network, (standard.gauge_m, *parameters.other_gauges_m))
+        layers.append(lines_layer("findings", outputs["findings"], FINDING_FIELDS, found))
     of_files = {
         layer.destination.file: [one for one in layers if one.destination is layer.destination] for layer in layers
     }
     writers: list[Callable[[], None]] = [partial(write_layers, same, network.frame) for same in of_files.values()]
     if "report" in outputs:
-        origin = Origin(tuple(args.tiles), standard, parameters.other_gauges_m, args.command_line)
+        origin = Origin(tuple(args.tiles), standard, parameters.other_gauges_m, args.command_line, parameters)
         writers.append(lambda: outputs["report"].write_text(origin.report(network)))
     if "cleaned" in outputs and any(raster.tiles for raster in network.cleaned):
         writers.append(lambda: _write_cleaned(network, outputs["cleaned"], standard, extent))

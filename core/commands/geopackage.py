@@ -16,6 +16,7 @@ from ..fields import QUALITY_FIELDS, UNKNOWN_IN_METRES, Field
 from ..frame import LocalFrame
 from ..geopackage import tables_in
 from ..rails import Centerline, RailLine, TrackGeometry
+from ..report import Finding
 
 KINDS = {int: np.int32, float: float, str: object}
 
@@ -47,7 +48,10 @@ class Layer:
 
 
 def lines_layer(
-    name: str, destination: Destination, fields: Sequence[Field], lines: Sequence[RailLine] | Sequence[Centerline]
+    name: str,
+    destination: Destination,
+    fields: Sequence[Field],
+    lines: Sequence[RailLine] | Sequence[Centerline] | Sequence[Finding],
 ) -> Layer:
     """Make a layer of lines.
 
@@ -56,7 +60,7 @@ def lines_layer(
     name : str
     destination : Destination
     fields : sequence of Field
-    lines : sequence of RailLine or Centerline
+    lines : sequence of RailLine, Centerline or Finding
     """
     columns = [[getattr(line, field.name) for line in lines] for field in fields]
     return Layer(name, destination, fields, columns, "LineString Z", [line.xyz for line in lines])
@@ -104,6 +108,7 @@ def write_layers(layers: Sequence[Layer], frame: LocalFrame) -> None:
 
 def _write_layer(layer: Layer, frame: LocalFrame, file: Path) -> None:
     """Write a layer, in place of the one of this name that the file has."""
+    columns = [_column(field, values) for field, values in zip(layer.fields, layer.columns)]
     try:
         pyogrio.raw.write(
             str(file),
@@ -111,7 +116,8 @@ def _write_layer(layer: Layer, frame: LocalFrame, file: Path) -> None:
             driver="GPKG",
             geometry=_geometry(layer, frame),
             geometry_type=layer.geometry_type,
-            field_data=[_column(field, values) for field, values in zip(layer.fields, layer.columns)],
+            field_data=[column for column, _ in columns],
+            field_mask=[empty for _, empty in columns],
             fields=[field.name for field in layer.fields],
             crs=frame.crs_wkt or UNKNOWN_IN_METRES,
             nan_as_null=True,
@@ -127,6 +133,9 @@ def _geometry(layer: Layer, frame: LocalFrame) -> np.ndarray:
     return np.array([shapely.to_wkb(shape, output_dimension=3) for shape in shapes], dtype=object)
 
 
-def _column(field: Field, values: Sequence[Any]) -> np.ndarray:
-    """Values of a field as they are written, (n,)."""
-    return np.array([field.value(value) for value in values], dtype=KINDS[field.kind])
+def _column(field: Field, values: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Values of a field as they are written, and where there are none, (n,) each."""
+    written = [field.value(value) for value in values]
+    empty = np.array([value is None for value in written], dtype=bool)
+    filler = 0 if field.kind is int else None
+    return np.array([filler if value is None else value for value in written], dtype=KINDS[field.kind]), empty

@@ -1,6 +1,7 @@
 """The report: a page that shows at a glance whether a result is good, and where it is not."""
 
+from .listing import Finding, list_findings
 from .origin import Origin
 from .page import build_page
 
-__all__ = ["Origin", "build_page"]
+__all__ = ["Finding", "Origin", "build_page", "list_findings"]

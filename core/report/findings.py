@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..polyline import interpolate, length_along, project
-from ..rails import Centerline, HeadWidths, RailNetwork, TrackGeometry, cell_borders
+from ..rails import Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry, cell_borders
 
 GAUGE_OFF_MM = 10.0
 """Plain track is not left in service with a larger deviation from its gauge. Curves of less than 200 m radius are
@@ -117,11 +117,21 @@ class TrackFindings:
 
 @dataclass(frozen=True)
 class Hole:
-    """A section without rails between two tracks that are likely one: their numbers, and its length in metres."""
+    """A section without rails between two tracks that are likely one.
+
+    Attributes
+    ----------
+    first, second : int
+        Numbers of the tracks.
+    length_m : float
+    ends : (2, 3) array
+        Ends of the tracks, local metres.
+    """
 
     first: int
     second: int
     length_m: float
+    ends: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -131,21 +141,25 @@ class Findings:
     Attributes
     ----------
     tracks : tuple of TrackFindings
-    lonely_rails : int
-        Number of rails that belong to no track.
-    lonely_m, rails_m : float
-        Length of these, and of all rails.
+    lonely : tuple of RailLine
+        Rails that belong to no track.
+    rails_m : float
+        Length of all rails.
     holes : tuple of Hole
     heads : HeadWidths or None
         Width of the heads; only if another one is stated.
     """
 
     tracks: tuple[TrackFindings, ...]
-    lonely_rails: int
-    lonely_m: float
+    lonely: tuple[RailLine, ...] = ()
     rails_m: float = 0.0
     holes: tuple[Hole, ...] = ()
     heads: HeadWidths | None = None
+
+    @property
+    def lonely_m(self) -> float:
+        """Length of the rails that belong to no track."""
+        return float(sum(rail.length_m for rail in self.lonely))
 
     @property
     def silent_share(self) -> float:
@@ -188,23 +202,29 @@ def examine(network: RailNetwork, gauges_m: Sequence[float]) -> Findings:
     """
     geometry = {track.track_id: track for track in network.geometry}
     tracks = tuple(_examine_track(line, geometry[line.track_id], gauges_m) for line in network.centerlines)
-    paired = {rail_id for line in network.centerlines for rail_id in (*line.left_ids, *line.right_ids)}
-    lonely = [rail.length_m for rail in network.rails if rail.rail_id not in paired]
     heads = network.heads
     return Findings(
         tracks,
-        len(lonely),
-        float(sum(lonely)),
+        _lonely(network),
         float(sum(rail.length_m for rail in network.rails)),
         tuple(_holes(network.centerlines)),
         heads if heads is not None and heads.differ else None,
     )
 
 
+def _lonely(network: RailNetwork) -> tuple[RailLine, ...]:
+    """Return the rails that belong to no track; none if a track does not name its rails, as one drawn by hand."""
+    named = [(*line.left_ids, *line.right_ids) for line in network.centerlines]
+    if not all(named):
+        return ()
+    paired = {rail_id for ids in named for rail_id in ids}
+    return tuple(rail for rail in network.rails if rail.rail_id not in paired)
+
+
 def _holes(lines: Sequence[Centerline]) -> Iterator[Hole]:
     """Find ends of tracks that lead to each other on an arc, the nearest first; each end leads to one other."""
     ends = [
-        (number, end[0, :2], _outward(end))
+        (number, end[0], _outward(end))
         for number, line in enumerate(lines)
         for end in (line.xyz, line.xyz[::-1])
         if not _is_met(end[0, :2], number, lines)
@@ -212,7 +232,7 @@ def _holes(lines: Sequence[Centerline]) -> Iterator[Hole]:
     found = []
     for one, (first, place, outward) in enumerate(ends):
         for other, (second, target, back) in enumerate(ends[:one]):
-            way = target - place
+            way = (target - place)[:2]
             length_m = float(np.hypot(*way))
             if first == second or not 0 < length_m <= MAX_HOLE_M:
                 continue
@@ -224,8 +244,9 @@ def _holes(lines: Sequence[Centerline]) -> Iterator[Hole]:
     for length_m, one, other in sorted(found):
         if one not in used and other not in used:
             used |= {one, other}
-            first, second = sorted((lines[ends[one][0]].track_id, lines[ends[other][0]].track_id))
-            yield Hole(first, second, length_m)
+            met = sorted((lines[ends[end][0]].track_id, end) for end in (one, other))
+            (first, _), (second, _) = met
+            yield Hole(first, second, length_m, np.stack([ends[end][1] for _, end in met]))
 
 
 def _outward(end: np.ndarray) -> np.ndarray:

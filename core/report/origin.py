@@ -1,14 +1,23 @@
-"""The origin of a result, for its report: cloud, rails and the command that repeats the run."""
+"""The origin of a result, for its report: cloud, rails, parameters, and the command that repeats the run."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
+from datetime import datetime
 from pathlib import Path
 
+from .. import VERSION
 from ..clouds.crs import parse_crs
+from ..parameters import Parameters
 from ..rails import RailNetwork
 from ..standards import RailStandard
 from .page import build_page
+
+STATED_APART = ("gauge_m", "head_width_m", "other_gauges_m", "engine", "device", "keep_cleaned")
+"""Parameters that the report states elsewhere, or that change no line."""
+
+INTERFACE = {"passes": "iterations", "quality_step": "step"}
+"""Names of parameters in QGIS where they differ."""
 
 
 @dataclass(frozen=True)
@@ -23,26 +32,52 @@ class Origin:
     other_gauges_m : tuple of float
     command : str
         Repeats the run.
+    parameters : Parameters or None
+        None if the lines come from another run.
+    time : datetime
+        Of the report, in the time zone of this computer.
     """
 
     paths: tuple[Path, ...]
     standard: RailStandard
     other_gauges_m: tuple[float, ...]
     command: str
+    parameters: Parameters | None = None
+    time: datetime = field(default_factory=datetime.now)
+
+    @property
+    def gauges_m(self) -> tuple[float, ...]:
+        """Gauges that tracks may have."""
+        return self.standard.gauge_m, *self.other_gauges_m
 
     def report(self, network: RailNetwork) -> str:
         """Build the report on a network with its track geometry, an HTML document."""
-        gauges_m = (self.standard.gauge_m, *self.other_gauges_m)
         first, *more = (path.resolve().name for path in self.paths)
         source = f"{first} and {len(more)} more" if more else first
         facts = {
+            "Date": f"{self.time:%Y-%m-%d %H:%M}",
+            "Version": f"Rail Extract {VERSION}",
             "Rail": self.standard.label,
-            "Gauge": ", ".join(f"{1000 * gauge_m:g} mm" for gauge_m in gauges_m),
+            "Gauge": ", ".join(f"{1000 * gauge_m:g} mm" for gauge_m in self.gauges_m),
             "Railhead width": f"{1000 * self.standard.head_width_m:g} mm",
             "Coordinate system": _title(network.frame.crs_wkt),
+            "Parameters": _stated(self.parameters) if self.parameters else "",
             "Command": self.command,
         }
-        return build_page(network, gauges_m, source, facts)
+        return build_page(network, self.gauges_m, source, facts)
+
+
+def _stated(parameters: Parameters) -> str:
+    """Write parameters under their names in QGIS, with units."""
+    stated = []
+    for one in fields(Parameters):
+        value = getattr(parameters, one.name)
+        if one.name in STATED_APART or value is None:
+            continue
+        name, _, unit = one.name.rpartition("_")
+        named, unit = {"m": (name, " m"), "deg": (name, "°")}.get(unit, (one.name, ""))
+        stated.append(f"{INTERFACE.get(named, named).upper()} {value:g}{unit}")
+    return ", ".join(stated)
 
 
 def _title(crs_wkt: str | None) -> str:

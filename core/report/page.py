@@ -19,13 +19,11 @@ from .findings import (
     TrackFindings,
     examine,
 )
+from .listing import Finding, listed
 from .markup import metres, table, tag, text
 from .plan import draw_plan
 from .plots import draw_profiles
 from .style import STYLE
-
-MAX_PLACES = 5
-"""Places listed for each reason; the pictures show all."""
 
 VERDICTS = (
     (0.0, "good", "Good throughout: every metre is supported by points, at gauge, with a small standard error."),
@@ -34,6 +32,14 @@ VERDICTS = (
     (np.inf, "poor", "Poor: large parts are in doubt. Check classes, gauge, railhead width and the cloud's density."),
 )
 """Share of the length in doubt up to which a verdict applies, CSS class of the verdict, and its words."""
+
+ADVICE = (
+    "Rail classes: choose the class that the rails of this cloud have, or CLASSIFY if they have none.",
+    "Rail standard: with DETECT, gauge and railhead width are measured in the points.",
+    "Density: points must be at most a few centimetres apart along the head; in clouds from aircraft they seldom are.",
+    "Extent and shortest line: the extent must contain rails that are longer than MIN_LENGTH.",
+)
+"""What to try if no track was found."""
 
 NOTES = (
     "A rail line is the top of the railhead, on the axis of the railhead. Gauge is the 3D distance between the two "
@@ -74,7 +80,7 @@ def build_page(
         tag("p", text(source), class_="source"),
         _verdict(findings, len(network.rails), network.warnings),
         _tiles(network, findings),
-        *([_map(findings), _places(findings), _tracks(findings)] if findings.tracks else []),
+        *([_map(findings), _findings(findings), _tracks(findings)] if findings.tracks else []),
         *(_profiles(track, height) for track, height in zip(findings.tracks, heights)),
         _facts({**(facts or {}), "Engine": network.engine}),
     ]
@@ -98,16 +104,24 @@ def verdict(findings: Findings) -> tuple[str, str]:
 def _verdict(findings: Findings, rail_count: int, warnings: Sequence[str]) -> str:
     """Write the verdict, the reasons for doubt, and what the user was warned of."""
     if not findings.tracks:
-        words = f"No track was found. There are {rail_count} rails, but no two of them are parallel at a gauge."
-        return tag("div", tag("strong", text(words)), *_listed(warnings), class_="verdict poor")
+        words = f"{_without_track(rail_count)} What to try:"
+        return tag("div", tag("strong", text(words)), *_listed([*warnings, *ADVICE]), class_="verdict poor")
     kind, headline = verdict(findings)
-    if findings.lonely_rails:
-        count = findings.lonely_rails
+    if findings.lonely:
+        count = len(findings.lonely)
         belong = "1 rail does not belong" if count == 1 else f"{count} rails do not belong"
         headline += f" {belong} to a track ({metres(findings.lonely_m)})."
     reasons = [_reason(findings, doubt) for doubt in DOUBTS if findings.length_of(doubt) > 0]
     listed = _listed([*reasons, *_hole_reasons(findings), *warnings])
     return tag("div", tag("strong", text(headline)), *listed, class_=f"verdict {kind}")
+
+
+def _without_track(rail_count: int) -> str:
+    """Say that no track was found, and how many rails."""
+    if not rail_count:
+        return "No rail was found."
+    rails = "There is 1 rail" if rail_count == 1 else f"There are {rail_count} rails"
+    return f"No track was found. {rails}, but no two rails are parallel at the gauge."
 
 
 def _listed(sentences: Sequence[str]) -> list[str]:
@@ -126,8 +140,8 @@ def _reason(findings: Findings, doubt: Doubt) -> str:
     """Write how much is in doubt for a reason, and where the longest place is."""
     length_m, place = findings.length_of(doubt), next(one for one in findings.places() if one.doubt == doubt)
     share = f"{metres(length_m)} of {metres(findings.length_m)} ({100 * length_m / findings.length_m:.1f} %)"
-    where = f"track {place.track_id}, {place.start_m:,.0f} to {place.end_m:,.0f} m"
-    return f"{share}: {doubt.label}. Longest: {where}."
+    where = f"track {place.track_id} between {place.start_m:,.0f} and {place.end_m:,.0f} m"
+    return f"{share}: {doubt.label}. Longest: {metres(place.length_m)} of {where}."
 
 
 def _tiles(network: RailNetwork, findings: Findings) -> str:
@@ -165,25 +179,48 @@ def _legend(*more: str) -> str:
     return tag("div", *keys, *more, class_="legend")
 
 
-def _places(findings: Findings) -> str:
-    """Write the list of places to look at."""
-    places = findings.places()
-    if not places:
+def _findings(findings: Findings) -> str:
+    """Write the list of places to look at, which the layer FINDINGS has as well."""
+    found = listed(findings)
+    if not found:
         return ""
-    rows = [
-        (place.track_id, f"{place.start_m:,.1f} to {place.end_m:,.1f} m", metres(place.length_m), place.doubt.label)
-        for doubt in DOUBTS
-        for place in [one for one in places if one.doubt == doubt][:MAX_PLACES]
-    ]
-    listed = tag("div", table(("Track", "Chainage", "In doubt", "Why"), rows), class_="scroll")
-    more = len(places) - len(rows)
-    rest = [tag("p", text(f"{more} more places are marked in the profiles below."), class_="notes")] if more else []
-    return _section("Where to look", listed.replace("<table>", '<table class="words">'), *rest)
+    headings = ("Finding", "Where", "Chainage", "In doubt", "Worst at", "Gauge", "Standard error", "Why")
+    written = tag("div", table(headings, map(_finding, found)), class_="scroll tall")
+    note = "The first findings may do most harm: they are in the order of possible error times length."
+    return _section("Where to look", written.replace("<table>", '<table class="words">'), _note(note))
+
+
+def _finding(finding: Finding) -> tuple[object, ...]:
+    where = f"track {finding.track_id}" if finding.rail_id is None else f"rail {finding.rail_id}"
+    return (
+        finding.finding,
+        where,
+        f"{finding.from_m:,.1f} to {finding.to_m:,.1f} m" if np.isfinite(finding.from_m) else "",
+        metres(finding.doubt_m),
+        _figure(finding.worst_m, "m"),
+        _figure(finding.gauge_mm, "mm"),
+        _figure(finding.sigma_mm, "mm"),
+        finding.reason,
+    )
+
+
+def _figure(value: float, unit: str) -> str:
+    return f"{value:,.1f} {unit}" if np.isfinite(value) else ""
 
 
 def _tracks(findings: Findings) -> str:
     """Write the table of tracks."""
-    headings = ("Track", "Length", "Gauge", "Cant", "Tightest radius", "Gradient", "Standard error", "No points")
+    headings = (
+        "Track",
+        "Length",
+        "Gauge",
+        "Cant",
+        "Twist",
+        "Tightest radius",
+        "Gradient",
+        "Standard error",
+        "No points",
+    )
     rows = [_row(track) for track in findings.tracks]
     return _section("Tracks", tag("div", table(headings, rows), class_="scroll"))
 
@@ -195,6 +232,7 @@ def _row(track: TrackFindings) -> tuple[str, ...]:
         metres(track.length_m),
         f"{line.gauge_mm:.1f} ± {line.gaugesd_mm:.1f} mm",
         _span(geometry.cant_mm, "mm"),
+        _span(geometry.twist_mm, "mm"),
         _tightest(geometry.radius_m),
         _span(geometry.grade_pm, "‰"),
         _median(geometry.sigma_mm),
@@ -227,7 +265,11 @@ def _profiles(track: TrackFindings, height_m: np.ndarray) -> str:
 
 def _facts(facts: Mapping[str, str]) -> str:
     listed = "".join(tag("dt", text(name)) + tag("dd", text(value)) for name, value in facts.items() if value)
-    return _section("How it was made", tag("dl", listed), *(tag("p", text(note), class_="notes") for note in NOTES))
+    return _section("How it was made", tag("dl", listed), *map(_note, NOTES))
+
+
+def _note(sentence: str) -> str:
+    return tag("p", text(sentence), class_="notes")
 
 
 def _section(heading: str, *content: str) -> str:

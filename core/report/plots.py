@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..tracks.geometry import TWIST_BASE_M
 from .findings import DOUBTS, GAUGE_OFF_MM, TrackFindings
 from .markup import tag, text
 
@@ -60,7 +61,7 @@ class Panel:
 
 
 def draw_profiles(track: TrackFindings, height_m: np.ndarray) -> str:
-    """Return the profiles of height, gauge, cant, curvature and standard error of a track as SVG.
+    """Return the profiles of height, gauge, cant, twist, curvature and standard error of a track as SVG.
 
     Parameters
     ----------
@@ -116,6 +117,7 @@ def _panels(track: TrackFindings, height_m: np.ndarray) -> list[Panel]:
         Panel("Height", "m", height_m, 0.2),
         Panel(f"Gauge, nominal {gauge:g}", "mm", geometry.gauge_mm, 20, (gauge - GAUGE_OFF_MM, gauge + GAUGE_OFF_MM)),
         Panel("Cant, left minus right", "mm", geometry.cant_mm, 20),
+        Panel(f"Twist over {TWIST_BASE_M:g} m", "mm", geometry.twist_mm, 6),
         Panel("Curvature, positive to the left", "1/km", curvature, 0.4),
         Panel("Standard error", "mm", geometry.sigma_mm, 4, floor=0.0),
     ]

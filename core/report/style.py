@@ -23,6 +23,8 @@ section, .verdict { background: var(--paper); border: 1px solid var(--line); bor
 .tile b { display: block; font-size: 23px; line-height: 1.25; font-variant-numeric: tabular-nums; }
 .tile span { color: var(--soft); font-size: 13px; }
 .scroll { overflow-x: auto; }
+.tall { max-height: 420px; overflow-y: auto; }
+.tall th { position: sticky; top: 0; background: var(--paper); }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; font-size: 14px; }
 th, td { padding: 5px 10px; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
 th { color: var(--soft); font-weight: 600; }
@@ -62,5 +64,6 @@ i.band { background: #e3f2e8; border: 1px solid #b9ddc6; height: 10px; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: 2px 18px; margin: 0 0 12px; font-size: 14px; }
 dt { color: var(--soft); }
 dd { margin: 0; overflow-wrap: anywhere; }
-@media print { body { background: none; } section, .verdict, .tile { break-inside: avoid; } }
+@media print { body { background: none; } .tall { max-height: none; }
+              section, .verdict, .tile { break-inside: avoid; } }
 """

@@ -20,6 +20,7 @@ from ..systems import system
 from ..writing.destinations import is_wanted
 from ..writing.layers import (
     CENTERLINES,
+    FINDINGS,
     RAILS,
     figures_of,
     figures_of_stations,
@@ -64,9 +65,10 @@ class ExtractRails(RailAlgorithm):
         "distance between the two rail lines minus the railhead width; it is not measured 14 mm below the top. Left "
         "and right are as seen along the line, and cant is left minus right.\n\n"
         "The report assesses the result in words and plots and shows where it is weak. The field sigma_mm is the "
-        "standard error of a line's lateral position, and bridged_m the length without points. Track geometry is a "
+        "standard error of a line's lateral position, and bridged_m the length without points. Findings are the places "
+        "to look at, the most harmful first. Track geometry is a "
         "layer of points along each track with gauge, cant, twist, radius and gradient. STATION_COUNT, SIGMA and "
-        "BRIDGED_LENGTH summarize the track geometry, measured for this layer or for the report."
+        "BRIDGED_LENGTH summarize the track geometry, measured for this layer, for the findings or for the report."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
@@ -84,9 +86,11 @@ class ExtractRails(RailAlgorithm):
             self.addParameter(definition)
         for destination in (outputs.rails("RAILS", optional=True), outputs.centerlines("CENTERLINES", optional=True)):
             self.addParameter(destination)
-        for extra in (outputs.quality("QUALITY"), outputs.cleaned()):
+        quality, cleaned = outputs.quality("QUALITY"), outputs.cleaned()
+        for extra in (quality, cleaned):
             extra.setCreateByDefault(False)
-            self.addParameter(extra)
+        for destination in (quality, outputs.findings(), cleaned):
+            self.addParameter(destination)
         self._add_report(outputs.report())
         figures = (*outputs.rail_figures(), *outputs.centerline_figures(), *outputs.quality_figures())
         for output in (*figures, outputs.engine()):
@@ -124,7 +128,7 @@ class ExtractRails(RailAlgorithm):
     ) -> dict[str, Any]:
         """Extract the rails and tracks, then write the outputs."""
         from ...core.pipeline import extract_files
-        from ...core.report import Origin
+        from ...core.report import Origin, list_findings
         from ...core.tasks import InTurn
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
@@ -132,12 +136,12 @@ class ExtractRails(RailAlgorithm):
         if values.detects():
             job = self._detected(job, request, values, progress)
         settings = values.settings(job.standard, job.other_gauges_m)
-        quality, report, cleaned = (
-            is_wanted(parameters.get(name), context) for name in ("QUALITY", "REPORT", "CLEANED")
+        quality, findings, report, cleaned = (
+            is_wanted(parameters.get(name), context) for name in ("QUALITY", "FINDINGS", "REPORT", "CLEANED")
         )
         settings = replace(
             settings,
-            quality_step_m=values.number("STEP") if quality or report else None,
+            quality_step_m=values.number("STEP") if quality or findings or report else None,
             keep_cleaned=cleaned,
         )
         with points_folder() as folder:
@@ -145,13 +149,15 @@ class ExtractRails(RailAlgorithm):
         progress.check()
         for failure in network.failures:
             progress.warning(failure)
-        origin = Origin(job.cloud.paths, job.standard, job.other_gauges_m, job.command)
+        origin = Origin(job.cloud.paths, job.standard, job.other_gauges_m, job.command, settings)
+        found = list_findings(network, origin.gauges_m) if findings else ()
         frame, rest = network.frame, (parameters, context)
         writers = {
             "CLEANED": lambda: self._write_cleaned(job, network, *rest),
             "RAILS": lambda: write_lines(self, "RAILS", RAILS, network.rails, frame, *rest),
             "CENTERLINES": lambda: write_lines(self, "CENTERLINES", CENTERLINES, network.centerlines, frame, *rest),
             "QUALITY": lambda: write_stations(self, "QUALITY", network.geometry, frame, *rest),
+            "FINDINGS": lambda: write_lines(self, "FINDINGS", FINDINGS, found, frame, *rest),
             "REPORT": lambda: write_report(self, "REPORT", network, origin, *rest),
         }
         written = write_each(writers, parameters, context)

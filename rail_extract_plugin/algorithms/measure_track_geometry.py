@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsProcessingContext
 
 from ...core.fields import QUALITY_FIELDS
-from ...core.progress import Progress
+from ...core.progress import Progress, Recording
+from ...core.standards import CUSTOM, RailStandard, resolve
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
+from ..dialog.passwords import masked
 from ..reading.clouds import CloudSource, points_folder
-from ..writing.layers import figures_of_stations, write_stations
+from ..writing.destinations import is_wanted
+from ..writing.layers import FINDINGS, figures_of_stations, write_lines, write_stations
+from ..writing.reports import write_report
+from ..writing.whole_files import write_each
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
+
+if TYPE_CHECKING:
+    from ...core.rails import TrackGeometry
 
 READING, MEASURING = 0.3, 0.9
 """Fractions of the progress bar at which lines and cloud are read, and at which the rails are measured."""
@@ -25,7 +35,11 @@ class Job:
     """The values of the parameters."""
 
     head_width_m: float
+    standard: RailStandard | None
+    """None if no gauge is stated."""
+    other_gauges_m: tuple[float, ...]
     cloud: CloudSource | None
+    command: str
 
 
 class MeasureTrackGeometry(RailAlgorithm):
@@ -44,14 +58,20 @@ class MeasureTrackGeometry(RailAlgorithm):
             "With a point cloud, heights are measured again and smoothed over 1 m only, and sigma_mm, points and "
             "bridged apply to each station. Without one, the heights are those of the rails, each rail's sigma_mm and "
             "points are taken as uniform along it, and bridged is 1 only where a rail is missing.",
+            "The findings and the report compare the gauge with that of the standard, with Gauge and with Other "
+            "gauges, whichever is nearest.",
         )
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs in the order of the interface."""
         layers = (inputs.centerlines(), inputs.rails_of_tracks(), inputs.points_of_rails())
-        for definition in (*layers, groups.step(), *groups.head(), outputs.quality()):
+        settings = (groups.step(), *groups.head(), groups.other_gauges())
+        findings = outputs.findings()
+        findings.setCreateByDefault(False)
+        for definition in (*layers, *settings, outputs.quality(), findings):
             self.addParameter(definition)
+        self._add_report(outputs.report())
         for output in outputs.quality_figures():
             self.addOutput(output)
 
@@ -60,18 +80,30 @@ class MeasureTrackGeometry(RailAlgorithm):
         values = ParameterValues(self, parameters, context)
         for name in ("INPUT", "RAILS"):
             values.lines(name)
-        return Job(values.head_width_m(), values.cloud("POINTS") if values.filled("POINTS") else None)
+        head_width_m = values.head_width_m()
+        gauge_mm, head_width_mm = values.optional_number("GAUGE"), values.optional_number("HEAD_WIDTH")
+        unstated = gauge_mm is None and values.choice("STANDARD") == CUSTOM
+        standard = None if unstated else resolve(values.choice("STANDARD"), gauge_mm, head_width_mm)
+        return Job(
+            head_width_m,
+            standard,
+            values.other_gauges_m(standard) if standard else (),
+            values.cloud("POINTS") if values.filled("POINTS") else None,
+            masked(self.asPythonCommand(parameters, context)),
+        )
 
     def compute(
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Measure each track, then write the points."""
+        from ...core.rails import RailNetwork
+        from ...core.report import Origin, list_findings
         from ...core.squares.remeasuring import measure_rails
         from ...core.tasks import InTurn
         from ...core.tracks.geometry import measure_track_geometry
-        from ..reading.track_inputs import check_gauges, read_inputs
+        from ..reading.track_inputs import check_gauges, read_inputs, with_measured_gauge
 
-        values = ParameterValues(self, parameters, context)
+        values, progress = ParameterValues(self, parameters, context), Recording(progress)
         lines = values.lines("INPUT"), values.lines("RAILS")
         with points_folder() as folder:
             tracks = read_inputs(*lines, job.cloud, folder, progress.span(0, READING))
@@ -81,5 +113,24 @@ class MeasureTrackGeometry(RailAlgorithm):
         measured = measure_track_geometry(tracks.centerlines, rails, job.head_width_m, values.number("STEP"), share)
         check_gauges(tracks, measured, progress)
         progress.check()
-        written = write_stations(self, "OUTPUT", measured, tracks.frame, parameters, context)
-        return {**written, **figures_of_stations(measured)}
+        frame, rest = tracks.frame, (parameters, context)
+        centerlines = with_measured_gauge(tracks.centerlines, measured)
+        network = RailNetwork(tuple(rails), centerlines, frame, geometry=measured, warnings=progress.warnings)
+        paths = job.cloud.paths if job.cloud else (Path(lines[0].sourceName()),)
+        origin = Origin(paths, job.standard or _own_standard(measured, job), job.other_gauges_m, job.command)
+        found = list_findings(network, origin.gauges_m) if is_wanted(parameters.get("FINDINGS"), context) else ()
+        writers = {
+            "OUTPUT": lambda: write_stations(self, "OUTPUT", measured, frame, *rest),
+            "FINDINGS": lambda: write_lines(self, "FINDINGS", FINDINGS, found, frame, *rest),
+            "REPORT": lambda: write_report(self, "REPORT", network, origin, *rest),
+        }
+        return {**write_each(writers, *rest), **figures_of_stations(measured)}
+
+
+def _own_standard(measured: Sequence[TrackGeometry], job: Job) -> RailStandard:
+    """Return a standard with the median gauge of the tracks where no gauge is stated."""
+    import numpy as np
+
+    gauge_mm = round(float(np.nanmedian(np.concatenate([track.gauge_mm for track in measured]))))
+    label = f"{1000 * job.head_width_m:g} mm head, {gauge_mm} mm as measured"
+    return RailStandard(CUSTOM, label, gauge_mm / 1000, job.head_width_m)

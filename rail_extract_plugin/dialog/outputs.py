@@ -52,6 +52,15 @@ def _layer(name: str, label: str, kind: QgsProcessing.SourceType, optional: bool
     return made
 
 
+def findings() -> QgsProcessingParameterDefinition:
+    """Define the layer of places to look at."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return helped(
+        QgsProcessingParameterFeatureSink("FINDINGS", tr("Findings"), line, optional=True),
+        tr("Places to look at, with the reason, the most harmful first: the table of the report as lines to review."),
+    )
+
+
 def cleaned() -> QgsProcessingParameterDefinition:
     """Define the raster that the network returns."""
     return helped(

@@ -107,10 +107,11 @@ def step() -> QgsProcessingParameterDefinition:
 
 
 def head() -> Definitions:
-    """Define the rail standard and railhead width, without the gauge."""
-    standard, _, head_width = rail()
-    standard.setHelp(tr("Rail profile, which gives the railhead width."))
-    return standard, head_width
+    """Define the railhead width, which the measured gauge depends on, and the gauge to compare it with."""
+    standard, gauge, head_width = rail()
+    standard.setHelp(tr("Rail profile, which gives the railhead width, and the gauge that findings compare with."))
+    advanced(gauge, tr("Gauge that findings compare with, instead of that of the standard."))
+    return standard, gauge, head_width
 
 
 def area() -> Definitions:

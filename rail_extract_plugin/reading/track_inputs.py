@@ -119,6 +119,16 @@ def check_gauges(tracks: TrackInputs, measured: Sequence[TrackGeometry], progres
         )
 
 
+def with_measured_gauge(centerlines: Sequence[Centerline], measured: Sequence[TrackGeometry]) -> tuple[Centerline, ...]:
+    """Return centerlines with mean and standard deviation of the measured gauge, where it is known."""
+    return tuple(
+        replace(line, gauge_mm=_mean(track.gauge_mm), gaugesd_mm=float(np.nanstd(track.gauge_mm)))
+        if np.isfinite(track.gauge_mm).any()
+        else line
+        for line, track in zip(centerlines, measured)
+    )
+
+
 def _mean(values: np.ndarray) -> float:
     """Return the mean of the finite values; NaN if there are none."""
     known = values[np.isfinite(values)]

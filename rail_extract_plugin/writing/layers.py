@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import repeat
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Union
 
 from qgis.core import (
     QgsCoordinateReferenceSystem,
@@ -27,6 +27,7 @@ from ...core.errors import RailExtractError
 from ...core.fields import (
     BRIDGED,
     CENTERLINE_FIELDS,
+    FINDING_FIELDS,
     LENGTH,
     QUALITY_FIELDS,
     RAIL_FIELDS,
@@ -46,6 +47,9 @@ if TYPE_CHECKING:
     from ...core.rails import Centerline, RailLine, TrackGeometry
     from ...core.raster import RailRaster
     from ...core.raster_file import RasterHeader
+    from ...core.report import Finding
+
+    Line = Union[RailLine, Centerline, Finding]
 
 KINDS = {int: INTEGER, float: REAL, str: TEXT}
 
@@ -59,7 +63,7 @@ class LayerKind:
 
 
 RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELDS, "centerlines")
-QUALITY = LayerKind(QUALITY_FIELDS, "quality")
+QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
 
 
 def fields(columns: Sequence[Field]) -> QgsFields:
@@ -70,14 +74,12 @@ def fields(columns: Sequence[Field]) -> QgsFields:
     return made
 
 
-def features(
-    lines: Sequence[RailLine | Centerline], columns: Sequence[Field], frame: LocalFrame
-) -> Iterator[QgsFeature]:
+def features(lines: Sequence[Line], columns: Sequence[Field], frame: LocalFrame) -> Iterator[QgsFeature]:
     """Convert lines to features in the cloud's coordinates, in 3D unless no line has heights.
 
     Parameters
     ----------
-    lines : sequence of RailLine or Centerline
+    lines : sequence of RailLine, Centerline or Finding
     columns : sequence of Field
     frame : LocalFrame
     """
@@ -97,7 +99,7 @@ def stations(tracks: Sequence[TrackGeometry], frame: LocalFrame) -> Iterator[Qgs
             yield _feature(QgsGeometry(QgsPoint(x, y) if math.isnan(z) else QgsPoint(x, y, z)), row, QUALITY.columns)
 
 
-def is_flat(lines: Sequence[RailLine | Centerline | TrackGeometry]) -> bool:
+def is_flat(lines: Sequence[Line | TrackGeometry]) -> bool:
     """Return whether there are lines, and none has heights."""
     return bool(lines) and all(any(map(math.isnan, line.xyz[:, 2])) for line in lines)
 
@@ -122,7 +124,7 @@ def write_lines(
     algorithm: QgsProcessingAlgorithm,
     name: str,
     kind: LayerKind,
-    lines: Sequence[RailLine | Centerline],
+    lines: Sequence[Line],
     frame: LocalFrame,
     parameters: dict[str, Any],
     context: QgsProcessingContext,
@@ -135,7 +137,7 @@ def write_lines(
     name : str
         Name of the output.
     kind : LayerKind
-    lines : sequence of RailLine or Centerline
+    lines : sequence of RailLine, Centerline or Finding
     frame : LocalFrame
     parameters : dict
     context : QgsProcessingContext

@@ -14,7 +14,7 @@ from ..compat import group_layer
 from ..i18n import tr
 from ..paths import STYLES
 
-BOTTOM_TO_TOP = ("raster", "rails", "centerlines", "quality")
+BOTTOM_TO_TOP = ("raster", "findings", "rails", "centerlines", "quality")
 """Order of the layers in the group, by style."""
 
 

@@ -3,6 +3,7 @@ import zipfile
 
 import package
 import pytest
+from rail_extract.core import VERSION
 
 
 @pytest.fixture(scope="module")
@@ -51,4 +52,4 @@ def test_versions_agree(request):
         re.search(r'^version ?= ?"?([\d.]+)', (root / name).read_text(encoding="utf-8"), re.MULTILINE).group(1)
         for name in ("metadata.txt", "pyproject.toml")
     }
-    assert len(stated) == 1
+    assert stated == {VERSION}

@@ -199,13 +199,13 @@ class Bench:
 
 
 OUTPUTS = {
-    "extractrails": ("RAILS.gpkg", "CENTERLINES.shp", "QUALITY.gpkg", "CLEANED.tif"),
+    "extractrails": ("RAILS.gpkg", "CENTERLINES.shp", "QUALITY.gpkg", "FINDINGS.gpkg", "CLEANED.tif"),
     "classifyrailpoints": ("OUTPUT.laz",),
     "rasterizerailpoints": ("OUTPUT.tif",),
     "frpdfcleanup": ("OUTPUT.tif",),
     "vectorizerails": ("OUTPUT.gpkg",),
     "buildtrackcenterlines": ("OUTPUT.gpkg",),
-    "measuretrackgeometry": ("OUTPUT.gpkg",),
+    "measuretrackgeometry": ("OUTPUT.gpkg", "FINDINGS.gpkg", "REPORT.html"),
 }
 """Outputs of the algorithms, each a file in the folder of the test."""
 

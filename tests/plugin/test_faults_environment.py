@@ -409,7 +409,7 @@ FAULTS = [
         "no output at all",
         without_outputs,
         REFUSED,
-        "No output is chosen: name at least one of RAILS, CENTERLINES, QUALITY, CLEANED, REPORT.",
+        "No output is chosen: name at least one of RAILS, CENTERLINES, QUALITY, FINDINGS, CLEANED, REPORT.",
     ),
     Fault(
         "output folder deleted during the run",

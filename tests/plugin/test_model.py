@@ -84,6 +84,7 @@ def test_model_gives_the_lines_of_extract_rails(model, run, outcome, write_cloud
     whole = {name: tmp_path / f"{name}.gpkg" for name in ("RAILS", "CENTERLINES", "QUALITY")}
     names = ("rails:RAILS", "centerlines:CENTERLINES", "quality:QUALITY", "centerlines:PAIRED_RAILS")
     steps = {name: tmp_path / f"{number}.gpkg" for number, name in enumerate(names)}
+    steps |= {"quality:FINDINGS": tmp_path / "findings.gpkg", "quality:REPORT": tmp_path / "report.html"}
     assert {definition.name() for definition in model.destinationParameterDefinitions()} == set(steps)
     assert model.parameterDefinition("quality:QUALITY").flags() & QgsProcessingParameterDefinition.Flag.FlagOptional
     for made in (run({**inputs, **whole}), outcome(model, {**inputs, **steps})):
@@ -92,6 +93,7 @@ def test_model_gives_the_lines_of_extract_rails(model, run, outcome, write_cloud
         assert farthest(read_lines(mine), read_lines(theirs)) < 0.001
     for paired in (steps[names[3]], whole["RAILS"]):
         assert [items["track_ids"] for _, items in read_features(paired)] == ["1", "1"]
+    assert "Good throughout" in steps["quality:REPORT"].read_text(encoding="utf-8")
     measured = [read_features(paths[name]) for paths, name in ((steps, names[2]), (whole, "QUALITY"))]
     assert len(measured[0]) == len(measured[1]) > 20
     for (mine, _), (theirs, _) in zip(*measured):

@@ -1,6 +1,7 @@
 """The command `extract`: its outputs are those of the walk, and what it refuses, it refuses before the run."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -17,9 +18,9 @@ from rail_extract.__main__ import main  # noqa: E402
 from rail_extract.core.clouds.points import read_rail_points  # noqa: E402
 from rail_extract.core.commands import extract  # noqa: E402
 from rail_extract.core.commands.extract import INCOMPLETE  # noqa: E402
-from rail_extract.core.fields import QUALITY_FIELDS, RAIL_FIELDS  # noqa: E402
+from rail_extract.core.fields import FINDING_FIELDS, QUALITY_FIELDS, RAIL_FIELDS  # noqa: E402
 from rail_extract.core.pipeline import Parameters, extract_files, extract_rails  # noqa: E402
-from rail_extract.core.report import Origin  # noqa: E402
+from rail_extract.core.report import Origin, list_findings  # noqa: E402
 from rail_extract.core.standards import STANDARDS  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -45,7 +46,7 @@ def values(path, layer):
 def test_all_outputs_are_those_of_the_walk(tiles, scheduler, tmp_path):
     out, report, cleaned = tmp_path / "out.gpkg", tmp_path / "report.html", tmp_path / "cleaned.tif"
     words = ["extract", str(tiles), *FAST, *scheduler, "--step", "2"]
-    words += ["--rails", str(out), "--centerlines", str(out), "--quality", str(out)]
+    words += ["--rails", str(out), "--centerlines", str(out), "--quality", str(out), "--findings", str(out)]
     words += ["--report", str(report), "--cleaned", str(cleaned)]
     assert main(words) == 0
     network = extract_rails(read_rail_points(tiles, [10]), PARAMETERS)
@@ -62,7 +63,14 @@ def test_all_outputs_are_those_of_the_walk(tiles, scheduler, tmp_path):
         assert np.count_nonzero(file.read(1)) == network.cleaned[0].count()
         assert file.tags()["RAIL_GAUGE_MM"] == "1435"
     command = " ".join(["python -m rail_extract", *words])
-    assert report.read_text(encoding="utf-8") == Origin((tiles,), STANDARD, (), command).report(network)
+    written = report.read_text(encoding="utf-8")
+    origin = Origin((tiles,), STANDARD, (), command, PARAMETERS)
+    undated = [re.sub(r"<dd>[\d-]+ [\d:]+</dd>", "", page) for page in (written, origin.report(network))]
+    assert undated[0] == undated[1]
+    findings, listed = values(out, "findings"), list_findings(network, (STANDARD.gauge_m,))
+    assert list(findings) == [field.name for field in FINDING_FIELDS]
+    assert findings["reason"].tolist() == [found.reason for found in listed]
+    assert findings["track_id"].tolist() == [found.track_id for found in listed]
     assert {file.name for file in tmp_path.iterdir()} == {"out.gpkg", "report.html", "cleaned.tif"}
 
 

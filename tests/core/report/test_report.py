@@ -10,9 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.rails import Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry
-from rail_extract.core.report import build_page
+from rail_extract.core.report import build_page, list_findings
 from rail_extract.core.report.findings import OFF_GAUGE, UNSUPPORTED, UNSURE, examine
+from rail_extract.core.report.listing import HOLE, LONE_RAIL, OFF_RAIL_MM
 from rail_extract.core.report.markup import metres, table, tag, text
+from rail_extract.core.report.page import ADVICE
 from rail_extract.core.report.plots import curve, round_up, ticks
 
 GAUGE_MM = 1435.0
@@ -105,7 +107,7 @@ def test_places_state_where_and_how_much():
     found = examine(network(track(2, bridged=bridged)), (1.435,)).places()
     assert [(place.start_m, place.end_m, place.length_m) for place in found] == [(9.5, 14.5, 3.0), (39.5, 40.5, 1.0)]
     assert headline(html) == "Good, except for a few places to look at."
-    assert "4.0 m of 200 m (2.0 %): a rail has no points. Longest: track 2, 10 to 14 m." in html
+    assert "4.0 m of 200 m (2.0 %): a rail has no points. Longest: 3.0 m of track 2 between 10 and 14 m." in html
     assert "9.5 to 14.5 m" in html
 
 
@@ -121,14 +123,16 @@ def test_each_track_is_judged_by_its_own_gauge():
     assert findings.share == 0
 
 
-def test_the_longest_places_are_listed_for_each_reason():
+def test_every_place_is_listed_the_most_harmful_first():
     sigma = np.full(1001, 1.0)
     sigma[100:900:20] = 9.0
-    bridged = at(1001, 950)
+    sigma[950], bridged = 30.0, at(1001, 950)
     html = page(track(length_m=1000.0, sigma_mm=sigma, bridged=bridged))
     rows = elements(html, "tbody")[0].findall("tr")
-    assert [row.findall("td")[3].text for row in rows] == ["a rail has no points"] + 5 * ["standard error above 5 mm"]
-    assert "35 more places are marked in the profiles below." in html
+    assert [row.findall("td")[7].text for row in rows] == ["a rail has no points"] + 40 * ["standard error above 5 mm"]
+    assert [cell.text for cell in rows[0].findall("td")][:7] == [
+        *("1", "track 1", "949.5 to 950.5 m", "1.0 m", "950.0 m", "1,435.0 mm", "30.0 mm")
+    ]
     marks = [one.get("class") for one in elements(html, "svg")[0].iter("path") if "mark" in one.get("class")]
     assert marks == ["unsure mark", "unsupported mark"]  # the most severe on top
 
@@ -139,6 +143,12 @@ def test_rails_without_a_track_are_reported():
     html = page(more_rails=(alone, replace(alone, rail_id=98)))
     assert headline(html).startswith("No track was found. There are 2 rails")
     assert not elements(html, "svg")
+
+
+def test_without_a_track_the_report_says_what_to_try():
+    html = page()
+    assert headline(html) == "No rail was found. What to try:"
+    assert len(elements(html, "li")) == len(ADVICE) == 4
 
 
 def test_radii_and_heights_are_those_of_the_cloud():
@@ -175,7 +185,7 @@ def test_every_panel_marks_the_places_in_doubt():
     html = page(track(bridged=at(101, *range(40, 60))))
     plan, profiles = elements(html, "svg")
     marks = [one for one in profiles.iter("rect") if one.get("class") == "unsupported"]
-    assert len(marks) == 5
+    assert len(marks) == 6
     panel = next(one for one in profiles.iter("rect") if one.get("class") == "panel")
     left, width = float(panel.get("x")), float(panel.get("width"))
     for mark in marks:
@@ -288,3 +298,43 @@ def test_a_track_that_ends_on_another_one_has_no_hole():
 def test_warnings_of_the_run_are_listed():
     whole = replace(network(track()), warnings=("1 rail turned by more than 10° within a metre.",))
     assert "<li>1 rail turned by more than 10° within a metre.</li>" in build_page(whole, (1.435,), "cloud.laz")
+
+
+def test_findings_are_in_the_order_of_possible_error_times_length():
+    """100 mm m off gauge, 90 of standard error, 12 of it where a rail has no points, and lines that may be wrong."""
+    gauge, sigma = np.full(101, GAUGE_MM), np.full(101, 1.5)
+    gauge[10:15] = GAUGE_MM + 20
+    sigma[30:40], sigma[60:62] = 9.0, 6.0
+    one = track(1, gauge_mm=gauge, sigma_mm=sigma, bridged=at(101, 60, 61))
+    findings = list_findings(network(one, more_rails=[lone(30.0)]), (1.435,))
+    assert [found.finding for found in findings] == [1, 2, 3, 4]
+    assert [found.harm for found in findings] == pytest.approx([30 * OFF_RAIL_MM, 100, 90, 12])
+    assert [found.reason for found in findings] == [LONE_RAIL, OFF_GAUGE.label, UNSURE.label, UNSUPPORTED.label]
+    off = findings[1]
+    assert (off.track_id, off.rail_id, off.from_m, off.to_m, off.doubt_m) == (1, None, 9.5, 14.5, 5.0)
+    assert (off.worst_m, off.gauge_mm, off.sigma_mm, off.points, off.review) == (10.0, 1455.0, 1.5, 1000, "")
+    np.testing.assert_allclose(off.xyz[[0, -1], 0], [9.5, 14.5])
+    assert (findings[0].track_id, findings[0].rail_id, findings[0].to_m) == (None, 99, 30.0)
+
+
+def test_a_missing_rail_counts_like_a_line_off_its_rail():
+    unknown = np.full(101, GAUGE_MM)
+    unknown[20:30] = np.nan
+    (found,) = list_findings(network(track(gauge_mm=unknown, sigma_mm=unknown / 1000)), (1.435,))
+    assert found.harm == pytest.approx(10 * OFF_RAIL_MM)
+    assert np.isnan(found.gauge_mm)
+
+
+def test_a_section_between_two_tracks_is_a_finding():
+    one, other = on_arc(1, 0, 60), on_arc(2, 140, 200)
+    (found,) = list_findings(network(one, other), (1.435,))
+    assert found.reason == HOLE.format(1, 2)
+    np.testing.assert_allclose(found.xyz, [one[0].xyz[-1], other[0].xyz[0]])
+    assert HOLE.format(1, 2) in page(one, other)
+
+
+def test_rails_are_not_lone_if_a_track_does_not_name_its_rails():
+    line, geometry = track()
+    nameless = replace(line, left_ids=(), right_ids=())
+    assert list_findings(network(track(), more_rails=[lone(9.0)]), (1.435,))
+    assert list_findings(network((nameless, geometry), more_rails=[lone(9.0)]), (1.435,)) == ()

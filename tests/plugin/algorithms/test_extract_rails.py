@@ -15,7 +15,7 @@ from rail_extract.rail_extract_plugin.reading.geotiff import read_header
 TEMPORARY_FOLDER = "Processing/Configuration/TEMP_PATH2"
 """Setting of QGIS for the folder in which it creates its temporary folder."""
 
-ALL_OUTPUTS = ("RAILS", "CENTERLINES", "QUALITY", "CLEANED", "REPORT")
+ALL_OUTPUTS = ("RAILS", "CENTERLINES", "QUALITY", "FINDINGS", "CLEANED", "REPORT")
 
 
 @pytest.fixture
@@ -52,6 +52,7 @@ def test_rails_and_centerlines_are_written_as_reported(run, scene, outputs):
 @pytest.mark.skipif(not find_spec("rasterio"), reason="needs the packages of the cluster")
 def test_the_command_writes_what_qgis_writes(run, run_step, write_cloud, track, tmp_path):
     points = track()
+    points = points[(points[:, 1] < 3_000_000) | (np.abs(points[:, 0] - 500_007) > 1)]  # a finding
     west, south = points[:, :2].min(axis=0) + [3.0, -5.0]
     east, north = points[:, :2].max(axis=0) + 5.0
     cloud, suffixes = write_cloud(points), {"CLEANED": "tif", "REPORT": "html"}
@@ -65,7 +66,7 @@ def test_the_command_writes_what_qgis_writes(run, run_step, write_cloud, track, 
     words += [word for name, path in theirs.items() for word in (f"--{name.lower()}", path)]
     told = subprocess.run([sys.executable, "-m", "rail_extract", *words, "--workers", "1"], capture_output=True)
     assert told.returncode == 0, told.stderr
-    for name in ("RAILS", "CENTERLINES"):
+    for name in ("RAILS", "CENTERLINES", "FINDINGS"):
         lines, others = read_features(mine[name]), read_features(theirs[name], name.lower())
         assert farthest([line for line, _ in lines], [line for line, _ in others]) < 0.0001
         assert [items for _, items in lines] == [items for _, items in others]
@@ -74,7 +75,7 @@ def test_the_command_writes_what_qgis_writes(run, run_step, write_cloud, track, 
     assert [one.geometry().asWkt(3) for one in stations] == [one.geometry().asWkt(3) for one in others]
     same_rasters(mine["CLEANED"], theirs["CLEANED"])
     pages = (path["REPORT"].read_text(encoding="utf-8") for path in (mine, theirs))
-    page, other = (re.sub("<dt>Command</dt><dd>.*?</dd>", "", page) for page in pages)
+    page, other = (re.sub("<dt>(Command|Date)</dt><dd>.*?</dd>", "", page) for page in pages)
     assert page == other
     vectorized = run_step(
         "vectorizerails", {"INPUT": theirs["CLEANED"], "POINTS": cloud, "OUTPUT": tmp_path / "v.gpkg"}
@@ -158,6 +159,32 @@ def test_report_and_its_figures(run, scene, tmp_path):
     assert outcome.results["STATION_COUNT"] > 10
     assert 0 < outcome.results["SIGMA"] < 5
     assert outcome.results["BRIDGED_LENGTH"] == 0
+
+
+def test_findings_are_the_table_of_the_report(run, write_cloud, track, tmp_path):
+    """A gap in one rail, and points on the other that widen the gauge."""
+    points = track(length_m=30.0)
+    left = points[:, 1] > 3_000_000
+    along = points[:, 0] - 500_000
+    points[left & (along > 20), 1] += 0.02
+    gap = left & (along > 8) & (along < 11)
+    paths = {"FINDINGS": tmp_path / "findings.gpkg", "REPORT": tmp_path / "report.html"}
+    outcome = run({"INPUT": write_cloud(points[~gap]), "ITERATIONS": 1, **paths})
+    assert outcome.ok, outcome.error
+    layer, findings = lines_of(paths["FINDINGS"])
+    assert layer.crs().authid() == "EPSG:32643"
+    assert layer.wkbType() == 1002  # LineStringZ
+    assert [finding["finding"] for finding in findings] == [1, 2]
+    assert [finding["reason"] for finding in findings] == ["gauge off by more than 10 mm", "a rail has no points"]
+    wide, bare = findings
+    assert (wide["from_m"], wide["to_m"]) == pytest.approx((20, 30), abs=2)
+    assert wide["gauge_mm"] == pytest.approx(1455, abs=2)
+    assert (bare["from_m"], bare["to_m"]) == pytest.approx((8, 11), abs=1)
+    assert bare.geometry().length() == pytest.approx(bare["to_m"] - bare["from_m"], abs=0.1)
+    table = re.findall("<tr>(.*?)</tr>", paths["REPORT"].read_text(encoding="utf-8").split("Where to look")[1])[1:3]
+    for row, finding in zip(table, findings):
+        assert f"{finding['from_m']} to {finding['to_m']} m" in row
+        assert finding["reason"] in row
 
 
 def test_a_single_rail_is_not_a_track_and_the_report_says_so(run, write_cloud, track, outputs, tmp_path):

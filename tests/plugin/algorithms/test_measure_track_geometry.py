@@ -250,6 +250,24 @@ def test_inconsistent_inputs_are_refused(qgis, run_step, write_cloud):
         assert_refused(run_step("measuretrackgeometry", given), sentence)
 
 
+def test_report_and_findings_judge_lines_from_files(measure, tmp_path):
+    """The gauge is compared with that of the standard, with GAUGE and with OTHER_GAUGES."""
+    middle, left, right = curved_track()
+    lines, rails, report = layer_of([middle]), layer_of([left, right]), tmp_path / "report.html"
+    paths = {"FINDINGS": str(tmp_path / "findings.gpkg"), "REPORT": str(report)}
+    measure(lines, rails, **paths)
+    assert QgsVectorLayer(paths["FINDINGS"]).featureCount() == 0
+    html = report.read_text(encoding="utf-8")
+    for words in ("Good throughout", "railextract:measuretrackgeometry", "EN 60E1", "60 m", "lines"):
+        assert words in html, words
+    for more, count in (({"GAUGE": 1420}, 1), ({"GAUGE": 1000}, 1), ({"GAUGE": 1000, "OTHER_GAUGES": "1435"}, 0)):
+        measure(lines, rails, **paths, **more)
+        findings = list(QgsVectorLayer(paths["FINDINGS"]).getFeatures())
+        assert [finding["reason"] for finding in findings] == count * ["gauge off by more than 10 mm"], more
+    measure(lines, rails, **paths, STANDARD="CUSTOM", HEAD_WIDTH=72)
+    assert "72 mm head, 1435 mm as measured" in report.read_text(encoding="utf-8")
+
+
 def test_output_may_be_skipped(qgis, run_step):
     middle, left, right = curved_track()
     outcome = run_step("measuretrackgeometry", {"INPUT": layer_of([middle]), "RAILS": layer_of([left, right])})

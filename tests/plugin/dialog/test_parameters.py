@@ -33,6 +33,7 @@ PARAMETERS = [
     ("RAILS", "sink", None),
     ("CENTERLINES", "sink", None),
     ("QUALITY", "sink", None),
+    ("FINDINGS", "sink", None),
     ("CLEANED", "rasterDestination", None),
     ("REPORT", "fileDestination", None),
 ]
@@ -42,6 +43,7 @@ OUTPUTS = {
     "RAILS": "outputVector",
     "CENTERLINES": "outputVector",
     "QUALITY": "outputVector",
+    "FINDINGS": "outputVector",
     "CLEANED": "outputRaster",
     "REPORT": "outputFile",
     "RAIL_COUNT": "outputNumber",
@@ -54,7 +56,7 @@ OUTPUTS = {
     "ENGINE_USED": "outputString",
 }
 
-RESULTS = {"RAILS", "CENTERLINES", "QUALITY", "CLEANED", "REPORT"}
+RESULTS = {"RAILS", "CENTERLINES", "QUALITY", "FINDINGS", "CLEANED", "REPORT"}
 ESSENTIAL = {"INPUT", "RAIL_CLASSES", "CLASSIFY", "STANDARD", "GAUGE", "HEAD_WIDTH", "EXTENT", "MAX_GAP"} | RESULTS
 OPTIONAL = {"GAUGE", "HEAD_WIDTH", "EXTENT", "CRS", "OTHER_GAUGES"} | RESULTS
 

@@ -22,7 +22,7 @@ from qgis.core import (
 from qgis.PyQt.QtCore import QSize
 from qgis.PyQt.QtGui import QColor
 from qgis.PyQt.QtXml import QDomDocument
-from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
+from rail_extract.core.fields import CENTERLINE_FIELDS, FINDING_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
 from rail_extract.rail_extract_plugin.paths import STYLES
 from rail_extract.rail_extract_plugin.writing.layers import fields
 from rail_extract.rail_extract_plugin.writing.styling import style_on_load
@@ -31,6 +31,7 @@ KINDS = {
     "rails": ("LineStringZ", RAIL_FIELDS),
     "centerlines": ("LineStringZ", CENTERLINE_FIELDS),
     "quality": ("PointZ", QUALITY_FIELDS),
+    "findings": ("LineStringZ", FINDING_FIELDS),
 }
 
 
@@ -110,6 +111,11 @@ def test_quality_is_coloured_by_the_deviation_from_the_median_gauge_of_the_track
     ]
 
 
+def test_findings_are_coloured_by_their_review(styled):
+    rows = [(LINE, {"finding": 1, "review": review}) for review in (None, "", "accepted", "rejected")]
+    assert colours(styled("findings", rows)) == ["#d62839", "#d62839", "#2e7d4f", "#787878"]
+
+
 def test_centerlines_show_their_number_and_direction(styled):
     layer = styled("centerlines", [(LINE, {"track_id": 7})])
     assert colours(layer) == ["#e64a19"]
@@ -131,6 +137,7 @@ def test_layers_can_be_drawn(styled, style):
         "rails": (LINE, {"sigma_mm": 1.0}),
         "centerlines": (LINE, {"track_id": 1}),
         "quality": ("POINT Z (500050 3000000 1)", {"track_id": 1, "gauge_mm": 1435.0, "bridged": 1}),
+        "findings": (LINE, {"finding": 1, "review": "accepted"}),
     }
     layer = styled(style, [rows[style]])
     settings = QgsMapSettings()
@@ -144,7 +151,7 @@ def test_layers_can_be_drawn(styled, style):
     job.waitForFinished()
     image = job.renderedImage()
     seen = {image.pixelColor(x, y).name() for x in range(60, 200) for y in range(100, 200)}
-    assert {"rails": "#1565c0", "centerlines": "#e64a19", "quality": "#f28e2b"}[style] in seen
+    assert {"rails": "#1565c0", "centerlines": "#e64a19", "quality": "#f28e2b", "findings": "#84b397"}[style] in seen
 
 
 @pytest.mark.parametrize("style", ["rails", "centerlines"])

@@ -1,0 +1,133 @@
+"""The list of findings, the most harmful first: the table of the report and the layer FINDINGS.
+
+See docs/method.md section 9.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..polyline import length_along
+from ..rails import RailLine, RailNetwork
+from .findings import DOUBTS, OFF_GAUGE, Findings, Hole, Place, TrackFindings, examine
+
+OFF_RAIL_MM = 70.0
+"""Possible error where a line is missing, or belongs to no track: a line off by the width of a railhead is off its
+rail, and being further off makes it no worse."""
+
+LONE_RAIL, HOLE = "a rail belongs to no track", "no rails were found between tracks {} and {}, which are likely one"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A place to look at.
+
+    Attributes
+    ----------
+    finding : int
+        Number, from 1 for the finding whose possible error, times its length, is largest.
+    reason : str
+    track_id, rail_id : int or None
+        Track, or lone rail.
+    from_m, to_m : float
+        Chainages along the track or the lone rail; NaN for a section between tracks.
+    doubt_m : float
+        Length in doubt between them.
+    worst_m : float
+        Chainage of the largest possible error.
+    gauge_mm, cant_mm, sigma_mm : float
+        Gauge, cant and standard error there.
+    points : int or None
+        Points on both rails, or on the lone rail.
+    review : str
+        For the user's decision.
+    xyz : (n, 3) array
+        The section in local metres.
+    harm : float
+        Possible error times length, mm m.
+    """
+
+    finding: int
+    reason: str
+    track_id: int | None
+    rail_id: int | None
+    from_m: float
+    to_m: float
+    doubt_m: float
+    worst_m: float
+    gauge_mm: float
+    cant_mm: float
+    sigma_mm: float
+    points: int | None
+    review: str
+    xyz: np.ndarray
+    harm: float
+
+
+def list_findings(network: RailNetwork, gauges_m: Sequence[float]) -> tuple[Finding, ...]:
+    """Return all places of a network to look at, in order of decreasing harm; see `findings.examine`."""
+    return listed(examine(network, gauges_m))
+
+
+def listed(findings: Findings) -> tuple[Finding, ...]:
+    """Return the places that an examination found, in order of decreasing harm."""
+    found = [*_of_tracks(findings), *map(_of_hole, findings.holes), *map(_of_lone_rail, findings.lonely)]
+    found.sort(key=lambda one: -one.harm)
+    return tuple(replace(one, finding=number) for number, one in enumerate(found, start=1))
+
+
+def _of_tracks(findings: Findings) -> Iterator[Finding]:
+    for track in findings.tracks:
+        error_mm = _possible_error(track)
+        for doubt in DOUBTS:
+            for place in track.places(doubt):
+                yield _of_place(track, place, error_mm)
+
+
+def _possible_error(track: TrackFindings) -> np.ndarray:
+    """Return the possible error at the stations, (n,) mm: off gauge the deviation, else the standard error."""
+    geometry = track.geometry
+    off_mm = np.abs(geometry.gauge_mm - track.nominal_mm)
+    error_mm = np.where(track.doubtful[OFF_GAUGE], off_mm, geometry.sigma_mm)
+    return np.minimum(np.nan_to_num(error_mm, nan=OFF_RAIL_MM), OFF_RAIL_MM)
+
+
+def _of_place(track: TrackFindings, place: Place, error_mm: np.ndarray) -> Finding:
+    geometry = track.geometry
+    within = (geometry.chainage_m >= place.start_m) & (geometry.chainage_m <= place.end_m)
+    numbers = np.flatnonzero(within & track.doubtful[place.doubt])
+    worst = numbers[np.argmax(error_mm[numbers])]
+    return Finding(
+        0,
+        place.doubt.label,
+        place.track_id,
+        None,
+        place.start_m,
+        place.end_m,
+        place.length_m,
+        float(geometry.chainage_m[worst]),
+        float(geometry.gauge_mm[worst]),
+        float(geometry.cant_mm[worst]),
+        float(geometry.sigma_mm[worst]),
+        int(geometry.points[within].sum()),
+        "",
+        track.line.part(place.start_m, place.end_m).xyz,
+        float(np.sum((error_mm * geometry.cells_m)[numbers])),
+    )
+
+
+def _of_hole(hole: Hole) -> Finding:
+    unknown = (np.nan,) * 3
+    reason = HOLE.format(hole.first, hole.second)
+    length_m, harm = hole.length_m, OFF_RAIL_MM * hole.length_m
+    return Finding(0, reason, hole.first, None, np.nan, np.nan, length_m, np.nan, *unknown, None, "", hole.ends, harm)
+
+
+def _of_lone_rail(rail: RailLine) -> Finding:
+    plan_m = float(length_along(rail.xyz[:, :2])[-1])
+    figures = 0.5 * plan_m, np.nan, np.nan, rail.sigma_mm, round(rail.points)
+    harm = OFF_RAIL_MM * plan_m
+    return Finding(0, LONE_RAIL, None, rail.rail_id, 0.0, plan_m, plan_m, *figures, "", rail.xyz, harm)
