@@ -23,6 +23,9 @@ BORDER_CELLS = 1e-6
 """A point this close to a cell border belongs to the next cell: files store millimetres, so points lie on borders, and
 the rounding of the last bit must not decide on the cell."""
 
+ROW = 1 << 31
+"""Distance between the numbers of two rows of cells, when a cell has a single number."""
+
 
 def cell_size(gauge_m: float, head_width_m: float) -> float:
     """Return the cell size in metres at which the rails are `CENTRE_SPACING_CELLS` apart (docs/method.md section 2.1).
@@ -163,9 +166,19 @@ def rasterize(xy: np.ndarray, cell_m: float) -> RailRaster:
     cell_m : float
         Side of a cell in metres; see `cell_size`.
     """
-    rows = np.floor(-np.asarray(xy)[:, 1] / cell_m + BORDER_CELLS).astype(np.int64)
-    columns = np.floor(np.asarray(xy)[:, 0] / cell_m + BORDER_CELLS).astype(np.int64)
-    return RailRaster(_tiles_of(np.column_stack([rows, columns])), cell_m, 0.0, 0.0)
+    xy = np.asarray(xy)
+    rows = np.floor(-xy[:, 1] / cell_m + BORDER_CELLS).astype(np.int64)
+    columns = np.floor(xy[:, 0] / cell_m + BORDER_CELLS).astype(np.int64)
+    return RailRaster(_tiles_of(_unique_cells(rows, columns)), cell_m, 0.0, 0.0)
+
+
+def _unique_cells(rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Return each cell once, (m, 2); far fewer than points, on dense clouds."""
+    if len(rows) and max(np.abs(rows).max(), np.abs(columns).max()) < ROW // 2:
+        numbers = np.unique(rows * ROW + columns)
+        rows = (numbers + ROW // 2) // ROW
+        columns = numbers - rows * ROW
+    return np.column_stack([rows, columns])
 
 
 def _tiles_of(cells: np.ndarray) -> dict[tuple[int, int], np.ndarray]:

@@ -50,3 +50,11 @@ def test_mapping_tiles_equals_mapping_the_whole():
 def test_a_stray_point_a_thousand_kilometres_away_costs_one_tile():
     raster = rasterize(np.array([[0.0, 0.0], [1e6, 1e6]]), 0.04)
     assert len(raster.tiles) == 2
+
+
+@pytest.mark.parametrize("reach_m", [1.0, 1e4, 1e9])
+def test_every_point_sets_its_cell_wherever_it_is(reach_m):
+    xy = np.random.default_rng(3).uniform(-reach_m, reach_m, (500, 2))
+    cells = rasterize(np.repeat(xy, 3, axis=0), 0.04).cells()
+    expected = np.floor(np.column_stack([-xy[:, 1], xy[:, 0]]) / 0.04 + 1e-6).astype(np.int64)
+    assert set(map(tuple, cells.tolist())) == set(map(tuple, expected.tolist()))
