@@ -128,9 +128,11 @@ def pair_rails(
     for section in progress.span(0.3, 1.0).follow(candidates):
         found = _match(rails, section, spacing, tolerance_m)
         matches.extend(match for match in found if _is_nearest(match, section, spacing, others_m))
-    sure = _without_ghosts(_select(matches))
-    misfits_m = [_misfit_m(rails, match, spacing) for match in sure]
-    return tuple(match.pair() for match in _without_rivals(sure, misfits_m))
+    # What wanders goes first: it would make the track next to it look like a ghost.
+    selected = _select(matches)
+    steady = _without_rivals(selected, [_misfit_m(rails, match, spacing)[1] for match in selected])
+    sure = _without_ghosts(steady)
+    return tuple(match.pair() for match in _without_rivals(sure, [sum(_misfit_m(rails, m, spacing)) for m in sure]))
 
 
 def find_candidates(parallels: Parallels, spacing_m: float, tolerance_m: float) -> list[Parallels]:
@@ -306,8 +308,8 @@ def _without_ghosts(matches: Sequence[_Match]) -> list[_Match]:
         matches = [part for match, ghost in zip(matches, ghosts) for part in _free_runs(match, ghost)]
 
 
-def _misfit_m(rails: Sequence[RailLine], match: _Match, spacing: float) -> float:
-    """Return how unlike two rails of a track the rails of a match are: off the gauge, and wandering."""
+def _misfit_m(rails: Sequence[RailLine], match: _Match, spacing: float) -> tuple[float, float]:
+    """Return how unlike two rails of a track the rails of a match are: off the gauge, and wandering (weighted)."""
     a, b = rails[match.a].xyz, rails[match.b].xyz
     start, end = np.sort(match.t_a[[0, -1]]).tolist()
     t = np.arange(start, end, COARSE_STEP_M)
@@ -318,7 +320,7 @@ def _misfit_m(rails: Sequence[RailLine], match: _Match, spacing: float) -> float
     heights = np.interp(feet.t[order], length_along(b[:, :2]), b[:, 2])
     level = np.nan_to_num(places[feet.point[order], 2] - heights)
     off = float(np.sqrt(np.mean((apart - spacing) ** 2)))
-    return off + WANDER_WEIGHT * (_wander(apart) + _wander(level))
+    return off, WANDER_WEIGHT * (_wander(apart) + _wander(level))
 
 
 def _wander(values: np.ndarray) -> float:

@@ -163,6 +163,17 @@ def test_a_wrong_partner_does_not_stay_where_the_right_one_is_interrupted():
     assert {frozenset((pair.left, pair.right)) for pair in pairs} == {frozenset((0, 2)), frozenset((0, 3))}
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_wandering_lines_on_both_sides_do_not_make_the_track_between_them_a_ghost(seed):
+    rng = np.random.default_rng(seed)
+    edges = [
+        wandering(rng, CURVED, side * (SPACING / 2 + 1.475), sigma_m) for side, sigma_m in ((1, 0.02), (-1, 0.006))
+    ]
+    pairs = pair_rails(rails_of(*tracks(CURVED, 0.0), *edges), GAUGE, WIDTH)
+    assert {frozenset((pair.left, pair.right)) for pair in pairs} == {frozenset((0, 1))}
+    assert sum(pair.length_m for pair in pairs) == pytest.approx(CURVED.length_m, abs=0.5)
+
+
 def test_a_rail_whose_other_partner_is_as_good_keeps_both():
     """Where three rails are at the gauge, nothing shows which two are a track."""
     widths = beside(CURVED, SPACING, 0.0, -SPACING - 0.005)
