@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 UNKNOWN_IN_METRES = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1]]'
@@ -37,11 +38,20 @@ class Field:
         if known is None:
             return None
         if self.kind is str:
-            return known if isinstance(known, str) else ",".join(map(str, known))
+            return known if isinstance(known, str) else ",".join(map(_word, known))
         if self.kind is int:
             return int(known)
         # Adding zero turns -0.0, which rounding may leave, into 0.0.
         return round(float(known), self.decimals) + 0.0 if math.isfinite(known) else None
+
+
+def _word(item: Any) -> str:
+    """Write an item of a list: a number, or start and end of a section in metres.
+
+    >>> _word(7), _word((12.3, 15.678))
+    ('7', '12.30-15.68')
+    """
+    return str(item) if isinstance(item, Integral) else "-".join(f"{value:.2f}" for value in item)
 
 
 CLASS_CODE = Field("class_code", int, "class of the points")
@@ -65,6 +75,12 @@ RAIL_FIELDS = (
         str,
         "track_id of the tracks that the rail belongs to, separated by commas; empty for a lone rail, and before rails "
         "are paired",
+    ),
+    Field(
+        "gaps",
+        str,
+        "sections without points that bridged_m sums up: plan distances from the start of the line, metres, such as "
+        "12.30-15.68,40.00-42.10",
     ),
 )
 CENTERLINE_FIELDS = (

@@ -15,6 +15,9 @@ SAME_PLACE_M = 1e-9
 
 NO_GAPS = np.empty((0, 2))
 
+SAME_SUM_M = 0.1
+"""Gaps of lines from files explain `bridged_m` if their lengths sum up to it: both are rounded to centimetres."""
+
 
 @dataclass(frozen=True)
 class Support:
@@ -77,9 +80,9 @@ class RailLine:
     sigma_mm : float
         Standard error of the line's lateral position: two thirds of the line are within it.
     bridged_m : float
-        Plan length without supporting points.
+        Plan length without supporting points; NaN if that is unknown.
     gaps : (k, 2) array
-        Plan chainages at which the sections without points start and end; empty for lines read from files.
+        Plan chainages at which the sections without points start and end; see `knows_gaps`.
     support : Support or None
         Support along the line; None for lines read from files.
     track_ids : tuple of int
@@ -101,6 +104,11 @@ class RailLine:
     def length_m(self) -> float:
         """Length in 3D; in plan if the line has no heights."""
         return _length(self.xyz)
+
+    @property
+    def knows_gaps(self) -> bool:
+        """Whether `gaps` are all sections without points; not of lines from files that say less."""
+        return bool(abs(np.sum(self.gaps[:, 1] - self.gaps[:, 0]) - self.bridged_m) <= SAME_SUM_M)
 
     def bridged_before(self, t: np.ndarray) -> np.ndarray:
         """Return the length of gaps before chainages `t`, (n,) metres; everything beyond the line's ends is a gap."""
@@ -158,7 +166,7 @@ class Centerline:
     cant_mm, cantmax_mm : float
         Mean of the left minus the right height, and the value of it with the largest absolute value.
     bridged_m : float
-        Plan length in which at least one rail has no supporting points.
+        Plan length in which at least one rail has no supporting points; NaN if the gaps of a rail are unknown.
     """
 
     xyz: np.ndarray

@@ -126,7 +126,7 @@ def flat_rails(network: LineNetwork, class_code: int, parameters: ElevationParam
     rails = []
     for line in network.lines:
         xyz = np.column_stack([line, np.full(len(line), np.nan)])
-        rail = RailLine(xyz, 0, class_code, points=0, resid_mm=np.nan, sigma_mm=np.nan, bridged_m=0.0)
+        rail = RailLine(xyz, 0, class_code, points=0, resid_mm=np.nan, sigma_mm=np.nan, bridged_m=np.nan)
         if rail.length_m >= parameters.min_length_m:
             rails.append(rail)
     return numbered(rails)

@@ -141,6 +141,8 @@ def _draw(
     xyz = _smoothed(xyz, parameters.smoothing_m, progress.span(0.67, 1.0))
     flip = starts_at_its_end(xyz)
     sides = [_ids(rails, (pair.left for pair in chain.pairs)), _ids(rails, (pair.right for pair in chain.pairs))]
+    bridged_m = float(bridged_steps(rails, left, right, length_along(stations)).sum())
+    gaps_known = all(rails[number].knows_gaps for pair in chain.pairs for number in (pair.left, pair.right))
     return Centerline(
         xyz=xyz[::-1] if flip else xyz,
         track_id=0,
@@ -151,7 +153,7 @@ def _draw(
         gaugesd_mm=1000 * float(gauge.std()),
         cant_mm=(-1000 if flip else 1000) * float(cant.mean()),
         cantmax_mm=(-1000 if flip else 1000) * float(cant[np.argmax(np.abs(cant))]),
-        bridged_m=float(bridged_steps(rails, left, right, length_along(stations)).sum()),
+        bridged_m=bridged_m if gaps_known else np.nan,
     )
 
 

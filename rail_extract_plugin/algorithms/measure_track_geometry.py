@@ -57,7 +57,8 @@ class MeasureTrackGeometry(RailAlgorithm):
             "\n".join(f"{field.name}: {field.meaning}." for field in QUALITY_FIELDS),
             "With a point cloud, heights are measured again and smoothed over 1 m only, and sigma_mm, points and "
             "bridged apply to each station. Without one, the heights are those of the rails, each rail's sigma_mm and "
-            "points are taken as uniform along it, and bridged is 1 only where a rail is missing.",
+            "points are taken as uniform along it, and bridged is 1 where a rail is missing or its field gaps names "
+            "the place.",
             "The findings and the report compare the gauge with that of the standard, with Gauge and with Other "
             "gauges, whichever is nearest.",
         )

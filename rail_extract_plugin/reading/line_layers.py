@@ -22,8 +22,9 @@ from ...core.clouds.crs import parse_crs, units, warn_of_scale
 from ...core.errors import CrsError, RailExtractError
 from ...core.fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
 from ...core.frame import ORIGIN_STEP, LocalFrame
+from ...core.polyline import length_along
 from ...core.progress import SILENT, Progress
-from ...core.rails import Centerline, RailLine
+from ...core.rails import NO_GAPS, SAME_SUM_M, Centerline, RailLine
 
 CHORD_TOLERANCE_M = 0.0005
 """Greatest deviation of the chords that approximate a curved line: well below the accuracy of a survey."""
@@ -165,12 +166,13 @@ def _parts(geometry: QgsGeometry, chord: float) -> Iterator[np.ndarray]:
 
 
 def _rail(feature: QgsFeature, xyz: np.ndarray, default_class: int) -> RailLine:
-    defaults = {"rail_id": feature.id(), "class_code": default_class, "bridged_m": 0.0}
-    return RailLine(xyz, **_attributes(feature, RailLine, RAIL_FIELDS, defaults))
+    defaults = {"rail_id": feature.id(), "class_code": default_class}
+    values = _attributes(feature, RailLine, RAIL_FIELDS, defaults)
+    return RailLine(xyz, **{**values, "gaps": _gaps(feature, xyz)})
 
 
 def _centerline(feature: QgsFeature, xyz: np.ndarray) -> Centerline:
-    defaults = {"track_id": feature.id(), "bridged_m": 0.0}
+    defaults = {"track_id": feature.id()}
     return Centerline(xyz, **_attributes(feature, Centerline, CENTERLINE_FIELDS, defaults))
 
 
@@ -215,6 +217,18 @@ def _ids(feature: QgsFeature, name: str) -> tuple[int, ...]:
     """Return the ids in a field such as "3,5"; none if the field is missing or holds something else."""
     words = str(_value(feature, name) or "").split(",")
     return tuple(int(word) for word in words) if all(word.strip().isdecimal() for word in words) else ()
+
+
+def _gaps(feature: QgsFeature, xyz: np.ndarray) -> np.ndarray:
+    """Return the sections in the field `gaps`, (k, 2) metres; none if the field does not hold those of this line."""
+    words = str(_value(feature, "gaps") or "").split(",")
+    try:
+        gaps = np.array([[float(bound) for bound in word.split("-")] for word in words], dtype=float)
+    except ValueError:
+        return NO_GAPS.copy()
+    rise = np.diff(gaps.ravel()) if gaps.ndim == 2 and gaps.shape[1] == 2 else np.array([-1.0])
+    in_order = bool((rise >= 0).all()) and gaps[-1, 1] <= length_along(xyz[:, :2])[-1] + SAME_SUM_M
+    return gaps if in_order else NO_GAPS.copy()
 
 
 def _value(feature: QgsFeature, name: str) -> Any:

@@ -192,12 +192,20 @@ def test_where_one_rail_is_missing_the_other_gives_the_height(cant, side):
 def test_gaps_of_rails_count_for_the_track():
     left, right, _ = track(STRAIGHT)
     (left_rail, right_rail) = rails_of(left, right)
-    left_rail = replace(left_rail, gaps=np.array([[10.0, 13.0], [30.0, 31.0]]))
-    right_rail = replace(right_rail, gaps=np.array([[12.0, 15.0]]))
+    left_rail = replace(left_rail, gaps=np.array([[10.0, 13.0], [30.0, 31.0]]), bridged_m=4.0)
+    right_rail = replace(right_rail, gaps=np.array([[12.0, 15.0]]), bridged_m=3.0)
     # The gaps of both rails overlap by one metre, which counts once. Reversing a rail does not change its gaps.
     for rails in ([left_rail, right_rail], [left_rail.reversed(), right_rail], [left_rail, right_rail.reversed()]):
         (line,) = build_centerlines(rails, GAUGE, WIDTH)
         assert line.bridged_m == pytest.approx(6.0, abs=0.01)
+
+
+@pytest.mark.parametrize("bridged_m", [3.0, np.nan])
+def test_the_bridged_length_of_a_track_is_unknown_if_the_gaps_of_a_rail_are(bridged_m):
+    """Lines drawn by hand, or from a file that has lost the sections."""
+    left, right = rails_of(*track(STRAIGHT)[:2])
+    (line,) = build_centerlines([left, replace(right, bridged_m=bridged_m)], GAUGE, WIDTH)
+    assert np.isnan(line.bridged_m)
 
 
 def test_bridged_length_is_counted_along_the_rail():

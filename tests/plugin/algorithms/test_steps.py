@@ -42,7 +42,10 @@ def chain(run_step, tmp_path):
     return run
 
 
-def test_chained_steps_give_the_lines_of_extract_rails(chain, run, cloud, tmp_path):
+def test_chained_steps_give_the_lines_of_extract_rails(chain, run, write_cloud, track, tmp_path):
+    points = track()
+    left, x = points[:, 1] > 3_000_000, points[:, 0] - 500_000
+    cloud = write_cloud(points[~((left & (np.abs(x - 4.5) < 1)) | (~left & (np.abs(x - 8) < 1)))])
     whole = {"RAILS": tmp_path / "rails.gpkg", "CENTERLINES": tmp_path / "tracks.gpkg"}
     assert run({"INPUT": cloud, "ITERATIONS": 1, **whole}).ok
     _, _, rails, tracks = chain(cloud)
@@ -51,7 +54,10 @@ def test_chained_steps_give_the_lines_of_extract_rails(chain, run, cloud, tmp_pa
     for mine, theirs in zip(read_features(rails), read_features(whole["RAILS"])):
         # Rails know their tracks once they are paired: the centerlines step returns them with track_ids.
         assert (mine[1].pop("track_ids") or "", theirs[1].pop("track_ids")) == ("", "1")
+        assert mine[1].pop("gaps") == theirs[1].pop("gaps")
         assert mine[1] == pytest.approx(theirs[1], rel=1e-6, abs=LAST_DIGIT)
+    ((_, mine),), ((_, theirs),) = read_features(tracks), read_features(whole["CENTERLINES"])
+    assert mine["bridged_m"] == theirs["bridged_m"] == pytest.approx(4.0, abs=0.2)
 
 
 INTERFACE = {

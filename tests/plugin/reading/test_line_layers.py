@@ -64,8 +64,28 @@ def test_existing_fields_are_used(layer):
     rails, _ = rails_of(layer(LEFT, RIGHT, fields=fields, values=[(7, 11, 1.5, "many"), (None, None, None, None)]))
     assert [(rail.rail_id, rail.class_code, rail.bridged_m, rail.points) for rail in rails] == [
         (7, 11, 1.5, 0),
-        (2, 0, 0.0, 0),
+        (2, 0, pytest.approx(math.nan, nan_ok=True), 0),
     ]
+
+
+@pytest.mark.parametrize(
+    ("text", "bridged_m", "gaps"),
+    [
+        ("1.00-3.00,5.00-6.50", 3.5, [[1, 3], [5, 6.5]]),
+        (None, 0.0, []),  # no gaps
+        ("1.00-3.00,5.0", 3.5, None),  # cut by a format with short texts
+        ("1.00-3.00", 3.5, None),
+        ("5.00-6.50,1.00-3.00", 3.5, None),
+        ("18.00-21.50", 3.5, None),  # beyond the end of the line, which was cut later
+        ("unknown", 3.5, None),
+        ("nan-nan", 3.5, None),
+    ],
+)
+def test_sections_without_points_are_read_if_they_explain_the_bridged_length(layer, text, bridged_m, gaps):
+    fields = "&field=bridged_m:double&field=gaps:string"
+    (rail,), _ = rails_of(layer(LEFT, fields=fields, values=[(bridged_m, text)]))
+    assert rail.knows_gaps == (gaps is not None)
+    np.testing.assert_array_equal(rail.gaps, np.reshape(gaps, (-1, 2)) if rail.knows_gaps else rail.gaps)
 
 
 def test_every_part_is_a_rail_with_the_id_of_its_feature(layer):

@@ -30,13 +30,14 @@ def test_rail_becomes_a_feature_in_the_units_of_the_cloud(qgis):
         points=812,
         resid_mm=4.5,
         sigma_mm=np.float64(0.7),
-        bridged_m=0.0,
+        bridged_m=1.5,
+        gaps=np.array([[0.25, 1.0], [2.0, 2.75]]),
         track_ids=(2, 5),
     )
     (feature,) = features([rail], RAIL_FIELDS, FEET)
     vertices = [(point.x(), point.y(), point.z()) for point in feature.geometry().vertices()]
     assert np.allclose(vertices, [(1000, 2000, 10), (1010, 2000, 11)])
-    assert feature.attributes() == [3, 10, 3.063, 812, 4.5, 0.7, 0.0, "2,5"]
+    assert feature.attributes() == [3, 10, 3.063, 812, 4.5, 0.7, 1.5, "2,5", "0.25-1.00,2.00-2.75"]
 
 
 def test_centerline_becomes_a_feature(qgis):
@@ -66,6 +67,7 @@ def test_fields_have_their_types(qgis, columns):
         "left_ids",
         "right_ids",
         "track_ids",
+        "gaps",
     }
 
 
