@@ -62,7 +62,8 @@ def cloud_source(value: Any, context: QgsProcessingContext) -> CloudSource:
     Raises
     ------
     CloudError
-        The layer is not a point cloud, or the path is not one of a cloud on this computer.
+        The layer is not a point cloud, the path is not one of a cloud on this computer, or the layer shows other points
+        or another coordinate system than its file, which is what a run reads.
     """
     if isinstance(value, QgsProperty):
         value = value.valueAsString(context.expressionContext())[0]
@@ -73,8 +74,30 @@ def cloud_source(value: Any, context: QgsProcessingContext) -> CloudSource:
         return _checked(CloudSource((Path(str(value)),)))
     if not isinstance(layer, QgsPointCloudLayer):
         raise CloudError(f'The layer "{layer.name()}" is not a point cloud: choose a point cloud layer or file.')
+    _check_as_in_file(layer)
     crs_wkt = layer.crs().toWkt() if layer.crs().isValid() else None
     return _checked(CloudSource((Path(layer.source()),), crs_wkt))
+
+
+def _check_as_in_file(layer: QgsPointCloudLayer) -> None:
+    """Raise a `CloudError` if the user has set a filter or another coordinate system for a layer."""
+    shown = layer.subsetString() if hasattr(layer, "subsetString") else ""  # since QGIS 3.26
+    if shown:
+        raise CloudError(
+            f'The layer "{layer.name()}" is filtered ({shown}), but a run reads all points of its file: remove the '
+            "filter, and choose points by class and extent."
+        )
+    provider = layer.dataProvider()
+    stated = provider.crs() if provider is not None else layer.crs()
+    if stated.isValid() and stated != layer.crs():
+        raise CloudError(
+            f'The layer "{layer.name()}" was set to {_system_name(layer.crs())}, but its file states '
+            f"{_system_name(stated)}, which a run uses: set the layer back, or correct the file."
+        )
+
+
+def _system_name(crs: QgsCoordinateReferenceSystem) -> str:
+    return crs.authid() or crs.description() or "no coordinate system"
 
 
 def read_points(

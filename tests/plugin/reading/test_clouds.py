@@ -2,6 +2,8 @@ import json
 
 import pytest
 from qgis.core import QgsCoordinateReferenceSystem, QgsPointCloudLayer, QgsProject, QgsProperty, QgsVectorLayer
+from rail_extract.core.clouds.readers import read_header
+from rail_extract.core.clouds.vpc import CatalogueTile, catalogue_text
 from rail_extract.core.errors import CloudError
 from rail_extract.rail_extract_plugin.reading.clouds import CloudSource, cloud_source
 
@@ -40,6 +42,36 @@ def test_layer_has_its_coordinate_system(path, layer, context):
 def test_layer_without_coordinate_system(layer, context):
     layer.setCrs(QgsCoordinateReferenceSystem())
     assert cloud_source(layer, context).crs_wkt is None
+
+
+@pytest.fixture
+def catalogue_layer(path, context):
+    """A layer of a virtual point cloud that states a coordinate system; QGIS reads these from 3.32 on."""
+    header = read_header(path)
+    wkt = QgsCoordinateReferenceSystem("EPSG:32643").toWkt()
+    path.with_name("all.vpc").write_text(
+        catalogue_text([CatalogueTile(path.name, header.point_count, header.extent)], wkt)
+    )
+    layer = QgsPointCloudLayer(str(path.with_name("all.vpc")), "my tiles", "vpc")
+    if not layer.isValid():
+        pytest.skip("this QGIS has no layers of virtual point clouds")
+    return layer
+
+
+def test_layer_as_in_its_file_is_read(catalogue_layer, context):
+    assert "UTM zone 43N" in cloud_source(catalogue_layer, context).crs_wkt
+
+
+def test_filtered_layer_is_refused(catalogue_layer, context):
+    assert catalogue_layer.setSubsetString("Classification = 2")
+    with pytest.raises(CloudError, match=r'"my tiles" is filtered \(Classification = 2\), but a run reads all points'):
+        cloud_source(catalogue_layer, context)
+
+
+def test_layer_with_another_system_than_its_file_is_refused(catalogue_layer, context):
+    catalogue_layer.setCrs(QgsCoordinateReferenceSystem("EPSG:25832"))
+    with pytest.raises(CloudError, match="was set to EPSG:25832, but its file states EPSG:32643"):
+        cloud_source(catalogue_layer, context)
 
 
 def test_virtual_point_cloud_is_left_to_the_core(path, context):
