@@ -33,6 +33,7 @@ from .steps import (
     square_side,
     tracks_of,
     warn_of_rails,
+    warn_of_split_classes,
     whole_rails,
     with_tracks,
 )
@@ -206,6 +207,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
     except NoTrackError as error:
         runner.failures.append(str(error))
     rails = with_tracks(rails, centerlines, progress)
+    warn_of_split_classes(rails, parameters, progress)
     heads = head_widths(sources[0], parameters.head_width_m, progress) if rails else None
     geometry = _measure_tracks(centerlines, rails, sources, parameters, runner, measuring)
     described = dict(runner.run({"engine": Task("Describing the engine", _describe_engine, (parameters,))}))

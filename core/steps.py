@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from .clouds.points import RailPoints
 from .errors import NoTrackError, ParameterError
@@ -38,6 +39,9 @@ from .vectorize import vectorize
 
 VECTORIZE, SMOOTH, REFINE, ELEVATE = 0.45, 0.05, 0.25, 0.25
 """Relative run times of the steps from a raster to lines, for the progress."""
+
+SAME_RAIL_M = 0.5
+"""Ends of rails that are closer together belong to one rail: no two rails of any gauge end so close to each other."""
 
 
 def square_side(parameters: Parameters) -> float:
@@ -308,6 +312,40 @@ def with_tracks(
             f"({heights}). Check the classification there."
         )
     return kept
+
+
+def warn_of_split_classes(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> None:
+    """Warn the user if rails of different classes seem to be the rails of one track, or parts of one rail.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+        With their tracks.
+    parameters : Parameters
+    progress : Progress
+    """
+    codes = {rail.rail_id: rail.class_code for rail in rails}
+    if len(set(codes.values())) < 2:
+        return
+    lone = [replace(rail, class_code=0) for rail in rails if not rail.track_ids]
+    try:
+        tracks = _tracks_of_class(lone, parameters, SILENT)
+    except NoTrackError:
+        tracks = ()
+    at_gauge = {tuple({codes[one] for one in (*track.left_ids, *track.right_ids)}) for track in tracks}
+    split = sorted({code for group in at_gauge | _in_line(rails) if len(group) > 1 for code in group})
+    if split:
+        progress.warning(
+            f"Rails of the classes {', '.join(map(str, split))} lie at gauge from each other or continue each other, "
+            "but each class is paired by itself. If they are of the same tracks, set MERGE_CLASSES."
+        )
+
+
+def _in_line(rails: Sequence[RailLine]) -> set[tuple[int, ...]]:
+    """Return the pairs of classes of which one has a rail that begins where a rail of the other ends."""
+    ends = np.concatenate([rail.xyz[[0, -1], :2] for rail in rails])
+    codes = [rail.class_code for rail in rails for _ in range(2)]
+    return {(codes[a], codes[b]) for a, b in cKDTree(ends).query_pairs(SAME_RAIL_M) if codes[a] != codes[b]}
 
 
 def _tracks_of_class(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> tuple[Centerline, ...]:

@@ -104,12 +104,15 @@ class Request:
         In units of the CRS.
     zero : LocalFrame
         Frame whose origin is the zero of the files' coordinate system.
+    merged : bool
+        Whether all points requested count as points of the first class.
     """
 
     headers: tuple[CloudHeader, ...]
     class_codes: tuple[int, ...]
     extent: Extent | None
     zero: LocalFrame
+    merged: bool = False
 
     def read(self, header: CloudHeader, progress: Progress = SILENT) -> Iterator[Chunk]:
         """Read the points requested from a file chunk by chunk; see `readers.read_classes`."""
@@ -117,7 +120,8 @@ class Request:
             return
         for xyz, codes, census in read_classes(header.path, self.class_codes, progress):
             inside = slice(None) if self.extent is None else self.holds(xyz)
-            yield xyz[inside], codes[inside], census
+            found = np.full_like(codes, self.class_codes[0]) if self.merged else codes
+            yield xyz[inside], found[inside], census
 
     def holds(self, xyz: np.ndarray) -> np.ndarray:
         """Return which places, (n, 3) in units of the CRS, lie in the extent, (n,) bool."""

@@ -83,6 +83,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "find the rail points of a raw cloud first; --rail-classes is ignored"
     cloud.add_argument("--classify", action="store_true", help=text)
     cloud.add_argument("--rail-classes", default="10", help="classes of rail points, such as 10,11 (default: 10)")
+    text = "take all rail classes for one, for tracks whose rails are of different classes"
+    cloud.add_argument("--merge-classes", action="store_true", help=text)
     add_cloud_arguments(cloud)
     method = parser.add_argument_group("method", "See docs/parameters.md.")
     method.add_argument("--iterations", type=int, default=Parameters.passes, help="passes of the network (default: 2)")
@@ -216,6 +218,7 @@ def _run_in(
     with connect(args.scheduler, args.workers, certificates, args.dashboard) as client:
         runner = DaskRunner(client, folder)
         request = ask(args.tiles, codes, args.crs, extent, progress, unreadable=runner.failures)
+        request = replace(request, merged=args.merge_classes and not args.classify)
         network = extract_files(request, folder.resolve(), parameters, runner, progress, args.classify)
     _write(network, args, standard, parameters, extent, outputs)
     print(f"{len(network.rails)} rails, {sum(rail.length_m for rail in network.rails) / 1000:.3f} km")

@@ -75,6 +75,7 @@ class ExtractRails(RailAlgorithm):
         """Declare the parameters and outputs in the order of the interface."""
         for definition in (
             *inputs.cloud(),
+            inputs.merge_classes(),
             inputs.classify(),
             *groups.rail(detect=True),
             *groups.area(),
@@ -133,6 +134,7 @@ class ExtractRails(RailAlgorithm):
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
         request = request_points(job.cloud, job.class_codes, values.extent, progress)
+        request = replace(request, merged=values.flag("MERGE_CLASSES") and not values.flag("CLASSIFY"))
         if values.detects():
             job = self._detected(job, request, values, progress)
         settings = values.settings(job.standard, job.other_gauges_m)

@@ -14,7 +14,7 @@ from qgis.core import (
 from ...core.standards import RAIL_CLASS
 from ..i18n import tr
 from .cloud_parameter import CloudParameter
-from .definitions import Definitions, helped
+from .definitions import Definitions, advanced, helped
 
 
 def cloud() -> Definitions:
@@ -53,6 +53,14 @@ def classify() -> QgsProcessingParameterDefinition:
             "For clouds that nobody has classified: finds the rail points first, as Classify Rail Points does. The "
             "rail classes are ignored."
         ),
+    )
+
+
+def merge_classes() -> QgsProcessingParameterDefinition:
+    """Define whether the rail classes are to be taken for one."""
+    return advanced(
+        QgsProcessingParameterBoolean("MERGE_CLASSES", tr("Take all rail classes for one"), defaultValue=False),
+        tr("For tracks whose rails, or parts of rails, are of different classes. The results have the first class."),
     )
 
 

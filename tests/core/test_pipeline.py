@@ -14,7 +14,7 @@ from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.standards import STANDARDS
-from rail_extract.core.steps import lines_of, overlap_tiles, tracks_of
+from rail_extract.core.steps import lines_of, overlap_tiles, tracks_of, warn_of_split_classes
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.plain import straight
 from rail_extract.laboratory.scenes.scanner import Scanner
@@ -89,6 +89,42 @@ def test_a_class_without_track_is_a_warning_if_another_class_has_one():
     assert (track.track_id, track.class_code) == (1, 10)
     (said,) = heard.said
     assert said.startswith("Class 11: No track of 1435 mm gauge found")
+
+
+SPLIT = "Rails of the classes 10, 11 lie at gauge from each other or continue each other"
+
+
+def split_between_classes(by_rail):
+    """A track whose rails, or halves of rails, have the classes 10 and 11."""
+    whole = rails_at(CURVES[0], 0.0, 1.435 + WIDTH)
+    if by_rail:
+        return [replace(rail, class_code=code, rail_id=code) for rail, code in zip(whole, (10, 11))]
+    middle = whole[0].length_m / 2
+    parts = [(rail, *span) for rail in whole for span in ((0.0, middle - 0.1), (middle + 0.1, 2 * middle))]
+    return [
+        replace(rail.between(start, end), class_code=10 + (start > 0), rail_id=number, track_ids=(1 + (start > 0),))
+        for number, (rail, start, end) in enumerate(parts)
+    ]
+
+
+@pytest.mark.parametrize("by_rail", [True, False])
+def test_a_track_that_is_split_between_classes_is_a_warning(by_rail):
+    heard = Warnings()
+    warn_of_split_classes(split_between_classes(by_rail), Parameters(1.435, WIDTH), heard)
+    (said,) = heard.said
+    assert said.startswith(SPLIT)
+    assert said.endswith("set MERGE_CLASSES.")
+
+
+def test_tracks_of_two_classes_are_not_a_warning():
+    heard = Warnings()
+    rails = rails_at(CURVES[0], 0.0, 1.435 + WIDTH, 5.0, 5.0 + 1.435 + WIDTH)
+    rails = [
+        replace(rail, class_code=10 + number // 2, rail_id=number, track_ids=(1 + number // 2,))
+        for number, rail in enumerate(rails)
+    ]
+    warn_of_split_classes(rails, Parameters(1.435, WIDTH), heard)
+    assert heard.said == []
 
 
 def test_lines_without_points_stay_in_their_cells_and_have_no_heights():

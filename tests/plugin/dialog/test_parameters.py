@@ -8,6 +8,7 @@ from rail_extract.rail_extract_plugin.dialog.parameter_values import CHOICES, NU
 PARAMETERS = [
     ("INPUT", "pointcloud", None),
     ("RAIL_CLASSES", "string", "10"),
+    ("MERGE_CLASSES", "boolean", False),
     ("CLASSIFY", "boolean", False),
     ("STANDARD", "enum", "EN_60E1_1435"),
     ("GAUGE", "number", None),
