@@ -120,7 +120,7 @@ def test_outputs_left_blank_in_the_batch_dialog_are_skipped(run, scene, tmp_path
     assert [path.name for path in tmp_path.glob("*.gpkg")] == ["rails.gpkg"]
 
 
-def test_rails_of_two_classes_make_a_track_when_merged(run, feedback, write_cloud, track, tmp_path):
+def test_rails_of_two_classes_make_a_track_when_merged(run, new_feedback, write_cloud, track, tmp_path):
     points = track()
     left = points[:, 1] > 3_000_000
     tiles = tmp_path / "tiles"
@@ -128,7 +128,8 @@ def test_rails_of_two_classes_make_a_track_when_merged(run, feedback, write_clou
     for code, mine in ((10, left), (11, ~left)):
         write_cloud(points[mine], f"{code}.las", class_code=code, folder=tiles)
     values = {"INPUT": tiles, "RAIL_CLASSES": "11,10", "ITERATIONS": 1, "RAILS": tmp_path / "rails.gpkg"}
-    apart, merged = run(values), run({**values, "MERGE_CLASSES": True})
+    feedback = new_feedback()
+    apart, merged = run(values, feedback), run({**values, "MERGE_CLASSES": True})
     assert (apart.results["CENTERLINE_COUNT"], merged.results["CENTERLINE_COUNT"]) == (0, 1)
     assert any("Rails of the classes 10, 11 lie at gauge" in text for text in feedback.warnings)
     assert {items["class_code"] for _, items in read_features(tmp_path / "rails.gpkg")} == {11}
