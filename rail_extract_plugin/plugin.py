@@ -10,7 +10,7 @@ from .provider import RailExtractProvider
 from .setup import package_folders
 
 if TYPE_CHECKING:
-    from .model_action import OpenModelAction
+    from .windows import Windows
 
 
 class RailExtractPlugin:
@@ -25,7 +25,7 @@ class RailExtractPlugin:
     def __init__(self, iface) -> None:
         self.iface = iface
         self.provider: RailExtractProvider | None = None
-        self.action: OpenModelAction | None = None
+        self.windows: Windows | None = None
 
     def initProcessing(self) -> None:
         """Register the algorithms; ``qgis_process`` calls only this."""
@@ -34,24 +34,18 @@ class RailExtractPlugin:
         QgsApplication.processingRegistry().addProvider(self.provider)
 
     def initGui(self) -> None:
-        """Start in QGIS with windows: register the algorithms, the menu entry and the setting."""
+        """Start in QGIS with windows: register the algorithms, the menu entries, the dock and the settings."""
         self.initProcessing()
 
-        from .model_action import OpenModelAction
-        from .setup import package_setting
+        from .windows import Windows
 
-        self.action = OpenModelAction()
-        self.action.register()
-        package_setting.register()
+        self.windows = Windows(self.iface)
 
     def unload(self) -> None:
         """Remove everything that was registered."""
-        if self.action is not None:
-            from .setup import package_setting
-
-            package_setting.deregister()
-            self.action.deregister()
-            self.action = None
+        if self.windows is not None:
+            self.windows.remove()
+            self.windows = None
         if self.provider is not None:
             QgsApplication.processingRegistry().removeProvider(self.provider)
             self.provider = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from qgis.core import (
@@ -27,6 +28,7 @@ from ..i18n import tr
 from ..paths import ICONS, PICTURES
 from ..setup.dependencies import explain_missing, missing_packages
 from ..writing.destinations import appends, destinations
+from ..writing.styling import NO_PROPERTIES
 from .sentences import COMMAND_LINE, sentence_for
 
 # Search terms, also in the languages of the larger railways: the toolbox search compares whole words.
@@ -67,6 +69,9 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     """Page of the guide that the Help button opens."""
     NEEDS: tuple[tuple[str, ...], ...] = ()
     """Required Python modules: of each inner tuple one is enough, and the first is recommended."""
+
+    layer_properties: Mapping[str, str] = NO_PROPERTIES
+    """What the layers of a run remember of it; see `writing.run`."""
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Any:
         """Read and check the parameters in the main thread, and return what `compute` needs.

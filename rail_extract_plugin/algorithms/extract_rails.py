@@ -29,6 +29,7 @@ from ..writing.layers import (
     write_stations,
 )
 from ..writing.reports import write_report
+from ..writing.run import properties_of
 from ..writing.whole_files import write_each
 from .base import CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
@@ -154,6 +155,7 @@ class ExtractRails(RailAlgorithm):
         origin = Origin(job.cloud.paths, job.standard, job.other_gauges_m, job.command, settings)
         found = list_findings(network, origin.gauges_m) if findings else ()
         frame, rest = network.frame, (parameters, context)
+        self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, frame)
         writers = {
             "CLEANED": lambda: self._write_cleaned(job, network, *rest),
             "RAILS": lambda: write_lines(self, "RAILS", RAILS, network.rails, frame, *rest),

@@ -20,6 +20,7 @@ from ..reading.clouds import CloudSource, points_folder
 from ..writing.destinations import is_wanted
 from ..writing.layers import FINDINGS, figures_of_stations, write_lines, write_stations
 from ..writing.reports import write_report
+from ..writing.run import properties_of
 from ..writing.whole_files import write_each
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
@@ -115,6 +116,9 @@ class MeasureTrackGeometry(RailAlgorithm):
         check_gauges(tracks, measured, progress)
         progress.check()
         frame, rest = tracks.frame, (parameters, context)
+        if job.cloud:
+            codes = tuple(cloud.class_code for cloud in tracks.clouds)
+            self.layer_properties = properties_of(job.cloud, codes, job.head_width_m, frame)
         centerlines = with_measured_gauge(tracks.centerlines, measured)
         network = RailNetwork(tuple(rails), centerlines, frame, geometry=measured, warnings=progress.warnings)
         paths = job.cloud.paths if job.cloud else (Path(lines[0].sourceName()),)

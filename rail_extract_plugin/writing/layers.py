@@ -209,7 +209,7 @@ def write_raster(
     destination = algorithm.destinations.get(name) or Destination.at(Path(path))
     with destination.replacing() as new:
         write_rasters(new, header, rasters, progress)
-    style_on_load(path, "raster", context)
+    style_on_load(path, "raster", context, algorithm.layer_properties)
     return {name: path}
 
 
@@ -255,7 +255,7 @@ def _write(
     layer_id = write_whole(parameters.get(name), context, algorithm.destinations.get(name), write)
     if not layer_id:
         return {}
-    style_on_load(layer_id, kind.style, context)
+    style_on_load(layer_id, kind.style, context, algorithm.layer_properties)
     return {name: layer_id}
 
 

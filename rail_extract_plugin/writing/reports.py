@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from qgis.core import QgsProcessingAlgorithm, QgsProcessingContext
 
 from ...core.disk import Destination
+from ..notices import notices
 
 if TYPE_CHECKING:
     from ...core.rails import RailNetwork
@@ -49,7 +50,9 @@ def write_report(
     path = algorithm.parameterAsFileOutput(parameters, name, context)
     if not path:
         return {}
-    return _write(algorithm, name, path, origin.report(network))
+    written = _write(algorithm, name, path, origin.report(network))
+    notices.report_written.emit(path)
+    return written
 
 
 def write_check(

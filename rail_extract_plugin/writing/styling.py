@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from qgis.core import (
     QgsMapLayer,
     QgsProcessingContext,
@@ -12,36 +14,48 @@ from qgis.PyQt import sip
 
 from ..compat import group_layer
 from ..i18n import tr
+from ..notices import notices
 from ..paths import STYLES
+
+FINDINGS = "findings"
+"""Style of the findings, which the user is asked to review."""
+
+NO_PROPERTIES: Mapping[str, str] = {}
 
 BOTTOM_TO_TOP = ("raster", "findings", "rails", "centerlines", "quality")
 """Order of the layers in the group, by style."""
 
 
 class _Styler(QgsProcessingLayerPostProcessorInterface):
-    def __init__(self, style: str) -> None:
+    def __init__(self, style: str, properties: Mapping[str, str]) -> None:
         super().__init__()
-        self._path = str(STYLES / f"{style}.qml")
+        self._style, self._properties = style, dict(properties)
 
     def postProcessLayer(
         self, layer: QgsMapLayer, context: QgsProcessingContext, feedback: QgsProcessingFeedback
     ) -> None:
-        layer.loadNamedStyle(self._path)
+        layer.loadNamedStyle(str(STYLES / f"{self._style}.qml"))
+        for name, value in self._properties.items():
+            layer.setCustomProperty(name, value)
         layer.triggerRepaint()
+        if self._style == FINDINGS:
+            notices.findings_loaded.emit(layer.id())
 
 
 _kept: list[_Styler] = []
 """QGIS calls these after the algorithm has been deleted, holds no reference, and deletes them with its context."""
 
 
-def _styler(style: str) -> _Styler:
+def _styler(style: str, properties: Mapping[str, str]) -> _Styler:
     """Create the object for one layer, and keep it until QGIS deletes it."""
     _kept[:] = [one for one in _kept if not sip.isdeleted(one)]
-    _kept.append(_Styler(style))
+    _kept.append(_Styler(style, properties))
     return _kept[-1]
 
 
-def style_on_load(layer_id: str, style: str, context: QgsProcessingContext) -> None:
+def style_on_load(
+    layer_id: str, style: str, context: QgsProcessingContext, properties: Mapping[str, str] = NO_PROPERTIES
+) -> None:
     """Apply a style if QGIS loads the layer after the run.
 
     All layers of a run go into one group, points above lines above rasters, if QGIS supports groups for results.
@@ -52,8 +66,10 @@ def style_on_load(layer_id: str, style: str, context: QgsProcessingContext) -> N
     style : str
         Name of a .qml file of the plugin, without its suffix.
     context : QgsProcessingContext
+    properties : mapping of str to str
+        To be stored with the layer.
     """
     if context.willLoadLayerOnCompletion(layer_id):
         details = context.layerToLoadOnCompletionDetails(layer_id)
-        details.setPostProcessor(_styler(style))
+        details.setPostProcessor(_styler(style, properties))
         group_layer(details, tr("Rail Extract"), BOTTOM_TO_TOP.index(style))

@@ -16,7 +16,8 @@ from qgis.core import (
 )
 from qgis.PyQt.QtCore import QObject, QUrl, pyqtSlot
 from qgis.PyQt.QtGui import QDesktopServices
-from qgis.PyQt.QtWidgets import QDialogButtonBox, QFileDialog, QGroupBox, QLineEdit
+from qgis.PyQt.QtWidgets import QDialogButtonBox, QDockWidget, QFileDialog, QGroupBox, QLineEdit
+from qgis.utils import iface
 
 SAMPLE, ARCHIVE = os.environ["RAIL_EXTRACT_SAMPLE"], os.environ["RAIL_EXTRACT_ZIP"]
 
@@ -141,6 +142,40 @@ def rails(driver: Driver) -> Iterator:
     dialog.setParameters({**parameters, "OUTPUT": str(driver.folder / "tracks.gpkg")})
     driver.keep("second log", (yield from press_run(dialog)))
     yield from close(dialog)
+
+
+def review(driver: Driver) -> Iterator:
+    """Extract the sample's rails from the plugin's menu, and review the findings in the dock."""
+    yield from install(ARCHIVE)
+    browser = Browser()
+    menu = next(one for one in iface.pluginMenu().actions() if one.text() == "Rail Extract").menu()
+    driver.keep("menu", [action.text() for action in menu.actions()])
+    later(menu.actions()[0].trigger)
+    dialog = yield lambda: window("AlgorithmDialog")
+    driver.keep("sample", dialog.mainWidget().wrappers["INPUT"].widget.value())
+    driver.keep("standard", dialog.mainWidget().wrappers["STANDARD"].parameterValue())
+    findings = str(driver.folder / "findings.gpkg")
+    dialog.setParameters({**PART, "INPUT": SAMPLE, "FINDINGS": findings, "REPORT": "TEMPORARY_OUTPUT"})
+    driver.picture("review_dialog")
+    yield from press_run(dialog)
+    yield from close(dialog)
+    driver.keep("opened", browser.urls)
+    dock = iface.mainWindow().findChild(QDockWidget, "RailExtractReview")
+    driver.keep("dock is visible", dock.isVisible())
+    yield lambda: not dock.is_reading
+    driver.keep("count", dock.count.text())
+    dock.buttons["next"].click()
+    yield 1.0
+    driver.picture("review_next")
+    dock.buttons["previous"].click()
+    dock.buttons["accepted"].click()
+    yield 1.0
+    driver.picture("review_accepted")
+    dock.buttons["rejected"].click()
+    driver.keep("count after", dock.count.text())
+    driver.keep("scale", iface.mapCanvas().extent().width())
+    yield 1.0
+    driver.picture("review_rejected")
 
 
 def batch(driver: Driver) -> Iterator:

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from osgeo import gdal, ogr
 
-SCENARIOS = ("dialogs", "rails", "batch", "model")
+SCENARIOS = ("dialogs", "rails", "review", "batch", "model")
 NAMES = [
     *("extractrails", "rasterizerailpoints", "frpdfcleanup", "vectorizerails", "buildtrackcenterlines"),
     *("measuretrackgeometry", "installpackages", "checkinstallation"),
@@ -75,6 +75,32 @@ def test_saved_lines_are_complete(run_scenario, name, count):
 def test_saved_raster_has_its_system(run_scenario):
     dataset = gdal.Open(str(run_scenario("rails").folder / "cleaned.tif"))
     assert dataset.GetSpatialRef().GetAuthorityCode(None) == "32643"
+
+
+def test_the_menu_opens_the_sample(run_scenario):
+    session = run_scenario("review")
+    assert session["menu"] == ["Open the Sample…", "Review Findings"]
+    assert session["sample"].endswith("rail_extract/resources/sample/sample.laz")
+    assert session["standard"] == "IN_75R_1000"
+
+
+def test_the_report_opens_after_a_run(run_scenario):
+    (opened,) = run_scenario("review")["opened"]
+    assert opened.startswith("file://") and opened.endswith(".html")
+
+
+def test_findings_are_reviewed_in_the_dock(run_scenario):
+    session = run_scenario("review")
+    assert session["dock is visible"]
+    total = int(session["count"].split()[2].rstrip(";"))
+    assert session["count"] == f"1 of {total}; 0 reviewed"
+    assert session["count after"].endswith("2 reviewed")
+    assert 20 <= session["scale"] < 100
+    dataset = ogr.Open(str(session.folder / "findings.gpkg"))
+    layer = dataset.GetLayer(0)
+    decided = {feature["finding"]: feature["review"] for feature in layer}
+    assert len(decided) == total
+    assert (decided[1], decided[2], set(list(decided.values())[2:])) == ("accepted", "rejected", {""})
 
 
 def test_batch_writes_what_is_named_and_skips_what_is_blank(run_scenario):

@@ -205,7 +205,7 @@ OUTPUTS = {
     "frpdfcleanup": ("OUTPUT.tif",),
     "vectorizerails": ("OUTPUT.gpkg",),
     "buildtrackcenterlines": ("OUTPUT.gpkg",),
-    "measuretrackgeometry": ("OUTPUT.gpkg", "FINDINGS.gpkg", "REPORT.html"),
+    "measuretrackgeometry": ("OUTPUT.gpkg",),
 }
 """Outputs of the algorithms, each a file in the folder of the test."""
 

@@ -111,7 +111,7 @@ def a_folder(folder):
 
 
 def without_outputs(bench):
-    return {**cloud(bench), **dict.fromkeys(("RAILS", "CENTERLINES", "QUALITY", "CLEANED"))}
+    return {**cloud(bench), **dict.fromkeys(("RAILS", "CENTERLINES", "QUALITY", "FINDINGS", "CLEANED"))}
 
 
 def a_pipe(folder):
@@ -139,7 +139,7 @@ def replaced_on_the_way(bench):
                 earlier(new)
 
     bench.feedback.progressChanged.connect(replace)
-    skipped = dict.fromkeys(("CENTERLINES", "QUALITY"))
+    skipped = dict.fromkeys(("CENTERLINES", "QUALITY", "FINDINGS"))
     return {**cloud(bench), **skipped, "RAILS": bench.folder / "rails.gpkg", "CLEANED": bench.folder / "cleaned.tif"}
 
 
@@ -157,13 +157,13 @@ def removed_on_the_way(bench):
     """The folder of the outputs is deleted during the run."""
     bench.feedback.progressChanged.connect(lambda done: shutil.rmtree(bench.folder / "gone", ignore_errors=True))
     (bench.folder / "gone").mkdir()
-    skipped = dict.fromkeys(("CENTERLINES", "QUALITY", "CLEANED"))
+    skipped = dict.fromkeys(("CENTERLINES", "QUALITY", "FINDINGS", "CLEANED"))
     return {**cloud(bench), **skipped, "RAILS": bench.folder / "gone" / "rails.gpkg"}
 
 
 def one_removed_on_the_way(bench):
     """The same for one of two outputs."""
-    skipped = dict.fromkeys(("QUALITY", "CLEANED"))
+    skipped = dict.fromkeys(("QUALITY", "FINDINGS", "CLEANED"))
     gone = removed_on_the_way(bench)["RAILS"].with_name("tracks.gpkg")
     return {**cloud(bench), **skipped, "RAILS": bench.folder / "rails.gpkg", "CENTERLINES": gone}
 

@@ -1,0 +1,18 @@
+"""Notices from runs to QGIS's windows; without windows, nobody listens."""
+
+from __future__ import annotations
+
+from qgis.PyQt.QtCore import QObject, pyqtSignal
+
+
+class _Notices(QObject):
+    """Signals of runs, which may come from any thread."""
+
+    report_written = pyqtSignal(str)
+    """Path of a report."""
+
+    findings_loaded = pyqtSignal(str)
+    """Id of a layer of findings in the project."""
+
+
+notices = _Notices()

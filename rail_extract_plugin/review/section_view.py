@@ -1,0 +1,139 @@
+"""The widget that draws a cross-section: the whole of it on top, and the heads of both rails, enlarged, below."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from qgis.PyQt.QtCore import QPointF, QRectF, QSize, Qt
+from qgis.PyQt.QtGui import QColor, QPainter, QPaintEvent, QPen, QTextOption
+from qgis.PyQt.QtWidgets import QSizePolicy, QWidget
+
+from ..i18n import tr
+from .sections import REACH_M, Picture
+
+POINT, RAIL, FRAME, PAPER, SOFT = (QColor(name) for name in ("#1565c0", "#d62839", "#dfe5ec", "#ffffff", "#5d6b7a"))
+
+POINT_PX, CROSS_PX, LINE_PX, GAP_PX = 1.6, 6.0, 18.0, 6.0
+"""Radius of a point, half the height of a rail's mark, height of a line of text, and space between panels."""
+
+WHOLE = 0.35
+"""Share of the height for the whole section."""
+
+HEADS = 3.0
+"""Width of an enlarged head in head widths, so that points next to it are seen, too."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A part of a section and where it is drawn.
+
+    Attributes
+    ----------
+    box : QRectF
+    right, up : float
+        Middle, metres.
+    width_m : float
+    title : str
+    """
+
+    box: QRectF
+    right: float
+    up: float
+    width_m: float
+    title: str
+
+    @property
+    def scale(self) -> float:
+        """Pixels per metre, in both directions."""
+        return self.box.width() / self.width_m
+
+    def place(self, right: float, up: float) -> QPointF:
+        """Return where a place of the section is drawn."""
+        middle = self.box.center()
+        return QPointF(
+            middle.x() + (right - self.right) * self.scale,
+            middle.y() + 0.5 * LINE_PX - (up - self.up) * self.scale,
+        )
+
+
+class SectionView(QWidget):
+    """Draws a picture."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._picture: Picture | None = None
+        self._reading = False
+        self.setMinimumHeight(200)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+
+    def show_picture(self, picture: Picture | None, reading: bool) -> None:
+        """Draw another picture; `reading` states whether its points are still being read."""
+        self._picture, self._reading = picture, reading
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        """Return the preferred size."""
+        return QSize(340, 260)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.fillRect(self.rect(), PAPER)
+        if self._picture is not None:
+            for panel in self._panels(self._picture):
+                painter.save()
+                painter.setClipRect(panel.box)
+                _draw(painter, panel, self._picture)
+                painter.restore()
+            self._write_note(painter, self._picture)
+        painter.end()
+
+    def _panels(self, picture: Picture) -> Iterator[Panel]:
+        """Yield the whole section, and the nearest rail on either side."""
+        width, height = float(self.width()), WHOLE * self.height()
+        yield Panel(QRectF(0, 0, width, height), 0.0, 0.0, 2 * REACH_M, tr("left") + " – " + tr("right"))
+        top, half = height + GAP_PX, 0.5 * (width - GAP_PX)
+        for start, title, mine in (
+            (0.0, tr("left rail"), picture.rails[picture.rails[:, 0] < 0]),
+            (half + GAP_PX, tr("right rail"), picture.rails[picture.rails[:, 0] >= 0]),
+        ):
+            if len(mine):
+                right, up = mine[np.argmin(np.abs(mine[:, 0]))]
+                box = QRectF(start, top, half, self.height() - top)
+                yield Panel(box, float(right), float(up), HEADS * picture.head_width_m, title)
+
+    def _write_note(self, painter: QPainter, picture: Picture) -> None:
+        """Write what is missing."""
+        nothing = picture.points is None or not len(picture.points)
+        note = tr("Reading the points…") if self._reading else picture.note
+        note = note or (tr("There is no rail point here.") if nothing else "")
+        box = QRectF(4, WHOLE * self.height() - LINE_PX, self.width() - 8, 3 * LINE_PX)
+        painter.setPen(QPen(SOFT))
+        painter.drawText(box, note, QTextOption(Qt.AlignmentFlag.AlignHCenter))
+
+
+def _draw(painter: QPainter, panel: Panel, picture: Picture) -> None:
+    """Draw points, rails, frame and scale of a panel."""
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(POINT)
+    for right, up in picture.points if picture.points is not None else ():
+        painter.drawEllipse(panel.place(right, up), POINT_PX, POINT_PX)
+    painter.setPen(QPen(RAIL, 1.6))
+    for right, up in picture.rails:
+        place, half = panel.place(right, up), 0.5 * picture.head_width_m * panel.scale
+        painter.drawLine(place - QPointF(half, 0), place + QPointF(half, 0))
+        painter.drawLine(place - QPointF(0, CROSS_PX), place + QPointF(0, CROSS_PX))
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.setPen(QPen(FRAME))
+    painter.drawRect(panel.box.adjusted(0.5, 0.5, -0.5, -0.5))
+    painter.setPen(QPen(SOFT))
+    painter.drawText(panel.box.adjusted(6, 2, -6, 0), panel.title, QTextOption(Qt.AlignmentFlag.AlignLeft))
+    painter.drawText(panel.box.adjusted(6, 2, -6, 0), _width(panel), QTextOption(Qt.AlignmentFlag.AlignRight))
+
+
+def _width(panel: Panel) -> str:
+    """Write the width of a panel."""
+    return f"{panel.width_m:g} m" if panel.width_m >= 1 else f"{1000 * panel.width_m:.0f} mm"

@@ -1,0 +1,85 @@
+"""What the plugin adds to QGIS's windows: menu entries, settings, the report after a run, and the dock for reviews.
+
+QGIS imports this module when it starts with windows; nothing else may.
+"""
+
+from __future__ import annotations
+
+from qgis.core import QgsProject
+from qgis.PyQt.QtCore import QObject, Qt
+from qgis.PyQt.QtGui import QIcon
+from qgis.PyQt.QtWidgets import QAction
+
+from .i18n import tr
+from .model_action import OpenModelAction
+from .notices import notices
+from .paths import ICON
+from .review.dock import ReviewDock
+from .review.report import ReportOpener
+from .sample_action import OpenSampleAction
+from .setup import package_setting
+
+MENU = "Rail Extract"
+"""Submenu of QGIS's menu of plugins."""
+
+
+class Windows(QObject):
+    """Adds everything when it is made, and takes it away with `remove`.
+
+    Parameters
+    ----------
+    iface : qgis.gui.QgisInterface or None
+        None in tests without QGIS's main window, which get no menu and no dock.
+    """
+
+    def __init__(self, iface) -> None:
+        super().__init__()
+        self._iface = iface
+        self._actions = (OpenSampleAction(), OpenModelAction())
+        for action in self._actions:
+            action.register()
+        package_setting.register()
+        self._reports = ReportOpener()
+        self._reports.register()
+        self.dock: ReviewDock | None = None
+        self._entries: list[QAction] = []
+        if iface is not None:
+            self._add_to(iface)
+
+    def _add_to(self, iface) -> None:
+        """Add the dock and the menu."""
+        self.dock = ReviewDock(iface)
+        iface.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, self.dock)
+        self.dock.hide()
+        sample = QAction(QIcon(str(ICON)), self._actions[0].name, iface.mainWindow())
+        sample.triggered.connect(lambda: self._actions[0].execute())
+        review = self.dock.toggleViewAction()
+        review.setText(tr("Review Findings"))
+        self._entries = [sample, review]
+        for entry in self._entries:
+            iface.addPluginToMenu(MENU, entry)
+        notices.findings_loaded.connect(self._show_findings)
+
+    def _show_findings(self, layer_id: str) -> None:
+        """Open the dock for the findings of a run, if there are any."""
+        layer = QgsProject.instance().mapLayer(layer_id)
+        if self.dock is not None and layer is not None and layer.featureCount():
+            self.dock.show_layer(layer_id)
+            self.dock.show()
+            self.dock.raise_()
+
+    def remove(self) -> None:
+        """Take everything away."""
+        if self.dock is not None:
+            notices.findings_loaded.disconnect(self._show_findings)
+            self.dock.close_for_good()
+            self._iface.removeDockWidget(self.dock)
+            self.dock.deleteLater()
+            self.dock = None
+        for entry in self._entries:
+            self._iface.removePluginMenu(MENU, entry)
+        self._entries = []
+        self._reports.deregister()
+        package_setting.deregister()
+        for action in self._actions:
+            action.deregister()

@@ -1,0 +1,219 @@
+"""The review of findings: what the dock shows, reads and writes, in QGIS without its main window."""
+
+import time
+
+import numpy as np
+import pytest
+from qgis.core import NULL, QgsCoordinateReferenceSystem, QgsFeature, QgsGeometry, QgsProject, QgsVectorLayer
+from qgis.gui import QgsMapCanvas
+from qgis.PyQt.QtWidgets import QMainWindow
+from rail_extract.core.fields import FINDING_FIELDS, RAIL_FIELDS
+from rail_extract.core.frame import LocalFrame
+from rail_extract.rail_extract_plugin.reading.clouds import CloudSource
+from rail_extract.rail_extract_plugin.review.findings import ACCEPTED, REJECTED, reviews
+from rail_extract.rail_extract_plugin.review.section_view import PAPER, POINT, RAIL
+from rail_extract.rail_extract_plugin.writing.layers import fields
+from rail_extract.rail_extract_plugin.writing.run import properties_of
+
+ZERO = LocalFrame(np.zeros(3))
+
+
+class Window:
+    """The part of QGIS's interface that the dock uses."""
+
+    def __init__(self):
+        self._window, self._canvas = QMainWindow(), QgsMapCanvas()
+        self._canvas.setDestinationCrs(QgsCoordinateReferenceSystem("EPSG:32643"))
+
+    def mainWindow(self):
+        return self._window
+
+    def mapCanvas(self):
+        return self._canvas
+
+
+@pytest.fixture
+def project(qgis):
+    yield QgsProject.instance()
+    QgsProject.instance().clear()
+
+
+@pytest.fixture
+def load(project):
+    """Add a layer of lines to the project."""
+
+    def load(name, columns, rows, properties=()):
+        layer = QgsVectorLayer("LineStringZ?crs=EPSG:32643", name, "memory")
+        layer.dataProvider().addAttributes(fields(columns).toList())
+        layer.updateFields()
+        for wkt, values in rows:
+            feature = QgsFeature(layer.fields())
+            feature.setGeometry(QgsGeometry.fromWkt(wkt))
+            for key, value in values.items():
+                feature[key] = value
+            assert layer.dataProvider().addFeature(feature)
+        for key, value in dict(properties).items():
+            layer.setCustomProperty(key, value)
+        return project.addMapLayer(layer)
+
+    return load
+
+
+def section(start, end, **values):
+    line = f"LINESTRING Z ({500_000 + start} 3000000 100, {500_000 + end} 3000000 100)"
+    return line, {"reason": "a rail has no points", "track_id": 1, "from_m": start, "to_m": end, **values}
+
+
+ROWS = [section(8.0, 10.0, finding=2, worst_m=9.0, gauge_mm=1440.0), section(2.0, 4.0, finding=1, worst_m=3.0)]
+
+
+@pytest.fixture
+def dock(project, plugin):
+    from rail_extract.rail_extract_plugin.review.dock import ReviewDock
+
+    made = []
+
+    def dock():
+        window = Window()
+        made.append((ReviewDock(window), window))
+        return made[-1][0]
+
+    yield dock
+    for one, _ in made:
+        one.close_for_good()
+
+
+def wait(qgis, dock):
+    for _ in range(400):
+        qgis.processEvents()
+        if not dock.is_reading:
+            return
+        time.sleep(0.02)
+    raise TimeoutError
+
+
+def test_findings_come_in_their_order_with_words_and_figures(load, dock):
+    load("Findings", FINDING_FIELDS, ROWS)
+    shown = dock()
+    assert shown.count.text() == "1 of 2; 0 reviewed"
+    assert shown.reason.text() == "A rail has no points"
+    assert shown.text.text().startswith("Track 1, 2.0 to 4.0 m")
+    assert not shown.buttons["previous"].isEnabled()
+    shown.buttons["next"].click()
+    assert shown.text.text() == "Track 1, 8.0 to 10.0 m: gauge 1,440.0 mm."
+    assert not shown.buttons["next"].isEnabled()
+
+
+def test_the_map_shows_the_place(load, dock):
+    load("Findings", FINDING_FIELDS, ROWS)
+    shown = dock()
+    shown.go(1)
+    extent = shown._canvas.extent()
+    assert (extent.center().x(), extent.center().y()) == pytest.approx((500_009, 3_000_000))
+    assert 20 <= max(extent.width(), extent.height()) < 60
+
+
+def test_decisions_are_written_and_can_be_taken_back(load, dock):
+    layer = load("Findings", FINDING_FIELDS, ROWS)
+    shown = dock()
+    shown.buttons[ACCEPTED].click()  # goes on
+    shown.buttons[REJECTED].click()
+    decided = {feature["finding"]: feature["review"] for feature in layer.getFeatures()}
+    assert decided == {1: ACCEPTED, 2: REJECTED}
+    assert shown.count.text() == "2 of 2; 2 reviewed"
+    assert shown.buttons[REJECTED].isChecked()
+    shown.buttons[REJECTED].click()
+    assert {feature["finding"]: feature["review"] for feature in layer.getFeatures()} == {1: ACCEPTED, 2: ""}
+    assert not layer.isEditable()
+
+
+def test_a_running_edit_session_is_left_open(load, dock):
+    layer = load("Findings", FINDING_FIELDS, ROWS)
+    layer.startEditing()
+    dock().buttons[ACCEPTED].click()
+    assert layer.isEditable()
+    assert reviews(layer)[0].decision == ACCEPTED
+    layer.rollBack()
+    assert reviews(layer)[0].value("review") is None
+
+
+def test_a_layer_that_cannot_be_changed_is_named(load, dock):
+    layer = load("Findings", FINDING_FIELDS, ROWS)
+    shown = dock()
+    layer.setReadOnly(True)
+    shown.buttons[ACCEPTED].click()
+    assert shown.problem.text() == 'The layer "Findings" can\'t be edited: save it as a GeoPackage.'
+    assert shown.count.text() == "1 of 2; 0 reviewed"
+    assert not shown.buttons[ACCEPTED].isChecked()
+
+
+def test_a_review_goes_on_at_the_first_open_finding(load, dock):
+    rows = [section(2.0, 4.0, finding=1, review=ACCEPTED), section(8.0, 9.0, finding=2, review=NULL)]
+    load("Findings", FINDING_FIELDS, rows)
+    assert dock().count.text() == "2 of 2; 1 reviewed"
+
+
+def test_layers_that_come_and_go_are_followed(load, dock, project):
+    shown = dock()
+    assert shown.count.text() == "No layer of findings is loaded."
+    load("Rails", RAIL_FIELDS, [])
+    assert shown.layers.count() == 0
+    layer = load("Findings", FINDING_FIELDS, ROWS)
+    assert shown.count.text() == "1 of 2; 0 reviewed"
+    project.removeMapLayer(layer.id())
+    assert shown.count.text() == "No layer of findings is loaded."
+    load("None", FINDING_FIELDS, [])
+    assert shown.count.text() == "There are no findings."
+
+
+@pytest.fixture
+def cloud(write_cloud, track):
+    """A track with its properties, as a run gives them to its layers."""
+    path = write_cloud(track())
+    return path, properties_of(CloudSource((path,)), (10,), 0.072, ZERO)
+
+
+def test_the_section_shows_points_and_rails_of_the_run(qgis, load, dock, cloud):
+    _, properties = cloud
+    half = 1.507 / 2
+    rails = [
+        (f"LINESTRING Z (500000 {3_000_000 + side} 100, 500012 {3_000_000 + side} 100)", {"rail_id": number})
+        for number, side in enumerate((half, -half))
+    ]
+    load("Rails", RAIL_FIELDS, rails, properties)
+    load("Findings", FINDING_FIELDS, ROWS, properties)
+    shown = dock()
+    wait(qgis, shown)
+    picture = shown._sections.picture(shown._found[0])
+    assert sorted(picture.rails[:, 0]) == pytest.approx([-half, half], abs=1e-6)
+    assert np.abs(picture.rails[:, 1]).max() < 0.001
+    assert len(picture.points) == pytest.approx(600, abs=100)  # 300 per metre of each rail, over a metre
+    assert np.abs(np.abs(picture.points[:, 0]) - half).max() <= 0.037
+    assert abs(picture.points[:, 1].mean()) < 0.001
+    shown.resize(360, 480)
+    shown.show()
+    qgis.processEvents()
+    image = shown.view.grab().toImage()
+    seen = {image.pixelColor(x, y).name() for x in range(image.width()) for y in range(image.height())}
+    assert {colour.name() for colour in (PAPER, POINT, RAIL)} <= seen
+
+
+def test_without_the_cloud_gauge_and_cant_place_the_rails(load, dock, cloud):
+    path, properties = cloud
+    path.unlink()
+    load("Findings", FINDING_FIELDS, [section(2.0, 4.0, finding=1, gauge_mm=1435.0, cant_mm=40.0)], properties)
+    shown = dock()
+    picture = shown._sections.picture(shown._found[0])
+    np.testing.assert_allclose(picture.rails, [[-0.7535, 0.02], [0.7535, -0.02]], atol=1e-9)
+    assert picture.points is None
+    assert picture.note == "cloud is not at its place any more: only rails are shown."
+
+
+def test_a_damaged_cloud_is_one_sentence(qgis, load, dock, cloud):
+    path, properties = cloud
+    path.write_bytes(b"LASF" + bytes(40))
+    load("Findings", FINDING_FIELDS, ROWS, properties)
+    shown = dock()
+    wait(qgis, shown)
+    assert "cloud.las" in shown._sections.note
+    assert "Traceback" not in shown._sections.note
