@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 from scipy.spatial import cKDTree
 
+from .classify.thin import SURROUNDINGS_M, drawn
 from .clouds.points import RailPoints
 from .errors import NoTrackError, ParameterError
 from .frame import LocalFrame
@@ -86,6 +87,8 @@ def clean_square(
 ) -> RailRaster:
     """Rasterize the points of a square, clean the raster with the network, and keep the tiles inside the square.
 
+    The network also sees cells that are drawn along thin rails (docs/method.md section 2.4).
+
     Parameters
     ----------
     source : PointSource
@@ -95,8 +98,12 @@ def clean_square(
     progress : Progress
     """
     cell_m = cell_size(parameters.gauge_m, parameters.head_width_m)
-    points = source.near(square, max_passes(parameters.passes) * MARGIN * cell_m)
-    return own_tiles(clean(rasterize(points.xyz, cell_m), engine, parameters.passes, progress), square)
+    margin_m = max_passes(parameters.passes) * MARGIN * cell_m
+    points = source.near(square, margin_m + SURROUNDINGS_M).xyz
+    spacings_m = [gauge_m + parameters.head_width_m for gauge_m in (parameters.gauge_m, *parameters.other_gauges_m)]
+    seen = np.concatenate([points[:, :2], drawn(points, spacings_m, cell_m)])
+    raster = rasterize(seen[square.holds(seen, margin_m)], cell_m)
+    return own_tiles(clean(raster, engine, parameters.passes, progress), square)
 
 
 def rails_of_square(

@@ -114,7 +114,15 @@ class Lines:
         )
 
 
-def find_lines(marks: Marks, reach_m: float, along_m: float, strip_m: float) -> Lines:
+def joined(one: Lines, other: Lines) -> Lines:
+    """Put the lines of further cells behind those of some, of the same reach."""
+    columns = ((one.axis, other.axis), (one.height, other.height), (one.theta, other.theta))
+    shares = ((one.cover, other.cover), (one.pure, other.pure))
+    axis, height, theta, cover, pure = (np.concatenate(pair) for pair in (*columns, *shares))
+    return Lines(axis, height, theta, cover, pure, one.reach_m)
+
+
+def find_lines(marks: Marks, reach_m: float, along_m: float, strip_m: float, wanted: np.ndarray | None = None) -> Lines:
     """Find the line through each cell.
 
     Parameters
@@ -126,18 +134,23 @@ def find_lines(marks: Marks, reach_m: float, along_m: float, strip_m: float) -> 
         Largest difference in height between neighbours on a line.
     strip_m : float
         Largest distance across from the line.
+    wanted : (k,) int array, optional
+        Cells whose lines are needed; the others get no cover.
     """
     count = len(marks.xy)
+    wanted = np.arange(count) if wanted is None else wanted
     theta, offset, cover, pure = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
-    for chosen, number, step in _neighbours(marks, reach_m, along_m):
+    for chosen, number, step in _neighbours(marks, wanted, reach_m, along_m):
         theta[chosen], offset[chosen] = _fitted(_main_direction(len(chosen), number, step), number, step, strip_m)
         cover[chosen], pure[chosen] = _measured(theta[chosen], offset[chosen], number, step, reach_m, strip_m)
     axis = marks.xy + offset[:, None] * np.column_stack([-np.sin(theta), np.cos(theta)])
     return Lines(axis, marks.height, theta, cover, pure, reach_m)
 
 
-def _neighbours(marks: Marks, reach_m: float, along_m: float) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield cells, chunk by chunk, with their neighbours of the same height.
+def _neighbours(
+    marks: Marks, wanted: np.ndarray, reach_m: float, along_m: float
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield wanted cells, chunk by chunk, with their neighbours of the same height.
 
     Yields
     ------
@@ -148,11 +161,11 @@ def _neighbours(marks: Marks, reach_m: float, along_m: float) -> Iterator[tuple[
     step : (m, 2) array
         From the cell to its neighbour.
     """
-    if len(marks.xy) < 2:
+    if len(marks.xy) < 2 or not len(wanted):
         return
     tree = cKDTree(marks.xy)
-    crowd = tree.query_ball_point(marks.xy, reach_m, return_length=True)
-    lonely = np.flatnonzero(crowd <= MAX_NEIGHBOURS + 1)
+    crowd = tree.query_ball_point(marks.xy[wanted], reach_m, return_length=True)
+    lonely = wanted[crowd <= MAX_NEIGHBOURS + 1]
     for start in range(0, len(lonely), CHUNK):
         chosen = lonely[start : start + CHUNK]
         near = cKDTree(marks.xy[chosen]).sparse_distance_matrix(tree, reach_m, output_type="ndarray")

@@ -16,7 +16,6 @@ from .partner import runs_inside, stations_with_partner
 from .pieces import LEAST_PAIRED, links, long_enough, lower_than_beside, pieces_of
 from .settings import DENSE, MARGIN_M, THIN, Settings, Tolerances
 from .sides import stands_free
-from .thin import drawn
 from .tops import HIGH_M, MILLIMETRES, Grid, Tops, highest_of_blocks, narrow_tops, tops_of
 
 THIN_PER_M2 = 400.0
@@ -78,13 +77,10 @@ class Classified:
     ----------
     rail : (n,) bool array
         Points on railheads; False for those in the margin.
-    drawn : (k, 2) array
-        Places of cells on rails that are too thin for FRPDF, local metres; see `thin`.
     figures : Figures
     """
 
     rail: np.ndarray
-    drawn: np.ndarray
     figures: Figures
 
 
@@ -98,7 +94,7 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> Classified:
         The corner lies at a multiple of `Settings.side_m` from the zero of the coordinate system.
     settings : Settings
     """
-    nothing = Classified(np.zeros(len(xyz), dtype=bool), np.empty((0, 2)), Figures())
+    nothing = Classified(np.zeros(len(xyz), dtype=bool), Figures())
     if not len(xyz):
         return nothing
     x, y = (np.ascontiguousarray(values) for values in xyz.T[:2])
@@ -117,8 +113,7 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> Classified:
     rail = nothing.rail
     found = near[np.union1d(standing.points, flush.points)]
     rail[found[settings.own(xyz[found])]] = True
-    places = standing.drawn[settings.own(standing.drawn)]
-    return Classified(rail, places, _figures(rail, standing, flush, grid, cell[rail[near]], settings))
+    return Classified(rail, _figures(rail, standing, flush, grid, cell[rail[near]], settings))
 
 
 @dataclass(frozen=True)
@@ -130,15 +125,12 @@ class Standing:
     points : (k,) int array
         Numbers of the points on heads.
     kept : Kept
-    drawn : (m, 2) array
-        See `Classified`.
     thin : bool
         Whether the square is thin.
     """
 
     points: np.ndarray
     kept: Kept
-    drawn: np.ndarray
     thin: bool
 
 
@@ -157,11 +149,7 @@ def _standing(
     beside = Near.find(xy[chosen], kept.lines)
     narrow = _narrow(kept, beside, settings, tolerances)
     on = beside.on(settings.head_width_m / 2 + tolerances.beside_m, narrow[beside.cell])
-    kept = kept.of(narrow)
-    heads = heads[_near_axes(tops, heads, kept, settings, HIGH_M)]
-    half_m = (settings.head_width_m + settings.cell_m) / 2
-    places = drawn(kept.lines, kept.pairs, tops.grid.middles(heads), half_m, settings.cell_m)
-    return Standing(chosen[on], kept, places, tolerances is THIN)
+    return Standing(chosen[on], kept.of(narrow), tolerances is THIN)
 
 
 def _figures(

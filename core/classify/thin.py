@@ -1,44 +1,108 @@
-"""Cells for rails that are too thin for FRPDF: drawn along the lines on which the cells of a rail were found.
+"""Cells for rails that are too thin for FRPDF: drawn along the lines on which the cells of a rail lie.
 
-They show the network where the rail runs and carry no measurement: as points they would cost accuracy.
+They show the network where the rail runs and carry no measurement: as points they would cost accuracy. They depend on
+the cells within `SURROUNDINGS_M` only, and there are none where rails are dense (docs/method.md section 2.4).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .lines import Lines
+from .lines import Lines, Marks, find_lines, joined
+from .partner import stations_with_partner
+from .pieces import links
+from .tops import Grid
 
-ENOUGH_PER_M = 18.0
+ENOUGH_PER_M = 14.0
 """Cells per metre of rail from which nothing is drawn: FRPDF finds all of a rail from here on, and 91 to 99 % of one
 with 7 to 10 cells per metre."""
 
-WITHIN_M = 1.0
+WITHIN_M = 2.0
 """Length to one side in which cells are counted."""
 
+REACH_M = 2.0
+"""Reach of a line: 10 cells to either side at 5 cells per metre."""
 
-def drawn(lines: Lines, pairs: np.ndarray, heads: np.ndarray, half_m: float, cell_m: float) -> np.ndarray:
+ALONG_M = 0.15
+"""Difference in height between two cells of one rail: a grade of 4 % over the reach, and a beam that blends head and
+ballast."""
+
+STRIP_M = 0.065
+"""Distance from a line within which a cell is on it: half a head, half a cell, noise, and the sagitta of a curve of
+100 m."""
+
+MIN_COVER, MIN_PURE = 0.35, 0.20
+"""Least cover and purity of a line; see `square`."""
+
+MIN_STATIONS, SINGLE_COVER = 2, 0.75
+"""Stations with a partner from which a line is a rail, and cover from which it is one without: FRPDF itself drops lone
+lines that are short."""
+
+PARTNER_M = 0.30
+"""Difference in height between the rails of a track: cant of 180 mm and the scatter of both."""
+
+PARTNER_WITHIN_M = 3.0
+"""Distance within which cells may be a partner's: the stations reach 1.2 m ahead, the widest gauge is 1.7 m."""
+
+SURROUNDINGS_M = 6.0
+"""Distance within which other cells count: that of a partner, and its reach."""
+
+
+def drawn(xyz: np.ndarray, spacings_m: Sequence[float], cell_m: float) -> np.ndarray:
     """Places along thin rails, half a cell apart, (k, 2) local metres.
 
     Parameters
     ----------
-    lines : Lines
-        Cells of rails, one of each block of 2 x 2.
-    pairs : (m, 2) int array
-        Cells that continue each other.
-    heads : (c, 2) array
-        Middles of all cells of railheads.
-    half_m : float
-        Distance across within which these are on a line.
+    xyz : (n, 3) array
+        Rail points, local metres.
+    spacings_m : sequence of float
+        Distances of the two heads of a track.
     cell_m : float
+        Side of a cell.
     """
-    if not len(pairs):
+    cells = _cells(xyz, cell_m)
+    if len(cells.xy) < 2:
         return np.empty((0, 2))
-    thin = _per_m(lines, heads, half_m) < ENOUGH_PER_M
-    pairs = _nearest_on_each_side(lines, pairs[thin[pairs].all(axis=1)])
+    tree = cKDTree(cells.xy)
+    few = tree.query_ball_point(cells.xy, WITHIN_M, return_length=True) < 2 * WITHIN_M * ENOUGH_PER_M
+    own, lines = _good_lines(cells, np.flatnonzero(few))
+    thin = _per_m(lines, cells.xy) < ENOUGH_PER_M
+    if not thin.any():
+        return np.empty((0, 2))
+    own, lines = own[thin], lines.of(thin)
+    beside = np.isfinite(cKDTree(lines.axis).query(cells.xy, distance_upper_bound=PARTNER_WITHIN_M)[0])
+    beside[own] = False
+    _, partners = _good_lines(cells, np.flatnonzero(beside))
+    both = joined(lines, partners)
+    stations = stations_with_partner(both, spacings_m, PARTNER_M)[: len(own)]
+    lines = lines.of((stations >= MIN_STATIONS) | (lines.cover >= SINGLE_COVER))
+    return _along(lines, _nearest_on_each_side(lines, links(lines)), cell_m / 2)
+
+
+def _good_lines(cells: Marks, wanted: np.ndarray) -> tuple[np.ndarray, Lines]:
+    """Find the lines of some cells, (k,) int, that lie on one: those cells, (m,), and their lines."""
+    lines = find_lines(cells, REACH_M, ALONG_M, STRIP_M, wanted)
+    good = np.flatnonzero((lines.cover >= MIN_COVER) & (lines.pure >= MIN_PURE))
+    return good, lines.of(good)
+
+
+def _cells(xyz: np.ndarray, cell_m: float) -> Marks:
+    """Cells with points, and the height of the highest point of each."""
+    if not len(xyz):
+        return Marks(np.empty((0, 2)), np.empty(0))
+    grid, cell = Grid.around(xyz[:, 0], xyz[:, 1], cell_m)
+    order = np.lexsort((xyz[:, 2], cell))
+    highest = np.flatnonzero(np.diff(cell[order], append=-1))
+    return Marks(grid.middles(cell[order[highest]]), xyz[order[highest], 2])
+
+
+def _along(lines: Lines, pairs: np.ndarray, step_m: float) -> np.ndarray:
+    """Places `step_m` apart from one axis of each pair to the other, (k, 2)."""
     start, end = lines.axis[pairs[:, 0]], lines.axis[pairs[:, 1]]
-    count = np.ceil(np.linalg.norm(end - start, axis=1) / (cell_m / 2)).astype(np.int64) + 1
+    count = np.ceil(np.linalg.norm(end - start, axis=1) / step_m).astype(np.int64) + 1
     pair = np.repeat(np.arange(len(count)), count)
     share = (np.arange(count.sum()) - (np.cumsum(count) - count)[pair]) / (count[pair] - 1)
     return start[pair] + share[:, None] * (end - start)[pair]
@@ -54,12 +118,12 @@ def _nearest_on_each_side(lines: Lines, pairs: np.ndarray) -> np.ndarray:
     return both[order[np.unique(side, return_index=True)[1]]]
 
 
-def _per_m(lines: Lines, heads: np.ndarray, half_m: float) -> np.ndarray:
-    """Cells of railheads per metre around each line's cell, (n,); at the end of a rail, on the side where it is."""
-    near = cKDTree(lines.axis).sparse_distance_matrix(cKDTree(heads), WITHIN_M, output_type="ndarray")
+def _per_m(lines: Lines, cells: np.ndarray) -> np.ndarray:
+    """Cells per metre around each line's cell, (n,); at the end of a rail, on the side where it is."""
+    near = cKDTree(lines.axis).sparse_distance_matrix(cKDTree(cells), WITHIN_M, output_type="ndarray")
     own = near["i"]
-    step = heads[near["j"]] - lines.axis[own]
-    on = np.abs(np.einsum("ij,ij->i", step, lines.across[own])) < half_m
+    step = cells[near["j"]] - lines.axis[own]
+    on = np.abs(np.einsum("ij,ij->i", step, lines.across[own])) < STRIP_M
     own, ahead = own[on], np.einsum("ij,ij->i", step, lines.along[own])[on] > 0
     counts = [np.bincount(own[ahead == side], minlength=len(lines.axis)) for side in (True, False)]
     return np.maximum(*counts) / WITHIN_M

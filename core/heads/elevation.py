@@ -233,8 +233,12 @@ def _unsupported(rail: RailLine, parameters: ElevationParameters) -> RailLine:
 
 
 def _supported(t: np.ndarray, length_m: float, free_ends: np.ndarray) -> tuple[float, float]:
-    """Return the chainages between which a line is kept: all of it except free ends without points."""
-    start, end = t[END_POINTS - 1], t[-END_POINTS]
+    """Return the chainages between which a line is kept: all of it except free ends without points.
+
+    Where points are few, the first of those that mark the end is expected further out.
+    """
+    further_m = max((END_POINTS - 1) / _points_per_m(np.diff(np.sort(t))) - MAX_UNSUPPORTED_END_M, 0.0)
+    start, end = max(t[END_POINTS - 1] - further_m, 0.0), min(t[-END_POINTS] + further_m, length_m)
     keep_start = not free_ends[0] or start <= MAX_UNSUPPORTED_END_M
     keep_end = not free_ends[1] or length_m - end <= MAX_UNSUPPORTED_END_M
     return 0.0 if keep_start else float(start), length_m if keep_end else float(end)
@@ -243,8 +247,7 @@ def _supported(t: np.ndarray, length_m: float, free_ends: np.ndarray) -> tuple[f
 def find_gaps(t: np.ndarray, start: float, end: float) -> np.ndarray:
     """Find the gaps between the points of a line: longer than MIN_GAP_M, and than chance makes them.
 
-    Of n points per metre at random places, n exp(-n g) per metre are followed by a gap longer than g. The median of the
-    spacings gives n; it is 0.69 / n.
+    Of n points per metre at random places, n exp(-n g) per metre are followed by a gap longer than g.
 
     Parameters
     ----------
@@ -259,7 +262,12 @@ def find_gaps(t: np.ndarray, start: float, end: float) -> np.ndarray:
         Start and end of each gap.
     """
     borders = np.concatenate([[start], np.clip(np.sort(t), start, end), [end]])
-    per_m = np.log(2) / max(float(np.median(np.diff(borders))), 1e-3)
+    per_m = _points_per_m(np.diff(borders))
     by_chance_m = np.log(max(per_m / CHANCE_GAPS, 1.0)) / per_m
     wide = np.flatnonzero(np.diff(borders) > np.clip(by_chance_m, MIN_GAP_M, MAX_CHANCE_GAP_M))
     return np.column_stack([borders[wide], borders[wide + 1]])
+
+
+def _points_per_m(spacings_m: np.ndarray) -> float:
+    """Estimate the points per metre, n, at random places, from the median of their spacings, which is 0.69 / n."""
+    return float(np.log(2) / max(float(np.median(spacings_m)), 1e-3))

@@ -25,11 +25,11 @@ def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SIL
     Returns
     -------
     Classified
-        Of the whole cloud; `drawn` in the metres of `xyz`.
+        Of the whole cloud.
     """
     zero = LocalFrame(np.zeros(3))
     rail = np.zeros(len(xyz), dtype=bool)
-    places, figures = [np.empty((0, 2))], Figures()
+    figures = Figures()
     members = points_by_square(xyz, settings.side_m)
     for key in progress.follow(list(members)):
         square = Square.on_grid(key, settings.side_m, zero)
@@ -37,6 +37,5 @@ def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SIL
         number = np.concatenate([part[square.holds(square.frame.to_local(xyz[part]), MARGIN_M)] for part in around_it])
         found = classify_square(square.frame.to_local(xyz[number]), settings)
         rail[number[found.rail]] = True
-        places.append(found.drawn + square.frame.origin[:2])
         figures += found.figures
-    return Classified(rail, np.concatenate(places), figures)
+    return Classified(rail, figures)

@@ -31,7 +31,7 @@ FEW_IN_SQUARE, MANY_SQUARES = 20, 100
 file states: a square of 41 m with rails has thousands of points, and each square becomes a file."""
 
 ENOUGH_CELLS_PER_M = 10.0
-"""Cells per metre of rail below which the lines have gaps: FRPDF needs about seven everywhere."""
+"""Cells per metre of rail below which lines are less accurate and may have gaps."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def report(figures: Figures, progress: Progress) -> None:
     if figures.cells_per_m < ENOUGH_CELLS_PER_M:
         progress.warning(
             f"The rails have {figures.cells_per_m:.1f} cells with points per metre; below {ENOUGH_CELLS_PER_M:.0f}, "
-            "lines have gaps: use a denser cloud."
+            "lines are less accurate and may have gaps: use a denser cloud."
         )
 
 

@@ -45,8 +45,8 @@ class ClassifyRailPoints(RailAlgorithm):
         "input is a folder or a virtual point cloud, a folder of the same tiles is written, with a virtual point "
         "cloud (.vpc) of the same name next to it.\n\n"
         "The log states how many metres of rail were found with and without a partner. Below 10 cells with points "
-        "per metre of rail (CELLS_PER_M), lines have gaps. The page about the classification describes the method "
-        "and its limits; it was tested on simulated clouds only."
+        "per metre of rail (CELLS_PER_M), lines are less accurate and may have gaps. The page about the classification "
+        "describes the method and its limits; it was tested on simulated clouds only."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:

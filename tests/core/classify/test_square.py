@@ -31,7 +31,7 @@ def test_two_rails_are_labelled(angle):
     assert (found & on).sum() / found.sum() > 0.99
 
 
-def test_a_thin_cloud_is_labelled_and_drawn():
+def test_a_thin_cloud_is_labelled():
     rng = np.random.RandomState(2)
     xyz, on = with_track(flat(20.0, rng=rng, per_m2=80), GAUGE, WIDTH, 0.3)
     xyz = rough(xyz, rng, 0.015, 0.012)
@@ -39,15 +39,6 @@ def test_a_thin_cloud_is_labelled_and_drawn():
     here = inner(xyz, 18)
     assert (found.rail & on)[here].sum() / on[here].sum() >= 0.93
     assert found.figures.thin == 1
-    along, across = turned(found.drawn, 0.3)
-    left = (np.abs(across - SPACING / 2) < 0.03) & (np.abs(along) < 8)
-    cells = np.unique(np.floor(found.drawn[left] / SETTINGS.cell_m), axis=0)
-    assert len(cells) / 16 >= 25
-
-
-def test_a_dense_cloud_is_not_drawn():
-    xyz, _ = ballasted(np.random.RandomState(3))
-    assert not len(classify_square(xyz, SETTINGS).drawn)
 
 
 def test_canted_rails_on_their_canted_bed():
@@ -171,4 +162,3 @@ def test_nothing_comes_of_nothing(xyz):
     found = classify_cloud(xyz, SETTINGS)
     assert not found.rail.any()
     assert found.rail.shape == (len(xyz),)
-    assert np.isfinite(found.drawn).all()

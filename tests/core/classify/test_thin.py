@@ -1,41 +1,82 @@
+"""Cells that are drawn along thin rails."""
+
 import numpy as np
 import pytest
 from rail_extract.core.classify.figures import Figures, shares_of_length
 from rail_extract.core.classify.lines import Marks, find_lines
-from rail_extract.core.classify.pieces import links
-from rail_extract.core.classify.thin import drawn
+from rail_extract.core.classify.thin import SURROUNDINGS_M, drawn
 
-CELL = 0.04
-
-
-def rail(per_m, length=20.0):
-    x = np.arange(0, length, 1 / per_m)
-    xy = np.column_stack([x, np.zeros(len(x))])
-    return find_lines(Marks(xy, np.zeros(len(x))), 2.0, 0.06, 0.065)
+CELL, SPACING = 0.04, 1.507
 
 
-def test_a_thin_rail_is_drawn_without_gaps():
-    lines = rail(4.0)
-    places = drawn(lines, links(lines), lines.axis, 0.056, CELL)
-    cells = np.unique(np.floor(places[:, 0] / CELL))
-    assert len(cells) == pytest.approx(19.75 / CELL, abs=2)
-    assert np.abs(places[:, 1]).max() < 0.01
+def track(per_m, length=20.0, angle=0.3, seed=1, rails=2):
+    """Points at random places on the heads of a track, at a grade of 2 %."""
+    rng = np.random.RandomState(seed)
+    along = rng.uniform(-length / 2, length / 2, int(rails * per_m * length))
+    side = rng.randint(rails, size=len(along)) - 0.5
+    across = side * SPACING + rng.uniform(-0.036, 0.036, len(along))
+    cosine, sine = np.cos(angle), np.sin(angle)
+    x, y = along * cosine - across * sine, along * sine + across * cosine
+    return np.column_stack([x, y, 0.02 * along + rng.normal(0, 0.012, len(along))])
 
 
-def test_a_dense_rail_is_not_drawn():
-    lines = rail(12.5)
-    heads = np.column_stack([np.arange(0, 20, CELL), np.zeros(500)])
-    assert not len(drawn(lines, links(lines), heads, 0.056, CELL))
+@pytest.mark.parametrize("angle", [0.0, 0.3, np.pi / 2, 2.5])
+def test_a_thin_track_is_drawn_along_its_axes(angle):
+    places = drawn(track(5.0, angle=angle), [SPACING], CELL)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    along, across = places @ [cosine, sine], places @ [-sine, cosine]
+    assert (np.abs(np.abs(across) - SPACING / 2) < 0.04).all()
+    assert np.sqrt(np.mean((np.abs(across) - SPACING / 2) ** 2)) < 0.015
+    for side in (1, -1):
+        here = (side * across > 0) & (np.abs(along) < 9)
+        assert len(np.unique(np.floor(along[here] / CELL))) >= 0.97 * 18 / CELL
 
 
-def test_nothing_is_drawn_from_nothing():
-    lines = rail(4.0).of(np.zeros(0, dtype=int))
-    assert drawn(lines, links(lines), np.empty((0, 2)), 0.056, CELL).shape == (0, 2)
+def test_a_dense_track_is_not_drawn():
+    assert drawn(track(25.0), [SPACING], CELL).shape == (0, 2)
+
+
+def test_a_short_loss_of_a_dense_rail_is_not_drawn():
+    xyz = track(60.0, angle=0.0)
+    random = np.random.RandomState(2).random_sample(len(xyz))
+    lost = (np.abs(xyz[:, 0]) < 1.0) & (random < 0.92)
+    assert not len(drawn(xyz[~lost], [SPACING], CELL))
+
+
+def test_scattered_points_are_not_drawn():
+    rng = np.random.RandomState(3)
+    xyz = np.column_stack([rng.uniform(0, 20, (400, 2)), rng.uniform(0, 0.1, 400)])
+    assert len(drawn(xyz, [SPACING], CELL)) * CELL / 2 < 0.02 * 400
+
+
+def test_other_gauges_are_drawn_as_well():
+    assert len(drawn(track(5.0), [1.1], CELL)) < 0.95 * len(drawn(track(5.0), [1.1, SPACING], CELL))
+
+
+def test_the_order_of_points_does_not_matter():
+    xyz = track(5.0)
+    again = drawn(xyz[np.random.RandomState(4).permutation(len(xyz))], [SPACING], CELL)
+    np.testing.assert_array_equal(again, drawn(xyz, [SPACING], CELL))
+
+
+def test_what_is_drawn_depends_on_the_surroundings_only():
+    xyz = track(5.0, length=60.0, angle=0.0)
+    whole = drawn(xyz, [SPACING], CELL)
+    part = drawn(xyz[np.abs(xyz[:, 0]) < 5 + SURROUNDINGS_M], [SPACING], CELL)
+    inside, expected = part[np.abs(part[:, 0]) < 5], whole[np.abs(whole[:, 0]) < 5]
+    assert len(expected) > 500
+    np.testing.assert_allclose(inside[np.lexsort(inside.T)], expected[np.lexsort(expected.T)], atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_nothing_is_drawn_from_nothing(count):
+    assert drawn(np.zeros((count, 3)), [SPACING], CELL).shape == (0, 2)
 
 
 @pytest.mark.parametrize("per_m", [4.0, 12.5])
 def test_cells_share_the_length_of_their_rail(per_m):
-    lines = rail(per_m)
+    x = np.arange(0, 20.0, 1 / per_m)
+    lines = find_lines(Marks(np.column_stack([x, np.zeros(len(x))]), np.zeros(len(x))), 2.0, 0.06, 0.065)
     assert shares_of_length(lines, 0.072).sum() == pytest.approx(20.0, rel=0.12)
 
 

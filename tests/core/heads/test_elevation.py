@@ -234,3 +234,13 @@ def test_points_count_within_the_tolerance_and_never_beyond_half_a_head(toleranc
     (rail,) = elevate(network_of(straight_line(60)), points, replace(PARAMETERS, tolerance_xy_m=tolerance_m))
     assert rail.resid_mm == pytest.approx(1000 * widest_m / np.sqrt(3), rel=0.05)
     assert rail.points == pytest.approx(6000 * 2 * widest_m / WIDTH, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_ends_of_thin_rails_are_cut_where_the_first_point_is_expected(seed):
+    """Three points per metre: the third one lies 1 m from the end of the rail on average."""
+    random = np.random.default_rng(seed)
+    xyz = np.column_stack([random.uniform(0, 80, 240), random.uniform(-0.03, 0.03, 240), np.zeros(240)])
+    (rail,) = elevate(network_of(straight_line(80)), cloud(xyz), PARAMETERS)
+    third = np.sort(xyz[:, 0])[[2, -3]]
+    assert rail.length_m == pytest.approx(min(third[1] + 0.5, 80) - max(third[0] - 0.5, 0), abs=0.25)
