@@ -32,6 +32,17 @@ def prepare_system(wkt: str | None) -> None:
             QgsMemoryProviderUtils.createMemoryLayer("", QgsFields(), QgsWkbTypes.Type.Point, _built[text])
 
 
+def lost_part(wkt: str | None) -> str | None:
+    """Return the coordinate system of a cloud if QGIS drops its vertical part, as it does before version 3.34."""
+    from ..core.clouds.crs import parse_crs
+
+    crs = parse_crs(wkt) if wkt else None
+    if crs is None or not crs.is_compound:
+        return None
+    kept = parse_crs(system(wkt).toWkt(QgsCoordinateReferenceSystem.WktVariant.WKT_PREFERRED))
+    return None if kept.is_compound else wkt
+
+
 def system(wkt: str | None) -> QgsCoordinateReferenceSystem:
     """Return the coordinate system of a WKT, or an invalid one if there is no WKT."""
     if not wkt:

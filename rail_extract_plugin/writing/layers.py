@@ -37,7 +37,7 @@ from ...core.fields import (
 )
 from ...core.progress import SILENT, Progress
 from ..compat import INTEGER, REAL, TEXT, field
-from ..systems import system
+from ..systems import lost_part, system
 from .destinations import is_wanted
 from .styling import style_on_load
 from .whole_files import write_whole
@@ -252,7 +252,8 @@ def _write(
         sink, layer_id = algorithm.parameterAsSink({**parameters, name: value}, name, context, columns, shape, crs)
         return (layer_id, add_features(sink, made)) if sink else ("", 0)
 
-    layer_id = write_whole(parameters.get(name), context, algorithm.destinations.get(name), write)
+    destination = algorithm.destinations.get(name)
+    layer_id = write_whole(parameters.get(name), context, destination, write, lost_part(frame.crs_wkt))
     if not layer_id:
         return {}
     style_on_load(layer_id, kind.style, context, algorithm.layer_properties)

@@ -23,7 +23,13 @@ from .destinations import appends, output_file, table_of
 Write = Callable[[Any], tuple[str, int]]
 
 
-def write_whole(value: Any, context: QgsProcessingContext, destination: Destination | None, write: Write) -> str:
+def write_whole(
+    value: Any,
+    context: QgsProcessingContext,
+    destination: Destination | None,
+    write: Write,
+    system_wkt: str | None = None,
+) -> str:
     """Write a layer in a temporary folder next to its destination, and move its files there when complete.
 
     The other tables of a GeoPackage stay, and so do the features of a layer to which new ones are added. Memory layers,
@@ -38,6 +44,8 @@ def write_whole(value: Any, context: QgsProcessingContext, destination: Destinat
         The file that the value names.
     write : callable
         Writes to such a value, and returns the layer's id and number of features; an empty id if skipped.
+    system_wkt : str, optional
+        Coordinate system that the file is to state, where QGIS can write only part of it.
 
     Returns
     -------
@@ -51,9 +59,10 @@ def write_whole(value: Any, context: QgsProcessingContext, destination: Destinat
     """
     if destination is None:
         return write(value)[0]
-    table = table_of(value, context)
-    if table or (not appends(value) and tables_in(destination.file) - {destination.file.stem}):
-        layer_id, name = _write_table(value, destination, table or destination.file.stem, write)
+    table, stem = table_of(value, context), destination.file.stem
+    if table or (not appends(value) and (system_wkt or tables_in(destination.file) - {stem})):
+        layer_id = _write_table(value, destination, table or stem, write, None if appends(value) else system_wkt)
+        name = f"|layername={table or stem}"
     else:
         with destination.replacing(edit=appends(value)) as new:
             layer_id = _write_file(value, new, write)
@@ -61,8 +70,8 @@ def write_whole(value: Any, context: QgsProcessingContext, destination: Destinat
     return _renamed(layer_id, f"{destination.path}{name}", context)
 
 
-def _write_table(value: Any, destination: Destination, table: str, write: Write) -> tuple[str, str]:
-    """Write a table of a file that has others; returns the layer's id, and what follows the path in the final one.
+def _write_table(value: Any, destination: Destination, table: str, write: Write, system_wkt: str | None) -> str:
+    """Write a table of a file that may have others; returns the layer's id before its files are moved.
 
     The table is written in a file of its own first: QGIS takes the coordinate system from the first table of a file.
     """
@@ -72,8 +81,8 @@ def _write_table(value: Any, destination: Destination, table: str, write: Write)
         if appends(value):
             _copy_table(new, alone, table)
         layer_id = _write_file(value, alone, write)
-        _copy_table(alone, new, table)
-    return layer_id, f"|layername={table}"
+        _copy_table(alone, new, table, system_wkt)
+    return layer_id
 
 
 def write_each(
@@ -147,8 +156,8 @@ def _count(file: Path) -> int:
         return 0
 
 
-def _copy_table(source: Path, target: Path, table: str) -> None:
-    """Copy a table of a file into another file, in place of the table of this name.
+def _copy_table(source: Path, target: Path, table: str, system_wkt: str | None = None) -> None:
+    """Copy a table of a file into another file, in place of the table of this name; it may state another system.
 
     Raises
     ------
@@ -158,7 +167,9 @@ def _copy_table(source: Path, target: Path, table: str) -> None:
     gdal.ErrorReset()
     mode = "overwrite" if target.exists() else None
     try:
-        options = gdal.VectorTranslateOptions(accessMode=mode, layers=[table], layerName=table)
+        options = gdal.VectorTranslateOptions(
+            accessMode=mode, layers=[table], layerName=table, dstSRS=system_wkt, reproject=False
+        )
         copied = gdal.VectorTranslate(str(target), str(source), options=options)
         del copied  # closes the file
         failed = gdal.GetLastErrorType() >= gdal.CE_Failure

@@ -153,7 +153,7 @@ def write_cloud(tmp_path):
         xyz: np.ndarray,
         name: str = "cloud.las",
         class_code: int = 10,
-        epsg: int | None = 32643,
+        epsg: int | str | None = 32643,
         folder: Path = tmp_path,
         any_chunk_size: bool = False,
     ) -> Path:
@@ -161,7 +161,7 @@ def write_cloud(tmp_path):
         header.scales = [1e-7, 1e-7, 1e-3] if epsg == 4326 else [0.001] * 3
         header.offsets = xyz[0]
         if epsg is not None:
-            header.add_crs(import_pyproj().CRS.from_epsg(epsg))
+            header.add_crs(import_pyproj().CRS.from_user_input(epsg))
         cloud = laspy.LasData(header)
         cloud.xyz = xyz
         cloud.classification = np.full(len(xyz), class_code, dtype=np.uint8)
