@@ -14,9 +14,10 @@ from .classify.settings import Settings
 from .clouds.las import CloudHeader
 from .clouds.points import RailPoints, Request
 from .errors import CloudError, NoRailPointsError, NoTrackError, RailExtractError
+from .frpdf.models import choose
 from .labelling.spooling import spool_found
 from .parameters import Parameters
-from .progress import SILENT, Progress, Recording
+from .progress import SILENT, Progress, Recording, counted
 from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from .raster import RailRaster
 from .scratch import scratch_folder
@@ -148,6 +149,8 @@ def extract_files(
             source = spool_found(request, settings, side_m, scratch, reading)
             return _walk([source], parameters, runner, rest)
     warn_of_gauge(request, parameters, progress)
+    count = sum(header.point_count for header in request.headers)
+    progress.info(f"Reading {counted(len(request.headers), 'file')} with {counted(count, 'point')}.")
     return _walk(_sorted_points(request, side_m, folder, runner, reading), parameters, runner, rest)
 
 
@@ -190,9 +193,11 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
     sources = plausible(sources, progress)
     for source, share in zip(sources, drawing.split(len(sources))):
         squares = {square.key: square for square in occupied_squares(sources, source)}
+        _announce_squares(source, squares, parameters, progress)
         parts, rasters = _draw_squares(source, squares, parameters, runner, share)
         any_square |= bool(parts) or not squares
         found = whole_rails(parts, source.frame, parameters, len(rails) + 1, progress) if parts else []
+        progress.info(f"Class {source.class_code}: {_lengths(found, 'rail')}.")
         warn_of_rails(found, source.class_code, parameters, progress)
         if found:
             warn_of_unexplained(source, found, progress)
@@ -206,11 +211,16 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
         centerlines = tracks_of(rails, parameters, pairing)
     except NoTrackError as error:
         runner.failures.append(str(error))
+    progress.info(f"Paired: {_lengths(centerlines, 'track')}.")
     rails = with_tracks(rails, centerlines, progress)
     warn_of_split_classes(rails, parameters, progress)
     heads = head_widths(sources[0], parameters.head_width_m, progress) if rails else None
     geometry = _measure_tracks(centerlines, rails, sources, parameters, runner, measuring)
+    if geometry:
+        count = sum(len(track.chainage_m) for track in geometry)
+        progress.info(f"Measured: {counted(count, 'station')}, one every {parameters.quality_step_m:g} m.")
     described = dict(runner.run({"engine": Task("Describing the engine", _describe_engine, (parameters,))}))
+    progress.info(f"Engine of the network: {described.get('engine', 'unknown')}.")
     progress.set_fraction(1.0)
     return RailNetwork(
         tuple(rails),
@@ -224,6 +234,21 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
         progress.warnings,
         heads,
     )
+
+
+def _announce_squares(
+    source: PointSource, squares: Mapping[Key, Square], parameters: Parameters, progress: Progress
+) -> None:
+    """Say which points are processed, and with which network."""
+    points, where = counted(sum(source.counts.values()), "point"), counted(len(squares), "square")
+    model = choose(parameters.gauge_m, parameters.head_width_m).name
+    passes = counted(parameters.passes, "pass", "passes") if parameters.passes else "passes until it is stable"
+    progress.info(f"Class {source.class_code}: {points} in {where}; network {model}, {passes}.")
+
+
+def _lengths(lines: Sequence[RailLine] | Sequence[Centerline], what: str) -> str:
+    """Write number and length of lines."""
+    return f"{counted(len(lines), what)}, {sum(line.length_m for line in lines):,.0f} m"
 
 
 def _draw_squares(

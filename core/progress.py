@@ -171,4 +171,13 @@ def _rounded(seconds: float) -> str:
     return f"{seconds / 3600:.1f} hours"
 
 
+def counted(count: int, one: str, many: str = "") -> str:
+    """Write a number of things, for messages.
+
+    >>> counted(1, "file"), counted(2000, "file"), counted(0, "pass", "passes")
+    ('1 file', '2,000 files', '0 passes')
+    """
+    return f"{count:,} {one if count == 1 else many or one + 's'}"
+
+
 SILENT = Progress()

@@ -23,7 +23,7 @@ from ..pipeline import extract_files
 from ..progress import Estimating, Progress
 from ..rails import RailNetwork
 from ..raster_file import header_for, on_one_grid
-from ..report import Origin, list_findings
+from ..report import Origin, list_findings, summary
 from ..scratch import scratch_folder
 from ..standards import SEARCHED_CLASSES, RailStandard, resolve
 from .options import Console, add_cloud_arguments, extent_of, gauges_of, numbers_in
@@ -223,6 +223,8 @@ def _run_in(
     _write(network, args, standard, parameters, extent, outputs)
     print(f"{len(network.rails)} rails, {sum(rail.length_m for rail in network.rails) / 1000:.3f} km")
     print(f"{len(network.centerlines)} centerlines, {sum(one.length_m for one in network.centerlines) / 1000:.3f} km")
+    if network.geometry:
+        print(summary(network, (standard.gauge_m, *parameters.other_gauges_m))[0])
     for failure in network.failures:
         print(failure, file=sys.stderr)
     return INCOMPLETE if network.failures else 0

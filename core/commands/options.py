@@ -78,10 +78,14 @@ def extent_of(text: str | None) -> tuple[float, float, float, float] | None:
 
 
 class Console(Progress):
-    """Prints the remaining time and the warnings to the error output."""
+    """Prints steps, remaining time and warnings to the error output."""
 
     def status(self, text: str) -> None:
         """Print the current activity."""
+        print(text, file=sys.stderr, flush=True)
+
+    def info(self, text: str) -> None:
+        """Print what was done."""
         print(text, file=sys.stderr, flush=True)
 
     def warning(self, text: str) -> None:

@@ -3,5 +3,6 @@
 from .listing import Finding, list_findings
 from .origin import Origin
 from .page import build_page
+from .summary import summary
 
-__all__ = ["Finding", "Origin", "build_page", "list_findings"]
+__all__ = ["Finding", "Origin", "build_page", "list_findings", "summary"]

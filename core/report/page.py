@@ -9,10 +9,7 @@ import numpy as np
 from ..rails import RailNetwork
 from .findings import (
     DOUBTS,
-    FEW,
     GAUGE_OFF_MM,
-    MANY,
-    SILENT_SHARE,
     UNSUPPORTED,
     Doubt,
     Findings,
@@ -24,14 +21,7 @@ from .markup import metres, table, tag, text
 from .plan import draw_plan
 from .plots import draw_profiles
 from .style import STYLE
-
-VERDICTS = (
-    (0.0, "good", "Good throughout: every metre is supported by points, at gauge, with a small standard error."),
-    (FEW, "good", "Good, except for a few places to look at."),
-    (MANY, "fair", "Usable, but look at the places below before you rely on them."),
-    (np.inf, "poor", "Poor: large parts are in doubt. Check classes, gauge, railhead width and the cloud's density."),
-)
-"""Share of the length in doubt up to which a verdict applies, CSS class of the verdict, and its words."""
+from .verdict import verdict
 
 ADVICE = (
     "Rail classes: choose the class that the rails of this cloud have, or CLASSIFY if they have none.",
@@ -91,14 +81,6 @@ def build_page(
         f"<style>{STYLE}</style>",
     )
     return f"<!DOCTYPE html>\n{tag('html', tag('head', *head), tag('body', tag('main', *body)), lang='en')}\n"
-
-
-def verdict(findings: Findings) -> tuple[str, str]:
-    """Return the CSS class and the words of the verdict on tracks that were found."""
-    # What no station shows is a reason to look, not to discard: conductor rails are lone lines, too.
-    silent = min(findings.silent_share, MANY) if findings.silent_share > SILENT_SHARE else 0.0
-    share = max(findings.share, silent)
-    return next((kind, words) for limit, kind, words in VERDICTS if share <= limit)
 
 
 def _verdict(findings: Findings, rail_count: int, warnings: Sequence[str]) -> str:

@@ -130,7 +130,7 @@ class ExtractRails(RailAlgorithm):
     ) -> dict[str, Any]:
         """Extract the rails and tracks, then write the outputs."""
         from ...core.pipeline import extract_files
-        from ...core.report import Origin, list_findings
+        from ...core.report import Origin, list_findings, summary
         from ...core.tasks import InTurn
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
@@ -164,6 +164,8 @@ class ExtractRails(RailAlgorithm):
             "FINDINGS": lambda: write_lines(self, "FINDINGS", FINDINGS, found, frame, *rest),
             "REPORT": lambda: write_report(self, "REPORT", network, origin, *rest),
         }
+        for sentence in summary(network, origin.gauges_m):
+            progress.info(sentence)
         written = write_each(writers, parameters, context)
         figures = {**figures_of(network.rails, "RAIL"), **figures_of(network.centerlines, "CENTERLINE")}
         measured = figures_of_stations(network.geometry) if settings.quality_step_m else {}

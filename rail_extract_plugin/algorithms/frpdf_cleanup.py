@@ -85,7 +85,10 @@ class FrpdfCleanup(RailAlgorithm):
         engine = make_engine(load_arrays(job.model.path), values.choice("ENGINE"), values.choice("DEVICE"))
         rasters = read_rasters(job.path, job.header, progress.span(0, READING))
         passes = int(values.number("ITERATIONS"))
+        progress.info(f"Network {job.model.name}, {engine.description}.")
         shares = progress.span(READING, WRITING).split(len(rasters))
         cleaned = [clean(raster, engine, passes, share) for raster, share in zip(rasters, shares)]
+        for code, before, after in zip(job.header.class_codes, rasters, cleaned):
+            progress.info(f"Class {code}: {before.count():,} rail cells before, {after.count():,} after.")
         written = write_raster(self, "OUTPUT", job.header, cleaned, parameters, context, progress.span(WRITING, 1))
         return {**written, "ENGINE_USED": engine.description}

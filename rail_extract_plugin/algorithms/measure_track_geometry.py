@@ -99,7 +99,7 @@ class MeasureTrackGeometry(RailAlgorithm):
     ) -> dict[str, Any]:
         """Measure each track, then write the points."""
         from ...core.rails import RailNetwork
-        from ...core.report import Origin, list_findings
+        from ...core.report import Origin, list_findings, summary
         from ...core.squares.remeasuring import measure_rails
         from ...core.tasks import InTurn
         from ...core.tracks.geometry import measure_track_geometry
@@ -124,6 +124,8 @@ class MeasureTrackGeometry(RailAlgorithm):
         paths = job.cloud.paths if job.cloud else (Path(lines[0].sourceName()),)
         origin = Origin(paths, job.standard or _own_standard(measured, job), job.other_gauges_m, job.command)
         found = list_findings(network, origin.gauges_m) if is_wanted(parameters.get("FINDINGS"), context) else ()
+        for sentence in summary(network, origin.gauges_m):
+            progress.info(sentence)
         writers = {
             "OUTPUT": lambda: write_stations(self, "OUTPUT", measured, frame, *rest),
             "FINDINGS": lambda: write_lines(self, "FINDINGS", FINDINGS, found, frame, *rest),

@@ -74,6 +74,7 @@ class Feedback(QgsProcessingFeedback):
     def __init__(self, cancel_at: float | None = None) -> None:
         super().__init__(False)
         self.errors: list[str] = []
+        self.infos: list[str] = []
         self.warnings: list[str] = []
         self.progress: list[float] = []
         self._cancel_at = cancel_at
@@ -81,6 +82,9 @@ class Feedback(QgsProcessingFeedback):
 
     def reportError(self, error, fatalError=False):
         self.errors.append(error)
+
+    def pushInfo(self, info):
+        self.infos.append(info)
 
     def pushWarning(self, warning):
         self.warnings.append(warning)

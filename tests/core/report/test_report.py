@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.rails import Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry
-from rail_extract.core.report import build_page, list_findings
+from rail_extract.core.report import build_page, list_findings, summary
 from rail_extract.core.report.findings import OFF_GAUGE, UNSUPPORTED, UNSURE, examine
 from rail_extract.core.report.listing import HOLE, LONE_RAIL, OFF_RAIL_MM
 from rail_extract.core.report.markup import metres, table, tag, text
@@ -338,3 +338,13 @@ def test_rails_are_not_lone_if_a_track_does_not_name_its_rails():
     nameless = replace(line, left_ids=(), right_ids=())
     assert list_findings(network(track(), more_rails=[lone(9.0)]), (1.435,))
     assert list_findings(network((nameless, geometry), more_rails=[lone(9.0)]), (1.435,)) == ()
+
+
+def test_the_summary_has_the_verdict_and_its_figures():
+    whole = network(track(bridged=at(101, 40, 41)), track(2), more_rails=[lone(2.0)])
+    assert summary(whole, (1.435,)) == (
+        "Good, except for a few places to look at.",
+        "5 rails (402 m), 2 tracks (200 m): standard error 1.5 mm (median), 1.0 % of the tracks in doubt, 2 findings.",
+    )
+    assert summary(replace(whole, geometry=()), (1.435,))[1] == "5 rails (402 m), 2 tracks (200 m)."
+    assert summary(network(), (1.435,)) == ("No track was found.", "0 rails (0.0 m), 0 tracks (0.0 m).")

@@ -226,6 +226,25 @@ def test_memory_layers(run, scene, context):
     assert rails.featureCount() == outcome.results["RAIL_COUNT"]
 
 
+def test_the_log_names_steps_figures_and_verdict(run, scene, new_feedback, tmp_path):
+    feedback = new_feedback()
+    assert run({**scene, "ENGINE": "OPENCV", "REPORT": tmp_path / "report.html"}, feedback).ok
+    patterns = (
+        r"Reading 1 file with 7,200 points\.",
+        r"Class 10: 7,200 points in 1 square; network base, 1 pass\.",
+        r"Class 10: 2 rails, 24 m\.",
+        r"Paired: 1 track, 12 m\.",
+        r"Measured: 13 stations, one every 1 m\.",
+        r"Engine of the network: OpenCV .*, CPU, float32\.",
+        r"Good throughout.*",
+        r"2 rails \(24 m\), 1 track \(12 m\): standard error [\d.]+ mm \(median\), 0\.0 % of the tracks in doubt, "
+        r"0 findings\.",
+    )
+    assert len(feedback.infos) == len(patterns)
+    for pattern, said in zip(patterns, feedback.infos):
+        assert re.fullmatch(pattern, said), said
+
+
 def test_progress_advances_to_the_end(run, scene, new_feedback):
     feedback = new_feedback()
     assert run(scene, feedback).ok

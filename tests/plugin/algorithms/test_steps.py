@@ -1,6 +1,7 @@
 """The four steps, individually and chained."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -151,6 +152,16 @@ def test_rasterize_makes_one_band_per_class(run_step, write_cloud, track, tmp_pa
     assert header.class_codes == (10, 11)
     y = [raster.to_local(raster.cells())[:, 1].mean() for raster in rasters]
     assert y[1] - y[0] == pytest.approx(0.2, abs=0.01)
+
+
+def test_cleanup_logs_engine_and_cells(run_step, raster, tmp_path, new_feedback):
+    feedback = new_feedback()
+    given = {"INPUT": raster, "ITERATIONS": 1, "ENGINE": "OPENCV", "OUTPUT": tmp_path / "cleaned.tif"}
+    assert run_step("frpdfcleanup", given, feedback).ok
+    engine, cells = feedback.infos
+    assert engine.startswith("Network base, OpenCV ")
+    before, after = map(int, re.fullmatch(r"Class 10: (\d+) rail cells before, (\d+) after\.", cells).groups())
+    assert 100 < before < 2 * after
 
 
 def test_cleanup_without_torch_keeps_grid_and_tags(run_step, raster, tmp_path, monkeypatch):
