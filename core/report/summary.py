@@ -24,11 +24,11 @@ def summary(network: RailNetwork, gauges_m: Sequence[float]) -> tuple[str, str]:
     gauges_m : sequence of float
         Gauges that tracks may have.
     """
-    lengths = [
-        f"{len(lines)} {what} ({metres(sum(line.length_m for line in lines))})"
-        for what, lines in (("rails", network.rails), ("tracks", network.centerlines))
-    ]
-    figures = ", ".join(lengths)
+    rails, tracks = (
+        f"{counted(len(lines), what)} ({metres(sum(line.length_m for line in lines))})"
+        for what, lines in (("rail", network.rails), ("track", network.centerlines))
+    )
+    figures = f"{rails}, {tracks}"
     if not network.centerlines:
         return "No track was found.", f"{figures}."
     if not network.geometry:

@@ -160,7 +160,8 @@ def test_cleanup_logs_engine_and_cells(run_step, raster, tmp_path, new_feedback)
     assert run_step("frpdfcleanup", given, feedback).ok
     engine, cells = feedback.infos
     assert engine.startswith("Network base, OpenCV ")
-    before, after = map(int, re.fullmatch(r"Class 10: (\d+) rail cells before, (\d+) after\.", cells).groups())
+    before, after = re.fullmatch(r"Class 10: ([\d,]+) rail cells before, ([\d,]+) after\.", cells).groups()
+    before, after = (int(text.replace(",", "")) for text in (before, after))
     assert 100 < before < 2 * after
 
 
