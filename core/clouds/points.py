@@ -32,11 +32,23 @@ class RailPoints:
         Local metres.
     frame : LocalFrame
     class_code : int
+    strips : (n,) array or None
+        Number of the strip, a pass of the scanner, that each point belongs to; None if all points are of one strip.
     """
 
     xyz: np.ndarray
     frame: LocalFrame
     class_code: int
+    strips: np.ndarray | None = None
+
+    def kept(self, which: np.ndarray) -> RailPoints:
+        """Return some of the points, by a mask (n,) bool or by their numbers (k,)."""
+        return replace(self, xyz=self.xyz[which], strips=None if self.strips is None else self.strips[which])
+
+
+def several(strips: np.ndarray) -> np.ndarray | None:
+    """Return strips, (n,), if there are several, else None."""
+    return strips if len(strips) and (strips != strips[0]).any() else None
 
 
 def read_rail_points(
@@ -86,10 +98,12 @@ def read_rail_points(
     (10, (75004, 3))
     """
     request = ask(paths, class_codes, crs_wkt, extent, progress)
-    xyz, codes = _collect(request, progress)
+    xyz, codes, strips = _collect(request, progress)
     frame = request.frame_at([np.unique(column, return_counts=True) for column in origin_steps(xyz).T])
     local = frame.to_local(xyz)
-    return tuple(RailPoints(local[codes == code], frame, int(code)) for code in np.unique(codes))
+    return tuple(
+        RailPoints(local[codes == code], frame, int(code), several(strips[codes == code])) for code in np.unique(codes)
+    )
 
 
 @dataclass(frozen=True)
@@ -118,10 +132,10 @@ class Request:
         """Read the points requested from a file chunk by chunk; see `readers.read_classes`."""
         if self.extent is not None and not _overlap(header.extent, self.extent):
             return
-        for xyz, codes, census in read_classes(header.path, self.class_codes, progress):
+        for xyz, codes, strips, census in read_classes(header.path, self.class_codes, progress):
             inside = slice(None) if self.extent is None else self.holds(xyz)
             found = np.full_like(codes, self.class_codes[0]) if self.merged else codes
-            yield xyz[inside], found[inside], census
+            yield xyz[inside], found[inside], strips[inside], census
 
     def holds(self, xyz: np.ndarray) -> np.ndarray:
         """Return which places, (n, 3) in units of the CRS, lie in the extent, (n,) bool."""
@@ -137,7 +151,7 @@ class Request:
         """
         found, count, passed = [np.empty((0, 3))], 0, 0
         for header in self.headers:
-            for xyz, _, census in self.read(header):
+            for xyz, _, _, census in self.read(header):
                 found.append(xyz)
                 count, passed = count + len(xyz), passed + int(census.sum())
                 if count >= SAMPLE_POINTS or passed >= MAX_PASSED:
@@ -258,17 +272,17 @@ def _fitting_zone(header: CloudHeader) -> str:
     return utm_zone(longitude, latitude) if fits else "the UTM zone of the place"
 
 
-def _collect(request: Request, progress: Progress) -> tuple[np.ndarray, np.ndarray]:
-    """Return coordinates, (n, 3) in CRS units, and classes, (n,), of the points requested from all files."""
-    kept_xyz, kept_codes, census = [], [], np.zeros(256, dtype=np.int64)
+def _collect(request: Request, progress: Progress) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return coordinates, (n, 3) in CRS units, classes and strips, (n,), of the points requested from all files."""
+    kept, census = [], np.zeros(256, dtype=np.int64)
     for header, share in zip(request.headers, request.shares(progress)):
-        for xyz, codes, counts in request.read(header, share):
+        for *points, counts in request.read(header, share):
             census += counts
-            kept_xyz.append(xyz)
-            kept_codes.append(codes)
-    if not sum(map(len, kept_codes)):
+            kept.append(points)
+    xyz, codes, strips = (np.concatenate(column) for column in zip(*kept)) if kept else (np.empty(0),) * 3
+    if not len(codes):
         raise request.explain_none(census)
-    return np.concatenate(kept_xyz), np.concatenate(kept_codes)
+    return xyz, codes, strips
 
 
 def _overlap(a: Extent, b: Extent) -> bool:

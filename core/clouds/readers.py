@@ -35,12 +35,12 @@ IMPOSSIBLE = (None, errno.EINVAL, errno.EOVERFLOW)
 Extent = tuple[float, float, float, float]
 """Smallest x, smallest y, largest x, largest y, in units of the CRS."""
 
-Chunk = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Coordinates (n, 3) in units of the CRS and classes (n,) of the points that were kept, and the number of points read
-by class (256,), kept or not."""
+Chunk = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""Coordinates (n, 3) in units of the CRS, classes (n,) and strips (n,) of the points that were kept, and the number of
+points read by class (256,), kept or not."""
 
-Points = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Coordinates (n, 3) in units of the CRS, classes (n,), and which points are not withheld, (n,) bool."""
+Points = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""Coordinates (n, 3) in units of the CRS, classes (n,), strips (n,), and which points are not withheld, (n,) bool."""
 
 Paths = Union[str, Path, Sequence[Union[str, Path]]]
 """Files, or folders of them."""
@@ -107,6 +107,8 @@ def read_classes(path: Path, class_codes: Sequence[int], progress: Progress = SI
         Points kept from a chunk, in units of the CRS.
     codes : (n,) uint8 array
         Their classes.
+    strips : (n,) uint16 array
+        Their strips: each pass of a scanner has a number of its own. All 0 where the file does not state any.
     census : (256,) int array
         Points in the chunk by class, kept or not, without withheld ones.
 
@@ -128,6 +130,8 @@ def read_points(path: Path, progress: Progress = SILENT) -> Iterator[Points]:
         In units of the CRS.
     codes : (n,) uint8 array
         Classes.
+    strips : (n,) uint16 array
+        See `read_classes`.
     valid : (n,) bool array
         Points that are not withheld.
 

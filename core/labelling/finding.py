@@ -24,7 +24,12 @@ from ..squares.grid import Key, Square, around, points_by_square
 from ..standards import LAST_CLASS
 
 POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8")])
-"""A point on disk: coordinates in units of the CRS, and its number among all points of all files."""
+"""A point on disk: coordinates in units of the CRS, and its number among all points of all files, with the number of
+its strip in the upper 16 bits."""
+
+STRIP_SHIFT = 48
+NUMBER_BITS, STRIP_BITS = (1 << STRIP_SHIFT) - 1, 0xFFFF
+"""How the two numbers share 64 bits."""
 
 FEW_IN_SQUARE, MANY_SQUARES = 20, 100
 """Chunks of points that are spread over more squares than this, with fewer points in each, are not in the unit that the
@@ -44,11 +49,14 @@ class Found:
         Units of the CRS.
     number : (k,) int array
         Their numbers among all points of all files.
+    strips : (k,) uint16 array
+        The strips that they belong to.
     figures : Figures
     """
 
     xyz: np.ndarray
     number: np.ndarray
+    strips: np.ndarray
     figures: Figures
 
 
@@ -118,10 +126,11 @@ def _sort(request: Request, side_m: float, folder: Path, progress: Progress) -> 
     wanted[list(request.class_codes)] = True
     first = 0
     for header, share in zip(request.headers, request.shares(progress)):
-        for xyz, codes, valid in read_points(header.path, share):
+        for xyz, codes, strips, valid in read_points(header.path, share):
             kept = np.flatnonzero(valid & wanted[codes] & request.holds(xyz))
             points = np.empty(len(kept), POINT)
-            points["xyz"], points["number"] = xyz[kept], kept + first
+            points["xyz"] = xyz[kept]
+            points["number"] = kept + first | strips[kept].astype(np.int64) << STRIP_SHIFT
             first += len(xyz)
             _append(points, request.zero, side_m, folder, counts, header.path.name)
     return counts
@@ -149,7 +158,9 @@ def _find_in(square: Square, counts: Mapping[Key, int], settings: Settings, fold
     parts = [_near(square, key, folder) for key in around(square.key) if key in counts]
     xyz, number = (np.concatenate(values) for values in zip(*parts))
     found = classify_square(square.frame.to_local(xyz), settings)
-    return Found(xyz[found.rail], number[found.rail], found.figures)
+    number = number[found.rail]
+    strips = (number >> STRIP_SHIFT & STRIP_BITS).astype(np.uint16)
+    return Found(xyz[found.rail], number & NUMBER_BITS, strips, found.figures)
 
 
 def _near(square: Square, key: Key, folder: Path) -> tuple[np.ndarray, np.ndarray]:

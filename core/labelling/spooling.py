@@ -40,7 +40,7 @@ def spool_found(request: Request, settings: Settings, side_m: float, folder: Pat
     census, figures = Census(), Figures()
     with writing(folder), scratch_folder(folder) as squares:
         for found in find_rail_points(request, settings, squares, progress):
-            census.add(RAIL_CLASS, found.xyz, request.zero, side_m, folder)
+            census.add(RAIL_CLASS, found.xyz, found.strips, request.zero, side_m, folder)
             figures += found.figures
     if not figures.points:
         raise NoRailPointsError(

@@ -126,7 +126,8 @@ class MemorySource:
         parts = [self._members[key] for key in around(square.key) if key in self._members]
         chosen = np.sort(np.concatenate(parts)) if parts else np.empty(0, dtype=np.int64)
         xyz = self._points.xyz[chosen] - square.frame.shift_to(self.frame)
-        return RailPoints(xyz[square.holds(xyz, margin_m)], square.frame, self.class_code)
+        near = replace(self._points.kept(chosen), xyz=xyz, frame=square.frame)
+        return near.kept(square.holds(xyz, margin_m))
 
     def part(self, square: Square) -> MemorySource:
         """See `PointSource`."""

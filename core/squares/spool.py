@@ -53,7 +53,7 @@ class SpooledPoints:
     frame, class_code, side_m, counts, span_m
         See `PointSource`.
     files : mapping of Key to tuple of str
-        Files that hold the points of each square.
+        Files that hold the points of each square, one for each strip; their names end with its number.
     """
 
     frame: LocalFrame
@@ -66,9 +66,12 @@ class SpooledPoints:
     def near(self, square: Square, margin_m: float) -> RailPoints:
         """See `PointSource`."""
         keys = sorted(self.files) if square.is_whole_plane else around(square.key)
-        parts = [np.fromfile(file).reshape(-1, 3) for key in keys for file in self.files.get(key, ())]
+        files = [file for key in keys for file in self.files.get(key, ())]
+        parts = [np.fromfile(file).reshape(-1, 3) for file in files]
         xyz = square.frame.to_local(np.concatenate(parts) if parts else np.empty((0, 3)))
-        return RailPoints(xyz[square.holds(xyz, margin_m)], square.frame, self.class_code)
+        strips = [int(Path(file).name.split("_")[-1]) for file in files]
+        each = np.repeat(np.uint16(strips), [len(part) for part in parts]) if len(set(strips)) > 1 else None
+        return RailPoints(xyz, square.frame, self.class_code, each).kept(square.holds(xyz, margin_m))
 
     def part(self, square: Square) -> SpooledPoints:
         """Keep only a square and its neighbours, so that less is sent to a worker."""
@@ -155,11 +158,11 @@ def spool_file(
 def _sort(request: Request, header: CloudHeader, side_m: float, folder: Path, progress: Progress) -> dict:
     """Write the points of a file to the files of their squares, and the report; returns the report."""
     found = Census()
-    for xyz, codes, census in request.read(header, progress):
+    for xyz, codes, strips, census in request.read(header, progress):
         found.census += census
         with writing(folder.parent):
             for code in np.unique(codes).tolist():
-                found.add(code, xyz[codes == code], request.zero, side_m, folder)
+                found.add(code, xyz[codes == code], strips[codes == code], request.zero, side_m, folder)
     report = found.report()
     text = json.dumps(report)
     with writing(folder.parent):
@@ -220,13 +223,20 @@ class Census:
         self._classes: dict[int, dict] = {}
         self._steps: list[dict[float, int]] = [{}, {}, {}]
 
-    def add(self, code: int, xyz: np.ndarray, zero: LocalFrame, side_m: float, folder: Path) -> None:
-        """Append points of one class, (n, 3) in units of the CRS, to the files of their squares."""
+    def add(
+        self, code: int, xyz: np.ndarray, strips: np.ndarray, zero: LocalFrame, side_m: float, folder: Path
+    ) -> None:
+        """Append points of one class, (n, 3) in units of the CRS, to the files of their squares and strips, (n,)."""
+        for strip in np.unique(strips).tolist():
+            self._add(code, strip, xyz[strips == strip], zero, side_m, folder)
+
+    def _add(self, code: int, strip: int, xyz: np.ndarray, zero: LocalFrame, side_m: float, folder: Path) -> None:
+        """Append points of one class and strip."""
         new = {"squares": {}, "checks": {}, "low": [np.inf] * 2, "high": [-np.inf] * 2}
         mine = self._classes.setdefault(code, new)
         for key, numbers in points_by_square(zero.to_local(xyz), side_m).items():
             part = xyz[numbers]
-            name = f"{code}_{key[0]}_{key[1]}"
+            name = f"{code}_{key[0]}_{key[1]}_{strip}"
             data = part.tobytes()
             with (folder / name).open("ab") as file:
                 file.write(data)

@@ -370,3 +370,38 @@ def test_damaged_files_are_read_or_refused(tmp_path, name, changes, cut):
         assert str(error)
     else:
         assert all(np.isfinite(points.xyz).all() for points in clouds)
+
+
+@pytest.mark.parametrize("name", ["a.las", "a.laz"])
+@pytest.mark.parametrize(("version", "point_format"), [("1.2", 1), ("1.4", 6)])
+def test_strips_are_read_where_there_are_several(tmp_path, name, version, point_format):
+    make_cloud(tmp_path / name, version=version, point_format=point_format)
+    cloud = laspy.read(tmp_path / name)
+    rail = np.asarray(cloud.classification) == RAIL
+    for ids in ([3, 3], [3, 12], [1, 40_000]):
+        cloud.point_source_id = np.random.RandomState(0).choice(ids, len(rail))
+        cloud.write(tmp_path / name)
+        (points,) = read_rail_points(tmp_path / name, [RAIL])
+        if ids[0] == ids[1]:
+            assert points.strips is None
+        else:
+            np.testing.assert_array_equal(points.strips, np.asarray(cloud.point_source_id)[rail])
+
+
+def test_source_ids_that_number_profiles_are_not_strips(tmp_path):
+    make_cloud(tmp_path / "a.laz")
+    cloud = laspy.read(tmp_path / "a.laz")
+    cloud.point_source_id = np.arange(len(cloud)) % 60_000
+    cloud.write(tmp_path / "a.laz")
+    (points,) = read_rail_points(tmp_path / "a.laz", [RAIL])
+    assert points.strips is None
+
+
+def test_files_with_source_ids_of_their_own_are_strips(tmp_path):
+    for number in (1, 2):
+        make_cloud(tmp_path / f"{number}.las")
+        cloud = laspy.read(tmp_path / f"{number}.las")
+        cloud.header.file_source_id = number
+        cloud.write(tmp_path / f"{number}.las")
+    (points,) = read_rail_points(tmp_path, [RAIL])
+    assert sorted(set(points.strips.tolist())) == [1, 2] and (np.diff(points.strips.astype(int)) >= 0).all()

@@ -166,3 +166,28 @@ def test_a_file_in_place_of_the_points_is_replaced(files, tmp_path):
         shutil.rmtree(folder)
         folder.write_text("no folder")
     assert spool(ask(files, [10]), SIDE, work)[0].counts == first[0].counts
+
+
+def test_points_keep_their_strips(tmp_path):
+    random, folder = np.random.RandomState(2), tmp_path / "cloud"
+    folder.mkdir()
+    xyz = random.uniform(0, 1, (4000, 3)) * [80.0, 20.0, 1.0] + [500_000, 5_400_000, 300]
+    strips = np.where(xyz[:, 0] < 500_060, random.choice([0, 7], 4000), 9)
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.scales, header.offsets, header.file_source_id = np.full(3, 0.001), [500_000, 5_400_000, 0], 4
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = xyz.T
+    cloud.classification, cloud.point_source_id = np.full(4000, 10, np.uint8), strips
+    cloud.write(folder / "a.laz")
+    expected = np.where(strips == 0, 4, strips)  # a point without a source id has that of its file
+    (points,) = read_rail_points(folder, [10])
+    np.testing.assert_array_equal(points.strips, expected)
+    (source,) = spool(ask(folder, [10]), SIDE, tmp_path)
+    for one in (source, MemorySource(points, SIDE)):
+        whole = one.near(Square((0, 0), points.frame, np.inf), 0.0)
+        order, wanted = np.lexsort(whole.xyz.T), np.lexsort(points.xyz.T)
+        np.testing.assert_array_equal(whole.strips[order], expected[wanted])
+        near = [one.near(square, 3.0) for square in lay_out([one], one)]
+        for part in near:
+            assert part.strips is None or len(part.strips) == len(part.xyz)
+        assert {4, 7, 9} == {int(one) for part in near if part.strips is not None for one in part.strips}
