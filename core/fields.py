@@ -117,6 +117,13 @@ QUALITY_FIELDS = (
     SIGMA,
     Field("points", int, "points on both rails for which this is the nearest station"),
     Field("bridged", int, "1 where a rail has no points, or is missing, for most of the step; else 0"),
+    Field("strips", int, "number of strips, passes of the scanner, that show the rails"),
+    Field(
+        "strip_mm",
+        float,
+        "largest distance between two of these strips, across or in height, millimetres; empty where there is one",
+        1,
+    ),
 )
 """In a `TrackGeometry`, the first is a single value and the others have a value for each station."""
 

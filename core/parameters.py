@@ -7,6 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+AS_THEY_ARE, ALIGNED = "AS_THEY_ARE", "ALIGNED"
+STRIPS = (AS_THEY_ARE, ALIGNED)
+"""What happens to strips, the passes of a scanner, that differ: nothing, or they are moved onto their mean."""
+
 DEFAULT_STEP_M = 1.0
 """Distance between the stations of the track geometry, once it is asked for."""
 
@@ -49,6 +53,8 @@ class Parameters:
         millimetre.
     keep_cleaned : bool
         Whether the result includes the rasters that the network cleaned.
+    strips : str
+        One of `STRIPS`.
     """
 
     gauge_m: float
@@ -71,3 +77,4 @@ class Parameters:
     quality_step_m: float | None = None
     square_tiles: int = 50
     keep_cleaned: bool = False
+    strips: str = AS_THEY_ARE

@@ -10,20 +10,22 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from .classify.settings import Settings
 from .clouds.las import CloudHeader
 from .clouds.points import RailPoints, Request
 from .errors import CloudError, NoRailPointsError, NoTrackError, RailExtractError
 from .frpdf.models import choose
 from .labelling.spooling import spool_found
-from .parameters import Parameters
+from .parameters import ALIGNED, Parameters
 from .progress import SILENT, Progress, Recording, counted
 from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from .raster import RailRaster
 from .scratch import scratch_folder
 from .squares.density import occupied_squares, plausible, warn_of_unexplained
 from .squares.grid import Key, MemorySource, PointSource, Square, around, assembled
-from .squares.pieces import SquareRails
+from .squares.pieces import SquareRails, rows_in_frame
 from .squares.remeasuring import measure_rails
 from .squares.spool import SpooledFile, SpooledPoints, gather, spool_file
 from .standard_checks import head_widths, warn_of_gauge
@@ -35,11 +37,13 @@ from .steps import (
     tracks_of,
     warn_of_rails,
     warn_of_split_classes,
+    warn_of_strips,
     whole_rails,
     with_tracks,
 )
 from .tasks import Context, InTurn, Runner, Task
 from .tracks.geometry import measure_track_geometry
+from .tracks.strip_courses import strip_courses
 
 READING, DRAWING, PAIRING, MEASURING = 0.2, 0.72, 0.04, 0.04
 """Run times of the steps relative to each other, for the progress: sorting files, squares, tracks, track geometry."""
@@ -188,6 +192,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
     progress = Recording(progress)
     drawing, pairing, measuring = progress.divide((DRAWING, PAIRING, MEASURING))
     rails: list[RailLine] = []
+    strips: list[np.ndarray] = []
     cleaned: dict[int, RailRaster] = {}
     any_square = False
     sources = plausible(sources, progress)
@@ -202,6 +207,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
         if found:
             warn_of_unexplained(source, found, progress)
         rails += found
+        strips += [rows_in_frame(part, source.frame) for part in parts]
         if rasters:
             cleaned[source.class_code] = assembled(rasters, squares, source.frame)
     if not any_square:
@@ -214,6 +220,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
     progress.info(f"Paired: {_lengths(centerlines, 'track')}.")
     rails = with_tracks(rails, centerlines, progress)
     warn_of_split_classes(rails, parameters, progress)
+    warn_of_strips(rails, parameters, progress)
     heads = head_widths(sources[0], parameters.head_width_m, progress) if rails else None
     geometry = _measure_tracks(centerlines, rails, sources, parameters, runner, measuring)
     if geometry:
@@ -233,6 +240,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
         tuple(runner.failures),
         progress.warnings,
         heads,
+        strip_courses(centerlines, np.concatenate(strips)) if strips else (),
     )
 
 
@@ -335,7 +343,8 @@ def _measure_tracks(
     if parameters.quality_step_m is None:
         return []
     remeasuring, stations = progress.divide((REMEASURE, STATIONS))
-    measured = measure_rails(rails, sources, parameters.head_width_m, runner, remeasuring)
+    align = parameters.strips == ALIGNED
+    measured = measure_rails(rails, sources, parameters.head_width_m, runner, remeasuring, align)
     geometry: list[TrackGeometry] = []
     for source, share in zip(sources, stations.split(len(sources))):
         geometry += measure_track_geometry(

@@ -31,11 +31,16 @@ class Support:
         Points on top of the railhead for which this is the nearest station.
     sigma_m : float
         Standard error of the line's lateral position.
+    strips : (n, 3) array or None
+        Number of strips, passes of the scanner, that show the line, the largest distance between two of them, across
+        or in height, metres, NaN where there is only one, and the part of the standard error that they share with the
+        other rail; None if all points are of one strip.
     """
 
     t: np.ndarray
     points: np.ndarray
     sigma_m: np.ndarray
+    strips: np.ndarray | None = None
 
     @property
     def rms_m(self) -> float:
@@ -50,11 +55,18 @@ class Support:
 
     def select(self, which: np.ndarray, start: float) -> Support:
         """Return the stations marked in `which`, (n,) bool; their chainages count from `start`."""
-        return Support(self.t[which] - start, self.points[which], self.sigma_m[which])
+        strips = None if self.strips is None else self.strips[which]
+        return Support(self.t[which] - start, self.points[which], self.sigma_m[which], strips)
 
     def reversed(self, length_m: float) -> Support:
         """Return the support of the reversed line, given the line's length."""
-        return Support(length_m - self.t[::-1], self.points[::-1], self.sigma_m[::-1])
+        strips = None if self.strips is None else self.strips[::-1]
+        return Support(length_m - self.t[::-1], self.points[::-1], self.sigma_m[::-1], strips)
+
+    @property
+    def every_strip(self) -> np.ndarray:
+        """`strips`, (n, 3), also where all points are of one strip."""
+        return np.tile([1.0, np.nan, 0.0], (len(self.t), 1)) if self.strips is None else self.strips
 
 
 def _length(xyz: np.ndarray) -> float:
@@ -230,6 +242,10 @@ class TrackGeometry:
         Points on both rails for which this is the nearest station.
     bridged : bool
         Whether a rail has no points, or is missing, for most of the section that the station represents.
+    strips : int
+        Number of strips, passes of the scanner, that show the rails.
+    strip_mm : float
+        Largest distance between two of them, across or in height; NaN where there is only one.
     """
 
     track_id: int
@@ -243,6 +259,8 @@ class TrackGeometry:
     sigma_mm: np.ndarray
     points: np.ndarray
     bridged: np.ndarray
+    strips: np.ndarray
+    strip_mm: np.ndarray
 
     @property
     def cells_m(self) -> np.ndarray:
@@ -254,6 +272,30 @@ class TrackGeometry:
         """Length that the bridged stations represent."""
         return float(self.cells_m[self.bridged].sum())
 
+
+@dataclass(frozen=True)
+class StripCourse:
+    """Offsets of one strip, a pass of the scanner, from the mean of all strips along a track; (n,) arrays.
+
+    Attributes
+    ----------
+    track_id, strip : int
+        Track, and number of the strip.
+    chainage_m : float
+        Plan distance from the start of the centerline of places that another strip shows as well.
+    across_mm, up_mm : float
+        Offset to the left, seen along the centerline, and upwards.
+    """
+
+    track_id: int
+    strip: int
+    chainage_m: np.ndarray
+    across_mm: np.ndarray
+    up_mm: np.ndarray
+
+
+STRIP_OFF_M = 0.003
+"""Distance between strips from which the user is warned. Strips of one scanner that agree differ by a millimetre."""
 
 HEAD_OFF_M = 0.006
 """Difference between the head widths that the points show and that is stated, from which the user is warned: noise of
@@ -294,6 +336,8 @@ class RailNetwork:
     failures : tuple of str
         A sentence for each file or square that is missing from the result, if the run tolerates that, and one if no
         two rails have the gauge.
+    strips : tuple of StripCourse
+        By track and strip, where several strips show a track.
     """
 
     rails: tuple[RailLine, ...]
@@ -306,3 +350,4 @@ class RailNetwork:
     failures: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     heads: HeadWidths | None = None
+    strips: tuple[StripCourse, ...] = ()

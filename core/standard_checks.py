@@ -105,17 +105,27 @@ def head_widths(source: PointSource, stated_m: float, progress: Progress) -> Hea
         Stated width of a railhead.
     progress : Progress
     """
-    xyz = fullest_square(source).xyz
+    points = fullest_square(source)
+    if points.strips is not None:  # strips side by side would look like a wider head
+        strips, counts = np.unique(points.strips, return_counts=True)
+        points = points.kept(points.strips == strips[np.argmax(counts)])
+    xyz = points.xyz
     place = xyz[np.argmin(np.abs(xyz[:, :2] - np.median(xyz[:, :2], axis=0)).max(axis=1)), :2]
     measured = measure_spacings(xyz[np.abs(xyz[:, :2] - place).max(axis=1) <= SAMPLE_M]).most_common()
     if measured is None:
         return HeadWidths(float("nan"), stated_m)
     widths = HeadWidths(measured[1], stated_m)
     if widths.differ:
-        progress.warning(
-            f"Heads look {1000 * widths.seen_m:.0f} mm wide, {1000 * stated_m:.0f} mm are stated{_question(*measured)} "
-            "Every gauge is off by the difference."
-        )
+        seen = f"Heads look {1000 * widths.seen_m:.0f} mm wide, {1000 * stated_m:.0f} mm are stated"
+        standard = closest_standard(*measured)
+        fits = standard is not None and abs(standard.head_width_m - widths.seen_m) <= HEAD_OFF_M
+        if fits or widths.seen_m < stated_m:
+            progress.warning(f"{seen}{_question(*measured)} Every gauge is off by the difference.")
+        else:
+            progress.warning(
+                f"{seen}, and no standard has such heads: passes of the scanner lie apart, or the points are noisy. "
+                "Passes can be compared and aligned (STRIPS) if the points have source ids."
+            )
     return widths
 
 

@@ -18,17 +18,19 @@ from .frpdf.cleanup import MARGIN, clean, max_passes
 from .frpdf.engine import Engine, make_engine
 from .frpdf.models import choose
 from .frpdf.weights import load_arrays
+from .heads.edges import STATION_STEP_M
 from .heads.elevation import ElevationParameters, elevate, flat_rails, numbered
 from .heads.refinement import refine
 from .heads.smoothing_check import warn_if_out_of_reach
+from .heads.strips import rows_of, strips_along
 from .lines.bridges import FIT_M
 from .lines.network_smoothing import smooth_network
 from .lines.thinning import thin
 from .lines.turning import MAX_TURN_DEG, parts_without_turns
-from .parameters import Parameters
+from .parameters import ALIGNED, Parameters
 from .polyline import length_along
 from .progress import SILENT, Progress
-from .rails import Centerline, RailLine
+from .rails import STRIP_OFF_M, Centerline, RailLine
 from .raster import TILE, RailRaster, cell_size, rasterize
 from .squares.grid import HALO_M, OVERLAP_M, Key, PointSource, Square, mosaic, own_tiles
 from .squares.pieces import SquareRails, trim
@@ -37,6 +39,12 @@ from .standards import distinct_gauges
 from .tracks.centerlines import CenterlineParameters, build_centerlines
 from .tracks.lone import assign_tracks
 from .vectorize import vectorize
+
+MIN_STRIPS_APART_M = 5.0
+"""Length of rail on which strips are apart from which the user is warned; they are compared over twice this length."""
+
+LARGEST_PERCENT = 95.0
+"""Percentile of the distances that is stated as the largest: switches and crossings make some of them wrong."""
 
 VECTORIZE, SMOOTH, REFINE, ELEVATE = 0.45, 0.05, 0.25, 0.25
 """Relative run times of the steps from a raster to lines, for the progress."""
@@ -131,7 +139,7 @@ def rails_of_square(
     if not square.is_whole_plane:
         # A line may be longer than the part of it that the square shows; `whole_rails` drops the lines that are short.
         parameters = replace(parameters, min_length_m=min(parameters.min_length_m, overlap_m - HALO_M))
-    return trim(_all_vertices(raster, source.class_code, points, parameters, progress), square)
+    return trim(*_all_vertices(raster, source.class_code, points, parameters, progress), square)
 
 
 def whole_rails(
@@ -178,7 +186,8 @@ def lines_of(
     first_id : int
         `rail_id` of the first rail.
     """
-    rails = _finished(_all_vertices(raster, class_code, points, parameters, progress), parameters, first_id, progress)
+    drawn, _ = _all_vertices(raster, class_code, points, parameters, progress)
+    rails = _finished(drawn, parameters, first_id, progress)
     warn_of_rails(rails, class_code, parameters, progress)
     return rails
 
@@ -199,10 +208,41 @@ def warn_of_rails(rails: Sequence[RailLine], class_code: int, parameters: Parame
     warn_if_out_of_reach(rails, parameters.head_width_m, parameters.smoothing_xy_m, progress)
 
 
+def warn_of_strips(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> None:
+    """Warn the user if strips, the passes of a scanner, differ.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+    parameters : Parameters
+    progress : Progress
+    """
+    spread_m = np.concatenate(
+        [rail.support.every_strip[:, 1] for rail in rails if rail.support is not None] or [np.empty(0)]
+    )
+    apart = spread_m[np.isfinite(spread_m)]
+    apart = apart[apart >= STRIP_OFF_M]
+    length_m = STATION_STEP_M * len(apart)
+    if length_m < MIN_STRIPS_APART_M:
+        return
+    remedy = (
+        "they are aligned to their mean, and sigma_mm states what remains in doubt"
+        if parameters.strips == ALIGNED
+        else "correct the positions of the scanner, or set STRIPS to ALIGNED"
+    )
+    progress.warning(
+        f"Strips are up to {1000 * np.percentile(apart, LARGEST_PERCENT):.0f} mm apart, on {length_m:.0f} m of rail "
+        f"where they meet: {remedy}."
+    )
+
+
 def _all_vertices(
     raster: RailRaster, class_code: int, points: RailPoints | None, parameters: Parameters, progress: Progress
-) -> tuple[RailLine, ...]:
-    """Turn the cleaned raster of one class into rails that have all their vertices."""
+) -> tuple[tuple[RailLine, ...], np.ndarray]:
+    """Turn the cleaned raster of one class into rails that have all their vertices, and list the offsets of strips.
+
+    See `strips.rows_of`.
+    """
     vectorizing, smoothing, refining, elevating = progress.divide((VECTORIZE, SMOOTH, REFINE, ELEVATE))
     network = vectorize(
         raster,
@@ -223,11 +263,13 @@ def _all_vertices(
         smoothing_z_m=parameters.smoothing_z_m,
         cell_m=raster.cell_m,
         min_length_m=parameters.min_length_m,
+        align=parameters.strips == ALIGNED,
     )
     if points is None:
-        return flat_rails(network, class_code, elevation)
-    network = refine(network, points, parameters.head_width_m, parameters.smoothing_xy_m, refining)
-    return elevate(network, points, elevation, elevating)
+        return flat_rails(network, class_code, elevation), rows_of((), ())
+    network = refine(network, points, parameters.head_width_m, parameters.smoothing_xy_m, refining, elevation.align)
+    strips = strips_along(network.lines, points, parameters.head_width_m)
+    return elevate(network, points, elevation, elevating, strips), rows_of(network.lines, strips)
 
 
 def _finished(rails: Sequence[RailLine], parameters: Parameters, first_id: int, progress: Progress) -> list[RailLine]:

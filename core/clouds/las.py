@@ -47,7 +47,7 @@ PROJECTION_USER = b"LASF_Projection"
 GEO_KEYS_RECORD = "GeoKeyDirectoryVlr"
 
 MAX_STRIPS = 100
-"""Most strips in a chunk. Where there are more, the source ids of the points number something else, such as profiles."""
+"""Most strips in a chunk. Where there are more, the source ids of points number something else, such as profiles."""
 
 
 def read_header(path: Path) -> CloudHeader:

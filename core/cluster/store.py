@@ -94,7 +94,8 @@ def save(path: Path, result: RailRaster | SquareRails | tuple[RailLine, ...]) ->
     if isinstance(result, RailRaster):
         _write(path, _raster_arrays(result))
     elif isinstance(result, SquareRails):
-        _write(path, {**_rail_arrays(result.rails), **_square_arrays(result.square), "nodes": result.nodes})
+        more = {"nodes": result.nodes, "strip_rows": result.strips}
+        _write(path, {**_rail_arrays(result.rails), **_square_arrays(result.square), **more})
     else:
         _write(path, _rail_arrays(result))
 
@@ -115,7 +116,9 @@ def load(stored: Stored) -> RailRaster | SquareRails | tuple[RailLine, ...]:
             if "bits" in arrays:
                 return _raster(arrays)
             rails = _rails(arrays)
-            return SquareRails(_square(arrays), rails, arrays["nodes"]) if "nodes" in arrays else rails
+            if "nodes" not in arrays:
+                return rails
+            return SquareRails(_square(arrays), rails, arrays["nodes"], arrays["strip_rows"])
     except Exception as error:  # damage shows as an error of the file, of the compression or of the arrays
         raise DamagedError(f"{Path(stored.path).name} is damaged ({error})") from error
 
@@ -160,15 +163,18 @@ def _rail_arrays(rails: Sequence[RailLine]) -> dict[str, np.ndarray]:
         **_packed("xyz", [rail.xyz for rail in rails], 3),
         **_packed("gaps", [rail.gaps for rail in rails], 2),
         **_packed("support", [np.column_stack([one.t, one.points, one.sigma_m]) for one in supports], 3),
+        **_packed("strips", [np.empty((0, 3)) if one.strips is None else one.strips for one in supports], 3),
     }
 
 
 def _rails(arrays: Mapping[str, np.ndarray]) -> tuple[RailLine, ...]:
-    parts = zip(arrays["figures"].tolist(), *(_unpacked(arrays, name) for name in ("xyz", "gaps", "support")))
-    return tuple(_rail(figures, xyz, gaps, support) for figures, xyz, gaps, support in parts)
+    names = ("xyz", "gaps", "support", "strips")
+    return tuple(_rail(*one) for one in zip(arrays["figures"].tolist(), *(_unpacked(arrays, name) for name in names)))
 
 
-def _rail(figures: Sequence[float], xyz: np.ndarray, gaps: np.ndarray, support: np.ndarray) -> RailLine:
+def _rail(
+    figures: Sequence[float], xyz: np.ndarray, gaps: np.ndarray, support: np.ndarray, strips: np.ndarray
+) -> RailLine:
     rail_id, class_code, points, resid_mm, sigma_mm, bridged_m = figures
     return RailLine(
         xyz,
@@ -179,7 +185,7 @@ def _rail(figures: Sequence[float], xyz: np.ndarray, gaps: np.ndarray, support: 
         sigma_mm,
         bridged_m,
         gaps,
-        Support(*support.T) if len(support) else None,
+        Support(support[:, 0], support[:, 1], support[:, 2], strips if len(strips) else None) if len(support) else None,
     )
 
 

@@ -18,7 +18,7 @@ from ..errors import ParameterError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, FINDING_FIELDS, RAIL_FIELDS
 from ..frpdf import DEVICES, ENGINES
 from ..frpdf.models import choose
-from ..parameters import DEFAULT_STEP_M, Parameters
+from ..parameters import DEFAULT_STEP_M, STRIPS, Parameters
 from ..pipeline import extract_files
 from ..progress import Estimating, Progress
 from ..rails import RailNetwork
@@ -54,6 +54,7 @@ WITH_OWN_OPTION = (
     "quality_step_m",
     "square_tiles",
     "keep_cleaned",
+    "strips",
 )
 """Parameters that are not declared by `_number_fields`."""
 
@@ -94,6 +95,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         unit = "degrees" if field.name.endswith("_deg") else "metres"
         text = f"{_option(field.name)[2:].replace('-', '_').upper()} in {unit} (default: {field.default:g})"
         method.add_argument(_option(field.name), type=float, default=field.default, metavar="N", help=text)
+    text = f"how strips, the passes of a scanner, are used (default: {Parameters.strips})"
+    method.add_argument("--strips", choices=STRIPS, default=Parameters.strips, help=text)
     text = f"STEP of --quality, --findings and --report in metres (default: {DEFAULT_STEP_M:g})"
     method.add_argument("--step", type=float, default=DEFAULT_STEP_M, metavar="N", help=text)
     run = parser.add_argument_group("workers")
@@ -172,6 +175,7 @@ def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameter
         quality_step_m=args.step if args.quality or args.findings or args.report else None,
         square_tiles=args.square_tiles,
         keep_cleaned=args.cleaned is not None,
+        strips=args.strips,
         **numbers,
     )
 

@@ -20,6 +20,7 @@ from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
 from .edges import search_distance, stations_along
 from .neighbours import free_edges
+from .strips import StripOffsets, aligned, measure_strips
 from .top import MIN_POINTS, find_top
 from .uncertainty import measure_support
 
@@ -60,6 +61,8 @@ class ElevationParameters:
         Cell size of the raster from which the line was drawn.
     min_length_m : float
         Shorter lines are dropped.
+    align : bool
+        Whether the strips of the points are moved onto their mean.
     """
 
     head_width_m: float
@@ -70,6 +73,7 @@ class ElevationParameters:
     smoothing_z_m: float = Parameters.smoothing_z_m
     cell_m: float = 0.04
     min_length_m: float = Parameters.min_length_m
+    align: bool = False
 
     @property
     def unseen_m(self) -> float:
@@ -78,7 +82,11 @@ class ElevationParameters:
 
 
 def elevate(
-    network: LineNetwork, points: RailPoints, parameters: ElevationParameters, progress: Progress = SILENT
+    network: LineNetwork,
+    points: RailPoints,
+    parameters: ElevationParameters,
+    progress: Progress = SILENT,
+    strips: Sequence[StripOffsets | None] = (),
 ) -> tuple[RailLine, ...]:
     """Add heights and figures to the smoothed plan lines of a network.
 
@@ -90,6 +98,8 @@ def elevate(
         The points from which the network was made.
     parameters : ElevationParameters
     progress : Progress
+    strips : sequence of StripOffsets or None
+        For each line, from `strips.strips_along`; empty if the points are of one strip.
 
     Returns
     -------
@@ -102,8 +112,8 @@ def elevate(
     edges = free_edges(network.lines, parameters.head_width_m)
     rails = []
     for number, line in enumerate(progress.span(0.6, 1.0).follow(network.lines)):
-        mine = feet.of(number)
-        rail = _measured(line, free_ends[number], edges[number], mine, points.xyz[mine.point, 2], parameters)
+        own = strips[number] if strips else None
+        rail = _measured(line, free_ends[number], edges[number], feet.of(number), points, parameters, own)
         if rail is not None and rail.length_m >= parameters.min_length_m:
             rails.append(replace(rail, class_code=points.class_code))
     return numbered(rails)
@@ -144,10 +154,14 @@ def _measured(
     free_ends: np.ndarray,
     edges: np.ndarray,
     feet: Feet,
-    z: np.ndarray,
+    points: RailPoints,
     parameters: ElevationParameters,
+    strips: StripOffsets | None,
 ) -> RailLine | None:
-    """Measure one line, given the feet and heights of its points; None if too few points support it."""
+    """Measure one line, given the feet of its points and its strips; None if too few points support it."""
+    z = points.xyz[feet.point, 2]
+    if parameters.align:
+        feet, z = aligned(strips, feet, z, points)
     head = np.abs(feet.across) <= min(0.5 * parameters.head_width_m, parameters.tolerance_xy_m)
     if head.sum() < MIN_POINTS:
         return None
@@ -179,7 +193,10 @@ def _measured(
         parameters.smoothing_xy_m,
         unseen_m=parameters.unseen_m,
         free=edges,
-    ).between(start, end)
+    )
+    if strips is not None:
+        support = strips.added_to(support, parameters.align)
+    support = support.between(start, end)
     xyz = np.column_stack([interpolate(line, along, stations), profile.at(stations)])
     figures = (len(supporting.t), 1000 * resid, 1000 * support.rms_m, bridged)
     return RailLine(xyz, 0, 0, *figures, gaps - start, support)
@@ -191,6 +208,7 @@ def measure_again(
     head_width_m: float,
     smoothing_z_m: float,
     progress: Progress = SILENT,
+    align: bool = False,
 ) -> list[RailLine]:
     """Measure heights, with another smoothing, and the support of finished rails, which may come from files.
 
@@ -202,6 +220,8 @@ def measure_again(
     smoothing_z_m : float
         Sigma of PAEK for the heights.
     progress : Progress
+    align : bool
+        See `ElevationParameters`.
 
     Returns
     -------
@@ -211,12 +231,13 @@ def measure_again(
     plans = [resample(rail.xyz[:, :2], smoothing_z_m / STATIONS_PER_SIGMA)[0] for rail in rails]
     feet = project(plans, points.xyz[:, :2], search_distance(head_width_m), progress.span(0.0, 0.7))
     # Lines from a file are only known to be on their heads, so the head width takes the place of the cell size.
-    parameters = ElevationParameters(head_width_m, smoothing_z_m=smoothing_z_m, cell_m=head_width_m)
+    parameters = ElevationParameters(head_width_m, smoothing_z_m=smoothing_z_m, cell_m=head_width_m, align=align)
     edges = free_edges(plans, head_width_m)
+    strips = measure_strips(plans, feet, points, edges, head_width_m)
     measured = []
     for number, rail in enumerate(progress.span(0.7, 1.0).follow(rails)):
-        mine = feet.of(number)
-        again = _measured(plans[number], NO_FREE_ENDS, edges[number], mine, points.xyz[mine.point, 2], parameters)
+        own = feet.of(number)
+        again = _measured(plans[number], NO_FREE_ENDS, edges[number], own, points, parameters, strips[number])
         if again is None:
             measured.append(_unsupported(rail, parameters))
         else:

@@ -22,6 +22,7 @@ from .branch_starts import APART_HEADS, slide_branches
 from .edges import HALF_HEAD_BINS, histograms, middles, search_distance
 from .level import MIN_ON_HEAD, on_top
 from .neighbours import free_edges
+from .strips import aligned, measure_strips
 
 MIN_SEEN_SHARE = 0.25
 """Minimum share of a line's stations with visible edges; otherwise the line stays as it is."""
@@ -48,6 +49,10 @@ where the raster separates the two, then where most of the head is free. Closer 
 towards the start assumed before, which moves the start half a metre forward. Without branches a third round moves lines
 by less than 0.1 mm."""
 
+ALIGNED_ROUNDS = 4
+"""Further rounds in which strips are aligned: a step of 30 mm where strips meet has been drawn as a bend 2 m long, of
+which a round removes half."""
+
 
 def refine(
     network: LineNetwork,
@@ -55,6 +60,7 @@ def refine(
     head_width_m: float,
     smoothing_m: float = Parameters.smoothing_xy_m,
     progress: Progress = SILENT,
+    align: bool = False,
 ) -> LineNetwork:
     """Move smoothed lines onto the axes of their railheads.
 
@@ -67,6 +73,8 @@ def refine(
     smoothing_m : float
         Sigma of PAEK for the shifts along a line.
     progress : Progress
+    align : bool
+        Whether the strips of the points are moved onto their mean.
 
     Returns
     -------
@@ -75,28 +83,40 @@ def refine(
         begin where they touch the rail that they leave.
     """
     rounds = SURE_HEADS if len(network.passes) else SURE_HEADS[:2]
+    more = ALIGNED_ROUNDS if align and points.strips is not None else 0
     by_x = points.xyz[np.argsort(points.xyz[:, 0])] if len(network.passes) else points.xyz
-    for number, sure in enumerate(rounds):
-        share = progress.span(number / len(rounds), (number + 1) / len(rounds))
+    shares = progress.split(len(rounds) + more)
+    for sure, share in zip(rounds, shares):
         network = _shifted(network, points, head_width_m, smoothing_m, share)
         network = slide_branches(network, by_x, head_width_m, sure * head_width_m)
+    for share in shares[len(rounds) :]:
+        network = _shifted(network, points, head_width_m, smoothing_m, share, align=True)
     return network
 
 
 def _shifted(
-    network: LineNetwork, points: RailPoints, head_width_m: float, smoothing_m: float, progress: Progress
+    network: LineNetwork,
+    points: RailPoints,
+    head_width_m: float,
+    smoothing_m: float,
+    progress: Progress,
+    align: bool = False,
 ) -> LineNetwork:
     """Move every line to the middle of its head, and the nodes with them."""
     feet = project(network.lines, points.xyz[:, :2], search_distance(head_width_m), progress.span(0.0, 0.7))
     edges = free_edges(network.lines, head_width_m)
+    strips = measure_strips(network.lines, feet, points, edges, head_width_m) if align else None
     free_ends = (network.degrees() == 1)[network.ends]
     lines = []
     for number, line in enumerate(progress.span(0.7, 1.0).follow(network.lines)):
         mine = feet.of(number)
+        z = points.xyz[mine.point, 2]
+        if strips is not None:
+            mine, z = aligned(strips[number], mine, z, points)
         if _is_narrow(mine.across, head_width_m):
             lines.append(_moved_onto(line, mine))
             continue
-        top, _ = on_top(mine.t, mine.across, points.xyz[mine.point, 2], head_width_m)
+        top, _ = on_top(mine.t, mine.across, z, head_width_m)
         along = length_along(line)
         stations, middle = _middles(mine.t[top], mine.across[top], along[-1], head_width_m, edges[number])
         known = np.isfinite(middle)

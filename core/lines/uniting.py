@@ -33,10 +33,12 @@ def _with_figures(parts: Sequence[RailLine], xyz: np.ndarray) -> RailLine:
     supports = [part.support for part in parts if part.support is not None]
     support, sigma_mm = None, parts[0].sigma_mm
     if len(supports) == len(parts):
+        several = any(one.strips is not None for one in supports)
         support = Support(
             np.concatenate([one.t + start for one, start in zip(supports, starts)]),
             np.concatenate([one.points for one in supports]),
             np.concatenate([one.sigma_m for one in supports]),
+            np.concatenate([one.every_strip for one in supports]) if several else None,
         )
         sigma_mm = 1000 * support.rms_m if len(support.t) else sigma_mm
     gaps = _merged_gaps(np.concatenate([part.gaps + start for part, start in zip(parts, starts)]))

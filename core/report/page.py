@@ -20,6 +20,7 @@ from .listing import Finding, listed
 from .markup import metres, table, tag, text
 from .plan import draw_plan
 from .plots import draw_profiles
+from .strip_plots import draw_strips, list_strips, strip_legend
 from .style import STYLE
 from .verdict import verdict
 
@@ -39,6 +40,13 @@ NOTES = (
     "The standard error is that of the centerline's lateral position: about two thirds of the true positions are "
     "within it. The report judges the tracks that were found. To see whether one was missed, compare the map with the "
     "cloud.",
+)
+
+
+STRIP_NOTE = (
+    "Offsets of each strip, a pass of the scanner, from the mean of the strips that show the same place, as they are "
+    "before any alignment: to the left, seen along the track, and upwards. Only places are listed where several strips "
+    "show a rail or one passes on to the next."
 )
 
 
@@ -71,6 +79,7 @@ def build_page(
         _verdict(findings, len(network.rails), network.warnings),
         _tiles(network, findings),
         *([_map(findings), _findings(findings), _tracks(findings)] if findings.tracks else []),
+        _strips(network),
         *(_profiles(track, height) for track, height in zip(findings.tracks, heights)),
         _facts({**(facts or {}), "Engine": network.engine}),
     ]
@@ -238,6 +247,19 @@ def _tightest(radius_m: np.ndarray) -> str:
         return "straight"
     tightest = known[np.argmin(np.abs(known))]
     return f"{abs(tightest):,.0f} m {'left' if tightest > 0 else 'right'}"
+
+
+def _strips(network: RailNetwork) -> str:
+    """Write how the strips differ, if there are several."""
+    if not network.strips:
+        return ""
+    tracks = dict.fromkeys(course.track_id for course in network.strips)
+    drawn = []
+    for track_id in tracks:
+        courses = [course for course in network.strips if course.track_id == track_id]
+        drawn += [tag("p", text(f"Track {track_id}")), draw_strips(courses), strip_legend(courses)]
+    note = tag("p", text(STRIP_NOTE), class_="notes")
+    return _section("Strips", tag("div", list_strips(network.strips), class_="scroll"), *drawn, note)
 
 
 def _profiles(track: TrackFindings, height_m: np.ndarray) -> str:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..frame import LocalFrame
 from ..lines.uniting import SAME_RAIL_M
 from ..polyline import interpolate, length_along, project, resample, runs
 from ..rails import RailLine
@@ -41,15 +42,27 @@ class SquareRails:
         In local metres of the square, cut `HALO_M` outside its border; rails without any length inside are left out.
     nodes : (n, 2) array
         Places where rails end on each other.
+    strips : (k, 7) array
+        Offsets of strips at places inside, see `strips.rows_of`.
     """
 
     square: Square
     rails: tuple[RailLine, ...]
     nodes: np.ndarray
+    strips: np.ndarray = field(default_factory=lambda: np.empty((0, 7)))
 
 
-def trim(rails: Sequence[RailLine], square: Square) -> SquareRails:
-    """Cut the lines of a square where they stop being valid."""
+def trim(rails: Sequence[RailLine], strips: np.ndarray, square: Square) -> SquareRails:
+    """Cut the lines of a square where they stop being valid, and keep the offsets of strips inside.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+        In local metres of the square.
+    strips : (k, 7) array
+        See `strips.rows_of`.
+    square : Square
+    """
     parts: list[RailLine] = []
     for rail in rails:
         stations, t = resample(rail.xyz[:, :2], CUT_STEP_M)
@@ -65,7 +78,14 @@ def trim(rails: Sequence[RailLine], square: Square) -> SquareRails:
         parts += [part for part, inside in found if inside.any()]
     places = np.concatenate([rail.xyz[:, :2] for rail in rails]) if rails else np.empty((0, 2))
     unique, counts = np.unique(places, axis=0, return_counts=True)
-    return SquareRails(square, tuple(parts), unique[counts > 1])
+    return SquareRails(square, tuple(parts), unique[counts > 1], strips[square.holds(strips[:, :2])])
+
+
+def rows_in_frame(part: SquareRails, frame: LocalFrame) -> np.ndarray:
+    """Return the offsets of strips in a square, (k, 7), with their places in the frame of the cloud."""
+    rows = part.strips.copy()
+    rows[:, :2] += part.square.frame.shift_to(frame)[:2]
+    return rows
 
 
 @dataclass

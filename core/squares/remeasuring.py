@@ -40,6 +40,7 @@ def measure_rails(
     head_width_m: float,
     runner: Runner,
     progress: Progress = SILENT,
+    align: bool = False,
 ) -> list[RailLine]:
     """Measure rails again for track geometry, like `elevation.measure_again`, using the points of one square at a time.
 
@@ -53,6 +54,8 @@ def measure_rails(
     runner : Runner
         Executes the measurement in each square; where it fails, rails keep the heights and support that they have.
     progress : Progress
+    align : bool
+        Whether the strips of the points are moved onto their mean.
 
     Returns
     -------
@@ -64,7 +67,7 @@ def measure_rails(
         numbers = [number for number, rail in enumerate(rails) if rail.class_code == source.class_code]
         squares = lay_out(sources, source)
         measure = _measure_undivided if squares[0].is_whole_plane else _measure_in_squares
-        again = measure([rails[number] for number in numbers], source, squares, head_width_m, runner, share)
+        again = measure([rails[number] for number in numbers], source, squares, (head_width_m, align), runner, share)
         for number, rail in zip(numbers, again):
             measured[number] = rail
     return measured
@@ -74,11 +77,11 @@ def _measure_undivided(
     rails: Sequence[RailLine],
     source: PointSource,
     squares: Sequence[Square],
-    head_width_m: float,
+    settings: tuple[float, bool],
     runner: Runner,
     progress: Progress,
 ) -> Sequence[RailLine]:
-    task = Task("Measuring the rails", _measure, (source, squares[0], tuple(rails), head_width_m))
+    task = Task("Measuring the rails", _measure, (source, squares[0], tuple(rails), *settings))
     return dict(runner.run({"measure": task}, progress)).get("measure", rails)
 
 
@@ -86,7 +89,7 @@ def _measure_in_squares(
     rails: Sequence[RailLine],
     source: PointSource,
     squares: Sequence[Square],
-    head_width_m: float,
+    settings: tuple[float, bool],
     runner: Runner,
     progress: Progress,
 ) -> list[RailLine]:
@@ -97,7 +100,7 @@ def _measure_in_squares(
         square = by_key.setdefault(key, Square.on_grid(key, source.side_m, source.frame))
         pieces = tuple(_with_context(rails[one.number], one, square, source) for one in sections[key])
         label = f"Measuring the rails of class {source.class_code} in square {key}"
-        tasks[key] = Task(label, _measure, (source.part(square), square, pieces, head_width_m))
+        tasks[key] = Task(label, _measure, (source.part(square), square, pieces, *settings))
     parts: list[list[tuple[float, RailLine]]] = [[] for _ in rails]
     for key, pieces in runner.run(tasks, progress):
         shift = by_key[key].frame.shift_to(source.frame)
@@ -109,11 +112,11 @@ def _measure_in_squares(
 
 
 def _measure(
-    source: PointSource, square: Square, rails: Sequence[RailLine], head_width_m: float, context: Context
+    source: PointSource, square: Square, rails: Sequence[RailLine], head_width_m: float, align: bool, context: Context
 ) -> tuple[RailLine, ...]:
     """Measure the rails of a square, in its frame; a task."""
     points = source.near(square, CONTEXT_M)
-    return tuple(measure_again(rails, points, head_width_m, PROFILE_SIGMA_M, context.progress))
+    return tuple(measure_again(rails, points, head_width_m, PROFILE_SIGMA_M, context.progress, align))
 
 
 def _with_context(rail: RailLine, section: _Section, square: Square, source: PointSource) -> RailLine:

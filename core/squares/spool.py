@@ -70,7 +70,11 @@ class SpooledPoints:
         parts = [np.fromfile(file).reshape(-1, 3) for file in files]
         xyz = square.frame.to_local(np.concatenate(parts) if parts else np.empty((0, 3)))
         strips = [int(Path(file).name.split("_")[-1]) for file in files]
-        each = np.repeat(np.uint16(strips), [len(part) for part in parts]) if len(set(strips)) > 1 else None
+        each = (
+            np.repeat(np.array(strips, dtype=np.uint16), [len(part) for part in parts])
+            if len(set(strips)) > 1
+            else None
+        )
         return RailPoints(xyz, square.frame, self.class_code, each).kept(square.holds(xyz, margin_m))
 
     def part(self, square: Square) -> SpooledPoints:

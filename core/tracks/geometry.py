@@ -112,6 +112,8 @@ def _measure(line: Centerline, track_rails: _TrackRails, head_width_m: float, st
     right = track_rails.named(line.right_ids).meet(fine[:, :2], -normals, half)
     cant = left.height_m - right.height_m
     gauge = np.hypot(left.distance_m + right.distance_m, np.nan_to_num(cant)) - head_width_m
+    strips = np.stack([_strips(rails, left), _strips(rails, right)])
+    at = _nearest(along, chainage)
     twist_at = np.add.outer(0.5 * TWIST_BASE_M * np.array([-1, 1]), chainage)
     behind, ahead = _profile(along, cant, twist_at.ravel()).reshape(2, -1)
     reached = (twist_at[0] >= 0) & (twist_at[1] <= along[-1])
@@ -127,9 +129,11 @@ def _measure(line: Centerline, track_rails: _TrackRails, head_width_m: float, st
         twist_mm=1000 * np.where(reached, ahead - behind, np.nan),
         radius_m=_radius(line.xyz[:, :2], chainage),
         grade_pm=_grade(along, fine[:, 2], chainage),
-        sigma_mm=1000 * np.interp(chainage, along, 0.5 * np.hypot(_sigma(rails, left), _sigma(rails, right))),
+        sigma_mm=1000 * np.interp(chainage, along, _sigma_of_both(rails, left, right, strips[:, :, 2])),
         points=_whole(_points(rails, left, along, cells) + _points(rails, right, along, cells)),
         bridged=np.diff(np.interp(cells, along, bridged), axis=0)[0] > 0.5 * np.diff(cells, axis=0)[0],
+        strips=strips[:, at, 0].max(axis=0).astype(int),
+        strip_mm=1000 * np.fmax(*strips[:, at, 1]),
     )
 
 
@@ -174,6 +178,28 @@ def _sigma(rails: Sequence[RailLine], side: Meeting) -> np.ndarray:
             else np.interp(side.t[mine], rail.support.t, rail.support.sigma_m)
         )
     return sigma
+
+
+def _sigma_of_both(rails: Sequence[RailLine], left: Meeting, right: Meeting, shared: np.ndarray) -> np.ndarray:
+    """Return the standard deviation of the middle, (n,) metres, given what both rails share, (2, n): that of strips."""
+    sigma = np.stack([_sigma(rails, left), _sigma(rails, right)])
+    own = np.sqrt(np.maximum(sigma**2 - shared**2, 0.0))
+    return np.hypot(0.5 * np.hypot(*own), 0.5 * shared.sum(axis=0))
+
+
+def _strips(rails: Sequence[RailLine], side: Meeting) -> np.ndarray:
+    """Look up the strips of the rails at the meetings, (n, 3); see `Support.strips`."""
+    found = np.tile([1.0, np.nan, 0.0], (len(side.t), 1))
+    for number in np.unique(side.rail):
+        mine, support = (side.rail == number) & np.isfinite(side.t), rails[number].support
+        if support is not None and support.strips is not None:
+            found[mine] = support.strips[_nearest(support.t, side.t[mine])]
+    return found
+
+
+def _nearest(t: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return the number of the nearest of chainages `t`, ascending, for each place."""
+    return np.searchsorted(0.5 * (t[1:] + t[:-1]), places)
 
 
 def _points(rails: Sequence[RailLine], side: Meeting, along: np.ndarray, cells: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...core.standards import STANDARDS
 from ..curves import Element, trace, transition_curve
+from . import strips
 from .plain import canted, rolling, spacing
 from .scanner import Scanner
 from .scene import RAIL, Gaps, Plan, Scene, build
@@ -185,5 +186,11 @@ ADVERSARIAL: dict[str, Callable[[], Scene]] = {
     "hole": hole,
     "gaps": gaps,
     "thin_points": thin_points,
+    "two_passes": strips.two_passes,
+    "three_passes": strips.three_passes,
+    "strips_meet": strips.meeting,
+    "strips_overlap": strips.overlapping,
+    "unmarked_passes": strips.unmarked,
+    "unmarked_meet": lambda: strips.meeting(with_ids=False),
 }
 """By name; every scene is seeded."""

@@ -46,6 +46,8 @@ class Scene:
         Gauges of tracks that do not have the gauge of the standard.
     gaps_m : float
         Length of rail without points.
+    strips : (n,) array or None
+        Strip of each point; None if there is one only.
     """
 
     name: str
@@ -57,10 +59,11 @@ class Scene:
     frame: LocalFrame
     other_gauges_m: tuple[float, ...] = ()
     gaps_m: float = 0.0
+    strips: np.ndarray | None = None
 
     def rail_points(self) -> RailPoints:
         """Return the points that `read_rail_points` would read from the file of the scene."""
-        return RailPoints(self.xyz[self.classification == RAIL], self.frame, RAIL)
+        return RailPoints(self.xyz, self.frame, RAIL, self.strips).kept(self.classification == RAIL)
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,8 @@ def write_cloud(scene: Scene, path: Path) -> None:
     cloud = laspy.LasData(header)
     cloud.x, cloud.y, cloud.z = scene.frame.to_crs(scene.xyz).T
     cloud.classification = scene.classification
+    if scene.strips is not None:
+        cloud.point_source_id = scene.strips
     cloud.write(path)
 
 

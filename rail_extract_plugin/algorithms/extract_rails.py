@@ -83,6 +83,7 @@ class ExtractRails(RailAlgorithm):
             *groups.cleanup(),
             *groups.lines(),
             *groups.pairing(),
+            groups.strips(),
             groups.step(),
         ):
             self.addParameter(definition)

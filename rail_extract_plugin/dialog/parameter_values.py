@@ -47,7 +47,7 @@ TYPES_WITHOUT_LINES = (
 )
 """Types of layers without lines; a layer of unknown type may have lines."""
 
-CHOICES = {"ENGINE": "engine", "DEVICE": "device"}
+CHOICES = {"ENGINE": "engine", "DEVICE": "device", "STRIPS": "strips"}
 
 
 class ParameterValues:

@@ -13,7 +13,7 @@ from qgis.core import (
 
 from ...core.frpdf import AUTO, DEVICES, ENGINES, MAX_PASSES
 from ...core.frpdf.models import MODELS
-from ...core.parameters import DEFAULT_STEP_M, Parameters
+from ...core.parameters import DEFAULT_STEP_M, STRIPS, Parameters
 from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS, UNCONFIRMED_PROFILES
 from ..i18n import tr
 from .definitions import MM_DECIMALS, Definitions, advanced, choice, helped, number
@@ -102,6 +102,18 @@ def step() -> QgsProcessingParameterDefinition:
         number("STEP", tr("Step of the track geometry [m]"), DEFAULT_STEP_M, 0.1, MAX_LENGTH_M),
         tr(
             "Distance between the stations along each track at which gauge, cant, twist, radius and gradient are given."
+        ),
+    )
+
+
+def strips() -> QgsProcessingParameterDefinition:
+    """Define what happens to strips that differ."""
+    return advanced(
+        choice("STRIPS", tr("Strips of the scanner"), STRIPS, Parameters.strips),
+        tr(
+            "What happens where passes of the scanner differ. AS_THEY_ARE uses their points together and states the "
+            "difference in strip_mm and sigma_mm. ALIGNED moves each pass onto the mean of all that show the same "
+            "rail, which removes steps. Passes are told apart by the source ids of the points."
         ),
     )
 

@@ -160,6 +160,7 @@ def write_cloud(tmp_path):
         epsg: int | str | None = 32643,
         folder: Path = tmp_path,
         any_chunk_size: bool = False,
+        strips: np.ndarray | int = 0,
     ) -> Path:
         header = laspy.LasHeader(point_format=6, version="1.4")
         header.scales = [1e-7, 1e-7, 1e-3] if epsg == 4326 else [0.001] * 3
@@ -169,6 +170,7 @@ def write_cloud(tmp_path):
         cloud = laspy.LasData(header)
         cloud.xyz = xyz
         cloud.classification = np.full(len(xyz), class_code, dtype=np.uint8)
+        cloud.point_source_id = np.full(len(xyz), strips, dtype=np.uint16)
         with chunks_of_any_size() if any_chunk_size else nullcontext():
             cloud.write(folder / name)
         return folder / name

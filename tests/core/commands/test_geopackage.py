@@ -33,6 +33,8 @@ STATIONS = TrackGeometry(
     np.array([0.416, 0.2]),
     np.array([12, 0]),
     np.array([False, True]),
+    np.array([2, 1]),
+    np.array([3.456, np.nan]),
 )
 
 
@@ -61,7 +63,8 @@ def test_a_file_holds_lines_and_points_with_their_fields(tmp_path):
     assert track[5:] == [[1435.0], [0.3], [-3.0], [-7.1], [0.0]]
     assert quality[:2] == [[1, 1], [0.0, 5.0]]
     np.testing.assert_array_equal(quality[2:6], [[1435.0, np.nan], [-3.0, 2.0], [np.nan, 0.1], [350.3, np.nan]])
-    assert quality[6:] == [[1.23, 5.68], [0.42, 0.2], [12, 0], [0, 1]]
+    assert quality[6:11] == [[1.23, 5.68], [0.42, 0.2], [12, 0], [0, 1], [2, 1]]
+    np.testing.assert_array_equal(quality[11], [3.5, np.nan])
 
 
 def test_layers_without_features_keep_their_fields(tmp_path):

@@ -35,6 +35,8 @@ def track(track_id=1, length_m=100.0, step_m=1.0, **profiles):
         "sigma_mm": np.full(count, 1.5),
         "points": np.full(count, 200),
         "bridged": np.zeros(count, dtype=bool),
+        "strips": np.ones(count, dtype=int),
+        "strip_mm": np.full(count, np.nan),
     }
     geometry = TrackGeometry(track_id, xyz, along, **{**usual, **profiles})
     ids = (2 * track_id - 1,), (2 * track_id,)

@@ -59,3 +59,28 @@ def test_narrow_heads_are_62_mm_wide_and_72_are_stated():
     across = project([scene.rails[0][:, :2]], scene.rail_points().xyz[:, :2], 0.1).across
     assert np.ptp(np.percentile(across, [1, 99])) < 0.066
     assert scene.standard.head_width_m == pytest.approx(0.072)
+
+
+@pytest.mark.parametrize(
+    ("name", "across_mm", "up_mm"),
+    [
+        ("two_passes", (10, -10), (0, 0)),
+        ("strips_meet", (15, -15), (7.5, -7.5)),
+        ("strips_overlap", (15, -15), (7.5, -7.5)),
+    ],
+)
+def test_strips_lie_as_far_from_the_truth_as_stated(name, across_mm, up_mm):
+    scene = ADVERSARIAL[name]()
+    points = scene.rail_points()
+    feet = project([rail[:, :2] for rail in scene.rails], points.xyz[:, :2], 0.1)
+    assert sorted(set(points.strips.tolist())) == [1, 2]
+    for strip, across, up in zip((1, 2), across_mm, up_mm):
+        mine = points.strips[feet.point] == strip
+        assert 1000 * np.mean(feet.across[mine]) == pytest.approx(across, abs=4)
+        rail = scene.rails[0]
+        own = mine & (feet.line == 0) & (np.abs(feet.across) < 0.02)
+        along = np.append(0, np.cumsum(np.hypot(*np.diff(rail[:, :2], axis=0).T)))
+        above = points.xyz[feet.point[own], 2] - np.interp(feet.t[own], along, rail[:, 2])
+        assert 1000 * np.median(above) == pytest.approx(up, abs=2)
+    with_ids = ADVERSARIAL["unmarked_meet"]()
+    assert with_ids.strips is None and with_ids.rail_points().strips is None

@@ -30,6 +30,7 @@ PARAMETERS = [
     ("MIN_LENGTH", "number", 1.0),
     ("OTHER_GAUGES", "string", None),
     ("CENTERLINE_TOLERANCE", "number", 0.05),
+    ("STRIPS", "enum", "AS_THEY_ARE"),
     ("STEP", "number", 1.0),
     ("RAILS", "sink", None),
     ("CENTERLINES", "sink", None),

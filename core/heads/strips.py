@@ -1,0 +1,399 @@
+"""Strips, the passes of a scanner: by how much they differ across and in height along a line, and how to align them.
+
+The position of a scanner is in error by some millimetres to centimetres that change slowly along the way. Where two
+passes show a rail, or one passes on to the next, their difference is seen. See docs/method.md section 6.7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
+from scipy.sparse.linalg import spsolve
+
+from ..clouds.points import RailPoints
+from ..parameters import Parameters
+from ..polyline import Feet, interpolate, left_normals, length_along, project
+from ..progress import SILENT, Progress
+from ..rails import Support
+from .edges import HALF_HEAD_BINS, histograms, middles, search_distance
+from .level import on_top
+from .neighbours import free_edges
+from .top import find_top
+
+STEP_M = 1.0
+"""Spacing of the stations at which strips are compared: four of the windows in which edges are looked for."""
+
+MIN_IN_STEP = 5
+"""Points on top of the head that show a strip at a station; fewer may be stray points."""
+
+PROFILE_SIGMA_M = 1.0
+"""Sigma of PAEK for the heights of a strip."""
+
+OBSERVED_M = 0.002
+"""Standard error of the position of one strip at a station, across and in height."""
+
+DRIFT_M, DRIFT_LENGTH_M = 0.02, 50.0
+"""Standard deviation of the error of a strip's position, and length along the way over which it changes and away from
+another strip fades: seconds of a scanning train."""
+
+IRREGULAR_M = 0.0005
+"""Standard deviation of the third difference of a rail's position at stations 1 m apart: waves of 2 mm that are 10 m
+long. Transitions have less than 0.2 mm. Steps between strips have tens of millimetres."""
+
+OUTLIER_SIGMAS = 2.0
+"""Residuals, in standard errors, from which a station loses weight: blades that one strip shows better."""
+
+HOLE_M, END_M = 2.0, 2.0
+"""Half the length without points that does not end a strip, and length of its ends that is left out: windows reach
+beyond the end there, where the line bends towards the next strip."""
+
+ROUNDS = 3
+"""Rounds of solving and weighing; a fourth changes offsets by less than 0.1 mm."""
+
+MEETING_M = 5.0
+"""Distance from a station within which two strips show the line: they are compared there. It is half the longest window
+in which edges are looked for, and a station."""
+
+
+@dataclass(frozen=True)
+class StripOffsets:
+    """Offsets of the strips that show a line from their mean, at n stations `STEP_M` apart.
+
+    Attributes
+    ----------
+    t : (n,) array
+        Chainage of the stations.
+    strips : (s,) int array
+        Numbers of the strips, ascending.
+    across, up : (s, n) arrays
+        Offsets to the left and upwards, metres. Away from where a strip meets another one they fade to zero.
+    points : (s, n) array
+        Points on the head by strip, averaged over `MEETING_M` on either side.
+    shown : (s, n) bool array
+        Where a strip shows the line within `MEETING_M`.
+    """
+
+    t: np.ndarray
+    strips: np.ndarray
+    across: np.ndarray
+    up: np.ndarray
+    points: np.ndarray
+    shown: np.ndarray
+
+    def moved(self, feet: Feet, z: np.ndarray, strips: np.ndarray) -> tuple[Feet, np.ndarray]:
+        """Move points onto the mean of all strips; see `aligned`."""
+        across, up = np.zeros(len(z)), np.zeros(len(z))
+        for number, strip in enumerate(self.strips):
+            mine = strips == strip
+            across[mine] = np.interp(feet.t[mine], self.t, self.across[number])
+            up[mine] = np.interp(feet.t[mine], self.t, self.up[number])
+        return replace(feet, across=feet.across - across), z - up
+
+    @property
+    def count(self) -> np.ndarray:
+        """Number of strips that show the line, (n,)."""
+        return self.shown.sum(axis=0)
+
+    @property
+    def spread_m(self) -> np.ndarray:
+        """Largest distance between two strips, across or in height, (n,); NaN where fewer than two show the line."""
+        spans = [
+            np.max(np.where(self.shown, values, -np.inf), axis=0) - np.min(np.where(self.shown, values, np.inf), axis=0)
+            for values in (self.across, self.up)
+        ]
+        return np.where(self.count >= 2, np.maximum(*spans), np.nan)
+
+    def standard_error(self, offsets: np.ndarray, aligned: bool) -> np.ndarray:
+        """Return the standard error of a line that several strips show, (n,) metres.
+
+        The mean of strips errs as their differences show; a line that follows some of them more than others errs by its
+        distance from the mean as well. Away from the place where strips meet, their errors there are the best estimate.
+
+        Parameters
+        ----------
+        offsets : (s, n) array
+            `across` or `up`.
+        aligned : bool
+            Whether the points were moved onto the mean.
+        """
+        count, meeting = self.count, self.count >= 2
+        if not meeting.any():
+            return np.zeros(len(self.t))
+        squares = np.sum(np.where(self.shown, offsets, 0.0) ** 2, axis=0)
+        of_mean = np.sqrt(squares[meeting] / (count * (count - 1))[meeting])
+        share = self.points / np.maximum(self.points.sum(axis=0), 1e-9)
+        followed = np.zeros(len(self.t))
+        for number, own in enumerate(offsets):
+            known = meeting & self.shown[number]
+            held = np.interp(self.t, self.t[known], own[known]) if known.any() else np.zeros(len(own))
+            followed += share[number] * (held - own if aligned else held)
+        return np.hypot(np.interp(self.t, self.t[meeting], of_mean), followed)
+
+    def added_to(self, support: Support, aligned: bool) -> Support:
+        """Add the number of strips, their spread and what they disagree about to the support of the line."""
+        error_m = np.interp(support.t, self.t, self.standard_error(self.across, aligned))
+        nearest = np.clip(np.round(support.t / STEP_M - 0.5).astype(int), 0, len(self.t) - 1)
+        strips = np.column_stack([np.maximum(self.count, 1)[nearest], self.spread_m[nearest], error_m])
+        return replace(support, sigma_m=np.hypot(support.sigma_m, error_m), strips=strips)
+
+
+def strips_along(
+    lines: Sequence[np.ndarray], points: RailPoints, head_width_m: float, progress: Progress = SILENT
+) -> list[StripOffsets | None]:
+    """Measure the offsets of the strips along lines within 3 cm of their rails; see `measure_strips`."""
+    if points.strips is None:
+        return [None] * len(lines)
+    projecting, measuring = progress.divide((0.5, 0.5))
+    feet = project(lines, points.xyz[:, :2], search_distance(head_width_m), projecting)
+    return measure_strips(lines, feet, points, free_edges(lines, head_width_m), head_width_m, measuring)
+
+
+def measure_strips(
+    lines: Sequence[np.ndarray],
+    feet: Feet,
+    points: RailPoints,
+    edges: Sequence[np.ndarray],
+    head_width_m: float,
+    progress: Progress = SILENT,
+) -> list[StripOffsets | None]:
+    """Measure the offsets of the strips along lines.
+
+    Parameters
+    ----------
+    lines : sequence of (n, 2) arrays
+        Lines within 3 cm of their rails.
+    feet : Feet
+        Feet of the points on them.
+    points : RailPoints
+    edges : sequence of (2, s) bool arrays
+        See `neighbours.free_edges`.
+    head_width_m : float
+    progress : Progress
+
+    Returns
+    -------
+    list of StripOffsets or None
+        For each line; None where a single strip shows it.
+    """
+    if points.strips is None:
+        return [None] * len(lines)
+    found: list[StripOffsets | None] = []
+    for number, line in enumerate(progress.follow(lines)):
+        mine = feet.of(number)
+        z, strips = points.xyz[mine.point, 2], points.strips[mine.point]
+        found.append(_offsets(line, mine, z, strips, edges[number], head_width_m))
+    return found
+
+
+def aligned(offsets: StripOffsets | None, feet: Feet, z: np.ndarray, points: RailPoints) -> tuple[Feet, np.ndarray]:
+    """Move the points of a line onto the mean of its strips.
+
+    Parameters
+    ----------
+    offsets : StripOffsets or None
+        Of the line; None if a single strip shows it.
+    feet : Feet
+        Feet of points on the line.
+    z : (k,) array
+        Heights of these points.
+    points : RailPoints
+        All points.
+
+    Returns
+    -------
+    feet : Feet
+    z : (k,) array
+    """
+    if offsets is None or points.strips is None:
+        return feet, z
+    return offsets.moved(feet, z, points.strips[feet.point])
+
+
+def _offsets(
+    line: np.ndarray, feet: Feet, z: np.ndarray, strips: np.ndarray, free: np.ndarray, head_width_m: float
+) -> StripOffsets | None:
+    """Measure the strips along one line."""
+    length_m = float(length_along(line)[-1])
+    seen = []
+    for strip in np.unique(strips):
+        mine = strips == strip
+        shown = _Shown.by(feet[mine], z[mine], free, length_m, head_width_m)
+        if shown is not None:
+            seen.append((int(strip), shown))
+    if len(seen) < 2:
+        return None
+    t = (np.arange(_steps(length_m)) + 0.5) * STEP_M
+    across, up, points = (np.array([getattr(shown, name) for _, shown in seen]) for name in ("across", "up", "points"))
+    reach = 2 * int(round(MEETING_M / STEP_M)) + 1
+    return StripOffsets(
+        t,
+        np.array([strip for strip, _ in seen]),
+        _from_mean(across, _third_differences(line, t)),
+        _from_mean(up, np.zeros(max(len(t) - 3, 0))),
+        uniform_filter1d(points.astype(float), reach, axis=1, mode="constant"),
+        maximum_filter1d(np.isfinite(across).astype(np.uint8), reach, axis=1, mode="constant") > 0,
+    )
+
+
+def _steps(length_m: float) -> int:
+    return max(int(np.ceil(length_m / STEP_M)), 1)
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """How one strip shows a line, at n stations `STEP_M` apart.
+
+    Attributes
+    ----------
+    across, up : (n,) arrays
+        Offset of the middle of the head to the left of the line, and height of its top; NaN where it shows none.
+    points : (n,) array
+        Number of points on top.
+    """
+
+    across: np.ndarray
+    up: np.ndarray
+    points: np.ndarray
+
+    @classmethod
+    def by(cls, feet: Feet, z: np.ndarray, free: np.ndarray, length_m: float, head_width_m: float) -> _Shown | None:
+        """Measure the head in the points of one strip; None if it has too few."""
+        top, _ = on_top(feet.t, feet.across, z, head_width_m)
+        if not top.any():
+            return None
+        stations, counts, wide_counts = histograms(feet.t[top], feet.across[top], length_m, head_width_m)
+        middle = middles(counts, wide_counts, free) * head_width_m / (2 * HALF_HEAD_BINS)
+        steps = _steps(length_m)
+        points = np.bincount(np.minimum((feet.t[top] / STEP_M).astype(int), steps - 1), minlength=steps)
+        number, known = np.minimum((stations / STEP_M).astype(int), steps - 1), np.isfinite(middle)
+        windows = np.bincount(number[known], minlength=steps)
+        seen = (points >= MIN_IN_STEP) & (windows > 0)
+        if not seen.any():
+            return None
+        inner = seen & _inner(seen)
+        seen = inner if inner.any() else seen
+        # The top is as high as on the axis of the head as this strip shows it: the head may lean.
+        own = feet.across - np.interp(feet.t, stations[known], middle[known])
+        head = np.abs(own) <= 0.5 * head_width_m
+        settings = Parameters.crown_radius_m, Parameters.tolerance_z_m, PROFILE_SIGMA_M
+        found = find_top(feet.t[head], own[head], z[head], head_width_m, *settings) if head.any() else None
+        if found is None:
+            return None
+        across = np.bincount(number[known], middle[known], minlength=steps) / np.maximum(windows, 1)
+        up = found[0].at((np.arange(steps) + 0.5) * STEP_M)
+        return cls(np.where(seen, across, np.nan), np.where(seen, up, np.nan), points)
+
+
+def _inner(seen: np.ndarray) -> np.ndarray:
+    """Return the stations, (n,) bool, that are not at an end of what a strip shows; it may miss some in between."""
+    hole, end = (2 * int(round(length / STEP_M)) + 1 for length in (HOLE_M, HOLE_M + END_M))
+    whole = maximum_filter1d(seen.astype(np.uint8), hole, mode="constant", cval=1)
+    return minimum_filter1d(whole, end, mode="constant", cval=1) > 0
+
+
+def _third_differences(line: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Return the third differences, (n - 3,) metres to the left, of places `t`, (n,), on a line."""
+    if len(t) < 4:
+        return np.empty(0)
+    along = length_along(line)
+    places, normals = interpolate(line, along, t), interpolate(left_normals(line), along, t)
+    bends = np.einsum("ij,ij->i", np.diff(places, 2, axis=0), normals[1:-1])
+    return np.diff(bends)
+
+
+def _from_mean(observed: np.ndarray, third: np.ndarray) -> np.ndarray:
+    """Separate what strips show of a rail into the rail and the offset of each strip.
+
+    The rail bends as smoothly as rails do, and the offset of a strip changes slowly. Least squares give both, so that
+    strips that show the same places, and strips that meet, are treated alike.
+
+    Parameters
+    ----------
+    observed : (s, n) array
+        Position of the rail at n stations as each strip shows it, relative to a line; NaN where it does not.
+    third : (n - 3,) array
+        Third differences of that line.
+
+    Returns
+    -------
+    (s, n) array
+        Offsets of the strips.
+    """
+    count, n = observed.shape
+    base = float(np.nanmedian(observed))
+    strip, station = np.nonzero(np.isfinite(observed))
+    values = observed[strip, station] - base
+    size = (count + 1) * n
+    rail, own = station * (count + 1), station * (count + 1) + 1 + strip
+    rows = np.arange(len(values))
+    shown = sparse.csr_matrix(
+        (np.ones(2 * len(values)), (np.tile(rows, 2), np.concatenate([rail, own]))), shape=(len(values), size)
+    )
+    prior, target = _prior(count, n, third)
+    weight = np.ones(len(values))
+    for _ in range(ROUNDS):
+        scaled = sparse.diags(weight / OBSERVED_M**2)
+        matrix = (shown.T @ scaled @ shown + prior.T @ prior).tocsc()
+        solution = spsolve(matrix, shown.T @ (weight / OBSERVED_M**2 * values) + prior.T @ target)
+        residual = np.abs(shown @ solution - values)
+        weight = np.minimum(1.0, OUTLIER_SIGMAS * OBSERVED_M / np.maximum(residual, 1e-9))
+    return solution.reshape(n, count + 1)[:, 1:].T
+
+
+def _prior(count: int, n: int, third: np.ndarray) -> tuple[sparse.csr_matrix, np.ndarray]:
+    """Return the equations, in standard deviations, that say how rails bend and how offsets change."""
+    unit = sparse.identity(count + 1, format="csr")
+    # The error of a position as a process with two equal roots: it and its rate of change are steady.
+    kept = np.exp(-STEP_M / DRIFT_LENGTH_M)
+    deviation_m = DRIFT_M * np.sqrt((1 - kept**2) ** 3 / (1 + kept**2))
+    change = sparse.diags([kept**2, -2 * kept, 1.0], [0, 1, 2], shape=(max(n - 2, 0), n)) / deviation_m
+    rate = sparse.diags([-1.0, 1.0], [0, 1], shape=(min(n - 1, 1), n)) * (DRIFT_LENGTH_M / STEP_M / DRIFT_M)
+    change = sparse.vstack([sparse.eye(1, n) / DRIFT_M, rate, change])
+    offsets = sparse.kron(change, unit[1:])
+    if not len(third):
+        level = sparse.kron(sparse.identity(n), unit[:1]) / DRIFT_M
+        return sparse.vstack([offsets, level]).tocsr(), np.zeros(offsets.shape[0] + n)
+    bends = sparse.diags([-1.0, 3.0, -3.0, 1.0], [0, 1, 2, 3], shape=(n - 3, n)) / IRREGULAR_M
+    rail = sparse.kron(bends, unit[:1])
+    target = np.concatenate([np.zeros(offsets.shape[0]), -third / IRREGULAR_M])
+    return sparse.vstack([offsets, rail]).tocsr(), target
+
+
+def rows_of(lines: Sequence[np.ndarray], offsets: Sequence[StripOffsets | None]) -> np.ndarray:
+    """List the offsets of strips where they meet.
+
+    Parameters
+    ----------
+    lines : sequence of (n, 2) arrays
+    offsets : sequence of StripOffsets or None
+        For each of them.
+
+    Returns
+    -------
+    (k, 7) array
+        x and y of a station, number of a strip that shows it, its offset in x, y and z, and the number of points.
+    """
+    rows = [np.empty((0, 7))]
+    for line, own in zip(lines, offsets):
+        if own is None:
+            continue
+        along = length_along(line)
+        places, normals = interpolate(line, along, own.t), interpolate(left_normals(line), along, own.t)
+        strip, station = np.nonzero(own.shown & (own.count >= 2))
+        shift = own.across[strip, station, None] * normals[station]
+        rows.append(
+            np.column_stack(
+                [
+                    places[station],
+                    own.strips[strip],
+                    shift,
+                    own.up[strip, station],
+                    own.points[strip, station],
+                ]
+            )
+        )
+    return np.concatenate(rows)

@@ -1,0 +1,106 @@
+"""Strips: their offsets along a line, the standard error that follows, and their alignment."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rail_extract.core.clouds.points import RailPoints
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.heads.elevation import ElevationParameters, elevate
+from rail_extract.core.heads.refinement import refine
+from rail_extract.core.heads.strips import rows_of, strips_along
+from rail_extract.core.lines.network import LineNetwork
+
+HEAD_M = 0.072
+LENGTH_M = 50.0
+
+
+def rail(shifts, seed=0, per_m=150, noise_m=0.003, radius_m=600.0):
+    """Points of strips on one head, given (strip, across, up, start, end); a line along its true axis."""
+    rng = np.random.RandomState(seed)
+    parts, strips = [], []
+    for strip, across, up, start, end in shifts:
+        count = int(per_m * (end - start))
+        t, u = rng.uniform(start, end, count), rng.uniform(-0.5, 0.5, count) * HEAD_M + across
+        parts.append(np.column_stack([t, t**2 / 2 / radius_m + u, 0.003 * t + up]))
+        strips.append(np.full(count, strip, dtype=np.uint16))
+    xyz = np.concatenate(parts) + noise_m * rng.standard_normal((sum(map(len, parts)), 3))
+    x = np.arange(0.0, LENGTH_M + 0.1, 0.2)
+    line = np.column_stack([x, x**2 / 2 / radius_m])
+    return RailPoints(xyz, LocalFrame(np.zeros(3)), 10, np.concatenate(strips)), line
+
+
+def single(line):
+    """Return a network of one line."""
+    return LineNetwork((line,), line[[0, -1]], np.array([[0, 1]]), np.empty((0, 3), dtype=int))
+
+
+@pytest.mark.parametrize("third", [False, True])
+def test_strips_over_the_same_place_are_offset_from_their_mean(third):
+    shifts = [(3, 0.010, 0.004, 0, LENGTH_M), (8, -0.010, -0.004, 0, LENGTH_M)]
+    shifts += [(9, 0.003, 0.0, 0, LENGTH_M)] if third else []
+    points, line = rail(shifts)
+    (found,) = strips_along([line], points, HEAD_M)
+    assert found.strips.tolist() == [one[0] for one in shifts]
+    for number, values in ((1, found.across), (2, found.up)):
+        expected = np.array([one[number] for one in shifts])
+        np.testing.assert_allclose(values.mean(axis=1), expected - expected.mean(), atol=0.0007)
+        assert np.abs(values - values.mean(axis=1, keepdims=True)).max() < 0.002
+    assert (found.count == len(shifts)).all()
+    np.testing.assert_allclose(np.mean(found.spread_m), 0.020, atol=0.001)
+    of_mean = 0.010 if not third else np.std([0.010, -0.010, 0.003]) / np.sqrt(2)
+    np.testing.assert_allclose(found.standard_error(found.across, aligned=True), of_mean, atol=0.0015)
+
+
+@pytest.mark.parametrize("overlap_m", [0.0, 12.0])
+def test_strips_that_follow_each_other_are_compared_where_they_meet(overlap_m):
+    middle = LENGTH_M / 2
+    shifts = [(1, 0.015, 0.0075, 0, middle + overlap_m / 2), (2, -0.015, -0.0075, middle - overlap_m / 2, LENGTH_M)]
+    points, line = rail(shifts)
+    (found,) = strips_along([line], points, HEAD_M)
+    at = int(middle)
+    np.testing.assert_allclose(found.across[:, at], [0.015, -0.015], atol=0.002)
+    np.testing.assert_allclose(found.up[:, at], [0.0075, -0.0075], atol=0.002)
+    assert found.count[at] == 2 and found.count[3] == 1 and np.isnan(found.spread_m[3])
+    # One strip alone errs by the distance of the other over the root of two.
+    as_they_are = found.standard_error(found.across, aligned=False)
+    np.testing.assert_allclose(as_they_are[[3, -3]], 0.030 / np.sqrt(2), atol=0.003)
+    assert as_they_are.min() > 0.012 and found.standard_error(found.across, aligned=True).min() > 0.012
+
+
+def test_aligned_lines_do_not_step_and_state_what_remains():
+    middle = LENGTH_M / 2
+    points, line = rail([(1, 0.015, 0.0075, 0, middle), (2, -0.015, -0.0075, middle, LENGTH_M)])
+    step = {}
+    for align in (False, True):
+        network = refine(single(line), points, HEAD_M, align=align)
+        strips = strips_along(network.lines, points, HEAD_M)
+        (one,) = elevate(network, points, ElevationParameters(HEAD_M, align=align), strips=strips)
+        true = np.interp(one.xyz[:, 0], line[:, 0], line[:, 1])
+        error = np.interp([middle - 3, middle + 3], one.xyz[:, 0], one.xyz[:, 1] - true)
+        height = np.interp([middle - 3, middle + 3], one.xyz[:, 0], one.xyz[:, 2] - 0.003 * one.xyz[:, 0])
+        step[align] = abs(np.diff(error)[0]), abs(np.diff(height)[0])
+        assert one.sigma_mm > 10 and (one.support.sigma_m > 0.01).all()
+    assert step[False][0] > 0.027 and step[True][0] < 0.004
+    assert step[False][1] > 0.010 and step[True][1] < 0.003
+
+
+def test_points_of_one_strip_are_left_alone():
+    points, line = rail([(1, 0.0, 0.0, 0, LENGTH_M)])
+    assert strips_along([line], replace(points, strips=None), HEAD_M) == [None]
+    assert strips_along([line], points, HEAD_M) == [None]
+    assert rows_of([line], [None]).shape == (0, 7)
+    network = refine(single(line), replace(points, strips=None), HEAD_M)
+    aligned = refine(single(line), replace(points, strips=None), HEAD_M, align=True)
+    np.testing.assert_array_equal(network.lines[0], aligned.lines[0])
+
+
+def test_rows_state_places_and_offsets_in_the_plane():
+    points, line = rail([(3, 0.010, 0.0, 0, LENGTH_M), (8, -0.010, 0.0, 0, LENGTH_M)])
+    turned = np.array([[0.0, -1.0], [1.0, 0.0]])
+    xyz = np.column_stack([points.xyz[:, :2] @ turned.T, points.xyz[:, 2]])
+    rows = rows_of([line @ turned.T], strips_along([line @ turned.T], replace(points, xyz=xyz), HEAD_M))
+    assert len(rows) == 2 * 51 and set(rows[:, 2]) == {3.0, 8.0}
+    # The line now runs north, and its left is in the west.
+    np.testing.assert_allclose(rows[rows[:, 2] == 3, 3].mean(), -0.010, atol=0.001)
+    np.testing.assert_allclose(rows[rows[:, 2] == 8, 3].mean(), 0.010, atol=0.001)
