@@ -139,7 +139,8 @@ def rails_of_square(
     if not square.is_whole_plane:
         # A line may be longer than the part of it that the square shows; `whole_rails` drops the lines that are short.
         parameters = replace(parameters, min_length_m=min(parameters.min_length_m, overlap_m - HALO_M))
-    return trim(*_all_vertices(raster, source.class_code, points, parameters, progress), square)
+    rails, strips = _all_vertices(raster, source.class_code, points, parameters, progress)
+    return trim(rails, square, strips)
 
 
 def whole_rails(

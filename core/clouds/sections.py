@@ -92,7 +92,7 @@ def points_near(
     for header, share in zip(request.headers, request.shares(progress)):
         if not _reaches(header, request, plan, reach_m):
             continue
-        for xyz, _, _ in request.read(header, share):
+        for xyz, *_ in request.read(header, share):
             local = request.zero.to_local(xyz)
             local = local[np.isin(_numbers(np.floor(local[:, :2] / reach_m)), cells)]
             for number in range(len(plan)) if len(local) else ():

@@ -27,6 +27,9 @@ HOLE_M = HOLE_STATIONS * CUT_STEP_M
 """Longest hole that can remain near a corner between the parts of a rail that two squares show; a longer one is filled
 by a third square."""
 
+NO_STRIPS = np.empty((0, 7))
+"""Offsets of strips where there is a single one."""
+
 PieceEnd = tuple[int, int]
 """Number of a piece and one of its ends: 0 for the start, 1 for the end."""
 
@@ -49,19 +52,19 @@ class SquareRails:
     square: Square
     rails: tuple[RailLine, ...]
     nodes: np.ndarray
-    strips: np.ndarray = field(default_factory=lambda: np.empty((0, 7)))
+    strips: np.ndarray = field(default_factory=NO_STRIPS.copy)
 
 
-def trim(rails: Sequence[RailLine], strips: np.ndarray, square: Square) -> SquareRails:
+def trim(rails: Sequence[RailLine], square: Square, strips: np.ndarray = NO_STRIPS) -> SquareRails:
     """Cut the lines of a square where they stop being valid, and keep the offsets of strips inside.
 
     Parameters
     ----------
     rails : sequence of RailLine
         In local metres of the square.
+    square : Square
     strips : (k, 7) array
         See `strips.rows_of`.
-    square : Square
     """
     parts: list[RailLine] = []
     for rail in rails:
