@@ -76,7 +76,8 @@ def _stated(parameters: Parameters) -> str:
             continue
         name, _, unit = one.name.rpartition("_")
         named, unit = {"m": (name, " m"), "deg": (name, "°")}.get(unit, (one.name, ""))
-        stated.append(f"{INTERFACE.get(named, named).upper()} {value:g}{unit}")
+        text = value if isinstance(value, str) else f"{value:g}{unit}"
+        stated.append(f"{INTERFACE.get(named, named).upper()} {text}")
     return ", ".join(stated)
 
 
