@@ -56,7 +56,7 @@ def findings() -> QgsProcessingParameterDefinition:
     """Define the layer of places to look at."""
     line = QgsProcessing.SourceType.TypeVectorLine
     return helped(
-        QgsProcessingParameterFeatureSink("FINDINGS", tr("Findings"), line, optional=True),
+        _layer("FINDINGS", tr("Findings"), line, optional=True),
         tr("Places to look at, with the reason, the most harmful first: the table of the report as lines to review."),
     )
 
