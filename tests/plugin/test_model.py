@@ -23,11 +23,13 @@ def model(plugin):
 
 
 def content(model):
-    """Return the content of a model, except the format number and the output names, which differ in newer QGIS."""
+    """Return the content of a model, except the format number and the names of outputs, which differ in newer QGIS."""
     content = model.toVariant()
     content.pop("internal_version", None)
     definitions = content.pop("parameterDefinitions")
-    return content, {name.split(":")[0]: {**one, "name": ""} for name, one in definitions.items()}
+    named = {one["description"]: {**one, "name": ""} for one in definitions.values()}
+    assert len(named) == len(definitions)
+    return content, named
 
 
 def test_model_is_up_to_date(model, tmp_path):

@@ -79,7 +79,10 @@ def test_the_other_tables_of_a_geopackage_stay(build, tmp_path, form):
     layer = QgsVectorLayer(found, "tracks", "ogr")
     (feature,) = layer.getFeatures()
     assert layer.crs().authid() == "EPSG:32643"
-    assert feature.geometry().asWkt(4).replace("LineString Z", "LineStringZ") == "LineStringZ (500000 3000000.7535 100, 500020 3000000.7535 100)"
+    assert (
+        feature.geometry().asWkt(4).replace("LineString Z", "LineStringZ")
+        == "LineStringZ (500000 3000000.7535 100, 500020 3000000.7535 100)"
+    )
     assert feature["gauge_mm"] == 1435.0
     assert [file.name for file in tmp_path.iterdir()] == ["tracks.gpkg"]
 
