@@ -1,7 +1,7 @@
 """The architecture of FRPDF: the stages of one pass, in order (docs/method.md section 3.1).
 
-Only the list `STAGES` states this order. `network` builds the modules to be trained from it and `folding` collects the
-weights of each stage; the engines and the ONNX files follow the list of layers that `folding` returns.
+Only `Architecture.stages` states this order. `network` builds the modules to be trained from it and `folding` collects
+the weights of each stage; the engines and the ONNX files follow the list of layers that `folding` returns.
 """
 
 from __future__ import annotations
@@ -9,46 +9,84 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Union
 
-CHANNELS = 24
-KERNEL_RADIUS = 3
-DILATIONS = (1, 3, 7, 15, 31, 63, 127)
-
 
 @dataclass(frozen=True)
 class Stacked:
-    """Two plain convolutions in a row, from `channels_in` to `CHANNELS` channels."""
+    """Two plain convolutions in a row, the first one from `channels_in` channels."""
 
     channels_in: int
-
-    @property
-    def reach(self) -> int:
-        """Distance in cells from which it takes information."""
-        return 2 * KERNEL_RADIUS
 
 
 @dataclass(frozen=True)
 class Combined:
-    """A dilated convolution whose result is joined with its input and reduced to `CHANNELS` channels again."""
+    """A dilated convolution whose result is joined with its input and reduced to the same number of channels."""
 
     dilation: int
-
-    @property
-    def reach(self) -> int:
-        """Distance in cells from which it takes information."""
-        return KERNEL_RADIUS * self.dilation
 
 
 @dataclass(frozen=True)
 class Output:
-    """A 1 x 1 convolution to one channel of logits."""
-
-    reach = 0
+    """A 1 x 1 convolution to one logit per cell."""
 
 
 Stage = Union[Stacked, Combined, Output]
 
-STAGES: tuple[Stage, ...] = (Stacked(2), *(Combined(dilation) for dilation in DILATIONS), Stacked(CHANNELS), Output())
-"""From two channels, raster and state, to the logits."""
 
-RECEPTIVE_RADIUS = sum(stage.reach for stage in STAGES)
-"""Distance in cells of the farthest cell that can influence a cell in one pass: 753."""
+@dataclass(frozen=True)
+class Architecture:
+    """The numbers that make one FRPDF differ from another.
+
+    Attributes
+    ----------
+    channels : int
+    kernel_radius : int
+        The side of a kernel is twice that plus one.
+    dilations : tuple of int
+        Of the stages between encoder and decoder.
+    block : int
+        Side of the square of cells that every layer computes as one; its cells are channels of the input and of the
+        output. With 1, every layer has the resolution of the raster.
+    """
+
+    channels: int
+    kernel_radius: int
+    dilations: tuple[int, ...]
+    block: int = 1
+
+    @property
+    def channels_in(self) -> int:
+        """Channels of the input: raster and state of each cell of a block."""
+        return 2 * self.block**2
+
+    @property
+    def channels_out(self) -> int:
+        """Channels of the logits: one for each cell of a block."""
+        return self.block**2
+
+    @property
+    def stages(self) -> tuple[Stage, ...]:
+        """The stages from raster and state to the logits."""
+        bridge = (Combined(dilation) for dilation in self.dilations)
+        return (Stacked(self.channels_in), *bridge, Stacked(self.channels), Output())
+
+    @property
+    def receptive_radius(self) -> int:
+        """Distance in cells of the farthest cell that can influence a cell in one pass, measured between blocks."""
+        return self.block * self.kernel_radius * (4 + sum(self.dilations))
+
+    @property
+    def products_per_cell(self) -> float:
+        """Multiplications for one cell in one pass."""
+        kernel = self.channels * (2 * self.kernel_radius + 1) ** 2
+        stacked = kernel * (self.channels_in + 3 * self.channels)
+        combined = len(self.dilations) * self.channels * (kernel + 2 * self.channels)
+        return (stacked + combined + self.channels * self.channels_out) / self.block**2
+
+
+BASE = Architecture(channels=24, kernel_radius=3, dilations=(1, 3, 7, 15, 31, 63, 127))
+"""The network of Gribov and Chang, section 5: receptive radius 753 cells, 292,680 products per cell."""
+
+FAST = Architecture(channels=64, kernel_radius=1, dilations=(1, 2, 4, 8, 16, 32, 8, 4, 2), block=4)
+"""The fast model: receptive radius 324 cells, 33,472 products per cell (docs/method.md section 3.11)."""
+
+ARCHITECTURES = (BASE, FAST)

@@ -1,18 +1,18 @@
-"""FRPDF as it is trained, with the class names of the paper (docs/method.md section 3.1): 293,545 parameters.
+"""FRPDF as it is trained, with the class names of the paper (docs/method.md section 3.1).
 
-Every layer keeps the resolution of the raster; context comes from dilation alone.
+Every layer keeps the resolution of the raster, or that of its blocks; context comes from dilation alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
 from . import DEFAULT_PASSES, FEEDBACK_THRESHOLD, START, STATISTICS
-from .architecture import CHANNELS, KERNEL_RADIUS, STAGES, Combined, Stacked, Stage
+from .architecture import BASE, Architecture, Combined, Stacked, Stage
 
 
 class PassBatchNorm2d(nn.BatchNorm2d):
@@ -99,16 +99,24 @@ class ProgressiveCombine2d(nn.Module):
 class FRPDFLayer(nn.Sequential):
     """One pass: two channels in (raster and state, each in -1 to 1), one channel of logits out."""
 
-    def __init__(self, stages: Sequence[Stage] = STAGES) -> None:
-        super().__init__(*map(_module, stages))
+    def __init__(self, architecture: Architecture = BASE) -> None:
+        super().__init__(*(_module(stage, architecture) for stage in architecture.stages))
+        self.block = architecture.block
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Map (batch, 2, height, width), sides multiples of the block, to logits, (batch, 1, height, width)."""
+        if self.block == 1:
+            return super().forward(x)
+        return nn.functional.pixel_shuffle(super().forward(nn.functional.pixel_unshuffle(x, self.block)), self.block)
 
 
-def _module(stage: Stage) -> nn.Module:
+def _module(stage: Stage, architecture: Architecture) -> nn.Module:
+    channels, radius = architecture.channels, architecture.kernel_radius
     if isinstance(stage, Stacked):
-        return StackedConv2d(stage.channels_in, CHANNELS, KERNEL_RADIUS, 1)
+        return StackedConv2d(stage.channels_in, channels, radius, 1)
     if isinstance(stage, Combined):
-        return ProgressiveCombine2d(CHANNELS, KERNEL_RADIUS, stage.dilation)
-    return nn.Conv2d(CHANNELS, 1, 1)
+        return ProgressiveCombine2d(channels, radius, stage.dilation)
+    return nn.Conv2d(channels, architecture.channels_out, 1)
 
 
 class Recurrent(nn.Module):
@@ -156,10 +164,10 @@ class Recurrent(nn.Module):
 
 
 class FRPDF(Recurrent):
-    """The recurrent network of the paper."""
+    """The recurrent network, by default that of the paper."""
 
-    def __init__(self) -> None:
-        super().__init__(FRPDFLayer())
+    def __init__(self, architecture: Architecture = BASE) -> None:
+        super().__init__(FRPDFLayer(architecture))
 
 
 def feedback(logits: Tensor) -> Tensor:

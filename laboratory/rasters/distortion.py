@@ -34,6 +34,8 @@ DENSITY = (20.0, 400.0)
 """Points per metre of rail."""
 WORST_DENSITY = 0.3
 """Factor of the densest scan at the top of the scale."""
+THIN_DENSITY = (4.0, 24.0)
+"""Points per metre of rail in thin clouds: 3 to 20 cells per metre, with those that are lost."""
 PROFILE_M = (0.03, 0.10)
 NOISE_M, WORST_NOISE_M = 0.012, 0.008
 """Largest scatter of points in plan, and what is added at the top of the scale."""
@@ -68,7 +70,9 @@ class Pair:
     gap_lengths_m: tuple[float, ...]
 
 
-def draw_pair(rng: np.random.Generator, layout: Layout, window: Window, head_width_m: float, severity: float) -> Pair:
+def draw_pair(
+    rng: np.random.Generator, layout: Layout, window: Window, head_width_m: float, severity: float, thin: bool = False
+) -> Pair:
     """Draw a layout as a scanner shows it and as it is.
 
     Parameters
@@ -79,10 +83,12 @@ def draw_pair(rng: np.random.Generator, layout: Layout, window: Window, head_wid
     head_width_m : float
     severity : float
         0 to 1.
+    thin : bool
+        Whether rails have only as many points as `THIN_DENSITY` states.
     """
     observed, label, distractor = np.zeros((3, window.size, window.size), dtype=bool)
     gap, lengths = np.zeros((window.size, window.size), dtype=np.int16), []
-    scanner = _random_scanner(rng, severity)
+    scanner = _random_scanner(rng, severity, thin)
     hidden = shadows(rng, window, severity)
     shared_gaps: dict[int, list[tuple[float, float]]] = {}
     for rail in layout.rails:
@@ -133,9 +139,11 @@ class _Scanner:
     fastenings: float
 
 
-def _random_scanner(rng: np.random.Generator, severity: float) -> _Scanner:
+def _random_scanner(rng: np.random.Generator, severity: float, thin: bool) -> _Scanner:
     density = None
-    if rng.random() >= COVERED_SHARE:
+    if thin:
+        density = math.exp(rng.uniform(*np.log(THIN_DENSITY)))
+    elif rng.random() >= COVERED_SHARE:
         thinnest = DENSITY[1] * (DENSITY[0] / DENSITY[1]) ** severity
         densest = DENSITY[1] * WORST_DENSITY ** worst_share(severity)
         density = math.exp(rng.uniform(math.log(thinnest), math.log(densest)))

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..curves import Curve, trace
+from ..curves import Curve, Element, trace
 from .alignments import (
     HALF_LENGTH_M,
     MIN_RADIUS_M,
@@ -25,9 +25,9 @@ from .alignments import (
     straight,
 )
 from .clothoids import Pose, random_joins
-from .fittings import GUARD_LENGTH_M, OPENING_M, check_rail, crossing, guard
+from .fittings import GUARD_LENGTH_M, OPENING_M, check_rail, crossing, frog, guard
 from .paths import NO_TRACK, STEP_M, Layout, RailPath, TrackSize, beside, combine, track
-from .turnouts import FORMS, YARD_FORMS, crossover, turnout
+from .turnouts import BLADE_LENGTH_M, FORMS, YARD_FORMS, branch, crossover, turnout, visible_from
 
 CHECKED_RADIUS_M = 200.0
 """Radius below which a curve may have a check rail along its inner rail."""
@@ -39,6 +39,14 @@ CROSSING_ANGLES = (1 / 9, math.pi / 2)
 
 GAUGE_PAIRS = ((0.914, 1.067), (1.000, 1.435), (1.067, 1.435), (1.435, 1.668), (1.435, 1.676))
 """Pairs of gauges that share a rail, metres; gauges closer to each other need four rails."""
+
+SLIP_ANGLES = (1 / 10, 1 / 6)
+"""Angles of crossings with slips, radians."""
+SLIP_TANGENT_M = (8.0, 13.0)
+"""Distance from the crossing of the axes to the toes of a slip."""
+
+BLADE_OPENING_M = (0.10, 0.20)
+"""Distance of an open blade's tip from where it lies when closed: room for a flange, from tramways to main lines."""
 
 BUFFER_LENGTH_M = (1.8, 3.0)
 BUFFER_AHEAD_M = (0.0, 0.6)
@@ -57,12 +65,12 @@ def random_layout(rng: np.random.Generator, size: TrackSize, family: str | None 
     rng : numpy Generator
     size : TrackSize
     family : str, optional
-        One of `FAMILIES`; by default, one is drawn by `WEIGHTS`.
+        One of `FAMILIES` or `RARE_FAMILIES`; by default, one of the former is drawn by `WEIGHTS`.
     """
     if family is None:
         names = list(WEIGHTS)
         family = names[rng.choice(len(names), p=np.array(list(WEIGHTS.values())) / sum(WEIGHTS.values()))]
-    return FAMILIES[family](rng, size)
+    return {**FAMILIES, **RARE_FAMILIES}[family](rng, size)
 
 
 def plain(rng: np.random.Generator, size: TrackSize) -> Layout:
@@ -114,6 +122,11 @@ def diamond(rng: np.random.Generator, size: TrackSize) -> Layout:
     """Lay two tracks that cross, in most cases with guard rails through the middle."""
     axis = straight(rng) if rng.random() < 0.6 else bend(rng, random_radius(rng, 190.0), (1,))
     angle = rng.choice([-1, 1]) * math.exp(rng.uniform(*np.log(CROSSING_ANGLES)))
+    return _crossed(rng, axis, angle, size)
+
+
+def _crossed(rng: np.random.Generator, axis: Curve, angle: float, size: TrackSize) -> Layout:
+    """Lay a track and a straight one that crosses its middle at an angle, radians; see `diamond`."""
     middle = len(axis.xy) // 2
     other = straight(rng)
     cosine, sine = (f(axis.heading[middle] + angle - other.heading[0]) for f in (math.cos, math.sin))
@@ -158,14 +171,19 @@ def yard(rng: np.random.Generator, size: TrackSize) -> Layout:
 def dual_gauge(rng: np.random.Generator, size: TrackSize) -> Layout:
     """Lay one track with a third rail for a second gauge; either gauge may be that of `size`."""
     axis = random_alignment(rng, 2 * MIN_RADIUS_M)
+    third = beside(axis, _third_rail_offset(rng, size), 0)
+    both = track(axis, size, spot=True)
+    return Layout((*both.rails, third), spots=both.spots)
+
+
+def _third_rail_offset(rng: np.random.Generator, size: TrackSize) -> float:
+    """Draw a pair of gauges and return the offset of the third rail to the left of the axis, metres."""
     narrow, wide = GAUGE_PAIRS[rng.integers(len(GAUGE_PAIRS))]
     asked = narrow if rng.random() < 0.5 else wide
     third_m = (wide - narrow) / asked * (size.spacing_m - size.head_width_m)
     outside = 1 if asked == narrow else -1
     side = rng.choice([-1, 1])
-    third = beside(axis, side * (0.5 * size.spacing_m + outside * third_m), 0)
-    both = track(axis, size, spot=True)
-    return Layout((*both.rails, third), spots=both.spots)
+    return side * (0.5 * size.spacing_m + outside * third_m)
 
 
 def buffer_end(rng: np.random.Generator, size: TrackSize) -> Layout:
@@ -184,6 +202,51 @@ def connections(rng: np.random.Generator, size: TrackSize) -> Layout:
         axes = [trace(elements, (start.x, start.y), start.heading, STEP_M) for start, elements in joins]
         tracks = [track(axis, size, spot=True) for axis in axes]
     return combine(tracks)
+
+
+def third_rail_end(rng: np.random.Generator, size: TrackSize) -> Layout:
+    """Lay one track with a third rail that ends near the middle."""
+    axis = random_alignment(rng, 2 * MIN_RADIUS_M)
+    axis = axis.reversed() if rng.random() < 0.5 else axis
+    ending = axis.piece(0.0, rng.uniform(0.4, 0.6) * axis.length_m)
+    third = beside(ending, _third_rail_offset(rng, size), 0)
+    return Layout((*track(axis, size).rails, third), spots=(third.xy[-1],))
+
+
+def slip(rng: np.random.Generator, size: TrackSize) -> Layout:
+    """Lay two tracks that cross at a small angle, with a single or a double slip between them."""
+    axis = straight(rng)
+    angle = int(rng.choice([-1, 1])) * rng.uniform(*SLIP_ANGLES)
+    tangent_m, middle, heading = rng.uniform(*SLIP_TANGENT_M), axis.xy[len(axis.xy) // 2], float(axis.heading[0])
+    curvature = math.tan(0.5 * abs(angle)) / tangent_m
+    parts = [_crossed(rng, axis, angle, size)]
+    for start, turn in ((heading, angle), (heading + angle, -angle))[: int(rng.integers(1, 3))]:
+        toe = middle - tangent_m * np.array([math.cos(start), math.sin(start)])
+        arc = Element(abs(turn) / curvature, *(math.copysign(curvature, turn),) * 2)
+        parts.append(track(trace([arc], tuple(toe.tolist()), start, STEP_M), size, spot=True))
+    return combine(parts)
+
+
+def open_blade(rng: np.random.Generator, size: TrackSize) -> Layout:
+    """Lay a turnout with one blade away from its stock rail, as wide as a wheel needs, up to its tip."""
+    main = straight(rng) if rng.random() < 0.5 else bend(rng, random_radius(rng, 500.0), (1,))
+    toe_m, hand = rng.uniform(0.3, 0.6) * main.length_m, int(rng.choice([-1, 1]))
+    side = branch(main, toe_m, FORMS[rng.integers(2, len(FORMS))], hand, rng.uniform(15.0, 45.0))
+    ahead, half_m = main.piece(toe_m, main.length_m), 0.5 * size.spacing_m
+    opening_m, blade_m = rng.uniform(*BLADE_OPENING_M), rng.uniform(*BLADE_LENGTH_M)
+
+    def bent_m(curve: Curve) -> np.ndarray:
+        return opening_m * np.clip(1 - STEP_M * np.arange(len(curve.xy)) / blade_m, 0, 1) ** 2
+
+    rails = [beside(main, -hand * half_m, 0), beside(side, hand * half_m, 0)]
+    if rng.random() < 0.5:  # set for the main track
+        rails += [beside(main, hand * half_m, 0), beside(side, hand * (bent_m(side) - half_m), 0)]
+    else:
+        closed = side.piece(visible_from(rng), side.length_m)
+        rails += [beside(main.piece(0.0, toe_m), hand * half_m, 0), beside(closed, -hand * half_m, 0)]
+        rails += [beside(ahead, hand * (half_m - bent_m(ahead)), 0)]
+    fittings, _ = frog(rng, ahead, side, hand, size)
+    return combine([Layout(tuple(rails), spots=(ahead.xy[int(2.0 / STEP_M)],)), fittings])
 
 
 FAMILIES: dict[str, Callable[[np.random.Generator, TrackSize], Layout]] = {
@@ -214,6 +277,13 @@ WEIGHTS = {
     "connections": 2.5,
 }
 """Frequency of each family in training: common and difficult ones are drawn more often."""
+
+RARE_FAMILIES: dict[str, Callable[[np.random.Generator, TrackSize], Layout]] = {
+    "third rail end": third_rail_end,
+    "slip": slip,
+    "open blade": open_blade,
+}
+"""Families that only training draws, equally often; the benchmark has `FAMILIES`."""
 
 
 def _parallels(

@@ -8,7 +8,7 @@ import numpy as np
 
 from .distortion import Pair, draw_pair
 from .drawing import Window
-from .layouts import random_layout
+from .layouts import RARE_FAMILIES, random_layout
 from .paths import TrackSize
 
 SPACING_M = 1.5112
@@ -24,6 +24,10 @@ RATIO_TOLERANCE = 0.06
 ODD_SHARE = 0.4
 """Share of pairs whose ratio is drawn from the whole range `RATIOS`, because the only model serves every standard."""
 
+RARE_SHARE = 0.15
+"""Share of training pairs of the rare families."""
+THIN_SHARE, THIN_SEVERITY = 0.15, 0.5
+"""Share of training pairs with thin rails, and the largest severity of these: beyond it no rail can be recognized."""
 EMPTY_SHARE = 0.05
 CLEAN_SHARE = 0.05
 FAR_M = 1e5
@@ -42,14 +46,33 @@ def ratio_near(rng: np.random.Generator, ratio: float) -> float:
     return ratio * math.exp(rng.uniform(-RATIO_TOLERANCE, RATIO_TOLERANCE))
 
 
+def training_pair(rng: np.random.Generator, size: int, ratio: float | None = None) -> Pair:
+    """Draw a pair for training: as `random_pair` does, and some of rare layouts and of thin rails.
+
+    Parameters
+    ----------
+    rng : numpy Generator
+        The pair depends on its state alone.
+    size : int
+        Cells along the side.
+    ratio : float, optional
+        Gauge divided by railhead width; by default, `random_ratio`.
+    """
+    family = list(RARE_FAMILIES)[rng.integers(len(RARE_FAMILIES))] if rng.random() < RARE_SHARE else None
+    thin = rng.random() < THIN_SHARE
+    severity = rng.uniform(0.0, THIN_SEVERITY) if thin else None
+    return random_pair(rng, size, severity, ratio, family, thin)
+
+
 def random_pair(
     rng: np.random.Generator,
     size: int,
     severity: float | None = None,
     ratio: float | None = None,
     family: str | None = None,
+    thin: bool = False,
 ) -> Pair:
-    """Draw one training pair.
+    """Draw one pair.
 
     Parameters
     ----------
@@ -62,7 +85,10 @@ def random_pair(
     ratio : float, optional
         Gauge divided by railhead width; by default, `random_ratio`.
     family : str, optional
-        One of `layouts.FAMILIES`. By default it is drawn, and some pairs are empty.
+        One of `layouts.FAMILIES` or `layouts.RARE_FAMILIES`. By default one of the former is drawn, and some pairs are
+        empty.
+    thin : bool
+        Whether rails have few points; see `distortion.THIN_DENSITY`.
     """
     if severity is None:
         severity = 0.0 if rng.random() < CLEAN_SHARE else rng.random()
@@ -73,4 +99,4 @@ def random_pair(
     if family is None and rng.random() < EMPTY_SHARE:
         middle = middle + FAR_M
     window = Window(size, CELL_M, middle[0] - 0.5 * extent_m, middle[1] + 0.5 * extent_m)
-    return draw_pair(rng, layout, window, track_size.head_width_m, severity)
+    return draw_pair(rng, layout, window, track_size.head_width_m, severity, thin)

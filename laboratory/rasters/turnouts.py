@@ -134,12 +134,12 @@ def turnout(
     side = branch(main, toe_m, form, hand, rng.uniform(15.0, 45.0))
     ahead = main.piece(toe_m, main.length_m)
     fittings, at = frog(rng, ahead, side, hand, size)
-    blade = side.piece(_visible_from(rng), side.length_m)
+    blade = side.piece(visible_from(rng), side.length_m)
     rails = beside(side, 0.5 * hand * size.spacing_m, 0), beside(blade, -0.5 * hand * size.spacing_m, 0)
     return combine([Layout(rails, spots=(ahead.xy[int(rng.uniform(0.0, 0.9) * at)],)), fittings])
 
 
-def _visible_from(rng: np.random.Generator) -> float:
+def visible_from(rng: np.random.Generator) -> float:
     """Draw the distance from the toe at which a blade begins to show, metres."""
     return rng.uniform(*BLADE_START) * rng.uniform(*BLADE_LENGTH_M)
 
@@ -178,7 +178,7 @@ def crossover(
     first, _ = frog(rng, tracks[0].piece(start_m, axis.length_m), side, hand, size)
     second, _ = frog(rng, backward.piece(axis.length_m - end_m, axis.length_m), side.reversed(), hand, size)
     rails = (
-        beside(side.piece(0.0, side.length_m - _visible_from(rng)), 0.5 * hand * size.spacing_m, 0),
-        beside(side.piece(_visible_from(rng), side.length_m), -0.5 * hand * size.spacing_m, 0),
+        beside(side.piece(0.0, side.length_m - visible_from(rng)), 0.5 * hand * size.spacing_m, 0),
+        beside(side.piece(visible_from(rng), side.length_m), -0.5 * hand * size.spacing_m, 0),
     )
     return combine([Layout(rails, spots=(side.xy[len(side.xy) // 2],)), first, second])

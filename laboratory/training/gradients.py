@@ -21,6 +21,9 @@ from ...core.frpdf.network import PassBatchNorm2d
 MAX_PHASED_DILATION = 40
 """Above this dilation the phases of a crop are smaller than the kernel, and one product per kernel tap is faster."""
 
+MANY_CHANNELS = 64
+"""Number of channels from which PyTorch's own convolutions and batch norm are faster."""
+
 COLUMNS_AT_ONCE = 4
 """Columns whose channels are normalized as one row of 96 numbers; it divides the sides of all crops."""
 
@@ -153,9 +156,9 @@ def train_on_cpu(network: nn.Module) -> None:
     for module in network.modules():
         if type(module) is nn.ReLU:
             module.__class__ = CpuReLU
-        if type(module) is PassBatchNorm2d:
+        if type(module) is PassBatchNorm2d and module.num_features < MANY_CHANNELS:
             module.__class__ = CpuBatchNorm2d
-        if type(module) is nn.Conv2d and module.dilation[0] > 1 and module.bias is None:
+        if type(module) is nn.Conv2d and module.dilation[0] > 1 and module.in_channels < MANY_CHANNELS:
             module.__class__ = CpuConv2d
     move(network, "cpu")
 

@@ -1,7 +1,7 @@
-"""The networks that can be trained: FRPDF, two other networks, and FRPDF with one of its choices undone.
+"""The networks that can be trained: FRPDF, its fast form, two other networks, and FRPDF with one of its choices undone.
 
-All have the same number of parameters within 5 %, and the recurrence, batch norm and statistics per pass of FRPDF, so
-that a comparison shows the effect of the architecture.
+All but the fast form have the same number of parameters within 5 %, and all have the recurrence, batch norm and statistics
+per pass of FRPDF, so that a comparison shows the effect of the architecture.
 """
 
 from __future__ import annotations
@@ -14,11 +14,13 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from ...core.frpdf.architecture import CHANNELS, DILATIONS, KERNEL_RADIUS
+from ...core.frpdf.architecture import BASE, FAST
 from ...core.frpdf.network import FRPDF, CustomConv2d, ProgressiveCombine2d, Recurrent, StackedConv2d, set_weights
 from ...core.frpdf.weights import load_arrays
 from .gradients import move, train_on_cpu
 
+CHANNELS, KERNEL_RADIUS, DILATIONS = BASE.channels, BASE.kernel_radius, BASE.dilations
+"""The numbers of FRPDF that the networks compared with it share."""
 UNET_CHANNELS = (6, 13, 25, 50, 100)
 """Channels from full resolution to a sixteenth."""
 ATROUS_CHANNELS = 16
@@ -125,6 +127,7 @@ class SkippingLayer(nn.Module):
 
 NETWORKS: dict[str, Callable[[], Recurrent]] = {
     "frpdf": FRPDF,
+    "fast": lambda: FRPDF(FAST),
     "unet": lambda: Recurrent(UNetLayer()),
     "acnn": lambda: Recurrent(AtrousLayer()),
     "pooled": lambda: Recurrent(PooledLayer()),

@@ -22,11 +22,12 @@ class Optimizers:
     """
 
     def __init__(self, network: nn.Module) -> None:
-        parameters = list(network.parameters())
-        self._parameters = parameters
-        self._kernels = [parameter for parameter in parameters if parameter.ndim == 4 and len(parameter) > 1]
+        self._parameters = list(network.parameters())
+        convolutions = [module for module in network.modules() if isinstance(module, nn.Conv2d)]
+        self._kernels = [module.weight for module in convolutions if module.bias is None]
         self._matrices = [nn.Parameter(_matrix(kernel.detach())) for kernel in self._kernels]
-        rest = [parameter for parameter in parameters if not (parameter.ndim == 4 and len(parameter) > 1)]
+        kernels = {id(kernel) for kernel in self._kernels}
+        rest = [parameter for parameter in self._parameters if id(parameter) not in kernels]
         self._parts = (
             torch.optim.Muon(self._matrices, weight_decay=WEIGHT_DECAY, adjust_lr_fn="match_rms_adamw"),
             torch.optim.AdamW(rest, weight_decay=WEIGHT_DECAY),

@@ -25,7 +25,7 @@ from ...core.frpdf import DEFAULT_PASSES, OUTPUT_THRESHOLD, START, STATISTICS
 from ...core.frpdf.network import PassBatchNorm2d, Recurrent, feedback, set_weights, weights_of
 from ...core.frpdf.weights import load_arrays, save_arrays
 from ..rasters.distortion import Pair
-from ..rasters.pairs import random_pair, ratio_near
+from ..rasters.pairs import ratio_near, training_pair
 from .gradients import move, train_on_cpu
 from .learning_curves import draw_curves
 from .networks import NETWORKS, output_bias
@@ -201,7 +201,7 @@ def batch(settings: Settings, stream: int, step: int) -> tuple[Tensor, Tensor, T
     if stream == DATA and step >= (1 - LAST_SHARE) * settings.steps:
         side, count = LAST_CROP, 1
     ratios = [None if settings.ratio is None else ratio_near(rng, settings.ratio) for _ in range(count)]
-    pairs = [random_pair(rng, side, ratio=ratio) for ratio in ratios]
+    pairs = [training_pair(rng, side, ratio) for ratio in ratios]
     rasters = zip(*((pair.observed, pair.label, cell_weights(pair)) for pair in pairs))
     observed, label, weight = (
         torch.from_numpy(np.stack(one)[:, None].astype(np.float32))
