@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frpdf import START
-from rail_extract.core.frpdf.architecture import RECEPTIVE_RADIUS
+from rail_extract.core.frpdf.architecture import BASE
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.frpdf.corridor import Piece, lay_fields
 from rail_extract.core.frpdf.engine import Engine
@@ -208,8 +208,8 @@ def _number_type(engine: Engine) -> str:
 def _clean_whole(network: FRPDF, raster: RailRaster) -> RailRaster:
     """Run the plain network on the bounding box and on everything around it that it can see."""
     cells = raster.cells()
-    corner = cells.min(axis=0) - RECEPTIVE_RADIUS
-    height, width = (cells.max(axis=0) + 1 + RECEPTIVE_RADIUS - corner).tolist()
+    corner = cells.min(axis=0) - BASE.receptive_radius
+    height, width = (cells.max(axis=0) + 1 + BASE.receptive_radius - corner).tolist()
     with torch.inference_mode():
         seen = torch.from_numpy(raster.read(*corner.tolist(), height, width))[None, None]
         logits = network(seen.float())[-1][0, 0].numpy()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Optional
 
@@ -9,7 +11,7 @@ import numpy as np
 
 from ..errors import ModelError
 from . import STATISTICS
-from .architecture import CHANNELS, KERNEL_RADIUS, STAGES, Combined, Stacked
+from .architecture import ARCHITECTURES, Architecture, Combined, Stacked
 
 EPSILON = 1e-5
 """Added to the variance in batch norm."""
@@ -32,7 +34,7 @@ class Convolution:
 
     @property
     def reach(self) -> int:
-        """Distance in cells from which it takes information."""
+        """Distance in cells, or in blocks of cells, from which it takes information."""
         return self.weight.shape[-1] // 2 * self.dilation
 
 
@@ -55,8 +57,39 @@ class FoldedLayer:
 
     @property
     def reach(self) -> int:
-        """Distance in cells from which it takes information."""
+        """Distance in cells, or in blocks of cells, from which it takes information."""
         return self.convolution.reach
+
+
+def block_side(layers: Sequence[FoldedLayer]) -> int:
+    """Return the side in cells of the blocks on which the layers of a pass work; see `Architecture.block`."""
+    return math.isqrt(len(layers[-1].convolution.bias))
+
+
+def into_blocks(cells: np.ndarray, side: int) -> np.ndarray:
+    """Rearrange (channels, height, width) into (channels x side x side, height / side, width / side)."""
+    channels, height, width = cells.shape
+    parts = cells.reshape(channels, height // side, side, width // side, side)
+    return parts.transpose(0, 2, 4, 1, 3).reshape(-1, height // side, width // side)
+
+
+def from_blocks(blocks: np.ndarray, side: int) -> np.ndarray:
+    """Rearrange (side x side, height, width), the cells of each block, into (side x height, side x width)."""
+    _, height, width = blocks.shape
+    parts = blocks.reshape(side, side, height, width).transpose(2, 0, 3, 1)
+    return parts.reshape(side * height, side * width)
+
+
+def architecture_of(arrays: dict[str, np.ndarray]) -> Architecture:
+    """Return the architecture whose first kernel has as many channels and taps as that of a weights file.
+
+    Without any, returns the first architecture; `fold` then states what differs.
+    """
+    shape = getattr(arrays.get("layer.0.0.0.weight"), "shape", ())[1:]
+    for one in ARCHITECTURES:
+        if shape == (one.channels_in, *(2 * one.kernel_radius + 1,) * 2):
+            return one
+    return ARCHITECTURES[0]
 
 
 def fold(arrays: dict[str, np.ndarray]) -> tuple[tuple[FoldedLayer, ...], ...]:
@@ -72,35 +105,33 @@ def fold(arrays: dict[str, np.ndarray]) -> tuple[tuple[FoldedLayer, ...], ...]:
     ModelError
         The arrays are not those of FRPDF.
     """
+    architecture = architecture_of(arrays)
     try:
-        return tuple(tuple(_fold_pass(arrays, number)) for number in range(STATISTICS))
+        return tuple(tuple(_fold_pass(arrays, architecture, number)) for number in range(STATISTICS))
     except (KeyError, ValueError) as error:
         raise ModelError(f"The weights file does not belong to FRPDF ({error}): reinstall the plugin.") from error
 
 
-def _fold_pass(arrays: dict[str, np.ndarray], number: int) -> list[FoldedLayer]:
+def _fold_pass(arrays: dict[str, np.ndarray], architecture: Architecture, number: int) -> list[FoldedLayer]:
+    channels, radius = architecture.channels, architecture.kernel_radius
     layers = []
-    for position, stage in enumerate(STAGES):
+    for position, stage in enumerate(architecture.stages):
         name = f"layer.{position}"
         if isinstance(stage, Stacked):
-            for place, channels_in in enumerate((stage.channels_in, CHANNELS)):
-                layers.append(FoldedLayer(_fold(arrays, f"{name}.{place}", number, channels_in)))
+            for place, channels_in in enumerate((stage.channels_in, channels)):
+                layers.append(FoldedLayer(_fold(arrays, f"{name}.{place}", number, (channels, channels_in), radius)))
         elif isinstance(stage, Combined):
-            dilated = _fold(arrays, f"{name}.dilated", number, CHANNELS, stage.dilation)
-            layers.append(FoldedLayer(dilated, _fold(arrays, f"{name}.reduce", number, 2 * CHANNELS, radius=0)))
+            dilated = _fold(arrays, f"{name}.dilated", number, (channels, channels), radius, stage.dilation)
+            layers.append(FoldedLayer(dilated, _fold(arrays, f"{name}.reduce", number, (channels, 2 * channels), 0)))
         else:
-            weight = _checked(arrays, f"{name}.weight", (1, CHANNELS, 1, 1))
-            layers.append(FoldedLayer(Convolution(weight, _checked(arrays, f"{name}.bias", (1,))), is_output=True))
+            weight = _checked(arrays, f"{name}.weight", (architecture.channels_out, channels, 1, 1))
+            bias = _checked(arrays, f"{name}.bias", (architecture.channels_out,))
+            layers.append(FoldedLayer(Convolution(weight, bias), is_output=True))
     return layers
 
 
 def _fold(
-    arrays: dict[str, np.ndarray],
-    name: str,
-    number: int,
-    channels_in: int,
-    dilation: int = 1,
-    radius: int = KERNEL_RADIUS,
+    arrays: dict[str, np.ndarray], name: str, number: int, channels: tuple[int, int], radius: int, dilation: int = 1
 ) -> Convolution:
     """Fold the batch norm that follows a convolution into it.
 
@@ -111,14 +142,16 @@ def _fold(
         Name of the two in the network.
     number : int
         Number of the batch statistics.
-    channels_in, dilation, radius : int
-        Channels of the convolution's input, distance between the cells of its kernel, and reach of the kernel.
+    channels : tuple of int
+        Channels of the convolution's result and of its input.
+    radius, dilation : int
+        Reach of the kernel, and distance between the cells of its kernel.
     """
     suffix = f"_{number}" if number else ""
     side = 2 * radius + 1
-    kernel = _checked(arrays, f"{name}.0.weight", (CHANNELS, channels_in, side, side))
+    kernel = _checked(arrays, f"{name}.0.weight", (*channels, side, side))
     mean, variance, weight, bias = (
-        _checked(arrays, f"{name}.1.{part}", (CHANNELS,))
+        _checked(arrays, f"{name}.1.{part}", (channels[0],))
         for part in (f"running_mean{suffix}", f"running_var{suffix}", "weight", "bias")
     )
     if (variance < 0).any():

@@ -18,6 +18,7 @@ from ..errors import DeviceExhaustedError
 from ..progress import Progress
 from . import START, STATISTICS
 from .corridor import Piece
+from .folding import from_blocks, into_blocks
 
 Array = Any
 """(channels, height, width) array of the library that computes."""
@@ -33,7 +34,7 @@ class Step:
     Attributes
     ----------
     reach : int
-        Distance in cells from which the layer takes information.
+        Distance in cells, or in blocks of cells, from which the layer takes information.
     run : callable
         Takes the input with its surroundings, `reach` cells larger on each side, and the input alone; returns an array
         of the input's height and width.
@@ -50,9 +51,12 @@ class LayeredEngine(ABC):
     ----------
     max_cells : int
         Cells to be computed at once.
+    block : int
+        Side of the blocks of cells on which the layers work, which divides the sides and corners of all pieces.
     """
 
     max_cells = 1 << 22
+    block: int
 
     def sweep(
         self,
@@ -78,13 +82,14 @@ class LayeredEngine(ABC):
         pieces: Sequence[Piece],
         progress: Progress,
     ) -> list[np.ndarray]:
-        held = [self._load(np.stack([raster, state]) * 2 - 1) for raster, state in zip(seen, known)]
+        steps, side = self._steps(min(number, STATISTICS - 1)), self.block
+        held = [self._load(into_blocks(np.stack([raster, state]) * 2 - 1, side)) for raster, state in zip(seen, known)]
         empty = np.array([0.0, 0.0 if number else START], dtype=np.float32)[:, None, None]
-        outside = self._load(empty * 2 - 1)
-        steps = self._steps(min(number, STATISTICS - 1))
+        outside = self._load(np.repeat(empty * 2 - 1, side**2, axis=0))
+        pieces = [Piece(*(place // side for place in piece.window)) for piece in pieces]
         for step, share in zip(steps, progress.split(len(steps))):
             held, outside = self._advance(step, held, outside, pieces, share)
-        return [self._probabilities(logits) for logits in held]
+        return [from_blocks(self._probabilities(logits), side) for logits in held]
 
     def retreat(self) -> str:
         """Compute fewer cells at once; see `Engine.retreat`."""
@@ -137,7 +142,7 @@ class LayeredEngine(ABC):
 
     @abstractmethod
     def _probabilities(self, logits: Array) -> np.ndarray:
-        """Convert (1, height, width) logits to (height, width) float32 probabilities."""
+        """Convert logits to a float32 array of probabilities."""
 
 
 def overlaps(

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .folding import Convolution, FoldedLayer, fold
+from .folding import Convolution, FoldedLayer, block_side, fold
 from .models import MODELS
 from .weights import load_arrays
 
@@ -21,7 +21,7 @@ IR_VERSION, OPERATOR_SET = 8, 13
 """Versions that runtimes since 2021 read."""
 
 _VARINT, _BYTES = 0, 2
-_FLOAT, _INT_ATTRIBUTE, _INTS_ATTRIBUTE = 1, 2, 7
+_FLOAT, _INT64, _INT_ATTRIBUTE, _INTS_ATTRIBUTE = 1, 7, 2, 7
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,17 +48,19 @@ def to_onnx(layers: Sequence[FoldedLayer], height: int, width: int) -> bytes:
     layers : sequence of FoldedLayer
         The layers of the pass.
     height, width : int
-        Size of the rasters.
+        Size of the rasters, multiples of the side of the network's blocks.
 
     Returns
     -------
     bytes
         An ONNX ModelProto.
     """
-    graph = _Graph()
-    x = "input"
+    graph, side = _Graph(), block_side(layers)
+    x = "input" if side == 1 else graph.into_blocks("input", 2, height, width, side)
     for layer in layers:
-        x = graph.layer(layer, x, x, output="logits" if layer.is_output else None)
+        x = graph.layer(layer, x, x, output="logits" if layer.is_output and side == 1 else None)
+    if side > 1:
+        graph.from_blocks(x, height, width, side, output="logits")
     return graph.proto({"input": (1, 2, height, width)}, {"logits": (1, 1, height, width)})
 
 
@@ -119,6 +121,25 @@ class _Graph:
         )
         return self._node("Conv", names, attributes, output)
 
+    def into_blocks(self, x: str, channels: int, height: int, width: int, side: int) -> str:
+        """Rearrange cells as `folding.into_blocks` does."""
+        rows, columns = height // side, width // side
+        x = self._arrange(x, (channels, rows, side, columns, side), (0, 2, 4, 1, 3))
+        return self._reshape(x, (1, channels * side**2, rows, columns))
+
+    def from_blocks(self, x: str, height: int, width: int, side: int, output: str) -> str:
+        """Rearrange blocks as `folding.from_blocks` does."""
+        x = self._arrange(x, (side, side, height // side, width // side), (2, 0, 3, 1))
+        return self._reshape(x, (1, 1, height, width), output)
+
+    def _arrange(self, x: str, shape: tuple[int, ...], axes: tuple[int, ...]) -> str:
+        return self._node("Transpose", [self._reshape(x, shape)], (_integers("perm", axes),))
+
+    def _reshape(self, x: str, shape: tuple[int, ...], output: str | None = None) -> str:
+        name = f"shape{len(self._nodes)}"
+        self._weights.append(_tensor(name, np.array(shape, dtype=np.int64)))
+        return self._node("Reshape", [x, name], output=output)
+
     def relu(self, x: str, output: str | None = None) -> str:
         return self._node("Relu", [x], output=output)
 
@@ -145,7 +166,8 @@ class _Graph:
 
 def _tensor(name: str, array: np.ndarray) -> bytes:
     dims = b"".join(_number(1, side) for side in array.shape)
-    return dims + _number(2, _FLOAT) + _text(8, name) + _message(9, np.ascontiguousarray(array, "<f4").tobytes())
+    kind, dtype = (_INT64, "<i8") if array.dtype == np.int64 else (_FLOAT, "<f4")
+    return dims + _number(2, kind) + _text(8, name) + _message(9, np.ascontiguousarray(array, dtype).tobytes())
 
 
 def _integers(name: str, values: Iterable[int]) -> bytes:

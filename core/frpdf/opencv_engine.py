@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from .folding import FoldedLayer, fold
+from .folding import FoldedLayer, block_side, fold
 from .layered import LayeredEngine, Step
 from .onnx import layer_to_onnx
 
@@ -16,7 +16,9 @@ class OpenCvEngine(LayeredEngine):
     """OpenCV on the CPU, in float32."""
 
     def __init__(self, arrays: dict[str, np.ndarray]) -> None:
-        self._passes = [[_step(layer) for layer in layers] for layers in fold(arrays)]
+        folded = fold(arrays)
+        self.block = block_side(folded[0])
+        self._passes = [[_step(layer) for layer in layers] for layers in folded]
         self._scratch = np.empty(0, dtype=np.float32)
         self.description = f"OpenCV {cv2.__version__}, CPU, float32"
 
@@ -45,7 +47,7 @@ class OpenCvEngine(LayeredEngine):
         return around
 
     def _probabilities(self, logits: np.ndarray) -> np.ndarray:
-        return 1 / (1 + np.exp(-logits[0]))
+        return 1 / (1 + np.exp(-logits))
 
 
 def _step(layer: FoldedLayer) -> Step:

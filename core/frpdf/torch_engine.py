@@ -12,7 +12,7 @@ from torch.nn.functional import conv2d
 from ..errors import ModelError
 from ..progress import Progress
 from .corridor import Piece
-from .folding import Convolution, FoldedLayer, fold
+from .folding import Convolution, FoldedLayer, block_side, fold
 from .layered import LayeredEngine, Step
 
 NO_MEMORY = ("DefaultCPUAllocator", "bad_alloc", "could not create a primitive", "could not create a memory object")
@@ -44,6 +44,7 @@ class TorchEngine(LayeredEngine):
         if device == "CUDA" and not has_cuda:
             raise ModelError("There is no CUDA device that PyTorch can use: choose AUTO or CPU.")
         self._folded = fold(arrays)
+        self.block = block_side(self._folded[0])
         self._exact = exact
         self._others = ["cpu"] if has_cuda and device != "CPU" else []
         try:
@@ -112,7 +113,7 @@ class TorchEngine(LayeredEngine):
         return around.copy_(outside.expand_as(around))
 
     def _probabilities(self, logits: Tensor) -> np.ndarray:
-        return torch.sigmoid(logits.float())[0].cpu().numpy()
+        return torch.sigmoid(logits.float()).cpu().numpy()
 
 
 def _step(layer: FoldedLayer, device: str, dtype: torch.dtype) -> Step:

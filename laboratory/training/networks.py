@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from ...core.frpdf.architecture import BASE, FAST
+from ...core.frpdf.folding import architecture_of
 from ...core.frpdf.network import FRPDF, CustomConv2d, ProgressiveCombine2d, Recurrent, StackedConv2d, set_weights
 from ...core.frpdf.weights import load_arrays
 from .gradients import move, train_on_cpu
@@ -158,14 +159,15 @@ class TrainedNetwork:
     Parameters
     ----------
     name : str
-        One of `NETWORKS`.
+        One of `NETWORKS`; the weights of "frpdf" decide which architecture it has.
     weights : Path
         An .npz file.
     """
 
     def __init__(self, name: str, weights: Path) -> None:
-        self._network = NETWORKS[name]()
-        set_weights(self._network, load_arrays(weights))
+        arrays = load_arrays(weights)
+        self._network = FRPDF(architecture_of(arrays)) if name == "frpdf" else NETWORKS[name]()
+        set_weights(self._network, arrays)
         self._device = "cuda" if torch.cuda.is_available() else "cpu"
         if self._device == "cpu":
             train_on_cpu(self._network)

@@ -8,13 +8,13 @@ from rail_extract.core.frpdf.weights import load_arrays
 
 
 def test_a_pass_sees_753_cells_far():
-    assert architecture.RECEPTIVE_RADIUS == 753
+    assert architecture.BASE.receptive_radius == 753
 
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: model.name)
 def test_the_shipped_weights_have_a_layer_for_each_convolution_of_the_stages(model):
     for layers in folding.fold(load_arrays(model.path)):
-        assert sum(layer.reach for layer in layers) == architecture.RECEPTIVE_RADIUS
+        assert sum(layer.reach for layer in layers) == architecture.BASE.receptive_radius
         assert [layer.convolution.dilation for layer in layers] == [1, 1, 1, 3, 7, 15, 31, 63, 127, 1, 1, 1]
         assert [layer.reduction is not None for layer in layers] == [False] * 2 + [True] * 7 + [False] * 3
         assert [layer.is_output for layer in layers] == [False] * 11 + [True]

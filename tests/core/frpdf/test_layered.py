@@ -38,14 +38,14 @@ def cut(raster, pieces):
 @pytest.mark.parametrize("number", [0, 1])
 def test_pieces_joined_give_the_whole_network_amid_an_empty_raster(arrays, radius, whole_pass, name, number):
     engine = engine_of(name, arrays)
-    height, width = 2 * radius + 11, 2 * radius + 30
+    height, width = 2 * radius + 12, 2 * radius + 32
     raster = np.zeros((height, width), dtype=np.float32)
-    raster[radius:-radius, radius:-radius] = noise(11, 30)
+    raster[radius:-radius, radius:-radius] = noise(12, 32)
     state = np.full_like(raster, 0.5) if number == 0 else raster
     # Beyond the reach of the rail cells, the whole network still sees the border of its raster.
     seen, known = (np.pad(one, radius, constant_values=one[0, 0]) for one in (raster, state))
     expected = 1 / (1 + np.exp(-whole_pass(arrays, seen, known, number)[radius:-radius, radius:-radius]))
-    pieces = quarters(height, width, 70, 120)
+    pieces = quarters(height, width, radius + 4, radius + 20)
     found = engine.sweep(cut(raster, pieces), cut(state, pieces), number, pieces, SILENT)
     for part, of_whole in zip(found, cut(expected, pieces)):
         np.testing.assert_allclose(part, of_whole, atol=1e-4)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.frpdf.architecture import RECEPTIVE_RADIUS
+from rail_extract.core.frpdf.architecture import BASE
 
 torch = pytest.importorskip("torch")
 
@@ -32,11 +32,11 @@ def test_a_cell_is_influenced_from_at_most_753_cells_away():
     for name, parameter in network.named_parameters():
         if name.endswith("0.weight") and parameter.dim() == 4:
             parameter.data.abs_()  # nothing cancels, no ReLU closes
-    length = 2 * RECEPTIVE_RADIUS + 21
+    length = 2 * BASE.receptive_radius + 21
     strip = torch.ones(1, 2, 1, length, requires_grad=True)
     network.layer(strip)[0, 0, 0, length // 2].backward()
     seen = np.flatnonzero(strip.grad.abs().sum(dim=(0, 1, 2)).numpy()) - length // 2
-    assert (seen.min(), seen.max()) == (-RECEPTIVE_RADIUS, RECEPTIVE_RADIUS)
+    assert (seen.min(), seen.max()) == (-BASE.receptive_radius, BASE.receptive_radius)
 
 
 def test_the_first_pass_has_separate_batch_statistics(network):

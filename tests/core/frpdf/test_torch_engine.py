@@ -97,4 +97,4 @@ def test_memory_that_pytorch_does_not_get_asks_for_smaller_parts(arrays):
     piece = Piece(0, 0, 1 << 24, 1 << 24)  # 3e14 cells: no computer has memory for them
     engine._load = lambda array: torch.empty((2, piece.height, piece.width))
     with pytest.raises(DeviceExhaustedError):
-        engine.sweep([np.zeros((1, 1))], [np.zeros((1, 1))], 0, [piece], Progress())
+        engine.sweep([np.zeros((4, 4))], [np.zeros((4, 4))], 0, [piece], Progress())

@@ -157,12 +157,12 @@ def test_the_command_leaves_weights_that_the_engines_take(small, tmp_path):
     assert not np.allclose(means[0], means[1])
 
 
-@pytest.mark.parametrize("name", NETWORKS)
+@pytest.mark.parametrize("name", sorted(set(NETWORKS) - {"fast"}))
 def test_the_networks_have_the_same_number_of_parameters(name):
     assert parameter_count(NETWORKS[name]()) == pytest.approx(parameter_count(NETWORKS["frpdf"]()), rel=0.05)
 
 
-@pytest.mark.parametrize("name", ["unet", "acnn", "pooled", "skipping"])
+@pytest.mark.parametrize("name", ["fast", "unet", "acnn", "pooled", "skipping"])
 def test_other_networks_are_trained_and_run_like_frpdf(small, tmp_path, name, monkeypatch):
     monkeypatch.setattr(train, "CROPS", ((128, 1),))
     settings = train.Settings(1, 0.003, 3, "cpu", network=name, passes=1)
