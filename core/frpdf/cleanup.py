@@ -8,7 +8,7 @@ from ..errors import DeviceExhaustedError
 from ..progress import SILENT, Progress
 from ..raster import TILE, RailRaster
 from . import DEFAULT_PASSES, FEEDBACK_THRESHOLD, MAX_PASSES, OUTPUT_THRESHOLD, START
-from .corridor import Piece, lay_fields
+from .corridor import Field, Piece, lay_fields
 from .engine import Engine
 
 MARGIN = 64
@@ -48,22 +48,43 @@ def clean(raster: RailRaster, engine: Engine, passes: int = DEFAULT_PASSES, prog
     """
     most = max_passes(passes)
     state, output = None, raster
+    laid: dict[int, list[Field]] = {}
     for number in range(most):
         step = progress.span(number / most, (number + 1) / most)
         before = output
-        state, output = _run_pass(raster, state, engine, number, step)
+        state, output = _run_pass(raster, state, engine, number, laid, step)
         if passes == UNTIL_STABLE and number > 0 and is_stable(_changed(before, output), output.count()):
             break
     return output
 
 
 def _run_pass(
-    raster: RailRaster, state: RailRaster | None, engine: Engine, number: int, progress: Progress
+    raster: RailRaster,
+    state: RailRaster | None,
+    engine: Engine,
+    number: int,
+    laid: dict[int, list[Field]],
+    progress: Progress,
 ) -> tuple[RailRaster, RailRaster]:
-    """Run one pass; return the state of the next pass, and the result if this pass is the last one."""
+    """Run one pass; return the state of the next pass, and the result if this pass is the last one.
+
+    Parameters
+    ----------
+    raster : RailRaster
+    state : RailRaster, optional
+        Result of the pass before.
+    engine : Engine
+    number : int
+        Number of the pass, from 0.
+    laid : dict of int to list of Field
+        Fields by the engine's `max_cells`, which all passes share; the missing ones are added.
+    progress : Progress
+    """
     while True:
         following, output = _Canvas(raster), _Canvas(raster)
-        fields = lay_fields(raster, engine.max_cells)
+        if engine.max_cells not in laid:
+            laid[engine.max_cells] = lay_fields(raster, engine.max_cells)
+        fields = laid[engine.max_cells]
         try:
             for field, step in zip(fields, progress.split(len(fields))):
                 seen = [raster.read(*piece.window).astype(np.float32) for piece in field.pieces]

