@@ -186,14 +186,14 @@ def _tiles_of(cells: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
     if len(cells) == 0:
         return {}
     cells = np.asarray(cells, dtype=np.int64)
-    tile_indices, tile_of_cell = np.unique(cells // TILE, axis=0, return_inverse=True)
-    tile_of_cell = tile_of_cell.ravel()
-    order = np.argsort(tile_of_cell, kind="stable")
-    borders = np.searchsorted(tile_of_cell[order], np.arange(len(tile_indices) + 1))
+    rows, columns = (cells // TILE).T
+    number = (rows - rows.min()) * (columns.max() - columns.min() + 1) + columns - columns.min()
+    order = np.argsort(number, kind="stable")
+    borders = np.flatnonzero(np.diff(number[order])) + 1
     tiles = {}
-    for number, (tile_row, tile_column) in enumerate(tile_indices.tolist()):
-        inside = cells[order[borders[number] : borders[number + 1]]] % TILE
+    for mine in np.split(order, borders):
+        inside = cells[mine] % TILE
         tile = np.zeros((TILE, TILE), dtype=bool)
         tile[inside[:, 0], inside[:, 1]] = True
-        tiles[tile_row, tile_column] = tile
+        tiles[int(rows[mine[0]]), int(columns[mine[0]])] = tile
     return tiles

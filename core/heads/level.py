@@ -62,8 +62,8 @@ def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
     (n,) array
     """
     number = np.floor((t - t[0]) / LEVEL_BIN_M).astype(int)
-    _, first, number, count = np.unique(number, return_index=True, return_inverse=True, return_counts=True)
-    middle = first + count // 2
+    first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
+    middle = first + np.diff(np.append(first, len(t))) // 2
     middle_t, middle_z = t[middle], z[np.lexsort((z, number))][middle]
     return np.interp(t, middle_t, _median_filtered(middle_t, middle_z))
 

@@ -9,6 +9,7 @@ raster-to-vector conversion", 2002. Formulas: docs/method.md section 5.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import comb
 
 import numpy as np
@@ -116,33 +117,44 @@ def _left_moments(t: np.ndarray, line: np.ndarray) -> tuple[np.ndarray, np.ndarr
     ends, slopes = line[1:], np.diff(line, axis=0) / steps[:, None]
     orders = np.arange(_MOMENTS)
     integral = factorial(orders) * gammainc(orders + 1.0, steps[:, None])
-    alone = integral[:, :, None]
     times_line = integral[:, :3, None] * ends[:, None, :] - integral[:, 1:4, None] * slopes[:, None, :]
-    return _scan(steps, alone), _scan(steps, times_line)
+    # With the vertices innermost, each operation runs through one stretch of memory.
+    alone, times_line = _scan(steps, integral.T[:, None], times_line.transpose(1, 2, 0))
+    return alone.transpose(2, 0, 1), times_line.transpose(2, 0, 1)
 
 
-def _scan(steps: np.ndarray, moments: np.ndarray) -> np.ndarray:
-    """Accumulate the moments of all segments before each vertex, (n segments, k, d) to (n + 1, k, d).
+def _scan(steps: np.ndarray, *moments: np.ndarray) -> list[np.ndarray]:
+    """Accumulate the moments of all segments before each vertex, each (k, d, n segments) to (k, d, n + 1).
 
     Each round doubles the section behind every vertex, until all sections exceed the reach of the kernel.
     """
-    span, total = steps.copy(), moments.copy()
+    span = steps.copy()
+    totals = [np.concatenate([np.zeros((*one.shape[:2], 1)), one], axis=2) for one in moments]
     offset = 1
     while offset < len(span) and span[offset:].min() < REACH_SIGMAS:
-        total[offset:] += _shifted(total[:-offset], span[offset:])
+        powers = [np.ones(len(span) - offset)]
+        for _ in range(_MOMENTS - 1):
+            powers.append(powers[-1] * span[offset:])
+        decay = np.exp(-span[offset:])
+        for total in totals:
+            total[..., 1 + offset :] += _shifted(total[..., 1:-offset], powers, decay)
         span[offset:] = span[offset:] + span[:-offset]
         offset *= 2
-    return np.concatenate([np.zeros((1, *total.shape[1:])), total])
+    return totals
 
 
-def _shifted(moments: np.ndarray, by: np.ndarray) -> np.ndarray:
-    """Convert moments to vertices that are `by`, (n,), further along: (u + by)^k by the binomial theorem."""
-    powers = [np.ones_like(by)]
-    for _ in range(moments.shape[1] - 1):
-        powers.append(powers[-1] * by)
+def _shifted(moments: np.ndarray, powers: Sequence[np.ndarray], decay: np.ndarray) -> np.ndarray:
+    """Convert moments, (k, d, n), to vertices further along: (u + by)^k exp(-by) by the binomial theorem.
+
+    Parameters
+    ----------
+    moments : (k, d, n) array
+    powers : sequence of (n,) arrays
+        Powers of the distances `by`, from 0.
+    decay : (n,) array
+        exp(-by).
+    """
     shifted = np.empty_like(moments)
-    for order in range(moments.shape[1]):
-        shifted[:, order] = sum(
-            (comb(order, lower) * powers[order - lower])[:, None] * moments[:, lower] for lower in range(order + 1)
-        )
-    return shifted * np.exp(-by)[:, None, None]
+    for order in range(len(moments)):
+        shifted[order] = sum(comb(order, lower) * powers[order - lower] * moments[lower] for lower in range(order + 1))
+    return shifted * decay
