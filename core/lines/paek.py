@@ -118,7 +118,7 @@ def _left_moments(t: np.ndarray, line: np.ndarray) -> tuple[np.ndarray, np.ndarr
     orders = np.arange(_MOMENTS)
     integral = factorial(orders) * gammainc(orders + 1.0, steps[:, None])
     times_line = integral[:, :3, None] * ends[:, None, :] - integral[:, 1:4, None] * slopes[:, None, :]
-    # With the vertices innermost, each operation runs through one stretch of memory.
+    # With the vertices innermost, each operation reads memory in order.
     alone, times_line = _scan(steps, integral.T[:, None], times_line.transpose(1, 2, 0))
     return alone.transpose(2, 0, 1), times_line.transpose(2, 0, 1)
 

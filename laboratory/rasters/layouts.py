@@ -65,7 +65,7 @@ def random_layout(rng: np.random.Generator, size: TrackSize, family: str | None 
     rng : numpy Generator
     size : TrackSize
     family : str, optional
-        One of `FAMILIES` or `RARE_FAMILIES`; by default, one of the former is drawn by `WEIGHTS`.
+        One of `FAMILIES` or `RARE_FAMILIES`; by default, one of `FAMILIES` is drawn by `WEIGHTS`.
     """
     if family is None:
         names = list(WEIGHTS)

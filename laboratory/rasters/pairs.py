@@ -85,7 +85,7 @@ def random_pair(
     ratio : float, optional
         Gauge divided by railhead width; by default, `random_ratio`.
     family : str, optional
-        One of `layouts.FAMILIES` or `layouts.RARE_FAMILIES`. By default one of the former is drawn, and some pairs are
+        One of `layouts.FAMILIES` or `layouts.RARE_FAMILIES`. By default one of `FAMILIES` is drawn, and some pairs are
         empty.
     thin : bool
         Whether rails have few points; see `distortion.THIN_DENSITY`.

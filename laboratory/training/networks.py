@@ -1,7 +1,7 @@
 """The networks that can be trained: FRPDF, its fast form, two other networks, and FRPDF with one of its choices undone.
 
-All but the fast form have the same number of parameters within 5 %, and all have the recurrence, batch norm and statistics
-per pass of FRPDF, so that a comparison shows the effect of the architecture.
+All have the recurrence, batch norm and statistics per pass of FRPDF, and all but the fast form the same number of
+parameters within 5 %, so that a comparison shows the effect of the architecture.
 """
 
 from __future__ import annotations

@@ -7,7 +7,16 @@ import pytest
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.rasters.alignments import MIN_RADIUS_M, bend, bent, random_alignment, shifted
 from rail_extract.laboratory.rasters.fittings import FLANGEWAY_M, crossing
-from rail_extract.laboratory.rasters.layouts import FAMILIES, WEIGHTS, ladder, random_layout
+from rail_extract.laboratory.rasters.layouts import (
+    BLADE_OPENING_M,
+    FAMILIES,
+    WEIGHTS,
+    ladder,
+    open_blade,
+    random_layout,
+    slip,
+    third_rail_end,
+)
 from rail_extract.laboratory.rasters.paths import NO_TRACK, TrackSize, track
 from rail_extract.laboratory.rasters.turnouts import FORMS, TurnoutForm, branch, crossover, turnout
 from scipy.spatial import cKDTree
@@ -193,3 +202,32 @@ def test_a_reverse_curve_turns_both_ways():
     axis = bend(np.random.default_rng(1), 100.0, (1, -1))
     assert axis.curvature.max() > 1 / 150
     assert axis.curvature.min() < -1 / 150
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_open_blade_stands_off_its_stock_rail_and_every_rail_keeps_its_gauge_elsewhere(seed):
+    rails = [rail.xy for rail in open_blade(np.random.default_rng(seed), SIZE).rails]
+    # The tip is the end of a rail that is nearest to another rail without being on it.
+    tips = [
+        cKDTree(np.concatenate([other for other in rails if other is not rail])).query(rail[0])[0] for rail in rails
+    ]
+    off = [tip for tip in tips if 0.05 < tip < 0.5]
+    assert len(off) == 1
+    assert BLADE_OPENING_M[0] - 0.02 < off[0] < BLADE_OPENING_M[1] + 0.02
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_slip_joins_the_two_tracks_that_cross(seed):
+    layout = slip(np.random.default_rng(seed), SIZE)
+    assert len(layout.rails) in (6, 8)
+    crossing_rails = cKDTree(np.concatenate([rail.xy for rail in layout.rails[:4]]))
+    for rail in layout.rails[4:]:
+        assert crossing_rails.query(rail.xy[[0, -1]])[0].max() < 0.03
+        assert crossing_rails.query(rail.xy)[0].max() > 0.2
+
+
+def test_a_third_rail_ends_where_the_raster_shows_it():
+    layout = third_rail_end(np.random.default_rng(0), SIZE)
+    left, right, third = (len(rail.xy) for rail in layout.rails)
+    assert left == right > third
+    assert np.array_equal(layout.spots[0], layout.rails[2].xy[-1])

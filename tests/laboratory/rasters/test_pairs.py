@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from rail_extract.laboratory.curves import Element, trace
+from rail_extract.laboratory.rasters import pairs
 from rail_extract.laboratory.rasters.distortion import LABEL_WAVELENGTH_M, draw_pair
 from rail_extract.laboratory.rasters.drawing import Window, draw_label, scan_coverage, scan_profiles
-from rail_extract.laboratory.rasters.layouts import FAMILIES
+from rail_extract.laboratory.rasters.layouts import FAMILIES, RARE_FAMILIES
 from rail_extract.laboratory.rasters.noise import flip, shadows
 from rail_extract.laboratory.rasters.pairs import BASE_RATIO, random_pair
 from rail_extract.laboratory.rasters.paths import Layout, RailPath
@@ -154,3 +155,21 @@ def test_ballast_is_next_to_the_rails():
         [flip(np.random.default_rng(seed), label, label, 1.0, 0.04) & ~label for seed in range(30)], axis=0
     )
     assert strays[:, 120:138].mean() > 2 * strays[:, :60].mean()
+
+
+def test_thin_rails_have_a_few_cells_per_metre():
+    pair = draw_pair(np.random.default_rng(2), track_layout(), WINDOW, WIDTH, 0.1, thin=True)
+    length_m = 0.04 * pair.label.sum() / (WIDTH / 0.04)
+    near = ndimage.binary_dilation(pair.label, np.ones((3, 3)))
+    assert 2 < (pair.observed & near).sum() / length_m < 24
+
+
+def test_training_draws_thin_rails_and_rare_layouts(monkeypatch):
+    drawn = []
+    monkeypatch.setattr(pairs, "random_pair", lambda *arguments: drawn.append(arguments[3:]))
+    for seed in range(1000):
+        pairs.training_pair(np.random.default_rng(seed), 64)
+    families = [family for _, family, _ in drawn]
+    assert 0.8 < families.count(None) / 1000 < 0.9
+    assert {family for family in families if family} == set(RARE_FAMILIES)
+    assert 0.1 < sum(thin for _, _, thin in drawn) / 1000 < 0.2

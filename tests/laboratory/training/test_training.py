@@ -205,8 +205,8 @@ def test_learning_curves_average_consecutive_steps_and_count_repeated_ones_once(
 
 
 def test_a_training_for_a_ratio_draws_rails_of_that_width(small, monkeypatch):
-    drawn, draw = [], train.random_pair
-    monkeypatch.setattr(train, "random_pair", lambda rng, side, ratio: drawn.append(ratio) or draw(rng, side))
+    drawn, draw = [], train.training_pair
+    monkeypatch.setattr(train, "training_pair", lambda rng, side, ratio: drawn.append(ratio) or draw(rng, side))
     for step in range(5):
         train.batch(train.Settings(5, 0.003, 0, "cpu", ratio=22.2), train.DATA, step)
     assert all(abs(np.log(ratio / 22.2)) <= 0.06 for ratio in drawn)
