@@ -37,6 +37,7 @@ from .steps import (
     tracks_of,
     warn_of_rails,
     warn_of_split_classes,
+    warn_of_steps,
     warn_of_strips,
     whole_rails,
     with_tracks,
@@ -221,6 +222,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
     rails = with_tracks(rails, centerlines, progress)
     warn_of_split_classes(rails, parameters, progress)
     warn_of_strips(rails, parameters, progress)
+    warn_of_steps(centerlines, progress)
     heads = head_widths(sources[0], parameters.head_width_m, progress) if rails else None
     geometry = _measure_tracks(centerlines, rails, sources, parameters, runner, measuring)
     if geometry:

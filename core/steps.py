@@ -37,6 +37,7 @@ from .squares.pieces import SquareRails, trim
 from .squares.seams import join
 from .standards import distinct_gauges
 from .tracks.centerlines import CenterlineParameters, build_centerlines
+from .tracks.jumps import find_steps
 from .tracks.lone import assign_tracks
 from .vectorize import vectorize
 
@@ -207,6 +208,25 @@ def warn_of_rails(rails: Sequence[RailLine], class_code: int, parameters: Parame
     if not rails:
         progress.warning(f"Class {class_code} shows no rail: check the rail classes, the standard and MIN_LENGTH.")
     warn_if_out_of_reach(rails, parameters.head_width_m, parameters.smoothing_xy_m, progress)
+
+
+def warn_of_steps(centerlines: Sequence[Centerline], progress: Progress) -> None:
+    """Warn the user of tracks that step to the side.
+
+    Parameters
+    ----------
+    centerlines : sequence of Centerline
+    progress : Progress
+    """
+    found = [(line.track_id, *step) for line in centerlines for step in find_steps(line.xyz)]
+    if found:
+        listed = ", ".join(
+            f"{1000 * abs(step_m):.0f} mm at {at_m:.0f} m of track {track}" for track, at_m, step_m in found[:3]
+        )
+        more = f" and {len(found) - 3} more" if len(found) > 3 else ""
+        progress.warning(
+            f"Tracks step to the side, as none does: {listed}{more}. Passes of the scanner that meet there lie apart."
+        )
 
 
 def warn_of_strips(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> None:

@@ -1,0 +1,37 @@
+"""Steps of tracks to the side."""
+
+import numpy as np
+import pytest
+from rail_extract.core.tracks.jumps import find_steps
+from rail_extract.laboratory.curves import Element, trace, transition_curve
+
+
+def stepped(curve, at_m, step_m):
+    """Return a line along a curve that moves to the left by a step, drawn 2 m long."""
+    share = 1 / (1 + np.exp(-4 * (curve.chainage - at_m)))
+    return curve.xy + (step_m * share)[:, None] * curve.left_normal
+
+
+@pytest.mark.parametrize("step_m", [0.03, -0.015])
+@pytest.mark.parametrize("radius_m", [300.0, 3000.0])
+def test_a_step_is_found_with_its_size(step_m, radius_m):
+    curve = trace([Element(80.0, 1 / radius_m, 1 / radius_m)], heading=0.7)
+    ((at_m, found_m),) = find_steps(stepped(curve, 33.0, step_m))
+    assert at_m == pytest.approx(33.0, abs=0.3)
+    assert found_m == pytest.approx(step_m, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    "elements",
+    [
+        [Element(40.0), Element(30.0, 1 / 190, 1 / 190), Element(30.0)],
+        transition_curve(15, 6, 38, 1 / 30),
+        transition_curve(10, 25, 20, 1 / 250),
+    ],
+)
+def test_what_tracks_do_is_no_step(elements):
+    rng = np.random.RandomState(0)
+    curve = trace(elements, heading=2.0)
+    wave = 0.001 * np.sin(curve.chainage * 2 * np.pi / rng.uniform(4, 20))
+    assert find_steps(curve.xy + wave[:, None] * curve.left_normal) == []
+    assert find_steps(curve.xy[:20]) == []
