@@ -44,6 +44,9 @@ from .vectorize import vectorize
 MIN_STRIPS_APART_M = 5.0
 """Length of rail on which strips are apart from which the user is warned; they are compared over twice this length."""
 
+MAX_LISTED = 3
+"""Steps that a warning lists."""
+
 LARGEST_PERCENT = 95.0
 """Percentile of the distances that is stated as the largest: switches and crossings make some of them wrong."""
 
@@ -220,12 +223,12 @@ def warn_of_steps(centerlines: Sequence[Centerline], progress: Progress) -> None
     """
     found = [(line.track_id, *step) for line in centerlines for step in find_steps(line.xyz)]
     if found:
-        listed = ", ".join(
-            f"{1000 * abs(step_m):.0f} mm at {at_m:.0f} m of track {track}" for track, at_m, step_m in found[:3]
-        )
-        more = f" and {len(found) - 3} more" if len(found) > 3 else ""
+        largest = sorted(found, key=lambda one: -abs(one[2]))[:MAX_LISTED]
+        words = [f"{1000 * abs(step_m):.0f} mm at {at_m:.0f} m of track {track}" for track, at_m, step_m in largest]
+        more = f" and {len(found) - MAX_LISTED} more" if len(found) > MAX_LISTED else ""
         progress.warning(
-            f"Tracks step to the side, as none does: {listed}{more}. Passes of the scanner that meet there lie apart."
+            f"Tracks step to the side, as none does: {', '.join(words)}{more}. "
+            "Passes of the scanner that meet there lie apart."
         )
 
 
