@@ -14,6 +14,9 @@ STRIPS = (AS_THEY_ARE, ALIGNED)
 DEFAULT_STEP_M = 1.0
 """Distance between the stations of the track geometry, once it is asked for."""
 
+DEFAULT_GUIDE_DISTANCE_M = 4.0
+"""Distance from a guide within which rails are searched: its own track, and as much as a map is off."""
+
 
 @dataclass(frozen=True)
 class Parameters:

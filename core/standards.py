@@ -226,7 +226,7 @@ def _custom(gauge_m: float, head_width_m: float) -> RailStandard:
     return RailStandard(CUSTOM, label, gauge_m, head_width_m)
 
 
-def distinct_gauges(gauges_m: Sequence[float], tolerance_m: float) -> tuple[float, ...]:
+def distinct_gauges(gauges_m: Sequence[float], tolerance_m: float, has_parameter: bool = True) -> tuple[float, ...]:
     """Return the gauges to pair rails by, without repetitions.
 
     Parameters
@@ -234,6 +234,8 @@ def distinct_gauges(gauges_m: Sequence[float], tolerance_m: float) -> tuple[floa
     gauges_m : sequence of float
     tolerance_m : float
         Largest deviation of a track from its gauge.
+    has_parameter : bool
+        Whether the user can choose the tolerance.
 
     Raises
     ------
@@ -246,9 +248,12 @@ def distinct_gauges(gauges_m: Sequence[float], tolerance_m: float) -> tuple[floa
         _check("gauge", 1000 * gauge_m, GAUGE_RANGE_MM)
     for low, high in zip(sorted(distinct), sorted(distinct)[1:]):
         if high - low < tolerance_m:
+            within, remedy = "", ""
+            if has_parameter:
+                within, remedy = f" within CENTERLINE_TOLERANCE ({tolerance_m:g} m)", ", or a smaller tolerance"
             raise ParameterError(
-                f"Gauges of {1000 * low:g} and {1000 * high:g} mm can't be distinguished within CENTERLINE_TOLERANCE "
-                f"({tolerance_m:g} m): give one of them, or a smaller tolerance."
+                f"Gauges of {1000 * low:g} and {1000 * high:g} mm can't be distinguished{within}: give one of "
+                f"them{remedy}."
             )
     return distinct
 

@@ -27,6 +27,8 @@ class Figures:
         Cells of railheads.
     squares, thin, paved : int
         Squares with rails; those among them that are thin, and those with rails in pavement.
+    along_m, across_m : float
+        Length of rails near the guide that run along it, and across it, whether they are kept or not.
     """
 
     points: int = 0
@@ -36,6 +38,8 @@ class Figures:
     squares: int = 0
     thin: int = 0
     paved: int = 0
+    along_m: float = 0.0
+    across_m: float = 0.0
 
     def __add__(self, other: Figures) -> Figures:
         return Figures(*(one + more for one, more in zip(astuple(self), astuple(other))))

@@ -5,7 +5,6 @@ The head is as high as the pavement around it. Its axis follows from the groove 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +15,7 @@ from .bed import Coarse
 from .lines import Lines, Marks, find_lines
 from .partner import partners
 from .pieces import lengths, links, pieces_of
+from .settings import Settings
 from .tops import Grid
 
 MIN_POINTS, MIN_SHARE, LEVEL_M, NEAR_BED_M = 60, 0.65, 0.008, 0.03
@@ -70,10 +70,13 @@ class Flush:
         Numbers of the points on heads.
     lines : Lines
         Axes of the heads.
+    rails : Lines
+        Those that the guide leaves out as well.
     """
 
     points: np.ndarray
     lines: Lines
+    rails: Lines
 
 
 def flush_rails(
@@ -83,8 +86,7 @@ def flush_rails(
     height: np.ndarray,
     grid: Grid,
     cell: np.ndarray,
-    gauges_m: Sequence[float],
-    head_width_m: float,
+    settings: Settings,
 ) -> Flush:
     """Find rails in pavement.
 
@@ -98,10 +100,10 @@ def flush_rails(
     grid : Grid
     cell : (n,) int array
         Cell of each of these points.
-    gauges_m : sequence of float
-    head_width_m : float
+    settings : Settings
     """
-    nothing = Flush(np.empty(0, dtype=np.int64), NO_LINES)
+    nothing = Flush(np.empty(0, dtype=np.int64), NO_LINES, NO_LINES)
+    head_width_m = settings.head_width_m
     level_m = _pavement(coarse, coarse.cell[near], height)
     if not np.isfinite(level_m).any():
         return nothing
@@ -115,9 +117,19 @@ def flush_rails(
     lines = find_lines(Marks(marks, np.zeros(len(marks))), REACH_M, 1.0, STRIP_M)
     lines = lines.of((lines.cover >= MIN_COVER) & (lines.pure >= MIN_PURE))
     flat = np.flatnonzero(np.abs(below) < HEAD_LEVEL_M)
-    heads = [_at_edge(_heads(lines, gauge_m, head_width_m), xy[flat], head_width_m) for gauge_m in gauges_m]
+    rails = [_at_edge(_heads(lines, gauge_m, head_width_m), xy[flat], head_width_m) for gauge_m in settings.gauges_m]
+    heads = [_guided(one, settings) for one in rails]
     points = [flat[_on_heads(one, xy[flat], head_width_m)] for one in heads]
-    return Flush(np.unique(np.concatenate(points)), heads[int(np.argmax([len(one) for one in points]))].lines)
+    most = int(np.argmax([len(one.inward) for one in rails]))
+    return Flush(np.unique(np.concatenate(points)), heads[most].lines, rails[most].lines)
+
+
+def _guided(heads: Heads, settings: Settings) -> Heads:
+    """Keep the heads that the guide, if there is one, asks for."""
+    if settings.guide is None:
+        return heads
+    kept = settings.guide.keeps(heads.lines, links(heads.lines), settings.spacings_m, np.inf)
+    return Heads(heads.lines.of(kept), heads.inward[kept])
 
 
 def _pavement(coarse: Coarse, cell: np.ndarray, height: np.ndarray) -> np.ndarray:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..raster import cell_size
+from .guide import Guide
 
 SQUARE_CELLS = 1024
 """Side of the squares that are classified one after another, in cells: 41 m at 1435 mm, images of 2 to 4 MB."""
@@ -90,11 +91,14 @@ class Settings:
     head_width_m : float
     keep_single : bool
         Whether straight rails of some length without a partner are kept.
+    guide : Guide, optional
+        Where to search; in metres from the zero of the coordinate system, or from the corner of the square.
     """
 
     gauges_m: tuple[float, ...]
     head_width_m: float
     keep_single: bool = True
+    guide: Guide | None = None
 
     @property
     def cell_m(self) -> float:
@@ -105,6 +109,17 @@ class Settings:
     def side_m(self) -> float:
         """Side of a square, metres."""
         return SQUARE_CELLS * self.cell_m
+
+    @property
+    def spacings_m(self) -> list[float]:
+        """Distances of the two heads of a track, metres, by gauge."""
+        return [gauge_m + self.head_width_m for gauge_m in self.gauges_m]
+
+    def at(self, key: tuple[int, int]) -> Settings:
+        """Return the settings for the square in this column and row."""
+        if self.guide is None:
+            return self
+        return replace(self, guide=self.guide.around(np.multiply(key, self.side_m), self.side_m))
 
     def own(self, xy: np.ndarray) -> np.ndarray:
         """Return which of (n, 2) or (n, 3) places, in metres from a square's corner, lie in the square, (n,) bool."""

@@ -109,7 +109,7 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> Classified:
     grid, cell = Grid.around(x[near], y[near], settings.cell_m)
     tops = tops_of(grid, cell, height, z[near])
     standing = _standing(xyz[near, :2], cell, height, coarse, tops, settings)
-    flush = flush_rails(coarse, near, xyz[near, :2], height, grid, cell, settings.gauges_m, settings.head_width_m)
+    flush = flush_rails(coarse, near, xyz[near, :2], height, grid, cell, settings)
     rail = nothing.rail
     found = near[np.union1d(standing.points, flush.points)]
     rail[found[settings.own(xyz[found])]] = True
@@ -127,11 +127,14 @@ class Standing:
     kept : Kept
     thin : bool
         Whether the square is thin.
+    rails : Kept
+        Those that the guide leaves out as well.
     """
 
     points: np.ndarray
     kept: Kept
     thin: bool
+    rails: Kept
 
 
 def _standing(
@@ -148,8 +151,11 @@ def _standing(
     chosen = label(tops, heads, cell, height, tolerances)
     beside = Near.find(xy[chosen], kept.lines)
     narrow = _narrow(kept, beside, settings, tolerances)
-    on = beside.on(settings.head_width_m / 2 + tolerances.beside_m, narrow[beside.cell])
-    return Standing(chosen[on], kept.of(narrow), tolerances is THIN)
+    wanted = narrow.copy()
+    if settings.guide is not None:
+        wanted &= settings.guide.keeps(kept.lines, kept.pairs, settings.spacings_m, tolerances.partner_m)
+    on = beside.on(settings.head_width_m / 2 + tolerances.beside_m, wanted[beside.cell])
+    return Standing(chosen[on], kept.of(wanted), tolerances is THIN, kept.of(narrow))
 
 
 def _figures(
@@ -159,6 +165,7 @@ def _figures(
     kept = standing.kept
     share_m = np.where(settings.own(kept.lines.axis), shares_of_length(kept.lines, settings.head_width_m), 0.0)
     flush_m = shares_of_length(flush.lines, settings.head_width_m)[settings.own(flush.lines.axis)]
+    near_m = _beside_guide(standing.rails.lines, settings) + _beside_guide(flush.rails, settings)
     there = bool(rail.any())
     return Figures(
         points=int(rail.sum()),
@@ -168,7 +175,17 @@ def _figures(
         squares=int(there),
         thin=int(there and standing.thin),
         paved=int(len(flush_m) > 0),
+        along_m=float(near_m[0]),
+        across_m=float(near_m[1]),
     )
+
+
+def _beside_guide(lines: Lines, settings: Settings) -> np.ndarray:
+    """Length of rails in the square that run along the guide, and across it, (2,) metres."""
+    if settings.guide is None or not len(lines.axis):
+        return np.zeros(2)
+    share_m = np.where(settings.own(lines.axis), shares_of_length(lines, settings.head_width_m), 0.0)
+    return np.array([share_m[chosen].sum() for chosen in settings.guide.crosses(lines)])
 
 
 def _density(coarse: Coarse, xy: np.ndarray) -> float:
@@ -194,8 +211,7 @@ def _kept(
     lines = centred(lines.of(good), Marks(tops.grid.middles(cells), top_m[cells]), half_m, tolerances.along_m)
     free = stands_free(tops, marks[good], lines)
     lines, marks = lines.of(free), marks[good[free]]
-    spacings_m = [gauge_m + settings.head_width_m for gauge_m in settings.gauges_m]
-    paired = stations_with_partner(lines, spacings_m, tolerances.partner_m) >= MIN_STATIONS
+    paired = stations_with_partner(lines, settings.spacings_m, tolerances.partner_m) >= MIN_STATIONS
     pairs = links(lines)
     kept = Kept(lines, marks, paired, pairs).of(_certain(lines, paired, pairs))
     inside = runs_inside(kept.lines, kept.paired, kept.pairs, settings.gauges_m, settings.head_width_m)

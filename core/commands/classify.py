@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ..classify.guide import Guide
 from ..classify.settings import Settings
-from ..clouds.points import ask
+from ..clouds.points import Request, ask
 from ..disk import writing
 from ..errors import ParameterError
 from ..labelling.files import Choice, classify_files, plan_output
-from ..parameters import Parameters
+from ..labelling.finding import guide_of
+from ..parameters import DEFAULT_GUIDE_DISTANCE_M
 from ..progress import Estimating
 from ..scratch import scratch_folder
 from ..standards import LAST_CLASS, RAIL_CLASS, SEARCHED_CLASSES, resolve
@@ -23,6 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "LAZ or LAS file; for several tiles, the name of their new folder, with .vpc added for the catalogue"
     parser.add_argument("--output", type=Path, required=True, help=text)
     add_cloud_arguments(parser)
+    text = "lines along the tracks, in a file such as GeoPackage or GeoJSON: search near them only"
+    parser.add_argument("--guide", type=Path, metavar="FILE", help=text)
+    text = f"how far the middle of a track may be from the guide (default: {DEFAULT_GUIDE_DISTANCE_M:g})"
+    parser.add_argument("--guide-distance", type=float, default=DEFAULT_GUIDE_DISTANCE_M, metavar="M", help=text)
+    text = "keep only tracks that have the guide within 0.5 m of their middle"
+    parser.add_argument("--only-guided", action="store_true", help=text)
     parser.add_argument("--pairs-only", action="store_true", help="leave out rails without a partner")
     text = f"class of the rail points that are found (default: {RAIL_CLASS})"
     parser.add_argument("--rail-class", type=int, default=RAIL_CLASS, metavar="N", help=text)
@@ -42,8 +50,9 @@ def run(args: argparse.Namespace) -> None:
     if not 0 <= args.rail_class <= LAST_CLASS:
         raise ParameterError(f"--rail-class must be a number from 0 to {LAST_CLASS}, not {args.rail_class}.")
     standard = resolve(args.standard, args.gauge, args.head_width)
-    gauges_m = gauges_of(args, standard, Parameters.centerline_tolerance_m)
-    settings = Settings(gauges_m, standard.head_width_m, keep_single=not args.pairs_only)
+    gauges_m = gauges_of(args, standard)
+    if args.only_guided and args.guide is None:
+        raise ParameterError("--only-guided needs lines to compare tracks with: give --guide.")
     choice = Choice(args.rail_class, args.rails_only, not args.no_reset)
     progress = Estimating(Console())
     output = args.output if len(args.tiles) == 1 or args.output.suffix else args.output.with_suffix(".vpc")
@@ -51,8 +60,24 @@ def run(args: argparse.Namespace) -> None:
         output.parent.mkdir(parents=True, exist_ok=True)
     planned = plan_output(args.tiles, output, choice.class_code, progress)
     request = ask(args.tiles, SEARCHED_CLASSES, args.crs, extent_of(args.extent), progress)
+    settings = Settings(gauges_m, standard.head_width_m, not args.pairs_only, _guide(args, request))
     with writing(output.parent), scratch_folder(planned.file.parent) as folder:
         result = classify_files(request, settings, choice, planned, folder, progress)
     figures = result.figures
     print(f"{figures.points} of {result.point_count} points are on rails")
     print(f"{figures.paired_m:.0f} m of rails with a partner, {figures.single_m:.0f} m without")
+
+
+def _guide(args: argparse.Namespace, request: Request) -> Guide | None:
+    """Read the guide, if there is one."""
+    if args.guide is None:
+        return None
+    try:
+        from .guide import read_lines
+    except ImportError as error:
+        raise ParameterError(
+            "--guide needs the packages pyogrio and shapely: in a clone, run pip install .[cluster]."
+        ) from error
+
+    lines = read_lines(args.guide, request.zero.crs_wkt)
+    return guide_of(request, lines, args.guide_distance, args.only_guided)

@@ -6,6 +6,7 @@ import argparse
 import sys
 
 from ..errors import ParameterError
+from ..parameters import Parameters
 from ..progress import Progress
 from ..standards import DEFAULT, RailStandard, distinct_gauges
 
@@ -27,15 +28,15 @@ def add_cloud_arguments(parser: argparse._ActionsContainer) -> None:
     )
 
 
-def gauges_of(args: argparse.Namespace, standard: RailStandard, tolerance_m: float) -> tuple[float, ...]:
+def gauges_of(args: argparse.Namespace, standard: RailStandard, tolerance_m: float | None = None) -> tuple[float, ...]:
     """Return the gauge of the standard and those of `--other-gauges`, metres.
 
     Parameters
     ----------
     args : Namespace
     standard : RailStandard
-    tolerance_m : float
-        Largest deviation of a track from its gauge.
+    tolerance_m : float, optional
+        Largest deviation of a track from its gauge, where the command has an option for it.
 
     Raises
     ------
@@ -43,7 +44,8 @@ def gauges_of(args: argparse.Namespace, standard: RailStandard, tolerance_m: flo
         The text holds something else than numbers, or the gauges can't be distinguished.
     """
     others_mm = numbers_in(args.other_gauges, "--other-gauges", float)
-    return distinct_gauges((standard.gauge_m, *(mm / 1000 for mm in others_mm)), tolerance_m)
+    own_m = Parameters.centerline_tolerance_m if tolerance_m is None else tolerance_m
+    return distinct_gauges((standard.gauge_m, *(mm / 1000 for mm in others_mm)), own_m, tolerance_m is not None)
 
 
 def numbers_in(text: str, option: str, kind: type) -> tuple:

@@ -18,7 +18,8 @@ def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SIL
     Parameters
     ----------
     xyz : (n, 3) array
-        Metres from the zero of the coordinate system, so that the squares do not depend on how files are cut.
+        Metres from the zero of the coordinate system, so that the squares do not depend on how files are cut. With a
+        guide, those that it holds.
     settings : Settings
     progress : Progress
 
@@ -35,7 +36,7 @@ def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SIL
         square = Square.on_grid(key, settings.side_m, zero)
         around_it = [members[one] for one in around(key) if one in members]
         number = np.concatenate([part[square.holds(square.frame.to_local(xyz[part]), MARGIN_M)] for part in around_it])
-        found = classify_square(square.frame.to_local(xyz[number]), settings)
+        found = classify_square(square.frame.to_local(xyz[number]), settings.at(key))
         rail[number[found.rail]] = True
         figures += found.figures
     return Classified(rail, figures)

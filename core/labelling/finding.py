@@ -5,19 +5,20 @@ The files are read once; memory holds one square and its margin (docs/classifica
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ..classify.figures import Figures
+from ..classify.guide import MIDDLE_M, Guide
 from ..classify.settings import MARGIN_M, Settings
 from ..classify.square import classify_square
 from ..clouds.points import Request
 from ..clouds.readers import read_points
 from ..disk import writing
-from ..errors import CloudError, NoRailPointsError
+from ..errors import CloudError, NoRailPointsError, ParameterError
 from ..frame import LocalFrame
 from ..progress import SILENT, Progress
 from ..squares.grid import Key, Square, around, points_by_square
@@ -77,7 +78,7 @@ def find_rail_points(
     Yields
     ------
     Found
-        Only for squares with rail points.
+        Only for squares with rails.
 
     Raises
     ------
@@ -89,18 +90,60 @@ def find_rail_points(
         The disk is full.
     """
     reading, searching = progress.divide((1.0, 1.0))
-    counts = _sort(request, settings.side_m, folder, reading)
+    counts = _sort(request, settings, folder, reading)
     if not counts:
-        where = "cloud" if request.extent is None else "extent"
-        raise NoRailPointsError(f"The {where} contains no points that are neither noise nor withheld: choose another.")
+        raise _nothing_to_search(request, settings.guide)
     for key in searching.follow(sorted(counts)):
         found = _find_in(Square.on_grid(key, settings.side_m, request.zero), counts, settings, folder)
-        if len(found.number):
+        if found.figures != Figures():
             yield found
+
+
+def _nothing_to_search(request: Request, guide: Guide | None) -> NoRailPointsError:
+    where = "cloud" if request.extent is None else "extent"
+    if guide is not None:
+        return NoRailPointsError(
+            f"The {where} has no point within {guide.distance_m:g} m of the guide: check the guide's place and "
+            "coordinate system."
+        )
+    return NoRailPointsError(f"The {where} contains no points that are neither noise nor withheld: choose another.")
+
+
+def guide_of(request: Request, lines: Sequence[np.ndarray], distance_m: float, only: bool) -> Guide:
+    """Return the guide along lines, (k, 2) or (k, 3) in units of the CRS, as `Settings` take it.
+
+    Raises
+    ------
+    ParameterError
+        No line comes near the cloud.
+    """
+    extents = np.array([header.extent for header in request.headers])
+    corners = np.array([[*extents[:, :2].min(axis=0), 0.0], [*extents[:, 2:].max(axis=0), 0.0]])
+    if not np.isfinite(corners).all():
+        corners = np.array([[-np.inf, -np.inf, 0.0], [np.inf, np.inf, 0.0]])
+    low, high = request.zero.to_local(corners)[:, :2]
+    flat = [request.zero.to_local(np.column_stack([line[:, :2], np.zeros(len(line))]))[:, :2] for line in lines]
+    guide = Guide.through(flat, distance_m, only, (*low, *high))
+    if not len(guide.xy):
+        raise ParameterError(
+            f"The guide has no line within {distance_m:g} m of the cloud: check its place and coordinate system."
+        )
+    return guide
 
 
 def report(figures: Figures, progress: Progress) -> None:
     """Inform the user of what was found and of what to doubt."""
+    if figures.across_m > figures.along_m:
+        progress.warning(
+            f"The guide crosses the tracks: {figures.across_m:.0f} m of the rails near it run across it, and "
+            f"{figures.along_m:.0f} m along it. Draw it along the tracks."
+        )
+    elif not figures.points and figures.along_m:
+        progress.warning(
+            f"No track has the guide within {MIDDLE_M:g} m of its middle: draw the guide along the middle of the "
+            "track, or search for all tracks near it."
+        )
+        return
     if not figures.points:
         progress.warning(
             "No rail was found: check the rail standard and the unit of the coordinates. A cloud that contains only "
@@ -119,8 +162,8 @@ def report(figures: Figures, progress: Progress) -> None:
         )
 
 
-def _sort(request: Request, side_m: float, folder: Path, progress: Progress) -> dict[Key, int]:
-    """Append all points to the files of their squares; returns the number of points by square."""
+def _sort(request: Request, settings: Settings, folder: Path, progress: Progress) -> dict[Key, int]:
+    """Append the points to be searched to the files of their squares; returns the number of points by square."""
     counts: dict[Key, int] = {}
     wanted = np.zeros(LAST_CLASS + 1, dtype=bool)
     wanted[list(request.class_codes)] = True
@@ -128,11 +171,13 @@ def _sort(request: Request, side_m: float, folder: Path, progress: Progress) -> 
     for header, share in zip(request.headers, request.shares(progress)):
         for xyz, codes, strips, valid in read_points(header.path, share):
             kept = np.flatnonzero(valid & wanted[codes] & request.holds(xyz))
+            if settings.guide is not None:
+                kept = kept[settings.guide.holds(request.zero.to_local(xyz[kept])[:, :2])]
             points = np.empty(len(kept), POINT)
             points["xyz"] = xyz[kept]
             points["number"] = kept + first | strips[kept].astype(np.int64) << STRIP_SHIFT
             first += len(xyz)
-            _append(points, request.zero, side_m, folder, counts, header.path.name)
+            _append(points, request.zero, settings.side_m, folder, counts, header.path.name)
     return counts
 
 
@@ -157,7 +202,7 @@ def _find_in(square: Square, counts: Mapping[Key, int], settings: Settings, fold
     """Find the rail points of a square."""
     parts = [_near(square, key, folder) for key in around(square.key) if key in counts]
     xyz, number = (np.concatenate(values) for values in zip(*parts))
-    found = classify_square(square.frame.to_local(xyz), settings)
+    found = classify_square(square.frame.to_local(xyz), settings.at(square.key))
     number = number[found.rail]
     strips = (number >> STRIP_SHIFT & STRIP_BITS).astype(np.uint16)
     return Found(xyz[found.rail], number & NUMBER_BITS, strips, found.figures)

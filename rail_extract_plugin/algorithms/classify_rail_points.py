@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsProcessingContext
 
@@ -16,6 +16,9 @@ from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource, points_folder, request_points
 from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
 
+if TYPE_CHECKING:
+    import numpy as np
+
 
 @dataclass(frozen=True)
 class Job:
@@ -26,6 +29,7 @@ class Job:
     other_gauges_m: tuple[float, ...]
     class_code: int
     output: Path
+    guide: tuple[np.ndarray, ...]
 
 
 class ClassifyRailPoints(RailAlgorithm):
@@ -56,6 +60,8 @@ class ClassifyRailPoints(RailAlgorithm):
             *groups.rail(),
             groups.other_gauges(),
             *groups.area(),
+            inputs.guide(),
+            *groups.guide(),
             *groups.labels(),
             outputs.classified(),
         ):
@@ -70,12 +76,14 @@ class ClassifyRailPoints(RailAlgorithm):
         values = ParameterValues(self, parameters, context)
         standard = values.standard()
         output = Path(self.parameterAsFileOutput(parameters, "OUTPUT", context))
+        cloud = values.cloud("INPUT")
         job = Job(
-            values.cloud("INPUT"),
+            cloud,
             standard,
             values.other_gauges_m(standard),
             int(values.number("RAIL_CLASS")),
             output,
+            values.guide(cloud),
         )
         plan_output(job.cloud.paths, output, job.class_code)
         return job
@@ -86,13 +94,17 @@ class ClassifyRailPoints(RailAlgorithm):
         """Classify the cloud and write the copy."""
         from ...core.classify.settings import Settings
         from ...core.labelling.files import Choice, classify_files, plan_output
+        from ...core.labelling.finding import guide_of
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
         gauges_m = (job.standard.gauge_m, *job.other_gauges_m)
-        settings = Settings(gauges_m, job.standard.head_width_m, values.flag("KEEP_SINGLE"))
         choice = Choice(job.class_code, int(values.number("CONTENT")) == 1, values.flag("RESET"))
         output = plan_output(job.cloud.paths, job.output, job.class_code, progress)
         request = request_points(job.cloud, SEARCHED_CLASSES, values.extent, progress)
+        guide = None
+        if job.guide:
+            guide = guide_of(request, job.guide, values.number("GUIDE_DISTANCE"), values.flag("ONLY_GUIDED"))
+        settings = Settings(gauges_m, job.standard.head_width_m, values.flag("KEEP_SINGLE"), guide)
         with points_folder() as folder:
             result = classify_files(request, settings, choice, output, folder, progress)
         return {

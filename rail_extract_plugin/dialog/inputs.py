@@ -56,6 +56,18 @@ def classify() -> QgsProcessingParameterDefinition:
     )
 
 
+def guide() -> QgsProcessingParameterDefinition:
+    """Define the lines along which rails are searched."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return advanced(
+        QgsProcessingParameterFeatureSource("GUIDE", tr("Guide"), [line], optional=True),
+        tr(
+            "Lines along the tracks, from a map such as OpenStreetMap or drawn by hand. Rails are searched near them "
+            "only. Lines in another coordinate system are transformed."
+        ),
+    )
+
+
 def merge_classes() -> QgsProcessingParameterDefinition:
     """Define whether the rail classes are to be taken for one."""
     return advanced(

@@ -20,9 +20,11 @@ from ...core.errors import ParameterError, RailExtractError, RasterError
 from ...core.parameters import Parameters
 from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RailStandard, distinct_gauges, resolve
 from ..reading.clouds import CloudSource, checked_crs, cloud_source
-from ..systems import prepare_system
+from ..systems import prepare_system, system
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from ...core.raster_file import RasterHeader
 
 NUMBERS = {
@@ -127,6 +129,29 @@ class ParameterValues:
         """
         from ..reading.line_layers import check_system, wkt_of
 
+        source = self._line_source(name)
+        check_system(source.sourceCrs())
+        prepare_system(wkt_of(source.sourceCrs()))
+        return source
+
+    def guide(self, cloud: CloudSource) -> tuple[np.ndarray, ...]:
+        """Read the lines of GUIDE, in the coordinate system of the cloud; none if it is empty.
+
+        Raises
+        ------
+        RailExtractError
+            The layer has no lines, or they can't be transformed; or ONLY_GUIDED is set without GUIDE.
+        """
+        from ..reading.line_layers import read_guide
+
+        if not self.filled("GUIDE"):
+            if self.flag("ONLY_GUIDED"):
+                raise ParameterError("ONLY_GUIDED needs lines to compare tracks with: choose GUIDE.")
+            return ()
+        return read_guide(self._line_source("GUIDE"), system(checked_crs(cloud)), self._context)
+
+    def _line_source(self, name: str) -> QgsProcessingFeatureSource:
+        """Return a layer that may have lines."""
         source = self._algorithm.parameterAsSource(self._parameters, name, self._context)
         if source is None:
             raise RailExtractError(f"{name} is not a readable layer: give a line layer.")
@@ -135,8 +160,6 @@ class ParameterValues:
             raise RailExtractError(
                 f"{name} has the geometry type {QgsWkbTypes.displayString(kind)}: give a line layer."
             )
-        check_system(source.sourceCrs())
-        prepare_system(wkt_of(source.sourceCrs()))
         return source
 
     def cloud(self, name: str) -> CloudSource:
@@ -199,7 +222,7 @@ class ParameterValues:
         others = gauges_m(self.text("OTHER_GAUGES"), "OTHER_GAUGES")
         own = self._has("CENTERLINE_TOLERANCE")
         tolerance_m = self.number("CENTERLINE_TOLERANCE") if own else Parameters.centerline_tolerance_m
-        return distinct_gauges((standard.gauge_m, *others), tolerance_m)[1:]
+        return distinct_gauges((standard.gauge_m, *others), tolerance_m, own)[1:]
 
     def settings(self, standard: RailStandard, other_gauges_m: tuple[float, ...] = ()) -> Parameters:
         """Return the algorithm's parameters for the core, with the core's defaults for all others."""

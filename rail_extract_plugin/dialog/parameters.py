@@ -13,7 +13,7 @@ from qgis.core import (
 
 from ...core.frpdf import AUTO, DEVICES, ENGINES, MAX_PASSES
 from ...core.frpdf.models import MODELS
-from ...core.parameters import DEFAULT_STEP_M, STRIPS, Parameters
+from ...core.parameters import DEFAULT_GUIDE_DISTANCE_M, DEFAULT_STEP_M, STRIPS, Parameters
 from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS, UNCONFIRMED_PROFILES
 from ..i18n import tr
 from .definitions import MM_DECIMALS, Definitions, advanced, choice, helped, number
@@ -264,6 +264,22 @@ def other_gauges() -> QgsProcessingParameterDefinition:
     return advanced(
         QgsProcessingParameterString("OTHER_GAUGES", tr("Other gauges [mm]"), optional=True),
         tr("Gauges of other tracks in the same cloud, such as 1000;1067, for mixed and dual gauge."),
+    )
+
+
+def guide() -> Definitions:
+    """Define where rails are searched."""
+    return (
+        advanced(
+            number("GUIDE_DISTANCE", tr("Distance from the guide [m]"), DEFAULT_GUIDE_DISTANCE_M, 0.5, MAX_LENGTH_M),
+            tr("Tracks whose middle is at most this far from a line of the guide are searched."),
+        ),
+        advanced(
+            QgsProcessingParameterBoolean("ONLY_GUIDED", tr("Only the tracks along the guide"), defaultValue=False),
+            tr(
+                "Keeps only tracks that have the guide within 0.5 m of their middle for more than half of their length."
+            ),
+        ),
     )
 
 

@@ -12,9 +12,12 @@ from qgis.core import (
     NULL,
     QgsAbstractGeometry,
     QgsCoordinateReferenceSystem,
+    QgsCoordinateTransform,
+    QgsCsException,
     QgsFeature,
     QgsFeatureRequest,
     QgsGeometry,
+    QgsProcessingContext,
     QgsProcessingFeatureSource,
 )
 
@@ -31,6 +34,8 @@ CHORD_TOLERANCE_M = 0.0005
 
 MAX_SEGMENT_M = 500_000.0
 """A longer straight segment has a stray vertex: the longest straight railway has 478 km."""
+
+GEOMETRY_AS_IT_IS = QgsProcessingFeatureSource.Flag.FlagSkipGeometryValidityChecks
 
 
 def read_rails(
@@ -83,16 +88,58 @@ def read_centerlines(
     return tuple(_centerline(feature, xyz) for feature, xyz in found), frame
 
 
+def read_guide(
+    source: QgsProcessingFeatureSource, crs: QgsCoordinateReferenceSystem, context: QgsProcessingContext
+) -> tuple[np.ndarray, ...]:
+    """Read the lines of a guide, (k, 2) each, in the coordinate system of the cloud.
+
+    Parameters
+    ----------
+    source : QgsProcessingFeatureSource
+    crs : QgsCoordinateReferenceSystem
+        That of the cloud. Without one, or if the guide has none, the coordinates are taken as they are.
+    context : QgsProcessingContext
+
+    Raises
+    ------
+    CrsError
+        The lines can't be transformed.
+    RailExtractError
+        The layer has no line.
+    """
+    change = QgsCoordinateTransform(source.sourceCrs(), crs, context.transformContext())
+    lines = []
+    for feature in source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS):
+        shape = feature.geometry()
+        if not _transform(shape, change):
+            raise CrsError(
+                f"GUIDE can't be transformed to the coordinate system of the cloud ({crs.authid() or crs.description()}"
+                "): check that both are assigned as the data were made."
+            )
+        lines += [vertices[:, :2] for vertices in _parts(shape, CHORD_TOLERANCE_M)]
+    if not lines:
+        raise RailExtractError("GUIDE has no lines: give a line layer.")
+    return tuple(lines)
+
+
+def _transform(shape: QgsGeometry, change: QgsCoordinateTransform) -> bool:
+    """Transform a geometry; False if it lies outside of the area of one of the systems."""
+    try:
+        shape.transform(change)
+    except QgsCsException:
+        return False
+    return shape.isNull() or shape.boundingBox().isFinite()
+
+
 def _read(
     source: QgsProcessingFeatureSource, progress: Progress, name: str
 ) -> tuple[list[tuple[QgsFeature, np.ndarray]], LocalFrame]:
     """Read the features, and the vertices of each of their parts, (n, 3) local metres."""
     crs_wkt, horizontal_unit_m, vertical_unit_m = _system(source.sourceCrs(), progress)
     request = QgsFeatureRequest()
-    flags = QgsProcessingFeatureSource.Flag.FlagSkipGeometryValidityChecks
     found = [
         (feature, vertices)
-        for feature in progress.follow(source.getFeatures(request, flags), source.featureCount())
+        for feature in progress.follow(source.getFeatures(request, GEOMETRY_AS_IT_IS), source.featureCount())
         for vertices in _parts(feature.geometry(), CHORD_TOLERANCE_M / horizontal_unit_m)
     ]
     if not found:

@@ -6,6 +6,7 @@ import laspy
 import numpy as np
 import pytest
 from faults import REFUSED, WARNED, Fault
+from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
 TITLE = "Raw clouds"
@@ -66,6 +67,19 @@ def in_its_place(bench):
     return {"INPUT": path, "OUTPUT": path}
 
 
+def guide(text, crs="EPSG:32643", **parameters):
+    """A raw cloud, and a line layer with this line."""
+
+    def prepare(bench):
+        layer = QgsVectorLayer(f"LineString?crs={crs}", "guide", "memory")
+        feature = QgsFeature(layer.fields())
+        feature.setGeometry(QgsGeometry.fromWkt(text))
+        assert not text or layer.dataProvider().addFeature(feature)
+        return {**raw(**parameters)(bench), "GUIDE": layer}
+
+    return prepare
+
+
 def full_disk(room, suffix=".laz", **parameters):
     """A disk that takes files of up to `room` bytes; further writing fails as on a full disk."""
 
@@ -102,6 +116,54 @@ FAULTS = [
         raw(EXTENT="600000,600010,3000000,3000010"),
         REFUSED,
         "The extent contains no points that are neither noise nor withheld: choose another.",
+    ),
+    Fault(
+        "raw cloud, other gauge almost equal to the gauge",
+        raw(OTHER_GAUGES="1450"),
+        REFUSED,
+        "Gauges of 1435 and 1450 mm can't be distinguished: give one of them.",
+    ),
+    Fault(
+        "guide far from the cloud",
+        guide("LINESTRING(510000 3000000, 511000 3000000)"),
+        REFUSED,
+        "The guide has no line within 4 m of the cloud: check its place and coordinate system.",
+    ),
+    Fault(
+        "guide beside the extent",
+        guide("LINESTRING(500000 3000016, 500040 3000016.1)", EXTENT="500016,500024,3000023.5,3000030"),
+        REFUSED,
+        "The extent has no point within 4 m of the guide: check the guide's place and coordinate system.",
+    ),
+    Fault(
+        "guide with the coordinates of another system",
+        guide("LINESTRING(500000 3000020, 500040 3000020)", "EPSG:4326"),
+        REFUSED,
+        "GUIDE can't be transformed to the coordinate system of the cloud (EPSG:32643): check that both are assigned "
+        "as the data were made.",
+    ),
+    Fault("guide without lines", guide(""), REFUSED, "GUIDE has no lines: give a line layer."),
+    Fault(
+        "only the tracks along a guide that is missing",
+        raw(ONLY_GUIDED=True),
+        REFUSED,
+        "ONLY_GUIDED needs lines to compare tracks with: choose GUIDE.",
+    ),
+    Fault(
+        "guide across the tracks",
+        guide("LINESTRING(500022 3000010, 500018 3000030)"),
+        WARNED,
+        "The guide crosses the tracks: 16 m of the rails near it run across it, and 0 m along it. Draw it along the "
+        "tracks.",
+        {},
+    ),
+    Fault(
+        "only the tracks along a guide beside the track",
+        guide("LINESTRING(500000 3000015.8, 500040 3000028.2)", ONLY_GUIDED=True),
+        WARNED,
+        "No track has the guide within 0.5 m of its middle: draw the guide along the middle of the track, or search "
+        "for all tracks near it.",
+        NOTHING,
     ),
     Fault(
         "class beyond the range of an old point format",

@@ -1,7 +1,10 @@
 """The command `classify`: it writes classified copies; and extraction from a raw cloud."""
 
+import json
+
 import laspy
 import numpy as np
+import pyproj
 import pytest
 from rail_extract.__main__ import main
 from rail_extract.core.clouds.points import ask
@@ -9,7 +12,7 @@ from rail_extract.core.errors import NoRailPointsError
 from rail_extract.core.pipeline import Parameters, extract_files
 from rail_extract.core.standards import SEARCHED_CLASSES
 from rail_extract.core.tasks import InTurn
-from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
+from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, flat, rough, with_track
 
 CORNER = np.array([500_000.0, 5_000_000.0, 100.0])
 
@@ -65,3 +68,55 @@ def test_ground_has_no_rails_to_extract(save, tmp_path):
     request = ask([save(rough(flat(8.0, rng=rng, per_m2=500), rng))], SEARCHED_CLASSES)
     with pytest.raises(NoRailPointsError, match="No rail was found in the raw cloud: check the rail standard"):
         extract_files(request, tmp_path, Parameters(1.435, 0.072, engine="OPENCV"), InTurn(), classify=True)
+
+
+def along_track(left=0.0, angle=0.3, length=60.0):
+    """A line along the track of `scene`, or turned from it, in UTM zone 32 N."""
+    direction, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    return MIDDLE + left * across + np.outer([-length, length], direction) + CORNER[:2]
+
+
+def geojson(path, line):
+    """Write a line as GeoJSON, which is in degrees."""
+    change = pyproj.Transformer.from_crs("EPSG:32632", "EPSG:4326", always_xy=True)
+    places = np.column_stack(change.transform(*line.T)).tolist()
+    shape = {"type": "LineString", "coordinates": places}
+    feature = {"type": "Feature", "properties": {}, "geometry": shape}
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
+    return str(path)
+
+
+@pytest.mark.parametrize(("left", "found"), [(0.0, True), (2.0, False)])
+def test_only_the_track_along_the_guide_is_classified(save, tmp_path, capsys, left, found):
+    guide = geojson(tmp_path / "guide.json", along_track(left))
+    new = tmp_path / "new.las"
+    options = ["--guide", guide, "--only-guided", "--crs", "EPSG:32632"]
+    assert main(["classify", str(save(scene()[0])), "--output", str(new), *options]) == 0
+    assert (laspy.read(new).classification == 10).any() == found
+    assert ("No track has the guide within 0.5 m of its middle" in capsys.readouterr().err) == (not found)
+
+
+def test_a_guide_across_the_tracks_is_noticed(save, tmp_path, capsys):
+    guide = geojson(tmp_path / "guide.json", along_track(angle=1.8))
+    options = ["--guide", guide, "--crs", "EPSG:32632"]
+    assert main(["classify", str(save(scene()[0])), "--output", str(tmp_path / "new.las"), *options]) == 0
+    assert "The guide crosses the tracks: " in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--only-guided"], "--only-guided needs lines to compare tracks with: give --guide."),
+        (["--guide", "nothing.json"], "nothing.json can't be read as a file of lines: give a GeoPackage or GeoJSON"),
+        (["--guide", "far.json"], "The guide has no line within 4 m of the cloud: check its place and coordinate"),
+        (["--guide", "empty.json"], "empty.json has no lines: give lines along the tracks."),
+    ],
+)
+def test_guides_that_can_t_be_used_are_refused(save, tmp_path, capsys, monkeypatch, options, message):
+    monkeypatch.chdir(tmp_path)
+    geojson(tmp_path / "far.json", along_track(50.0))
+    (tmp_path / "empty.json").write_text('{"type": "FeatureCollection", "features": []}')
+    options = ["--output", str(tmp_path / "new.las"), "--crs", "EPSG:32632", *options]
+    assert main(["classify", str(save(scene()[0])), *options]) == 1
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "new.las").exists()
