@@ -24,6 +24,10 @@ SLOPE_BINS = 9
 CROWN_SHARE = 0.35
 """Part of the head width on either side of the axis that excludes the round corners: 25 mm of a 72 mm head."""
 
+AXIS_SHARE = 0.25
+"""Part of the head width on either side of the axis that gives the height: the crown falls by at most 0.5 mm there, and
+no point of a face is near it, even where the line is a centimetre off."""
+
 PRIOR_SLOPE = 0.1
 """Expected slope, which keeps the fit stable where points are few: 0.05 from inclined rails, 0.1 from 150 mm cant."""
 
@@ -139,6 +143,30 @@ def on_top(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float
     noise = robust_sigma(flat[head & (np.abs(flat) < max(2 * MAX_DEPTH_M, OFF_TOP_SIGMAS * noise))])
     lowest, highest = -max(MAX_DEPTH_M, MAX_DEPTH_SIGMAS * noise), max(MAX_DEPTH_M, MAX_ABOVE_SIGMAS * noise)
     return (flat >= lowest) & (flat <= highest), noise
+
+
+def in_head_frame(
+    t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return points in the frame of their head: offset to the left and height, (n,) each, from the top on the line.
+
+    NaN if the crown has too few points.
+
+    Parameters
+    ----------
+    t, across, z : (n,) arrays
+        Chainage (increasing), offset to the left and height of points near the line, metres.
+    head_width_m : float
+    """
+    head = np.abs(across) <= 0.5 * head_width_m
+    crown = np.abs(across) <= AXIS_SHARE * head_width_m
+    if crown.sum() < MIN_ON_HEAD:
+        return np.full(len(t), np.nan), np.full(len(t), np.nan)
+    above = z - np.interp(t, t[crown], rough_level(t[crown], z[crown]))
+    slope = np.interp(t, t[head], cross_slope(t[head], across[head], above[head], head_width_m))
+    flat = above - slope * across
+    flat -= np.interp(t, t[crown], rough_level(t[crown], flat[crown]))
+    return across + slope * flat, flat
 
 
 def _moving_fit(

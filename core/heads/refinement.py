@@ -22,6 +22,7 @@ from .branch_starts import APART_HEADS, slide_branches
 from .edges import HALF_HEAD_BINS, histograms, middles, search_distance
 from .level import MIN_ON_HEAD, on_top
 from .neighbours import free_edges
+from .sections import outline_middles, with_outline
 from .strips import aligned, measure_strips
 
 MIN_SEEN_SHARE = 0.25
@@ -86,8 +87,8 @@ def refine(
     more = ALIGNED_ROUNDS if align and points.strips is not None else 0
     by_x = points.xyz[np.argsort(points.xyz[:, 0])] if len(network.passes) else points.xyz
     shares = progress.split(len(rounds) + more)
-    for sure, share in zip(rounds, shares):
-        network = _shifted(network, points, head_width_m, smoothing_m, share)
+    for number, (sure, share) in enumerate(zip(rounds, shares)):
+        network = _shifted(network, points, head_width_m, smoothing_m, share, by_outline=number > 0)
         network = slide_branches(network, by_x, head_width_m, sure * head_width_m)
     for share in shares[len(rounds) :]:
         network = _shifted(network, points, head_width_m, smoothing_m, share, align=True)
@@ -100,6 +101,7 @@ def _shifted(
     head_width_m: float,
     smoothing_m: float,
     progress: Progress,
+    by_outline: bool = True,
     align: bool = False,
 ) -> LineNetwork:
     """Move every line to the middle of its head, and the nodes with them."""
@@ -119,6 +121,9 @@ def _shifted(
         top, _ = on_top(mine.t, mine.across, z, head_width_m)
         along = length_along(line)
         stations, middle = _middles(mine.t[top], mine.across[top], along[-1], head_width_m, edges[number])
+        if by_outline:
+            seen = np.isfinite(middle) & edges[number].all(axis=0)
+            middle = with_outline(middle, outline_middles(mine.t, mine.across, z, along[-1], head_width_m, seen))
         known = np.isfinite(middle)
         if known.sum() < max(MIN_SEEN_SHARE * len(stations), 2):
             lines.append(line)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..lines.smoothing import smooth_profile
 from .envelope import extremal_boundary
-from .level import cross_slope, robust_sigma, rough_level
+from .level import AXIS_SHARE, cross_slope, robust_sigma, rough_level
 
 MIN_POINTS = 10
 """A line with fewer points is not a rail: 1 m of the sparsest rail has more."""
@@ -35,9 +35,6 @@ BAND_SIGMAS = 3.0
 
 BAND_ROUNDS = 3
 """Rounds of smoothing and selection; a fourth moves the top by less than 0.1 mm."""
-
-AXIS_SHARE = 0.25
-"""Part of the head width on either side of the axis that gives the height: the crown falls by at most 0.5 mm there."""
 
 PROFILE_BIN_M = 0.25
 """Bins along the line in which points are averaged: a twelfth of the smoothing's sigma."""

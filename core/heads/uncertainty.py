@@ -1,10 +1,10 @@
 """Standard error of a rail's line across the head's axis, at stations along the line.
 
-It has five independent parts: the number and noise of the points at the edges (sampling), how much the result depends
-on the one edge that is clearly visible (view), the distance to the nearest points (bridging), the distance between
-the line and the middle of the edges (remainder), and the curvature of bridges, which nothing shows. Only the last is
-known where no edges are visible. See docs/method.md
-section 6.6.
+It has five independent parts: the number and noise of the points at the edges or on the outline (sampling), what all
+stations of a section share, because the parts of the head that the scanner sees are not known exactly (view), the
+distance to the nearest points (bridging), the distance between the line and the middle of the head (remainder), and the
+curvature of bridges, which nothing shows. Only the last is known where no edges are visible. See docs/method.md section
+6.6.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from ..polyline import distance_to
 from ..rails import Support
 from .edges import BLUR_BINS, HALF_HEAD_BINS, STATION_STEP_M, CrossSections, histograms
 from .level import on_top
+from .sections import Middles, outline_middles, with_outline
 
 UNSURE_CURVATURE = 0.007
 """Standard error, 1/m, of the curvature of a bridge across a gap, which follows from the lines on either side. On the
@@ -59,19 +60,29 @@ def measure_support(
     points = np.bincount(np.minimum((t[top] / STATION_STEP_M).astype(int), len(stations) - 1), minlength=len(stations))
     sections, bin_m = CrossSections.of(wide_counts), head_width_m / (2 * HALF_HEAD_BINS)
     edges = sections.find_edges(free)
-    middle = edges.middles_in(counts, wide_counts)
-    known = np.isfinite(middle)
+    by_edges = edges.middles_in(counts, wide_counts) * bin_m
+    known = np.isfinite(by_edges)
     if known.sum() < 2:
         return Support(stations, points, np.full(len(stations), unseen_m))
     averaged = np.maximum(_averaged(points, smoothing_m), counts.sum(axis=1))
     share = averaged / np.maximum(wide_counts.sum(axis=1), 1)
     sampling = _sampling(edges.density * share / bin_m, edges.weight, noise_m, BLUR_BINS * bin_m)
     view = (sections.middles(edges) - sections.middles(edges.equally_weighted(free))) * bin_m / np.sqrt(3)
+    by_outline = outline_middles(t, across, z, length_m, head_width_m, known & free.all(axis=0))
+    outlined = np.isfinite(by_outline.offset)
+    by_chance = 1 / np.sqrt(np.maximum(_combined(by_outline, smoothing_m), 1e-9))
+    sampling, view = np.where(outlined, by_chance, sampling), np.where(outlined, by_outline.common, view)
     bridging = sampling * distance_to(t[top], stations) / smoothing_m
-    remainder = smooth_profile(stations[known], middle[known] * bin_m, smoothing_m, stations)
-    sigma = np.sqrt(sampling**2 + view**2 + bridging**2 + remainder**2)
-    seen = np.where(known, np.minimum(sigma, unseen_m), unseen_m)
-    return Support(stations, points, np.hypot(seen, _bridge_error(t, stations)))
+    middle = with_outline(by_edges, by_outline)
+    remainder = smooth_profile(stations[known], middle[known], smoothing_m, stations)
+    beyond_chance = np.maximum(remainder**2 - np.where(outlined, sampling, 0.0) ** 2, 0.0)
+    sigma = np.sqrt(sampling**2 + view**2 + bridging**2 + beyond_chance)
+    return Support(stations, points, np.hypot(np.where(known, sigma, unseen_m), _bridge_error(t, stations)))
+
+
+def _combined(middles: Middles, smoothing_m: float) -> np.ndarray:
+    """Return the information about the middle in what PAEK averages of the windows at each station, (s,) 1/m²."""
+    return np.hypot(_averaged(middles.information, smoothing_m), middles.in_window)
 
 
 def _bridge_error(t: np.ndarray, stations: np.ndarray) -> np.ndarray:
@@ -89,7 +100,7 @@ def _bridge_error(t: np.ndarray, stations: np.ndarray) -> np.ndarray:
 
 
 def _averaged(points: np.ndarray, smoothing_m: float) -> np.ndarray:
-    """Return the number of points that PAEK averages at each station, (s,): those of an equivalent moving average."""
+    """Sum up points over what PAEK averages at each station, (s,): the length of an equivalent moving average."""
     size = max(int(round(smoothing_m / VARIANCE_FACTOR / STATION_STEP_M)), 1)
     return uniform_filter1d(points.astype(float), size, mode="constant") * size
 

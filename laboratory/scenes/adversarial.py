@@ -26,6 +26,9 @@ LID_FROM_RAIL_M = 1.475
 LID_LENGTH_M, LID_ASKEW_M = 1.0, 0.008
 """Length of a lid, and standard deviation of its position across and in height."""
 
+NEXT_TRACK_M = 4.5
+"""Distance between the axes of two tracks."""
+
 Extra = Callable[[np.random.RandomState, Track], np.ndarray]
 """Draws points that are classified as rail, given the track that they lie next to: (n, 3)."""
 
@@ -173,6 +176,39 @@ def thin_points(seed: int = 35, points_per_m: float = 10.0) -> Scene:
     return replace(scene, xyz=scene.xyz[kept], classification=scene.classification[kept])
 
 
+def from_the_side(
+    name: str, seed: int, angle_deg: float, face_share: float = 1.0, noise_m: float = 0.005, length_m: float = 60.0
+) -> Scene:
+    """Build a track that is scanned from the next one only, with the side faces of its rails in the class.
+
+    Parameters
+    ----------
+    name : str
+    seed : int
+    angle_deg : float
+        Angle of the scanner above the horizontal, seen from the track.
+    face_share : float
+        Share of the points on side faces that are classified as rail.
+    noise_m, length_m : float
+    """
+    rng = np.random.RandomState(seed)
+    curve = trace([Element(length_m, 1 / 800, 1 / 800)], heading=0.2 * seed)
+    track = Track(curve, spacing(STANDARD), rolling(curve), canted(curve, 0.05))
+    height_m = NEXT_TRACK_M * float(np.tan(np.radians(angle_deg)))
+    scanner = Scanner(
+        left_m=NEXT_TRACK_M * (-1) ** seed, height_m=height_m, noise_m=noise_m, face_share=face_share, half_range_m=25.0
+    )
+    return build(name, Plan([track], STANDARD, scanner), rng)
+
+
+def all_faces(seed: int = 39, noise_m: float = 0.005) -> Scene:
+    """Build a track that is scanned from a train on it, with all points of the side faces in the class."""
+    rng = np.random.RandomState(seed)
+    curve = trace([Element(60.0, 1 / 800, 1 / 800)], heading=0.4)
+    track = Track(curve, spacing(STANDARD), rolling(curve), canted(curve, 0.05))
+    return build("all_faces", Plan([track], STANDARD, Scanner(noise_m=noise_m, face_share=1.0)), rng)
+
+
 ADVERSARIAL: dict[str, Callable[[], Scene]] = {
     "trough": lambda: beside("trough", 1, [lids], 80.0),
     "ballast": lambda: beside("ballast", 2, [ballast]),
@@ -192,5 +228,9 @@ ADVERSARIAL: dict[str, Callable[[], Scene]] = {
     "strips_overlap": strips.overlapping,
     "unmarked_passes": strips.unmarked,
     "unmarked_meet": lambda: strips.meeting(with_ids=False),
+    "side_17": lambda: from_the_side("side_17", 36, 17.0),
+    "side_30": lambda: from_the_side("side_30", 37, 30.0, face_share=0.5),
+    "side_45": lambda: from_the_side("side_45", 38, 45.0),
+    "all_faces": all_faces,
 }
 """By name; every scene is seeded."""

@@ -5,6 +5,7 @@ from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.edges import station_count
 from rail_extract.core.heads.elevation import ElevationParameters, elevate
 from rail_extract.core.heads.refinement import refine
+from rail_extract.core.heads.sections import PROFILE_SIGMA_M
 from rail_extract.core.heads.uncertainty import UNSURE_CURVATURE, measure_support
 from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.polyline import interpolate, length_along, project
@@ -12,7 +13,7 @@ from rail_extract.core.rails import Support
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.vectorize import vectorize
 from rail_extract.laboratory.curves import Element, trace
-from rail_extract.laboratory.scenes.scanner import Scanner, scan
+from rail_extract.laboratory.scenes.scanner import Scanner, head_outline, scan
 from rail_extract.laboratory.scenes.tracks import Track
 
 GAUGE, WIDTH = 1.435, 0.072
@@ -20,12 +21,14 @@ UNSEEN = 0.0115
 
 
 def head(length, density, noise=0.003, seed=0):
-    """Points on a flat head along the x axis: chainage, offset and height."""
+    """Points on the crown and the corners of a head along the x axis: chainage, offset and height."""
     random = np.random.default_rng(seed)
     count = int(length * density)
     t = np.sort(random.uniform(0, length, count))
-    across = random.uniform(-WIDTH / 2, WIDTH / 2, count) + random.normal(0, noise, count)
-    return t, across, random.normal(0, noise, count)
+    across = random.uniform(-WIDTH / 2, WIDTH / 2, count)
+    outline, _ = head_outline(WIDTH)
+    height = np.interp(across, *outline[::-1].T)
+    return t, across + random.normal(0, noise, count), height + random.normal(0, noise, count)
 
 
 def support(t, across, z, length=60.0):
@@ -58,7 +61,7 @@ def test_two_thirds_of_a_line_are_within_sigma(left_m, noise_m):
 
 
 def test_four_times_the_points_halve_sigma():
-    few, many = (support(*head(60, density)).rms_m for density in (100, 400))
+    few, many = (np.sqrt(support(*head(60, density)).rms_m ** 2 - PROFILE_SIGMA_M**2) for density in (100, 400))
     assert many == pytest.approx(few / 2, rel=0.25)  # the middle moves by chance, which counts as well
 
 

@@ -1,0 +1,369 @@
+"""The outline of a railhead in the points of a section: where it lies, and which parts of it the scanner sees.
+
+A scanner to one side sees one face of a head and the corner above it, whose points pile up at that edge: whatever looks
+at offsets alone moves towards the scanner. Offset and height together show which part of the outline a point may be
+from. See docs/method.md section 6.8.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+CROWN_RADIUS_M = 0.300
+"""Radius of the running surface: 300 mm on 60E1. With 254 mm, as on American rails, it falls by 0.2 mm more."""
+
+CORNER_RADIUS_M = 0.013
+"""Radius of the corners in EN 13674-1; 9.5 to 14.3 mm on American rails."""
+
+FACE_DEPTH_M = 0.035
+"""Depth of the lower end of the faces below the top, about the height of a head without its fillets."""
+
+FACE_TURN = np.pi / 4
+"""Angle between the axis and the normal of the surface from which a classification may leave the surface out."""
+
+SAMPLE_M = 0.002
+"""Largest distance between samples of the outline: finer than the noise of any cloud."""
+
+VIEWS_DEG = (5.0, 12.0, 22.0, 40.0, 90.0, 140.0, 158.0, 168.0, 175.0)
+"""Angles of view above the horizontal on the right; scanners and passes may see a head from several."""
+
+BIN_M = 0.002
+"""Side of the bins in which points are counted."""
+
+BESIDE_M, ABOVE_M, BELOW_M = 0.024, 0.016, 0.046
+"""Reach of the bins beyond the edges, above the top and below it: three standard deviations of strong noise."""
+
+MIN_STRAY_SHARE = 0.02
+"""Smallest share of points that are on no part of the outline: it limits how far a single one can pull."""
+
+START_NOISE_M, MIN_NOISE_M = 0.005, 0.001
+"""Noise at the start of a fit, and the least that a scanner has."""
+
+LEAN_SIGMA = 0.06
+"""Expected error of the slope across from `level.cross_slope`, which side faces turn by up to 0.1."""
+
+NOISE_RATIO_SIGMA = 0.3
+"""Expected logarithm of the ratio of the noise across and in height."""
+
+WIDTH_SIGMA_M = 0.0005
+"""Expected error of the head width: half of what tables differ by, because most agree."""
+
+MAX_STEPS = np.array([0.004, 0.004, 0.1, 0.002, 0.3, 0.3])
+"""Largest changes of the place in a round: metres, metres, slope, metres, and logarithms of the noise."""
+
+PLACE = len(MAX_STEPS)
+"""Number of the unknowns of the place."""
+
+MAX_ROUNDS, SETTLED = 40, 0.1
+"""Largest number of rounds of a fit, and the gain of the log-likelihood from which it goes on; most need ten."""
+
+STEP_PARTS = (1.0, 1 / 3, 1 / 9)
+"""Parts of a step that are tried until the likelihood rises."""
+
+MIN_SHARE_LEFT = 0.3
+"""Part of its share that a part keeps in a step."""
+
+WRONG_WIDTH_SIGMAS = 8.0
+"""Error of the head width, in standard errors, from which it is rather taken for wrong, and the points decide alone."""
+
+USED_SHARE = 2e-3
+"""Parts with a smaller share of the points do not count among the unknowns."""
+
+SHARE_RIDGE = 0.02
+"""Weight of the shares of the last round in the next, relative to that of the points: views next to each other look
+alike."""
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The outline of a head, and the parts of it that have a share of the points each.
+
+    Attributes
+    ----------
+    left, up : (j,) arrays
+        Samples: metres to the left of the axis and above the top.
+    widening : (j,) array
+        How far each sample moves to the left if the head is a metre wider.
+    parts : (k, j) array
+        Points of each part by sample; rows sum to 1. The first parts are what is seen of the crown and the upper
+        corners from each view, the others are the lower corners and the faces, which classifications may leave out.
+    """
+
+    left: np.ndarray
+    up: np.ndarray
+    widening: np.ndarray
+    parts: np.ndarray
+
+    @classmethod
+    def of(cls, head_width_m: float) -> Outline:
+        """Sample the outline of a head. Rays at equal angles meet a surface in proportion to how it faces them."""
+        half = 0.5 * head_width_m
+        inner, reach = half - CORNER_RADIUS_M, CROWN_RADIUS_M - CORNER_RADIUS_M
+        shoulder = np.arcsin(inner / reach)
+        drop = CROWN_RADIUS_M - reach * np.cos(shoulder)
+        middle = 0.5 * (drop + FACE_DEPTH_M)
+        turn, size = _samples(-shoulder, shoulder, CROWN_RADIUS_M)
+        pieces = [(CROWN_RADIUS_M * np.sin(turn), CROWN_RADIUS_M * (np.cos(turn) - 1), turn, size)]
+        for side in (-1, 1):
+            for first, last in ((shoulder, FACE_TURN), (FACE_TURN, np.pi / 2)):
+                turn, size = _samples(first, last, CORNER_RADIUS_M)
+                left = side * (inner + CORNER_RADIUS_M * np.sin(turn))
+                pieces.append((left, CORNER_RADIUS_M * np.cos(turn) - drop, side * turn, size))
+            for first, last in ((drop, middle), (middle, FACE_DEPTH_M)):
+                down, size = _samples(first, last, 1.0)
+                level = np.full(len(down), side * 0.5 * np.pi)
+                pieces.append((np.full(len(down), side * half), -down, level, size))
+        left, up, turn, size = (np.concatenate(column) for column in zip(*pieces))
+        seen = np.sin(np.radians(VIEWS_DEG)[:, None] + turn) * size
+        number = np.repeat(np.arange(len(pieces)), [len(piece[0]) for piece in pieces])
+        open_parts = np.where(np.abs(turn) < FACE_TURN, np.maximum(seen, 0), 0)
+        faces = np.array([np.where(number == piece, size, 0) for piece in (2, 3, 4, 6, 7, 8)])
+        parts = np.concatenate([open_parts, faces])
+        return cls(left, up, np.clip(left / inner, -1, 1) / 2, parts / parts.sum(axis=1, keepdims=True))
+
+
+def _samples(first: float, last: float, metres: float) -> tuple[np.ndarray, np.ndarray]:
+    """Divide a range into equal pieces: their middles and their lengths in metres."""
+    borders = np.linspace(first, last, max(int(np.ceil((last - first) * metres / SAMPLE_M)), 2) + 1)
+    return 0.5 * (borders[1:] + borders[:-1]), np.diff(borders) * metres
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Bins across and in height around a head, by their middles, metres."""
+
+    left: np.ndarray
+    up: np.ndarray
+
+    @classmethod
+    def of(cls, head_width_m: float) -> Grid:
+        """Lay out the bins for a head."""
+        reach = 0.5 * head_width_m + BESIDE_M
+        return cls(_bins(-reach, reach), _bins(-BELOW_M, ABOVE_M))
+
+    def number(self, left: np.ndarray, up: np.ndarray) -> np.ndarray:
+        """Return the number of the bin of each point, (n,), and -1 for those outside."""
+        column = np.floor((left - self.left[0]) / BIN_M + 0.5)
+        row = np.floor((up - self.up[0]) / BIN_M + 0.5)
+        inside = (column >= 0) & (column < len(self.left)) & (row >= 0) & (row < len(self.up))
+        return np.where(inside, column * len(self.up) + row, -1.0).astype(int)
+
+    @property
+    def size(self) -> int:
+        """Number of bins."""
+        return len(self.left) * len(self.up)
+
+
+def _bins(first: float, last: float) -> np.ndarray:
+    """Return the middles of the bins of a range."""
+    return first + BIN_M * (np.arange(int(round((last - first) / BIN_M))) + 0.5)
+
+
+@dataclass(frozen=True)
+class Section:
+    """The head in one section of a line.
+
+    Attributes
+    ----------
+    place : (6,) array
+        Offset of the axis to the left, height of the top, slope across, excess of the head width, and the logarithms of
+        the noise across and in height; lengths in metres.
+    shares : (k + 1,) array
+        Share of the points of each part, and of those on none.
+    """
+
+    place: np.ndarray
+    shares: np.ndarray
+
+
+@dataclass(frozen=True)
+class Blurred:
+    """An outline at a place, blurred by noise.
+
+    Attributes
+    ----------
+    outline : Outline
+    across, height : (x, j), (j, y) arrays
+        Densities of each sample in the bins across and in height.
+    off, above : (x, j), (j, y) arrays
+        Distance of the bins from each sample in standard deviations of the noise.
+    noise : (2,) array
+        Across and in height, metres.
+    parts : (k + 1, b) array
+        Density of each part by bin, and of strays.
+    """
+
+    outline: Outline
+    across: np.ndarray
+    height: np.ndarray
+    off: np.ndarray
+    above: np.ndarray
+    noise: np.ndarray
+    parts: np.ndarray
+
+    @classmethod
+    def at(cls, place: np.ndarray, outline: Outline, grid: Grid) -> Blurred:
+        """Put the outline at a place and blur it."""
+        left, up, lean, wider = place[:4]
+        noise = np.exp(place[4:])
+        off = (grid.left[:, None] - left - outline.left - wider * outline.widening + lean * outline.up) / noise[0]
+        above = (grid.up - (up + outline.up + lean * outline.left)[:, None]) / noise[1]
+        across = np.exp(-0.5 * off**2) * (BIN_M / (noise[0] * np.sqrt(2 * np.pi)))
+        height = np.exp(-0.5 * above**2) * (BIN_M / (noise[1] * np.sqrt(2 * np.pi)))
+        parts = np.full((len(outline.parts) + 1, grid.size), 1 / grid.size)
+        parts[:-1] = ((across * outline.parts[:, None, :]) @ height).reshape(len(outline.parts), -1)
+        return cls(outline, across, height, off, above, noise, parts)
+
+    def density(self, shares: np.ndarray) -> np.ndarray:
+        """Return the density of points in each bin, (b,), given the shares of the parts."""
+        return shares @ self.parts
+
+    def by_place(self, shares: np.ndarray) -> np.ndarray:
+        """Return the derivatives of the density with respect to the place, (6, b)."""
+        across = self.across * (shares[:-1] @ self.outline.parts)
+        moved, lifted = across * self.off / self.noise[0], self.height * self.above / self.noise[1]
+        derivatives = (
+            moved @ self.height,
+            across @ lifted,
+            (across * self.outline.left) @ lifted - (moved * self.outline.up) @ self.height,
+            (moved * self.outline.widening) @ self.height,
+            (across * (self.off**2 - 1)) @ self.height,
+            across @ (self.height * (self.above**2 - 1)),
+        )
+        return np.array(derivatives).reshape(PLACE, -1)
+
+
+def fit_section(counts: np.ndarray, outline: Outline, grid: Grid, start: Section | None = None) -> Section:
+    """Find the place of a head and the shares of its parts that explain the points best.
+
+    Shares follow by expectation maximization, the place together with the shares by Fisher scoring.
+
+    Parameters
+    ----------
+    counts : (b,) array
+        Points in each bin.
+    outline : Outline
+    grid : Grid
+    start : Section, optional
+        An estimate, such as that of the section before.
+    """
+    section = start if start is not None else _start(outline)
+    used = counts > 0
+    blurred = Blurred.at(section.place, outline, grid)
+    best = -np.inf
+    for number in range(MAX_ROUNDS):
+        section = Section(section.place, _maximized(counts, section.shares, blurred))
+        before, best = best, _log_likelihood(counts, section, blurred)
+        step = _scoring_step(counts, section, blurred, used)
+        for part in STEP_PARTS:
+            tried = _moved(section, part * step)
+            moved = Blurred.at(tried.place, outline, grid)
+            gained = _log_likelihood(counts, tried, moved)
+            if gained > best:
+                section, blurred, best = tried, moved, gained
+                break
+        if number > 1 and best - before < SETTLED:
+            break
+    return section
+
+
+def _start(outline: Outline) -> Section:
+    """Return a head in the middle of the bins, all parts of which have the same share."""
+    count = len(outline.parts) + 1
+    return Section(np.append(np.zeros(4), np.log([START_NOISE_M] * 2)), np.full(count, 1 / count))
+
+
+def _log_likelihood(counts: np.ndarray, section: Section, blurred: Blurred) -> float:
+    """Return the logarithm of the likelihood of the points and of what is expected of slope, width and noise."""
+    lean, wider, across, height = section.place[2:]
+    usual = (lean / LEAN_SIGMA) ** 2 + ((across - height) / NOISE_RATIO_SIGMA) ** 2
+    width = WRONG_WIDTH_SIGMAS**2 * np.log1p((wider / (WRONG_WIDTH_SIGMAS * WIDTH_SIGMA_M)) ** 2)
+    return float(counts @ np.log(blurred.density(section.shares)) - 0.5 * (usual + width))
+
+
+def _expected(place: np.ndarray) -> np.ndarray:
+    """Return the information about the place that does not come from the points, (6, 6)."""
+    known = np.zeros((PLACE, PLACE))
+    known[2, 2] = LEAN_SIGMA**-2
+    known[3, 3] = WIDTH_SIGMA_M**-2 / (1 + (place[3] / (WRONG_WIDTH_SIGMAS * WIDTH_SIGMA_M)) ** 2)
+    known[4:, 4:] = np.array([[1, -1], [-1, 1]]) / NOISE_RATIO_SIGMA**2
+    return known
+
+
+def _maximized(counts: np.ndarray, shares: np.ndarray, blurred: Blurred) -> np.ndarray:
+    """Return the shares of the parts that one round of expectation maximization gives."""
+    return _normalized(shares * (blurred.parts @ (counts / blurred.density(shares))))
+
+
+def _normalized(shares: np.ndarray) -> np.ndarray:
+    """Scale shares to a sum of 1, with a minimum for strays."""
+    shares = shares / shares.sum()
+    stray = max(shares[-1], MIN_STRAY_SHARE)
+    return np.append(shares[:-1] * ((1 - stray) / max(shares[:-1].sum(), 1e-9)), stray)
+
+
+def _scoring_step(counts: np.ndarray, section: Section, blurred: Blurred, used: np.ndarray) -> np.ndarray:
+    """Return the change of place and shares, (6 + k + 1,), that the gradient and the information ask for."""
+    known, rates = _rates(section, blurred, used)
+    gradient = rates @ counts[used]
+    gradient[:PLACE] -= _expected(section.place) @ section.place
+    gradient[PLACE:] -= section.shares[known] @ gradient[PLACE:] / section.shares[known].sum()  # their sum stays
+    found = np.linalg.solve(_information(counts[used], section, known, rates), gradient)
+    found *= min(1.0, 1 / max(np.abs(found[:PLACE] / MAX_STEPS).max(), 1e-12))
+    step = np.zeros(PLACE + len(section.shares))
+    step[:PLACE], step[PLACE + known] = found[:PLACE], found[PLACE:]
+    return step
+
+
+def _rates(section: Section, blurred: Blurred, used: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the parts whose shares count as unknowns, and the relative derivatives, (6 + p, u), in the used bins."""
+    known = np.flatnonzero(section.shares[:-1] > USED_SHARE)
+    derivatives = np.concatenate([blurred.by_place(section.shares)[:, used], blurred.parts[np.ix_(known, used)]])
+    return known, derivatives / blurred.density(section.shares)[used]
+
+
+def _information(counts: np.ndarray, section: Section, known: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """Return the Fisher information about the place and the shares."""
+    found = (rates * counts) @ rates.T
+    found[:PLACE, :PLACE] += _expected(section.place)
+    found[range(PLACE, len(found)), range(PLACE, len(found))] += SHARE_RIDGE * counts.sum() / section.shares[known]
+    return found
+
+
+def _moved(section: Section, step: np.ndarray) -> Section:
+    """Apply a step; shares stay positive."""
+    place = section.place + step[:PLACE]
+    place[4:] = np.maximum(place[4:], np.log(MIN_NOISE_M))
+    return Section(place, _normalized(np.maximum(section.shares + step[PLACE:], MIN_SHARE_LEFT * section.shares)))
+
+
+@dataclass(frozen=True)
+class Scores:
+    """What each bin contributes to the offset of a head, and how well the section knows it.
+
+    Attributes
+    ----------
+    by_bin : (b,) array
+        Derivative of the log-likelihood of a point with respect to the offset, 1/m, less what a wrong height or slope
+        across would add to it.
+    common_m : float
+        Standard error of the offset of the section that more points next to a station would not reduce.
+    """
+
+    by_bin: np.ndarray
+    common_m: float
+
+    @classmethod
+    def of(cls, counts: np.ndarray, section: Section, outline: Outline, grid: Grid) -> Scores:
+        """Find the scores of a fitted section."""
+        blurred = Blurred.at(section.place, outline, grid)
+        density = blurred.density(section.shares)
+        scores = blurred.by_place(section.shares)[:3] / density
+        products = (scores * density) @ scores.T
+        by_bin = scores[0] - np.linalg.solve(products[1:, 1:], products[1:, 0]) @ scores[1:]
+        used = counts > 0
+        known, rates = _rates(section, blurred, used)
+        whole = np.linalg.inv(_information(counts[used], section, known, rates))[0, 0]
+        return cls(by_bin, float(np.sqrt(max(whole - 1 / (counts @ by_bin**2), 0.0))))

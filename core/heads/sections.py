@@ -1,0 +1,131 @@
+"""The middle of the head at stations along a line, from the outline of the head in sections of the line.
+
+A section shows which parts of the head the scanner sees, and how far the line is off on average; the points around each
+station then show how far it is off there. See docs/method.md section 6.8.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, WINDOWS, station_count
+from .level import in_head_frame
+from .outline import Grid, Outline, Scores, Section, fit_section
+
+MIN_SECTION_POINTS = 250
+"""Points that a section needs for its parts to be told apart."""
+
+MAX_STRAY_SHARE = 0.3
+"""With more points on no part of the outline, something else than a head is seen."""
+
+MAX_SECTION_SHIFT_M = 0.02
+"""Largest offset of a section: further off, the other edge of the head is outside the bins."""
+
+MAX_SIGMA_M = 0.006
+"""Standard error of the middle in a window from which it counts as not visible."""
+
+PROFILE_SIGMA_M = 0.0004
+"""Standard error of the middle that comes from the outline itself: real heads chain more radii, and are worn."""
+
+
+@dataclass(frozen=True)
+class Middles:
+    """Middle of the head at s stations, NaN where the sections do not show it.
+
+    Attributes
+    ----------
+    offset : (s,) array
+        Metres to the left of the line.
+    information, in_window : (s,) arrays
+        Inverse variance of it, 1/m², that the points next to a station alone contribute, and those of its window.
+    common : (s,) array
+        Standard error that all stations of a section share, metres.
+    """
+
+    offset: np.ndarray
+    information: np.ndarray
+    in_window: np.ndarray
+    common: np.ndarray
+
+
+def outline_middles(
+    t: np.ndarray, across: np.ndarray, z: np.ndarray, length_m: float, head_width_m: float, seen: np.ndarray
+) -> Middles:
+    """Find the middle of the head from its outline, at the stations of a line that is on the head.
+
+    Parameters
+    ----------
+    t, across, z : (n,) arrays
+        Chainage (increasing), offset to the left and height of points near the line, metres.
+    length_m : float
+        Length of the line.
+    head_width_m : float
+    seen : (s,) bool array
+        Where the head stands alone and its edges are visible.
+    """
+    count = station_count(length_m)
+    middles = Middles(np.full(count, np.nan), np.zeros(count), np.zeros(count), np.full(count, np.nan))
+    left, up = in_head_frame(t, across, z, head_width_m)
+    station = np.minimum((t / STATION_STEP_M).astype(int), count - 1)
+    outline, grid = Outline.of(head_width_m), Grid.of(head_width_m)
+    bins = grid.number(left, up)
+    used = (bins >= 0) & seen[station]
+    station, bins = station[used], bins[used]
+    section: Section | None = None
+    for first, last in _borders(count):
+        here = slice(*np.searchsorted(station, [first, last]))
+        counts = np.bincount(bins[here], minlength=grid.size).astype(float)
+        if counts.sum() < MIN_SECTION_POINTS:
+            continue
+        section = fit_section(counts, outline, grid, section)
+        if section.shares[-1] > MAX_STRAY_SHARE or abs(section.place[0]) > MAX_SECTION_SHIFT_M:
+            section = None
+            continue
+        scores = Scores.of(counts, section, outline, grid)
+        part = slice(first, last)
+        middles.offset[part], middles.information[part], middles.in_window[part] = _in_windows(
+            section.place[0], scores.by_bin[bins[here]], station[here] - first, last - first
+        )
+        middles.offset[part][~seen[part]] = np.nan
+        middles.common[part] = np.hypot(scores.common_m, PROFILE_SIGMA_M)
+    return middles
+
+
+def _borders(count: int) -> list[tuple[int, int]]:
+    """Divide stations into sections of about VIEW_STATIONS."""
+    borders = np.linspace(0, count, max(int(round(count / VIEW_STATIONS)), 1) + 1).astype(int)
+    return list(zip(borders[:-1].tolist(), borders[1:].tolist()))
+
+
+def _in_windows(
+    offset_m: float, score: np.ndarray, station: np.ndarray, count: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find the middles at the stations of a section from the scores of its points.
+
+    Returns
+    -------
+    offset, information, in_window : (count,) arrays
+        See `Middles`.
+    """
+    sums = np.array([np.bincount(station, weights, minlength=count) for weights in (None, score, score**2)], float)
+    chosen = WINDOWS[-1] * uniform_filter1d(sums, WINDOWS[-1], axis=1, mode="constant")
+    for size in WINDOWS[-2::-1]:
+        window = size * uniform_filter1d(sums, size, axis=1, mode="constant")
+        enough = window[0] >= ENOUGH_POINTS
+        chosen[:, enough] = window[:, enough]
+    _, gradient, known = chosen
+    offset = offset_m + gradient / np.maximum(known, 1e-9)
+    return np.where(known > MAX_SIGMA_M**-2, offset, np.nan), sums[2], known
+
+
+def with_outline(by_edges: np.ndarray, by_outline: Middles) -> np.ndarray:
+    """Return the middles from the outline, and from the edges elsewhere, in metres to the left.
+
+    Edges are corrected by what they differ by where both are known.
+    """
+    both = np.isfinite(by_edges) & np.isfinite(by_outline.offset)
+    correction = np.median((by_outline.offset - by_edges)[both]) if both.any() else 0.0
+    return np.where(np.isfinite(by_outline.offset), by_outline.offset, by_edges + correction)

@@ -1,0 +1,126 @@
+import numpy as np
+import pytest
+from rail_extract.core.heads.outline import (
+    FACE_DEPTH_M,
+    MIN_STRAY_SHARE,
+    Blurred,
+    Grid,
+    Outline,
+    Scores,
+    Section,
+    fit_section,
+)
+from rail_extract.laboratory.scenes.scanner import Scanner, head_outline, scan
+from rail_extract.laboratory.scenes.tracks import Railhead
+
+WIDTH = 0.072
+
+
+def straight_head(length=40.0, step=0.01):
+    x = np.arange(0, length, step)
+    axes = [np.tile(axis, (len(x), 1)) for axis in ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0])]
+    return Railhead(np.column_stack([x, 0 * x, 0 * x]), *axes)
+
+
+def seen_from(angle_deg, share, noise_m, seed=0, width=WIDTH, away=4.5):
+    """Offsets to the left and heights of the points of a head along the x axis, with a scanner on its left."""
+    path = np.column_stack([np.linspace(0, 40, 400), np.zeros((400, 2))])
+    height_m = away * np.tan(np.radians(angle_deg))
+    scanner = Scanner(noise_m=noise_m, face_share=share, left_m=away, height_m=height_m, half_range_m=30.0)
+    return scan(straight_head(), width, path, scanner, np.random.RandomState(seed))[:, 1:].T
+
+
+def counts_of(grid, left, up):
+    number = grid.number(left, up)
+    return np.bincount(number[number >= 0], minlength=grid.size).astype(float)
+
+
+def fitted(left, up, width=WIDTH):
+    outline, grid = Outline.of(width), Grid.of(width)
+    counts = counts_of(grid, left, up)
+    return counts, fit_section(counts, outline, grid), outline, grid
+
+
+def test_the_outline_is_that_of_the_laboratory():
+    outline = Outline.of(WIDTH)
+    samples, _ = head_outline(WIDTH)
+    for left, up in zip(outline.left, outline.up):
+        assert np.hypot(*(samples - [left, up]).T).min() < 0.0025
+    assert np.abs(outline.left).max() == pytest.approx(WIDTH / 2)
+    assert outline.up.min() > -FACE_DEPTH_M
+    np.testing.assert_allclose(outline.parts.sum(axis=1), 1.0)
+    np.testing.assert_allclose(np.sort(outline.left), -np.sort(-outline.left)[::-1])
+
+
+@pytest.mark.parametrize("angle_deg", [10, 17, 30, 45, 75])
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+def test_a_head_is_found_whatever_share_of_its_face_is_seen(angle_deg, share):
+    for noise_m, off_m in ((0.003, 0.006), (0.005, -0.006)):
+        left, up = seen_from(angle_deg, share, noise_m)
+        _, section, _, _ = fitted(left + off_m, up)
+        assert section.place[0] == pytest.approx(off_m, abs=0.0015)
+        np.testing.assert_allclose(np.exp(section.place[4:]), noise_m, rtol=0.25)
+
+
+def test_sides_are_mirrored():
+    left, up = seen_from(25, 1.0, 0.005)
+    _, one, _, _ = fitted(left + 0.004, up)
+    _, other, _, _ = fitted(-left - 0.004, up)
+    assert other.place[0] == pytest.approx(-one.place[0], abs=3e-4)  # bins are half open
+
+
+@pytest.mark.parametrize("wrong_m", [-0.008, 0.008])
+def test_a_wrong_width_is_seen_where_both_edges_are(wrong_m):
+    left, up = seen_from(70, 0.3, 0.004, away=1.0)
+    _, section, _, _ = fitted(left, up, WIDTH + wrong_m)
+    assert 0.5 < section.place[3] / -wrong_m < 1.2
+    assert abs(section.place[0]) < 0.0015
+
+
+def test_strays_do_not_pull():
+    random = np.random.default_rng(0)
+    left, up = seen_from(45, 0.5, 0.004)
+    strays = random.uniform(0.0, 0.06, 300), random.uniform(-0.04, 0.012, 300)
+    _, section, _, _ = fitted(np.append(left, strays[0]), np.append(up, strays[1]))
+    assert abs(section.place[0]) < 0.0015
+    assert MIN_STRAY_SHARE < section.shares[-1] < 0.2
+
+
+def test_derivatives_are_those_of_the_density():
+    outline, grid = Outline.of(WIDTH), Grid.of(WIDTH)
+    random = np.random.default_rng(1)
+    shares = random.dirichlet(np.ones(len(outline.parts) + 1))
+    place = np.array([0.003, -0.002, 0.04, 0.001, np.log(0.004), np.log(0.006)])
+    derivatives = Blurred.at(place, outline, grid).by_place(shares)
+    for number, step in enumerate([1e-6, 1e-6, 1e-5, 1e-6, 1e-5, 1e-5]):
+        change = np.eye(6)[number] * step
+        densities = [Blurred.at(place + side * change, outline, grid).density(shares) for side in (-1, 1)]
+        numeric = (densities[1] - densities[0]) / (2 * step)
+        np.testing.assert_allclose(derivatives[number], numeric, atol=1e-5 * np.abs(numeric).max())
+
+
+def test_scores_follow_a_shift_and_not_a_lift():
+    left, up = seen_from(30, 0.5, 0.004)
+    counts, section, outline, grid = fitted(left, up)
+    scores = Scores.of(counts, section, outline, grid).by_bin
+    for moved_m, lifted_m, expected_m in ((0.001, 0.0, 0.001), (-0.001, 0.0, -0.001), (0.0, 0.001, 0.0)):
+        number = grid.number(left + moved_m, up + lifted_m)
+        own = scores[number[number >= 0]]
+        assert own.sum() / (own @ own) == pytest.approx(expected_m, abs=2.5e-4)
+
+
+def test_few_points_make_a_section_less_sure():
+    left, up = seen_from(30, 0.5, 0.005)
+    errors = []
+    for part in (slice(None), slice(None, None, 8)):
+        counts, section, outline, grid = fitted(left[part], up[part])
+        errors.append(Scores.of(counts, section, outline, grid).common_m)
+    assert errors[1] > 1.5 * errors[0] > 0
+
+
+def test_a_fit_starts_from_an_estimate():
+    left, up = seen_from(20, 1.0, 0.005)
+    counts, section, outline, grid = fitted(left, up)
+    again = fit_section(counts, outline, grid, section)
+    np.testing.assert_allclose(again.place[:2], section.place[:2], atol=2e-4)
+    assert isinstance(again, Section)

@@ -1,0 +1,74 @@
+import numpy as np
+import pytest
+from rail_extract.core.heads.edges import station_count
+from rail_extract.core.heads.sections import Middles, outline_middles, with_outline
+from rail_extract.laboratory.scenes.scanner import Scanner, scan
+from rail_extract.laboratory.scenes.tracks import Railhead
+
+WIDTH, LENGTH = 0.072, 60.0
+
+
+def scanned(angle_deg, share=1.0, noise_m=0.005, seed=0, slope=0.0, bend_m=0.0):
+    """Chainage, offset and height of the points of a head, which may lean and wander about the line."""
+    x = np.arange(0, LENGTH, 0.01)
+    axis, across = np.array([0.0, -slope, 1.0]), np.array([0.0, 1.0, slope])
+    size = np.hypot(1, slope)
+    top = np.column_stack([x, bend_m * np.sin(x / 5), 0.005 * x])
+    head = Railhead(top, np.tile(axis / size, (len(x), 1)), np.tile(across / size, (len(x), 1)))
+    path = np.column_stack([x[::10], np.zeros((len(x[::10]), 2))])
+    height_m = 4.5 * np.tan(np.radians(angle_deg))
+    scanner = Scanner(noise_m=noise_m, face_share=share, left_m=4.5, height_m=height_m, half_range_m=30.0)
+    points = scan(head, WIDTH, path, scanner, np.random.RandomState(seed))
+    return points[np.argsort(points[:, 0])].T
+
+
+def middles_of(points, seen=None):
+    seen = np.ones(station_count(LENGTH), dtype=bool) if seen is None else seen
+    return outline_middles(*points, LENGTH, WIDTH, seen)
+
+
+@pytest.mark.parametrize("angle_deg", [17, 30, 45])
+@pytest.mark.parametrize("share", [0.3, 1.0])
+@pytest.mark.parametrize("slope", [0.0, 0.08])
+def test_the_middle_does_not_lean_to_the_scanner(angle_deg, share, slope):
+    middles = middles_of(scanned(angle_deg, share, slope=slope))
+    assert np.isfinite(middles.offset).all()
+    assert abs(middles.offset.mean()) < 0.0015
+
+
+def test_middles_follow_the_head_along_the_line():
+    middles = middles_of(scanned(30, bend_m=0.004))
+    true_m = 0.004 * np.sin((np.arange(len(middles.offset)) + 0.5) * 0.25 / 5)
+    assert np.corrcoef(middles.offset, true_m)[0, 1] > 0.9
+    assert np.sqrt(np.mean((middles.offset - true_m) ** 2)) < 0.0016
+
+
+def test_stations_that_do_not_show_the_head_alone_have_no_middle_and_do_not_count():
+    points = scanned(30)
+    t, across, z = points
+    seen = np.arange(station_count(LENGTH)) >= 60
+    disturbed = np.array([t, across + np.where(t < 10, 0.02, 0.0), z])
+    middles = middles_of(disturbed, seen)
+    assert np.isnan(middles.offset[:60]).all()
+    np.testing.assert_allclose(middles.offset[62:], middles_of(points, seen).offset[62:], atol=4e-4)
+
+
+def test_few_points_show_no_middle():
+    few = scanned(30)[:, ::60]
+    assert np.isnan(middles_of(few).offset).all()
+
+
+def test_what_is_no_head_shows_no_middle():
+    random = np.random.default_rng(0)
+    t = np.sort(random.uniform(0, LENGTH, 12000))
+    middles = middles_of(np.array([t, random.uniform(-0.09, 0.09, len(t)), random.uniform(-0.08, 0.03, len(t))]))
+    assert np.isnan(middles.offset).all()
+
+
+def test_edges_are_corrected_by_what_the_outline_shows_elsewhere():
+    by_edges = np.array([0.005, 0.006, np.nan, 0.004, 0.009])
+    nothing = np.zeros(5)
+    by_outline = Middles(np.array([0.001, 0.002, 0.0, np.nan, np.nan]), nothing, nothing, nothing)
+    np.testing.assert_allclose(with_outline(by_edges, by_outline), [0.001, 0.002, 0.0, 0.0, 0.005], atol=1e-12)
+    unknown = Middles(np.full(5, np.nan), nothing, nothing, nothing)
+    np.testing.assert_array_equal(with_outline(by_edges, unknown), by_edges)
