@@ -147,16 +147,19 @@ def extract_files(
         Every square failed.
     """
     side_m = square_side(parameters)
+    progress = recording = Recording(progress)
     reading, rest = progress.divide((READING, DRAWING + PAIRING + MEASURING))
     if classify:
         settings = Settings((parameters.gauge_m, *parameters.other_gauges_m), parameters.head_width_m)
         with scratch_folder(folder) as scratch:
-            source = spool_found(request, settings, side_m, scratch, reading)
-            return _walk([source], parameters, runner, rest)
+            source, figures = spool_found(request, settings, side_m, scratch, reading)
+            network = _walk([source], parameters, runner, rest)
+        return replace(network, warnings=recording.warnings, search=figures)
     warn_of_gauge(request, parameters, progress)
     count = sum(header.point_count for header in request.headers)
     progress.info(f"Reading {counted(len(request.headers), 'file')} with {counted(count, 'point')}.")
-    return _walk(_sorted_points(request, side_m, folder, runner, reading), parameters, runner, rest)
+    network = _walk(_sorted_points(request, side_m, folder, runner, reading), parameters, runner, rest)
+    return replace(network, warnings=recording.warnings)
 
 
 def _sorted_points(

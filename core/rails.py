@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 
 import numpy as np
 
@@ -315,6 +315,48 @@ class HeadWidths:
         return abs(self.seen_m - self.stated_m) > HEAD_OFF_M
 
 
+ENOUGH_CELLS_PER_M = 10.0
+"""Cells per metre of rail below which lines are less accurate and may have gaps."""
+
+
+@dataclass(frozen=True)
+class SearchFigures:
+    """What was found in a raw cloud, or in a square of it; figures of squares add up.
+
+    Attributes
+    ----------
+    points : int
+        Points on rails.
+    paired_m, single_m : float
+        Length of rails with and without a partner.
+    cells : int
+        Cells of railheads.
+    squares, thin, paved : int
+        Squares with rails; those among them that are thin, and those with rails in pavement.
+    along_m, across_m : float
+        Length of rails near the guide that run along it, and across it, whether they are kept or not.
+    """
+
+    points: int = 0
+    paired_m: float = 0.0
+    single_m: float = 0.0
+    cells: int = 0
+    squares: int = 0
+    thin: int = 0
+    paved: int = 0
+    along_m: float = 0.0
+    across_m: float = 0.0
+
+    def __add__(self, other: SearchFigures) -> SearchFigures:
+        return SearchFigures(*(one + more for one, more in zip(astuple(self), astuple(other))))
+
+    @property
+    def cells_per_m(self) -> float:
+        """Cells per metre of rail; 0 without rails."""
+        length_m = self.paired_m + self.single_m
+        return self.cells / length_m if length_m else 0.0
+
+
 @dataclass(frozen=True)
 class RailNetwork:
     """All results of an extraction from one cloud.
@@ -338,6 +380,8 @@ class RailNetwork:
         two rails have the gauge.
     strips : tuple of StripCourse
         By track and strip, where several strips show a track.
+    search : SearchFigures or None
+        What was found in a raw cloud; None for a classified one.
     """
 
     rails: tuple[RailLine, ...]
@@ -351,3 +395,4 @@ class RailNetwork:
     warnings: tuple[str, ...] = ()
     heads: HeadWidths | None = None
     strips: tuple[StripCourse, ...] = ()
+    search: SearchFigures | None = None

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..frame import ORIGIN_STEP
+from ..rails import SearchFigures
 from .bed import COARSE_M, Coarse, find_bed
-from .figures import Figures, shares_of_length
+from .figures import shares_of_length
 from .flush import Flush, flush_rails
 from .labels import Near, label, whole_heads
 from .lines import Lines, Marks, centred, find_lines
@@ -77,11 +78,11 @@ class Classified:
     ----------
     rail : (n,) bool array
         Points on railheads; False for those in the margin.
-    figures : Figures
+    figures : SearchFigures
     """
 
     rail: np.ndarray
-    figures: Figures
+    figures: SearchFigures
 
 
 def classify_square(xyz: np.ndarray, settings: Settings) -> Classified:
@@ -94,7 +95,7 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> Classified:
         The corner lies at a multiple of `Settings.side_m` from the zero of the coordinate system.
     settings : Settings
     """
-    nothing = Classified(np.zeros(len(xyz), dtype=bool), Figures())
+    nothing = Classified(np.zeros(len(xyz), dtype=bool), SearchFigures())
     if not len(xyz):
         return nothing
     x, y = (np.ascontiguousarray(values) for values in xyz.T[:2])
@@ -160,14 +161,14 @@ def _standing(
 
 def _figures(
     rail: np.ndarray, standing: Standing, flush: Flush, grid: Grid, cell: np.ndarray, settings: Settings
-) -> Figures:
+) -> SearchFigures:
     """Sum up what was found in the square without its margin; `cell` are those of the rail points."""
     kept = standing.kept
     share_m = np.where(settings.own(kept.lines.axis), shares_of_length(kept.lines, settings.head_width_m), 0.0)
     flush_m = shares_of_length(flush.lines, settings.head_width_m)[settings.own(flush.lines.axis)]
     near_m = _beside_guide(standing.rails.lines, settings) + _beside_guide(flush.rails, settings)
     there = bool(rail.any())
-    return Figures(
+    return SearchFigures(
         points=int(rail.sum()),
         paired_m=float(share_m[kept.paired].sum() + flush_m.sum()),
         single_m=float(share_m[~kept.paired].sum()),

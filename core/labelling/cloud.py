@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..classify.figures import Figures
 from ..classify.settings import MARGIN_M, Settings
 from ..classify.square import Classified, classify_square
 from ..frame import LocalFrame
 from ..progress import SILENT, Progress
+from ..rails import SearchFigures
 from ..squares.grid import Square, around, points_by_square
 
 
@@ -30,7 +30,7 @@ def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SIL
     """
     zero = LocalFrame(np.zeros(3))
     rail = np.zeros(len(xyz), dtype=bool)
-    figures = Figures()
+    figures = SearchFigures()
     members = points_by_square(xyz, settings.side_m)
     for key in progress.follow(list(members)):
         square = Square.on_grid(key, settings.side_m, zero)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..classify.figures import Figures
 from ..classify.settings import Settings
 from ..clouds.points import Request
 from ..clouds.readers import CATALOGUES, READERS, list_files
@@ -17,6 +16,7 @@ from ..clouds.vpc import CatalogueTile, catalogue_text
 from ..disk import Destination, writing
 from ..errors import DiskError, ParameterError
 from ..progress import SILENT, Progress
+from ..rails import SearchFigures
 from ..scratch import scratch_folder
 from ..standards import RAIL_CLASS
 from .finding import Found, find_rail_points, report
@@ -78,12 +78,12 @@ class Result:
         See `Output`.
     point_count : int
         Points in the files that were read.
-    figures : Figures
+    figures : SearchFigures
     """
 
     file: Path
     point_count: int
-    figures: Figures
+    figures: SearchFigures
 
 
 def plan_output(paths: Sequence[Path], output: Path, class_code: int, progress: Progress = SILENT) -> Output:
@@ -161,7 +161,7 @@ def classify_files(
     """
     finding, rewriting = progress.divide((2.0, 1.0))
     labels = _Labels(request, folder)
-    figures = Figures()
+    figures = SearchFigures()
     with writing(folder):
         squares = folder / "squares"
         squares.mkdir()

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..classify.figures import Figures
 from ..classify.guide import MIDDLE_M, Guide
 from ..classify.settings import MARGIN_M, Settings
 from ..classify.square import classify_square
@@ -21,6 +20,7 @@ from ..disk import writing
 from ..errors import CloudError, NoRailPointsError, ParameterError
 from ..frame import LocalFrame
 from ..progress import SILENT, Progress
+from ..rails import ENOUGH_CELLS_PER_M, SearchFigures
 from ..squares.grid import Key, Square, around, points_by_square
 from ..standards import LAST_CLASS
 
@@ -36,9 +36,6 @@ FEW_IN_SQUARE, MANY_SQUARES = 20, 100
 """Chunks of points that are spread over more squares than this, with fewer points in each, are not in the unit that the
 file states: a square of 41 m with rails has thousands of points, and each square becomes a file."""
 
-ENOUGH_CELLS_PER_M = 10.0
-"""Cells per metre of rail below which lines are less accurate and may have gaps."""
-
 
 @dataclass(frozen=True)
 class Found:
@@ -52,13 +49,13 @@ class Found:
         Their numbers among all points of all files.
     strips : (k,) uint16 array
         The strips that they belong to.
-    figures : Figures
+    figures : SearchFigures
     """
 
     xyz: np.ndarray
     number: np.ndarray
     strips: np.ndarray
-    figures: Figures
+    figures: SearchFigures
 
 
 def find_rail_points(
@@ -95,7 +92,7 @@ def find_rail_points(
         raise _nothing_to_search(request, settings.guide)
     for key in searching.follow(sorted(counts)):
         found = _find_in(Square.on_grid(key, settings.side_m, request.zero), counts, settings, folder)
-        if found.figures != Figures():
+        if found.figures != SearchFigures():
             yield found
 
 
@@ -131,7 +128,7 @@ def guide_of(request: Request, lines: Sequence[np.ndarray], distance_m: float, o
     return guide
 
 
-def report(figures: Figures, progress: Progress) -> None:
+def report(figures: SearchFigures, progress: Progress) -> None:
     """Inform the user of what was found and of what to doubt."""
     if figures.across_m > figures.along_m:
         progress.warning(

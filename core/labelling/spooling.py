@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..classify.figures import Figures
 from ..classify.settings import Settings
 from ..clouds.points import Request
 from ..disk import writing
 from ..errors import NoRailPointsError
 from ..progress import Progress
+from ..rails import SearchFigures
 from ..scratch import scratch_folder
 from ..squares.spool import Census, SpooledFile, SpooledPoints, gather
 from ..standards import RAIL_CLASS
 from .finding import find_rail_points, report
 
 
-def spool_found(request: Request, settings: Settings, side_m: float, folder: Path, progress: Progress) -> SpooledPoints:
+def spool_found(
+    request: Request, settings: Settings, side_m: float, folder: Path, progress: Progress
+) -> tuple[SpooledPoints, SearchFigures]:
     """Find the rail points of a raw cloud and sort them into the squares of the extraction, as class `RAIL_CLASS`.
 
     Parameters
@@ -37,7 +39,7 @@ def spool_found(request: Request, settings: Settings, side_m: float, folder: Pat
     CloudError, DiskError
         See `find_rail_points`.
     """
-    census, figures = Census(), Figures()
+    census, figures = Census(), SearchFigures()
     with writing(folder), scratch_folder(folder) as squares:
         for found in find_rail_points(request, settings, squares, progress):
             census.add(RAIL_CLASS, found.xyz, found.strips, request.zero, side_m, folder)
@@ -49,4 +51,4 @@ def spool_found(request: Request, settings: Settings, side_m: float, folder: Pat
         )
     report(figures, progress)
     (source,) = gather(request, side_m, [SpooledFile(str(folder), census.report())])
-    return source
+    return source, figures

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from ..rails import RailNetwork
+from ..rails import ENOUGH_CELLS_PER_M, RailNetwork, SearchFigures
 from .findings import (
     DOUBTS,
     GAUGE_OFF_MM,
@@ -79,6 +79,7 @@ def build_page(
         _verdict(findings, len(network.rails), network.warnings),
         _tiles(network, findings),
         *([_map(findings), _findings(findings), _tracks(findings)] if findings.tracks else []),
+        _search(network.search),
         _strips(network),
         *(_profiles(track, height) for track, height in zip(findings.tracks, heights)),
         _facts({**(facts or {}), "Engine": network.engine}),
@@ -247,6 +248,39 @@ def _tightest(radius_m: np.ndarray) -> str:
         return "straight"
     tightest = known[np.argmin(np.abs(known))]
     return f"{abs(tightest):,.0f} m {'left' if tightest > 0 else 'right'}"
+
+
+def _search(found: SearchFigures | None) -> str:
+    """Write what was found in a raw cloud, and what to doubt."""
+    if found is None:
+        return ""
+    rows = [
+        ("Rail points", f"{found.points:,}", "All others were left out."),
+        ("Rails with a partner", metres(found.paired_m), "Another rail runs at the distance of the gauge."),
+        (
+            "Rails without a partner",
+            metres(found.single_m),
+            "The other rail is hidden or was not found, or it is a straight bar of the height and width of a rail.",
+        ),
+        (
+            "Cells with points per metre",
+            f"{found.cells_per_m:.0f}",
+            f"Below {ENOUGH_CELLS_PER_M:.0f}, lines are less accurate and may have gaps.",
+        ),
+        ("Squares with rails", f"{found.squares:,}", "Squares of about 41 m are searched one by one."),
+        (
+            "Thin squares",
+            f"{found.thin:,}",
+            "With fewer than 400 points per square metre, heads and ballast blend: more may be missed.",
+        ),
+        (
+            "Paved squares",
+            f"{found.paved:,}",
+            "Rails level with the pavement are found by their grooves, and less accurately.",
+        ),
+    ]
+    written = tag("div", table(("Found", "", "What it means"), rows), class_="scroll")
+    return _section("Rail points in the raw cloud", written.replace("<table>", '<table class="words">'))
 
 
 def _strips(network: RailNetwork) -> str:

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.classify.figures import Figures
 from ...core.classify.settings import Settings
 from ...core.clouds.points import RailPoints
 from ...core.labelling.cloud import classify_cloud
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_rails
+from ...core.rails import SearchFigures
 from ..scenes.raw import RawScene
 from ..scenes.scene import RAIL
 from .lines import Match, cut, match, nearest
@@ -46,7 +46,7 @@ class Score:
         Processor time of the classification.
     peak_mib : float
         Peak memory of the process.
-    figures : Figures
+    figures : SearchFigures
     """
 
     scene: str
@@ -56,7 +56,7 @@ class Score:
     wrong: int
     seconds: float
     peak_mib: float
-    figures: Figures
+    figures: SearchFigures
 
 
 def settings_of(scene: RawScene) -> Settings:

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.classify.figures import Figures, shares_of_length
+from rail_extract.core.classify.figures import shares_of_length
 from rail_extract.core.classify.lines import Marks, find_lines
 from rail_extract.core.classify.thin import SURROUNDINGS_M, drawn
+from rail_extract.core.rails import SearchFigures
 
 CELL, SPACING = 0.04, 1.507
 
@@ -81,7 +82,7 @@ def test_cells_share_the_length_of_their_rail(per_m):
 
 
 def test_figures_add_up():
-    one, other = Figures(10, 1.0, 2.0, 30, 1, 1, 0), Figures(5, 4.0, 3.0, 20, 1, 0, 1)
-    assert one + other == Figures(15, 5.0, 5.0, 50, 2, 1, 1)
+    one, other = SearchFigures(10, 1.0, 2.0, 30, 1, 1, 0), SearchFigures(5, 4.0, 3.0, 20, 1, 0, 1)
+    assert one + other == SearchFigures(15, 5.0, 5.0, 50, 2, 1, 1)
     assert (one + other).cells_per_m == 5.0
-    assert Figures().cells_per_m == 0.0
+    assert SearchFigures().cells_per_m == 0.0

@@ -61,6 +61,15 @@ def test_rails_are_extracted_from_a_raw_cloud(save, tmp_path):
     (track,) = network.centerlines
     assert track.gauge_mm == pytest.approx(1435, abs=3)
     assert not list(folder.iterdir())
+    assert network.search.paired_m == pytest.approx(19, abs=2)
+    assert network.search.squares == 2
+
+
+def test_a_raw_cloud_with_few_points_is_doubted(save, tmp_path):
+    xyz, _ = with_track(flat(20.0, rng=np.random.RandomState(3), per_m2=80), 1.435, 0.072, 0.3)
+    request = ask([save(rough(xyz, np.random.RandomState(4), 0.01, 0.01))], SEARCHED_CLASSES)
+    network = extract_files(request, tmp_path, Parameters(1.435, 0.072, engine="OPENCV"), InTurn(), classify=True)
+    assert [warning for warning in network.warnings if "cells with points per metre; below 10" in warning]
 
 
 def test_ground_has_no_rails_to_extract(save, tmp_path):

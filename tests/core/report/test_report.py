@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.rails import Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry
+from rail_extract.core.rails import Centerline, HeadWidths, RailLine, RailNetwork, SearchFigures, TrackGeometry
 from rail_extract.core.report import build_page, list_findings, summary
 from rail_extract.core.report.findings import OFF_GAUGE, UNSUPPORTED, UNSURE, examine
 from rail_extract.core.report.listing import HOLE, LONE_RAIL, OFF_RAIL_MM
@@ -350,3 +350,16 @@ def test_the_summary_has_the_verdict_and_its_figures():
     )
     assert summary(replace(whole, geometry=()), (1.435,))[1] == "5 rails (402 m), 2 tracks (200 m)."
     assert summary(network(), (1.435,)) == ("No track was found.", "0 rails (0.0 m), 0 tracks (0.0 m).")
+
+
+def test_what_was_found_in_a_raw_cloud_is_listed():
+    found = SearchFigures(12345, 240.0, 12.6, 2500, 6, 2, 1)
+    html = build_page(replace(network(track()), search=found), (1.435,), "cloud.laz")
+    rows = re.findall(r"<tr>(.*?)</tr>", html[html.index("Rail points in the raw cloud") :])
+    cells = dict(re.findall(r"<td>(.*?)</td>", row)[:2] for row in rows if "<td>" in row)
+    assert cells["Rail points"] == "12,345"
+    assert cells["Rails with a partner"] == metres(240.0)
+    assert cells["Rails without a partner"] == metres(12.6)
+    assert cells["Cells with points per metre"] == "10"
+    assert (cells["Squares with rails"], cells["Thin squares"], cells["Paved squares"]) == ("6", "2", "1")
+    assert "Rail points in the raw cloud" not in page(track())

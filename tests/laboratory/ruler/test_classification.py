@@ -61,11 +61,11 @@ def test_heads_are_found_and_nothing_else(plain):
 
 
 def test_labels_of_everything_score_badly(plain, monkeypatch):
-    from rail_extract.core.classify.figures import Figures
     from rail_extract.core.classify.square import Classified
+    from rail_extract.core.rails import SearchFigures
     from rail_extract.laboratory.ruler import classification
 
-    everything = Classified(np.ones(len(plain.xyz), dtype=bool), np.empty((0, 2)), Figures())
+    everything = Classified(np.ones(len(plain.xyz), dtype=bool), SearchFigures())
     monkeypatch.setattr(classification, "classify_cloud", lambda *_: everything)
     result, _ = score(plain)
     assert result.recall == 1.0
