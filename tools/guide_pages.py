@@ -58,7 +58,9 @@ def guide_files() -> dict[str, bytes]:
 def _page(text: str) -> str:
     title = re.search(r"^# (.+)", text)[1]
     body = markdown.markdown(text, extensions=EXTENSIONS, output_format="html")
-    return PAGE.format(title=escape(title), body=re.sub(r'(?<=href=")(?!\w+:|#)[^"]+', _target, body))
+    body = re.sub(r'(?<=href=")(?!\w+:|#)[^"]+', _target, body)
+    # Files of the repository have no address until the owner fills it in: their names remain, without a link.
+    return PAGE.format(title=escape(title), body=re.sub(r'<a href="">(.*?)</a>', r"\1", body))
 
 
 def _target(link: re.Match) -> str:
@@ -66,4 +68,5 @@ def _target(link: re.Match) -> str:
     path, mark, place = link[0].partition("#")
     if path.removesuffix(".md") in PAGES:
         return path.removesuffix(".md") + ".html" + mark + place
-    return on_the_web(normpath(f"docs/{path}")) + mark + place
+    address = on_the_web(normpath(f"docs/{path}"))
+    return address + mark + place if address else ""

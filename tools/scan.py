@@ -22,26 +22,33 @@ KEYS = (
     "version",
     "author",
     "email",
-    "repository",
-    "tracker",
-    "homepage",
     "icon",
     "tags",
 )
 
 
+OF_THE_OWNER = ("repository", "tracker", "homepage")
+"""Addresses that the owner of the repository fills in before the first upload; until then no link leads there."""
+
+
 def layout_findings(plugin: Path) -> list[str]:
     """List what the site refuses apart from code."""
-    metadata = configparser.ConfigParser(interpolation=None)
-    metadata.read(plugin / "metadata.txt", encoding="utf-8")
-    findings = [f"metadata.txt lacks {key}" for key in KEYS if not metadata.get("general", key, fallback="")]
+    metadata = _general(plugin)
+    findings = [f"metadata.txt lacks {key}" for key in KEYS if not metadata.get(key)]
     findings += [f"{name} is missing" for name in ("__init__.py", "LICENSE") if not (plugin / name).is_file()]
-    if not (plugin / metadata.get("general", "icon", fallback="-")).is_file():
+    if not (plugin / metadata.get("icon", "-")).is_file():
         findings.append("the icon that metadata.txt names is missing")
     findings += [f"{path} does not belong in a zip" for path in plugin.rglob("*") if path.suffix in (".pyc", ".so")]
     if ARCHIVE.stat().st_size > MAX_BYTES:
         findings.append(f"the zip has {ARCHIVE.stat().st_size} bytes, more than {MAX_BYTES}")
     return findings
+
+
+def _general(plugin: Path) -> configparser.SectionProxy:
+    """Return the metadata of the plugin."""
+    metadata = configparser.ConfigParser(interpolation=None)
+    metadata.read(plugin / "metadata.txt", encoding="utf-8")
+    return metadata["general"]
 
 
 def bandit_findings(plugin: Path) -> list[str]:
@@ -75,6 +82,9 @@ def main() -> None:
         unpack(ARCHIVE, Path(folder))
         plugin = Path(folder) / PLUGIN
         findings = layout_findings(plugin) + bandit_findings(plugin) + secret_findings(plugin)
+        unfilled = [key for key in OF_THE_OWNER if not _general(plugin).get(key)]
+    if unfilled:
+        print(f"Before the upload, fill in {', '.join(unfilled)} in metadata.txt.")
     print(*findings, f"{ARCHIVE.name}: {ARCHIVE.stat().st_size} bytes, {len(findings)} findings", sep="\n")
     sys.exit(bool(findings))
 

@@ -45,8 +45,9 @@ def sentence_for(error: BaseException, definitions: Sequence[QgsProcessingParame
         return tr("Not enough memory: choose a smaller extent.")
     _log(error)
     text = masked(": ".join(filter(None, (type(error).__name__, " ".join(str(error).split())))))
-    return tr("Rail Extract failed unexpectedly ({}): report this at {} with the traceback from the log.").format(
-        text, tracker()
+    where = tr(" at {}").format(tracker()) if tracker() else ""
+    return tr("Rail Extract failed unexpectedly ({}): report this{} with the traceback from the log.").format(
+        text, where
     )
 
 

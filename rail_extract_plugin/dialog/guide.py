@@ -1,27 +1,26 @@
-"""Addresses: of the guide, which is in the zip or, for a clone that was not built, on the web, and of the tracker."""
+"""Addresses: of the guide, which is in the zip, of the repository, and of the tracker."""
 
 from __future__ import annotations
 
 from configparser import ConfigParser
 
-from ..paths import GUIDE, METADATA
+from ..paths import GUIDE, METADATA, ROOT
 
 
 def guide(page: str) -> str:
-    """Return the address of a page of the guide; `tools/package.py` puts the pages into the zip."""
-    shipped = GUIDE / f"{page}.html"
-    if shipped.exists():
-        return shipped.as_uri()
-    return on_the_web(f"docs/{page}.md")
+    """Return the address of a page of the guide: in the zip, or the text that it is made of in a clone."""
+    shipped, source = GUIDE / f"{page}.html", ROOT / "docs" / f"{page}.md"
+    return next((path.as_uri() for path in (shipped, source) if path.exists()), on_the_web(f"docs/{page}.md"))
 
 
 def on_the_web(file: str) -> str:
-    """Return the address of a file in the repository named in the plugin's metadata."""
-    return f"{_metadata('repository')}/blob/main/{file}"
+    """Return the address of a file in the repository; empty until `repository` is filled in in `metadata.txt`."""
+    repository = _metadata("repository")
+    return f"{repository}/blob/main/{file}" if repository else ""
 
 
 def tracker() -> str:
-    """Return the address where errors are reported."""
+    """Return the address where errors are reported; empty until `tracker` is filled in in `metadata.txt`."""
     return _metadata("tracker")
 
 

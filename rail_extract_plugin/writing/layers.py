@@ -209,7 +209,7 @@ def write_raster(
     destination = algorithm.destinations.get(name) or Destination.at(Path(path))
     with destination.replacing() as new:
         write_rasters(new, header, rasters, progress)
-    style_on_load(path, "raster", context, algorithm.layer_properties)
+    _style(algorithm, name, path, "raster", context)
     return {name: path}
 
 
@@ -256,8 +256,16 @@ def _write(
     layer_id = write_whole(parameters.get(name), context, destination, write, lost_part(frame.crs_wkt))
     if not layer_id:
         return {}
-    style_on_load(layer_id, kind.style, context, algorithm.layer_properties)
+    _style(algorithm, name, layer_id, kind.style, context)
     return {name: layer_id}
+
+
+def _style(
+    algorithm: QgsProcessingAlgorithm, name: str, layer_id: str, style: str, context: QgsProcessingContext
+) -> None:
+    """Apply a style to an output when QGIS loads it, and name it by the cloud of the run."""
+    title = algorithm.parameterDefinition(name).description()
+    style_on_load(layer_id, style, context, algorithm.layer_properties, title)
 
 
 def _feature(geometry: QgsGeometry, values: Sequence[Any], columns: Sequence[Field]) -> QgsFeature:

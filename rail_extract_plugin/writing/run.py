@@ -9,15 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from uuid import uuid4
 
-from qgis.core import QgsMapLayer
+from qgis.core import QgsMapLayer, QgsProject
 
 from ..reading.clouds import CloudSource
 
 if TYPE_CHECKING:
     from ...core.frame import LocalFrame
 
-RUN, CLOUD = "rail_extract/run", "rail_extract/cloud"
-"""Names of the properties: the id that the layers of a run share, and the cloud with its rail classes."""
+RUN, CLOUD, NUMBER = "rail_extract/run", "rail_extract/cloud", "rail_extract/number"
+"""Names of the properties: the id that the layers of a run share, the cloud with its rail classes, and the number of
+the run among those of the same cloud in the project."""
 
 
 @dataclass(frozen=True)
@@ -68,3 +69,31 @@ def cloud_of(layer: QgsMapLayer) -> RunCloud | None:
         return RunCloud(paths, codes, facts["crs"], width_m, (east, north, up)) if paths else None
     except (KeyError, TypeError, ValueError):
         return None
+
+
+def run_name(layer: QgsMapLayer, title: str) -> str:
+    """Return a layer's title with the name of its cloud, and a number from the second run on; the title without a run.
+
+    Parameters
+    ----------
+    layer : QgsMapLayer
+        Gets the number as a property.
+    title : str
+    """
+    cloud = cloud_of(layer)
+    if cloud is None:
+        return title
+    number = _number_of_run(layer, cloud)
+    layer.setCustomProperty(NUMBER, number)
+    return f"{title}: {cloud.name}" if number == 1 else f"{title}: {cloud.name} {number}"
+
+
+def _number_of_run(layer: QgsMapLayer, cloud: RunCloud) -> int:
+    """Return the number that the run has already, or the next free one."""
+    others = [one for one in QgsProject.instance().mapLayers().values() if one.id() != layer.id()]
+    numbered = [(one, int(one.customProperty(NUMBER))) for one in others if one.customProperty(NUMBER)]
+    run = layer.customProperty(RUN)
+    own = [number for one, number in numbered if one.customProperty(RUN) == run]
+    known = (cloud_of(one) for one, _ in numbered)
+    taken = [number for (_, number), other in zip(numbered, known) if other is not None and other.name == cloud.name]
+    return own[0] if own else max(taken, default=0) + 1

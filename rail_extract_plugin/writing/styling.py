@@ -16,6 +16,7 @@ from ..compat import group_layer
 from ..i18n import tr
 from ..notices import notices
 from ..paths import STYLES
+from .run import run_name
 
 FINDINGS = "findings"
 """Style of the findings, which the user is asked to review."""
@@ -27,9 +28,9 @@ BOTTOM_TO_TOP = ("raster", "findings", "rails", "centerlines", "quality")
 
 
 class _Styler(QgsProcessingLayerPostProcessorInterface):
-    def __init__(self, style: str, properties: Mapping[str, str]) -> None:
+    def __init__(self, style: str, title: str, properties: Mapping[str, str]) -> None:
         super().__init__()
-        self._style, self._properties = style, dict(properties)
+        self._style, self._title, self._properties = style, title, dict(properties)
 
     def postProcessLayer(
         self, layer: QgsMapLayer, context: QgsProcessingContext, feedback: QgsProcessingFeedback
@@ -37,6 +38,8 @@ class _Styler(QgsProcessingLayerPostProcessorInterface):
         layer.loadNamedStyle(str(STYLES / f"{self._style}.qml"))
         for name, value in self._properties.items():
             layer.setCustomProperty(name, value)
+        if layer.name() == self._title:
+            layer.setName(run_name(layer, self._title))
         layer.triggerRepaint()
         if self._style == FINDINGS:
             notices.findings_loaded.emit(layer.id())
@@ -46,15 +49,19 @@ _kept: list[_Styler] = []
 """QGIS calls these after the algorithm has been deleted, holds no reference, and deletes them with its context."""
 
 
-def _styler(style: str, properties: Mapping[str, str]) -> _Styler:
+def _styler(style: str, title: str, properties: Mapping[str, str]) -> _Styler:
     """Create the object for one layer, and keep it until QGIS deletes it."""
     _kept[:] = [one for one in _kept if not sip.isdeleted(one)]
-    _kept.append(_Styler(style, properties))
+    _kept.append(_Styler(style, title, properties))
     return _kept[-1]
 
 
 def style_on_load(
-    layer_id: str, style: str, context: QgsProcessingContext, properties: Mapping[str, str] = NO_PROPERTIES
+    layer_id: str,
+    style: str,
+    context: QgsProcessingContext,
+    properties: Mapping[str, str] = NO_PROPERTIES,
+    title: str = "",
 ) -> None:
     """Apply a style if QGIS loads the layer after the run.
 
@@ -68,8 +75,10 @@ def style_on_load(
     context : QgsProcessingContext
     properties : mapping of str to str
         To be stored with the layer.
+    title : str
+        Name of the output. A layer with this name gets that of the cloud as well; a model, for example, gives its own.
     """
     if context.willLoadLayerOnCompletion(layer_id):
         details = context.layerToLoadOnCompletionDetails(layer_id)
-        details.setPostProcessor(_styler(style, properties))
+        details.setPostProcessor(_styler(style, title, properties))
         group_layer(details, tr("Rail Extract"), BOTTOM_TO_TOP.index(style))

@@ -1,5 +1,5 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
-<qgis styleCategories="Symbology|Labeling|Symbology3D|Elevation" version="3.22.0" labelsEnabled="1">
+<qgis styleCategories="Symbology|Labeling|Symbology3D|Elevation|Fields|MapTips" version="3.22.0" labelsEnabled="1">
   <renderer-v2 type="singleSymbol">
     <symbols>
       <symbol name="0" type="line" alpha="1">
@@ -42,7 +42,7 @@
       <text-style fieldName="'Track ' || &quot;track_id&quot;" isExpression="1" fontSize="9" fontSizeUnit="Point" fontWeight="63" textColor="181,54,11,255" textOpacity="1">
         <text-buffer bufferDraw="1" bufferSize="0.9" bufferSizeUnits="MM" bufferColor="255,255,255,255" bufferOpacity="1"/>
       </text-style>
-      <placement placement="2" placementFlags="10" dist="1" distUnits="MM" repeatDistance="180" repeatDistanceUnits="MM" priority="5"/>
+      <placement placement="2" placementFlags="9" dist="0" distUnits="MM" repeatDistance="180" repeatDistanceUnits="MM" priority="5"/>
       <rendering drawLabels="1" obstacle="1" fontMaxPixelSize="10000" maxNumLabels="2000"/>
     </settings>
   </labeling>
@@ -52,6 +52,19 @@
       <material ambient="230,74,25,255"/>
     </symbol>
   </renderer-3d>
+  <aliases>
+    <alias field="track_id" index="0" name="Track"/>
+    <alias field="class_code" index="1" name="Class"/>
+    <alias field="left_ids" index="2" name="Left rails"/>
+    <alias field="right_ids" index="3" name="Right rails"/>
+    <alias field="length_m" index="4" name="Length [m]"/>
+    <alias field="gauge_mm" index="5" name="Gauge, mean [mm]"/>
+    <alias field="gaugesd_mm" index="6" name="Gauge, standard deviation [mm]"/>
+    <alias field="cant_mm" index="7" name="Cant, mean [mm]"/>
+    <alias field="cantmax_mm" index="8" name="Cant, largest [mm]"/>
+    <alias field="bridged_m" index="9" name="Without points [m]"/>
+  </aliases>
+  <mapTip>&lt;b&gt;Track [% &quot;track_id&quot; %]&lt;/b&gt;&lt;br&gt;Gauge: [% coalesce(format_number(&quot;gauge_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Cant: [% coalesce(format_number(&quot;cant_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Length: [% coalesce(format_number(&quot;length_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Without points: [% coalesce(format_number(&quot;bridged_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>
   <layerGeometryType>1</layerGeometryType>
 </qgis>

@@ -1,5 +1,5 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
-<qgis styleCategories="Symbology|Labeling|Elevation" version="3.22.0" labelsEnabled="1">
+<qgis styleCategories="Symbology|Labeling|Elevation|Fields|MapTips|Forms" version="3.22.0" labelsEnabled="1">
   <renderer-v2 type="categorizedSymbol" attr="coalesce(&quot;review&quot;, '')">
     <categories>
       <category type="string" value="" symbol="0" label="open" render="true"/>
@@ -50,10 +50,41 @@
       <text-style fieldName="finding" isExpression="0" fontSize="9" fontSizeUnit="Point" fontWeight="63" textColor="150,20,35,255" textOpacity="1">
         <text-buffer bufferDraw="1" bufferSize="0.9" bufferSizeUnits="MM" bufferColor="255,255,255,255" bufferOpacity="1"/>
       </text-style>
-      <placement placement="2" placementFlags="10" dist="2.5" distUnits="MM" priority="7"/>
+      <placement placement="2" placementFlags="9" dist="0" distUnits="MM" priority="7"/>
       <rendering drawLabels="1" obstacle="1" fontMaxPixelSize="10000" maxNumLabels="2000"/>
     </settings>
   </labeling>
+  <fieldConfiguration>
+    <field name="review">
+      <editWidget type="ValueMap">
+        <config>
+          <Option type="Map">
+            <Option name="map" type="List">
+              <Option type="Map"><Option name="open" type="QString" value=""/></Option>
+              <Option type="Map"><Option name="accepted" type="QString" value="accepted"/></Option>
+              <Option type="Map"><Option name="rejected" type="QString" value="rejected"/></Option>
+            </Option>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+  </fieldConfiguration>
+  <aliases>
+    <alias field="finding" index="0" name="Finding"/>
+    <alias field="reason" index="1" name="Reason"/>
+    <alias field="track_id" index="2" name="Track"/>
+    <alias field="rail_id" index="3" name="Lone rail"/>
+    <alias field="from_m" index="4" name="From [m]"/>
+    <alias field="to_m" index="5" name="To [m]"/>
+    <alias field="doubt_m" index="6" name="In doubt [m]"/>
+    <alias field="worst_m" index="7" name="Worst place [m]"/>
+    <alias field="gauge_mm" index="8" name="Gauge there [mm]"/>
+    <alias field="cant_mm" index="9" name="Cant there [mm]"/>
+    <alias field="sigma_mm" index="10" name="Standard error there [mm]"/>
+    <alias field="points" index="11" name="Points"/>
+    <alias field="review" index="12" name="Review"/>
+  </aliases>
+  <mapTip>&lt;b&gt;[% &quot;finding&quot; %]: [% &quot;reason&quot; %]&lt;/b&gt;&lt;br&gt;[% if(&quot;rail_id&quot; IS NULL, &#x27;Track &#x27; || &quot;track_id&quot;, &#x27;Rail &#x27; || &quot;rail_id&quot;) %], [% coalesce(format_number(&quot;from_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %] to [% coalesce(format_number(&quot;to_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Review: [% if(coalesce(&quot;review&quot;, &#x27;&#x27;) = &#x27;&#x27;, &#x27;open&#x27;, &quot;review&quot;) %]</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>
   <layerGeometryType>1</layerGeometryType>
 </qgis>

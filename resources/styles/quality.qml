@@ -1,5 +1,5 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
-<qgis styleCategories="Symbology|Elevation" version="3.22.0">
+<qgis styleCategories="Symbology|Elevation|Fields|MapTips" version="3.22.0">
   <renderer-v2 type="graduatedSymbol" attr="coalesce(&quot;gauge_mm&quot; - median(&quot;gauge_mm&quot;, group_by:=&quot;track_id&quot;), 999999)" graduatedMethod="GraduatedColor">
     <ranges>
       <range lower="-10000" upper="-10" symbol="0" label="more than 10 mm narrow" render="true"/>
@@ -8,6 +8,7 @@
       <range lower="5" upper="10" symbol="3" label="5 to 10 mm wide" render="true"/>
       <range lower="10" upper="10000" symbol="4" label="more than 10 mm wide" render="true"/>
       <range lower="10000" upper="1000000" symbol="5" label="unknown" render="true"/>
+      <range lower="1000001" upper="1000002" symbol="6" label="orange ring: a rail has no points" render="true"/>
     </ranges>
     <symbols>
       <symbol name="0" type="marker" alpha="1">
@@ -202,9 +203,36 @@
           </data_defined_properties>
         </layer>
       </symbol>
+      <symbol name="6" type="marker" alpha="1">
+        <layer class="SimpleMarker" enabled="1" pass="0" locked="0">
+          <Option type="Map">
+            <Option name="name" type="QString" value="circle"/>
+            <Option name="color" type="QString" value="255,255,255,255"/>
+            <Option name="outline_color" type="QString" value="242,142,43,255"/>
+            <Option name="outline_style" type="QString" value="solid"/>
+            <Option name="outline_width" type="QString" value="0.7"/>
+            <Option name="outline_width_unit" type="QString" value="MM"/>
+            <Option name="size" type="QString" value="2"/>
+            <Option name="size_unit" type="QString" value="MM"/>
+          </Option>
+        </layer>
+      </symbol>
     </symbols>
     <classificationMethod id="Custom"/>
   </renderer-v2>
+  <aliases>
+    <alias field="track_id" index="0" name="Track"/>
+    <alias field="chainage_m" index="1" name="Chainage [m]"/>
+    <alias field="gauge_mm" index="2" name="Gauge [mm]"/>
+    <alias field="cant_mm" index="3" name="Cant [mm]"/>
+    <alias field="twist_mm" index="4" name="Twist over 3 m [mm]"/>
+    <alias field="radius_m" index="5" name="Radius [m]"/>
+    <alias field="grade_pm" index="6" name="Gradient [‰]"/>
+    <alias field="sigma_mm" index="7" name="Standard error [mm]"/>
+    <alias field="points" index="8" name="Points"/>
+    <alias field="bridged" index="9" name="Rail without points"/>
+  </aliases>
+  <mapTip>&lt;b&gt;Track [% &quot;track_id&quot; %], [% coalesce(format_number(&quot;chainage_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;/b&gt;&lt;br&gt;Gauge: [% coalesce(format_number(&quot;gauge_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Cant: [% coalesce(format_number(&quot;cant_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Twist: [% coalesce(format_number(&quot;twist_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Standard error: [% coalesce(format_number(&quot;sigma_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>
   <layerGeometryType>0</layerGeometryType>
 </qgis>

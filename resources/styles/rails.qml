@@ -1,5 +1,5 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
-<qgis styleCategories="Symbology|Symbology3D|Elevation" version="3.22.0">
+<qgis styleCategories="Symbology|Symbology3D|Elevation|Fields|MapTips" version="3.22.0">
   <renderer-v2 type="graduatedSymbol" attr="CASE WHEN coalesce(&quot;track_ids&quot;, '') = '' AND coalesce(maximum(length(&quot;track_ids&quot;)), 0) &gt; 0 THEN -1 ELSE coalesce(&quot;sigma_mm&quot;, 999999) END" graduatedMethod="GraduatedColor">
     <ranges>
       <range lower="0" upper="2" symbol="0" label="standard error up to 2 mm" render="true"/>
@@ -78,6 +78,18 @@
       <material ambient="21,101,192,255"/>
     </symbol>
   </renderer-3d>
+  <aliases>
+    <alias field="rail_id" index="0" name="Rail"/>
+    <alias field="class_code" index="1" name="Class"/>
+    <alias field="length_m" index="2" name="Length [m]"/>
+    <alias field="points" index="3" name="Points"/>
+    <alias field="resid_mm" index="4" name="Scatter of the points [mm]"/>
+    <alias field="sigma_mm" index="5" name="Standard error [mm]"/>
+    <alias field="bridged_m" index="6" name="Without points [m]"/>
+    <alias field="track_ids" index="7" name="Tracks"/>
+    <alias field="gaps" index="8" name="Sections without points"/>
+  </aliases>
+  <mapTip>&lt;b&gt;Rail [% &quot;rail_id&quot; %]&lt;/b&gt;&lt;br&gt;Standard error: [% coalesce(format_number(&quot;sigma_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Length: [% coalesce(format_number(&quot;length_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Without points: [% coalesce(format_number(&quot;bridged_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;[% if(coalesce(&quot;track_ids&quot;, &#x27;&#x27;) = &#x27;&#x27;, &#x27;In no track&#x27;, &#x27;Track &#x27; || &quot;track_ids&quot;) %]</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>
   <layerGeometryType>1</layerGeometryType>
 </qgis>

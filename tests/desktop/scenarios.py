@@ -119,7 +119,7 @@ def rails(driver: Driver) -> Iterator:
     yield from install(ARCHIVE)
     dialog = yield from open_dialog("extractrails")
     dialog.mainWidget().wrappers["INPUT"].widget.combo.lineEdit().insert(SAMPLE)
-    outputs = dict.fromkeys(("RAILS", "CENTERLINES", "QUALITY", "REPORT"), "TEMPORARY_OUTPUT")
+    outputs = dict.fromkeys(("RAILS", "CENTERLINES", "QUALITY", "FINDINGS", "REPORT"), "TEMPORARY_OUTPUT")
     dialog.setParameters({**PART, **outputs, "CLEANED": str(driver.folder / "cleaned.tif")})
     driver.keep("log", (yield from press_run(dialog)))
     results = dialog.results()
@@ -135,10 +135,10 @@ def rails(driver: Driver) -> Iterator:
     options = QgsVectorFileWriter.SaveVectorOptions()
     saved = str(driver.folder / "saved.gpkg")
     context = QgsProject.instance().transformContext()
-    QgsVectorFileWriter.writeAsVectorFormatV3(layers["Rails"], saved, context, options)
+    QgsVectorFileWriter.writeAsVectorFormatV3(layers["Rails: sample"], saved, context, options)
     driver.picture("rails_later")
     dialog = yield from open_dialog("buildtrackcenterlines")
-    parameters = {"INPUT": layers["Rails"].id(), "STANDARD": PART["STANDARD"]}
+    parameters = {"INPUT": layers["Rails: sample"].id(), "STANDARD": PART["STANDARD"]}
     dialog.setParameters({**parameters, "OUTPUT": str(driver.folder / "tracks.gpkg")})
     driver.keep("second log", (yield from press_run(dialog)))
     yield from close(dialog)

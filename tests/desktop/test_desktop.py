@@ -53,13 +53,14 @@ def test_rails_are_found_and_loaded(run_scenario):
     session = run_scenario("rails")
     assert session["results"]["RAIL_COUNT"] == 6
     assert session["results"]["CENTERLINE_COUNT"] == 3
-    assert session["layers"] == ["Cleaned rail raster", "Rails", "Track centerlines", "Track geometry"]
+    titles = ("Cleaned rail raster", "Findings", "Rails", "Track centerlines", "Track geometry")
+    assert session["layers"] == [f"{title}: sample" for title in titles]
 
 
 def test_systems_outlive_the_thread_of_the_run(run_scenario):
     session = run_scenario("rails")
     systems = [*session["systems"].values(), session["project's system"], session["new system"]]
-    assert ["UTM zone 43N" in wkt for wkt in systems] == [True] * 6
+    assert ["UTM zone 43N" in wkt for wkt in systems] == [True] * 7
     assert ["UTM zone 43N" in wkt for wkt in run_scenario("model")["systems"].values()] == [True] * 3
 
 
@@ -108,12 +109,13 @@ def test_batch_writes_what_is_named_and_skips_what_is_blank(run_scenario):
     assert session["log"].count("correctly executed") == 2
     assert "Batch execution completed" in session["log"]
     assert session["files"] == ["RAILS0.gpkg", "RAILS1.gpkg", "REPORT0.html", "REPORT1.html"]
-    assert session["layers"] == ["Rails", "Rails"]
+    assert session["layers"] == ["Rails: sample", "Rails: sample 2"]
 
 
 def test_model_takes_a_folder_and_runs(run_scenario):
     session = run_scenario("model")
     assert session["choice of a step"] == "Point cloud (layer, file or folder)"
     assert session["choice of a step"] in session["choices of a step"]
-    assert set(session["results"]) == {"rails:RAILS", "centerlines:CENTERLINES", "quality:QUALITY"}
+    made = {name for name, value in session["results"].items() if value}
+    assert made == {"rails:RAILS", "centerlines:CENTERLINES", "quality:QUALITY", "quality:REPORT"}
     assert "Execution completed" in session["log"]

@@ -483,8 +483,7 @@ FAULTS = [
             f"unforeseen error {when}",
             failing(module, name, error),
             REFUSED,
-            f"Rail Extract failed unexpectedly ({said}): report this at https://…/issues with the traceback from the "
-            "log.",
+            f"Rail Extract failed unexpectedly ({said}): report this with the traceback from the log.",
         )
         for when, module, name, error, said in (
             ("in the search for packages", base, "missing_packages", OSError("gone"), "OSError: gone"),

@@ -118,11 +118,22 @@ def test_toolbox_search(make, word, found):
 @pytest.mark.parametrize("name", NAMES)
 def test_help_button_opens_the_guide(make, name, tmp_path, monkeypatch):
     address = make(name).helpUrl()
-    assert re.fullmatch(r"https://\S+/rail-extract/blob/main/docs/\w+\.md", address)
+    assert Path(QUrl(address).toLocalFile()).is_file()  # of the clone
     page = tmp_path / f"{Path(address).stem}.html"
     page.touch()
     monkeypatch.setattr(guide, "GUIDE", tmp_path)  # as in the zip
     assert make(name).helpUrl() == page.as_uri()
+
+
+def test_no_link_leads_nowhere_until_the_repository_has_an_address(make, tmp_path, monkeypatch):
+    for name in ("GUIDE", "ROOT"):
+        monkeypatch.setattr(guide, name, tmp_path)
+    assert make("extractrails").helpUrl() == guide.tracker() == ""
+    metadata = tmp_path / "metadata.txt"
+    metadata.write_text("[general]\nrepository=https://host/rails\ntracker=https://host/rails/issues\n")
+    monkeypatch.setattr(guide, "METADATA", metadata)
+    assert make("extractrails").helpUrl() == "https://host/rails/blob/main/docs/parameters.md"
+    assert guide.tracker() == "https://host/rails/issues"
 
 
 CONTRADICTIONS = [

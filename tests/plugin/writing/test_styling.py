@@ -2,9 +2,11 @@
 
 import gc
 
+import numpy as np
 import pytest
 from qgis.core import (
     Qgis,
+    QgsExpression,
     QgsExpressionContext,
     QgsExpressionContextUtils,
     QgsFeature,
@@ -23,8 +25,11 @@ from qgis.PyQt.QtCore import QSize
 from qgis.PyQt.QtGui import QColor
 from qgis.PyQt.QtXml import QDomDocument
 from rail_extract.core.fields import CENTERLINE_FIELDS, FINDING_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
+from rail_extract.core.frame import LocalFrame
 from rail_extract.rail_extract_plugin.paths import STYLES
+from rail_extract.rail_extract_plugin.reading.clouds import CloudSource
 from rail_extract.rail_extract_plugin.writing.layers import fields
+from rail_extract.rail_extract_plugin.writing.run import properties_of
 from rail_extract.rail_extract_plugin.writing.styling import style_on_load
 
 KINDS = {
@@ -114,6 +119,75 @@ def test_quality_is_coloured_by_the_deviation_from_the_median_gauge_of_the_track
 def test_findings_are_coloured_by_their_review(styled):
     rows = [(LINE, {"finding": 1, "review": review}) for review in (None, "", "accepted", "rejected")]
     assert colours(styled("findings", rows)) == ["#d62839", "#d62839", "#2e7d4f", "#787878"]
+
+
+@pytest.mark.parametrize("style", KINDS)
+def test_fields_have_names_in_words_with_units(styled, style):
+    layer = styled(style)
+    for field in KINDS[style][1]:
+        alias = layer.attributeAlias(layer.fields().lookupField(field.name))
+        assert alias and alias != field.name
+        for ending, unit in (("_mm", "[mm]"), ("_m", "[m]"), ("_pm", "[‰]")):
+            assert alias.endswith(unit) or not field.name.endswith(ending) or alias.endswith("[mm]"), alias
+
+
+@pytest.mark.parametrize(
+    ("style", "values", "said"),
+    [
+        ("rails", {"rail_id": 3, "sigma_mm": 1.25}, ["Rail 3", "Standard error: 1.3 mm", "In no track"]),
+        ("centerlines", {"track_id": 2, "gauge_mm": 1436.04}, ["Track 2", "Gauge: 1,436.0 mm", "Cant: unknown"]),
+        ("quality", {"track_id": 2, "chainage_m": 17.0}, ["Track 2, 17.0 m", "Gauge: unknown"]),
+        ("findings", {"finding": 4, "reason": "gauge off", "track_id": 1}, ["4: gauge off", "Track 1", "Review: open"]),
+    ],
+)
+def test_map_tips_say_what_is_under_the_mouse(styled, style, values, said):
+    shape = "POINT Z (500000 3000000 1)" if style == "quality" else LINE
+    layer = styled(style, [(shape, values)])
+    scopes = QgsExpressionContext(QgsExpressionContextUtils.globalProjectLayerScopes(layer))
+    scopes.setFeature(next(layer.getFeatures()))
+    tip = QgsExpression.replaceExpressionText(layer.mapTipTemplate(), scopes)
+    for words in said:
+        assert words in tip
+
+
+def test_the_review_is_chosen_from_a_list(styled):
+    layer = styled("findings")
+    widget = layer.editorWidgetSetup(layer.fields().lookupField("review"))
+    assert widget.type() == "ValueMap"
+    assert widget.config()["map"] == [{"open": ""}, {"accepted": "accepted"}, {"rejected": "rejected"}]
+
+
+@pytest.mark.parametrize("style", ["centerlines", "findings"])
+def test_labels_are_on_their_own_line(styled, style):
+    assert styled(style).labeling().settings().placementFlags & 7 == 1  # on the line, neither above nor below
+
+
+def test_the_legend_names_the_ring(styled):
+    layer = styled("quality")  # QGIS deletes the renderer with its layer
+    labels = [item.label() for item in layer.renderer().legendSymbolItems()]
+    assert labels[-1] == "orange ring: a rail has no points"
+
+
+def test_layers_are_named_by_cloud_and_numbered_by_run(context, new_feedback, tmp_path):
+    frame, project, names = LocalFrame(np.zeros(3)), QgsProject.instance(), []
+    clouds = [CloudSource((tmp_path / name,)) for name in ("a.laz", "a.laz", "b.copc.laz")]
+    runs = [properties_of(cloud, (10,), 0.072, frame) for cloud in clouds]
+    for properties in (*runs, {}):
+        for title in ("Rails", "Findings"):
+            layer = project.addMapLayer(QgsVectorLayer("LineStringZ?crs=EPSG:32643", title, "memory"))
+            context.addLayerToLoadOnCompletion(layer.id(), QgsProcessingContext.LayerDetails(title, project, title))
+            style_on_load(layer.id(), "rails", context, properties, title)
+            details = context.layerToLoadOnCompletionDetails(layer.id())
+            details.postProcessor().postProcessLayer(layer, context, new_feedback())
+            names.append(layer.name())
+    named = [f"{title}{of_cloud}" for of_cloud in (": a", ": a 2", ": b", "") for title in ("Rails", "Findings")]
+    assert names == named
+    layer = project.addMapLayer(QgsVectorLayer("LineStringZ?crs=EPSG:32643", "my file", "memory"))
+    context.addLayerToLoadOnCompletion(layer.id(), QgsProcessingContext.LayerDetails("Rails", project, "RAILS"))
+    style_on_load(layer.id(), "rails", context, runs[0], "Rails")
+    details = context.layerToLoadOnCompletionDetails(layer.id())
+    details.postProcessor().postProcessLayer(layer, context, new_feedback())
+    assert layer.name() == "my file"
 
 
 def test_centerlines_show_their_number_and_direction(styled):
