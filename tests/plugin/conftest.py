@@ -85,6 +85,7 @@ class Feedback(QgsProcessingFeedback):
 
     def pushInfo(self, info):
         self.infos.append(info)
+        super().pushInfo(info)
 
     def pushWarning(self, warning):
         self.warnings.append(warning)
