@@ -11,6 +11,10 @@ class CloudError(RailExtractError):
     """A point cloud file is missing, empty, damaged or not a point cloud."""
 
 
+class EmptyCloudError(CloudError):
+    """A file has no points: a reason to leave it out, but not to refuse the other tiles of a folder."""
+
+
 class NoRailPointsError(RailExtractError):
     """The cloud has no points of the rail classes."""
 

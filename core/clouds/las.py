@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import CloudError
+from ..errors import CloudError, EmptyCloudError
 from ..progress import SILENT, Progress
 from . import laz
 from .crs import crs_of_geokeys, import_pyproj
@@ -31,6 +31,9 @@ MIN_HEADER, HEADER_14, VLR_HEADER, EVLR_HEADER = 227, 375, 54, 60
 
 MAX_SCALE = 1000.0
 """Largest step between neighbouring coordinates, in units of the CRS; a larger one means a damaged header."""
+
+MAX_EMPTY = 64
+"""Most bytes between the header and the end of a file without points: LAZ files have an empty table of chunks there."""
 
 MAX_OFFSET = 1e10
 """Largest coordinate, in units of the CRS: the earth's circumference is 4e9 cm."""
@@ -165,7 +168,12 @@ def _check_start(path: Path) -> None:
 def _check_header(path: Path, header: laspy.LasHeader) -> None:
     """Refuse impossible counts and scales, and compressed files that can't be read."""
     if header.point_count == 0:
-        raise CloudError(f"{path.name} has no points: leave it out, or export it again.")
+        end = header.start_of_first_evlr if header.number_of_evlrs else path.stat().st_size
+        if end - header.offset_to_point_data > MAX_EMPTY:
+            raise CloudError(
+                f"{path.name} was not finished: it has points, but its header states none; copy or export it again."
+            )
+        raise EmptyCloudError(f"{path.name} has no points: leave it out, or export it again.")
     scales_fit = np.isfinite(header.scales).all() and (header.scales > 0).all()
     offsets_fit = (np.abs(header.offsets) <= MAX_OFFSET).all()
     if not scales_fit or (header.scales > MAX_SCALE).any() or not offsets_fit:

@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from ..errors import CloudError, CrsError, NoRailPointsError, ParameterError
+from ..errors import CloudError, CrsError, EmptyCloudError, NoRailPointsError, ParameterError
 from ..frame import ORIGIN_STEP, LocalFrame
 from ..progress import SILENT, Progress
 from ..standards import LAST_CLASS
@@ -203,18 +203,22 @@ def ask(
     paths, class_codes, crs_wkt, extent, progress
         See `read_rail_points`.
     unreadable : list of str, optional
-        If given, files that can't be read are left out, unless all are, and the reasons are appended here.
+        If given, files that can't be read are left out, unless all are, and the reasons are appended here. Files
+        without points are left out in any case.
     """
     _check_request(class_codes, extent)
-    headers = _read_headers(paths, unreadable)
+    headers = _read_headers(paths, unreadable, progress)
     return Request(headers, tuple(class_codes), extent, _shared_system(headers, crs_wkt, progress))
 
 
-def _read_headers(paths: Paths, unreadable: list[str] | None) -> tuple[CloudHeader, ...]:
+def _read_headers(paths: Paths, unreadable: list[str] | None, progress: Progress) -> tuple[CloudHeader, ...]:
     headers, last = [], None
     for path in list_files(paths):
         try:
             headers.append(read_header(path))
+        except EmptyCloudError as error:
+            progress.info(f"{path.name} has no points and is left out.")
+            last = error
         except CloudError as error:
             if unreadable is None:
                 raise

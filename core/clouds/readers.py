@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -15,7 +15,7 @@ from typing import Protocol, Union, cast
 
 import numpy as np
 
-from ..errors import Cancelled, CloudError, RailExtractError
+from ..errors import Cancelled, CloudError, EmptyCloudError, RailExtractError
 from ..progress import SILENT, Progress
 from .vpc import list_tiles
 
@@ -89,6 +89,15 @@ def read_header(path: Path) -> CloudHeader:
     """
     with explained(path):
         return _reader(path).read_header(path)
+
+
+def first_header(paths: Paths) -> CloudHeader:
+    """Read the header of the first file that has points; errors as for `read_header`."""
+    *others, last = list_files(paths)
+    for path in others:
+        with suppress(EmptyCloudError):
+            return read_header(path)
+    return read_header(last)
 
 
 def read_classes(path: Path, class_codes: Sequence[int], progress: Progress = SILENT) -> Iterator[Chunk]:

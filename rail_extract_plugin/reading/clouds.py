@@ -169,9 +169,9 @@ def points_folder() -> Iterator[Path]:
 
 def crs_of(source: CloudSource) -> str | None:
     """Return the coordinate system of a cloud's first file as WKT; reading the points checks that all files agree."""
-    from ...core.clouds.readers import list_files, read_header
+    from ...core.clouds.readers import first_header
 
-    return read_header(list_files(source.paths)[0]).crs_wkt or source.crs_wkt
+    return first_header(source.paths).crs_wkt or source.crs_wkt
 
 
 def checked_crs(source: CloudSource) -> str | None:
@@ -185,10 +185,10 @@ def checked_crs(source: CloudSource) -> str | None:
         The coordinate system does not measure lengths.
     """
     from ...core.clouds.points import ask
-    from ...core.clouds.readers import list_files
+    from ...core.clouds.readers import first_header
 
     try:
-        return ask(list_files(source.paths)[:1], (RAIL_CLASS,), source.crs_wkt).zero.crs_wkt
+        return ask(first_header(source.paths).path, (RAIL_CLASS,), source.crs_wkt).zero.crs_wkt
     except CloudError:
         return None
 

@@ -290,7 +290,7 @@ FAULTS = [
         "zero points",
         damaged(overwritten(COUNT_AT, bytes(8))),
         REFUSED,
-        "cloud.las has no points: leave it out, or export it again.",
+        "cloud.las was not finished: it has points, but its header states none; copy or export it again.",
     ),
     Fault(
         "absurd number of points",

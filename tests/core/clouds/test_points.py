@@ -13,10 +13,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rail_extract.core.clouds import las, laz
 from rail_extract.core.clouds.points import read_rail_points
+from rail_extract.core.clouds.readers import first_header
 from rail_extract.core.errors import (
     Cancelled,
     CloudError,
     CrsError,
+    EmptyCloudError,
     NoRailPointsError,
     ParameterError,
     RailExtractError,
@@ -232,6 +234,30 @@ def test_a_folder_of_tiles_is_one_cloud(tmp_path):
     np.testing.assert_allclose(points.frame.to_crs(points.xyz), expected, rtol=0, atol=1e-9)
 
 
+class Heard(Progress):
+    """Keeps what is said."""
+
+    def __init__(self):
+        self.said = []
+
+    def info(self, text):
+        self.said.append(text)
+
+
+@pytest.mark.parametrize("name", ["0.las", "0.laz", "9.las"])
+def test_tiles_without_points_are_left_out(tmp_path, name):
+    make_cloud(tmp_path / "1.las")
+    laspy.LasData(laspy.LasHeader(point_format=6, version="1.4")).write(tmp_path / name)
+    heard = Heard()
+    (points,) = read_rail_points(tmp_path, [RAIL], progress=heard)
+    (alone,) = read_rail_points(tmp_path / "1.las", [RAIL])
+    assert len(points.xyz) == len(alone.xyz)
+    assert heard.said == [f"{name} has no points and is left out."]
+    assert first_header([tmp_path / name, tmp_path / "1.las"]).point_count > 0
+    with pytest.raises(EmptyCloudError, match="has no points: leave it out"):
+        read_rail_points(tmp_path / name, [RAIL])
+
+
 def test_an_extent_selects_points(tmp_path):
     xyz, codes = make_cloud(tmp_path / "1.las")
     make_cloud(tmp_path / "2.las", place=PLACE + [500, 0, 0])
@@ -329,7 +355,7 @@ BAD_FILES = {
     "absurd LAZ count": (lambda folder: damaged(folder, "a.laz", set_bytes(247, b"\xff" * 6)), "damaged"),
     "absurd records": (lambda folder: damaged(folder, "a.las", set_bytes(100, b"\xff" * 4)), "damaged header"),
     "absurd late records": (lambda folder: damaged(folder, "a.las", set_bytes(243, b"\xff" * 4)), "records after"),
-    "zero points": (lambda folder: damaged(folder, "a.las", set_bytes(247, b"\x00" * 8)), "has no points"),
+    "zero points": (lambda folder: damaged(folder, "a.las", set_bytes(247, b"\x00" * 8)), "was not finished"),
     "scale not a number": (lambda folder: damaged(folder, "a.las", set_bytes(131, NAN)), "scale or offset"),
     "scale zero": (lambda folder: damaged(folder, "a.las", set_bytes(131, b"\x00" * 8)), "scale or offset"),
     "offset not a number": (lambda folder: damaged(folder, "a.las", set_bytes(171, NAN)), "scale or offset"),
