@@ -22,13 +22,20 @@ COMMANDS = {
 """Module and help of each command; a module has `add_arguments(parser)` and `run(args)`, which may return a code."""
 
 
+INTERRUPTED = 130
+"""Exit code of a command that Ctrl-C ended, as shells expect it."""
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code; only the module of this command is imported."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     parser = argparse.ArgumentParser(prog=PROGRAM, description=__doc__)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     listed = {name: command for name, command in COMMANDS.items() if _is_installed(command[0])}
-    parsers = {name: commands.add_parser(name, help=text, description=text) for name, (_, text) in listed.items()}
+    parsers = {
+        name: commands.add_parser(name, help=text, description=text, fromfile_prefix_chars="@")
+        for name, (_, text) in listed.items()
+    }
     chosen = arguments[0] if arguments and arguments[0] in listed else None
     if chosen is None:
         parser.parse_args(arguments)
@@ -52,6 +59,9 @@ def _run(module, args: argparse.Namespace) -> int:
     except errors.RailExtractError as error:
         print(error, file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        print("Cancelled; nothing was written.", file=sys.stderr)
+        return INTERRUPTED
 
 
 if __name__ == "__main__":

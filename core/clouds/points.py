@@ -212,7 +212,8 @@ def ask(
 
 
 def _read_headers(paths: Paths, unreadable: list[str] | None, progress: Progress) -> tuple[CloudHeader, ...]:
-    headers, last = [], None
+    headers: list[CloudHeader] = []
+    last: CloudError | None = None
     for path in list_files(paths):
         try:
             headers.append(read_header(path))

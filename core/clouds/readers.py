@@ -42,6 +42,9 @@ points read by class (256,), kept or not."""
 Points = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 """Coordinates (n, 3) in units of the CRS, classes (n,), strips (n,), and which points are not withheld, (n,) bool."""
 
+WILDCARDS = "*?"
+"""Characters of patterns such as tiles/2024_*.laz, which not every shell replaces with the names of files."""
+
 Paths = Union[str, Path, Sequence[Union[str, Path]]]
 """Files, or folders of them."""
 
@@ -191,6 +194,11 @@ def list_files(paths: Paths) -> tuple[Path, ...]:
 
 def _files_of(path: Path) -> Sequence[Path]:
     """List the files that one path stands for."""
+    if not path.exists() and set(WILDCARDS) & set(str(path)):
+        matches = sorted(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
+        if not matches:
+            raise CloudError(f"No file matches {path}: check the folder and the pattern.")
+        return [file for match in matches for file in _files_of(match)]
     if not path.exists():
         raise CloudError(
             f"{path} does not exist: give a {_any_of((*READERS, *CATALOGUES))} file, or a folder of tiles, on this "

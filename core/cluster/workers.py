@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import os
+import signal
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +13,7 @@ from pathlib import Path
 
 import dask
 from distributed import Client, LocalCluster
+from distributed import TimeoutError as NoAnswer
 from distributed.security import Security
 from distributed.system import MEMORY_LIMIT
 
@@ -35,6 +38,9 @@ PAGES = ("distributed.scheduler.http.routes", "distributed.worker.http.routes")
 
 TIMEOUT_S = 20
 """How long a scheduler may take to answer."""
+
+WORKERS_S = 10
+"""How long a scheduler may have no workers."""
 
 WORKER_BYTES = 3 << 29
 """Memory per local worker: its peak is a gigabyte (docs/scaling.md), and the joining process needs some."""
@@ -79,6 +85,16 @@ class Certificates:
 
 
 @contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Start processes that ignore Ctrl-C, which a terminal sends to all: the command itself ends its workers."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
 def connect(
     scheduler: str | None,
     workers: int | None = None,
@@ -116,6 +132,12 @@ def connect(
                 f"No Dask scheduler answers at {scheduler} ({error}): check the address and the certificates."
             ) from error
         with client:
+            try:
+                client.wait_for_workers(1, timeout=WORKERS_S)
+            except NoAnswer:
+                raise RailExtractError(
+                    f"The Dask scheduler at {scheduler} has no workers: start some with `dask worker {scheduler}`."
+                ) from None
             yield client
         return
     if workers is None:
@@ -130,14 +152,16 @@ def connect(
     temporary = Path(tempfile.gettempdir())
     sweep(temporary)
     with scratch_folder(temporary) as folder, dask.config.set({**settings, "temporary-directory": str(folder)}):
-        cluster = LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            memory_limit=None,  # Dask's own, an even share of the memory, kills workers at their peak
-            host=HERE,
-            security=Security.temporary(),
-            dashboard_address=f"{HERE}:{dashboard_port or 0}",
-            scheduler_kwargs={"dashboard": dashboard_port is not None},
-        )
+        with _deaf_to_interrupts():
+            cluster = LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                memory_limit=None,  # Dask's own, an even share of the memory, kills workers at their peak
+                host=HERE,
+                security=Security.temporary(),
+                dashboard_address=f"{HERE}:{dashboard_port or 0}",
+                scheduler_kwargs={"dashboard": dashboard_port is not None},
+                silence_logs=logging.ERROR,  # Dask warns of workers that it ends
+            )
         with cluster, Client(cluster) as client:
             yield client

@@ -16,12 +16,12 @@ from ..parameters import DEFAULT_GUIDE_DISTANCE_M
 from ..progress import Estimating
 from ..scratch import scratch_folder
 from ..standards import LAST_CLASS, RAIL_CLASS, SEARCHED_CLASSES, resolve
-from .options import Console, add_cloud_arguments, extent_of, gauges_of
+from .options import TILES_HELP, Console, add_cloud_arguments, extent_of, gauges_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument("tiles", nargs="+", type=Path, metavar="TILE", help="point clouds, or folders of them")
+    parser.add_argument("tiles", nargs="+", type=Path, metavar="TILE", help=TILES_HELP)
     text = "LAZ or LAS file; for several tiles, the name of their new folder, with .vpc added for the catalogue"
     parser.add_argument("--output", type=Path, required=True, help=text)
     add_cloud_arguments(parser)

@@ -26,7 +26,7 @@ from ..raster_file import header_for, on_one_grid
 from ..report import Origin, list_findings, summary
 from ..scratch import scratch_folder
 from ..standards import SEARCHED_CLASSES, RailStandard, resolve
-from .options import Console, add_cloud_arguments, extent_of, gauges_of, numbers_in
+from .options import TILES_HELP, Console, add_cloud_arguments, extent_of, gauges_of, numbers_in
 
 NEEDS = {name: name for name in ("distributed", "cryptography", "pyogrio", "shapely", "rasterio")}
 """Modules and packages of the extra "cluster"; rasterio is needed for `--cleaned` only."""
@@ -72,7 +72,7 @@ POSITIVE = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument("tiles", nargs="+", type=Path, metavar="TILE", help="point clouds, or folders of them")
+    parser.add_argument("tiles", nargs="+", type=Path, metavar="TILE", help=TILES_HELP)
     output = parser.add_argument_group("outputs", "Existing files are replaced. GeoPackages may be the same file.")
     output.add_argument("--rails", type=Path, required=True, help="GeoPackage for the rails")
     output.add_argument("--centerlines", type=Path, help="GeoPackage for the track centerlines")

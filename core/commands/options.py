@@ -10,6 +10,11 @@ from ..parameters import Parameters
 from ..progress import Progress
 from ..standards import DEFAULT, RailStandard, distinct_gauges
 
+TILES_HELP = (
+    "point clouds, virtual point clouds, folders of tiles, or patterns such as tiles/*.laz; @FILE reads the names, one "
+    "per line, from a file"
+)
+
 
 def add_cloud_arguments(parser: argparse._ActionsContainer) -> None:
     """Declare the rails and the coordinate system of the cloud, and the area to read, in a parser or in a group."""

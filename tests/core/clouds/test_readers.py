@@ -100,6 +100,18 @@ def test_unknown_suffix_is_refused(tmp_path, name):
         readers.read_header(tmp_path / name)
 
 
+def test_patterns_stand_for_files_and_folders(tmp_path, monkeypatch):
+    names = ("a 1.laz", "b 1.las", "b/c.laz")
+    (tmp_path / "b").mkdir()
+    for name in names:
+        (tmp_path / name).touch()
+    monkeypatch.chdir(tmp_path)
+    for pattern, expected in (("*1.la?", names[:2]), ("b*", names[1:][::-1]), (tmp_path / "?/*", names[2:])):
+        assert readers.list_files(pattern) == tuple(tmp_path / name for name in expected)
+    with pytest.raises(CloudError, match=r"^No file matches .*\*\.e57: check the folder and the pattern.$"):
+        readers.list_files(tmp_path / "*.e57")
+
+
 def test_no_path_is_refused():
     with pytest.raises(CloudError, match="^No point cloud was given"):
         readers.list_files([])

@@ -7,7 +7,7 @@ from http.client import HTTPConnection, HTTPException
 
 import psutil
 import pytest
-from distributed import Client
+from distributed import Client, LocalCluster
 from distributed.comm.addressing import parse_host_port
 from distributed.security import Security
 from rail_extract.core.cluster.workers import Certificates, connect
@@ -119,6 +119,16 @@ def test_wrong_certificates_are_refused(client, scheduler, tmp_path, monkeypatch
     monkeypatch.setattr("rail_extract.core.cluster.workers.TIMEOUT_S", 3)
     with pytest.raises(RailExtractError, match="check the address and the certificates"):
         next(connect(client.scheduler.address, certificates=Certificates(*files)).gen)
+
+
+def test_a_scheduler_without_workers_is_named(monkeypatch):
+    monkeypatch.setattr("rail_extract.core.cluster.workers.WORKERS_S", 1)
+    sentence = r"^The Dask scheduler at tcp://.* has no workers: start some"
+    with (
+        LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address=None) as cluster,
+        pytest.raises(RailExtractError, match=sentence),
+    ):
+        next(connect(cluster.scheduler_address).gen)
 
 
 def test_nothing_is_left_in_the_temporary_folder(tmp_path, monkeypatch):

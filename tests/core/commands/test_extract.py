@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +15,7 @@ pyogrio = pytest.importorskip("pyogrio")
 rasterio = pytest.importorskip("rasterio")
 pytest.importorskip("distributed")
 
-from rail_extract.__main__ import main  # noqa: E402
+from rail_extract.__main__ import INTERRUPTED, main  # noqa: E402
 from rail_extract.core.clouds.points import read_rail_points  # noqa: E402
 from rail_extract.core.commands import extract  # noqa: E402
 from rail_extract.core.commands.extract import INCOMPLETE  # noqa: E402
@@ -192,6 +193,31 @@ def test_a_geopackage_in_use_is_refused_before_the_run(tiles, tmp_path, capsys):
     assert main(["extract", str(tiles), "--rails", str(out)]) == 1
     assert f"{out} is open in another program" in capsys.readouterr().err
     assert out.read_text() == "theirs"
+
+
+def test_options_are_read_from_a_file(tmp_path, capsys):
+    (tmp_path / "tiles.txt").write_text("gone.laz\n--rails\nout.gpkg\n")
+    assert main(["extract", f"@{tmp_path / 'tiles.txt'}"]) == 1
+    assert "gone.laz does not exist" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends Ctrl-C to consoles, not to processes")
+def test_an_interrupted_command_says_so_in_one_sentence(tiles, tmp_path):
+    """A terminal sends Ctrl-C to the command and to its workers."""
+    out, words = tmp_path / "out.gpkg", [sys.executable, "-m", "rail_extract", "extract", str(tiles)]
+    process = subprocess.Popen(
+        [*words, "--rails", str(out), "--engine", "OPENCV", "--workers", "1"],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    while not process.stderr.readline().startswith("Class 10"):  # said when the workers have begun
+        assert process.poll() is None
+    os.killpg(process.pid, signal.SIGINT)
+    _, said = process.communicate()
+    assert process.returncode == INTERRUPTED
+    assert [line for line in said.splitlines() if " done, " not in line] == ["Cancelled; nothing was written."]
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_only_commands_that_are_installed_are_listed(tmp_path):
