@@ -72,9 +72,14 @@ class RasterizeRailPoints(RailAlgorithm):
         """Rasterize each class, then write the file."""
         from ...core.raster import cell_size, rasterize
         from ...core.raster_file import header_for
+        from ...core.squares.density import plausible
+        from ...core.squares.grid import MemorySource
+        from ..reading.track_inputs import SQUARE_M
 
         values = ParameterValues(self, parameters, context)
         clouds = read_points(job.cloud, job.class_codes, values.extent, progress.span(0, READING))
+        dense = {source.class_code for source in plausible([MemorySource(one, SQUARE_M) for one in clouds], progress)}
+        clouds = tuple(points for points in clouds if points.class_code in dense)
         cell_m = cell_size(job.standard.gauge_m, job.standard.head_width_m)
         rasters = [rasterize(points.xyz, cell_m) for points in clouds]
         frame, codes = clouds[0].frame, [points.class_code for points in clouds]

@@ -140,6 +140,15 @@ def test_one_algorithm_serves_a_batch_over_a_folder(qgis, plugin, outcome, write
     assert counts[2] / counts[0] == pytest.approx(3, rel=0.1)
 
 
+def test_points_too_thin_for_rails_are_refused_before_the_raster(run_step, write_cloud, track, tmp_path):
+    points = track()
+    cloud = write_cloud(points[0] + 100 * (points - points[0]))
+    outcome = run_step("rasterizerailpoints", {"INPUT": cloud, "OUTPUT": tmp_path / "raster.tif"})
+    assert not outcome.ok
+    assert outcome.error.startswith("The points of class 10 are ")
+    assert "too far for rails" in outcome.error
+
+
 def test_rasterize_makes_one_band_per_class(run_step, write_cloud, track, tmp_path):
     for code in (11, 10):
         write_cloud(track() + [0, 0.2 * code, 0], f"{code}.las", class_code=code)
