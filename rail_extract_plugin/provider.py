@@ -33,8 +33,11 @@ class RailExtractProvider(QgsProcessingProvider):
         return ["tif", "tiff"]
 
     def supportedOutputVectorLayerExtensions(self) -> list[str]:
-        """Return the suffixes of the formats that keep heights, fields, coordinates and the coordinate system."""
-        return ["gpkg", "shp", "geojson", "fgb", "gml"]
+        """Return the suffixes of the formats that keep heights, fields, coordinates and the coordinate system.
+
+        DXF and CSV, which do not, are written for other programs; see `core.exchange`.
+        """
+        return ["gpkg", "shp", "geojson", "fgb", "gml", "dxf", "csv"]
 
     def loadAlgorithms(self) -> None:
         """Create the algorithms."""

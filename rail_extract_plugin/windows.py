@@ -5,6 +5,8 @@ QGIS imports this module when it starts with windows; nothing else may.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from qgis.core import QgsProject
 from qgis.PyQt.QtCore import QObject, Qt
 from qgis.PyQt.QtGui import QIcon
@@ -14,10 +16,13 @@ from .i18n import tr
 from .model_action import OpenModelAction
 from .notices import notices
 from .paths import ICON
-from .review.dock import ReviewDock
 from .review.report import ReportOpener
 from .sample_action import OpenSampleAction
 from .setup import package_setting
+from .setup.dependencies import is_installed
+
+if TYPE_CHECKING:
+    from .review.dock import ReviewDock
 
 MENU = "Rail Extract"
 """Submenu of QGIS's menu of plugins."""
@@ -47,18 +52,26 @@ class Windows(QObject):
             self._add_to(iface)
 
     def _add_to(self, iface) -> None:
-        """Add the dock and the menu."""
+        """Add the menu and, if the package that it needs is installed, the dock."""
+        sample = QAction(QIcon(str(ICON)), self._actions[0].name, iface.mainWindow())
+        sample.triggered.connect(lambda: self._actions[0].execute())
+        self._entries = [sample]
+        if is_installed("numpy"):
+            self._entries.append(self._add_dock(iface))
+        for entry in self._entries:
+            iface.addPluginToMenu(MENU, entry)
+
+    def _add_dock(self, iface) -> QAction:
+        """Add the dock, and return the menu entry that shows it."""
+        from .review.dock import ReviewDock
+
         self.dock = ReviewDock(iface)
         iface.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, self.dock)
         self.dock.hide()
-        sample = QAction(QIcon(str(ICON)), self._actions[0].name, iface.mainWindow())
-        sample.triggered.connect(lambda: self._actions[0].execute())
+        notices.findings_loaded.connect(self._show_findings)
         review = self.dock.toggleViewAction()
         review.setText(tr("Review Findings"))
-        self._entries = [sample, review]
-        for entry in self._entries:
-            iface.addPluginToMenu(MENU, entry)
-        notices.findings_loaded.connect(self._show_findings)
+        return review
 
     def _show_findings(self, layer_id: str) -> None:
         """Open the dock for the findings of a run, if there are any."""

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from qgis.core import QgsProject, QgsTask, QgsVectorLayer
 
 from ...core.errors import Cancelled, RailExtractError
 from ...core.progress import Progress
+from ..writing.layers import vertices_of
 from ..writing.run import RUN, RunCloud, cloud_of
 from .findings import Review
 
@@ -83,7 +84,7 @@ class Sections:
     def _plane(self, review: Review) -> Section:
         from ...core.clouds.sections import section_at
 
-        return section_at(np.nan_to_num(_vertices(review.feature)) * self._units_m, review.worst_share)
+        return section_at(np.nan_to_num(vertices_of(review.feature)) * self._units_m, review.worst_share)
 
     def _rails(self, plane: Section, review: Review, width_m: float) -> np.ndarray:
         """Return where the rails of the run cross a plane, or where gauge and cant put them, (k, 2)."""
@@ -163,11 +164,6 @@ def _level(rails: np.ndarray, points: np.ndarray | None) -> float:
     return 0.0
 
 
-def _vertices(feature: Any) -> np.ndarray:
-    """Return the vertices of a line, (n, 3) in units of its layer; heights are NaN where there are none."""
-    return np.array([(vertex.x(), vertex.y(), vertex.z()) for vertex in feature.geometry().vertices()], dtype=float)
-
-
 def _rails_of_run(run: str | None) -> list[np.ndarray]:
     """Return the rails that the same run has loaded, (n, 3) each."""
     layers = QgsProject.instance().mapLayers().values()
@@ -177,4 +173,4 @@ def _rails_of_run(run: str | None) -> list[np.ndarray]:
         if run and layer.customProperty(RUN) == run and isinstance(layer, QgsVectorLayer)
         if layer.fields().lookupField("rail_id") >= 0 and layer.fields().lookupField("resid_mm") >= 0
     ]
-    return [_vertices(feature) for layer in mine for feature in layer.getFeatures() if feature.hasGeometry()]
+    return [vertices_of(feature) for layer in mine for feature in layer.getFeatures() if feature.hasGeometry()]

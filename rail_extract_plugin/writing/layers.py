@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
 from qgis.core import (
+    NULL,
     QgsCoordinateReferenceSystem,
     QgsFeature,
     QgsFeatureSink,
@@ -19,6 +20,7 @@ from qgis.core import (
     QgsPoint,
     QgsProcessingAlgorithm,
     QgsProcessingContext,
+    QgsProcessingOutputLayerDefinition,
     QgsWkbTypes,
 )
 
@@ -38,11 +40,13 @@ from ...core.fields import (
 from ...core.progress import SILENT, Progress
 from ..compat import INTEGER, REAL, TEXT, field
 from ..systems import lost_part, system
-from .destinations import is_wanted
+from .destinations import appends, is_wanted
 from .styling import style_on_load
 from .whole_files import write_whole
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from ...core.frame import LocalFrame
     from ...core.rails import Centerline, RailLine, TrackGeometry
     from ...core.raster import RailRaster
@@ -56,14 +60,20 @@ KINDS = {int: INTEGER, float: REAL, str: TEXT}
 
 @dataclass(frozen=True)
 class LayerKind:
-    """The fields of a layer, and the style it gets when QGIS loads it."""
+    """The fields of a layer, the style it gets when QGIS loads it, and the word for its layers in a drawing."""
 
     columns: tuple[Field, ...]
     style: str
+    drawing: str
 
 
-RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELDS, "centerlines")
-QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
+RAILS = LayerKind(RAIL_FIELDS, "rails", "RAILS")
+CENTERLINES = LayerKind(CENTERLINE_FIELDS, "centerlines", "TRACK")
+QUALITY = LayerKind(QUALITY_FIELDS, "quality", "STATIONS")
+FINDINGS = LayerKind(FINDING_FIELDS, "findings", "FINDINGS")
+
+EXCHANGED = (".dxf", ".csv")
+"""Suffixes of files for other programs, which QGIS's sinks do not write; see `core.exchange`."""
 
 
 def fields(columns: Sequence[Field]) -> QgsFields:
@@ -246,18 +256,59 @@ def _write(
     """Write features to the output `name` unless the user skipped it."""
     if not is_wanted(parameters.get(name), context):
         return {}
+    destination = algorithm.destinations.get(name)
+    exchanged = destination is not None and destination.file.suffix.lower() in EXCHANGED
+    if exchanged and not appends(parameters.get(name)):
+        return _exchange(algorithm, name, kind, shape, made, frame, parameters, context)
     columns, crs = fields(kind.columns), output_crs(frame.crs_wkt)
 
     def write(value: Any) -> tuple[str, int]:
         sink, layer_id = algorithm.parameterAsSink({**parameters, name: value}, name, context, columns, shape, crs)
         return (layer_id, add_features(sink, made)) if sink else ("", 0)
 
-    destination = algorithm.destinations.get(name)
     layer_id = write_whole(parameters.get(name), context, destination, write, lost_part(frame.crs_wkt))
     if not layer_id:
         return {}
     _style(algorithm, name, layer_id, kind.style, context)
     return {name: layer_id}
+
+
+def _exchange(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    kind: LayerKind,
+    shape: QgsWkbTypes.Type,
+    made: Iterator[QgsFeature],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write features for other programs; QGIS loads the file if the user wants that."""
+    from ...core.exchange import Shape, write_shapes
+
+    destination, value = algorithm.destinations[name], parameters.get(name)
+    shapes = (Shape(vertices_of(feature), _plain(feature.attributes())) for feature in made)
+    is_line = QgsWkbTypes.geometryType(shape) == QgsWkbTypes.GeometryType.LineGeometry
+    with destination.replacing() as new:
+        write_shapes(new, shapes, kind.columns, frame, kind.drawing, is_line)
+    path = str(destination.path)
+    if isinstance(value, QgsProcessingOutputLayerDefinition) and value.destinationProject:
+        title = algorithm.parameterDefinition(name).description()
+        details = QgsProcessingContext.LayerDetails(title, value.destinationProject, name)
+        context.addLayerToLoadOnCompletion(path, details)
+    return {name: path}
+
+
+def vertices_of(feature: QgsFeature) -> np.ndarray:
+    """Return the vertices of a line or a point, (n, 3) in units of its layer; heights are NaN where there are none."""
+    import numpy as np
+
+    return np.array([(vertex.x(), vertex.y(), vertex.z()) for vertex in feature.geometry().vertices()], dtype=float)
+
+
+def _plain(values: Sequence[Any]) -> list[Any]:
+    """Return attributes with None where they are empty."""
+    return [None if value == NULL else value for value in values]
 
 
 def _style(

@@ -399,8 +399,6 @@ FAULTS = [
         )
         for suffix, what in (
             ("docx", "an unknown format"),
-            ("dxf", "a format without fields"),
-            ("csv", "a format without geometry"),
             ("tab", "a format without heights"),
             ("kml", "a format with a coordinate system of its own"),
         )

@@ -7,6 +7,9 @@ from qgis.core import NULL, QgsFeature, QgsGeometry, QgsVectorLayer
 from rail_extract.core.clouds.crs import import_pyproj
 from rail_extract.core.fields import CENTERLINE_FIELDS
 
+EXCHANGED = ("dxf", "csv")
+"""Formats for other programs, which have a module of their own."""
+
 FORMATS = ("gpkg", "shp", "geojson", "fgb", "gml")
 
 
@@ -22,7 +25,7 @@ def rails():
 
 
 def test_the_formats_are_those_of_the_dialog(plugin):
-    assert tuple(plugin.provider.supportedOutputVectorLayerExtensions()) == FORMATS
+    assert tuple(plugin.provider.supportedOutputVectorLayerExtensions()) == (*FORMATS, *EXCHANGED)
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
