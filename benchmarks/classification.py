@@ -1,16 +1,25 @@
-"""Print how well rail points are found in raw clouds, and what lines they give.
+"""Print how well rail points are found in raw clouds, what lines they give, and how long a large cloud takes.
 
 Run `python benchmarks/classification.py [--seed N] [--lines] [SCENE ...]`. Thresholds were chosen on seeds 1 to 9; the
-published tables are those of the default seed.
+published tables are those of the default seed. `--large 50` classifies tiles of 50 million points in all with the
+command `classify`, by one process and by two; compare rows of the same run only.
 """
 
 from __future__ import annotations
 
 import argparse
 import multiprocessing
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
 from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
 
 import numpy as np
+from rail_extract.core.clouds.las import laspy
 from rail_extract.laboratory.ruler.classification import Score, lines_from, score
 from rail_extract.laboratory.ruler.lines import Match
 from rail_extract.laboratory.scenes.raw_catalogue import AIR, RAW_SCENES
@@ -29,7 +38,11 @@ def main() -> None:
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help=f"of {', '.join(RAW_SCENES)}")
     parser.add_argument("--seed", type=int, default=SEED, help=f"of the scenes (default {SEED})")
     parser.add_argument("--lines", action="store_true", help="extract lines from the labelled points as well")
+    parser.add_argument("--large", type=float, metavar="MIO", help="million points of a large cloud to measure instead")
     arguments = parser.parse_args()
+    if arguments.large:
+        measure_large(arguments.large, arguments.seed)
+        return
     print(HEADER)
     print(
         f"{'scene':<22}{'Mio':>6}{'recall':>8}{'prec.':>8}{'wrong':>7}{'s/Mio':>7}{'MiB':>6}{'cells/m':>8}"
@@ -38,6 +51,49 @@ def main() -> None:
     for name in arguments.scenes or RAW_SCENES:
         with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
             print(row(name, *pool.submit(measured, name, arguments.seed, arguments.lines).result()), flush=True)
+
+
+TILES = 10
+"""Files of the large cloud."""
+
+APART_M = 82.0
+"""Distance between the copies of the scene in the large cloud."""
+
+
+def measure_large(millions: float, seed: int) -> None:
+    """Write a large cloud and print the run times and the memory of the command `classify`."""
+    with tempfile.TemporaryDirectory() as folder:
+        raw, new = Path(folder) / "raw", Path(folder) / "new.vpc"
+        raw.mkdir()
+        count = _write_tiles(raw, millions, seed)
+        print(f"{'workers':<10}{'Mio':>6}{'s':>8}{'CPU s':>8}{'CPU s/Mio':>10}{'MiB of one process':>20}")
+        for workers in (1, 2):
+            before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+            command = [sys.executable, "-m", "rail_extract", "classify", raw, "--output", new, "--workers", workers]
+            subprocess.run([str(word) for word in command], check=True, capture_output=True)
+            seconds, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+            cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+            print(
+                f"{workers:<10}{count / 1e6:>6.1f}{seconds:>8.0f}{cpu_s:>8.0f}{cpu_s / count * 1e6:>10.2f}"
+                f"{after.ru_maxrss / 1024:>20.0f}",
+                flush=True,
+            )
+            shutil.rmtree(new.with_suffix(""))
+
+
+def _write_tiles(folder: Path, millions: float, seed: int) -> int:
+    """Write copies of a double track beside each other to tiles, and return the number of points."""
+    xyz = RAW_SCENES["double"](seed).xyz
+    copies = max(round(millions * 1e6 / len(xyz)), 1)
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.scales = [0.001, 0.001, 0.001]
+    for number, part in enumerate(np.array_split(np.arange(copies), min(TILES, copies))):
+        with laspy.open(folder / f"{number}.laz", "w", header=header) as writer:
+            for copy in part:
+                points = laspy.ScaleAwarePointRecord.zeros(len(xyz), header=header)
+                points.x, points.y, points.z = (xyz + [0.0, APART_M * copy, 0.0]).T
+                writer.write_points(points)
+    return copies * len(xyz)
 
 
 def measured(name: str, seed: int, lines: bool) -> tuple[Score, Match | None]:

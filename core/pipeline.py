@@ -127,7 +127,7 @@ def extract_files(
     progress : Progress
     classify : bool
         Whether the cloud is a raw one, whose rail points are to be found first; the request is for the classes
-        `standards.SEARCHED_CLASSES` then. This process finds them, whatever the runner.
+        `standards.SEARCHED_CLASSES` then.
 
     Returns
     -------
@@ -152,7 +152,7 @@ def extract_files(
     if classify:
         settings = Settings((parameters.gauge_m, *parameters.other_gauges_m), parameters.head_width_m)
         with scratch_folder(folder) as scratch:
-            source, figures = spool_found(request, settings, side_m, scratch, reading)
+            source, figures = spool_found(request, settings, side_m, scratch, runner, reading)
             network = _walk([source], parameters, runner, rest)
         return replace(network, warnings=recording.warnings, search=figures)
     warn_of_gauge(request, parameters, progress)

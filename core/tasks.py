@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from graphlib import TopologicalSorter
 from typing import Any, Protocol, TypeVar
@@ -166,3 +166,21 @@ def in_order(tasks: Mapping[Name, Task]) -> TopologicalSorter[Name]:
     order: TopologicalSorter[Any] = TopologicalSorter({name: task.inputs for name, task in tasks.items()})
     order.prepare()
     return order
+
+
+def in_listed_order(tasks: Mapping[Name, Task], results: Iterable[tuple[Name, Any]]) -> Iterator[Any]:
+    """Yield results in the order in which their tasks are listed, each as soon as those before it are there.
+
+    Parameters
+    ----------
+    tasks : mapping of Name to Task
+    results : iterable of Name and result
+        From `Runner.run`; tasks that failed are missing.
+    """
+    waiting: dict[Any, Any] = {}
+    order = deque(tasks)
+    for name, result in results:
+        waiting[name] = result
+        while order and order[0] in waiting:
+            yield waiting.pop(order.popleft())
+    yield from (waiting[name] for name in order if name in waiting)

@@ -169,15 +169,30 @@ class Window:
         return Window(self.grid, self.cell[chosen], self.reach)
 
     def sums(self, image: np.ndarray) -> np.ndarray:
-        """Sum an image of whole numbers in each window, (k,) int."""
-        rows, columns = self.grid.shape
-        integral = np.zeros((rows + 1, columns + 1), dtype=np.int32)
-        np.cumsum(image, axis=1, dtype=np.int32, out=integral[1:, 1:])
-        np.cumsum(integral[1:], axis=0, out=integral[1:])
-        row, column = np.divmod(self.cell, columns)
-        top, bottom = np.maximum(row - self.reach, 0), np.minimum(row + self.reach + 1, rows)
-        left, right = np.maximum(column - self.reach, 0), np.minimum(column + self.reach + 1, columns)
-        return integral[bottom, right] - integral[top, right] - integral[bottom, left] + integral[top, left]
+        """Sum an image of whole numbers in each window, (k,)."""
+        kind = np.uint16 if image.dtype == bool else np.int32  # at most 65 535 cells in a window
+        across = _sums_along(image.astype(kind), self.reach, 1)
+        return _sums_along(across, self.reach, 0).ravel()[self.cell]
+
+
+def _sums_along(image: np.ndarray, reach: int, axis: int) -> np.ndarray:
+    """Sum each value of an image with the `reach` values before and after it: sums of 1, 2, 4 … values add up."""
+
+    def part(values: np.ndarray, start: int, length: int) -> np.ndarray:
+        return values[start : start + length] if axis == 0 else values[:, start : start + length]
+
+    size, count = image.shape[axis], 2 * reach + 1
+    powers = np.zeros([length + 2 * reach * (number == axis) for number, length in enumerate(image.shape)], image.dtype)
+    part(powers, reach, size)[:] = image
+    total, start, length = part(powers, 0, size).copy(), 1, 1  # the count is odd
+    while 2 * length <= count:
+        remaining = powers.shape[axis] - length
+        powers = part(powers, 0, remaining) + part(powers, length, remaining)
+        length *= 2
+        if count & length:
+            total += part(powers, start, size)
+            start += length
+    return total
 
 
 def highest_of_blocks(tops: Tops, cells: np.ndarray) -> np.ndarray:

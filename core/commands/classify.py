@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from ..classify.guide import Guide
@@ -16,6 +18,7 @@ from ..parameters import DEFAULT_GUIDE_DISTANCE_M
 from ..progress import Estimating
 from ..scratch import scratch_folder
 from ..standards import LAST_CLASS, RAIL_CLASS, SEARCHED_CLASSES, resolve
+from ..tasks import InTurn, Runner
 from .options import TILES_HELP, Console, add_cloud_arguments, extent_of, gauges_of
 
 
@@ -35,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = f"class of the rail points that are found (default: {RAIL_CLASS})"
     parser.add_argument("--rail-class", type=int, default=RAIL_CLASS, metavar="N", help=text)
     parser.add_argument("--rails-only", action="store_true", help="write the rail points only")
+    parser.add_argument("--workers", type=int, default=1, help="processes that work on the cloud (default: 1)")
     text = "keep the rail class of points that are not found; otherwise they become class 1"
     parser.add_argument("--no-reset", action="store_true", help=text)
 
@@ -49,6 +53,8 @@ def run(args: argparse.Namespace) -> None:
     """
     if not 0 <= args.rail_class <= LAST_CLASS:
         raise ParameterError(f"--rail-class must be a number from 0 to {LAST_CLASS}, not {args.rail_class}.")
+    if args.workers < 1:
+        raise ParameterError(f"--workers must be 1 or more, not {args.workers}.")
     standard = resolve(args.standard, args.gauge, args.head_width)
     gauges_m = gauges_of(args, standard)
     if args.only_guided and args.guide is None:
@@ -61,11 +67,28 @@ def run(args: argparse.Namespace) -> None:
     planned = plan_output(args.tiles, output, choice.class_code, progress)
     request = ask(args.tiles, SEARCHED_CLASSES, args.crs, extent_of(args.extent), progress)
     settings = Settings(gauges_m, standard.head_width_m, not args.pairs_only, _guide(args, request))
-    with writing(output.parent), scratch_folder(planned.file.parent) as folder:
-        result = classify_files(request, settings, choice, planned, folder, progress)
+    with writing(output.parent), scratch_folder(planned.file.parent) as folder, _runner(args.workers, folder) as runner:
+        result = classify_files(request, settings, choice, planned, folder, runner, progress)
     figures = result.figures
     print(f"{figures.points} of {result.point_count} points are on rails")
     print(f"{figures.paired_m:.0f} m of rails with a partner, {figures.single_m:.0f} m without")
+
+
+@contextmanager
+def _runner(workers: int, folder: Path) -> Iterator[Runner]:
+    """Execute tasks in this process, or in several of their own."""
+    if workers == 1:
+        yield InTurn()
+        return
+    try:
+        from ..cluster.runner import DaskRunner
+        from ..cluster.workers import connect
+    except ImportError as error:
+        raise ParameterError(
+            "--workers needs the package distributed: in a clone, run pip install .[cluster]."
+        ) from error
+    with connect(None, workers) as client:
+        yield DaskRunner(client, folder / "tasks")
 
 
 def _guide(args: argparse.Namespace, request: Request) -> Guide | None:

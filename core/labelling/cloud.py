@@ -6,10 +6,9 @@ import numpy as np
 
 from ..classify.settings import MARGIN_M, Settings
 from ..classify.square import Classified, classify_square
-from ..frame import LocalFrame
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
-from ..squares.grid import Square, around, points_by_square
+from ..squares.grid import points_by_square
 
 
 def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SILENT) -> Classified:
@@ -28,15 +27,14 @@ def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SIL
     Classified
         Of the whole cloud.
     """
-    zero = LocalFrame(np.zeros(3))
     rail = np.zeros(len(xyz), dtype=bool)
     figures = SearchFigures()
     members = points_by_square(xyz, settings.side_m)
+    around_them = points_by_square(xyz, settings.side_m, MARGIN_M)
     for key in progress.follow(list(members)):
-        square = Square.on_grid(key, settings.side_m, zero)
-        around_it = [members[one] for one in around(key) if one in members]
-        number = np.concatenate([part[square.holds(square.frame.to_local(xyz[part]), MARGIN_M)] for part in around_it])
-        found = classify_square(square.frame.to_local(xyz[number]), settings.at(key))
+        number = around_them[key]
+        corner = np.array([*np.multiply(key, settings.side_m), 0.0])
+        found = classify_square(xyz[number] - corner, settings.at(key))
         rail[number[found.rail]] = True
         figures += found.figures
     return Classified(rail, figures)

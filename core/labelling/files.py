@@ -14,11 +14,12 @@ from ..clouds.readers import CATALOGUES, READERS, list_files
 from ..clouds.rewriting import check_class, rewrite
 from ..clouds.vpc import CatalogueTile, catalogue_text
 from ..disk import Destination, writing
-from ..errors import DiskError, ParameterError
+from ..errors import DiskError, ParameterError, RailExtractError
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from ..scratch import scratch_folder
 from ..standards import RAIL_CLASS
+from ..tasks import Context, Runner, Task, in_listed_order
 from .finding import Found, find_rail_points, report
 
 UNCLASSIFIED = 1
@@ -134,7 +135,13 @@ def plan_output(paths: Sequence[Path], output: Path, class_code: int, progress: 
 
 
 def classify_files(
-    request: Request, settings: Settings, choice: Choice, output: Output, folder: Path, progress: Progress = SILENT
+    request: Request,
+    settings: Settings,
+    choice: Choice,
+    output: Output,
+    folder: Path,
+    runner: Runner,
+    progress: Progress = SILENT,
 ) -> Result:
     """Find the rail points of a cloud and write its files with their classes.
 
@@ -147,7 +154,9 @@ def classify_files(
     output : Output
         From `plan_output`, for the files of the request.
     folder : Path
-        Existing folder for temporary files, 32 bytes per point; the caller removes it.
+        Existing folder for temporary files, 42 bytes per point; the caller removes it.
+    runner : Runner
+        Its results are complete, or there is no output.
     progress : Progress
 
     Raises
@@ -158,6 +167,8 @@ def classify_files(
         The extent contains no points.
     DiskError
         The disk is full, or another program has changed an output.
+    RailExtractError
+        A square could not be searched.
     """
     finding, rewriting = progress.divide((2.0, 1.0))
     labels = _Labels(request, folder)
@@ -165,18 +176,30 @@ def classify_files(
     with writing(folder):
         squares = folder / "squares"
         squares.mkdir()
-    for found in find_rail_points(request, settings, squares, finding):
+    for found in find_rail_points(request, settings, squares, runner, finding):
         with writing(folder):
             labels.add(found)
         figures += found.figures
+    _check_complete(runner)
     report(figures, progress)
     writer = _Writer(request, choice, labels)
     if output.names:
-        writer.write_tiles(output, rewriting)
+        writer.write_tiles(output, runner, rewriting)
     else:
         with Destination.at(output.file).replacing() as new:
             writer.write(0, new, rewriting)
     return Result(output.file, int(labels.starts[-1]), figures)
+
+
+def _check_complete(runner: Runner) -> None:
+    """Refuse to continue without the results of tasks that failed.
+
+    Raises
+    ------
+    RailExtractError
+    """
+    if runner.failures:
+        raise RailExtractError(f"{runner.failures[-1]} Nothing was written.")
 
 
 class _Labels:
@@ -236,18 +259,24 @@ class _Writer:
 
         return rewrite(self._request.headers[place].path, new, change, progress)
 
-    def write_tiles(self, output: Output, progress: Progress) -> None:
+    def write_tiles(self, output: Output, runner: Runner, progress: Progress) -> None:
         """Write all tiles into a temporary folder, then move it to its name and write the catalogue."""
         catalogue = Destination.at(output.file)
         with writing(output.file.parent), scratch_folder(output.file.parent) as scratch:
             new = scratch / "tiles"
             new.mkdir()
-            tiles = []
-            for place, share in enumerate(self._request.shares(progress)):
-                name = output.names[place]
-                count = self.write(place, new / name, share)
-                href = f"./{output.folder.name}/{name}"
-                tiles.append(CatalogueTile(href, count, self._request.headers[place].extent))
+            tasks = {
+                place: Task(
+                    f"Writing {name}", _write_tile, (self, place, str(new / name)), weight=header.point_count + 1
+                )
+                for place, (name, header) in enumerate(zip(output.names, self._request.headers))
+            }
+            counts = list(in_listed_order(tasks, runner.run(tasks, progress)))
+            _check_complete(runner)
+            tiles = [
+                CatalogueTile(f"./{output.folder.name}/{name}", count, header.extent)
+                for name, count, header in zip(output.names, counts, self._request.headers)
+            ]
             _check_folder(output)
             _replace_folder(output.folder, new, scratch / "old")
         catalogue.write_text(catalogue_text(tiles, self._request.zero.crs_wkt))
@@ -259,6 +288,12 @@ class _Writer:
             changed[(codes == choice.class_code) & self._request.holds(xyz)] = UNCLASSIFIED
         changed[rail] = choice.class_code
         return changed
+
+
+def _write_tile(writer: _Writer, place: int, new: str, context: Context) -> int:
+    """Write one of several files; returns how many points it has. A task."""
+    with writing(Path(new).parent):
+        return writer.write(place, Path(new), context.progress)
 
 
 def _without_copc(file: Path, progress: Progress) -> Path:

@@ -5,8 +5,9 @@ The files are read once; memory holds one square and its margin (docs/classifica
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import uuid
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,14 +16,15 @@ from ..classify.guide import MIDDLE_M, Guide
 from ..classify.settings import MARGIN_M, Settings
 from ..classify.square import classify_square
 from ..clouds.points import Request
-from ..clouds.readers import read_points
+from ..clouds.readers import CloudHeader, read_points
 from ..disk import writing
 from ..errors import CloudError, NoRailPointsError, ParameterError
 from ..frame import LocalFrame
 from ..progress import SILENT, Progress
 from ..rails import ENOUGH_CELLS_PER_M, SearchFigures
-from ..squares.grid import Key, Square, around, points_by_square
+from ..squares.grid import Key, Square, points_by_square
 from ..standards import LAST_CLASS
+from ..tasks import Context, Runner, Task, in_listed_order
 
 POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8")])
 """A point on disk: coordinates in units of the CRS, and its number among all points of all files, with the number of
@@ -59,7 +61,7 @@ class Found:
 
 
 def find_rail_points(
-    request: Request, settings: Settings, folder: Path, progress: Progress = SILENT
+    request: Request, settings: Settings, folder: Path, runner: Runner, progress: Progress = SILENT
 ) -> Iterator[Found]:
     """Find the points on railheads, square by square.
 
@@ -69,29 +71,33 @@ def find_rail_points(
         Files, searched classes and extent.
     settings : Settings
     folder : Path
-        Empty folder for the points of the squares, 32 bytes each; the caller removes it.
+        Empty folder for the points of the squares, 32 bytes each and a third more for those near borders; the caller
+        removes it.
+    runner : Runner
+        Executes one task per file and one per square. Whether errors of single ones end the run is for it to decide.
     progress : Progress
 
     Yields
     ------
     Found
-        Only for squares with rails.
+        Only for squares with rails; in the same order with any runner.
 
     Raises
     ------
     CloudError
-        A file is damaged, or its points are too far apart.
+        A file is damaged, or its points are too far apart; if the runner tolerates that, all of them are.
     NoRailPointsError
         The extent contains no points.
     DiskError
         The disk is full.
     """
     reading, searching = progress.divide((1.0, 1.0))
-    counts = _sort(request, settings, folder, reading)
-    if not counts:
+    sorted_files = _sorted_files(request, settings, folder, runner, reading)
+    keys = sorted({key for one in sorted_files for key in one.counts})
+    if not keys:
         raise _nothing_to_search(request, settings.guide)
-    for key in searching.follow(sorted(counts)):
-        found = _find_in(Square.on_grid(key, settings.side_m, request.zero), counts, settings, folder)
+    tasks = {key: _search_task(key, sorted_files, request.zero, settings) for key in keys}
+    for found in in_listed_order(tasks, runner.run(tasks, searching)):
         if found.figures != SearchFigures():
             yield found
 
@@ -159,60 +165,102 @@ def report(figures: SearchFigures, progress: Progress) -> None:
         )
 
 
-def _sort(request: Request, settings: Settings, folder: Path, progress: Progress) -> dict[Key, int]:
-    """Append the points to be searched to the files of their squares; returns the number of points by square."""
+@dataclass(frozen=True)
+class _SortedFile:
+    """The points of one file of the cloud, sorted into squares.
+
+    Attributes
+    ----------
+    folder : str
+        Folder with one file for each square that has points inside or within `MARGIN_M`.
+    counts : dict of Key to int
+        Points inside each square.
+    """
+
+    folder: str
+    counts: dict[Key, int]
+
+
+def _sorted_files(
+    request: Request, settings: Settings, folder: Path, runner: Runner, progress: Progress
+) -> list[_SortedFile]:
+    """Sort the points of all files into squares, one file per task."""
+    starts = np.cumsum([0, *(header.point_count for header in request.headers)])
+    tasks = {
+        place: Task(
+            f"Reading {header.path.name}",
+            _sort_file,
+            (replace(request, headers=()), header, int(starts[place]), settings, str(folder)),
+            weight=header.point_count + 1,
+        )
+        for place, header in enumerate(request.headers)
+    }
+    found = list(in_listed_order(tasks, runner.run(tasks, progress)))
+    if not found:
+        raise CloudError(f"Not one file could be read; the last error was: {runner.failures[-1]}")
+    return found
+
+
+def _sort_file(
+    request: Request, header: CloudHeader, first: int, settings: Settings, folder: str, context: Context
+) -> _SortedFile:
+    """Append the points of a file that are to be searched to the files of their squares; a task.
+
+    Each execution has a folder of its own: a worker may have died half-way.
+    """
+    mine = Path(folder) / uuid.uuid4().hex
+    with writing(mine.parent):
+        mine.mkdir()
     counts: dict[Key, int] = {}
     wanted = np.zeros(LAST_CLASS + 1, dtype=bool)
     wanted[list(request.class_codes)] = True
-    first = 0
-    for header, share in zip(request.headers, request.shares(progress)):
-        for xyz, codes, strips, valid in read_points(header.path, share):
-            kept = np.flatnonzero(valid & wanted[codes] & request.holds(xyz))
-            if settings.guide is not None:
-                kept = kept[settings.guide.holds(request.zero.to_local(xyz[kept])[:, :2])]
-            points = np.empty(len(kept), POINT)
-            points["xyz"] = xyz[kept]
-            points["number"] = kept + first | strips[kept].astype(np.int64) << STRIP_SHIFT
-            first += len(xyz)
-            _append(points, request.zero, settings.side_m, folder, counts, header.path.name)
-    return counts
+    for xyz, codes, strips, valid in read_points(header.path, context.progress):
+        kept = np.flatnonzero(valid & wanted[codes] & request.holds(xyz))
+        if settings.guide is not None:
+            kept = kept[settings.guide.holds(request.zero.to_local(xyz[kept])[:, :2])]
+        points = np.empty(len(kept), POINT)
+        points["xyz"] = xyz[kept]
+        points["number"] = kept + first | strips[kept].astype(np.int64) << STRIP_SHIFT
+        first += len(xyz)
+        _append(points, request.zero, settings.side_m, mine, counts, header.path.name)
+    return _SortedFile(str(mine), counts)
 
 
 def _append(
     points: np.ndarray, zero: LocalFrame, side_m: float, folder: Path, counts: dict[Key, int], name: str
 ) -> None:
-    """Append points to the files of their squares, and count them."""
-    members = points_by_square(zero.to_local(points["xyz"]), side_m)
+    """Append points to the files of the squares that need them, and count them in their own squares."""
+    places = zero.to_local(points["xyz"])
+    members = points_by_square(places, side_m)
     if len(members) > MANY_SQUARES and len(points) < FEW_IN_SQUARE * len(members):
         raise CloudError(
             f"The points of {name} are too far apart for rails: if the coordinates are in centimetres or millimetres, "
             "assign a coordinate system that says so."
         )
-    with writing(folder):
-        for key, numbers in members.items():
+    for key, numbers in members.items():
+        counts[key] = counts.get(key, 0) + len(numbers)
+    with writing(folder.parent):
+        for key, numbers in points_by_square(places, side_m, MARGIN_M).items():
             with _file(folder, key).open("ab") as file:
                 file.write(points[numbers].tobytes())
-            counts[key] = counts.get(key, 0) + len(numbers)
 
 
-def _find_in(square: Square, counts: Mapping[Key, int], settings: Settings, folder: Path) -> Found:
-    """Find the rail points of a square."""
-    parts = [_near(square, key, folder) for key in around(square.key) if key in counts]
-    xyz, number = (np.concatenate(values) for values in zip(*parts))
-    found = classify_square(square.frame.to_local(xyz), settings.at(square.key))
-    number = number[found.rail]
-    strips = (number >> STRIP_SHIFT & STRIP_BITS).astype(np.uint16)
-    return Found(xyz[found.rail], number & NUMBER_BITS, strips, found.figures)
+def _search_task(key: Key, sorted_files: Sequence[_SortedFile], zero: LocalFrame, settings: Settings) -> Task:
+    """Make the task that searches a square."""
+    files = [_file(Path(one.folder), key) for one in sorted_files]
+    weight = sum(one.counts.get(key, 0) for one in sorted_files)
+    arguments = (Square.on_grid(key, settings.side_m, zero), [str(file) for file in files], settings.at(key))
+    return Task(f"Searching square {key}", _search, arguments, weight=weight)
 
 
-def _near(square: Square, key: Key, folder: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Read the points of a square or of a neighbour that lie in the square or its margin: coordinates and numbers."""
-    points = np.fromfile(_file(folder, key), POINT)
-    xyz, number = np.ascontiguousarray(points["xyz"]), np.ascontiguousarray(points["number"])
-    if key == square.key:
-        return xyz, number
-    near = square.holds(square.frame.to_local(xyz), MARGIN_M)
-    return xyz[near], number[near]
+def _search(square: Square, files: Sequence[str], settings: Settings, context: Context) -> Found:
+    """Find the rail points of a square; a task."""
+    context.progress.check()
+    points = np.concatenate([np.fromfile(file, POINT) for file in files if Path(file).exists()])
+    found = classify_square(square.frame.to_local(points["xyz"]), settings)
+    points = points[found.rail]
+    strips = (points["number"] >> STRIP_SHIFT & STRIP_BITS).astype(np.uint16)
+    return Found(points["xyz"].copy(), points["number"] & NUMBER_BITS, strips, found.figures)
 
 
 def _file(folder: Path, key: Key) -> Path:

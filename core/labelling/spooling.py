@@ -13,11 +13,12 @@ from ..rails import SearchFigures
 from ..scratch import scratch_folder
 from ..squares.spool import Census, SpooledFile, SpooledPoints, gather
 from ..standards import RAIL_CLASS
+from ..tasks import Runner
 from .finding import find_rail_points, report
 
 
 def spool_found(
-    request: Request, settings: Settings, side_m: float, folder: Path, progress: Progress
+    request: Request, settings: Settings, side_m: float, folder: Path, runner: Runner, progress: Progress
 ) -> tuple[SpooledPoints, SearchFigures]:
     """Find the rail points of a raw cloud and sort them into the squares of the extraction, as class `RAIL_CLASS`.
 
@@ -30,6 +31,7 @@ def spool_found(
         Side of the squares of the extraction.
     folder : Path
         Folder to write to; the caller removes it.
+    runner : Runner
     progress : Progress
 
     Raises
@@ -41,7 +43,7 @@ def spool_found(
     """
     census, figures = Census(), SearchFigures()
     with writing(folder), scratch_folder(folder) as squares:
-        for found in find_rail_points(request, settings, squares, progress):
+        for found in find_rail_points(request, settings, squares, runner, progress):
             census.add(RAIL_CLASS, found.xyz, found.strips, request.zero, side_m, folder)
             figures += found.figures
     if not figures.points:

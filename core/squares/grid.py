@@ -153,13 +153,23 @@ def unique_keys(xyz_m: np.ndarray, side_m: float) -> tuple[list[Key], np.ndarray
     """
     if not len(xyz_m):
         return [], np.empty(0, dtype=np.int64)
-    column, row = np.floor(xyz_m[:, :2] / side_m).astype(np.int64).T
+    column, row = (np.floor(values / side_m).astype(np.int64) for values in xyz_m[:, :2].T)
     first_column, first_row, height = int(column.min()), int(row.min()), int(np.ptp(row)) + 1
-    found, number = np.unique((column - first_column) * height + row - first_row, return_inverse=True)
-    return [(first_column + one // height, first_row + one % height) for one in found.tolist()], number.ravel()
+    square = (column - first_column) * height + row - first_row
+    found, number = _distinct(square, (int(column.max()) - first_column + 1) * height)
+    return [(first_column + one // height, first_row + one % height) for one in found.tolist()], number
 
 
-def points_by_square(xyz_m: np.ndarray, side_m: float) -> dict[Key, np.ndarray]:
+def _distinct(numbers: np.ndarray, limit: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distinct numbers below `limit`, ascending, and the index of each number among them, (n,)."""
+    if limit > len(numbers):
+        found, index = np.unique(numbers, return_inverse=True)
+        return found, index.ravel()
+    there = np.bincount(numbers, minlength=limit) > 0
+    return np.flatnonzero(there), (np.cumsum(there) - 1)[numbers]
+
+
+def points_by_square(xyz_m: np.ndarray, side_m: float, margin_m: float = 0.0) -> dict[Key, np.ndarray]:
     """Sort points into squares.
 
     Parameters
@@ -168,16 +178,32 @@ def points_by_square(xyz_m: np.ndarray, side_m: float) -> dict[Key, np.ndarray]:
         Metres from the zero of the coordinate system.
     side_m : float
         Side of the squares.
+    margin_m : float
+        Distance, less than half a side, beyond the border of a square up to which points belong to it as well.
 
     Returns
     -------
     dict of Key to (k,) int array
-        Numbers of the points of each square, ascending; the squares are in ascending order, too.
+        Numbers of the points of each square, ascending without a margin; the squares are in ascending order.
     """
+    number = np.arange(len(xyz_m))
+    if margin_m:
+        xyz_m, number = _with_margin(xyz_m[:, :2], side_m, margin_m)
     keys, square = unique_keys(xyz_m, side_m)
-    order = np.argsort(square, kind="stable")
+    # Sorting small numbers takes linear time.
+    order = np.argsort(square.astype(np.min_scalar_type(len(keys))), kind="stable")
     borders = np.searchsorted(square[order], np.arange(1, len(keys)))
-    return dict(zip(keys, np.split(order, borders)))
+    return dict(zip(keys, np.split(number[order], borders)))
+
+
+def _with_margin(xy_m: np.ndarray, side_m: float, margin_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Repeat places near the borders of squares, moved into each square that they belong to, and their numbers."""
+    crosses = np.floor((xy_m - margin_m) / side_m) != np.floor((xy_m + margin_m) / side_m)
+    moved, number = [xy_m - margin_m], [np.arange(len(xy_m))]
+    for chosen, sense in ((crosses[:, 0], (1, -1)), (crosses[:, 1], (-1, 1)), (crosses.all(axis=1), (1, 1))):
+        number.append(np.flatnonzero(chosen))
+        moved.append(xy_m[number[-1]] + np.multiply(sense, margin_m))
+    return np.concatenate(moved), np.concatenate(number)
 
 
 def around(key: Key) -> list[Key]:

@@ -95,6 +95,7 @@ class ClassifyRailPoints(RailAlgorithm):
         from ...core.classify.settings import Settings
         from ...core.labelling.files import Choice, classify_files, plan_output
         from ...core.labelling.finding import guide_of
+        from ...core.tasks import InTurn
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
         gauges_m = (job.standard.gauge_m, *job.other_gauges_m)
@@ -106,7 +107,7 @@ class ClassifyRailPoints(RailAlgorithm):
             guide = guide_of(request, job.guide, values.number("GUIDE_DISTANCE"), values.flag("ONLY_GUIDED"))
         settings = Settings(gauges_m, job.standard.head_width_m, values.flag("KEEP_SINGLE"), guide)
         with points_folder() as folder:
-            result = classify_files(request, settings, choice, output, folder, progress)
+            result = classify_files(request, settings, choice, output, folder, InTurn(), progress)
         return {
             "OUTPUT": str(result.file),
             "POINT_COUNT": result.point_count,

@@ -46,6 +46,20 @@ def test_a_classified_copy_is_written(save, tmp_path, capsys):
     assert [one.name for one in new.parent.iterdir()] == ["new.las"]
 
 
+def test_workers_change_nothing(save, tmp_path):
+    """Two processes of their own."""
+    source = str(save(scene()[0]))
+    for count in ("1", "2"):
+        assert main(["classify", source, "--output", str(tmp_path / f"{count}.las"), "--workers", count]) == 0
+    assert (tmp_path / "1.las").read_bytes() == (tmp_path / "2.las").read_bytes()
+
+
+def test_there_is_a_worker_at_least(save, tmp_path, capsys):
+    options = ["--output", str(tmp_path / "new.las"), "--workers", "0"]
+    assert main(["classify", str(save(scene()[0])), *options]) == 1
+    assert "--workers must be 1 or more, not 0." in capsys.readouterr().err
+
+
 def test_a_class_out_of_range_is_refused(save, tmp_path, capsys):
     assert main(["classify", str(save(scene()[0])), "--output", str(tmp_path / "o.las"), "--rail-class", "256"]) == 1
     assert "--rail-class must be a number from 0 to 255, not 256." in capsys.readouterr().err

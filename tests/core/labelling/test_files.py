@@ -6,11 +6,12 @@ from rail_extract.core.classify.settings import Settings
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.clouds.vpc import list_tiles
-from rail_extract.core.errors import Cancelled, CloudError, DiskError, ParameterError
+from rail_extract.core.errors import Cancelled, CloudError, DiskError, ParameterError, RailExtractError
 from rail_extract.core.labelling.files import Choice, classify_files, plan_output
-from rail_extract.core.progress import Progress, Recording
+from rail_extract.core.progress import SILENT, Progress, Recording
 from rail_extract.core.scratch import scratch_folder
 from rail_extract.core.standards import SEARCHED_CLASSES
+from rail_extract.core.tasks import InTurn
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
 GAUGE, WIDTH = 1.435, 0.072
@@ -47,13 +48,13 @@ def save(path, xyz, point_format=6, codes=None):
     return path
 
 
-def classify(tmp_path, paths, output, choice=TEN, progress=None):
+def classify(tmp_path, paths, output, choice=TEN, progress=None, runner=None):
     """Plan and write; returns the result and the progress."""
     progress = progress or Recording(Progress())
     planned = plan_output(paths, output, choice.class_code, progress)
     request = ask(paths, SEARCHED_CLASSES, None, None, progress)
     with scratch_folder(tmp_path) as work:
-        return classify_files(request, SETTINGS, choice, planned, work, progress), progress
+        return classify_files(request, SETTINGS, choice, planned, work, runner or InTurn(), progress), progress
 
 
 @pytest.mark.parametrize(
@@ -128,6 +129,45 @@ def test_tiles_are_classified_as_one_cloud(tmp_path, scene):
     (tmp_path / "new" / "diary.txt").write_text("mine")
     with pytest.raises(DiskError, match="new exists and holds other files: choose another name"):
         classify(tmp_path, [raw], tmp_path / "new.laz")
+
+
+class Backwards(InTurn):
+    """Returns the results of tasks in the opposite order, and fails where it is told to."""
+
+    def __init__(self, failing=""):
+        super().__init__()
+        self.failing = failing
+
+    def run(self, tasks, progress=SILENT):
+        for name, result in reversed(list(super().run(tasks, progress))):
+            if self.failing and tasks[name].label.startswith(self.failing):
+                self.failures.append(f"{tasks[name].label} failed (reason).")
+            else:
+                yield name, result
+
+
+def test_any_runner_gives_the_same_files(tmp_path, scene):
+    tiles = tmp_path / "raw"
+    tiles.mkdir()
+    for name, part in zip(("a.las", "b.las", "c.las"), np.array_split(scene[0], 3)):
+        save(tiles / name, part)
+    written = []
+    for runner in (InTurn(), Backwards()):
+        result, _ = classify(tmp_path, [tiles], tmp_path / "new.vpc", runner=runner)
+        written.append([result.figures, *(one.read_bytes() for one in sorted((tmp_path / "new").iterdir()))])
+    assert written[0][0].paired_m > 14
+    assert written[0] == written[1]
+
+
+@pytest.mark.parametrize("failing", ["Reading b.las", "Searching", "Writing b.las"])
+def test_nothing_is_written_where_a_part_failed(tmp_path, scene, failing):
+    tiles = tmp_path / "raw"
+    tiles.mkdir()
+    for name, part in zip(("a.las", "b.las"), np.array_split(scene[0], 2)):
+        save(tiles / name, part)
+    with pytest.raises(RailExtractError, match=rf"{failing}.* failed \(reason\). Nothing was written."):
+        classify(tmp_path, [tiles], tmp_path / "new.vpc", runner=Backwards(failing))
+    assert [one.name for one in tmp_path.iterdir()] == ["raw"]
 
 
 def test_ground_has_no_rail(tmp_path):
