@@ -52,8 +52,8 @@ class ReviewDock(QDockWidget):
     def _build(self) -> None:
         """Create the widgets."""
         self.layers, self.view = QComboBox(), SectionView()
-        self.count, self.reason, self.text, self.problem = QLabel(), QLabel(), QLabel(), QLabel()
-        for label in (self.reason, self.text, self.problem):
+        self.count, self.reason, self.text, self.note, self.problem = (QLabel() for _ in range(5))
+        for label in (self.reason, self.text, self.note, self.problem):
             label.setWordWrap(True)
         self.reason.setStyleSheet("font-weight: 600")
         self.problem.setStyleSheet("color: #d62839")
@@ -71,7 +71,7 @@ class ReviewDock(QDockWidget):
         for name in (ACCEPTED, REJECTED):
             self.buttons[name].setCheckable(True)
         content, column, grid = QWidget(), QVBoxLayout(), QGridLayout()
-        for widget in (self.layers, self.count, self.reason, self.text, self.view, self.problem):
+        for widget in (self.layers, self.count, self.reason, self.text, self.view, self.note, self.problem):
             column.addWidget(widget, 1 if widget is self.view else 0)
         for number, button in enumerate(self.buttons.values()):
             grid.addWidget(button, number // 2, number % 2)
@@ -186,8 +186,9 @@ class ReviewDock(QDockWidget):
         self.buttons["next"].setEnabled(self._at < len(self._found) - 1)
         if not any_found or self._sections is None:
             self.count.setText(tr("There are no findings.") if self._layer else tr("No layer of findings is loaded."))
-            self.reason.clear(), self.text.clear()
-            self.view.show_picture(None, False)
+            for label in (self.reason, self.text, self.note):
+                label.clear()
+            self.view.show_picture(None)
             return
         shown = self._found[self._at]
         decided = sum(one.decision != OPEN for one in self._found)
@@ -195,4 +196,8 @@ class ReviewDock(QDockWidget):
         reason = shown.value("reason") or ""
         self.reason.setText(f"{reason[:1].upper()}{reason[1:]}")
         self.text.setText(f"{shown.where}: {shown.figures}.")
-        self.view.show_picture(self._sections.picture(shown), self.is_reading)
+        picture = self._sections.picture(shown)
+        self.view.show_picture(picture)
+        nothing = picture.points is None or not len(picture.points)
+        empty = tr("There is no rail point here.") if nothing else ""
+        self.note.setText(tr("Reading the points…") if self.is_reading else picture.note or empty)

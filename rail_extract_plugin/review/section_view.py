@@ -64,13 +64,12 @@ class SectionView(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._picture: Picture | None = None
-        self._reading = False
         self.setMinimumHeight(200)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
-    def show_picture(self, picture: Picture | None, reading: bool) -> None:
-        """Draw another picture; `reading` states whether its points are still being read."""
-        self._picture, self._reading = picture, reading
+    def show_picture(self, picture: Picture | None) -> None:
+        """Draw another picture."""
+        self._picture = picture
         self.update()
 
     def sizeHint(self) -> QSize:
@@ -88,7 +87,6 @@ class SectionView(QWidget):
                 painter.setClipRect(panel.box)
                 _draw(painter, panel, self._picture)
                 painter.restore()
-            self._write_note(painter, self._picture)
         painter.end()
 
     def _panels(self, picture: Picture) -> Iterator[Panel]:
@@ -104,15 +102,6 @@ class SectionView(QWidget):
                 right, up = mine[np.argmin(np.abs(mine[:, 0]))]
                 box = QRectF(start, top, half, self.height() - top)
                 yield Panel(box, float(right), float(up), HEADS * picture.head_width_m, title)
-
-    def _write_note(self, painter: QPainter, picture: Picture) -> None:
-        """Write what is missing."""
-        nothing = picture.points is None or not len(picture.points)
-        note = tr("Reading the points…") if self._reading else picture.note
-        note = note or (tr("There is no rail point here.") if nothing else "")
-        box = QRectF(4, WHOLE * self.height() - LINE_PX, self.width() - 8, 3 * LINE_PX)
-        painter.setPen(QPen(SOFT))
-        painter.drawText(box, note, QTextOption(Qt.AlignmentFlag.AlignHCenter))
 
 
 def _draw(painter: QPainter, panel: Panel, picture: Picture) -> None:

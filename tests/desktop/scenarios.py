@@ -178,6 +178,35 @@ def review(driver: Driver) -> Iterator:
     driver.picture("review_rejected")
 
 
+def deliveries(driver: Driver) -> Iterator:
+    """Write files for other programs, and judge lines from files."""
+    yield from install(ARCHIVE)
+    folder, browser = driver.folder, Browser()
+    dialog = yield from open_dialog("extractrails")
+    paths = {"RAILS": "rails.dxf", "CENTERLINES": "tracks.csv", "QUALITY": "stations_points.csv"}
+    outputs = {name: str(folder / path) for name, path in paths.items()}
+    dialog.setParameters({"INPUT": SAMPLE, **PART, **outputs, "FINDINGS": None, "REPORT": None})
+    driver.keep("log", (yield from press_run(dialog)))
+    yield from close(dialog)
+    layers = QgsProject.instance().mapLayers().values()
+    driver.keep("layers", {layer.name(): layer.featureCount() for layer in layers if layer.isValid()})
+    driver.picture("deliveries")
+    lines = {"RAILS": str(folder / "rails.gpkg"), "CENTERLINES": str(folder / "tracks.gpkg")}
+    dialog = yield from open_dialog("extractrails")
+    skipped = dict.fromkeys(("QUALITY", "FINDINGS", "REPORT"))
+    dialog.setParameters({"INPUT": SAMPLE, **PART, **skipped, **lines})
+    yield from press_run(dialog)
+    yield from close(dialog)
+    dialog = yield from open_dialog("measuretrackgeometry")
+    values = {"INPUT": lines["CENTERLINES"], "RAILS": lines["RAILS"], "STANDARD": PART["STANDARD"]}
+    dialog.setParameters({**values, "OUTPUT": "TEMPORARY_OUTPUT", "FINDINGS": str(folder / "found.gpkg")})
+    driver.picture("measure_dialog")
+    driver.keep("measure log", (yield from press_run(dialog)))
+    yield from close(dialog)
+    driver.keep("opened", browser.urls)
+    driver.picture("measured")
+
+
 def batch(driver: Driver) -> Iterator:
     """Fill two rows of the batch dialog, with an output left blank, and a report."""
     yield from install(ARCHIVE)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from osgeo import gdal, ogr
 
-SCENARIOS = ("dialogs", "rails", "review", "batch", "model")
+SCENARIOS = ("dialogs", "rails", "review", "deliveries", "batch", "model")
 NAMES = [
     *("extractrails", "rasterizerailpoints", "frpdfcleanup", "vectorizerails", "buildtrackcenterlines"),
     *("measuretrackgeometry", "installpackages", "checkinstallation"),
@@ -102,6 +102,29 @@ def test_findings_are_reviewed_in_the_dock(run_scenario):
     decided = {feature["finding"]: feature["review"] for feature in layer}
     assert len(decided) == total
     assert (decided[1], decided[2], set(list(decided.values())[2:])) == ("accepted", "rejected", {""})
+
+
+def test_files_for_other_programs_are_written_and_loaded(run_scenario):
+    session = run_scenario("deliveries")
+    assert "3 tracks" in session["log"]
+    drawing = ogr.Open(str(session.folder / "rails.dxf"))
+    lines = [(feature["Layer"], feature.GetGeometryRef().GetGeometryType()) for feature in drawing.GetLayer(0)]
+    assert lines == 6 * [("RAILS_10", ogr.wkbLineString25D)]
+    table = ogr.Open(str(session.folder / "tracks.csv"))
+    assert [feature["track_id"] for feature in table.GetLayer(0)] == [1, 2, 3]
+    vertices = (session.folder / "stations_points.csv").read_text(encoding="utf-8").splitlines()
+    assert vertices[0].startswith("track_id,chainage_m,") and len(vertices) > 60
+    assert session["layers"]["Track centerlines"] == 3
+
+
+def test_lines_from_files_are_judged(run_scenario):
+    session = run_scenario("deliveries")
+    assert "% of the tracks in doubt" in session["measure log"]
+    (opened,) = session["opened"]
+    assert opened.endswith(".html")
+    dataset = ogr.Open(str(session.folder / "found.gpkg"))
+    reasons = {feature["reason"] for feature in dataset.GetLayer(0)}
+    assert reasons <= {"a rail has no points", "gauge off by more than 10 mm", "standard error above 5 mm"}
 
 
 def test_batch_writes_what_is_named_and_skips_what_is_blank(run_scenario):

@@ -250,7 +250,7 @@ def lone(length_m, rail_id=99):
     [
         (3.0, "Good throughout: every metre is supported by points, at gauge, with a small standard error. 1 rail "),
         (9.0, "Good, except for a few places to look at. 1 rail does not belong to a track (9.0 m)."),
-        (90.0, "Usable, but look at the places below before you rely on them. 1 rail does not belong to a track "),
+        (90.0, "Usable, but look at the findings before you rely on them. 1 rail does not belong to a track "),
     ],
 )
 def test_the_headline_counts_lone_rails(length_m, words):

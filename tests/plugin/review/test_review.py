@@ -206,7 +206,7 @@ def test_without_the_cloud_gauge_and_cant_place_the_rails(load, dock, cloud):
     picture = shown._sections.picture(shown._found[0])
     np.testing.assert_allclose(picture.rails, [[-0.7535, 0.02], [0.7535, -0.02]], atol=1e-9)
     assert picture.points is None
-    assert picture.note == "cloud is not at its place any more: only rails are shown."
+    assert shown.note.text() == picture.note == "cloud is not at its place any more: only rails are shown."
 
 
 def test_a_damaged_cloud_is_one_sentence(qgis, load, dock, cloud):
