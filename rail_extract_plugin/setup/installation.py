@@ -19,7 +19,7 @@ from ...core.scratch import scratch_folder, sweep
 from . import processes
 from .dependencies import OWNED_BY_QGIS, is_installed, pins
 from .interpreter import Interpreter
-from .locked import Locked, locked_packages
+from .locked import Locked, locked_order, locked_packages
 
 MIN_PIP = (22, 2)
 """The first version that can report what it would install."""
@@ -204,9 +204,12 @@ def install(order: Order, interpreter: Interpreter, folder: Path, others: Sequen
     with _temporary_folder(folder) as temporary:
         pip = Pip(interpreter, temporary, [*others, folder])
         pip.prepare(locked, progress.span(0, 0.1))
-        found = pip.resolve(order, locked, progress)
+        ordered = locked_order(order.requirements, locked)
+        if ordered is None:
+            wanted = _beyond_qgis(pip.resolve(order, locked, progress), progress)
+        else:
+            wanted = [package for package in ordered if _version_in_qgis(package.name) is None]
         progress.set_fraction(0.3)
-        wanted = _beyond_qgis(found, progress)
         staging = temporary / "packages"
         if wanted:
             pip.download(wanted, staging, order.options, progress)

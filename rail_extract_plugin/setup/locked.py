@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,14 @@ SYSTEMS = (
     ("darwin", "arm64"),
 )
 """Systems and processors of which the list has the files."""
+
+
+BROUGHT = {
+    "laspy[lazrs]": ("laspy", "lazrs"),
+    "opencv-python-headless": ("opencv-python-headless",),
+    "pyproj": ("pyproj", "certifi"),
+}
+"""What each requirement installs besides packages of QGIS: pip would have to download all files to find that out."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +53,21 @@ def locked_packages() -> dict[str, Locked]:
         return {}
     python = "{}.{}".format(*sys.version_info)
     return {locked.name: locked for locked, pythons in _listed() if python in pythons}
+
+
+def locked_order(requirements: Sequence[str], locked: Mapping[str, Locked]) -> list[Locked] | None:
+    """Return all packages of an order, or None if the list does not have all of them.
+
+    Parameters
+    ----------
+    requirements : sequence of str
+        In the syntax of pip.
+    locked : mapping of str to Locked
+        The list, by name.
+    """
+    names = dict.fromkeys(name for requirement in requirements for name in BROUGHT.get(requirement, (requirement,)))
+    known = set(requirements) <= set(BROUGHT) and set(names) <= set(locked)
+    return [locked[name] for name in names] if known else None
 
 
 def _listed() -> Iterator[tuple[Locked, list[str]]]:

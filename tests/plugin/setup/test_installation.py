@@ -179,6 +179,28 @@ def checksum(tmp_path, name, version="1.0"):
     return f"sha256:{hashlib.sha256(wheel.read_bytes()).hexdigest()}"
 
 
+def test_files_of_the_list_are_downloaded_once(put, add_wheel, monkeypatch, tmp_path, folder):
+    """Asking pip what it would install downloads the files, OpenCV's 50 MB, once more."""
+    calls, run = [], installation.processes.run
+    monkeypatch.setattr(installation.processes, "run", lambda *given: calls.append(given[1]) or run(*given))
+    add_wheel("railfirst", requires=("railsecond",))
+    add_wheel("railsecond")
+    files = {
+        name: (tmp_path / "index" / f"{name}-1.0-py3-none-any.whl").read_bytes() for name in ("railfirst", "railsecond")
+    }
+    sums = {name: f"sha256:{hashlib.sha256(content).hexdigest()}" for name, content in files.items()}
+    lock(monkeypatch, *(Locked(name, "1.0", (checksum,)) for name, checksum in sums.items()))
+    monkeypatch.setitem(locked.BROUGHT, "railfirst", ("railfirst", "railsecond"))
+    assert put("railfirst") == "railfirst 1.0, railsecond 1.0"
+    assert sum("install" in call for call in calls) == 1
+
+
+def test_the_list_has_what_every_requirement_brings():
+    listed = {package.name for package, _ in locked._listed()}
+    assert {name for names in locked.BROUGHT.values() for name in names} == listed - {"pip"}
+    assert set(locked.BROUGHT) == {one.requirement for one in PACKAGES if one.module not in (*OWNED_BY_QGIS, *OPTIONAL)}
+
+
 def test_the_locked_version_is_installed(put, add_wheel, monkeypatch, tmp_path):
     for version in ("1.0", "1.1", "2.0"):
         add_wheel("railfirst", version)
