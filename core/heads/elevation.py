@@ -20,6 +20,7 @@ from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
 from .edges import search_distance, stations_along
 from .neighbours import free_edges
+from .own_level import on_own_level
 from .strips import StripOffsets, aligned, measure_strips
 from .top import MIN_POINTS, find_top
 from .uncertainty import measure_support
@@ -162,6 +163,8 @@ def _measured(
     z = points.xyz[feet.point, 2]
     if parameters.align:
         feet, z = aligned(strips, feet, z, points)
+    own = on_own_level(feet.t, feet.across, z, parameters.head_width_m)
+    near, feet, z = feet.t, feet[own], z[own]
     head = np.abs(feet.across) <= min(0.5 * parameters.head_width_m, parameters.tolerance_xy_m)
     if head.sum() < MIN_POINTS:
         return None
@@ -193,6 +196,7 @@ def _measured(
         parameters.smoothing_xy_m,
         unseen_m=parameters.unseen_m,
         free=edges,
+        near=near,
     )
     if strips is not None:
         support = strips.added_to(support, parameters.align)

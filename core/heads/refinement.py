@@ -22,6 +22,7 @@ from .branch_starts import APART_HEADS, slide_branches
 from .edges import HALF_HEAD_BINS, histograms, middles, search_distance
 from .level import MIN_ON_HEAD, on_top
 from .neighbours import free_edges
+from .own_level import on_own_level
 from .sections import outline_middles, with_outline
 from .strips import aligned, measure_strips
 
@@ -32,6 +33,13 @@ MAX_UNSEEN_M = 6.0
 """Longest section without visible edges that is redrawn from the line on either side, because other rails distort the
 raster there: heads that cross at 1:26.5 cover each other over this length. Where an arc of 190 m begins abruptly, the
 redrawn line is 3 mm off."""
+
+MIN_COVERED_M, MAX_COVERED_M, MIN_COVERED_PER_M = 2.0, 30.0, 5.0
+"""Length of sections that are redrawn because the head is covered, up to two lanes of a road with their sides, and
+points per metre at another height that show it."""
+
+ASTRAY_M = 2.0
+"""Length on either side of such a section in which the line leaves the head: smoothing draws a step as a bend."""
 
 NARROW_SHARE, NARROW_PERCENTILES = 0.25, (5.0, 95.0)
 """Width of a band of points, in head widths and between these percentiles, in which no edges are looked for: points
@@ -115,6 +123,8 @@ def _shifted(
         z = points.xyz[mine.point, 2]
         if strips is not None:
             mine, z = aligned(strips[number], mine, z, points)
+        own = on_own_level(mine.t, mine.across, z, head_width_m)
+        other, mine, z = mine.t[~own], mine[own], z[own]
         if _is_narrow(mine.across, head_width_m):
             lines.append(_moved_onto(line, mine))
             continue
@@ -131,6 +141,7 @@ def _shifted(
         shift = smooth_profile(stations[known], middle[known], smoothing_m, along)
         moved = line + shift[:, None] * left_normals(line)
         moved = _redrawn(moved, along, _unseen(stations, known))
+        moved = _redrawn(moved, along, _covered(mine.t[top], other))
         lines.append(_with_redrawn_ends(moved, along, free_ends[number]))
     return _joined(network, lines, smoothing_m)
 
@@ -211,6 +222,24 @@ def _unseen(stations: np.ndarray, known: np.ndarray) -> list[tuple[float, float]
     numbers = np.flatnonzero(known)
     gaps = [(stations[a], stations[b]) for a, b in zip(numbers, numbers[1:]) if b - a > 1]
     return [(start, end) for start, end in gaps if end - start <= MAX_UNSEEN_M]
+
+
+def _covered(t: np.ndarray, other: np.ndarray) -> list[tuple[float, float]]:
+    """List the sections that have points at another height than the rail only, which the line follows.
+
+    Parameters
+    ----------
+    t, other : (n,), (k,) arrays
+        Chainages of the points on the head, and of those at another height, increasing.
+    """
+    if len(t) < 2 or not len(other):
+        return []
+    wide = np.flatnonzero(np.diff(t) > MIN_COVERED_M)
+    gaps = np.column_stack([t[wide], t[wide + 1]])
+    length_m = gaps[:, 1] - gaps[:, 0]
+    count = np.diff(np.searchsorted(other, gaps), axis=1)[:, 0]
+    gaps = gaps[(count > MIN_COVERED_PER_M * length_m) & (length_m <= MAX_COVERED_M)]
+    return [(start - ASTRAY_M, end + ASTRAY_M) for start, end in gaps.tolist()]
 
 
 def _redrawn(line: np.ndarray, along: np.ndarray, unseen: list[tuple[float, float]]) -> np.ndarray:

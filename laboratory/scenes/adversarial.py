@@ -209,6 +209,87 @@ def all_faces(seed: int = 39, noise_m: float = 0.005) -> Scene:
     return build("all_faces", Plan([track], STANDARD, Scanner(noise_m=noise_m, face_share=1.0)), rng)
 
 
+def crossing(
+    seed: int = 40,
+    length_m: float = 15.0,
+    inside_m: float = 0.066,
+    depth_m: float = 0.035,
+    noise_m: float = 0.004,
+) -> Scene:
+    """Build a road crossing where dirt in the flangeways is classified as rail, and the heads are not.
+
+    Parameters
+    ----------
+    seed : int
+    length_m : float
+    inside_m, depth_m : float
+        Position of the dirt: from the axes of the rails towards the middle of the track, and below their tops.
+    noise_m : float
+    """
+    rng = np.random.RandomState(seed)
+    curve = trace([Element(70.0, 1 / 1500, 1 / 1500)], heading=0.3 * seed)
+    track = Track(curve, spacing(STANDARD), rolling(curve))
+    start_m = 28.0
+    missing: dict[tuple[int, int], Gaps] = {(0, side): ((start_m, start_m + length_m),) for side in (1, -1)}
+    scene = build("crossing", Plan([track], STANDARD, Scanner(noise_m=noise_m), gaps=missing), rng)
+    road = track.piece(start_m, start_m + length_m)
+    across_m = 0.5 * track.spacing_m - inside_m
+    return with_points(
+        scene, [strip(rng, road, side * across_m, -depth_m, 0.045, 250, noise_m=0.005) for side in (1, -1)]
+    )
+
+
+def standing_train(seed: int = 41, head_share: float = 0.1, length_m: float = 62.0, noise_m: float = 0.004) -> Scene:
+    """Build a track on which a train stands, whose wheels, bogies and frames are classified as rail.
+
+    Parameters
+    ----------
+    seed : int
+    head_share : float
+        Share of the points on the heads below the train that the scanner sees, in places half a metre long.
+    length_m : float
+        Length of the train.
+    noise_m : float
+    """
+    rng = np.random.RandomState(seed)
+    curve = trace([Element(110.0, 1 / 2000, 1 / 2000)], heading=0.25 * seed)
+    track = Track(curve, spacing(STANDARD), rolling(curve))
+    start_m = 24.0
+    hidden: dict[tuple[int, int], Gaps] = {}
+    for side in (1, -1):
+        places = start_m + 0.5 * np.flatnonzero(rng.random_sample(int(2 * length_m)) >= head_share)
+        hidden[0, side] = tuple((float(place), float(place) + 0.5) for place in places)
+    scene = build("standing_train", Plan([track], STANDARD, Scanner(noise_m=noise_m), gaps=hidden), rng)
+    below = track.piece(start_m, start_m + length_m)
+    wheels = np.abs((below.curve.chainage + 1.0) % 9.0 - 1.25) < 1.2
+    up_m = np.where(wheels, 0.12, 0.28)
+    clouds = []
+    for side in (1, -1):
+        middle_m = side * 0.5 * track.spacing_m
+        clouds.append(strip(rng, below, middle_m, up_m, 0.08, 120))
+        clouds.append(strip(rng, below, middle_m, up_m + 0.05, 0.1, 60, 0.04))
+    return with_points(scene, clouds)
+
+
+def grooved(seed: int = 42, road_m: float = 0.07, noise_m: float = 0.004) -> Scene:
+    """Build grooved rails with a strip of the road on their outer sides in the class.
+
+    Parameters
+    ----------
+    seed : int
+    road_m : float
+        Width of the road that is classified as rail.
+    noise_m : float
+    """
+    rng = np.random.RandomState(seed)
+    standard = replace(STANDARD, head_width_m=0.056)
+    curve = trace([Element(60.0, 1 / 400, 1 / 400)], heading=0.2 * seed)
+    track = Track(curve, spacing(standard), rolling(curve))
+    scene = build("grooved", Plan([track], standard, Scanner(noise_m=noise_m, height_m=3.0)), rng)
+    outside_m = 0.5 * (track.spacing_m + standard.head_width_m + road_m)
+    return with_points(scene, [strip(rng, track, side * outside_m, 0.0, road_m, 250, noise_m) for side in (1, -1)])
+
+
 ADVERSARIAL: dict[str, Callable[[], Scene]] = {
     "trough": lambda: beside("trough", 1, [lids], 80.0),
     "ballast": lambda: beside("ballast", 2, [ballast]),
@@ -232,5 +313,9 @@ ADVERSARIAL: dict[str, Callable[[], Scene]] = {
     "side_30": lambda: from_the_side("side_30", 37, 30.0, face_share=0.5),
     "side_45": lambda: from_the_side("side_45", 38, 45.0),
     "all_faces": all_faces,
+    "crossing": crossing,
+    "standing_train": standing_train,
+    "hidden_heads": lambda: standing_train(43, head_share=0.0),
+    "grooved": grooved,
 }
 """By name; every scene is seeded."""

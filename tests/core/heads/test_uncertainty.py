@@ -65,6 +65,25 @@ def test_four_times_the_points_halve_sigma():
     assert many == pytest.approx(few / 2, rel=0.25)  # the middle moves by chance, which counts as well
 
 
+def test_a_band_wider_than_a_head_tells_that_the_head_may_be_at_either_end():
+    """As where road next to a grooved rail is as high as its head."""
+    t, across, z = head(60, 500)
+    wide = support(t, across * (1 + 0.05 / WIDTH), 0.0 * z)
+    assert wide.sigma_m[10:-10] == pytest.approx(np.hypot(UNSEEN, 0.025), abs=0.004)
+
+
+def test_a_line_that_follows_what_covers_the_head_is_off_by_half_a_head():
+    t, across, z = head(60, 150)
+    seen = (t < 20) | (t > 50)
+    free = np.ones((2, station_count(60.0)), dtype=bool)
+    hidden, covered = (
+        measure_support(t[seen], across[seen], z[seen], 60.0, WIDTH, 0.8, UNSEEN, free, near) for near in (None, t)
+    )
+    middle = (hidden.t > 30) & (hidden.t < 40)
+    assert hidden.sigma_m[middle].min() > 0.5
+    assert covered.sigma_m[middle] == pytest.approx(np.hypot(UNSEEN, WIDTH / 2), abs=0.001)
+
+
 def test_noise_increases_sigma():
     clean, noisy = (support(*head(60, 150, noise)).rms_m for noise in (0.002, 0.008))
     assert noisy > 1.5 * clean

@@ -1,0 +1,216 @@
+"""Points at the height of their rail: dirt next to a covered rail is lower, a train that stands on it is higher.
+
+Where a head is covered, what lies next to it or above it is all that a line has. A rail does not step: a level that
+begins and ends with a step is not the rail's, and no vehicle is lower than the rail on which it stands. See
+docs/method.md section 6.9.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import binary_opening, median_filter
+
+from .level import LEVEL_BIN_M, MIN_ON_HEAD, robust_sigma
+
+WINDOW_M = 0.02
+"""Height in which the points on top of a head are: noise of 5 mm, and 100 mm of cant."""
+
+LEVELS = 3
+"""Levels that are looked for in a bin: the head, what stands on it, and what is in between."""
+
+APART_M = 0.03
+"""Distance of two levels of a bin from which the points of one are not those of the other."""
+
+MIN_POINTS = 3
+"""Points that make a level: on the sparsest rails a bin has five."""
+
+STEP_M, STEP_SIGMAS = (0.008, 0.015), 4.0
+"""Largest change of the level beyond the gradient, between these limits, in standard deviations of what bins show by
+chance: dirt in a flangeway is 10 to 50 mm below the top."""
+
+SAGITTA = 5e-5
+"""Sagitta of a rail's profile, metres, per product of the distances from both ends, m²: half the curvature of waves of
+10 mm that are 60 m long."""
+
+SKIPPED_BINS = 3
+"""Bins without a level that a level runs across."""
+
+SLOPE_BINS = 41
+"""Bins, 20 m, whose median change of level is the gradient."""
+
+MIN_BINS = 4
+"""Bins, 2 m, of a level that counts, because what stands out by chance is shorter, and of its end that is compared with
+the next bin."""
+
+DRIFT = 0.004
+"""Error of the gradient, by which the levels on both sides of a gap may differ per metre, and at most `MAX_DRIFT_M`."""
+
+MAX_DRIFT_M = 0.1
+"""Largest difference of two levels across a gap: longer gaps are not seen through by gradients alone."""
+
+SHIFTED_M, SHIFT_BINS = 0.05, 24
+"""Largest step between two passes of a scanner, and bins, 12 m, that a level must have to be taken for another pass: a
+road, with a step on either side, may be twice as wide."""
+
+VEHICLE_M = 0.07
+"""Height above the rail from which parts of vehicles are: the lowest gauge allows 80 mm."""
+
+VEHICLE_NEAR_M = 3.0
+"""Distance along the line within which a level that is lower by this shows that another is a vehicle's."""
+
+VEHICLE_WEIGHT = 0.25
+"""Weight of a level that is rather that of a vehicle: it counts if the lower one is very short."""
+
+ABOVE_M, BELOW_M = 0.03, 0.06
+"""Heights above and below its level up to which points are on a head: weeds are higher, and faces with their noise are
+not lower."""
+
+
+@dataclass(frozen=True)
+class _Levels:
+    """Levels of the bins of a line, (n,) arrays, in order of the bins."""
+
+    bin: np.ndarray
+    height: np.ndarray
+
+
+def on_own_level(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> np.ndarray:
+    """Find the points that may be on the head by their height, (n,) bool.
+
+    All points are, where the level of a line is not in doubt.
+
+    Parameters
+    ----------
+    t, across, z : (n,) arrays
+        Chainage (increasing), offset to the left and height of points near the line, metres.
+    head_width_m : float
+    """
+    head = np.abs(across) <= 0.5 * head_width_m
+    if head.sum() < MIN_ON_HEAD:
+        return np.ones(len(t), dtype=bool)
+    flat = z - _gradient(t[head], z[head], t)
+    number = (t / LEVEL_BIN_M).astype(int)
+    levels = _levels(number[head], flat[head])
+    step_m = _step(levels)
+    chosen = _chain(_pieces(levels, step_m), step_m)
+    if not len(chosen):
+        return np.ones(len(t), dtype=bool)
+    bins = np.arange(number.max() + 1)
+    level = np.interp(bins, chosen[:, 0], chosen[:, 1])
+    own, any_level = np.zeros((2, len(bins)), dtype=bool)
+    any_level[levels.bin] = True
+    near_m = step_m + _sagitta(levels.bin, chosen[:, 0])
+    own[levels.bin[np.abs(levels.height - level[levels.bin]) <= near_m]] = True
+    other = binary_opening(any_level & ~own, np.ones(MIN_BINS))
+    above = flat - np.interp(t, (bins + 0.5) * LEVEL_BIN_M, level)
+    return (above <= ABOVE_M) & (above >= -BELOW_M) & ~other[number]
+
+
+def _gradient(t: np.ndarray, z: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Sum up the gradient of points, (n,), and return it at chainages `at`: steps do not count."""
+    number = (t / LEVEL_BIN_M).astype(int)
+    bins, first, number, count = np.unique(number, return_index=True, return_inverse=True, return_counts=True)
+    if len(bins) < 2:
+        return np.zeros(len(at))
+    middle = first + count // 2
+    place, height = t[middle], z[np.lexsort((z, number))][middle]
+    slope = median_filter(np.diff(height) / np.diff(bins), SLOPE_BINS, mode="reflect") / LEVEL_BIN_M
+    place = np.concatenate([[place[0] - 1.0], place, [place[-1] + 1.0]])
+    slope = np.concatenate([slope[:1], slope, slope[-1:]])
+    return np.interp(at, place, np.concatenate([[0.0], np.cumsum(slope * np.diff(place))]))
+
+
+def _levels(number: np.ndarray, z: np.ndarray) -> _Levels:
+    """Find the heights at which most points of each bin are, up to LEVELS in each; the fullest first."""
+    found_bin, found_height = [], []
+    left = np.ones(len(z), dtype=bool)
+    for _ in range(LEVELS):
+        order = np.flatnonzero(left)[np.lexsort((z[left], number[left]))]
+        if not len(order):
+            break
+        key = number[order] * (2 * np.ptp(z) + 1.0) + z[order] - z.min()
+        count = np.searchsorted(key, key + WINDOW_M, side="right") - np.arange(len(key))
+        best = np.lexsort((-count, number[order]))
+        best = best[np.flatnonzero(np.diff(number[order], prepend=-1))]
+        best = best[count[best] >= MIN_POINTS]
+        if not len(best):
+            break
+        height = z[order[best + count[best] // 2]]
+        found_bin.append(number[order[best]])
+        found_height.append(height)
+        at = np.full(number.max() + 1, np.inf)
+        at[found_bin[-1]] = height
+        left &= np.abs(z - at[number]) > APART_M
+    bins, heights = np.concatenate([[], *found_bin]).astype(int), np.concatenate([[], *found_height])
+    order = np.argsort(bins, kind="stable")
+    return _Levels(bins[order], heights[order])
+
+
+def _step(levels: _Levels) -> float:
+    """Return the change of level, metres, that chance does not explain; the fullest level of a bin is the first."""
+    first = np.flatnonzero(np.diff(levels.bin, prepend=-1))
+    return float(np.clip(STEP_SIGMAS * robust_sigma(np.diff(levels.height[first])), *STEP_M))
+
+
+def _sagitta(bins: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Return by how much a rail may leave the straight line between the known bins next to each bin, metres."""
+    after = np.clip(np.searchsorted(known, bins), 1, max(len(known) - 1, 1))
+    before_m, behind_m = (
+        LEVEL_BIN_M * np.maximum(side, 0) for side in (bins - known[after - 1], known[after % len(known)] - bins)
+    )
+    return SAGITTA * before_m * behind_m
+
+
+def _pieces(levels: _Levels, step_m: float) -> list[np.ndarray]:
+    """Link levels of successive bins that do not step: bins and heights, (k, 2), of each piece."""
+    pieces: list[list[tuple[int, float]]] = []
+    open_pieces: list[int] = []
+    for here, up in zip(levels.bin.tolist(), levels.height.tolist()):
+        open_pieces = [one for one in open_pieces if here - pieces[one][-1][0] <= SKIPPED_BINS]
+        steps = [(abs(_last(pieces[one]) - up), one) for one in open_pieces if pieces[one][-1][0] < here]
+        step, nearest = min(steps, default=(np.inf, -1))
+        if step <= step_m:
+            pieces[nearest].append((here, up))
+        else:
+            open_pieces.append(len(pieces))
+            pieces.append([(here, up)])
+    return [np.array(piece) for piece in pieces if len(piece) >= MIN_BINS]
+
+
+def _last(piece: list[tuple[int, float]]) -> float:
+    """Return the height of the end of a piece: its median, so that a level cannot step by halves."""
+    return sorted(height for _, height in piece[-MIN_BINS:])[len(piece[-MIN_BINS:]) // 2]
+
+
+def _chain(pieces: list[np.ndarray], step_m: float) -> np.ndarray:
+    """Choose the pieces that one rail can have, with most bins: their bins and heights, (k, 2)."""
+    if not pieces:
+        return np.empty((0, 2))
+    pieces.sort(key=lambda piece: piece[0, 0])
+    start, end = np.array([[piece[0, 0], piece[-1, 0]] for piece in pieces]).T
+    first, last, middle = np.array(
+        [[np.median(piece[:MIN_BINS, 1]), np.median(piece[-MIN_BINS:, 1]), np.median(piece[:, 1])] for piece in pieces]
+    ).T
+    weight = np.array([float(len(piece)) for piece in pieces])
+    near = VEHICLE_NEAR_M / LEVEL_BIN_M
+    for number in range(len(pieces)):
+        beside = (start <= end[number] + near) & (end >= start[number] - near)
+        if np.any(beside & (middle < middle[number] - VEHICLE_M)):
+            weight[number] *= VEHICLE_WEIGHT
+    best, before = weight.copy(), np.full(len(pieces), -1)
+    for number in range(1, len(pieces)):
+        gap_m = (start[number] - end[:number]) * LEVEL_BIN_M
+        off_m = np.abs(first[number] - last[:number])
+        fits = off_m <= step_m + np.minimum(DRIFT * gap_m, MAX_DRIFT_M)
+        cost = np.where(fits, 0.0, np.where(off_m <= SHIFTED_M, SHIFT_BINS, np.inf))
+        sums = np.where(gap_m > 0, best[:number] - cost, 0.0)
+        if sums.max() > 0:
+            before[number] = int(np.argmax(sums))
+            best[number] += sums.max()
+    chosen, number = [], int(np.argmax(best))
+    while number >= 0:
+        chosen.append(pieces[number])
+        number = int(before[number])
+    return np.concatenate(chosen[::-1])

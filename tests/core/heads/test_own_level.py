@@ -1,0 +1,73 @@
+import numpy as np
+import pytest
+from rail_extract.core.heads.own_level import on_own_level
+
+WIDTH = 0.072
+
+
+def band(start, end, density=150, up=0.0, across=0.0, half=0.036, noise=0.004, seed=0, profile=None):
+    """Points of a level strip: chainage, offset and height."""
+    random = np.random.default_rng(seed)
+    t = random.uniform(start, end, int((end - start) * density))
+    z = up + random.normal(0, noise, len(t)) + (0.0 if profile is None else profile(t))
+    return np.column_stack([t, across + random.uniform(-half, half, len(t)), z])
+
+
+def own(*parts):
+    """Whether the points of each part may be on the head."""
+    points = np.concatenate(parts)
+    order = np.argsort(points[:, 0], kind="stable")
+    found = np.empty(len(points), dtype=bool)
+    found[order] = on_own_level(*points[order].T, WIDTH)
+    return np.split(found, np.cumsum([len(part) for part in parts])[:-1])
+
+
+def hilly(t):
+    return 0.03 * t + 0.01 * np.sin(2 * np.pi * t / 60)
+
+
+@pytest.mark.parametrize("noise", [0.002, 0.005, 0.008])
+@pytest.mark.parametrize("density", [12, 150])
+def test_all_points_of_a_head_are_on_its_level(noise, density):
+    (found,) = own(band(0, 100, density, noise=noise, profile=hilly))
+    assert found.mean() > (0.998 if density > 12 else 0.95)  # six points in a bin, of which three show its level
+
+
+@pytest.mark.parametrize("depth", [0.02, 0.035, 0.06])
+@pytest.mark.parametrize("length", [6.0, 15.0, 22.0])
+def test_dirt_between_two_steps_is_not(depth, length):
+    before, after = band(0, 30, profile=hilly), band(30 + length, 70, seed=1, profile=hilly)
+    dirt = band(30, 30 + length, 200, -depth, noise=0.005, seed=2, profile=hilly)
+    heads, more_heads, covered = own(before, after, dirt)
+    assert heads.mean() > 0.98
+    assert more_heads.mean() > 0.98
+    assert covered.mean() < 0.05
+
+
+def test_a_train_that_stands_on_the_rail_is_not_even_where_it_hides_most_of_it():
+    seen = [band(start, start + 0.5, seed=int(start), profile=hilly) for start in range(22, 80, 5)]
+    ends = band(0, 20, profile=hilly), band(85, 100, seed=1, profile=hilly)
+    frames = band(20, 85, 200, 0.28, noise=0.01, seed=2, profile=hilly)
+    *heads, train = own(*ends, *seen, frames)
+    assert np.concatenate(heads).mean() > 0.98
+    assert train.mean() < 0.01
+
+
+def test_a_step_without_return_is_that_of_another_pass():
+    """As where strips of a scanner meet."""
+    one, other = own(band(0, 40), band(40, 80, up=0.02, seed=1))
+    assert one.mean() > 0.99
+    assert other.mean() > 0.99
+
+
+def test_weeds_are_not_on_the_level():
+    random = np.random.default_rng(5)
+    weeds = np.column_stack([random.uniform(0, 60, 40), random.uniform(-0.03, 0.03, 40), random.uniform(0.05, 0.1, 40)])
+    heads, above = own(band(0, 60), weeds)
+    assert heads.all()
+    assert not above.any()
+
+
+def test_few_points_are_left_alone():
+    (found,) = own(band(0, 5, 10))
+    assert found.all()
