@@ -13,6 +13,7 @@ from ..frame import ORIGIN_STEP, LocalFrame
 from ..progress import SILENT, Progress
 from ..standards import LAST_CLASS
 from .crs import common_crs, is_geographic, name_of, parse_crs, units, utm_zone, warn_of_scale
+from .mask import Mask
 from .readers import Chunk, CloudHeader, Extent, Paths, list_files, read_classes, read_header
 
 SAMPLE_POINTS = 200_000
@@ -97,7 +98,11 @@ def read_rail_points(
     >>> points.class_code, points.xyz.shape
     (10, (75004, 3))
     """
-    request = ask(paths, class_codes, crs_wkt, extent, progress)
+    return read_requested(ask(paths, class_codes, crs_wkt, extent, progress), progress)
+
+
+def read_requested(request: Request, progress: Progress = SILENT) -> tuple[RailPoints, ...]:
+    """Read the points requested; results and errors as of `read_rail_points`."""
     xyz, codes, strips = _collect(request, progress)
     frame = request.frame_at([np.unique(column, return_counts=True) for column in origin_steps(xyz).T])
     local = frame.to_local(xyz)
@@ -118,6 +123,8 @@ class Request:
         In units of the CRS.
     zero : LocalFrame
         Frame whose origin is the zero of the files' coordinate system.
+    mask : Mask or None
+        Area to which the points are limited, in units of the CRS.
     merged : bool
         Whether all points requested count as points of the first class.
     """
@@ -127,19 +134,32 @@ class Request:
     extent: Extent | None
     zero: LocalFrame
     merged: bool = False
+    mask: Mask | None = None
 
     def read(self, header: CloudHeader, progress: Progress = SILENT) -> Iterator[Chunk]:
         """Read the points requested from a file chunk by chunk; see `readers.read_classes`."""
-        if self.extent is not None and not _overlap(header.extent, self.extent):
+        if not all(_overlap(header.extent, area) for area in self._areas()):
             return
         for xyz, codes, strips, census in read_classes(header.path, self.class_codes, progress):
-            inside = slice(None) if self.extent is None else self.holds(xyz)
+            inside = self.holds(xyz) if self._areas() else slice(None)
             found = np.full_like(codes, self.class_codes[0]) if self.merged else codes
             yield xyz[inside], found[inside], strips[inside], census
 
     def holds(self, xyz: np.ndarray) -> np.ndarray:
-        """Return which places, (n, 3) in units of the CRS, lie in the extent, (n,) bool."""
-        return np.ones(len(xyz), dtype=bool) if self.extent is None else _inside(xyz, self.extent)
+        """Return which places, (n, 3) in units of the CRS, lie in the extent and the mask, (n,) bool."""
+        inside = np.ones(len(xyz), dtype=bool) if self.extent is None else _inside(xyz, self.extent)
+        if self.mask is not None:
+            inside[inside] = self.mask.holds(xyz[inside])
+        return inside
+
+    @property
+    def where(self) -> str:
+        """What limits the points, in a word."""
+        return "mask" if self.mask is not None else "cloud" if self.extent is None else "extent"
+
+    def _areas(self) -> list[Extent]:
+        """List the rectangles outside of which no point is requested."""
+        return [area for area in (self.extent, None if self.mask is None else self.mask.extent) if area is not None]
 
     def sample(self) -> np.ndarray:
         """Read the first points requested, (n, 3) metres from one of them; takes a few seconds for a cloud of any size.
@@ -175,8 +195,10 @@ class Request:
     def explain_none(self, census: np.ndarray) -> NoRailPointsError:
         """Return the error for a cloud without the points requested; it names the classes found, (256,) counts."""
         wanted = ", ".join(str(code) for code in sorted(set(self.class_codes)))
-        if self.extent is not None and (census.sum() == 0 or census[list(self.class_codes)].any()):
-            return NoRailPointsError(f"The extent contains no points of class {wanted}: choose a larger extent.")
+        if self._areas() and (census.sum() == 0 or census[list(self.class_codes)].any()):
+            return NoRailPointsError(
+                f"The {self.where} contains no points of class {wanted}: choose a larger {self.where}."
+            )
         if not census.any():
             return NoRailPointsError(
                 "All points of the cloud are marked as withheld: export the valid points without this mark."

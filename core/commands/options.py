@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
 
+from ..clouds.points import Request
 from ..errors import ParameterError
 from ..parameters import Parameters
 from ..progress import Progress
@@ -31,6 +36,37 @@ def add_cloud_arguments(parser: argparse._ActionsContainer) -> None:
         help="read only the points in this rectangle, in units of the coordinate system; write --extent=-5,... if "
         "the first number is negative",
     )
+    text = "read only the points in the polygons of this GeoPackage or GeoJSON file"
+    parser.add_argument("--mask", type=Path, metavar="FILE", help=text)
+
+
+def shapes_module(option: str) -> ModuleType:
+    """Return the module that reads vector files, for an option that names one.
+
+    Raises
+    ------
+    ParameterError
+        Its packages are not installed.
+    """
+    try:
+        return import_module(".shapes", __package__)
+    except ImportError as error:
+        raise ParameterError(
+            f"{option} needs the packages pyogrio and shapely: in a clone, run pip install .[cluster]."
+        ) from error
+
+
+def within_mask(request: Request, path: Path | None) -> Request:
+    """Limit a request for points to the polygons of a file, if one was given.
+
+    Raises
+    ------
+    ParameterError
+        The file has no polygons, or its packages are not installed.
+    """
+    if path is None:
+        return request
+    return replace(request, mask=shapes_module("--mask").read_mask(path, request.zero.crs_wkt))
 
 
 def gauges_of(args: argparse.Namespace, standard: RailStandard, tolerance_m: float | None = None) -> tuple[float, ...]:

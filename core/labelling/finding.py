@@ -103,7 +103,7 @@ def find_rail_points(
 
 
 def _nothing_to_search(request: Request, guide: Guide | None) -> NoRailPointsError:
-    where = "cloud" if request.extent is None else "extent"
+    where = request.where
     if guide is not None:
         return NoRailPointsError(
             f"The {where} has no point within {guide.distance_m:g} m of the guide: check the guide's place and "

@@ -297,6 +297,7 @@ def _fingerprint(request: Request, header: CloudHeader, side_m: float) -> str:
         request.class_codes if request.merged else sorted(request.class_codes),
         request.merged,
         request.extent,
+        None if request.mask is None else hashlib.sha256(request.mask.edges.tobytes()).hexdigest(),
         side_m,
         request.zero.horizontal_unit_m,
         request.zero.vertical_unit_m,

@@ -25,6 +25,7 @@ from ..systems import prepare_system, system
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.clouds.mask import Mask
     from ...core.raster_file import RasterHeader
 
 NUMBERS = {
@@ -150,6 +151,23 @@ class ParameterValues:
             return ()
         return read_guide(self._line_source("GUIDE"), system(checked_crs(cloud)), self._context)
 
+    def _mask(self, cloud: CloudSource) -> Mask | None:
+        """Read the polygons of MASK, in the coordinate system of the cloud.
+
+        Raises
+        ------
+        RailExtractError
+            The layer has no polygons, or they can't be transformed.
+        """
+        from ..reading.line_layers import read_mask
+
+        if not self.filled("MASK"):
+            return None
+        source = self._algorithm.parameterAsSource(self._parameters, "MASK", self._context)
+        if source is None:
+            raise RailExtractError("MASK is not a readable layer: give a polygon layer.")
+        return read_mask(source, system(checked_crs(cloud)), self._context)
+
     def _line_source(self, name: str) -> QgsProcessingFeatureSource:
         """Return a layer that may have lines."""
         source = self._algorithm.parameterAsSource(self._parameters, name, self._context)
@@ -174,7 +192,7 @@ class ParameterValues:
             )
         source = replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
         prepare_system(checked_crs(source))
-        return source
+        return replace(source, mask=self._mask(source))
 
     def extent(self, crs: QgsCoordinateReferenceSystem) -> tuple[float, float, float, float] | None:
         """Read EXTENT in `crs`: west, south, east and north limits.

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from qgis.core import (
+    QgsProcessing,
     QgsProcessingParameterBoolean,
     QgsProcessingParameterCrs,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterEnum,
     QgsProcessingParameterExtent,
+    QgsProcessingParameterFeatureSource,
     QgsProcessingParameterString,
 )
 
@@ -132,6 +134,12 @@ def area() -> Definitions:
         helped(
             QgsProcessingParameterExtent("EXTENT", tr("Extent"), optional=True),
             tr("Only points inside this rectangle are read. Leave empty to read all points."),
+        ),
+        advanced(
+            QgsProcessingParameterFeatureSource(
+                "MASK", tr("Mask"), [QgsProcessing.SourceType.TypeVectorPolygon], optional=True
+            ),
+            tr("Only points inside these polygons are read, for example a strip along the line."),
         ),
         advanced(
             QgsProcessingParameterCrs("CRS", tr("CRS of a cloud without one"), optional=True),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Optional
 
@@ -24,6 +24,7 @@ from ...core.standards import RAIL_CLASS
 from ..systems import system
 
 if TYPE_CHECKING:
+    from ...core.clouds.mask import Mask
     from ...core.clouds.points import RailPoints, Request
     from ...core.squares.spool import SpooledPoints
 
@@ -44,10 +45,13 @@ class CloudSource:
         Files, virtual point clouds, or folders of tiles.
     crs_wkt : str or None
         Coordinate system set by the user, used where files state none.
+    mask : Mask or None
+        Area to which the points are limited, in the coordinate system of the cloud.
     """
 
     paths: tuple[Path, ...]
     crs_wkt: str | None = None
+    mask: Mask | None = None
 
 
 def cloud_source(value: Any, context: QgsProcessingContext) -> CloudSource:
@@ -116,9 +120,9 @@ def read_points(
         Returns the extent to read, given the cloud's coordinate system.
     progress : Progress
     """
-    from ...core.clouds.points import read_rail_points
+    from ...core.clouds.points import read_requested
 
-    return read_rail_points(source.paths, class_codes, source.crs_wkt, bounds(system(crs_of(source))), progress)
+    return read_requested(request_points(source, class_codes, bounds, progress), progress)
 
 
 def spool_points(
@@ -155,7 +159,8 @@ def request_points(source: CloudSource, class_codes: Sequence[int], bounds: Boun
     """
     from ...core.clouds.points import ask
 
-    return ask(source.paths, class_codes, source.crs_wkt, bounds(system(crs_of(source))), progress)
+    request = ask(source.paths, class_codes, source.crs_wkt, bounds(system(crs_of(source))), progress)
+    return replace(request, mask=source.mask)
 
 
 @contextmanager

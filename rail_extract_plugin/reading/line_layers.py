@@ -17,11 +17,13 @@ from qgis.core import (
     QgsFeature,
     QgsFeatureRequest,
     QgsGeometry,
+    QgsPolygon,
     QgsProcessingContext,
     QgsProcessingFeatureSource,
 )
 
 from ...core.clouds.crs import parse_crs, units, warn_of_scale
+from ...core.clouds.mask import Mask
 from ...core.errors import CrsError, RailExtractError
 from ...core.fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
 from ...core.frame import ORIGIN_STEP, LocalFrame
@@ -107,19 +109,56 @@ def read_guide(
     RailExtractError
         The layer has no line.
     """
-    change = QgsCoordinateTransform(source.sourceCrs(), crs, context.transformContext())
-    lines = []
-    for feature in source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS):
-        shape = feature.geometry()
-        if not _transform(shape, change):
-            raise CrsError(
-                f"GUIDE can't be transformed to the coordinate system of the cloud ({crs.authid() or crs.description()}"
-                "): check that both are assigned as the data were made."
-            )
-        lines += [vertices[:, :2] for vertices in _parts(shape, CHORD_TOLERANCE_M)]
+    shapes = _transformed(source, crs, context, "GUIDE")
+    lines = tuple(vertices[:, :2] for shape in shapes for vertices in _parts(shape, CHORD_TOLERANCE_M))
     if not lines:
         raise RailExtractError("GUIDE has no lines: give a line layer.")
-    return tuple(lines)
+    return lines
+
+
+def read_mask(
+    source: QgsProcessingFeatureSource, crs: QgsCoordinateReferenceSystem, context: QgsProcessingContext
+) -> Mask:
+    """Read the polygons of a mask in the coordinate system of the cloud; overlaps count once.
+
+    Parameters
+    ----------
+    source, crs, context
+        See `read_guide`.
+
+    Raises
+    ------
+    CrsError
+        The polygons can't be transformed.
+    RailExtractError
+        The layer has no polygon.
+    """
+    shapes = [shape.makeValid() for shape in _transformed(source, crs, context, "MASK") if not shape.isNull()]
+    united = QgsGeometry.unaryUnion(shapes)
+    united.convertToStraightSegment(CHORD_TOLERANCE_M, QgsAbstractGeometry.SegmentationToleranceType.MaximumDifference)
+    polygons = [part for part in united.constParts() if isinstance(part, QgsPolygon)] if shapes else []
+    rings = [
+        np.array([(point.x(), point.y()) for point in ring.points()])
+        for part in polygons
+        for ring in (part.exteriorRing(), *(part.interiorRing(at) for at in range(part.numInteriorRings())))
+    ]
+    if not rings:
+        raise RailExtractError("MASK has no polygons: give a polygon layer.")
+    return Mask.of(rings)
+
+
+def _transformed(
+    source: QgsProcessingFeatureSource, crs: QgsCoordinateReferenceSystem, context: QgsProcessingContext, name: str
+) -> list[QgsGeometry]:
+    """Return the geometries of a layer in another coordinate system."""
+    change = QgsCoordinateTransform(source.sourceCrs(), crs, context.transformContext())
+    shapes = [feature.geometry() for feature in source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS)]
+    if not all(_transform(shape, change) for shape in shapes):
+        raise CrsError(
+            f"{name} can't be transformed to the coordinate system of the cloud ({crs.authid() or crs.description()}): "
+            "check that both are assigned as the data were made."
+        )
+    return shapes
 
 
 def _transform(shape: QgsGeometry, change: QgsCoordinateTransform) -> bool:

@@ -130,7 +130,7 @@ def test_a_guide_across_the_tracks_is_noticed(save, tmp_path, capsys):
     ("options", "message"),
     [
         (["--only-guided"], "--only-guided needs lines to compare tracks with: give --guide."),
-        (["--guide", "nothing.json"], "nothing.json can't be read as a file of lines: give a GeoPackage or GeoJSON"),
+        (["--guide", "nothing.json"], "nothing.json can't be read as a vector file: give a GeoPackage or GeoJSON"),
         (["--guide", "far.json"], "The guide has no line within 4 m of the cloud: check its place and coordinate"),
         (["--guide", "empty.json"], "empty.json has no lines: give lines along the tracks."),
     ],

@@ -1,5 +1,6 @@
 """The command `extract`: its outputs are those of the walk, and what it refuses, it refuses before the run."""
 
+import json
 import os
 import re
 import shutil
@@ -9,6 +10,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pyproj
 import pytest
 
 pyogrio = pytest.importorskip("pyogrio")
@@ -88,6 +90,20 @@ def test_an_extent_limits_the_points(tiles, scheduler, tmp_path):
         assert [float(word) for word in file.tags()["RAIL_EXTENT"].split(",")] == pytest.approx(
             [x.min() - 1, south, x.min() + 25, north]
         )
+
+
+def test_a_mask_limits_the_points(tiles, scheduler, tmp_path):
+    """Polygons in a file, in another coordinate system than the cloud."""
+    (points,) = read_rail_points(tiles, [10], "EPSG:32643")
+    west, south = points.frame.to_crs(points.xyz)[:, :2].min(axis=0) - 1
+    ring = [(west, south), (west + 41, south), (west + 41, south + 500), (west, south + 500), (west, south)]
+    change = pyproj.Transformer.from_crs(points.frame.crs_wkt, "EPSG:4326", always_xy=True)
+    polygon = {"type": "Polygon", "coordinates": [[change.transform(*corner) for corner in ring]]}
+    mask, out = tmp_path / "mask.geojson", tmp_path / "out.gpkg"
+    mask.write_text(json.dumps(polygon))
+    words = ["extract", str(tiles), "--rails", str(out), "--mask", str(mask), "--crs", "EPSG:32643"]
+    assert main([*words, *FAST, *scheduler]) == 0
+    assert values(out, "rails")["length_m"].sum() == pytest.approx(80, abs=3)
 
 
 def test_a_corrupt_tile_is_named_and_the_rest_is_written(tiles, scheduler, tmp_path, capsys):

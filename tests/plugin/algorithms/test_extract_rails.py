@@ -9,7 +9,17 @@ import numpy as np
 import pytest
 from lines import farthest, read_features
 from osgeo import gdal
-from qgis.core import QgsProcessingOutputLayerDefinition, QgsProcessingUtils, QgsVectorLayer
+from qgis.core import (
+    QgsCoordinateReferenceSystem,
+    QgsCoordinateTransform,
+    QgsFeature,
+    QgsGeometry,
+    QgsProcessingOutputLayerDefinition,
+    QgsProcessingUtils,
+    QgsProject,
+    QgsRectangle,
+    QgsVectorLayer,
+)
 from rail_extract.core.scratch import PREFIX
 from rail_extract.rail_extract_plugin.reading.geotiff import read_header
 
@@ -119,6 +129,32 @@ def test_outputs_left_blank_in_the_batch_dialog_are_skipped(run, scene, tmp_path
         (*blank, "REPORT", "SIGMA")
     )
     assert [path.name for path in tmp_path.glob("*.gpkg")] == ["rails.gpkg"]
+
+
+@pytest.mark.parametrize("crs", ["EPSG:32643", "EPSG:4326"])
+def test_a_mask_limits_the_points(run, scene, outputs, crs):
+    """Two polygons that overlap, around 6 m of the track."""
+    mask = QgsVectorLayer(f"Polygon?crs={crs}", "mask", "memory")
+    change = QgsCoordinateTransform(
+        QgsCoordinateReferenceSystem("EPSG:32643"), mask.crs(), QgsProject.instance().transformContext()
+    )
+    for west, east in ((500_002, 500_006), (500_005, 500_008)):
+        feature = QgsFeature()
+        shape = QgsGeometry.fromRect(QgsRectangle(west, 2_999_990, east, 3_000_010))
+        shape.transform(change)
+        feature.setGeometry(shape)
+        assert mask.dataProvider().addFeature(feature)
+    outcome = run({**scene, **outputs, "MASK": mask})
+    assert outcome.ok, outcome.error
+    assert outcome.results["RAIL_COUNT"] == 2
+    assert outcome.results["RAIL_LENGTH"] == pytest.approx(12, abs=0.2)
+
+
+def test_a_mask_without_polygons_is_refused(run, scene, outputs):
+    mask = QgsVectorLayer("Polygon?crs=EPSG:32643", "mask", "memory")
+    outcome = run({**scene, **outputs, "MASK": mask})
+    assert not outcome.ok
+    assert outcome.error == "MASK has no polygons: give a polygon layer."
 
 
 def test_rails_of_two_classes_make_a_track_when_merged(run, new_feedback, write_cloud, track, tmp_path):

@@ -63,7 +63,7 @@ def test_chained_steps_give_the_lines_of_extract_rails(chain, run, write_cloud, 
 
 INTERFACE = {
     "rasterizerailpoints": (
-        "INPUT RAIL_CLASSES=10 STANDARD=EN_60E1_1435 GAUGE HEAD_WIDTH EXTENT CRS OUTPUT",
+        "INPUT RAIL_CLASSES=10 STANDARD=EN_60E1_1435 GAUGE HEAD_WIDTH EXTENT MASK CRS OUTPUT",
         {"OUTPUT": "outputRaster"},
     ),
     "frpdfcleanup": (
@@ -86,9 +86,11 @@ INTERFACE = {
         },
     ),
     "measuretrackgeometry": (
-        "INPUT RAILS POINTS STEP=1.0 STANDARD=EN_60E1_1435 HEAD_WIDTH OUTPUT",
+        "INPUT RAILS POINTS STEP=1.0 STANDARD=EN_60E1_1435 GAUGE HEAD_WIDTH OTHER_GAUGES OUTPUT FINDINGS REPORT",
         {
             "OUTPUT": "outputVector",
+            "FINDINGS": "outputVector",
+            "REPORT": "outputFile",
             "STATION_COUNT": "outputNumber",
             "SIGMA": "outputNumber",
             "BRIDGED_LENGTH": "outputNumber",

@@ -14,6 +14,7 @@ PARAMETERS = [
     ("GAUGE", "number", None),
     ("HEAD_WIDTH", "number", None),
     ("EXTENT", "extent", None),
+    ("MASK", "source", None),
     ("CRS", "crs", None),
     ("ITERATIONS", "number", 2),
     ("ENGINE", "enum", "AUTO"),
@@ -60,7 +61,7 @@ OUTPUTS = {
 
 RESULTS = {"RAILS", "CENTERLINES", "QUALITY", "FINDINGS", "CLEANED", "REPORT"}
 ESSENTIAL = {"INPUT", "RAIL_CLASSES", "CLASSIFY", "STANDARD", "GAUGE", "HEAD_WIDTH", "EXTENT", "MAX_GAP"} | RESULTS
-OPTIONAL = {"GAUGE", "HEAD_WIDTH", "EXTENT", "CRS", "OTHER_GAUGES"} | RESULTS
+OPTIONAL = {"GAUGE", "HEAD_WIDTH", "EXTENT", "MASK", "CRS", "OTHER_GAUGES"} | RESULTS
 
 
 CORE_DEFAULTS = {name: getattr(Parameters, field) for name, field in {**NUMBERS, **CHOICES}.items()}

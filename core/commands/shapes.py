@@ -1,0 +1,68 @@
+"""Lines and polygons of vector files, in the coordinate system of a cloud."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pyogrio
+import shapely
+
+from ..clouds.crs import import_pyproj, parse_crs
+from ..clouds.mask import Mask
+from ..errors import ParameterError
+
+
+def read_lines(path: Path, crs_wkt: str | None) -> list[np.ndarray]:
+    """Read the lines of the first layer of a file, (k, 2) each.
+
+    Parameters
+    ----------
+    path : Path
+        In any format that GDAL reads.
+    crs_wkt : str or None
+        Coordinate system to transform them to. Without one, or if the file states none, they stay as they are.
+
+    Raises
+    ------
+    ParameterError
+        The file can't be read, or has no lines.
+    """
+    lines = [part for part in _parts(path, crs_wkt) if part.geom_type == "LineString" and part.length > 0]
+    if not lines:
+        raise ParameterError(f"{path} has no lines: give lines along the tracks.")
+    return [shapely.get_coordinates(line) for line in lines]
+
+
+def read_mask(path: Path, crs_wkt: str | None) -> Mask:
+    """Read the polygons of the first layer of a file; overlaps count once.
+
+    Parameters
+    ----------
+    path, crs_wkt
+        See `read_lines`.
+
+    Raises
+    ------
+    ParameterError
+        The file can't be read, or has no polygons.
+    """
+    areas = [part for part in _parts(path, crs_wkt) if part.geom_type == "Polygon" and part.area > 0]
+    if not areas:
+        raise ParameterError(f"{path} has no polygons: give polygons around the tracks.")
+    united = shapely.get_parts(shapely.union_all(shapely.make_valid(areas)))
+    return Mask.of([shapely.get_coordinates(ring) for ring in shapely.get_rings(united)])
+
+
+def _parts(path: Path, crs_wkt: str | None) -> list[shapely.Geometry]:
+    """Read the single geometries of a file, in another coordinate system; those that it does not cover are left out."""
+    try:
+        meta, _, shapes, _ = pyogrio.raw.read(path, columns=[], force_2d=True)
+    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError) as error:
+        raise ParameterError(f"{path} can't be read as a vector file: give a GeoPackage or GeoJSON file.") from error
+    parts = shapely.get_parts(shapely.from_wkb(shapes)) if shapes is not None else []
+    if crs_wkt and meta["crs"]:
+        pyproj = import_pyproj()
+        change = pyproj.Transformer.from_crs(parse_crs(meta["crs"]), parse_crs(crs_wkt), always_xy=True)
+        parts = shapely.transform(parts, lambda xy: np.column_stack(change.transform(*xy.T)))
+    return [part for part in parts if np.isfinite(shapely.get_coordinates(part)).all()]
