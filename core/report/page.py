@@ -132,7 +132,7 @@ def _reason(findings: Findings, doubt: Doubt) -> str:
     """Write how much is in doubt for a reason, and where the longest place is."""
     length_m, place = findings.length_of(doubt), next(one for one in findings.places() if one.doubt == doubt)
     share = f"{metres(length_m)} of {metres(findings.length_m)} ({100 * length_m / findings.length_m:.1f} %)"
-    where = f"track {place.track_id} between {place.start_m:,.0f} and {place.end_m:,.0f} m"
+    where = f"track {place.track_id} between {place.start_m:,.1f} and {place.end_m:,.1f} m"
     return f"{share}: {doubt.label}. Longest: {metres(place.length_m)} of {where}."
 
 
@@ -197,7 +197,7 @@ def _finding(finding: Finding) -> tuple[object, ...]:
 
 
 def _figure(value: float, unit: str) -> str:
-    return f"{value:,.1f} {unit}" if np.isfinite(value) else ""
+    return f"{value:.1f} {unit}" if np.isfinite(value) else ""
 
 
 def _tracks(findings: Findings) -> str:

@@ -109,7 +109,7 @@ def test_places_state_where_and_how_much():
     found = examine(network(track(2, bridged=bridged)), (1.435,)).places()
     assert [(place.start_m, place.end_m, place.length_m) for place in found] == [(9.5, 14.5, 3.0), (39.5, 40.5, 1.0)]
     assert headline(html) == "Good, except for a few places to look at."
-    assert "4.0 m of 200 m (2.0 %): a rail has no points. Longest: 3.0 m of track 2 between 10 and 14 m." in html
+    assert "4.0 m of 200 m (2.0 %): a rail has no points. Longest: 3.0 m of track 2 between 9.5 and 14.5 m." in html
     assert "9.5 to 14.5 m" in html
 
 
@@ -133,7 +133,7 @@ def test_every_place_is_listed_the_most_harmful_first():
     rows = elements(html, "tbody")[0].findall("tr")
     assert [row.findall("td")[7].text for row in rows] == ["a rail has no points"] + 40 * ["standard error above 5 mm"]
     assert [cell.text for cell in rows[0].findall("td")][:7] == [
-        *("1", "track 1", "949.5 to 950.5 m", "1.0 m", "950.0 m", "1,435.0 mm", "30.0 mm")
+        *("1", "track 1", "949.5 to 950.5 m", "1.0 m", "950.0 m", "1435.0 mm", "30.0 mm")
     ]
     marks = [one.get("class") for one in elements(html, "svg")[0].iter("path") if "mark" in one.get("class")]
     assert marks == ["unsure mark", "unsupported mark"]  # the most severe on top
@@ -250,7 +250,7 @@ def lone(length_m, rail_id=99):
     [
         (3.0, "Good throughout: every metre is supported by points, at gauge, with a small standard error. 1 rail "),
         (9.0, "Good, except for a few places to look at. 1 rail does not belong to a track (9.0 m)."),
-        (90.0, "Usable, but look at the findings before you rely on them. 1 rail does not belong to a track "),
+        (90.0, "Usable, but look at the findings before you rely on the lines. 1 rail does not belong to a track "),
     ],
 )
 def test_the_headline_counts_lone_rails(length_m, words):

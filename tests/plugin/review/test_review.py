@@ -100,7 +100,7 @@ def test_findings_come_in_their_order_with_words_and_figures(load, dock):
     assert shown.text.text().startswith("Track 1, 2.0 to 4.0 m")
     assert not shown.buttons["previous"].isEnabled()
     shown.buttons["next"].click()
-    assert shown.text.text() == "Track 1, 8.0 to 10.0 m: gauge 1,440.0 mm."
+    assert shown.text.text() == "Track 1, 8.0 to 10.0 m: gauge 1440.0 mm."
     assert not shown.buttons["next"].isEnabled()
 
 
