@@ -10,10 +10,12 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
+import numpy as np  # noqa: E402
 from dialog_pictures import HELP_SHARE, SIZES, dialog_pictures, start_qgis  # noqa: E402
 from PIL import Image  # noqa: E402
 from qgis.core import (  # noqa: E402
@@ -21,6 +23,7 @@ from qgis.core import (  # noqa: E402
     QgsMapLayer,
     QgsMapRendererParallelJob,
     QgsMapSettings,
+    QgsProject,
     QgsRectangle,
     QgsVectorLayer,
     QgsVectorLayerCache,
@@ -33,6 +36,11 @@ from qgis.gui import (  # noqa: E402
 )
 from qgis.PyQt.QtCore import QSize  # noqa: E402
 from qgis.PyQt.QtGui import QColor  # noqa: E402
+from qgis.PyQt.QtWidgets import QMainWindow, QWidget  # noqa: E402
+from rail_extract.core.frame import LocalFrame  # noqa: E402
+from rail_extract.core.standards import resolve  # noqa: E402
+from rail_extract.rail_extract_plugin.reading.clouds import CloudSource  # noqa: E402
+from rail_extract.rail_extract_plugin.writing.run import properties_of  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
 SAMPLE = ROOT / "resources" / "sample" / "sample.laz"
@@ -44,6 +52,7 @@ OUTPUTS = {
     "QUALITY": "quality.gpkg",
     "CENTERLINES": "centerlines.gpkg",
     "RAILS": "rails.gpkg",
+    "FINDINGS": "findings.gpkg",
     "REPORT": "report.html",
 }
 """The files of a run, from the top layer to the bottom; layers have the names of their styles."""
@@ -57,6 +66,9 @@ DIALOGS = {
 
 MAP_SIZE, TABLE_HEIGHT, REPORT_SIZE = QSize(1000, 480), 230, (1140, 2265)
 """Pixels."""
+
+REVIEW_SIZE = (380, 520)
+"""Pixels of the dock."""
 
 REPORT_TOP = 1300
 """Height of the report above the plots of the first track, in pixels."""
@@ -90,6 +102,7 @@ def main() -> None:
         for layer in layers[1:3]:
             _table(layer, FOLDER / f"table_{layer.name()}.png")
         _report(folder / OUTPUTS["REPORT"], FOLDER / "report.png")
+        _review(folder / OUTPUTS["FINDINGS"], layers[2], FOLDER / "review.png")
         del layers
     for picture in sorted(FOLDER.glob("*.png")):
         _shrink(picture)
@@ -149,6 +162,39 @@ def _table(layer: QgsVectorLayer, picture: Path) -> None:
     QgsApplication.processEvents()
     view.grab().save(str(picture))
     view.setModel(None)
+
+
+class _Window:
+    """The part of QGIS's interface that the dock for reviews uses."""
+
+    def __init__(self) -> None:
+        self.mainWindow, self.mapCanvas = partial(_same, QMainWindow()), partial(_same, QgsMapCanvas())
+
+
+def _same(widget: QWidget) -> QWidget:
+    return widget
+
+
+def _review(path: Path, rails: QgsVectorLayer, picture: Path) -> None:
+    """Draw the dock for reviews at the first finding."""
+    from rail_extract.rail_extract_plugin.review.dock import ReviewDock
+
+    properties = properties_of(CloudSource((SAMPLE,)), (10,), resolve(STANDARD).head_width_m, LocalFrame(np.zeros(3)))
+    project, findings = QgsProject.instance(), _layer(path)
+    for layer in (rails, findings):
+        for name, value in properties.items():
+            layer.setCustomProperty(name, value)
+        project.addMapLayer(layer.clone())
+    window = _Window()
+    dock = ReviewDock(window)
+    while dock.is_reading:
+        QgsApplication.processEvents()
+    dock.resize(*REVIEW_SIZE)
+    dock.show()
+    QgsApplication.processEvents()
+    dock.grab().save(str(picture))
+    dock.close_for_good()
+    project.clear()
 
 
 def _report(page: Path, picture: Path) -> None:

@@ -146,7 +146,7 @@ class ReviewDock(QDockWidget):
             self._show()
         else:
             self.go(self._at + 1)
-        self.problem.setText(problem)
+        _say(self.problem, problem)
 
     def close_for_good(self) -> None:
         """Stop reading points and following the project, before the dock is deleted."""
@@ -176,7 +176,7 @@ class ReviewDock(QDockWidget):
 
     def _show(self) -> None:
         """Show the current finding."""
-        self.problem.clear()
+        _say(self.problem, "")
         any_found = bool(self._found)
         for name, button in self.buttons.items():
             button.setEnabled(any_found)
@@ -187,17 +187,23 @@ class ReviewDock(QDockWidget):
         if not any_found or self._sections is None:
             self.count.setText(tr("There are no findings.") if self._layer else tr("No layer of findings is loaded."))
             for label in (self.reason, self.text, self.note):
-                label.clear()
+                _say(label, "")
             self.view.show_picture(None)
             return
         shown = self._found[self._at]
         decided = sum(one.decision != OPEN for one in self._found)
         self.count.setText(tr("{} of {}; {} reviewed").format(self._at + 1, len(self._found), decided))
         reason = shown.value("reason") or ""
-        self.reason.setText(f"{reason[:1].upper()}{reason[1:]}")
-        self.text.setText(f"{shown.where}: {shown.figures}.")
+        _say(self.reason, f"{reason[:1].upper()}{reason[1:]}")
+        _say(self.text, f"{shown.where}: {shown.figures}.")
         picture = self._sections.picture(shown)
         self.view.show_picture(picture)
         nothing = picture.points is None or not len(picture.points)
         empty = tr("There is no rail point here.") if nothing else ""
-        self.note.setText(tr("Reading the points…") if self.is_reading else picture.note or empty)
+        _say(self.note, tr("Reading the points…") if self.is_reading else picture.note or empty)
+
+
+def _say(label: QLabel, text: str) -> None:
+    """Show a text; without one, the label takes no space."""
+    label.setText(text)
+    label.setVisible(bool(text))

@@ -1,5 +1,5 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
-<qgis styleCategories="Symbology|Labeling|Elevation|Fields|MapTips|Forms" version="3.22.0" labelsEnabled="1">
+<qgis styleCategories="Symbology|Labeling|Symbology3D|Elevation|Fields|MapTips|Forms" version="3.22.0" labelsEnabled="1">
   <renderer-v2 type="categorizedSymbol" attr="coalesce(&quot;review&quot;, '')">
     <categories>
       <category type="string" value="" symbol="0" label="open" render="true"/>
@@ -54,6 +54,12 @@
       <rendering drawLabels="1" obstacle="1" fontMaxPixelSize="10000" maxNumLabels="2000"/>
     </settings>
   </labeling>
+  <renderer-3d type="vector" layer="">
+    <symbol type="line" material_type="simpleline">
+      <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" simple-lines="1" width="6"/>
+      <material ambient="214,40,57,255"/>
+    </symbol>
+  </renderer-3d>
   <fieldConfiguration>
     <field name="review">
       <editWidget type="ValueMap">

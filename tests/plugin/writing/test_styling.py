@@ -228,7 +228,7 @@ def test_layers_can_be_drawn(styled, style):
     assert {"rails": "#1565c0", "centerlines": "#e64a19", "quality": "#f28e2b", "findings": "#84b397"}[style] in seen
 
 
-@pytest.mark.parametrize("style", ["rails", "centerlines"])
+@pytest.mark.parametrize("style", ["rails", "centerlines", "findings"])
 def test_lines_are_at_their_heights_in_3d(styled, style):
     module = pytest.importorskip("qgis._3d")
     module.Qgs3D.initialize()
