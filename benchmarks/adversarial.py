@@ -9,6 +9,7 @@ import argparse
 import sys
 
 import numpy as np
+from rail_extract.core.frpdf.models import NAMES
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.pipeline import extract_rails
 from rail_extract.core.rails import RailNetwork
@@ -33,11 +34,13 @@ def main() -> None:
     """Print the table for the scenes named on the command line, or all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scenes", nargs="*", choices=[*ADVERSARIAL, []], metavar="SCENE", help=", ".join(ADVERSARIAL))
+    parser.add_argument("--model", choices=NAMES, default=Parameters.model, help="weights of the network")
+    arguments = parser.parse_args()
     print(*HEADINGS, sep="\n")
-    for name in parser.parse_args().scenes or ADVERSARIAL:
+    for name in arguments.scenes or ADVERSARIAL:
         scene = ADVERSARIAL[name]()
         standard = scene.standard
-        parameters = Parameters(standard.gauge_m, standard.head_width_m, quality_step_m=1.0)
+        parameters = Parameters(standard.gauge_m, standard.head_width_m, quality_step_m=1.0, model=arguments.model)
         print(row(scene, extract_rails([scene.rail_points()], parameters)), flush=True)
         print(name, file=sys.stderr, flush=True)
 

@@ -30,6 +30,8 @@ class Parameters:
         Passes of the network; 0 runs until the result is stable.
     engine, device : str
         See `frpdf.engine`.
+    model : str
+        Name of a model, see `frpdf.models`.
     smoothing_xy_m, smoothing_z_m : float
         Sigma of PAEK in plan and in height.
     tolerance_xy_m, tolerance_z_m : float
@@ -65,6 +67,7 @@ class Parameters:
     passes: int = 2
     engine: str = "AUTO"
     device: str = "AUTO"
+    model: str = "AUTO"
     smoothing_xy_m: float = 0.8
     smoothing_z_m: float = 3.0
     tolerance_xy_m: float = 0.10

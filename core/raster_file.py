@@ -14,6 +14,7 @@ import numpy as np
 from .errors import ParameterError, RasterError
 from .frame import LocalFrame
 from .frpdf.models import choose
+from .parameters import Parameters
 from .raster import TILE, RailRaster
 from .standards import CUSTOM, RailStandard, resolve
 
@@ -134,6 +135,7 @@ def header_for(
     frame: LocalFrame,
     standard: RailStandard,
     extent: tuple[float, float, float, float] | None = None,
+    model: str = Parameters.model,
 ) -> RasterHeader:
     """Lay out a file for rasters of one grid, with a margin of a tile in which the network can close gaps.
 
@@ -148,6 +150,8 @@ def header_for(
     standard : RailStandard
     extent : tuple of float, optional
         Extent to which the points were restricted.
+    model : str
+        The parameter MODEL of the run.
 
     Raises
     ------
@@ -164,7 +168,7 @@ def header_for(
             "large an area for a raster: set EXTENT, which also excludes stray points."
         )
     window = (*(first * TILE).tolist(), height, width)
-    model = choose(standard.gauge_m, standard.head_width_m).name
+    model = choose(standard.gauge_m, standard.head_width_m, model).name
     return RasterHeader(
         tuple(class_codes), frame, cell_m, window, standard.gauge_m, standard.head_width_m, model, extent
     )

@@ -90,7 +90,7 @@ def _tile_side(parameters: Parameters) -> float:
 
 def engine_for(parameters: Parameters) -> Engine:
     """Set up the engine with the weights that fit the gauge and the railhead."""
-    arrays = load_arrays(choose(parameters.gauge_m, parameters.head_width_m).path)
+    arrays = load_arrays(choose(parameters.gauge_m, parameters.head_width_m, parameters.model).path)
     return make_engine(arrays, parameters.engine, parameters.device)
 
 

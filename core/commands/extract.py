@@ -17,7 +17,7 @@ from ..disk import Destination, writing
 from ..errors import ParameterError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, FINDING_FIELDS, RAIL_FIELDS
 from ..frpdf import DEVICES, ENGINES
-from ..frpdf.models import choose
+from ..frpdf.models import NAMES, choose
 from ..parameters import DEFAULT_STEP_M, STRIPS, Parameters
 from ..pipeline import extract_files
 from ..progress import Estimating, Progress
@@ -50,6 +50,7 @@ WITH_OWN_OPTION = (
     "passes",
     "engine",
     "device",
+    "model",
     "other_gauges_m",
     "quality_step_m",
     "square_tiles",
@@ -91,6 +92,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     method.add_argument("--iterations", type=int, default=Parameters.passes, help="passes of the network (default: 2)")
     method.add_argument("--engine", choices=ENGINES, default=Parameters.engine, help="what runs the network")
     method.add_argument("--device", choices=DEVICES, default=Parameters.device, help="where the network runs")
+    text = "weights of the network (default: AUTO, by gauge and railhead)"
+    method.add_argument("--model", choices=NAMES, default=Parameters.model, help=text)
     for field in _number_fields():
         unit = "degrees" if field.name.endswith("_deg") else "metres"
         text = f"{_option(field.name)[2:].replace('-', '_').upper()} in {unit} (default: {field.default:g})"
@@ -156,7 +159,7 @@ def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameter
     ModelError
         No weights fit the standard.
     """
-    choose(standard.gauge_m, standard.head_width_m)
+    choose(standard.gauge_m, standard.head_width_m, args.model)
     gauges_m = gauges_of(args, standard, args.centerline_tolerance)
     numbers = {field.name: getattr(args, _option(field.name)[2:].replace("-", "_")) for field in _number_fields()}
     workers = 0 if args.workers is None else args.workers - 1
@@ -171,6 +174,7 @@ def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameter
         args.iterations,
         args.engine,
         args.device,
+        args.model,
         other_gauges_m=gauges_m[1:],
         quality_step_m=args.step if args.quality or args.findings or args.report else None,
         square_tiles=args.square_tiles,
@@ -292,7 +296,7 @@ def _write(
         origin = Origin(tuple(args.tiles), standard, parameters.other_gauges_m, args.command_line, parameters)
         writers.append(lambda: outputs["report"].write_text(origin.report(network)))
     if "cleaned" in outputs and any(raster.tiles for raster in network.cleaned):
-        writers.append(lambda: _write_cleaned(network, outputs["cleaned"], standard, extent))
+        writers.append(lambda: _write_cleaned(network, outputs["cleaned"], standard, extent, parameters.model))
     errors: list[RailExtractError] = []
     for write in writers:
         try:
@@ -308,12 +312,13 @@ def _write_cleaned(
     destination: Destination,
     standard: RailStandard,
     extent: tuple[float, float, float, float] | None,
+    model: str,
 ) -> None:
     """Write the cleaned rasters as Clean Rail Raster does."""
     from .geotiff import write_rasters
 
     rasters, frame = on_one_grid(network.cleaned, network.frame)
-    header = header_for(rasters, network.cleaned_classes, frame, standard, extent)
+    header = header_for(rasters, network.cleaned_classes, frame, standard, extent, model)
     with destination.replacing() as new:
         write_rasters(new, header, rasters)
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import ModelError
+from ..parameters import Parameters
+from . import AUTO
 
 FOLDER = Path(__file__).resolve().parents[2] / "models"
 
@@ -43,11 +45,25 @@ class Model:
         return FOLDER / self.file
 
 
-MODELS = (Model("base", 1.435, 0.0762, "frpdf_base.npz"),)
+MODELS = (Model("base", 1.435, 0.0762, "frpdf_base.npz"), Model("fast", 1.435, 0.0762, "frpdf_fast.npz"))
+
+NAMES = (AUTO, *(model.name for model in MODELS))
+"""Values of the parameter MODEL."""
+
+AUTOMATIC = ("base",)
+"""Names of the models among which AUTO chooses by ratio; the card of the models says why `fast` is left out."""
 
 
-def choose(gauge_m: float, head_width_m: float) -> Model:
-    """Choose the model whose ratio of gauge to railhead is nearest (Gribov and Chang, section 7).
+def choose(gauge_m: float, head_width_m: float, name: str = Parameters.model) -> Model:
+    """Return the model of a name; with AUTO, that whose ratio of gauge to railhead is nearest.
+
+    Gribov and Chang, section 7.
+
+    Parameters
+    ----------
+    gauge_m, head_width_m : float
+    name : str
+        One of `NAMES`.
 
     Raises
     ------
@@ -60,4 +76,5 @@ def choose(gauge_m: float, head_width_m: float) -> Model:
             f"A gauge of {1000 * gauge_m:.0f} mm is {ratio:.1f} times a railhead of {1000 * head_width_m:.1f} mm, and"
             f" the models cover {MIN_RATIO} to {MAX_RATIO} times: check GAUGE and HEAD_WIDTH."
         )
-    return min(MODELS, key=lambda model: abs(math.log(ratio / model.ratio)))
+    named = [model for model in MODELS if model.name in (AUTOMATIC if name == AUTO else (name,))]
+    return min(named, key=lambda model: abs(math.log(ratio / model.ratio)))

@@ -63,13 +63,24 @@ class Result:
     peak_mib: float
 
 
-def measure(scene: Scene) -> Result:
-    """Extract the lines of a scene by this project and by the plain script, and compare both with the truth."""
+def measure(scene: Scene, model: str = Parameters.model) -> Result:
+    """Extract the lines of a scene by this project and by the plain script, and compare both with the truth.
+
+    Parameters
+    ----------
+    scene : Scene
+    model : str
+        One of `frpdf.models.NAMES`.
+    """
     clouds = _through_a_file(scene)
     standard = scene.standard
     start = time.perf_counter()
     parameters = Parameters(
-        standard.gauge_m, standard.head_width_m, other_gauges_m=scene.other_gauges_m, quality_step_m=QUALITY_STEP_M
+        standard.gauge_m,
+        standard.head_width_m,
+        other_gauges_m=scene.other_gauges_m,
+        quality_step_m=QUALITY_STEP_M,
+        model=model,
     )
     network = extract_rails(clouds, parameters)
     seconds = time.perf_counter() - start

@@ -80,6 +80,7 @@ class ExtractRails(RailAlgorithm):
             inputs.classify(),
             *groups.rail(detect=True),
             *groups.area(),
+            groups.model(is_advanced=True),
             *groups.cleanup(),
             *groups.lines(),
             *groups.pairing(),
@@ -109,7 +110,7 @@ class ExtractRails(RailAlgorithm):
         if classify and values.detects():
             raise ParameterError("DETECT measures classified points, which CLASSIFY does not need: choose STANDARD.")
         standard = values.standard(DEFAULT if values.detects() else None)
-        choose_model(standard.gauge_m, standard.head_width_m)
+        choose_model(standard.gauge_m, standard.head_width_m, values.choice("MODEL"))
         return Job(
             values.cloud("INPUT"),
             SEARCHED_CLASSES if classify else values.class_codes(),
@@ -123,7 +124,7 @@ class ExtractRails(RailAlgorithm):
         from ...core.standard_checks import detect_standard
 
         standard = values.standard(detect_standard(request, progress).name)
-        choose_model(standard.gauge_m, standard.head_width_m)
+        choose_model(standard.gauge_m, standard.head_width_m, values.choice("MODEL"))
         return replace(job, standard=standard, other_gauges_m=values.other_gauges_m(standard))
 
     def compute(
@@ -185,6 +186,7 @@ class ExtractRails(RailAlgorithm):
         if not any(raster.tiles for raster in network.cleaned):
             return {}
         rasters, frame = on_one_grid(network.cleaned, network.frame)
-        extent = ParameterValues(self, parameters, context).extent(system(network.frame.crs_wkt))
-        header = header_for(rasters, network.cleaned_classes, frame, job.standard, extent)
+        values = ParameterValues(self, parameters, context)
+        extent, model = values.extent(system(network.frame.crs_wkt)), values.choice("MODEL")
+        header = header_for(rasters, network.cleaned_classes, frame, job.standard, extent, model)
         return write_raster(self, "CLEANED", header, rasters, parameters, context)

@@ -50,7 +50,7 @@ TYPES_WITHOUT_LINES = (
 )
 """Types of layers without lines; a layer of unknown type may have lines."""
 
-CHOICES = {"ENGINE": "engine", "DEVICE": "device", "STRIPS": "strips"}
+CHOICES = {"ENGINE": "engine", "DEVICE": "device", "MODEL": "model", "STRIPS": "strips"}
 
 
 class ParameterValues:

@@ -13,8 +13,8 @@ from qgis.core import (
     QgsProcessingParameterString,
 )
 
-from ...core.frpdf import AUTO, DEVICES, ENGINES, MAX_PASSES
-from ...core.frpdf.models import MODELS
+from ...core.frpdf import DEVICES, ENGINES, MAX_PASSES
+from ...core.frpdf.models import NAMES
 from ...core.parameters import DEFAULT_GUIDE_DISTANCE_M, DEFAULT_STEP_M, STRIPS, Parameters
 from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS, UNCONFIRMED_PROFILES
 from ..i18n import tr
@@ -90,11 +90,14 @@ def raster_rail() -> Definitions:
     )
 
 
-def model() -> QgsProcessingParameterDefinition:
+def model(is_advanced: bool = False) -> QgsProcessingParameterDefinition:
     """Define the choice of the network's weights."""
-    return helped(
-        choice("MODEL", tr("Model"), (AUTO, *(one.name for one in MODELS)), AUTO),
-        tr("Trained weights of the network. AUTO selects those that fit the gauge and railhead width of the raster."),
+    return (advanced if is_advanced else helped)(
+        choice("MODEL", tr("Model"), NAMES, Parameters.model),
+        tr(
+            "Trained weights of the network: base is the network of the paper, fast a smaller one. AUTO selects those "
+            "that fit the gauge and railhead width."
+        ),
     )
 
 

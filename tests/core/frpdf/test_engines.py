@@ -7,7 +7,7 @@ import pytest
 from rail_extract.core.clouds.points import RailPoints, read_rail_points
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.frpdf.engine import make_engine
-from rail_extract.core.frpdf.models import choose
+from rail_extract.core.frpdf.models import MODELS
 from rail_extract.core.frpdf.weights import load_arrays
 from rail_extract.core.pipeline import Parameters
 from rail_extract.core.raster import cell_size, rasterize
@@ -30,11 +30,11 @@ def points() -> RailPoints:
     return read_rail_points(SAMPLE, [10], extent=EXTENT)[0]
 
 
-@pytest.fixture(scope="module")
-def rasters(points):
+@pytest.fixture(scope="module", params=MODELS, ids=lambda model: model.name)
+def rasters(points, request):
     """The same raster cleaned by each engine."""
     raster = rasterize(points.xyz, cell_size(GAUGE_M, HEAD_WIDTH_M))
-    arrays = load_arrays(choose(GAUGE_M, HEAD_WIDTH_M).path)
+    arrays = load_arrays(request.param.path)
     return {name: clean(raster, make_engine(arrays, name, "CPU")) for name in ("TORCH", "OPENCV")}
 
 

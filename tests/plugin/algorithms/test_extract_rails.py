@@ -72,8 +72,10 @@ def test_the_command_writes_what_qgis_writes(run, run_step, write_cloud, track, 
         for who in ("qgis", "command")
     )
     settings = {"INPUT": cloud, "ITERATIONS": 1, "ENGINE": "OPENCV", "EXTENT": f"{west},{east},{south},{north}"}
+    settings["MODEL"] = "fast"
     assert run({**settings, **mine}).ok
     words = ["extract", cloud, "--iterations", "1", "--engine", "OPENCV", f"--extent={west},{south},{east},{north}"]
+    words += ["--model", "fast"]
     words += [word for name, path in theirs.items() for word in (f"--{name.lower()}", path)]
     told = subprocess.run([sys.executable, "-m", "rail_extract", *words, "--workers", "1"], capture_output=True)
     assert told.returncode == 0, told.stderr

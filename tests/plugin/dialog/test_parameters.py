@@ -16,6 +16,7 @@ PARAMETERS = [
     ("EXTENT", "extent", None),
     ("MASK", "source", None),
     ("CRS", "crs", None),
+    ("MODEL", "enum", "AUTO"),
     ("ITERATIONS", "number", 2),
     ("ENGINE", "enum", "AUTO"),
     ("DEVICE", "enum", "AUTO"),
@@ -94,6 +95,7 @@ def test_optional_parameters(algorithm):
     ("name", "options"),
     [
         ("STANDARD", [*STANDARDS, "CUSTOM", "DETECT"]),
+        ("MODEL", ["AUTO", "base", "fast"]),
         ("ENGINE", ["AUTO", "TORCH", "OPENCV"]),
         ("DEVICE", ["AUTO", "CPU", "CUDA"]),
     ],
