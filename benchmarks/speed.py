@@ -20,7 +20,8 @@ START = time.perf_counter()
 
 from rail_extract.core import pipeline, steps  # noqa: E402
 from rail_extract.core.clouds.points import read_rail_points  # noqa: E402
-from rail_extract.core.frpdf.models import choose  # noqa: E402
+from rail_extract.core.frpdf import ENGINES  # noqa: E402
+from rail_extract.core.frpdf.models import NAMES, choose  # noqa: E402
 from rail_extract.core.frpdf.weights import load_arrays  # noqa: E402
 from rail_extract.core.standards import resolve  # noqa: E402
 from speed_network import CLOCKS, Cut, cells_table, changes_table, speed_table  # noqa: E402
@@ -53,23 +54,25 @@ def main() -> None:
     parser.add_argument(
         "--runs", type=int, default=3, help="number of whole calls and rounds of the network (default 3)"
     )
+    parser.add_argument("--model", choices=NAMES, default=pipeline.Parameters.model, help="weights of the network")
+    parser.add_argument("--engine", choices=ENGINES, default=pipeline.Parameters.engine, help="engine of the steps")
     parser.add_argument("--clock", choices=CLOCKS, default="wall", help="clock for steps and network")
     arguments = parser.parse_args()
     parts, clock = arguments.parts or PARTS, CLOCKS[arguments.clock]
     spent = 0.0
     if "stages" in parts:
-        spent = print_stages(clock)
+        spent = print_stages(clock, arguments.model, arguments.engine)
     if "network" in parts:
-        print(*speed_table(sample_cut(), arguments.runs, clock), "", *cells_table(), "", sep="\n")
+        print(*speed_table(sample_cut(arguments.model), arguments.runs, clock), "", *cells_table(), "", sep="\n")
     if "changes" in parts:
-        print(*changes_table(sample_cut()), "", sep="\n")
+        print(*changes_table(sample_cut(arguments.model)), "", sep="\n")
     if "calls" in parts:
-        print_calls(arguments.runs, spent)
+        print_calls(arguments.runs, spent, arguments.model, arguments.engine)
 
 
-def print_stages(clock) -> float:
+def print_stages(clock, model: str, engine: str) -> float:
     """Print the seconds of each step, imports included, and return their sum."""
-    seconds, description = stages(clock)
+    seconds, description = stages(clock, model, engine)
     seconds = {"import": IMPORT_SECONDS, **seconds}
     print(f"Steps on the sample, with {description}")
     for name, spent in seconds.items():
@@ -79,19 +82,19 @@ def print_stages(clock) -> float:
     return sum(seconds.values())
 
 
-def print_calls(runs: int, walk_s: float) -> None:
+def print_calls(runs: int, walk_s: float, model: str, engine: str) -> None:
     """Print the seconds of whole calls, and the part of them outside the extraction."""
     if "QGIS_PROCESS" not in os.environ:
         sys.exit('QGIS_PROCESS is not set: run `eval "$(make -s env)"` to time whole calls.')
     starts = sorted(_call("help", "railextract:extractrails") for _ in range(runs))
-    whole = sorted(whole_call() for _ in range(runs))
+    whole = sorted(whole_call(model, engine) for _ in range(runs))
     print(f"Whole qgis_process calls: {', '.join(f'{spent:.1f}' for spent in whole)} s")
     print(f"  start of QGIS and the plugin: {starts[0]:.1f} s")
     if walk_s:
         print(f"  reading parameters and writing: {whole[0] - starts[0] - walk_s:.1f} s")
 
 
-def stages(clock) -> tuple[dict[str, float], str]:
+def stages(clock, model: str, engine: str) -> tuple[dict[str, float], str]:
     """Extract the sample with a clock on each step; return seconds by step and the engine."""
     spent: Counter[str] = Counter()
 
@@ -109,26 +112,26 @@ def stages(clock) -> tuple[dict[str, float], str]:
     clouds = timed("read_rail_points", read_rail_points)(SAMPLE, [10])
     for name in STAGES:
         setattr(steps, name, timed(name, getattr(steps, name)))
-    parameters = pipeline.Parameters(standard.gauge_m, standard.head_width_m)
+    parameters = pipeline.Parameters(standard.gauge_m, standard.head_width_m, model=model, engine=engine)
     network = timed("whole walk", pipeline.extract_rails)(clouds, parameters)
     named = sum(spent[name] for name in STAGES)
     spent["joining and all else"] = spent.pop("whole walk") - named
     return dict(spent), network.engine
 
 
-def sample_cut() -> Cut:
+def sample_cut(model: str) -> Cut:
     """Read the section of the sample on which the network is measured."""
     standard = resolve(STANDARD)
     parameters = pipeline.Parameters(standard.gauge_m, standard.head_width_m, simplify_xy_m=0.0, simplify_z_m=0.0)
-    arrays = load_arrays(choose(standard.gauge_m, standard.head_width_m).path)
+    arrays = load_arrays(choose(standard.gauge_m, standard.head_width_m, model).path)
     return Cut(read_rail_points(SAMPLE, [10], extent=CUT)[0], parameters, arrays)
 
 
-def whole_call() -> float:
+def whole_call(model: str, engine: str) -> float:
     """Run Extract Rails in QGIS, from start to end, and return the seconds."""
     with tempfile.TemporaryDirectory() as folder:
         outputs = [f"{name}={Path(folder) / name.lower()}.gpkg" for name in ("RAILS", "CENTERLINES")]
-        words = [f"INPUT={SAMPLE}", f"STANDARD={STANDARD}", *outputs]
+        words = [f"INPUT={SAMPLE}", f"STANDARD={STANDARD}", f"MODEL={model}", f"ENGINE={engine}", *outputs]
         return _call("run", "railextract:extractrails", "--", *words)
 
 

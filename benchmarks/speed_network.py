@@ -17,7 +17,7 @@ from rail_extract.core.frpdf.architecture import BASE
 from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.frpdf.corridor import Piece, lay_fields
 from rail_extract.core.frpdf.engine import Engine
-from rail_extract.core.frpdf.folding import fold
+from rail_extract.core.frpdf.folding import architecture_of, fold
 from rail_extract.core.frpdf.network import FRPDF, set_weights
 from rail_extract.core.frpdf.onnx import to_onnx
 from rail_extract.core.frpdf.opencv_engine import OpenCvEngine
@@ -64,7 +64,7 @@ class Cut:
 
 def plain_network(arrays: dict[str, np.ndarray]) -> FRPDF:
     """Return the network as it is trained, in float32."""
-    network = FRPDF()
+    network = FRPDF(architecture_of(arrays))
     set_weights(network, arrays)
     return network.eval()
 

@@ -254,7 +254,7 @@ def _announce_squares(
 ) -> None:
     """Say which points are processed, and with which network."""
     points, where = counted(sum(source.counts.values()), "point"), counted(len(squares), "square")
-    model = choose(parameters.gauge_m, parameters.head_width_m).name
+    model = choose(parameters.gauge_m, parameters.head_width_m, parameters.model).name
     passes = counted(parameters.passes, "pass", "passes") if parameters.passes else "passes until it is stable"
     progress.info(f"Class {source.class_code}: {points} in {where}; network {model}, {passes}.")
 

@@ -1,7 +1,6 @@
 """The list of stages describes the network of the paper, and the shipped weights fit it."""
 
 import numpy as np
-import pytest
 from rail_extract.core.frpdf import architecture, folding
 from rail_extract.core.frpdf.models import choose
 from rail_extract.core.frpdf.weights import load_arrays
