@@ -33,6 +33,18 @@ def test_rails_against_truth(extracted, truth):
     assert (comparison.line_count, comparison.truth_count) == (6, 6)
 
 
+def test_rails_of_the_fast_model_against_truth(qgis_process, sample, truth, tmp_path):
+    rails = tmp_path / "rails.gpkg"
+    run = qgis_process({"INPUT": sample / "sample.laz", "STANDARD": STANDARD, "MODEL": "fast", "RAILS": rails})
+    assert run.returncode == 0, run.stdout + run.stderr
+    comparison = compare_lines(read_lines(rails), truth("rail"))
+    assert comparison.completeness >= MIN_SHARE
+    assert comparison.correctness >= MIN_SHARE
+    assert comparison.lateral_rmse_m <= MAX_LATERAL_M
+    assert comparison.height_rmse_m <= MAX_HEIGHT_M
+    assert (comparison.line_count, comparison.truth_count) == (6, 6)
+
+
 def test_centerlines_against_truth(extracted, truth):
     comparison = compare_lines(read_lines(extracted.centerlines), truth("centerline"))
     assert comparison.completeness >= MIN_SHARE

@@ -14,9 +14,10 @@ SEED, SIDE = 4, 512
 SET = (("parallel", 0.6), ("turnout", 0.75), ("connections", 0.9))
 """Family and severity of each raster: difficult ones, because easy ones hardly show a change of the weights."""
 
-MIN_F1, MIN_F1_WITHIN_ONE_CELL = 0.828, 0.956
-"""The weights reach 0.8307 and 0.9592 in bfloat16 on PyTorch, 0.8312 and 0.9592 in float32 on OpenCV. Those of the
-sixth run of training reach 0.8273 and 0.9578; with 20 % noise on the kernels, 0.77 and 0.91 remain."""
+MIN_F1 = {"base": (0.828, 0.956), "fast": (0.805, 0.946)}
+"""Smallest F1, strict and within one cell. `base` reaches 0.8307 and 0.9592 in bfloat16 on PyTorch, 0.8312 and 0.9592
+in float32 on OpenCV; the weights of the sixth run of its training reach 0.8273 and 0.9578; with 20 % noise on the
+kernels, 0.77 and 0.91 remain. `fast` reaches 0.8083 and 0.9480, and 0.7744 and 0.9288 with this noise."""
 
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: model.name)
@@ -29,5 +30,5 @@ def test_the_weights_reach_their_f1(model):
         found = clean(raster, engine).read(0, 0, SIDE, SIDE)
         strict, tolerant = strict + score(found, pair.label), tolerant + score(found, pair.label, tolerance=1)
     assert strict.tp + strict.fn > 10_000
-    assert strict.f1 > MIN_F1
-    assert tolerant.f1 > MIN_F1_WITHIN_ONE_CELL
+    assert strict.f1 > MIN_F1[model.name][0]
+    assert tolerant.f1 > MIN_F1[model.name][1]
