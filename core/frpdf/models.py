@@ -51,7 +51,7 @@ NAMES = (AUTO, *(model.name for model in MODELS))
 """Values of the parameter MODEL."""
 
 AUTOMATIC = ("base",)
-"""Names of the models among which AUTO chooses by ratio; the card of the models says why `fast` is left out."""
+"""Names of the models among which AUTO chooses by ratio; models/MODEL_CARD.md says why `fast` is left out."""
 
 
 def choose(gauge_m: float, head_width_m: float, name: str = Parameters.model) -> Model:
