@@ -35,6 +35,9 @@ APPLICATION = "RAIL_EXTRACT"
 MAX_TEXT = 255
 """Longest text of extended data."""
 
+DRAWN = {"rails": "RAILS", "centerlines": "TRACK", "quality": "STATIONS", "findings": "FINDINGS"}
+"""First word of the layers in a drawing, by output."""
+
 COLOURS = {"RAILS": 5, "TRACK": 1, "STATIONS": 3}
 """Colour of a layer by the first word of its name: blue, red, green."""
 

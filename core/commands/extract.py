@@ -34,11 +34,13 @@ NEEDS = {name: name for name in ("distributed", "cryptography", "pyogrio", "shap
 INCOMPLETE = 2
 """Exit code of a run that has written results in which some files or squares are missing."""
 
+LAYERS = (".gpkg", ".dxf", ".csv")
+
 SUFFIXES = {
-    "rails": (".gpkg",),
-    "centerlines": (".gpkg",),
-    "quality": (".gpkg",),
-    "findings": (".gpkg",),
+    "rails": LAYERS,
+    "centerlines": LAYERS,
+    "quality": LAYERS,
+    "findings": LAYERS,
     "cleaned": (".tif", ".tiff"),
     "report": (".html", ".htm"),
 }
@@ -75,7 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument("tiles", nargs="+", type=Path, metavar="TILE", help=TILES_HELP)
     output = parser.add_argument_group("outputs", "Existing files are replaced. GeoPackages may be the same file.")
-    output.add_argument("--rails", type=Path, required=True, help="GeoPackage for the rails")
+    output.add_argument("--rails", type=Path, required=True, help="GeoPackage (or .dxf, .csv) for the rails")
     output.add_argument("--centerlines", type=Path, help="GeoPackage for the track centerlines")
     output.add_argument("--quality", type=Path, help="GeoPackage for the points with the track geometry")
     output.add_argument("--findings", type=Path, help="GeoPackage for the places to look at")
@@ -203,6 +205,8 @@ def _outputs(args: argparse.Namespace) -> dict[str, Destination]:
         with writing(path.parent):
             path.parent.mkdir(parents=True, exist_ok=True)
         destination = Destination.at(path)
+        if destination.file in files and path.suffix.lower() != ".gpkg":
+            raise ParameterError(f"Only a GeoPackage holds several outputs: give --{name} a file other than {path}.")
         outputs[name] = files.setdefault(destination.file, destination)
     return outputs
 

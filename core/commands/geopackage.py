@@ -12,6 +12,7 @@ import pyogrio
 import shapely
 
 from ..disk import Destination
+from ..exchange import DRAWN, Shape, write_shapes
 from ..fields import QUALITY_FIELDS, UNKNOWN_IN_METRES, Field
 from ..frame import LocalFrame
 from ..geopackage import tables_in
@@ -85,7 +86,7 @@ def stations_layer(name: str, destination: Destination, tracks: Sequence[TrackGe
 
 
 def write_layers(layers: Sequence[Layer], frame: LocalFrame) -> None:
-    """Write layers into one GeoPackage; its other layers stay.
+    """Write layers into one GeoPackage, whose other layers stay, or one layer into a DXF or CSV file.
 
     Parameters
     ----------
@@ -101,9 +102,21 @@ def write_layers(layers: Sequence[Layer], frame: LocalFrame) -> None:
     """
     names = {layer.name for layer in layers}
     destination = layers[0].destination
+    if destination.file.suffix.lower() != ".gpkg":
+        _write_for_others(layers[0], frame)
+        return
     with destination.replacing(edit=bool(tables_in(destination.file) - names)) as new:
         for layer in layers:
             _write_layer(layer, frame, new)
+
+
+def _write_for_others(layer: Layer, frame: LocalFrame) -> None:
+    """Write a layer for other programs, by the suffix of its file."""
+    columns = [[field.value(value) for value in values] for field, values in zip(layer.fields, layer.columns)]
+    shapes = [Shape(np.atleast_2d(frame.to_crs(xyz)), values) for xyz, values in zip(layer.xyz, zip(*columns))]
+    is_line = layer.geometry_type != "Point Z"
+    with layer.destination.replacing() as new:
+        write_shapes(new, shapes, layer.fields, frame, DRAWN[layer.name], is_line)
 
 
 def _write_layer(layer: Layer, frame: LocalFrame, file: Path) -> None:

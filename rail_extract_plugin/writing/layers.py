@@ -60,17 +60,14 @@ KINDS = {int: INTEGER, float: REAL, str: TEXT}
 
 @dataclass(frozen=True)
 class LayerKind:
-    """The fields of a layer, the style it gets when QGIS loads it, and the word for its layers in a drawing."""
+    """The fields of a layer, and the style it gets when QGIS loads it."""
 
     columns: tuple[Field, ...]
     style: str
-    drawing: str
 
 
-RAILS = LayerKind(RAIL_FIELDS, "rails", "RAILS")
-CENTERLINES = LayerKind(CENTERLINE_FIELDS, "centerlines", "TRACK")
-QUALITY = LayerKind(QUALITY_FIELDS, "quality", "STATIONS")
-FINDINGS = LayerKind(FINDING_FIELDS, "findings", "FINDINGS")
+RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELDS, "centerlines")
+QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
 
 EXCHANGED = (".dxf", ".csv")
 """Suffixes of files for other programs, which QGIS's sinks do not write; see `core.exchange`."""
@@ -284,13 +281,13 @@ def _exchange(
     context: QgsProcessingContext,
 ) -> dict[str, str]:
     """Write features for other programs; QGIS loads the file if the user wants that."""
-    from ...core.exchange import Shape, write_shapes
+    from ...core.exchange import DRAWN, Shape, write_shapes
 
     destination, value = algorithm.destinations[name], parameters.get(name)
     shapes = (Shape(vertices_of(feature), _plain(feature.attributes())) for feature in made)
     is_line = QgsWkbTypes.geometryType(shape) == QgsWkbTypes.GeometryType.LineGeometry
     with destination.replacing() as new:
-        write_shapes(new, shapes, kind.columns, frame, kind.drawing, is_line)
+        write_shapes(new, shapes, kind.columns, frame, DRAWN[kind.style], is_line)
     path = str(destination.path)
     if isinstance(value, QgsProcessingOutputLayerDefinition) and value.destinationProject:
         title = algorithm.parameterDefinition(name).description()

@@ -171,7 +171,8 @@ def test_an_output_that_is_a_folder_is_refused_before_the_run(tiles, tmp_path, c
     ("words", "said"),
     [
         (["--rails", "out.shp"], "--rails writes .gpkg"),
-        (["--quality", "out.csv"], "--quality writes .gpkg"),
+        (["--quality", "out.tab"], "--quality writes .gpkg"),
+        (["--rails", "out.dxf", "--centerlines", "out.dxf"], "Only a GeoPackage holds several outputs"),
         (["--cleaned", "out.png"], "--cleaned writes .tif"),
         (["--report", "out.pdf"], "--report writes .html"),
         (["--other-gauges", "1430"], "distinguished"),
