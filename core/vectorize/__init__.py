@@ -22,6 +22,7 @@ from .junctions import clean_junctions, run_through, weld_pairs
 from .pixels import chamfer_distance, parity_fix, pixel_set
 from .repairs import cut_kinks, straighten_blots
 from .routes import choose_routes
+from .slips import add_curves, open_slips
 from .tracing import trace
 from .veinerization import prune, veinerize
 
@@ -78,12 +79,12 @@ def vectorize(
     progress.set_fraction(0.6)
     progress.check()
     places, widths_m = closed.to_local(pixels.cells / 2), raster.cell_m * distance / 2
-    network = clean_junctions(traced, head_width_m)
+    seen = cKDTree(places if raw is None else np.concatenate([places, raw.to_local(raw.cells())]))
+    network, slips = open_slips(clean_junctions(traced, head_width_m), seen)
     network = straighten_blots(network, places, widths_m, head_width_m, progress.span(0.6, 0.8))
     network = cut_kinks(network, progress.span(0.8, 0.85))
-    seen = cKDTree(places if raw is None else np.concatenate([places, raw.to_local(raw.cells())]))
     network = join_gaps(network, max_gap_m, gap_angle_deg, seen, at_nodes=False, progress=progress)
-    network = resolve_branches(resolve_crossings(network))
+    network = resolve_branches(add_curves(resolve_crossings(network), slips))
     network = join_gaps(run_through(network), max_gap_m, gap_angle_deg, seen, progress=progress)
     network = attach_branches(network, seen, max_gap_m, progress.span(0.9, 1.0))
     network = choose_routes(_drop_short(drop_guards(network), min_length_m))

@@ -81,6 +81,38 @@ def throat(seed: int = 22) -> Scene:
     return _build("throat", curves, rng, gaps=1, scanner=Scanner(noise_m=0.004, half_range_m=30.0, ray_step_rad=0.0015))
 
 
+def double_slip(seed: int = 23, number: float = 9.0, radius_m: float = 190.0, heading: float = 0.8) -> Scene:
+    """Build two straight tracks that cross at 1:9, with a slip curve of 190 m on either side of their crossing.
+
+    Each slip curve is tangent to both tracks and lies between the acute frogs, as in a double slip 190-1:9.
+    """
+    rng = np.random.RandomState(seed)
+    half_m, angle = 45.0, float(np.arctan(1 / number))
+    tracks = [
+        trace([Element(2 * half_m)], (-half_m * np.cos(way), -half_m * np.sin(way)), way)
+        for way in (heading, heading + angle)
+    ]
+    tangent_m = radius_m * np.tan(angle / 2)
+    slips = [
+        trace(
+            [Element(radius_m * angle, hand / radius_m, hand / radius_m)],
+            (-tangent_m * np.cos(way), -tangent_m * np.sin(way)),
+            way,
+        )
+        for way, hand in ((heading, 1), (heading + angle, -1))
+    ]
+    return _build("double_slip", [*tracks, *slips], rng, gaps=0)
+
+
+def three_way(seed: int = 24, apart_m: float = 0.0, heading: float = -0.5) -> Scene:
+    """Build a straight track that two branches 190-1:9 leave, one to either side, the second one `apart_m` later."""
+    rng = np.random.RandomState(seed)
+    form = next(candidate for candidate in FORMS if candidate.name == "190-1:9")
+    main = trace([Element(2 * FREE_M + form.arc_m + apart_m)], heading=heading)
+    sides = [branch(main, FREE_M + back_m, form, hand, FREE_M) for hand, back_m in ((1, 0.0), (-1, apart_m))]
+    return _build("three_way", [main, *sides], rng, gaps=0)
+
+
 def _turned_back(ladder: Curve, arc_m: float, end_m: float, curvature: float, main: Curve) -> Curve:
     """Return a ladder that ends parallel to the main track, as the last yard track."""
     toe_m = float(main.step_m * np.argmin(np.linalg.norm(main.xy - ladder.xy[0], axis=1)))
@@ -115,7 +147,7 @@ def _build(name: str, curves: list[Curve], rng: np.random.RandomState, gaps: int
         scanner,
         gaps={
             key: places
-            for number, curve in enumerate(curves)
+            for number, curve in enumerate(curves if gaps else [])
             for key, places in random_gaps(rng, number, curve.length_m, gaps, longest_m=1.5).items()
         },
         clutter=Clutter(

@@ -1,0 +1,333 @@
+"""Slips: crossings of two rails at a small angle whose four legs curves connect on either side.
+
+Each rail of a slip curve touches both rails of the crossing, inside the frogs. The raster separates the four rails only
+over the few metres in the middle, too short for their parting to be measured. A curve that touches two straight lines
+has one unknown, however, and cells far from both lines show it. See docs/method.md section 4.12.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..lines.ends import STEP_M, even_points, tip_and_direction
+from ..lines.network import LineNetwork
+from ..polyline import runs
+from .junctions import DIRECTION_M
+
+CLEAR_M = (8.0, 11.0, 14.0)
+"""Distances from the middle of a slip from which its legs are taken for those of the crossing, tried in this order."""
+
+CLEAR_SHARE = 0.7
+"""Smallest part of the tangent length at which they are: a slip curve of 190 m at 1:9 touches the legs at 10.5 m and is
+26 mm from them at 7.4 m. The frogs are at 13.6 m."""
+
+NEAR_M = 2.5
+"""Largest distance between a node inside a slip and its middle."""
+
+MAX_MISS_M, STRAY_M = 0.2, 0.1
+"""Largest distance between two legs of one rail, across: 16 m times the error of a direction, half a cell on 2.5 m. And
+largest distance of a line from the straight legs of a slip."""
+
+MAX_BEND_DEG = 4.0
+"""Largest angle between opposite legs: 16 m of a curve of 230 m."""
+
+MIN_ANGLE_DEG, MAX_ANGLE_DEG = 2.0, 12.0
+"""Angles of crossings with slips: from 1:18.5 (3 degrees) to those of old yards (1:5)."""
+
+MIN_LEG_SHARE = 0.6
+"""Shortest part of a leg, in `DIRECTION_M`, that shows its direction."""
+
+SIDE_M = 0.15
+"""Width beside the outer rails of a slip from which lines are removed: they stray by the width of a merged strip."""
+
+ENTRY_M = 1.0
+"""Length within which a leg is cut at the border of a slip."""
+
+MIN_RADIUS_M, MAX_RADIUS_M = 80.0, 700.0
+"""Radii of slip curves: 190 and 215 m are usual, 100 m in old yards, 500 m at 1:14."""
+
+SEPARATE_M, MIN_SEEN_M = 0.11, 2.0
+"""Distance between the axes of a slip curve and of the rails that cross from which there is a cell between their heads,
+and shortest length on which a slip curve is that far from both. Wing rails at frogs are apart for a metre."""
+
+HALF_HEAD_M = 0.036
+"""Distance from its axis within which cells are on a rail."""
+
+BIN_M, COVER_M = 0.01, 0.25
+"""Bins of the distance between the curve and the crossing, and of the length along the curve."""
+
+MIN_COVERED = 0.8
+"""Share of the length in the middle of a slip curve on which there are cells."""
+
+
+@dataclass(frozen=True)
+class _Cross:
+    """Where two lines cross: the place, unit vectors along and across the mean of them, (2, 2), and half the angle."""
+
+    place: np.ndarray
+    axes: np.ndarray
+    half_angle: float
+
+    @classmethod
+    def of(cls, tips: np.ndarray) -> _Cross | None:
+        """Find where two straight lines cross, given two points on either, (4, 2); None if they hardly do."""
+        ways = [tips[1] - tips[0], tips[3] - tips[2]]
+        ways[1] = ways[1] * np.sign(ways[0] @ ways[1])
+        first, second = (way / np.hypot(*way) for way in ways)
+        turn = first[0] * second[1] - first[1] * second[0]
+        half_angle = 0.5 * abs(float(np.arcsin(np.clip(turn, -1.0, 1.0))))
+        if not np.radians(MIN_ANGLE_DEG) <= 2 * half_angle <= np.radians(MAX_ANGLE_DEG):
+            return None
+        step = tips[2] - tips[0]
+        place = tips[0] + first * (step[0] * second[1] - step[1] * second[0]) / turn
+        along = (first + second) / np.hypot(*(first + second))
+        return cls(place, np.array([along, [-along[1], along[0]]]), half_angle)
+
+    def height_of_curve(self, cells: np.ndarray, side: float) -> float | None:
+        """Find how far above the crossing, on one side of it, a curve that touches both lines passes.
+
+        A curve of radius R passes e = R h² / 2 above a crossing of half angle h. At x it is y = e + x² h² / (4 e)
+        above it, so every cell states an e.
+
+        Parameters
+        ----------
+        cells : (n, 2) array
+        side : float
+            1 to the left of the crossing, -1 to the right.
+
+        Returns
+        -------
+        float or None
+            None if cells show no such curve.
+        """
+        x, y = self.axes @ (cells - self.place).T
+        y = side * y
+        inside = y > np.abs(x) * self.half_angle
+        x, y = x[inside], y[inside]
+        height = 0.5 * (y + np.sqrt(y**2 - (x * self.half_angle) ** 2))
+        reach = self._seen_m(height) / 2
+        lowest, highest = (0.5 * radius * self.half_angle**2 for radius in (MIN_RADIUS_M, MAX_RADIUS_M))
+        used = (np.abs(x) <= reach) & (height >= lowest) & (height <= highest)
+        x, height = x[used], height[used]
+        if not len(x):
+            return None
+        counts = np.bincount((height / BIN_M).astype(int))
+        width = int(round(2 * HALF_HEAD_M / BIN_M))
+        mode = (np.argmax(np.convolve(counts, np.ones(width), "same")) + 0.5) * BIN_M
+        on_head = np.abs(height - mode) <= HALF_HEAD_M
+        found = float(np.median(height[on_head]))
+        length = float(self._seen_m(found))
+        covered = np.unique(np.floor(x[np.abs(height - found) <= HALF_HEAD_M] / COVER_M))
+        return found if length >= MIN_SEEN_M and len(covered) >= MIN_COVERED * length / COVER_M else None
+
+    def _seen_m(self, height: np.ndarray | float) -> np.ndarray:
+        """Return the length on which curves that pass so far above are `SEPARATE_M` from both lines.
+
+        At the share s of the tangent length from the middle, they are e (1 - s)² from the nearer one.
+        """
+        share = np.maximum(1 - np.sqrt(SEPARATE_M / np.maximum(height, 1e-9)), 0.0)
+        return 2 * share * 2 * height / self.half_angle
+
+    def curve(self, height: float, side: float) -> np.ndarray:
+        """Return the curve that passes `height` above the crossing, (n, 2), between the places where it touches."""
+        tangent = 2 * height / self.half_angle
+        x = np.linspace(-tangent, tangent, int(2 * tangent / STEP_M) + 2)
+        y = side * (height + (x * self.half_angle) ** 2 / (4 * height))
+        return self.place + np.column_stack([x, y]) @ self.axes
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A crossing with curves that connect its legs.
+
+    Attributes
+    ----------
+    cross : _Cross
+    clear_m : float
+        Distance from the middle from which the legs are clear.
+    heights : tuple of (float, float)
+        For each curve, how far from the crossing it passes, and the side, 1 for the left.
+    """
+
+    cross: _Cross
+    clear_m: float
+    heights: tuple[tuple[float, float], ...]
+
+    @property
+    def tangent_m(self) -> float:
+        """Distance from the middle at which the longest curve touches the legs."""
+        return max(2 * height / self.cross.half_angle for height, _ in self.heights)
+
+    def holds(self, places: np.ndarray) -> np.ndarray:
+        """Return which places, (n, 2), are inside: between the legs and the curves, or on them."""
+        x, y = self.cross.axes @ (places - self.cross.place).T
+        top = np.abs(x) * self.cross.half_angle + SIDE_M
+        for height, side in self.heights:
+            curved = height + (x * self.cross.half_angle) ** 2 / (4 * height) + SIDE_M
+            top = np.where(side * y > 0, np.maximum(top, curved), top)
+        return (np.abs(x) < self.clear_m) & (np.abs(y) < top)
+
+    def is_leg(self, place: np.ndarray) -> bool:
+        """Return whether a place is where a leg enters."""
+        x, y = self.cross.axes @ (place - self.cross.place)
+        off_m = abs(abs(y) - abs(x) * self.cross.half_angle)
+        return bool(off_m < STRAY_M and abs(x) > self.clear_m - ENTRY_M)
+
+
+def open_slips(network: LineNetwork, seen: cKDTree) -> tuple[LineNetwork, list[Slip]]:
+    """Draw the crossings inside slips with a single node, and find the slip curves.
+
+    Parameters
+    ----------
+    network : LineNetwork
+        Lines without passes.
+    seen : cKDTree
+        Places of rail cells.
+
+    Returns
+    -------
+    network : LineNetwork
+        In which four straight legs meet in the middle of each slip.
+    slips : list of Slip
+        What `add_curves` adds once the crossings are resolved.
+    """
+    slips: list[Slip] = []
+    for place in network.nodes[network.degrees() > 2]:
+        if any(np.hypot(*(place - slip.cross.place)) < NEAR_M for slip in slips):
+            continue
+        slip = _slip(_Parts.of(network), place, seen)
+        if slip is not None:
+            slips.append(slip)
+            network = _as_crossing(network, slip)
+    return network, slips
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """Even points on all lines, with the number of the line of each and a tree of them."""
+
+    points: np.ndarray
+    line: np.ndarray
+    tree: cKDTree
+
+    @classmethod
+    def of(cls, network: LineNetwork) -> _Parts:
+        """Place points on the lines of a network."""
+        parts = [even_points(line) for line in network.lines]
+        points = np.concatenate(parts)
+        return cls(points, np.repeat(np.arange(len(parts)), [len(part) for part in parts]), cKDTree(points))
+
+    def legs(self, place: np.ndarray, clear_m: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the tips and the outward directions of the lines, (n, 2) each, that leave a circle around a place."""
+        reach_m = clear_m + DIRECTION_M
+        near = np.sort(np.array(self.tree.query_ball_point(place, reach_m), dtype=int))
+        distance = np.hypot(*(self.points[near] - place).T)
+        near, distance = near[distance >= clear_m], distance[distance >= clear_m]
+        breaks = np.flatnonzero((np.diff(near) > 1) | (np.diff(self.line[near]) != 0)) + 1
+        found = []
+        for run in np.split(np.arange(len(near)), breaks) if len(near) else []:
+            if len(run) * STEP_M >= MIN_LEG_SHARE * DIRECTION_M and distance[run].min() < clear_m + 2 * STEP_M:
+                part = self.points[near[run]]
+                tip, outward = tip_and_direction(part if distance[run[0]] < distance[run[-1]] else part[::-1])
+                found.append((tip, -outward))
+        tips, outward = (
+            (np.array(values).reshape(-1, 2) for values in zip(*found)) if found else (np.empty((0, 2)),) * 2
+        )
+        return tips, outward
+
+
+def _slip(parts: _Parts, place: np.ndarray, seen: cKDTree) -> Slip | None:
+    """Find the slip around a node; None if there is none."""
+    for clear_m in CLEAR_M:
+        rough = _cross_near(parts, place, clear_m)
+        cross = rough and _cross_near(parts, rough.place, clear_m)
+        if cross is None:
+            continue
+        cells = seen.data[seen.query_ball_point(cross.place, clear_m)]
+        heights = [(cross.height_of_curve(cells, side), side) for side in (1.0, -1.0)]
+        slip = Slip(cross, clear_m, tuple((height, side) for height, side in heights if height is not None))
+        if slip.heights and clear_m >= CLEAR_SHARE * slip.tangent_m:
+            return slip
+    return None
+
+
+def _cross_near(parts: _Parts, place: np.ndarray, clear_m: float) -> _Cross | None:
+    """Find two straight lines that cross near a place, by their legs outside; of several, the nearest."""
+    tips, outward = parts.legs(place, clear_m)
+    pairs = [pair for pair in combinations(range(len(tips)), 2) if _continue(tips[list(pair)], outward[list(pair)])]
+    crosses = [_Cross.of(tips[[*one, *other]]) for one, other in combinations(pairs, 2) if not set(one) & set(other)]
+    near = [cross for cross in crosses if cross is not None and np.hypot(*(cross.place - place)) < NEAR_M]
+    return min(near, key=lambda cross: float(np.hypot(*(cross.place - place))), default=None)
+
+
+def _continue(tips: np.ndarray, outward: np.ndarray) -> bool:
+    """Return whether two legs, (2, 2) each, continue each other."""
+    bend = np.degrees(np.arccos(np.clip(-outward[0] @ outward[1], -1.0, 1.0)))
+    way = outward[0] - outward[1]
+    step = tips[0] - tips[1]
+    miss = abs(step[0] * way[1] - step[1] * way[0]) / max(np.hypot(*way), 1e-9)
+    return bool(bend <= MAX_BEND_DEG and miss <= MAX_MISS_M)
+
+
+def _as_crossing(network: LineNetwork, slip: Slip) -> LineNetwork:
+    """Remove what lies inside a slip, and let its four legs meet in one node."""
+    hub = len(network.nodes)
+    lines: list[np.ndarray] = []
+    ends: list[tuple[int, int]] = []
+    nodes = [*network.nodes, slip.cross.place]
+    for line, own in zip(network.lines, network.ends.tolist()):
+        outside = ~slip.holds(line)
+        for first, last in runs(outside):
+            piece, pair = line[first : last + 1], list(own)
+            for side, cut in ((0, first > 0), (1, last < len(line) - 1)):
+                if not cut:
+                    continue
+                tip = piece[-1 if side else 0]
+                if slip.is_leg(tip):
+                    way = even_points(np.array([slip.cross.place, tip]))[:-1]
+                    piece = np.concatenate([piece, way[::-1]] if side else [way, piece])
+                    pair[side] = hub
+                else:
+                    pair[side] = len(nodes)
+                    nodes.append(tip)
+            if len(piece) > 1:
+                lines.append(piece)
+                ends.append((pair[0], pair[1]))
+    return LineNetwork(tuple(lines), np.array(nodes), np.array(ends)).tidy()
+
+
+def add_curves(network: LineNetwork, slips: Sequence[Slip]) -> LineNetwork:
+    """Add the curves of slips, which begin and end on the lines that they touch.
+
+    Parameters
+    ----------
+    network : LineNetwork
+    slips : sequence of Slip
+        Those whose crossing has not been resolved are left out.
+    """
+    for slip in slips:
+        near = [np.hypot(*(line - slip.cross.place).T) for line in network.lines]
+        through = [n for n, one in enumerate(near) if one.min() < STRAY_M and 0 < one.argmin() < len(one) - 1]
+        if len(through) != 2:
+            continue
+        for height, side in slip.heights:
+            network = _with_curve(network, slip.cross.curve(height, side), through)
+    return network.tidy() if slips else network
+
+
+def _with_curve(network: LineNetwork, curve: np.ndarray, through: Sequence[int]) -> LineNetwork:
+    """Add a curve between two of the lines `through`."""
+    count, own = len(network.nodes), len(network.lines)
+    nodes, ends = np.concatenate([network.nodes, curve[[0, -1]]]), np.concatenate([network.ends, [[count, count + 1]]])
+    network = LineNetwork((*network.lines, curve), nodes, ends, network.passes)
+    for end, place in ((2 * own, curve[0]), (2 * own + 1, curve[-1])):
+        distances = [np.hypot(*(network.lines[number] - place).T) for number in through]
+        nearest = int(np.argmin([one.min() for one in distances]))
+        vertex = int(np.clip(distances[nearest].argmin(), 1, len(distances[nearest]) - 2))
+        network = network.with_end(end, network.from_end(end)[1:2], 2, at=(through[nearest], vertex))
+    return network
