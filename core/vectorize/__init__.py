@@ -13,7 +13,7 @@ from ..parameters import Parameters
 from ..progress import SILENT, Progress
 from ..raster import RailRaster
 from .attaching import attach_branches
-from .branches import resolve_branches
+from .branches import free_third_rails, resolve_branches
 from .closing import close
 from .crossings import resolve_crossings
 from .guards import drop_guards
@@ -84,7 +84,7 @@ def vectorize(
     network = straighten_blots(network, places, widths_m, head_width_m, progress.span(0.6, 0.8))
     network = cut_kinks(network, progress.span(0.8, 0.85))
     network = join_gaps(network, max_gap_m, gap_angle_deg, seen, at_nodes=False, progress=progress)
-    network = resolve_branches(add_curves(resolve_crossings(network), slips))
+    network = resolve_branches(free_third_rails(add_curves(resolve_crossings(network), slips)))
     network = join_gaps(run_through(network), max_gap_m, gap_angle_deg, seen, progress=progress)
     network = attach_branches(network, seen, max_gap_m, progress.span(0.9, 1.0))
     network = choose_routes(_drop_short(drop_guards(network), min_length_m))

@@ -17,6 +17,7 @@ from ..polyline import length_along
 from .crossings import MISFIT_M as KNOWN_MISFIT_M
 from .crossings import SKIP_M
 from .junctions import DEFLECTION_DEG, DIRECTION_M, deflections, ends_by_node
+from .steadiness import unsteadiness
 
 MAX_BACK_M = 40.0
 """Largest length by which a branch is extended back: on a radius of 2500 m, as at 1:26.5, two rails are 0.2 m apart
@@ -24,6 +25,10 @@ after 32 m, and the visible part gives that length to within a quarter."""
 
 STEADY_M = 8.0
 """Length over which the parting of two rails is measured."""
+
+MERGED_M, MIN_LEG_M = 8.0, 8.0
+"""Length of the stem of three rails in which they are merged, and shortest leg that shows which of them goes on: rails
+that part on 190 m have separate heads after 7.5 m."""
 
 SHARPER = 2.0
 UNSURE_CURVATURE = 16 * STAIRS_M / STEADY_M**2
@@ -61,6 +66,51 @@ def resolve_branches(network: LineNetwork) -> LineNetwork:
         for leg, line in zip(legs, redrawn):
             lines[leg // 2] = turned(line, leg)
     return LineNetwork(tuple(lines), nodes, network.ends, network.passes)
+
+
+def free_third_rails(network: LineNetwork) -> LineNetwork:
+    """Where three rails part within a few metres, draw the one that goes on straight, and let the others end freely.
+
+    A short line then connects two branchings, too short for its direction to be measured; `attach_branches` leads the
+    free rails back to the one that goes on.
+    """
+    freed = True
+    while freed:
+        freed = False
+        stems = {node: (stem, legs) for node, stem, legs in branchings(network)}
+        for link in np.flatnonzero(network.lengths() < SKIP_M + DIRECTION_M).tolist():
+            for near, far in ((0, 1), (1, 0)):
+                first, second = (stems.get(int(network.ends[link, side])) for side in (near, far))
+                if first is None or second is None or second[0] != 2 * link + far or 2 * link + near not in first[1]:
+                    continue
+                legs = [leg for leg in first[1] if leg != 2 * link + near] + second[1]
+                drawn = _third_freed(network, first[0], link, legs)
+                if drawn is not None:
+                    network, freed = drawn, True
+                    break
+            if freed:
+                break
+    return network
+
+
+def _third_freed(network: LineNetwork, stem: int, link: int, legs: list[int]) -> LineNetwork | None:
+    """Join a stem with the steadiest of three legs, and free the others; None if no rail could go on so."""
+    trunk = network.from_end(stem)
+    rails = {leg: cut_back(network.from_end(leg), SKIP_M) for leg in legs if network.lengths()[leg // 2] > MIN_LEG_M}
+    if len(rails) < len(legs) or len({end // 2 for end in (stem, link * 2, *legs)}) < 5:
+        return None
+    if length_along(trunk)[-1] < MERGED_M + MIN_LEG_M:
+        return None
+    trunk = cut_back(trunk, MERGED_M)
+    steady = min(legs, key=lambda leg: unsteadiness(trunk, rails[leg], MIN_LEG_M))
+    curve = bridge(trunk, rails[steady], misfit_m=KNOWN_MISFIT_M)
+    if curve is None:
+        return None
+    cuts_m = dict.fromkeys(legs, SKIP_M) | {stem: MERGED_M + curve.cuts_m[0], steady: SKIP_M + curve.cuts_m[1]}
+    keep = np.arange(len(network.lines)) != link
+    one, other = (end - 2 * (end // 2 > link) for end in (stem, steady))
+    points = {one: curve.points, other: curve.points[::-1]}
+    return network.cut_back(cuts_m).select(keep).weld({one: other, other: one}, points)
 
 
 def branchings(network: LineNetwork) -> Iterator[tuple[int, int, list[int]]]:

@@ -2,7 +2,7 @@
 
 Each rail of a slip curve touches both rails of the crossing, inside the frogs. The raster separates the four rails only
 over the few metres in the middle, too short for their parting to be measured. A curve that touches two straight lines
-has one unknown, however, and cells far from both lines show it. See docs/method.md section 4.12.
+has one unknown, however, and cells far from both lines show it. See docs/method.md section 4.16.
 """
 
 from __future__ import annotations
@@ -26,8 +26,11 @@ CLEAR_SHARE = 0.7
 """Smallest part of the tangent length at which they are: a slip curve of 190 m at 1:9 touches the legs at 10.5 m and is
 26 mm from them at 7.4 m. The frogs are at 13.6 m."""
 
-NEAR_M = 2.5
-"""Largest distance between a node inside a slip and its middle."""
+SAME_M = 0.5
+"""Crossings this close to each other are one: those of the two rails of a track are a gauge apart."""
+
+NODE_M, NEAR_M = 4.0, 1.5
+"""Largest distance from the middle of a slip to a junction that the raster makes of it, and to a place between two."""
 
 MAX_MISS_M, STRAY_M = 0.2, 0.1
 """Largest distance between two legs of one rail, across: 16 m times the error of a direction, half a cell on 2.5 m. And
@@ -51,9 +54,10 @@ ENTRY_M = 1.0
 MIN_RADIUS_M, MAX_RADIUS_M = 80.0, 700.0
 """Radii of slip curves: 190 and 215 m are usual, 100 m in old yards, 500 m at 1:14."""
 
-SEPARATE_M, MIN_SEEN_M = 0.11, 2.0
+SEPARATE_M, MIN_SEEN_M = 0.11, 5.0
 """Distance between the axes of a slip curve and of the rails that cross from which there is a cell between their heads,
-and shortest length on which a slip curve is that far from both. Wing rails at frogs are apart for a metre."""
+and shortest length on which a slip curve is that far from both: 8 m for 190 m at 1:9, 6 m for 50 m at 1:4. What wing
+rails and check rails at frogs look like is that far from both for less than 5 m."""
 
 HALF_HEAD_M = 0.036
 """Distance from its axis within which cells are on a rail."""
@@ -197,14 +201,23 @@ def open_slips(network: LineNetwork, seen: cKDTree) -> tuple[LineNetwork, list[S
         What `add_curves` adds once the crossings are resolved.
     """
     slips: list[Slip] = []
-    for place in network.nodes[network.degrees() > 2]:
-        if any(np.hypot(*(place - slip.cross.place)) < NEAR_M for slip in slips):
-            continue
-        slip = _slip(_Parts.of(network), place, seen)
-        if slip is not None:
+    parts = None
+    for place in _candidates(network):
+        parts = parts or _Parts.of(network)
+        slip = _slip(parts, place, seen)
+        if slip is not None and all(np.hypot(*(slip.cross.place - one.cross.place)) > SAME_M for one in slips):
             slips.append(slip)
-            network = _as_crossing(network, slip)
+            network, parts = _as_crossing(network, slip), None
     return network, slips
+
+
+def _candidates(network: LineNetwork) -> np.ndarray:
+    """Return places that may be in the middle of a slip, (n, 2): between two junctions, or at one; a metre apart."""
+    nodes = network.nodes[network.degrees() > 2]
+    pairs = cKDTree(nodes).query_pairs(2 * NODE_M, output_type="ndarray") if len(nodes) else np.empty((0, 2), dtype=int)
+    places = np.concatenate([nodes[pairs].mean(axis=1), nodes])
+    _, first = np.unique(np.round(places), axis=0, return_index=True)
+    return places[np.sort(first)]
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.standards import STANDARDS
 from ..curves import Element, trace, transition_curve
-from . import strips
+from . import strips, switches
 from .plain import canted, rolling, spacing
 from .scanner import Scanner
 from .scene import RAIL, Gaps, Plan, Scene, build
@@ -308,6 +308,8 @@ ADVERSARIAL: dict[str, Callable[[], Scene]] = {
     "strips_meet": strips.meeting,
     "strips_overlap": strips.overlapping,
     "unmarked_passes": strips.unmarked,
+    "double_slip": switches.double_slip,
+    "three_way": switches.three_way,
     "unmarked_meet": lambda: strips.meeting(with_ids=False),
     "side_17": lambda: from_the_side("side_17", 36, 17.0),
     "side_30": lambda: from_the_side("side_30", 37, 30.0, face_share=0.5),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from rail_extract.core.lines.bridges import MISFIT_M
 from rail_extract.core.lines.network import LineNetwork
-from rail_extract.core.vectorize.branches import resolve_branches
+from rail_extract.core.vectorize.branches import free_third_rails, resolve_branches
 from rail_extract.core.vectorize.junctions import (
     run_through,
 )
@@ -34,3 +34,22 @@ def test_a_merged_part_is_resolved_into_two_rails(radius):
     assert np.abs(through[:, 1]).max() < 0.02
     assert branch[0, 0] == pytest.approx(40 + np.sqrt(2 * radius * MISFIT_M), abs=0.7)
     assert cKDTree(trace([Element(80, 1 / radius, 1 / radius)], (40.0, 0.0)).xy).query(branch)[0].max() < 0.02
+
+
+def test_of_three_rails_that_part_within_metres_the_straight_one_goes_on():
+    x = np.arange(-20.0, 30.0, 0.1)
+    stem = np.column_stack([x[x <= 0], 0 * x[x <= 0]])[::-1]
+    ahead = x[x >= 0]
+    left = np.column_stack([ahead, 0.1 + (ahead + 6.0) ** 2 / 380 - 36 / 380])
+    straight = np.column_stack([ahead[20:], 0 * ahead[20:]])
+    right = np.column_stack([ahead[20:], -((ahead[20:] + 4.5) ** 2) / 380])
+    link = np.array([[0.0, 0.0], [1.0, -0.05], [2.0, -0.06]])
+    straight[0] = right[0] = link[-1]
+    left[0] = stem[0] = link[0]
+    lines = (stem, left, link, straight, right)
+    nodes = np.array([link[0], link[-1], *(line[-1] for line in (stem, left, straight, right))])
+    network = LineNetwork(lines, nodes, np.array([[0, 2], [0, 3], [0, 1], [1, 4], [1, 5]]))
+    freed = free_third_rails(network)
+    assert len(freed.lines) == 3 and (freed.degrees() == 1).all()
+    through = max(freed.lines, key=len)
+    assert np.abs(through[:, 1]).max() < 0.02 and np.ptp(through[:, 0]) > 49
