@@ -93,7 +93,7 @@ class _Cross:
         return cls(place, np.array([along, [-along[1], along[0]]]), half_angle)
 
     def height_of_curve(self, cells: np.ndarray, side: float) -> float | None:
-        """Find how far above the crossing, on one side of it, a curve that touches both lines passes.
+        """Find the height above the crossing, on one side of it, of a curve that touches both lines.
 
         A curve of radius R passes e = R h² / 2 above a crossing of half angle h. At x it is y = e + x² h² / (4 e)
         above it, so every cell states an e.
@@ -130,7 +130,7 @@ class _Cross:
         return found if length >= MIN_SEEN_M and len(covered) >= MIN_COVERED * length / COVER_M else None
 
     def _seen_m(self, height: np.ndarray | float) -> np.ndarray:
-        """Return the length on which curves that pass so far above are `SEPARATE_M` from both lines.
+        """Return the length on which curves at such heights are `SEPARATE_M` from both lines.
 
         At the share s of the tangent length from the middle, they are e (1 - s)² from the nearer one.
         """
