@@ -62,6 +62,8 @@ BRIDGED = Field(
 SIGMA = Field("sigma_mm", float, "standard error of the line's lateral position, millimetres", 2)
 """With two decimals because it is a few tenths of a millimetre in dense clouds."""
 
+SIGMAZ = Field("sigmaz_mm", float, "standard error of the line's height, millimetres; it grows where no points are", 2)
+
 RAIL_FIELDS = (
     Field("rail_id", int, "number of the rail, counted from west to east by the start of the line"),
     CLASS_CODE,
@@ -82,6 +84,7 @@ RAIL_FIELDS = (
         "sections without points that bridged_m sums up: plan distances from the start of the line, metres, such as "
         "12.30-15.68,40.00-42.10",
     ),
+    SIGMAZ,
 )
 CENTERLINE_FIELDS = (
     Field("track_id", int, "number of the track, counted from west to east by the start of the line"),
@@ -124,6 +127,7 @@ QUALITY_FIELDS = (
         "largest distance between two of these strips, across or in height, millimetres; empty where there is one",
         1,
     ),
+    SIGMAZ,
 )
 """In a `TrackGeometry`, the first is a single value and the others have a value for each station."""
 

@@ -35,17 +35,30 @@ class Support:
         Number of strips, passes of the scanner, that show the line, the largest distance between two of them, across
         or in height, metres, NaN where there is only one, and the part of the standard error that they share with the
         other rail; None if all points are of one strip.
+    sigmaz_m : (n,) array or None
+        Standard error of the line's height; None if it has none.
     """
 
     t: np.ndarray
     points: np.ndarray
     sigma_m: np.ndarray
     strips: np.ndarray | None = None
+    sigmaz_m: np.ndarray | None = None
 
     @property
     def rms_m(self) -> float:
         """Standard error of the whole line (RMS)."""
         return float(np.sqrt(np.mean(self.sigma_m**2)))
+
+    @property
+    def heights_m(self) -> np.ndarray:
+        """`sigmaz_m`, (n,), NaN if there is none."""
+        return np.full(len(self.t), np.nan) if self.sigmaz_m is None else self.sigmaz_m
+
+    @property
+    def rmsz_m(self) -> float:
+        """Standard error of the height of the whole line (RMS)."""
+        return float(np.sqrt(np.mean(self.heights_m**2)))
 
     def between(self, start: float, end: float) -> Support:
         """Return the part from `start` to `end`, with at least one station; its chainages count from `start`."""
@@ -56,12 +69,14 @@ class Support:
     def select(self, which: np.ndarray, start: float) -> Support:
         """Return the stations marked in `which`, (n,) bool; their chainages count from `start`."""
         strips = None if self.strips is None else self.strips[which]
-        return Support(self.t[which] - start, self.points[which], self.sigma_m[which], strips)
+        sigmaz_m = None if self.sigmaz_m is None else self.sigmaz_m[which]
+        return Support(self.t[which] - start, self.points[which], self.sigma_m[which], strips, sigmaz_m)
 
     def reversed(self, length_m: float) -> Support:
         """Return the support of the reversed line, given the line's length."""
         strips = None if self.strips is None else self.strips[::-1]
-        return Support(length_m - self.t[::-1], self.points[::-1], self.sigma_m[::-1], strips)
+        sigmaz_m = None if self.sigmaz_m is None else self.sigmaz_m[::-1]
+        return Support(length_m - self.t[::-1], self.points[::-1], self.sigma_m[::-1], strips, sigmaz_m)
 
     @property
     def every_strip(self) -> np.ndarray:
@@ -99,6 +114,8 @@ class RailLine:
         Support along the line; None for lines read from files.
     track_ids : tuple of int
         Tracks of the rail; empty for a lone rail, and before rails are paired.
+    sigmaz_mm : float
+        Standard error of the line's height; NaN if it is unknown.
     """
 
     xyz: np.ndarray
@@ -111,6 +128,7 @@ class RailLine:
     gaps: np.ndarray = field(default_factory=NO_GAPS.copy)
     support: Support | None = None
     track_ids: tuple[int, ...] = ()
+    sigmaz_mm: float = np.nan
 
     @property
     def length_m(self) -> float:
@@ -153,7 +171,8 @@ class RailLine:
         part = self.between(start, end)
         sigma_mm = self.sigma_mm if part.support is None else 1000 * part.support.rms_m
         bridged_m = float(np.sum(part.gaps[:, 1] - part.gaps[:, 0]))
-        return replace(part, sigma_mm=sigma_mm, bridged_m=bridged_m)
+        sigmaz_mm = self.sigmaz_mm if part.support is None else 1000 * part.support.rmsz_m
+        return replace(part, sigma_mm=sigma_mm, sigmaz_mm=sigmaz_mm, bridged_m=bridged_m)
 
     def reversed(self) -> RailLine:
         """Return the line in the other direction."""
@@ -246,6 +265,8 @@ class TrackGeometry:
         Number of strips, passes of the scanner, that show the rails.
     strip_mm : float
         Largest distance between two of them, across or in height; NaN where there is only one.
+    sigmaz_mm : float
+        Standard error of the centerline's height.
     """
 
     track_id: int
@@ -261,6 +282,7 @@ class TrackGeometry:
     bridged: np.ndarray
     strips: np.ndarray
     strip_mm: np.ndarray
+    sigmaz_mm: np.ndarray
 
     @property
     def cells_m(self) -> np.ndarray:

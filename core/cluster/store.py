@@ -157,12 +157,12 @@ def _square(arrays: Mapping[str, np.ndarray]) -> Square:
 
 def _rail_arrays(rails: Sequence[RailLine]) -> dict[str, np.ndarray]:
     supports = [rail.support or Support(np.empty(0), np.empty(0), np.empty(0)) for rail in rails]
-    figures = [(r.rail_id, r.class_code, r.points, r.resid_mm, r.sigma_mm, r.bridged_m) for r in rails]
+    figures = [(r.rail_id, r.class_code, r.points, r.resid_mm, r.sigma_mm, r.bridged_m, r.sigmaz_mm) for r in rails]
     return {
-        "figures": np.array(figures, dtype=float).reshape(-1, 6),
+        "figures": np.array(figures, dtype=float).reshape(-1, 7),
         **_packed("xyz", [rail.xyz for rail in rails], 3),
         **_packed("gaps", [rail.gaps for rail in rails], 2),
-        **_packed("support", [np.column_stack([one.t, one.points, one.sigma_m]) for one in supports], 3),
+        **_packed("support", [np.column_stack([one.t, one.points, one.sigma_m, one.heights_m]) for one in supports], 4),
         **_packed("strips", [np.empty((0, 3)) if one.strips is None else one.strips for one in supports], 3),
     }
 
@@ -175,7 +175,8 @@ def _rails(arrays: Mapping[str, np.ndarray]) -> tuple[RailLine, ...]:
 def _rail(
     figures: Sequence[float], xyz: np.ndarray, gaps: np.ndarray, support: np.ndarray, strips: np.ndarray
 ) -> RailLine:
-    rail_id, class_code, points, resid_mm, sigma_mm, bridged_m = figures
+    rail_id, class_code, points, resid_mm, sigma_mm, bridged_m, sigmaz_mm = figures
+    t, shown, sigma_m, sigmaz_m = support.T
     return RailLine(
         xyz,
         int(rail_id),
@@ -185,7 +186,8 @@ def _rail(
         sigma_mm,
         bridged_m,
         gaps,
-        Support(support[:, 0], support[:, 1], support[:, 2], strips if len(strips) else None) if len(support) else None,
+        Support(t, shown, sigma_m, strips if len(strips) else None, sigmaz_m) if len(support) else None,
+        sigmaz_mm=sigmaz_mm,
     )
 
 

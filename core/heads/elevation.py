@@ -19,11 +19,12 @@ from ..polyline import Feet, interpolate, length_along, project, resample, start
 from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
 from .edges import search_distance, stations_along
+from .level import AXIS_SHARE
 from .neighbours import free_edges
 from .own_level import on_own_level
 from .strips import StripOffsets, aligned, measure_strips
 from .top import MIN_POINTS, find_top
-from .uncertainty import measure_support
+from .uncertainty import height_error, measure_support
 
 MIN_GAP_M, MAX_CHANCE_GAP_M = 0.5, 0.9
 """Length without points from which a line counts as bridged: five profiles of the fastest train's scanner. Where points
@@ -198,12 +199,17 @@ def _measured(
         free=edges,
         near=near,
     )
+    axial = np.abs(supporting.across) <= AXIS_SHARE * parameters.head_width_m
+    axial |= axial.sum() < MIN_POINTS
+    t = supporting.t[axial]
+    residual_m = z[head][top][axial] - profile.at(t)
+    support = replace(support, sigmaz_m=height_error(t, residual_m, support.t, parameters.smoothing_z_m))
     if strips is not None:
         support = strips.added_to(support, parameters.align)
     support = support.between(start, end)
     xyz = np.column_stack([interpolate(line, along, stations), profile.at(stations)])
     figures = (len(supporting.t), 1000 * resid, 1000 * support.rms_m, bridged)
-    return RailLine(xyz, 0, 0, *figures, gaps - start, support)
+    return RailLine(xyz, 0, 0, *figures, gaps - start, support, sigmaz_mm=1000 * support.rmsz_m)
 
 
 def measure_again(

@@ -59,6 +59,10 @@ PLACE = len(MAX_STEPS)
 MAX_ROUNDS, SETTLED = 40, 0.1
 """Largest number of rounds of a fit, and the gain of the log-likelihood from which it goes on; most need ten."""
 
+RIDGE = np.array([400.0, 400.0, 1.0, 1.0, 0.1, 0.1])
+"""Information about the place that is always there, as of 5 cm and of a factor of 20 in the noise: drawn or computed
+points, which are all in a few bins, may say nothing about some of it."""
+
 STEP_PARTS = (1.0, 1 / 3, 1 / 9)
 """Parts of a step that are tried until the likelihood rises."""
 
@@ -327,7 +331,7 @@ def _rates(section: Section, blurred: Blurred, used: np.ndarray) -> tuple[np.nda
 def _information(counts: np.ndarray, section: Section, known: np.ndarray, rates: np.ndarray) -> np.ndarray:
     """Return the Fisher information about the place and the shares."""
     found = (rates * counts) @ rates.T
-    found[:PLACE, :PLACE] += _expected(section.place)
+    found[:PLACE, :PLACE] += _expected(section.place) + np.diag(RIDGE)
     found[range(PLACE, len(found)), range(PLACE, len(found))] += SHARE_RIDGE * counts.sum() / section.shares[known]
     return found
 
@@ -361,9 +365,9 @@ class Scores:
         blurred = Blurred.at(section.place, outline, grid)
         density = blurred.density(section.shares)
         scores = blurred.by_place(section.shares)[:3] / density
-        products = (scores * density) @ scores.T
+        products = (scores * density) @ scores.T + np.diag(RIDGE[:3] / max(counts.sum(), 1.0))
         by_bin = scores[0] - np.linalg.solve(products[1:, 1:], products[1:, 0]) @ scores[1:]
         used = counts > 0
         known, rates = _rates(section, blurred, used)
         whole = np.linalg.inv(_information(counts[used], section, known, rates))[0, 0]
-        return cls(by_bin, float(np.sqrt(max(whole - 1 / (counts @ by_bin**2), 0.0))))
+        return cls(by_bin, float(np.sqrt(max(whole - 1 / max(counts @ by_bin**2, RIDGE[0]), 0.0))))

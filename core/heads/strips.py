@@ -138,7 +138,13 @@ class StripOffsets:
         error_m = np.interp(support.t, self.t, self.standard_error(self.across, aligned))
         nearest = np.clip(np.round(support.t / STEP_M - 0.5).astype(int), 0, len(self.t) - 1)
         strips = np.column_stack([np.maximum(self.count, 1)[nearest], self.spread_m[nearest], error_m])
-        return replace(support, sigma_m=np.hypot(support.sigma_m, error_m), strips=strips)
+        up_m = np.interp(support.t, self.t, self.standard_error(self.up, aligned))
+        return replace(
+            support,
+            sigma_m=np.hypot(support.sigma_m, error_m),
+            sigmaz_m=np.hypot(support.heights_m, up_m),
+            strips=strips,
+        )
 
 
 def strips_along(

@@ -17,12 +17,20 @@ from ..lines.smoothing import smooth_profile
 from ..polyline import distance_to
 from ..rails import Support
 from .edges import BLUR_BINS, HALF_HEAD_BINS, STATION_STEP_M, CrossSections, histograms
-from .level import on_top
+from .level import on_top, robust_sigma
 from .sections import Middles, outline_middles, with_outline
 
 UNSURE_CURVATURE = 0.007
 """Standard error, 1/m, of the curvature of a bridge across a gap, which follows from the lines on either side. On the
 scene `gaps`, with gaps of 1.5 to 4.5 m in a curve of 250 m with transitions, errors in the middle are 1.6 to 20 mm."""
+
+TOP_SIGMA_M = 0.0003
+"""Standard error of the height that does not depend on the points: the crown falls off next to the axis, and waves of
+the rail are smoothed."""
+
+UNSURE_GRADIENT_CHANGE = 1e-4
+"""The same as `UNSURE_CURVATURE` for the height, 1/m: vertical curves have radii of 2 to 20 km, settled track has waves
+of 10 mm that are 60 m long."""
 
 BESIDE_HEADS = 0.5
 """Standard error, in head widths, of a line that follows what covers a head: wheels and flangeways are next to it."""
@@ -98,6 +106,24 @@ def measure_support(
 def _combined(middles: Middles, smoothing_m: float) -> np.ndarray:
     """Return the information about the middle in what PAEK averages of the windows at each station, (s,) 1/m²."""
     return np.hypot(_averaged(middles.information, smoothing_m), middles.in_window)
+
+
+def height_error(t: np.ndarray, residual_m: np.ndarray, stations: np.ndarray, smoothing_m: float) -> np.ndarray:
+    """Estimate the standard error of a line's height at stations along it, (s,) metres.
+
+    Parameters
+    ----------
+    t, residual_m : (n,) arrays
+        Chainage (increasing) of the points on the axis of the head, and their heights above the line.
+    stations : (s,) array
+        Equidistant chainages, see `edges.stations_along`.
+    smoothing_m : float
+        Sigma of PAEK that smoothed the heights.
+    """
+    points = np.bincount(np.minimum((t / STATION_STEP_M).astype(int), len(stations) - 1), minlength=len(stations))
+    sampling = robust_sigma(residual_m) / np.sqrt(np.maximum(_averaged(points, smoothing_m), 1.0))
+    bridge = _bridge_error(t, stations) * (UNSURE_GRADIENT_CHANGE / UNSURE_CURVATURE)
+    return np.sqrt(sampling**2 + TOP_SIGMA_M**2 + bridge**2)
 
 
 def _either_end(counts: np.ndarray, head_width_m: float) -> np.ndarray:

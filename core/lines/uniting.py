@@ -31,7 +31,7 @@ def _with_figures(parts: Sequence[RailLine], xyz: np.ndarray) -> RailLine:
     points = np.array([part.points for part in parts], dtype=float)
     squares = np.array([part.resid_mm**2 for part in parts])
     supports = [part.support for part in parts if part.support is not None]
-    support, sigma_mm = None, parts[0].sigma_mm
+    support, sigma_mm, sigmaz_mm = None, parts[0].sigma_mm, parts[0].sigmaz_mm
     if len(supports) == len(parts):
         several = any(one.strips is not None for one in supports)
         support = Support(
@@ -39,8 +39,10 @@ def _with_figures(parts: Sequence[RailLine], xyz: np.ndarray) -> RailLine:
             np.concatenate([one.points for one in supports]),
             np.concatenate([one.sigma_m for one in supports]),
             np.concatenate([one.every_strip for one in supports]) if several else None,
+            np.concatenate([one.heights_m for one in supports]),
         )
-        sigma_mm = 1000 * support.rms_m if len(support.t) else sigma_mm
+        if len(support.t):
+            sigma_mm, sigmaz_mm = 1000 * support.rms_m, 1000 * support.rmsz_m
     gaps = _merged_gaps(np.concatenate([part.gaps + start for part, start in zip(parts, starts)]))
     return replace(
         parts[0],
@@ -48,6 +50,7 @@ def _with_figures(parts: Sequence[RailLine], xyz: np.ndarray) -> RailLine:
         points=int(round(points.sum())),
         resid_mm=float(np.sqrt((points * squares).sum() / max(points.sum(), 1.0))),
         sigma_mm=sigma_mm,
+        sigmaz_mm=sigmaz_mm,
         bridged_m=float(np.sum(gaps[:, 1] - gaps[:, 0])),
         gaps=gaps,
         support=support,

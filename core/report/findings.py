@@ -278,7 +278,7 @@ def _examine_track(line: Centerline, geometry: TrackGeometry, gauges_m: Sequence
     with np.errstate(invalid="ignore"):
         unsupported = geometry.bridged | np.isnan(geometry.gauge_mm)
         off = ~unsupported & (np.abs(geometry.gauge_mm - nominal_mm) > GAUGE_OFF_MM)
-        unsure = ~unsupported & ~off & (geometry.sigma_mm > UNSURE_MM)
+        unsure = ~unsupported & ~off & (np.fmax(geometry.sigma_mm, geometry.sigmaz_mm) > UNSURE_MM)
     return TrackFindings(line, geometry, nominal_mm, {UNSUPPORTED: unsupported, OFF_GAUGE: off, UNSURE: unsure})
 
 

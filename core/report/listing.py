@@ -88,10 +88,11 @@ def _of_tracks(findings: Findings) -> Iterator[Finding]:
 
 
 def _possible_error(track: TrackFindings) -> np.ndarray:
-    """Return the possible error at the stations, (n,) mm: off gauge the deviation, else the standard error."""
+    """Return the possible error at the stations, (n,) mm: off gauge the deviation, else the larger standard error."""
     geometry = track.geometry
     off_mm = np.abs(geometry.gauge_mm - track.nominal_mm)
-    error_mm = np.where(track.doubtful[OFF_GAUGE], off_mm, geometry.sigma_mm)
+    standard_mm = geometry.sigma_mm + np.maximum(np.nan_to_num(geometry.sigmaz_mm - geometry.sigma_mm), 0.0)
+    error_mm = np.where(track.doubtful[OFF_GAUGE], off_mm, standard_mm)
     return np.minimum(np.nan_to_num(error_mm, nan=OFF_RAIL_MM), OFF_RAIL_MM)
 
 

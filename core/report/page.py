@@ -211,6 +211,7 @@ def _tracks(findings: Findings) -> str:
         "Tightest radius",
         "Gradient",
         "Standard error",
+        "of the height",
         "No points",
     )
     rows = [_row(track) for track in findings.tracks]
@@ -228,6 +229,7 @@ def _row(track: TrackFindings) -> tuple[str, ...]:
         _tightest(geometry.radius_m),
         _span(geometry.grade_pm, "‰"),
         _median(geometry.sigma_mm),
+        _median(geometry.sigmaz_mm),
         metres(track.length_of(UNSUPPORTED)),
     )
 

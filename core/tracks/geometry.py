@@ -134,6 +134,7 @@ def _measure(line: Centerline, track_rails: _TrackRails, head_width_m: float, st
         bridged=np.diff(np.interp(cells, along, bridged), axis=0)[0] > 0.5 * np.diff(cells, axis=0)[0],
         strips=strips[:, at, 0].max(axis=0).astype(int),
         strip_mm=1000 * np.fmax(*strips[:, at, 1]),
+        sigmaz_mm=1000 * np.interp(chainage, along, _height_sigma_of_both(rails, left, right)),
     )
 
 
@@ -167,15 +168,17 @@ def _grade(along: np.ndarray, z: np.ndarray, chainage: np.ndarray) -> np.ndarray
     return 1000 * np.diff(np.interp(ends, along, z), axis=0)[0] / np.diff(ends, axis=0)[0]
 
 
-def _sigma(rails: Sequence[RailLine], side: Meeting) -> np.ndarray:
-    """Look up the standard deviation of the rails at the meetings, (n,) metres; that of the whole rail if need be."""
+def _sigma(
+    rails: Sequence[RailLine], side: Meeting, whole_mm: str = "sigma_mm", along_m: str = "sigma_m"
+) -> np.ndarray:
+    """Look up a standard deviation of the rails at the meetings, (n,) metres; that of the whole rail if need be."""
     sigma = np.full(len(side.t), np.nan)
     for number in np.unique(side.rail):
         mine, rail = (side.rail == number) & np.isfinite(side.t), rails[number]
         sigma[mine] = (
-            rail.sigma_mm / 1000
+            getattr(rail, whole_mm) / 1000
             if rail.support is None
-            else np.interp(side.t[mine], rail.support.t, rail.support.sigma_m)
+            else np.interp(side.t[mine], rail.support.t, getattr(rail.support, along_m))
         )
     return sigma
 
@@ -185,6 +188,15 @@ def _sigma_of_both(rails: Sequence[RailLine], left: Meeting, right: Meeting, sha
     sigma = np.stack([_sigma(rails, left), _sigma(rails, right)])
     own = np.sqrt(np.maximum(sigma**2 - shared**2, 0.0))
     return np.hypot(0.5 * np.hypot(*own), 0.5 * shared.sum(axis=0))
+
+
+def _height_sigma_of_both(rails: Sequence[RailLine], left: Meeting, right: Meeting) -> np.ndarray:
+    """Return the standard deviation of the height of the middle, (n,) metres.
+
+    That of one rail: what hides heads, such as trains and roads, hides both, and passes are off in height alike.
+    """
+    squares = [_sigma(rails, side, "sigmaz_mm", "heights_m") ** 2 for side in (left, right)]
+    return np.sqrt(np.mean(squares, axis=0))
 
 
 def _strips(rails: Sequence[RailLine], side: Meeting) -> np.ndarray:

@@ -88,6 +88,7 @@
     <alias field="bridged_m" index="6" name="Without points [m]"/>
     <alias field="track_ids" index="7" name="Tracks"/>
     <alias field="gaps" index="8" name="Sections without points"/>
+    <alias field="sigmaz_mm" index="9" name="Standard error of the height [mm]"/>
   </aliases>
   <mapTip>&lt;b&gt;Rail [% &quot;rail_id&quot; %]&lt;/b&gt;&lt;br&gt;Standard error: [% coalesce(format_number(&quot;sigma_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Length: [% coalesce(format_number(&quot;length_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Without points: [% coalesce(format_number(&quot;bridged_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;[% if(coalesce(&quot;track_ids&quot;, &#x27;&#x27;) = &#x27;&#x27;, &#x27;In no track&#x27;, &#x27;Track &#x27; || &quot;track_ids&quot;) %]</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>

@@ -124,3 +124,11 @@ def test_a_fit_starts_from_an_estimate():
     again = fit_section(counts, outline, grid, section)
     np.testing.assert_allclose(again.place[:2], section.place[:2], atol=2e-4)
     assert isinstance(again, Section)
+
+
+@pytest.mark.parametrize(("left", "up"), [(0.0, 0.0), (0.05, 0.01), (0.036, -0.03)])
+def test_points_at_one_place_break_nothing(left, up):
+    """As those that were drawn on the axis, or thinned to a grid."""
+    counts, section, outline, grid = fitted(np.full(500, left), np.full(500, up))
+    assert np.isfinite(section.place).all()
+    assert np.isfinite(Scores.of(counts, section, outline, grid).by_bin).all()

@@ -6,7 +6,13 @@ from rail_extract.core.heads.edges import station_count
 from rail_extract.core.heads.elevation import ElevationParameters, elevate
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.heads.sections import PROFILE_SIGMA_M
-from rail_extract.core.heads.uncertainty import UNSURE_CURVATURE, measure_support
+from rail_extract.core.heads.uncertainty import (
+    TOP_SIGMA_M,
+    UNSURE_CURVATURE,
+    UNSURE_GRADIENT_CHANGE,
+    height_error,
+    measure_support,
+)
 from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.polyline import interpolate, length_along, project
 from rail_extract.core.rails import Support
@@ -148,3 +154,15 @@ def test_support_of_a_part_and_of_the_line_reversed():
     np.testing.assert_allclose(turned.t, whole.t)
     np.testing.assert_array_equal(turned.points, whole.points[::-1])
     np.testing.assert_array_equal(turned.sigma_m, whole.sigma_m[::-1])
+
+
+def test_the_height_is_known_by_its_points_and_unsure_where_none_are():
+    random = np.random.default_rng(2)
+    t = np.sort(random.uniform(0, 60, 6000))
+    t = t[(t < 20) | (t > 40)]
+    stations = np.arange(0.125, 60, 0.25)
+    few, many = (height_error(part, random.normal(0, 0.004, len(part)), stations, 3.0) for part in (t[::10], t))
+    seen = (stations > 5) & (stations < 15)
+    assert few[seen] == pytest.approx(np.hypot(0.004 / np.sqrt(10 * 3 / 0.33375), TOP_SIGMA_M), rel=0.35)
+    assert many[seen].max() < few[seen].min()
+    assert many[len(stations) // 2] == pytest.approx(np.hypot(0.004, UNSURE_GRADIENT_CHANGE * 10 * 10 / 2), rel=0.05)

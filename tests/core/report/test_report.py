@@ -37,6 +37,7 @@ def track(track_id=1, length_m=100.0, step_m=1.0, **profiles):
         "bridged": np.zeros(count, dtype=bool),
         "strips": np.ones(count, dtype=int),
         "strip_mm": np.full(count, np.nan),
+        "sigmaz_mm": np.full(count, 0.5),
     }
     geometry = TrackGeometry(track_id, xyz, along, **{**usual, **profiles})
     ids = (2 * track_id - 1,), (2 * track_id,)

@@ -138,6 +138,7 @@ def test_measured_geometry_is_compared_with_the_truth():
         bridged=np.zeros(len(at), dtype=bool),
         strips=np.ones(len(at), dtype=int),
         strip_mm=np.full(len(at), np.nan),
+        sigmaz_mm=np.full(len(at), np.nan),
     )
     errors = compare_geometry([track], rails, [middle], 0.072)
     assert errors.gauge_m == pytest.approx(0.002, abs=1e-4)

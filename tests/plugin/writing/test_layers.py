@@ -33,11 +33,12 @@ def test_rail_becomes_a_feature_in_the_units_of_the_cloud(qgis):
         bridged_m=1.5,
         gaps=np.array([[0.25, 1.0], [2.0, 2.75]]),
         track_ids=(2, 5),
+        sigmaz_mm=0.456,
     )
     (feature,) = features([rail], RAIL_FIELDS, FEET)
     vertices = [(point.x(), point.y(), point.z()) for point in feature.geometry().vertices()]
     assert np.allclose(vertices, [(1000, 2000, 10), (1010, 2000, 11)])
-    assert feature.attributes() == [3, 10, 3.063, 812, 4.5, 0.7, 1.5, "2,5", "0.25-1.00,2.00-2.75"]
+    assert feature.attributes() == [3, 10, 3.063, 812, 4.5, 0.7, 1.5, "2,5", "0.25-1.00,2.00-2.75", 0.46]
 
 
 def test_centerline_becomes_a_feature(qgis):
