@@ -90,6 +90,10 @@ class Feedback(QgsProcessingFeedback):
     def pushWarning(self, warning):
         self.warnings.append(warning)
 
+    def said(self) -> str:
+        """Return all messages."""
+        return "\n".join((*self.errors, *self.warnings, *self.infos))
+
     def _follow(self, percent: float) -> None:
         self.progress.append(percent)
         if self._cancel_at is not None and percent >= self._cancel_at:
@@ -167,7 +171,7 @@ def write_cloud(tmp_path):
         header.scales = [1e-7, 1e-7, 1e-3] if epsg == 4326 else [0.001] * 3
         header.offsets = xyz[0]
         if epsg is not None:
-            header.add_crs(import_pyproj().CRS.from_user_input(epsg))
+            header.add_crs(import_pyproj().CRS.from_epsg(epsg))
         cloud = laspy.LasData(header)
         cloud.xyz = xyz
         cloud.classification = np.full(len(xyz), class_code, dtype=np.uint8)

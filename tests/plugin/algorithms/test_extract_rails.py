@@ -435,7 +435,7 @@ def test_rail_standard_is_detected(run, write_cloud, track, new_feedback, tmp_pa
     outcome = run({"INPUT": write_cloud(track()), "STANDARD": "DETECT", "ITERATIONS": 1, "RAILS": rails}, feedback)
     assert outcome.ok, outcome.error
     assert outcome.results["CENTERLINE_COUNT"] == 1
-    assert "Detected EN 60E1 (UIC 60), 1435 mm (EN_60E1_1435): rails are 1507 mm apart" in feedback.textLog()
+    assert "Detected EN 60E1 (UIC 60), 1435 mm (EN_60E1_1435): rails are 1507 mm apart" in feedback.said()
 
 
 def test_points_of_one_rail_detect_nothing(run, write_cloud, track):

@@ -39,7 +39,7 @@ def test_report_and_messages_show_no_password(run, write_cloud, track, tmp_path,
     outputs = {"CENTERLINES": tmp_path / "tracks.gpkg", "REPORT": tmp_path / "report.html"}
     outcome = run({"INPUT": write_cloud(track()), "ITERATIONS": 1, "RAILS": database, **outputs}, feedback)
     assert not outcome.ok
-    assert "secret7" not in outcome.error + feedback.textLog()
+    assert "secret7" not in outcome.error + feedback.said()
     if outputs["REPORT"].exists():
         page = outputs["REPORT"].read_text(encoding="utf-8")
         assert "password=***" in page

@@ -49,7 +49,7 @@ def test_result_of_the_check_is_shown_and_written(run_step, new_feedback, tmp_pa
     outcome = run_step("checkinstallation", {"REPORT": tmp_path / "check.html"}, feedback)
     assert outcome.ok
     said = "Rail Extract works here. Self test passed: 100.0% of the true rails found"
-    assert said in feedback.textLog()
+    assert said in feedback.said()
     page = (tmp_path / "check.html").read_text(encoding="utf-8")
     assert "<h1>Rail Extract works here.</h1>" in page
     assert f"<td>{outcome.results['SELF_TEST']}</td>" in page

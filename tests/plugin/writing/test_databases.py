@@ -119,6 +119,6 @@ def test_no_report_and_no_message_has_the_password(server, run_step, bench, tmp_
     assert outcome.ok, outcome.error
     page = path.read_text(encoding="utf-8")
     assert "postgis:" in page and "127.0.0.1" in page
-    for text in (page, bench.feedback.textLog()):
+    for text in (page, bench.feedback.said()):
         assert "c\\ret" not in text and "ret/@x" not in text
     assert sql(server, "rails", "SELECT count(*) FROM rails") == "2"

@@ -56,7 +56,7 @@ def test_nothing_is_lost(run_step, rails, tmp_path, suffix):
 @pytest.mark.parametrize(("suffix", "table"), [("gpkg", ""), ("gpkg", "rails"), ("shp", ""), ("fgb", "")])
 def test_the_system_of_heights_is_kept(run, write_cloud, track, tmp_path, suffix, table):
     """QGIS before 3.34 drops it from its systems."""
-    both = "EPSG:25832+5783"
+    both = "25832+5783"
     cloud = write_cloud(track(), epsg=both)
     path = tmp_path / f"räils.{suffix}"
     output = f"ogr:dbname='{path}' table=\"{table}\" (geom)" if table else path
