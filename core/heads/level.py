@@ -51,6 +51,14 @@ unbiased."""
 MAX_ABOVE_SIGMAS = 3.0
 """Height above the top, in standard deviations of the noise, beyond which a point is a weed."""
 
+BLENDED_M = 0.006
+"""Fall of both rims of a head below its crown from which beams blend the head and the ballast, as those from the air
+do. Seen by narrow beams, the round corners fall by 1 to 2 mm, and the rim of a line that is off the head by more, but
+not both."""
+
+CROWN_HEADS, RIM_HEADS = 0.2, (0.3, 0.5)
+"""Parts of the head width on either side of the axis: the crown, and the rims."""
+
 
 def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Return the height of most points around each point: medians of short bins, filtered by a running median.
@@ -80,6 +88,19 @@ def _median_filtered(t: np.ndarray, z: np.ndarray) -> np.ndarray:
     if own.any():
         level = np.interp(t, t[own], level[own])
     return trend + median_filter(level, MEDIAN_BINS, mode="nearest")
+
+
+def is_blended(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> bool:
+    """Return whether heights fall from the crown to both rims, so that the head has no edges that could be seen."""
+    head = np.abs(across) <= RIM_HEADS[1] * head_width_m
+    if head.sum() < MIN_ON_HEAD:
+        return False
+    above, heads = z[head] - rough_level(t[head], z[head]), across[head] / head_width_m
+    crown = np.abs(heads) < CROWN_HEADS
+    rims = [side * heads > RIM_HEADS[0] for side in (1, -1)]
+    if not (crown.any() and all(rim.any() for rim in rims)):
+        return False
+    return bool(np.median(above[crown]) - max(np.median(above[rim]) for rim in rims) > BLENDED_M)
 
 
 def robust_sigma(values: np.ndarray) -> float:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_opening, median_filter
 
-from .level import LEVEL_BIN_M, MIN_ON_HEAD, robust_sigma
+from .level import LEVEL_BIN_M, MIN_ON_HEAD, is_blended, robust_sigma
 
 WINDOW_M = 0.02
 """Height in which the points on top of a head are: noise of 5 mm, and 100 mm of cant."""
@@ -79,7 +79,7 @@ class _Levels:
 def on_own_level(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> np.ndarray:
     """Find the points that may be on the head by their height, (n,) bool.
 
-    All points are, where the level of a line is not in doubt.
+    All points are, where the level of a line is not in doubt, or where beams blend heads with the ballast.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def on_own_level(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m:
     head_width_m : float
     """
     head = np.abs(across) <= 0.5 * head_width_m
-    if head.sum() < MIN_ON_HEAD:
+    if head.sum() < MIN_ON_HEAD or is_blended(t, across, z, head_width_m):
         return np.ones(len(t), dtype=bool)
     flat = z - _gradient(t[head], z[head], t)
     number = (t / LEVEL_BIN_M).astype(int)

@@ -19,8 +19,8 @@ from ..parameters import Parameters
 from ..polyline import Feet, interpolate, left_normals, length_along, project
 from ..progress import SILENT, Progress
 from .branch_starts import APART_HEADS, slide_branches
-from .edges import HALF_HEAD_BINS, histograms, middles, search_distance
-from .level import MIN_ON_HEAD, on_top
+from .edges import HALF_HEAD_BINS, histograms, mean_offsets, middles, search_distance
+from .level import MIN_ON_HEAD, is_blended, on_top
 from .neighbours import free_edges
 from .own_level import on_own_level
 from .sections import outline_middles, with_outline
@@ -130,8 +130,12 @@ def _shifted(
             continue
         top, _ = on_top(mine.t, mine.across, z, head_width_m)
         along = length_along(line)
-        stations, middle = _middles(mine.t[top], mine.across[top], along[-1], head_width_m, edges[number])
-        if by_outline:
+        blended = is_blended(mine.t, mine.across, z, head_width_m)
+        if blended:
+            stations, middle = mean_offsets(mine.t, mine.across, along[-1], head_width_m)
+        else:
+            stations, middle = _middles(mine.t[top], mine.across[top], along[-1], head_width_m, edges[number])
+        if by_outline and not blended:
             seen = np.isfinite(middle) & edges[number].all(axis=0)
             middle = with_outline(middle, outline_middles(mine.t, mine.across, z, along[-1], head_width_m, seen))
         known = np.isfinite(middle)

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
+from rail_extract.core.heads.level import is_blended
 from rail_extract.core.heads.refinement import _covered, _redrawn, refine
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.lines.network_smoothing import smooth_network
@@ -244,3 +245,33 @@ def test_dirt_next_to_covered_rails_does_not_draw_the_line():
     drawn = np.column_stack([x, np.interp(x, [29, 31, 44, 46], [0, 0.066, 0.066, 0])])
     (refined,) = refine(network_of(drawn), cloud(xyz, dirt), WIDTH).lines
     assert np.abs(refined[:, 1]).max() < 0.015
+
+
+def blended_head(length, density, footprint=0.05, seed=0):
+    """Points of a head in beams as wide as the head: those that reach beyond it also see the ballast, 0.17 m below."""
+    random = np.random.default_rng(seed)
+    count = int(length * density)
+    x, across = random.uniform(0, length, count), random.uniform(-0.06, 0.06, count)
+    beyond = np.clip((np.abs(across) + footprint / 2 - WIDTH / 2) / footprint, 0, 1)
+    xyz = np.column_stack([x, across, -0.17 * beyond]) + random.normal(0, [0, 0.003, 0.012], (count, 3))
+    return xyz[xyz[:, 2] > -0.08]
+
+
+@pytest.mark.parametrize(("density", "seed"), [(12, 1), (25, 2), (100, 3)])
+def test_heads_in_wide_beams_have_their_axis_in_the_middle_of_their_points(density, seed):
+    line = wavy_line(80, 0.010, 60) + [0.0, 0.008]
+    refined = refine(network_of(line), cloud(blended_head(80, density, seed=seed)), WIDTH).lines[0]
+    assert rms(line[:, 1]) > 0.010
+    assert rms(refined[:, 1]) < 0.05 / np.sqrt(density)
+    assert abs(refined[:, 1].mean()) < 0.003
+
+
+@pytest.mark.parametrize("offset", [-0.015, 0.0, 0.015])
+@pytest.mark.parametrize("noise", [0.003, 0.008])
+def test_heads_in_narrow_beams_are_not_blended(offset, noise):
+    t, across, z = head(80, 100, noise, low_share=0.15).T
+    order = np.argsort(t)
+    assert not is_blended(t[order], across[order] + offset, z[order], WIDTH)
+    t, across, z = blended_head(80, 50).T
+    order = np.argsort(t)
+    assert is_blended(t[order], across[order] + offset / 2, z[order], WIDTH)
