@@ -9,6 +9,7 @@ import numpy as np
 
 from ..polyline import interpolate, length_along, project
 from ..rails import Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry, cell_borders
+from ..tracks.jumps import find_steps
 
 GAUGE_OFF_MM = 10.0
 """Plain track is not left in service with a larger deviation from its gauge. Curves of less than 200 m radius are
@@ -148,6 +149,8 @@ class Findings:
     holes : tuple of Hole
     heads : HeadWidths or None
         Width of the heads; only if another one is stated.
+    stepped_m : float
+        Plan length of the tracks that step to the side: on one side of a step, all of it is off.
     """
 
     tracks: tuple[TrackFindings, ...]
@@ -155,6 +158,7 @@ class Findings:
     rails_m: float = 0.0
     holes: tuple[Hole, ...] = ()
     heads: HeadWidths | None = None
+    stepped_m: float = 0.0
 
     @property
     def lonely_m(self) -> float:
@@ -168,7 +172,8 @@ class Findings:
             return 1.0
         hole_m = sum(hole.length_m for hole in self.holes)
         lonely = self.lonely_m / self.rails_m if self.rails_m else 0.0
-        return max(lonely, hole_m / (self.length_m + hole_m) if hole_m else 0.0)
+        stepped = self.stepped_m / self.length_m if self.stepped_m else 0.0
+        return max(lonely, stepped, hole_m / (self.length_m + hole_m) if hole_m else 0.0)
 
     @property
     def length_m(self) -> float:
@@ -209,6 +214,7 @@ def examine(network: RailNetwork, gauges_m: Sequence[float]) -> Findings:
         float(sum(rail.length_m for rail in network.rails)),
         tuple(_holes(network.centerlines)),
         heads if heads is not None and heads.differ else None,
+        sum(track.length_m for track in tracks if find_steps(track.line.xyz)),
     )
 
 

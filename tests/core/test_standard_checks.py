@@ -1,5 +1,7 @@
 """Points compared with the stated rail standard: units, gauge and width of the heads."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rail_extract.core.clouds.points import RailPoints
@@ -10,6 +12,7 @@ from rail_extract.core.progress import Progress
 from rail_extract.core.squares.grid import MemorySource
 from rail_extract.core.standard_checks import head_widths, warn_of_gauge
 from rail_extract.laboratory.curves import Element, trace, transition_curve
+from rail_extract.laboratory.scenes.strips import two_passes
 
 WIDTH = 0.072
 LINE = trace([Element(40.0)], heading=0.4)
@@ -69,4 +72,15 @@ def test_heads_of_another_width_than_stated_are_said(width_m, count):
     assert widths.seen_m == pytest.approx(width_m, abs=0.002)
     assert widths.differ == (count == 1)
     assert len(heard.said) == count
-    assert all("72 mm are stated: is it " in one for one in heard.said)
+    said = "72 mm are stated: is it " if width_m < 0.08 else "72 mm are stated, and no standard has such heads"
+    assert all(said in one for one in heard.said)
+
+
+def test_passes_side_by_side_without_a_mark_are_said():
+    scene = two_passes(apart_m=0.016)
+    for strips, count in ((None, 1), (scene.rail_points().strips, 0)):
+        heard = Warnings()
+        source = MemorySource(replace(scene.rail_points(), strips=strips), 500.0)
+        assert head_widths(source, 0.072, heard).differ == bool(count)
+        assert len(heard.said) == count
+        assert all("passes of the scanner lie apart" in text for text in heard.said)

@@ -9,7 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.rails import Centerline, HeadWidths, RailLine, RailNetwork, SearchFigures, TrackGeometry
+from rail_extract.core.rails import (
+    Centerline,
+    HeadWidths,
+    RailLine,
+    RailNetwork,
+    SearchFigures,
+    StripCourse,
+    TrackGeometry,
+)
 from rail_extract.core.report import build_page, list_findings, summary
 from rail_extract.core.report.findings import OFF_GAUGE, UNSUPPORTED, UNSURE, examine
 from rail_extract.core.report.listing import HOLE, LONE_RAIL, OFF_RAIL_MM
@@ -364,3 +372,25 @@ def test_what_was_found_in_a_raw_cloud_is_listed():
     assert cells["Cells with points per metre"] == "10"
     assert (cells["Squares with rails"], cells["Thin squares"], cells["Paved squares"]) == ("6", "2", "1")
     assert "Rail points in the raw cloud" not in page(track())
+
+
+def test_a_track_that_steps_to_the_side_is_not_good():
+    line, geometry = track(1)
+    bent = line.xyz + np.column_stack([0 * line.xyz[:, 0], 0.03 * (line.xyz[:, 0] > 50), 0 * line.xyz[:, 0]])
+    plain, stepped = (examine(network((one, geometry)), [1.435]) for one in (line, replace(line, xyz=bent)))
+    assert plain.stepped_m == 0 and stepped.stepped_m == pytest.approx(100.0)
+    assert headline(build_page(network((replace(line, xyz=bent), geometry)), [1.435], "a.laz")).startswith("Usable")
+
+
+def test_strips_have_a_table_and_profiles_in_colours():
+    at = np.arange(0.5, 60.0)
+    courses = tuple(
+        StripCourse(1, strip, at, across + 0 * at, 2.0 + 0 * at) for strip, across in ((7, 10.2), (9, -10.2), (12, 0.0))
+    )
+    html = build_page(replace(network(track(1)), strips=courses), [1.435], "a.laz")
+    assert "<h2>Strips</h2>" in html and "Strips of track 1" in html
+    for strip, across in ((7, "+10.2 mm"), (9, "-10.2 mm"), (12, "+0.0 mm")):
+        assert f"<td>{strip}</td><td>60 m</td><td>{across}</td>" in html
+        assert f"strip {strip}" in html
+    assert html.count('class="curve" style="stroke: #') == 6
+    assert "<h2>Strips</h2>" not in build_page(network(track(1)), [1.435], "a.laz")
