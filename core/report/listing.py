@@ -27,15 +27,19 @@ class Finding:
 
     Attributes
     ----------
-    finding : int
-        Number, from 1 for the finding whose possible error, times its length, is largest.
     reason : str
+    xyz : (n, 3) array
+        The section in local metres.
+    harm : float
+        Possible error times length, mm m.
+    doubt_m : float
+        Length in doubt within the section.
+    finding : int
+        Number, from 1 for the finding with the largest harm.
     track_id, rail_id : int or None
         Track, or lone rail.
     from_m, to_m : float
         Chainages along the track or the lone rail; NaN for a section between tracks.
-    doubt_m : float
-        Length in doubt between them.
     worst_m : float
         Chainage of the largest possible error.
     gauge_mm, cant_mm, sigma_mm : float
@@ -44,27 +48,23 @@ class Finding:
         Points on both rails, or on the lone rail.
     review : str
         For the user's decision.
-    xyz : (n, 3) array
-        The section in local metres.
-    harm : float
-        Possible error times length, mm m.
     """
 
-    finding: int
     reason: str
-    track_id: int | None
-    rail_id: int | None
-    from_m: float
-    to_m: float
-    doubt_m: float
-    worst_m: float
-    gauge_mm: float
-    cant_mm: float
-    sigma_mm: float
-    points: int | None
-    review: str
     xyz: np.ndarray
     harm: float
+    doubt_m: float
+    finding: int = 0
+    track_id: int | None = None
+    rail_id: int | None = None
+    from_m: float = np.nan
+    to_m: float = np.nan
+    worst_m: float = np.nan
+    gauge_mm: float = np.nan
+    cant_mm: float = np.nan
+    sigma_mm: float = np.nan
+    points: int | None = None
+    review: str = ""
 
 
 def list_findings(network: RailNetwork, gauges_m: Sequence[float]) -> tuple[Finding, ...]:
@@ -102,33 +102,37 @@ def _of_place(track: TrackFindings, place: Place, error_mm: np.ndarray) -> Findi
     numbers = np.flatnonzero(within & track.doubtful[place.doubt])
     worst = numbers[np.argmax(error_mm[numbers])]
     return Finding(
-        0,
         place.doubt.label,
-        place.track_id,
-        None,
-        place.start_m,
-        place.end_m,
-        place.length_m,
-        float(geometry.chainage_m[worst]),
-        float(geometry.gauge_mm[worst]),
-        float(geometry.cant_mm[worst]),
-        float(geometry.sigma_mm[worst]),
-        int(geometry.points[within].sum()),
-        "",
-        track.line.part(place.start_m, place.end_m).xyz,
-        float(np.sum((error_mm * geometry.cells_m)[numbers])),
+        xyz=track.line.part(place.start_m, place.end_m).xyz,
+        harm=float(np.sum((error_mm * geometry.cells_m)[numbers])),
+        doubt_m=place.length_m,
+        track_id=place.track_id,
+        from_m=place.start_m,
+        to_m=place.end_m,
+        worst_m=float(geometry.chainage_m[worst]),
+        gauge_mm=float(geometry.gauge_mm[worst]),
+        cant_mm=float(geometry.cant_mm[worst]),
+        sigma_mm=float(geometry.sigma_mm[worst]),
+        points=int(geometry.points[within].sum()),
     )
 
 
 def _of_hole(hole: Hole) -> Finding:
-    unknown = (np.nan,) * 3
     reason = HOLE.format(hole.first, hole.second)
-    length_m, harm = hole.length_m, OFF_RAIL_MM * hole.length_m
-    return Finding(0, reason, hole.first, None, np.nan, np.nan, length_m, np.nan, *unknown, None, "", hole.ends, harm)
+    return Finding(reason, hole.ends, OFF_RAIL_MM * hole.length_m, hole.length_m, track_id=hole.first)
 
 
 def _of_lone_rail(rail: RailLine) -> Finding:
     plan_m = float(length_along(rail.xyz[:, :2])[-1])
-    figures = 0.5 * plan_m, np.nan, np.nan, rail.sigma_mm, round(rail.points)
-    harm = OFF_RAIL_MM * plan_m
-    return Finding(0, LONE_RAIL, None, rail.rail_id, 0.0, plan_m, plan_m, *figures, "", rail.xyz, harm)
+    return Finding(
+        LONE_RAIL,
+        rail.xyz,
+        OFF_RAIL_MM * plan_m,
+        plan_m,
+        rail_id=rail.rail_id,
+        from_m=0.0,
+        to_m=plan_m,
+        worst_m=0.5 * plan_m,
+        sigma_mm=rail.sigma_mm,
+        points=round(rail.points),
+    )

@@ -22,8 +22,8 @@ from qgis.utils import iface
 SAMPLE, ARCHIVE = os.environ["RAIL_EXTRACT_SAMPLE"], os.environ["RAIL_EXTRACT_ZIP"]
 
 NAMES = (
-    *("extractrails", "rasterizerailpoints", "frpdfcleanup", "vectorizerails", "buildtrackcenterlines"),
-    *("measuretrackgeometry", "installpackages", "checkinstallation"),
+    *("extractrails", "classifyrailpoints", "rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
+    *("buildtrackcenterlines", "measuretrackgeometry", "installpackages", "checkinstallation"),
 )
 
 PART = {
