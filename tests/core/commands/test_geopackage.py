@@ -35,6 +35,7 @@ STATIONS = TrackGeometry(
     np.array([False, True]),
     np.array([2, 1]),
     np.array([3.456, np.nan]),
+    np.array([0.789, np.nan]),
 )
 
 

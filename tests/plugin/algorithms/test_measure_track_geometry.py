@@ -64,7 +64,8 @@ def test_points_have_the_fields_of_the_interface_and_the_values_of_the_track(mea
     middle, left, right = curved_track()
     results, layer, values = measure(layer_of([middle]), layer_of([left, right]))
     assert " ".join(values) == (
-        "track_id chainage_m gauge_mm cant_mm twist_mm radius_m grade_pm sigma_mm points bridged"
+        "track_id chainage_m gauge_mm cant_mm twist_mm radius_m grade_pm sigma_mm points bridged strips strip_mm "
+        "sigmaz_mm"
     )
     assert layer.wkbType() == 1001  # PointZ
     assert layer.crs().authid() == "EPSG:32643"
