@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -19,6 +22,12 @@ which points to write (n,) bool."""
 
 LAST_OLD_FORMAT, LAST_OLD_CLASS = 5, 31
 """Point formats 0 to 5 have five bits for the class."""
+
+RECORD_HEAD, RECORD_BLOCK = 60, 1 << 20
+"""Bytes of the head of a record behind the points, an EVLR of LAS 1.4, and bytes that are copied at once."""
+
+RECORDS_AT = 235
+"""Place in the header of LAS 1.4 of the start of the first of these records, followed by their number."""
 
 COPC = "copc"
 """User of the records that describe the octree of a COPC file; they do not fit a file without one."""
@@ -82,13 +91,53 @@ def rewrite(path: Path, new: Path, change: Change, progress: Progress = SILENT) 
                     chunk.classification[other] = codes[other]
                     writer.write_points(chunk if keep.all() else chunk[keep])
                 written = int(writer.header.point_count)
-                if header.number_of_evlrs:
-                    with explained(path):
-                        reader.read_evlrs()
-                    writer.write_evlrs(type(reader.evlrs)(one for one in reader.evlrs if one.user_id != COPC))
         except WRITE_ERRORS as error:
             raise OSError(str(error)) from error
+        if header.number_of_evlrs:
+            _append_records(path, header.start_of_first_evlr, header.number_of_evlrs, new)
     return written
+
+
+def _append_records(path: Path, start: int, count: int, new: Path) -> None:
+    """Copy the records behind the points of a file, which may be larger than memory, without those of an octree."""
+    with new.open("r+b") as target:
+        first, kept = target.seek(0, os.SEEK_END), 0
+        for is_head, block in _record_blocks(path, start, count):
+            kept += is_head
+            target.write(block)
+        target.seek(RECORDS_AT)
+        target.write(struct.pack("<QI", first if kept else 0, kept))
+
+
+def _record_blocks(path: Path, start: int, count: int) -> Iterator[tuple[bool, bytes]]:
+    """Read the records behind the points of a file block by block; whether each block is the head of a record."""
+    with explained(path), path.open("rb") as source:
+        source.seek(start)
+        for _ in range(count):
+            head = _read(source, RECORD_HEAD)
+            remaining = int.from_bytes(head[20:28], "little")
+            if head[2:18].rstrip(b"\0") == COPC.encode():
+                source.seek(remaining, os.SEEK_CUR)
+                continue
+            yield True, head
+            while remaining:
+                block = _read(source, min(remaining, RECORD_BLOCK))
+                remaining -= len(block)
+                yield False, block
+
+
+def _read(source: BinaryIO, length: int) -> bytes:
+    """Read exactly this number of bytes.
+
+    Raises
+    ------
+    ValueError
+        The file ends before.
+    """
+    block = source.read(length)
+    if len(block) < length:
+        raise ValueError("a record behind the points is cut off")
+    return block
 
 
 def _chunks(path: Path, reader: laspy.LasReader, progress: Progress) -> Iterator[laspy.ScaleAwarePointRecord]:

@@ -225,3 +225,11 @@ def test_a_copc_file_loses_only_the_records_of_its_octree(tmp_path, scene):
     assert {one.user_id for one in after.vlrs} == {"LASF_Spec", "someone"}
     assert [one.user_id for one in after.evlrs] == ["someone"]
     assert len(after.points) == len(scene[0])
+
+
+def test_records_that_are_cut_off_are_noticed(tmp_path, scene):
+    source = save(tmp_path / "raw.las", scene[0])
+    source.write_bytes(source.read_bytes()[:-2])
+    with pytest.raises(CloudError, match=r"raw.las"):
+        classify(tmp_path, [source], tmp_path / "new.las")
+    assert [one.name for one in tmp_path.iterdir()] == ["raw.las"]
