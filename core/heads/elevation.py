@@ -251,8 +251,18 @@ def measure_again(
         if again is None:
             measured.append(_unsupported(rail, parameters))
         else:
-            measured.append(replace(rail, xyz=again.xyz, gaps=again.gaps, support=again.support))
+            measured.append(replace(rail, xyz=again.xyz, gaps=again.gaps, support=_with_strips_of(rail, again.support)))
     return measured
+
+
+def _with_strips_of(rail: RailLine, support: Support | None) -> Support | None:
+    """Let a support state the strips as the rail did before, which was measured with more of its surroundings."""
+    before = rail.support
+    if before is None or before.strips is None or support is None:
+        return support
+    strips = before.strips[np.searchsorted(0.5 * (before.t[1:] + before.t[:-1]), support.t)]
+    own = np.sqrt(np.maximum(support.sigma_m**2 - support.every_strip[:, 2] ** 2, 0.0))
+    return replace(support, sigma_m=np.hypot(own, strips[:, 2]), strips=strips)
 
 
 def _unsupported(rail: RailLine, parameters: ElevationParameters) -> RailLine:

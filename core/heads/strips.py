@@ -16,7 +16,7 @@ from scipy.sparse.linalg import spsolve
 
 from ..clouds.points import RailPoints
 from ..parameters import Parameters
-from ..polyline import Feet, interpolate, left_normals, length_along, project
+from ..polyline import Feet, distance_to, interpolate, left_normals, length_along, project
 from ..progress import SILENT, Progress
 from ..rails import Support
 from .edges import HALF_HEAD_BINS, histograms, middles, search_distance
@@ -39,6 +39,10 @@ OBSERVED_M = 0.002
 DRIFT_M, DRIFT_LENGTH_M = 0.02, 50.0
 """Standard deviation of the error of a strip's position, and length along the way over which it changes and away from
 another strip fades: seconds of a scanning train."""
+
+FADE_M = 35.0
+"""Length over which offsets fade to zero away from where strips meet: less than a square sees beyond its border, so
+that neighbouring squares align strips alike."""
 
 IRREGULAR_M = 0.0005
 """Standard deviation of the third difference of a rail's position at stations 1 m apart: waves of 2 mm that are 10 m
@@ -235,13 +239,16 @@ def _offsets(
     t = (np.arange(_steps(length_m)) + 0.5) * STEP_M
     across, up, points = (np.array([getattr(shown, name) for _, shown in seen]) for name in ("across", "up", "points"))
     reach = 2 * int(round(MEETING_M / STEP_M)) + 1
+    shown = maximum_filter1d(np.isfinite(across).astype(np.uint8), reach, axis=1, mode="constant") > 0
+    away_m = distance_to(t[shown.sum(axis=0) >= 2], t)
+    kept = 0.5 + 0.5 * np.cos(np.pi * np.clip(away_m / FADE_M, 0.0, 1.0))
     return StripOffsets(
         t,
         np.array([strip for strip, _ in seen]),
-        _from_mean(across, _third_differences(line, t)),
-        _from_mean(up, np.zeros(max(len(t) - 3, 0))),
+        kept * _from_mean(across, _third_differences(line, t)),
+        kept * _from_mean(up, np.zeros(max(len(t) - 3, 0))),
         uniform_filter1d(points.astype(float), reach, axis=1, mode="constant"),
-        maximum_filter1d(np.isfinite(across).astype(np.uint8), reach, axis=1, mode="constant") > 0,
+        shown,
     )
 
 
