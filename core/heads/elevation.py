@@ -19,12 +19,13 @@ from ..polyline import Feet, interpolate, length_along, project, resample, start
 from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
 from .edges import search_distance, stations_along
-from .level import AXIS_SHARE
+from .flank import find_flank
+from .level import AXIS_SHARE, rough_level
 from .neighbours import free_edges
 from .own_level import on_own_level
 from .strips import StripOffsets, aligned, measure_strips
-from .top import MIN_POINTS, find_top
-from .uncertainty import height_error, measure_support
+from .top import MIN_POINTS, Profile, find_top
+from .uncertainty import height_error, measure_support, on_one_face
 
 MIN_GAP_M, MAX_CHANCE_GAP_M = 0.5, 0.9
 """Length without points from which a line counts as bridged: five profiles of the fastest train's scanner. Where points
@@ -169,18 +170,23 @@ def _measured(
     head = np.abs(feet.across) <= min(0.5 * parameters.head_width_m, parameters.tolerance_xy_m)
     if head.sum() < MIN_POINTS:
         return None
-    found = find_top(
-        feet.t[head],
-        feet.across[head],
-        z[head],
-        parameters.head_width_m,
-        parameters.crown_radius_m,
-        parameters.tolerance_z_m,
-        parameters.smoothing_z_m,
-    )
-    if found is None:
-        return None
-    profile, top = found
+    flank = find_flank(feet.t, feet.across, z, parameters.head_width_m)
+    if flank is None:
+        found = find_top(
+            feet.t[head],
+            feet.across[head],
+            z[head],
+            parameters.head_width_m,
+            parameters.crown_radius_m,
+            parameters.tolerance_z_m,
+            parameters.smoothing_z_m,
+        )
+        if found is None:
+            return None
+        profile, top = found
+    else:
+        head, top = np.ones((2, len(z)), dtype=bool)
+        profile = Profile.through(feet.t, rough_level(feet.t, z) + flank.top_m, parameters.smoothing_z_m)
     supporting = feet[head][top]
     along = length_along(line)
     start, end = _supported(supporting.t, along[-1], free_ends)
@@ -199,6 +205,8 @@ def _measured(
         free=edges,
         near=near,
     )
+    if flank is not None:
+        support = on_one_face(support, feet.t, flank.sigma_m)
     axial = np.abs(supporting.across) <= AXIS_SHARE * parameters.head_width_m
     axial |= axial.sum() < MIN_POINTS
     t = supporting.t[axial]

@@ -20,11 +20,13 @@ from ..polyline import Feet, interpolate, left_normals, length_along, project
 from ..progress import SILENT, Progress
 from .branch_starts import APART_HEADS, slide_branches
 from .edges import HALF_HEAD_BINS, histograms, mean_offsets, middles, search_distance
+from .flank import Flank, find_flank
 from .level import MIN_ON_HEAD, is_blended, on_top
 from .neighbours import free_edges
 from .own_level import on_own_level
 from .sections import outline_middles, with_outline
 from .strips import aligned, measure_strips
+from .top import Profile
 
 MIN_SEEN_SHARE = 0.25
 """Minimum share of a line's stations with visible edges; otherwise the line stays as it is."""
@@ -125,6 +127,10 @@ def _shifted(
             mine, z = aligned(strips[number], mine, z, points)
         own = on_own_level(mine.t, mine.across, z, head_width_m)
         other, mine, z = mine.t[~own], mine[own], z[own]
+        flank = find_flank(mine.t, mine.across, z, head_width_m)
+        if flank is not None:
+            lines.append(_moved_off(line, mine, flank, smoothing_m))
+            continue
         if _is_narrow(mine.across, head_width_m):
             lines.append(_moved_onto(line, mine))
             continue
@@ -161,6 +167,13 @@ def _is_narrow(across: np.ndarray, head_width_m: float) -> bool:
 def _moved_onto(line: np.ndarray, feet: Feet) -> np.ndarray:
     """Move a line sideways onto the middle of its points."""
     return line + np.median(feet.across) * left_normals(line)
+
+
+def _moved_off(line: np.ndarray, feet: Feet, flank: Flank, smoothing_m: float) -> np.ndarray:
+    """Move a line along one face of its head onto the axis."""
+    along_face = Profile.through(feet.t, feet.across, smoothing_m).at(length_along(line))
+    shift = along_face + flank.left_m - np.median(feet.across)
+    return line + shift[:, None] * left_normals(line)
 
 
 def _with_redrawn_ends(line: np.ndarray, along: np.ndarray, free_ends: np.ndarray) -> np.ndarray:

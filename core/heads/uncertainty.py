@@ -9,6 +9,8 @@ curvature of bridges, which nothing shows. Only the last is known where no edges
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
@@ -106,6 +108,13 @@ def measure_support(
 def _combined(middles: Middles, smoothing_m: float) -> np.ndarray:
     """Return the information about the middle in what PAEK averages of the windows at each station, (s,) 1/m²."""
     return np.hypot(_averaged(middles.information, smoothing_m), middles.in_window)
+
+
+def on_one_face(support: Support, t: np.ndarray, sigma_m: float) -> Support:
+    """Replace the support of a line whose points, at chainages `t` (n,), are on one face; its axis has `sigma_m`."""
+    places = np.minimum((t / STATION_STEP_M).astype(int), len(support.t) - 1)
+    points = np.bincount(places, minlength=len(support.t))
+    return replace(support, points=points, sigma_m=np.hypot(sigma_m, _bridge_error(t, support.t)))
 
 
 def height_error(t: np.ndarray, residual_m: np.ndarray, stations: np.ndarray, smoothing_m: float) -> np.ndarray:

@@ -177,7 +177,13 @@ def thin_points(seed: int = 35, points_per_m: float = 10.0) -> Scene:
 
 
 def from_the_side(
-    name: str, seed: int, angle_deg: float, face_share: float = 1.0, noise_m: float = 0.005, length_m: float = 60.0
+    name: str,
+    seed: int,
+    angle_deg: float,
+    face_share: float = 1.0,
+    noise_m: float = 0.005,
+    length_m: float = 60.0,
+    top_share: float = 1.0,
 ) -> Scene:
     """Build a track that is scanned from the next one only, with the side faces of its rails in the class.
 
@@ -190,13 +196,20 @@ def from_the_side(
     face_share : float
         Share of the points on side faces that are classified as rail.
     noise_m, length_m : float
+    top_share : float
+        The same for the crown.
     """
     rng = np.random.RandomState(seed)
     curve = trace([Element(length_m, 1 / 800, 1 / 800)], heading=0.2 * seed)
     track = Track(curve, spacing(STANDARD), rolling(curve), canted(curve, 0.05))
     height_m = NEXT_TRACK_M * float(np.tan(np.radians(angle_deg)))
     scanner = Scanner(
-        left_m=NEXT_TRACK_M * (-1) ** seed, height_m=height_m, noise_m=noise_m, face_share=face_share, half_range_m=25.0
+        left_m=NEXT_TRACK_M * (-1) ** seed,
+        height_m=height_m,
+        noise_m=noise_m,
+        face_share=face_share,
+        half_range_m=25.0,
+        top_share=top_share,
     )
     return build(name, Plan([track], STANDARD, scanner), rng)
 
@@ -239,11 +252,18 @@ def crossing(
     )
 
 
-def standing_train(seed: int = 41, head_share: float = 0.1, length_m: float = 62.0, noise_m: float = 0.004) -> Scene:
+def standing_train(
+    name: str = "standing_train",
+    seed: int = 41,
+    head_share: float = 0.1,
+    length_m: float = 62.0,
+    noise_m: float = 0.004,
+) -> Scene:
     """Build a track on which a train stands, whose wheels, bogies and frames are classified as rail.
 
     Parameters
     ----------
+    name : str
     seed : int
     head_share : float
         Share of the points on the heads below the train that the scanner sees, in places half a metre long.
@@ -259,7 +279,7 @@ def standing_train(seed: int = 41, head_share: float = 0.1, length_m: float = 62
     for side in (1, -1):
         places = start_m + 0.5 * np.flatnonzero(rng.random_sample(int(2 * length_m)) >= head_share)
         hidden[0, side] = tuple((float(place), float(place) + 0.5) for place in places)
-    scene = build("standing_train", Plan([track], STANDARD, Scanner(noise_m=noise_m), gaps=hidden), rng)
+    scene = build(name, Plan([track], STANDARD, Scanner(noise_m=noise_m), gaps=hidden), rng)
     below = track.piece(start_m, start_m + length_m)
     wheels = np.abs((below.curve.chainage + 1.0) % 9.0 - 1.25) < 1.2
     up_m = np.where(wheels, 0.12, 0.28)
@@ -314,10 +334,11 @@ ADVERSARIAL: dict[str, Callable[[], Scene]] = {
     "side_17": lambda: from_the_side("side_17", 36, 17.0),
     "side_30": lambda: from_the_side("side_30", 37, 30.0, face_share=0.5),
     "side_45": lambda: from_the_side("side_45", 38, 45.0),
+    "one_face": lambda: from_the_side("one_face", 44, 20.0, noise_m=0.004, top_share=0.0),
     "all_faces": all_faces,
     "crossing": crossing,
     "standing_train": standing_train,
-    "hidden_heads": lambda: standing_train(43, head_share=0.0),
+    "hidden_heads": lambda: standing_train("hidden_heads", 43, head_share=0.0),
     "grooved": grooved,
 }
 """By name; every scene is seeded."""

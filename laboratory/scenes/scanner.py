@@ -46,6 +46,8 @@ class Scanner:
         Distance at which half of the rays return.
     face_share : float
         Share of the points on side faces that are classified as rail.
+    top_share : float
+        The same for the crown and the upper corners: a polished crown may return nothing.
     """
 
     profile_step_m: float = 0.05
@@ -55,6 +57,7 @@ class Scanner:
     noise_m: float = 0.003
     half_range_m: float = 18.0
     face_share: float = 0.3
+    top_share: float = 1.0
 
 
 def head_outline(head_width_m: float) -> tuple[np.ndarray, np.ndarray]:
@@ -205,4 +208,4 @@ def _hits(
 def _chance(distance_m: np.ndarray, turn: np.ndarray, scanner: Scanner) -> np.ndarray:
     """Return the probability that a ray returns and its point is classified as rail."""
     returned = 1 / (1 + (distance_m / scanner.half_range_m) ** 4)
-    return returned * np.where(np.abs(turn) > FACE_TURN, scanner.face_share, 1.0)
+    return returned * np.where(np.abs(turn) > FACE_TURN, scanner.face_share, scanner.top_share)

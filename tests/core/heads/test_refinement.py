@@ -275,3 +275,15 @@ def test_heads_in_narrow_beams_are_not_blended(offset, noise):
     t, across, z = blended_head(80, 50).T
     order = np.argsort(t)
     assert is_blended(t[order], across[order] + offset / 2, z[order], WIDTH)
+
+
+def test_a_line_on_one_face_moves_onto_the_axis():
+    face = head(60, 150, low_share=1.0, noise=0.003)
+    outer = face[(face[:, 2] < -0.004)]
+    corner = head(60, 60, low_share=0.0, noise=0.003, seed=5)
+    turn = np.random.default_rng(6).uniform(np.pi / 4, np.pi / 2, len(corner))
+    corner[:, 1] = 0.023 + 0.013 * np.sin(turn) + np.random.default_rng(7).normal(0, 0.003, len(corner))
+    corner[:, 2] = 0.013 * np.cos(turn) - 0.014 + np.random.default_rng(8).normal(0, 0.003, len(corner))
+    outer = outer[outer[:, 2] < -0.013]
+    (refined,) = refine(network_of(wavy_line(60, 0.005, 30) + [0.0, 0.034]), cloud(outer, corner), WIDTH).lines
+    assert rms(refined[:, 1]) < 0.003
