@@ -148,6 +148,7 @@ FINDING_FIELDS = (
     Field("gauge_mm", float, "gauge there, millimetres", 1),
     Field("cant_mm", float, "cant there, millimetres", 1),
     Field("sigma_mm", float, "standard error there, millimetres", 2),
+    Field("sigmaz_mm", float, "standard error of the height there, millimetres", 2),
     Field("points", int, "points on the rails of the section"),
     Field("review", str, "decision of the user: accepted or rejected; empty before"),
 )

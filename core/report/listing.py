@@ -12,11 +12,14 @@ import numpy as np
 
 from ..polyline import length_along
 from ..rails import RailLine, RailNetwork
+from ..tracks.jumps import ARM_M, find_steps
 from .findings import DOUBTS, OFF_GAUGE, Findings, Hole, Place, TrackFindings, examine
 
 OFF_RAIL_MM = 70.0
 """Possible error where a line is missing, or belongs to no track: a line off by the width of a railhead is off its
 rail, and being further off makes it no worse."""
+
+STEP = "the track steps {:.0f} mm to the side"
 
 LONE_RAIL, HOLE = "a rail belongs to no track", "no rails were found between tracks {} and {}, which are likely one"
 
@@ -42,8 +45,8 @@ class Finding:
         Chainages along the track or the lone rail; NaN for a section between tracks.
     worst_m : float
         Chainage of the largest possible error.
-    gauge_mm, cant_mm, sigma_mm : float
-        Gauge, cant and standard error there.
+    gauge_mm, cant_mm, sigma_mm, sigmaz_mm : float
+        Gauge, cant and standard errors there.
     points : int or None
         Points on both rails, or on the lone rail.
     review : str
@@ -63,6 +66,7 @@ class Finding:
     gauge_mm: float = np.nan
     cant_mm: float = np.nan
     sigma_mm: float = np.nan
+    sigmaz_mm: float = np.nan
     points: int | None = None
     review: str = ""
 
@@ -85,6 +89,8 @@ def _of_tracks(findings: Findings) -> Iterator[Finding]:
         for doubt in DOUBTS:
             for place in track.places(doubt):
                 yield _of_place(track, place, error_mm)
+        for at_m, size_m in find_steps(track.line.xyz):
+            yield _of_step(track, at_m, 1000 * abs(size_m))
 
 
 def _possible_error(track: TrackFindings) -> np.ndarray:
@@ -113,7 +119,24 @@ def _of_place(track: TrackFindings, place: Place, error_mm: np.ndarray) -> Findi
         gauge_mm=float(geometry.gauge_mm[worst]),
         cant_mm=float(geometry.cant_mm[worst]),
         sigma_mm=float(geometry.sigma_mm[worst]),
+        sigmaz_mm=float(geometry.sigmaz_mm[worst]),
         points=int(geometry.points[within].sum()),
+    )
+
+
+def _of_step(track: TrackFindings, at_m: float, size_mm: float) -> Finding:
+    """Return the finding of a step: the part of the track that shows it."""
+    start_m, end_m = max(at_m - ARM_M, 0.0), min(at_m + ARM_M, track.length_m)
+    length_m = end_m - start_m
+    return Finding(
+        STEP.format(size_mm),
+        track.line.part(start_m, end_m).xyz,
+        min(size_mm, OFF_RAIL_MM) * length_m,
+        length_m,
+        track_id=track.line.track_id,
+        from_m=start_m,
+        to_m=end_m,
+        worst_m=at_m,
     )
 
 

@@ -87,8 +87,9 @@
     <alias field="gauge_mm" index="8" name="Gauge there [mm]"/>
     <alias field="cant_mm" index="9" name="Cant there [mm]"/>
     <alias field="sigma_mm" index="10" name="Standard error there [mm]"/>
-    <alias field="points" index="11" name="Points"/>
-    <alias field="review" index="12" name="Review"/>
+    <alias field="sigmaz_mm" index="11" name="Standard error of the height there [mm]"/>
+    <alias field="points" index="12" name="Points"/>
+    <alias field="review" index="13" name="Review"/>
   </aliases>
   <mapTip>&lt;b&gt;[% &quot;finding&quot; %]: [% &quot;reason&quot; %]&lt;/b&gt;&lt;br&gt;[% if(&quot;rail_id&quot; IS NULL, &#x27;Track &#x27; || &quot;track_id&quot;, &#x27;Rail &#x27; || &quot;rail_id&quot;) %], [% coalesce(format_number(&quot;from_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %] to [% coalesce(format_number(&quot;to_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Review: [% if(coalesce(&quot;review&quot;, &#x27;&#x27;) = &#x27;&#x27;, &#x27;open&#x27;, &quot;review&quot;) %]</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>

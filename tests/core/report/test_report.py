@@ -394,3 +394,23 @@ def test_strips_have_a_table_and_profiles_in_colours():
         assert f"strip {strip}" in html
     assert html.count('class="curve" style="stroke: #') == 6
     assert "<h2>Strips</h2>" not in build_page(network(track(1)), [1.435], "a.laz")
+
+
+def test_a_step_to_the_side_is_a_finding_with_its_size():
+    line, geometry = track()
+    along = line.xyz[:, 0]
+    bent = line.xyz + np.column_stack([0 * along, 0.030 * np.clip((along - 49) / 2, 0, 1), 0 * along])
+    (found,) = list_findings(network((replace(line, xyz=bent), geometry)), (1.435,))
+    assert found.worst_m == pytest.approx(50, abs=0.5)
+    assert (found.from_m, found.to_m) == pytest.approx((found.worst_m - 5, found.worst_m + 5))
+    size_mm = float(re.fullmatch(r"the track steps (\d+) mm to the side", found.reason).group(1))
+    assert size_mm == pytest.approx(30, abs=3)
+    assert found.harm == pytest.approx(10 * size_mm, abs=10)
+
+
+def test_the_larger_standard_error_counts():
+    high = np.full(101, 1.0)
+    high[40:50] = 8.0
+    (found,) = list_findings(network(track(sigmaz_mm=high)), (1.435,))
+    assert (found.reason, found.sigmaz_mm) == (UNSURE.label, 8.0)
+    assert found.harm == pytest.approx(80)
