@@ -8,7 +8,7 @@ has one unknown, however, and cells far from both lines show it. See docs/method
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -58,6 +58,16 @@ SEPARATE_M, MIN_SEEN_M = 0.11, 5.0
 """Distance between the axes of a slip curve and of the rails that cross from which there is a cell between their heads,
 and shortest length on which a slip curve is that far from both: 8 m for 190 m at 1:9, 6 m for 50 m at 1:4. What wing
 rails and check rails at frogs look like is that far from both for less than 5 m."""
+
+SPACINGS_M = (0.6, 1.8)
+"""Distances between the axes of the rails of a track: gauges of 600 to 1676 mm. The left rails of two tracks cross that
+far beside their right rails."""
+
+BESIDE_M = (-1.507, -1.07, 1.07, 1.507)
+"""Where the other two rails may cross, on standard and on metre gauge; `NEAR_M` covers the others."""
+
+SHIFT_M = 1.0
+"""Largest distance along the crossing between these two places: 10 cm across at an angle of 1:9."""
 
 HALF_HEAD_M = 0.036
 """Distance from its axis within which cells are on a rail."""
@@ -176,6 +186,11 @@ class Slip:
             top = np.where(side * y > 0, np.maximum(top, curved), top)
         return (np.abs(x) < self.clear_m) & (np.abs(y) < top)
 
+    def is_beside(self, other: Slip) -> bool:
+        """Return whether another slip is that of the other two rails of the same two tracks."""
+        x, y = self.cross.axes @ (other.cross.place - self.cross.place)
+        return bool(abs(x) < SHIFT_M and SPACINGS_M[0] < abs(y) < SPACINGS_M[1])
+
     def is_leg(self, place: np.ndarray) -> bool:
         """Return whether a place is where a leg enters."""
         x, y = self.cross.axes @ (place - self.cross.place)
@@ -200,15 +215,40 @@ def open_slips(network: LineNetwork, seen: cKDTree) -> tuple[LineNetwork, list[S
     slips : list of Slip
         What `add_curves` adds once the crossings are resolved.
     """
+    slips = _paired(_find(network, seen))
+    for slip in slips:
+        network = _as_crossing(network, slip)
+    return network, slips
+
+
+def _find(network: LineNetwork, seen: cKDTree) -> list[Slip]:
+    """Find crossings with curves; each is drawn before the next is sought, which it may disturb."""
     slips: list[Slip] = []
     parts = None
-    for place in _candidates(network):
+    places = list(_candidates(network))
+    while places:
+        place = places.pop(0)
         parts = parts or _Parts.of(network)
         slip = _slip(parts, place, seen)
         if slip is not None and all(np.hypot(*(slip.cross.place - one.cross.place)) > SAME_M for one in slips):
             slips.append(slip)
             network, parts = _as_crossing(network, slip), None
-    return network, slips
+            places += [slip.cross.place + beside_m * slip.cross.axes[1] for beside_m in BESIDE_M]
+    return slips
+
+
+def _paired(found: Sequence[Slip]) -> list[Slip]:
+    """Keep the slip curves that have a partner: the other rail of the track that they carry."""
+    kept = []
+    for slip in found:
+        others = [one for one in found if one is not slip and slip.is_beside(one)]
+        ways = [other * one.cross.axes[1] for one in others for _, other in one.heights]
+        heights = tuple(
+            (height, side) for height, side in slip.heights if any(side * slip.cross.axes[1] @ way > 0 for way in ways)
+        )
+        if heights:
+            kept.append(replace(slip, heights=heights))
+    return kept
 
 
 def _candidates(network: LineNetwork) -> np.ndarray:

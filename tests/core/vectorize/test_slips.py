@@ -5,6 +5,7 @@ import pytest
 from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.raster import rasterize
 from rail_extract.core.vectorize import vectorize
+from rail_extract.core.vectorize.slips import open_slips
 from scipy.spatial import cKDTree
 
 HEAD_M, CELL_M = 0.072, 0.04
@@ -36,14 +37,31 @@ def raster_of(lines, rng, per_m=400):
     return rasterize(np.concatenate(clouds), CELL_M)
 
 
+SPACING_M = 1.507
+
+
+def at_gauge(lines, heading):
+    """The rails, and their partners: two tracks that cross."""
+    across = SPACING_M * np.array([-np.sin(heading), np.cos(heading)])
+    return [*lines, *(line + across for line in lines)]
+
+
 @pytest.mark.parametrize("sides", [(1, -1), (1,), (-1,), ()])
 @pytest.mark.parametrize(("number", "radius_m", "heading"), [(9, 190.0, 0.5), (9, 190.0, -1.2), (11, 300.0, 0.3)])
 def test_all_rails_of_a_slip_are_drawn(number, radius_m, heading, sides):
-    true = rails(number, radius_m, sides, heading)
+    true = at_gauge(rails(number, radius_m, sides, heading), heading)
     network = smooth_network(vectorize(raster_of(true, np.random.RandomState(0)), HEAD_M), 0.8)
     assert len(network.lines) == len(true)
-    assert len(network.passes) == 2 * len(sides)  # each slip curve begins and ends on one of the rails that cross
+    assert len(network.passes) == 4 * len(sides)  # each slip curve begins and ends on one of the rails that cross
     for axis in true:
         off = [np.percentile(cKDTree(axis).query(line)[0], 95) for line in network.lines]
         line = network.lines[int(np.argmin(off))]
         assert min(off) < 0.05 and np.percentile(cKDTree(line).query(axis)[0], 90) < 0.06
+
+
+def test_a_curve_without_a_partner_is_no_slip():
+    """The frog of a turnout may look like half a slip, but the other rail of the track has none."""
+    lone = rails(9, 190.0, (1,), 0.4)
+    partner = [line + SPACING_M * np.array([-np.sin(0.4), np.cos(0.4)]) for line in lone[:1]]
+    network = vectorize(raster_of([*lone, *partner], np.random.RandomState(0)), HEAD_M)
+    assert open_slips(network, cKDTree(np.concatenate(lone)))[1] == []
