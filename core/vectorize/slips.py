@@ -63,8 +63,8 @@ SPACINGS_M = (0.6, 1.8)
 """Distances between the axes of the rails of a track: gauges of 600 to 1676 mm. The left rails of two tracks cross that
 far beside their right rails."""
 
-BESIDE_M = (-1.507, -1.07, 1.07, 1.507)
-"""Where the other two rails may cross, on standard and on metre gauge; `NEAR_M` covers the others."""
+BESIDE_M = (1.07, 1.507)
+"""How far to either side the other two rails may cross: metre and standard gauge. `NEAR_M` covers the others."""
 
 SHIFT_M = 1.0
 """Largest distance along the crossing between these two places: 10 cm across at an angle of 1:9."""
@@ -233,7 +233,7 @@ def _find(network: LineNetwork, seen: cKDTree) -> list[Slip]:
         if slip is not None and all(np.hypot(*(slip.cross.place - one.cross.place)) > SAME_M for one in slips):
             slips.append(slip)
             network, parts = _as_crossing(network, slip), None
-            places += [slip.cross.place + beside_m * slip.cross.axes[1] for beside_m in BESIDE_M]
+            places += [slip.cross.place + side * m * slip.cross.axes[1] for m in BESIDE_M for side in (1.0, -1.0)]
     return slips
 
 
