@@ -2,36 +2,21 @@
 
 from __future__ import annotations
 
-from processing.gui.ContextAction import ContextAction
-from processing.gui.ProviderActions import ProviderContextMenuActions
-from qgis.core import QgsApplication, QgsProcessingAlgorithm
+from qgis.core import QgsApplication
 
 from .i18n import tr
-from .model_action import EXTRACT_RAILS
 from .paths import SAMPLE
+from .toolbox_action import EXTRACT_RAILS, ToolboxAction
 
 PARAMETERS = {"INPUT": str(SAMPLE / "sample.laz"), "STANDARD": "IN_75R_1000"}
 """The sample, and the standard of its rails."""
 
 
-class OpenSampleAction(ContextAction):
+class OpenSampleAction(ToolboxAction):
     """Opens the dialog with the sample; it is in the toolbox's context menu and in the menu of the plugin."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self.name = tr("Open the Sample…")
-
-    def register(self) -> None:
-        """Add the entry to the context menu."""
-        ProviderContextMenuActions.registerProviderContextMenuActions([self])
-
-    def deregister(self) -> None:
-        """Remove the entry."""
-        ProviderContextMenuActions.deregisterProviderContextMenuActions([self])
-
-    def isEnabled(self) -> bool:
-        """Return whether the entry applies to the clicked algorithm, which must be Extract Rails."""
-        return isinstance(self.itemData, QgsProcessingAlgorithm) and self.itemData.id() == EXTRACT_RAILS
+        super().__init__(tr("Open the Sample…"))
 
     def execute(self) -> None:
         """Open the dialog."""
