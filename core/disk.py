@@ -113,7 +113,7 @@ class Destination:
         except OSError as error:
             raise _unwritable(path, error) from error
         check_closed(file)
-        return cls(path, file, _identity(file))
+        return cls(path, file, identity(file))
 
     @contextmanager
     def replacing(self, edit: bool = False) -> Iterator[Path]:
@@ -146,7 +146,7 @@ class Destination:
                 yield new
                 if any(new.parent.iterdir()):
                     self._move_in(folder, copied)
-                    self.before = _identity(self.file)
+                    self.before = identity(self.file)
         except OSError as error:
             raise _unwritable(self.path, error) from error
 
@@ -172,9 +172,9 @@ class Destination:
         for file in filter(Path.is_file, new):
             _flush(file)
             _keep_rights(file, self.file.with_name(file.name), self.file)
-        with _alone_in(self.file.parent):
+        with alone_in(self.file.parent):
             try:
-                is_other = _identity(self.file) not in (None, self.before)
+                is_other = identity(self.file) not in (None, self.before)
                 if is_other or (copied is not None and copied != _state(self.file)):
                     raise DiskError(f"{self.path} was changed by another program in the meantime.")
                 check_closed(self.file)
@@ -204,7 +204,7 @@ def _check_writable(path: Path, file: Path) -> None:
         file.replace(file)  # refused on Windows while another program has it open
 
 
-def _identity(file: Path) -> tuple[int, int] | None:
+def identity(file: Path) -> tuple[int, int] | None:
     """Return what changes if a file is replaced but not if its content is edited; None if there is no file."""
     try:
         state = file.stat()
@@ -285,7 +285,7 @@ def _swap(folder: Path, main: Path, names: Sequence[Path]) -> None:
 def _complete(folder: Path) -> None:
     """Complete the move that a killed run had begun in its temporary folder, or take it back."""
     journal, parent = folder / MOVING, folder.parent
-    with suppress(OSError, ValueError), _alone_in(parent):
+    with suppress(OSError, ValueError), alone_in(parent):
         main, *names = (parent / Path(name).name for name in json.loads(journal.read_text(encoding="utf-8")))
         if not (folder / NEW / main.name).exists():
             return  # it was complete
@@ -313,7 +313,7 @@ def _keep_beside(files: Sequence[Path], main: Path) -> Path:
 
 
 @contextmanager
-def _alone_in(folder: Path) -> Iterator[None]:
+def alone_in(folder: Path) -> Iterator[None]:
     """Keep other runs from moving files into the same folder, where the operating system can lock folders."""
     try:
         opened = os.open(folder, os.O_RDONLY)

@@ -20,9 +20,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import laspy
 import numpy as np
 from osgeo import gdal, ogr
 from qgis.core import QgsApplication, QgsProcessingContext
+from rail_extract.core.clouds.rewriting import rewrite
 from rail_extract.core.disk import Destination
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.rails import RailLine
@@ -42,14 +44,17 @@ COUNT = 40
 
 FRAME = LocalFrame(np.array([500_000.0, 3_000_000.0, 0.0]), 1.0, 1.0, None)
 
+POINTS = 20_000
+"""Points of a cloud."""
+
 LEFT_OVER = re.compile(rf"{re.escape(PREFIX)}\w+")
 
 
-def write_layer(path: Path, version: int) -> None:
+def write_layer(destination: Destination, version: int) -> None:
     """Write rails whose number and place are the version."""
     xyz = np.array([[version, 0.0, version], [version, 10.0, version]], dtype=float)
     rails = [RailLine(xyz, version, 10, version, 1.0, 1.0, 0.0) for _ in range(COUNT)]
-    _write(VectorizeRails(), path, lambda *rest: write_lines(rest[0], "OUTPUT", RAILS, rails, FRAME, *rest[1:]))
+    _write(VectorizeRails(), destination, lambda *rest: write_lines(rest[0], "OUTPUT", RAILS, rails, FRAME, *rest[1:]))
 
 
 def read_layer(path: Path) -> set[int]:
@@ -62,13 +67,21 @@ def read_layer(path: Path) -> set[int]:
     return found if len(features) == COUNT else {-len(features)}
 
 
-def write_table(path: Path, version: int) -> None:
+def read_drawing(path: Path) -> set[int]:
+    """Return the versions in a drawing, from its heights."""
+    dataset = ogr.Open(str(path))
+    features = list(dataset.GetLayer(0))
+    return {round(one.GetGeometryRef().GetZ(0)) for one in features} if len(features) == COUNT else {-len(features)}
+
+
+def write_table(destination: Destination, version: int) -> None:
     """Write rails into a GeoPackage that has a table of other people."""
-    if not path.exists():
-        dataset = ogr.GetDriverByName("GPKG").CreateDataSource(str(path))
+    if not destination.file.exists():
+        dataset = ogr.GetDriverByName("GPKG").CreateDataSource(str(destination.file))
         dataset.CreateLayer("signals", geom_type=ogr.wkbPoint)
         del dataset
-    write_layer(path, version)
+        destination = Destination.at(destination.path)
+    write_layer(destination, version)
 
 
 def read_table(path: Path) -> set[int]:
@@ -77,14 +90,14 @@ def read_table(path: Path) -> set[int]:
     return read_layer(path) if dataset.GetLayerByName("signals") else {-1}
 
 
-def write_cells(path: Path, version: int) -> None:
+def write_cells(destination: Destination, version: int) -> None:
     """Write a raster whose cells and gauge are the version."""
     across = version % 50 * 0.1
     points = np.column_stack([np.linspace(0, 40, 4000), np.full(4000, across), np.zeros(4000)])
     standard = resolve("CUSTOM", 1435.0, 72.0)
     raster = rasterize(points, 0.04)
     header = header_for([raster], (10 + version % 50,), FRAME, standard)
-    _write(FrpdfCleanup(), path, lambda *rest: write_raster(rest[0], "OUTPUT", header, [raster], *rest[1:]))
+    _write(FrpdfCleanup(), destination, lambda *rest: write_raster(rest[0], "OUTPUT", header, [raster], *rest[1:]))
 
 
 def read_cells(path: Path) -> set[int]:
@@ -97,9 +110,9 @@ def read_cells(path: Path) -> set[int]:
     return {int(band.GetDescription()) - 10} | across
 
 
-def write_page(path: Path, version: int) -> None:
+def write_page(destination: Destination, version: int) -> None:
     """Write a page of 4 MB on which every word is the version."""
-    Destination.at(path).write_text(f"{version} " * 600_000)
+    destination.write_text(f"{version} " * 600_000)
 
 
 def read_page(path: Path) -> set[int]:
@@ -108,21 +121,45 @@ def read_page(path: Path) -> set[int]:
     return set(map(int, set(words))) if len(words) == 600_000 else {-len(words)}
 
 
-FORMATS: dict[str, tuple[str, Callable[[Path, int], None], Callable[[Path], set[int]]]] = {
+def write_points(destination: Destination, version: int) -> None:
+    """Write a copy of a cloud in which the class of every point is the version."""
+    source = Path(tempfile.gettempdir()) / f"kills_{os.getpid()}.las"
+    if not source.exists():
+        cloud = laspy.LasData(laspy.LasHeader(version="1.4", point_format=6))
+        cloud.xyz = np.random.default_rng(1).uniform(0, 100, (POINTS, 3))
+        cloud.write(source)
+    with destination.replacing() as new:
+        rewrite(source, new, lambda xyz, codes: (np.full_like(codes, version % 200), np.ones(len(xyz), bool)))
+    source.unlink()
+
+
+def read_points(path: Path) -> set[int]:
+    """Return the versions, modulo 200, of a cloud's points."""
+    codes = np.asarray(laspy.read(path).classification)
+    return set(np.unique(codes).tolist()) if len(codes) == POINTS else {-len(codes)}
+
+
+FORMATS: dict[str, tuple[str, Callable[[Destination, int], None], Callable[[Path], set[int]]]] = {
     **{suffix: (f"rails.{suffix}", write_layer, read_layer) for suffix in ("gpkg", "shp", "geojson", "fgb", "gml")},
+    "csv": ("rails.csv", write_layer, read_layer),
+    "dxf": ("rails.dxf", write_layer, read_drawing),
     "gpkg table": ("rails.gpkg", write_table, read_table),
     "tif": ("rails.tif", write_cells, read_cells),
+    "laz": ("rails.laz", write_points, read_points),
     "html": ("rails.html", write_page, read_page),
 }
 """By format: name of the file, and how a version is written and read."""
 
+SETS = (".shp", ".csv")
+"""Suffixes of outputs of several files, whose main file is absent for a moment."""
 
-def _write(algorithm: Any, path: Path, write: Callable[..., Any]) -> None:
+
+def _write(algorithm: Any, destination: Destination, write: Callable[..., Any]) -> None:
     """Write an output as the algorithm does."""
     context = QgsProcessingContext()
     algorithm.initAlgorithm()
-    algorithm.destinations = {"OUTPUT": Destination.at(path)}
-    write(algorithm, {"OUTPUT": str(path)}, context)
+    algorithm.destinations = {"OUTPUT": destination}
+    write(algorithm, {"OUTPUT": str(destination.path)}, context)
 
 
 def kill_once(name: str, folder: Path, first: int, after_s: float) -> str:
@@ -150,7 +187,7 @@ def kill_once(name: str, folder: Path, first: int, after_s: float) -> str:
         try:
             os.write(writer, b"x")
             for version in range(first, first + 10_000):
-                write(folder / file, version)
+                write(Destination.at(folder / file), version)
         except BaseException as error:
             print(f"{name}: {error!r}", flush=True)
         os._exit(1)
@@ -160,22 +197,23 @@ def kill_once(name: str, folder: Path, first: int, after_s: float) -> str:
     os.waitpid(process, 0)
     os.close(reader), os.close(writer)
     absent = not (folder / file).exists()
-    before = None if absent else _versions(read, folder / file)
+    before = None if absent else versions(read, folder / file)
     for left in folder.iterdir():
         if LEFT_OVER.fullmatch(left.name):
             for entry in filter(Path.exists, (left / MARK, left)):
                 os.utime(entry, (0, time.time() - MIN_UNMARKED_AGE_S - 1))
     Destination.at(folder / "next.txt")
     left = [one.name for one in folder.iterdir() if LEFT_OVER.fullmatch(one.name)]
-    after = _versions(read, folder / file)
+    after = versions(read, folder / file)
     if len(after) != 1 or min(after) < 0 or left or (before not in (None, after)):
         return f"{name}: versions {before} and then {after}, left {left}"
     if absent:
-        return "absent until the next run" if file.endswith(".shp") else f"{name}: absent"
+        return "absent until the next run" if file.endswith(SETS) else f"{name}: absent"
     return "whole"
 
 
-def _versions(read: Callable[[Path], set[int]], path: Path) -> set[int]:
+def versions(read: Callable[[Path], set[int]], path: Path) -> set[int]:
+    """Return the versions in a file; a file that cannot be read has several, one of which is negative."""
     try:
         return read(path)
     except Exception as error:
@@ -188,10 +226,18 @@ def kill_often(name: str, times: int, seed: int = 1) -> Counter[str]:
     file, write, _ = FORMATS[name]
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        write(folder / file, 1)
+        write(Destination.at(folder / file), 1)
         for number in range(times):
             found[kill_once(name, folder, 2 + number, MAX_S * moments.random())] += 1
     return found
+
+
+def start_qgis() -> QgsApplication:
+    """Start QGIS without a screen."""
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    application = QgsApplication([], False)
+    application.initQgis()
+    return application
 
 
 def main() -> None:
@@ -199,9 +245,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("times", type=int, nargs="?", default=50, help="kills per format (default: 50)")
     times = parser.parse_args().times
-    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
-    application = QgsApplication([], False)
-    application.initQgis()
+    application = start_qgis()  # noqa: F841 - kept alive
     wrong = False
     for name in FORMATS:
         found = kill_often(name, times)

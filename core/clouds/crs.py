@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -223,8 +224,7 @@ def warn_of_scale(
         Takes the warning.
     """
     plane = _plane(crs)
-    found = [_scale_at(plane, *place) for place in places] if plane.is_projected else []
-    known = [one for one in found if np.isfinite(one).all()]
+    known = [one for one in _scales(plane, places) if np.isfinite(one).all()] if plane.is_projected else []
     if not known:
         return
     factor, longitude, latitude = min(known, key=lambda one: abs(one[0] - 1))
@@ -235,21 +235,22 @@ def warn_of_scale(
         )
 
 
-def _scale_at(plane: pyproj.CRS, x: float, y: float) -> tuple[float, float, float]:
-    """Return scale factor, longitude and latitude at a place; of the factors east and north, that farther from 1.
+def _scales(plane: pyproj.CRS, places: Sequence[tuple[float, float]]) -> Iterator[tuple[float, float, float]]:
+    """Yield scale factor, longitude and latitude at places; of the factors east and north, that farther from 1.
 
-    They are NaN or infinite where they are unknown: far outside the system, or in one that PROJ can't relate to others.
+    They are NaN or infinite where they are unknown: far outside the system. There are none in a system that PROJ can't
+    relate to others.
     """
     pyproj = import_pyproj()
     half = BASELINE_M / 2 / plane.axis_info[0].unit_conversion_factor
-    try:
+    ground = pyproj.Geod(ellps="WGS84")
+    with suppress(pyproj.exceptions.ProjError):
         to_degrees = pyproj.Transformer.from_crs(plane, WGS_84, always_xy=True)
-        longitudes, latitudes = to_degrees.transform([x - half, x, x + half, x], [y, y - half, y, y + half])
-        ground = pyproj.Geod(ellps="WGS84").inv(longitudes[:2], latitudes[:2], longitudes[2:], latitudes[2:])[2]
-    except pyproj.exceptions.ProjError:
-        return np.nan, np.nan, np.nan
-    factors = [BASELINE_M / length_m if length_m else np.nan for length_m in ground]
-    return max(factors, key=lambda factor: abs(factor - 1)), longitudes[0], latitudes[0]
+        for x, y in places:
+            longitudes, latitudes = to_degrees.transform([x - half, x, x + half, x], [y, y - half, y, y + half])
+            lengths_m = ground.inv(longitudes[:2], latitudes[:2], longitudes[2:], latitudes[2:])[2]
+            factors = [BASELINE_M / length_m if length_m else np.nan for length_m in lengths_m]
+            yield max(factors, key=lambda factor: abs(factor - 1)), longitudes[0], latitudes[0]
 
 
 def common_crs(systems: Sequence[tuple[str, pyproj.CRS | None]]) -> pyproj.CRS | None:

@@ -13,7 +13,7 @@ from ..clouds.points import Request
 from ..clouds.readers import CATALOGUES, READERS, list_files
 from ..clouds.rewriting import check_class, rewrite
 from ..clouds.vpc import CatalogueTile, catalogue_text
-from ..disk import Destination, writing
+from ..disk import Destination, alone_in, identity, writing
 from ..errors import DiskError, ParameterError, RailExtractError
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
@@ -54,14 +54,22 @@ class Output:
 
     Attributes
     ----------
-    file : Path
+    destination : Destination
         The file that opens the result: the only one, or the catalogue of the tiles.
     names : tuple of str
         Name of each tile; empty for a single file.
+    before : tuple of int or None
+        Identity of the folder of the tiles that was there when the run began.
     """
 
-    file: Path
+    destination: Destination
     names: tuple[str, ...] = ()
+    before: tuple[int, int] | None = None
+
+    @property
+    def file(self) -> Path:
+        """The file that opens the result."""
+        return self.destination.path
 
     @property
     def folder(self) -> Path:
@@ -119,19 +127,16 @@ def plan_output(paths: Sequence[Path], output: Path, class_code: int, progress: 
         raise ParameterError(
             f"{output.name} is not a name for the classified cloud: let it end in {' or '.join(suffixes)}."
         )
-    if is_single:
-        planned = Output(_without_copc(output, progress))
-        written = [planned.file]
-    else:
-        planned = Output(
-            output.with_name(_without_copc(output, progress).stem + CATALOGUE), _tile_names(files, progress)
-        )
-        written = [planned.folder / name for name in planned.names]
+    plain = _without_copc(output, progress)
+    names = () if is_single else _tile_names(files, progress)
+    main = plain if is_single else plain.with_name(plain.stem + CATALOGUE)
+    folder = main.with_suffix("")
+    written = [main] if is_single else [folder / name for name in names]
     if {file.resolve() for file in files} & {file.resolve() for file in written}:
         raise ParameterError("The classified cloud would replace the cloud that is read: choose another name.")
-    _check_folder(planned)
-    Destination.at(planned.file)
-    return planned
+    if names:
+        _check_folder(folder, names)
+    return Output(Destination.at(main), names, identity(folder) if names else None)
 
 
 def classify_files(
@@ -186,7 +191,7 @@ def classify_files(
     if output.names:
         writer.write_tiles(output, runner, rewriting)
     else:
-        with Destination.at(output.file).replacing() as new:
+        with output.destination.replacing() as new:
             writer.write(0, new, rewriting)
     return Result(output.file, int(labels.starts[-1]), figures)
 
@@ -261,7 +266,6 @@ class _Writer:
 
     def write_tiles(self, output: Output, runner: Runner, progress: Progress) -> None:
         """Write all tiles into a temporary folder, then move it to its name and write the catalogue."""
-        catalogue = Destination.at(output.file)
         with writing(output.file.parent), scratch_folder(output.file.parent) as scratch:
             new = scratch / "tiles"
             new.mkdir()
@@ -277,9 +281,8 @@ class _Writer:
                 CatalogueTile(f"./{output.folder.name}/{name}", count, header.extent)
                 for name, count, header in zip(output.names, counts, self._request.headers)
             ]
-            _check_folder(output)
-            _replace_folder(output.folder, new, scratch / "old")
-        catalogue.write_text(catalogue_text(tiles, self._request.zero.crs_wkt))
+            _move_tiles(output, new, scratch / "old")
+        output.destination.write_text(catalogue_text(tiles, self._request.zero.crs_wkt))
 
     def _classes(self, xyz: np.ndarray, codes: np.ndarray, rail: np.ndarray) -> np.ndarray:
         """Return the new classes of points, (n,)."""
@@ -320,27 +323,36 @@ def _tile_names(files: Sequence[Path], progress: Progress) -> tuple[str, ...]:
     return names
 
 
-def _check_folder(output: Output) -> None:
+def _check_folder(folder: Path, names: Sequence[str]) -> None:
     """Refuse to replace a folder that holds anything else than tiles of these names.
 
     Raises
     ------
     DiskError
     """
-    if output.names and output.folder.exists():
-        strange = not output.folder.is_dir() or {one.name for one in output.folder.iterdir()} - set(output.names)
-        if strange:
-            raise DiskError(f"{output.folder} exists and holds other files: choose another name.")
+    if folder.exists() and (not folder.is_dir() or {one.name for one in folder.iterdir()} - set(names)):
+        raise DiskError(f"{folder} exists and holds other files: choose another name.")
 
 
-def _replace_folder(folder: Path, new: Path, old: Path) -> None:
-    """Move a new folder to its name; the old one is back in its place if that fails."""
-    if not folder.exists():
-        new.replace(folder)
-        return
-    folder.replace(old)
-    try:
-        new.replace(folder)
-    except OSError:
-        old.replace(folder)
-        raise
+def _move_tiles(output: Output, new: Path, old: Path) -> None:
+    """Move a new folder of tiles to its name; the old one is back in its place if that fails.
+
+    Raises
+    ------
+    DiskError
+        Another run has written the folder in the meantime, or it holds other files.
+    """
+    folder = output.folder
+    with alone_in(folder.parent):
+        if identity(folder) not in (None, output.before):
+            raise DiskError(f"{folder} was changed by another program in the meantime. Nothing was written.")
+        _check_folder(folder, output.names)
+        if not folder.exists():
+            new.replace(folder)
+            return
+        folder.replace(old)
+        try:
+            new.replace(folder)
+        except OSError:
+            old.replace(folder)
+            raise

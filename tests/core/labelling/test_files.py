@@ -192,6 +192,28 @@ def test_what_cannot_be_done_is_refused(tmp_path, scene):
         plan_output([source], tmp_path / "new.txt", 10)
 
 
+@pytest.mark.parametrize("count", [1, 2])
+def test_of_two_runs_onto_one_output_the_later_one_says_so_and_changes_nothing(tmp_path, scene, count):
+    sources = [save(tmp_path / f"raw{number}.las", scene[0][:20_000]) for number in range(count)]
+    output = tmp_path / ("new.las" if count == 1 else "new.vpc")
+    first, second = (plan_output(sources, output, code) for code in (10, 11))
+    request = ask(sources, SEARCHED_CLASSES)
+
+    def run(choice, planned):
+        with scratch_folder(tmp_path) as work:
+            classify_files(request, SETTINGS, choice, planned, work, InTurn())
+
+    def content():
+        return {path: path.read_bytes() for path in [output, *tmp_path.glob("new/*")]}
+
+    run(TEN, first)
+    written = content()
+    with pytest.raises(DiskError, match="was changed by another program in the meantime"):
+        run(Choice(11), second)
+    assert content() == written
+    assert [path.name for path in tmp_path.glob("*_new*")] == (["new_new.las"] if count == 1 else [])
+
+
 def test_coordinates_in_another_unit_are_refused(tmp_path, scene):
     source = save(tmp_path / "raw.las", (scene[0] - CORNER) * 1000 + CORNER)
     with pytest.raises(CloudError, match="too far apart for rails: if the coordinates are in centimetres"):
