@@ -5,7 +5,8 @@ This module imports neither numpy nor anything that needs it, so that dialogs op
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 AS_THEY_ARE, ALIGNED = "AS_THEY_ARE", "ALIGNED"
 STRIPS = (AS_THEY_ARE, ALIGNED)
@@ -48,6 +49,8 @@ class Parameters:
         Shorter lines are dropped.
     other_gauges_m : tuple of float
         Further gauges to pair, for mixed and dual gauge.
+    other_heads_m : tuple of float
+        Width of the railheads on each of them; empty if all are `head_width_m` wide.
     centerline_tolerance_m : float
         Largest deviation from the gauge at which two rails make a track.
     quality_step_m : float or None
@@ -79,8 +82,25 @@ class Parameters:
     simplify_z_m: float = 0.002
     min_length_m: float = 1.0
     other_gauges_m: tuple[float, ...] = ()
+    other_heads_m: tuple[float, ...] = ()
     centerline_tolerance_m: float = 0.05
     quality_step_m: float | None = None
     square_tiles: int = 50
     keep_cleaned: bool = False
     strips: str = AS_THEY_ARE
+
+    @property
+    def gauges(self) -> tuple[tuple[float, float], ...]:
+        """Gauges that tracks may have, each with the width of its railheads; the first one is that of the standard."""
+        heads_m = self.other_heads_m or (self.head_width_m,) * len(self.other_gauges_m)
+        return ((self.gauge_m, self.head_width_m), *zip(self.other_gauges_m, heads_m))
+
+    @property
+    def gauges_m(self) -> tuple[float, ...]:
+        """Gauges that tracks may have; the first one is that of the standard."""
+        return self.gauge_m, *self.other_gauges_m
+
+    def with_gauges(self, others: Sequence[tuple[float, float]]) -> Parameters:
+        """Return the parameters with further gauges, given with the width of their railheads."""
+        gauges_m, heads_m = (tuple(one[part] for one in others) for part in range(2))
+        return replace(self, other_gauges_m=gauges_m, other_heads_m=heads_m)

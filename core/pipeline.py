@@ -45,6 +45,7 @@ from .steps import (
 from .tasks import Context, InTurn, Runner, Task
 from .tracks.geometry import measure_track_geometry
 from .tracks.strip_courses import strip_courses
+from .tracks.widths_by_gauge import widths_by_gauge
 
 READING, DRAWING, PAIRING, MEASURING = 0.2, 0.72, 0.04, 0.04
 """Run times of the steps relative to each other, for the progress: sorting files, squares, tracks, track geometry."""
@@ -150,7 +151,7 @@ def extract_files(
     progress = recording = Recording(progress)
     reading, rest = progress.divide((READING, DRAWING + PAIRING + MEASURING))
     if classify:
-        settings = Settings((parameters.gauge_m, *parameters.other_gauges_m), parameters.head_width_m)
+        settings = Settings(parameters.gauges_m, parameters.head_width_m)
         with scratch_folder(folder) as scratch:
             source, figures = spool_found(request, settings, side_m, scratch, runner, reading)
             network = _walk([source], parameters, runner, rest)
@@ -226,7 +227,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
     warn_of_split_classes(rails, parameters, progress)
     warn_of_strips(rails, parameters, progress)
     warn_of_steps(centerlines, progress)
-    heads = head_widths(sources[0], parameters.head_width_m, progress) if rails else None
+    heads = head_widths(sources[0], parameters.gauges, progress) if rails else None
     geometry = _measure_tracks(centerlines, rails, sources, parameters, runner, measuring)
     if geometry:
         count = sum(len(track.chainage_m) for track in geometry)
@@ -349,7 +350,8 @@ def _measure_tracks(
         return []
     remeasuring, stations = progress.divide((REMEASURE, STATIONS))
     align = parameters.strips == ALIGNED
-    measured = measure_rails(rails, sources, parameters.head_width_m, runner, remeasuring, align)
+    heads_m = widths_by_gauge(rails, parameters.gauges, parameters.centerline_tolerance_m)
+    measured = measure_rails(rails, sources, heads_m, runner, remeasuring, align)
     geometry: list[TrackGeometry] = []
     for source, share in zip(sources, stations.split(len(sources))):
         geometry += measure_track_geometry(
@@ -358,5 +360,6 @@ def _measure_tracks(
             parameters.head_width_m,
             parameters.quality_step_m,
             share,
+            parameters.gauges,
         )
     return sorted(geometry, key=lambda one: one.track_id)

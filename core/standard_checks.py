@@ -17,7 +17,8 @@ from .progress import SILENT, Progress
 from .rails import HEAD_OFF_M, HeadWidths
 from .squares.density import fullest_square
 from .squares.grid import PointSource
-from .standards import RailStandard, closest_standard
+from .standards import Gauge, RailStandard, closest_standard
+from .tracks.widths_by_gauge import width_at
 
 SAMPLE_M = 50.0
 """Half the side of the area whose points show the width of the heads."""
@@ -68,12 +69,11 @@ def warn_of_gauge(request: Request, parameters: Parameters, progress: Progress) 
         return  # reported when the points are sorted
     spacings = measure_spacings(sample)
     measured = spacings.most_common()
-    gauges = (parameters.gauge_m, *parameters.other_gauges_m)
-    tolerance_m = parameters.centerline_tolerance_m
-    if any(spacings.include(one + parameters.head_width_m, tolerance_m) for one in gauges):
+    spacings_m, tolerance_m = [sum(one) for one in parameters.gauges], parameters.centerline_tolerance_m
+    if any(spacings.include(one, tolerance_m) for one in spacings_m):
         return
     for factor, stated, real in zip(FEET, ("metres", "feet"), ("feet", "metres")):
-        if _is_off_by(factor, sample, gauges, parameters):
+        if _is_off_by(factor, sample, spacings_m, parameters):
             progress.warning(
                 f"Rails are {1 / factor:.3g} times as far apart as the gauge: the coordinates are said to be {stated}, "
                 f"are these {real}? Assign a coordinate system that says so."
@@ -85,24 +85,23 @@ def warn_of_gauge(request: Request, parameters: Parameters, progress: Progress) 
     progress.warning(f"Rails are {_in_words(*measured)}; {expected:.0f} mm apart are expected{_question(*measured)}")
 
 
-def _is_off_by(factor: float, xyz: np.ndarray, gauges_m: Sequence[float], parameters: Parameters) -> bool:
+def _is_off_by(factor: float, xyz: np.ndarray, spacings_m: Sequence[float], parameters: Parameters) -> bool:
     """Return whether rails are at a gauge, with heads of the stated width, once coordinates are multiplied."""
     measured = measure_spacings(factor * xyz).most_common()
     if measured is None or abs(measured[1] - parameters.head_width_m) > 2 * HEAD_OFF_M:
         return False
-    spacings_m = [gauge_m + parameters.head_width_m for gauge_m in gauges_m]
     return min(abs(measured[0] - one) for one in spacings_m) <= parameters.centerline_tolerance_m
 
 
-def head_widths(source: PointSource, stated_m: float, progress: Progress) -> HeadWidths:
+def head_widths(source: PointSource, gauges: Sequence[Gauge], progress: Progress) -> HeadWidths:
     """Measure how wide heads look, and warn the user if another width is stated.
 
     Parameters
     ----------
     source : PointSource
         Points of one class; those in the middle of its fullest square are looked at.
-    stated_m : float
-        Stated width of a railhead.
+    gauges : sequence of Gauge
+        As stated; the one that fits the distance of most rails counts.
     progress : Progress
     """
     points = fullest_square(source)
@@ -113,7 +112,8 @@ def head_widths(source: PointSource, stated_m: float, progress: Progress) -> Hea
     place = xyz[np.argmin(np.abs(xyz[:, :2] - np.median(xyz[:, :2], axis=0)).max(axis=1)), :2]
     measured = measure_spacings(xyz[np.abs(xyz[:, :2] - place).max(axis=1) <= SAMPLE_M]).most_common()
     if measured is None:
-        return HeadWidths(float("nan"), stated_m)
+        return HeadWidths(float("nan"), gauges[0][1])
+    stated_m = width_at(measured[0], gauges)
     widths = HeadWidths(measured[1], stated_m)
     if widths.differ:
         seen = f"Heads look {1000 * widths.seen_m:.0f} mm wide, {1000 * stated_m:.0f} mm are stated"

@@ -10,10 +10,14 @@ section 10.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .errors import ParameterError
+
+Gauge = tuple[float, float]
+"""Gauge, and width of a railhead on it, metres; their sum is the distance between the axes of the heads."""
 
 DEFAULT = "EN_60E1_1435"
 CUSTOM, DETECT = "CUSTOM", "DETECT"
@@ -224,6 +228,55 @@ def closest_standard(spacing_m: float, head_width_m: float) -> RailStandard | No
 def _custom(gauge_m: float, head_width_m: float) -> RailStandard:
     label = f"{head_width_m * 1000:g} mm head, {gauge_m * 1000:g} mm"
     return RailStandard(CUSTOM, label, gauge_m, head_width_m)
+
+
+def read_gauges(
+    text: str, what: str, standard: RailStandard, tolerance_m: float, has_parameter: bool = True
+) -> tuple[Gauge, ...]:
+    """Read the gauges that tracks may have: that of the standard, and those of a text such as "1000/66;1067".
+
+    Parameters
+    ----------
+    text : str
+        Millimetres. The width of the railhead may follow a gauge; it is that of the standard otherwise.
+    what : str
+        Name of the parameter or option, for the error.
+    standard : RailStandard
+    tolerance_m : float
+    has_parameter : bool
+        See `distinct_gauges`.
+
+    Raises
+    ------
+    ParameterError
+        The text is something else, a number is outside the range of railways, or gauges can't be distinguished.
+
+    Examples
+    --------
+    >>> read_gauges("1000/66; 1067", "OTHER_GAUGES", STANDARDS["EN_60E1_1435"], 0.05)
+    ((1.435, 0.072), (1.0, 0.066), (1.067, 0.072))
+    """
+    words = [word for word in re.split(r"[;,\s]+", re.sub(r"\s*/\s*", "/", text)) if word]
+    numbers = [[float(part) for part in word.split("/")] if _PAIR.fullmatch(word) else [0.0] for word in words]
+    if not all(all(pair) for pair in numbers):
+        raise ParameterError(
+            f'{what} "{text}" must be millimetres such as 1000;1067, or 1000/66 with the width of the railhead.'
+        )
+    heads_m = {standard.gauge_m: standard.head_width_m}
+    for gauge_mm, *head_mm in numbers:
+        for one in head_mm:
+            _check("railhead width", one, HEAD_WIDTH_RANGE_MM)
+        head_m = head_mm[0] / 1000 if head_mm else heads_m.get(gauge_mm / 1000, standard.head_width_m)
+        if heads_m.setdefault(gauge_mm / 1000, head_m) != head_m:
+            raise ParameterError(
+                f"Tracks of {gauge_mm:g} mm gauge can't have railheads of {1000 * heads_m[gauge_mm / 1000]:g} and "
+                f"{1000 * head_m:g} mm: give one width."
+            )
+    return tuple((one, heads_m[one]) for one in distinct_gauges(tuple(heads_m), tolerance_m, has_parameter))
+
+
+_PAIR = re.compile(r"\d+(\.\d+)?(/\d+(\.\d+)?)?")
+"""A gauge, and maybe the width of the railhead."""
 
 
 def distinct_gauges(gauges_m: Sequence[float], tolerance_m: float, has_parameter: bool = True) -> tuple[float, ...]:

@@ -19,7 +19,7 @@ from .frpdf.engine import Engine, make_engine
 from .frpdf.models import choose
 from .frpdf.weights import load_arrays
 from .heads.edges import STATION_STEP_M
-from .heads.elevation import ElevationParameters, elevate, flat_rails, numbered
+from .heads.elevation import ElevationParameters, elevate, flat_rail, flat_rails, numbered
 from .heads.refinement import refine
 from .heads.smoothing_check import warn_if_out_of_reach
 from .heads.strips import rows_of, strips_along
@@ -39,6 +39,7 @@ from .standards import distinct_gauges
 from .tracks.centerlines import CenterlineParameters, build_centerlines
 from .tracks.jumps import find_steps
 from .tracks.lone import assign_tracks
+from .tracks.widths_by_gauge import widths_by_gauge
 from .vectorize import vectorize
 
 MIN_STRIPS_APART_M = 5.0
@@ -112,7 +113,7 @@ def clean_square(
     cell_m = cell_size(parameters.gauge_m, parameters.head_width_m)
     margin_m = max_passes(parameters.passes) * MARGIN * cell_m
     points = source.near(square, margin_m + SURROUNDINGS_M).xyz
-    spacings_m = [gauge_m + parameters.head_width_m for gauge_m in (parameters.gauge_m, *parameters.other_gauges_m)]
+    spacings_m = [gauge_m + head_m for gauge_m, head_m in parameters.gauges]
     seen = np.concatenate([points[:, :2], drawn(points, spacings_m, cell_m)])
     raster = rasterize(seen[square.holds(seen, margin_m)], cell_m)
     return own_tiles(clean(raster, engine, parameters.passes, progress), square)
@@ -291,9 +292,11 @@ def _all_vertices(
     )
     if points is None:
         return flat_rails(network, class_code, elevation), rows_of((), ())
-    network = refine(network, points, parameters.head_width_m, parameters.smoothing_xy_m, refining, elevation.align)
-    strips = strips_along(network.lines, points, parameters.head_width_m)
-    return elevate(network, points, elevation, elevating, strips), rows_of(network.lines, strips)
+    drawn = [flat_rail(line, class_code) for line in network.lines]
+    heads = widths_by_gauge(drawn, parameters.gauges, parameters.centerline_tolerance_m)
+    network = refine(network, points, heads, parameters.smoothing_xy_m, refining, elevation.align)
+    strips = strips_along(network.lines, points, heads)
+    return elevate(network, points, elevation, elevating, strips, heads), rows_of(network.lines, strips)
 
 
 def _finished(rails: Sequence[RailLine], parameters: Parameters, first_id: int, progress: Progress) -> list[RailLine]:
@@ -429,13 +432,14 @@ def _tracks_of_class(rails: Sequence[RailLine], parameters: Parameters, progress
         smoothing_m=parameters.smoothing_xy_m,
         min_length_m=parameters.min_length_m,
     )
-    gauges = distinct_gauges((parameters.gauge_m, *parameters.other_gauges_m), parameters.centerline_tolerance_m)
+    distinct = distinct_gauges(parameters.gauges_m, parameters.centerline_tolerance_m)
+    gauges = [(gauge_m, dict(parameters.gauges)[gauge_m]) for gauge_m in distinct]
     centerlines: list[Centerline] = []
     errors: list[NoTrackError] = []
-    for gauge_m, step in zip(gauges, progress.split(len(gauges))):
-        settings = replace(settings, other_gauges_m=tuple(other for other in gauges if other != gauge_m))
+    for one, step in zip(gauges, progress.split(len(gauges))):
+        settings = replace(settings, other_spacings_m=tuple(sum(other) for other in gauges if other != one))
         try:
-            centerlines += build_centerlines(rails, gauge_m, parameters.head_width_m, settings, step)
+            centerlines += build_centerlines(rails, *one, settings, step)
         except NoTrackError as error:
             errors.append(error)
     if errors and not centerlines:

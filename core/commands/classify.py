@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> None:
     if args.workers < 1:
         raise ParameterError(f"--workers must be 1 or more, not {args.workers}.")
     standard = resolve(args.standard, args.gauge, args.head_width)
-    gauges_m = gauges_of(args, standard)
+    gauges_m = tuple(gauge_m for gauge_m, _ in gauges_of(args, standard))
     if args.only_guided and args.guide is None:
         raise ParameterError("--only-guided needs lines to compare tracks with: give --guide.")
     choice = Choice(args.rail_class, args.rails_only, not args.no_reset)

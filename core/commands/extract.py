@@ -54,6 +54,7 @@ WITH_OWN_OPTION = (
     "device",
     "model",
     "other_gauges_m",
+    "other_heads_m",
     "quality_step_m",
     "square_tiles",
     "keep_cleaned",
@@ -162,7 +163,7 @@ def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameter
         No weights fit the standard.
     """
     choose(standard.gauge_m, standard.head_width_m, args.model)
-    gauges_m = gauges_of(args, standard, args.centerline_tolerance)
+    gauges = gauges_of(args, standard, args.centerline_tolerance)
     numbers = {field.name: getattr(args, _option(field.name)[2:].replace("-", "_")) for field in _number_fields()}
     workers = 0 if args.workers is None else args.workers - 1
     for name, value in {**numbers, "iterations": args.iterations, "step": args.step, "workers": workers}.items():
@@ -177,13 +178,12 @@ def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameter
         args.engine,
         args.device,
         args.model,
-        other_gauges_m=gauges_m[1:],
         quality_step_m=args.step if args.quality or args.findings or args.report else None,
         square_tiles=args.square_tiles,
         keep_cleaned=args.cleaned is not None,
         strips=args.strips,
         **numbers,
-    )
+    ).with_gauges(gauges[1:])
 
 
 def _outputs(args: argparse.Namespace) -> dict[str, Destination]:
@@ -237,7 +237,7 @@ def _run_in(
     print(f"{len(network.rails)} rails, {sum(rail.length_m for rail in network.rails) / 1000:.3f} km")
     print(f"{len(network.centerlines)} centerlines, {sum(one.length_m for one in network.centerlines) / 1000:.3f} km")
     if network.geometry:
-        print(summary(network, (standard.gauge_m, *parameters.other_gauges_m))[0])
+        print(summary(network, parameters.gauges_m)[0])
     for failure in network.failures:
         print(failure, file=sys.stderr)
     return INCOMPLETE if network.failures else 0
@@ -290,14 +290,14 @@ def _write(
     if "quality" in outputs:
         layers.append(stations_layer("quality", outputs["quality"], network.geometry))
     if "findings" in outputs:
-        found = list_findings(network, (standard.gauge_m, *parameters.other_gauges_m))
+        found = list_findings(network, parameters.gauges_m)
         layers.append(lines_layer("findings", outputs["findings"], FINDING_FIELDS, found))
     of_files = {
         layer.destination.file: [one for one in layers if one.destination is layer.destination] for layer in layers
     }
     writers: list[Callable[[], None]] = [partial(write_layers, same, network.frame) for same in of_files.values()]
     if "report" in outputs:
-        origin = Origin(tuple(args.tiles), standard, parameters.other_gauges_m, args.command_line, parameters)
+        origin = Origin(tuple(args.tiles), standard, parameters.gauges[1:], args.command_line, parameters)
         writers.append(lambda: outputs["report"].write_text(origin.report(network)))
     if "cleaned" in outputs and any(raster.tiles for raster in network.cleaned):
         writers.append(lambda: _write_cleaned(network, outputs["cleaned"], standard, extent, parameters.model))

@@ -13,7 +13,7 @@ from ..clouds.points import Request
 from ..errors import ParameterError
 from ..parameters import Parameters
 from ..progress import Progress
-from ..standards import DEFAULT, RailStandard, distinct_gauges
+from ..standards import DEFAULT, Gauge, RailStandard, read_gauges
 
 TILES_HELP = (
     "point clouds, virtual point clouds, folders of tiles, or patterns such as tiles/*.laz; @FILE reads the names, one "
@@ -28,7 +28,8 @@ def add_cloud_arguments(parser: argparse._ActionsContainer) -> None:
     parser.add_argument(
         "--head-width", type=float, metavar="MM", help="railhead width, instead of that of the standard"
     )
-    parser.add_argument("--other-gauges", default="", metavar="MM", help="further gauges to pair, such as 1000;1067")
+    text = "further gauges to pair, such as 1000;1067, or 1000/66 with the width of the railhead"
+    parser.add_argument("--other-gauges", default="", metavar="MM", help=text)
     parser.add_argument("--crs", help="coordinate system of tiles that state none, such as EPSG:25832")
     parser.add_argument(
         "--extent",
@@ -69,8 +70,8 @@ def within_mask(request: Request, path: Path | None) -> Request:
     return replace(request, mask=shapes_module("--mask").read_mask(path, request.zero.crs_wkt))
 
 
-def gauges_of(args: argparse.Namespace, standard: RailStandard, tolerance_m: float | None = None) -> tuple[float, ...]:
-    """Return the gauge of the standard and those of `--other-gauges`, metres.
+def gauges_of(args: argparse.Namespace, standard: RailStandard, tolerance_m: float | None = None) -> tuple[Gauge, ...]:
+    """Return the gauge of the standard and those of `--other-gauges`.
 
     Parameters
     ----------
@@ -82,11 +83,10 @@ def gauges_of(args: argparse.Namespace, standard: RailStandard, tolerance_m: flo
     Raises
     ------
     ParameterError
-        The text holds something else than numbers, or the gauges can't be distinguished.
+        The text contains something other than gauges, or they can't be distinguished.
     """
-    others_mm = numbers_in(args.other_gauges, "--other-gauges", float)
     own_m = Parameters.centerline_tolerance_m if tolerance_m is None else tolerance_m
-    return distinct_gauges((standard.gauge_m, *(mm / 1000 for mm in others_mm)), own_m, tolerance_m is not None)
+    return read_gauges(args.other_gauges, "--other-gauges", standard, own_m, tolerance_m is not None)
 
 
 def numbers_in(text: str, option: str, kind: type) -> tuple:

@@ -6,6 +6,7 @@ See docs/method.md section 6.2.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Union
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, uniform_filter1d
@@ -57,6 +58,15 @@ HALF_RANGE_BINS = HALF_HEAD_BINS + MAX_SHIFT_BINS + 2 + BLURRED_BINS + RIM_BINS
 
 EDGE_ROUNDS = 2
 """The first round finds out how the scanner sees the head, the second uses the edges that count."""
+
+
+Widths = Union[float, np.ndarray]
+"""Width of the heads of all lines, or of each line, (n,) metres."""
+
+
+def widest(head_width_m: Widths) -> float:
+    """Return the width of the widest head."""
+    return float(np.max(head_width_m, initial=0.0))
 
 
 def search_distance(head_width_m: float) -> float:

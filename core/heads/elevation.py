@@ -18,7 +18,7 @@ from ..parameters import Parameters
 from ..polyline import Feet, interpolate, length_along, project, resample, starts_at_its_end
 from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
-from .edges import search_distance, stations_along
+from .edges import Widths, search_distance, stations_along, widest
 from .flank import find_flank
 from .level import AXIS_SHARE, rough_level
 from .neighbours import free_edges
@@ -90,6 +90,7 @@ def elevate(
     parameters: ElevationParameters,
     progress: Progress = SILENT,
     strips: Sequence[StripOffsets | None] = (),
+    head_width_m: Widths | None = None,
 ) -> tuple[RailLine, ...]:
     """Add heights and figures to the smoothed plan lines of a network.
 
@@ -103,20 +104,23 @@ def elevate(
     progress : Progress
     strips : sequence of StripOffsets or None
         For each line, from `strips.strips_along`; empty if the points are of one strip.
+    head_width_m : float or (n,) array, optional
+        Width of the heads, of all lines or of each; that of the parameters by default.
 
     Returns
     -------
     tuple of RailLine
         In order of their starts from west to east, numbered from 1; without lines that are short or have no points.
     """
-    reach_m = search_distance(parameters.head_width_m)
-    feet = project(network.lines, points.xyz[:, :2], reach_m, progress.span(0.0, 0.6))
+    widths = parameters.head_width_m if head_width_m is None else head_width_m
+    feet = project(network.lines, points.xyz[:, :2], search_distance(widest(widths)), progress.span(0.0, 0.6))
     free_ends = (network.degrees() == 1)[network.ends]
-    edges = free_edges(network.lines, parameters.head_width_m)
+    edges = free_edges(network.lines, widest(widths))
+    of_lines = [replace(parameters, head_width_m=float(one)) for one in np.broadcast_to(widths, len(network.lines))]
     rails = []
     for number, line in enumerate(progress.span(0.6, 1.0).follow(network.lines)):
         own = strips[number] if strips else None
-        rail = _measured(line, free_ends[number], edges[number], feet.of(number), points, parameters, own)
+        rail = _measured(line, free_ends[number], edges[number], feet.of(number), points, of_lines[number], own)
         if rail is not None and rail.length_m >= parameters.min_length_m:
             rails.append(replace(rail, class_code=points.class_code))
     return numbered(rails)
@@ -136,13 +140,14 @@ def flat_rails(network: LineNetwork, class_code: int, parameters: ElevationParam
     tuple of RailLine
         As from `elevate`, but with heights of NaN and figures of support of 0 or NaN.
     """
-    rails = []
-    for line in network.lines:
-        xyz = np.column_stack([line, np.full(len(line), np.nan)])
-        rail = RailLine(xyz, 0, class_code, points=0, resid_mm=np.nan, sigma_mm=np.nan, bridged_m=np.nan)
-        if rail.length_m >= parameters.min_length_m:
-            rails.append(rail)
-    return numbered(rails)
+    rails = (flat_rail(line, class_code) for line in network.lines)
+    return numbered([rail for rail in rails if rail.length_m >= parameters.min_length_m])
+
+
+def flat_rail(line: np.ndarray, class_code: int) -> RailLine:
+    """Make a rail without heights from a line in plan, (n, 2)."""
+    xyz = np.column_stack([line, np.full(len(line), np.nan)])
+    return RailLine(xyz, 0, class_code, points=0, resid_mm=np.nan, sigma_mm=np.nan, bridged_m=np.nan)
 
 
 def numbered(rails: Sequence[RailLine]) -> tuple[RailLine, ...]:
@@ -223,7 +228,7 @@ def _measured(
 def measure_again(
     rails: Sequence[RailLine],
     points: RailPoints,
-    head_width_m: float,
+    head_width_m: Widths,
     smoothing_z_m: float,
     progress: Progress = SILENT,
     align: bool = False,
@@ -234,7 +239,8 @@ def measure_again(
     ----------
     rails : sequence of RailLine
     points : RailPoints
-    head_width_m : float
+    head_width_m : float or (n,) array
+        Width of the heads, of all rails or of each.
     smoothing_z_m : float
         Sigma of PAEK for the heights.
     progress : Progress
@@ -247,17 +253,20 @@ def measure_again(
         In the order given. A rail without points keeps its heights and is a gap from end to end.
     """
     plans = [resample(rail.xyz[:, :2], smoothing_z_m / STATIONS_PER_SIGMA)[0] for rail in rails]
-    feet = project(plans, points.xyz[:, :2], search_distance(head_width_m), progress.span(0.0, 0.7))
+    feet = project(plans, points.xyz[:, :2], search_distance(widest(head_width_m)), progress.span(0.0, 0.7))
     # Lines from a file are only known to be on their heads, so the head width takes the place of the cell size.
-    parameters = ElevationParameters(head_width_m, smoothing_z_m=smoothing_z_m, cell_m=head_width_m, align=align)
-    edges = free_edges(plans, head_width_m)
+    of_rails = [
+        ElevationParameters(float(one), smoothing_z_m=smoothing_z_m, cell_m=float(one), align=align)
+        for one in np.broadcast_to(head_width_m, len(rails))
+    ]
+    edges = free_edges(plans, widest(head_width_m))
     strips = measure_strips(plans, feet, points, edges, head_width_m)
     measured = []
     for number, rail in enumerate(progress.span(0.7, 1.0).follow(rails)):
         own = feet.of(number)
-        again = _measured(plans[number], NO_FREE_ENDS, edges[number], own, points, parameters, strips[number])
+        again = _measured(plans[number], NO_FREE_ENDS, edges[number], own, points, of_rails[number], strips[number])
         if again is None:
-            measured.append(_unsupported(rail, parameters))
+            measured.append(_unsupported(rail, of_rails[number]))
         else:
             measured.append(replace(rail, xyz=again.xyz, gaps=again.gaps, support=_with_strips_of(rail, again.support)))
     return measured

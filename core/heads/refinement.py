@@ -19,7 +19,7 @@ from ..parameters import Parameters
 from ..polyline import Feet, interpolate, left_normals, length_along, project
 from ..progress import SILENT, Progress
 from .branch_starts import APART_HEADS, slide_branches
-from .edges import HALF_HEAD_BINS, histograms, mean_offsets, middles, search_distance
+from .edges import HALF_HEAD_BINS, Widths, histograms, mean_offsets, middles, search_distance, widest
 from .flank import Flank, find_flank
 from .level import MIN_ON_HEAD, is_blended, on_top
 from .neighbours import free_edges
@@ -68,7 +68,7 @@ which a round removes half."""
 def refine(
     network: LineNetwork,
     points: RailPoints,
-    head_width_m: float,
+    head_width_m: Widths,
     smoothing_m: float = Parameters.smoothing_xy_m,
     progress: Progress = SILENT,
     align: bool = False,
@@ -80,7 +80,8 @@ def refine(
     network : LineNetwork
         Smoothed lines within 3 cm of their rails.
     points : RailPoints
-    head_width_m : float
+    head_width_m : float or (n,) array
+        Width of the heads, of all lines or of each.
     smoothing_m : float
         Sigma of PAEK for the shifts along a line.
     progress : Progress
@@ -96,10 +97,10 @@ def refine(
     rounds = SURE_HEADS if len(network.passes) else SURE_HEADS[:2]
     more = ALIGNED_ROUNDS if align and points.strips is not None else 0
     by_x = points.xyz[np.argsort(points.xyz[:, 0])] if len(network.passes) else points.xyz
-    shares = progress.split(len(rounds) + more)
+    shares, widest_m = progress.split(len(rounds) + more), widest(head_width_m)
     for number, (sure, share) in enumerate(zip(rounds, shares)):
         network = _shifted(network, points, head_width_m, smoothing_m, share, by_outline=number > 0)
-        network = slide_branches(network, by_x, head_width_m, sure * head_width_m)
+        network = slide_branches(network, by_x, widest_m, sure * widest_m)
     for share in shares[len(rounds) :]:
         network = _shifted(network, points, head_width_m, smoothing_m, share, align=True)
     return network
@@ -108,20 +109,21 @@ def refine(
 def _shifted(
     network: LineNetwork,
     points: RailPoints,
-    head_width_m: float,
+    widths: Widths,
     smoothing_m: float,
     progress: Progress,
     by_outline: bool = True,
     align: bool = False,
 ) -> LineNetwork:
     """Move every line to the middle of its head, and the nodes with them."""
-    feet = project(network.lines, points.xyz[:, :2], search_distance(head_width_m), progress.span(0.0, 0.7))
-    edges = free_edges(network.lines, head_width_m)
-    strips = measure_strips(network.lines, feet, points, edges, head_width_m) if align else None
+    feet = project(network.lines, points.xyz[:, :2], search_distance(widest(widths)), progress.span(0.0, 0.7))
+    edges = free_edges(network.lines, widest(widths))
+    strips = measure_strips(network.lines, feet, points, edges, widths) if align else None
+    of_lines = np.broadcast_to(widths, len(network.lines))
     free_ends = (network.degrees() == 1)[network.ends]
     lines = []
     for number, line in enumerate(progress.span(0.7, 1.0).follow(network.lines)):
-        mine = feet.of(number)
+        mine, head_width_m = feet.of(number), float(of_lines[number])
         z = points.xyz[mine.point, 2]
         if strips is not None:
             mine, z = aligned(strips[number], mine, z, points)

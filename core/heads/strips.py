@@ -19,7 +19,7 @@ from ..parameters import Parameters
 from ..polyline import Feet, distance_to, interpolate, left_normals, length_along, project
 from ..progress import SILENT, Progress
 from ..rails import Support
-from .edges import HALF_HEAD_BINS, histograms, middles, search_distance
+from .edges import HALF_HEAD_BINS, Widths, histograms, middles, search_distance, widest
 from .level import on_top
 from .neighbours import free_edges
 from .top import find_top
@@ -152,14 +152,14 @@ class StripOffsets:
 
 
 def strips_along(
-    lines: Sequence[np.ndarray], points: RailPoints, head_width_m: float, progress: Progress = SILENT
+    lines: Sequence[np.ndarray], points: RailPoints, head_width_m: Widths, progress: Progress = SILENT
 ) -> list[StripOffsets | None]:
     """Measure the offsets of the strips along lines within 3 cm of their rails; see `measure_strips`."""
     if points.strips is None:
         return [None] * len(lines)
     projecting, measuring = progress.divide((0.5, 0.5))
-    feet = project(lines, points.xyz[:, :2], search_distance(head_width_m), projecting)
-    return measure_strips(lines, feet, points, free_edges(lines, head_width_m), head_width_m, measuring)
+    feet = project(lines, points.xyz[:, :2], search_distance(widest(head_width_m)), projecting)
+    return measure_strips(lines, feet, points, free_edges(lines, widest(head_width_m)), head_width_m, measuring)
 
 
 def measure_strips(
@@ -167,7 +167,7 @@ def measure_strips(
     feet: Feet,
     points: RailPoints,
     edges: Sequence[np.ndarray],
-    head_width_m: float,
+    head_width_m: Widths,
     progress: Progress = SILENT,
 ) -> list[StripOffsets | None]:
     """Measure the offsets of the strips along lines.
@@ -181,7 +181,8 @@ def measure_strips(
     points : RailPoints
     edges : sequence of (2, s) bool arrays
         See `neighbours.free_edges`.
-    head_width_m : float
+    head_width_m : float or (n,) array
+        Width of the heads, of all lines or of each.
     progress : Progress
 
     Returns
@@ -192,10 +193,11 @@ def measure_strips(
     if points.strips is None:
         return [None] * len(lines)
     found: list[StripOffsets | None] = []
+    widths_m = np.broadcast_to(head_width_m, len(lines))
     for number, line in enumerate(progress.follow(lines)):
         mine = feet.of(number)
         z, strips = points.xyz[mine.point, 2], points.strips[mine.point]
-        found.append(_offsets(line, mine, z, strips, edges[number], head_width_m))
+        found.append(_offsets(line, mine, z, strips, edges[number], float(widths_m[number])))
     return found
 
 

@@ -10,10 +10,10 @@ from .. import VERSION
 from ..clouds.crs import parse_crs
 from ..parameters import Parameters
 from ..rails import RailNetwork
-from ..standards import RailStandard
+from ..standards import Gauge, RailStandard
 from .page import build_page
 
-STATED_APART = ("gauge_m", "head_width_m", "other_gauges_m", "engine", "device", "keep_cleaned")
+STATED_APART = ("gauge_m", "head_width_m", "other_gauges_m", "other_heads_m", "engine", "device", "keep_cleaned")
 """Parameters that the report states elsewhere, or that change no line."""
 
 INTERFACE = {"passes": "iterations", "quality_step": "step"}
@@ -29,7 +29,7 @@ class Origin:
     paths : tuple of Path
         Files or folders of the cloud.
     standard : RailStandard
-    other_gauges_m : tuple of float
+    other_gauges : tuple of Gauge
     command : str
         Repeats the run.
     parameters : Parameters or None
@@ -40,7 +40,7 @@ class Origin:
 
     paths: tuple[Path, ...]
     standard: RailStandard
-    other_gauges_m: tuple[float, ...]
+    other_gauges: tuple[Gauge, ...]
     command: str
     parameters: Parameters | None = None
     time: datetime = field(default_factory=datetime.now)
@@ -48,7 +48,7 @@ class Origin:
     @property
     def gauges_m(self) -> tuple[float, ...]:
         """Gauges that tracks may have."""
-        return self.standard.gauge_m, *self.other_gauges_m
+        return self.standard.gauge_m, *(gauge_m for gauge_m, _ in self.other_gauges)
 
     def report(self, network: RailNetwork) -> str:
         """Build the report on a network with its track geometry, an HTML document."""
@@ -59,12 +59,22 @@ class Origin:
             "Version": f"Rail Extract {VERSION}",
             "Rail": self.standard.label,
             "Gauge": ", ".join(f"{1000 * gauge_m:g} mm" for gauge_m in self.gauges_m),
-            "Railhead width": f"{1000 * self.standard.head_width_m:g} mm",
+            "Railhead width": ", ".join(self._head_widths()),
             "Coordinate system": _title(network.frame.crs_wkt),
             "Parameters": _stated(self.parameters) if self.parameters else "",
             "Command": self.command,
         }
         return build_page(network, self.gauges_m, source, facts)
+
+    def _head_widths(self) -> list[str]:
+        """Write the width of the railheads, and those of gauges where it differs."""
+        width_m = self.standard.head_width_m
+        others = [
+            f"{1000 * own_m:g} mm on {1000 * gauge_m:g} mm gauge"
+            for gauge_m, own_m in self.other_gauges
+            if own_m != width_m
+        ]
+        return [f"{1000 * width_m:g} mm", *others]
 
 
 def _stated(parameters: Parameters) -> str:

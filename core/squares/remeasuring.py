@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..heads.edges import Widths
 from ..heads.elevation import measure_again
 from ..lines.smoothing import GAP_SIGMAS
 from ..lines.uniting import united
@@ -37,7 +38,7 @@ class _Section:
 def measure_rails(
     rails: Sequence[RailLine],
     sources: Sequence[PointSource],
-    head_width_m: float,
+    head_width_m: Widths,
     runner: Runner,
     progress: Progress = SILENT,
     align: bool = False,
@@ -50,7 +51,8 @@ def measure_rails(
         In the frame of the sources.
     sources : sequence of PointSource
         One per class; rails of other classes remain as they are.
-    head_width_m : float
+    head_width_m : float or (n,) array
+        Width of the heads, of all rails or of each.
     runner : Runner
         Executes the measurement in each square; where it fails, rails keep the heights and support that they have.
     progress : Progress
@@ -62,12 +64,13 @@ def measure_rails(
     list of RailLine
         In the order given.
     """
-    measured = list(rails)
+    measured, widths_m = list(rails), np.broadcast_to(head_width_m, len(rails))
     for source, share in zip(sources, progress.split(len(sources))):
         numbers = [number for number, rail in enumerate(rails) if rail.class_code == source.class_code]
         squares = lay_out(sources, source)
         measure = _measure_undivided if squares[0].is_whole_plane else _measure_in_squares
-        again = measure([rails[number] for number in numbers], source, squares, (head_width_m, align), runner, share)
+        own = widths_m[numbers]
+        again = measure([rails[number] for number in numbers], source, squares, (own, align), runner, share)
         for number, rail in zip(numbers, again):
             measured[number] = rail
     return measured
@@ -77,7 +80,7 @@ def _measure_undivided(
     rails: Sequence[RailLine],
     source: PointSource,
     squares: Sequence[Square],
-    settings: tuple[float, bool],
+    settings: tuple[np.ndarray, bool],
     runner: Runner,
     progress: Progress,
 ) -> Sequence[RailLine]:
@@ -89,18 +92,19 @@ def _measure_in_squares(
     rails: Sequence[RailLine],
     source: PointSource,
     squares: Sequence[Square],
-    settings: tuple[float, bool],
+    settings: tuple[np.ndarray, bool],
     runner: Runner,
     progress: Progress,
 ) -> list[RailLine]:
-    by_key = {square.key: square for square in squares}
+    by_key, (widths_m, align) = {square.key: square for square in squares}, settings
     sections = _sections_by_square(rails, source)
     tasks = {}
     for key in sorted(sections):
         square = by_key.setdefault(key, Square.on_grid(key, source.side_m, source.frame))
         pieces = tuple(_with_context(rails[one.number], one, square, source) for one in sections[key])
         label = f"Measuring the rails of class {source.class_code} in square {key}"
-        tasks[key] = Task(label, _measure, (source.part(square), square, pieces, *settings))
+        own = widths_m[[one.number for one in sections[key]]]
+        tasks[key] = Task(label, _measure, (source.part(square), square, pieces, own, align))
     parts: list[list[tuple[float, RailLine]]] = [[] for _ in rails]
     for key, pieces in runner.run(tasks, progress):
         shift = by_key[key].frame.shift_to(source.frame)
@@ -112,11 +116,16 @@ def _measure_in_squares(
 
 
 def _measure(
-    source: PointSource, square: Square, rails: Sequence[RailLine], head_width_m: float, align: bool, context: Context
+    source: PointSource,
+    square: Square,
+    rails: Sequence[RailLine],
+    widths_m: np.ndarray,
+    align: bool,
+    context: Context,
 ) -> tuple[RailLine, ...]:
     """Measure the rails of a square, in its frame; a task."""
     points = source.near(square, CONTEXT_M)
-    return tuple(measure_again(rails, points, head_width_m, PROFILE_SIGMA_M, context.progress, align))
+    return tuple(measure_again(rails, points, widths_m, PROFILE_SIGMA_M, context.progress, align))
 
 
 def _with_context(rail: RailLine, section: _Section, square: Square, source: PointSource) -> RailLine:

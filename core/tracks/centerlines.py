@@ -45,15 +45,15 @@ class CenterlineParameters:
         Sigma of PAEK in plan.
     min_length_m : float
         Shorter centerlines are dropped.
-    other_gauges_m : tuple of float
-        Other gauges for which centerlines are made: rails whose distance is closer to one of them are left to it.
+    other_spacings_m : tuple of float
+        Distances of the rails of other gauges for which centerlines are made: rails closer to one are left to it.
     """
 
     tolerance_m: float = Parameters.centerline_tolerance_m
     max_gap_m: float = Parameters.max_gap_m
     smoothing_m: float = Parameters.smoothing_xy_m
     min_length_m: float = Parameters.min_length_m
-    other_gauges_m: tuple[float, ...] = ()
+    other_spacings_m: tuple[float, ...] = ()
 
 
 def build_centerlines(
@@ -85,8 +85,8 @@ def build_centerlines(
         Rails are parallel, but at another spacing.
     """
     rails = _in_order(rails)
-    others = parameters.other_gauges_m
-    pairs = pair_rails(rails, gauge_m, head_width_m, parameters.tolerance_m, others, progress.span(0.0, 0.5))
+    others_m = parameters.other_spacings_m
+    pairs = pair_rails(rails, gauge_m, head_width_m, parameters.tolerance_m, others_m, progress.span(0.0, 0.5))
     if not pairs:
         _refuse_other_spacing(rails, gauge_m, head_width_m, parameters.tolerance_m)
     chains = chain_pairs(rails, pairs, parameters.max_gap_m, parameters.tolerance_m)

@@ -14,8 +14,10 @@ from ..lines.smoothing import smooth_line, smooth_profile
 from ..polyline import distance_to, interpolate, left_normals, length_along, resample
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine, TrackGeometry, cell_borders
+from ..standards import Gauge
 from .midline import Meeting, Side, bridged_steps
 from .parallels import most_common_spacing
+from .widths_by_gauge import width_at
 
 MEETING_STEP_M = 0.25
 """Spacing of the stations at which both rails are met."""
@@ -49,6 +51,7 @@ def measure_track_geometry(
     head_width_m: float,
     step_m: float = 1.0,
     progress: Progress = SILENT,
+    gauges: Sequence[Gauge] = (),
 ) -> tuple[TrackGeometry, ...]:
     """Measure tracks at equal distances along their centerlines.
 
@@ -64,6 +67,8 @@ def measure_track_geometry(
     step_m : float
         Distance between stations; the last station is the end of the track.
     progress : Progress
+    gauges : sequence of Gauge
+        Gauges that tracks may have, if the width of the heads depends on them.
 
     Returns
     -------
@@ -71,7 +76,13 @@ def measure_track_geometry(
         One per centerline, in the order given.
     """
     track_rails = _TrackRails(rails)
-    return tuple(_measure(line, track_rails, head_width_m, step_m) for line in progress.follow(centerlines))
+    measured = []
+    for line in progress.follow(centerlines):
+        width_m = head_width_m
+        if gauges and np.isfinite(line.gauge_mm):
+            width_m = width_at(line.gauge_mm / 1000 + head_width_m, gauges)
+        measured.append(_measure(line, track_rails, width_m, step_m))
+    return tuple(measured)
 
 
 class _TrackRails:

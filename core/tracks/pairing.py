@@ -93,7 +93,7 @@ def pair_rails(
     gauge_m: float,
     head_width_m: float,
     tolerance_m: float = 0.05,
-    other_gauges_m: Sequence[float] = (),
+    other_spacings_m: Sequence[float] = (),
     progress: Progress = SILENT,
 ) -> tuple[RailPair, ...]:
     """Find the sections along which two rails of one class are at gauge (docs/method.md section 8.3).
@@ -108,8 +108,8 @@ def pair_rails(
         Their sum is the distance between the rail lines.
     tolerance_m : float
         Maximum deviation from that distance.
-    other_gauges_m : sequence of float
-        Other gauges for which rails are paired: a match that is closer to one of them is left to it.
+    other_spacings_m : sequence of float
+        Distances at which rails are paired for other gauges: a match that is closer to one of them is left to it.
     progress : Progress
 
     Returns
@@ -123,11 +123,10 @@ def pair_rails(
     reach_m = max(MAX_SPACING_M, spacing + 2 * tolerance_m)
     parallels = find_parallels(rails, reach_m, progress.span(0.0, 0.3))
     candidates = find_candidates(parallels, spacing, tolerance_m)
-    others_m = [gauge + head_width_m for gauge in other_gauges_m]
     matches: list[_Match] = []
     for section in progress.span(0.3, 1.0).follow(candidates):
         found = _match(rails, section, spacing, tolerance_m)
-        matches.extend(match for match in found if _is_nearest(match, section, spacing, others_m))
+        matches.extend(match for match in found if _is_nearest(match, section, spacing, other_spacings_m))
     # What wanders goes first: it would make the track next to it look like a ghost.
     selected = _select(matches)
     steady = _without_rivals(selected, [_misfit_m(rails, match, spacing)[1] for match in selected])

@@ -8,7 +8,7 @@ from typing import Any
 from qgis.core import QgsProcessingContext
 
 from ...core.progress import Progress
-from ...core.standards import RailStandard
+from ...core.standards import Gauge, RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
@@ -25,7 +25,7 @@ class Job:
     """The values of the parameters."""
 
     standard: RailStandard
-    other_gauges_m: tuple[float, ...]
+    other_gauges: tuple[Gauge, ...]
 
 
 class BuildTrackCenterlines(RailAlgorithm):
@@ -71,7 +71,7 @@ class BuildTrackCenterlines(RailAlgorithm):
         values = ParameterValues(self, parameters, context)
         standard = values.standard()
         values.lines("INPUT")
-        return Job(standard, values.other_gauges_m(standard))
+        return Job(standard, values.other_gauges(standard))
 
     def compute(
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
@@ -82,7 +82,7 @@ class BuildTrackCenterlines(RailAlgorithm):
 
         values = ParameterValues(self, parameters, context)
         rails, frame = read_rails(values.lines("INPUT"), progress.span(0, READING))
-        settings = values.settings(job.standard, job.other_gauges_m)
+        settings = values.settings(job.standard, job.other_gauges)
         tracks = tracks_of(rails, settings, progress.span(READING, 1))
         progress.check()
         rest = (frame, parameters, context)

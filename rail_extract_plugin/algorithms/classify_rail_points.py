@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from qgis.core import QgsProcessingContext
 
 from ...core.progress import Estimating, Progress
-from ...core.standards import SEARCHED_CLASSES, RailStandard
+from ...core.standards import SEARCHED_CLASSES, Gauge, RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
@@ -26,7 +26,7 @@ class Job:
 
     cloud: CloudSource
     standard: RailStandard
-    other_gauges_m: tuple[float, ...]
+    other_gauges: tuple[Gauge, ...]
     class_code: int
     output: Path
     guide: tuple[np.ndarray, ...]
@@ -80,7 +80,7 @@ class ClassifyRailPoints(RailAlgorithm):
         job = Job(
             cloud,
             standard,
-            values.other_gauges_m(standard),
+            values.other_gauges(standard),
             int(values.number("RAIL_CLASS")),
             output,
             values.guide(cloud),
@@ -98,7 +98,7 @@ class ClassifyRailPoints(RailAlgorithm):
         from ...core.tasks import InTurn
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
-        gauges_m = (job.standard.gauge_m, *job.other_gauges_m)
+        gauges_m = (job.standard.gauge_m, *(gauge_m for gauge_m, _ in job.other_gauges))
         choice = Choice(job.class_code, int(values.number("CONTENT")) == 1, values.flag("RESET"))
         output = plan_output(job.cloud.paths, job.output, job.class_code, progress)
         request = request_points(job.cloud, SEARCHED_CLASSES, values.extent, progress)

@@ -10,7 +10,7 @@ from qgis.core import QgsProcessingContext
 from ...core.errors import ParameterError
 from ...core.frpdf.models import choose as choose_model
 from ...core.progress import Estimating, Progress
-from ...core.standards import DEFAULT, SEARCHED_CLASSES, RailStandard
+from ...core.standards import DEFAULT, SEARCHED_CLASSES, Gauge, RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
@@ -45,7 +45,7 @@ class Job:
     cloud: CloudSource
     class_codes: tuple[int, ...]
     standard: RailStandard
-    other_gauges_m: tuple[float, ...]
+    other_gauges: tuple[Gauge, ...]
     command: str
 
 
@@ -115,7 +115,7 @@ class ExtractRails(RailAlgorithm):
             values.cloud("INPUT"),
             SEARCHED_CLASSES if classify else values.class_codes(),
             standard,
-            values.other_gauges_m(standard),
+            values.other_gauges(standard),
             masked(self.asPythonCommand(parameters, context)),
         )
 
@@ -125,7 +125,7 @@ class ExtractRails(RailAlgorithm):
 
         standard = values.standard(detect_standard(request, progress).name)
         choose_model(standard.gauge_m, standard.head_width_m, values.choice("MODEL"))
-        return replace(job, standard=standard, other_gauges_m=values.other_gauges_m(standard))
+        return replace(job, standard=standard, other_gauges=values.other_gauges(standard))
 
     def compute(
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
@@ -140,7 +140,7 @@ class ExtractRails(RailAlgorithm):
         request = replace(request, merged=values.flag("MERGE_CLASSES") and not values.flag("CLASSIFY"))
         if values.detects():
             job = self._detected(job, request, values, progress)
-        settings = values.settings(job.standard, job.other_gauges_m)
+        settings = values.settings(job.standard, job.other_gauges)
         quality, findings, report, cleaned = (
             is_wanted(parameters.get(name), context) for name in ("QUALITY", "FINDINGS", "REPORT", "CLEANED")
         )
@@ -154,7 +154,7 @@ class ExtractRails(RailAlgorithm):
         progress.check()
         for failure in network.failures:
             progress.warning(failure)
-        origin = Origin(job.cloud.paths, job.standard, job.other_gauges_m, job.command, settings)
+        origin = Origin(job.cloud.paths, job.standard, job.other_gauges, job.command, settings)
         found = list_findings(network, origin.gauges_m) if findings else ()
         frame, rest = network.frame, (parameters, context)
         self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, frame)

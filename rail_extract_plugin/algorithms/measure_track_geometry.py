@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 from qgis.core import QgsProcessingContext
 
 from ...core.fields import QUALITY_FIELDS
+from ...core.parameters import Parameters
 from ...core.progress import Progress, Recording
-from ...core.standards import CUSTOM, RailStandard, resolve
+from ...core.standards import CUSTOM, Gauge, RailStandard, resolve
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
@@ -38,9 +39,14 @@ class Job:
     head_width_m: float
     standard: RailStandard | None
     """None if no gauge is stated."""
-    other_gauges_m: tuple[float, ...]
+    other_gauges: tuple[Gauge, ...]
     cloud: CloudSource | None
     command: str
+
+    @property
+    def gauges(self) -> tuple[Gauge, ...]:
+        """Gauges that tracks may have; the first one is that of the standard, 0 if none is stated."""
+        return ((self.standard.gauge_m if self.standard else 0.0, self.head_width_m), *self.other_gauges)
 
 
 class MeasureTrackGeometry(RailAlgorithm):
@@ -89,7 +95,7 @@ class MeasureTrackGeometry(RailAlgorithm):
         return Job(
             head_width_m,
             standard,
-            values.other_gauges_m(standard) if standard else (),
+            values.other_gauges(standard) if standard else (),
             values.cloud("POINTS") if values.filled("POINTS") else None,
             masked(self.asPythonCommand(parameters, context)),
         )
@@ -103,6 +109,7 @@ class MeasureTrackGeometry(RailAlgorithm):
         from ...core.squares.remeasuring import measure_rails
         from ...core.tasks import InTurn
         from ...core.tracks.geometry import measure_track_geometry
+        from ...core.tracks.widths_by_gauge import widths_by_gauge
         from ..reading.track_inputs import check_gauges, read_inputs, with_measured_gauge
 
         values, progress = ParameterValues(self, parameters, context), Recording(progress)
@@ -110,9 +117,11 @@ class MeasureTrackGeometry(RailAlgorithm):
         with points_folder() as folder:
             tracks = read_inputs(*lines, job.cloud, folder, progress.span(0, READING))
             measuring = progress.span(READING, MEASURING)
-            rails = measure_rails(tracks.rails, tracks.clouds, job.head_width_m, InTurn(), measuring)
+            heads_m = widths_by_gauge(tracks.rails, job.gauges, Parameters.centerline_tolerance_m)
+            rails = measure_rails(tracks.rails, tracks.clouds, heads_m, InTurn(), measuring)
         share = progress.span(MEASURING, 1)
-        measured = measure_track_geometry(tracks.centerlines, rails, job.head_width_m, values.number("STEP"), share)
+        step_m = values.number("STEP")
+        measured = measure_track_geometry(tracks.centerlines, rails, job.head_width_m, step_m, share, job.gauges)
         check_gauges(tracks, measured, progress)
         progress.check()
         frame, rest = tracks.frame, (parameters, context)
@@ -122,7 +131,7 @@ class MeasureTrackGeometry(RailAlgorithm):
         centerlines = with_measured_gauge(tracks.centerlines, measured)
         network = RailNetwork(tuple(rails), centerlines, frame, geometry=measured, warnings=progress.warnings)
         paths = job.cloud.paths if job.cloud else (Path(lines[0].sourceName()),)
-        origin = Origin(paths, job.standard or _own_standard(measured, job), job.other_gauges_m, job.command)
+        origin = Origin(paths, job.standard or _own_standard(measured, job), job.other_gauges, job.command)
         found = list_findings(network, origin.gauges_m) if is_wanted(parameters.get("FINDINGS"), context) else ()
         for sentence in summary(network, origin.gauges_m):
             progress.info(sentence)

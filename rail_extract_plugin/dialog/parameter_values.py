@@ -18,7 +18,7 @@ from qgis.core import (
 
 from ...core.errors import ParameterError, RailExtractError, RasterError
 from ...core.parameters import Parameters
-from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RailStandard, distinct_gauges, resolve
+from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, Gauge, RailStandard, read_gauges, resolve
 from ..reading.clouds import CloudSource, checked_crs, cloud_source
 from ..systems import prepare_system, system
 
@@ -235,20 +235,19 @@ class ParameterValues:
             raise ParameterError("The standard CUSTOM needs the railhead width, in millimetres: fill in HEAD_WIDTH.")
         return resolve(DEFAULT if head_width_mm else self.choice("STANDARD"), None, head_width_mm).head_width_m
 
-    def other_gauges_m(self, standard: RailStandard) -> tuple[float, ...]:
+    def other_gauges(self, standard: RailStandard) -> tuple[Gauge, ...]:
         """Read OTHER_GAUGES, and check that they can be distinguished from each other and from the standard's gauge."""
-        others = gauges_m(self.text("OTHER_GAUGES"), "OTHER_GAUGES")
         own = self._has("CENTERLINE_TOLERANCE")
         tolerance_m = self.number("CENTERLINE_TOLERANCE") if own else Parameters.centerline_tolerance_m
-        return distinct_gauges((standard.gauge_m, *others), tolerance_m, own)[1:]
+        return read_gauges(self.text("OTHER_GAUGES"), "OTHER_GAUGES", standard, tolerance_m, own)[1:]
 
-    def settings(self, standard: RailStandard, other_gauges_m: tuple[float, ...] = ()) -> Parameters:
+    def settings(self, standard: RailStandard, other_gauges: tuple[Gauge, ...] = ()) -> Parameters:
         """Return the algorithm's parameters for the core, with the core's defaults for all others."""
         given: dict[str, Any] = {field: self.number(name) for name, field in NUMBERS.items() if self._has(name)}
         given.update({field: self.choice(name) for name, field in CHOICES.items() if self._has(name)})
         if self._has("ITERATIONS"):
             given["passes"] = int(self.number("ITERATIONS"))
-        return Parameters(standard.gauge_m, standard.head_width_m, other_gauges_m=other_gauges_m, **given)
+        return Parameters(standard.gauge_m, standard.head_width_m, **given).with_gauges(other_gauges)
 
     def _has(self, name: str) -> bool:
         return self._algorithm.parameterDefinition(name) is not None
@@ -266,25 +265,6 @@ def class_numbers(text: str, what: str) -> tuple[int, ...]:
     if not words or not all(word.isdecimal() and int(word) <= LAST_CLASS for word in words):
         raise ParameterError(f'{what} "{text}" must be whole numbers from 0 to {LAST_CLASS} such as 10 or 10,11.')
     return tuple(dict.fromkeys(int(word) for word in words))
-
-
-def gauges_m(text: str, what: str) -> tuple[float, ...]:
-    """Parse lengths in millimetres such as "1000;1067"; `what` is the name of the parameter, for the error.
-
-    Returns
-    -------
-    tuple of float
-        Metres.
-
-    Raises
-    ------
-    ParameterError
-        The text contains something other than positive numbers.
-    """
-    words = _words(text)
-    if not all(re.fullmatch(r"\d+(\.\d+)?", word) and float(word) > 0 for word in words):
-        raise ParameterError(f'{what} "{text}" must be millimetres such as 1000;1067.')
-    return tuple(float(word) / 1000 for word in words)
 
 
 def _words(text: str) -> list[str]:

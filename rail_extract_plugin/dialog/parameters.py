@@ -274,7 +274,7 @@ def other_gauges() -> QgsProcessingParameterDefinition:
     """Define the gauges of other tracks."""
     return advanced(
         QgsProcessingParameterString("OTHER_GAUGES", tr("Other gauges [mm]"), optional=True),
-        tr("Gauges of other tracks in the same cloud, such as 1000;1067, for mixed and dual gauge."),
+        tr("Gauges of other tracks in the same cloud, such as 1000;1067, or 1000/66 with the width of the railhead."),
     )
 
 

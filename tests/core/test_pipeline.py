@@ -13,7 +13,7 @@ from rail_extract.core.polyline import length_along, project
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import cell_size, rasterize
-from rail_extract.core.standards import STANDARDS
+from rail_extract.core.standards import STANDARDS, RailStandard
 from rail_extract.core.steps import lines_of, overlap_tiles, tracks_of, warn_of_split_classes
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.plain import straight
@@ -200,6 +200,24 @@ def test_the_minimum_length_is_that_of_whole_lines_not_of_their_parts_in_squares
 )
 def test_squares_overlap_as_far_as_both_sides_of_a_border_need(gauge, changed, tiles):
     assert overlap_tiles(Parameters(gauge, WIDTH, **changed)) == tiles
+
+
+def test_the_width_of_heads_may_depend_on_the_gauge(monkeypatch):
+    """A mixed line: 72 mm heads on 1435 mm, and 66 mm heads on 1000 mm beside them."""
+    monkeypatch.setattr(steps, "clean", lambda raster, *_: raster)
+    standards = STANDARDS["EN_60E1_1435"], RailStandard("CUSTOM", "", 1.0, 0.066)
+    curve, clouds = trace([Element(25.0)], heading=0.4), []
+    for standard, left_m in zip(standards, (0.0, 6.0)):
+        spacing_m = standard.gauge_m + standard.head_width_m
+        track = Track(curve, spacing_m, np.full(len(curve.xy), 100.0), left_m=left_m)
+        plan = Plan([track], standard, Scanner(left_m=left_m))
+        clouds.append(build("mixed", plan, np.random.RandomState(1)).rail_points().xyz)
+    points = RailPoints(np.concatenate(clouds), LocalFrame(np.zeros(3)), 10)
+    settings = Parameters(1.435, WIDTH, quality_step_m=2.0, other_gauges_m=(1.0,))
+    for heads_m, narrow_mm in (((), 994.0), ((0.066,), 1000.0)):
+        found = extract_rails([points], replace(settings, other_heads_m=heads_m))
+        assert [line.gauge_mm for line in found.centerlines] == pytest.approx([1435, narrow_mm], abs=1)
+        assert [np.nanmean(one.gauge_mm) for one in found.geometry] == pytest.approx([1435, narrow_mm], abs=1)
 
 
 @pytest.mark.parametrize("tiles", [4, 50])

@@ -68,7 +68,7 @@ def test_coordinates_in_the_right_unit_are_no_warning():
 def test_heads_of_another_width_than_stated_are_said(width_m, count):
     points = RailPoints(heads_of(LINE, SEEN_SHARE * width_m), LocalFrame(np.zeros(3)), 10)
     heard = Warnings()
-    widths = head_widths(MemorySource(points, 500.0), 0.072, heard)
+    widths = head_widths(MemorySource(points, 500.0), ((1.435, 0.072),), heard)
     assert widths.seen_m == pytest.approx(width_m, abs=0.002)
     assert widths.differ == (count == 1)
     assert len(heard.said) == count
@@ -81,6 +81,6 @@ def test_passes_side_by_side_without_a_mark_are_said():
     for strips, count in ((None, 1), (scene.rail_points().strips, 0)):
         heard = Warnings()
         source = MemorySource(replace(scene.rail_points(), strips=strips), 500.0)
-        assert head_widths(source, 0.072, heard).differ == bool(count)
+        assert head_widths(source, ((1.435, 0.072),), heard).differ == bool(count)
         assert len(heard.said) == count
         assert all("passes of the scanner lie apart" in text for text in heard.said)

@@ -6,7 +6,7 @@ import math
 
 import pytest
 from rail_extract.core.errors import ParameterError
-from rail_extract.core.standards import DEFAULT, STANDARDS, UNCONFIRMED, distinct_gauges, resolve
+from rail_extract.core.standards import DEFAULT, STANDARDS, UNCONFIRMED, distinct_gauges, read_gauges, resolve
 
 INTERFACE = """
 US_90ARAA_1435 US_100ARAA_1435 US_100RE_1435 US_115RE_1435 US_119RE_1435 US_132RE_1435 US_133RE_1435 US_136RE_1435
@@ -101,3 +101,37 @@ def test_gauges_closer_than_the_tolerance_are_refused(gauges):
 def test_impossible_other_gauges_are_refused():
     with pytest.raises(ParameterError, match="A gauge of 1 mm"):
         distinct_gauges((1.435, 0.001), 0.05)
+
+
+@pytest.mark.parametrize(
+    ("text", "others"),
+    [
+        ("", []),
+        ("1000;1067", [(1.0, 0.072), (1.067, 0.072)]),
+        ("1520.5 1000", [(1.5205, 0.072), (1.0, 0.072)]),
+        ("1000/66, 1067 / 62.5", [(1.0, 0.066), (1.067, 0.0625)]),
+        ("1000/66;1000;1435", [(1.0, 0.066)]),
+    ],
+)
+def test_other_gauges_are_read_with_the_width_of_their_heads(text, others):
+    found = read_gauges(text, "OTHER_GAUGES", STANDARDS[DEFAULT], 0.05)
+    assert found == ((1.435, 0.072), *others)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        *(
+            (text, "must be millimetres")
+            for text in ("wide", "0", "-1000", "1e3", "1000;x", "1000/", "1000/0", "1/2/3")
+        ),
+        ("1000/660", "A railhead width of 660 mm is not possible"),
+        ("1/66", "A gauge of 1 mm is not possible"),
+        ("1435/66", "can't have railheads of 72 and 66 mm"),
+        ("1000/66;1000/62", "can't have railheads of 66 and 62 mm"),
+        ("1450/66", "can't be distinguished"),
+    ],
+)
+def test_other_gauges_that_make_no_sense_are_refused(text, said):
+    with pytest.raises(ParameterError, match=said):
+        read_gauges(text, "OTHER_GAUGES", STANDARDS[DEFAULT], 0.05)

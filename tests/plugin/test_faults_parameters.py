@@ -156,13 +156,25 @@ FAULTS = [
         "other gauges as words",
         with_(OTHER_GAUGES="wide"),
         REFUSED,
-        'OTHER_GAUGES "wide" must be millimetres such as 1000;1067.',
+        'OTHER_GAUGES "wide" must be millimetres such as 1000;1067, or 1000/66 with the width of the railhead.',
     ),
     Fault(
         "other gauge of zero",
         with_(OTHER_GAUGES="0"),
         REFUSED,
-        'OTHER_GAUGES "0" must be millimetres such as 1000;1067.',
+        'OTHER_GAUGES "0" must be millimetres such as 1000;1067, or 1000/66 with the width of the railhead.',
+    ),
+    Fault(
+        "railhead of another gauge too wide",
+        with_(OTHER_GAUGES="1000/660"),
+        REFUSED,
+        "A railhead width of 660 mm is not possible: give millimetres from 40 to 90.",
+    ),
+    Fault(
+        "two railhead widths on one gauge",
+        with_(OTHER_GAUGES="1000/66;1000/72"),
+        REFUSED,
+        "Tracks of 1000 mm gauge can't have railheads of 66 and 72 mm: give one width.",
     ),
     Fault(
         "other gauge too close to the gauge",

@@ -176,7 +176,7 @@ def test_an_output_that_is_a_folder_is_refused_before_the_run(tiles, tmp_path, c
         (["--cleaned", "out.png"], "--cleaned writes .tif"),
         (["--report", "out.pdf"], "--report writes .html"),
         (["--other-gauges", "1430"], "distinguished"),
-        (["--other-gauges", "wide"], "numbers"),
+        (["--other-gauges", "wide"], '--other-gauges "wide" must be millimetres'),
         (["--gauge", "300"], "gauge"),
         (["--max-gap", "-1"], "--max-gap"),
         (["--step", "0"], "--step"),

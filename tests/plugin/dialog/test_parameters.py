@@ -3,7 +3,7 @@ from qgis.core import QgsProcessingParameterDefinition
 from rail_extract.core.errors import ParameterError
 from rail_extract.core.parameters import DEFAULT_STEP_M, Parameters
 from rail_extract.core.standards import STANDARDS
-from rail_extract.rail_extract_plugin.dialog.parameter_values import CHOICES, NUMBERS, class_numbers, gauges_m
+from rail_extract.rail_extract_plugin.dialog.parameter_values import CHOICES, NUMBERS, class_numbers
 
 PARAMETERS = [
     ("INPUT", "pointcloud", None),
@@ -122,20 +122,6 @@ def test_class_numbers(text, numbers):
 def test_class_numbers_refuses(text):
     with pytest.raises(ParameterError, match="RAIL_CLASSES"):
         class_numbers(text, "RAIL_CLASSES")
-
-
-@pytest.mark.parametrize(
-    ("text", "gauges"),
-    [("", ()), ("1000;1067", (1.0, 1.067)), ("1435.5 1000", (1.4355, 1.0)), ("1000,1067", (1.0, 1.067))],
-)
-def test_gauges(text, gauges):
-    assert gauges_m(text, "OTHER_GAUGES") == pytest.approx(gauges)
-
-
-@pytest.mark.parametrize("text", ["wide", "0", "-1000", "1e3", "1000;x"])
-def test_gauges_refuses(text):
-    with pytest.raises(ParameterError, match="OTHER_GAUGES"):
-        gauges_m(text, "OTHER_GAUGES")
 
 
 def test_defaults_match_the_core(plugin):
