@@ -124,7 +124,7 @@ QUALITY_FIELDS = (
     Field(
         "strip_mm",
         float,
-        "largest distance between two of these strips, across or in height, millimetres; empty where there is one",
+        "largest distance between two strips, across or in height, as they or the blur of heads show it, millimetres",
         1,
     ),
     SIGMAZ,

@@ -44,6 +44,7 @@ from .steps import (
 )
 from .tasks import Context, InTurn, Runner, Task
 from .tracks.geometry import measure_track_geometry
+from .tracks.jumps import doubting_steps
 from .tracks.strip_courses import strip_courses
 from .tracks.widths_by_gauge import widths_by_gauge
 
@@ -227,6 +228,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
     warn_of_split_classes(rails, parameters, progress)
     warn_of_strips(rails, parameters, progress)
     warn_of_steps(centerlines, progress)
+    rails = doubting_steps(rails, centerlines)
     heads = head_widths(sources[0], parameters.gauges, progress) if rails else None
     geometry = _measure_tracks(centerlines, rails, sources, parameters, runner, measuring)
     if geometry:

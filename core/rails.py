@@ -33,8 +33,9 @@ class Support:
         Standard error of the line's lateral position.
     strips : (n, 3) array or None
         Number of strips, passes of the scanner, that show the line, the largest distance between two of them, across
-        or in height, metres, NaN where there is only one, and the part of the standard error that they share with the
-        other rail; None if all points are of one strip.
+        or in height, metres, and the part of the standard error that they share with the other rail. The distance is
+        NaN where there is one strip, unless its head is blurred as if there were two. None if all points are of one
+        strip and no head is blurred.
     sigmaz_m : (n,) array or None
         Standard error of the line's height; None if it has none.
     """

@@ -242,23 +242,31 @@ def warn_of_strips(rails: Sequence[RailLine], parameters: Parameters, progress: 
     parameters : Parameters
     progress : Progress
     """
-    spread_m = np.concatenate(
-        [rail.support.every_strip[:, 1] for rail in rails if rail.support is not None] or [np.empty(0)]
+    shown = np.concatenate(
+        [rail.support.every_strip[:, :2] for rail in rails if rail.support is not None] or [np.empty((0, 2))]
     )
-    apart = spread_m[np.isfinite(spread_m)]
-    apart = apart[apart >= STRIP_OFF_M]
-    length_m = STATION_STEP_M * len(apart)
-    if length_m < MIN_STRIPS_APART_M:
-        return
-    remedy = (
-        "they are aligned to their mean, and sigma_mm states what remains in doubt"
-        if parameters.strips == ALIGNED
-        else "correct the positions of the scanner, or set STRIPS to ALIGNED"
-    )
-    progress.warning(
-        f"Strips are up to {1000 * np.percentile(apart, LARGEST_PERCENT):.0f} mm apart, on {length_m:.0f} m of rail "
-        f"where they meet: {remedy}."
-    )
+    count, spread_m = shown[np.nan_to_num(shown[:, 1]) >= STRIP_OFF_M].T
+    if STATION_STEP_M * np.sum(count > 1) >= MIN_STRIPS_APART_M:
+        remedy = (
+            "they are aligned to their mean, and sigma_mm states what remains in doubt"
+            if parameters.strips == ALIGNED
+            else "correct the positions of the scanner, or set STRIPS to ALIGNED"
+        )
+        progress.warning(
+            f"Strips are up to {_largest(spread_m[count > 1])}, on {STATION_STEP_M * np.sum(count > 1):.0f} m of rail "
+            f"where they meet: {remedy}."
+        )
+    if STATION_STEP_M * np.sum(count == 1) >= MIN_STRIPS_APART_M:
+        progress.warning(
+            f"Heads are blurred across on {STATION_STEP_M * np.sum(count == 1):.0f} m of rail, as by passes of the "
+            f"scanner up to {_largest(spread_m[count == 1])}, whose points state neither source id nor GPS time: "
+            "sigma_mm contains half of it. Export the cloud with them, or pass by pass."
+        )
+
+
+def _largest(spread_m: np.ndarray) -> str:
+    """State the largest of the distances between strips."""
+    return f"{1000 * np.percentile(spread_m, LARGEST_PERCENT):.0f} mm apart"
 
 
 def _all_vertices(

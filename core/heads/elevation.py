@@ -209,6 +209,7 @@ def _measured(
         unseen_m=parameters.unseen_m,
         free=edges,
         near=near,
+        marked=strips is not None,
     )
     if flank is not None:
         support = on_one_face(support, feet.t, flank.sigma_m)

@@ -52,6 +52,7 @@ def measure_support(
     unseen_m: float,
     free: np.ndarray,
     near: np.ndarray | None = None,
+    marked: bool = False,
 ) -> Support:
     """Measure how well points support a line.
 
@@ -70,6 +71,8 @@ def measure_support(
         Where the right and the left edge are free of other heads; see `neighbours.free_edges`.
     near : (k,) array, optional
         Chainages of these points and of those near the line that are at another height than the rail, increasing.
+    marked : bool
+        Whether the points state their strips, so that strips are compared elsewhere.
 
     Returns
     -------
@@ -102,7 +105,17 @@ def measure_support(
     remainder = smooth_profile(stations[known], middle[known], smoothing_m, stations)
     beyond_chance = np.maximum(remainder**2 - np.where(outlined, sampling, 0.0) ** 2, 0.0)
     sigma = np.sqrt(sampling**2 + view**2 + bridging**2 + beyond_chance)
-    return Support(stations, points, np.hypot(np.where(known, sigma, unseen), bridge))
+    support = Support(stations, points, np.hypot(np.where(known, sigma, unseen), bridge))
+    return support if marked else _with_blur(support, by_outline.blur)
+
+
+def _with_blur(support: Support, blur_m: np.ndarray) -> Support:
+    """Add what blurs the head across, (s,) metres, as of passes of the scanner that lie apart by twice that."""
+    if not blur_m.any():
+        return support
+    apart_m = np.where(blur_m > 0, 2 * blur_m, np.nan)
+    strips = np.column_stack([np.ones(len(blur_m)), apart_m, blur_m])
+    return replace(support, sigma_m=np.hypot(support.sigma_m, blur_m), strips=strips)
 
 
 def _combined(middles: Middles, smoothing_m: float) -> np.ndarray:

@@ -166,3 +166,22 @@ def test_the_height_is_known_by_its_points_and_unsure_where_none_are():
     assert few[seen] == pytest.approx(np.hypot(0.004 / np.sqrt(10 * 3 / 0.33375), TOP_SIGMA_M), rel=0.35)
     assert many[seen].max() < few[seen].min()
     assert many[len(stations) // 2] == pytest.approx(np.hypot(0.004, UNSURE_GRADIENT_CHANGE * 10 * 10 / 2), rel=0.05)
+
+
+@pytest.mark.parametrize("apart_m", [0.010, 0.015, 0.025])
+def test_two_passes_without_a_mark_blur_the_head_and_are_in_sigma(apart_m):
+    t, across, z = head(60.0, 120)
+    across[::2] += 0.5 * apart_m
+    across[1::2] -= 0.5 * apart_m
+    found = support(t, across, z)
+    count, spread_m, shared_m = found.strips.T
+    assert (count == 1).all()
+    assert np.allclose(spread_m, apart_m, atol=0.002)
+    assert np.allclose(shared_m, 0.5 * spread_m)
+    assert (found.sigma_m >= shared_m).all()
+
+
+@pytest.mark.parametrize("noise_m", [0.001, 0.003, 0.008])
+@pytest.mark.parametrize("density", [10, 120])
+def test_one_pass_does_not_blur_the_head(noise_m, density):
+    assert support(*head(60.0, density, noise_m, seed=4)).strips is None

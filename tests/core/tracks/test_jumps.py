@@ -1,8 +1,11 @@
 """Steps of tracks to the side."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from rail_extract.core.tracks.jumps import find_steps
+from rail_extract.core.rails import Centerline, RailLine, Support
+from rail_extract.core.tracks.jumps import doubting_steps, find_steps
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 
 
@@ -35,3 +38,23 @@ def test_what_tracks_do_is_no_step(elements):
     wave = 0.001 * np.sin(curve.chainage * 2 * np.pi / rng.uniform(4, 20))
     assert find_steps(curve.xy + wave[:, None] * curve.left_normal) == []
     assert find_steps(curve.xy[:20]) == []
+
+
+def test_half_of_a_step_is_in_doubt_on_either_side():
+    curve = trace([Element(80.0, 1 / 800, 1 / 800)], heading=0.3)
+    heights = np.zeros(len(curve.xy))
+    lines = [
+        stepped(replace(curve, xy=curve.xy + left_m * curve.left_normal), 33.0, 0.03) for left_m in (0.0, 0.75, -0.75)
+    ]
+    middle, left, right = (np.column_stack([line, heights]) for line in lines)
+    t = np.arange(0.125, 80.0, 0.25)
+    support = Support(t, np.full(len(t), 10), np.full(len(t), 0.001))
+    rails = [RailLine(xyz, number, 10, 800, 20.0, 1.0, 0.0, support=support) for number, xyz in ((1, left), (2, right))]
+    other = replace(rails[0], rail_id=3)
+    track = Centerline(middle, 1, 10, (1,), (2,), 1435.0, 0.5, 0.0, 0.0, 0.0)
+    *doubted, kept = doubting_steps([*rails, other], [track])
+    for rail in doubted:
+        assert np.allclose(rail.support.sigma_m, np.hypot(0.001, 0.015), rtol=0.06)
+        assert np.allclose(rail.support.strips[:, 1], 0.03, rtol=0.06)
+        assert rail.sigma_mm == pytest.approx(15.0, rel=0.06)
+    assert kept is other
