@@ -227,7 +227,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
     rails = with_tracks(rails, centerlines, progress)
     warn_of_split_classes(rails, parameters, progress)
     warn_of_strips(rails, parameters, progress)
-    warn_of_steps(centerlines, progress)
+    warn_of_steps(rails, centerlines, progress)
     rails = doubting_steps(rails, centerlines)
     heads = head_widths(sources[0], parameters.gauges, progress) if rails else None
     geometry = _measure_tracks(centerlines, rails, sources, parameters, runner, measuring)

@@ -124,7 +124,7 @@ def head_widths(source: PointSource, gauges: Sequence[Gauge], progress: Progress
         else:
             progress.warning(
                 f"{seen}, and no standard has such heads: passes of the scanner lie apart, or the points are noisy. "
-                "Passes can be compared and aligned (STRIPS) if the points have source ids."
+                "Passes can be compared and aligned (STRIPS) if the points have source ids or GPS times."
             )
     return widths
 

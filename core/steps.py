@@ -214,15 +214,16 @@ def warn_of_rails(rails: Sequence[RailLine], class_code: int, parameters: Parame
     warn_if_out_of_reach(rails, parameters.head_width_m, parameters.smoothing_xy_m, progress)
 
 
-def warn_of_steps(centerlines: Sequence[Centerline], progress: Progress) -> None:
+def warn_of_steps(rails: Sequence[RailLine], centerlines: Sequence[Centerline], progress: Progress) -> None:
     """Warn the user of tracks that step to the side.
 
     Parameters
     ----------
+    rails : sequence of RailLine
     centerlines : sequence of Centerline
     progress : Progress
     """
-    found = [(line.track_id, *step) for line in centerlines for step in find_steps(line.xyz)]
+    found = [(line.track_id, *step) for line in centerlines for step in find_steps(line, rails)]
     if found:
         largest = sorted(found, key=lambda one: -abs(one[2]))[:MAX_LISTED]
         words = [f"{1000 * abs(step_m):.0f} mm at {at_m:.0f} m of track {track}" for track, at_m, step_m in largest]

@@ -14,6 +14,7 @@ from ..errors import CloudError, EmptyCloudError
 from ..progress import SILENT, Progress
 from . import laz
 from .crs import crs_of_geokeys, import_pyproj
+from .passes import marks_of
 from .readers import Chunk, CloudHeader, Points
 
 with warnings.catch_warnings():
@@ -49,9 +50,6 @@ PROJECTION_USER = b"LASF_Projection"
 
 GEO_KEYS_RECORD = "GeoKeyDirectoryVlr"
 
-MAX_STRIPS = 100
-"""Most strips in a chunk. Where there are more, the source ids of points number something else, such as profiles."""
-
 
 def read_header(path: Path) -> CloudHeader:
     """Read and check the header of one file; see `readers.read_header`."""
@@ -66,46 +64,35 @@ def read_classes(path: Path, class_codes: Sequence[int], progress: Progress = SI
     """Read the points of some classes chunk by chunk; see `readers.read_classes`."""
     wanted = np.zeros(256, dtype=bool)
     wanted[list(class_codes)] = True
-    for chunk, codes, strips, valid in _chunks(path, progress):
+    for chunk, codes, marks, valid in _chunks(path, progress):
         keep = np.flatnonzero(wanted[codes] & valid)
-        yield _coordinates(chunk, keep), codes[keep], strips[keep], np.bincount(codes[valid], minlength=256)
+        yield _coordinates(chunk, keep), codes[keep], marks[keep], np.bincount(codes[valid], minlength=256)
 
 
 def read_points(path: Path, progress: Progress = SILENT) -> Iterator[Points]:
     """Read all points chunk by chunk; see `readers.read_points`."""
-    for chunk, codes, strips, valid in _chunks(path, progress):
-        yield _coordinates(chunk, slice(None)), codes, strips, valid
+    for chunk, codes, marks, valid in _chunks(path, progress):
+        yield _coordinates(chunk, slice(None)), codes, marks, valid
 
 
 def _chunks(
     path: Path, progress: Progress
 ) -> Iterator[tuple[laspy.ScaleAwarePointRecord, np.ndarray, np.ndarray, np.ndarray]]:
-    """Check a file and read it chunk by chunk: points, their classes and strips, and which are not withheld."""
+    """Check a file and read it chunk by chunk: points, their classes and marks, and which are not withheld."""
     with _open(path) as reader:
         header, done = reader.header, 0
-        total = header.point_count
+        total, timed = header.point_count, "gps_time" in header.point_format.dimension_names
         if header.are_points_compressed:
             laz.check_layers(path, header, laz.read_chunk_table(path, header), progress)
         for chunk in reader.chunk_iterator(chunk_size(header)):
             progress.check()
-            strips = _strips(np.asarray(chunk.point_source_id), header.file_source_id)
-            yield chunk, np.asarray(chunk.classification), strips, np.asarray(chunk.withheld) == 0
+            gps_time = np.asarray(chunk.gps_time) if timed else None
+            marks = marks_of(np.asarray(chunk.point_source_id), header.file_source_id, gps_time)
+            yield chunk, np.asarray(chunk.classification), marks, np.asarray(chunk.withheld) == 0
             done += len(chunk)
             progress.set_fraction(done / total)
     if done < total:
         raise CloudError(f"{path.name} is cut off: it holds {done} of the {total} points stated in its header.")
-
-
-def _strips(source_ids: np.ndarray, file_source_id: int) -> np.ndarray:
-    """Return the strips of points, (n,), given the source ids of the points and of the file.
-
-    By the LAS specification, 0 stands for the source id of the file.
-    """
-    if not source_ids.any():
-        return np.full(len(source_ids), file_source_id, dtype=np.uint16)
-    if np.count_nonzero(np.bincount(source_ids)) > MAX_STRIPS:  # counting is faster than sorting them
-        return np.zeros(len(source_ids), dtype=np.uint16)
-    return np.where(source_ids == 0, file_source_id, source_ids).astype(np.uint16)
 
 
 def chunk_size(header: laspy.LasHeader) -> int:
@@ -124,7 +111,8 @@ def _open(path: Path) -> Iterator[laspy.LasReader]:
     """Open a file and check it; what laspy and lazrs raise on a damaged file is left to `readers`."""
     _check_start(path)
     fields = laspy.DecompressionSelection
-    selection = fields.XY_RETURNS_CHANNEL | fields.Z | fields.CLASSIFICATION | fields.FLAGS | fields.POINT_SOURCE_ID
+    selection = fields.XY_RETURNS_CHANNEL | fields.Z | fields.CLASSIFICATION | fields.FLAGS
+    selection |= fields.POINT_SOURCE_ID | fields.GPS_TIME
     with laspy.open(path, read_evlrs=False, decompression_selection=selection) as reader:
         _check_header(path, reader.header)
         yield reader

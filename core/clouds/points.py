@@ -14,10 +14,14 @@ from ..progress import SILENT, Progress
 from ..standards import LAST_CLASS
 from .crs import common_crs, is_geographic, name_of, parse_crs, units, utm_zone, warn_of_scale
 from .mask import Mask
+from .passes import number_passes
 from .readers import Chunk, CloudHeader, Extent, Paths, list_files, read_classes, read_header
 
 SAMPLE_POINTS = 200_000
 """Number of points in a sample: at least some ten metres of the densest track."""
+
+PLACE_M = 40.0
+"""Side of the squares in which passes are told apart by their times."""
 
 MAX_PASSED = 5_000_000
 """Number of points of any class after which a sample ends."""
@@ -45,6 +49,15 @@ class RailPoints:
     def kept(self, which: np.ndarray) -> RailPoints:
         """Return some of the points, by a mask (n,) bool or by their numbers (k,)."""
         return replace(self, xyz=self.xyz[which], strips=None if self.strips is None else self.strips[which])
+
+
+def _strips(xyz: np.ndarray, marks: np.ndarray) -> np.ndarray:
+    """Return the strips, (n,), of points, (n, 3) local metres, by their marks."""
+    found, number = np.unique(marks, return_inverse=True)
+    places = np.floor(xyz[:, :2] / PLACE_M).astype(np.int64)
+    rows = np.unique(np.column_stack([number.ravel(), places]), axis=0)
+    passes = number_passes(found[rows[:, 0]], rows[:, 1:])
+    return np.array([passes[mark] for mark in found.tolist()], dtype=np.int32)[number.ravel()]
 
 
 def several(strips: np.ndarray) -> np.ndarray | None:
@@ -103,9 +116,10 @@ def read_rail_points(
 
 def read_requested(request: Request, progress: Progress = SILENT) -> tuple[RailPoints, ...]:
     """Read the points requested; results and errors as of `read_rail_points`."""
-    xyz, codes, strips = _collect(request, progress)
+    xyz, codes, marks = _collect(request, progress)
     frame = request.frame_at([np.unique(column, return_counts=True) for column in origin_steps(xyz).T])
     local = frame.to_local(xyz)
+    strips = _strips(local, marks)
     return tuple(
         RailPoints(local[codes == code], frame, int(code), several(strips[codes == code])) for code in np.unique(codes)
     )
@@ -140,10 +154,10 @@ class Request:
         """Read the points requested from a file chunk by chunk; see `readers.read_classes`."""
         if not all(_overlap(header.extent, area) for area in self._areas()):
             return
-        for xyz, codes, strips, census in read_classes(header.path, self.class_codes, progress):
+        for xyz, codes, marks, census in read_classes(header.path, self.class_codes, progress):
             inside = self.holds(xyz) if self._areas() else slice(None)
             found = np.full_like(codes, self.class_codes[0]) if self.merged else codes
-            yield xyz[inside], found[inside], strips[inside], census
+            yield xyz[inside], found[inside], marks[inside], census
 
     def holds(self, xyz: np.ndarray) -> np.ndarray:
         """Return which places, (n, 3) in units of the CRS, lie in the extent and the mask, (n,) bool."""
@@ -300,16 +314,16 @@ def _fitting_zone(header: CloudHeader) -> str:
 
 
 def _collect(request: Request, progress: Progress) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return coordinates, (n, 3) in CRS units, classes and strips, (n,), of the points requested from all files."""
+    """Return coordinates, (n, 3) in CRS units, classes and marks, (n,), of the points requested from all files."""
     kept, census = [], np.zeros(256, dtype=np.int64)
     for header, share in zip(request.headers, request.shares(progress)):
         for *points, counts in request.read(header, share):
             census += counts
             kept.append(points)
-    xyz, codes, strips = (np.concatenate(column) for column in zip(*kept)) if kept else (np.empty(0),) * 3
+    xyz, codes, marks = (np.concatenate(column) for column in zip(*kept)) if kept else (np.empty(0),) * 3
     if not len(codes):
         raise request.explain_none(census)
-    return xyz, codes, strips
+    return xyz, codes, marks
 
 
 def _overlap(a: Extent, b: Extent) -> bool:

@@ -36,11 +36,11 @@ Extent = tuple[float, float, float, float]
 """Smallest x, smallest y, largest x, largest y, in units of the CRS."""
 
 Chunk = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""Coordinates (n, 3) in units of the CRS, classes (n,) and strips (n,) of the points that were kept, and the number of
+"""Coordinates (n, 3) in units of the CRS, classes (n,) and marks (n,) of the points that were kept, and the number of
 points read by class (256,), kept or not."""
 
 Points = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""Coordinates (n, 3) in units of the CRS, classes (n,), strips (n,), and which points are not withheld, (n,) bool."""
+"""Coordinates (n, 3) in units of the CRS, classes (n,), marks (n,), and which points are not withheld, (n,) bool."""
 
 WILDCARDS = "*?"
 """Characters of patterns such as tiles/2024_*.laz, which not every shell replaces with the names of files."""
@@ -119,8 +119,8 @@ def read_classes(path: Path, class_codes: Sequence[int], progress: Progress = SI
         Points kept from a chunk, in units of the CRS.
     codes : (n,) uint8 array
         Their classes.
-    strips : (n,) uint16 array
-        Their strips: each pass of a scanner has a number of its own. All 0 where the file does not state any.
+    marks : (n,) uint32 array
+        What tells their passes apart, see `passes.marks_of`. All 0 where the file states neither source ids nor times.
     census : (256,) int array
         Points in the chunk by class, kept or not, without withheld ones.
 
@@ -142,7 +142,7 @@ def read_points(path: Path, progress: Progress = SILENT) -> Iterator[Points]:
         In units of the CRS.
     codes : (n,) uint8 array
         Classes.
-    strips : (n,) uint16 array
+    marks : (n,) uint32 array
         See `read_classes`.
     valid : (n,) bool array
         Points that are not withheld.

@@ -102,13 +102,18 @@ def outline_middles(
         )
         middles.offset[part][~seen[part]] = np.nan
         middles.common[part] = np.hypot(scores.common_m, PROFILE_SIGMA_M)
-        middles.blur[part] = _blur(section)
+        middles.blur[part] = _blur(section, middles.offset[part])
     return middles
 
 
-def _blur(section: Section) -> float:
-    """Return by how much the edges of a head are blurred beyond the noise; see `Middles.blur`."""
+def _blur(section: Section, offset: np.ndarray) -> float:
+    """Return by how much the edges of a head are blurred beyond the noise; see `Middles.blur`.
+
+    Where the line wanders about the head, by its `offset`, (k,) metres, it blurs the section as well.
+    """
     wider_m, (across_m, height_m) = section.place[3], np.exp(section.place[4:])
+    known = offset[np.isfinite(offset)]
+    across_m = np.sqrt(max(across_m**2 - (np.var(known) if len(known) else 0.0), 0.0))
     blur_m = float(np.sqrt(max(across_m**2 - height_m**2, 0.0)))
     is_blurred = blur_m >= BLURRED_M and across_m >= BLURRED_RATIO * height_m and abs(wider_m) <= BLURRED_WIDTH_M
     return blur_m if is_blurred else 0.0

@@ -26,13 +26,9 @@ from ..squares.grid import Key, Square, points_by_square
 from ..standards import LAST_CLASS
 from ..tasks import Context, Runner, Task, in_listed_order
 
-POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8")])
-"""A point on disk: coordinates in units of the CRS, and its number among all points of all files, with the number of
-its strip in the upper 16 bits."""
-
-STRIP_SHIFT = 48
-NUMBER_BITS, STRIP_BITS = (1 << STRIP_SHIFT) - 1, 0xFFFF
-"""How the two numbers share 64 bits."""
+POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8"), ("mark", "<u4")])
+"""A point on disk: coordinates in units of the CRS, its number among all points of all files, and its mark, see
+`passes.marks_of`."""
 
 FEW_IN_SQUARE, MANY_SQUARES = 20, 100
 """Chunks of points that are spread over more squares than this, with fewer points in each, are not in the unit that the
@@ -49,14 +45,14 @@ class Found:
         Units of the CRS.
     number : (k,) int array
         Their numbers among all points of all files.
-    strips : (k,) uint16 array
-        The strips that they belong to.
+    marks : (k,) uint32 array
+        What tells their passes apart, see `passes.marks_of`.
     figures : SearchFigures
     """
 
     xyz: np.ndarray
     number: np.ndarray
-    strips: np.ndarray
+    marks: np.ndarray
     figures: SearchFigures
 
 
@@ -71,7 +67,7 @@ def find_rail_points(
         Files, searched classes and extent.
     settings : Settings
     folder : Path
-        Empty folder for the points of the squares, 32 bytes each and a third more for those near borders; the caller
+        Empty folder for the points of the squares, 36 bytes each and a third more for those near borders; the caller
         removes it.
     runner : Runner
         Executes one task per file and one per square. Whether errors of single ones end the run is for it to decide.
@@ -214,13 +210,14 @@ def _sort_file(
     counts: dict[Key, int] = {}
     wanted = np.zeros(LAST_CLASS + 1, dtype=bool)
     wanted[list(request.class_codes)] = True
-    for xyz, codes, strips, valid in read_points(header.path, context.progress):
+    for xyz, codes, marks, valid in read_points(header.path, context.progress):
         kept = np.flatnonzero(valid & wanted[codes] & request.holds(xyz))
         if settings.guide is not None:
             kept = kept[settings.guide.holds(request.zero.to_local(xyz[kept])[:, :2])]
         points = np.empty(len(kept), POINT)
         points["xyz"] = xyz[kept]
-        points["number"] = kept + first | strips[kept].astype(np.int64) << STRIP_SHIFT
+        points["number"] = kept + first
+        points["mark"] = marks[kept]
         first += len(xyz)
         _append(points, request.zero, settings.side_m, mine, counts, header.path.name)
     return _SortedFile(str(mine), counts)
@@ -259,8 +256,7 @@ def _search(square: Square, files: Sequence[str], settings: Settings, context: C
     points = np.concatenate([np.fromfile(file, POINT) for file in files if Path(file).exists()])
     found = classify_square(square.frame.to_local(points["xyz"]), settings)
     points = points[found.rail]
-    strips = (points["number"] >> STRIP_SHIFT & STRIP_BITS).astype(np.uint16)
-    return Found(points["xyz"].copy(), points["number"] & NUMBER_BITS, strips, found.figures)
+    return Found(points["xyz"].copy(), points["number"].copy(), points["mark"].copy(), found.figures)
 
 
 def _file(folder: Path, key: Key) -> Path:

@@ -44,7 +44,7 @@ def spool_found(
     census, figures = Census(), SearchFigures()
     with writing(folder), scratch_folder(folder) as squares:
         for found in find_rail_points(request, settings, squares, runner, progress):
-            census.add(RAIL_CLASS, found.xyz, found.strips, request.zero, side_m, folder)
+            census.add(RAIL_CLASS, found.xyz, found.marks, request.zero, side_m, folder)
             figures += found.figures
     if not figures.points:
         raise NoRailPointsError(

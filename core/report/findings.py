@@ -95,12 +95,15 @@ class TrackFindings:
         Nearest of the gauges that tracks may have.
     doubtful : dict of Doubt to (n,) bool array
         Stations in doubt, by reason; a station has at most one.
+    steps : tuple of tuple of float
+        Chainage and size in metres of its steps to the side.
     """
 
     line: Centerline
     geometry: TrackGeometry
     nominal_mm: float
     doubtful: dict[Doubt, np.ndarray]
+    steps: tuple[tuple[float, float], ...] = ()
 
     @property
     def length_m(self) -> float:
@@ -206,7 +209,10 @@ def examine(network: RailNetwork, gauges_m: Sequence[float]) -> Findings:
         Gauges that tracks may have.
     """
     geometry = {track.track_id: track for track in network.geometry}
-    tracks = tuple(_examine_track(line, geometry[line.track_id], gauges_m) for line in network.centerlines)
+    tracks = tuple(
+        _examine_track(line, geometry[line.track_id], gauges_m, find_steps(line, network.rails))
+        for line in network.centerlines
+    )
     heads = network.heads
     return Findings(
         tracks,
@@ -214,7 +220,7 @@ def examine(network: RailNetwork, gauges_m: Sequence[float]) -> Findings:
         float(sum(rail.length_m for rail in network.rails)),
         tuple(_holes(network.centerlines)),
         heads if heads is not None and heads.differ else None,
-        sum(track.length_m for track in tracks if find_steps(track.line.xyz)),
+        sum(track.length_m for track in tracks if track.steps),
     )
 
 
@@ -279,13 +285,16 @@ def _is_met(place: np.ndarray, number: int, lines: Sequence[Centerline]) -> bool
     )
 
 
-def _examine_track(line: Centerline, geometry: TrackGeometry, gauges_m: Sequence[float]) -> TrackFindings:
+def _examine_track(
+    line: Centerline, geometry: TrackGeometry, gauges_m: Sequence[float], steps: Sequence[tuple[float, float]]
+) -> TrackFindings:
     nominal_mm = min((1000 * gauge_m for gauge_m in gauges_m), key=lambda gauge: abs(gauge - line.gauge_mm))
     with np.errstate(invalid="ignore"):
         unsupported = geometry.bridged | np.isnan(geometry.gauge_mm)
         off = ~unsupported & (np.abs(geometry.gauge_mm - nominal_mm) > GAUGE_OFF_MM)
         unsure = ~unsupported & ~off & (np.fmax(geometry.sigma_mm, geometry.sigmaz_mm) > UNSURE_MM)
-    return TrackFindings(line, geometry, nominal_mm, {UNSUPPORTED: unsupported, OFF_GAUGE: off, UNSURE: unsure})
+    doubtful = {UNSUPPORTED: unsupported, OFF_GAUGE: off, UNSURE: unsure}
+    return TrackFindings(line, geometry, nominal_mm, doubtful, tuple(steps))
 
 
 def _places(geometry: TrackGeometry, doubt: Doubt, doubtful: np.ndarray, merge_m: float) -> Iterator[Place]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..polyline import length_along
 from ..rails import RailLine, RailNetwork
-from ..tracks.jumps import ARM_M, find_steps
+from ..tracks.jumps import ARM_M
 from .findings import DOUBTS, OFF_GAUGE, Findings, Hole, Place, TrackFindings, examine
 
 OFF_RAIL_MM = 70.0
@@ -89,7 +89,7 @@ def _of_tracks(findings: Findings) -> Iterator[Finding]:
         for doubt in DOUBTS:
             for place in track.places(doubt):
                 yield _of_place(track, place, error_mm)
-        for at_m, size_m in find_steps(track.line.xyz):
+        for at_m, size_m in track.steps:
             yield _of_step(track, at_m, 1000 * abs(size_m))
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..clouds.passes import number_passes
 from ..clouds.points import RailPoints, Request, origin_steps
 from ..clouds.readers import CloudHeader
 from ..disk import writing
@@ -24,6 +25,9 @@ from ..scratch import discard, scratch_folder
 from .grid import Key, Square, around, points_by_square
 
 REPORT = "report.json"
+
+LAYOUT = 2
+"""Number of the layout of sorted points, so that those of an earlier version are read again."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,9 @@ class SpooledPoints:
     frame, class_code, side_m, counts, span_m
         See `PointSource`.
     files : mapping of Key to tuple of str
-        Files that hold the points of each square, one for each strip; their names end with its number.
+        Files that hold the points of each square, one for each mark (see `passes.marks_of`), with which its name ends.
+    passes : mapping of int to int
+        Number of the strip, a pass of the scanner, of each mark.
     """
 
     frame: LocalFrame
@@ -62,6 +68,7 @@ class SpooledPoints:
     counts: Mapping[Key, int]
     span_m: float
     files: Mapping[Key, tuple[str, ...]]
+    passes: Mapping[int, int]
 
     def near(self, square: Square, margin_m: float) -> RailPoints:
         """See `PointSource`."""
@@ -69,11 +76,9 @@ class SpooledPoints:
         files = [file for key in keys for file in self.files.get(key, ())]
         parts = [np.fromfile(file).reshape(-1, 3) for file in files]
         xyz = square.frame.to_local(np.concatenate(parts) if parts else np.empty((0, 3)))
-        strips = [int(Path(file).name.split("_")[-1]) for file in files]
+        strips = [self.passes[_numbers(file)[-1]] for file in files]
         each = (
-            np.repeat(np.array(strips, dtype=np.uint16), [len(part) for part in parts])
-            if len(set(strips)) > 1
-            else None
+            np.repeat(np.array(strips, dtype=np.int32), [len(part) for part in parts]) if len(set(strips)) > 1 else None
         )
         return RailPoints(xyz, square.frame, self.class_code, each).kept(square.holds(xyz, margin_m))
 
@@ -82,9 +87,10 @@ class SpooledPoints:
         if square.is_whole_plane:
             return self
         keys = [key for key in around(square.key) if key in self.files]
-        return replace(
-            self, counts={key: self.counts[key] for key in keys}, files={key: self.files[key] for key in keys}
-        )
+        files = {key: self.files[key] for key in keys}
+        marks = {_numbers(file)[-1] for own in files.values() for file in own}
+        passes = {mark: self.passes[mark] for mark in sorted(marks)}
+        return replace(self, counts={key: self.counts[key] for key in keys}, files=files, passes=passes)
 
 
 def spool(request: Request, side_m: float, folder: Path, progress: Progress = SILENT) -> tuple[SpooledPoints, ...]:
@@ -162,11 +168,11 @@ def spool_file(
 def _sort(request: Request, header: CloudHeader, side_m: float, folder: Path, progress: Progress) -> dict:
     """Write the points of a file to the files of their squares, and the report; returns the report."""
     found = Census()
-    for xyz, codes, strips, census in request.read(header, progress):
+    for xyz, codes, marks, census in request.read(header, progress):
         found.census += census
         with writing(folder.parent):
             for code in np.unique(codes).tolist():
-                found.add(code, xyz[codes == code], strips[codes == code], request.zero, side_m, folder)
+                found.add(code, xyz[codes == code], marks[codes == code], request.zero, side_m, folder)
     report = found.report()
     text = json.dumps(report)
     with writing(folder.parent):
@@ -216,7 +222,15 @@ def gather(request: Request, side_m: float, found: Sequence[SpooledFile]) -> tup
         raise request.explain_none(np.sum([file.report["census"] for file in found], axis=0))
     steps = [_merged([file.report["steps"][axis] for file in found]) for axis in range(3)]
     frame = request.frame_at([(np.array(list(one)), np.array(list(one.values()))) for one in steps])
-    return tuple(_source(code, found, frame, side_m) for code in codes)
+    rows = [
+        (mark, *key)
+        for file in found
+        for of_class in file.report["classes"].values()
+        for _, *key, mark in map(_numbers, of_class["squares"])
+    ]
+    marks, *places = np.array(rows).T
+    passes = number_passes(marks, np.column_stack(places))
+    return tuple(_source(code, found, frame, side_m, passes) for code in codes)
 
 
 class Census:
@@ -227,20 +241,18 @@ class Census:
         self._classes: dict[int, dict] = {}
         self._steps: list[dict[float, int]] = [{}, {}, {}]
 
-    def add(
-        self, code: int, xyz: np.ndarray, strips: np.ndarray, zero: LocalFrame, side_m: float, folder: Path
-    ) -> None:
-        """Append points of one class, (n, 3) in units of the CRS, to the files of their squares and strips, (n,)."""
-        for strip in np.unique(strips).tolist():
-            self._add(code, strip, xyz[strips == strip], zero, side_m, folder)
+    def add(self, code: int, xyz: np.ndarray, marks: np.ndarray, zero: LocalFrame, side_m: float, folder: Path) -> None:
+        """Append points of one class, (n, 3) in units of the CRS, to the files of their squares and marks, (n,)."""
+        for mark in np.unique(marks).tolist():
+            self._add(code, mark, xyz[marks == mark], zero, side_m, folder)
 
-    def _add(self, code: int, strip: int, xyz: np.ndarray, zero: LocalFrame, side_m: float, folder: Path) -> None:
-        """Append points of one class and strip."""
+    def _add(self, code: int, mark: int, xyz: np.ndarray, zero: LocalFrame, side_m: float, folder: Path) -> None:
+        """Append points of one class and mark."""
         new = {"squares": {}, "checks": {}, "low": [np.inf] * 2, "high": [-np.inf] * 2}
         mine = self._classes.setdefault(code, new)
         for key, numbers in points_by_square(zero.to_local(xyz), side_m).items():
             part = xyz[numbers]
-            name = f"{code}_{key[0]}_{key[1]}_{strip}"
+            name = f"{code}_{key[0]}_{key[1]}_{mark}"
             data = part.tobytes()
             with (folder / name).open("ab") as file:
                 file.write(data)
@@ -272,25 +284,35 @@ def _merged(counts: Sequence[Sequence[Sequence[float]]]) -> dict[float, int]:
     return dict(sorted(total.items()))
 
 
-def _source(code: int, found: Sequence[SpooledFile], frame: LocalFrame, side_m: float) -> SpooledPoints:
+def _numbers(file: str) -> list[int]:
+    """Return the numbers that name a file of points: class, both numbers of the square, and mark."""
+    return [int(part) for part in Path(file).name.split("_")]
+
+
+def _source(
+    code: int, found: Sequence[SpooledFile], frame: LocalFrame, side_m: float, passes: Mapping[int, int]
+) -> SpooledPoints:
     """Combine the points of one class."""
     counts: dict[Key, int] = {}
     files: dict[Key, tuple[str, ...]] = {}
     mine = [(file.folder, file.report["classes"][str(code)]) for file in found if str(code) in file.report["classes"]]
     for folder, of_class in mine:
         for name, count in of_class["squares"].items():
-            key = (int(name.split("_")[1]), int(name.split("_")[2]))
+            _, column, row, _ = _numbers(name)
+            key = (column, row)
             counts[key] = counts.get(key, 0) + count
             files[key] = (*files.get(key, ()), str(Path(folder) / name))
     low = np.min([of_class["low"] for _, of_class in mine], axis=0)
     high = np.max([of_class["high"] for _, of_class in mine], axis=0)
-    return SpooledPoints(frame, code, side_m, counts, float((high - low).max() * frame.horizontal_unit_m), files)
+    span_m = float((high - low).max() * frame.horizontal_unit_m)
+    return SpooledPoints(frame, code, side_m, counts, span_m, files, passes)
 
 
 def _fingerprint(request: Request, header: CloudHeader, side_m: float) -> str:
     """Return a name that depends on the file and on everything that determines how its points are sorted."""
     state = header.path.stat()
     facts = (
+        LAYOUT,
         str(header.path.resolve()),
         state.st_size,
         state.st_mtime_ns,

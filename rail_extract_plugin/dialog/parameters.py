@@ -118,7 +118,7 @@ def strips() -> QgsProcessingParameterDefinition:
         tr(
             "What happens where passes of the scanner differ. AS_THEY_ARE uses their points together and states the "
             "difference in strip_mm and sigma_mm. ALIGNED moves each pass onto the mean of all that show the same "
-            "rail, which removes steps. Passes are told apart by the source ids of the points."
+            "rail, which removes steps. Passes are told apart by the source ids and GPS times of the points."
         ),
     )
 

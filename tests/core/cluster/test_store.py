@@ -75,12 +75,13 @@ def test_other_results_are_not_stored():
 
 def test_a_name_changes_with_each_fact():
     square = Square.on_grid((3, -4), 512.0, FRAME)
-    source = SpooledPoints(FRAME, 10, 512.0, {(3, -4): 7}, 9.0, {(3, -4): ("/a/size1/10_3_-4",)})
+    source = SpooledPoints(FRAME, 10, 512.0, {(3, -4): 7}, 9.0, {(3, -4): ("/a/size1/10_3_-4_0",)}, {0: 1})
     facts = [
         (square, source, Parameters(1.435, 0.072)),
         (replace(square, key=(3, -5)), source, Parameters(1.435, 0.072)),
         (replace(square, frame=replace(FRAME, origin=FRAME.origin + 1e-9)), source, Parameters(1.435, 0.072)),
-        (square, replace(source, files={(3, -4): ("/a/size2/10_3_-4",)}), Parameters(1.435, 0.072)),
+        (square, replace(source, files={(3, -4): ("/a/size2/10_3_-4_0",)}), Parameters(1.435, 0.072)),
+        (square, replace(source, passes={0: 2}), Parameters(1.435, 0.072)),
         (square, source, Parameters(1.435, 0.072, smoothing_z_m=2.0)),
         (square, source, RAILS),
         (square, source, RAILS[::-1]),

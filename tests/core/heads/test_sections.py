@@ -68,7 +68,7 @@ def test_what_is_no_head_shows_no_middle():
 def test_edges_are_corrected_by_what_the_outline_shows_elsewhere():
     by_edges = np.array([0.005, 0.006, np.nan, 0.004, 0.009])
     nothing = np.zeros(5)
-    by_outline = Middles(np.array([0.001, 0.002, 0.0, np.nan, np.nan]), nothing, nothing, nothing)
+    by_outline = Middles(np.array([0.001, 0.002, 0.0, np.nan, np.nan]), nothing, nothing, nothing, nothing)
     np.testing.assert_allclose(with_outline(by_edges, by_outline), [0.001, 0.002, 0.0, 0.0, 0.005], atol=1e-12)
-    unknown = Middles(np.full(5, np.nan), nothing, nothing, nothing)
+    unknown = Middles(np.full(5, np.nan), nothing, nothing, nothing, nothing)
     np.testing.assert_array_equal(with_outline(by_edges, unknown), by_edges)

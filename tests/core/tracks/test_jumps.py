@@ -15,11 +15,25 @@ def stepped(curve, at_m, step_m):
     return curve.xy + (step_m * share)[:, None] * curve.left_normal
 
 
+def track(line, *sides):
+    return Centerline(np.column_stack([line, np.zeros(len(line))]), 1, 10, *(sides or ((), ())), *np.zeros(5))
+
+
+def rail(number, line):
+    t = np.arange(0.125, 80.0, 0.25)
+    support = Support(t, np.full(len(t), 10), np.full(len(t), 0.001))
+    return RailLine(np.column_stack([line, np.zeros(len(line))]), number, 10, 800, 20.0, 1.0, 0.0, support=support)
+
+
+def beside(curve, left_m):
+    return replace(curve, xy=curve.xy + left_m * curve.left_normal)
+
+
 @pytest.mark.parametrize("step_m", [0.03, -0.015])
 @pytest.mark.parametrize("radius_m", [300.0, 3000.0])
 def test_a_step_is_found_with_its_size(step_m, radius_m):
     curve = trace([Element(80.0, 1 / radius_m, 1 / radius_m)], heading=0.7)
-    ((at_m, found_m),) = find_steps(stepped(curve, 33.0, step_m))
+    ((at_m, found_m),) = find_steps(track(stepped(curve, 33.0, step_m)), ())
     assert at_m == pytest.approx(33.0, abs=0.3)
     assert found_m == pytest.approx(step_m, rel=0.06)
 
@@ -36,25 +50,27 @@ def test_what_tracks_do_is_no_step(elements):
     rng = np.random.RandomState(0)
     curve = trace(elements, heading=2.0)
     wave = 0.001 * np.sin(curve.chainage * 2 * np.pi / rng.uniform(4, 20))
-    assert find_steps(curve.xy + wave[:, None] * curve.left_normal) == []
-    assert find_steps(curve.xy[:20]) == []
+    assert find_steps(track(curve.xy + wave[:, None] * curve.left_normal), ()) == []
+    assert find_steps(track(curve.xy[:20]), ()) == []
 
 
 def test_half_of_a_step_is_in_doubt_on_either_side():
     curve = trace([Element(80.0, 1 / 800, 1 / 800)], heading=0.3)
-    heights = np.zeros(len(curve.xy))
-    lines = [
-        stepped(replace(curve, xy=curve.xy + left_m * curve.left_normal), 33.0, 0.03) for left_m in (0.0, 0.75, -0.75)
-    ]
-    middle, left, right = (np.column_stack([line, heights]) for line in lines)
-    t = np.arange(0.125, 80.0, 0.25)
-    support = Support(t, np.full(len(t), 10), np.full(len(t), 0.001))
-    rails = [RailLine(xyz, number, 10, 800, 20.0, 1.0, 0.0, support=support) for number, xyz in ((1, left), (2, right))]
-    other = replace(rails[0], rail_id=3)
-    track = Centerline(middle, 1, 10, (1,), (2,), 1435.0, 0.5, 0.0, 0.0, 0.0)
-    *doubted, kept = doubting_steps([*rails, other], [track])
-    for rail in doubted:
-        assert np.allclose(rail.support.sigma_m, np.hypot(0.001, 0.015), rtol=0.06)
-        assert np.allclose(rail.support.strips[:, 1], 0.03, rtol=0.06)
-        assert rail.sigma_mm == pytest.approx(15.0, rel=0.06)
-    assert kept is other
+    middle, left, right = (stepped(beside(curve, left_m), 33.0, 0.03) for left_m in (0.0, 0.75, -0.75))
+    rails = [rail(1, left), rail(2, right[::-1]), rail(3, left)]
+    *doubted, kept = doubting_steps(rails, [track(middle, (1,), (2,))])
+    for one in doubted:
+        assert np.allclose(one.support.sigma_m, np.hypot(0.001, 0.015), rtol=0.06)
+        assert np.allclose(one.support.strips[:, 1], 0.03, rtol=0.06)
+        assert one.sigma_mm == pytest.approx(15.0, rel=0.06)
+    assert kept is rails[2]
+
+
+@pytest.mark.parametrize("other_m", [0.0, -0.03])
+def test_a_track_does_not_step_where_one_of_its_rails_does_not(other_m):
+    curve = trace([Element(80.0, 1 / 800, 1 / 800)], heading=0.3)
+    rails = [rail(1, stepped(beside(curve, 0.75), 33.0, 0.04)), rail(2, stepped(beside(curve, -0.75), 33.0, other_m))]
+    middle = stepped(curve, 33.0, 0.02)
+    one = track(middle, (1,), (2,))
+    assert find_steps(track(middle), ()) and not find_steps(one, rails)
+    assert doubting_steps(rails, [one]) == rails
