@@ -40,7 +40,9 @@ class LocalFrame:
 
     def to_local(self, xyz_crs: np.ndarray) -> np.ndarray:
         """Convert (n, 3) or (3,) coordinates of the cloud to local metres."""
-        return (np.asarray(xyz_crs, dtype=float) - self.origin) * self._metres
+        local = np.asarray(xyz_crs, dtype=float) - self.origin
+        local *= self._metres  # without another copy
+        return local
 
     def to_crs(self, xyz_local: np.ndarray) -> np.ndarray:
         """Convert (n, 3) or (3,) local metres to coordinates of the cloud."""

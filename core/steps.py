@@ -112,11 +112,15 @@ def clean_square(
     """
     cell_m = cell_size(parameters.gauge_m, parameters.head_width_m)
     margin_m = max_passes(parameters.passes) * MARGIN * cell_m
-    points = source.near(square, margin_m + SURROUNDINGS_M).xyz
-    spacings_m = [gauge_m + head_m for gauge_m, head_m in parameters.gauges]
-    seen = np.concatenate([points[:, :2], drawn(points, spacings_m, cell_m)])
+    seen = _seen(source.near(square, margin_m + SURROUNDINGS_M).xyz, parameters, cell_m)
     raster = rasterize(seen[square.holds(seen, margin_m)], cell_m)
     return own_tiles(clean(raster, engine, parameters.passes, progress), square)
+
+
+def _seen(points: np.ndarray, parameters: Parameters, cell_m: float) -> np.ndarray:
+    """Return what the network sees, (n, 2) local metres: points, (m, 3), and places along thin rails."""
+    spacings_m = [gauge_m + head_m for gauge_m, head_m in parameters.gauges]
+    return np.concatenate([points[:, :2], drawn(points, spacings_m, cell_m)])
 
 
 def rails_of_square(

@@ -74,13 +74,11 @@ class SpooledPoints:
         """See `PointSource`."""
         keys = sorted(self.files) if square.is_whole_plane else around(square.key)
         files = [file for key in keys for file in self.files.get(key, ())]
-        parts = [np.fromfile(file).reshape(-1, 3) for file in files]
-        xyz = square.frame.to_local(np.concatenate(parts) if parts else np.empty((0, 3)))
-        strips = [self.passes[_numbers(file)[-1]] for file in files]
-        each = (
-            np.repeat(np.array(strips, dtype=np.int32), [len(part) for part in parts]) if len(set(strips)) > 1 else None
-        )
-        return RailPoints(xyz, square.frame, self.class_code, each).kept(square.holds(xyz, margin_m))
+        parts = [_read(file, square, margin_m) for file in files]
+        xyz = parts[0] if len(parts) == 1 else np.concatenate(parts or [np.empty((0, 3))])
+        strips = np.array([self.passes[_numbers(file)[-1]] for file in files], dtype=np.int32)
+        each = np.repeat(strips, [len(part) for part in parts]) if len(np.unique(strips)) > 1 else None
+        return RailPoints(xyz, square.frame, self.class_code, each)
 
     def part(self, square: Square) -> SpooledPoints:
         """Keep only a square and its neighbours, so that less is sent to a worker."""
@@ -91,6 +89,16 @@ class SpooledPoints:
         marks = {_numbers(file)[-1] for own in files.values() for file in own}
         passes = {mark: self.passes[mark] for mark in sorted(marks)}
         return replace(self, counts={key: self.counts[key] for key in keys}, files=files, passes=passes)
+
+
+def _read(file: str, square: Square, margin_m: float) -> np.ndarray:
+    """Read the points of a file that lie in a square or at most `margin_m` outside, (n, 3), in the frame of the square.
+
+    A single place may hold most of a cloud, so that each copy of its points counts.
+    """
+    xyz = square.frame.to_local(np.fromfile(file).reshape(-1, 3))
+    inside = square.holds(xyz, margin_m)
+    return xyz if inside.all() else xyz[inside]
 
 
 def spool(request: Request, side_m: float, folder: Path, progress: Progress = SILENT) -> tuple[SpooledPoints, ...]:

@@ -58,3 +58,13 @@ def test_every_point_sets_its_cell_wherever_it_is(reach_m):
     cells = rasterize(np.repeat(xy, 3, axis=0), 0.04).cells()
     expected = np.floor(np.column_stack([-xy[:, 1], xy[:, 0]]) / 0.04 + 1e-6).astype(np.int64)
     assert set(map(tuple, cells.tolist())) == set(map(tuple, expected.tolist()))
+
+
+def test_many_points_are_rasterized_in_parts(monkeypatch):
+    xy = np.random.RandomState(0).uniform(-20, 20, (1000, 2))
+    whole = rasterize(xy, 0.04)
+    monkeypatch.setattr("rail_extract.core.raster.POINTS_AT_ONCE", 300)
+    parts = rasterize(xy, 0.04)
+    assert whole.tiles.keys() == parts.tiles.keys()
+    assert all(np.array_equal(whole.tiles[key], parts.tiles[key]) for key in whole.tiles)
+    assert rasterize(xy[:0], 0.04).count() == 0

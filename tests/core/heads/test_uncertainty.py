@@ -10,6 +10,8 @@ from rail_extract.core.heads.uncertainty import (
     TOP_SIGMA_M,
     UNSURE_CURVATURE,
     UNSURE_GRADIENT_CHANGE,
+    VARIANCE_FACTOR,
+    _averaged,
     height_error,
     measure_support,
 )
@@ -185,3 +187,10 @@ def test_two_passes_without_a_mark_blur_the_head_and_are_in_sigma(apart_m):
 @pytest.mark.parametrize("density", [10, 120])
 def test_one_pass_does_not_blur_the_head(noise_m, density):
     assert support(*head(60.0, density, noise_m, seed=4)).strips is None
+
+
+def test_points_are_summed_over_the_stations_that_smoothing_averages():
+    points = np.array([0, 0, 0, 60, 0, 0, 0])
+    assert _averaged(points, 0.001).tolist() == points.tolist()
+    wide = _averaged(points, 5 * 0.25 * VARIANCE_FACTOR)
+    assert wide == pytest.approx([0, 60, 60, 60, 60, 60, 0])

@@ -151,3 +151,11 @@ def test_no_crossing_is_drawn_back_along_its_legs(seed):
     places = np.column_stack([window.x0 + (columns + 0.5) * CELL_M, window.y0 - (rows + 0.5) * CELL_M])
     network = smooth_network(vectorize(rasterize(places, CELL_M), SIZE.head_width_m), 0.8)
     assert max(turn_deg(line) for line in network.lines) < MAX_TURN_DEG
+
+
+def test_parts_are_listed_along_the_line_whichever_is_longest():
+    parts = parts_without_turns(way([0, 0], [12, 0], [12, 30], [50, 30], [50, 25], [70, 25]), 1.0, 0.8)
+    assert len(parts) == 5
+    assert parts == sorted(parts)
+    lengths = [end - start for start, end in parts]
+    assert lengths == pytest.approx([12, 30, 38, 5, 20], abs=2.1)

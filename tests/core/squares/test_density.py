@@ -7,7 +7,15 @@ from rail_extract.core.errors import CloudError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
-from rail_extract.core.squares.density import MIN_IN_WINDOW, WINDOW_M, occupied_squares, plausible, warn_of_unexplained
+from rail_extract.core.squares.density import (
+    MIN_IN_WINDOW,
+    WINDOW_M,
+    _company,
+    _holds_only_strays,
+    occupied_squares,
+    plausible,
+    warn_of_unexplained,
+)
 from rail_extract.core.squares.grid import MemorySource, lay_out
 
 SIDE_M = 500.0
@@ -123,3 +131,19 @@ def test_points_far_from_all_rails_give_a_warning(others, said, length_m):
     listener = Listener()
     warn_of_unexplained(one, [straight(7.1, length_m)], listener)
     assert [text[5:9] for text in listener.warnings] == [said] * bool(said)
+
+
+def test_company_is_counted_in_a_cell_and_the_rings_around():
+    xyz = np.array([[0.5, 0.5, 0], [0.6, 0.5, 9], [1.5, 0.5, 0], [2.5, 1.5, 0], [-0.5, -1.5, 0]])
+    for rings, wanted in enumerate(([2, 2, 1, 1, 1], [3, 3, 4, 2, 1], [5, 5, 5, 4, 4])):
+        number, company = _company(xyz, 1.0, rings)
+        assert company[number].tolist() == wanted
+
+
+@pytest.mark.parametrize("apart_m", [0.1, 1.5, 2.5])
+def test_strays_have_company_one_window_away_but_not_two(apart_m):
+    """Two groups, each half as many as company takes, in windows next to each other or with one between."""
+    group = np.full((MIN_IN_WINDOW // 2 + 1, 3), 0.01)
+    points = source(group, group + [apart_m * WINDOW_M, 0, 0])
+    (square,) = lay_out([points], points)
+    assert _holds_only_strays(points, square) == (apart_m > 2)

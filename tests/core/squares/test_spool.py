@@ -3,15 +3,17 @@
 import os
 import re
 import shutil
+import tracemalloc
 
 import numpy as np
 import pytest
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask, read_rail_points
 from rail_extract.core.errors import Cancelled, NoRailPointsError
+from rail_extract.core.frame import LocalFrame
 from rail_extract.core.progress import Progress
 from rail_extract.core.squares.grid import MemorySource, Square, lay_out
-from rail_extract.core.squares.spool import spool
+from rail_extract.core.squares.spool import SpooledPoints, spool
 
 SIDE = 30.0
 
@@ -191,3 +193,20 @@ def test_points_keep_their_strips(tmp_path):
         for part in near:
             assert part.strips is None or len(part.strips) == len(part.xyz)
         assert {4, 7, 9} == {int(one) for part in near if part.strips is not None for one in part.strips}
+
+
+def test_points_at_one_place_are_read_with_a_single_copy(tmp_path):
+    """A cloud that lies in one square is held twice at most: as stored, and in local metres."""
+    points = np.random.RandomState(0).uniform(0, SIDE, (200_000, 3))
+    points.tofile(tmp_path / "10_0_0_0")
+    square = Square.on_grid((0, 0), SIDE, LocalFrame(np.zeros(3)))
+    files = {(0, 0): (str(tmp_path / "10_0_0_0"),)}
+    source = SpooledPoints(square.frame, 10, SIDE, {(0, 0): len(points)}, SIDE, files, {0: 1})
+    tracemalloc.start()
+    try:
+        near = source.near(square, 0.0)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    np.testing.assert_array_equal(near.xyz, points)
+    assert peak < 2.5 * points.nbytes

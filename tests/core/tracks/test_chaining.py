@@ -11,6 +11,8 @@ from rail_extract.core.polyline import length_along
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.centerlines import build_centerlines
+from rail_extract.core.tracks.chaining import _rail_links
+from rail_extract.core.tracks.pairing import RailPair
 from rail_extract.laboratory.curves import Curve, Element, trace
 from rail_extract.laboratory.rasters.turnouts import FORMS, branch
 from rail_extract.laboratory.ruler.lines import compare_lines
@@ -241,3 +243,13 @@ def test_drawing_a_long_track_can_be_cancelled():
     with pytest.raises(Cancelled):
         build(*laid.rails(), progress=progress)
     assert progress.fraction < 0.75
+
+
+@pytest.mark.parametrize(("gap_m", "count"), [(-1.2, 0), (-0.8, 1), (4.0, 1), (6.0, 0)])
+def test_a_rail_links_sections_that_it_continues_over_a_gap_or_a_small_overlap(gap_m, count):
+    pairs = [RailPair(0, 1, (0.0, 50.0), (0.0, 50.0)), RailPair(0, 2, (50 + gap_m, 90.0), (40.0, 0.0))]
+    links = list(_rail_links(pairs, 5.0))
+    assert len(links) == count
+    for link in links:
+        assert (link.first, link.second, link.rail) == (1, 2, 0)
+        assert link.length_m == pytest.approx(gap_m)

@@ -3,6 +3,7 @@ import pytest
 from rail_extract.core.lines.thinning import thin
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.centerlines import build_centerlines
+from rail_extract.core.tracks.forking import MAX_APART_M, _angle, _extended
 from rail_extract.laboratory.curves import Element, trace
 from rail_extract.laboratory.rasters.turnouts import FORMS, branch
 from rail_extract.laboratory.ruler.lines import compare_lines
@@ -138,3 +139,25 @@ def test_a_track_that_continues_another_at_a_distance_does_not_fork():
     rails = [rail for curve in (first, second) for rail in Track(curve, GAUGE + WIDTH).rails()]
     found = build_centerlines(rails_of(*rails), GAUGE, WIDTH)
     assert sum(line.length_m for line in found) == pytest.approx(60.0, abs=0.5)
+
+
+@pytest.mark.parametrize(("first_m", "is_near"), [(MAX_APART_M - 0.005, True), (MAX_APART_M + 0.005, False)])
+def test_a_branch_is_only_extended_if_its_very_end_is_near_the_track(first_m, is_near):
+    """A branch on an arc of 300 m, whose second vertex is further away than the limit in both cases."""
+    x = np.arange(0.0, 60.0, 0.5)
+    through = np.column_stack([x - 20, np.zeros((len(x), 2))])
+    way = x + np.sqrt(600 * first_m)
+    branch = np.column_stack([x, way**2 / 600, np.zeros(len(x))])
+    longer = _extended(branch, through)
+    assert (longer is not None) == is_near
+    if is_near:
+        assert longer[0] == pytest.approx([-np.sqrt(600 * first_m), 0, 0], abs=0.05)
+
+
+@pytest.mark.parametrize(("bend", "touch"), [(0.001, -5.0), (-0.001, -np.inf)])
+def test_a_straight_switch_has_a_heel_behind_which_the_branch_bends_outward(bend, touch):
+    s = np.arange(0.0, 30.0, 0.5)
+    off = 0.02 * (s + 5) + bend * np.maximum(s - 8, 0) ** 2
+    law, misfit_m = _angle(s, off, 8.0)
+    assert law.touch == pytest.approx(touch)
+    assert misfit_m.max() < 1e-9

@@ -5,7 +5,7 @@ import pytest
 from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.raster import rasterize
 from rail_extract.core.vectorize import vectorize
-from rail_extract.core.vectorize.slips import open_slips
+from rail_extract.core.vectorize.slips import SIDE_M, Slip, _Cross, open_slips
 from scipy.spatial import cKDTree
 
 HEAD_M, CELL_M = 0.072, 0.04
@@ -65,3 +65,18 @@ def test_a_curve_without_a_partner_is_no_slip():
     partner = [line + SPACING_M * np.array([-np.sin(0.4), np.cos(0.4)]) for line in lone[:1]]
     network = vectorize(raster_of([*lone, *partner], np.random.RandomState(0)), HEAD_M)
     assert open_slips(network, cKDTree(np.concatenate(lone)))[1] == []
+
+
+def test_a_slip_holds_what_lies_between_its_legs_and_its_curve():
+    cross = _Cross(np.array([10.0, 20.0]), np.eye(2), 0.05)
+    slip = Slip(cross, 12.0, ((0.3, 1.0),))
+    assert slip.tangent_m == pytest.approx(2 * 0.3 / 0.05)
+    curve = cross.curve(0.3, 1.0)
+    inner = np.abs(curve[:, 0] - 10) < 11.9
+    assert slip.holds(curve[inner]).all()
+    assert not slip.holds(curve[inner] + [0, SIDE_M + 0.01]).any()
+    assert slip.holds(curve[inner] + [0, SIDE_M - 0.01]).all()
+    mirrored = curve * [1, -1] + [0, 40]
+    middle = np.abs(curve[:, 0] - 10) < 2
+    assert not slip.holds(mirrored[middle]).any()
+    assert not slip.holds(np.array([[22.1, 20.0]])).any()

@@ -266,6 +266,19 @@ def test_a_cancel_ends_the_work():
         vectorize(draw([straight(5, 0.3)]), HEAD_M, progress=Impatient())
 
 
+def test_the_progress_rises_from_0_to_1():
+    fractions = []
+
+    class Listening(Progress):
+        def set_fraction(self, fraction):
+            fractions.append(fraction)
+
+    vectorize(draw([straight(20, 0.3)]), HEAD_M, progress=Listening())
+    assert fractions == sorted(fractions)
+    assert 0.0 <= fractions[0] < 0.3
+    assert fractions[-1] == 1.0
+
+
 def test_every_line_asks_for_a_cancel():
     class Counting(Progress):
         asked = 0
