@@ -12,6 +12,10 @@ AS_THEY_ARE, ALIGNED = "AS_THEY_ARE", "ALIGNED"
 STRIPS = (AS_THEY_ARE, ALIGNED)
 """What happens to strips, the passes of a scanner, that differ: nothing, or they are moved onto their mean."""
 
+OVERLAP, SYNTHETIC = "OVERLAP", "SYNTHETIC"
+LEAVE_OUT = (OVERLAP, SYNTHETIC)
+"""Points that can be left out by their flag: of overlapping strips, or computed and not measured."""
+
 DEFAULT_STEP_M = 1.0
 """Distance between the stations of the track geometry, once it is asked for."""
 

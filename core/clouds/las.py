@@ -11,17 +11,26 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import CloudError, EmptyCloudError
+from ..parameters import OVERLAP, SYNTHETIC
 from ..progress import SILENT, Progress
-from . import laz
+from . import copc, laz
 from .crs import crs_of_geokeys, import_pyproj
 from .passes import marks_of
-from .readers import Chunk, CloudHeader, Points
+from .readers import Chunk, CloudHeader, Extent, Points
 
 with warnings.catch_warnings():
     # In a virtual environment, pyproj (imported by laspy) warns about a data folder that PROJ finds by itself.
     warnings.simplefilter("ignore", UserWarning)
     import laspy
     from laspy.vlrs.vlrlist import VLRList
+
+_PARTS = laspy.DecompressionSelection
+FIELDS = _PARTS.XY_RETURNS_CHANNEL | _PARTS.Z | _PARTS.CLASSIFICATION | _PARTS.FLAGS
+FIELDS |= _PARTS.POINT_SOURCE_ID | _PARTS.GPS_TIME
+"""What is decompressed of a point."""
+
+OVERLAP_CLASS = 12
+"""Class of overlap points in point formats 0 to 5, which have no flag for it."""
 
 CHUNK = 250_000
 """Points read at once: about 10 MB, and read in much less than the half second within which a run must react to a
@@ -60,39 +69,62 @@ def read_header(path: Path) -> CloudHeader:
         return CloudHeader(path, int(header.point_count), (xmin, ymin, xmax, ymax), _crs_wkt(header))
 
 
-def read_classes(path: Path, class_codes: Sequence[int], progress: Progress = SILENT) -> Iterator[Chunk]:
+def read_classes(
+    path: Path,
+    class_codes: Sequence[int],
+    progress: Progress = SILENT,
+    extent: Extent | None = None,
+    leave_out: Sequence[str] = (),
+) -> Iterator[Chunk]:
     """Read the points of some classes chunk by chunk; see `readers.read_classes`."""
     wanted = np.zeros(256, dtype=bool)
     wanted[list(class_codes)] = True
-    for chunk, codes, marks, valid in _chunks(path, progress):
+    for chunk, codes, marks, valid, whole in _chunks(path, progress, extent, leave_out):
         keep = np.flatnonzero(wanted[codes] & valid)
-        yield _coordinates(chunk, keep), codes[keep], marks[keep], np.bincount(codes[valid], minlength=256)
+        counted = codes[valid] if whole else codes[keep]
+        yield _coordinates(chunk, keep), codes[keep], marks[keep], np.bincount(counted, minlength=256)
 
 
-def read_points(path: Path, progress: Progress = SILENT) -> Iterator[Points]:
+def read_points(path: Path, progress: Progress = SILENT, leave_out: Sequence[str] = ()) -> Iterator[Points]:
     """Read all points chunk by chunk; see `readers.read_points`."""
-    for chunk, codes, marks, valid in _chunks(path, progress):
+    for chunk, codes, marks, valid, _ in _chunks(path, progress, None, leave_out):
         yield _coordinates(chunk, slice(None)), codes, marks, valid
 
 
 def _chunks(
-    path: Path, progress: Progress
-) -> Iterator[tuple[laspy.ScaleAwarePointRecord, np.ndarray, np.ndarray, np.ndarray]]:
-    """Check a file and read it chunk by chunk: points, their classes and marks, and which are not withheld."""
+    path: Path, progress: Progress, extent: Extent | None, leave_out: Sequence[str]
+) -> Iterator[tuple[laspy.ScaleAwarePointRecord, np.ndarray, np.ndarray, np.ndarray, bool]]:
+    """Check a file and read it: points, classes, marks, which are valid, and whether the file is read as a whole."""
     with _open(path) as reader:
-        header, done = reader.header, 0
-        total, timed = header.point_count, "gps_time" in header.point_format.dimension_names
+        header, done, some = reader.header, 0, None
+        timed = "gps_time" in header.point_format.dimension_names
         if header.are_points_compressed:
-            laz.check_layers(path, header, laz.read_chunk_table(path, header), progress)
-        for chunk in reader.chunk_iterator(chunk_size(header)):
+            table = laz.read_chunk_table(path, header)
+            laz.check_layers(path, header, table, progress)
+            some = copc.chunks_in(path, header, table, extent) if extent is not None else None
+        total = header.point_count if some is None else sum(one.points for one in some)
+        most = chunk_size(header)
+        parts = reader.chunk_iterator(most) if some is None else copc.read_chunks(path, header, some, FIELDS, most)
+        for chunk in parts:
             progress.check()
             gps_time = np.asarray(chunk.gps_time) if timed else None
             marks = marks_of(np.asarray(chunk.point_source_id), header.file_source_id, gps_time)
-            yield chunk, np.asarray(chunk.classification), marks, np.asarray(chunk.withheld) == 0
+            yield chunk, np.asarray(chunk.classification), marks, _valid(chunk, leave_out), some is None
             done += len(chunk)
             progress.set_fraction(done / total)
     if done < total:
         raise CloudError(f"{path.name} is cut off: it holds {done} of the {total} points stated in its header.")
+
+
+def _valid(chunk: laspy.ScaleAwarePointRecord, leave_out: Sequence[str]) -> np.ndarray:
+    """Return which points are neither withheld nor of a kind that is to be left out, (n,) bool."""
+    valid = np.asarray(chunk.withheld) == 0
+    if SYNTHETIC in leave_out:
+        valid &= np.asarray(chunk.synthetic) == 0
+    if OVERLAP in leave_out:
+        flagged = "overlap" in chunk.point_format.dimension_names
+        valid &= np.asarray(chunk.overlap) == 0 if flagged else np.asarray(chunk.classification) != OVERLAP_CLASS
+    return valid
 
 
 def chunk_size(header: laspy.LasHeader) -> int:
@@ -110,10 +142,7 @@ def _coordinates(chunk: laspy.ScaleAwarePointRecord, keep: np.ndarray | slice) -
 def _open(path: Path) -> Iterator[laspy.LasReader]:
     """Open a file and check it; what laspy and lazrs raise on a damaged file is left to `readers`."""
     _check_start(path)
-    fields = laspy.DecompressionSelection
-    selection = fields.XY_RETURNS_CHANNEL | fields.Z | fields.CLASSIFICATION | fields.FLAGS
-    selection |= fields.POINT_SOURCE_ID | fields.GPS_TIME
-    with laspy.open(path, read_evlrs=False, decompression_selection=selection) as reader:
+    with laspy.open(path, read_evlrs=False, decompression_selection=FIELDS) as reader:
         _check_header(path, reader.header)
         yield reader
 

@@ -139,6 +139,8 @@ class Request:
         Frame whose origin is the zero of the files' coordinate system.
     mask : Mask or None
         Area to which the points are limited, in units of the CRS.
+    leave_out : tuple of str
+        Flags whose points are left out; see `readers.read_classes`.
     merged : bool
         Whether all points requested count as points of the first class.
     """
@@ -149,12 +151,14 @@ class Request:
     zero: LocalFrame
     merged: bool = False
     mask: Mask | None = None
+    leave_out: tuple[str, ...] = ()
 
     def read(self, header: CloudHeader, progress: Progress = SILENT) -> Iterator[Chunk]:
         """Read the points requested from a file chunk by chunk; see `readers.read_classes`."""
         if not all(_overlap(header.extent, area) for area in self._areas()):
             return
-        for xyz, codes, marks, census in read_classes(header.path, self.class_codes, progress):
+        chunks = read_classes(header.path, self.class_codes, progress, self._bounds(), self.leave_out)
+        for xyz, codes, marks, census in chunks:
             inside = self.holds(xyz) if self._areas() else slice(None)
             found = np.full_like(codes, self.class_codes[0]) if self.merged else codes
             yield xyz[inside], found[inside], marks[inside], census
@@ -174,6 +178,14 @@ class Request:
     def _areas(self) -> list[Extent]:
         """List the rectangles outside of which no point is requested."""
         return [area for area in (self.extent, None if self.mask is None else self.mask.extent) if area is not None]
+
+    def _bounds(self) -> Extent | None:
+        """Return the rectangle in which points are requested; None if that is everywhere."""
+        areas = self._areas()
+        if not areas:
+            return None
+        xmin, ymin, xmax, ymax = zip(*areas)
+        return max(xmin), max(ymin), min(xmax), min(ymax)
 
     def sample(self) -> np.ndarray:
         """Read the first points requested, (n, 3) metres from one of them; takes a few seconds for a cloud of any size.
@@ -214,8 +226,9 @@ class Request:
                 f"The {self.where} contains no points of class {wanted}: choose a larger {self.where}."
             )
         if not census.any():
+            flags = _either("withheld", *map(str.lower, self.leave_out))
             return NoRailPointsError(
-                "All points of the cloud are marked as withheld: export the valid points without this mark."
+                f"All points of the cloud are marked as {flags}: export the valid points without this mark."
             )
         found = ", ".join(f"{code} ({census[code]})" for code in np.flatnonzero(census))
         return NoRailPointsError(
@@ -324,6 +337,12 @@ def _collect(request: Request, progress: Progress) -> tuple[np.ndarray, np.ndarr
     if not len(codes):
         raise request.explain_none(census)
     return xyz, codes, marks
+
+
+def _either(*words: str) -> str:
+    """Enumerate words: withheld, overlap or synthetic."""
+    *others, last = words
+    return f"{', '.join(others)} or {last}" if others else last
 
 
 def _overlap(a: Extent, b: Extent) -> bool:

@@ -23,6 +23,9 @@ READERS = {".las": "las", ".laz": "las"}
 """Module of this package by the suffix of the files it reads. It is imported on first use, because QGIS lacks the
 packages that readers need. COPC files end in .copc.laz."""
 
+OTHER_FORMATS = {".ply": "a PLY", ".e57": "an E57", ".pts": "a PTS", ".ptx": "a PTX", ".xyz": "an XYZ"}
+"""Formats of point clouds that are not read: rail points have a class, and lengths need a coordinate system."""
+
 CATALOGUES: dict[str, Callable[[Path], Sequence[Path]]] = {".vpc": list_tiles}
 """Functions that list the clouds named in a file, by its suffix."""
 
@@ -75,10 +78,17 @@ class Reader(Protocol):
     def read_header(self, path: Path) -> CloudHeader:
         """Read and check the header of a file, without its points; see `read_header`."""
 
-    def read_classes(self, path: Path, class_codes: Sequence[int], progress: Progress = SILENT) -> Iterator[Chunk]:
+    def read_classes(
+        self,
+        path: Path,
+        class_codes: Sequence[int],
+        progress: Progress = SILENT,
+        extent: Extent | None = None,
+        leave_out: Sequence[str] = (),
+    ) -> Iterator[Chunk]:
         """Read a file chunk by chunk and keep the points of some classes; see `read_classes`."""
 
-    def read_points(self, path: Path, progress: Progress = SILENT) -> Iterator[Points]:
+    def read_points(self, path: Path, progress: Progress = SILENT, leave_out: Sequence[str] = ()) -> Iterator[Points]:
         """Read all points of a file chunk by chunk; see `read_points`."""
 
 
@@ -103,7 +113,13 @@ def first_header(paths: Paths) -> CloudHeader:
     return read_header(last)
 
 
-def read_classes(path: Path, class_codes: Sequence[int], progress: Progress = SILENT) -> Iterator[Chunk]:
+def read_classes(
+    path: Path,
+    class_codes: Sequence[int],
+    progress: Progress = SILENT,
+    extent: Extent | None = None,
+    leave_out: Sequence[str] = (),
+) -> Iterator[Chunk]:
     """Read a file chunk by chunk and keep the points of some classes; withheld points are left out.
 
     Parameters
@@ -112,6 +128,10 @@ def read_classes(path: Path, class_codes: Sequence[int], progress: Progress = SI
     class_codes : sequence of int
         Classes to keep, 0 to 255.
     progress : Progress
+    extent : tuple of float, optional
+        Where points are needed: those elsewhere may be left out where that saves time, as in COPC files.
+    leave_out : sequence of str
+        Some of `parameters.LEAVE_OUT`: points with these flags are treated like withheld ones.
 
     Yields
     ------
@@ -122,7 +142,8 @@ def read_classes(path: Path, class_codes: Sequence[int], progress: Progress = SI
     marks : (n,) uint32 array
         What tells their passes apart, see `passes.marks_of`. All 0 where the file states neither source ids nor times.
     census : (256,) int array
-        Points in the chunk by class, kept or not, without withheld ones.
+        Points in the chunk by class, kept or not, without withheld ones. Of a file that is not read as a whole, only
+        those of the classes to keep.
 
     Raises
     ------
@@ -130,11 +151,18 @@ def read_classes(path: Path, class_codes: Sequence[int], progress: Progress = SI
         The file has an unknown suffix, or turns out to be cut off or damaged.
     """
     with explained(path):
-        yield from _reader(path).read_classes(path, class_codes, progress)
+        yield from _reader(path).read_classes(path, class_codes, progress, extent, leave_out)
 
 
-def read_points(path: Path, progress: Progress = SILENT) -> Iterator[Points]:
+def read_points(path: Path, progress: Progress = SILENT, leave_out: Sequence[str] = ()) -> Iterator[Points]:
     """Read all points of a file chunk by chunk, in the order of the file.
+
+    Parameters
+    ----------
+    path : Path
+    progress : Progress
+    leave_out : sequence of str
+        See `read_classes`.
 
     Yields
     ------
@@ -145,7 +173,7 @@ def read_points(path: Path, progress: Progress = SILENT) -> Iterator[Points]:
     marks : (n,) uint32 array
         See `read_classes`.
     valid : (n,) bool array
-        Points that are not withheld.
+        Points that are neither withheld nor to be left out.
 
     Raises
     ------
@@ -153,7 +181,7 @@ def read_points(path: Path, progress: Progress = SILENT) -> Iterator[Points]:
         See `read_classes`.
     """
     with explained(path):
-        yield from _reader(path).read_points(path, progress)
+        yield from _reader(path).read_points(path, progress, leave_out)
 
 
 @contextmanager
@@ -220,6 +248,11 @@ def _reader(path: Path) -> Reader:
 def _module_of(path: Path) -> str:
     """Name the module that reads a file."""
     module = READERS.get(path.suffix.lower())
+    if module is None and path.suffix.lower() in OTHER_FORMATS:
+        raise CloudError(
+            f"{path.name} is {OTHER_FORMATS[path.suffix.lower()]} file, which states neither classes nor a coordinate "
+            "system in a standard way: convert it to LAS or LAZ, for example with CloudCompare or PDAL."
+        )
     if module is None:
         raise CloudError(f"{path.name} has no suffix of a known cloud format: export the cloud as {_any_of(READERS)}.")
     return module

@@ -19,7 +19,7 @@ from ..progress import Estimating
 from ..scratch import scratch_folder
 from ..standards import LAST_CLASS, RAIL_CLASS, SEARCHED_CLASSES, resolve
 from ..tasks import InTurn, Runner
-from .options import TILES_HELP, Console, add_cloud_arguments, extent_of, gauges_of, shapes_module, within_mask
+from .options import TILES_HELP, Console, add_cloud_arguments, extent_of, gauges_of, limited, shapes_module
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> None:
         output.parent.mkdir(parents=True, exist_ok=True)
     planned = plan_output(args.tiles, output, choice.class_code, progress)
     request = ask(args.tiles, SEARCHED_CLASSES, args.crs, extent_of(args.extent), progress)
-    request = within_mask(request, args.mask)
+    request = limited(request, args)
     settings = Settings(gauges_m, standard.head_width_m, not args.pairs_only, _guide(args, request))
     with writing(output.parent), scratch_folder(planned.file.parent) as folder, _runner(args.workers, folder) as runner:
         result = classify_files(request, settings, choice, planned, folder, runner, progress)

@@ -26,7 +26,7 @@ from ..raster_file import header_for, on_one_grid
 from ..report import Origin, list_findings, summary
 from ..scratch import scratch_folder
 from ..standards import SEARCHED_CLASSES, RailStandard, resolve
-from .options import TILES_HELP, Console, add_cloud_arguments, extent_of, gauges_of, numbers_in, within_mask
+from .options import TILES_HELP, Console, add_cloud_arguments, extent_of, gauges_of, limited, numbers_in
 
 NEEDS = {name: name for name in ("distributed", "cryptography", "pyogrio", "shapely", "rasterio")}
 """Modules and packages of the extra "cluster"; rasterio is needed for `--cleaned` only."""
@@ -230,7 +230,7 @@ def _run_in(
     with connect(args.scheduler, args.workers, certificates, args.dashboard) as client:
         runner = DaskRunner(client, folder)
         request = ask(args.tiles, codes, args.crs, extent, progress, unreadable=runner.failures)
-        request = within_mask(request, args.mask)
+        request = limited(request, args)
         request = replace(request, merged=args.merge_classes and not args.classify)
         network = extract_files(request, folder.resolve(), parameters, runner, progress, args.classify)
     _write(network, args, standard, parameters, extent, outputs)

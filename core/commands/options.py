@@ -11,7 +11,7 @@ from types import ModuleType
 
 from ..clouds.points import Request
 from ..errors import ParameterError
-from ..parameters import Parameters
+from ..parameters import LEAVE_OUT, Parameters
 from ..progress import Progress
 from ..standards import DEFAULT, Gauge, RailStandard, read_gauges
 
@@ -37,6 +37,10 @@ def add_cloud_arguments(parser: argparse._ActionsContainer) -> None:
         help="read only the points in this rectangle, in units of the coordinate system; write --extent=-5,... if "
         "the first number is negative",
     )
+    flags = ",".join(LEAVE_OUT)
+    parser.add_argument(
+        "--leave-out", default="", metavar="FLAGS", help=f"leave out points with these flags, of {flags}"
+    )
     text = "read only the points in the polygons of this GeoPackage or GeoJSON file"
     parser.add_argument("--mask", type=Path, metavar="FILE", help=text)
 
@@ -57,17 +61,21 @@ def shapes_module(option: str) -> ModuleType:
         ) from error
 
 
-def within_mask(request: Request, path: Path | None) -> Request:
-    """Limit a request for points to the polygons of a file, if one was given.
+def limited(request: Request, args: argparse.Namespace) -> Request:
+    """Limit a request for points to the polygons of `--mask` and the points without the flags of `--leave-out`.
 
     Raises
     ------
     ParameterError
         The file has no polygons, or its packages are not installed.
     """
-    if path is None:
+    flags = tuple(word.strip().upper() for word in args.leave_out.split(",") if word.strip())
+    if not set(flags) <= set(LEAVE_OUT):
+        raise ParameterError(f'--leave-out "{args.leave_out}" should be flags of {", ".join(LEAVE_OUT)}.')
+    request = replace(request, leave_out=flags)
+    if args.mask is None:
         return request
-    return replace(request, mask=shapes_module("--mask").read_mask(path, request.zero.crs_wkt))
+    return replace(request, mask=shapes_module("--mask").read_mask(args.mask, request.zero.crs_wkt))
 
 
 def gauges_of(args: argparse.Namespace, standard: RailStandard, tolerance_m: float | None = None) -> tuple[Gauge, ...]:

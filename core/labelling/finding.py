@@ -210,7 +210,7 @@ def _sort_file(
     counts: dict[Key, int] = {}
     wanted = np.zeros(LAST_CLASS + 1, dtype=bool)
     wanted[list(request.class_codes)] = True
-    for xyz, codes, marks, valid in read_points(header.path, context.progress):
+    for xyz, codes, marks, valid in read_points(header.path, context.progress, request.leave_out):
         kept = np.flatnonzero(valid & wanted[codes] & request.holds(xyz))
         if settings.guide is not None:
             kept = kept[settings.guide.holds(request.zero.to_local(xyz[kept])[:, :2])]

@@ -328,6 +328,7 @@ def _fingerprint(request: Request, header: CloudHeader, side_m: float) -> str:
         request.merged,
         request.extent,
         None if request.mask is None else hashlib.sha256(request.mask.edges.tobytes()).hexdigest(),
+        sorted(request.leave_out),
         side_m,
         request.zero.horizontal_unit_m,
         request.zero.vertical_unit_m,

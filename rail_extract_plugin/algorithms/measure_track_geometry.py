@@ -74,7 +74,7 @@ class MeasureTrackGeometry(RailAlgorithm):
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs in the order of the interface."""
         layers = (inputs.centerlines(), inputs.rails_of_tracks(), inputs.points_of_rails())
-        settings = (groups.step(), *groups.head(), groups.other_gauges())
+        settings = (groups.step(), *groups.head(), groups.other_gauges(), groups.leave_out())
         findings = outputs.findings()
         findings.setCreateByDefault(False)
         for definition in (*layers, *settings, outputs.quality(), findings):

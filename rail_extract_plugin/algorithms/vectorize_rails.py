@@ -55,7 +55,13 @@ class VectorizeRails(RailAlgorithm):
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs in the order of the interface."""
-        for definition in (inputs.raster(), inputs.points(), *groups.lines(), *groups.raster_rail()):
+        for definition in (
+            inputs.raster(),
+            inputs.points(),
+            *groups.lines(),
+            *groups.raster_rail(),
+            groups.leave_out(),
+        ):
             self.addParameter(definition)
         self.addParameter(outputs.rails())
         for output in outputs.rail_figures():

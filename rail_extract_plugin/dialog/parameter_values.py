@@ -168,6 +168,12 @@ class ParameterValues:
             raise RailExtractError("MASK is not a readable layer: give a polygon layer.")
         return read_mask(source, system(checked_crs(cloud)), self._context)
 
+    def _left_out(self) -> tuple[str, ...]:
+        """Read LEAVE_OUT; nothing where an algorithm does not have it."""
+        if not self._has("LEAVE_OUT"):
+            return ()
+        return tuple(self._algorithm.parameterAsEnumStrings(self._parameters, "LEAVE_OUT", self._context))
+
     def _line_source(self, name: str) -> QgsProcessingFeatureSource:
         """Return a layer that may have lines."""
         source = self._algorithm.parameterAsSource(self._parameters, name, self._context)
@@ -192,7 +198,7 @@ class ParameterValues:
             )
         source = replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
         prepare_system(checked_crs(source))
-        return replace(source, mask=self._mask(source))
+        return replace(source, mask=self._mask(source), leave_out=self._left_out())
 
     def extent(self, crs: QgsCoordinateReferenceSystem) -> tuple[float, float, float, float] | None:
         """Read EXTENT in `crs`: west, south, east and north limits.

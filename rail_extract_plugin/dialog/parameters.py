@@ -15,7 +15,7 @@ from qgis.core import (
 
 from ...core.frpdf import DEVICES, ENGINES, MAX_PASSES
 from ...core.frpdf.models import NAMES
-from ...core.parameters import DEFAULT_GUIDE_DISTANCE_M, DEFAULT_STEP_M, STRIPS, Parameters
+from ...core.parameters import DEFAULT_GUIDE_DISTANCE_M, DEFAULT_STEP_M, LEAVE_OUT, STRIPS, Parameters
 from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS, UNCONFIRMED_PROFILES
 from ..i18n import tr
 from .definitions import MM_DECIMALS, Definitions, advanced, choice, helped, number
@@ -147,6 +147,25 @@ def area() -> Definitions:
         advanced(
             QgsProcessingParameterCrs("CRS", tr("CRS of a cloud without one"), optional=True),
             tr("Projected coordinate system for files that do not state one; other files keep their own."),
+        ),
+        leave_out(),
+    )
+
+
+def leave_out() -> QgsProcessingParameterDefinition:
+    """Define which points are left out by their flag."""
+    return advanced(
+        QgsProcessingParameterEnum(
+            "LEAVE_OUT",
+            tr("Points to leave out"),
+            list(LEAVE_OUT),
+            allowMultiple=True,
+            optional=True,
+            usesStaticStrings=True,
+        ),
+        tr(
+            "OVERLAP leaves out points that are marked as overlap of strips, SYNTHETIC those that are marked as "
+            "computed, not measured. Withheld points are always left out."
         ),
     )
 

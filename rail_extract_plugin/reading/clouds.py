@@ -52,6 +52,7 @@ class CloudSource:
     paths: tuple[Path, ...]
     crs_wkt: str | None = None
     mask: Mask | None = None
+    leave_out: tuple[str, ...] = ()
 
 
 def cloud_source(value: Any, context: QgsProcessingContext) -> CloudSource:
@@ -160,7 +161,7 @@ def request_points(source: CloudSource, class_codes: Sequence[int], bounds: Boun
     from ...core.clouds.points import ask
 
     request = ask(source.paths, class_codes, source.crs_wkt, bounds(system(crs_of(source))), progress)
-    return replace(request, mask=source.mask)
+    return replace(request, mask=source.mask, leave_out=source.leave_out)
 
 
 @contextmanager

@@ -120,7 +120,7 @@ def rails(driver: Driver) -> Iterator:
     dialog = yield from open_dialog("extractrails")
     dialog.mainWidget().wrappers["INPUT"].widget.combo.lineEdit().insert(SAMPLE)
     outputs = dict.fromkeys(("RAILS", "CENTERLINES", "QUALITY", "FINDINGS", "REPORT"), "TEMPORARY_OUTPUT")
-    others = {"OTHER_GAUGES": "1435/72", "CLEANED": str(driver.folder / "cleaned.tif")}
+    others = {"OTHER_GAUGES": "1435/72", "LEAVE_OUT": ["SYNTHETIC"], "CLEANED": str(driver.folder / "cleaned.tif")}
     dialog.setParameters({**PART, **outputs, **others})
     driver.keep("log", (yield from press_run(dialog)))
     results = dialog.results()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 
 import laspy
 import numpy as np
@@ -12,7 +13,7 @@ from fuzzing.clouds import chunks_of_any_size
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rail_extract.core.clouds import las, laz
-from rail_extract.core.clouds.points import read_rail_points
+from rail_extract.core.clouds.points import ask, read_rail_points, read_requested
 from rail_extract.core.clouds.readers import first_header
 from rail_extract.core.errors import (
     Cancelled,
@@ -142,6 +143,29 @@ def test_withheld_points_are_left_out(tmp_path):
     cloud.write(tmp_path / "a.las")
     with pytest.raises(NoRailPointsError, match=r"number of points, are 2 \(500\): set"):
         read_rail_points(tmp_path / "a.las", [RAIL])
+
+
+@pytest.mark.parametrize(("version", "point_format"), [("1.2", 1), ("1.4", 6)])
+def test_overlap_and_synthetic_points_are_left_out_on_demand(tmp_path, version, point_format):
+    """Point formats below 6 have a class for overlap, and no flag."""
+    make_cloud(tmp_path / "a.las", version=version, point_format=point_format, codes=(RAIL,))
+    cloud = laspy.read(tmp_path / "a.las")
+    cloud.synthetic[:100] = 1
+    if point_format < 6:
+        cloud.classification[50:300] = 12
+    else:
+        cloud.overlap[50:300] = 1
+    cloud.write(tmp_path / "a.las")
+    request = ask(tmp_path / "a.las", [RAIL, 12])
+    counts = []
+    for flags in ((), ("SYNTHETIC",), ("OVERLAP",), ("OVERLAP", "SYNTHETIC")):
+        points = read_requested(replace(request, leave_out=flags))
+        counts.append(sum(len(one.xyz) for one in points))
+    assert counts == [3000, 2900, 2750, 2700]
+    cloud.synthetic[:] = 1
+    cloud.write(tmp_path / "a.las")
+    with pytest.raises(NoRailPointsError, match="^All points of the cloud are marked as withheld or synthetic"):
+        read_requested(replace(request, leave_out=("SYNTHETIC",)))
 
 
 def test_no_point_is_lost_between_chunks(tmp_path, monkeypatch):

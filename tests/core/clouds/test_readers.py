@@ -89,7 +89,7 @@ def test_virtual_point_cloud_without_its_tiles_is_refused(tmp_path, names, sente
         readers.list_files(write_catalogue(tmp_path / "all.vpc", *names))
 
 
-@pytest.mark.parametrize("name", ["cloud.e57", "cloud"])
+@pytest.mark.parametrize("name", ["cloud.dat", "cloud"])
 def test_unknown_suffix_is_refused(tmp_path, name):
     (tmp_path / name).touch()
     sentence = f"^{name} has no suffix of a known cloud format: export the cloud as .las or .laz.$"
@@ -120,3 +120,10 @@ def test_no_path_is_refused():
 def test_missing_path_is_refused_with_the_suffixes(tmp_path):
     with pytest.raises(CloudError, match="gone.laz does not exist: give a .las, .laz or .vpc file, or a folder"):
         readers.list_files(tmp_path / "gone.laz")
+
+
+@pytest.mark.parametrize(("name", "what"), [("cloud.ply", "a PLY"), ("cloud.E57", "an E57")])
+def test_other_formats_are_refused_with_the_remedy(tmp_path, name, what):
+    (tmp_path / name).write_bytes(b"ply")
+    with pytest.raises(CloudError, match=f"^{name} is {what} file, .* convert it to LAS or LAZ"):
+        readers.list_files(tmp_path / name)

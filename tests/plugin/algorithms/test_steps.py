@@ -63,7 +63,7 @@ def test_chained_steps_give_the_lines_of_extract_rails(chain, run, write_cloud, 
 
 INTERFACE = {
     "rasterizerailpoints": (
-        "INPUT RAIL_CLASSES=10 STANDARD=EN_60E1_1435 GAUGE HEAD_WIDTH EXTENT MASK CRS OUTPUT",
+        "INPUT RAIL_CLASSES=10 STANDARD=EN_60E1_1435 GAUGE HEAD_WIDTH EXTENT MASK CRS LEAVE_OUT OUTPUT",
         {"OUTPUT": "outputRaster"},
     ),
     "frpdfcleanup": (
@@ -72,7 +72,7 @@ INTERFACE = {
     ),
     "vectorizerails": (
         "INPUT POINTS SMOOTHING_XY=0.8 SMOOTHING_Z=3.0 TOLERANCE_XY=0.1 TOLERANCE_Z=0.03 CROWN_RADIUS=20.0 MAX_GAP=5.0 "
-        "GAP_ANGLE=10.0 SIMPLIFY_XY=0.002 SIMPLIFY_Z=0.002 MIN_LENGTH=1.0 GAUGE HEAD_WIDTH OUTPUT",
+        "GAP_ANGLE=10.0 SIMPLIFY_XY=0.002 SIMPLIFY_Z=0.002 MIN_LENGTH=1.0 GAUGE HEAD_WIDTH LEAVE_OUT OUTPUT",
         {"OUTPUT": "outputVector", "RAIL_COUNT": "outputNumber", "RAIL_LENGTH": "outputNumber"},
     ),
     "buildtrackcenterlines": (
@@ -86,7 +86,8 @@ INTERFACE = {
         },
     ),
     "measuretrackgeometry": (
-        "INPUT RAILS POINTS STEP=1.0 STANDARD=EN_60E1_1435 GAUGE HEAD_WIDTH OTHER_GAUGES OUTPUT FINDINGS REPORT",
+        "INPUT RAILS POINTS STEP=1.0 STANDARD=EN_60E1_1435 GAUGE HEAD_WIDTH OTHER_GAUGES LEAVE_OUT OUTPUT FINDINGS "
+        "REPORT",
         {
             "OUTPUT": "outputVector",
             "FINDINGS": "outputVector",

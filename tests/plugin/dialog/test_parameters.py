@@ -16,6 +16,7 @@ PARAMETERS = [
     ("EXTENT", "extent", None),
     ("MASK", "source", None),
     ("CRS", "crs", None),
+    ("LEAVE_OUT", "enum", None),
     ("MODEL", "enum", "AUTO"),
     ("ITERATIONS", "number", 2),
     ("ENGINE", "enum", "AUTO"),
@@ -62,7 +63,7 @@ OUTPUTS = {
 
 RESULTS = {"RAILS", "CENTERLINES", "QUALITY", "FINDINGS", "CLEANED", "REPORT"}
 ESSENTIAL = {"INPUT", "RAIL_CLASSES", "CLASSIFY", "STANDARD", "GAUGE", "HEAD_WIDTH", "EXTENT", "MAX_GAP"} | RESULTS
-OPTIONAL = {"GAUGE", "HEAD_WIDTH", "EXTENT", "MASK", "CRS", "OTHER_GAUGES"} | RESULTS
+OPTIONAL = {"GAUGE", "HEAD_WIDTH", "EXTENT", "MASK", "CRS", "LEAVE_OUT", "OTHER_GAUGES"} | RESULTS
 
 
 CORE_DEFAULTS = {name: getattr(Parameters, field) for name, field in {**NUMBERS, **CHOICES}.items()}

@@ -1,0 +1,144 @@
+"""The octree of COPC files: with it, only the chunks that an extent touches are read.
+
+The layout is that of the COPC specification, version 1.0. laspy's reader of these files holds all points that it reads
+in memory, and does not end where pages of a damaged octree refer to each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .laz import ChunkTable
+from .readers import Extent
+
+if TYPE_CHECKING:
+    import laspy
+
+try:
+    import lazrs
+except ImportError:
+    lazrs = None
+
+ENTRY = np.dtype([("level", "<i4"), ("key", "<i4", 3), ("at", "<u8"), ("size", "<i4"), ("points", "<i4")])
+"""Entry of the octree: depth and place of a node, and position, bytes and points of its chunk."""
+
+PAGE = -1
+"""Number of points that marks an entry for another page of the octree."""
+
+CHUNKS_AT = 8
+"""Bytes between the start of the point data and the first chunk: the position of the chunk table."""
+
+MAX_LEVEL = 30
+"""Deepest level of an octree: below it, a node of a cloud 1000 km long is a millimetre wide."""
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """A compressed chunk of points: its position in the file, bytes, and number of points."""
+
+    at: int
+    size: int
+    points: int
+
+
+def chunks_in(path: Path, header: laspy.LasHeader, table: ChunkTable, extent: Extent) -> tuple[Chunk, ...] | None:
+    """List the chunks that may hold points of an extent, in the order of the file.
+
+    Parameters
+    ----------
+    path : Path
+    header : laspy.LasHeader
+    table : list of tuple
+        From `laz.read_chunk_table`.
+    extent : tuple of float
+
+    Returns
+    -------
+    tuple of Chunk or None
+        None if the file has no octree, or one that does not account for every chunk of the file.
+    """
+    info = next(iter(header.vlrs.get("CopcInfoVlr")), None)
+    if info is None:
+        return None
+    nodes = _nodes(path, info.hierarchy_root_offset, info.hierarchy_root_size)
+    nodes = nodes[np.argsort(nodes["at"], kind="stable")]
+    points, sizes = np.array([one for one in table if one[0]], dtype=np.int64).reshape(-1, 2).T
+    starts = header.offset_to_point_data + CHUNKS_AT + np.cumsum(np.append(0, sizes[:-1]))[: len(sizes)]
+    stated = np.stack([starts, sizes, points]).astype(np.int64)
+    found = np.stack([nodes["at"].astype(np.int64), nodes["size"], nodes["points"]])
+    levels_fit = ((nodes["level"] >= 0) & (nodes["level"] <= MAX_LEVEL)).all()
+    if not np.array_equal(found, stated) or not levels_fit or not np.isfinite([*info.center, info.halfsize]).all():
+        return None
+    side = 2 * info.halfsize / 2.0 ** nodes["level"]
+    low = info.center[:2] - info.halfsize + nodes["key"][:, :2] * side[:, None]
+    beyond = header.scales[:2]  # coordinates are rounded
+    touched = ((low - beyond <= extent[2:]) & (low + side[:, None] + beyond >= extent[:2])).all(axis=1)
+    return tuple(Chunk(*one) for one in found.T[touched].tolist())
+
+
+def _nodes(path: Path, root_at: int, root_size: int) -> np.ndarray:
+    """Read the entries of all nodes with points, page by page; pages that are missing or repeated give none."""
+    nodes, seen, pages = [np.empty(0, ENTRY)], set(), [(root_at, root_size)]
+    length = path.stat().st_size
+    with path.open("rb") as file:
+        while pages:
+            at, size = pages.pop()
+            if at in seen or size <= 0 or at + size > length:
+                continue
+            seen.add(at)
+            file.seek(at)
+            entries = np.frombuffer(file.read(size - size % ENTRY.itemsize), ENTRY)
+            nodes.append(entries[entries["points"] > 0])
+            pages += [(int(one["at"]), int(one["size"])) for one in entries[entries["points"] == PAGE]]
+    return np.concatenate(nodes)
+
+
+def read_chunks(
+    path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], fields: laspy.DecompressionSelection, most: int
+) -> Iterator[laspy.ScaleAwarePointRecord]:
+    """Read chunks, several at once as long as they hold no more than `most` points.
+
+    Parameters
+    ----------
+    path : Path
+    header : laspy.LasHeader
+    chunks : sequence of Chunk
+    fields : laspy.DecompressionSelection
+        What to decompress.
+    most : int
+    """
+    from laspy.point.record import PackedPointRecord, ScaleAwarePointRecord
+
+    record = header.vlrs.get("LasZipVlr")[0].record_data
+    with path.open("rb") as file:
+        for group in _groups(chunks, most):
+            held = b"".join(_read_at(file, chunk) for chunk in group)
+            points = np.empty(sum(chunk.points for chunk in group) * header.point_format.size, dtype=np.uint8)
+            table = [(chunk.points, chunk.size) for chunk in group]
+            lazrs.decompress_points_with_chunk_table(held, record, points, table, fields.to_lazrs())
+            packed = PackedPointRecord.from_buffer(points, header.point_format)
+            yield ScaleAwarePointRecord(packed.array, packed.point_format, header.scales, header.offsets)
+
+
+def _read_at(file, chunk: Chunk) -> bytes:
+    file.seek(chunk.at)
+    return file.read(chunk.size)
+
+
+def _groups(chunks: Sequence[Chunk], most: int) -> Iterator[list[Chunk]]:
+    """Divide chunks into groups of no more than `most` points, or of one chunk."""
+    group: list[Chunk] = []
+    count = 0
+    for chunk in chunks:
+        if group and count + chunk.points > most:
+            yield group
+            group, count = [], 0
+        group.append(chunk)
+        count += chunk.points
+    if group:
+        yield group

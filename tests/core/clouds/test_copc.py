@@ -1,0 +1,136 @@
+"""COPC files: only chunks that an extent touches are read, and the points are those of a full read."""
+
+import struct
+from unittest import mock
+
+import laspy
+import lazrs
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from laspy._compression import lazrsbackend
+from rail_extract.core.clouds import copc, las, laz
+from rail_extract.core.clouds.points import read_rail_points
+from rail_extract.core.errors import NoRailPointsError
+
+RAIL, HALF_M, LOW = 10, 32.0, np.array([578000.0, 2494000.0, 500.0])
+LEVELS = 4
+
+
+def nodes_of(xyz):
+    """Node of each point, (n, 4): a random level, and the place there."""
+    level = np.random.RandomState(2).randint(0, LEVELS, len(xyz))
+    return np.column_stack([level, np.floor((xyz - LOW) / (2 * HALF_M / 2.0**level)[:, None])]).astype(int)
+
+
+def write_copc(path, count=4000):
+    """Write a cloud with an octree; return its points in the order of the file."""
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.scales, header.offsets = [0.001] * 3, LOW
+    header.vlrs.append(laspy.VLR("copc", 1, "copc info", bytes(160)))
+    cloud = laspy.LasData(header)
+    cloud.xyz = LOW + np.random.RandomState(1).uniform(0, 2 * HALF_M, (count, 3))
+    cloud.classification = np.random.RandomState(3).choice([2, RAIL], count)
+    nodes, index = np.unique(nodes_of(cloud.xyz), axis=0, return_inverse=True)
+    cloud.points = cloud.points[np.argsort(index.ravel(), kind="stable")]
+    counts = np.bincount(index.ravel())
+    cloud.evlrs = laspy.vlrs.vlrlist.VLRList([laspy.VLR("copc", 1000, "hierarchy", bytes(32 * len(nodes)))])
+
+    class Writer(lazrsbackend.LazrsPointWriter):
+        def __init__(self, dest, point_format, parallel):
+            super().__init__(dest, point_format, parallel=False)
+            self.vlr = lazrs.LazVlr.new_for_compression(point_format.id, point_format.num_extra_bytes, True)
+
+        def write_points(self, points):
+            for end, size in zip(np.cumsum(counts), counts):
+                super().write_points(points[end - size : end])
+                self.compressor.finish_current_chunk()
+
+    with mock.patch.object(lazrsbackend, "LazrsPointWriter", Writer):
+        cloud.write(path)
+    with laspy.open(path) as reader:
+        root_at, table = reader.header.start_of_first_evlr + 60, laz.read_chunk_table(path, reader.header)
+        at = reader.header.offset_to_point_data + 8
+    entries = b""
+    for node, (points, size) in zip(nodes.tolist(), table):
+        entries += struct.pack("<4iQ2i", *node, at, size, points)
+        at += size
+    info = struct.pack("<5d2Q2d", *(LOW + HALF_M), HALF_M, 1.0, root_at, len(entries), 0.0, 1.0)
+    data = bytearray(path.read_bytes())
+    place = data.index(b"copc\0") - 2 + 54
+    data[place : place + len(info)] = info
+    data[root_at : root_at + len(entries)] = entries
+    path.write_bytes(data)
+    return root_at, len(nodes)
+
+
+def read(path, extent=None, codes=(RAIL,)):
+    parts = list(las.read_classes(path, codes, extent=extent))
+    return np.concatenate([np.empty((0, 3)), *(xyz for xyz, *_ in parts)]), sum(
+        int(census.sum()) for *_, census in parts
+    )
+
+
+def inside(xyz, extent):
+    return xyz[((xyz[:, :2] >= extent[:2]) & (xyz[:, :2] <= extent[2:])).all(axis=1)]
+
+
+@pytest.fixture(scope="module")
+def cloud(tmp_path_factory):
+    path = tmp_path_factory.mktemp("copc") / "a.copc.laz"
+    return path, *write_copc(path)
+
+
+@settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(corner=st.tuples(*[st.floats(-5, 64)] * 2), size=st.tuples(*[st.floats(0.5, 40)] * 2))
+def test_the_points_of_an_extent_are_those_of_a_full_read(cloud, corner, size):
+    low = LOW[:2] + corner
+    extent = (*low, *(low + size))
+    found = [read(cloud[0], one)[0] for one in (extent, None)]
+    np.testing.assert_array_equal(*(inside(xyz, extent) for xyz in found))
+
+
+def test_little_more_than_the_extent_is_read(cloud):
+    """Of a corner, an eighth of the side: the root, and one node of 64 on the other levels or four."""
+    low = LOW[:2]
+    with laspy.open(cloud[0]) as reader:
+        table = laz.read_chunk_table(cloud[0], reader.header)
+        chunks = copc.chunks_in(cloud[0], reader.header, table, (*low, *(low + 8.0)))
+    assert sum(one.points for one in chunks) < 0.4 * 4000
+    assert len(chunks) < 0.1 * cloud[1:][1]
+    _, rails = read(cloud[0], (*low, *(low + 8.0)))
+    assert 0 < rails <= sum(one.points for one in chunks)
+
+
+def test_all_points_are_read_once_from_several_groups(cloud, monkeypatch):
+    monkeypatch.setattr(las, "CHUNK", 300)
+    everywhere = (*LOW[:2], *(LOW[:2] + 2 * HALF_M))
+    np.testing.assert_array_equal(read(cloud[0], everywhere, (2, RAIL))[0], read(cloud[0], None, (2, RAIL))[0])
+
+
+@pytest.mark.parametrize("damage", ["endless", "a node is missing", "another size", "a deep level"])
+def test_an_octree_that_does_not_fit_the_chunks_is_not_used(cloud, tmp_path, damage):
+    path, root_at, count = cloud
+    data, last = bytearray(path.read_bytes()), root_at + 32 * (count - 1)
+    place, new = {
+        "endless": (last + 16, struct.pack("<Q2i", root_at, 32 * count, -1)),
+        "a node is missing": (last + 28, struct.pack("<i", 0)),
+        "another size": (last + 24, struct.pack("<i", 17)),
+        "a deep level": (last, struct.pack("<i", 2000)),
+    }[damage]
+    data[place : place + len(new)] = new
+    (tmp_path / "b.copc.laz").write_bytes(data)
+    extent = (*LOW[:2], *(LOW[:2] + 8.0))
+    with laspy.open(path) as reader:
+        table = laz.read_chunk_table(path, reader.header)
+        assert copc.chunks_in(tmp_path / "b.copc.laz", reader.header, table, extent) is None
+    np.testing.assert_array_equal(read(tmp_path / "b.copc.laz", extent)[0], read(path)[0])
+
+
+def test_an_extent_without_rails_is_named_as_such(cloud):
+    outside = LOW[:2] + 100.0
+    with pytest.raises(NoRailPointsError, match="The extent contains no points of class 10: choose a larger extent"):
+        read_rail_points(cloud[0], [RAIL], "EPSG:32643", (*outside, *(outside + 1.0)))
+    with pytest.raises(NoRailPointsError, match="The extent contains no points of class 7: choose a larger extent"):
+        read_rail_points(cloud[0], [7], "EPSG:32643", (*LOW[:2], *(LOW[:2] + 8.0)))
