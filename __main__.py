@@ -14,6 +14,7 @@ PROGRAM = "python -m rail_extract"
 COMMANDS = {
     "extract": ("core.commands.extract", "extract rails and track centerlines on several cores or computers"),
     "classify": ("core.commands.classify", "find the rail points of raw clouds and write classified copies"),
+    "grow": ("core.commands.grow", "follow rails from seeds and write classified copies of the clouds"),
     "onnx": ("core.frpdf.onnx", "write the network for other runtimes"),
     "train": ("laboratory.training.train", "train the network on synthetic rasters"),
     "evaluate": ("laboratory.training.evaluate", "compare weights on a fixed set of synthetic rasters"),

@@ -108,3 +108,37 @@ class Parameters:
         """Return the parameters with further gauges, given with the width of their railheads."""
         gauges_m, heads_m = (tuple(one[part] for one in others) for part in range(2))
         return replace(self, other_gauges_m=gauges_m, other_heads_m=heads_m)
+
+
+@dataclass(frozen=True)
+class GrowParameters:
+    """How rails are followed from seeds; lengths in metres.
+
+    Attributes
+    ----------
+    both : bool
+        Whether the other rail of the track is followed, too.
+    search_m : float
+        Largest distance of a seed from its rail, and of a rail from where its course leads.
+    thickness_m : float
+        Width of the strip along the axis in which points belong to the rail: a head, and mixed pixels beside it.
+    window_m : float
+        Length of rail that is looked at as one.
+    min_height_m : float
+        Least height of the rail above the bed beside it; less only in pavements, beside a groove.
+    tolerance_z_m : float
+        Largest difference in height between the points of a head, and between its windows.
+    max_outliers : int
+        Windows in a row in which the rail may not be seen.
+    max_length_m : float
+        Length that is followed to either side of a seed.
+    """
+
+    both: bool = True
+    search_m: float = 0.25
+    thickness_m: float = 0.10
+    window_m: float = 0.5
+    min_height_m: float = 0.05
+    tolerance_z_m: float = 0.02
+    max_outliers: int = 5
+    max_length_m: float = 200.0

@@ -34,6 +34,26 @@ def read_lines(path: Path, crs_wkt: str | None) -> list[np.ndarray]:
     return [shapely.get_coordinates(line) for line in lines]
 
 
+def read_seeds(path: Path, crs_wkt: str | None) -> list[np.ndarray]:
+    """Read the points, (1, 2) each, and the lines, (k, 2) each, of the first layer of a file.
+
+    Parameters
+    ----------
+    path, crs_wkt
+        See `read_lines`.
+
+    Raises
+    ------
+    ParameterError
+        The file can't be read, or has neither points nor lines.
+    """
+    parts = _parts(path, crs_wkt)
+    seeds = [part for part in parts if part.geom_type == "Point" or (part.geom_type == "LineString" and part.length)]
+    if not seeds:
+        raise ParameterError(f"{path} has neither points nor lines: give places on railheads.")
+    return [shapely.get_coordinates(seed) for seed in seeds]
+
+
 def read_mask(path: Path, crs_wkt: str | None) -> Mask:
     """Read the polygons of the first layer of a file; overlaps count once.
 

@@ -20,7 +20,7 @@ from ..rails import SearchFigures
 from ..scratch import scratch_folder
 from ..standards import RAIL_CLASS
 from ..tasks import Context, Runner, Task, in_listed_order
-from .finding import Found, find_rail_points, report
+from .finding import find_rail_points, report
 
 UNCLASSIFIED = 1
 """Class of a point that loses the rail class."""
@@ -176,24 +176,31 @@ def classify_files(
         A square could not be searched.
     """
     finding, rewriting = progress.divide((2.0, 1.0))
-    labels = _Labels(request, folder)
+    labels = Labels(request, folder)
     figures = SearchFigures()
     with writing(folder):
         squares = folder / "squares"
         squares.mkdir()
     for found in find_rail_points(request, settings, squares, runner, finding):
         with writing(folder):
-            labels.add(found)
+            labels.add(found.number)
         figures += found.figures
     _check_complete(runner)
     report(figures, progress)
+    write_labelled(request, choice, labels, output, runner, rewriting)
+    return Result(output.file, labels.point_count, figures)
+
+
+def write_labelled(
+    request: Request, choice: Choice, labels: Labels, output: Output, runner: Runner, progress: Progress
+) -> None:
+    """Write the files of a cloud with the classes that follow from the labels; see `classify_files`."""
     writer = _Writer(request, choice, labels)
     if output.names:
-        writer.write_tiles(output, runner, rewriting)
+        writer.write_tiles(output, runner, progress)
     else:
         with output.destination.replacing() as new:
-            writer.write(0, new, rewriting)
-    return Result(output.file, int(labels.starts[-1]), figures)
+            writer.write(0, new, progress)
 
 
 def _check_complete(runner: Runner) -> None:
@@ -207,7 +214,7 @@ def _check_complete(runner: Runner) -> None:
         raise RailExtractError(f"{runner.failures[-1]} Nothing was written.")
 
 
-class _Labels:
+class Labels:
     """Numbers of the rail points of each file, on disk.
 
     Parameters
@@ -219,14 +226,19 @@ class _Labels:
     def __init__(self, request: Request, folder: Path) -> None:
         counts = [header.point_count for header in request.headers]
         self.starts = np.append(0, np.cumsum(counts)).astype(np.int64)
-        self._folder = folder
+        self.folder = folder
 
-    def add(self, found: Found) -> None:
-        """Append the rail points of a square."""
-        file = np.searchsorted(self.starts, found.number, side="right") - 1
+    @property
+    def point_count(self) -> int:
+        """Points in all files."""
+        return int(self.starts[-1])
+
+    def add(self, number: np.ndarray) -> None:
+        """Append rail points by their numbers among all points of all files, (k,) int."""
+        file = np.searchsorted(self.starts, number, side="right") - 1
         for place in np.unique(file).tolist():
             with self._file(place).open("ab") as stream:
-                stream.write((found.number[file == place] - self.starts[place]).tobytes())
+                stream.write((number[file == place] - self.starts[place]).tobytes())
 
     def of(self, place: int) -> np.ndarray:
         """Return the numbers of a file's rail points within the file, ascending."""
@@ -234,7 +246,7 @@ class _Labels:
         return np.sort(np.fromfile(file, np.int64)) if file.exists() else np.empty(0, np.int64)
 
     def _file(self, place: int) -> Path:
-        return self._folder / f"labels_{place}"
+        return self.folder / f"labels_{place}"
 
 
 class _Writer:
@@ -244,10 +256,10 @@ class _Writer:
     ----------
     request : Request
     choice : Choice
-    labels : _Labels
+    labels : Labels
     """
 
-    def __init__(self, request: Request, choice: Choice, labels: _Labels) -> None:
+    def __init__(self, request: Request, choice: Choice, labels: Labels) -> None:
         self._request, self._choice, self._labels = request, choice, labels
 
     def write(self, place: int, new: Path, progress: Progress) -> int:

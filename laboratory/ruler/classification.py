@@ -83,7 +83,7 @@ def score(scene: RawScene, wide: bool = False) -> tuple[Score, np.ndarray]:
     found = classify_cloud(scene.xyz, settings_of(scene))
     seconds = time.process_time() - start
     peak_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    head, beside = _truth(scene, found.rail, wide)
+    head, beside = truth(scene, found.rail, wide)
     right = found.rail & (head | beside)
     result = Score(
         scene=scene.name,
@@ -106,7 +106,7 @@ def lines_from(scene: RawScene, rail: np.ndarray) -> Match:
     return match([line.xyz for line in network.rails], scene.rails)
 
 
-def _truth(scene: RawScene, rail: np.ndarray, wide: bool) -> tuple[np.ndarray, np.ndarray]:
+def truth(scene: RawScene, rail: np.ndarray, wide: bool) -> tuple[np.ndarray, np.ndarray]:
     """Points on heads down to `FACE_M`, and labelled points right beside a head, (n,) bool each."""
     head, beside = np.zeros(len(rail), dtype=bool), np.zeros(len(rail), dtype=bool)
     if not scene.rails:

@@ -1,0 +1,123 @@
+"""The command `python -m rail_extract grow`: the outputs of Grow Rail Points from Seeds."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from ..clouds.points import ask
+from ..disk import writing
+from ..errors import ParameterError
+from ..grow.settings import GrowSettings
+from ..labelling.files import Choice, plan_output
+from ..labelling.growing import grow_files
+from ..parameters import GrowParameters
+from ..progress import Estimating
+from ..scratch import scratch_folder
+from ..standards import DEFAULT, LAST_CLASS, RAIL_CLASS, SEARCHED_CLASSES, resolve
+from ..tasks import InTurn
+from .options import TILES_HELP, Console, shapes_module
+
+LENGTHS = {
+    "search": "largest distance of a seed from its rail, and of the rail from its course",
+    "thickness": "width of the strip along the axis in which points belong to the rail",
+    "window": "length of rail that is looked at as one",
+    "min_height": "least height of the rail above its bed",
+    "tolerance_z": "largest difference in height between the points of a head",
+    "max_length": "length that is followed to either side of a seed",
+}
+"""Options in metres, each an attribute of `GrowParameters` without its unit."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.add_argument("tiles", nargs="+", type=Path, metavar="TILE", help=TILES_HELP)
+    text = "LAZ or LAS file; for several tiles, the name of their new folder, with .vpc added for the catalogue"
+    parser.add_argument("--output", type=Path, required=True, help=text)
+    text = "points on railheads, or lines along them, in a file such as GeoPackage or GeoJSON"
+    parser.add_argument("--seeds", type=Path, metavar="FILE", help=text)
+    text = "a place on a railhead, in units of the coordinate system; may be given several times"
+    parser.add_argument("--seed", action="append", default=[], metavar="X,Y", help=text)
+    parser.add_argument("--standard", default=DEFAULT, help=f"rail standard (default: {DEFAULT})")
+    parser.add_argument("--gauge", type=float, metavar="MM", help="gauge, instead of that of the standard")
+    text = "railhead width, instead of that of the standard"
+    parser.add_argument("--head-width", type=float, metavar="MM", help=text)
+    parser.add_argument("--crs", help="coordinate system of tiles that state none, such as EPSG:25832")
+    text = "do not follow the other rail of the track"
+    parser.add_argument("--single", action="store_true", help=text)
+    for name, text in LENGTHS.items():
+        value = getattr(GrowParameters, f"{name}_m")
+        option = f"--{name.replace('_', '-')}"
+        parser.add_argument(option, type=float, default=value, metavar="M", help=f"{text} (default: {value:g})")
+    most = GrowParameters.max_outliers
+    text = f"windows in a row in which the rail may not be seen (default: {most})"
+    parser.add_argument("--max-outliers", type=int, default=most, metavar="N", help=text)
+    text = f"class of the rail points (default: {RAIL_CLASS})"
+    parser.add_argument("--rail-class", type=int, default=RAIL_CLASS, metavar="N", help=text)
+    parser.add_argument("--rails-only", action="store_true", help="write the rail points only")
+
+
+def run(args: argparse.Namespace) -> None:
+    """Grow and write.
+
+    Raises
+    ------
+    RailExtractError
+        A parameter is wrong, a file can't be read, no seed lies on a rail, or the output can't be written.
+    """
+    if not 0 <= args.rail_class <= LAST_CLASS:
+        raise ParameterError(f"--rail-class must be a number from 0 to {LAST_CLASS}, not {args.rail_class}.")
+    standard = resolve(args.standard, args.gauge, args.head_width)
+    settings = GrowSettings(standard.gauge_m, standard.head_width_m, _parameters(args))
+    progress = Estimating(Console())
+    output = args.output if len(args.tiles) == 1 or args.output.suffix else args.output.with_suffix(".vpc")
+    with writing(output.parent):
+        output.parent.mkdir(parents=True, exist_ok=True)
+    planned = plan_output(args.tiles, output, args.rail_class, progress)
+    request = ask(args.tiles, SEARCHED_CLASSES, args.crs, None, progress)
+    choice = Choice(args.rail_class, args.rails_only, reset=False)
+    seeds = _seeds(args, request.zero.crs_wkt)
+    with writing(output.parent), scratch_folder(planned.file.parent) as folder:
+        result = grow_files(request, seeds, settings, choice, planned, folder, InTurn(), progress)
+    figures = result.figures
+    print(f"{figures.points} of {result.point_count} points are on rails")
+    print(f"{figures.paired_m:.0f} m of rails with a partner, {figures.single_m:.0f} m without")
+
+
+def _parameters(args: argparse.Namespace) -> GrowParameters:
+    """Return the parameters of the growth.
+
+    Raises
+    ------
+    ParameterError
+        A length is not positive.
+    """
+    lengths = {f"{name}_m": getattr(args, name) for name in LENGTHS}
+    for name in LENGTHS:
+        if not 0 < getattr(args, name) < np.inf:
+            raise ParameterError(f"--{name.replace('_', '-')} must be a positive number.")
+    if args.max_outliers < 0:
+        raise ParameterError(f"--max-outliers must be 0 or more, not {args.max_outliers}.")
+    return GrowParameters(both=not args.single, max_outliers=args.max_outliers, **lengths)
+
+
+def _seeds(args: argparse.Namespace, crs_wkt: str | None) -> list[np.ndarray]:
+    """Return the seeds, in the coordinate system of the cloud.
+
+    Raises
+    ------
+    ParameterError
+        There are none, or they can't be read.
+    """
+    seeds = [] if args.seeds is None else shapes_module("--seeds").read_seeds(args.seeds, crs_wkt)
+    for text in args.seed:
+        try:
+            x, y = (float(word) for word in text.split(","))
+        except ValueError:
+            raise ParameterError(f'--seed "{text}" should be two numbers: x,y.') from None
+        seeds.append(np.array([[x, y]]))
+    if not seeds:
+        raise ParameterError("A rail is followed from seeds: give --seeds or --seed.")
+    return seeds

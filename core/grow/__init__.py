@@ -1,0 +1,1 @@
+"""Rails followed from seeds in raw clouds (docs/growing.md)."""

@@ -1,0 +1,316 @@
+"""Rails grown from seeds in clouds of any size, and classified copies of the files with their points.
+
+Only points within reach of the seeds are read; they are sorted into squares on disk, and memory holds those around the
+place where a rail is followed (docs/growing.md).
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..clouds.points import Request
+from ..clouds.readers import read_points
+from ..disk import writing
+from ..errors import ParameterError, RailExtractError
+from ..grow.growth import Growth, Stop, grow, on_rails
+from ..grow.points import Buckets
+from ..grow.settings import GrowSettings
+from ..grow.start import PATCH_M
+from ..polyline import length_along, resample
+from ..progress import SILENT, Progress
+from ..rails import SearchFigures
+from ..raster import BORDER_CELLS, cell_size
+from ..squares.grid import Key, points_by_square
+from ..standards import LAST_CLASS
+from ..tasks import Runner
+from .files import Choice, Labels, Output, write_labelled
+from .finding import POINT
+
+SIDE_M = 10.0
+"""Side of the squares on disk: four of them hold what a window needs, and 0.5 million points of a dense cloud each."""
+
+KEPT_POINTS = 6_000_000
+"""Points of squares that are kept in memory: 24 bytes each."""
+
+LINE_STEP_M = 20.0
+"""Distance between the places of a line at which rails are looked for; those that a rail has reached are skipped."""
+
+SAME_M = 0.26
+"""Two windows of 0.5 m this close are the same piece of rail."""
+
+
+@dataclass(frozen=True)
+class Grown:
+    """What grew from the seeds.
+
+    Attributes
+    ----------
+    file : Path
+        The file that opens the result.
+    point_count : int
+        Points in the files that were read.
+    figures : SearchFigures
+    stops : tuple of Stop
+        Where rails were not followed further, in units of the CRS.
+    """
+
+    file: Path
+    point_count: int
+    figures: SearchFigures
+    stops: tuple[Stop, ...]
+
+
+def grow_files(
+    request: Request,
+    seeds: Sequence[np.ndarray],
+    settings: GrowSettings,
+    choice: Choice,
+    output: Output,
+    folder: Path,
+    runner: Runner,
+    progress: Progress = SILENT,
+) -> Grown:
+    """Follow rails from seeds and write the files of a cloud with the classes of their points.
+
+    Parameters
+    ----------
+    request : Request
+        Files, `standards.SEARCHED_CLASSES` classes and extent.
+    seeds : sequence of (k, 2) array
+        Places on railheads, k = 1, or lines along them, in units of the CRS.
+    settings : GrowSettings
+    choice : Choice
+    output : Output
+        From `files.plan_output`, for the files of the request.
+    folder : Path
+        Existing folder for temporary files, 32 bytes per point within reach; the caller removes it.
+    runner : Runner
+        Writes the files.
+    progress : Progress
+
+    Raises
+    ------
+    CloudError
+        A file is damaged.
+    DiskError
+        The disk is full, or another program has changed an output.
+    ParameterError
+        No seed lies in the cloud.
+    RailExtractError
+        No seed lies on a rail.
+    """
+    finding, labelling, rewriting = progress.divide((6.0, 1.0, 3.0))
+    squares, growths = grow_all(request, seeds, settings, folder, finding)
+    labels, figures = Labels(request, folder), _lengths(growths)
+    for points in labelling.follow(squares.keys()):
+        figures += _labelled(squares.read(points), growths, settings, request, labels)
+    _report(growths, figures, request, progress)
+    write_labelled(request, choice, labels, output, runner, rewriting)
+    stops = tuple(Stop(request.zero.to_crs(stop.xyz), stop.reason) for growth in growths for stop in growth.stops)
+    return Grown(output.file, labels.point_count, figures, stops)
+
+
+def grow_all(
+    request: Request, seeds: Sequence[np.ndarray], settings: GrowSettings, folder: Path, progress: Progress = SILENT
+) -> tuple[Squares, list[Growth]]:
+    """Follow rails from seeds; returns the points that were read, and what grew, in metres.
+
+    Parameters and errors are those of `grow_files`.
+    """
+    reading, growing = progress.divide((1.0, 1.0))
+    local = [request.zero.to_local(np.column_stack([seed[:, :2], np.zeros(len(seed))]))[:, :2] for seed in seeds]
+    places = [resample(seed, LINE_STEP_M)[0] if len(seed) > 1 else seed for seed in local]
+    squares = Squares(request, np.concatenate(places), settings, folder / "squares")
+    squares.fill(reading)
+    growths: list[Growth] = []
+    missed = 0
+    for seed in growing.follow(places):
+        grown = list(_grow_along(squares, seed, settings, progress))
+        growths += grown
+        missed += not grown
+    parameters = settings.parameters
+    if not growths:
+        raise RailExtractError(
+            f"No seed lies on a rail: put seeds within {parameters.search_m:g} m of railheads that stand "
+            f"{parameters.min_height_m:g} m above the bed, and check the rail standard."
+        )
+    if missed:
+        progress.warning(f"{missed} of {len(places)} seeds lie on no rail: move them onto railheads.")
+    return squares, growths
+
+
+def _grow_along(squares: Squares, places: np.ndarray, settings: GrowSettings, progress: Progress) -> Iterator[Growth]:
+    """Grow from a seed: from both ends of a line, and from those of its places that no rail has reached."""
+    reached = np.empty((0, 2))
+    for place in (*places[:1], *places[:0:-1]):
+        if len(reached) and np.hypot(*(reached - place).T).min() <= settings.parameters.search_m + SAME_M:
+            continue
+        grown = grow(squares, place, settings, progress.span(0.0, 0.0))
+        if grown is not None:
+            yield grown
+            reached = np.concatenate([reached, grown.rails[0].xyz[:, :2]])
+
+
+class Squares:
+    """Points within reach of seeds, sorted into squares on disk; a `grow.points.Points`.
+
+    Parameters
+    ----------
+    request : Request
+    places : (k, 2) array
+        Seeds, metres from the zero of the coordinate system.
+    settings : GrowSettings
+    folder : Path
+        To be created.
+
+    Raises
+    ------
+    ParameterError
+        No seed lies in the cloud.
+    """
+
+    def __init__(self, request: Request, places: np.ndarray, settings: GrowSettings, folder: Path) -> None:
+        self._request, self._folder = request, folder
+        reach_m = settings.parameters.max_length_m + PATCH_M
+        steps = np.arange(-int(reach_m / SIDE_M) - 1, int(reach_m / SIDE_M) + 2)
+        around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+        around = around[np.hypot(*around.T) <= reach_m / SIDE_M + np.sqrt(2)]
+        own = np.unique(np.floor(places / SIDE_M).astype(np.int64), axis=0)
+        self._wanted = {(int(column), int(row)) for one in own for column, row in one + around}
+        self._low, self._high = places.min(axis=0) - reach_m, places.max(axis=0) + reach_m
+        self._inside(places)
+        self._kept: OrderedDict[Key, Buckets] = OrderedDict()
+
+    def _inside(self, places: np.ndarray) -> None:
+        """Refuse seeds of which none lies in the cloud; headers may state an extent that is not a number."""
+        extents = np.array([header.extent for header in self._request.headers], dtype=float)
+        if not np.isfinite(extents).all():
+            return
+        corners = np.column_stack([extents.reshape(-1, 2), np.zeros(2 * len(extents))])
+        corners = self._request.zero.to_local(corners)[:, :2].reshape(-1, 2, 2)
+        inside = (places[:, None] >= corners[:, 0] - PATCH_M) & (places[:, None] <= corners[:, 1] + PATCH_M)
+        if not inside.all(axis=2).any():
+            raise ParameterError("No seed lies in the cloud: check the place and the coordinate system of the seeds.")
+
+    def fill(self, progress: Progress) -> None:
+        """Read the points of the cloud that are within reach."""
+        first = 0
+        with writing(self._folder.parent):
+            self._folder.mkdir()
+        for header, share in zip(self._request.headers, self._request.shares(progress)):
+            if self._may_reach(header.extent):
+                self._sort(header.path, first, share)
+            first += header.point_count
+
+    def _may_reach(self, extent: tuple[float, float, float, float]) -> bool:
+        """Return whether a file may have points within reach."""
+        corners = self._request.zero.to_local(np.column_stack([np.reshape(extent, (2, 2)), np.zeros(2)]))[:, :2]
+        return not ((corners[0] > self._high).any() or (corners[1] < self._low).any())
+
+    def _sort(self, path: Path, first: int, progress: Progress) -> None:
+        """Append the points of a file to the files of their squares."""
+        wanted = np.zeros(LAST_CLASS + 1, dtype=bool)
+        wanted[list(self._request.class_codes)] = True
+        for xyz, codes, _, valid in read_points(path, progress, self._request.leave_out):
+            kept = np.flatnonzero(valid & wanted[codes] & self._request.holds(xyz))
+            places = self._request.zero.to_local(xyz[kept])
+            near = ((places[:, :2] >= self._low) & (places[:, :2] <= self._high)).all(axis=1)
+            kept, places = kept[near], places[near]
+            points = np.empty(len(kept), POINT)
+            points["xyz"], points["number"] = places, kept + first
+            first += len(xyz)
+            with writing(self._folder.parent):
+                for key, number in points_by_square(places, SIDE_M).items() if len(places) else ():
+                    if key in self._wanted:
+                        with self._file(key).open("ab") as file:
+                            file.write(points[number].tobytes())
+
+    def keys(self) -> list[Key]:
+        """List the squares with points."""
+        return sorted(key for key in self._wanted if self._file(key).exists())
+
+    def read(self, key: Key) -> np.ndarray:
+        """Return the points of a square, (n,) `finding.POINT` in metres."""
+        file = self._file(key)
+        return np.fromfile(file, POINT) if file.exists() else np.empty(0, POINT)
+
+    def around(self, xy: np.ndarray, reach_m: float) -> np.ndarray:
+        """See `grow.points.Points`."""
+        low, high = (np.floor((xy + step) / SIDE_M).astype(np.int64) for step in (-reach_m, reach_m))
+        keys = [(c, r) for c in range(int(low[0]), int(high[0]) + 1) for r in range(int(low[1]), int(high[1]) + 1)]
+        return np.concatenate([self._buckets(key).around(xy, reach_m) for key in keys])
+
+    def _buckets(self, key: Key) -> Buckets:
+        """Return the points of a square from memory, or read them and forget those that were not used for long."""
+        if key not in self._kept:
+            self._kept[key] = Buckets(np.ascontiguousarray(self.read(key)["xyz"]))
+            while len(self._kept) > 4 and sum(len(one) for one in self._kept.values()) > KEPT_POINTS:
+                self._kept.popitem(last=False)
+        self._kept.move_to_end(key)
+        return self._kept[key]
+
+    def _file(self, key: Key) -> Path:
+        return self._folder / f"{key[0]}_{key[1]}"
+
+
+def _labelled(
+    points: np.ndarray, growths: Sequence[Growth], settings: GrowSettings, request: Request, labels: Labels
+) -> SearchFigures:
+    """Label the points of a square that are on rails, and count them."""
+    xyz = points["xyz"]
+    low, high = xyz[:, :2].min(axis=0) - SIDE_M, xyz[:, :2].max(axis=0) + SIDE_M
+    rails = [
+        rail
+        for growth in growths
+        for rail in growth.rails
+        if ((rail.xyz[:, :2] >= low) & (rail.xyz[:, :2] <= high)).all(axis=1).any()
+    ]
+    rail = on_rails(rails, xyz, settings)
+    if not rail.any():
+        return SearchFigures()
+    with writing(labels.folder):
+        labels.add(points["number"][rail])
+    cells = np.floor(xyz[rail, :2] / cell_size(settings.gauge_m, settings.head_width_m) + BORDER_CELLS)
+    return SearchFigures(points=int(rail.sum()), cells=len(np.unique(cells, axis=0)), squares=1)
+
+
+def _lengths(growths: Sequence[Growth]) -> SearchFigures:
+    """Sum up the length of rails with and without a partner; what several seeds reach counts once."""
+    known, paired_m, single_m = np.empty((0, 2)), 0.0, 0.0
+    for growth in growths:
+        for rail in growth.rails:
+            xy = rail.xyz[:, :2]
+            new = np.isinf(cKDTree(known).query(xy, distance_upper_bound=SAME_M)[0]) if len(known) else True
+            length_m = float((np.gradient(length_along(xy)) * new * rail.seen).sum())
+            if len(growth.rails) > 1:
+                paired_m += length_m
+            else:
+                single_m += length_m
+            known = np.concatenate([known, xy])
+    return SearchFigures(paired_m=paired_m, single_m=single_m)
+
+
+def _report(growths: Sequence[Growth], figures: SearchFigures, request: Request, progress: Progress) -> None:
+    """Inform the user of what grew, and where and why it stops."""
+    for growth in growths:
+        first, last = (f"{_place(stop.xyz, request)}, where {stop.reason.value}" for stop in growth.stops)
+        progress.info(
+            f"Followed {' and '.join(f'{rail.length_m:.0f} m' for rail in growth.rails)} of rail from {first}, to "
+            f"{last}."
+        )
+    progress.info(
+        f"Found {figures.points} rail points: {figures.paired_m:.0f} m of rails with a partner and "
+        f"{figures.single_m:.0f} m of single rails."
+    )
+
+
+def _place(xyz: np.ndarray, request: Request) -> str:
+    """Write a place in units of the CRS."""
+    x, y = request.zero.to_crs(xyz)[:2]
+    return f"{x:.1f}, {y:.1f}"

@@ -1,0 +1,64 @@
+"""The command `grow`: seeds from the command line and from files, and its messages."""
+
+import json
+
+import laspy
+import numpy as np
+import pyproj
+import pytest
+from rail_extract.__main__ import main
+from rail_extract.laboratory.scenes.raw_strips import SPACING_M, strip
+
+CORNER = np.array([500_000.0, 5_000_000.0, 100.0])
+TRACK = strip(14.0)
+X, Y = CORNER[:2] + TRACK.at(7.0, SPACING_M / 2)
+
+
+@pytest.fixture
+def raw(tmp_path):
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.scales, header.offsets = [0.0005] * 3, CORNER
+    header.add_crs(pyproj.CRS(25832))
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = (TRACK.xyz + CORNER).T
+    cloud.write(tmp_path / "raw.las")
+    return str(tmp_path / "raw.las")
+
+
+def test_a_classified_copy_is_written(raw, tmp_path, capsys):
+    new = tmp_path / "out" / "new.las"
+    assert main(["grow", raw, "--output", str(new), "--seed", f"{X},{Y}", "--rail-class", "20", "--single"]) == 0
+    found = np.asarray(laspy.read(new).classification) == 20
+    left = TRACK.head & (TRACK.xyz[:, 1] > 0)
+    assert (found & left).sum() > 0.94 * left.sum()
+    assert not found[TRACK.xyz[:, 1] < 0].any()
+    said = capsys.readouterr()
+    assert f"{found.sum()} of {len(found)} points are on rails" in said.out
+    assert "where the cloud ends" in said.err
+
+
+def test_seeds_of_a_file_are_transformed(raw, tmp_path):
+    pytest.importorskip("pyogrio")
+    longitude, latitude = pyproj.Transformer.from_crs(25832, 4326, always_xy=True).transform(X, Y)
+    point = {"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [longitude, latitude]}}
+    (tmp_path / "seeds.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [point]}))
+    new = tmp_path / "new.las"
+    assert main(["grow", raw, "--output", str(new), "--seeds", str(tmp_path / "seeds.geojson")]) == 0
+    assert (laspy.read(new).classification == 10).sum() > 0.9 * TRACK.head.sum()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ([], "A rail is followed from seeds: give --seeds or --seed."),
+        (["--seed", "5"], '--seed "5" should be two numbers: x,y.'),
+        (["--seed", "1,2"], "No seed lies in the cloud"),
+        (["--seed", f"{X},{Y}", "--window", "0"], "--window must be a positive number."),
+        (["--seed", f"{X},{Y}", "--max-outliers", "-1"], "--max-outliers must be 0 or more, not -1."),
+        (["--seed", f"{X},{Y}", "--rail-class", "300"], "--rail-class must be a number from 0 to 255, not 300."),
+    ],
+)
+def test_each_mistake_gets_a_sentence(raw, tmp_path, capsys, options, message):
+    assert main(["grow", raw, "--output", str(tmp_path / "new.las"), *options]) == 1
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "new.las").exists()

@@ -1,0 +1,55 @@
+"""Starts: the rail at a seed."""
+
+import numpy as np
+import pytest
+from rail_extract.core.grow.points import Buckets
+from rail_extract.core.grow.settings import DENSE, THIN, GrowSettings
+from rail_extract.core.grow.start import find_start
+from rail_extract.core.parameters import GrowParameters
+from rail_extract.laboratory.scenes.raw_shapes import TOP_M
+from rail_extract.laboratory.scenes.raw_strips import GAUGE_M, SPACING_M, WIDTH_M, strip
+
+
+def growing(**changes):
+    return GrowSettings(GAUGE_M, WIDTH_M, GrowParameters(**changes))
+
+
+@pytest.mark.parametrize(("rail", "off"), [(1, 0.0), (1, 0.12), (-1, -0.12), (-1, 0.2)])
+def test_the_nearest_rail_is_found(rail, off):
+    track = strip(12.0)
+    start = find_start(Buckets(track.xyz), track.at(6.0, rail * SPACING_M / 2 + off), growing())
+    assert start.xyz[:, 1] == pytest.approx(rail * SPACING_M / 2, abs=0.004)
+    assert start.xyz[:, 2] == pytest.approx(TOP_M, abs=0.003)
+    assert abs(start.heading[1]) < 0.005
+    assert start.side * np.sign(start.heading[0]) == -rail
+    assert start.level_m == pytest.approx(0.0, abs=0.005)
+    assert start.beam is DENSE
+
+
+def test_a_sharp_curve_is_found():
+    track = strip(12.0, 1 / 25)
+    start = find_start(Buckets(track.xyz), track.at(6.0, SPACING_M / 2), growing())
+    assert np.hypot(*(start.xyz[:, :2] - [0, 25]).T) == pytest.approx(25 - SPACING_M / 2, abs=0.025)
+
+
+def test_a_thin_cloud_is_known_as_such():
+    track = strip(16.0, per_m2=150, noise_m=0.01)
+    start = find_start(Buckets(track.xyz), track.at(8.0, SPACING_M / 2), growing())
+    assert start.beam is THIN
+    assert start.xyz[:, 1] == pytest.approx(SPACING_M / 2, abs=0.03)
+
+
+@pytest.mark.parametrize("left", [0.0, 1.3])
+def test_between_the_rails_there_is_none(left):
+    track = strip(12.0)
+    assert find_start(Buckets(track.xyz), track.at(6.0, left), growing()) is None
+
+
+def test_outside_of_the_cloud_there_is_none():
+    assert find_start(Buckets(strip(6.0).xyz), np.array([100.0, 0.0]), growing()) is None
+
+
+def test_a_single_rail_has_no_side():
+    track = strip(14.0, rails=[lambda s: np.full_like(s, 0.3)])
+    start = find_start(Buckets(track.xyz), track.at(7.0, 0.3), growing())
+    assert start.side == 0

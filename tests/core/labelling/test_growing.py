@@ -1,0 +1,134 @@
+"""Rails grown in files: tiles, messages about seeds, and what stays as it was."""
+
+import numpy as np
+import pytest
+from rail_extract.core.clouds.las import laspy
+from rail_extract.core.clouds.points import ask
+from rail_extract.core.clouds.vpc import list_tiles
+from rail_extract.core.errors import ParameterError, RailExtractError
+from rail_extract.core.grow.follow import Reason
+from rail_extract.core.grow.settings import GrowSettings
+from rail_extract.core.labelling.files import Choice, plan_output
+from rail_extract.core.labelling.growing import grow_files
+from rail_extract.core.parameters import GrowParameters
+from rail_extract.core.progress import Progress, Recording
+from rail_extract.core.scratch import scratch_folder
+from rail_extract.core.standards import SEARCHED_CLASSES
+from rail_extract.core.tasks import InTurn
+from rail_extract.laboratory.scenes.raw_strips import GAUGE_M, SPACING_M, WIDTH_M, strip
+
+CORNER = np.array([500_003.0, 5_000_008.0, 100.0])
+TRACK = strip(24.0)
+TEN = Choice(10, reset=False)
+SEED = CORNER[:2] + TRACK.at(12.0, SPACING_M / 2)
+
+
+def save(path, xyz, codes=1):
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.scales, header.offsets = [0.0005] * 3, CORNER
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = (xyz + CORNER).T
+    cloud.classification = np.full(len(xyz), codes)
+    cloud.intensity = np.arange(len(xyz)) % 60_000
+    cloud.write(path)
+    return path
+
+
+class Messages(Recording):
+    """Keeps what is said."""
+
+    def __init__(self):
+        super().__init__(Progress())
+        self.infos = []
+
+    def info(self, text):
+        self.infos.append(text)
+
+
+def grow(tmp_path, paths, output, seeds, choice=TEN, **changes):
+    progress = Messages()
+    planned = plan_output(paths, output, choice.class_code, progress)
+    request = ask(paths, SEARCHED_CLASSES, None, None, progress)
+    settings = GrowSettings(GAUGE_M, WIDTH_M, GrowParameters(**changes))
+    seeds = [np.atleast_2d(seed) for seed in seeds]
+    with scratch_folder(tmp_path) as work:
+        return grow_files(request, seeds, settings, choice, planned, work, InTurn(), progress), progress
+
+
+def test_only_the_class_of_points_on_the_rails_changes(tmp_path):
+    source = save(tmp_path / "raw.laz", TRACK.xyz, np.where(np.arange(len(TRACK.xyz)) % 7, 2, 10))
+    result, progress = grow(tmp_path, [source], tmp_path / "new.las", [SEED])
+    before, after = laspy.read(source), laspy.read(result.file)
+    changed = np.asarray(after.classification) != np.asarray(before.classification)
+    assert np.all(np.asarray(after.classification)[changed] == 10)
+    assert (changed & TRACK.head).sum() > 0.96 * (TRACK.head & (before.classification != 10)).sum()
+    assert (changed & ~TRACK.head).sum() < 0.03 * changed.sum()
+    for name in ("X", "Y", "Z", "intensity"):
+        assert np.array_equal(np.asarray(after[name]), np.asarray(before[name])), name
+    figures = result.figures
+    assert result.point_count == len(TRACK.xyz)
+    assert figures.paired_m == pytest.approx(47.0, abs=2.0)
+    assert figures.single_m == 0.0
+    assert figures.cells_per_m > 30
+    assert [stop.reason for stop in result.stops] == [Reason.CLOUD, Reason.CLOUD]
+    assert sorted(stop.xyz[0] for stop in result.stops) == pytest.approx([500_003.5, 500_026.5], abs=1.0)
+    assert any("where the cloud ends" in text for text in progress.infos)
+
+
+def test_tiles_give_the_same_points_as_one_file(tmp_path):
+    west = TRACK.xyz[:, 0] < 9.0
+    tiles = tmp_path / "tiles"
+    tiles.mkdir()
+    save(tiles / "a.laz", TRACK.xyz[west])
+    save(tiles / "b.laz", TRACK.xyz[~west])
+    one, _ = grow(tmp_path, [save(tmp_path / "raw.laz", TRACK.xyz)], tmp_path / "one.las", [SEED])
+    several, _ = grow(tmp_path, [tiles], tmp_path / "several.vpc", [SEED])
+    codes = np.asarray(laspy.read(one.file).classification)
+    for path, own in zip(list_tiles(several.file), (west, ~west)):
+        assert np.array_equal(np.asarray(laspy.read(path).classification), codes[own])
+
+
+def test_a_second_run_adds_to_the_first(tmp_path):
+    source = save(tmp_path / "raw.las", TRACK.xyz)
+    first, _ = grow(tmp_path, [source], tmp_path / "first.las", [SEED], both=False)
+    right = CORNER[:2] + TRACK.at(12.0, -SPACING_M / 2)
+    second, _ = grow(tmp_path, [first.file], tmp_path / "second.las", [right], both=False)
+    both, _ = grow(tmp_path, [source], tmp_path / "both.las", [SEED])
+    rails = [np.asarray(laspy.read(one.file).classification) == 10 for one in (first, second, both)]
+    assert rails[0].sum() < 0.6 * rails[1].sum()
+    assert np.mean(rails[1] == rails[2]) > 0.999
+
+
+def test_two_seeds_on_one_track_count_its_length_once(tmp_path):
+    source = save(tmp_path / "raw.las", TRACK.xyz)
+    seeds = [SEED, CORNER[:2] + TRACK.at(8.0, SPACING_M / 2), CORNER[:2] + TRACK.at(6.0, 0.0)]
+    result, progress = grow(tmp_path, [source], tmp_path / "new.las", seeds)
+    assert result.figures.paired_m == pytest.approx(47.0, abs=2.5)
+    assert "1 of 3 seeds lie on no rail: move them onto railheads." in progress.warnings
+
+
+def test_a_line_reaches_on_beyond_the_longest_run(tmp_path):
+    long = strip(60.0)
+    source = save(tmp_path / "raw.las", long.xyz)
+    line = CORNER[:2] + [long.at(s, SPACING_M / 2) for s in (5.0, 30.0, 55.0)]
+    alone, _ = grow(tmp_path, [source], tmp_path / "alone.las", [line[:1]], max_length_m=12.0)
+    whole, _ = grow(tmp_path, [source], tmp_path / "whole.las", [line], max_length_m=12.0)
+    assert alone.figures.paired_m == pytest.approx(2 * 17.0, abs=4.0)
+    assert whole.figures.paired_m == pytest.approx(2 * 59.0, abs=3.0)
+
+
+def test_only_rails_are_written_on_request(tmp_path):
+    source = save(tmp_path / "raw.las", TRACK.xyz)
+    result, _ = grow(tmp_path, [source], tmp_path / "new.las", [SEED], Choice(20, only_rails=True, reset=False))
+    cloud = laspy.read(result.file)
+    assert len(cloud.points) == result.figures.points
+    assert np.all(cloud.classification == 20)
+
+
+def test_seeds_elsewhere_are_refused(tmp_path):
+    source = save(tmp_path / "raw.las", TRACK.xyz)
+    with pytest.raises(ParameterError, match="No seed lies in the cloud"):
+        grow(tmp_path, [source], tmp_path / "new.las", [[12.0, 50.0]])
+    with pytest.raises(RailExtractError, match=r"No seed lies on a rail: put seeds within 0\.25 m"):
+        grow(tmp_path, [source], tmp_path / "new.las", [CORNER[:2] + TRACK.at(12.0, 0.0)])
+    assert not (tmp_path / "new.las").exists()
