@@ -79,6 +79,9 @@ SHARE_RIDGE = 0.02
 """Weight of the shares of the last round in the next, relative to that of the points: views next to each other look
 alike."""
 
+SHARE_DOUBT = 2e-4
+"""The same where the error of a section is estimated: nothing is known of the shares before."""
+
 
 @dataclass(frozen=True)
 class Outline:
@@ -328,11 +331,13 @@ def _rates(section: Section, blurred: Blurred, used: np.ndarray) -> tuple[np.nda
     return known, derivatives / blurred.density(section.shares)[used]
 
 
-def _information(counts: np.ndarray, section: Section, known: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Return the Fisher information about the place and the shares."""
+def _information(
+    counts: np.ndarray, section: Section, known: np.ndarray, rates: np.ndarray, ridge: float = SHARE_RIDGE
+) -> np.ndarray:
+    """Return the Fisher information about the place and the shares, with the weight `ridge` of shares known before."""
     found = (rates * counts) @ rates.T
     found[:PLACE, :PLACE] += _expected(section.place) + np.diag(RIDGE)
-    found[range(PLACE, len(found)), range(PLACE, len(found))] += SHARE_RIDGE * counts.sum() / section.shares[known]
+    found[range(PLACE, len(found)), range(PLACE, len(found))] += ridge * counts.sum() / section.shares[known]
     return found
 
 
@@ -369,5 +374,5 @@ class Scores:
         by_bin = scores[0] - np.linalg.solve(products[1:, 1:], products[1:, 0]) @ scores[1:]
         used = counts > 0
         known, rates = _rates(section, blurred, used)
-        whole = np.linalg.inv(_information(counts[used], section, known, rates))[0, 0]
+        whole = np.linalg.inv(_information(counts[used], section, known, rates, SHARE_DOUBT))[0, 0]
         return cls(by_bin, float(np.sqrt(max(whole - 1 / max(counts @ by_bin**2, RIDGE[0]), 0.0))))

@@ -6,17 +6,22 @@ station then show how far it is off there. See docs/method.md section 6.8.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, WINDOWS, station_count
+from .edges import ENOUGH_POINTS, STATION_STEP_M, SURE_SIGMAS, VIEW_STATIONS, WINDOWS, station_count
 from .level import in_head_frame
 from .outline import Grid, Outline, Scores, Section, fit_section
 
 MIN_SECTION_POINTS = 250
 """Points that a section needs for its parts to be told apart."""
+
+CHANGED_VIEW, MIN_HALF_POINTS = 0.02, 700
+"""Change of the share of points on the left half of the head from one half of a section to the other, from which these
+are sections of their own, and the points that each needs: the axis of a section of 700 has an error of 0.7 mm."""
 
 MAX_STRAY_SHARE = 0.3
 """With more points on no part of the outline, something else than a head is seen."""
@@ -26,6 +31,13 @@ MAX_SECTION_SHIFT_M = 0.02
 
 MAX_SIGMA_M = 0.006
 """Standard error of the middle in a window from which it counts as not visible."""
+
+WRONG_WIDTH_M, MAX_WRONG_WIDTH_M = 0.004, 0.015
+"""Error of the width from which another outline is fitted: standards differ by a millimetre; and from which the points
+show something else than a head."""
+
+SETTLED_WIDTH_M, WIDTH_ROUNDS = 0.0005, 5
+"""Change of the width at which this ends, and most rounds; each finds two thirds of what is left."""
 
 BLURRED_M, BLURRED_RATIO = 0.004, 1.4
 """Blur of the edges beyond the noise in height, and ratio of the noise across to that in height, from which a head is
@@ -81,37 +93,63 @@ def outline_middles(
     middles = Middles(np.full(count, np.nan), np.zeros(count), np.zeros(count), np.full(count, np.nan), np.zeros(count))
     left, up = in_head_frame(t, across, z, head_width_m)
     station = np.minimum((t / STATION_STEP_M).astype(int), count - 1)
-    outline, grid = Outline.of(head_width_m), Grid.of(head_width_m)
+    head, grid = Head(head_width_m, Outline.of(head_width_m)), Grid.of(head_width_m)
     bins = grid.number(left, up)
     used = (bins >= 0) & seen[station]
     station, bins = station[used], bins[used]
     section: Section | None = None
-    for first, last in _borders(count):
+    for first, last in _borders(count, station, left[used] > 0):
         here = slice(*np.searchsorted(station, [first, last]))
         counts = np.bincount(bins[here], minlength=grid.size).astype(float)
         if counts.sum() < MIN_SECTION_POINTS:
             continue
-        section = fit_section(counts, outline, grid, section)
+        section, head = _fitted(counts, head, grid, section)
         if section.shares[-1] > MAX_STRAY_SHARE or abs(section.place[0]) > MAX_SECTION_SHIFT_M:
             section = None
             continue
-        scores = Scores.of(counts, section, outline, grid)
+        scores = Scores.of(counts, section, head.outline, grid)
         part = slice(first, last)
         middles.offset[part], middles.information[part], middles.in_window[part] = _in_windows(
             section.place[0], scores.by_bin[bins[here]], station[here] - first, last - first
         )
         middles.offset[part][~seen[part]] = np.nan
         middles.common[part] = np.hypot(scores.common_m, PROFILE_SIGMA_M)
-        middles.blur[part] = _blur(section, middles.offset[part])
+        wider_m = head.width_m + section.place[3] - head_width_m
+        middles.blur[part] = _blur(section, wider_m, middles.offset[part])
     return middles
 
 
-def _blur(section: Section, offset: np.ndarray) -> float:
+@dataclass(frozen=True)
+class Head:
+    """The outline of a head of some width in metres, and whether that is the stated one."""
+
+    width_m: float
+    outline: Outline
+    is_stated: bool = True
+
+
+def _fitted(counts: np.ndarray, head: Head, grid: Grid, start: Section | None) -> tuple[Section, Head]:
+    """Fit a head to a section, with another outline if the stated width is wrong.
+
+    What the scanner sees of an outline that is too wide depends on the side that it looks from, and so does the axis of
+    a head that was made narrower. Each round therefore begins with the outline of the width found before.
+    """
+    section = fit_section(counts, head.outline, grid, start)
+    for _ in range(WIDTH_ROUNDS):
+        wider_m = section.place[3]
+        if not (WRONG_WIDTH_M if head.is_stated else SETTLED_WIDTH_M) < abs(wider_m) < MAX_WRONG_WIDTH_M:
+            break
+        head = Head(head.width_m + wider_m, Outline.of(head.width_m + wider_m), is_stated=False)
+        section = fit_section(counts, head.outline, grid)
+    return section, head
+
+
+def _blur(section: Section, wider_m: float, offset: np.ndarray) -> float:
     """Return by how much the edges of a head are blurred beyond the noise; see `Middles.blur`.
 
     Where the line wanders about the head, by its `offset`, (k,) metres, it blurs the section as well.
     """
-    wider_m, (across_m, height_m) = section.place[3], np.exp(section.place[4:])
+    across_m, height_m = np.exp(section.place[4:])
     known = offset[np.isfinite(offset)]
     across_m = np.sqrt(max(across_m**2 - (np.var(known) if len(known) else 0.0), 0.0))
     blur_m = float(np.sqrt(max(across_m**2 - height_m**2, 0.0)))
@@ -119,10 +157,31 @@ def _blur(section: Section, offset: np.ndarray) -> float:
     return blur_m if is_blurred else 0.0
 
 
-def _borders(count: int) -> list[tuple[int, int]]:
-    """Divide stations into sections of about VIEW_STATIONS."""
+def _borders(count: int, station: np.ndarray, is_left: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Divide stations into sections of about VIEW_STATIONS, and into shorter ones where the view changes.
+
+    A branch leaves the track that the scanner is on: it is seen from above first, then from the side. The parts of the
+    head that a whole section shows would pull its beginning and its end to either side.
+
+    Parameters
+    ----------
+    count : int
+        Number of stations.
+    station, is_left : (n,) int and bool arrays
+        Station of each point, ascending, and whether the point is to the left of the axis.
+    """
     borders = np.linspace(0, count, max(int(round(count / VIEW_STATIONS)), 1) + 1).astype(int)
-    return list(zip(borders[:-1].tolist(), borders[1:].tolist()))
+    sections = list(zip(borders[:-1].tolist(), borders[1:].tolist()))
+    while sections:
+        first, last = sections.pop(0)
+        start, middle, end = np.searchsorted(station, [first, (first + last) // 2, last])
+        if min(middle - start, end - middle) >= MIN_HALF_POINTS:
+            halves = [is_left[start:middle], is_left[middle:end]]
+            chance = np.sqrt(sum(0.25 / len(half) for half in halves))
+            if abs(halves[0].mean() - halves[1].mean()) > max(CHANGED_VIEW, SURE_SIGMAS * chance):
+                sections[:0] = [(first, (first + last) // 2), ((first + last) // 2, last)]
+                continue
+        yield first, last
 
 
 def _in_windows(

@@ -1,10 +1,10 @@
 """Standard error of a rail's line across the head's axis, at stations along the line.
 
-It has five independent parts: the number and noise of the points at the edges or on the outline (sampling), what all
+It has six independent parts: the number and noise of the points at the edges or on the outline (sampling), what all
 stations of a section share, because the parts of the head that the scanner sees are not known exactly (view), the
-distance to the nearest points (bridging), the distance between the line and the middle of the head (remainder), and the
-curvature of bridges, which nothing shows. Only the last is known where no edges are visible. See docs/method.md section
-6.6.
+distance to the nearest points (bridging), the distance between the line and the middle of the head (remainder), what
+the windows are too long to show (wander), and the curvature of bridges, which nothing shows. Only the last is known
+where no edges are visible. See docs/method.md section 6.6.
 """
 
 from __future__ import annotations
@@ -104,7 +104,8 @@ def measure_support(
     middle = with_outline(by_edges, by_outline)
     remainder = smooth_profile(stations[known], middle[known], smoothing_m, stations)
     beyond_chance = np.maximum(remainder**2 - np.where(outlined, sampling, 0.0) ** 2, 0.0)
-    sigma = np.sqrt(sampling**2 + view**2 + bridging**2 + beyond_chance)
+    wander = _wander(points, counts.sum(axis=1), head_width_m, smoothing_m)
+    sigma = np.sqrt(sampling**2 + view**2 + bridging**2 + beyond_chance + wander**2)
     support = Support(stations, points, np.hypot(np.where(known, sigma, unseen), bridge))
     return support if marked else _with_blur(support, by_outline.blur)
 
@@ -116,6 +117,25 @@ def _with_blur(support: Support, blur_m: np.ndarray) -> Support:
     apart_m = np.where(blur_m > 0, 2 * blur_m, np.nan)
     strips = np.column_stack([np.ones(len(blur_m)), apart_m, blur_m])
     return replace(support, sigma_m=np.hypot(support.sigma_m, blur_m), strips=strips)
+
+
+def _wander(points: np.ndarray, in_window: np.ndarray, head_width_m: float, smoothing_m: float) -> np.ndarray:
+    """Estimate how far a line wanders within the windows in which edges are looked for, (s,) metres.
+
+    The raster draws it through the points that there are: the mean of n that are spread over the head errs by the
+    width of the head over the root of 12 n. Of this, windows correct what is longer than they are.
+
+    Parameters
+    ----------
+    points, in_window : (s,) arrays
+        Points on top that are nearest to the stations, and those in the windows.
+    head_width_m, smoothing_m : float
+    """
+    seen = np.flatnonzero(points)
+    count = np.maximum(_averaged(points, smoothing_m), 1.0)
+    count = count[seen][np.minimum(np.searchsorted(seen, np.arange(len(points))), len(seen) - 1)]
+    left = np.clip(1 - count / np.maximum(in_window, 1.0), 0.0, 1.0)
+    return head_width_m * np.sqrt(left / (12 * count))
 
 
 def _combined(middles: Middles, smoothing_m: float) -> np.ndarray:

@@ -1,14 +1,14 @@
 import numpy as np
 import pytest
-from rail_extract.core.heads.edges import station_count
-from rail_extract.core.heads.sections import Middles, outline_middles, with_outline
+from rail_extract.core.heads.edges import VIEW_STATIONS, station_count
+from rail_extract.core.heads.sections import Middles, _borders, outline_middles, with_outline
 from rail_extract.laboratory.scenes.scanner import Scanner, scan
 from rail_extract.laboratory.scenes.tracks import Railhead
 
 WIDTH, LENGTH = 0.072, 60.0
 
 
-def scanned(angle_deg, share=1.0, noise_m=0.005, seed=0, slope=0.0, bend_m=0.0):
+def scanned(angle_deg, share=1.0, noise_m=0.005, seed=0, slope=0.0, bend_m=0.0, width_m=WIDTH):
     """Chainage, offset and height of the points of a head, which may lean and wander about the line."""
     x = np.arange(0, LENGTH, 0.01)
     axis, across = np.array([0.0, -slope, 1.0]), np.array([0.0, 1.0, slope])
@@ -18,7 +18,7 @@ def scanned(angle_deg, share=1.0, noise_m=0.005, seed=0, slope=0.0, bend_m=0.0):
     path = np.column_stack([x[::10], np.zeros((len(x[::10]), 2))])
     height_m = 4.5 * np.tan(np.radians(angle_deg))
     scanner = Scanner(noise_m=noise_m, face_share=share, left_m=4.5, height_m=height_m, half_range_m=30.0)
-    points = scan(head, WIDTH, path, scanner, np.random.RandomState(seed))
+    points = scan(head, width_m, path, scanner, np.random.RandomState(seed))
     return points[np.argsort(points[:, 0])].T
 
 
@@ -34,6 +34,24 @@ def test_the_middle_does_not_lean_to_the_scanner(angle_deg, share, slope):
     middles = middles_of(scanned(angle_deg, share, slope=slope))
     assert np.isfinite(middles.offset).all()
     assert abs(middles.offset.mean()) < 0.0015
+
+
+def test_the_axis_stays_where_another_width_is_stated():
+    """Without another outline it is 1.7 mm off."""
+    points = scanned(60, noise_m=0.004, seed=3, width_m=0.062)
+    assert abs(np.nanmean(middles_of(points).offset)) < 0.001
+
+
+@pytest.mark.parametrize(("last", "density", "sections"), [(0.5, 30, 1), (0.6, 30, 3), (0.6, 3, 1)])
+def test_a_section_is_divided_where_the_view_changes(last, density, sections):
+    """The share of points on the left half of the head changes along 40 m, if there are enough points to say so."""
+    random, count = np.random.RandomState(0), VIEW_STATIONS
+    station = np.repeat(np.arange(count), density)
+    is_left = random.random_sample(len(station)) < 0.5 + (last - 0.5) * station / count
+    borders = list(_borders(count, station, is_left))
+    assert len(borders) == sections
+    assert borders[0][0] == 0 and borders[-1][1] == count
+    assert all(one[1] == other[0] for one, other in zip(borders, borders[1:]))
 
 
 def test_middles_follow_the_head_along_the_line():

@@ -194,3 +194,10 @@ def test_points_are_summed_over_the_stations_that_smoothing_averages():
     assert _averaged(points, 0.001).tolist() == points.tolist()
     wide = _averaged(points, 5 * 0.25 * VARIANCE_FACTOR)
     assert wide == pytest.approx([0, 60, 60, 60, 60, 60, 0])
+
+
+def test_a_thin_line_wanders_within_its_windows():
+    """Smoothing averages 2.4 m of the line, which show 24 points, and windows are 8.25 m long."""
+    thin, dense = (np.median(support(*head(60.0, density)).sigma_m) for density in (10, 300))
+    assert thin > WIDTH * np.sqrt((1 - 2.4 / 8.25) / (12 * 24)) > 0.003
+    assert dense < 0.001
