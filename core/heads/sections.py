@@ -12,16 +12,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from .edges import ENOUGH_POINTS, STATION_STEP_M, SURE_SIGMAS, VIEW_STATIONS, WINDOWS, station_count
+from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, WINDOWS, station_count
 from .level import in_head_frame
 from .outline import Grid, Outline, Scores, Section, fit_section
 
 MIN_SECTION_POINTS = 250
 """Points that a section needs for its parts to be told apart."""
 
-CHANGED_VIEW, MIN_HALF_POINTS = 0.02, 700
+CHANGED_VIEW, MIN_HALF_POINTS = 0.04, 700
 """Change of the share of points on the left half of the head from one half of a section to the other, from which these
-are sections of their own, and the points that each needs: the axis of a section of 700 has an error of 0.7 mm."""
+are sections of their own, and the points that each needs: the axis of a section of 700 has an error of 0.7 mm, and the
+share one of 0.02."""
+
+SHARE_STATIONS = 8
+"""Stations, 2 m, in which the share of points on the left is found; their median is that of the half."""
 
 MAX_STRAY_SHARE = 0.3
 """With more points on no part of the outline, something else than a head is seen."""
@@ -174,14 +178,21 @@ def _borders(count: int, station: np.ndarray, is_left: np.ndarray) -> Iterator[t
     sections = list(zip(borders[:-1].tolist(), borders[1:].tolist()))
     while sections:
         first, last = sections.pop(0)
-        start, middle, end = np.searchsorted(station, [first, (first + last) // 2, last])
-        if min(middle - start, end - middle) >= MIN_HALF_POINTS:
-            halves = [is_left[start:middle], is_left[middle:end]]
-            chance = np.sqrt(sum(0.25 / len(half) for half in halves))
-            if abs(halves[0].mean() - halves[1].mean()) > max(CHANGED_VIEW, SURE_SIGMAS * chance):
-                sections[:0] = [(first, (first + last) // 2), ((first + last) // 2, last)]
+        middle = (first + last) // 2
+        start, half, end = np.searchsorted(station, [first, middle, last])
+        if min(half - start, end - half) >= MIN_HALF_POINTS:
+            before, after = (_share(station[part], is_left[part]) for part in (slice(start, half), slice(half, end)))
+            if abs(before - after) > CHANGED_VIEW:
+                sections[:0] = [(first, middle), (middle, last)]
                 continue
         yield first, last
+
+
+def _share(station: np.ndarray, is_left: np.ndarray) -> float:
+    """Return the share of points on the left in most parts of a section: in some the line may be off the head."""
+    part = (station - station[0]) // SHARE_STATIONS
+    count, on_left = np.bincount(part), np.bincount(part, is_left)
+    return float(np.median(on_left[count > 0] / count[count > 0]))
 
 
 def _in_windows(
