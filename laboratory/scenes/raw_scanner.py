@@ -132,17 +132,22 @@ def _cast_chunk(segments: Segments, source: np.ndarray, scanner: RawScanner, rng
 def _sharp(
     segments: Segments, source: np.ndarray, phase: np.ndarray, scanner: RawScanner, rng: np.random.RandomState
 ) -> tuple[np.ndarray, ...]:
-    """Cast thin rays; where the ranges of neighbours differ, some come back from between them."""
+    """Cast thin rays; where the ranges of neighbours differ, some come back from between them.
+
+    A beam is mixed if the edge lies within half its footprint of its middle, on either side; less than half of it then
+    lies on the other surface.
+    """
     distance, number, facing = _ranges(segments, source, phase, scanner)
     profile, ray = np.nonzero(np.isfinite(distance))
     own, kind = distance[profile, ray], segments.kind[number[profile, ray]]
-    beside = np.minimum(ray + 1, distance.shape[1] - 1)
-    other = distance[profile, beside]
-    chance = scanner.footprint_m / (np.minimum(own, other) * scanner.ray_step_rad)
-    edge = np.isfinite(other) & (np.abs(other - own) > MIXED_STEP_M) & (rng.random_sample(len(own)) < chance)
-    share = np.where(edge, rng.random_sample(len(own)), 0.0)
-    blended = np.where(edge, (1 - share) * own + share * np.where(edge, other, 0.0), own)
-    kind = np.where(edge, MIXED, kind)
+    blended = own.copy()
+    for side in (-1, 1):
+        other = distance[profile, np.clip(ray + side, 0, distance.shape[1] - 1)]
+        chance = 0.5 * scanner.footprint_m / (np.minimum(own, other) * scanner.ray_step_rad)
+        edge = np.isfinite(other) & (np.abs(other - own) > MIXED_STEP_M) & (rng.random_sample(len(own)) < chance)
+        share = 0.5 * rng.random_sample(len(own))
+        blended[edge] += share[edge] * (other - own)[edge]
+        kind = np.where(edge, MIXED, kind)
     return profile, ray + _first_ray(scanner), blended, kind, _returned(facing[profile, ray])
 
 

@@ -24,8 +24,9 @@ PLATFORM, WALL, FENCE, MAST, WIRE, PLANT, TRAIN = range(8, 15)
 RAIL_HEIGHT_M = 0.172
 """Height of a rail with a head of 72 mm (60E1); others are scaled by the width of their heads."""
 
-# Right half of 60E1, from the bottom's middle to the top's, in metres across and above the bottom
-_OUTLINE = np.array(
+# Right half of 60E1 (EN 13674-1), from the bottom's middle to the lower end of the head's face, in metres across and
+# above the bottom
+_FOOT_AND_WEB = np.array(
     [
         (0.0, 0.0),
         (0.075, 0.0),
@@ -34,17 +35,14 @@ _OUTLINE = np.array(
         (0.012, 0.036),
         (0.00825, 0.060),
         (0.00825, 0.105),
-        (0.012, 0.118),
-        (0.0355, 0.126),
-        (0.036, 0.158),
-        (0.033, 0.166),
-        (0.0225, 0.1703),
-        (0.010, 0.1718),
-        (0.0, 0.172),
+        (0.012, 0.1254),
+        (0.03717, 0.1345),
     ]
 )
-_HEAD_FROM = 8
-"""First point of the outline that belongs to the head."""
+_ARCS = ((0.013, 0.036, 5), (0.080, 0.02603, 2), (0.300, 0.01023, 1))
+"""Arcs of the head from its face to its middle: radius, half the width at the lower end, and chords, which deviate from
+them by 0.1 mm. The face below widens by 1 in 20."""
+
 
 SLEEPER_STEP_M, SLEEPER_WIDTH_M, SLEEPER_LENGTH_M = 0.60, 0.26, 2.6
 PAD_M = 0.010
@@ -211,13 +209,23 @@ def outline(head_width_m: float) -> tuple[np.ndarray, np.ndarray]:
         Metres across and above the top.
     (m - 1,) bool array
     """
-    scale = head_width_m / 0.072
-    right = (_OUTLINE[1:] - np.array([0.0, RAIL_HEIGHT_M])) * scale
-    left = right[-2::-1] * np.array([-1.0, 1.0])
-    whole = np.concatenate([right, left])
+    below = _FOOT_AND_WEB[1:] - np.array([0.0, RAIL_HEIGHT_M])
+    right = np.concatenate([below, _crown()]) * (head_width_m / 0.072)
+    whole = np.concatenate([right, right[-2::-1] * np.array([-1.0, 1.0])])
     number = np.arange(len(whole) - 1)
-    first = _HEAD_FROM - 1
+    first = len(below) - 1
     return whole, (number >= first) & (number < len(whole) - 1 - first)
+
+
+def _crown() -> np.ndarray:
+    """Right half of the top of a head of 72 mm, from the upper end of the face to the middle, (m, 2)."""
+    at, chords, turn = np.zeros(2), [np.zeros((1, 2))], 0.0
+    for radius, half, count in _ARCS[::-1]:
+        end = np.arcsin(min(np.sin(turn) + (half - at[0]) / radius, 1.0))
+        angle = np.linspace(turn, end, count + 1)[1:]
+        chords.append(at + radius * np.column_stack([np.sin(angle) - np.sin(turn), np.cos(angle) - np.cos(turn)]))
+        at, turn = chords[-1][-1], end
+    return np.concatenate(chords)[::-1]
 
 
 def rail(
