@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import binary_dilation
+from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from .bed import Coarse
@@ -41,19 +42,31 @@ MIN_LENGTH_M = 2.0
 """Shortest groove."""
 
 ALONG_M = 0.6
-"""Length to either side over which the spacing and the edge are averaged."""
-
-EDGE_M = 0.022
-"""Distance beyond the head's side in which the edge of what is level is looked for."""
+"""Length to either side over which the points of slices are added up."""
 
 SLICE_M = 0.05
-"""Length of a slice in which the outermost point is an edge."""
+"""Length of the slice of level points that each cell of a groove looks at, to either side."""
 
-BESIDE_M = 0.003
-"""Width beyond the head's side within which a level point is rail."""
+BIN_M, BINS = 0.004, 56
+"""Bins across in which the level points of a slice are counted: 112 mm to either side, a wide groove and a head."""
+
+LEVEL_QUANTILE, GAP_SHARE = 0.6, 0.35
+"""Quantile over the bins that stands for what is level, because grooves and gaps fill less than half of them; and share
+of it below which a bin is part of the gap: near the edge of a head that hides its own corner half of the points are
+left."""
+
+SEARCH_BINS = 6
+"""Distance from the middle of the cavities within which the gap is looked for: where only one wall is seen, the middle
+lies on it."""
 
 HEAD_LEVEL_M = 0.012
 """Largest difference in height between a head and the pavement."""
+
+FACE_M, CORNER_M = 0.035, 0.013
+"""Depth of the face of a head below the pavement, and radius of the corner above it."""
+
+BESIDE_M = 0.003
+"""Distance beyond the edge within which a point on the side of the groove is still rail: noise across."""
 
 TENTHS_OF_MM = 10_000
 
@@ -116,10 +129,11 @@ def flush_rails(
     marks = marks[crowd <= CROWD]
     lines = find_lines(Marks(marks, np.zeros(len(marks))), REACH_M, 1.0, STRIP_M)
     lines = lines.of((lines.cover >= MIN_COVER) & (lines.pure >= MIN_PURE))
-    flat = np.flatnonzero(np.abs(below) < HEAD_LEVEL_M)
-    rails = [_at_edge(_heads(lines, gauge_m, head_width_m), xy[flat], head_width_m) for gauge_m in settings.gauges_m]
+    flat = xy[np.abs(below) < HEAD_LEVEL_M]
+    rails = [_at_edge(_grooves(lines, gauge_m), flat, head_width_m) for gauge_m in settings.gauges_m]
     heads = [_guided(one, settings) for one in rails]
-    points = [flat[_on_heads(one, xy[flat], head_width_m)] for one in heads]
+    upper = np.flatnonzero((below > -HEAD_LEVEL_M) & (below < FACE_M))
+    points = [upper[_on_heads(one, xy[upper], below[upper], head_width_m)] for one in heads]
     most = int(np.argmax([len(one.inward) for one in rails]))
     return Flush(np.unique(np.concatenate(points)), heads[most].lines, rails[most].lines)
 
@@ -129,7 +143,7 @@ def _guided(heads: Heads, settings: Settings) -> Heads:
     if settings.guide is None:
         return heads
     kept = settings.guide.keeps(heads.lines, links(heads.lines), settings.spacings_m, np.inf)
-    return Heads(heads.lines.of(kept), heads.inward[kept])
+    return heads.of(kept)
 
 
 def _pavement(coarse: Coarse, cell: np.ndarray, height: np.ndarray) -> np.ndarray:
@@ -156,7 +170,7 @@ def _centroids(cell: np.ndarray, xy: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Heads:
-    """Lines along the axes of heads.
+    """Lines along heads, or along the grooves inside them.
 
     Attributes
     ----------
@@ -168,84 +182,95 @@ class Heads:
     lines: Lines
     inward: np.ndarray
 
+    def of(self, chosen: np.ndarray) -> Heads:
+        """Choose some of the cells."""
+        return Heads(self.lines.of(chosen), self.inward[chosen])
+
     def moved(self, inward_m: np.ndarray) -> Heads:
         """Move the axes towards the other rail, (n,) metres."""
         axis = self.lines.axis + inward_m[:, None] * self.inward
         return replace(self, lines=replace(self.lines, axis=axis))
 
 
-def _heads(lines: Lines, gauge_m: float, head_width_m: float) -> Heads:
-    """Find pairs of grooves and put the axes of the heads outside of them.
-
-    An error that both grooves share, such as that of walls that are seen from one side, does not move the middle.
-    """
-    stations, side, apart_m = partners(lines, gauge_m - INSIDE_M, SPACING_M, 1.0)
+def _grooves(lines: Lines, gauge_m: float) -> Heads:
+    """Keep the lines that have their partner at the gauge and are long enough."""
+    stations, side, _ = partners(lines, gauge_m - INSIDE_M, SPACING_M, 1.0)
     paired = stations >= MIN_STATIONS
-    lines, side, apart_m = lines.of(paired), side[paired], apart_m[paired]
+    lines, side = lines.of(paired), side[paired]
     pairs = links(lines)
     piece = pieces_of(len(lines.axis), pairs)
     long = lengths(lines.axis, piece)[piece] >= MIN_LENGTH_M
-    lines, side, apart_m = lines.of(long), side[long], apart_m[long]
-    inward = side[:, None] * lines.across
-    spacing_m = _smoothed(lines, inward, apart_m)
-    outward_m = (gauge_m + head_width_m - spacing_m) / 2
-    return Heads(lines, inward).moved(-outward_m)
+    return Heads(lines.of(long), (side[:, None] * lines.across)[long])
 
 
-def _smoothed(lines: Lines, inward: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Average values over the cells of the same groove within `ALONG_M`, (n,)."""
-    if len(values) < 2:
-        return values
-    one, other = cKDTree(lines.axis).query_pairs(ALONG_M, output_type="ndarray").T
-    same = np.einsum("ij,ij->i", inward[one], inward[other]) > 0
-    one, other = one[same], other[same]
-    total = values + np.bincount(one, values[other], len(values)) + np.bincount(other, values[one], len(values))
-    count = 1 + np.bincount(one, minlength=len(values)) + np.bincount(other, minlength=len(values))
-    return total / count
+def _at_edge(grooves: Heads, xy: np.ndarray, head_width_m: float) -> Heads:
+    """Put the axes of the heads beside the outer edges of the grooves.
 
+    The groove is a gap in what is level. A scanner to one side sees one wall only, and the middle of what it sees in
+    the groove is not the groove's; but the gap begins where the head ends.
 
-def _at_edge(heads: Heads, xy: np.ndarray, head_width_m: float) -> Heads:
-    """Move axes so that the heads end where the level points do, towards the groove.
-
-    A groove that is seen from one side shows one wall only; its middle then is not the middle of its points.
+    Parameters
+    ----------
+    grooves : Heads
+        Lines through what is seen in the grooves.
+    xy : (k, 2) array
+        Level points.
+    head_width_m : float
     """
-    if not len(heads.inward) or not len(xy):
-        return heads
-    limit_m = head_width_m / 2 + EDGE_M
-    near = cKDTree(heads.lines.axis).sparse_distance_matrix(
-        cKDTree(xy), np.hypot(limit_m, SLICE_M), output_type="ndarray"
-    )
+    if not len(grooves.inward) or not len(xy):
+        return grooves.of(np.zeros(len(grooves.inward), dtype=bool))
+    edge_m = _outer_edges(_summed_along(grooves, _level_counts(grooves, xy)))
+    seen = np.isfinite(edge_m)
+    return grooves.of(seen).moved(edge_m[seen] - head_width_m / 2)
+
+
+def _level_counts(grooves: Heads, xy: np.ndarray) -> np.ndarray:
+    """Level points by distance inwards from each cell of a groove, (n, BINS)."""
+    axis, inward = grooves.lines.axis, grooves.inward
+    reach_m = np.hypot(BIN_M * BINS / 2, SLICE_M)
+    near = cKDTree(axis).sparse_distance_matrix(cKDTree(xy), reach_m, output_type="ndarray")
     own = near["i"]
-    step = xy[near["j"]] - heads.lines.axis[own]
-    inward = np.einsum("ij,ij->i", step, heads.inward[own])
-    inside = (np.abs(np.einsum("ij,ij->i", step, heads.lines.along[own])) < SLICE_M / 2) & (inward < limit_m)
-    edge_m = np.full(len(heads.lines.axis), -np.inf)
-    np.maximum.at(edge_m, own[inside], inward[inside])
-    edge_m[edge_m < 0] = np.nan
-    shift_m = _medians(heads, edge_m) - head_width_m / 2
-    return heads.moved(np.nan_to_num(shift_m))
+    step = xy[near["j"]] - axis[own]
+    bins = np.floor(np.einsum("ij,ij->i", step, inward[own]) / BIN_M).astype(np.int64) + BINS // 2
+    inside = np.abs(np.einsum("ij,ij->i", step, grooves.lines.along[own])) < SLICE_M
+    inside &= (bins >= 0) & (bins < BINS)
+    return np.bincount(own[inside] * BINS + bins[inside], minlength=len(axis) * BINS).reshape(-1, BINS)
 
 
-def _medians(heads: Heads, values: np.ndarray) -> np.ndarray:
-    """Median of values on the same head within `ALONG_M`, (n,); NaN where there is none."""
-    near = cKDTree(heads.lines.axis).query_ball_point(heads.lines.axis, ALONG_M)
-    found = np.full(len(values), np.nan)
-    for number, members in enumerate(near):
-        mine = np.array(members)
-        mine = mine[heads.inward[mine] @ heads.inward[number] > 0]
-        known = values[mine][np.isfinite(values[mine])]
-        if len(known):
-            found[number] = np.median(known)
-    return found
+def _summed_along(grooves: Heads, counts: np.ndarray) -> np.ndarray:
+    """Add up the counts of the cells of the same groove within `ALONG_M`, (n, BINS)."""
+    axis, inward = grooves.lines.axis, grooves.inward
+    one, other = cKDTree(axis).query_pairs(ALONG_M, output_type="ndarray").T
+    same = np.abs(np.einsum("ij,ij->i", axis[other] - axis[one], inward[one])) < STRIP_M
+    same &= np.einsum("ij,ij->i", inward[one], inward[other]) > 0
+    own = np.arange(len(axis))
+    rows, columns = np.concatenate([own, one[same], other[same]]), np.concatenate([own, other[same], one[same]])
+    return csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(axis), len(axis))) @ counts
 
 
-def _on_heads(heads: Heads, xy: np.ndarray, head_width_m: float) -> np.ndarray:
-    """Return which level points lie on a head, (k,) bool."""
+def _outer_edges(counts: np.ndarray) -> np.ndarray:
+    """Distance inwards at which the gap that is nearest to the middle begins, (n,) metres; NaN where there is none."""
+    limit = GAP_SHARE * np.quantile(counts, LEVEL_QUANTILE, axis=1)[:, None]
+    level, number, middle = counts >= np.maximum(limit, 1), np.arange(BINS), BINS // 2
+    far = np.where(level, BINS, np.abs(number - middle))
+    gap = np.argmin(far, axis=1)
+    head = np.max(np.where(level & (number < gap[:, None]), number, -1), axis=1)
+    rows = np.arange(len(counts))
+    found = (far[rows, gap] <= SEARCH_BINS) & (head >= 0)
+    high, low = counts[rows, head], counts[rows, np.minimum(head + 1, BINS - 1)]
+    share = (high - limit[:, 0]) / np.maximum(high - low, 1)
+    return np.where(found, (head - middle + 0.5 + share) * BIN_M, np.nan)
+
+
+def _on_heads(heads: Heads, xy: np.ndarray, below_m: np.ndarray, head_width_m: float) -> np.ndarray:
+    """Return which points lie on a head: on its level top, or on the face beside the groove, (k,) bool."""
     if not len(heads.inward) or not len(xy):
         return np.zeros(len(xy), dtype=bool)
     distance, cell = cKDTree(heads.lines.axis).query(xy, distance_upper_bound=REACH_M / 2)
     near = np.isfinite(distance)
-    on = np.zeros(len(xy), dtype=bool)
-    across = np.einsum("ij,ij->i", xy[near] - heads.lines.axis[cell[near]], heads.inward[cell[near]])
-    on[near] = np.abs(across) <= head_width_m / 2 + BESIDE_M
-    return on
+    inward = np.full(len(xy), np.inf)
+    inward[near] = np.einsum("ij,ij->i", xy[near] - heads.lines.axis[cell[near]], heads.inward[cell[near]])
+    half_m = head_width_m / 2
+    top = (np.abs(below_m) < HEAD_LEVEL_M) & (inward >= -half_m)
+    face = (below_m >= HEAD_LEVEL_M) & (below_m < FACE_M) & (inward >= half_m - CORNER_M)
+    return (top | face) & (inward <= half_m + BESIDE_M)

@@ -88,15 +88,16 @@ class Way:
 
     Attributes
     ----------
-    left_m, top_m, slope : (profiles,) arrays
-        Place of the axis to the left of the reference line, height of the rails' tops, and rise of the plane of both
-        rails to the left.
+    left_m, top_m, slope, secant : (profiles,) arrays
+        Place of the axis to the left of the reference line, height of the rails' tops, sine of the tilt of the plane of
+        both rails to the left, and length in the profile of what is 1 m long across the track.
     spacing_m : float
     """
 
     left_m: np.ndarray
     top_m: np.ndarray
     slope: np.ndarray
+    secant: np.ndarray
     spacing_m: float
 
 
@@ -185,18 +186,20 @@ def ways_of(reference: Curve, station: np.ndarray, tracks: Sequence[Track]) -> l
         if track.curve is reference:
             at = reference.chainage
             left = np.full(len(axis), float(track.left_m))
+            secant = np.ones(len(axis))
         else:
             sample = tree.query(axis[:, :2])[1]
             step = axis[:, :2] - reference.xy[sample]
             left = np.sum(step * reference.left_normal[sample], axis=1)
             forward = np.column_stack([np.cos(reference.heading), np.sin(reference.heading)])[sample]
             at = reference.chainage[sample] + np.sum(step * forward, axis=1)
+            secant = 1 / np.cos(track.curve.heading - reference.heading[sample])
             order = np.argsort(at)
-            at, left, axis, cant = at[order], left[order], axis[order], cant[order]
-        place, top, slope = (
-            np.interp(station, at, values, left=np.nan, right=np.nan) for values in (left, axis[:, 2], cant)
+            at, left, axis, cant, secant = at[order], left[order], axis[order], cant[order], secant[order]
+        place, top, slope, secant = (
+            np.interp(station, at, values, left=np.nan, right=np.nan) for values in (left, axis[:, 2], cant, secant)
         )
-        ways.append(Way(place, top, slope, track.spacing_m))
+        ways.append(Way(place, top, slope, secant, track.spacing_m))
     return ways
 
 
@@ -245,14 +248,12 @@ def rail(
 
 
 def running_rails(world: World, hidden: np.ndarray | None = None) -> None:
-    """Add the rails of all tracks with their fastenings; where heads overlap, the later one is left out."""
+    """Add the rails of all tracks with their fastenings; where heads overlap, rays hit the outline of both."""
     laid: list[np.ndarray] = []
     middle = world.every(SLEEPER_STEP_M, 0.12, 0.07)
     for way in world.ways:
         for side in (1, -1):
             left, top = rail_place(way, side)
-            for other in laid:
-                left = np.where(np.abs(left - other) < world.head_width_m, np.nan, left)
             laid.append(left)
             rail(world, left, top, hidden)
             bottom = top - RAIL_HEIGHT_M * world.head_width_m / 0.072
@@ -276,7 +277,8 @@ def running_rails(world: World, hidden: np.ndarray | None = None) -> None:
 def rail_place(way: Way, side: int, inward_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Place and height of a rail's top in each profile; `inward_m` moves it towards the axis."""
     from_axis = side * (way.spacing_m / 2 - inward_m)
-    return way.left_m + from_axis, way.top_m + from_axis * way.slope
+    across = from_axis * np.sqrt(1 - way.slope**2) * way.secant
+    return way.left_m + across, way.top_m + from_axis * way.slope
 
 
 def ground(world: World, terrain_m: np.ndarray | None = None, where: np.ndarray | None = None) -> None:
