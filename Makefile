@@ -75,6 +75,10 @@ contact-sheet: .venv/installed  ## draw synthetic training pairs by family and s
 parameter-pictures: .venv/installed  ## draw what the parameters do, docs/pictures/parameters
 	@$(PYTHON) tools/parameter_pictures.py
 
+.PHONY: classification-pictures
+classification-pictures: .venv/installed  ## draw the steps of the classification, docs/pictures/classification
+	@$(PYTHON) tools/classification_pictures.py
+
 .PHONY: screenshots
 screenshots: plugin  ## take pictures of the dialogs and of the sample's result, docs/pictures
 	@. ./$(ENVIRONMENT) && $(PYTHON) tools/screenshots.py

@@ -22,21 +22,25 @@ LEAST_M = 1.5
 LEAST_PAIRED = 0.4
 """Share of a piece's cells with a partner from which the piece has one."""
 
+HIDDEN_M = 1.3
+"""Length of a rail with a partner that a wheel may hide without dividing the rail: a wheel of 0.92 m and a cell at both
+ends. Between the wheels of a bogie, 1.5 m are seen."""
+
 LEAST_SINGLE_M = 5.0
 """Shortest piece without a partner: FRPDF is trained to remove shorter lone lines; a longer one may be the visible rail
 of a hidden pair."""
 
 
-def links(lines: Lines, aligned_m: float = ALIGNED_M) -> np.ndarray:
-    """Pairs of cells within reach that lie on each other's axis, (m, 2) int."""
+def links(lines: Lines, within_m: float | None = None) -> np.ndarray:
+    """Pairs of cells that lie on each other's axis, at most `within_m` apart or within reach, (m, 2) int."""
     if len(lines.axis) < 2:
         return np.empty((0, 2), dtype=np.int64)
-    pairs = cKDTree(lines.axis).query_pairs(lines.reach_m, output_type="ndarray")
+    pairs = cKDTree(lines.axis).query_pairs(within_m or lines.reach_m, output_type="ndarray")
     one, other = pairs.T
     step = lines.axis[other] - lines.axis[one]
     on = np.ones(len(pairs), dtype=bool)
     for end in (one, other):
-        on &= np.abs(np.einsum("ij,ij->i", step, lines.across[end])) < aligned_m
+        on &= np.abs(np.einsum("ij,ij->i", step, lines.across[end])) < ALIGNED_M
     return pairs[on]
 
 
@@ -86,10 +90,14 @@ def long_enough(
     if not len(lines.axis):
         return np.zeros(0, dtype=bool)
     piece = pieces_of(len(lines.axis), pairs)
-    length_m = lengths(lines.axis, piece)
-    size = np.bincount(piece)
-    share = np.bincount(piece, paired, len(size)) / size
-    with_partner = share > LEAST_PAIRED
-    least_m = np.where(with_partner, LEAST_M, LEAST_SINGLE_M)
-    kept = (length_m >= least_m) | (np.bincount(piece, open_ended, len(size)) > 0)
-    return (kept & (with_partner | keep_single))[piece]
+    with_partner = (np.bincount(piece, paired) > LEAST_PAIRED * np.bincount(piece))[piece]
+    kept = _reaches(lines.axis, piece, LEAST_SINGLE_M, open_ended) & keep_single
+    pair = np.flatnonzero(with_partner)
+    piece = pieces_of(len(pair), links(lines.of(pair), max(HIDDEN_M, lines.reach_m)))
+    kept[pair] = _reaches(lines.axis[pair], piece, LEAST_M, open_ended[pair])
+    return kept
+
+
+def _reaches(xy: np.ndarray, piece: np.ndarray, least_m: float, open_ended: np.ndarray) -> np.ndarray:
+    """Return which cells belong to pieces of at least this length, or to open-ended ones, (n,) bool."""
+    return ((lengths(xy, piece) >= least_m) | (np.bincount(piece, open_ended) > 0))[piece]

@@ -49,3 +49,15 @@ def test_the_order_of_points_does_not_matter():
     order = np.random.RandomState(2).permutation(len(xyz))
     found = classify_square(xyz, SETTINGS).rail
     np.testing.assert_array_equal(classify_square(xyz[order], SETTINGS).rail, found[order])
+
+
+@pytest.mark.parametrize("seen_m", [(0.0, 0.012), (0.030, GROOVE)])
+def test_a_groove_whose_one_wall_is_hidden_gives_the_same_axes(seen_m):
+    xyz, on, inside = street(0.002)
+    hidden = (inside > 0) & (inside < GROOVE) & ((inside < seen_m[0]) | (inside > seen_m[1]))
+    xyz, on, inside = xyz[~hidden], on[~hidden], inside[~hidden]
+    found = classify_square(xyz, SETTINGS).rail
+    here = np.abs(turned(xyz, 0.3)[0]) < 3
+    assert (found & on & here).sum() / (on & here).sum() > 0.9
+    assert np.mean(inside[found & here & on]) == pytest.approx(-WIDTH / 2, abs=0.003)
+    assert (found & on).sum() / found.sum() > 0.93

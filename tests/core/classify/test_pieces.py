@@ -45,3 +45,14 @@ def test_single_rails_can_be_left_out():
     none = np.zeros(len(lines.axis), dtype=bool)
     assert not long_enough(lines, links(lines), none, none, keep_single=False).any()
     assert long_enough(lines, links(lines), ~none, none, keep_single=False).all()
+
+
+@pytest.mark.parametrize(("gap_m", "paired", "kept"), [(1.1, 1, 1), (1.5, 1, 0), (1.1, 0, 0)])
+def test_a_wheel_does_not_divide_a_rail(gap_m, paired, kept):
+    lines = lines_of((7.4 + gap_m, 0.0))
+    x = lines.axis[:, 0]
+    lines = lines.of((x < 6.0) | (x > 6.0 + gap_m))
+    behind, none = lines.axis[:, 0] > 6.0, np.zeros(len(lines.axis), dtype=bool)
+    found = long_enough(lines, links(lines), np.full(len(behind), bool(paired)), none, keep_single=True)
+    assert found[~behind].all()
+    assert (found[behind] == kept).all()

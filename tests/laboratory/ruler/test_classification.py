@@ -1,12 +1,27 @@
 import numpy as np
 import pytest
 from rail_extract.core.standards import STANDARDS
+from rail_extract.laboratory.rasters.turnouts import FORMS, branch
 from rail_extract.laboratory.ruler.classification import lines_from, score
+from rail_extract.laboratory.ruler.lines import cut, nearest
+from rail_extract.laboratory.scenes.plain import spacing
 from rail_extract.laboratory.scenes.raw import scan_world
 from rail_extract.laboratory.scenes.raw_catalogue import MOBILE, NEGATIVE, parallel
 from rail_extract.laboratory.scenes.raw_catalogue import line as plan
-from rail_extract.laboratory.scenes.raw_scanner import RawScanner, Segments, cast
-from rail_extract.laboratory.scenes.raw_world import FASTENING, FOOT, HEAD, SLEEPER, ground, outline, running_rails
+from rail_extract.laboratory.scenes.raw_scanner import MIXED, RawScanner, Segments, cast
+from rail_extract.laboratory.scenes.raw_world import (
+    FASTENING,
+    FOOT,
+    GROUND,
+    HEAD,
+    SLEEPER,
+    ground,
+    outline,
+    rail_place,
+    running_rails,
+    ways_of,
+)
+from rail_extract.laboratory.scenes.tracks import Track
 
 
 @pytest.fixture(scope="module")
@@ -34,9 +49,50 @@ def test_rays_hit_what_comes_first():
 def test_a_rail_has_the_width_of_its_head_and_a_foot():
     shape, head = outline(0.072)
     assert np.ptp(shape[:, 0]) == pytest.approx(0.150)
-    assert np.ptp(shape[np.append(head, False) | np.insert(head, 0, False), 0]) == pytest.approx(0.072)
+    of_head = shape[np.append(head, False) | np.insert(head, 0, False)]
+    # 72 mm at 14 mm below the top; the faces widen by 1 in 20 and end 37.5 mm below it.
+    assert np.ptp(of_head[:, 0]) == pytest.approx(0.0743, abs=1e-4)
+    assert np.ptp(of_head[of_head[:, 1] > -0.015, 0]) == pytest.approx(0.072)
+    assert of_head[:, 1].min() == pytest.approx(-0.0375)
     assert shape[:, 1].max() == pytest.approx(0.0)
     assert shape[:, 1].min() == pytest.approx(-0.172)
+
+
+def test_points_at_both_edges_of_a_head_are_mixed():
+    count = 2000
+    number = np.arange(count)
+    kinds = np.repeat(np.array([GROUND, HEAD], dtype=np.uint8), count)
+    ends = [np.tile(place, (count, 1)) for place in ([-1.0, 0.0], [1.0, 0.0], [-0.036, 0.15], [0.036, 0.15])]
+    segments = Segments(np.concatenate([number, number]), np.concatenate(ends[::2]), np.concatenate(ends[1::2]), kinds)
+    order = np.argsort(segments.profile, kind="stable")
+    segments = Segments(*(values[order] for values in (segments.profile, segments.start, segments.end, segments.kind)))
+    scanner = RawScanner(noise_m=0.0, view_rad=(-0.1, 0.1))
+    hits = cast(segments, np.tile([0.0, 4.0], (count, 1)), scanner, np.random.RandomState(1))
+    head = hits.place[hits.kind == HEAD, 0]
+    assert np.mean(head) == pytest.approx(0.0, abs=2e-4)
+    mixed = hits.place[hits.kind == MIXED]
+    assert np.mean(mixed[:, 0] > 0) == pytest.approx(0.5, abs=0.05)
+    assert np.mean(mixed[:, 1] > 0.075) == pytest.approx(0.5, abs=0.05)
+
+
+def test_the_rails_of_a_branch_and_of_a_canted_track_are_a_gauge_apart():
+    main = plan(60.0, 0.0, 0.4)
+    side = branch(main, 5.0, next(form for form in FORMS if form.name == "300-1:9"), 1, 20.0)
+    standard = STANDARDS["EN_60E1_1435"]
+    tracks = [Track(curve, spacing(standard), cant_m=cant) for curve, cant in ((main, 0.1), (side, 0.0))]
+    station = np.arange(0.0, 60.0, 0.1)
+    for way, track in zip(ways_of(main, station, tracks), tracks):
+        for number, one in zip((1, -1), track.rails()):
+            left, top = rail_place(way, number)
+            there = np.flatnonzero(np.isfinite(left))[5:-5]
+            xy = [
+                np.interp(station, main.chainage, main.xy[:, axis])
+                + left * np.interp(station, main.chainage, main.left_normal[:, axis])
+                for axis in (0, 1)
+            ]
+            places = np.column_stack([*xy, top])[there]
+            feet, _ = nearest(places, cut([one]))
+            assert np.abs(places - feet).max() < 0.0005
 
 
 def test_points_lie_where_their_kind_says(plain):
