@@ -15,6 +15,7 @@ COMMANDS = {
     "extract": ("core.commands.extract", "extract rails and track centerlines on several cores or computers"),
     "classify": ("core.commands.classify", "find the rail points of raw clouds and write classified copies"),
     "grow": ("core.commands.grow", "follow rails from seeds and write classified copies of the clouds"),
+    "train-classifier": ("core.commands.train_classifier", "train a classifier of rail points on labelled clouds"),
     "onnx": ("core.frpdf.onnx", "write the network for other runtimes"),
     "train": ("laboratory.training.train", "train the network on synthetic rasters"),
     "evaluate": ("laboratory.training.evaluate", "compare weights on a fixed set of synthetic rasters"),
@@ -25,6 +26,9 @@ COMMANDS = {
 
 INTERRUPTED = 130
 """Exit code of a command that Ctrl-C ended, as shells expect it."""
+
+
+CANCELLED = "Cancelled; nothing was written."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -60,8 +64,11 @@ def _run(module, args: argparse.Namespace) -> int:
     except errors.RailExtractError as error:
         print(error, file=sys.stderr)
         return 1
+    except errors.Cancelled as cancelled:
+        print(str(cancelled) or CANCELLED, file=sys.stderr)
+        return INTERRUPTED
     except KeyboardInterrupt:
-        print("Cancelled; nothing was written.", file=sys.stderr)
+        print(CANCELLED, file=sys.stderr)
         return INTERRUPTED
 
 

@@ -22,6 +22,13 @@ DEFAULT_STEP_M = 1.0
 DEFAULT_GUIDE_DISTANCE_M = 4.0
 """Distance from a guide within which rails are searched: its own track, and as much as a map is off."""
 
+GEOMETRY, LEARNED = "GEOMETRY", "LEARNED"
+METHODS = (GEOMETRY, LEARNED)
+"""What finds rail points in raw clouds: their geometry, or a network that was trained on labelled clouds."""
+
+DEFAULT_EPOCHS = 10
+"""How many times a rail classifier learns from each block with rails."""
+
 
 @dataclass(frozen=True)
 class Parameters:

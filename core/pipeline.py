@@ -114,6 +114,7 @@ def extract_files(
     runner: Runner,
     progress: Progress = SILENT,
     classify: bool = False,
+    weights: Path | None = None,
 ) -> RailNetwork:
     """Extract rails and centerlines from files of points, however large, with any runner.
 
@@ -130,6 +131,8 @@ def extract_files(
     classify : bool
         Whether the cloud is a raw one, whose rail points are to be found first; the request is for the classes
         `standards.SEARCHED_CLASSES` then.
+    weights : Path, optional
+        Weights of the network that finds them; None means geometry.
 
     Returns
     -------
@@ -152,7 +155,7 @@ def extract_files(
     progress = recording = Recording(progress)
     reading, rest = progress.divide((READING, DRAWING + PAIRING + MEASURING))
     if classify:
-        settings = Settings(parameters.gauges_m, parameters.head_width_m)
+        settings = Settings(parameters.gauges_m, parameters.head_width_m, weights=weights)
         with scratch_folder(folder) as scratch:
             source, figures = spool_found(request, settings, side_m, scratch, runner, reading)
             network = _walk([source], parameters, runner, rest)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -93,12 +94,15 @@ class Settings:
         Whether straight rails of some length without a partner are kept.
     guide : Guide, optional
         Where to search; in metres from the zero of the coordinate system, or from the corner of the square.
+    weights : Path, optional
+        Weights of a network that was trained on labelled clouds and replaces the geometry; see `learned`.
     """
 
     gauges_m: tuple[float, ...]
     head_width_m: float
     keep_single: bool = True
     guide: Guide | None = None
+    weights: Path | None = None
 
     @property
     def cell_m(self) -> float:

@@ -14,12 +14,22 @@ from ..disk import writing
 from ..errors import ParameterError
 from ..labelling.files import Choice, classify_files, plan_output
 from ..labelling.finding import guide_of
+from ..learned.model import weights_for
 from ..parameters import DEFAULT_GUIDE_DISTANCE_M
 from ..progress import Estimating
 from ..scratch import scratch_folder
 from ..standards import LAST_CLASS, RAIL_CLASS, SEARCHED_CLASSES, resolve
 from ..tasks import InTurn, Runner
-from .options import TILES_HELP, Console, add_cloud_arguments, extent_of, gauges_of, limited, shapes_module
+from .options import (
+    TILES_HELP,
+    Console,
+    add_cloud_arguments,
+    add_method_arguments,
+    extent_of,
+    gauges_of,
+    limited,
+    shapes_module,
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--guide-distance", type=float, default=DEFAULT_GUIDE_DISTANCE_M, metavar="M", help=text)
     text = "keep only tracks that have the guide within 0.5 m of their middle"
     parser.add_argument("--only-guided", action="store_true", help=text)
+    add_method_arguments(parser)
     parser.add_argument("--pairs-only", action="store_true", help="leave out rails without a partner")
     text = f"class of the rail points that are found (default: {RAIL_CLASS})"
     parser.add_argument("--rail-class", type=int, default=RAIL_CLASS, metavar="N", help=text)
@@ -60,6 +71,7 @@ def run(args: argparse.Namespace) -> None:
     if args.only_guided and args.guide is None:
         raise ParameterError("--only-guided needs lines to compare tracks with: give --guide.")
     choice = Choice(args.rail_class, args.rails_only, not args.no_reset)
+    weights = weights_for(args.method, args.weights)
     progress = Estimating(Console())
     output = args.output if len(args.tiles) == 1 or args.output.suffix else args.output.with_suffix(".vpc")
     with writing(output.parent):
@@ -67,7 +79,8 @@ def run(args: argparse.Namespace) -> None:
     planned = plan_output(args.tiles, output, choice.class_code, progress)
     request = ask(args.tiles, SEARCHED_CLASSES, args.crs, extent_of(args.extent), progress)
     request = limited(request, args)
-    settings = Settings(gauges_m, standard.head_width_m, not args.pairs_only, _guide(args, request))
+    guide = _guide(args, request)
+    settings = Settings(gauges_m, standard.head_width_m, not args.pairs_only, guide, weights)
     with writing(output.parent), scratch_folder(planned.file.parent) as folder, _runner(args.workers, folder) as runner:
         result = classify_files(request, settings, choice, planned, folder, runner, progress)
     figures = result.figures

@@ -18,7 +18,8 @@ from ..errors import ParameterError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, FINDING_FIELDS, RAIL_FIELDS
 from ..frpdf import DEVICES, ENGINES
 from ..frpdf.models import NAMES, choose
-from ..parameters import DEFAULT_STEP_M, STRIPS, Parameters
+from ..learned.model import weights_for
+from ..parameters import DEFAULT_STEP_M, LEARNED, STRIPS, Parameters
 from ..pipeline import extract_files
 from ..progress import Estimating, Progress
 from ..rails import RailNetwork
@@ -26,7 +27,16 @@ from ..raster_file import header_for, on_one_grid
 from ..report import Origin, list_findings, summary
 from ..scratch import scratch_folder
 from ..standards import SEARCHED_CLASSES, RailStandard, resolve
-from .options import TILES_HELP, Console, add_cloud_arguments, extent_of, gauges_of, limited, numbers_in
+from .options import (
+    TILES_HELP,
+    Console,
+    add_cloud_arguments,
+    add_method_arguments,
+    extent_of,
+    gauges_of,
+    limited,
+    numbers_in,
+)
 
 NEEDS = {name: name for name in ("distributed", "cryptography", "pyogrio", "shapely", "rasterio")}
 """Modules and packages of the extra "cluster"; rasterio is needed for `--cleaned` only."""
@@ -87,6 +97,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     cloud = parser.add_argument_group("point cloud and rails")
     text = "find the rail points of a raw cloud first; --rail-classes is ignored"
     cloud.add_argument("--classify", action="store_true", help=text)
+    add_method_arguments(cloud)
     cloud.add_argument("--rail-classes", default="10", help="classes of rail points, such as 10,11 (default: 10)")
     text = "take all rail classes for one, for tracks whose rails are of different classes"
     cloud.add_argument("--merge-classes", action="store_true", help=text)
@@ -224,6 +235,7 @@ def _run_in(
 
     codes, extent = numbers_in(args.rail_classes, "--rail-classes", int), extent_of(args.extent)
     codes = SEARCHED_CLASSES if args.classify else codes
+    weights = _weights(args)
     progress = Estimating(Console())
     files = _certificate_files(args, progress)
     certificates = Certificates(*files) if files else None
@@ -232,7 +244,7 @@ def _run_in(
         request = ask(args.tiles, codes, args.crs, extent, progress, unreadable=runner.failures)
         request = limited(request, args)
         request = replace(request, merged=args.merge_classes and not args.classify)
-        network = extract_files(request, folder.resolve(), parameters, runner, progress, args.classify)
+        network = extract_files(request, folder.resolve(), parameters, runner, progress, args.classify, weights)
     _write(network, args, standard, parameters, extent, outputs)
     print(f"{len(network.rails)} rails, {sum(rail.length_m for rail in network.rails) / 1000:.3f} km")
     print(f"{len(network.centerlines)} centerlines, {sum(one.length_m for one in network.centerlines) / 1000:.3f} km")
@@ -241,6 +253,20 @@ def _run_in(
     for failure in network.failures:
         print(failure, file=sys.stderr)
     return INCOMPLETE if network.failures else 0
+
+
+def _weights(args: argparse.Namespace) -> Path | None:
+    """Return the weights that find the rail points of a raw cloud, on any worker; None for geometry.
+
+    Raises
+    ------
+    ParameterError, ModelError
+        They can't be used.
+    """
+    if args.method == LEARNED and not args.classify:
+        raise ParameterError("--method is for raw clouds: give --classify as well.")
+    weights = weights_for(args.method, args.weights)
+    return None if weights is None else weights.resolve()
 
 
 def _certificate_files(args: argparse.Namespace, progress: Progress) -> tuple[Path, ...]:

@@ -11,7 +11,7 @@ from types import ModuleType
 
 from ..clouds.points import Request
 from ..errors import ParameterError
-from ..parameters import LEAVE_OUT, Parameters
+from ..parameters import GEOMETRY, LEARNED, LEAVE_OUT, METHODS, Parameters
 from ..progress import Progress
 from ..standards import DEFAULT, Gauge, RailStandard, read_gauges
 
@@ -43,6 +43,14 @@ def add_cloud_arguments(parser: argparse._ActionsContainer) -> None:
     )
     text = "read only the points in the polygons of this GeoPackage or GeoJSON file"
     parser.add_argument("--mask", type=Path, metavar="FILE", help=text)
+
+
+def add_method_arguments(parser: argparse._ActionsContainer) -> None:
+    """Declare what finds the rail points of a raw cloud, in a parser or in a group."""
+    text = f"what finds the rail points of a raw cloud (default: {GEOMETRY})"
+    parser.add_argument("--method", choices=METHODS, default=GEOMETRY, help=text)
+    text = f"file that train-classifier has written, for --method {LEARNED}"
+    parser.add_argument("--weights", type=Path, metavar="FILE", help=text)
 
 
 def shapes_module(option: str) -> ModuleType:

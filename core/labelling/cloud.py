@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..classify.settings import MARGIN_M, Settings
-from ..classify.square import Classified, classify_square
+from ..classify.square import Classified
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from ..squares.grid import points_by_square
+from ..tasks import Context, Once
+from .finding import search_square
 
 
 def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SILENT) -> Classified:
@@ -30,11 +32,12 @@ def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SIL
     rail = np.zeros(len(xyz), dtype=bool)
     figures = SearchFigures()
     members = points_by_square(xyz, settings.side_m)
+    context = Context({}, Once(), progress)
     around_them = points_by_square(xyz, settings.side_m, MARGIN_M)
     for key in progress.follow(list(members)):
         number = around_them[key]
         corner = np.array([*np.multiply(key, settings.side_m), 0.0])
-        found = classify_square(xyz[number] - corner, settings.at(key))
+        found = search_square(xyz[number] - corner, settings.at(key), context)
         rail[number[found.rail]] = True
         figures += found.figures
     return Classified(rail, figures)

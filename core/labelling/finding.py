@@ -14,12 +14,14 @@ import numpy as np
 
 from ..classify.guide import MIDDLE_M, Guide
 from ..classify.settings import MARGIN_M, Settings
-from ..classify.square import classify_square
+from ..classify.square import Classified, classify_square
 from ..clouds.points import Request
 from ..clouds.readers import CloudHeader, read_points
 from ..disk import writing
 from ..errors import CloudError, NoRailPointsError, ParameterError
 from ..frame import LocalFrame
+from ..learned.model import Classifier
+from ..learned.square import label_square
 from ..progress import SILENT, Progress
 from ..rails import ENOUGH_CELLS_PER_M, SearchFigures
 from ..squares.grid import Key, Square, points_by_square
@@ -28,7 +30,7 @@ from ..tasks import Context, Runner, Task, in_listed_order
 
 POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8"), ("mark", "<u4")])
 """A point on disk: coordinates in units of the CRS, its number among all points of all files, and its mark, see
-`passes.marks_of`."""
+`passes.marks_of`, or its class."""
 
 FEW_IN_SQUARE, MANY_SQUARES = 20, 100
 """Chunks of points that are spread over more squares than this, with fewer points in each, are not in the unit that the
@@ -88,7 +90,7 @@ def find_rail_points(
         The disk is full.
     """
     reading, searching = progress.divide((1.0, 1.0))
-    sorted_files = _sorted_files(request, settings, folder, runner, reading)
+    sorted_files = sort_files(request, settings, folder, runner, reading)
     keys = sorted({key for one in sorted_files for key in one.counts})
     if not keys:
         raise _nothing_to_search(request, settings.guide)
@@ -162,7 +164,7 @@ def report(figures: SearchFigures, progress: Progress) -> None:
 
 
 @dataclass(frozen=True)
-class _SortedFile:
+class SortedFile:
     """The points of one file of the cloud, sorted into squares.
 
     Attributes
@@ -177,16 +179,16 @@ class _SortedFile:
     counts: dict[Key, int]
 
 
-def _sorted_files(
-    request: Request, settings: Settings, folder: Path, runner: Runner, progress: Progress
-) -> list[_SortedFile]:
-    """Sort the points of all files into squares, one file per task."""
+def sort_files(
+    request: Request, settings: Settings, folder: Path, runner: Runner, progress: Progress, with_class: bool = False
+) -> list[SortedFile]:
+    """Sort the points of all files into squares, one file per task; with their classes as marks."""
     starts = np.cumsum([0, *(header.point_count for header in request.headers)])
     tasks = {
         place: Task(
             f"Reading {header.path.name}",
             _sort_file,
-            (replace(request, headers=()), header, int(starts[place]), settings, str(folder)),
+            (replace(request, headers=()), header, int(starts[place]), settings, str(folder), with_class),
             weight=header.point_count + 1,
         )
         for place, header in enumerate(request.headers)
@@ -198,8 +200,14 @@ def _sorted_files(
 
 
 def _sort_file(
-    request: Request, header: CloudHeader, first: int, settings: Settings, folder: str, context: Context
-) -> _SortedFile:
+    request: Request,
+    header: CloudHeader,
+    first: int,
+    settings: Settings,
+    folder: str,
+    with_class: bool,
+    context: Context,
+) -> SortedFile:
     """Append the points of a file that are to be searched to the files of their squares; a task.
 
     Each execution has a folder of its own: a worker may have died half-way.
@@ -217,10 +225,10 @@ def _sort_file(
         points = np.empty(len(kept), POINT)
         points["xyz"] = xyz[kept]
         points["number"] = kept + first
-        points["mark"] = marks[kept]
+        points["mark"] = (codes if with_class else marks)[kept]
         first += len(xyz)
         _append(points, request.zero, settings.side_m, mine, counts, header.path.name)
-    return _SortedFile(str(mine), counts)
+    return SortedFile(str(mine), counts)
 
 
 def _append(
@@ -242,21 +250,39 @@ def _append(
                 file.write(points[numbers].tobytes())
 
 
-def _search_task(key: Key, sorted_files: Sequence[_SortedFile], zero: LocalFrame, settings: Settings) -> Task:
+def _search_task(key: Key, sorted_files: Sequence[SortedFile], zero: LocalFrame, settings: Settings) -> Task:
     """Make the task that searches a square."""
-    files = [_file(Path(one.folder), key) for one in sorted_files]
+    files = [str(file) for file in files_of(key, sorted_files)]
     weight = sum(one.counts.get(key, 0) for one in sorted_files)
-    arguments = (Square.on_grid(key, settings.side_m, zero), [str(file) for file in files], settings.at(key))
+    arguments = (Square.on_grid(key, settings.side_m, zero), files, settings.at(key))
     return Task(f"Searching square {key}", _search, arguments, weight=weight)
 
 
 def _search(square: Square, files: Sequence[str], settings: Settings, context: Context) -> Found:
     """Find the rail points of a square; a task."""
     context.progress.check()
-    points = np.concatenate([np.fromfile(file, POINT) for file in files if Path(file).exists()])
-    found = classify_square(square.frame.to_local(points["xyz"]), settings)
+    points = read_square(files)
+    found = search_square(square.frame.to_local(points["xyz"]), settings, context)
     points = points[found.rail]
     return Found(points["xyz"].copy(), points["number"].copy(), points["mark"].copy(), found.figures)
+
+
+def search_square(xyz: np.ndarray, settings: Settings, context: Context) -> Classified:
+    """Find the points on railheads in a square by the method of the settings; see `classify_square`."""
+    if settings.weights is None:
+        return classify_square(xyz, settings)
+    classifier = context.once(Classifier.of, settings.weights)
+    return label_square(xyz, settings, classifier, context.progress)
+
+
+def files_of(key: Key, sorted_files: Sequence[SortedFile]) -> list[Path]:
+    """List the files that may hold points of a square."""
+    return [_file(Path(one.folder), key) for one in sorted_files]
+
+
+def read_square(files: Sequence[str | Path]) -> np.ndarray:
+    """Read the points of a square and of its margin, (n,) array of POINT."""
+    return np.concatenate([np.fromfile(file, POINT) for file in files if Path(file).exists()])
 
 
 def _file(folder: Path, key: Key) -> Path:

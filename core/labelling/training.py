@@ -1,0 +1,149 @@
+"""From a labelled cloud to the weights of a classifier, in a folder that lets an interrupted training continue."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..classify.settings import Settings
+from ..clouds.points import Request
+from ..disk import Destination, writing
+from ..errors import ParameterError
+from ..learned.examples import INDEX, Examples
+from ..learned.model import WEIGHTS_SUFFIX, check_torch, device_of, save
+from ..progress import SILENT, Progress
+from .examples import write_examples
+
+if TYPE_CHECKING:
+    from ..learned.training import Trained
+
+FOLDER_SUFFIX = "_training"
+"""Added to the name of the weights, it is that of the folder that holds a training until it is complete."""
+
+SOURCE, EXAMPLES = "source.json", "examples"
+
+READING = 0.1
+"""Share of a training that reading takes, for the progress."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a training is given, besides the cloud.
+
+    Attributes
+    ----------
+    rail_classes : tuple of int
+        Classes of the rail points.
+    epochs : int
+        How many times each block with rails is learned from.
+    seed : int
+    device : {"AUTO", "CPU", "CUDA"}
+    """
+
+    rail_classes: tuple[int, ...]
+    epochs: int
+    seed: int
+    device: str
+
+
+def check_training(weights: Path, plan: Plan) -> None:
+    """Check what can be checked before a cloud is read.
+
+    Raises
+    ------
+    ParameterError
+        The weights have another suffix.
+    ModelError
+        PyTorch or the CUDA device is missing.
+    """
+    if weights.suffix.lower() != WEIGHTS_SUFFIX:
+        raise ParameterError(f"{weights.name} is not a name for weights: let it end in {WEIGHTS_SUFFIX}.")
+    check_torch("Training")
+    device_of(plan.device)
+
+
+def folder_of(weights: Path) -> Path:
+    """Return the folder that holds the training of weights until it is complete."""
+    return weights.with_name(weights.stem + FOLDER_SUFFIX)
+
+
+def train_classifier(
+    request: Request, settings: Settings, plan: Plan, weights: Destination, progress: Progress = SILENT
+) -> Trained:
+    """Train a classifier on a labelled cloud and write its weights; continue if such a training was interrupted.
+
+    Parameters
+    ----------
+    request : Request
+        Files, `standards.SEARCHED_CLASSES` classes and extent.
+    settings : Settings
+    plan : Plan
+    weights : Destination
+        The .npz file. The folder `folder_of` it is removed once the weights are written.
+    progress : Progress
+
+    Raises
+    ------
+    NoRailPointsError, ParameterError
+        Nothing can be learned from the labels, or the folder holds another training.
+    CloudError, DiskError, ModelError, Cancelled
+        See `examples.write_examples` and `learned.training.train`.
+    """
+    from ..learned.training import Settings as TrainingSettings
+    from ..learned.training import train
+
+    folder = folder_of(weights.file)
+    reading, learning = progress.divide((READING, 1 - READING))
+    with writing(folder.parent):
+        examples = _examples(request, settings, plan, folder, reading)
+        reading.set_fraction(1.0)
+        trained = train(examples, TrainingSettings(plan.epochs, plan.seed), folder, plan.device, learning)
+    with weights.replacing() as new:
+        save(new, trained.network)
+    shutil.rmtree(folder, ignore_errors=True)
+    return trained
+
+
+def _examples(request: Request, settings: Settings, plan: Plan, folder: Path, progress: Progress) -> Examples:
+    """Write the blocks of the cloud, or return those of the training that continues."""
+    source, examples = folder / SOURCE, folder / EXAMPLES
+    identity = _identity(request, settings, plan.rail_classes)
+    if source.exists():
+        if source.read_text(encoding="utf-8") != identity:
+            raise other_training(folder)
+    elif folder.exists() and any(folder.iterdir()):
+        raise other_training(folder)
+    if (examples / INDEX).exists():
+        return Examples.load(examples)
+    is_new = not folder.exists()
+    try:
+        examples.mkdir(parents=True, exist_ok=True)
+        source.write_text(identity, encoding="utf-8")
+        progress.status("Cutting the cloud into blocks")
+        found = write_examples(request, plan.rail_classes, settings, examples, progress)
+        found.validation(plan.seed)
+        return found
+    except BaseException:
+        if is_new:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+
+
+def other_training(folder: Path) -> ParameterError:
+    """Return the error for a folder that holds something else."""
+    return ParameterError(
+        f"{folder} holds another training, with other clouds or settings: delete it, or choose another name for the "
+        "weights."
+    )
+
+
+def _identity(request: Request, settings: Settings, rail_classes: Sequence[int]) -> str:
+    """Return a text that is the same for the same blocks."""
+    files = [[header.path.name, header.point_count, *map(str, header.extent)] for header in request.headers]
+    mask = None if request.mask is None else list(map(str, request.mask.extent))
+    extent = None if request.extent is None else list(map(str, request.extent))
+    return json.dumps([files, list(rail_classes), settings.side_m, extent, mask, list(request.leave_out)])

@@ -1,0 +1,171 @@
+"""What the network is given: the points of a square thinned by height zone and cut into blocks.
+
+Gribov and Chang, section 3: a zone of heights in which rails lie, thinned ground, blocks of 4 x 4 m with at most 3000
+points each.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..classify.bed import Coarse, find_bed
+from ..classify.tops import HIGH_M, LOW_M, TOP_M
+from ..frame import ORIGIN_STEP
+from ..squares.grid import points_by_square
+
+BLOCK_M = 4.0
+"""Side of a block: it holds both rails of a track of any gauge."""
+
+CORE_M = 3.0
+"""Largest side of the middle of a block, whose points are labelled: those nearer to its border lack surroundings."""
+
+MAX_POINTS = 3000
+"""Most points of a block; one with more becomes several blocks of the same place, each with a part of its points."""
+
+LEAST_M = -0.20
+"""Height above the bed from which points are used."""
+
+RAIL_VOXEL_M, CONTEXT_VOXEL_M = 0.05, 0.20
+"""One point is kept of each cube of this side, in the zone of railheads and outside of it. A cloud from a train and one
+from the air are then almost equally dense; the ground and what stands higher are surroundings only."""
+
+SHUFFLE_SEED = 20_20
+"""Of the order in which points are dropped from layer to layer: random, but the same for the same points."""
+
+
+@dataclass(frozen=True)
+class Thinned:
+    """The points of a square that the network sees.
+
+    Attributes
+    ----------
+    number : (n,) int array
+        Their numbers among the points of the square, in an order that depends on their places only.
+    place : (n, 4) float32 array
+        Metres from the square's corner, the height counting from a multiple of `ORIGIN_STEP`; height above the bed.
+    railhigh : (n,) bool array
+        Points in the zone of railheads; only these can be on rails.
+    band : (m,) int array
+        Numbers of all points of the square in the zone of railheads.
+    band_place : (m, 3) float32 array
+        Their places.
+    stands_for : (m,) int array
+        The thinned point of their cube, for each.
+    """
+
+    number: np.ndarray
+    place: np.ndarray
+    railhigh: np.ndarray
+    band: np.ndarray
+    band_place: np.ndarray
+    stands_for: np.ndarray
+
+
+@dataclass(frozen=True)
+class Block:
+    """Points that go through the network together.
+
+    Attributes
+    ----------
+    number : (n,) int array
+        Numbers among the thinned points, in the order in which layers drop them, the last ones first.
+    core : (n,) bool array
+        Points in the middle of the block that can be on rails; those of all blocks of a square cover it once.
+    key : tuple of int
+        Column and row in the square.
+    """
+
+    number: np.ndarray
+    core: np.ndarray
+    key: tuple[int, int]
+
+
+def thin(xyz: np.ndarray) -> Thinned:
+    """Find the heights above the bed and thin the points.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        See `classify.square.classify_square`.
+    """
+    x, y = (np.ascontiguousarray(values) for values in xyz.T[:2])
+    z = (xyz[:, 2] - ORIGIN_STEP * np.floor(xyz[:, 2].min() / ORIGIN_STEP)).astype(np.float32)
+    coarse = Coarse.around(x, y)
+    dx, dy = coarse.offsets(x, y)
+    height, _ = find_bed(coarse, dx, dy, z).heights(dx, dy, z)
+    used = np.flatnonzero((height >= LEAST_M) & (height <= HIGH_M))
+    place = np.column_stack([x[used], y[used], z[used], height[used]]).astype(np.float32)
+    railhigh = (place[:, 3] >= LOW_M) & (place[:, 3] <= TOP_M)
+    band, context = np.flatnonzero(railhigh), np.flatnonzero(~railhigh)
+    chosen, stands_for = _one_of_each(place[band], RAIL_VOXEL_M)
+    kept = np.concatenate([band[chosen], context[_one_of_each(place[context], CONTEXT_VOXEL_M)[0]]])
+    return Thinned(used[kept], place[kept], railhigh[kept], used[band], place[band, :3], stands_for)
+
+
+def _one_of_each(place: np.ndarray, side_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Choose the point nearest to the middle of each cube.
+
+    Points at the same distance are ordered by their places, so the choice does not depend on the order of the points.
+
+    Returns
+    -------
+    (k,) int array
+        The points chosen, in the order of the cubes.
+    (n,) int array
+        Number of the cube of each point.
+    """
+    scaled = place[:, :3].astype(float) / side_m
+    cube = np.floor(scaled)
+    off = np.square(scaled - cube - 0.5).sum(axis=1)
+    order = np.lexsort((*place.T, off, *cube.T))
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = np.any(np.diff(cube[order], axis=0) != 0, axis=1)
+    number = np.empty(len(order), dtype=np.int64)
+    number[order] = np.cumsum(first) - 1
+    return order[first], number
+
+
+def cut(thinned: Thinned, side_m: float) -> list[Block]:
+    """Cut a square into blocks; places without a point in the zone of railheads are left out.
+
+    Parameters
+    ----------
+    thinned : Thinned
+    side_m : float
+        Side of the square.
+    """
+    core_m = core_side(side_m)
+    margin_m = min((BLOCK_M - core_m) / 2, core_m / 2 - 1e-6)
+    inside = np.all((thinned.place[:, :2] >= 0) & (thinned.place[:, :2] < side_m), axis=1)
+    labelled = inside & thinned.railhigh
+    place = thinned.place[:, :2].astype(float)
+    own = {key: numbers[labelled[numbers]] for key, numbers in points_by_square(place, core_m).items()}
+    around = points_by_square(place, core_m, margin_m)
+    blocks = []
+    for key, core in own.items():
+        if len(core):
+            blocks += _parts(np.sort(around[key]), core, key)
+    return blocks
+
+
+def core_side(side_m: float) -> float:
+    """Return the side of the cores that divide a square, metres."""
+    return side_m / math.ceil(side_m / CORE_M)
+
+
+def _parts(numbers: np.ndarray, core: np.ndarray, key: tuple[int, int]) -> list[Block]:
+    """Shuffle the points of a block and divide them among as few blocks as can hold them."""
+    shuffled = numbers[np.random.RandomState(SHUFFLE_SEED).permutation(len(numbers))]
+    count = math.ceil(len(shuffled) / MAX_POINTS)
+    parts = (shuffled[first::count] for first in range(count))
+    blocks = (Block(part, np.isin(part, core, assume_unique=True), key) for part in parts)
+    return [block for block in blocks if block.core.any()]
+
+
+def centred(place: np.ndarray) -> np.ndarray:
+    """Move the places of a block's points, (n, 4), to their middle in plan and their mean height, (n, 4) float32."""
+    middle = np.append((place[:, :2].max(axis=0) + place[:, :2].min(axis=0)) / 2, place[:, 2].mean(dtype=float))
+    return np.column_stack([place[:, :3] - middle, place[:, 3]]).astype(np.float32)

@@ -1,0 +1,196 @@
+"""Trained weights on disk, and the probabilities that they give."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import ModelError, ParameterError
+from ..frpdf.weights import load_arrays, save_arrays
+from ..parameters import LEARNED
+from ..progress import SILENT, Progress
+from .blocks import MAX_POINTS, Block, Thinned, centred
+from .pyramid import build
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from .network import RandLaNet, Tensors
+
+WEIGHTS_SUFFIX = ".npz"
+
+AT_ONCE = 8 * MAX_POINTS
+"""Points that go through the network at once: some 300 MB."""
+
+NO_TORCH = "{} needs PyTorch: install it with the algorithm Install packages, or with pip install torch."
+
+
+def check_torch(what: str) -> None:
+    """Check that PyTorch starts.
+
+    Parameters
+    ----------
+    what : str
+        What needs it, for the message.
+
+    Raises
+    ------
+    ModelError
+    """
+    try:
+        import torch  # noqa: F401
+    except (ImportError, OSError) as error:  # Windows: a missing library
+        raise ModelError(NO_TORCH.format(what)) from error
+
+
+def save(path: Path, network: RandLaNet) -> None:
+    """Write the weights of a network."""
+    from .network import arrays_of
+
+    save_arrays(path, arrays_of(network))
+
+
+def load(path: Path) -> RandLaNet:
+    """Make a network with the weights of a file, on the CPU.
+
+    Raises
+    ------
+    ModelError
+        PyTorch is missing, or the file is missing, is damaged or holds something else.
+    """
+    check_torch("METHOD LEARNED")
+    import torch
+
+    from .network import RandLaNet, arrays_of
+
+    if not path.is_file():
+        raise ModelError(f"The weights file {path} is missing: choose one that Train rail classifier has written.")
+    try:
+        arrays = load_arrays(path)
+    except ModelError as error:
+        raise ModelError(
+            f"The weights file {path.name} cannot be read: choose one that Train rail classifier has written."
+        ) from error
+    network = RandLaNet()
+    shapes = {name: array.shape for name, array in arrays_of(network).items()}
+    if {name: array.shape for name, array in arrays.items()} != shapes:
+        raise ModelError(
+            f"{path.name} holds the weights of something else: choose a file that Train rail classifier has written."
+        )
+    if not all(np.isfinite(array).all() for array in arrays.values()):
+        raise ModelError(f"{path.name} holds weights that are not numbers: train them again.")
+    network.load_state_dict({name: torch.from_numpy(array) for name, array in arrays.items()}, strict=False)
+    return network.eval()
+
+
+class Classifier:
+    """A trained network on its device.
+
+    Parameters
+    ----------
+    network : RandLaNet
+    device : {"AUTO", "CPU", "CUDA"}
+
+    Raises
+    ------
+    ModelError
+        There is no CUDA device.
+    """
+
+    def __init__(self, network: RandLaNet, device: str = "AUTO") -> None:
+        self.device = device_of(device)
+        self._network = network.eval().to(self.device)
+        self._may_retreat = device == "AUTO"
+
+    @classmethod
+    def of(cls, path: Path, device: str = "AUTO") -> Classifier:
+        """Load the weights of a file; see `load`."""
+        return cls(load(path), device)
+
+    def probabilities(self, thinned: Thinned, blocks: Sequence[Block], progress: Progress = SILENT) -> np.ndarray:
+        """Return the probability of each thinned point of being on a rail, (n,) float32; NaN outside of all cores."""
+        found = np.full(len(thinned.number), np.nan, dtype=np.float32)
+        for group in in_groups([len(block.number) for block in blocks]):
+            progress.check()
+            chosen = [blocks[number] for number in group]
+            places = [centred(thinned.place[block.number]) for block in chosen]
+            computed = self._computed(places, progress)
+            for block, values in zip(chosen, np.split(computed, np.cumsum([len(place) for place in places])[:-1])):
+                found[block.number[block.core]] = values[block.core]
+        return found
+
+    def _computed(self, places: Sequence[np.ndarray], progress: Progress) -> np.ndarray:
+        """Run the network on blocks; the graphics card's memory may be taken by other programs."""
+        import torch
+
+        try:
+            with torch.inference_mode():
+                return torch.sigmoid(self._network(*inputs(places, self.device))).cpu().numpy()
+        except torch.cuda.OutOfMemoryError:
+            if not self._may_retreat:
+                raise ModelError("The graphics card has too little free memory: set DEVICE to CPU.") from None
+            torch.cuda.empty_cache()
+            self.device = "cpu"
+            self._network.to(self.device)
+            progress.warning("The graphics card has too little free memory: continuing on the CPU.")
+            return self._computed(places, progress)
+
+
+def weights_for(method: str, weights: Path | None) -> Path | None:
+    """Return the weights that a method uses, after a check that they can be; None for geometry.
+
+    Raises
+    ------
+    ParameterError
+        The method and the weights contradict each other.
+    ModelError
+        See `load`.
+    """
+    if method == LEARNED and weights is None:
+        raise ParameterError("METHOD LEARNED needs WEIGHTS: choose those that Train rail classifier has written.")
+    if method != LEARNED and weights is not None:
+        raise ParameterError("WEIGHTS are for METHOD LEARNED: choose this method, or leave WEIGHTS empty.")
+    if weights is not None:
+        load(weights)
+    return weights
+
+
+def device_of(device: str) -> str:
+    """Return PyTorch's name of a device: with AUTO, that of a graphics card if there is one.
+
+    Raises
+    ------
+    ModelError
+        There is no CUDA device.
+    """
+    import torch
+
+    if device == "CUDA" and not torch.cuda.is_available():
+        raise ModelError("There is no CUDA device that PyTorch can use: choose AUTO or CPU.")
+    return "cuda" if device != "CPU" and torch.cuda.is_available() else "cpu"
+
+
+def inputs(places: Sequence[np.ndarray], device: str) -> tuple[Tensor, list[Tensors]]:
+    """Make the network's inputs from the places of blocks, (n, FEATURES) float32 each; see `blocks.centred`."""
+    import torch
+
+    from .network import Tensors
+
+    layers = build([place[:, :3] for place in places])
+    return torch.from_numpy(np.concatenate(places)).to(device), [Tensors.of(layer, device) for layer in layers]
+
+
+def in_groups(counts: Sequence[int]) -> list[list[int]]:
+    """Divide blocks, by their numbers of points, into groups of at most `AT_ONCE` points, in order."""
+    groups: list[list[int]] = []
+    total = 0
+    for number, count in enumerate(counts):
+        if not groups or total + count > AT_ONCE:
+            groups.append([])
+            total = 0
+        groups[-1].append(number)
+        total += count
+    return groups

@@ -1,0 +1,142 @@
+"""The command `train-classifier`, and `classify` with its weights."""
+
+import laspy
+import numpy as np
+import pytest
+from rail_extract.__main__ import INTERRUPTED, main
+from rail_extract.core.classify.settings import Settings
+from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_bar, with_track
+
+torch = pytest.importorskip("torch")
+
+from rail_extract.core.labelling.cloud import classify_cloud  # noqa: E402
+from rail_extract.core.learned import training  # noqa: E402
+
+SIDE_M = Settings((1.435,), 0.072).side_m
+CORNER = np.array([round(500_000 / SIDE_M) * SIDE_M, round(5_000_000 / SIDE_M) * SIDE_M, 100.0])
+
+
+@pytest.fixture(autouse=True)
+def _small(monkeypatch):
+    """Make steps fast, also on computers that do other work: small operations wait for the slowest thread."""
+    monkeypatch.setattr(training, "BATCH", 2)
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+def scene():
+    """12 m of track in four areas, with a kerb as high as the rails; which points are on heads."""
+    rng = np.random.RandomState(3)
+    xyz, on = with_track(flat(12.0, rng=rng, per_m2=400), 1.435, 0.072, 0.3)
+    xyz, kerb = with_bar(xyz, 0.5, 0.3, 3.0)
+    return rough(xyz, rng), on & ~kerb
+
+
+@pytest.fixture
+def save(tmp_path):
+    def save(name, xyz, codes):
+        header = laspy.LasHeader(point_format=6, version="1.4")
+        header.scales, header.offsets = [0.0005] * 3, CORNER
+        cloud = laspy.LasData(header)
+        cloud.x, cloud.y, cloud.z = (xyz + CORNER).T
+        cloud.classification = codes
+        cloud.write(tmp_path / name)
+        return str(tmp_path / name)
+
+    return save
+
+
+@pytest.fixture
+def labelled(save):
+    xyz, on = scene()
+    west = xyz[:, 0] < 20
+    return [save(f"{name}.laz", xyz[part], np.where(on, 10, 2)[part]) for name, part in (("w", west), ("e", ~west))]
+
+
+def test_weights_label_the_cloud_and_the_card_describes_them(labelled, save, tmp_path, capsys):
+    weights, card = tmp_path / "out" / "rails.npz", tmp_path / "out" / "card.html"
+    words = ["train-classifier", *labelled, "--weights", str(weights), "--card", str(card), "--epochs", "8"]
+    assert main([*words, "--device", "CPU"]) == 0
+    assert "of blocks kept back" in capsys.readouterr().out
+    assert sorted(one.name for one in weights.parent.iterdir()) == ["card.html", "rails.npz"]
+    page = card.read_text()
+    assert "w.laz" in page or "e.laz" in page
+    for part in ("Rail classes", "8, ", "112,769 weights", "<svg"):
+        assert part in page
+    xyz, on = scene()
+    raw = save("raw.laz", xyz, np.full(len(xyz), 2))
+    new = tmp_path / "new.laz"
+    assert main(["classify", raw, "--output", str(new), "--method", "LEARNED", "--weights", str(weights)]) == 0
+    found = np.asarray(laspy.read(new).classification) == 10
+    assert (found & on).sum() / on.sum() > 0.7
+    assert (found & on).sum() / found.sum() > 0.9
+    assert f"{found.sum()} of {len(xyz)} points are on rails" in capsys.readouterr().out
+    order = np.random.RandomState(1).permutation(len(xyz))
+    settings = Settings((1.435,), 0.072, weights=weights)
+    places = laspy.read(raw).xyz
+    one, other = (classify_cloud(places[part], settings) for part in (..., order))
+    assert np.array_equal(one.rail, found)
+    assert np.array_equal(other.rail, one.rail[order])
+    assert 15 < one.figures.paired_m < 26
+
+
+def test_a_training_continues_after_its_time(labelled, tmp_path, capsys):
+    weights, folder = tmp_path / "rails.npz", tmp_path / "rails_training"
+    words = ["train-classifier", *labelled, "--weights", str(weights), "--epochs", "1"]
+    assert main([*words, "--minutes", "0"]) == INTERRUPTED
+    assert "Cancelled" in capsys.readouterr().err
+    assert not folder.exists()  # nothing had been read
+    assert main([*words, "--minutes", "0.02"]) == INTERRUPTED or weights.exists()
+    if folder.exists():
+        other = ["train-classifier", labelled[0], "--weights", str(weights)]
+        assert main(other) == 1
+        assert "rails_training holds another training, with other clouds or settings" in capsys.readouterr().err
+    assert main(words) == 0
+    assert weights.exists() and not folder.exists()
+
+
+def labels(change):
+    def make(save):
+        xyz, on = scene()
+        xyz, codes = change(xyz, np.where(on, 10, 2))
+        return [save("labelled.laz", xyz, codes)]
+
+    return make
+
+
+FAULTS = {
+    "no labels": (labels(lambda xyz, codes: (xyz, codes * 0)), [], "The cloud has no points of class 10 to learn from"),
+    "one class": (labels(lambda xyz, codes: (xyz, codes * 0 + 10)), [], "All points of the cloud are of class 10"),
+    "flat": (
+        labels(lambda xyz, codes: (xyz * [1, 1, 0.1], codes)),
+        [],
+        "No point of class 10 is 0.055 to 0.4 m above the bed, where railheads lie",
+    ),
+    "one place": (
+        labels(lambda xyz, codes: (xyz[(xyz[:, :2] < 20).all(axis=1)], codes[(xyz[:, :2] < 20).all(axis=1)])),
+        [],
+        "The labelled rails all lie in one place of 20 m: give a longer labelled cloud",
+    ),
+    "suffix": (labels(lambda xyz, codes: (xyz, codes)), ["--weights", "w.pt"], "w.pt is not a name for weights"),
+    "epochs": (labels(lambda xyz, codes: (xyz, codes)), ["--epochs", "0"], "--epochs must be 1 or more, not 0."),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_labels_from_which_nothing_can_be_learned_are_refused(fault, save, tmp_path, capsys):
+    make, more, message = FAULTS[fault]
+    files = make(save)
+    weights = tmp_path / "out" / "rails.npz"
+    assert main(["train-classifier", *files, "--weights", str(weights), *more]) == 1
+    assert message in capsys.readouterr().err
+    assert not weights.parent.exists() or not list(weights.parent.iterdir())
+
+
+def test_a_method_without_its_weights_is_refused(labelled, tmp_path, capsys):
+    words = ["classify", labelled[0], "--output", str(tmp_path / "new.laz"), "--method", "LEARNED"]
+    assert main(words) == 1
+    assert "METHOD LEARNED needs WEIGHTS: choose those" in capsys.readouterr().err
+    assert main([*words, "--weights", labelled[0]]) == 1
+    assert "w.laz cannot be read: choose one that Train rail classifier has written" in capsys.readouterr().err

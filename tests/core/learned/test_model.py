@@ -1,0 +1,103 @@
+"""Weights on disk, what is refused, and the probabilities of a square."""
+
+import sys
+
+import numpy as np
+import pytest
+from rail_extract.core.errors import ModelError, ParameterError
+from rail_extract.core.frpdf.weights import save_arrays
+from rail_extract.core.learned import model
+from rail_extract.core.learned.blocks import MAX_POINTS, cut, thin
+from rail_extract.core.progress import Progress, Recording
+from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
+
+
+def test_groups_hold_all_blocks_in_order_and_few_points():
+    counts = [MAX_POINTS] * 20 + [100, 200]
+    groups = model.in_groups(counts)
+    assert [number for group in groups for number in group] == list(range(22))
+    assert max(sum(counts[number] for number in group) for group in groups) <= model.AT_ONCE
+
+
+def test_without_pytorch_one_sentence_says_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "torch", None)
+    with pytest.raises(ModelError, match="METHOD LEARNED needs PyTorch: install it with the algorithm Install"):
+        model.load(tmp_path / "any.npz")
+
+
+def test_method_and_weights_go_together(tmp_path):
+    assert model.weights_for("GEOMETRY", None) is None
+    with pytest.raises(ParameterError, match="METHOD LEARNED needs WEIGHTS"):
+        model.weights_for("LEARNED", None)
+    with pytest.raises(ParameterError, match="WEIGHTS are for METHOD LEARNED"):
+        model.weights_for("GEOMETRY", tmp_path / "any.npz")
+
+
+@pytest.fixture
+def network():
+    torch = pytest.importorskip("torch")
+    from rail_extract.core.learned.network import RandLaNet
+
+    torch.manual_seed(1)
+    return RandLaNet()
+
+
+def test_weights_survive_the_file(network, tmp_path):
+    model.save(tmp_path / "weights.npz", network)
+    loaded = model.load(tmp_path / "weights.npz")
+    assert (tmp_path / "weights.npz").stat().st_size < 2e6
+    for name, value in network.state_dict().items():
+        if not name.endswith("num_batches_tracked"):
+            assert np.array_equal(value, loaded.state_dict()[name]), name
+    assert not loaded.training
+
+
+def test_files_that_are_not_such_weights_are_refused(network, tmp_path):
+    path = tmp_path / "weights.npz"
+    with pytest.raises(ModelError, match=r"weights.npz is missing: choose one"):
+        model.load(path)
+    path.write_bytes(b"PK\x03\x04 cut")
+    with pytest.raises(ModelError, match=r"weights.npz cannot be read: choose one that Train rail classifier"):
+        model.load(path)
+    save_arrays(path, {"stages.0.weight": np.zeros((5, 2, 3, 3), np.float32)})
+    with pytest.raises(ModelError, match=r"weights.npz holds the weights of something else"):
+        model.load(path)
+    network.stem.linear.weight.data[0, 0] = np.nan
+    model.save(path, network)
+    with pytest.raises(ModelError, match=r"weights.npz holds weights that are not numbers"):
+        model.load(path)
+
+
+def track():
+    rng = np.random.RandomState(3)
+    xyz, _ = with_track(flat(6.0, rng=rng, per_m2=1000), 1.435, 0.072, 0.3)
+    thinned = thin(rough(xyz, rng))
+    return thinned, cut(thinned, 41.0)
+
+
+def test_all_points_of_cores_get_a_probability_and_no_others(network):
+    thinned, blocks = track()
+    found = model.Classifier(network, "CPU").probabilities(thinned, blocks)
+    assert np.array_equal(np.isfinite(found), thinned.railhigh)
+    assert found[thinned.railhigh].std() > 0
+
+
+def test_a_full_graphics_card_is_left_for_the_cpu_or_named(network, monkeypatch):
+    """The card itself is not needed: its error is raised by the first call."""
+    import torch
+
+    def full(*_):
+        classifier._network.forward = forward
+        raise torch.cuda.OutOfMemoryError("CUDA out of memory")
+
+    thinned, blocks = track()
+    forward = network.forward
+    classifier = model.Classifier(network, "AUTO")
+    network.forward = full
+    progress = Recording(Progress())
+    assert np.isfinite(classifier.probabilities(thinned, blocks, progress)).any()
+    assert progress.warnings == ("The graphics card has too little free memory: continuing on the CPU.",)
+    classifier = model.Classifier(network, "CPU")
+    network.forward = full
+    with pytest.raises(ModelError, match="too little free memory: set DEVICE to CPU"):
+        classifier.probabilities(thinned, blocks)

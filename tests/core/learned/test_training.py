@@ -1,0 +1,138 @@
+"""Training: what is kept back, resuming, cancelling, the calibrated output."""
+
+import numpy as np
+import pytest
+from rail_extract.core.errors import Cancelled, ParameterError
+from rail_extract.core.learned.examples import INDEX, POINT, Examples, write_square
+from rail_extract.core.progress import Progress
+from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_bar, with_track
+
+torch = pytest.importorskip("torch")
+
+from rail_extract.core.learned import training  # noqa: E402
+from rail_extract.core.learned.training import Figures, Settings, train, varied  # noqa: E402
+
+SIDE = 40.0
+
+
+@pytest.fixture(autouse=True)
+def _small(monkeypatch):
+    """Make steps fast, also on computers that do other work: small operations wait for the slowest thread."""
+    monkeypatch.setattr(training, "BATCH", 2)
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+@pytest.fixture(scope="module")
+def examples(tmp_path_factory):
+    """Blocks of 12 m of track and a kerb, in four areas."""
+    folder = tmp_path_factory.mktemp("examples")
+    rng = np.random.RandomState(3)
+    xyz, on = with_track(flat(12.0, rng=rng, per_m2=200), 1.435, 0.072, 0.3)
+    xyz, kerb = with_bar(xyz, 0.5, 0.3, 3.0)
+    xyz = rough(xyz, rng)
+    tile = (xyz[:, 0] > 20).astype(int)
+    np.save(folder / INDEX, write_square(folder, 0, (0, 0), SIDE, xyz, on & ~kerb, tile))
+    return Examples.load(folder)
+
+
+class CancelledAfter(Progress):
+    """Cancels once a number of steps are done."""
+
+    def __init__(self, steps):
+        self.left = steps
+
+    def is_cancelled(self):
+        self.left -= 1
+        return self.left < 0
+
+
+def test_blocks_on_disk_have_their_labels_and_count_all_points(examples):
+    points = np.concatenate([examples.block(number) for number in range(len(examples.index))])
+    core = points[points["core"]]
+    assert core["rail"].sum() == examples.index["rail"].sum() > 100
+    # A thinned point has the label of most of the points that it stands for.
+    assert (core["rails"][core["rail"]] > 0).all()
+    assert (core["others"][~core["rail"]] > 0).all()
+    assert core["rails"].sum() == pytest.approx(200 * 2 * 12.56 * 0.072, rel=0.1)
+    assert set(examples.index["tile"]) == {0, 1}
+
+
+def test_whole_areas_are_kept_back_some_with_rails(examples):
+    kept_back = examples.validation(0)
+    areas = {tuple(area) for area in examples.index["area"][kept_back]}
+    assert not areas & {tuple(area) for area in examples.index["area"][~kept_back]}
+    assert examples.index["rail"][kept_back].any()
+    assert examples.index["rail"][~kept_back].any()
+    assert any((examples.validation(seed) != kept_back).any() for seed in range(1, 9))
+
+
+def test_rails_in_one_place_can_not_be_divided(examples):
+    alone = Examples(examples.folder, examples.index[examples.index["area"].sum(axis=1) == 0])
+    with pytest.raises(ParameterError, match="all lie in one place of 20 m: give a longer labelled cloud"):
+        alone.validation(0)
+
+
+def test_an_interrupted_training_gives_the_same_weights(examples, tmp_path):
+    once, twice = tmp_path / "once", tmp_path / "twice"
+    once.mkdir()
+    twice.mkdir()
+    whole = train(examples, Settings(1), once, "CPU")
+    with pytest.raises(Cancelled, match=r"Cancelled at step 2 of \d: the same run continues from .*twice"):
+        train(examples, Settings(1), twice, "CPU", CancelledAfter(2))
+    assert (twice / training.CHECKPOINT).exists()
+    resumed = train(examples, Settings(1), twice, "CPU")
+    for name, value in whole.network.state_dict().items():
+        assert torch.equal(value, resumed.network.state_dict()[name]), name
+    assert resumed.checks == whole.checks
+    assert resumed.by_tile == whole.by_tile
+    with pytest.raises(ParameterError, match="twice holds another training"):
+        train(examples, Settings(2), twice, "CPU")
+    (twice / training.CHECKPOINT).write_bytes(b"cut")
+    with pytest.raises(ParameterError, match=r"checkpoint.pt is damaged: delete the folder .*twice and train again"):
+        train(examples, Settings(1), twice, "CPU")
+
+
+def test_the_loss_falls_and_the_output_is_calibrated(examples, tmp_path):
+    trained = train(examples, Settings(6), tmp_path, "CPU")
+    losses = [check.loss for check in trained.checks]
+    assert np.mean(losses[-3:]) < 0.7 * np.mean(losses[:3])
+    assert trained.total.f1 > 0.9
+    run = training._Run(examples, Settings(6), *_parts(examples), tmp_path, "cpu")
+    run.resume()
+    run.network.head[-1].bias.data += 3.0  # everything seems to be rail
+    f1 = sum(run.evaluated_by_tile().values(), Figures()).f1
+    run.calibrate()
+    assert sum(run.evaluated_by_tile().values(), Figures()).f1 >= f1
+    best = run.network.head[-1].bias.item()
+    run.calibrate()  # nothing is left to change
+    assert run.network.head[-1].bias.item() == pytest.approx(best, abs=training.LOGIT_STEP + 1e-6)
+
+
+def _parts(examples):
+    kept_back = examples.validation(0)
+    return np.flatnonzero(~kept_back), np.flatnonzero(kept_back)
+
+
+def test_figures_count_what_points_stand_for():
+    points = np.zeros(3, POINT)
+    points["rails"], points["others"] = [5, 3, 0], [0, 1, 4]
+    figures = Figures.of(np.array([True, False, True]), points)
+    assert figures == Figures(right=5, missed=3, wrong=4)
+    assert (figures.recall, figures.precision) == (5 / 8, 5 / 9)
+    assert figures.f1 == pytest.approx(2 / (8 / 5 + 9 / 5))
+    assert np.isnan(Figures().recall)
+
+
+def test_varied_blocks_keep_distances_in_plan_and_labels(examples):
+    number = int(examples.index["rail"].argmax())
+    block = examples.block(number)
+    one, again = (varied(block, np.random.RandomState(4)) for _ in range(2))
+    assert np.array_equal(one, again)
+    assert 0.25 * len(block) < len(one) < len(block)
+    assert one["rail"].mean() == pytest.approx(block["rail"].mean(), abs=0.1)
+    spread = np.linalg.norm(one["place"][:, :2], axis=1).mean() / np.linalg.norm(block["place"][:, :2], axis=1).mean()
+    assert spread == pytest.approx(1, abs=0.12)
+    assert np.abs(one["place"][:, 3] - np.median(one["place"][:, 3])).max() < 1
