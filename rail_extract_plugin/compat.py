@@ -5,6 +5,8 @@ All other modules write enums with their scope (``QgsProcessing.SourceType.TypeV
 
 from __future__ import annotations
 
+from typing import Any
+
 from qgis.core import Qgis, QgsField, QgsProcessingContext
 
 if Qgis.QGIS_VERSION_INT >= 33800:
@@ -47,3 +49,20 @@ def group_layer(details: QgsProcessingContext.LayerDetails, group: str, place: i
     if Qgis.QGIS_VERSION_INT >= 33200:
         details.groupName = group
         details.layerSortKey = place
+
+
+def set_material(symbol: Any, material: Any) -> None:
+    """Give a 3D symbol its material; the method has another name since QGIS 3.36."""
+    (symbol.setMaterialSettings if hasattr(symbol, "setMaterialSettings") else symbol.setMaterial)(material)
+
+
+def keep_heights(symbol: Any) -> None:
+    """Have a 3D symbol use the heights of all vertices as they are; the enums moved in QGIS 3.30."""
+    if hasattr(Qgis, "AltitudeClamping"):
+        clamping, binding = Qgis.AltitudeClamping.Absolute, Qgis.AltitudeBinding.Vertex
+    else:
+        from qgis._3d import Qgs3DTypes
+
+        clamping, binding = Qgs3DTypes.AltitudeClamping.AltClampAbsolute, Qgs3DTypes.AltitudeBinding.AltBindVertex
+    symbol.setAltitudeClamping(clamping)
+    symbol.setAltitudeBinding(binding)

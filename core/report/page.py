@@ -16,6 +16,7 @@ from .findings import (
     TrackFindings,
     examine,
 )
+from .limits import limits_table
 from .listing import Finding, listed
 from .markup import metres, table, tag, text
 from .plan import draw_plan
@@ -79,6 +80,7 @@ def build_page(
         _verdict(findings, len(network.rails), network.warnings),
         _tiles(network, findings),
         *([_map(findings), _findings(findings), _tracks(findings)] if findings.tracks else []),
+        *([_section("Limits", limits_table(findings.tracks))] if findings.tracks else []),
         _search(network.search),
         _strips(network),
         *(_profiles(track, height) for track, height in zip(findings.tracks, heights)),

@@ -60,6 +60,11 @@ i.unsupported { background: var(--unsupported); }
 i.offgauge { background: var(--offgauge); }
 i.unsure { background: var(--unsure); }
 i.band { background: #e3f2e8; border: 1px solid #b9ddc6; height: 10px; }
+.limits { margin: 0 0 10px; font-size: 14px; }
+.limits label { display: inline-block; margin: 0 28px 4px 0; }
+table.quantities th:nth-child(2), table.quantities td:nth-child(2) { text-align: left; }
+.limits input { width: 70px; font: inherit; text-align: right; padding: 2px 4px; border: 1px solid var(--line);
+                border-radius: 4px; }
 .notes { color: var(--soft); font-size: 13px; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: 2px 18px; margin: 0 0 12px; font-size: 14px; }
 dt { color: var(--soft); }

@@ -17,6 +17,7 @@ from ..i18n import tr
 from ..notices import notices
 from ..paths import STYLES
 from .run import run_name
+from .view_3d import show_lines_in_3d
 
 FINDINGS = "findings"
 """Style of the findings, which the user is asked to review."""
@@ -36,6 +37,7 @@ class _Styler(QgsProcessingLayerPostProcessorInterface):
         self, layer: QgsMapLayer, context: QgsProcessingContext, feedback: QgsProcessingFeedback
     ) -> None:
         layer.loadNamedStyle(str(STYLES / f"{self._style}.qml"))
+        show_lines_in_3d(layer, self._style)
         for name, value in self._properties.items():
             layer.setCustomProperty(name, value)
         if layer.name() == self._title:

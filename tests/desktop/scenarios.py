@@ -129,6 +129,7 @@ def rails(driver: Driver) -> Iterator:
     layers = {layer.name(): layer for layer in QgsProject.instance().mapLayers().values()}
     driver.keep("layers", sorted(layers))
     driver.picture("rails")
+    QgsProject.instance().write(str(driver.folder / "saved.qgs"))
     yield POOL_S
     driver.keep("systems", {name: layer.crs().toWkt() for name, layer in layers.items()})
     driver.keep("project's system", QgsProject.instance().crs().toWkt())

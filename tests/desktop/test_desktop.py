@@ -1,5 +1,6 @@
 """What a new user meets in the real QGIS; each test looks at what one of the scenarios found."""
 
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
@@ -71,6 +72,14 @@ def test_saved_lines_are_complete(run_scenario, name, count):
     assert layer.GetSpatialRef().GetAuthorityCode(None) == "32643"
     assert layer.GetFeatureCount() == count
     assert layer.GetGeomType() == ogr.wkbLineString25D
+
+
+def test_saved_project_shows_the_lines_in_3d(run_scenario):
+    project = ET.parse(run_scenario("rails").folder / "saved.qgs")
+    layers = {layer.findtext("layername"): layer for layer in project.iter("maplayer")}
+    for title in ("Rails", "Track centerlines", "Findings"):
+        data = layers[f"{title}: sample"].find("renderer-3d/symbol/data")
+        assert (data.get("alt-clamping"), data.get("alt-binding")) == ("absolute", "vertex")
 
 
 def test_saved_raster_has_its_system(run_scenario):

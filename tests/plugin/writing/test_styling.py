@@ -26,6 +26,7 @@ from qgis.PyQt.QtGui import QColor
 from qgis.PyQt.QtXml import QDomDocument
 from rail_extract.core.fields import CENTERLINE_FIELDS, FINDING_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
 from rail_extract.core.frame import LocalFrame
+from rail_extract.rail_extract_plugin import compat
 from rail_extract.rail_extract_plugin.paths import STYLES
 from rail_extract.rail_extract_plugin.reading.clouds import CloudSource
 from rail_extract.rail_extract_plugin.writing.layers import fields
@@ -291,3 +292,17 @@ def test_styles_are_applied_again_in_a_second_run(qgis, new_feedback):
 def test_layer_that_is_not_loaded_is_not_styled(context):
     style_on_load("unknown", "rails", context)
     assert not context.layersToLoadOnCompletion()
+
+
+@pytest.mark.parametrize("style", ["rails", "centerlines", "findings"])
+def test_lines_keep_their_heights_in_3d(styled, style):
+    symbols = pytest.importorskip("qgis._3d")
+    layer = styled(style, ())
+    gc.collect()
+    symbol = layer.renderer3D().symbol()
+    bare = symbols.QgsLine3DSymbol()
+    compat.keep_heights(bare)
+    assert (symbol.altitudeClamping(), symbol.altitudeBinding()) == (bare.altitudeClamping(), bare.altitudeBinding())
+    assert bare.altitudeClamping() != symbols.QgsLine3DSymbol().altitudeClamping()
+    assert layer.renderer3D().layer() == layer
+    assert symbol.renderAsSimpleLines() and symbol.width() >= 2
