@@ -41,6 +41,10 @@ test-desktop: plugin  ## test the real QGIS application on a virtual display
 fuzz: plugin  ## read damaged files of every kind for MINUTES=5, from SEED=0; `tools/fuzz.py KIND:SEED` repeats one
 	@. ./$(ENVIRONMENT) && $(PYTHON) tools/fuzz.py --minutes $(or $(MINUTES),5) --seed $(or $(SEED),0)
 
+.PHONY: endure
+endure: plugin  ## kill runs while they write, let pairs of runs write one output, and repeat a run two hundred times
+	@. ./$(ENVIRONMENT) && $(PYTHON) tools/kills.py 50 && $(PYTHON) tools/races.py 20 && $(PYTHON) tools/growth.py 200
+
 .PHONY: test-qgis
 test-qgis: plugin  ## run the tests that need QGIS: plugin and, through qgis_process, the whole
 	@. ./$(ENVIRONMENT) && "$$QGIS_PROCESS" --version | head -n 1 && $(PYTHON) -m pytest tests/plugin tests/e2e

@@ -1,7 +1,8 @@
 """Read damaged files: none may end in a traceback, a signal, a hang, or more memory than allowed.
 
 Each kind of file has a process of its own, which is watched and replaced when it dies. Every damaged file is made from
-a seed, so that `python tools/fuzz.py KIND:SEED` makes and reads one again.
+a seed, so that `python tools/fuzz.py KIND:SEED` makes and reads one again. A temporary folder in memory, such as
+`TMPDIR=/dev/shm`, makes it a third faster.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import time
 from collections import Counter
 from collections.abc import Iterable
 from contextlib import suppress
+from itertools import count, islice
 from pathlib import Path
 
 from fuzzing.kinds import KINDS, PLUGIN, Kind
@@ -175,6 +177,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("what", nargs="*", help=f"kinds ({', '.join(KINDS)}), or KIND:SEED to read one file again")
     parser.add_argument("--minutes", type=float, default=5.0, help="time for all kinds together (default 5)")
+    parser.add_argument("--files", type=int, default=sys.maxsize, help="most files of each kind (default: no limit)")
     parser.add_argument("--seed", type=int, default=0, help="first seed (default 0)")
     parser.add_argument("--work", help=argparse.SUPPRESS)
     parser.add_argument("--folder", type=Path, help=argparse.SUPPRESS)
@@ -189,14 +192,18 @@ def main(arguments: list[str] | None = None) -> int:
     rows, bad = [], 0
     for kind in kinds:
         share_s = 60 * args.minutes / len(kinds)
-        counts, failures = fuzz(kind, range(args.seed, sys.maxsize), time.monotonic() + share_s)
-        rows.append((kind.name, sum(counts.values()), counts[READ], counts[REFUSED], len(failures)))
+        start = time.monotonic()
+        counts, failures = fuzz(kind, islice(count(args.seed), args.files), start + share_s)
+        files = sum(counts.values())
+        rows.append(
+            (kind.name, files, counts[READ], counts[REFUSED], len(failures), files / (time.monotonic() - start))
+        )
         bad += len(failures)
         for seed, reason in failures.items():
             print(f"{kind.name}:{seed} {reason}", flush=True)
-    print(f"{'kind':8} {'files':>8} {READ:>8} {REFUSED:>8} {FAILED:>8}")
+    print(f"{'kind':8} {'files':>8} {READ:>8} {REFUSED:>8} {FAILED:>8} {'per s':>8}")
     for row in rows:
-        print(f"{row[0]:8} {row[1]:8} {row[2]:8} {row[3]:8} {row[4]:8}")
+        print(f"{row[0]:8} {row[1]:8} {row[2]:8} {row[3]:8} {row[4]:8} {row[5]:8.0f}")
     return 1 if bad else 0
 
 

@@ -24,7 +24,6 @@ import laspy
 import numpy as np
 from osgeo import gdal, ogr
 from qgis.core import QgsApplication, QgsProcessingContext
-from rail_extract.core.clouds.rewriting import rewrite
 from rail_extract.core.disk import Destination
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.rails import RailLine
@@ -122,15 +121,12 @@ def read_page(path: Path) -> set[int]:
 
 
 def write_points(destination: Destination, version: int) -> None:
-    """Write a copy of a cloud in which the class of every point is the version."""
-    source = Path(tempfile.gettempdir()) / f"kills_{os.getpid()}.las"
-    if not source.exists():
-        cloud = laspy.LasData(laspy.LasHeader(version="1.4", point_format=6))
-        cloud.xyz = np.random.default_rng(1).uniform(0, 100, (POINTS, 3))
-        cloud.write(source)
+    """Write a cloud in which the class of every point is the version."""
+    cloud = laspy.LasData(laspy.LasHeader(version="1.4", point_format=6))
+    cloud.xyz = np.random.default_rng(1).uniform(0, 100, (POINTS, 3))
+    cloud.classification = np.full(POINTS, version % 200)
     with destination.replacing() as new:
-        rewrite(source, new, lambda xyz, codes: (np.full_like(codes, version % 200), np.ones(len(xyz), bool)))
-    source.unlink()
+        cloud.write(new)
 
 
 def read_points(path: Path) -> set[int]:

@@ -2,12 +2,14 @@ import numpy as np
 import pytest
 from rail_extract.core.heads.outline import (
     FACE_DEPTH_M,
+    MAX_STEPS,
     MIN_STRAY_SHARE,
     Blurred,
     Grid,
     Outline,
     Scores,
     Section,
+    _scoring_step,
     fit_section,
 )
 from rail_extract.laboratory.scenes.scanner import Scanner, head_outline, scan
@@ -132,3 +134,14 @@ def test_points_at_one_place_break_nothing(left, up):
     counts, section, outline, grid = fitted(np.full(500, left), np.full(500, up))
     assert np.isfinite(section.place).all()
     assert np.isfinite(Scores.of(counts, section, outline, grid).by_bin).all()
+
+
+def test_a_step_is_limited_where_the_start_is_far_off():
+    left, up = seen_from(30, 0.3, 0.003)
+    counts, section, outline, grid = fitted(left, up)
+    far = Section(section.place + [0.015, 0, 0, 0, 0, 0], section.shares)
+    step = _scoring_step(counts, far, Blurred.at(far.place, outline, grid), counts > 0)
+    assert np.abs(step[:6] / MAX_STEPS).max() == pytest.approx(1.0)
+    assert step[0] < 0
+    near = _scoring_step(counts, section, Blurred.at(section.place, outline, grid), counts > 0)
+    assert np.abs(near[:6] / MAX_STEPS).max() < 0.1

@@ -11,7 +11,7 @@ from rail_extract.core.polyline import length_along
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.centerlines import build_centerlines
-from rail_extract.core.tracks.chaining import _rail_links
+from rail_extract.core.tracks.chaining import _Ends, _rail_links
 from rail_extract.core.tracks.pairing import RailPair
 from rail_extract.laboratory.curves import Curve, Element, trace
 from rail_extract.laboratory.rasters.turnouts import FORMS, branch
@@ -253,3 +253,13 @@ def test_a_rail_links_sections_that_it_continues_over_a_gap_or_a_small_overlap(g
     for link in links:
         assert (link.first, link.second, link.rail) == (1, 2, 0)
         assert link.length_m == pytest.approx(gap_m)
+
+
+def test_a_track_may_go_on_half_a_gauge_beside_the_rail_that_goes_on():
+    """The left rail goes on for 6 m at the start, the right one for 4 m at the end."""
+    left = np.array([[-6.0, SPACING / 2, 0], [50.0, SPACING / 2, 0]])
+    right = np.array([[54.0, -SPACING / 2, 0], [0.0, -SPACING / 2, 0]])
+    ends = _Ends.of(rails_of(left, right), [RailPair(0, 1, (6.0, 56.0), (4.0, 54.0)[::-1])], 5.0, set())
+    assert ends.owner.tolist() == [0, 1, 0, 1]
+    assert ends.xy == pytest.approx(np.array([[0, 0], [50, 0], [-5, 0], [54, 0]]))
+    assert ends.outward == pytest.approx(np.array([[-1, 0], [1, 0], [-1, 0], [1, 0]]))
