@@ -138,7 +138,7 @@ def grow_all(
     if not growths:
         raise RailExtractError(
             f"No seed lies on a rail: put seeds within {parameters.search_m:g} m of railheads that stand "
-            f"{parameters.min_height_m:g} m above the bed, and check the rail standard."
+            f"{parameters.min_height_m:g} m above the bed, and check the rail standard and the unit of the coordinates."
         )
     if missed:
         progress.warning(f"{missed} of {len(places)} seeds lie on no rail: move them onto railheads.")

@@ -5,6 +5,7 @@ from .check_installation import CheckInstallation
 from .classify_rail_points import ClassifyRailPoints
 from .extract_rails import ExtractRails
 from .frpdf_cleanup import FrpdfCleanup
+from .grow_rail_points import GrowRailPoints
 from .install_packages import InstallPackages
 from .measure_track_geometry import MeasureTrackGeometry
 from .rasterize_rail_points import RasterizeRailPoints
@@ -13,6 +14,7 @@ from .vectorize_rails import VectorizeRails
 ALGORITHMS = (
     ExtractRails,
     ClassifyRailPoints,
+    GrowRailPoints,
     RasterizeRailPoints,
     FrpdfCleanup,
     VectorizeRails,

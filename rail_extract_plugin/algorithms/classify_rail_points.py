@@ -19,6 +19,8 @@ from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.rails import SearchFigures
+
 
 @dataclass(frozen=True)
 class Job:
@@ -108,11 +110,16 @@ class ClassifyRailPoints(RailAlgorithm):
         settings = Settings(gauges_m, job.standard.head_width_m, values.flag("KEEP_SINGLE"), guide)
         with points_folder() as folder:
             result = classify_files(request, settings, choice, output, folder, InTurn(), progress)
-        return {
-            "OUTPUT": str(result.file),
-            "POINT_COUNT": result.point_count,
-            "RAIL_POINTS": result.figures.points,
-            "PAIRED_LENGTH": result.figures.paired_m,
-            "SINGLE_LENGTH": result.figures.single_m,
-            "CELLS_PER_M": result.figures.cells_per_m,
-        }
+        return classified_results(result.file, result.point_count, result.figures)
+
+
+def classified_results(file: Path, point_count: int, figures: SearchFigures) -> dict[str, Any]:
+    """Return the results of an algorithm that writes a classified copy."""
+    return {
+        "OUTPUT": str(file),
+        "POINT_COUNT": point_count,
+        "RAIL_POINTS": figures.points,
+        "PAIRED_LENGTH": figures.paired_m,
+        "SINGLE_LENGTH": figures.single_m,
+        "CELLS_PER_M": figures.cells_per_m,
+    }

@@ -7,6 +7,7 @@ from qgis.core import (
     QgsProcessingParameterBoolean,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterFeatureSource,
+    QgsProcessingParameterPoint,
     QgsProcessingParameterRasterLayer,
     QgsProcessingParameterString,
 )
@@ -64,6 +65,24 @@ def guide() -> QgsProcessingParameterDefinition:
         tr(
             "Lines along the tracks, from a map such as OpenStreetMap or drawn by hand. Rails are searched near them "
             "only. Lines in another coordinate system are transformed."
+        ),
+    )
+
+
+def seeds() -> Definitions:
+    """Define the places from which rails are followed."""
+    point, line = QgsProcessing.SourceType.TypeVectorPoint, QgsProcessing.SourceType.TypeVectorLine
+    return (
+        helped(
+            QgsProcessingParameterFeatureSource("SEEDS", tr("Seeds"), [point, line], optional=True),
+            tr(
+                "Points on railheads, or lines along them, one for each rail or track to follow. In another coordinate "
+                "system they are transformed."
+            ),
+        ),
+        helped(
+            QgsProcessingParameterPoint("SEED", tr("Seed on the map"), optional=True),
+            tr("A single place on a railhead, picked on the map, besides the layer or instead of it."),
         ),
     )
 

@@ -17,7 +17,7 @@ from qgis.core import (
 )
 
 from ...core.errors import ParameterError, RailExtractError, RasterError
-from ...core.parameters import Parameters
+from ...core.parameters import GrowParameters, Parameters
 from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, Gauge, RailStandard, read_gauges, resolve
 from ..reading.clouds import CloudSource, checked_crs, cloud_source
 from ..systems import prepare_system, system
@@ -42,6 +42,16 @@ NUMBERS = {
     "CENTERLINE_TOLERANCE": "centerline_tolerance_m",
 }
 """Attribute of the core's `Parameters` for each number of the interface."""
+
+GROWTH = {
+    "SEARCH": "search_m",
+    "THICKNESS": "thickness_m",
+    "WINDOW": "window_m",
+    "MIN_HEIGHT": "min_height_m",
+    "TOLERANCE_Z": "tolerance_z_m",
+    "MAX_LENGTH": "max_length_m",
+}
+"""The same for `GrowParameters`; TOLERANCE_Z has another default there."""
 
 TYPES_WITHOUT_LINES = (
     QgsWkbTypes.GeometryType.PointGeometry,
@@ -150,6 +160,36 @@ class ParameterValues:
                 raise ParameterError("ONLY_GUIDED needs lines to compare tracks with: choose GUIDE.")
             return ()
         return read_guide(self._line_source("GUIDE"), system(checked_crs(cloud)), self._context)
+
+    def seeds(self, cloud: CloudSource) -> tuple[np.ndarray, ...]:
+        """Read SEEDS and SEED, in the coordinate system of the cloud.
+
+        Raises
+        ------
+        RailExtractError
+            There are none, or they can't be transformed.
+        """
+        from ..reading.line_layers import read_place, read_seeds
+
+        if not self.filled("SEEDS") and not self.filled("SEED"):
+            raise ParameterError("A rail is followed from seeds: choose a layer for SEEDS, or pick a point for SEED.")
+        crs = system(checked_crs(cloud))
+        found: tuple[np.ndarray, ...] = ()
+        if self.filled("SEEDS"):
+            source = self._algorithm.parameterAsSource(self._parameters, "SEEDS", self._context)
+            if source is None:
+                raise RailExtractError("SEEDS is not a readable layer: give a layer of points or lines.")
+            found = read_seeds(source, crs, self._context)
+        if self.filled("SEED"):
+            place = self._algorithm.parameterAsPoint(self._parameters, "SEED", self._context)
+            own = self._algorithm.parameterAsPointCrs(self._parameters, "SEED", self._context)
+            found = (*found, read_place(place, own, crs, self._context))
+        return found
+
+    def growth(self) -> GrowParameters:
+        """Read how rails are followed."""
+        lengths = {field: self.number(name) for name, field in GROWTH.items()}
+        return GrowParameters(both=self.flag("BOTH"), max_outliers=int(self.number("MAX_OUTLIERS")), **lengths)
 
     def _mask(self, cloud: CloudSource) -> Mask | None:
         """Read the polygons of MASK, in the coordinate system of the cloud.

@@ -15,7 +15,7 @@ from qgis.core import (
 
 from ...core.frpdf import DEVICES, ENGINES, MAX_PASSES
 from ...core.frpdf.models import NAMES
-from ...core.parameters import DEFAULT_GUIDE_DISTANCE_M, DEFAULT_STEP_M, LEAVE_OUT, STRIPS, Parameters
+from ...core.parameters import DEFAULT_GUIDE_DISTANCE_M, DEFAULT_STEP_M, LEAVE_OUT, STRIPS, GrowParameters, Parameters
 from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS, UNCONFIRMED_PROFILES
 from ..i18n import tr
 from .definitions import MM_DECIMALS, Definitions, advanced, choice, helped, number
@@ -144,11 +144,16 @@ def area() -> Definitions:
             ),
             tr("Only points inside these polygons are read, for example a strip along the line."),
         ),
-        advanced(
-            QgsProcessingParameterCrs("CRS", tr("CRS of a cloud without one"), optional=True),
-            tr("Projected coordinate system for files that do not state one; other files keep their own."),
-        ),
+        crs(),
         leave_out(),
+    )
+
+
+def crs() -> QgsProcessingParameterDefinition:
+    """Define the coordinate system of a cloud that states none."""
+    return advanced(
+        QgsProcessingParameterCrs("CRS", tr("CRS of a cloud without one"), optional=True),
+        tr("Projected coordinate system for files that do not state one; other files keep their own."),
     )
 
 
@@ -315,7 +320,6 @@ def guide() -> Definitions:
 
 def labels() -> Definitions:
     """Define which points are labelled as rails, and what is written."""
-    contents = [tr("Whole cloud"), tr("Rail points only")]
     return (
         helped(
             QgsProcessingParameterBoolean("KEEP_SINGLE", tr("Keep rails without a partner"), defaultValue=True),
@@ -324,14 +328,7 @@ def labels() -> Definitions:
                 "example because it is hidden. Otherwise only pairs of rails are kept."
             ),
         ),
-        helped(
-            number("RAIL_CLASS", tr("Class of rail points"), RAIL_CLASS, maximum=LAST_CLASS, whole=True),
-            tr("The class that points on rails get. In point formats 0 to 5, classes end at 31."),
-        ),
-        helped(
-            QgsProcessingParameterEnum("CONTENT", tr("Content of the output"), contents, defaultValue=0),
-            tr("0 writes the whole cloud, 1 only the points on rails."),
-        ),
+        *content(),
         advanced(
             QgsProcessingParameterBoolean("RESET", tr("Reset the class of other points"), defaultValue=True),
             tr(
@@ -340,6 +337,61 @@ def labels() -> Definitions:
             ),
         ),
     )
+
+
+def content() -> Definitions:
+    """Define the class of rail points, and whether the others are written as well."""
+    contents = [tr("Whole cloud"), tr("Rail points only")]
+    return (
+        helped(
+            number("RAIL_CLASS", tr("Class of rail points"), RAIL_CLASS, maximum=LAST_CLASS, whole=True),
+            tr("The class that points on rails get. In point formats 0 to 5, classes end at 31."),
+        ),
+        helped(
+            QgsProcessingParameterEnum("CONTENT", tr("Content of the output"), contents, defaultValue=0),
+            tr("0 writes the whole cloud, 1 only the points on rails."),
+        ),
+    )
+
+
+def growth() -> Definitions:
+    """Define how rails are followed from seeds."""
+    defaults = GrowParameters()
+    lengths = (
+        advanced(
+            number("SEARCH", tr("Search distance [m]"), defaults.search_m, 0.02, 1.0),
+            tr("A seed finds the rail within this distance; a rail is lost further than this from its course."),
+        ),
+        advanced(
+            number("THICKNESS", tr("Width of the strip of rail points [m]"), defaults.thickness_m, 0.02, 0.5),
+            tr("Points within half of this width of the rail's axis belong to it, if they are at its height."),
+        ),
+        advanced(
+            number("WINDOW", tr("Length of a window [m]"), defaults.window_m, 0.1, 5.0),
+            tr("Length of rail that is looked at as one. In thin clouds, windows become longer by themselves."),
+        ),
+        advanced(
+            number("MIN_HEIGHT", tr("Least height above the bed [m]"), defaults.min_height_m, 0.001, 0.4),
+            tr("The bed beside a rail is lower than its top by this, except in pavements beside a groove."),
+        ),
+        advanced(
+            number("TOLERANCE_Z", tr("Tolerance in height [m]"), defaults.tolerance_z_m, 0.001, MAX_TOLERANCE_M),
+            tr("Largest difference in height between points of a head, and from one window to the next."),
+        ),
+    )
+    longest = advanced(
+        number("MAX_LENGTH", tr("Longest run [m]"), defaults.max_length_m, 1.0, MAX_LENGTH_M),
+        tr("Rails are followed for this length to either side of a seed; only these points are read."),
+    )
+    outliers = advanced(
+        number("MAX_OUTLIERS", tr("Most windows without the rail"), defaults.max_outliers, maximum=1000, whole=True),
+        tr("A rail that is not seen in more windows in a row than this is not followed further."),
+    )
+    both = helped(
+        QgsProcessingParameterBoolean("BOTH", tr("Follow both rails of the track"), defaultValue=defaults.both),
+        tr("The other rail of the track, at the gauge, is followed as well. Otherwise only the one with the seed."),
+    )
+    return (both, *lengths, outliers, longest)
 
 
 def pairing() -> Definitions:

@@ -17,9 +17,11 @@ from qgis.core import (
     QgsFeature,
     QgsFeatureRequest,
     QgsGeometry,
+    QgsPointXY,
     QgsPolygon,
     QgsProcessingContext,
     QgsProcessingFeatureSource,
+    QgsWkbTypes,
 )
 
 from ...core.clouds.crs import parse_crs, units, warn_of_scale
@@ -114,6 +116,61 @@ def read_guide(
     if not lines:
         raise RailExtractError("GUIDE has no lines: give a line layer.")
     return lines
+
+
+def read_seeds(
+    source: QgsProcessingFeatureSource, crs: QgsCoordinateReferenceSystem, context: QgsProcessingContext
+) -> tuple[np.ndarray, ...]:
+    """Read the points of a layer, (1, 2) each, and its lines, (k, 2) each, in the coordinate system of the cloud.
+
+    Parameters
+    ----------
+    source, crs, context
+        See `read_guide`.
+
+    Raises
+    ------
+    CrsError
+        They can't be transformed.
+    RailExtractError
+        The layer has neither points nor lines.
+    """
+    found: list[np.ndarray] = []
+    for shape in _transformed(source, crs, context, "SEEDS"):
+        if QgsWkbTypes.geometryType(shape.wkbType()) == QgsWkbTypes.GeometryType.PointGeometry:
+            found += [np.array([[vertex.x(), vertex.y()]]) for vertex in shape.vertices()]
+        elif QgsWkbTypes.geometryType(shape.wkbType()) == QgsWkbTypes.GeometryType.LineGeometry:
+            found += [vertices[:, :2] for vertices in _parts(shape, CHORD_TOLERANCE_M)]
+    if not found:
+        raise RailExtractError("SEEDS has neither points nor lines: add points on railheads, or choose another layer.")
+    return tuple(found)
+
+
+def read_place(
+    place: QgsPointXY,
+    own: QgsCoordinateReferenceSystem,
+    crs: QgsCoordinateReferenceSystem,
+    context: QgsProcessingContext,
+) -> np.ndarray:
+    """Return a place in the coordinate system of the cloud, (1, 2).
+
+    Parameters
+    ----------
+    place : QgsPointXY
+    own : QgsCoordinateReferenceSystem
+        That of the place.
+    crs, context
+        See `read_guide`.
+
+    Raises
+    ------
+    CrsError
+        It can't be transformed.
+    """
+    shape = QgsGeometry.fromPointXY(place)
+    if not _transform(shape, QgsCoordinateTransform(own, crs, context.transformContext())):
+        raise CrsError("SEED can't be transformed to the coordinate system of the cloud: pick it on the cloud.")
+    return np.array([[shape.asPoint().x(), shape.asPoint().y()]])
 
 
 def read_mask(

@@ -22,7 +22,7 @@ from qgis.utils import iface
 SAMPLE, ARCHIVE = os.environ["RAIL_EXTRACT_SAMPLE"], os.environ["RAIL_EXTRACT_ZIP"]
 
 NAMES = (
-    *("extractrails", "classifyrailpoints", "rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
+    *("extractrails", "classifyrailpoints", "growrailpoints", "rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
     *("buildtrackcenterlines", "measuretrackgeometry", "installpackages", "checkinstallation"),
 )
 

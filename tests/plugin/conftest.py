@@ -212,6 +212,7 @@ class Bench:
 OUTPUTS = {
     "extractrails": ("RAILS.gpkg", "CENTERLINES.shp", "QUALITY.gpkg", "FINDINGS.gpkg", "CLEANED.tif"),
     "classifyrailpoints": ("OUTPUT.laz",),
+    "growrailpoints": ("OUTPUT.laz",),
     "rasterizerailpoints": ("OUTPUT.tif",),
     "frpdfcleanup": ("OUTPUT.tif",),
     "vectorizerails": ("OUTPUT.gpkg",),

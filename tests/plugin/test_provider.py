@@ -14,6 +14,7 @@ def test_toolbox_offers_the_algorithms(qgis, plugin):
         for name in (
             "extractrails",
             "classifyrailpoints",
+            "growrailpoints",
             "rasterizerailpoints",
             "frpdfcleanup",
             "vectorizerails",

@@ -1,9 +1,9 @@
 import pytest
 from qgis.core import QgsProcessingParameterDefinition
 from rail_extract.core.errors import ParameterError
-from rail_extract.core.parameters import DEFAULT_STEP_M, Parameters
+from rail_extract.core.parameters import DEFAULT_STEP_M, GrowParameters, Parameters
 from rail_extract.core.standards import STANDARDS
-from rail_extract.rail_extract_plugin.dialog.parameter_values import CHOICES, NUMBERS, class_numbers
+from rail_extract.rail_extract_plugin.dialog.parameter_values import CHOICES, GROWTH, NUMBERS, class_numbers
 
 PARAMETERS = [
     ("INPUT", "pointcloud", None),
@@ -68,6 +68,8 @@ OPTIONAL = {"GAUGE", "HEAD_WIDTH", "EXTENT", "MASK", "CRS", "LEAVE_OUT", "OTHER_
 
 CORE_DEFAULTS = {name: getattr(Parameters, field) for name, field in {**NUMBERS, **CHOICES}.items()}
 CORE_DEFAULTS |= {"ITERATIONS": Parameters.passes, "STEP": DEFAULT_STEP_M}
+GROW_DEFAULTS = {name: getattr(GrowParameters, field) for name, field in GROWTH.items()}
+GROW_DEFAULTS |= {"BOTH": GrowParameters.both, "MAX_OUTLIERS": GrowParameters.max_outliers}
 
 
 def having(algorithm, flag):
@@ -129,8 +131,9 @@ def test_defaults_match_the_core(plugin):
     seen = set()
     for algorithm in plugin.provider.algorithms():
         for definition in algorithm.parameterDefinitions():
-            if definition.name() in CORE_DEFAULTS:
+            defaults = GROW_DEFAULTS if algorithm.name() == "growrailpoints" else CORE_DEFAULTS
+            if definition.name() in defaults:
                 seen.add(definition.name())
-                default = CORE_DEFAULTS[definition.name()]
+                default = defaults[definition.name()]
                 assert definition.defaultValue() == default, (algorithm.name(), definition.name())
-    assert seen == set(CORE_DEFAULTS)
+    assert seen == {*CORE_DEFAULTS, *GROW_DEFAULTS}

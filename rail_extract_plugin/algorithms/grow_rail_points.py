@@ -1,0 +1,100 @@
+"""Grow Rail Points from Seeds: follows rails from places on them and writes a classified copy of the cloud."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from qgis.core import QgsProcessingContext
+
+from ...core.parameters import GrowParameters
+from ...core.progress import Estimating, Progress
+from ...core.standards import SEARCHED_CLASSES, RailStandard
+from ..dialog import inputs, outputs
+from ..dialog import parameters as groups
+from ..dialog.parameter_values import ParameterValues
+from ..reading.clouds import CloudSource, points_folder, request_points
+from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
+from .classify_rail_points import ClassifyRailPoints, classified_results
+
+if TYPE_CHECKING:
+    import numpy as np
+
+
+@dataclass(frozen=True)
+class Job:
+    """The values of the parameters."""
+
+    cloud: CloudSource
+    standard: RailStandard
+    parameters: GrowParameters
+    class_code: int
+    output: Path
+    seeds: tuple[np.ndarray, ...]
+
+
+class GrowRailPoints(RailAlgorithm):
+    """The algorithm ``railextract:growrailpoints``."""
+
+    NAME = "growrailpoints"
+    LABEL = "Grow rail points from seeds"
+    TAGS = (*RAIL_WORDS, *CLOUD_WORDS, "classification", "raw", "seed", "interactive", "follow", "Klassifizierung")
+    PICTURE = "gauge.svg"
+    NEEDS = ClassifyRailPoints.NEEDS
+    SUMMARY = "Follows rails in a lidar cloud from places that you point at, and classifies their points in a copy."
+    HELP = (
+        "Choose the point cloud, raw or classified, and the rail standard, and give places on railheads: a layer of "
+        "points or lines, or a point on the map. Each rail is followed to both sides along its head, over crossings "
+        "and through switches, up to the longest run. The log states where each rail stops, and why.\n\n"
+        "The copy has the same points in the same order with the same attributes; points on these rails get the class "
+        "of rail points. Where the input is a folder or a virtual point cloud, a folder of the same tiles is written, "
+        "with a virtual point cloud (.vpc) of the same name next to it.\n\n"
+        "The page about growing describes the method and its limits; it was tested on simulated clouds only."
+    )
+
+    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
+        """Declare the parameters and outputs in the order of the interface."""
+        for definition in (
+            inputs.raw_cloud(),
+            *inputs.seeds(),
+            *groups.rail(),
+            *groups.growth(),
+            groups.crs(),
+            groups.leave_out(),
+            *groups.content(),
+            outputs.classified(),
+        ):
+            self.addParameter(definition)
+        for output in outputs.classified_figures():
+            self.addOutput(output)
+
+    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+        """Read and check the parameters, in the main thread."""
+        from ...core.labelling.files import plan_output
+
+        values = ParameterValues(self, parameters, context)
+        standard = values.standard()
+        output = Path(self.parameterAsFileOutput(parameters, "OUTPUT", context))
+        cloud = values.cloud("INPUT")
+        job = Job(cloud, standard, values.growth(), int(values.number("RAIL_CLASS")), output, values.seeds(cloud))
+        plan_output(job.cloud.paths, output, job.class_code)
+        return job
+
+    def compute(
+        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
+    ) -> dict[str, Any]:
+        """Follow the rails and write the copy."""
+        from ...core.grow.settings import GrowSettings
+        from ...core.labelling.files import Choice, plan_output
+        from ...core.labelling.growing import grow_files
+        from ...core.tasks import InTurn
+
+        values, progress = ParameterValues(self, parameters, context), Estimating(progress)
+        choice = Choice(job.class_code, int(values.number("CONTENT")) == 1, reset=False)
+        output = plan_output(job.cloud.paths, job.output, job.class_code, progress)
+        request = request_points(job.cloud, SEARCHED_CLASSES, lambda crs: None, progress)
+        settings = GrowSettings(job.standard.gauge_m, job.standard.head_width_m, job.parameters)
+        with points_folder() as folder:
+            grown = grow_files(request, job.seeds, settings, choice, output, folder, InTurn(), progress)
+        return classified_results(grown.file, grown.point_count, grown.figures)

@@ -1,0 +1,75 @@
+"""Grow Rail Points from Seeds: seeds of layers and of the map, and the results."""
+
+import laspy
+import numpy as np
+import pytest
+from qgis.core import (
+    QgsCoordinateReferenceSystem,
+    QgsCoordinateTransform,
+    QgsFeature,
+    QgsGeometry,
+    QgsPointXY,
+    QgsProject,
+    QgsVectorLayer,
+)
+from rail_extract.laboratory.scenes.raw_strips import SPACING_M, strip
+
+CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
+TRACK = strip(14.0)
+
+
+@pytest.fixture
+def raw(write_cloud):
+    return write_cloud(TRACK.xyz + CORNER, "raw.laz", 2)
+
+
+def layer_of(shapes, crs="EPSG:32643", kind="Point"):
+    layer = QgsVectorLayer(f"{kind}?crs={crs}", "seeds", "memory")
+    for shape in shapes:
+        feature = QgsFeature()
+        feature.setGeometry(shape)
+        assert layer.dataProvider().addFeature(feature)
+    return layer
+
+
+def place(along, left):
+    return QgsPointXY(*(CORNER[:2] + TRACK.at(along, left)))
+
+
+def test_both_rails_get_their_class_from_a_seed_in_degrees(raw, run_step, tmp_path, new_feedback):
+    utm, degrees = QgsCoordinateReferenceSystem("EPSG:32643"), QgsCoordinateReferenceSystem("EPSG:4326")
+    shape = QgsGeometry.fromPointXY(place(7.0, SPACING_M / 2))
+    shape.transform(QgsCoordinateTransform(utm, degrees, QgsProject.instance()))
+    feedback = new_feedback()
+    values = {"INPUT": raw, "SEEDS": layer_of([shape], "EPSG:4326"), "OUTPUT": tmp_path / "new.laz"}
+    done = run_step("growrailpoints", values, feedback)
+    assert done.ok, done.error
+    assert not feedback.warnings
+    found = np.asarray(laspy.read(done.results["OUTPUT"]).classification) == 10
+    assert done.results["POINT_COUNT"] == len(TRACK.xyz)
+    assert done.results["RAIL_POINTS"] == found.sum()
+    assert (found & TRACK.head).sum() > 0.94 * TRACK.head.sum()
+    assert (found & TRACK.head).sum() > 0.97 * found.sum()
+    assert done.results["PAIRED_LENGTH"] == pytest.approx(27, abs=2)
+    assert done.results["SINGLE_LENGTH"] == 0
+    assert done.results["CELLS_PER_M"] > 30
+    assert any("where the cloud ends" in text for text in feedback.infos)
+
+
+def test_one_rail_grows_from_a_place_on_the_map(raw, run_step):
+    x, y = place(7.0, -SPACING_M / 2)
+    values = {"INPUT": raw, "SEED": f"{x},{y} [EPSG:32643]", "BOTH": False, "CONTENT": 1, "OUTPUT": "TEMPORARY_OUTPUT"}
+    done = run_step("growrailpoints", values)
+    assert done.ok, done.error
+    cloud = laspy.read(done.results["OUTPUT"])
+    assert len(cloud.points) == done.results["RAIL_POINTS"]
+    assert np.abs(cloud.y - y).max() < 0.06
+    assert done.results["SINGLE_LENGTH"] == pytest.approx(13.5, abs=1)
+
+
+def test_a_line_along_a_rail_is_a_row_of_seeds(raw, run_step, tmp_path):
+    line = QgsGeometry.fromPolylineXY([place(2.0, SPACING_M / 2), place(12.0, SPACING_M / 2)])
+    values = {"INPUT": raw, "SEEDS": layer_of([line], kind="LineString"), "MAX_LENGTH": 2, "OUTPUT": tmp_path / "n.las"}
+    done = run_step("growrailpoints", values)
+    assert done.ok, done.error
+    assert 12 < done.results["PAIRED_LENGTH"] < 22

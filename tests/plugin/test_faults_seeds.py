@@ -1,0 +1,120 @@
+"""Faults of seeds, in Grow Rail Points from Seeds."""
+
+import resource
+
+import numpy as np
+import pytest
+from faults import FINE, REFUSED, WARNED, Fault
+from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from rail_extract.laboratory.scenes.raw_strips import SPACING_M, strip
+
+TITLE = "Seeds"
+
+CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
+ON_RAIL = f"POINT(500006 {3_000_000 + SPACING_M / 2})"
+BESIDE = "POINT(500006 3000000)"
+NO_RAIL = (
+    "No seed lies on a rail: put seeds within 0.25 m of railheads that stand 0.05 m above the bed, and check the rail "
+    "standard and the unit of the coordinates."
+)
+NO_SEED = "No seed lies in the cloud: check the place and the coordinate system of the seeds."
+
+
+def cloud(bench, change=lambda xyz: xyz):
+    return bench.cloud(change(strip(12.0).xyz) + CORNER, "raw.laz", 2)
+
+
+def seeds(*texts, kind="Point", crs="EPSG:32643", change=lambda xyz: xyz, **parameters):
+    """A raw cloud, and a layer with these shapes."""
+
+    def prepare(bench):
+        layer = QgsVectorLayer(f"{kind}?crs={crs}", "seeds", "memory")
+        for text in texts:
+            feature = QgsFeature(layer.fields())
+            feature.setGeometry(QgsGeometry.fromWkt(text))
+            assert layer.dataProvider().addFeature(feature)
+        return {"INPUT": cloud(bench, change), "SEEDS": layer, **parameters}
+
+    return prepare
+
+
+def full_disk(bench):
+    values = seeds(ON_RAIL)(bench)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    bench.run.callback(lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard)))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    return values
+
+
+def cancelled(percent):
+    def prepare(bench):
+        bench.feedback.progressChanged.connect(lambda done: bench.feedback.cancel() if done >= percent else None)
+        return seeds(ON_RAIL)(bench)
+
+    return prepare
+
+
+FAULTS = [
+    Fault(
+        "no seeds",
+        lambda bench: {"INPUT": cloud(bench)},
+        REFUSED,
+        "A rail is followed from seeds: choose a layer for SEEDS, or pick a point for SEED.",
+    ),
+    Fault(
+        "layer of seeds that is empty",
+        seeds(),
+        REFUSED,
+        "SEEDS has neither points nor lines: add points on railheads, or choose another layer.",
+    ),
+    Fault("seed between the rails", seeds(BESIDE), REFUSED, NO_RAIL),
+    Fault("seeds of a cloud in millimetres", seeds(ON_RAIL, change=lambda xyz: 1000 * xyz), REFUSED, NO_RAIL),
+    Fault("seed far from the cloud", seeds("POINT(700000 3000000)"), REFUSED, NO_SEED),
+    Fault(
+        "seeds with the coordinates of another system",
+        seeds(ON_RAIL, crs="EPSG:4326"),
+        REFUSED,
+        "SEEDS can't be transformed to the coordinate system of the cloud (EPSG:32643): check that both are assigned "
+        "as the data were made.",
+    ),
+    Fault(
+        "one seed on a rail and one beside",
+        seeds(ON_RAIL, BESIDE),
+        WARNED,
+        "1 of 2 seeds lie on no rail: move them onto railheads.",
+    ),
+    Fault("seed on the map", lambda bench: {"INPUT": cloud(bench), "SEED": f"500006,{3e6 + SPACING_M / 2}"}, FINE),
+    Fault(
+        "seed on the map, off the rails",
+        lambda bench: {"INPUT": cloud(bench), "SEED": "500006,3000000"},
+        REFUSED,
+        NO_RAIL,
+    ),
+    Fault(
+        "polygons as seeds",
+        seeds("POLYGON((500000 3000000, 500001 3000000, 500001 3000001, 500000 3000000))", kind="Polygon"),
+        REFUSED,
+        "SEEDS has neither points nor lines: add points on railheads, or choose another layer.",
+    ),
+    Fault(
+        "class of grown rails beyond a byte",
+        seeds(ON_RAIL, RAIL_CLASS=256),
+        REFUSED,
+        "RAIL_CLASS can't be 256: give a number from 0 to 255.",
+    ),
+    Fault(
+        "full disk, points near seeds",
+        full_disk,
+        REFUSED,
+        "… can't be written to (…): free space on the disk, or choose another folder.",
+    ),
+    *(
+        Fault(f"growth cancelled at {percent} %", cancelled(percent), REFUSED, "Cancelled; nothing was written.")
+        for percent in (10, 40, 65)
+    ),
+]
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_fault(meet, fault):
+    meet(fault, "growrailpoints")
