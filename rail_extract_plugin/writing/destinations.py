@@ -28,6 +28,9 @@ TABLE = "ogr:"
 """Prefix of destinations that are a table of a file."""
 
 
+EXCHANGED = (".dxf", ".csv")
+"""Suffixes of files for other programs, which QGIS's sinks do not write; see `core.exchange`."""
+
 ESCAPE = "%[0-9A-Fa-f]{2}"
 """SQLite decodes these in the path of a GeoPackage that GDAL opens for reading."""
 
@@ -73,6 +76,11 @@ def destinations(values: Mapping[str, Any], context: QgsProcessingContext) -> di
 
 def _prepare_layer(name: str, path: Path, table: str) -> None:
     """Check that features can be added to a layer, and build its coordinate system in this thread (see `systems`)."""
+    if path.suffix.lower() in EXCHANGED:
+        raise RailExtractError(
+            f"Nothing can be added to {path.name}, because DXF and CSV files are written as a whole: give {name} a new "
+            "file, or a layer of a GeoPackage."
+        )
     source = f"{path}|layername={table}" if table else str(path)
     layer = QgsVectorLayer(source, name, "ogr")
     if (

@@ -40,7 +40,7 @@ from ...core.fields import (
 from ...core.progress import SILENT, Progress
 from ..compat import INTEGER, REAL, TEXT, field
 from ..systems import lost_part, system
-from .destinations import appends, is_wanted
+from .destinations import EXCHANGED, is_wanted
 from .styling import style_on_load
 from .whole_files import write_whole
 
@@ -68,9 +68,6 @@ class LayerKind:
 
 RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELDS, "centerlines")
 QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
-
-EXCHANGED = (".dxf", ".csv")
-"""Suffixes of files for other programs, which QGIS's sinks do not write; see `core.exchange`."""
 
 
 def fields(columns: Sequence[Field]) -> QgsFields:
@@ -254,8 +251,7 @@ def _write(
     if not is_wanted(parameters.get(name), context):
         return {}
     destination = algorithm.destinations.get(name)
-    exchanged = destination is not None and destination.file.suffix.lower() in EXCHANGED
-    if exchanged and not appends(parameters.get(name)):
+    if destination is not None and destination.file.suffix.lower() in EXCHANGED:
         return _exchange(algorithm, name, kind, shape, made, frame, parameters, context)
     columns, crs = fields(kind.columns), output_crs(frame.crs_wkt)
 

@@ -187,6 +187,16 @@ def test_a_layer_that_takes_no_features_is_refused(run_step, rails, tmp_path):
     assert "Nothing can be added to" in outcome.error
 
 
+@pytest.mark.parametrize("name", ["tracks.csv", "tracks.dxf"])
+def test_nothing_is_added_to_files_for_other_programs(build, run_step, rails, tmp_path, name):
+    build(tmp_path / name)
+    before = (tmp_path / name).read_bytes()
+    outcome = run_step(CENTERLINES, {"INPUT": rails, "OUTPUT": adding_to(str(tmp_path / name), rails.crs())})
+    assert not outcome.ok
+    assert f"Nothing can be added to {name}, because DXF and CSV files are written as a whole" in outcome.error
+    assert (tmp_path / name).read_bytes() == before
+
+
 def test_every_layer_can_be_an_existing_one(plugin):
     outputs = [output for one in plugin.provider.algorithms() for output in one.destinationParameterDefinitions()]
     layers = [output for output in outputs if output.type() == "sink"]
