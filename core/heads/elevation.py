@@ -20,7 +20,7 @@ from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
 from .edges import Widths, search_distance, stations_along, widest
 from .flank import find_flank
-from .level import AXIS_SHARE, rough_level
+from .level import AXIS_SHARE, blended_fall, rough_level
 from .neighbours import free_edges
 from .own_level import on_own_level
 from .strips import StripOffsets, aligned, measure_strips
@@ -177,10 +177,11 @@ def _measured(
         return None
     flank = find_flank(feet.t, feet.across, z, parameters.head_width_m)
     if flank is None:
+        level_z = z + blended_fall(feet.t, feet.across, z, parameters.head_width_m)
         found = find_top(
             feet.t[head],
             feet.across[head],
-            z[head],
+            level_z[head],
             parameters.head_width_m,
             parameters.crown_radius_m,
             parameters.tolerance_z_m,
@@ -190,7 +191,7 @@ def _measured(
             return None
         profile, top = found
     else:
-        head, top = np.ones((2, len(z)), dtype=bool)
+        level_z, (head, top) = z, np.ones((2, len(z)), dtype=bool)
         profile = Profile.through(feet.t, rough_level(feet.t, z) + flank.top_m, parameters.smoothing_z_m)
     supporting = feet[head][top]
     along = length_along(line)
@@ -216,7 +217,7 @@ def _measured(
     axial = np.abs(supporting.across) <= AXIS_SHARE * parameters.head_width_m
     axial |= axial.sum() < MIN_POINTS
     t = supporting.t[axial]
-    residual_m = z[head][top][axial] - profile.at(t)
+    residual_m = level_z[head][top][axial] - profile.at(t)
     support = replace(support, sigmaz_m=height_error(t, residual_m, support.t, parameters.smoothing_z_m))
     if strips is not None:
         support = strips.added_to(support, parameters.align)

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from statistics import NormalDist
 
 import numpy as np
 import pytest
@@ -246,3 +247,17 @@ def test_ends_of_thin_rails_are_cut_where_the_first_point_is_expected(seed):
     (rail,) = elevate(network_of(straight_line(80)), cloud(xyz), PARAMETERS)
     third = np.sort(xyz[:, 0])[[2, -3]]
     assert rail.length_m == pytest.approx(min(third[1] + 0.5, 80) - max(third[0] - 0.5, 0), abs=0.25)
+
+
+@pytest.mark.parametrize("density", [12, 50])
+def test_wide_beams_that_blend_the_head_with_the_ballast_do_not_lower_it(density):
+    random = np.random.default_rng(4)
+    count = int(80 * density)
+    x, across = random.uniform(0, 80, count), random.uniform(-0.05, 0.05, count)
+    # A beam of 60 mm with a normal profile: its share beyond the head sees the ballast, 0.17 m below.
+    normal = NormalDist()
+    edges = np.stack([(WIDTH / 2 - side * across) / 0.015 for side in (1, -1)])
+    beyond = 1 - np.array([normal.cdf(a) - normal.cdf(-b) for a, b in edges.T])
+    xyz = np.column_stack([x, across, -0.17 * beyond]) + random.normal(0, [0, 0.003, 0.012], (count, 3))
+    (rail,) = elevate(network_of(straight_line(80)), cloud(xyz[xyz[:, 2] > -0.06]), PARAMETERS)
+    assert abs(height_error(rail)[0]) < 0.0035
