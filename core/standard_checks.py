@@ -12,6 +12,7 @@ import numpy as np
 from .clouds.points import Request
 from .errors import CloudError, ParameterError
 from .heads.gauge_estimate import measure_spacings
+from .heads.roads import MIN_WIDER_M
 from .parameters import Parameters
 from .progress import SILENT, Progress
 from .rails import HEAD_OFF_M, HeadWidths
@@ -119,7 +120,12 @@ def head_widths(source: PointSource, gauges: Sequence[Gauge], progress: Progress
         seen = f"Heads look {1000 * widths.seen_m:.0f} mm wide, {1000 * stated_m:.0f} mm are stated"
         standard = closest_standard(*measured)
         fits = standard is not None and abs(standard.head_width_m - widths.seen_m) <= HEAD_OFF_M
-        if fits or widths.seen_m < stated_m:
+        if widths.seen_m > stated_m + MIN_WIDER_M:
+            progress.warning(
+                f"{seen}: road or dirt next to them is classified as rail. Where it hides one edge of a head and the "
+                "other is at gauge, the line follows that one. Check the classification elsewhere."
+            )
+        elif fits or widths.seen_m < stated_m:
             progress.warning(f"{seen}{_question(*measured)} Every gauge is off by the difference.")
         else:
             progress.warning(

@@ -21,6 +21,7 @@ from .frpdf.weights import load_arrays
 from .heads.edges import STATION_STEP_M
 from .heads.elevation import ElevationParameters, elevate, flat_rail, flat_rails, numbered
 from .heads.refinement import refine
+from .heads.roads import onto_heads
 from .heads.smoothing_check import warn_if_out_of_reach
 from .heads.strips import rows_of, strips_along
 from .lines.bridges import FIT_M
@@ -307,6 +308,8 @@ def _all_vertices(
         return flat_rails(network, class_code, elevation), rows_of((), ())
     drawn = [flat_rail(line, class_code) for line in network.lines]
     heads = widths_by_gauge(drawn, parameters.gauges, parameters.centerline_tolerance_m)
+    spacings_m = [sum(gauge) for gauge in parameters.gauges]
+    network = replace(network, lines=onto_heads(network.lines, points, heads, spacings_m))
     network = refine(network, points, heads, parameters.smoothing_xy_m, refining, elevation.align)
     strips = strips_along(network.lines, points, heads)
     return elevate(network, points, elevation, elevating, strips, heads), rows_of(network.lines, strips)

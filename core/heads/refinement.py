@@ -24,6 +24,7 @@ from .flank import Flank, find_flank
 from .level import MIN_ON_HEAD, is_blended, on_top
 from .neighbours import free_edges
 from .own_level import on_own_level
+from .roads import hidden_edges
 from .sections import outline_middles, with_outline
 from .strips import aligned, measure_strips
 from .top import Profile
@@ -138,13 +139,14 @@ def _shifted(
             continue
         top, _ = on_top(mine.t, mine.across, z, head_width_m)
         along = length_along(line)
+        free = edges[number] & ~hidden_edges(mine.t[top], mine.across[top], along[-1], head_width_m)
         blended = is_blended(mine.t, mine.across, z, head_width_m)
         if blended:
             stations, middle = mean_offsets(mine.t, mine.across, along[-1], head_width_m)
         else:
-            stations, middle = _middles(mine.t[top], mine.across[top], along[-1], head_width_m, edges[number])
+            stations, middle = _middles(mine.t[top], mine.across[top], along[-1], head_width_m, free)
         if by_outline and not blended:
-            seen = np.isfinite(middle) & edges[number].all(axis=0)
+            seen = np.isfinite(middle) & free.all(axis=0)
             middle = with_outline(middle, outline_middles(mine.t, mine.across, z, along[-1], head_width_m, seen))
         known = np.isfinite(middle)
         if known.sum() < max(MIN_SEEN_SHARE * len(stations), 2):

@@ -20,6 +20,7 @@ from ..polyline import distance_to
 from ..rails import Support
 from .edges import BLUR_BINS, HALF_HEAD_BINS, STATION_STEP_M, CrossSections, histograms
 from .level import on_top, robust_sigma
+from .roads import MIN_WIDER_M, bands, hidden_edges
 from .sections import Middles, outline_middles, with_outline
 
 UNSURE_CURVATURE = 0.007
@@ -34,12 +35,12 @@ UNSURE_GRADIENT_CHANGE = 1e-4
 """The same as `UNSURE_CURVATURE` for the height, 1/m: vertical curves have radii of 2 to 20 km, settled track has waves
 of 10 mm that are 60 m long."""
 
+ALONE_SIGMA_M = 0.0012
+"""Standard error of the middle that comes from a single edge: how much of its corner is seen depends on the view. Seen
+from above a track, the left and the right corner differ by 1.7 mm."""
+
 BESIDE_HEADS = 0.5
 """Standard error, in head widths, of a line that follows what covers a head: wheels and flangeways are next to it."""
-
-BAND, MIN_WIDER_M = (0.02, 0.98), 0.02
-"""Shares of the points between which a band is measured, and how much wider than a head it has to be: noise of 8 mm
-makes heads look 5 mm wider, and one of two passes 15 mm."""
 
 
 def measure_support(
@@ -80,6 +81,7 @@ def measure_support(
     """
     top, noise_m = on_top(t, across, z, head_width_m)
     stations, counts, wide_counts = histograms(t[top], across[top], length_m, head_width_m)
+    free = free & ~hidden_edges(t[top], across[top], length_m, head_width_m)
     points = np.bincount(np.minimum((t[top] / STATION_STEP_M).astype(int), len(stations) - 1), minlength=len(stations))
     sections, bin_m = CrossSections.of(wide_counts), head_width_m / (2 * HALF_HEAD_BINS)
     edges = sections.find_edges(free)
@@ -99,6 +101,7 @@ def measure_support(
     by_outline = outline_middles(t, across, z, length_m, head_width_m, known & free.all(axis=0))
     outlined = np.isfinite(by_outline.offset)
     by_chance = 1 / np.sqrt(np.maximum(_combined(by_outline, smoothing_m), 1e-9))
+    view = np.hypot(view, np.where(free.sum(axis=0) == 1, ALONE_SIGMA_M, 0.0))
     sampling, view = np.where(outlined, by_chance, sampling), np.where(outlined, by_outline.common, view)
     bridging = sampling * distance_to(t[top], stations) / smoothing_m
     middle = with_outline(by_edges, by_outline)
@@ -173,10 +176,8 @@ def _either_end(counts: np.ndarray, head_width_m: float) -> np.ndarray:
 
     Road next to a grooved rail is as high as its head, which may be at either end of the band.
     """
-    sums = np.cumsum(counts, axis=1)
-    whole = np.maximum(sums[:, -1:], 1e-9)
-    first, last = (np.argmax(sums >= part * whole, axis=1) for part in BAND)
-    wider_m = (last - first + 1) / (BAND[1] - BAND[0]) * head_width_m / (2 * HALF_HEAD_BINS) - head_width_m
+    right_m, left_m = bands(counts, head_width_m)
+    wider_m = left_m - right_m - head_width_m
     return np.where(wider_m > MIN_WIDER_M, 0.5 * wider_m, 0.0)
 
 

@@ -1,0 +1,176 @@
+"""Rails in a street next to whose heads the road is classified as rail: the head is at the end that is at gauge.
+
+The road lies level with the head, so that their points form one band and the head has a single edge, at the groove for
+the flanges. See docs/method.md section 6.10.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import binary_opening
+
+from ..clouds.points import RailPoints
+from ..lines.smoothing import smooth_profile
+from ..polyline import Feet, interpolate, left_normals, length_along, project
+from .edges import HALF_HEAD_BINS, HALF_RANGE_BINS, STATION_STEP_M, histograms, search_distance
+from .level import on_top
+from .own_level import on_own_level
+
+BAND = (0.02, 0.98)
+"""Shares of the points between which a band is measured."""
+
+MIN_WIDER_M = 0.02
+"""How much wider than a head a band has to be: noise of 8 mm makes heads look 5 mm wider, two passes 15 mm."""
+
+MIN_LENGTH_M, SMOOTHING_M = 8.0, 3.0
+"""Length along which the points have to form such a band: heads that cross at 1:26.5 cover each other over 6 m; and
+sigma of PAEK for the ends of the band."""
+
+MAX_MISS_M, CLEARLY_M = 0.015, 0.012
+"""Largest deviation of two heads from their distance, and by how much the other end of the band must be further off."""
+
+AT_EDGE_M = 0.012
+"""Largest distance of the end of a band from the edge of the head: lines are within 1 cm of the axis."""
+
+MIN_ABREAST = 0.5
+"""Share of the places that have to be abreast of a line."""
+
+PLACE_M = 1.0
+"""Spacing of the places at which the distance of two rails is measured."""
+
+
+def bands(counts: np.ndarray, head_width_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ends of the band of points around a line, (s,) metres to the left: the right one and the left one.
+
+    Parameters
+    ----------
+    counts : (s, 2 HALF_RANGE_BINS) array
+        See `edges.histograms`.
+    head_width_m : float
+    """
+    sums = np.cumsum(counts, axis=1)
+    whole = np.maximum(sums[:, -1:], 1e-9)
+    first, last = (np.argmax(sums >= part * whole, axis=1) for part in BAND)
+    cut = (last - first + 1) * BAND[0] / (BAND[1] - BAND[0])
+    bin_m = head_width_m / (2 * HALF_HEAD_BINS)
+    return (first - cut - HALF_RANGE_BINS) * bin_m, (last + 1 + cut - HALF_RANGE_BINS) * bin_m
+
+
+def _wide_bands(
+    counts: np.ndarray, wide_counts: np.ndarray, head_width_m: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the ends of bands, (s,) metres, and where they are wider than a head, (s,) bool, in windows of any length.
+
+    Long windows look wide where a line leaves its head, as at a road crossing; short ones may have few points. Heads
+    that touch are wide together for some metres.
+    """
+    right_m, left_m = bands(wide_counts, head_width_m)
+    least_m = head_width_m + MIN_WIDER_M
+    wide = (left_m - right_m > least_m) & (-np.subtract(*bands(counts, head_width_m)) > least_m)
+    return right_m, left_m, binary_opening(wide, np.ones(int(MIN_LENGTH_M / STATION_STEP_M)))
+
+
+def hidden_edges(t: np.ndarray, across: np.ndarray, length_m: float, head_width_m: float) -> np.ndarray:
+    """Find the stations of a line on its head where road hides the right and the left edge, (2, s) bool.
+
+    Parameters
+    ----------
+    t, across : (n,) arrays
+        Chainage and offset to the left of the points on top, metres.
+    length_m : float
+    head_width_m : float
+    """
+    right_m, left_m, wide = _wide_bands(*histograms(t, across, length_m, head_width_m)[1:], head_width_m)
+    half_m = 0.5 * head_width_m
+    at_left, at_right = np.abs(left_m - half_m) <= AT_EDGE_M, np.abs(right_m + half_m) <= AT_EDGE_M
+    return np.stack([wide & at_left & ~at_right, wide & at_right & ~at_left])
+
+
+def onto_heads(
+    lines: Sequence[np.ndarray], points: RailPoints, heads_m: np.ndarray, spacings_m: Sequence[float]
+) -> tuple[np.ndarray, ...]:
+    """Move lines in the middle of road and head onto the heads, where one end of the band is at gauge.
+
+    Parameters
+    ----------
+    lines : sequence of (n, 2) arrays
+        Smoothed lines.
+    points : RailPoints
+    heads_m : (n,) array
+        Width of the head of each line.
+    spacings_m : sequence of float
+        Distances between the axes of the two rails of a track.
+
+    Returns
+    -------
+    tuple of (n, 2) arrays
+        Other lines stay as they are.
+    """
+    if not len(lines):
+        return tuple(lines)
+    feet = project(lines, points.xyz[:, :2], search_distance(float(np.max(heads_m))))
+    either: dict[int, _Band] = {}
+    for number, (line, width_m) in enumerate(zip(lines, heads_m)):
+        mine = feet.of(number)
+        ends = _on_either_end(line, mine, points.xyz[mine.point, 2], float(width_m))
+        if ends is not None:
+            either[number] = ends
+    candidates = [either[number].lines if number in either else (line,) for number, line in enumerate(lines)]
+    return tuple(
+        _at_gauge(line, either.get(number), candidates[:number] + candidates[number + 1 :], spacings_m)
+        for number, line in enumerate(lines)
+    )
+
+
+@dataclass(frozen=True)
+class _Band:
+    """A band of points that is wider than a head: the line moved onto either end, and places there by end, (k, 2)."""
+
+    lines: tuple[np.ndarray, np.ndarray]
+    places: tuple[np.ndarray, np.ndarray]
+
+
+def _on_either_end(line: np.ndarray, feet: Feet, z: np.ndarray, head_width_m: float) -> _Band | None:
+    """Move a line onto either end of its band; None where the points form none that is wider than a head."""
+    own = on_own_level(feet.t, feet.across, z, head_width_m)
+    feet, z = feet[own], z[own]
+    top, _ = on_top(feet.t, feet.across, z, head_width_m)
+    if not top.any():
+        return None
+    along = length_along(line)
+    stations, counts, wide_counts = histograms(feet.t[top], feet.across[top], along[-1], head_width_m)
+    right_m, left_m, wide = _wide_bands(counts, wide_counts, head_width_m)
+    if not wide.any():
+        return None
+    shifts = (np.where(wide, left_m - 0.5 * head_width_m, 0.0), np.where(wide, right_m + 0.5 * head_width_m, 0.0))
+    left, right = (
+        line + smooth_profile(stations, shift, SMOOTHING_M, along)[:, None] * left_normals(line) for shift in shifts
+    )
+    at = stations[wide & (stations <= along[-1])][:: int(PLACE_M / STATION_STEP_M)]
+    return _Band((left, right), (interpolate(left, along, at), interpolate(right, along, at)))
+
+
+def _at_gauge(
+    line: np.ndarray, band: _Band | None, others: Sequence[Sequence[np.ndarray]], spacings_m: Sequence[float]
+) -> np.ndarray:
+    """Return a line on the end of its band that is at gauge from another line; as it is if neither end clearly is."""
+    if band is None:
+        return line
+    misses_m = [_miss(places, [line for lines in others for line in lines], spacings_m) for places in band.places]
+    best = int(np.argmin(misses_m))
+    if misses_m[best] > MAX_MISS_M or misses_m[1 - best] - misses_m[best] < CLEARLY_M:
+        return line
+    return band.lines[best]
+
+
+def _miss(places: np.ndarray, others: Sequence[np.ndarray], spacings_m: Sequence[float]) -> float:
+    """Return by how much places on a rail, (k, 2), miss the distance of two rails, from the line that does least."""
+    found = [np.inf]
+    for other in others:
+        away_m = np.abs(project([other], places, max(spacings_m) + MAX_MISS_M).across)
+        if len(away_m) > MIN_ABREAST * len(places):
+            found.append(min(abs(float(np.median(away_m)) - spacing_m) for spacing_m in spacings_m))
+    return min(found)
