@@ -5,6 +5,7 @@ from __future__ import annotations
 import resource
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -59,12 +60,13 @@ class Score:
     figures: SearchFigures
 
 
-def settings_of(scene: RawScene) -> Settings:
-    """Make the settings that fit a scene."""
-    return Settings((scene.standard.gauge_m, *scene.other_gauges_m), scene.standard.head_width_m)
+def settings_of(scene: RawScene, weights: Path | None = None) -> Settings:
+    """Make the settings that fit a scene; with weights, for a trained network."""
+    gauges_m = (scene.standard.gauge_m, *scene.other_gauges_m)
+    return Settings(gauges_m, scene.standard.head_width_m, weights=weights)
 
 
-def score(scene: RawScene, wide: bool = False) -> tuple[Score, np.ndarray]:
+def score(scene: RawScene, wide: bool = False, weights: Path | None = None) -> tuple[Score, np.ndarray]:
     """Classify a scene and compare the labels with the truth.
 
     Parameters
@@ -72,6 +74,8 @@ def score(scene: RawScene, wide: bool = False) -> tuple[Score, np.ndarray]:
     scene : RawScene
     wide : bool
         Whether the beam is as wide as a head.
+    weights : Path, optional
+        Weights of a trained network; None means geometry.
 
     Returns
     -------
@@ -80,7 +84,7 @@ def score(scene: RawScene, wide: bool = False) -> tuple[Score, np.ndarray]:
         The labels.
     """
     start = time.process_time()
-    found = classify_cloud(scene.xyz, settings_of(scene))
+    found = classify_cloud(scene.xyz, settings_of(scene, weights))
     seconds = time.process_time() - start
     peak_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     head, beside = truth(scene, found.rail, wide)

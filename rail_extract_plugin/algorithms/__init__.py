@@ -9,6 +9,7 @@ from .grow_rail_points import GrowRailPoints
 from .install_packages import InstallPackages
 from .measure_track_geometry import MeasureTrackGeometry
 from .rasterize_rail_points import RasterizeRailPoints
+from .train_rail_classifier import TrainRailClassifier
 from .vectorize_rails import VectorizeRails
 
 ALGORITHMS = (
@@ -20,6 +21,7 @@ ALGORITHMS = (
     VectorizeRails,
     BuildTrackCenterlines,
     MeasureTrackGeometry,
+    TrainRailClassifier,
     InstallPackages,
     CheckInstallation,
 )

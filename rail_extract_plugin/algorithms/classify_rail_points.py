@@ -32,6 +32,7 @@ class Job:
     class_code: int
     output: Path
     guide: tuple[np.ndarray, ...]
+    weights: Path | None
 
 
 class ClassifyRailPoints(RailAlgorithm):
@@ -45,8 +46,8 @@ class ClassifyRailPoints(RailAlgorithm):
     SUMMARY = "Finds the points on railheads in a lidar cloud that nobody has classified, and writes a classified copy."
     HELP = (
         "Choose the point cloud and the rail standard, then run. Rails are found by their shape: no classes of the "
-        "ground, no trajectory and no training are needed. Classes of low and high noise (7 and 18) and withheld "
-        "points are left out of the search.\n\n"
+        "ground, no trajectory and no training are needed. METHOD LEARNED uses a classifier of your own instead. "
+        "Classes of low and high noise (7 and 18) and withheld points are left out of the search.\n\n"
         "The copy has the same points in the same order with the same attributes; only classes differ. Where the "
         "input is a folder or a virtual point cloud, a folder of the same tiles is written, with a virtual point "
         "cloud (.vpc) of the same name next to it.\n\n"
@@ -64,6 +65,7 @@ class ClassifyRailPoints(RailAlgorithm):
             *groups.area(),
             inputs.guide(),
             *groups.guide(),
+            *groups.method(),
             *groups.labels(),
             outputs.classified(),
         ):
@@ -86,6 +88,7 @@ class ClassifyRailPoints(RailAlgorithm):
             int(values.number("RAIL_CLASS")),
             output,
             values.guide(cloud),
+            values.weights(),
         )
         plan_output(job.cloud.paths, output, job.class_code)
         return job
@@ -107,7 +110,7 @@ class ClassifyRailPoints(RailAlgorithm):
         guide = None
         if job.guide:
             guide = guide_of(request, job.guide, values.number("GUIDE_DISTANCE"), values.flag("ONLY_GUIDED"))
-        settings = Settings(gauges_m, job.standard.head_width_m, values.flag("KEEP_SINGLE"), guide)
+        settings = Settings(gauges_m, job.standard.head_width_m, values.flag("KEEP_SINGLE"), guide, job.weights)
         with points_folder() as folder:
             result = classify_files(request, settings, choice, output, folder, InTurn(), progress)
         return classified_results(result.file, result.point_count, result.figures)

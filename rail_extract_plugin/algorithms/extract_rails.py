@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsProcessingContext
 
 from ...core.errors import ParameterError
 from ...core.frpdf.models import choose as choose_model
+from ...core.parameters import LEARNED
 from ...core.progress import Estimating, Progress
 from ...core.standards import DEFAULT, SEARCHED_CLASSES, Gauge, RailStandard
 from ..dialog import inputs, outputs
@@ -47,6 +49,7 @@ class Job:
     standard: RailStandard
     other_gauges: tuple[Gauge, ...]
     command: str
+    weights: Path | None
 
 
 class ExtractRails(RailAlgorithm):
@@ -78,6 +81,7 @@ class ExtractRails(RailAlgorithm):
             *inputs.cloud(),
             inputs.merge_classes(),
             inputs.classify(),
+            *groups.method(),
             *groups.rail(detect=True),
             *groups.area(),
             groups.model(is_advanced=True),
@@ -109,6 +113,9 @@ class ExtractRails(RailAlgorithm):
         classify = values.flag("CLASSIFY")
         if classify and values.detects():
             raise ParameterError("DETECT measures classified points, which CLASSIFY does not need: choose STANDARD.")
+        if values.choice("METHOD") == LEARNED and not classify:
+            raise ParameterError("METHOD LEARNED is for raw clouds: set CLASSIFY, or choose GEOMETRY.")
+        weights = values.weights()
         standard = values.standard(DEFAULT if values.detects() else None)
         choose_model(standard.gauge_m, standard.head_width_m, values.choice("MODEL"))
         return Job(
@@ -117,6 +124,7 @@ class ExtractRails(RailAlgorithm):
             standard,
             values.other_gauges(standard),
             masked(self.asPythonCommand(parameters, context)),
+            weights,
         )
 
     def _detected(self, job: Job, request: Request, values: ParameterValues, progress: Progress) -> Job:
@@ -149,8 +157,9 @@ class ExtractRails(RailAlgorithm):
             quality_step_m=values.number("STEP") if quality or findings or report else None,
             keep_cleaned=cleaned,
         )
+        classify = values.flag("CLASSIFY")
         with points_folder() as folder:
-            network = extract_files(request, folder, settings, InTurn(), progress, values.flag("CLASSIFY"))
+            network = extract_files(request, folder, settings, InTurn(), progress, classify, job.weights)
         progress.check()
         for failure in network.failures:
             progress.warning(failure)

@@ -40,7 +40,7 @@ def sentence_for(error: BaseException, definitions: Sequence[QgsProcessingParame
     if isinstance(error, QgsProcessingException):
         return masked(str(error))
     if isinstance(error, (Cancelled, KeyboardInterrupt)):
-        return tr("Cancelled; nothing was written.")
+        return str(error) or tr("Cancelled; nothing was written.")
     if isinstance(error, MemoryError):
         return tr("Not enough memory: choose a smaller extent.")
     _log(error)

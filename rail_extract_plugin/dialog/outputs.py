@@ -97,6 +97,34 @@ def report() -> QgsProcessingParameterDefinition:
     return helped(_page(), tr("A web page with an assessment of the result, a map, and plots of each track."))
 
 
+def weights() -> QgsProcessingParameterDefinition:
+    """Define the weights of a trained classifier."""
+    return helped(
+        QgsProcessingParameterFileDestination("WEIGHTS", tr("Weights of the classifier"), tr("Weights (*.npz)")),
+        tr(
+            "The classifier, for METHOD LEARNED. Until the training is complete, a folder next to it keeps what was "
+            "learned, and a run with the same name continues."
+        ),
+    )
+
+
+def card() -> QgsProcessingParameterDefinition:
+    """Define the card of a trained classifier."""
+    return helped(
+        QgsProcessingParameterFileDestination("CARD", tr("Card"), tr("Web pages (*.html)"), optional=True),
+        tr("A web page with recall and precision by tile, the course of the training, and its settings."),
+    )
+
+
+def training_figures() -> Numbers:
+    """Define the figures about a trained classifier."""
+    return (
+        QgsProcessingOutputNumber("RECALL", tr("Share of the rail points kept back that are found")),
+        QgsProcessingOutputNumber("PRECISION", tr("Share of the points found that are rail points")),
+        QgsProcessingOutputNumber("STEPS", tr("Steps of the training")),
+    )
+
+
 def check_report() -> QgsProcessingParameterDefinition:
     """Define the report on the installation."""
     return helped(_page(), tr("A web page with the result, to be attached to bug reports."))

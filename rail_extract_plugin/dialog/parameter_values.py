@@ -261,6 +261,19 @@ class ParameterValues:
 
         return choose_engine(self.choice("ENGINE"), self.choice("DEVICE"))
 
+    def weights(self) -> Path | None:
+        """Read METHOD and WEIGHTS: the weights of the network that finds rail points, or None for geometry.
+
+        Raises
+        ------
+        ParameterError, ModelError
+            They contradict each other, or can't be used.
+        """
+        from ...core.learned.model import weights_for
+
+        given = self._algorithm.parameterAsFile(self._parameters, "WEIGHTS", self._context)
+        return weights_for(self.choice("METHOD"), Path(given) if given else None)
+
     def class_codes(self) -> tuple[int, ...]:
         """Read RAIL_CLASSES."""
         return class_numbers(self.text("RAIL_CLASSES"), "RAIL_CLASSES")

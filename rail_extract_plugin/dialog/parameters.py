@@ -10,12 +10,23 @@ from qgis.core import (
     QgsProcessingParameterEnum,
     QgsProcessingParameterExtent,
     QgsProcessingParameterFeatureSource,
+    QgsProcessingParameterFile,
     QgsProcessingParameterString,
 )
 
 from ...core.frpdf import DEVICES, ENGINES, MAX_PASSES
 from ...core.frpdf.models import NAMES
-from ...core.parameters import DEFAULT_GUIDE_DISTANCE_M, DEFAULT_STEP_M, LEAVE_OUT, STRIPS, GrowParameters, Parameters
+from ...core.parameters import (
+    DEFAULT_EPOCHS,
+    DEFAULT_GUIDE_DISTANCE_M,
+    DEFAULT_STEP_M,
+    GEOMETRY,
+    LEAVE_OUT,
+    METHODS,
+    STRIPS,
+    GrowParameters,
+    Parameters,
+)
 from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS, UNCONFIRMED_PROFILES
 from ..i18n import tr
 from .definitions import MM_DECIMALS, Definitions, advanced, choice, helped, number
@@ -38,6 +49,10 @@ MAX_CROWN_RADIUS_M = 10_000.0
 
 MAX_LENGTH_M = 100_000.0
 """Longer than any gap to close, any minimum line length and any step between stations."""
+
+
+MAX_EPOCHS, MAX_SEED = 10_000, 2**31 - 1
+"""Weeks on any computer, and the largest seed of a random generator."""
 
 
 STANDARD_WIDGET = {"widget_wrapper": {"class": f"{__package__}.standard_widget.StandardWidgetWrapper"}}
@@ -299,6 +314,40 @@ def other_gauges() -> QgsProcessingParameterDefinition:
     return advanced(
         QgsProcessingParameterString("OTHER_GAUGES", tr("Other gauges [mm]"), optional=True),
         tr("Gauges of other tracks in the same cloud, such as 1000;1067, or 1000/66 with the width of the railhead."),
+    )
+
+
+def method() -> Definitions:
+    """Define what finds the rail points of a raw cloud."""
+    return (
+        advanced(
+            choice("METHOD", tr("What finds rail points"), METHODS, GEOMETRY),
+            tr("GEOMETRY needs no training. LEARNED uses weights that Train Rail Classifier has written."),
+        ),
+        advanced(
+            QgsProcessingParameterFile(
+                "WEIGHTS", tr("Weights of the classifier"), optional=True, fileFilter=tr("Weights (*.npz)")
+            ),
+            tr("The file that Train Rail Classifier has written, for METHOD LEARNED."),
+        ),
+    )
+
+
+def training() -> Definitions:
+    """Define how a classifier is trained."""
+    return (
+        helped(
+            number("EPOCHS", tr("Epochs"), DEFAULT_EPOCHS, 1, MAX_EPOCHS, whole=True),
+            tr("How many times each block of 4 m with rails is learned from. More take longer and may find more."),
+        ),
+        advanced(
+            number("SEED", tr("Seed"), 0, maximum=MAX_SEED, whole=True),
+            tr("Of the random numbers. It also chooses the places that are kept back."),
+        ),
+        advanced(
+            choice("DEVICE", tr("Device of the training"), DEVICES, "AUTO"),
+            tr("CPU, or CUDA for an Nvidia GPU. AUTO uses the GPU if there is one."),
+        ),
     )
 
 

@@ -50,7 +50,7 @@ def write_report(
     path = algorithm.parameterAsFileOutput(parameters, name, context)
     if not path:
         return {}
-    written = _write(algorithm, name, path, origin.report(network))
+    written = write_page(algorithm, name, path, origin.report(network))
     notices.report_written.emit(path)
     return written
 
@@ -82,10 +82,10 @@ def write_check(
     rows = "".join(f"<tr><th align='left'>{escape(key)}</th><td>{escape(facts[key])}</td></tr>" for key in facts)
     title = f"<title>{escape(algorithm.displayName())}</title>"
     page = f'<!DOCTYPE html><meta charset="utf-8">{title}<h1>{escape(verdict)}</h1><table>{rows}</table>'
-    return _write(algorithm, name, path, page)
+    return write_page(algorithm, name, path, page)
 
 
-def _write(algorithm: QgsProcessingAlgorithm, name: str, path: str, page: str) -> dict[str, str]:
+def write_page(algorithm: QgsProcessingAlgorithm, name: str, path: str, page: str) -> dict[str, str]:
     """Write a page to an output; QGIS chooses the path of a temporary one during the run."""
     destination = algorithm.destinations.get(name) or Destination.at(Path(path))
     destination.write_text(page)

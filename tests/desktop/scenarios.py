@@ -23,7 +23,7 @@ SAMPLE, ARCHIVE = os.environ["RAIL_EXTRACT_SAMPLE"], os.environ["RAIL_EXTRACT_ZI
 
 NAMES = (
     *("extractrails", "classifyrailpoints", "growrailpoints", "rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
-    *("buildtrackcenterlines", "measuretrackgeometry", "installpackages", "checkinstallation"),
+    *("buildtrackcenterlines", "measuretrackgeometry", "trainrailclassifier", "installpackages", "checkinstallation"),
 )
 
 PART = {

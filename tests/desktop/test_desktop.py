@@ -9,7 +9,7 @@ from osgeo import gdal, ogr
 SCENARIOS = ("dialogs", "rails", "review", "deliveries", "batch", "model")
 NAMES = [
     *("extractrails", "classifyrailpoints", "growrailpoints", "rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
-    *("buildtrackcenterlines", "measuretrackgeometry", "installpackages", "checkinstallation"),
+    *("buildtrackcenterlines", "measuretrackgeometry", "trainrailclassifier", "installpackages", "checkinstallation"),
 ]
 
 
@@ -25,7 +25,7 @@ def test_every_dialog_opens_and_its_help(run_scenario):
     session = run_scenario("dialogs")
     assert session["dialogs"] == NAMES
     pages = [Path(address.replace("file://", "")).name for address in session["help"]]
-    assert pages == ["parameters.html"] * 8 + ["troubleshooting.html"] * 2
+    assert pages == ["parameters.html"] * 9 + ["troubleshooting.html"] * 2
 
 
 def test_cloud_is_chosen_from_clouds_alone(run_scenario):

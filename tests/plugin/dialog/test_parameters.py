@@ -10,6 +10,8 @@ PARAMETERS = [
     ("RAIL_CLASSES", "string", "10"),
     ("MERGE_CLASSES", "boolean", False),
     ("CLASSIFY", "boolean", False),
+    ("METHOD", "enum", "GEOMETRY"),
+    ("WEIGHTS", "file", None),
     ("STANDARD", "enum", "EN_60E1_1435"),
     ("GAUGE", "number", None),
     ("HEAD_WIDTH", "number", None),
@@ -63,7 +65,7 @@ OUTPUTS = {
 
 RESULTS = {"RAILS", "CENTERLINES", "QUALITY", "FINDINGS", "CLEANED", "REPORT"}
 ESSENTIAL = {"INPUT", "RAIL_CLASSES", "CLASSIFY", "STANDARD", "GAUGE", "HEAD_WIDTH", "EXTENT", "MAX_GAP"} | RESULTS
-OPTIONAL = {"GAUGE", "HEAD_WIDTH", "EXTENT", "MASK", "CRS", "LEAVE_OUT", "OTHER_GAUGES"} | RESULTS
+OPTIONAL = {"WEIGHTS", "GAUGE", "HEAD_WIDTH", "EXTENT", "MASK", "CRS", "LEAVE_OUT", "OTHER_GAUGES"} | RESULTS
 
 
 CORE_DEFAULTS = {name: getattr(Parameters, field) for name, field in {**NUMBERS, **CHOICES}.items()}

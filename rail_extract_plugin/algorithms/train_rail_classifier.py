@@ -1,0 +1,93 @@
+"""Train Rail Classifier: a network that learns rail points from labelled clouds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from qgis.core import QgsProcessingContext
+
+from ...core.disk import Destination
+from ...core.progress import Estimating, Progress
+from ...core.standards import SEARCHED_CLASSES, RailStandard
+from ..dialog import inputs, outputs
+from ..dialog import parameters as groups
+from ..dialog.parameter_values import ParameterValues
+from ..reading.clouds import CloudSource, request_points
+from ..writing.reports import write_page
+from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
+
+if TYPE_CHECKING:
+    from ...core.labelling.training import Plan
+
+
+@dataclass(frozen=True)
+class Job:
+    """The values of the parameters."""
+
+    cloud: CloudSource
+    standard: RailStandard
+    plan: Plan
+
+
+class TrainRailClassifier(RailAlgorithm):
+    """The algorithm ``railextract:trainrailclassifier``."""
+
+    NAME = "trainrailclassifier"
+    LABEL = "Train rail classifier"
+    TAGS = (*RAIL_WORDS, *CLOUD_WORDS, "classification", "training", "RandLA-Net", "deep learning", "neural network")
+    PICTURE = "gauge.svg"
+    NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",), ("torch",))
+    SUMMARY = "Trains a network on clouds whose rail points have a class, so that it classifies other clouds."
+    HELP = (
+        "Choose clouds with labelled rail points, the classes of these points and a file for the weights, then run. "
+        "All other points are examples of what is not on rails: the clouds must contain them. A training takes minutes "
+        "on a GPU and hours on a CPU.\n\n"
+        "Classify rail points and Extract rails use the weights with METHOD LEARNED. A classifier knows the scanner "
+        "that it learned from; for other scanners, geometry is often better. A fifth of the places is kept back, and "
+        "the card states how well the classifier labels them.\n\n"
+        "A run that is cancelled keeps what it has learned in a folder next to the weights. The same run continues "
+        "there."
+    )
+
+    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
+        """Declare the parameters and outputs in the order of the interface."""
+        for definition in (*inputs.cloud(), *groups.rail(), *groups.area(), *groups.training(), outputs.weights()):
+            self.addParameter(definition)
+        self._add_report(outputs.card())
+        for output in outputs.training_figures():
+            self.addOutput(output)
+
+    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+        """Read and check the parameters, in the main thread."""
+        from ...core.labelling.training import Plan, check_training
+
+        values = ParameterValues(self, parameters, context)
+        epochs, seed = int(values.number("EPOCHS")), int(values.number("SEED"))
+        plan = Plan(values.class_codes(), epochs, seed, values.choice("DEVICE"))
+        check_training(Path(self.parameterAsFileOutput(parameters, "WEIGHTS", context)), plan)
+        return Job(values.cloud("INPUT"), values.standard(), plan)
+
+    def compute(
+        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
+    ) -> dict[str, Any]:
+        """Train, and write the weights and the card."""
+        from ...core.classify.settings import Settings
+        from ...core.labelling.training import train_classifier
+        from ...core.report.training_card import build_card, facts_of
+
+        values, progress = ParameterValues(self, parameters, context), Estimating(progress)
+        request = request_points(job.cloud, SEARCHED_CLASSES, values.extent, progress)
+        settings = Settings((job.standard.gauge_m,), job.standard.head_width_m)
+        # QGIS chooses the names of temporary files during the run.
+        weights, card = (self.parameterAsFileOutput(parameters, name, context) for name in ("WEIGHTS", "CARD"))
+        destination = self.destinations.get("WEIGHTS") or Destination.at(Path(weights))
+        trained = train_classifier(request, settings, job.plan, destination, progress)
+        results = {"WEIGHTS": weights}
+        if card:
+            names = [header.path.name for header in request.headers]
+            page = build_card(trained, names, facts_of(trained, job.plan, job.standard))
+            results.update(write_page(self, "CARD", card, page))
+        total = trained.total
+        return {**results, "RECALL": total.recall, "PRECISION": total.precision, "STEPS": trained.steps}

@@ -1,0 +1,124 @@
+"""Faults of labels, weights and trainings."""
+
+import numpy as np
+import pytest
+from faults import REFUSED, Fault
+from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
+
+pytest.importorskip("torch")
+
+TITLE = "Trained classifiers"
+
+CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
+
+
+def labelled(change=lambda xyz, codes: (xyz, codes), **parameters):
+    """A cloud of 8 m of track whose rail points are labelled, changed, and these parameters."""
+
+    def prepare(bench):
+        rng = np.random.RandomState(3)
+        xyz, on = with_track(flat(8.0, rng=rng, per_m2=300), 1.435, 0.072, 0.3)
+        xyz, codes = change(rough(xyz, rng), np.where(on, 10, 2))
+        return {"INPUT": bench.cloud(xyz + CORNER, "labelled.laz", codes), **parameters}
+
+    return prepare
+
+
+def weights(content, **parameters):
+    """Weights in a file with this content."""
+
+    def prepare(bench):
+        path = bench.folder / "weights.npz"
+        if content == "something else":
+            np.savez_compressed(path, kernel=np.zeros((5, 2), np.float32))
+        elif content is not None:
+            path.write_bytes(content)
+        return {**labelled()(bench), "METHOD": "LEARNED", "WEIGHTS": path, **parameters}
+
+    return prepare
+
+
+def cancelled(percent):
+    def prepare(bench):
+        bench.feedback.progressChanged.connect(lambda done: bench.feedback.cancel() if done >= percent else None)
+        return labelled()(bench)
+
+    return prepare
+
+
+FAULTS = [
+    Fault(
+        "training without labels",
+        labelled(RAIL_CLASSES="11"),
+        REFUSED,
+        "The cloud has no points of class 11 to learn from: classify its rails, or set the rail classes.",
+    ),
+    Fault(
+        "training with labels of one class only",
+        labelled(lambda xyz, codes: (xyz[codes == 10], codes[codes == 10])),
+        REFUSED,
+        "All points of the cloud are of class 10: give the whole cloud, with the points around the rails.",
+    ),
+    Fault(
+        "training with labels on the ground",
+        labelled(lambda xyz, codes: (xyz * [1, 1, 0.05], codes)),
+        REFUSED,
+        "No point of class 10 is 0.055 to 0.4 m above the bed, where railheads lie: check the labels and the unit of "
+        "the coordinates.",
+    ),
+    Fault(
+        "training with labels in one place",
+        labelled(lambda xyz, codes: (xyz[xyz[:, 0] < 17], codes[xyz[:, 0] < 17])),
+        REFUSED,
+        "The labelled rails all lie in one place of 20 m: give a longer labelled cloud, so that a part can be kept "
+        "back for validation.",
+    ),
+    Fault("training cancelled while the cloud is read", cancelled(1), REFUSED, "Cancelled; nothing was written."),
+    Fault(
+        "classification with METHOD LEARNED and no weights",
+        labelled(METHOD="LEARNED"),
+        REFUSED,
+        "METHOD LEARNED needs WEIGHTS: choose those that Train rail classifier has written.",
+        run="classifyrailpoints",
+    ),
+    Fault(
+        "classification with weights and METHOD GEOMETRY",
+        weights(b"", METHOD="GEOMETRY"),
+        REFUSED,
+        "WEIGHTS are for METHOD LEARNED: choose this method, or leave WEIGHTS empty.",
+        run="classifyrailpoints",
+    ),
+    Fault(
+        "classification with weights that are missing",
+        weights(None),
+        REFUSED,
+        "The weights file …weights.npz is missing: choose one that Train rail classifier has written.",
+        run="classifyrailpoints",
+    ),
+    Fault(
+        "classification with damaged weights",
+        weights(b"PK\x03\x04 cut"),
+        REFUSED,
+        "The weights file weights.npz cannot be read: choose one that Train rail classifier has written.",
+        run="classifyrailpoints",
+    ),
+    Fault(
+        "classification with weights of something else",
+        weights("something else"),
+        REFUSED,
+        "weights.npz holds the weights of something else: choose a file that Train rail classifier has written.",
+        run="classifyrailpoints",
+    ),
+    Fault(
+        "extraction with METHOD LEARNED from a classified cloud",
+        labelled(METHOD="LEARNED"),
+        REFUSED,
+        "METHOD LEARNED is for raw clouds: set CLASSIFY, or choose GEOMETRY.",
+        run="extractrails",
+    ),
+]
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_fault(meet, fault):
+    meet(fault, "trainrailclassifier")
