@@ -217,11 +217,16 @@ def _quantile(cell: np.ndarray, height: np.ndarray, cells: int, low: float) -> n
     with np.errstate(invalid="ignore"):
         inside = np.flatnonzero((height >= low) & (height < low + count * FINE_M))
     bins = np.minimum(((height[inside] - np.float32(low)) * np.float32(1 / FINE_M)).astype(np.int32), count - 1)
-    counts = np.bincount(cell[inside] * np.int32(count) + bins, minlength=cells * count).reshape(cells, count)
+    cell = cell[inside]
+    found = np.full(cells, np.nan, dtype=np.float32)
+    held = np.zeros(cells, dtype=bool)
+    held[cell] = True
+    row = np.cumsum(held, dtype=np.int32) - np.int32(1)  # the upper levels have few cells
+    counts = np.bincount(row[cell] * np.int32(count) + bins, minlength=int(held.sum()) * count).reshape(-1, count)
     below = np.cumsum(counts, axis=1, dtype=np.int32)
-    total = below[:, -1]
-    number = np.argmax(below >= np.maximum(QUANTILE * total, 1)[:, None], axis=1)
-    return np.where(total > 0, low + (number + 0.5) * FINE_M, np.nan).astype(np.float32)
+    number = np.argmax(below >= np.maximum(QUANTILE * below[:, -1], 1)[:, None], axis=1)
+    found[held] = low + (number + 0.5) * FINE_M
+    return found
 
 
 def _planes(level_heights: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

@@ -170,7 +170,7 @@ class Window:
 
     def sums(self, image: np.ndarray) -> np.ndarray:
         """Sum an image of whole numbers in each window, (k,)."""
-        kind = np.uint16 if image.dtype == bool else np.int32  # at most 65 535 cells in a window
+        kind = np.min_scalar_type((2 * self.reach + 1) ** 2) if image.dtype == bool else np.int32
         across = _sums_along(image.astype(kind), self.reach, 1)
         return _sums_along(across, self.reach, 0).ravel()[self.cell]
 

@@ -8,7 +8,7 @@ from ..classify.settings import MARGIN_M, Settings
 from ..classify.square import Classified
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
-from ..squares.grid import points_by_square
+from ..squares.grid import points_by_square, unique_keys
 from ..tasks import Context, Once
 from .finding import search_square
 
@@ -31,10 +31,10 @@ def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SIL
     """
     rail = np.zeros(len(xyz), dtype=bool)
     figures = SearchFigures()
-    members = points_by_square(xyz, settings.side_m)
+    keys, _ = unique_keys(xyz, settings.side_m)
     context = Context({}, Once(), progress)
     around_them = points_by_square(xyz, settings.side_m, MARGIN_M)
-    for key in progress.follow(list(members)):
+    for key in progress.follow(keys):
         number = around_them[key]
         corner = np.array([*np.multiply(key, settings.side_m), 0.0])
         found = search_square(xyz[number] - corner, settings.at(key), context)

@@ -24,7 +24,7 @@ from ..learned.model import Classifier
 from ..learned.square import label_square
 from ..progress import SILENT, Progress
 from ..rails import ENOUGH_CELLS_PER_M, SearchFigures
-from ..squares.grid import Key, Square, points_by_square
+from ..squares.grid import Key, Square, points_by_square, unique_keys
 from ..standards import LAST_CLASS
 from ..tasks import Context, Runner, Task, in_listed_order
 
@@ -236,14 +236,14 @@ def _append(
 ) -> None:
     """Append points to the files of the squares that need them, and count them in their own squares."""
     places = zero.to_local(points["xyz"])
-    members = points_by_square(places, side_m)
-    if len(members) > MANY_SQUARES and len(points) < FEW_IN_SQUARE * len(members):
+    keys, square = unique_keys(places, side_m)
+    if len(keys) > MANY_SQUARES and len(points) < FEW_IN_SQUARE * len(keys):
         raise CloudError(
             f"The points of {name} are too far apart for rails: if the coordinates are in centimetres or millimetres, "
             "assign a coordinate system that says so."
         )
-    for key, numbers in members.items():
-        counts[key] = counts.get(key, 0) + len(numbers)
+    for key, count in zip(keys, np.bincount(square).tolist()):
+        counts[key] = counts.get(key, 0) + count
     with writing(folder.parent):
         for key, numbers in points_by_square(places, side_m, MARGIN_M).items():
             with _file(folder, key).open("ab") as file:
