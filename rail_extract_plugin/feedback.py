@@ -1,10 +1,10 @@
-"""Reports the core's progress to QGIS."""
+"""Reports the core's progress to QGIS: to the log of a run, and to the status bar."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from qgis.core import QgsProcessingFeedback, QgsProcessingParameterDefinition
+from qgis.core import QgsProcessingFeedback, QgsProcessingParameterDefinition, QgsTask
 
 from ..core.progress import Progress
 from .dialog.wording import for_user
@@ -45,3 +45,23 @@ class QgisProgress(Progress):
     def is_cancelled(self) -> bool:
         """Return whether the Cancel button was pressed."""
         return self._feedback.isCanceled()
+
+
+class TaskProgress(Progress):
+    """Shows the progress of a background task in QGIS's status bar.
+
+    Parameters
+    ----------
+    task : QgsTask
+    """
+
+    def __init__(self, task: QgsTask) -> None:
+        self._task = task
+
+    def set_fraction(self, fraction: float) -> None:
+        """Move the progress bar."""
+        self._task.setProgress(100 * fraction)
+
+    def is_cancelled(self) -> bool:
+        """Return whether the task was cancelled."""
+        return self._task.isCanceled()

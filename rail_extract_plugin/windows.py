@@ -1,4 +1,4 @@
-"""What the plugin adds to QGIS's windows: menu entries, settings, the report after a run, and the dock for reviews.
+"""What the plugin adds to QGIS's windows: menu entries, settings, reports after runs, the dock and the toolbar.
 
 QGIS imports this module when it starts with windows; nothing else may.
 """
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from qgis.core import QgsProject
 from qgis.PyQt.QtCore import QObject, Qt
 from qgis.PyQt.QtGui import QIcon
-from qgis.PyQt.QtWidgets import QAction
+from qgis.PyQt.QtWidgets import QAction, QToolBar
 
 from .i18n import tr
 from .model_action import OpenModelAction
@@ -22,6 +22,7 @@ from .setup import package_setting
 from .setup.dependencies import is_installed
 
 if TYPE_CHECKING:
+    from .growing.tool import GrowRails
     from .review.dock import ReviewDock
 
 MENU = "Rail Extract"
@@ -47,6 +48,8 @@ class Windows(QObject):
         self._reports = ReportOpener()
         self._reports.register()
         self.dock: ReviewDock | None = None
+        self.growing: GrowRails | None = None
+        self._toolbar: QToolBar | None = None
         self._entries: list[QAction] = []
         if iface is not None:
             self._add_to(iface)
@@ -57,7 +60,7 @@ class Windows(QObject):
         sample.triggered.connect(lambda: self._actions[0].execute())
         self._entries = [sample]
         if is_installed("numpy"):
-            self._entries.append(self._add_dock(iface))
+            self._entries += [self._add_dock(iface), self._add_toolbar(iface)]
         for entry in self._entries:
             iface.addPluginToMenu(MENU, entry)
 
@@ -72,6 +75,17 @@ class Windows(QObject):
         review = self.dock.toggleViewAction()
         review.setText(tr("Review Findings"))
         return review
+
+    def _add_toolbar(self, iface) -> QAction:
+        """Add the toolbar for growing rails, and return the menu entry that begins it."""
+        from .growing.tool import GrowRails
+
+        self.growing = GrowRails(iface.mapCanvas(), iface.messageBar(), iface.activeLayer, iface.mainWindow())
+        self._toolbar = iface.addToolBar(MENU)
+        self._toolbar.setObjectName("RailExtractGrowing")
+        self._toolbar.addActions(self.growing.actions)
+        self._toolbar.addWidget(self.growing.standards)
+        return self.growing.grow_action
 
     def _show_findings(self, layer_id: str) -> None:
         """Open the dock for the findings of a run, if there are any."""
@@ -89,9 +103,17 @@ class Windows(QObject):
             self._iface.removeDockWidget(self.dock)
             self.dock.deleteLater()
             self.dock = None
+        if self.growing is not None and self._toolbar is not None:
+            self.growing.close_for_good()
+            self._iface.mainWindow().removeToolBar(self._toolbar)
+            self._toolbar.deleteLater()
+            self._toolbar = None
         for entry in self._entries:
             self._iface.removePluginMenu(MENU, entry)
         self._entries = []
+        if self.growing is not None:
+            self.growing.deleteLater()
+            self.growing = None
         self._reports.deregister()
         package_setting.deregister()
         for action in self._actions:

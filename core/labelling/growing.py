@@ -299,15 +299,18 @@ def _lengths(growths: Sequence[Growth]) -> SearchFigures:
 def _report(growths: Sequence[Growth], figures: SearchFigures, request: Request, progress: Progress) -> None:
     """Inform the user of what grew, and where and why it stops."""
     for growth in growths:
-        first, last = (f"{_place(stop.xyz, request)}, where {stop.reason.value}" for stop in growth.stops)
-        progress.info(
-            f"Followed {' and '.join(f'{rail.length_m:.0f} m' for rail in growth.rails)} of rail from {first}, to "
-            f"{last}."
-        )
+        progress.info(described(growth, request))
     progress.info(
         f"Found {figures.points} rail points: {figures.paired_m:.0f} m of rails with a partner and "
         f"{figures.single_m:.0f} m of single rails."
     )
+
+
+def described(growth: Growth, request: Request) -> str:
+    """Say how far rails were followed, and why they end."""
+    first, last = (f"{_place(stop.xyz, request)}, where {stop.reason.value}" for stop in growth.stops)
+    lengths = " and ".join(f"{rail.length_m:.0f} m" for rail in growth.rails)
+    return f"Followed {lengths} of rail from {first}, to {last}."
 
 
 def _place(xyz: np.ndarray, request: Request) -> str:

@@ -50,6 +50,7 @@ class GrowRailPoints(RailAlgorithm):
         "The copy has the same points in the same order with the same attributes; points on these rails get the class "
         "of rail points. Where the input is a folder or a virtual point cloud, a folder of the same tiles is written, "
         "with a virtual point cloud (.vpc) of the same name next to it.\n\n"
+        "The toolbar button Grow Rails lets you click rails on the map and shows at once what grows. "
         "The page about growing describes the method and its limits; it was tested on simulated clouds only."
     )
 

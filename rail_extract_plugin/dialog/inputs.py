@@ -77,7 +77,7 @@ def seeds() -> Definitions:
             QgsProcessingParameterFeatureSource("SEEDS", tr("Seeds"), [point, line], optional=True),
             tr(
                 "Points on railheads, or lines along them, one for each rail or track to follow. In another coordinate "
-                "system they are transformed."
+                "system they are transformed. The map tool Grow Rails makes such a layer."
             ),
         ),
         helped(

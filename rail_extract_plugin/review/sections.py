@@ -11,7 +11,7 @@ import numpy as np
 from qgis.core import QgsProject, QgsTask, QgsVectorLayer
 
 from ...core.errors import Cancelled, RailExtractError
-from ...core.progress import Progress
+from ..feedback import TaskProgress
 from ..writing.layers import vertices_of
 from ..writing.run import RUN, RunCloud, cloud_of
 from .findings import Review
@@ -125,7 +125,7 @@ class ReadingTask(QgsTask):
             from ...core.clouds.sections import points_near
 
             request = ask(self._cloud.paths, self._cloud.class_codes, self._cloud.crs_wkt)
-            found = points_near(request, list(self._places.values()), REACH_M, _TaskProgress(self))
+            found = points_near(request, list(self._places.values()), REACH_M, TaskProgress(self))
             self._points = dict(zip(self._places, found))
         except Cancelled:
             return False
@@ -139,21 +139,6 @@ class ReadingTask(QgsTask):
         """Pass the points on, in the main thread."""
         if result:
             self._done(self._points, self._error)
-
-
-class _TaskProgress(Progress):
-    """Shows the progress in QGIS's status bar."""
-
-    def __init__(self, task: QgsTask) -> None:
-        self._task = task
-
-    def set_fraction(self, fraction: float) -> None:
-        """Move the progress bar."""
-        self._task.setProgress(100 * fraction)
-
-    def is_cancelled(self) -> bool:
-        """Return whether the task was cancelled."""
-        return self._task.isCanceled()
 
 
 def _level(rails: np.ndarray, points: np.ndarray | None) -> float:

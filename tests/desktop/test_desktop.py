@@ -89,7 +89,7 @@ def test_saved_raster_has_its_system(run_scenario):
 
 def test_the_menu_opens_the_sample(run_scenario):
     session = run_scenario("review")
-    assert session["menu"] == ["Open the Sample…", "Review Findings"]
+    assert session["menu"] == ["Open the Sample…", "Review Findings", "Grow Rails"]
     assert session["sample"].endswith("rail_extract/resources/sample/sample.laz")
     assert session["standard"] == "IN_75R_1000"
 

@@ -1,0 +1,1 @@
+"""The map tool that follows rails from clicks."""

@@ -1,0 +1,93 @@
+"""What grows from a click, computed in the background."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from qgis.core import QgsPointXY, QgsTask
+
+from ...core.errors import Cancelled, RailExtractError
+from ...core.standards import SEARCHED_CLASSES, RailStandard
+from ..feedback import TaskProgress
+from ..reading.clouds import CloudSource, points_folder
+
+if TYPE_CHECKING:
+    import numpy as np
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What grew from a seed, in the coordinate system of the cloud.
+
+    Attributes
+    ----------
+    rails : tuple of (k, 2) array
+    ends : tuple of (2,) array
+        Both ends of the rail of the seed.
+    text : str
+        How far it goes and why it ends; or why there is none.
+    """
+
+    rails: tuple[np.ndarray, ...] = ()
+    ends: tuple[np.ndarray, ...] = ()
+    text: str = ""
+
+
+class GrowTask(QgsTask):
+    """Follows the rail at a place, in a thread of QGIS.
+
+    Parameters
+    ----------
+    cloud : CloudSource
+    standard : RailStandard
+    seed : QgsPointXY
+        In the coordinate system of the cloud.
+    done : callable
+        Called in the main thread with what grew; not if the task was cancelled.
+    """
+
+    def __init__(
+        self, cloud: CloudSource, standard: RailStandard, seed: QgsPointXY, done: Callable[[Shown], None]
+    ) -> None:
+        super().__init__("Rail Extract: growing rails", QgsTask.Flag.CanCancel)
+        self._cloud, self._standard, self._seed, self._done = cloud, standard, seed, done
+        self._shown = Shown()
+
+    def run(self) -> bool:
+        """Follow the rail; no exception may leave this method."""
+        try:
+            self._shown = self._grown()
+        except Cancelled:
+            return False
+        except RailExtractError as error:
+            self._shown = Shown(text=str(error))
+        except Exception as error:
+            self._shown = Shown(text=f"The rail can't be followed ({type(error).__name__}: {error}).")
+        return True
+
+    def _grown(self) -> Shown:
+        import numpy as np
+
+        from ...core.clouds.points import ask
+        from ...core.grow.settings import GrowSettings
+        from ...core.labelling.growing import described, grow_all
+
+        request = ask(self._cloud.paths, SEARCHED_CLASSES, self._cloud.crs_wkt)
+        request = replace(request, leave_out=self._cloud.leave_out)
+        settings = GrowSettings(self._standard.gauge_m, self._standard.head_width_m)
+        seed = np.array([[self._seed.x(), self._seed.y()]])
+        with points_folder() as folder:
+            _, (growth,) = grow_all(request, [seed], settings, folder, TaskProgress(self))
+        to_crs = request.zero.to_crs
+        return Shown(
+            tuple(to_crs(rail.xyz)[:, :2] for rail in growth.rails),
+            tuple(to_crs(stop.xyz)[:2] for stop in growth.stops),
+            described(growth, request),
+        )
+
+    def finished(self, result: bool) -> None:
+        """Pass on what grew, in the main thread."""
+        if result:
+            self._done(self._shown)

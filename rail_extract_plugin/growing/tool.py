@@ -1,0 +1,320 @@
+"""The toolbar "Rail Extract": click rails on the map, see them grow, undo, and accept them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+
+from qgis.core import (
+    Qgis,
+    QgsApplication,
+    QgsCoordinateReferenceSystem,
+    QgsCoordinateTransform,
+    QgsFeature,
+    QgsGeometry,
+    QgsMapLayer,
+    QgsPointCloudLayer,
+    QgsPointXY,
+    QgsProcessingContext,
+    QgsProject,
+    QgsVectorLayer,
+    QgsWkbTypes,
+)
+from qgis.gui import QgsMapCanvas, QgsMapMouseEvent, QgsMapTool, QgsMessageBar, QgsRubberBand
+from qgis.PyQt import sip
+from qgis.PyQt.QtCore import QObject, Qt
+from qgis.PyQt.QtGui import QColor, QIcon
+from qgis.PyQt.QtWidgets import QAction, QComboBox, QWidget
+
+from ...core.errors import RailExtractError
+from ...core.standards import DEFAULT, STANDARDS
+from ..algorithms.grow_rail_points import GrowRailPoints
+from ..i18n import tr
+from ..paths import ICONS
+from ..reading.clouds import cloud_source
+from ..setup.dependencies import explain_missing, missing_packages
+from .task import GrowTask, Shown
+
+COLOUR, WIDTH, END_SIZE = "#e64a19", 3, 11
+"""Colour and width of the rails, and size of the marks at their ends, in pixels."""
+
+MESSAGE_S = 10
+"""Time for which a message is shown."""
+
+
+@dataclass
+class Seed:
+    """A click, and what is drawn for it.
+
+    Attributes
+    ----------
+    place : QgsPointXY
+    crs : QgsCoordinateReferenceSystem
+        That of the place: the layer's.
+    bands : list of QgsRubberBand
+    """
+
+    place: QgsPointXY
+    crs: QgsCoordinateReferenceSystem
+    bands: list[QgsRubberBand]
+
+
+class ClickTool(QgsMapTool):
+    """Reports clicks on the map, and the keys for undo and accept.
+
+    Parameters
+    ----------
+    canvas : QgsMapCanvas
+    clicked : callable
+        Called with a place in the coordinate system of the map.
+    undo, accept : callable
+    """
+
+    def __init__(
+        self,
+        canvas: QgsMapCanvas,
+        clicked: Callable[[QgsPointXY], None],
+        undo: Callable[[], None],
+        accept: Callable[[], None],
+    ) -> None:
+        super().__init__(canvas)
+        self._clicked = clicked
+        self._keys = {
+            Qt.Key.Key_Backspace: undo,
+            Qt.Key.Key_Delete: undo,
+            Qt.Key.Key_Return: accept,
+            Qt.Key.Key_Enter: accept,
+        }
+        self.setCursor(Qt.CursorShape.CrossCursor)
+
+    def canvasReleaseEvent(self, event: QgsMapMouseEvent) -> None:
+        """Pass a click of the left button on."""
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._clicked(event.mapPoint())
+
+    def keyPressEvent(self, event) -> None:
+        """Undo with Backspace, accept with Enter."""
+        action = self._keys.get(event.key())
+        if action is not None:
+            event.ignore()  # or the canvas takes the key as well
+            action()
+
+
+class GrowRails(QObject):
+    """Grows rails from clicks on a point cloud layer.
+
+    Parameters
+    ----------
+    canvas : QgsMapCanvas
+    messages : QgsMessageBar
+    active_layer : callable
+        Returns the layer that is selected in the layer panel.
+    parent : QWidget
+    """
+
+    def __init__(
+        self,
+        canvas: QgsMapCanvas,
+        messages: QgsMessageBar,
+        active_layer: Callable[[], QgsMapLayer | None],
+        parent: QWidget,
+    ) -> None:
+        super().__init__(parent)
+        self._canvas, self._messages, self._active_layer = canvas, messages, active_layer
+        self._layer: QgsPointCloudLayer | None = None
+        self._task: GrowTask | None = None
+        self.seeds: list[Seed] = []
+        self.dialog: QWidget | None = None
+        self.message = ""
+        self.tool = ClickTool(canvas, self.click, self.undo, self.accept)
+        self.grow_action = self._action("growrailpoints.svg", tr("Grow Rails"), lambda: canvas.setMapTool(self.tool))
+        self.grow_action.setCheckable(True)
+        self.grow_action.setToolTip(tr("Click rails on a point cloud and see how far they can be followed"))
+        self.tool.setAction(self.grow_action)
+        self.undo_action = self._action("undo.svg", tr("Undo Last Rail"), self.undo)
+        self.accept_action = self._action("accept.svg", tr("Classify Grown Rails…"), self.accept)
+        self.standards = QComboBox()
+        self.standards.setToolTip(tr("Rail standard of the rails that are clicked"))
+        for name, standard in STANDARDS.items():
+            self.standards.addItem(standard.label, name)
+        self.standards.setCurrentIndex(self.standards.findData(DEFAULT))
+        QgsProject.instance().layersRemoved.connect(self._forget_removed)
+        self._enable()
+
+    def _action(self, icon: str, text: str, do: Callable[[], None]) -> QAction:
+        """Make an action."""
+        made = QAction(QIcon(str(ICONS / icon)), text, self.parent())
+        made.triggered.connect(lambda: do())
+        return made
+
+    @property
+    def actions(self) -> Sequence[QAction]:
+        """Actions of the toolbar, in order."""
+        return self.grow_action, self.undo_action, self.accept_action
+
+    @property
+    def is_growing(self) -> bool:
+        """Whether a rail is being followed."""
+        return self._task is not None
+
+    def click(self, place: QgsPointXY) -> None:
+        """Follow the rail at a place in the coordinate system of the map."""
+        if self.is_growing:
+            self._say(tr("The rail of the last click is still growing: wait, or undo it."))
+            return
+        try:
+            layer = self._chosen_layer()
+            cloud = cloud_source(layer, QgsProcessingContext())
+        except RailExtractError as error:
+            self._say(str(error))
+            return
+        self._layer, map_crs = layer, self._canvas.mapSettings().destinationCrs()
+        to_layer = QgsCoordinateTransform(map_crs, layer.crs(), QgsProject.instance())
+        seed = Seed(to_layer.transform(place), layer.crs(), [])
+        self.seeds.append(seed)
+        self._draw(seed, [QgsGeometry.fromPointXY(seed.place)], QgsWkbTypes.GeometryType.PointGeometry)
+        standard = STANDARDS[self.standards.currentData()]
+        self._task = GrowTask(cloud, standard, seed.place, lambda shown: self._show(seed, shown))
+        self._task.taskTerminated.connect(self._stopped)
+        QgsApplication.taskManager().addTask(self._task)
+        self._enable()
+
+    def _chosen_layer(self) -> QgsPointCloudLayer:
+        """Return the layer to grow in: the selected one, or the only cloud of the project.
+
+        Raises
+        ------
+        RailExtractError
+            There is none, seeds of another layer wait, or packages are missing.
+        """
+        missing = missing_packages(GrowRailPoints.NEEDS)
+        if missing:
+            raise RailExtractError(explain_missing(tr("Grow Rails"), missing, []))
+        layer = self._active_layer()
+        if not isinstance(layer, QgsPointCloudLayer):
+            layers = QgsProject.instance().mapLayers().values()
+            clouds = [one for one in layers if isinstance(one, QgsPointCloudLayer)]
+            if len(clouds) != 1:
+                raise RailExtractError(tr("Select a point cloud in the layer panel, then click on a rail."))
+            layer = clouds[0]
+        if self.seeds and layer is not self._layer:
+            raise RailExtractError(
+                tr("Rails of another point cloud are still shown: classify or undo them before you click on this one.")
+            )
+        return layer
+
+    def _show(self, seed: Seed, shown: Shown) -> None:
+        """Draw what grew, or take the click back if nothing did."""
+        self._task = None
+        if sip.isdeleted(self) or seed not in self.seeds:
+            return
+        if shown.rails:
+            lines = [QgsGeometry.fromPolylineXY([QgsPointXY(*place) for place in rail]) for rail in shown.rails]
+            self._draw(seed, lines, QgsWkbTypes.GeometryType.LineGeometry)
+            ends = [QgsGeometry.fromPointXY(QgsPointXY(*end)) for end in shown.ends]
+            self._draw(seed, ends, QgsWkbTypes.GeometryType.PointGeometry, QgsRubberBand.IconType.ICON_X)
+        else:
+            self._remove(seed)
+        self._say(shown.text)
+        self._enable()
+
+    def _draw(
+        self,
+        seed: Seed,
+        shapes: Sequence[QgsGeometry],
+        kind: QgsWkbTypes.GeometryType,
+        icon: QgsRubberBand.IconType = QgsRubberBand.IconType.ICON_CIRCLE,
+    ) -> None:
+        """Draw shapes over the map."""
+        band = QgsRubberBand(self._canvas, kind)
+        band.setColor(QColor(COLOUR))
+        band.setWidth(WIDTH)
+        band.setIcon(icon)
+        band.setIconSize(END_SIZE)
+        for shape in shapes:
+            band.addGeometry(shape, seed.crs)
+        seed.bands.append(band)
+
+    def undo(self) -> None:
+        """Take the last click back, also while its rail grows."""
+        self.cancel()
+        if self.seeds:
+            self._remove(self.seeds[-1])
+        self._enable()
+
+    def accept(self) -> None:
+        """Open the dialog of the algorithm with the seeds as a layer, and clear the map."""
+        from processing.gui.AlgorithmDialog import AlgorithmDialog
+
+        if self.is_growing or not self.seeds or self._layer is None:
+            return
+        values = {
+            "INPUT": self._layer.id(),
+            "SEEDS": self._seed_layer().id(),
+            "STANDARD": self.standards.currentData(),
+        }
+        algorithm = QgsApplication.processingRegistry().createAlgorithmById(f"railextract:{GrowRailPoints.NAME}")
+        self.dialog = AlgorithmDialog(algorithm, parent=self.parent())
+        self.dialog.setParameters(values)
+        self.dialog.show()
+        self.clear()
+
+    def _seed_layer(self) -> QgsVectorLayer:
+        """Add a layer with the seeds to the project."""
+        layer = QgsVectorLayer("Point", tr("Rail seeds"), "memory")
+        layer.setCrs(self.seeds[0].crs)
+        features = [QgsFeature() for _ in self.seeds]
+        for feature, seed in zip(features, self.seeds):
+            feature.setGeometry(QgsGeometry.fromPointXY(seed.place))
+        layer.dataProvider().addFeatures(features)
+        layer.updateExtents()
+        return QgsProject.instance().addMapLayer(layer)
+
+    def clear(self) -> None:
+        """Take all clicks back."""
+        self.cancel()
+        for seed in list(self.seeds):
+            self._remove(seed)
+        self._layer = None
+        self._enable()
+
+    def cancel(self) -> None:
+        """Stop growing."""
+        if self._task is not None:
+            task, self._task = self._task, None
+            with suppress(RuntimeError):  # QGIS deletes finished tasks
+                task.cancel()
+
+    def close_for_good(self) -> None:
+        """Stop and clean the map, before the tool is deleted."""
+        QgsProject.instance().layersRemoved.disconnect(self._forget_removed)
+        self.clear()
+        if self._canvas.mapTool() is self.tool:
+            self._canvas.unsetMapTool(self.tool)
+
+    def _stopped(self) -> None:
+        """Take the click of a task back that was cancelled in the status bar."""
+        if self._task is not None:
+            self.undo()
+
+    def _remove(self, seed: Seed) -> None:
+        """Take a click back."""
+        for band in seed.bands:
+            self._canvas.scene().removeItem(band)
+        self.seeds.remove(seed)
+
+    def _forget_removed(self, ids: Sequence[str]) -> None:
+        """Take all clicks back if their layer was removed."""
+        if self._layer is not None and (sip.isdeleted(self._layer) or self._layer.id() in ids):
+            self.clear()
+
+    def _say(self, text: str) -> None:
+        """Show a message above the map."""
+        self.message = text
+        self._messages.pushMessage(tr("Grow Rails"), text, Qgis.MessageLevel.Info, MESSAGE_S)
+
+    def _enable(self) -> None:
+        """Enable what can be done."""
+        self.undo_action.setEnabled(bool(self.seeds))
+        self.accept_action.setEnabled(bool(self.seeds) and not self.is_growing)

@@ -1,0 +1,157 @@
+"""The map tool: clicks on a real map canvas, what is drawn, undo, and the dialog with the seeds."""
+
+import time
+
+import numpy as np
+import pytest
+from qgis.core import QgsCoordinateReferenceSystem, QgsPointCloudLayer, QgsPointXY, QgsProject, QgsRectangle
+from qgis.gui import QgsMapCanvas, QgsMessageBar
+from qgis.PyQt.QtCore import QPoint, Qt
+from qgis.PyQt.QtTest import QTest
+from qgis.PyQt.QtWidgets import QMainWindow
+from rail_extract.laboratory.scenes.raw_strips import SPACING_M, strip
+from rail_extract.rail_extract_plugin.growing.tool import GrowRails
+
+CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
+TRACK = strip(12.0)
+UTM = QgsCoordinateReferenceSystem("EPSG:32643")
+
+
+def place(along, left):
+    return QgsPointXY(*(CORNER[:2] + TRACK.at(along, left)))
+
+
+@pytest.fixture
+def canvas(qgis):
+    canvas = QgsMapCanvas()
+    canvas.resize(800, 400)
+    canvas.setDestinationCrs(UTM)
+    canvas.setExtent(QgsRectangle(499_999, 2_999_997, 500_013, 3_000_003))
+    canvas.show()
+    qgis.processEvents()
+    return canvas
+
+
+@pytest.fixture
+def layer(qgis, plugin, write_cloud):
+    """A layer of the project; it may be invalid here, because this QGIS may lack PDAL."""
+    layer = QgsPointCloudLayer(str(write_cloud(TRACK.xyz + CORNER, "raw.laz", 2)), "raw", "pdal")
+    layer.setCrs(UTM)
+    yield QgsProject.instance().addMapLayer(layer)
+    QgsProject.instance().clear()
+
+
+@pytest.fixture
+def growing(qgis, canvas):
+    window, messages = QMainWindow(), QgsMessageBar()
+    made = GrowRails(canvas, messages, lambda: None, window)
+    made.bar = messages
+    yield made
+    made.close_for_good()
+    if made.dialog is not None:
+        made.dialog.close()
+
+
+def click(canvas, point):
+    """Press and release the left button on the map."""
+    pixel = canvas.getCoordinateTransform().transform(point)
+    QTest.mouseClick(canvas.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(round(pixel.x()), round(pixel.y())))
+
+
+def wait(qgis, growing):
+    end = time.monotonic() + 60
+    while growing.is_growing and time.monotonic() < end:
+        qgis.processEvents()
+        time.sleep(0.02)
+    assert not growing.is_growing
+
+
+def lines(seed):
+    """Lengths of the lines that are drawn for a click."""
+    return [band.asGeometry().length() for band in seed.bands if band.asGeometry().length() > 1]
+
+
+def test_a_click_shows_both_rails_of_the_track_and_their_ends(qgis, canvas, layer, growing):
+    growing.grow_action.trigger()
+    assert canvas.mapTool() is growing.tool
+    assert growing.grow_action.isChecked()
+    click(canvas, place(6.0, SPACING_M / 2))
+    assert growing.is_growing
+    assert not growing.accept_action.isEnabled()
+    wait(qgis, growing)
+    (seed,) = growing.seeds
+    assert lines(seed) == [pytest.approx(23, abs=1.5)]
+    assert seed.bands[-1].asGeometry().constGet().numGeometries() == 2
+    assert growing.message.startswith("Followed 1")
+    assert "where the cloud ends" in growing.message
+    assert growing.accept_action.isEnabled()
+
+
+def test_a_click_beside_the_rails_is_taken_back_with_a_reason(qgis, canvas, layer, growing):
+    growing.click(place(6.0, 0.0))
+    wait(qgis, growing)
+    assert growing.seeds == []
+    assert growing.message.startswith("No seed lies on a rail: put seeds within 0.25 m")
+    assert not growing.undo_action.isEnabled()
+
+
+def test_backspace_takes_the_last_click_back(qgis, canvas, layer, growing):
+    growing.grow_action.trigger()
+    for along in (4.0, 8.0):
+        growing.click(place(along, SPACING_M / 2))
+        wait(qgis, growing)
+    first, second = growing.seeds
+    QTest.keyClick(canvas, Qt.Key.Key_Backspace)
+    assert growing.seeds == [first]
+    assert not any(band.scene() for band in second.bands)
+    assert all(band.scene() for band in first.bands)
+
+
+def test_undo_stops_a_rail_that_grows(qgis, canvas, layer, growing):
+    growing.click(place(6.0, SPACING_M / 2))
+    growing.undo()
+    assert growing.seeds == []
+    for _ in range(50):
+        qgis.processEvents()
+        time.sleep(0.02)
+    assert growing.seeds == []
+    growing.click(place(6.0, SPACING_M / 2))
+    wait(qgis, growing)
+    assert len(growing.seeds) == 1
+
+
+def test_the_dialog_opens_with_the_seeds_and_runs(qgis, canvas, layer, growing, run_step, tmp_path):
+    growing.standards.setCurrentIndex(growing.standards.findData("EN_49E1_1435"))
+    growing.click(place(6.0, -SPACING_M / 2))
+    wait(qgis, growing)
+    growing.accept()
+    values = growing.dialog.mainWidget().createProcessingParameters()
+    assert values["INPUT"] in (layer.id(), layer.source())
+    assert values["STANDARD"] == "EN_49E1_1435"
+    assert growing.seeds == []
+    done = run_step("growrailpoints", {**values, "INPUT": layer.source(), "OUTPUT": tmp_path / "new.laz"})
+    assert done.ok, done.error
+    assert done.results["PAIRED_LENGTH"] == pytest.approx(23, abs=1.5)
+
+
+def test_without_a_cloud_it_says_what_to_do(qgis, canvas, plugin, growing):
+    growing.click(place(6.0, 0.0))
+    assert growing.message == "Select a point cloud in the layer panel, then click on a rail."
+
+
+def test_a_second_cloud_has_to_wait(qgis, canvas, layer, growing):
+    growing.click(place(6.0, SPACING_M / 2))
+    wait(qgis, growing)
+    other = QgsProject.instance().addMapLayer(QgsPointCloudLayer("", "other", ""))
+    growing._active_layer = lambda: other
+    growing.click(place(6.0, SPACING_M / 2))
+    assert growing.message.startswith("Rails of another point cloud are still shown")
+    assert len(growing.seeds) == 1
+
+
+def test_removing_the_layer_takes_its_clicks_away(qgis, canvas, layer, growing):
+    growing.click(place(6.0, SPACING_M / 2))
+    wait(qgis, growing)
+    QgsProject.instance().removeMapLayer(layer.id())
+    assert growing.seeds == []
+    assert not growing.accept_action.isEnabled()
