@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 from driver import Driver, algorithm, choose, close, install, later, open_batch, open_dialog, press_run, window
 from qgis.core import (
     QgsCoordinateReferenceSystem,
     QgsPointCloudLayer,
+    QgsPointXY,
     QgsProject,
+    QgsRectangle,
     QgsVectorFileWriter,
     QgsVectorLayer,
 )
-from qgis.PyQt.QtCore import QObject, QUrl, pyqtSlot
+from qgis.PyQt.QtCore import QObject, QPoint, Qt, QUrl, pyqtSlot
 from qgis.PyQt.QtGui import QDesktopServices
+from qgis.PyQt.QtTest import QTest
 from qgis.PyQt.QtWidgets import QDialogButtonBox, QDockWidget, QFileDialog, QGroupBox, QLineEdit
-from qgis.utils import iface
+from qgis.utils import iface, plugins
 
 SAMPLE, ARCHIVE = os.environ["RAIL_EXTRACT_SAMPLE"], os.environ["RAIL_EXTRACT_ZIP"]
 
@@ -32,6 +36,9 @@ PART = {
     "ITERATIONS": 1,
 }
 """Parameters for 20 m of the sample's three tracks, for runs of a second or two."""
+
+ON_RAIL = QgsPointXY(578256.73, 2494330.32)
+"""A place on a rail of the sample."""
 
 POOL_S = 35.0
 """Time after which Qt has ended the thread of a run: 30 s without work, and some more."""
@@ -178,6 +185,44 @@ def review(driver: Driver) -> Iterator:
     driver.keep("scale", iface.mapCanvas().extent().width())
     yield 1.0
     driver.picture("review_rejected")
+
+
+def growing(driver: Driver) -> Iterator:
+    """Click a rail of the sample on the map, see it grow, click another one, undo it, and classify the first."""
+    yield from install(ARCHIVE)
+    layer, canvas = QgsPointCloudLayer(SAMPLE, "sample", "pdal"), iface.mapCanvas()  # invalid in a QGIS without PDAL
+    layer.setCrs(QgsCoordinateReferenceSystem("EPSG:32643"))
+    QgsProject.instance().setCrs(layer.crs())
+    iface.setActiveLayer(QgsProject.instance().addMapLayer(layer))
+    canvas.setExtent(QgsRectangle.fromCenterAndSize(ON_RAIL, 40, 40))
+    menu = next(one for one in iface.pluginMenu().actions() if one.text() == "Rail Extract").menu()
+    next(one for one in menu.actions() if one.text() == "Grow Rails").trigger()
+    tool = plugins["rail_extract"].windows.growing
+    tool.standards.setCurrentIndex(tool.standards.findData(PART["STANDARD"]))
+    yield 1.0
+    click = partial(QTest.mouseClick, canvas.viewport(), Qt.MouseButton.LeftButton)
+    for _ in range(2):
+        pixel = canvas.getCoordinateTransform().transform(ON_RAIL)
+        click(pos=QPoint(round(pixel.x()), round(pixel.y())))
+        yield lambda: not tool.is_growing
+    driver.keep("said", tool.message)
+    canvas.setExtent(QgsRectangle.fromCenterAndSize(ON_RAIL, 200, 200))
+    canvas.refresh()
+    yield 1.0
+    driver.picture("grown")
+    tool.undo_action.trigger()
+    driver.keep("left after undo", len(tool.seeds))
+    later(tool.accept_action.trigger)
+    dialog = yield lambda: window("AlgorithmDialog")
+    values = dialog.mainWidget().createProcessingParameters()
+    driver.keep("standard", values["STANDARD"])
+    driver.picture("grow_dialog")
+    classified = str(driver.folder / "classified.las")
+    dialog.setParameters({**values, "INPUT": SAMPLE, "RAIL_CLASS": 20, "OUTPUT": classified})
+    driver.keep("log", (yield from press_run(dialog)))
+    driver.keep("results", dialog.results())
+    yield from close(dialog)
+    driver.picture("grown_classified")
 
 
 def deliveries(driver: Driver) -> Iterator:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from osgeo import gdal, ogr
 
-SCENARIOS = ("dialogs", "rails", "review", "deliveries", "batch", "model")
+SCENARIOS = ("dialogs", "rails", "review", "growing", "deliveries", "batch", "model")
 NAMES = [
     *("extractrails", "classifyrailpoints", "growrailpoints", "rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
     *("buildtrackcenterlines", "measuretrackgeometry", "trainrailclassifier", "installpackages", "checkinstallation"),
@@ -111,6 +111,16 @@ def test_findings_are_reviewed_in_the_dock(run_scenario):
     decided = {feature["finding"]: feature["review"] for feature in layer}
     assert len(decided) == total
     assert (decided[1], decided[2], set(list(decided.values())[2:])) == ("accepted", "rejected", {""})
+
+
+def test_a_clicked_rail_grows_and_is_classified(run_scenario):
+    session = run_scenario("growing")
+    assert session["said"].startswith("Followed 1")
+    assert session["left after undo"] == 1
+    assert session["standard"] == "IN_75R_1000"
+    assert session["results"]["PAIRED_LENGTH"] > 300
+    assert "Followed 1" in session["log"]
+    assert (session.folder / "classified.las").stat().st_size > 1_000_000
 
 
 def test_files_for_other_programs_are_written_and_loaded(run_scenario):
