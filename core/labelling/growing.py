@@ -130,8 +130,8 @@ def grow_all(
     squares.fill(reading)
     growths: list[Growth] = []
     missed = 0
-    for seed in growing.follow(places):
-        grown = list(_grow_along(squares, seed, settings, progress))
+    for seed, share in zip(places, growing.split(len(places))):
+        grown = list(_grow_along(squares, seed, settings, share))
         growths += grown
         missed += not grown
     parameters = settings.parameters
@@ -151,7 +151,7 @@ def _grow_along(squares: Squares, places: np.ndarray, settings: GrowSettings, pr
     for place in (*places[:1], *places[:0:-1]):
         if len(reached) and np.hypot(*(reached - place).T).min() <= settings.parameters.search_m + SAME_M:
             continue
-        grown = grow(squares, place, settings, progress.span(0.0, 0.0))
+        grown = grow(squares, place, settings, progress)
         if grown is not None:
             yield grown
             reached = np.concatenate([reached, grown.rails[0].xyz[:, :2]])
@@ -306,9 +306,12 @@ def _report(growths: Sequence[Growth], figures: SearchFigures, request: Request,
     )
 
 
-def described(growth: Growth, request: Request) -> str:
-    """Say how far rails were followed, and why they end."""
-    first, last = (f"{_place(stop.xyz, request)}, where {stop.reason.value}" for stop in growth.stops)
+def described(growth: Growth, request: Request | None = None) -> str:
+    """Say how far rails were followed, why they end and, given the request for the points, where."""
+    first, last = (
+        f"{_place(stop.xyz, request)}, where {stop.reason.value}" if request else f"where {stop.reason.value}"
+        for stop in growth.stops
+    )
     lengths = " and ".join(f"{rail.length_m:.0f} m" for rail in growth.rails)
     return f"Followed {lengths} of rail from {first}, to {last}."
 

@@ -84,7 +84,7 @@ class GrowTask(QgsTask):
         return Shown(
             tuple(to_crs(rail.xyz)[:, :2] for rail in growth.rails),
             tuple(to_crs(stop.xyz)[:2] for stop in growth.stops),
-            described(growth, request),
+            described(growth),
         )
 
     def finished(self, result: bool) -> None:
