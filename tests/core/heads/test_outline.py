@@ -2,13 +2,16 @@ import numpy as np
 import pytest
 from rail_extract.core.heads.outline import (
     FACE_DEPTH_M,
+    LEAN_SIGMA,
     MAX_STEPS,
     MIN_STRAY_SHARE,
+    NOISE_RATIO_SIGMA,
     Blurred,
     Grid,
     Outline,
     Scores,
     Section,
+    _log_likelihood,
     _scoring_step,
     fit_section,
 )
@@ -145,3 +148,14 @@ def test_a_step_is_limited_where_the_start_is_far_off():
     assert step[0] < 0
     near = _scoring_step(counts, section, Blurred.at(section.place, outline, grid), counts > 0)
     assert np.abs(near[:6] / MAX_STEPS).max() < 0.1
+
+
+@pytest.mark.parametrize(
+    "place",
+    [[0, 0, LEAN_SIGMA, 0, 0, 0], [0, 0, 0, 0, NOISE_RATIO_SIGMA, 0], [0.01, 0.01, 0, 0, 1, 1 + NOISE_RATIO_SIGMA]],
+)
+def test_without_points_a_section_is_as_likely_as_is_expected_of_its_place(place):
+    outline, grid = Outline.of(WIDTH), Grid.of(WIDTH)
+    section = Section(np.array(place, dtype=float), np.full(len(outline.parts) + 1, 1 / (len(outline.parts) + 1)))
+    blurred = Blurred.at(section.place, outline, grid)
+    assert _log_likelihood(np.zeros(grid.size), section, blurred) == pytest.approx(-0.5)

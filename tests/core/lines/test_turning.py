@@ -159,3 +159,8 @@ def test_parts_are_listed_along_the_line_whichever_is_longest():
     assert parts == sorted(parts)
     lengths = [end - start for start, end in parts]
     assert lengths == pytest.approx([12, 30, 38, 5, 20], abs=2.1)
+
+
+def test_of_two_parts_on_each_other_the_longer_one_stays():
+    (part,) = parts_without_turns(way([0, 0], [6, 0], [6, 0.05], [-20, 0.05]), 1.0, 0.8)
+    assert part == (pytest.approx(6, abs=1.2), pytest.approx(32.05, abs=0.1))

@@ -11,7 +11,7 @@ from rail_extract.core.polyline import length_along
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.centerlines import build_centerlines
-from rail_extract.core.tracks.chaining import _Ends, _rail_links
+from rail_extract.core.tracks.chaining import _Ends, _facing, _rail_links
 from rail_extract.core.tracks.pairing import RailPair
 from rail_extract.laboratory.curves import Curve, Element, trace
 from rail_extract.laboratory.rasters.turnouts import FORMS, branch
@@ -263,3 +263,9 @@ def test_a_track_may_go_on_half_a_gauge_beside_the_rail_that_goes_on():
     assert ends.owner.tolist() == [0, 1, 0, 1]
     assert ends.xy == pytest.approx(np.array([[0, 0], [50, 0], [-5, 0], [54, 0]]))
     assert ends.outward == pytest.approx(np.array([[-1, 0], [1, 0], [-1, 0], [1, 0]]))
+
+
+@pytest.mark.parametrize(("aside_m", "faces"), [(0.02, True), (0.7, True), (0.8, False)])
+def test_ends_face_each_other_within_ten_degrees_of_the_gap(aside_m, faces):
+    ends = _Ends(np.array([1, 2]), np.array([[0, 0], [4.0, aside_m]]), np.array([[1.0, 0], [-1, 0]]))
+    assert len(_facing(ends, LONGEST_GAP_M, 0.05)) == faces

@@ -161,3 +161,14 @@ def test_a_straight_switch_has_a_heel_behind_which_the_branch_bends_outward(bend
     law, misfit_m = _angle(s, off, 8.0)
     assert law.touch == pytest.approx(touch)
     assert misfit_m.max() < 1e-9
+
+
+@pytest.mark.parametrize(("at_m", "is_extended"), [(None, True), (2.0, True), (11.0, False)])
+def test_a_branch_that_leaves_its_arc_late_is_not_extended(at_m, is_extended):
+    """An arc of 300 m that lies off by 5 cm for 2 m; it is followed as far as 0.8 m from the track."""
+    x = np.arange(0.0, 60.0, 0.5)
+    through = np.column_stack([x - 20, np.zeros((len(x), 2))])
+    branch = np.column_stack([x, (x + 8) ** 2 / 600, np.zeros(len(x))])
+    if at_m is not None:
+        branch[(x >= at_m) & (x < at_m + 2), 1] += 0.05
+    assert (_extended(branch, through) is not None) == is_extended
