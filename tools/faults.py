@@ -30,8 +30,8 @@ TRIED = (
     (
         "make fuzz",
         "damaged files of eleven kinds: LAS, LAZ, COPC, catalogues, weights, folders of earlier runs, vector layers, "
-        "rasters; 53,000 catalogues and LAZ files, 28,000 of all kinds",
-        "none ends in a traceback or a signal, or takes more than 1 GB",
+        "rasters; 50,000 catalogues, 3,000 LAZ files, 4,000 vector layers, 28,000 of all kinds",
+        "none ends in a traceback or a signal, takes more than 1 GB, or hangs",
     ),
     (
         "tools/kills.py 50",
@@ -46,7 +46,7 @@ TRIED = (
     (
         "tools/growth.py 200",
         "one extraction with all outputs after another, in one process",
-        "the memory that is held changes by less than 1 MB after the first run, in the 120 runs made",
+        "the memory that is held grows by 2 MB from the first run (484 MB) to the 180th (486 MB)",
     ),
 )
 """Faults that are made at random: the command, what it tries, and what its last run found."""
@@ -63,8 +63,6 @@ Some faults are made at random. Each command below makes as many as time allows;
 DENSE = """
 A cloud of 10 million points in one square metre takes 0.85 GB: 0.28 GB for Python and its libraries, 0.48 GB for the
 points as they are stored and in local metres.
-
-A raster in which half of the cells of 30 m by 30 m are set, as damage may leave it, takes some tens of seconds.
 """
 
 

@@ -84,19 +84,23 @@ def parity_fix(pixels: Pixels) -> Pixels:
 def chamfer_distance(pixels: Pixels) -> np.ndarray:
     """Measure the distance of each pixel to the background, edge steps 2 and diagonal steps 3, (n,) int array.
 
-    After r rounds, a distance is the shortest over paths of at most r steps. A longer path costs at least 2 (r + 1), so
-    pixels at or below that are final and leave the rounds.
+    Distances become final in ascending order, and each pixel passes its own on once, so that wide areas of cells, as in
+    rasters of something else than rails, take no longer per cell than lines do.
     """
     count = len(pixels)
     distance = np.full(count + 1, _FAR)
+    for direction in np.argsort(-np.array(STEP_COSTS), kind="stable").tolist():  # edge steps, which are shorter, last
+        distance[:count][pixels.neighbours[:, direction] == count] = STEP_COSTS[direction]
     distance[count] = 0
-    active, settled = np.arange(count), 2
-    while len(active):
-        around = pixels.neighbours[active]
-        nearest = distance[around[:, 0]] + STEP_COSTS[0]
-        for direction in range(1, len(RING)):
-            np.minimum(nearest, distance[around[:, direction]] + STEP_COSTS[direction], out=nearest)
-        distance[active] = nearest
-        settled += 2
-        active = active[nearest > settled]
+    waiting = {cost: [np.flatnonzero(distance == cost)] for cost in set(STEP_COSTS)}
+    while waiting:
+        level = min(waiting)
+        final = np.concatenate(waiting.pop(level))
+        final = final[distance[final] == level]  # to the others, a shorter path was found
+        for direction, cost in enumerate(STEP_COSTS):
+            reached = pixels.neighbours[final, direction]
+            reached = reached[distance[reached] > level + cost]
+            if len(reached):
+                distance[reached] = level + cost
+                waiting.setdefault(level + cost, []).append(reached)
     return distance[:count]

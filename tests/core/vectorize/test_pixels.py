@@ -100,3 +100,9 @@ def test_neighbours_are_mutual_and_do_not_wrap_around_rows():
         for direction in np.flatnonzero(around < len(pixels)):
             assert pixels.neighbours[around[direction], (direction + 4) % 8] == number
     assert np.count_nonzero(pixels.neighbours < len(pixels)) == 2 * 4
+
+
+def test_a_wide_area_is_as_deep_as_its_nearest_border():
+    cells = np.argwhere(np.ones((61, 90)))
+    inward = np.minimum(cells, [60, 89] - cells).min(axis=1) + 1
+    assert np.array_equal(chamfer_distance(pixel_set(cells)), 2 * inward)
