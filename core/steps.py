@@ -264,8 +264,8 @@ def warn_of_strips(rails: Sequence[RailLine], parameters: Parameters, progress: 
         )
     if STATION_STEP_M * np.sum(count == 1) >= MIN_STRIPS_APART_M:
         progress.warning(
-            f"Heads are blurred across on {STATION_STEP_M * np.sum(count == 1):.0f} m of rail, as by passes of the "
-            f"scanner up to {_largest(spread_m[count == 1])}, whose points state neither source id nor GPS time: "
+            f"Heads are blurred or too wide on {STATION_STEP_M * np.sum(count == 1):.0f} m of rail, as by passes of "
+            f"the scanner up to {_largest(spread_m[count == 1])}, whose points state neither source id nor GPS time: "
             "sigma_mm contains half of it. Export the cloud with them, or pass by pass."
         )
 

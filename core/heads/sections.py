@@ -6,7 +6,6 @@ station then show how far it is off there. See docs/method.md section 6.8.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,10 +18,12 @@ from .outline import Grid, Outline, Scores, Section, fit_section
 MIN_SECTION_POINTS = 250
 """Points that a section needs for its parts to be told apart."""
 
-CHANGED_VIEW, MIN_HALF_POINTS = 0.04, 700
-"""Change of the share of points on the left half of the head from one half of a section to the other, from which these
-are sections of their own, and the points that each needs: the axis of a section of 700 has an error of 0.7 mm, and the
-share one of 0.02."""
+PULL_M, PULL_DOUBT = 0.028, 0.3
+"""Distance by which the middles at the ends of a section are pulled, per change of the share of points on the left from
+one half to the other, and how well that is known: 22 to 36 mm, on branches seen from above first and at 40° then."""
+
+MIN_HALF_POINTS = 250
+"""Points in half a section that show its view: their share is known to 0.03, which pulls by a millimetre."""
 
 SHARE_STATIONS = 8
 """Stations, 2 m, in which the share of points on the left is found; their median is that of the half."""
@@ -47,8 +48,8 @@ BLURRED_M, BLURRED_RATIO = 0.004, 1.4
 """Blur of the edges beyond the noise in height, and ratio of the noise across to that in height, from which a head is
 blurred. Worn corners blur edges by 2 mm, and the two noises of a scanner differ by a fifth."""
 
-BLURRED_WIDTH_M = 0.005
-"""Error of the width beyond which something else than a blurred head is seen: dirt next to it, or another profile."""
+WIDENED_M = 0.008
+"""Excess of the width from which passes may have widened the head; without round corners it looks 7 mm wider."""
 
 PROFILE_SIGMA_M = 0.0004
 """Standard error of the middle that comes from the outline itself: real heads chain more radii, and are worn."""
@@ -100,9 +101,9 @@ def outline_middles(
     head, grid = Head(head_width_m, Outline.of(head_width_m)), Grid.of(head_width_m)
     bins = grid.number(left, up)
     used = (bins >= 0) & seen[station]
-    station, bins = station[used], bins[used]
+    left, station, bins = left[used], station[used], bins[used]
     section: Section | None = None
-    for first, last in _borders(count, station, left[used] > 0):
+    for first, last in _borders(count):
         here = slice(*np.searchsorted(station, [first, last]))
         counts = np.bincount(bins[here], minlength=grid.size).astype(float)
         if counts.sum() < MIN_SECTION_POINTS:
@@ -116,8 +117,9 @@ def outline_middles(
         middles.offset[part], middles.information[part], middles.in_window[part] = _in_windows(
             section.place[0], scores.by_bin[bins[here]], station[here] - first, last - first
         )
-        middles.offset[part][~seen[part]] = np.nan
-        middles.common[part] = np.hypot(scores.common_m, PROFILE_SIGMA_M)
+        pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
+        middles.offset[part] = np.where(seen[part], middles.offset[part] - pull, np.nan)
+        middles.common[part] = np.hypot(np.hypot(scores.common_m, PROFILE_SIGMA_M), PULL_DOUBT * pull)
         wider_m = head.width_m + section.place[3] - head_width_m
         middles.blur[part] = _blur(section, wider_m, middles.offset[part])
     return middles
@@ -151,41 +153,42 @@ def _fitted(counts: np.ndarray, head: Head, grid: Grid, start: Section | None) -
 def _blur(section: Section, wider_m: float, offset: np.ndarray) -> float:
     """Return by how much the edges of a head are blurred beyond the noise; see `Middles.blur`.
 
-    Where the line wanders about the head, by its `offset`, (k,) metres, it blurs the section as well.
+    Where the line wanders about the head, by its `offset`, (k,) metres, it blurs the section as well. Passes from
+    either side each show the edge that they are shifted to: they widen the head, by `wider_m`, rather than blur it.
     """
     across_m, height_m = np.exp(section.place[4:])
     known = offset[np.isfinite(offset)]
     across_m = np.sqrt(max(across_m**2 - (np.var(known) if len(known) else 0.0), 0.0))
-    blur_m = float(np.sqrt(max(across_m**2 - height_m**2, 0.0)))
-    is_blurred = blur_m >= BLURRED_M and across_m >= BLURRED_RATIO * height_m and abs(wider_m) <= BLURRED_WIDTH_M
-    return blur_m if is_blurred else 0.0
+    blur_m = np.sqrt(max(across_m**2 - height_m**2, 0.0))
+    is_blurred = blur_m >= BLURRED_M and across_m >= BLURRED_RATIO * height_m and wider_m >= -WRONG_WIDTH_M
+    widened_m = 0.5 * wider_m if WIDENED_M < wider_m < MAX_WRONG_WIDTH_M else 0.0
+    return float(np.hypot(blur_m if is_blurred and wider_m < MAX_WRONG_WIDTH_M else 0.0, widened_m))
 
 
-def _borders(count: int, station: np.ndarray, is_left: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Divide stations into sections of about VIEW_STATIONS, and into shorter ones where the view changes.
+def _borders(count: int) -> list[tuple[int, int]]:
+    """Divide stations into sections of about VIEW_STATIONS."""
+    borders = np.linspace(0, count, max(int(round(count / VIEW_STATIONS)), 1) + 1).astype(int)
+    return list(zip(borders[:-1].tolist(), borders[1:].tolist()))
 
-    A branch leaves the track that the scanner is on: it is seen from above first, then from the side. The parts of the
-    head that a whole section shows would pull its beginning and its end to either side.
+
+def _pull(station: np.ndarray, is_left: np.ndarray, count: int) -> np.ndarray:
+    """Return how far middles of a section are pulled to the left because the view changes along it, (count,) metres.
+
+    A branch leaves the track that the scanner is on: it is seen from above first, then from the side. What the whole
+    section shows on average pulls its beginning to one side and its end to the other.
 
     Parameters
     ----------
-    count : int
-        Number of stations.
     station, is_left : (n,) int and bool arrays
         Station of each point, ascending, and whether the point is to the left of the axis.
+    count : int
+        Number of stations.
     """
-    borders = np.linspace(0, count, max(int(round(count / VIEW_STATIONS)), 1) + 1).astype(int)
-    sections = list(zip(borders[:-1].tolist(), borders[1:].tolist()))
-    while sections:
-        first, last = sections.pop(0)
-        middle = (first + last) // 2
-        start, half, end = np.searchsorted(station, [first, middle, last])
-        if min(half - start, end - half) >= MIN_HALF_POINTS:
-            before, after = (_share(station[part], is_left[part]) for part in (slice(start, half), slice(half, end)))
-            if abs(before - after) > CHANGED_VIEW:
-                sections[:0] = [(first, middle), (middle, last)]
-                continue
-        yield first, last
+    half = int(np.searchsorted(station, count // 2))
+    if min(half, len(station) - half) < MIN_HALF_POINTS:
+        return np.zeros(count)
+    change = _share(station[half:], is_left[half:]) - _share(station[:half], is_left[:half])
+    return PULL_M * change * np.linspace(-1.0, 1.0, count)
 
 
 def _share(station: np.ndarray, is_left: np.ndarray) -> float:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.heads.edges import VIEW_STATIONS, station_count
-from rail_extract.core.heads.sections import Middles, _borders, outline_middles, with_outline
+from rail_extract.core.heads.sections import Middles, _pull, outline_middles, with_outline
 from rail_extract.laboratory.scenes.scanner import Scanner, scan
 from rail_extract.laboratory.scenes.tracks import Railhead
 
@@ -42,16 +42,16 @@ def test_the_axis_stays_where_another_width_is_stated():
     assert abs(np.nanmean(middles_of(points).offset)) < 0.001
 
 
-@pytest.mark.parametrize(("last", "density", "sections"), [(0.5, 30, 1), (0.6, 30, 3), (0.6, 3, 1)])
-def test_a_section_is_divided_where_the_view_changes(last, density, sections):
+@pytest.mark.parametrize(("last", "density", "pull_m"), [(0.5, 30, 0.0), (0.7, 30, 0.0028), (0.7, 1, 0.0)])
+def test_a_view_that_changes_pulls_the_ends_of_a_section(last, density, pull_m):
     """The share of points on the left half of the head changes along 40 m, if there are enough points to say so."""
     random, count = np.random.RandomState(0), VIEW_STATIONS
     station = np.repeat(np.arange(count), density)
     is_left = random.random_sample(len(station)) < 0.5 + (last - 0.5) * station / count
-    borders = list(_borders(count, station, is_left))
-    assert len(borders) == sections
-    assert borders[0][0] == 0 and borders[-1][1] == count
-    assert all(one[1] == other[0] for one, other in zip(borders, borders[1:]))
+    is_left |= (station > 20) & (station < 28)
+    pull = _pull(station, is_left, count)
+    assert pull[-1] == pytest.approx(pull_m, abs=0.0009)
+    assert pull[0] == -pull[-1] and pull[count // 2] == 0.0
 
 
 def test_middles_follow_the_head_along_the_line():

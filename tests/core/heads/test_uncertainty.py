@@ -201,3 +201,10 @@ def test_a_thin_line_wanders_within_its_windows():
     thin, dense = (np.median(support(*head(60.0, density)).sigma_m) for density in (10, 300))
     assert thin > WIDTH * np.sqrt((1 - 2.4 / 8.25) / (12 * 24)) > 0.003
     assert dense < 0.001
+
+
+def test_a_head_that_passes_from_either_side_widen_is_in_sigma():
+    t, across, z = head(60.0, 120)
+    found = support(t, across * (1 + 0.011 / WIDTH), z)
+    assert np.median(found.strips[:, 1]) == pytest.approx(0.011, abs=0.002)
+    assert (found.sigma_m > 0.0045).all()
