@@ -49,7 +49,7 @@ def add_method_arguments(parser: argparse._ActionsContainer) -> None:
     """Declare what finds the rail points of a raw cloud, in a parser or in a group."""
     text = f"what finds the rail points of a raw cloud (default: {GEOMETRY})"
     parser.add_argument("--method", choices=METHODS, default=GEOMETRY, help=text)
-    text = f"file that train-classifier has written, for --method {LEARNED}"
+    text = f"file that train-classifier has written, for --method {LEARNED} (default: those shipped)"
     parser.add_argument("--weights", type=Path, metavar="FILE", help=text)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import ModelError, ParameterError
+from ..frpdf.models import FOLDER
 from ..frpdf.weights import load_arrays, save_arrays
 from ..parameters import LEARNED
 from ..progress import SILENT, Progress
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from .network import RandLaNet, Tensors
+
+SHIPPED = FOLDER / "rail_classifier.npz"
+"""Weights trained on simulated clouds of a scanner on a train; models/MODEL_CARD.md describes them."""
 
 WEIGHTS_SUFFIX = ".npz"
 
@@ -142,6 +146,13 @@ class Classifier:
 def weights_for(method: str, weights: Path | None) -> Path | None:
     """Return the weights that a method uses, after a check that they can be; None for geometry.
 
+    Parameters
+    ----------
+    method : str
+        One of `parameters.METHODS`.
+    weights : Path, optional
+        None means `SHIPPED` if the method is LEARNED.
+
     Raises
     ------
     ParameterError
@@ -149,12 +160,12 @@ def weights_for(method: str, weights: Path | None) -> Path | None:
     ModelError
         See `load`.
     """
-    if method == LEARNED and weights is None:
-        raise ParameterError("METHOD LEARNED needs WEIGHTS: choose those that Train rail classifier has written.")
-    if method != LEARNED and weights is not None:
-        raise ParameterError("WEIGHTS are for METHOD LEARNED: choose this method, or leave WEIGHTS empty.")
-    if weights is not None:
-        load(weights)
+    if method != LEARNED:
+        if weights is not None:
+            raise ParameterError("WEIGHTS are for METHOD LEARNED: choose this method, or leave WEIGHTS empty.")
+        return None
+    weights = weights or SHIPPED
+    load(weights)
     return weights
 
 

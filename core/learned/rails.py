@@ -1,6 +1,6 @@
-"""Rails of the points that the network labelled: their figures, and what the guide and the choice of pairs leave out.
+"""Rails of the points that the network labelled: what is too short for one is left out, and their figures.
 
-The labels are the network's; lines and partners are found as in `classify`.
+Lines, partners and pieces are found as in `classify`. The network sees 4 m and does not know what continues beyond.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from ..classify.figures import shares_of_length
 from ..classify.lines import Lines, Marks, find_lines
 from ..classify.partner import stations_with_partner
-from ..classify.pieces import LEAST_PAIRED, links, pieces_of
+from ..classify.pieces import links, long_enough
 from ..classify.settings import THIN, Settings
 from ..classify.tops import Grid
 from ..rails import SearchFigures
@@ -38,7 +38,7 @@ def rails_of(xyz: np.ndarray, settings: Settings) -> tuple[np.ndarray, SearchFig
     Returns
     -------
     (n,) bool array
-        Points that are kept: all, unless there is a guide or only pairs are wanted.
+        Points that are kept.
     SearchFigures
     """
     if not len(xyz):
@@ -70,11 +70,10 @@ def rails_of(xyz: np.ndarray, settings: Settings) -> tuple[np.ndarray, SearchFig
 
 
 def _wanted(lines: Lines, paired: np.ndarray, pairs: np.ndarray, settings: Settings) -> np.ndarray:
-    """Return which cells belong to rails that the user wants, (n,) bool."""
-    wanted = np.ones(len(paired), dtype=bool)
+    """Return which cells belong to rails that are long enough and that the user wants, (n,) bool."""
+    low, high = REACH_M / 2, settings.side_m - REACH_M / 2
+    open_ended = np.any((lines.axis < low) | (lines.axis > high), axis=1)
+    wanted = long_enough(lines, pairs, paired, open_ended, settings.keep_single)
     if settings.guide is not None:
         wanted &= settings.guide.keeps(lines, pairs, settings.spacings_m, LEVEL_M)
-    if not settings.keep_single:
-        piece = pieces_of(len(paired), pairs)
-        wanted &= (np.bincount(piece, paired) > LEAST_PAIRED * np.bincount(piece))[piece]
     return wanted

@@ -322,13 +322,16 @@ def method() -> Definitions:
     return (
         advanced(
             choice("METHOD", tr("What finds rail points"), METHODS, GEOMETRY),
-            tr("GEOMETRY needs no training. LEARNED uses weights that Train Rail Classifier has written."),
+            tr("The shape of rails, or a network that has learned them from labelled clouds and needs PyTorch."),
         ),
         advanced(
             QgsProcessingParameterFile(
                 "WEIGHTS", tr("Weights of the classifier"), optional=True, fileFilter=tr("Weights (*.npz)")
             ),
-            tr("The file that Train Rail Classifier has written, for METHOD LEARNED."),
+            tr(
+                "The file that Train Rail Classifier has written, for METHOD LEARNED. Leave empty to use the weights "
+                "that were trained on simulated clouds."
+            ),
         ),
     )
 

@@ -27,8 +27,6 @@ def test_without_pytorch_one_sentence_says_what_to_install(monkeypatch, tmp_path
 
 def test_method_and_weights_go_together(tmp_path):
     assert model.weights_for("GEOMETRY", None) is None
-    with pytest.raises(ParameterError, match="METHOD LEARNED needs WEIGHTS"):
-        model.weights_for("LEARNED", None)
     with pytest.raises(ParameterError, match="WEIGHTS are for METHOD LEARNED"):
         model.weights_for("GEOMETRY", tmp_path / "any.npz")
 

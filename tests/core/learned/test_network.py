@@ -79,7 +79,7 @@ def test_one_block_can_be_learned_by_heart(net):
     rail = torch.from_numpy(np.abs(place[:, 0]) < 0.5)
     prepared = inputs([place], "cpu")
     optimizer = torch.optim.Adam(net.parameters(), 0.01)
-    for _ in range(60):
+    for _ in range(50):
         loss = torch.nn.functional.binary_cross_entropy_with_logits(net(*prepared), rail.float())
         optimizer.zero_grad()
         loss.backward()
