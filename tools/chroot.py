@@ -107,7 +107,7 @@ git init --quiet .; git -c safe.directory=/{TREE} add --all
 if {probe} --only-binary=:all: "{torch}" >/dev/null 2>&1; then torch="{torch}"; else torch=""
     echo "There is no CPU build of PyTorch for this Python: the network runs with OpenCV."
 fi
-make TORCH="$torch" TORCH_BUILDS="{builds}" test-qgis
+make TORCH="$torch" TORCH_BUILDS="{builds}" {os.environ.get("TESTS", "test-qgis")}
 """
 
 

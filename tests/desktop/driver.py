@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from qgis.core import QgsApplication, QgsProcessingAlgorithm, QgsProject
+from qgis.core import Qgis, QgsApplication, QgsProcessingAlgorithm, QgsProject
 from qgis.PyQt import sip
 from qgis.PyQt.QtCore import QModelIndex, QTimer
 from qgis.PyQt.QtWidgets import QApplication, QDialogButtonBox, QDockWidget, QTextEdit, QWidget
@@ -43,7 +43,7 @@ class Driver:
 
     def __init__(self, scenario: Scenario, folder: Path) -> None:
         self.folder = folder
-        self.results: dict[str, Any] = {"exceptions": [], "ended": False}
+        self.results: dict[str, Any] = {"exceptions": [], "ended": False, "version": Qgis.QGIS_VERSION_INT}
         self._steps = scenario(self)
         self._begun = self._active = False
         self._wait: Callable[[], Any] = lambda: True
