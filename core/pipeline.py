@@ -210,13 +210,13 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
         _announce_squares(source, squares, parameters, progress)
         parts, rasters = _draw_squares(source, squares, parameters, runner, share)
         any_square |= bool(parts) or not squares
-        found = whole_rails(parts, source.frame, parameters, len(rails) + 1, progress) if parts else []
+        strips += [rows_in_frame(part, source.frame) for part in parts]
+        found = whole_rails(_released(parts), source.frame, parameters, len(rails) + 1, progress) if parts else []
         progress.info(f"Class {source.class_code}: {_lengths(found, 'rail')}.")
         warn_of_rails(found, source.class_code, parameters, progress)
         if found:
             warn_of_unexplained(source, found, progress)
         rails += found
-        strips += [rows_in_frame(part, source.frame) for part in parts]
         if rasters:
             cleaned[source.class_code] = assembled(rasters, squares, source.frame)
     if not any_square:
@@ -253,6 +253,12 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
         heads,
         strip_courses(centerlines, np.concatenate(strips)) if strips else (),
     )
+
+
+def _released(parts: list[SquareRails]) -> Iterator[SquareRails]:
+    """Yield the results of squares and let go of them."""
+    while parts:
+        yield parts.pop()
 
 
 def _announce_squares(

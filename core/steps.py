@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -154,7 +154,7 @@ def rails_of_square(
 
 
 def whole_rails(
-    results: Sequence[SquareRails],
+    results: Iterable[SquareRails],
     frame: LocalFrame,
     parameters: Parameters,
     first_id: int = 1,
@@ -164,7 +164,8 @@ def whole_rails(
 
     Parameters
     ----------
-    results : sequence of SquareRails
+    results : iterable of SquareRails
+        An iterator that lets go of what it yields saves a third of the memory of a long railway.
     frame : LocalFrame
         Local frame of the result.
     parameters : Parameters

@@ -35,14 +35,19 @@ def thin(lines: Sequence[Line], tolerance_xy_m: float, tolerance_z_m: float) -> 
     -------
     tuple of RailLine or Centerline
     """
-    ends = {tuple(end) for line in lines for end in line.xyz[[0, -1], :2].tolist()}
+    ends = np.unique([_as_complex(line.xyz[[0, -1]]) for line in lines])
     return tuple(replace(line, xyz=_thinned(line.xyz, ends, tolerance_xy_m, tolerance_z_m)) for line in lines)
 
 
-def _thinned(xyz: np.ndarray, ends: set[tuple[float, ...]], tolerance_xy_m: float, tolerance_z_m: float) -> np.ndarray:
+def _as_complex(xyz: np.ndarray) -> np.ndarray:
+    """Return places in plan, (n,), as single numbers, which can be looked up."""
+    return xyz[:, 0] + 1j * xyz[:, 1]
+
+
+def _thinned(xyz: np.ndarray, ends: np.ndarray, tolerance_xy_m: float, tolerance_z_m: float) -> np.ndarray:
     """Thin the pieces between the vertices in which other lines end, (k, 3)."""
-    inner = [number for number, vertex in enumerate(xyz[:-1, :2].tolist()) if number and tuple(vertex) in ends]
-    knots = [0, *inner, len(xyz) - 1]
+    inner = np.flatnonzero(np.isin(_as_complex(xyz[1:-1]), ends)) + 1
+    knots = [0, *inner.tolist(), len(xyz) - 1]
     pieces = [xyz[first : last + 1] for first, last in zip(knots, knots[1:])]
     return np.concatenate([*(_fitted(piece, tolerance_xy_m, tolerance_z_m)[:-1] for piece in pieces), xyz[-1:]])
 

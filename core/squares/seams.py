@@ -46,11 +46,12 @@ def join(results: Iterable[SquareRails], frame: LocalFrame) -> list[RailLine]:
     The result does not depend on the order of the squares. If the cloud is not divided, only rings change: they are
     closed.
     """
-    ordered = sorted(results, key=lambda result: result.square.key)
+    ordered = sorted(results, key=lambda result: result.square.key, reverse=True)
     if len(ordered) == 1 and ordered[0].square.is_whole_plane:
         return [closed_ring(rail) for rail in ordered[0].rails]
     joiner, nodes = _Joiner(), []
-    for result in ordered:
+    while ordered:
+        result = ordered.pop()  # and forget it: memory holds all lines here
         shift = result.square.frame.shift_to(frame)
         joiner.add(result.square, [replace(rail, xyz=rail.xyz + shift) for rail in result.rails], shift[:2])
         nodes.append(result.nodes + shift[:2])
