@@ -2,8 +2,8 @@
 
 `python benchmarks/scaling.py` measures a synthetic double track of 1 km and of 10 km, each in a separate process, and
 one worker against two on the longer one, with one thread each. `--km 0.6` is faster; half a kilometre cannot be
-divided. `--memory 100` adds a run over 100 km to measure its memory: it skips the network, so its time has no meaning.
-Compare rows of the same run only.
+divided. `--memory 500` measures 500 km alone, to see what grows with length: network and drawing are left out, and each
+square has the true lines, so only reading and joining are measured. Compare rows of the same run only.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import json
 import resource
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -19,13 +18,16 @@ import time
 from pathlib import Path
 
 import numpy as np
-from rail_extract.core import pipeline, steps
+from rail_extract.core import pipeline
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.cluster.runner import DaskRunner
 from rail_extract.core.cluster.workers import connect
 from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
-from rail_extract.core.squares.spool import spool
+from rail_extract.core.rails import RailLine, Support
+from rail_extract.core.squares.grid import HALO_M, Square
+from rail_extract.core.squares.pieces import SquareRails, trim
+from rail_extract.core.squares.spool import SpooledPoints, spool
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.steps import engine_for, square_side
 from rail_extract.laboratory.curves import Element, trace
@@ -44,10 +46,22 @@ HEADING = 0.35
 POINTS_PER_M = 500
 """Rail points per metre of double track: 50 million on 100 km."""
 
+FEW_POINTS_PER_M = 100
+"""The same where points only show which squares there are."""
+
+TRACKS_AT_M = (0.0, 4.5)
+"""Distances of the two tracks to the left of the first one."""
+
+VERTEX_M, STATION_M = 0.09, 0.25
+"""Spacing of the vertices and of the stations of the lines that a square's drawing returns."""
+
 NETWORK_KM = 70_000
 """Length of track of a large national network; a kilometre of double track has two kilometres of track."""
 
 WORKERS = (2, 16, 64, 256)
+
+DRAWN, LAID = "drawn", "laid"
+"""Whether lines are drawn from the points, or laid where they truly are."""
 
 
 def main() -> None:
@@ -55,22 +69,24 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--km", type=float, default=1.0, help="shorter of the two lengths (default 1)")
     parser.add_argument("--times", type=int, default=10, help="ratio of the two lengths (default 10)")
-    parser.add_argument("--memory", type=float, metavar="KM", help="length of a further run that measures memory")
+    parser.add_argument(
+        "--memory", type=float, metavar="KM", help="measure only what grows with length, over this length"
+    )
     parser.add_argument("--skip-workers", action="store_true", help="leave the workers out")
-    parser.add_argument("--measure", nargs=2, metavar=("FOLDER", "NETWORK"), help=argparse.SUPPRESS)
+    parser.add_argument("--measure", nargs=2, metavar=("FOLDER", "LINES"), help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.measure:
-        print(json.dumps(measure(Path(args.measure[0]), args.measure[1] == "with")))
+        print(json.dumps(measure(Path(args.measure[0]), args.measure[1] == DRAWN)))
         return
     with tempfile.TemporaryDirectory() as folder:
+        if args.memory:
+            lay_track(Path(folder) / "memory", args.memory, FEW_POINTS_PER_M)
+            show(f"{args.memory:g} km, lines laid", in_own_process(Path(folder) / "memory", LAID))
+            return
         long = compare_lengths(Path(folder), args.km, args.times)
         if not args.skip_workers:
             compare_workers(Path(folder) / "long", Path(folder))
         print_costs(long, args.km * args.times)
-        if args.memory:
-            shutil.rmtree(Path(folder) / "long")
-            lay_track(Path(folder) / "memory", args.memory)
-            show(f"{args.memory:g} km without the network", in_own_process(Path(folder) / "memory", "without"))
 
 
 def compare_lengths(folder: Path, km: float, times: int) -> dict:
@@ -86,8 +102,8 @@ def compare_lengths(folder: Path, km: float, times: int) -> dict:
     """
     lay_track(folder / "short", km)
     lay_track(folder / "long", km * times)
-    short = show(f"{km:g} km", in_own_process(folder / "short", "with"))
-    long = show(f"{km * times:g} km", in_own_process(folder / "long", "with"))
+    short = show(f"{km:g} km", in_own_process(folder / "short", DRAWN))
+    long = show(f"{km * times:g} km", in_own_process(folder / "long", DRAWN))
     seconds, memory = long["seconds"] / short["seconds"], long["peak_mib"] / short["peak_mib"]
     print(f"{times} times the length: {seconds:.2f} times the time, {memory:.2f} times the memory")
     return long
@@ -128,14 +144,14 @@ def print_costs(figures: dict, km: float) -> None:
         print(f"  {workers:4} workers {parallel / workers:8.1f} + {serial:.1f} h")
 
 
-def lay_track(folder: Path, km: float) -> None:
+def lay_track(folder: Path, km: float, points_per_m: float = POINTS_PER_M) -> None:
     """Write the files of a straight double track."""
     folder.mkdir()
     curve = trace([Element(PIECE_M)], heading=HEADING)
-    tracks = [Track(curve, spacing(STANDARD), np.full(len(curve.xy), 100.0), left_m=left) for left in (0.0, 4.5)]
+    tracks = [Track(curve, spacing(STANDARD), np.full(len(curve.xy), 100.0), left_m=left) for left in TRACKS_AT_M]
     scene = build("piece", Plan(tracks, STANDARD, Scanner(noise_m=0.004)), np.random.RandomState(8))
     xyz = scene.xyz[scene.classification == RAIL]
-    chosen = np.random.RandomState(9).randint(len(xyz), size=int(POINTS_PER_M * PIECE_M))
+    chosen = np.random.RandomState(9).randint(len(xyz), size=int(points_per_m * PIECE_M))
     step = PIECE_M * np.array([np.cos(HEADING), np.sin(HEADING), 0.0])
     header = laspy.LasHeader(version="1.4", point_format=6)
     header.scales = np.full(3, 0.001)
@@ -151,19 +167,41 @@ def parameters() -> Parameters:
     return Parameters(STANDARD.gauge_m, STANDARD.head_width_m)
 
 
-def in_own_process(folder: Path, network: str) -> dict:
+def laid_rails(source: SpooledPoints, square: Square, *_) -> SquareRails:
+    """Return the true lines in a square, with as many vertices and figures as lines that are drawn from points."""
+    ahead, left = np.array([np.cos(HEADING), np.sin(HEADING)]), np.array([-np.sin(HEADING), np.cos(HEADING)])
+    corner = square.side_m * np.array(square.key)
+    middle_m = (corner + 0.5 * square.side_m) @ ahead
+    vertices = VERTEX_M * np.arange(
+        max((middle_m - square.side_m) // VERTEX_M, 0), (middle_m + square.side_m) // VERTEX_M
+    )
+    vertices = vertices[square.holds(vertices[:, None] * ahead - corner, 2 * HALO_M)]
+    if len(vertices) < 2:
+        return trim([], square)
+    stations = np.arange(0.0, np.ptp(vertices), STATION_M)
+    figures = np.full(len(stations), 0.001)
+    support = Support(stations, np.full(len(stations), 30), figures, sigmaz_m=figures.copy())
+    half_m = 0.5 * spacing(STANDARD)
+    sides = [track_m + side_m for track_m in TRACKS_AT_M for side_m in (-half_m, half_m)]
+    plans = [vertices[:, None] * ahead + side_m * left - corner for side_m in sides]
+    lines = [np.column_stack([plan, 100.0 + np.sin(vertices / 300.0)]) for plan in plans]
+    rails = [RailLine(line, 1, RAIL, 30.0 * len(stations), 1.0, 1.0, 0.0, support=support) for line in lines]
+    return trim(rails, square)
+
+
+def in_own_process(folder: Path, lines: str) -> dict:
     """Measure in a separate process, because peak memory is that of a process."""
-    words = [sys.executable, __file__, "--measure", str(folder), network]
+    words = [sys.executable, __file__, "--measure", str(folder), lines]
     run = subprocess.run(words, capture_output=True, text=True)
     if run.returncode:
         sys.exit(run.stderr)
     return json.loads(run.stdout.splitlines()[-1])
 
 
-def measure(folder: Path, with_network: bool) -> dict:
+def measure(folder: Path, drawn: bool) -> dict:
     """Extract the clouds in a folder; return core-seconds by step, peak memory and sizes in bytes."""
-    if not with_network:
-        steps.clean = lambda raster, *_: raster
+    if not drawn:
+        pipeline.clean_square, pipeline.rails_of_square = (lambda *_: None), laid_rails
     draw_squares = pipeline._draw_squares
     marks = []
 
