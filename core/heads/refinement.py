@@ -52,6 +52,9 @@ CURL_M, STEADY_M = 0.8, 3.5
 """Length of a free end that is redrawn, and of the part before it that it continues. The raster curls over two head
 widths or more, half a window of 1.25 m adds to that, and the curvature of a tram's rail takes metres to measure."""
 
+LAST_POINTS = 3
+"""Points on a head from which on it is shown, counted from its end: the first one may be a stray."""
+
 MAX_CROSSING_SHIFT_M = 3.0
 """Limit for how far a crossing moves when two lines move by half a head: at 1:26.5 each moves it by 1 m."""
 
@@ -156,7 +159,7 @@ def _shifted(
         moved = line + shift[:, None] * left_normals(line)
         moved = _redrawn(moved, along, _unseen(stations, known))
         moved = _redrawn(moved, along, _covered(mine.t[top], other))
-        lines.append(_with_redrawn_ends(moved, along, free_ends[number]))
+        lines.append(_with_redrawn_ends(moved, along, free_ends[number], mine.t[top]))
     return _joined(network, lines, smoothing_m)
 
 
@@ -180,15 +183,28 @@ def _moved_off(line: np.ndarray, feet: Feet, flank: Flank, smoothing_m: float) -
     return line + shift[:, None] * left_normals(line)
 
 
-def _with_redrawn_ends(line: np.ndarray, along: np.ndarray, free_ends: np.ndarray) -> np.ndarray:
-    """Redraw the free ends of a line as a continuation of the line: the raster's lines curl where a rail ends."""
-    line = line.copy()
-    for from_end, t, free in ((line, along, free_ends[0]), (line[::-1], along[-1] - along[::-1], free_ends[1])):
-        steady = (t >= CURL_M) & (t <= CURL_M + STEADY_M)
-        if free and steady.sum() > 3 and along[-1] > 2 * (CURL_M + STEADY_M):
-            curled = t < CURL_M
-            curve = np.polynomial.polynomial.polyfit(t[steady], from_end[steady], 2)
-            from_end[curled] = np.polynomial.polynomial.polyval(t[curled], curve).T
+def _with_redrawn_ends(line: np.ndarray, along: np.ndarray, free_ends: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Redraw the free ends of a line as a continuation of the line: the raster's lines curl where a rail ends.
+
+    Parameters
+    ----------
+    line : (n, 2) array
+    along : (n,) array
+        Chainages of its vertices.
+    free_ends : (2,) bool array
+        Whether its start and its end are free.
+    t : (k,) array
+        Chainages of the points on the head, increasing; the raster's lines go on where there are no more.
+    """
+    line, last = line.copy(), min(LAST_POINTS, len(t)) - 1
+    ends = ((line, along, t[last]), (line[::-1], along[-1] - along[::-1], along[-1] - t[-1 - last]))
+    for (from_end, t_end, shown), free in zip(ends, free_ends):
+        start = max(shown, 0.0) + CURL_M
+        steady = (t_end >= start) & (t_end <= start + STEADY_M)
+        if free and steady.sum() > 3 and along[-1] > 2 * (start + STEADY_M):
+            curled = t_end < start
+            curve = np.polynomial.polynomial.polyfit(t_end[steady], from_end[steady], 2)
+            from_end[curled] = np.polynomial.polynomial.polyval(t_end[curled], curve).T
     return line
 
 
