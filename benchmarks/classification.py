@@ -20,6 +20,8 @@ from pathlib import Path
 
 import numpy as np
 from rail_extract.core.clouds.las import laspy
+from rail_extract.core.frpdf.models import NAMES
+from rail_extract.core.parameters import Parameters
 from rail_extract.laboratory.ruler.classification import Score, lines_from, score
 from rail_extract.laboratory.ruler.lines import Match
 from rail_extract.laboratory.scenes.raw_catalogue import AIR, RAW_SCENES
@@ -38,6 +40,7 @@ def main() -> None:
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help=f"of {', '.join(RAW_SCENES)}")
     parser.add_argument("--seed", type=int, default=SEED, help=f"of the scenes (default {SEED})")
     parser.add_argument("--lines", action="store_true", help="extract lines from the labelled points as well")
+    parser.add_argument("--model", choices=NAMES, default=Parameters.model, help="weights that draw the lines")
     parser.add_argument("--large", type=float, metavar="MIO", help="million points of a large cloud to measure instead")
     arguments = parser.parse_args()
     if arguments.large:
@@ -50,7 +53,8 @@ def main() -> None:
     )
     for name in arguments.scenes or RAW_SCENES:
         with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
-            print(row(name, *pool.submit(measured, name, arguments.seed, arguments.lines).result()), flush=True)
+            result = pool.submit(measured, name, arguments.seed, arguments.model if arguments.lines else None).result()
+            print(row(name, *result), flush=True)
 
 
 TILES = 10
@@ -96,11 +100,11 @@ def _write_tiles(folder: Path, millions: float, seed: int) -> int:
     return copies * len(xyz)
 
 
-def measured(name: str, seed: int, lines: bool) -> tuple[Score, Match | None]:
-    """Measure one scene."""
+def measured(name: str, seed: int, model: str | None) -> tuple[Score, Match | None]:
+    """Measure one scene, and its lines if a model is to draw them."""
     scene = RAW_SCENES[name](seed)
     result, rail = score(scene, wide=name in AIR)
-    return result, lines_from(scene, rail) if lines and rail.any() and scene.rails else None
+    return result, lines_from(scene, rail, model) if model is not None and rail.any() and scene.rails else None
 
 
 def row(name: str, result: Score, found: Match | None) -> str:

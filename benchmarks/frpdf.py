@@ -1,6 +1,7 @@
 """Compare networks that clean rail rasters on a fixed set of synthetic rasters.
 
-The tables have the figures of Gribov and Chang, F1 by severity and by family, bridged gaps and removed lines. Run
+The tables have the figures of Gribov and Chang, F1 by severity and by family, bridged gaps, removed lines, and the
+scores on rare rasters: thin rails, ends of third rails, slips and open blades. Run
 `python benchmarks/frpdf.py [NETWORK ...]`. A network is one of
 
 - `weights.npz`: weights of FRPDF, with one pass and with two (`weights.npz@3`: with three only; `@0`: until fewer than
@@ -12,7 +13,8 @@ The tables have the figures of Gribov and Chang, F1 by severity and by family, b
   table shows its attribute `parameters` if it has one.
 
 Each row runs in a separate process, so that its memory can be measured. The set: 1024 x 1024 cells of 4 cm, 132RE, each
-family of layouts at each severity from 0.1 to 0.9. Nothing is trained or tuned with its seeds.
+family of layouts at each severity from 0.1 to 0.9, and rare rasters of 512 x 512. Nothing is trained or tuned with its
+seeds.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ import numpy as np
 from rail_extract.core.frpdf import DEFAULT_PASSES
 from rail_extract.core.frpdf.models import MODELS
 from rail_extract.laboratory.rasters.distortion import Pair
-from rail_extract.laboratory.rasters.layouts import FAMILIES
+from rail_extract.laboratory.rasters.layouts import FAMILIES, RARE_FAMILIES
 from rail_extract.laboratory.rasters.pairs import BASE_RATIO, random_pair
 from rail_extract.laboratory.training.evaluate import Cleaner, classical, cleaner_of
 from rail_extract.laboratory.training.networks import TrainedNetwork
@@ -45,6 +47,8 @@ SEVERITIES = tuple(number / 10 for number in range(1, 10))
 GAP_LENGTHS_M = (0.2, 0.5, 1.0, 2.0, 4.0, 8.0)
 """Limits of the classes of gaps; the last class also has overlapping gaps that are longer."""
 TOLERANCES = (0, 1)
+RARE = ("thin rails", *RARE_FAMILIES)
+RARE_COUNT, RARE_SIDE, RARE_SEVERITY = 8, 512, 0.25
 
 
 @dataclass
@@ -58,6 +62,8 @@ class Tally:
     gaps : dict of class to [bridged, all]
     lines : list of int
         Cells of guard rails and lone lines: removed ones, all.
+    rare : dict of str to Scores
+        Within one cell, for each kind of rare rasters.
     parameters : int or None
     seconds : float
         Per raster.
@@ -69,6 +75,7 @@ class Tally:
     scores: dict = field(default_factory=lambda: defaultdict(Scores))
     gaps: dict = field(default_factory=lambda: defaultdict(lambda: [0, 0]))
     lines: list = field(default_factory=lambda: [0, 0])
+    rare: dict = field(default_factory=lambda: defaultdict(Scores))
     parameters: int | None = None
     seconds: float = 0.0
     memory_mib: float = 0.0
@@ -102,6 +109,12 @@ def benchmark_pair(number: int) -> tuple[str, float, Pair]:
     return family, severity, random_pair(np.random.default_rng([SEED, number]), SIDE, severity, BASE_RATIO, family)
 
 
+def rare_pair(kind: str, number: int) -> Pair:
+    """Return the pair of a rare raster."""
+    rng, family = np.random.default_rng([SEED, RARE.index(kind), number]), kind if kind in RARE_FAMILIES else None
+    return random_pair(rng, RARE_SIDE, RARE_SEVERITY, BASE_RATIO, family, thin=family is None)
+
+
 def expand(networks: Iterable[str]) -> Iterable[str]:
     """Yield a row for each number of passes of weights: `weights.npz@2`."""
     for network in networks:
@@ -130,9 +143,13 @@ def measure(row: str, count: int) -> Tally:
             tally.gaps[int(place)][1] += 1
         tally.lines[0] += int(np.count_nonzero(pair.distractor & ~found))
         tally.lines[1] += int(np.count_nonzero(pair.distractor))
+    for kind in RARE:
+        for number in range(min(count, RARE_COUNT)):
+            pair = rare_pair(kind, number)
+            tally.rare[kind] += score(np.asarray(cleaner(pair.observed)) >= 0.5, pair.label, tolerance=1)
     tally.memory_mib = _peak_mib()
     tally.gaps = dict(tally.gaps)
-    tally.scores = dict(tally.scores)
+    tally.scores, tally.rare = dict(tally.scores), dict(tally.rare)
     return tally
 
 
@@ -208,6 +225,11 @@ def report(tallies: Sequence[Tally], count: int) -> Iterable[str]:
         yield from _parted(tallies, tolerance, list(FAMILIES)[:count], "by family")
     yield ""
     yield from _repairs(tallies)
+    yield ""
+    yield f"{'rare, within one cell':24}" + "".join(f"{kind:>22}" for kind in RARE)
+    for tally in tallies:
+        figures = [f"{s.precision:.3f} {s.recall:.3f} {s.f1:.3f}" for s in (tally.rare[kind] for kind in RARE)]
+        yield f"{tally.name:24}" + "".join(f"{words:>22}" for words in figures)
 
 
 def _confusion(tallies: Sequence[Tally], tolerance: int) -> Iterable[str]:

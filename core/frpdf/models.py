@@ -50,8 +50,8 @@ MODELS = (Model("base", 1.435, 0.0762, "frpdf_base.npz"), Model("fast", 1.435, 0
 NAMES = (AUTO, *(model.name for model in MODELS))
 """Values of the parameter MODEL."""
 
-AUTOMATIC = ("base",)
-"""Names of the models among which AUTO chooses by ratio; models/MODEL_CARD.md says why `fast` is left out."""
+AUTOMATIC = ("fast",)
+"""Names of the models among which AUTO chooses by ratio; models/MODEL_CARD.md compares both."""
 
 
 def choose(gauge_m: float, head_width_m: float, name: str = Parameters.model) -> Model:

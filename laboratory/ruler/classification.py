@@ -102,10 +102,11 @@ def score(scene: RawScene, wide: bool = False, weights: Path | None = None) -> t
     return result, found.rail
 
 
-def lines_from(scene: RawScene, rail: np.ndarray) -> Match:
+def lines_from(scene: RawScene, rail: np.ndarray, model: str = Parameters.model) -> Match:
     """Extract rails from labelled points, (n,) bool, and compare them with the truth."""
     points = RailPoints(scene.xyz[rail], scene.frame, RAIL)
-    parameters = Parameters(scene.standard.gauge_m, scene.standard.head_width_m, other_gauges_m=scene.other_gauges_m)
+    gauge_m, head_width_m = scene.standard.gauge_m, scene.standard.head_width_m
+    parameters = Parameters(gauge_m, head_width_m, other_gauges_m=scene.other_gauges_m, model=model)
     network = extract_rails([points], parameters)
     return match([line.xyz for line in network.rails], scene.rails)
 

@@ -37,7 +37,7 @@ def test_each_class_is_a_band_at_its_place(tmp_path, crs, unit_m, epsg):
         assert (file.nodata, file.dtypes, file.block_shapes) == (0, ("uint8",) * 2, [(1024, 1024)] * 2)
         tags = {name: text for name, text in file.tags().items() if name.startswith("RAIL")}
         extent = "1.5,2.0,3.0,4.25"
-        assert tags == {"RAIL_GAUGE_MM": "1435", "RAIL_HEAD_MM": "72", "RAIL_MODEL": "base", "RAIL_EXTENT": extent}
+        assert tags == {"RAIL_GAUGE_MM": "1435", "RAIL_HEAD_MM": "72", "RAIL_MODEL": "fast", "RAIL_EXTENT": extent}
         for band, raster in enumerate(rasters, start=1):
             cells = np.argwhere(file.read(band) == 1)
             assert len(cells) == raster.count()

@@ -14,10 +14,11 @@ SEED, SIDE = 4, 512
 SET = (("parallel", 0.6), ("turnout", 0.75), ("connections", 0.9))
 """Family and severity of each raster: difficult ones, because easy ones hardly show a change of the weights."""
 
-MIN_F1 = {"base": (0.828, 0.956), "fast": (0.805, 0.946)}
+MIN_F1 = {"base": (0.828, 0.956), "fast": (0.823, 0.962)}
 """Smallest F1, strict and within one cell. `base` reaches 0.8307 and 0.9592 in bfloat16 on PyTorch, 0.8312 and 0.9592
 in float32 on OpenCV; the weights of the sixth run of its training reach 0.8273 and 0.9578; with 20 % noise on the
-kernels, 0.77 and 0.91 remain. `fast` reaches 0.8083 and 0.9480, and 0.7744 and 0.9288 with this noise."""
+kernels, 0.77 and 0.91 remain. `fast` reaches 0.8261 and 0.9648; the weights after the first run of its training, 0.8083
+and 0.9480."""
 
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: model.name)

@@ -51,7 +51,7 @@ def test_cells_keep_their_position(tmp_path, code, unit_m):
     write_rasters(path, header, rasters)
     found = read_header(path)
     assert found.bounds == extent
-    assert (found.class_codes, found.model) == ((10, 11), "base")
+    assert (found.class_codes, found.model) == ((10, 11), "fast")
     assert (found.gauge_m, found.head_width_m) == pytest.approx((1.435, 0.072), abs=1e-9)
     assert found.cell_m == pytest.approx(CELL_M, rel=1e-12)
     assert found.frame.horizontal_unit_m == pytest.approx(unit_m, rel=1e-9)
@@ -70,7 +70,7 @@ def test_file_is_a_plain_geotiff_with_one_band_per_class(tmp_path):
     write_rasters(tmp_path / "r.tif", header_for(rasters, (10, 11), frame_in("EPSG:32643"), STANDARD), rasters)
     dataset = gdal.Open(str(tmp_path / "r.tif"))
     tags = {name: text for name, text in dataset.GetMetadata().items() if name.startswith("RAIL")}
-    assert tags == {"RAIL_GAUGE_MM": "1435", "RAIL_HEAD_MM": "72", "RAIL_MODEL": "base"}
+    assert tags == {"RAIL_GAUGE_MM": "1435", "RAIL_HEAD_MM": "72", "RAIL_MODEL": "fast"}
     assert [dataset.GetRasterBand(number).GetDescription() for number in (1, 2)] == ["10", "11"]
     band = dataset.GetRasterBand(2)
     assert (band.DataType, band.GetNoDataValue(), band.GetBlockSize()) == (gdal.GDT_Byte, 0, [BLOCK, BLOCK])
@@ -222,7 +222,7 @@ def test_model_by_name_by_tag_and_by_ratio(geotiff):
         header = read_header(geotiff(tags={"RAIL_GAUGE_MM": gauge, "RAIL_HEAD_MM": head, **more}))
         return choose_model(header, header.standard(None, None), name)
 
-    assert chosen("AUTO", "1435", "72").name == "base"
+    assert chosen("AUTO", "1435", "72").name == "fast"
     assert chosen("AUTO", "1435", "72", RAIL_MODEL="base").name == "base"
     assert chosen("base", "1435", "72", RAIL_MODEL="gone").name == "base"
     with pytest.raises(RasterError, match="cells are 40.0 mm wide, but .* needs 28.1 mm"):
