@@ -18,6 +18,12 @@ from .start import Start, find_start
 SMOOTH_M = {True: 1.5, False: 3.0}
 """Half the length over which the axis is smoothed, by whether the cloud is dense."""
 
+MIN_SEEN = 0.8
+"""Least share of the windows of a rail in which it, or the other one, was seen. Measured on rails: 0.99."""
+
+PAIR_M, SINGLE_M = 3.0, 5.0
+"""Shortest rails with the other one of the track and without it, as lone rails of a classification."""
+
 FLUSH_BESIDE_M, FLUSH_LEVEL_M = 0.003, 0.012
 """Width beyond the side of a head in a pavement and difference in height within which a point is on it; as in
 `classify.flush`."""
@@ -87,12 +93,27 @@ def grow(points: Points, seed: np.ndarray, settings: GrowSettings, progress: Pro
     # The way back begins beyond the seed, so that both rails are measured there.
     backwards, first = follow(points, turned(start), _beyond(start, onwards, settings), settings, back)
     windows = [*backwards[::-1], *onwards]
-    if not windows:
+    if not _is_rail(windows, start, (first, last), settings):
         return None
     kinds = (False, True) if settings.parameters.both and start.side else (False,)
     rails = tuple(filter(None, (_rail(windows, is_other, start, settings) for is_other in kinds)))
     stops = Stop(windows[0].xyz, first), Stop(windows[-1].xyz, last)
     return Growth(rails, stops) if rails else None
+
+
+def _is_rail(windows: Sequence[Window], start: Start, ends: tuple[Reason, Reason], settings: GrowSettings) -> bool:
+    """Return whether what was followed is a rail: seen almost everywhere, steady, and of some length.
+
+    The length does not count where the user has limited it.
+    """
+    heads = [window.head for window in windows if window.head is not None]
+    if not heads or np.mean([window.is_seen for window in windows]) < MIN_SEEN:
+        return False
+    if np.sqrt(np.mean([head.across_m**2 for head in heads])) > start.beam.steady_m:
+        return False
+    paired = np.mean([window.other is not None for window in windows]) >= MIN_SEEN
+    length_m = len(windows) * settings.parameters.window_m
+    return Reason.LENGTH in ends or length_m >= (PAIR_M if paired else SINGLE_M)
 
 
 def _beyond(start: Start, onwards: Sequence[Window], settings: GrowSettings) -> np.ndarray:

@@ -110,7 +110,7 @@ def grow_files(
     labels, figures = Labels(request, folder), _lengths(growths)
     for points in labelling.follow(squares.keys()):
         figures += _labelled(squares.read(points), growths, settings, request, labels)
-    _report(growths, figures, request, progress)
+    _report(growths, figures, settings, request, progress)
     write_labelled(request, choice, labels, output, runner, rewriting)
     stops = tuple(Stop(request.zero.to_crs(stop.xyz), stop.reason) for growth in growths for stop in growth.stops)
     return Grown(output.file, labels.point_count, figures, stops)
@@ -296,10 +296,18 @@ def _lengths(growths: Sequence[Growth]) -> SearchFigures:
     return SearchFigures(paired_m=paired_m, single_m=single_m)
 
 
-def _report(growths: Sequence[Growth], figures: SearchFigures, request: Request, progress: Progress) -> None:
+def _report(
+    growths: Sequence[Growth], figures: SearchFigures, settings: GrowSettings, request: Request, progress: Progress
+) -> None:
     """Inform the user of what grew, and where and why it stops."""
     for growth in growths:
         progress.info(described(growth, request))
+    single = sum(len(growth.rails) == 1 for growth in growths)
+    if settings.parameters.both and single:
+        progress.warning(
+            f"{single} of {len(growths)} followed rails have no other rail at the gauge: check that their seeds lie on "
+            "rails, and the rail standard."
+        )
     progress.info(
         f"Found {figures.points} rail points: {figures.paired_m:.0f} m of rails with a partner and "
         f"{figures.single_m:.0f} m of single rails."

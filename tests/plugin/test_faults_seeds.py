@@ -38,6 +38,12 @@ def seeds(*texts, kind="Point", crs="EPSG:32643", change=lambda xyz: xyz, **para
     return prepare
 
 
+def lone(bench):
+    """A cloud with one rail."""
+    xyz = strip(12.0, rails=[lambda along: np.full_like(along, SPACING_M / 2)]).xyz
+    return {"INPUT": bench.cloud(xyz + CORNER, "raw.laz", 2), "SEED": f"500006,{3e6 + SPACING_M / 2}"}
+
+
 def full_disk(bench):
     values = seeds(ON_RAIL)(bench)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -82,6 +88,13 @@ FAULTS = [
         seeds(ON_RAIL, BESIDE),
         WARNED,
         "1 of 2 seeds lie on no rail: move them onto railheads.",
+    ),
+    Fault(
+        "seed on a lone rail",
+        lone,
+        WARNED,
+        "1 of 1 followed rails have no other rail at the gauge: check that their seeds lie on rails, and the rail "
+        "standard.",
     ),
     Fault("seed on the map", lambda bench: {"INPUT": cloud(bench), "SEED": f"500006,{3e6 + SPACING_M / 2}"}, FINE),
     Fault(

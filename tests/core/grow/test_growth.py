@@ -144,3 +144,17 @@ def test_it_can_be_cancelled():
     track = strip(10.0)
     with pytest.raises(Cancelled):
         grow(Buckets(track.xyz), track.at(5.0, SPACING_M / 2), growing(), Impatient())
+
+
+@pytest.mark.parametrize(("length", "found"), [(4.0, False), (7.0, True)])
+def test_a_short_lone_bar_is_no_rail(length, found):
+    bar = strip(16.0, rails=[lambda s: np.where(np.abs(s - 8.0) < length / 2, 0.3, np.nan)])
+    assert (grow(Buckets(bar.xyz), bar.at(8.0, 0.3), growing()) is not None) == found
+
+
+def test_a_crooked_row_of_stones_is_no_rail():
+    rng = np.random.RandomState(5)
+    places = np.arange(0.0, 20.5, 0.5)
+    crooked = np.cumsum(rng.choice([-0.03, 0.03], len(places)))
+    row = strip(20.0, rails=[lambda s: 0.3 + np.interp(s, places, crooked)])
+    assert grow(Buckets(row.xyz), row.at(10.0, 0.3 + crooked[20]), growing()) is None
