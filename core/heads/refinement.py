@@ -142,7 +142,7 @@ def _shifted(
             continue
         top, _ = on_top(mine.t, mine.across, z, head_width_m)
         along = length_along(line)
-        free = edges[number] & ~hidden_edges(mine.t[top], mine.across[top], along[-1], head_width_m)
+        free = edges[number] & ~hidden_edges(mine.t[top], mine.across[top], along[-1], head_width_m, edges[number])
         blended = is_blended(mine.t, mine.across, z, head_width_m)
         if blended:
             stations, middle = mean_offsets(mine.t, mine.across, along[-1], head_width_m)

@@ -17,6 +17,7 @@ from ..lines.smoothing import smooth_profile
 from ..polyline import Feet, interpolate, left_normals, length_along, project
 from .edges import HALF_HEAD_BINS, HALF_RANGE_BINS, STATION_STEP_M, histograms, search_distance
 from .level import on_top
+from .neighbours import free_edges
 from .own_level import on_own_level
 
 BAND = (0.02, 0.98)
@@ -60,7 +61,7 @@ def bands(counts: np.ndarray, head_width_m: float) -> tuple[np.ndarray, np.ndarr
 
 
 def _wide_bands(
-    counts: np.ndarray, wide_counts: np.ndarray, head_width_m: float
+    counts: np.ndarray, wide_counts: np.ndarray, head_width_m: float, free: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the ends of bands, (s,) metres, and where they are wider than a head, (s,) bool, in windows of any length.
 
@@ -69,11 +70,13 @@ def _wide_bands(
     """
     right_m, left_m = bands(wide_counts, head_width_m)
     least_m = head_width_m + MIN_WIDER_M
-    wide = (left_m - right_m > least_m) & (-np.subtract(*bands(counts, head_width_m)) > least_m)
+    wide = free.all(axis=0) & (left_m - right_m > least_m) & (-np.subtract(*bands(counts, head_width_m)) > least_m)
     return right_m, left_m, binary_opening(wide, np.ones(int(MIN_LENGTH_M / STATION_STEP_M)))
 
 
-def hidden_edges(t: np.ndarray, across: np.ndarray, length_m: float, head_width_m: float) -> np.ndarray:
+def hidden_edges(
+    t: np.ndarray, across: np.ndarray, length_m: float, head_width_m: float, free: np.ndarray
+) -> np.ndarray:
     """Find the stations of a line on its head where road hides the right and the left edge, (2, s) bool.
 
     Parameters
@@ -82,8 +85,10 @@ def hidden_edges(t: np.ndarray, across: np.ndarray, length_m: float, head_width_
         Chainage and offset to the left of the points on top, metres.
     length_m : float
     head_width_m : float
+    free : (2, s) bool array
+        See `neighbours.free_edges`: the head of another line is not road.
     """
-    right_m, left_m, wide = _wide_bands(*histograms(t, across, length_m, head_width_m)[1:], head_width_m)
+    right_m, left_m, wide = _wide_bands(*histograms(t, across, length_m, head_width_m)[1:], head_width_m, free)
     half_m = 0.5 * head_width_m
     at_left, at_right = np.abs(left_m - half_m) <= AT_EDGE_M, np.abs(right_m + half_m) <= AT_EDGE_M
     return np.stack([wide & at_left & ~at_right, wide & at_right & ~at_left])
@@ -112,10 +117,11 @@ def onto_heads(
     if not len(lines):
         return tuple(lines)
     feet = project(lines, points.xyz[:, :2], search_distance(float(np.max(heads_m))))
+    free = free_edges(lines, float(np.max(heads_m)))
     either: dict[int, _Band] = {}
     for number, (line, width_m) in enumerate(zip(lines, heads_m)):
         mine = feet.of(number)
-        ends = _on_either_end(line, mine, points.xyz[mine.point, 2], float(width_m))
+        ends = _on_either_end(line, mine, points.xyz[mine.point, 2], float(width_m), free[number])
         if ends is not None:
             either[number] = ends
     candidates = [either[number].lines if number in either else (line,) for number, line in enumerate(lines)]
@@ -133,7 +139,7 @@ class _Band:
     places: tuple[np.ndarray, np.ndarray]
 
 
-def _on_either_end(line: np.ndarray, feet: Feet, z: np.ndarray, head_width_m: float) -> _Band | None:
+def _on_either_end(line: np.ndarray, feet: Feet, z: np.ndarray, head_width_m: float, free: np.ndarray) -> _Band | None:
     """Move a line onto either end of its band; None where the points form none that is wider than a head."""
     own = on_own_level(feet.t, feet.across, z, head_width_m)
     feet, z = feet[own], z[own]
@@ -142,7 +148,7 @@ def _on_either_end(line: np.ndarray, feet: Feet, z: np.ndarray, head_width_m: fl
         return None
     along = length_along(line)
     stations, counts, wide_counts = histograms(feet.t[top], feet.across[top], along[-1], head_width_m)
-    right_m, left_m, wide = _wide_bands(counts, wide_counts, head_width_m)
+    right_m, left_m, wide = _wide_bands(counts, wide_counts, head_width_m, free)
     if not wide.any():
         return None
     shifts = (np.where(wide, left_m - 0.5 * head_width_m, 0.0), np.where(wide, right_m + 0.5 * head_width_m, 0.0))

@@ -81,7 +81,7 @@ def measure_support(
     """
     top, noise_m = on_top(t, across, z, head_width_m)
     stations, counts, wide_counts = histograms(t[top], across[top], length_m, head_width_m)
-    free = free & ~hidden_edges(t[top], across[top], length_m, head_width_m)
+    free = free & ~hidden_edges(t[top], across[top], length_m, head_width_m, free)
     points = np.bincount(np.minimum((t[top] / STATION_STEP_M).astype(int), len(stations) - 1), minlength=len(stations))
     sections, bin_m = CrossSections.of(wide_counts), head_width_m / (2 * HALF_HEAD_BINS)
     edges = sections.find_edges(free)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
+from rail_extract.core.heads.edges import station_count
 from rail_extract.core.heads.elevation import ElevationParameters, elevate
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.heads.roads import hidden_edges, onto_heads
@@ -76,7 +77,10 @@ def test_the_axis_follows_the_edge_that_is_seen():
 def test_one_edge_is_hidden_on_the_side_of_the_road():
     random = np.random.RandomState(1)
     t = np.sort(random.uniform(0, LENGTH, 6000))
-    hidden = hidden_edges(t, random.uniform(-0.5 * WIDTH, 0.5 * WIDTH + 0.05, 6000), LENGTH, WIDTH)
+    free = np.ones((2, station_count(LENGTH)), dtype=bool)
+    hidden = hidden_edges(t, random.uniform(-0.5 * WIDTH, 0.5 * WIDTH + 0.05, 6000), LENGTH, WIDTH, free)
     assert not hidden[0].any() and hidden[1].all()
-    assert not hidden_edges(t, random.uniform(-0.5 * WIDTH, 0.5 * WIDTH, 6000), LENGTH, WIDTH).any()
-    assert not hidden_edges(t, random.uniform(-0.06, 0.06, 6000), LENGTH, WIDTH).any()
+    assert not hidden_edges(t, random.uniform(-0.5 * WIDTH, 0.5 * WIDTH, 6000), LENGTH, WIDTH, free).any()
+    assert not hidden_edges(t, random.uniform(-0.06, 0.06, 6000), LENGTH, WIDTH, free).any()
+    band = random.uniform(-0.5 * WIDTH, 0.5 * WIDTH + 0.05, 6000)
+    assert not hidden_edges(t, band, LENGTH, WIDTH, free & False).any()
