@@ -158,3 +158,12 @@ def test_a_crooked_row_of_stones_is_no_rail():
     crooked = np.cumsum(rng.choice([-0.03, 0.03], len(places)))
     row = strip(20.0, rails=[lambda s: 0.3 + np.interp(s, places, crooked)])
     assert grow(Buckets(row.xyz), row.at(10.0, 0.3 + crooked[20]), growing()) is None
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_towards_a_switch_the_track_that_keeps_its_curvature_is_followed(side):
+    track = strip(28.0, rails=diverging(150.0), half_width_m=2.6)
+    found, _ = grown(track, 4.0, side * SPACING_M / 2)
+    for rail, own in zip(found.rails, (side, -side)):
+        assert rail.xyz[:, 0].max() > 27.0
+        assert np.abs(rail.xyz[:, 1] - own * SPACING_M / 2).max() < 0.03
