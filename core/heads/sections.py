@@ -41,6 +41,10 @@ WRONG_WIDTH_M, MAX_WRONG_WIDTH_M = 0.004, 0.015
 """Error of the width from which another outline is fitted: standards differ by a millimetre; and from which the points
 show something else than a head."""
 
+MAX_HEAD_WIDTH_M = 0.078
+"""Widest head that is fitted: the widest of the standards has 77.8 mm. Heads that are flat to their edges look 10 mm
+too wide, and their axis would be wherever the scanner seems to look from."""
+
 SETTLED_WIDTH_M, WIDTH_ROUNDS = 0.0005, 5
 """Change of the width at which this ends, and most rounds; each finds two thirds of what is left."""
 
@@ -108,7 +112,7 @@ def outline_middles(
         counts = np.bincount(bins[here], minlength=grid.size).astype(float)
         if counts.sum() < MIN_SECTION_POINTS:
             continue
-        section, head = _fitted(counts, head, grid, section)
+        section, head, width_m = _fitted(counts, head, grid, section)
         if section.shares[-1] > MAX_STRAY_SHARE or abs(section.place[0]) > MAX_SECTION_SHIFT_M:
             section = None
             continue
@@ -120,8 +124,7 @@ def outline_middles(
         pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
         middles.offset[part] = np.where(seen[part], middles.offset[part] - pull, np.nan)
         middles.common[part] = np.hypot(np.hypot(scores.common_m, PROFILE_SIGMA_M), PULL_DOUBT * pull)
-        wider_m = head.width_m + section.place[3] - head_width_m
-        middles.blur[part] = _blur(section, wider_m, middles.offset[part])
+        middles.blur[part] = _blur(section, width_m - head_width_m, middles.offset[part])
     return middles
 
 
@@ -134,20 +137,24 @@ class Head:
     is_stated: bool = True
 
 
-def _fitted(counts: np.ndarray, head: Head, grid: Grid, start: Section | None) -> tuple[Section, Head]:
-    """Fit a head to a section, with another outline if the stated width is wrong.
+def _fitted(counts: np.ndarray, head: Head, grid: Grid, start: Section | None) -> tuple[Section, Head, float]:
+    """Fit a head to a section, with another outline if the stated width is wrong, and find the width that it shows.
 
     What the scanner sees of an outline that is too wide depends on the side that it looks from, and so does the axis of
-    a head that was made narrower. Each round therefore begins with the outline of the width found before.
+    a head that was made narrower. Each round therefore begins with the outline of the width found before. Where that
+    does not settle at the width of some head, the points have another shape, as flat heads, and the outline stays.
     """
-    section = fit_section(counts, head.outline, grid, start)
+    section = first = fit_section(counts, head.outline, grid, start)
+    found, width_m = head, head.width_m + first.place[3]
+    least_m = WRONG_WIDTH_M if head.is_stated else SETTLED_WIDTH_M
     for _ in range(WIDTH_ROUNDS):
-        wider_m = section.place[3]
-        if not (WRONG_WIDTH_M if head.is_stated else SETTLED_WIDTH_M) < abs(wider_m) < MAX_WRONG_WIDTH_M:
+        if not least_m < abs(width_m - found.width_m) or abs(width_m - head.width_m) >= MAX_WRONG_WIDTH_M:
             break
-        head = Head(head.width_m + wider_m, Outline.of(head.width_m + wider_m), is_stated=False)
-        section = fit_section(counts, head.outline, grid)
-    return section, head
+        found, least_m = Head(width_m, Outline.of(width_m), is_stated=False), SETTLED_WIDTH_M
+        section = fit_section(counts, found.outline, grid)
+        width_m = found.width_m + section.place[3]
+    settled = abs(width_m - found.width_m) <= least_m and width_m <= MAX_HEAD_WIDTH_M
+    return (section, found, width_m) if settled else (first, head, width_m)
 
 
 def _blur(section: Section, wider_m: float, offset: np.ndarray) -> float:
