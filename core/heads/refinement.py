@@ -52,9 +52,6 @@ CURL_M, STEADY_M = 0.8, 3.5
 """Length of a free end that is redrawn, and of the part before it that it continues. The raster curls over two head
 widths or more, half a window of 1.25 m adds to that, and the curvature of a tram's rail takes metres to measure."""
 
-LAST_POINTS = 3
-"""Points on a head from which on it is shown, counted from its end: the first one may be a stray."""
-
 MAX_CROSSING_SHIFT_M = 3.0
 """Limit for how far a crossing moves when two lines move by half a head: at 1:26.5 each moves it by 1 m."""
 
@@ -196,8 +193,8 @@ def _with_redrawn_ends(line: np.ndarray, along: np.ndarray, free_ends: np.ndarra
     t : (k,) array
         Chainages of the points on the head, increasing; the raster's lines go on where there are no more.
     """
-    line, last = line.copy(), min(LAST_POINTS, len(t)) - 1
-    ends = ((line, along, t[last]), (line[::-1], along[-1] - along[::-1], along[-1] - t[-1 - last]))
+    line = line.copy()
+    ends = ((line, along, t[0]), (line[::-1], along[-1] - along[::-1], along[-1] - t[-1]))
     for (from_end, t_end, shown), free in zip(ends, free_ends):
         start = max(shown, 0.0) + CURL_M
         steady = (t_end >= start) & (t_end <= start + STEADY_M)

@@ -13,7 +13,7 @@ from scipy.ndimage import uniform_filter1d
 
 from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, WINDOWS, station_count
 from .level import in_head_frame
-from .outline import Grid, Outline, Scores, Section, fit_section
+from .outline import CROWN_RADIUS_M, Grid, Outline, Scores, Section, fit_section
 
 MIN_SECTION_POINTS = 250
 """Points that a section needs for its parts to be told apart."""
@@ -54,6 +54,11 @@ blurred. Worn corners blur edges by 2 mm, and the two noises of a scanner differ
 
 WIDENED_M = 0.008
 """Excess of the width from which passes may have widened the head; without round corners it looks 7 mm wider."""
+
+CROWNED_SHARE, CROWN_SHARE, CROWN_BAND_M = 0.5, 0.4, 0.006
+"""Curvature of the top, as a share of that of the outline, from which a head is crowned, and the points by which it is
+measured: within this share of the head's width from its axis, and this far from the top. A head that is flat to its
+edges looks 11 mm wider than it is, as one that passes have widened does."""
 
 PROFILE_SIGMA_M = 0.0004
 """Standard error of the middle that comes from the outline itself: real heads chain more radii, and are worn."""
@@ -105,7 +110,7 @@ def outline_middles(
     head, grid = Head(head_width_m, Outline.of(head_width_m)), Grid.of(head_width_m)
     bins = grid.number(left, up)
     used = (bins >= 0) & seen[station]
-    left, station, bins = left[used], station[used], bins[used]
+    left, up, station, bins = left[used], up[used], station[used], bins[used]
     section: Section | None = None
     for first, last in _borders(count):
         here = slice(*np.searchsorted(station, [first, last]))
@@ -124,7 +129,8 @@ def outline_middles(
         pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
         middles.offset[part] = np.where(seen[part], middles.offset[part] - pull, np.nan)
         middles.common[part] = np.hypot(np.hypot(scores.common_m, PROFILE_SIGMA_M), PULL_DOUBT * pull)
-        middles.blur[part] = _blur(section, width_m - head_width_m, middles.offset[part])
+        wider_m = width_m - head_width_m if _is_crowned(left[here], up[here], head_width_m) else 0.0
+        middles.blur[part] = _blur(section, wider_m, middles.offset[part])
     return middles
 
 
@@ -155,6 +161,15 @@ def _fitted(counts: np.ndarray, head: Head, grid: Grid, start: Section | None) -
         width_m = found.width_m + section.place[3]
     settled = abs(width_m - found.width_m) <= least_m and width_m <= MAX_HEAD_WIDTH_M
     return (section, found, width_m) if settled else (first, head, width_m)
+
+
+def _is_crowned(left: np.ndarray, up: np.ndarray, head_width_m: float) -> bool:
+    """Return whether points, by their offsets from the axis and from the top, (n,) metres, show a round top."""
+    top = (np.abs(left) < CROWN_SHARE * head_width_m) & (np.abs(up) < CROWN_BAND_M)
+    if top.sum() < ENOUGH_POINTS:
+        return False
+    curvature = -2 * np.polynomial.polynomial.polyfit(left[top], up[top], 2)[2]
+    return bool(curvature > CROWNED_SHARE / CROWN_RADIUS_M)
 
 
 def _blur(section: Section, wider_m: float, offset: np.ndarray) -> float:

@@ -73,7 +73,7 @@ def test_rails_are_extracted_from_a_raw_cloud(save, tmp_path):
     network = extract_files(request, folder, parameters, InTurn(), classify=True)
     assert [rail.class_code for rail in network.rails] == [10, 10]
     (track,) = network.centerlines
-    assert track.gauge_mm == pytest.approx(1435, abs=3)
+    assert track.gauge_mm == pytest.approx(1435, abs=5)  # ten metres of bars without round corners
     assert not list(folder.iterdir())
     assert network.search.paired_m == pytest.approx(19, abs=2)
     assert network.search.squares == 2

@@ -223,7 +223,7 @@ def test_an_interrupted_command_says_so_in_one_sentence(tiles, tmp_path):
     """A terminal sends Ctrl-C to the command and to its workers."""
     out, words = tmp_path / "out.gpkg", [sys.executable, "-m", "rail_extract", "extract", str(tiles)]
     process = subprocess.Popen(
-        [*words, "--rails", str(out), "--engine", "OPENCV", "--workers", "1"],
+        [*words, "--rails", str(out), "--engine", "OPENCV", "--model", "base", "--workers", "1"],
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
