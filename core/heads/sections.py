@@ -58,7 +58,7 @@ WIDENED_M = 0.008
 CROWNED_SHARE, CROWN_SHARE, CROWN_BAND_M = 0.5, 0.4, 0.006
 """Curvature of the top, as a share of that of the outline, from which a head is crowned, and the points by which it is
 measured: within this share of the head's width from its axis, and this far from the top. A head that is flat to its
-edges looks 11 mm wider than it is, as one that passes have widened does."""
+edges looks 11 mm wider than it is, and blurred, as one that several passes show."""
 
 PROFILE_SIGMA_M = 0.0004
 """Standard error of the middle that comes from the outline itself: real heads chain more radii, and are worn."""
@@ -129,8 +129,8 @@ def outline_middles(
         pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
         middles.offset[part] = np.where(seen[part], middles.offset[part] - pull, np.nan)
         middles.common[part] = np.hypot(np.hypot(scores.common_m, PROFILE_SIGMA_M), PULL_DOUBT * pull)
-        wider_m = width_m - head_width_m if _is_crowned(left[here], up[here], head_width_m) else 0.0
-        middles.blur[part] = _blur(section, wider_m, middles.offset[part])
+        if _is_crowned(left[here], up[here], head_width_m):
+            middles.blur[part] = _blur(section, width_m - head_width_m, middles.offset[part])
     return middles
 
 

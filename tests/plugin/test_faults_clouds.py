@@ -87,14 +87,14 @@ POINTS = [
     Fault("all points duplicated", of(lambda points: np.repeat(points, 2, axis=0)), gives=TRACK),
     Fault(
         "only one rail",
-        of(lambda points: points[:1800]),
+        scattered(30, 0.07, 0.005),
         WARNED,
         "No two rails run parallel: there are rails but no track centerlines.",
         {"RAIL_COUNT": 1, "CENTERLINE_COUNT": 0},
     ),
     Fault(
         "vertical wall",
-        scattered(6, 0.01, 3),
+        scattered(30, 0.01, 3),
         WARNED,
         "No two rails run parallel: there are rails but no track centerlines.",
     ),
