@@ -7,7 +7,7 @@ from rail_extract.laboratory.ruler.lines import compare_lines
 
 STANDARD = "IN_75R_1000"
 TRUE_GAUGE_MM = 1000
-MAX_LATERAL_M, MAX_HEIGHT_M, MAX_GAUGE_MM = 1.5 * 0.0019, 1.5 * 0.0004, 1.5 * 0.4
+MAX_LATERAL_M, MAX_HEIGHT_M, MAX_GAUGE_MM = 1.5 * 0.0019, 1.5 * 0.0004, 1.5 * 0.8
 """Greatest RMSE of the rails in plan and in height, and greatest error of a track's gauge: 1.5 times the figures that
 the README states."""
 

@@ -60,7 +60,7 @@ def with_weights(change):
         shutil.copytree(models.FOLDER, bench.folder / "models")
         bench.patch.setattr(models, "FOLDER", bench.folder / "models")
         change(models.MODELS[0].path)
-        return cloud(bench)
+        return {**cloud(bench), "MODEL": models.MODELS[0].name}
 
     return prepare
 

@@ -296,7 +296,7 @@ def test_the_log_names_steps_figures_and_verdict(run, scene, new_feedback, tmp_p
     assert run({**scene, "ENGINE": "OPENCV", "REPORT": tmp_path / "report.html"}, feedback).ok
     patterns = (
         r"Reading 1 file with 7,200 points\.",
-        r"Class 10: 7,200 points in 1 square; network base, 1 pass\.",
+        r"Class 10: 7,200 points in 1 square; network fast, 1 pass\.",
         r"Class 10: 2 rails, 24 m\.",
         r"Paired: 1 track, 12 m\.",
         r"Measured: 13 stations, one every 1 m\.",
