@@ -84,5 +84,5 @@ def test_weights_make_a_row_for_each_number_of_passes(small):
 
 def test_the_report_names_every_row_in_every_table(small):
     text = "\n".join(small.report([small.measure("input", 2), small.measure("closing", 2)], 2))
-    assert text.count("\ninput ") == text.count("\nclosing ") == 7
-    assert "lines removed" in text
+    assert text.count("\ninput ") == text.count("\nclosing ") == 8
+    assert "lines removed" in text and "thin rails" in text
