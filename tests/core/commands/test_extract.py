@@ -222,8 +222,9 @@ def test_options_are_read_from_a_file(tmp_path, capsys):
 def test_an_interrupted_command_says_so_in_one_sentence(tiles, tmp_path):
     """A terminal sends Ctrl-C to the command and to its workers."""
     out, words = tmp_path / "out.gpkg", [sys.executable, "-m", "rail_extract", "extract", str(tiles)]
+    slow = ["--engine", "OPENCV", "--model", "base", "--iterations", "5"]  # or it ends before the signal comes
     process = subprocess.Popen(
-        [*words, "--rails", str(out), "--engine", "OPENCV", "--model", "base", "--workers", "1"],
+        [*words, "--rails", str(out), *slow, "--workers", "1"],
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
