@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -18,6 +18,7 @@ import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
+from pictures import draw_pictures  # noqa: E402
 from rail_extract.core.classify import square  # noqa: E402
 from rail_extract.core.classify.bed import Coarse, find_bed  # noqa: E402
 from rail_extract.core.classify.lines import Lines, Marks, find_lines  # noqa: E402
@@ -226,18 +227,5 @@ PICTURES: dict[str, Callable[[], Figure]] = {
 }
 
 
-def main(names: Sequence[str]) -> None:
-    """Draw the pictures that are named, or all."""
-    unknown = sorted({*names} - {*PICTURES})
-    if unknown:
-        sys.exit(f"There is no picture {unknown[0]}: choose from {', '.join(PICTURES)}.")
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    for name in names or PICTURES:
-        path = FOLDER / f"{name}.png"
-        PICTURES[name]().savefig(path, dpi=DPI, pil_kwargs={"optimize": True})
-        plt.close("all")
-        print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB", flush=True)
-
-
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    draw_pictures(PICTURES, FOLDER, DPI, sys.argv[1:])

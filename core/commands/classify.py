@@ -12,16 +12,16 @@ from ..classify.settings import Settings
 from ..clouds.points import Request, ask
 from ..disk import writing
 from ..errors import ParameterError
-from ..labelling.files import Choice, classify_files, plan_output
+from ..labelling.files import Choice, classify_files
 from ..labelling.finding import guide_of
 from ..learned.model import weights_for
 from ..parameters import DEFAULT_GUIDE_DISTANCE_M
 from ..progress import Estimating
 from ..scratch import scratch_folder
-from ..standards import LAST_CLASS, RAIL_CLASS, SEARCHED_CLASSES, resolve
+from ..standards import SEARCHED_CLASSES, resolve
 from ..tasks import InTurn, Runner
+from .copies import add_label_arguments, add_tiles_arguments, check_rail_class, planned_output, print_figures
 from .options import (
-    TILES_HELP,
     Console,
     add_cloud_arguments,
     add_method_arguments,
@@ -34,9 +34,7 @@ from .options import (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument("tiles", nargs="+", type=Path, metavar="TILE", help=TILES_HELP)
-    text = "LAZ or LAS file; for several tiles, the name of their new folder, with .vpc added for the catalogue"
-    parser.add_argument("--output", type=Path, required=True, help=text)
+    add_tiles_arguments(parser)
     add_cloud_arguments(parser)
     text = "lines along the tracks, in a file such as GeoPackage or GeoJSON: search near them only"
     parser.add_argument("--guide", type=Path, metavar="FILE", help=text)
@@ -46,9 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only-guided", action="store_true", help=text)
     add_method_arguments(parser)
     parser.add_argument("--pairs-only", action="store_true", help="leave out rails without a partner")
-    text = f"class of the rail points that are found (default: {RAIL_CLASS})"
-    parser.add_argument("--rail-class", type=int, default=RAIL_CLASS, metavar="N", help=text)
-    parser.add_argument("--rails-only", action="store_true", help="write the rail points only")
+    add_label_arguments(parser, "the rail points that are found")
     parser.add_argument("--workers", type=int, default=1, help="processes that work on the cloud (default: 1)")
     text = "keep the rail class of points that are not found; otherwise they become class 1"
     parser.add_argument("--no-reset", action="store_true", help=text)
@@ -62,8 +58,7 @@ def run(args: argparse.Namespace) -> None:
     RailExtractError
         A parameter is wrong, a file can't be read, or the output can't be written.
     """
-    if not 0 <= args.rail_class <= LAST_CLASS:
-        raise ParameterError(f"--rail-class must be a number from 0 to {LAST_CLASS}, not {args.rail_class}.")
+    check_rail_class(args)
     if args.workers < 1:
         raise ParameterError(f"--workers must be 1 or more, not {args.workers}.")
     standard = resolve(args.standard, args.gauge, args.head_width)
@@ -73,19 +68,18 @@ def run(args: argparse.Namespace) -> None:
     choice = Choice(args.rail_class, args.rails_only, not args.no_reset)
     weights = weights_for(args.method, args.weights)
     progress = Estimating(Console())
-    output = args.output if len(args.tiles) == 1 or args.output.suffix else args.output.with_suffix(".vpc")
-    with writing(output.parent):
-        output.parent.mkdir(parents=True, exist_ok=True)
-    planned = plan_output(args.tiles, output, choice.class_code, progress)
+    planned = planned_output(args, progress)
     request = ask(args.tiles, SEARCHED_CLASSES, args.crs, extent_of(args.extent), progress)
     request = limited(request, args)
     guide = _guide(args, request)
     settings = Settings(gauges_m, standard.head_width_m, not args.pairs_only, guide, weights)
-    with writing(output.parent), scratch_folder(planned.file.parent) as folder, _runner(args.workers, folder) as runner:
+    with (
+        writing(planned.file.parent),
+        scratch_folder(planned.file.parent) as folder,
+        _runner(args.workers, folder) as runner,
+    ):
         result = classify_files(request, settings, choice, planned, folder, runner, progress)
-    figures = result.figures
-    print(f"{figures.points} of {result.point_count} points are on rails")
-    print(f"{figures.paired_m:.0f} m of rails with a partner, {figures.single_m:.0f} m without")
+    print_figures(result.figures, result.point_count)
 
 
 @contextmanager

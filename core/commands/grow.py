@@ -11,14 +11,15 @@ from ..clouds.points import ask
 from ..disk import writing
 from ..errors import ParameterError
 from ..grow.settings import GrowSettings
-from ..labelling.files import Choice, plan_output
+from ..labelling.files import Choice
 from ..labelling.growing import grow_files
 from ..parameters import GrowParameters
 from ..progress import Estimating
 from ..scratch import scratch_folder
-from ..standards import DEFAULT, LAST_CLASS, RAIL_CLASS, SEARCHED_CLASSES, resolve
+from ..standards import DEFAULT, SEARCHED_CLASSES, resolve
 from ..tasks import InTurn
-from .options import TILES_HELP, Console, shapes_module
+from .copies import add_label_arguments, add_tiles_arguments, check_rail_class, planned_output, print_figures
+from .options import Console, shapes_module
 
 LENGTHS = {
     "search": "largest distance of a seed from its rail, and of the rail from its course",
@@ -33,9 +34,7 @@ LENGTHS = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument("tiles", nargs="+", type=Path, metavar="TILE", help=TILES_HELP)
-    text = "LAZ or LAS file; for several tiles, the name of their new folder, with .vpc added for the catalogue"
-    parser.add_argument("--output", type=Path, required=True, help=text)
+    add_tiles_arguments(parser)
     text = "points on railheads, or lines along them, in a file such as GeoPackage or GeoJSON"
     parser.add_argument("--seeds", type=Path, metavar="FILE", help=text)
     text = "a place on a railhead, in units of the coordinate system; may be given several times"
@@ -54,9 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     most = GrowParameters.max_outliers
     text = f"windows in a row in which the rail may not be seen (default: {most})"
     parser.add_argument("--max-outliers", type=int, default=most, metavar="N", help=text)
-    text = f"class of the rail points (default: {RAIL_CLASS})"
-    parser.add_argument("--rail-class", type=int, default=RAIL_CLASS, metavar="N", help=text)
-    parser.add_argument("--rails-only", action="store_true", help="write the rail points only")
+    add_label_arguments(parser, "the rail points")
 
 
 def run(args: argparse.Namespace) -> None:
@@ -67,23 +64,18 @@ def run(args: argparse.Namespace) -> None:
     RailExtractError
         A parameter is wrong, a file can't be read, no seed lies on a rail, or the output can't be written.
     """
-    if not 0 <= args.rail_class <= LAST_CLASS:
-        raise ParameterError(f"--rail-class must be a number from 0 to {LAST_CLASS}, not {args.rail_class}.")
+    check_rail_class(args)
     standard = resolve(args.standard, args.gauge, args.head_width)
     settings = GrowSettings(standard.gauge_m, standard.head_width_m, _parameters(args))
     progress = Estimating(Console())
-    output = args.output if len(args.tiles) == 1 or args.output.suffix else args.output.with_suffix(".vpc")
-    with writing(output.parent):
-        output.parent.mkdir(parents=True, exist_ok=True)
-    planned = plan_output(args.tiles, output, args.rail_class, progress)
+    planned = planned_output(args, progress)
     request = ask(args.tiles, SEARCHED_CLASSES, args.crs, None, progress)
     choice = Choice(args.rail_class, args.rails_only, reset=False)
     seeds = _seeds(args, request.zero.crs_wkt)
-    with writing(output.parent), scratch_folder(planned.file.parent) as folder:
+    parent = planned.file.parent
+    with writing(parent), scratch_folder(parent) as folder:
         result = grow_files(request, seeds, settings, choice, planned, folder, InTurn(), progress)
-    figures = result.figures
-    print(f"{figures.points} of {result.point_count} points are on rails")
-    print(f"{figures.paired_m:.0f} m of rails with a partner, {figures.single_m:.0f} m without")
+    print_figures(result.figures, result.point_count)
 
 
 def _parameters(args: argparse.Namespace) -> GrowParameters:
