@@ -212,7 +212,8 @@ def list_files(paths: Paths) -> tuple[Path, ...]:
     """
     files: list[Path] = []
     for path in [paths] if isinstance(paths, (str, Path)) else paths:
-        files.extend(file.absolute() for file in _files_of(Path(path)))  # a worker may run in another folder
+        with explained(Path(path)):
+            files.extend(file.absolute() for file in _files_of(Path(path)))  # a worker may run in another folder
     if not files:
         raise CloudError("No point cloud was given: name a file or a folder of tiles.")
     for file in files:

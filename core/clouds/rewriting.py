@@ -32,6 +32,9 @@ RECORDS_AT = 235
 COPC = "copc"
 """User of the records that describe the octree of a COPC file; they do not fit a file without one."""
 
+AS_IT_IS = "surrogateescape"
+"""Has laspy write text as it read it: the standard allows ASCII only, and some programs write other characters."""
+
 WRITE_ERRORS = () if lazrs is None else (lazrs.LazrsError,)
 """What lazrs raises where the disk is full."""
 
@@ -81,8 +84,12 @@ def rewrite(path: Path, new: Path, change: Change, progress: Progress = SILENT) 
         header = reader.header
         for record in header.vlrs.get_by_id(COPC):
             header.vlrs.remove(record)
+        with explained(path):
+            for record in header.vlrs:
+                record.user_id.encode("ascii")  # otherwise laspy can't write it
+        compress = new.suffix.lower() == ".laz"
         try:
-            with laspy.open(new, "w", header=header, do_compress=new.suffix.lower() == ".laz") as writer:
+            with laspy.open(new, "w", header=header, do_compress=compress, encoding_errors=AS_IT_IS) as writer:
                 for chunk in _chunks(path, reader, progress):
                     before = np.array(chunk.classification)
                     xyz = np.column_stack([chunk.X, chunk.Y, chunk.Z]) * header.scales + header.offsets

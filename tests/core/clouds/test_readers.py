@@ -117,6 +117,11 @@ def test_no_path_is_refused():
         readers.list_files([])
 
 
+def test_a_name_that_the_system_does_not_accept_is_refused():
+    with pytest.raises(CloudError, match=r"can't be read \(File name too long\)|does not exist"):
+        readers.list_files(["a" * 5000])
+
+
 def test_missing_path_is_refused_with_the_suffixes(tmp_path):
     with pytest.raises(CloudError, match="gone.laz does not exist: give a .las, .laz or .vpc file, or a folder"):
         readers.list_files(tmp_path / "gone.laz")

@@ -86,6 +86,27 @@ def test_only_the_classes_change(tmp_path, scene, suffix, point_format, new):
     ]
 
 
+def test_text_in_other_characters_than_ascii_stays_as_it_is(tmp_path, scene):
+    source = save(tmp_path / "raw.las", scene[0])
+    data = source.read_bytes()
+    head = data[:1000].replace(b"notes\0", b"n\xf6tes\0")
+    head = head[:26] + "G\u00f6ttingen".encode("latin-1").ljust(32, b"\0") + head[58:]
+    source.write_bytes(head + data[1000:])
+    result, _ = classify(tmp_path, [source], tmp_path / "new.las")
+    copied = result.file.read_bytes()[:1000]
+    assert copied[26:58] == head[26:58]
+    assert head.count(b"n\xf6tes\0") == copied.count(b"n\xf6tes\0") > 0
+
+
+def test_a_record_of_a_user_whose_name_can_not_be_copied_is_refused(tmp_path, scene):
+    source = save(tmp_path / "raw.las", scene[0])
+    data = source.read_bytes()
+    source.write_bytes(data[:1000].replace(b"someone\0", "s\u00f6meon\0".encode()) + data[1000:])
+    with pytest.raises(CloudError, match=r"raw.las is cut off or damaged"):
+        classify(tmp_path, [source], tmp_path / "new.las")
+    assert [one.name for one in tmp_path.iterdir()] == ["raw.las"]
+
+
 def test_the_rail_class_is_reset_or_kept_and_other_points_are_left_out(tmp_path, scene):
     xyz, on = scene
     codes = np.where(np.arange(len(xyz)) % 2, 10, 7)
