@@ -8,6 +8,7 @@ import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from types import ModuleType
 
 PROGRAM = "python -m rail_extract"
 
@@ -33,7 +34,12 @@ CANCELLED = "Cancelled; nothing was written."
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code; only the module of this command is imported."""
-    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    module, args = parse(sys.argv[1:] if arguments is None else list(arguments))
+    return _run(module, args)
+
+
+def parse(arguments: list[str]) -> tuple[ModuleType, argparse.Namespace]:
+    """Return the module of a command and its arguments; ends the program if there are others, or help is asked for."""
     parser = argparse.ArgumentParser(prog=PROGRAM, description=__doc__)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     listed = {name: command for name, command in COMMANDS.items() if _is_installed(command[0])}
@@ -44,12 +50,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = arguments[0] if arguments and arguments[0] in listed else None
     if chosen is None:
         parser.parse_args(arguments)
-        return 0
+        parser.exit()
     module = importlib.import_module(f".{listed[chosen][0]}", __package__)
     module.add_arguments(parsers[chosen])
-    args = parser.parse_args(arguments)
+    try:
+        args = parser.parse_args(arguments)
+    except (UnicodeDecodeError, RecursionError):
+        parsers[chosen].error("a file that is given as @FILE is not text, or names itself")
     args.command_line = shlex.join([*PROGRAM.split(), *arguments])
-    return _run(module, args)
+    return module, args
 
 
 def _is_installed(module: str) -> bool:
@@ -57,7 +66,7 @@ def _is_installed(module: str) -> bool:
     return Path(__file__).with_name(module.split(".")[0]).is_dir()
 
 
-def _run(module, args: argparse.Namespace) -> int:
+def _run(module: ModuleType, args: argparse.Namespace) -> int:
     errors = importlib.import_module(".core.errors", __package__)
     try:
         return module.run(args) or 0

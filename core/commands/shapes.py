@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -70,19 +72,27 @@ def read_mask(path: Path, crs_wkt: str | None) -> Mask:
     areas = [part for part in _parts(path, crs_wkt) if part.geom_type == "Polygon" and part.area > 0]
     if not areas:
         raise ParameterError(f"{path} has no polygons: give polygons around the tracks.")
-    united = shapely.get_parts(shapely.union_all(shapely.make_valid(areas)))
+    with _explained(path):
+        united = shapely.get_parts(shapely.union_all(shapely.make_valid(areas)))
     return Mask.of([shapely.get_coordinates(ring) for ring in shapely.get_rings(united)])
 
 
 def _parts(path: Path, crs_wkt: str | None) -> list[shapely.Geometry]:
     """Read the single geometries of a file, in another coordinate system; those that it does not cover are left out."""
-    try:
+    with _explained(path):
         meta, _, shapes, _ = pyogrio.raw.read(path, columns=[], force_2d=True)
-    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError) as error:
+        parts = shapely.get_parts(shapely.from_wkb(shapes)) if shapes is not None else []
+        if crs_wkt and meta["crs"]:
+            pyproj = import_pyproj()
+            change = pyproj.Transformer.from_crs(parse_crs(meta["crs"]), parse_crs(crs_wkt), always_xy=True)
+            parts = shapely.transform(parts, lambda xy: np.column_stack(change.transform(*xy.T)))
+        return [part for part in parts if np.isfinite(shapely.get_coordinates(part)).all()]
+
+
+@contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    """Turn what GDAL, PROJ and GEOS raise because of a file into a `ParameterError` that names the file."""
+    try:
+        yield
+    except (RuntimeError, ValueError, shapely.errors.ShapelyError) as error:
         raise ParameterError(f"{path} can't be read as a vector file: give a GeoPackage or GeoJSON file.") from error
-    parts = shapely.get_parts(shapely.from_wkb(shapes)) if shapes is not None else []
-    if crs_wkt and meta["crs"]:
-        pyproj = import_pyproj()
-        change = pyproj.Transformer.from_crs(parse_crs(meta["crs"]), parse_crs(crs_wkt), always_xy=True)
-        parts = shapely.transform(parts, lambda xy: np.column_stack(change.transform(*xy.T)))
-    return [part for part in parts if np.isfinite(shapely.get_coordinates(part)).all()]

@@ -218,6 +218,15 @@ def test_options_are_read_from_a_file(tmp_path, capsys):
     assert "gone.laz does not exist" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("content", [b"\xff\xfe\xff", b"@names.txt"])
+def test_a_file_of_options_that_can_not_be_one_is_refused(tmp_path, monkeypatch, capsys, content):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "names.txt").write_bytes(content)
+    with pytest.raises(SystemExit, match="2"):
+        main(["extract", "@names.txt"])
+    assert "error: a file that is given as @FILE is not text, or names itself" in capsys.readouterr().err
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends Ctrl-C to consoles, not to processes")
 def test_an_interrupted_command_says_so_in_one_sentence(tiles, tmp_path):
     """A terminal sends Ctrl-C to the command and to its workers."""
