@@ -285,7 +285,7 @@ def _swap(folder: Path, main: Path, names: Sequence[Path]) -> None:
 def _complete(folder: Path) -> None:
     """Complete the move that a killed run had begun in its temporary folder, or take it back."""
     journal, parent = folder / MOVING, folder.parent
-    with suppress(OSError, ValueError), alone_in(parent):
+    with suppress(OSError, ValueError, TypeError, RecursionError), alone_in(parent):
         main, *names = (parent / Path(name).name for name in json.loads(journal.read_text(encoding="utf-8")))
         if not (folder / NEW / main.name).exists():
             return  # it was complete

@@ -11,7 +11,7 @@ from ..classify.settings import Settings
 from ..clouds.points import Request
 from ..disk import writing
 from ..errors import NoRailPointsError, ParameterError
-from ..learned.examples import INDEX, Examples, write_square
+from ..learned.examples import Examples, save_index, write_square
 from ..progress import SILENT, Progress
 from ..scratch import scratch_folder
 from ..squares.grid import Square
@@ -32,7 +32,7 @@ def write_examples(
         Classes of the rail points; all other points are examples of what is not on rails.
     settings : Settings
     folder : Path
-        Existing folder for the blocks; complete once it holds the index.
+        Existing folder for the blocks; complete once it holds the checksums.
     progress : Progress
 
     Raises
@@ -60,7 +60,7 @@ def write_examples(
             entries.append(write_square(folder, file, key, settings.side_m, xyz, rail, tile))
         index = np.concatenate(entries) if entries else np.empty(0)
         _check(census, index, rail_classes)
-        np.save(folder / INDEX, index)
+        save_index(folder, index)
     return Examples.load(folder)
 
 

@@ -13,7 +13,7 @@ from ..classify.settings import Settings
 from ..clouds.points import Request
 from ..disk import Destination, writing
 from ..errors import ParameterError
-from ..learned.examples import INDEX, Examples
+from ..learned.examples import CHECKS, Examples
 from ..learned.model import WEIGHTS_SUFFIX, check_torch, device_of, save
 from ..progress import SILENT, Progress
 from .examples import write_examples
@@ -113,16 +113,20 @@ def _examples(request: Request, settings: Settings, plan: Plan, folder: Path, pr
     source, examples = folder / SOURCE, folder / EXAMPLES
     identity = _identity(request, settings, plan.rail_classes)
     if source.exists():
-        if source.read_text(encoding="utf-8") != identity:
+        if source.read_bytes() != identity.encode():
             raise other_training(folder)
     elif folder.exists() and any(folder.iterdir()):
         raise other_training(folder)
-    if (examples / INDEX).exists():
-        return Examples.load(examples)
+    if (examples / CHECKS).exists():
+        try:
+            return Examples.load(examples)
+        except ValueError:
+            progress.warning(f"{examples} is damaged: the cloud is cut into blocks again.")
+            shutil.rmtree(examples)
     is_new = not folder.exists()
     try:
         examples.mkdir(parents=True, exist_ok=True)
-        source.write_text(identity, encoding="utf-8")
+        source.write_bytes(identity.encode())
         progress.status("Cutting the cloud into blocks")
         found = write_examples(request, plan.rail_classes, settings, examples, progress)
         found.validation(plan.seed)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +31,9 @@ VALIDATION_SHARE = 0.2
 
 INDEX = "index.npy"
 
+CHECKS = "checks.json"
+"""File with the checksums of all others, written last."""
+
 
 @dataclass(frozen=True)
 class Examples:
@@ -45,7 +50,15 @@ class Examples:
 
     @classmethod
     def load(cls, folder: Path) -> Examples:
-        """Read the index of blocks that `write_square` has written."""
+        """Read the index of blocks that `save_index` has completed.
+
+        Raises
+        ------
+        ValueError
+            A file is missing or damaged.
+        """
+        if (folder / CHECKS).read_bytes() != _checks(folder):
+            raise ValueError(f"{folder} is damaged")
         return cls(folder, np.load(folder / INDEX))
 
     def block(self, number: int) -> np.ndarray:
@@ -124,6 +137,18 @@ def write_square(
         start += len(points)
     np.save(_square_file(folder, file), np.concatenate(parts))
     return entries
+
+
+def save_index(folder: Path, index: np.ndarray) -> None:
+    """Write the index of blocks, (n,) of ENTRY, and that all files are complete."""
+    np.save(folder / INDEX, index)
+    (folder / CHECKS).write_bytes(_checks(folder))
+
+
+def _checks(folder: Path) -> bytes:
+    """Return the checksums of the files of blocks and of their index."""
+    files = sorted(folder.glob(f"*{Path(INDEX).suffix}"))
+    return json.dumps({file.name: zlib.crc32(file.read_bytes()) for file in files}).encode()
 
 
 def _square_file(folder: Path, file: int) -> Path:

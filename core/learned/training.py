@@ -377,14 +377,18 @@ class _Run:
             return
         try:
             state = torch.load(path, map_location=self.device, weights_only=True)
-            identity = state["identity"]
+            is_same = state["identity"] == self._identity()
+            if is_same:
+                self._restore(state)
         except Exception as error:  # a damaged file raises any of a dozen errors
             raise ParameterError(f"{path} is damaged: delete the folder {self.folder} and train again.") from error
-        if identity != self._identity():
+        if not is_same:
             raise ParameterError(
                 f"{self.folder} holds another training, with other clouds or settings: delete it, or choose another "
                 "name for the weights."
             )
+
+    def _restore(self, state: dict[str, Any]) -> None:
         self.network.load_state_dict(state["network"])
         self.optimizer.load_state_dict(state["optimizer"])
         self.step, self.losses = state["step"], list(state["losses"])

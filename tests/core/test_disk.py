@@ -6,12 +6,13 @@ import stat
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import pytest
 from rail_extract.core.disk import Destination
 from rail_extract.core.errors import DiskError
-from rail_extract.core.scratch import MIN_AGE_S, PREFIX
+from rail_extract.core.scratch import MIN_AGE_S, MIN_UNMARKED_AGE_S, PREFIX
 
 
 def fill(folder, **files):
@@ -229,6 +230,16 @@ with destination.replacing() as new:
         new.with_suffix(suffix).write_text("new")
     Path.replace = count
 """
+
+
+@pytest.mark.parametrize("text", ["", "[]", "[1, 2]", "{}", "null", "[" * 100_000])
+def test_a_damaged_list_of_moves_is_removed(tmp_path, text):
+    killed = tmp_path / f"{PREFIX}{'0' * 12}"
+    (killed / "new").mkdir(parents=True)
+    (killed / "moving").write_text(text)
+    os.utime(killed, (0, time.time() - MIN_UNMARKED_AGE_S - 1))
+    Destination.at(tmp_path / "other.txt")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

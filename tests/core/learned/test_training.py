@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.errors import Cancelled, ParameterError
-from rail_extract.core.learned.examples import INDEX, POINT, Examples, write_square
+from rail_extract.core.learned.examples import POINT, Examples, save_index, write_square
 from rail_extract.core.progress import Progress
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_bar, with_track
 
@@ -34,7 +34,7 @@ def examples(tmp_path_factory):
     xyz, kerb = with_bar(xyz, 0.5, 0.3, 3.0)
     xyz = rough(xyz, rng)
     tile = (xyz[:, 0] > 20).astype(int)
-    np.save(folder / INDEX, write_square(folder, 0, (0, 0), SIDE, xyz, on & ~kerb, tile))
+    save_index(folder, write_square(folder, 0, (0, 0), SIDE, xyz, on & ~kerb, tile))
     return Examples.load(folder)
 
 
@@ -58,6 +58,16 @@ def test_blocks_on_disk_have_their_labels_and_count_all_points(examples):
     assert (core["others"][~core["rail"]] > 0).all()
     assert core["rails"].sum() == pytest.approx(200 * 2 * 12.56 * 0.072, rel=0.1)
     assert set(examples.index["tile"]) == {0, 1}
+
+
+@pytest.mark.parametrize("name", ["0.npy", "index.npy", "checks.json"])
+def test_a_damaged_folder_is_not_loaded(examples, tmp_path, name):
+    for file in examples.folder.iterdir():
+        data = bytearray(file.read_bytes())
+        data[-9] ^= file.name == name
+        (tmp_path / file.name).write_bytes(data)
+    with pytest.raises(ValueError, match="damaged"):
+        Examples.load(tmp_path)
 
 
 def test_whole_areas_are_kept_back_some_with_rails(examples):
