@@ -36,8 +36,12 @@ from ...core.rails import NO_GAPS, SAME_SUM_M, Centerline, RailLine
 CHORD_TOLERANCE_M = 0.0005
 """Greatest deviation of the chords that approximate a curved line: well below the accuracy of a survey."""
 
-MAX_SEGMENT_M = 500_000.0
-"""A longer straight segment has a stray vertex: the longest straight railway has 478 km."""
+MAX_SEGMENT_M = 100_000.0
+"""A longer straight segment has a stray vertex: in the plane of a map, a railway that is straight on the ground bows by
+metres over this length."""
+
+MAX_SPIKE_M = 10_000.0
+"""A longer straight segment from which the line turns back has a stray vertex."""
 
 GEOMETRY_AS_IT_IS = QgsProcessingFeatureSource.Flag.FlagSkipGeometryValidityChecks
 
@@ -245,9 +249,7 @@ def _read(
         raise RailExtractError(
             f"{name} has a line (feature {lost}) with a coordinate that is not a number: repair or delete it."
         )
-    stray = next(
-        (feature.id() for feature, vertices in found if _longest(vertices) * horizontal_unit_m > MAX_SEGMENT_M), None
-    )
+    stray = next((feature.id() for feature, vertices in found if _is_stray(vertices[:, :2] * horizontal_unit_m)), None)
     if stray is not None:
         raise RailExtractError(f"{name} has a line (feature {stray}) with a stray vertex: repair or delete it.")
     middle = np.median(np.concatenate([vertices for _, vertices in found]), axis=0)
@@ -258,9 +260,13 @@ def _read(
     return [(feature, frame.to_local(vertices)) for feature, vertices in found], frame
 
 
-def _longest(vertices: np.ndarray) -> float:
-    """Return the length of the longest straight segment in plan, in units of the vertices."""
-    return float(np.hypot(*np.diff(vertices[:, :2], axis=0).T).max())
+def _is_stray(xy: np.ndarray) -> bool:
+    """Return whether a line, (n, 2) metres in plan, has a vertex that is a mistake: too far from the others."""
+    steps = np.diff(xy, axis=0)
+    lengths_m = np.hypot(*steps.T)
+    turns_back = np.einsum("ij,ij->i", steps[:-1], steps[1:]) < 0
+    spikes_m = np.maximum(lengths_m[:-1], lengths_m[1:])[turns_back]
+    return bool(lengths_m.max() > MAX_SEGMENT_M or spikes_m.max(initial=0.0) > MAX_SPIKE_M)
 
 
 def _system(crs: QgsCoordinateReferenceSystem, progress: Progress) -> tuple[str | None, float, float]:

@@ -402,6 +402,12 @@ LINES = [
         "INPUT has a line (feature 1) with a stray vertex: repair or delete it.",
     ),
     Fault(
+        "vertex 20 km away, from which the line comes back",
+        lines(line((500000, 3000001.507, 100), (520_000, 3000001.507, 100), (500006, 3000001.507, 100)), RIGHT),
+        REFUSED,
+        "INPUT has a line (feature 1) with a stray vertex: repair or delete it.",
+    ),
+    Fault(
         "duplicate lines",
         lines(LEFT, RIGHT, LEFT, RIGHT),
         WARNED,

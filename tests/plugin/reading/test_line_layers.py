@@ -127,6 +127,19 @@ def test_lines_of_zero_length_and_empty_parts_are_skipped(layer):
         rails_of(layer(still))
 
 
+@pytest.mark.parametrize(
+    "kilometres, is_refused", [((0, 99), False), ((0, 101), True), ((0, 9, 1), False), ((0, 11, 1), True)]
+)
+def test_a_vertex_far_from_the_others_is_refused(layer, kilometres, is_refused):
+    places = ", ".join(f"{500_000 + 1000 * km} 3000000 100" for km in kilometres)
+    stray = layer(f"LINESTRING Z ({places})")
+    if is_refused:
+        with pytest.raises(RailExtractError, match="stray vertex"):
+            rails_of(stray)
+    else:
+        assert len(rails_of(stray)[0]) == 1
+
+
 def test_degrees_are_refused(layer):
     with pytest.raises(CrsError, match="degrees"):
         rails_of(layer("LINESTRING Z (75 27 0, 75.1 27 0)", crs="EPSG:4326"))
