@@ -19,10 +19,11 @@ import time
 from collections import Counter
 from collections.abc import Iterable
 from contextlib import suppress
+from importlib import import_module
 from itertools import count, islice
 from pathlib import Path
 
-from fuzzing.kinds import KINDS, PLUGIN, Kind
+from fuzzing.kinds import KINDS, Kind
 
 MAX_BYTES = 2**30
 """Memory that reading a file may take in addition to that of Python and its libraries."""
@@ -61,7 +62,10 @@ def work(kind: Kind, folder: Path) -> None:
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # libraries write what they like
     good = kind.make(folder)
-    outcome_of(kind, Path(good[0]))  # imports what is needed before the limit counts
+    outcome = outcome_of(kind, kind.copied(folder, good[0]))  # imports what is needed before the limit counts
+    if outcome != READ:
+        print(f"undamaged: {outcome}", file=answers, flush=True)
+        return
     size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (size + MAX_BYTES,) * 2)
     print(READY, file=answers, flush=True)
@@ -148,7 +152,7 @@ def fuzz(kind: Kind, seeds: Iterable[int], until: float = float("inf")) -> tuple
     counts : Counter
         Number of files by outcome.
     failures : dict of int to str
-        What went wrong, by seed.
+        What went wrong, by seed; each is also printed at once.
     """
     counts: Counter = Counter()
     failures: dict[int, str] = {}
@@ -167,6 +171,7 @@ def fuzz(kind: Kind, seeds: Iterable[int], until: float = float("inf")) -> tuple
                 counts[outcome] += 1
                 if outcome not in (READ, REFUSED):
                     failures[seed] = reason or outcome
+                    print(f"{kind.name}:{seed} {failures[seed]}", flush=True)
         finally:
             if watched is not None:
                 watched.end()
@@ -200,8 +205,6 @@ def main(arguments: list[str] | None = None) -> int:
             (kind.name, files, counts[READ], counts[REFUSED], len(failures), files / (time.monotonic() - start))
         )
         bad += len(failures)
-        for seed, reason in failures.items():
-            print(f"{kind.name}:{seed} {reason}", flush=True)
     print(f"{'kind':8} {'files':>8} {READ:>8} {REFUSED:>8} {FAILED:>8} {'per s':>8}")
     for row in rows:
         print(f"{row[0]:8} {row[1]:8} {row[2]:8} {row[3]:8} {row[4]:8} {row[5]:8.0f}")
@@ -226,12 +229,10 @@ def _again(kind: Kind, seed: int) -> int:
 
 def _can_run(kind: Kind) -> bool:
     """Return whether this Python can read a kind."""
-    if kind not in PLUGIN:
-        return True
     try:
-        import qgis.core  # noqa: F401
+        import_module(kind.needs)
     except ImportError:
-        print(f"{kind.name}: left out, because there is no QGIS", file=sys.stderr)
+        print(f"{kind.name}: left out, because {kind.needs} is not installed", file=sys.stderr)
         return False
     return True
 

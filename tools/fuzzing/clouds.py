@@ -14,7 +14,7 @@ import numpy as np
 from laspy._compression import lazrsbackend
 from rail_extract.core.clouds.crs import import_pyproj
 
-RAIL = 10
+from .kinds import RAIL
 
 
 @contextmanager

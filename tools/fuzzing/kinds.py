@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+import os
 import random
 import shutil
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from .mutators import mutate, mutate_text
+
+RAIL = 10
+"""Class of the points of all clouds."""
+
+
+SHAPES = (
+    '{"type": "Point", "coordinates": [500003, 3000001]}',
+    '{"type": "LineString", "coordinates": [[500000, 3000000], [500009, 3000004]]}',
+    '{"type": "Polygon", "coordinates": [[[500000, 3000000], [500009, 3000000], [500009, 3000009], [5e5, 3e6]]]}',
+)
+"""Seeds, a guide and a mask."""
 
 
 @dataclass(frozen=True)
@@ -24,14 +37,15 @@ class Kind:
         Reads a damaged file. It may raise a `RailExtractError`; everything else is a failure.
     damage : callable
         Changes the bytes of a file.
-    needs_qgis : bool
+    needs : str
+        Module that must be installed.
     """
 
     name: str
     make: Callable[[Path], Sequence[Path]]
     read: Callable[[Path], object]
     damage: Callable[[bytes, random.Random], bytes] = mutate
-    needs_qgis: bool = False
+    needs: str = "numpy"
 
     def mutant(self, folder: Path, good: Sequence[Path], seed: int) -> Path:
         """Copy the folder of the good files, damage one of them as a seed says, and return its path.
@@ -44,13 +58,16 @@ class Kind:
         seed : int
         """
         rng = random.Random(f"{self.name}:{seed}")
-        path = rng.choice(list(good))
+        path = self.copied(folder, rng.choice(list(good)))
+        path.write_bytes(self.damage(path.read_bytes(), rng))
+        return path
+
+    def copied(self, folder: Path, path: Path) -> Path:
+        """Copy the folder of the good files, and return the path of the copy of one of them."""
         copy = folder / "mutant"
         shutil.rmtree(copy, ignore_errors=True)
         shutil.copytree(folder, copy, ignore=shutil.ignore_patterns("mutant"))
-        damaged = copy / path.relative_to(folder)
-        damaged.write_bytes(self.damage(path.read_bytes(), rng))
-        return damaged
+        return copy / path.relative_to(folder)
 
 
 def _read_cloud(path: Path) -> None:
@@ -58,7 +75,7 @@ def _read_cloud(path: Path) -> None:
     import numpy as np
     from rail_extract.core.clouds.points import read_rail_points
 
-    for points in read_rail_points(path, [10]):
+    for points in read_rail_points(path, [RAIL]):
         if not (len(points.xyz) and np.isfinite(points.xyz).all()):
             raise AssertionError("points that are not numbers")
 
@@ -101,7 +118,7 @@ def _spooled(cloud: Path, folder: Path) -> Sequence:
     from rail_extract.core.clouds.points import ask
     from rail_extract.core.squares.spool import spool
 
-    return spool(ask(cloud, [10]), SPOOL_SIDE_M, folder)
+    return spool(ask(cloud, [RAIL]), SPOOL_SIDE_M, folder)
 
 
 def _make_stored(folder: Path) -> list[Path]:
@@ -133,6 +150,116 @@ def _read_stored(path: Path) -> None:
         raise RailExtractError(" ".join(str(error).split())) from error
 
 
+def _copy_cloud(path: Path) -> None:
+    """Read a raw cloud and write a classified copy, which must have the same points."""
+    import laspy
+    from rail_extract.core.clouds.rewriting import rewrite
+
+    _read_cloud(path)
+    copy = path.with_name(f"copy{path.suffix}")
+    written = rewrite(path, copy, lambda xyz, codes: (codes, codes == codes))
+    with laspy.open(copy, read_evlrs=False) as reader:
+        there = sum(len(chunk) for chunk in reader.chunk_iterator(1000))
+    if written != there:
+        raise AssertionError(f"{written} points were written, and {there} are there")
+
+
+def _make_classifier(folder: Path) -> list[Path]:
+    from rail_extract.core.learned.model import SHIPPED
+
+    return [Path(shutil.copy(SHIPPED, folder / "classifier.npz"))]
+
+
+def _read_classifier(path: Path) -> None:
+    from rail_extract.core.learned.model import load
+
+    load(path)
+
+
+def _make_training(folder: Path) -> list[Path]:
+    """Write the folder of a training that was interrupted."""
+    from . import learning
+
+    return learning.write_training(folder)
+
+
+def _read_training(path: Path) -> None:
+    """Continue the training in a damaged folder."""
+    from . import learning
+
+    learning.continue_training(path)
+
+
+def _make_shapes(folder: Path) -> list[Path]:
+    """Write seeds, a guide and a mask as GeoJSON and as a GeoPackage."""
+    import pyogrio
+    import shapely
+
+    shapes = shapely.from_geojson(list(SHAPES))
+    paths = [folder / "shapes.geojson", folder / "shapes.gpkg"]
+    for path in paths:
+        kind = {"geometry_type": "Unknown", "crs": "EPSG:32642", "layer": "shapes"}
+        pyogrio.raw.write(path, shapely.to_wkb(shapes), [], [], **kind)
+    return paths
+
+
+def _read_shapes(path: Path) -> None:
+    """Read a vector file as the commands do, for a cloud in another coordinate system."""
+    from rail_extract.core.clouds.crs import import_pyproj
+    from rail_extract.core.commands import shapes
+
+    wkt = import_pyproj().CRS.from_epsg(32643).to_wkt()
+    for read in (shapes.read_seeds, shapes.read_lines, shapes.read_mask):
+        read(path, wkt)
+
+
+def _make_names(folder: Path) -> list[Path]:
+    """Write the names of two tiles."""
+    from .clouds import write_las
+
+    tiles = write_las(folder)[:2]
+    path = folder / "names.txt"
+    path.write_text("".join(f"{tile}\n" for tile in tiles), encoding="utf-8")
+    return [path]
+
+
+def _read_names(path: Path) -> None:
+    """Read the arguments of a command from a file, and find the tiles that it names."""
+    from rail_extract.__main__ import parse
+    from rail_extract.core.clouds.points import ask
+    from rail_extract.core.errors import ParameterError
+
+    try:
+        _, args = parse(["classify", f"@{path}", "--output", "out.laz"])
+    except SystemExit as error:
+        raise ParameterError("The arguments are refused.") from error
+    ask(args.tiles, [RAIL])
+
+
+def _make_moving(folder: Path) -> list[Path]:
+    """Write the temporary folder of a run that was killed while it moved the files of a shapefile."""
+    from rail_extract.core import disk, scratch
+
+    killed = folder / f"{scratch.PREFIX}{'0' * 12}"
+    for name in (disk.NEW, disk.OLD):
+        (killed / name).mkdir(parents=True)
+        (killed / name / "a.shp").write_bytes(b"shp")
+        (killed / name / "a.dbf").write_bytes(b"dbf")
+    (killed / disk.MOVING).write_text('["a.shp", "a.dbf"]', encoding="utf-8")
+    return [killed / disk.MOVING]
+
+
+def _read_moving(path: Path) -> None:
+    """Complete an interrupted move, as the next run does: nothing is written outside of the folder."""
+    from rail_extract.core import disk, scratch
+
+    folder = path.parents[1]
+    os.utime(path.parent, (0, time.time() - scratch.MIN_UNMARKED_AGE_S - 1))
+    disk.Destination.at(folder / "next.txt")
+    if path.exists():
+        raise AssertionError("the temporary folder is still there")
+
+
 def _clouds(name: str) -> Callable[[Path], Sequence[Path]]:
     def make(folder: Path) -> Sequence[Path]:
         from . import clouds
@@ -153,19 +280,26 @@ def _layers(name: str, function: str) -> Callable[[Path], Sequence[Path]]:
 
 CORE = (
     *(Kind(name, _clouds(name), _read_cloud) for name in ("las", "laz", "copc")),
+    Kind("copied", _clouds("las"), _copy_cloud),
     Kind("vpc", _clouds("vpc"), _read_cloud, mutate_text),
     Kind("weights", _make_weights, _read_weights),
     Kind("work", _make_spool, _read_spool),
     Kind("stored", _make_stored, _read_stored),
+    Kind("moving", _make_moving, _read_moving, mutate_text),
+    Kind("names", _make_names, _read_names, mutate_text),
+    Kind("shapes", _make_shapes, _read_shapes, mutate_text, needs="pyogrio"),
+    Kind("classifier", _make_classifier, _read_classifier, needs="torch"),
+    Kind("training", _make_training, _read_training, needs="torch"),
 )
 """Kinds that need no QGIS; `make check` reads some of each."""
 
 PLUGIN = (
     *(
-        Kind(suffix, _layers(suffix, "write_lines"), _layers(suffix, "read_lines"), damage, needs_qgis=True)
+        Kind(suffix, _layers(suffix, "write_lines"), _layers(suffix, "read_lines"), damage, needs="qgis.core")
         for suffix, damage in (("gpkg", mutate), ("geojson", mutate_text), ("shp", mutate))
     ),
-    Kind("tif", _layers("tif", "write_raster"), _layers("tif", "read_raster"), needs_qgis=True),
+    Kind("tif", _layers("tif", "write_raster"), _layers("tif", "read_raster"), needs="qgis.core"),
+    Kind("areas", _layers("areas", "write_areas"), _layers("areas", "read_areas"), mutate_text, needs="qgis.core"),
 )
 
 KINDS = {kind.name: kind for kind in (*CORE, *PLUGIN)}

@@ -3,25 +3,48 @@
 from __future__ import annotations
 
 import os
+import pickle
 import sys
+from collections.abc import Callable
+from contextlib import closing
 from functools import lru_cache
 from pathlib import Path
+from sqlite3 import connect
 from typing import Any
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 import numpy as np  # noqa: E402
+from osgeo import gdal  # noqa: E402
 from qgis.core import (  # noqa: E402
     QgsApplication,
     QgsCoordinateTransformContext,
     QgsFeature,
     QgsGeometry,
+    QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingFeedback,
     QgsVectorFileWriter,
     QgsVectorLayer,
 )
+from rail_extract.core import steps  # noqa: E402
 from rail_extract.core.errors import RailExtractError  # noqa: E402
+from rail_extract.core.progress import Progress  # noqa: E402
+
+from .clouds import write_las  # noqa: E402
+from .kinds import SHAPES  # noqa: E402
+
+PAGE_BYTES = 512
+"""Smallest page of a GeoPackage: a file of small pages has little that is never read."""
+
+BLOCK_CELLS = 32
+"""Side of the blocks of a raster: a damaged block is full of cells, and takes as long as a large one for nothing."""
+
+REMEMBERED = 100
+"""Results that are remembered."""
+
+AREAS = ("SEEDS", "GUIDE", "MASK")
+"""Parameters for the layers of `SHAPES`."""
 
 UNFORESEEN = ("Traceback", "failed unexpectedly")
 """Words of what must not be said about a damaged file."""
@@ -52,7 +75,23 @@ def qgis() -> QgsApplication:
 
         qgis.plugin = classFactory(None)  # type: ignore[attr-defined]
         qgis.plugin.initProcessing()  # type: ignore[attr-defined]
+        steps.tracks_of, steps.lines_of = remembered(steps.tracks_of), remembered(steps.lines_of)
     return application
+
+
+def remembered(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compute what is read once only: most damage changes nothing of it."""
+    known: dict[bytes, Any] = {}
+
+    def call(*values: Any, **options: Any) -> Any:
+        key = pickle.dumps(([value for value in values if not isinstance(value, Progress)], options))
+        if key not in known:
+            if len(known) >= REMEMBERED:
+                known.clear()
+            known[key] = function(*values, **options)
+        return known[key]
+
+    return call
 
 
 def write_lines(folder: Path, suffix: str) -> list[Path]:
@@ -62,13 +101,17 @@ def write_lines(folder: Path, suffix: str) -> list[Path]:
     for number, y in enumerate((0.0, 1.507)):
         feature = QgsFeature(layer.fields())
         feature.setAttributes([number + 1, 10])
-        places = ", ".join(f"{500_000 + x} {3_000_000 + y} {100 + 0.001 * x}" for x in range(0, 21, 2))
+        places = ", ".join(f"{500_000 + x} {3_000_000 + y} {100 + 0.001 * x}" for x in (0, 2, 5, 6))
         feature.setGeometry(QgsGeometry.fromWkt(f"LINESTRING Z ({places})"))
         layer.dataProvider().addFeature(feature)
     options = QgsVectorFileWriter.SaveVectorOptions()
     options.driverName = QgsVectorFileWriter.driverForExtension(suffix)
     path = folder / f"lines.{suffix}"
     QgsVectorFileWriter.writeAsVectorFormatV3(layer, str(path), QgsCoordinateTransformContext(), options)
+    if suffix == "gpkg":
+        with closing(connect(path)) as database:
+            database.execute(f"PRAGMA page_size = {PAGE_BYTES}")
+            database.execute("VACUUM")
     return sorted(folder.glob("lines.*"))
 
 
@@ -85,8 +128,32 @@ def write_raster(folder: Path) -> list[Path]:
     raster = rasterize(np.random.default_rng(0).uniform(0, 4, (200, 2)), 0.04)
     wkt = import_pyproj().CRS.from_epsg(32643).to_wkt()
     frame = LocalFrame(np.array([500_000.0, 3_000_000.0, 0.0]), crs_wkt=wkt)
-    write_rasters(folder / "rail.tif", header_for([raster], (10,), frame, STANDARDS["EN_60E1_1435"]), [raster])
-    return [folder / "rail.tif"]
+    whole = folder / "whole.tif"
+    write_rasters(whole, header_for([raster], (10,), frame, STANDARDS["EN_60E1_1435"]), [raster])
+    blocks = ["TILED=YES", f"BLOCKXSIZE={BLOCK_CELLS}", f"BLOCKYSIZE={BLOCK_CELLS}", "COMPRESS=DEFLATE"]
+    gdal.Translate(str(folder / "rail.tif"), str(whole), creationOptions=blocks)
+    gdal.Translate(str(folder / "rows.tif"), str(whole), creationOptions=["COMPRESS=LZW"])
+    whole.unlink()
+    return [folder / "rail.tif", folder / "rows.tif"]
+
+
+def write_areas(folder: Path) -> list[Path]:
+    """Write seeds, a guide and a mask, and a raw cloud."""
+    write_las(folder)
+    paths = [folder / f"{name}.geojson" for name in AREAS]
+    for path, shape in zip(paths, SHAPES):
+        feature = f'{{"type": "Feature", "properties": {{}}, "geometry": {shape}}}'
+        crs = '{"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::32643"}}'
+        path.write_text(f'{{"type": "FeatureCollection", "crs": {crs}, "features": [{feature}]}}', encoding="utf-8")
+    return paths
+
+
+def read_areas(path: Path) -> None:
+    """Check the values of the algorithms that take seeds, a guide and a mask; they read them then."""
+    layers = {name: str(path.with_name(f"{name}.geojson")) for name in AREAS}
+    cloud = {"INPUT": str(path.with_name("1.4_7.las")), "OUTPUT": str(path.with_name("out.las"))}
+    _check("growrailpoints", {"SEEDS": layers["SEEDS"], **cloud})
+    _check("classifyrailpoints", {"GUIDE": layers["GUIDE"], "MASK": layers["MASK"], **cloud})
 
 
 def read_lines(path: Path) -> None:
@@ -110,14 +177,22 @@ def _run(name: str, parameters: dict[str, Any]) -> None:
     AssertionError
         It failed without an explanation.
     """
+    algorithm, context, listener = _check(name, parameters), QgsProcessingContext(), Listener()
+    _, succeeded = algorithm.run(parameters, context, listener)
+    _judge(succeeded, "\n".join(listener.errors).strip(), context)
+
+
+def _check(name: str, parameters: dict[str, Any]) -> QgsProcessingAlgorithm:
+    """Check the values of an algorithm, as QGIS does; errors as for `_run`."""
     algorithm = qgis().processingRegistry().createAlgorithmById(f"railextract:{name}")
-    context, listener = QgsProcessingContext(), Listener()
-    accepted, said = algorithm.checkParameterValues(parameters, context)
-    if accepted:
-        _, accepted = algorithm.run(parameters, context, listener)
-        said = "\n".join(listener.errors).strip()
+    context = QgsProcessingContext()
+    _judge(*algorithm.checkParameterValues(parameters, context), context)
+    return algorithm
+
+
+def _judge(succeeded: bool, said: str, context: QgsProcessingContext) -> None:
     context.temporaryLayerStore().removeAllMapLayers()
     if any(word in said for word in UNFORESEEN):
         raise AssertionError(said)
-    if not accepted:
+    if not succeeded:
         raise RailExtractError(said)
