@@ -9,9 +9,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from ..polyline import interpolate, left_normals, length_along, project
-from ..rails import Centerline, RailLine
+from ..rails import Centerline, RailLine, Support
 
 STATION_M = 0.25
 """Spacing of the stations at which a track is looked at."""
@@ -20,23 +21,25 @@ ARM_M, CORE_M = 5.0, 1.0
 """Length of the track on either side of a place that shows a step, and half the length in the middle that is left out:
 smoothing draws a step as a bend 2 m long."""
 
-BESIDE_M = 3.0
-"""Distance in plan within which the steps of the track and of its rails are one: a track's width, and some metres
-along, because smoothing blurs the place."""
-
 MIN_SHARE = 0.5
-"""Smallest step of a rail, relative to that of its track."""
+"""Smallest step of a rail, relative to the mean of both rails of the track."""
 
 REACH_M = 1.2
 """Distance from a centerline within which its rails are: half of the widest gauge, and a head."""
 
-MIN_STEP_M = 0.012
-"""Smallest step. An arc of 190 m that begins abruptly looks like 6 mm, as do clothoids of trams, and waves of 1 mm that
-are 5 m long."""
+MIN_STEP_M = 0.008
+"""Smallest step: waves of 1 mm that are 5 m long look like 4 mm."""
+
+BEND_M2 = 1.9
+"""Largest step, metres, that an abrupt change of the curvature looks like, per 1/m by which the arms then differ."""
+
+STEP_SIGMAS, STEP_GAIN = 5.0, 2.75
+"""Standard errors from which a step is not chance, and the standard error of a step in those of the line that shows it,
+whose errors are alike over a metre."""
 
 
 def find_steps(track: Centerline, rails: Sequence[RailLine]) -> list[tuple[float, float]]:
-    """Find the steps of a track: places where its centerline and a rail on either side step the same way.
+    """Find the steps of a track: places where a rail on either side steps the same way.
 
     At switches one of the rails may be off for some metres, as no pass of a scanner puts it.
 
@@ -52,57 +55,40 @@ def find_steps(track: Centerline, rails: Sequence[RailLine]) -> list[tuple[float
         Chainage of each step, and its size to the left in metres: the mean of the rails, which are smoothed less.
     """
     line = track.xyz[:, :2]
-    sides = [_steps_of_side(rails, ids) for ids in (track.left_ids, track.right_ids) if ids]
-    found = []
-    for at_m, across_m in _steps(line, MIN_STEP_M):
-        place = interpolate(line, length_along(line), np.array([at_m]))
-        sizes_m = [_step_beside(place, across_m, *side) for side in sides]
-        if all(abs(size_m) >= MIN_SHARE * abs(across_m) for size_m in sizes_m):
-            found.append((at_m, float(np.mean(sizes_m)) if sizes_m else across_m))
+    t = np.arange(0.0, length_along(line)[-1], STATION_M)
+    sides = [
+        [(rail.xyz, rail.support) for rail in rails if rail.rail_id in ids] for ids in (track.left_ids, track.right_ids)
+    ]
+    left, right = (_shown(line, t, side if all(sides) else [(line, None)]) for side in sides)
+    across, bend = 0.5 * (left[0] + right[0]), 0.5 * (left[1] + right[1])
+    chance = STEP_SIGMAS * STEP_GAIN * 0.5 * np.hypot(left[2], right[2])
+    with np.errstate(invalid="ignore"):
+        alike = np.minimum(left[0] * across, right[0] * across) >= MIN_SHARE * across**2
+        is_step = alike & (np.abs(across) >= np.maximum(MIN_STEP_M, chance) + bend)
+    return _peaks(t, np.where(is_step, across, 0.0))
+
+
+def _shown(line: np.ndarray, t: np.ndarray, side: Sequence[tuple[np.ndarray, Support | None]]) -> np.ndarray:
+    """Return what the lines on one side of a track show at chainages `t`, (n,), of it: rows of `_steps_along`, or NaN."""
+    found = np.full((3, len(t)), np.nan)
+    for xyz, support in side:
+        places, *shown = _steps_along(xyz[:, :2], support)
+        feet = project([line], places, REACH_M)
+        for row, column in zip(found, shown):
+            if len(feet.t) > 1:
+                here = np.interp(t, feet.t, column[feet.point], left=np.nan, right=np.nan)
+                row[:] = np.where(np.isnan(row), here, row)
     return found
 
 
-def _steps_of_side(rails: Sequence[RailLine], ids: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the places, (k, 2), and the steps to the left, (k,) metres, of the rails with these numbers.
-
-    A step to the left is one in either direction along the line.
-    """
-    found = [np.empty((0, 3))]
-    for rail in rails:
-        if rail.rail_id in ids:
-            line = rail.xyz[:, :2]
-            at_m, across_m = np.array(_steps(line, MIN_SHARE * MIN_STEP_M)).reshape(-1, 2).T
-            found.append(np.column_stack([interpolate(line, length_along(line), at_m), across_m]))
-    rows = np.concatenate(found)
-    return rows[:, :2], rows[:, 2]
-
-
-def _step_beside(place: np.ndarray, like_m: float, places: np.ndarray, across_m: np.ndarray) -> float:
-    """Return the largest step of a rail next to a place of a track, to the same side as `like_m`; 0 without one."""
-    beside = (np.hypot(*(places - place).T) <= BESIDE_M) & (across_m * like_m > 0)
-    return float(np.sign(like_m) * np.abs(across_m[beside]).max()) if beside.any() else 0.0
-
-
-def _steps(line: np.ndarray, least_m: float) -> list[tuple[float, float]]:
-    """Find the steps of a line, (n, 2), from a size on: chainages, and sizes to the left in metres.
-
-    On either side of a place, a cubic and a step are fitted to the line.
-    """
-    along = length_along(line)
-    t = np.arange(0.0, along[-1], STATION_M)
-    weights = _weights()
-    half = len(weights) // 2
-    if len(t) < len(weights):
-        return []
-    places, normals = interpolate(line, along, t), interpolate(left_normals(line), along, t)
-    steps = np.column_stack([np.correlate(column, weights, "valid") for column in places.T])
-    across = np.einsum("ij,ij->i", steps, normals[half:-half])
+def _peaks(t: np.ndarray, across: np.ndarray) -> list[tuple[float, float]]:
+    """Return the places and sizes of steps, given what each station, (n,), shows; the largest one counts."""
     found = []
     size = np.abs(across)
-    while len(size) and size.max() >= least_m:
+    while len(size) and size.max() > 0:
         place = int(np.argmax(size))
-        found.append((float(t[place + half]), float(across[place])))
-        size[max(place - 2 * half, 0) : place + 2 * half + 1] = 0.0
+        found.append((float(t[place]), float(across[place])))
+        size[np.abs(t - t[place]) <= 2 * ARM_M] = 0.0
     return sorted(found)
 
 
@@ -143,11 +129,42 @@ def _doubting(rail: RailLine, found: Sequence[tuple[np.ndarray, float]]) -> Rail
     return replace(rail, sigma_mm=1000 * support.rms_m, support=support)
 
 
-def _weights() -> np.ndarray:
-    """Return the weights of stations around a place whose sum is the step there, (k,)."""
+def _steps_along(line: np.ndarray, support: Support | None = None) -> tuple[np.ndarray, ...]:
+    """Fit a cubic and a step to a line, (n, 2), on either side of stations along it.
+
+    Returns
+    -------
+    places : (k, 2) array
+    across, bend, chance : (k,) arrays
+        Step to the left, metres, in either direction along the line; the step that the difference between the
+        curvatures on both sides looks like; standard error of the line, less what passes of a scanner add to it.
+    """
+    along = length_along(line)
+    t = np.arange(0.0, along[-1], STATION_M)
+    weights, bends = _weights()
+    half = len(weights) // 2
+    if len(t) < len(weights):
+        return np.empty((0, 2)), *np.empty((3, 0))
+    places, normals = interpolate(line, along, t), interpolate(left_normals(line), along, t)[half:-half]
+    across, bend = (
+        np.einsum("ij,ij->i", np.column_stack([np.correlate(column, one, "valid") for column in places.T]), normals)
+        for one in (weights, bends)
+    )
+    variance = np.zeros(len(t))
+    if support is not None:
+        variance = np.interp(t, support.t, np.maximum(support.sigma_m**2 - support.every_strip[:, 2] ** 2, 0.0))
+    chance = np.sqrt(uniform_filter1d(variance, len(weights))[half:-half])
+    return places[half:-half], across, BEND_M2 * np.abs(bend), chance
+
+
+def _weights() -> tuple[np.ndarray, np.ndarray]:
+    """Return the weights of stations around a place whose sums are the step and the change of curvature, (k,) each."""
     count = int(round(ARM_M / STATION_M))
     t = np.arange(-count, count + 1) * STATION_M
     used = np.abs(t) >= CORE_M
-    weights = np.zeros(len(t))
-    weights[used] = np.linalg.pinv(np.stack([t**0, t, t**2, t**3, t > 0], axis=1)[used])[-1]
-    return weights
+    steps, bends = np.zeros(len(t)), np.zeros(len(t))
+    steps[used] = np.linalg.pinv(np.stack([t**0, t, t**2, t**3, t > 0], axis=1)[used])[-1]
+    for side in (1, -1):
+        arm = used & (side * t > 0)
+        bends[arm] = side * np.linalg.pinv(np.stack([t**0, t, t**2 / 2], axis=1)[arm])[-1]
+    return steps, bends

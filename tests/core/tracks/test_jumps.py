@@ -74,3 +74,21 @@ def test_a_track_does_not_step_where_one_of_its_rails_does_not(other_m):
     one = track(middle, (1,), (2,))
     assert find_steps(track(middle), ()) and not find_steps(one, rails)
     assert doubting_steps(rails, [one]) == rails
+
+
+@pytest.mark.parametrize(("sigma_m", "steps"), [(0.001, 1), (0.006, 0)])
+def test_both_rails_show_a_step_that_the_centerline_hides_unless_it_is_chance(sigma_m, steps):
+    curve = trace([Element(80.0, 1 / 400, 1 / 400)], heading=1.2)
+    rails = [rail(number, stepped(beside(curve, left_m), 40.0, 0.012)) for number, left_m in ((1, 0.75), (2, -0.75))]
+    rails = [replace(one, support=replace(one.support, sigma_m=0 * one.support.sigma_m + sigma_m)) for one in rails]
+    smooth = track(curve.xy, (1,), (2,))
+    found = find_steps(smooth, rails)
+    assert len(found) == steps
+    assert all(at_m == pytest.approx(40, abs=0.5) and size_m == pytest.approx(0.012, rel=0.1) for at_m, size_m in found)
+    assert find_steps(smooth, doubting_steps(rails, [smooth])) == found
+
+
+def test_an_abrupt_arc_is_no_step_of_two_rails():
+    curve = trace([Element(40.0), Element(30.0, 1 / 60, 1 / 60)], heading=2.0)
+    rails = [rail(number, beside(curve, left_m).xy) for number, left_m in ((1, 0.75), (2, -0.75))]
+    assert find_steps(track(curve.xy, (1,), (2,)), rails) == []
