@@ -69,7 +69,7 @@ def find_steps(track: Centerline, rails: Sequence[RailLine]) -> list[tuple[float
 
 
 def _shown(line: np.ndarray, t: np.ndarray, side: Sequence[tuple[np.ndarray, Support | None]]) -> np.ndarray:
-    """Return what the lines on one side of a track show at chainages `t`, (n,), of it: rows of `_steps_along`, or NaN."""
+    """Return what the lines on one side of a track show at its chainages `t`, (n,): rows of `_steps_along`, or NaN."""
     found = np.full((3, len(t)), np.nan)
     for xyz, support in side:
         places, *shown = _steps_along(xyz[:, :2], support)
