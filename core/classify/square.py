@@ -166,7 +166,7 @@ def _figures(
     kept = standing.kept
     share_m = np.where(settings.own(kept.lines.axis), shares_of_length(kept.lines, settings.head_width_m), 0.0)
     flush_m = shares_of_length(flush.lines, settings.head_width_m)[settings.own(flush.lines.axis)]
-    near_m = _beside_guide(standing.rails.lines, settings) + _beside_guide(flush.rails, settings)
+    near_m = beside_guide(standing.rails.lines, settings) + beside_guide(flush.rails, settings)
     there = bool(rail.any())
     return SearchFigures(
         points=int(rail.sum()),
@@ -181,8 +181,8 @@ def _figures(
     )
 
 
-def _beside_guide(lines: Lines, settings: Settings) -> np.ndarray:
-    """Length of rails in the square that run along the guide, and across it, (2,) metres."""
+def beside_guide(lines: Lines, settings: Settings) -> np.ndarray:
+    """Return the length of rails in the square that run along the guide, and across it, (2,) metres."""
     if settings.guide is None or not len(lines.axis):
         return np.zeros(2)
     share_m = np.where(settings.own(lines.axis), shares_of_length(lines, settings.head_width_m), 0.0)

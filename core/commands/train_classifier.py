@@ -30,6 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--card", type=Path, help="HTML file for recall and precision by tile, curves and settings")
     parser.add_argument("--rail-classes", default="10", help="classes of rail points, such as 10,11 (default: 10)")
     add_cloud_arguments(parser)
+    text = "weights to start from, such as models/rail_classifier.npz: fewer labels and epochs do"
+    parser.add_argument("--start", type=Path, metavar="FILE", help=text)
     text = f"how many times each block with rails is learned from (default: {DEFAULT_EPOCHS})"
     parser.add_argument("--epochs", type=int, default=DEFAULT_EPOCHS, metavar="N", help=text)
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the random numbers (default: 0)")
@@ -50,7 +52,7 @@ def run(args: argparse.Namespace) -> None:
     """
     if args.epochs < 1:
         raise ParameterError(f"--epochs must be 1 or more, not {args.epochs}.")
-    plan = Plan(numbers_in(args.rail_classes, "--rail-classes", int), args.epochs, args.seed, args.device)
+    plan = Plan(numbers_in(args.rail_classes, "--rail-classes", int), args.epochs, args.seed, args.device, args.start)
     check_training(args.weights, plan)
     standard = resolve(args.standard, args.gauge, args.head_width)
     outputs = []

@@ -14,7 +14,7 @@ from ..clouds.points import Request
 from ..disk import Destination, writing
 from ..errors import ParameterError
 from ..learned.examples import CHECKS, Examples
-from ..learned.model import WEIGHTS_SUFFIX, check_torch, device_of, save
+from ..learned.model import WEIGHTS_SUFFIX, check_torch, device_of, load, save
 from ..progress import SILENT, Progress
 from .examples import write_examples
 
@@ -42,12 +42,15 @@ class Plan:
         How many times each block with rails is learned from.
     seed : int
     device : {"AUTO", "CPU", "CUDA"}
+    start : Path, optional
+        Weights to start from.
     """
 
     rail_classes: tuple[int, ...]
     epochs: int
     seed: int
     device: str
+    start: Path | None = None
 
 
 def check_training(weights: Path, plan: Plan) -> None:
@@ -58,12 +61,14 @@ def check_training(weights: Path, plan: Plan) -> None:
     ParameterError
         The weights have another suffix.
     ModelError
-        PyTorch or the CUDA device is missing.
+        PyTorch or the CUDA device is missing, or the weights to start from are missing or something else.
     """
     if weights.suffix.lower() != WEIGHTS_SUFFIX:
         raise ParameterError(f"{weights.name} is not a name for weights: let it end in {WEIGHTS_SUFFIX}.")
     check_torch("Training")
     device_of(plan.device)
+    if plan.start is not None:
+        load(plan.start)
 
 
 def folder_of(weights: Path) -> Path:
@@ -101,7 +106,7 @@ def train_classifier(
     with writing(folder.parent):
         examples = _examples(request, settings, plan, folder, reading)
         reading.set_fraction(1.0)
-        trained = train(examples, TrainingSettings(plan.epochs, plan.seed), folder, plan.device, learning)
+        trained = train(examples, TrainingSettings(plan.epochs, plan.seed, plan.start), folder, plan.device, learning)
     with weights.replacing() as new:
         save(new, trained.network)
     shutil.rmtree(folder, ignore_errors=True)

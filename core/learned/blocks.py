@@ -54,6 +54,10 @@ class Thinned:
         Their places.
     stands_for : (m,) int array
         The thinned point of their cube, for each.
+    coarse : Coarse
+        The cells in which the bed was found.
+    height : (k,) float32 array
+        Height above the bed of each point of the square.
     """
 
     number: np.ndarray
@@ -62,6 +66,8 @@ class Thinned:
     band: np.ndarray
     band_place: np.ndarray
     stands_for: np.ndarray
+    coarse: Coarse
+    height: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -102,7 +108,9 @@ def thin(xyz: np.ndarray) -> Thinned:
     band, context = np.flatnonzero(railhigh), np.flatnonzero(~railhigh)
     chosen, stands_for = _one_of_each(place[band], RAIL_VOXEL_M)
     kept = np.concatenate([band[chosen], context[_one_of_each(place[context], CONTEXT_VOXEL_M)[0]]])
-    return Thinned(used[kept], place[kept], railhigh[kept], used[band], place[band, :3], stands_for)
+    return Thinned(
+        used[kept], place[kept], railhigh[kept], used[band], place[band, :3], stands_for, coarse, height
+    )
 
 
 def _one_of_each(place: np.ndarray, side_m: float) -> tuple[np.ndarray, np.ndarray]:

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..classify.bed import COARSE_M, Coarse
+from ..classify.figures import shares_of_length
+from ..classify.flush import flush_rails
 from ..classify.settings import Settings
-from ..classify.square import Classified
+from ..classify.square import REACH_M, REACH_POINTS_PER_M, Classified, beside_guide
+from ..classify.tops import HIGH_M, Grid
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from .blocks import RAIL_VOXEL_M, Thinned, cut, thin
 from .model import Classifier
 from .rails import rails_of
 
-PROBABILITY = 0.5
-"""Probability from which a point is labelled; the training sets the bias of the output accordingly."""
+PROBABILITY, POSSIBLE = 0.5, 0.1
+"""Probability from which a point is labelled, for which the training sets the bias of the output; and that from which
+it is labelled if it continues a rail: where a rail leaves the block, plants or shadows leave less to see of it."""
 
 NEAREST = 3
 """Thinned points whose probabilities, weighted by the inverse of their squared distances, give that of a point."""
@@ -37,16 +44,45 @@ def label_square(
     progress : Progress
     """
     rail = np.zeros(len(xyz), dtype=bool)
-    thinned = thin(xyz) if len(xyz) else None
-    blocks = cut(thinned, settings.side_m) if thinned else []
-    if thinned is None or not blocks:
+    if not len(xyz):
         return Classified(rail, SearchFigures())
-    probability = _spread(thinned, classifier.probabilities(thinned, blocks, progress))
-    found = thinned.band[probability >= PROBABILITY]
-    found = found[settings.own(xyz[found])]
-    kept, figures = rails_of(xyz[found], settings)
-    rail[found[kept]] = True
-    return Classified(rail, figures)
+    thinned = thin(xyz)
+    blocks = cut(thinned, settings.side_m)
+    flush, figures = _flush(xyz, thinned, settings)
+    rail[flush] = True
+    if blocks:
+        probability = _spread(thinned, classifier.probabilities(thinned, blocks, progress))
+        found = np.flatnonzero((probability >= POSSIBLE) & settings.own(xyz[thinned.band]))
+        point, sure = thinned.band[found], probability[found] >= PROBABILITY
+        kept, standing = rails_of(xyz[point], sure, settings, _reach_m(thinned.coarse, point[sure]))
+        rail[point[kept]] = True
+        figures += standing
+    return Classified(rail, replace(figures, points=int(rail.sum()), squares=int(rail.any())))
+
+
+def _flush(xyz: np.ndarray, thinned: Thinned, settings: Settings) -> tuple[np.ndarray, SearchFigures]:
+    """Find the points of rails in pavements, (k,) int numbers, by their grooves, which the network does not see."""
+    near = np.flatnonzero(thinned.height <= HIGH_M)
+    if not len(near):
+        return near, SearchFigures()
+    grid, cell = Grid.around(xyz[near, 0], xyz[near, 1], settings.cell_m)
+    found = flush_rails(thinned.coarse, near, xyz[near, :2], thinned.height[near], grid, cell, settings)
+    own = found.points[settings.own(xyz[near[found.points]])]
+    length_m = shares_of_length(found.lines, settings.head_width_m)[settings.own(found.lines.axis)].sum()
+    along_m, across_m = beside_guide(found.rails, settings)
+    cells = len(np.unique(cell[own]))
+    figures = SearchFigures(
+        paired_m=float(length_m), cells=cells, paved=int(length_m > 0), along_m=float(along_m), across_m=float(across_m)
+    )
+    return near[own], figures
+
+
+def _reach_m(coarse: Coarse, point: np.ndarray) -> float:
+    """Return the distance within which lines are looked for, from the density around labelled points, (n,) numbers."""
+    if not len(point):
+        return REACH_M[0]
+    per_m2 = np.median(coarse.count[coarse.cell[point]]) / COARSE_M**2
+    return float(np.clip(REACH_POINTS_PER_M / per_m2, *REACH_M))
 
 
 def _spread(thinned: Thinned, probability: np.ndarray) -> np.ndarray:

@@ -76,6 +76,7 @@ def facts_of(trained: Trained, plan: Plan, standard: RailStandard) -> dict[str, 
         "Blocks kept back": f"{trained.kept_back:,}, in places of some 20 m that the seed chooses",
         "Epochs": f"{plan.epochs}, {trained.steps:,} steps",
         "Seed": str(plan.seed),
+        "Started from": plan.start.name if plan.start else "random weights",
         "Network": f"RandLA-Net, {trained.parameters:,} weights",
     }
 

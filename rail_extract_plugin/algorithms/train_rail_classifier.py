@@ -65,7 +65,8 @@ class TrainRailClassifier(RailAlgorithm):
 
         values = ParameterValues(self, parameters, context)
         epochs, seed = int(values.number("EPOCHS")), int(values.number("SEED"))
-        plan = Plan(values.class_codes(), epochs, seed, values.choice("DEVICE"))
+        start = self.parameterAsFile(parameters, "START", context)
+        plan = Plan(values.class_codes(), epochs, seed, values.choice("DEVICE"), Path(start) if start else None)
         check_training(Path(self.parameterAsFileOutput(parameters, "WEIGHTS", context)), plan)
         return Job(values.cloud("INPUT"), values.standard(), plan)
 

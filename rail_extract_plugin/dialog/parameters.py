@@ -344,6 +344,15 @@ def training() -> Definitions:
             tr("How many times each block of 4 m with rails is learned from. More take longer and may find more."),
         ),
         advanced(
+            QgsProcessingParameterFile(
+                "START", tr("Weights to start from"), optional=True, fileFilter=tr("Weights (*.npz)")
+            ),
+            tr(
+                "Weights that have learned from other clouds, such as rail_classifier.npz in the folder models of the "
+                "plugin: fewer labels and epochs do. Leave empty to start from random weights."
+            ),
+        ),
+        advanced(
             number("SEED", tr("Seed"), 0, maximum=MAX_SEED, whole=True),
             tr("Of the random numbers. It also chooses the places that are kept back."),
         ),
