@@ -35,14 +35,14 @@ APPLICATION = "RAIL_EXTRACT"
 MAX_TEXT = 255
 """Longest text of extended data."""
 
-DRAWN = {"rails": "RAILS", "centerlines": "TRACK", "quality": "STATIONS", "findings": "FINDINGS"}
+DRAWN = {"rails": "RAILS", "centerlines": "TRACK", "quality": "STATIONS", "findings": "FINDINGS", "stops": "STOPS"}
 """First word of the layers in a drawing, by output."""
 
 COLOURS = {"RAILS": 5, "TRACK": 1, "STATIONS": 3}
 """Colour of a layer by the first word of its name: blue, red, green."""
 
 OTHER_COLOUR = 30
-"""Orange, for findings."""
+"""Orange, for findings and stops."""
 
 ID_FIELDS = ("rail_id", "track_id", "finding", "class_code")
 """Fields that a row of a vertex has."""

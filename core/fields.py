@@ -152,3 +152,8 @@ FINDING_FIELDS = (
     Field("points", int, "points on the rails of the section"),
     Field("review", str, "decision of the user: accepted or rejected; empty before"),
 )
+
+STOP_FIELDS = (
+    Field("stop", int, "number of the stop, in the order of the seeds"),
+    Field("reason", str, "why the rail is not followed further"),
+)

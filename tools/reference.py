@@ -19,7 +19,14 @@ from qgis.core import (  # noqa: E402
     QgsProcessingParameterNumber,
     QgsProcessingProvider,
 )
-from rail_extract.core.fields import CENTERLINE_FIELDS, FINDING_FIELDS, QUALITY_FIELDS, RAIL_FIELDS, Field  # noqa: E402
+from rail_extract.core.fields import (  # noqa: E402
+    CENTERLINE_FIELDS,
+    FINDING_FIELDS,
+    QUALITY_FIELDS,
+    RAIL_FIELDS,
+    STOP_FIELDS,
+    Field,
+)
 from rail_extract.core.standards import CUSTOM, STANDARDS, UNCONFIRMED  # noqa: E402
 from rail_extract.rail_extract_plugin.algorithms import ALGORITHMS  # noqa: E402
 from rail_extract.rail_extract_plugin.dialog.definitions import UNBOUNDED  # noqa: E402
@@ -39,6 +46,7 @@ LAYERS = {
     "Centerlines": CENTERLINE_FIELDS,
     "Track geometry": QUALITY_FIELDS,
     "Findings": FINDING_FIELDS,
+    "Stops": STOP_FIELDS,
 }
 
 

@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ..clouds.points import ask
-from ..disk import Destination, writing
+from ..disk import Destination
 from ..errors import ParameterError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, FINDING_FIELDS, RAIL_FIELDS
 from ..frpdf import DEVICES, ENGINES
@@ -28,10 +28,12 @@ from ..report import Origin, list_findings, summary
 from ..scratch import scratch_folder
 from ..standards import SEARCHED_CLASSES, RailStandard, resolve
 from .options import (
+    LAYERS,
     TILES_HELP,
     Console,
     add_cloud_arguments,
     add_method_arguments,
+    destination_of,
     extent_of,
     gauges_of,
     limited,
@@ -43,8 +45,6 @@ NEEDS = {name: name for name in ("distributed", "cryptography", "pyogrio", "shap
 
 INCOMPLETE = 2
 """Exit code of a run that has written results in which some files or squares are missing."""
-
-LAYERS = (".gpkg", ".dxf", ".csv")
 
 SUFFIXES = {
     "rails": LAYERS,
@@ -211,11 +211,7 @@ def _outputs(args: argparse.Namespace) -> dict[str, Destination]:
         path = getattr(args, name)
         if path is None:
             continue
-        if path.suffix.lower() not in suffixes:
-            raise ParameterError(f"The option --{name} writes {suffixes[0]} files: give {path.name} this suffix.")
-        with writing(path.parent):
-            path.parent.mkdir(parents=True, exist_ok=True)
-        destination = Destination.at(path)
+        destination = destination_of(name, path, suffixes)
         if destination.file in files and path.suffix.lower() != ".gpkg":
             raise ParameterError(f"Only a GeoPackage holds several outputs: give --{name} a file other than {path}.")
         outputs[name] = files.setdefault(destination.file, destination)

@@ -13,9 +13,10 @@ import shapely
 
 from ..disk import Destination
 from ..exchange import DRAWN, Shape, write_shapes
-from ..fields import QUALITY_FIELDS, UNKNOWN_IN_METRES, Field
+from ..fields import QUALITY_FIELDS, STOP_FIELDS, UNKNOWN_IN_METRES, Field
 from ..frame import LocalFrame
 from ..geopackage import tables_in
+from ..grow.growth import Stop
 from ..rails import Centerline, RailLine, TrackGeometry
 from ..report import Finding
 
@@ -83,6 +84,12 @@ def stations_layer(name: str, destination: Destination, tracks: Sequence[TrackGe
     return Layer(
         name, destination, QUALITY_FIELDS, columns, "Point Z", [place for track in tracks for place in track.xyz]
     )
+
+
+def stops_layer(destination: Destination, stops: Sequence[Stop]) -> Layer:
+    """Make a layer of the places where rails were not followed further."""
+    columns: list[Sequence[Any]] = [range(1, len(stops) + 1), [stop.reason.value for stop in stops]]
+    return Layer("stops", destination, STOP_FIELDS, columns, "Point Z", [stop.xyz for stop in stops])
 
 
 def write_layers(layers: Sequence[Layer], frame: LocalFrame) -> None:

@@ -19,7 +19,7 @@ from ..scratch import scratch_folder
 from ..standards import DEFAULT, SEARCHED_CLASSES, resolve
 from ..tasks import InTurn
 from .copies import add_label_arguments, add_tiles_arguments, check_rail_class, planned_output, print_figures
-from .options import Console, shapes_module
+from .options import Console, destination_of, shapes_module
 
 LENGTHS = {
     "search": "largest distance of a seed from its rail, and of the rail from its course",
@@ -54,6 +54,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = f"windows in a row in which the rail may not be seen (default: {most})"
     parser.add_argument("--max-outliers", type=int, default=most, metavar="N", help=text)
     add_label_arguments(parser, "the rail points")
+    text = "GeoPackage (or .dxf, .csv) for the places where rails are not followed further, with the reason"
+    parser.add_argument("--stops", type=Path, metavar="FILE", help=text)
 
 
 def run(args: argparse.Namespace) -> None:
@@ -69,12 +71,16 @@ def run(args: argparse.Namespace) -> None:
     settings = GrowSettings(standard.gauge_m, standard.head_width_m, _parameters(args))
     progress = Estimating(Console())
     planned = planned_output(args, progress)
+    stops = None if args.stops is None else destination_of("stops", args.stops)
+    layers = None if stops is None else shapes_module("--stops", "geopackage")
     request = ask(args.tiles, SEARCHED_CLASSES, args.crs, None, progress)
     choice = Choice(args.rail_class, args.rails_only, reset=False)
     seeds = _seeds(args, request.zero.crs_wkt)
     parent = planned.file.parent
     with writing(parent), scratch_folder(parent) as folder:
         result = grow_files(request, seeds, settings, choice, planned, folder, InTurn(), progress)
+    if layers is not None:
+        layers.write_layers([layers.stops_layer(stops, result.stops)], request.zero)
     print_figures(result.figures, result.point_count)
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
 from ..clouds.points import Request
+from ..disk import Destination, writing
 from ..errors import ParameterError
 from ..parameters import GEOMETRY, LEARNED, LEAVE_OUT, METHODS, Parameters
 from ..progress import Progress
@@ -53,8 +55,27 @@ def add_method_arguments(parser: argparse._ActionsContainer) -> None:
     parser.add_argument("--weights", type=Path, metavar="FILE", help=text)
 
 
-def shapes_module(option: str) -> ModuleType:
-    """Return the module that reads vector files, for an option that names one.
+LAYERS = (".gpkg", ".dxf", ".csv")
+"""File name suffixes of layers."""
+
+
+def destination_of(name: str, path: Path, suffixes: Sequence[str] = LAYERS) -> Destination:
+    """Check that the file of the option `name` can be written, and make its folder.
+
+    Raises
+    ------
+    ParameterError, DiskError
+        It could not be written after the run.
+    """
+    if path.suffix.lower() not in suffixes:
+        raise ParameterError(f"The option --{name} writes {suffixes[0]} files: give {path.name} this suffix.")
+    with writing(path.parent):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    return Destination.at(path)
+
+
+def shapes_module(option: str, name: str = "shapes") -> ModuleType:
+    """Return the module that reads vector files, or the one that writes them, for an option that names one.
 
     Raises
     ------
@@ -62,7 +83,7 @@ def shapes_module(option: str) -> ModuleType:
         Its packages are not installed.
     """
     try:
-        return import_module(".shapes", __package__)
+        return import_module(f".{name}", __package__)
     except ImportError as error:
         raise ParameterError(
             f"{option} needs the packages pyogrio and shapely: in a clone, run pip install .[cluster]."

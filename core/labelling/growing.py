@@ -57,7 +57,7 @@ class Grown:
         Points in the files that were read.
     figures : SearchFigures
     stops : tuple of Stop
-        Where rails were not followed further, in units of the CRS.
+        Where rails were not followed further, in metres from the zero of the request; each place once.
     """
 
     file: Path
@@ -112,8 +112,7 @@ def grow_files(
         figures += _labelled(squares.read(points), growths, settings, request, labels)
     _report(growths, figures, settings, request, progress)
     write_labelled(request, choice, labels, output, runner, rewriting)
-    stops = tuple(Stop(request.zero.to_crs(stop.xyz), stop.reason) for growth in growths for stop in growth.stops)
-    return Grown(output.file, labels.point_count, figures, stops)
+    return Grown(output.file, labels.point_count, figures, _stops(growths))
 
 
 def grow_all(
@@ -294,6 +293,15 @@ def _lengths(growths: Sequence[Growth]) -> SearchFigures:
                 single_m += length_m
             known = np.concatenate([known, xy])
     return SearchFigures(paired_m=paired_m, single_m=single_m)
+
+
+def _stops(growths: Sequence[Growth]) -> tuple[Stop, ...]:
+    """List where rails were not followed further; what several seeds reach counts once."""
+    stops: list[Stop] = []
+    for stop in (stop for growth in growths for stop in growth.stops):
+        if all(np.hypot(*(stop.xyz - one.xyz)[:2]) > SAME_M for one in stops):
+            stops.append(stop)
+    return tuple(stops)
 
 
 def _report(

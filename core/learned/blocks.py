@@ -108,9 +108,7 @@ def thin(xyz: np.ndarray) -> Thinned:
     band, context = np.flatnonzero(railhigh), np.flatnonzero(~railhigh)
     chosen, stands_for = _one_of_each(place[band], RAIL_VOXEL_M)
     kept = np.concatenate([band[chosen], context[_one_of_each(place[context], CONTEXT_VOXEL_M)[0]]])
-    return Thinned(
-        used[kept], place[kept], railhigh[kept], used[band], place[band, :3], stands_for, coarse, height
-    )
+    return Thinned(used[kept], place[kept], railhigh[kept], used[band], place[band, :3], stands_for, coarse, height)
 
 
 def _one_of_each(place: np.ndarray, side_m: float) -> tuple[np.ndarray, np.ndarray]:

@@ -29,9 +29,7 @@ GRADIENT = 0.04
 """Steepest gradient of railways: by how much the top of a rail rises along it."""
 
 
-def rails_of(
-    xyz: np.ndarray, sure: np.ndarray, settings: Settings, reach_m: float
-) -> tuple[np.ndarray, SearchFigures]:
+def rails_of(xyz: np.ndarray, sure: np.ndarray, settings: Settings, reach_m: float) -> tuple[np.ndarray, SearchFigures]:
     """Choose among points of a square that may be on rails, and sum up their rails.
 
     Parameters

@@ -15,6 +15,7 @@ from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource, points_folder, request_points
+from ..writing.layers import write_stops
 from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
 from .classify_rail_points import ClassifyRailPoints, classified_results
 
@@ -65,6 +66,7 @@ class GrowRailPoints(RailAlgorithm):
             groups.leave_out(),
             *groups.content(),
             outputs.classified(),
+            outputs.stops(),
         ):
             self.addParameter(definition)
         for output in outputs.classified_figures():
@@ -98,4 +100,5 @@ class GrowRailPoints(RailAlgorithm):
         settings = GrowSettings(job.standard.gauge_m, job.standard.head_width_m, job.parameters)
         with points_folder() as folder:
             grown = grow_files(request, job.seeds, settings, choice, output, folder, InTurn(), progress)
-        return classified_results(grown.file, grown.point_count, grown.figures)
+        results = classified_results(grown.file, grown.point_count, grown.figures)
+        return {**results, **write_stops(self, "STOPS", grown.stops, request.zero, parameters, context)}

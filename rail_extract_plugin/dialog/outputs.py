@@ -61,6 +61,15 @@ def findings() -> QgsProcessingParameterDefinition:
     )
 
 
+def stops() -> QgsProcessingParameterDefinition:
+    """Define the layer of places where rails were not followed further."""
+    point = QgsProcessing.SourceType.TypeVectorPoint
+    return helped(
+        _layer("STOPS", tr("Stops"), point, optional=True),
+        tr("Points where a rail is not followed further, with the reason."),
+    )
+
+
 def cleaned() -> QgsProcessingParameterDefinition:
     """Define the raster that the network returns."""
     return helped(

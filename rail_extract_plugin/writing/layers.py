@@ -34,6 +34,7 @@ from ...core.fields import (
     QUALITY_FIELDS,
     RAIL_FIELDS,
     SIGMA,
+    STOP_FIELDS,
     UNKNOWN_IN_METRES,
     Field,
 )
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ...core.frame import LocalFrame
+    from ...core.grow.growth import Stop
     from ...core.rails import Centerline, RailLine, TrackGeometry
     from ...core.raster import RailRaster
     from ...core.raster_file import RasterHeader
@@ -68,6 +70,7 @@ class LayerKind:
 
 RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELDS, "centerlines")
 QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
+STOPS = LayerKind(STOP_FIELDS, "stops")
 
 
 def fields(columns: Sequence[Field]) -> QgsFields:
@@ -179,6 +182,29 @@ def write_stations(
     shape = QgsWkbTypes.Type.Point if is_flat(tracks) else QgsWkbTypes.Type.PointZ
     made = stations(tracks, frame)
     return _write(algorithm, name, QUALITY, shape, made, frame, parameters, context)
+
+
+def write_stops(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    stops: Sequence[Stop],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the places where rails were not followed further as points.
+
+    Parameters
+    ----------
+    stops : sequence of Stop
+    algorithm, name, frame, parameters, context
+        See `write_lines`.
+    """
+    made = (
+        _feature(QgsGeometry(QgsPoint(*frame.to_crs(stop.xyz).tolist())), (number, stop.reason.value), STOPS.columns)
+        for number, stop in enumerate(stops, 1)
+    )
+    return _write(algorithm, name, STOPS, QgsWkbTypes.Type.PointZ, made, frame, parameters, context)
 
 
 def write_raster(

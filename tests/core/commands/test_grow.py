@@ -47,6 +47,20 @@ def test_seeds_of_a_file_are_transformed(raw, tmp_path):
     assert (laspy.read(new).classification == 10).sum() > 0.9 * TRACK.head.sum()
 
 
+@pytest.mark.parametrize("name", ["stops.gpkg", "stops.csv"])
+def test_stops_are_written_with_their_reason(raw, tmp_path, name):
+    pyogrio, shapely = pytest.importorskip("pyogrio"), pytest.importorskip("shapely")
+    stops = tmp_path / "out" / name
+    values = ["grow", raw, "--output", str(tmp_path / "new.las"), "--seed", f"{X},{Y}", "--stops", str(stops)]
+    assert main(values) == 0
+    _, _, shapes, columns = pyogrio.raw.read(stops)
+    places = shapely.get_coordinates(shapely.from_wkb(shapes), include_z=True)
+    assert sorted(places[:, 0]) == pytest.approx([500_000.0, 500_014.0], abs=1.0)
+    assert places[:, 1] == pytest.approx(Y, abs=0.02)
+    assert columns[-2].tolist() == [1, 2]
+    assert columns[-1].tolist() == ["the cloud ends"] * 2
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -55,6 +69,7 @@ def test_seeds_of_a_file_are_transformed(raw, tmp_path):
         (["--seed", "1,2"], "No seed lies in the cloud"),
         (["--seed", f"{X},{Y}", "--window", "0"], "--window must be a positive number."),
         (["--seed", f"{X},{Y}", "--max-outliers", "-1"], "--max-outliers must be 0 or more, not -1."),
+        (["--seed", f"{X},{Y}", "--stops", "a.shp"], "The option --stops writes .gpkg files: give a.shp this suffix."),
         (["--seed", f"{X},{Y}", "--rail-class", "300"], "--rail-class must be a number from 0 to 255, not 300."),
     ],
 )

@@ -105,6 +105,7 @@ def test_two_seeds_on_one_track_count_its_length_once(tmp_path):
     result, progress = grow(tmp_path, [source], tmp_path / "new.las", seeds)
     assert result.figures.paired_m == pytest.approx(47.0, abs=2.5)
     assert "1 of 3 seeds lie on no rail: move them onto railheads." in progress.warnings
+    assert len(result.stops) == 2
 
 
 def test_a_line_reaches_on_beyond_the_longest_run(tmp_path):

@@ -41,7 +41,12 @@ def test_both_rails_get_their_class_from_a_seed_in_degrees(raw, run_step, tmp_pa
     shape = QgsGeometry.fromPointXY(place(7.0, SPACING_M / 2))
     shape.transform(QgsCoordinateTransform(utm, degrees, QgsProject.instance()))
     feedback = new_feedback()
-    values = {"INPUT": raw, "SEEDS": layer_of([shape], "EPSG:4326"), "OUTPUT": tmp_path / "new.laz"}
+    values = {
+        "INPUT": raw,
+        "SEEDS": layer_of([shape], "EPSG:4326"),
+        "OUTPUT": tmp_path / "new.laz",
+        "STOPS": tmp_path / "stops.gpkg",
+    }
     done = run_step("growrailpoints", values, feedback)
     assert done.ok, done.error
     assert not feedback.warnings
@@ -54,6 +59,11 @@ def test_both_rails_get_their_class_from_a_seed_in_degrees(raw, run_step, tmp_pa
     assert done.results["SINGLE_LENGTH"] == 0
     assert done.results["CELLS_PER_M"] > 30
     assert any("where the cloud ends" in text for text in feedback.infos)
+    stops = list(QgsVectorLayer(str(tmp_path / "stops.gpkg"), "stops", "ogr").getFeatures())
+    assert [(stop["stop"], stop["reason"]) for stop in stops] == [(1, "the cloud ends"), (2, "the cloud ends")]
+    ends = [stop.geometry().constGet() for stop in stops]
+    assert sorted(end.x() for end in ends) == pytest.approx([500_000, 500_014], abs=1.0)
+    assert [end.y() for end in ends] == pytest.approx([3_000_000 + SPACING_M / 2] * 2, abs=0.02)
 
 
 def test_one_rail_grows_from_a_place_on_the_map(raw, run_step):

@@ -24,7 +24,7 @@ from qgis.core import (
 from qgis.PyQt.QtCore import QSize
 from qgis.PyQt.QtGui import QColor
 from qgis.PyQt.QtXml import QDomDocument
-from rail_extract.core.fields import CENTERLINE_FIELDS, FINDING_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
+from rail_extract.core.fields import CENTERLINE_FIELDS, FINDING_FIELDS, QUALITY_FIELDS, RAIL_FIELDS, STOP_FIELDS
 from rail_extract.core.frame import LocalFrame
 from rail_extract.rail_extract_plugin import compat
 from rail_extract.rail_extract_plugin.paths import STYLES
@@ -38,6 +38,7 @@ KINDS = {
     "centerlines": ("LineStringZ", CENTERLINE_FIELDS),
     "quality": ("PointZ", QUALITY_FIELDS),
     "findings": ("LineStringZ", FINDING_FIELDS),
+    "stops": ("PointZ", STOP_FIELDS),
 }
 
 
@@ -138,11 +139,12 @@ def test_fields_have_names_in_words_with_units(styled, style):
         ("rails", {"rail_id": 3, "sigma_mm": 1.25}, ["Rail 3", "Standard error: 1.3 mm", "In no track"]),
         ("centerlines", {"track_id": 2, "gauge_mm": 1436.04}, ["Track 2", "Gauge: 1,436.0 mm", "Cant: unknown"]),
         ("quality", {"track_id": 2, "chainage_m": 17.0}, ["Track 2, 17.0 m", "Gauge: unknown"]),
+        ("stops", {"stop": 2, "reason": "the cloud ends"}, ["Stop 2", "the cloud ends"]),
         ("findings", {"finding": 4, "reason": "gauge off", "track_id": 1}, ["4: gauge off", "Track 1", "Review: open"]),
     ],
 )
 def test_map_tips_say_what_is_under_the_mouse(styled, style, values, said):
-    shape = "POINT Z (500000 3000000 1)" if style == "quality" else LINE
+    shape = "POINT Z (500000 3000000 1)" if style in ("quality", "stops") else LINE
     layer = styled(style, [(shape, values)])
     scopes = QgsExpressionContext(QgsExpressionContextUtils.globalProjectLayerScopes(layer))
     scopes.setFeature(next(layer.getFeatures()))
@@ -215,6 +217,7 @@ def test_layers_can_be_drawn(styled, style):
         "centerlines": (LINE, {"track_id": 1}),
         "quality": ("POINT Z (500050 3000000 1)", {"track_id": 1, "gauge_mm": 1435.0, "bridged": 1}),
         "findings": (LINE, {"finding": 1, "review": "accepted"}),
+        "stops": ("POINT Z (500050 3000000 1)", {"stop": 1, "reason": "the cloud ends"}),
     }
     layer = styled(style, [rows[style]])
     settings = QgsMapSettings()
@@ -228,7 +231,8 @@ def test_layers_can_be_drawn(styled, style):
     job.waitForFinished()
     image = job.renderedImage()
     seen = {image.pixelColor(x, y).name() for x in range(60, 200) for y in range(100, 200)}
-    assert {"rails": "#1565c0", "centerlines": "#e64a19", "quality": "#f28e2b", "findings": "#84b397"}[style] in seen
+    colours = {"rails": "#1565c0", "centerlines": "#e64a19", "quality": "#f28e2b", "findings": "#84b397"}
+    assert {**colours, "stops": "#e64a19"}[style] in seen
 
 
 @pytest.mark.parametrize("style", ["rails", "centerlines", "findings"])
