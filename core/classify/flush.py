@@ -17,7 +17,7 @@ from .lines import Lines, Marks, find_lines
 from .partner import partners
 from .pieces import lengths, links, pieces_of
 from .settings import Settings
-from .tops import Grid
+from .tops import TENTHS_OF_MM, Grid, centroids
 
 MIN_POINTS, MIN_SHARE, LEVEL_M, NEAR_BED_M = 60, 0.65, 0.008, 0.03
 """A coarse cell is paved if it has more points than this, and this share of them lies this close to their mean height;
@@ -67,8 +67,6 @@ FACE_M, CORNER_M = 0.035, 0.013
 
 BESIDE_M = 0.003
 """Distance beyond the edge within which a point on the side of the groove is still rail: noise across."""
-
-TENTHS_OF_MM = 10_000
 
 NO_LINES = Lines(np.empty((0, 2)), np.empty(0), np.empty(0), np.empty(0), np.empty(0), REACH_M)
 
@@ -122,7 +120,7 @@ def flush_rails(
         return nothing
     below = level_m[coarse.cell[near]] - height
     hollow = np.flatnonzero((below > CAVITY_M[0]) & (below < CAVITY_M[1]))
-    marks = _centroids(cell[hollow], xy[hollow])
+    marks = centroids(cell[hollow], xy[hollow])
     if len(marks) < 2:
         return nothing
     crowd = cKDTree(marks).query_ball_point(marks, CROWD_M, return_length=True)
@@ -158,14 +156,6 @@ def _pavement(coarse: Coarse, cell: np.ndarray, height: np.ndarray) -> np.ndarra
     paved = (coarse.count > MIN_POINTS) & (flat > MIN_SHARE * np.bincount(cell, minlength=cells))
     grown = binary_dilation(paved.reshape(coarse.shape), np.ones((3, 3))).ravel()
     return np.where(grown, level / TENTHS_OF_MM, np.nan)
-
-
-def _centroids(cell: np.ndarray, xy: np.ndarray) -> np.ndarray:
-    """Mean places of the points of each cell, (k, 2)."""
-    cells, number = np.unique(cell, return_inverse=True)
-    count = np.bincount(number, minlength=len(cells))
-    tenths = np.round(xy * TENTHS_OF_MM)
-    return np.column_stack([np.bincount(number, column, len(cells)) / count for column in tenths.T]) / TENTHS_OF_MM
 
 
 @dataclass(frozen=True)

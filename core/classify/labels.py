@@ -8,8 +8,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .lines import Lines
+from .pieces import HIDDEN_M
 from .settings import Tolerances
-from .tops import EMPTY, MILLIMETRES, Grid, Tops, Window
+from .tops import EMPTY, MILLIMETRES, TENTHS_OF_MM, Grid, Tops, Window
 
 HEAD_M = 0.11
 """Distance within which a higher kept cell shows that a lower one is the foot of the rail or a fastening."""
@@ -21,10 +22,16 @@ NEAREST, MIN_AXES = 6, 2
 """Axes that are looked at for a place, and how many of them it must lie on: where two heads part there are some of
 each, and single axes are led astray by a guard rail."""
 
+BEYOND_M = HIDDEN_M + 0.3
+"""Distance to an axis up to which a place may lie on it. Behind a wheel at the end of a cloud, the rail is too short to
+show its direction: the axis before the wheel continues to it, and over some of its cells."""
+
 WIDEST_M = 0.075
 """Distance from the axis within which points count towards the width of a top: short of a guard rail."""
 
-TENTHS_OF_MM = 10_000
+WIDTH_SPREADS = 1.9
+"""Standard deviations beyond which points no longer count towards the width of a top: a bar's points lie within 1.73 of
+them. A guard rail that leads some axes astray adds a quarter of the density on either side."""
 
 
 def whole_heads(tops: Tops, kept: np.ndarray, tolerances: Tolerances) -> np.ndarray:
@@ -123,7 +130,7 @@ class Near:
         if not len(xy) or not len(lines.axis):
             return cls(len(xy), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0))
         count = np.arange(1, min(NEAREST, len(lines.axis)) + 1)
-        near = cKDTree(lines.axis).query(xy, k=count, distance_upper_bound=lines.reach_m)[1]
+        near = cKDTree(lines.axis).query(xy, k=count, distance_upper_bound=max(lines.reach_m, BEYOND_M))[1]
         place, rank = np.nonzero(near < len(lines.axis))
         cell = near[place, rank]
         across = np.einsum("ij,ij->i", xy[place] - lines.axis[cell], lines.across[cell])
@@ -134,22 +141,27 @@ class Near:
         on = (np.abs(self.across) <= half_m) & fits
         return np.bincount(self.place[on], minlength=self.count) >= MIN_AXES
 
-    def widths(self, piece: np.ndarray) -> np.ndarray:
+    def widths(self, piece: np.ndarray, rounds: int) -> np.ndarray:
         """Width of the top of each piece: that of a bar whose points scatter across as much, (pieces,) metres.
 
         Parameters
         ----------
         piece : (cells,) int array
             Piece of each cell.
+        rounds : int
+            See `Tolerances.width_rounds`.
         """
-        inside = np.abs(self.across) < WIDEST_M
         # Whole numbers add up to the same sum in any order of the points.
-        across = np.round(self.across[inside] * TENTHS_OF_MM)
-        number, count = piece[self.cell[inside]], int(piece.max()) + 1
-        points = np.maximum(np.bincount(number, minlength=count), 1)
-        mean = np.bincount(number, across, count) / points
-        variance = np.bincount(number, across**2, count) / points - mean**2
-        return np.sqrt(12 * np.maximum(variance, 0)) / TENTHS_OF_MM
+        across = np.round(self.across * TENTHS_OF_MM)
+        number, count = piece[self.cell], int(piece.max()) + 1
+        inside = np.abs(self.across) < WIDEST_M
+        for _ in range(rounds):
+            left, own = across[inside], number[inside]
+            points = np.maximum(np.bincount(own, minlength=count), 1)
+            mean = np.bincount(own, left, count) / points
+            spread = np.sqrt(np.maximum(np.bincount(own, left**2, count) / points - mean**2, 0))
+            inside = inside & (np.abs(across - mean[number]) <= WIDTH_SPREADS * spread[number])
+        return np.sqrt(12) * spread / TENTHS_OF_MM
 
 
 def _with_neighbours(grid: Grid, cells: np.ndarray) -> np.ndarray:

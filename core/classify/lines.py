@@ -240,7 +240,7 @@ def centred(lines: Lines, cells: Marks, half_m: float, along_m: float) -> Lines:
     cells : Marks
         All narrow cells.
     half_m : float
-        Largest distance of a cell of the head from its axis: half the head and half a cell, short of a guard rail.
+        Largest distance of a cell's top from the axis of its head: half the head and noise, short of a guard rail.
     along_m : float
         Largest difference in height.
     """

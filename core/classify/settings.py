@@ -40,7 +40,10 @@ class Tolerances:
         the beam is as wide.
     wider_m, wider_single_m : float
         Width beyond that of a head up to which the top of a piece may be one, with a partner and without. Measured: up
-        to 16 mm beside guard rails, and 42 mm on thin clouds; kerbs of 150 mm 55 to 65 mm.
+        to 8 mm, and 42 mm on thin clouds; kerbs of 150 mm 42 mm, on thin clouds 63 mm.
+    width_rounds : int
+        Rounds in which this width is measured. From the second on, points that do not fit a bar are left out: those of
+        a guard rail, where beams are narrow enough to show it apart.
     """
 
     along_m: float
@@ -52,6 +55,7 @@ class Tolerances:
     beside_m: float
     wider_m: float
     wider_single_m: float
+    width_rounds: int
 
 
 DENSE = Tolerances(
@@ -62,8 +66,9 @@ DENSE = Tolerances(
     below_m=0.040,
     above_m=0.025,
     beside_m=0.02,
-    wider_m=0.03,
+    wider_m=0.025,
     wider_single_m=0.012,
+    width_rounds=5,
 )
 """For scanners on vehicles: beams of a few millimetres, range noise up to 5 mm."""
 
@@ -77,6 +82,7 @@ THIN = Tolerances(
     beside_m=0.035,
     wider_m=0.05,
     wider_single_m=0.04,
+    width_rounds=1,
 )
 """For scanners in the air: a beam of 4 to 9 cm blends the head and the ballast."""
 

@@ -17,7 +17,7 @@ from .partner import runs_inside, stations_with_partner
 from .pieces import LEAST_PAIRED, links, long_enough, lower_than_beside, pieces_of
 from .settings import DENSE, MARGIN_M, THIN, Settings, Tolerances
 from .sides import stands_free
-from .tops import HIGH_M, MILLIMETRES, Grid, Tops, highest_of_blocks, narrow_tops, tops_of
+from .tops import HIGH_M, MILLIMETRES, Grid, Tops, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
 
 THIN_PER_M2 = 400.0
 """Points per square metre below which a square is thin: no scanner on a vehicle, or far from it."""
@@ -41,6 +41,42 @@ SINGLE_COVER = 0.75
 
 SINGLE_HEIGHT_M = 0.12
 """Least height above the bed of a rail without a partner: lower things are edges of slopes, kerbs and boards."""
+
+
+NOISE_ACROSS_M = 0.01
+"""Distance beyond the side of a head within which the top of a cell counts towards its axis: less than half the gap
+to a guard rail, from which on the axis would lie between both."""
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Cells that may be on railheads.
+
+    Attributes
+    ----------
+    tops : Tops
+    cells : (n,) int array
+        Narrow tops.
+    marks : (m,) int array
+        The highest one of each block of 2 x 2 cells.
+    places : (rows * columns, 2) array
+        Middles of the tops of these cells.
+    """
+
+    tops: Tops
+    cells: np.ndarray
+    marks: np.ndarray
+    places: np.ndarray
+
+    @classmethod
+    def find(cls, tops: Tops, xy: np.ndarray, cell: np.ndarray, height: np.ndarray) -> Candidates:
+        """Find the narrow tops; the arguments are those of `middles_of_tops`."""
+        cells = narrow_tops(tops)
+        return cls(tops, cells, highest_of_blocks(tops, cells), middles_of_tops(tops, cells, xy, cell, height))
+
+    def at(self, cells: np.ndarray) -> Marks:
+        """Return places and heights of some of the cells."""
+        return Marks(self.places[cells], self.tops.top.ravel()[cells] / MILLIMETRES)
 
 
 @dataclass(frozen=True)
@@ -142,13 +178,12 @@ def _standing(
     xy: np.ndarray, cell: np.ndarray, height: np.ndarray, coarse: Coarse, tops: Tops, settings: Settings
 ) -> Standing:
     """Find rails that stand out of their bed."""
-    cells = narrow_tops(tops)
-    marks = highest_of_blocks(tops, cells)
-    density = _density(coarse, tops.grid.middles(marks))
+    found = Candidates.find(tops, xy, cell, height)
+    density = _density(coarse, tops.grid.middles(found.marks))
     tolerances = THIN if density < THIN_PER_M2 else DENSE
     reach_m = float(np.clip(REACH_POINTS_PER_M / density, *REACH_M))
-    kept = _kept(tops, cells, marks, reach_m, tolerances, settings)
-    heads = whole_heads(tops, _completed(tops, marks, kept, settings, tolerances), tolerances)
+    kept = _kept(found, reach_m, tolerances, settings)
+    heads = whole_heads(tops, _completed(found, kept, settings, tolerances), tolerances)
     chosen = label(tops, heads, cell, height, tolerances)
     beside = Near.find(xy[chosen], kept.lines)
     narrow = _narrow(kept, beside, settings, tolerances)
@@ -200,18 +235,14 @@ def _density(coarse: Coarse, xy: np.ndarray) -> float:
     return float(np.quantile(counts, DENSITY_QUANTILE)) / COARSE_M**2 if len(counts) else np.inf
 
 
-def _kept(
-    tops: Tops, cells: np.ndarray, marks: np.ndarray, reach_m: float, tolerances: Tolerances, settings: Settings
-) -> Kept:
+def _kept(found: Candidates, reach_m: float, tolerances: Tolerances, settings: Settings) -> Kept:
     """Keep the candidates that lie on rails."""
-    top_m = tops.top.ravel() / MILLIMETRES
-    places = Marks(tops.grid.middles(marks), top_m[marks])
-    lines = find_lines(places, reach_m, tolerances.along_m, tolerances.strip_m)
+    lines = find_lines(found.at(found.marks), reach_m, tolerances.along_m, tolerances.strip_m)
     good = np.flatnonzero((lines.cover >= MIN_COVER) & (lines.pure >= MIN_PURE))
-    half_m = (settings.head_width_m + settings.cell_m) / 2
-    lines = centred(lines.of(good), Marks(tops.grid.middles(cells), top_m[cells]), half_m, tolerances.along_m)
-    free = stands_free(tops, marks[good], lines)
-    lines, marks = lines.of(free), marks[good[free]]
+    half_m = settings.head_width_m / 2 + NOISE_ACROSS_M
+    lines = centred(lines.of(good), found.at(found.cells), half_m, tolerances.along_m)
+    free = stands_free(found.tops, found.marks[good], lines)
+    lines, marks = lines.of(free), found.marks[good[free]]
     paired = stations_with_partner(lines, settings.spacings_m, tolerances.partner_m) >= MIN_STATIONS
     pairs = links(lines)
     kept = Kept(lines, marks, paired, pairs).of(_certain(lines, paired, pairs))
@@ -231,7 +262,7 @@ def _certain(lines: Lines, paired: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     return certain
 
 
-def _completed(tops: Tops, marks: np.ndarray, kept: Kept, settings: Settings, tolerances: Tolerances) -> np.ndarray:
+def _completed(found: Candidates, kept: Kept, settings: Settings, tolerances: Tolerances) -> np.ndarray:
     """Add to the kept cells the other candidates on their axes: the line that such a cell saw was a wrong one.
 
     Returns
@@ -239,15 +270,14 @@ def _completed(tops: Tops, marks: np.ndarray, kept: Kept, settings: Settings, to
     (k,) int array
         Cells.
     """
-    others = np.setdiff1d(marks, kept.cell)
-    return np.union1d(kept.cell, others[_near_axes(tops, others, kept, settings, tolerances.along_m)])
+    others = np.setdiff1d(found.marks, kept.cell)
+    return np.union1d(kept.cell, others[_near_axes(found.at(others), kept, settings, tolerances.along_m)])
 
 
-def _near_axes(tops: Tops, cells: np.ndarray, kept: Kept, settings: Settings, height_m: float) -> np.ndarray:
-    """Return which cells lie on the axes of kept ones, and within `height_m` of them in height, (k,) bool."""
-    near = Near.find(tops.grid.middles(cells), kept.lines)
-    top = tops.top.ravel()[cells] / MILLIMETRES
-    level = np.abs(kept.lines.height[near.cell] - top[near.place]) < height_m
+def _near_axes(marks: Marks, kept: Kept, settings: Settings, height_m: float) -> np.ndarray:
+    """Return which marks lie on the axes of kept cells, and within `height_m` of them in height, (k,) bool."""
+    near = Near.find(marks.xy, kept.lines)
+    level = np.abs(kept.lines.height[near.cell] - marks.height[near.place]) < height_m
     return near.on((settings.head_width_m + settings.cell_m) / 2, level)
 
 
@@ -259,7 +289,7 @@ def _narrow(kept: Kept, points: Near, settings: Settings, tolerances: Tolerances
     if not len(kept.cell):
         return np.zeros(0, dtype=bool)
     piece = pieces_of(len(kept.cell), kept.pairs)
-    width_m = points.widths(piece)
+    width_m = points.widths(piece, tolerances.width_rounds)
     size = np.bincount(piece)
     height_m = np.bincount(piece, kept.lines.height) / size
     single = np.bincount(piece, kept.paired) <= LEAST_PAIRED * size

@@ -60,6 +60,17 @@ def test_guard_and_third_rails_go_and_rails_stay(left):
     assert (found & on)[inner(xyz, 8)].sum() / on[inner(xyz, 8)].sum() > 0.98
 
 
+def test_a_rail_behind_a_wheel_at_the_end_of_the_cloud_is_labelled():
+    rng = np.random.RandomState(12)
+    xyz, on = ballasted(rng, 0.0)
+    along, across = turned(xyz, 0.0)
+    wheel = (np.abs(along - 3.05) < 0.55) & (np.abs(np.abs(across) - SPACING / 2) < 0.09)
+    found = classify_square(xyz[~wheel], SETTINGS).rail
+    behind = on & (along > 3.62)
+    assert behind.sum() > 100
+    assert found[behind[~wheel]].mean() > 0.95
+
+
 @pytest.mark.parametrize(("length", "kept"), [(4.8, False), (5.2, True)])
 def test_lone_bars(length, kept):
     xyz, on = with_bar(flat(8.0), WIDTH, 0.2, length_m=length)

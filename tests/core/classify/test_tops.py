@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from rail_extract.core.classify.tops import EMPTY, Grid, highest_of_blocks, narrow_tops, tops_of
+from rail_extract.core.classify.tops import EMPTY, Grid, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
 from rail_extract.core.raster import rasterize
 from rail_extract.laboratory.scenes.raw_shapes import flat, turned, with_bar
 
@@ -76,3 +76,11 @@ def test_blocks_keep_their_highest_cell():
     found, cell = tops(xyz)
     kept = highest_of_blocks(found, np.unique(cell))
     np.testing.assert_array_equal(kept, np.sort(cell[[1, 3]]))
+
+
+def test_the_middle_of_a_top_leaves_out_lower_points_and_other_cells():
+    xyz = np.array([[0.025, 0.01, 0.2], [0.035, 0.02, 0.17], [0.005, 0.03, 0.1], [0.06, 0.02, 0.2], [0.5, 0.5, 0.05]])
+    found, cell = tops(xyz)
+    places = middles_of_tops(found, cell[:1], xyz[:, :2], cell, xyz[:, 2].astype(np.float32))
+    np.testing.assert_allclose(places[cell[0]], [0.03, 0.015], atol=1e-4)
+    assert np.isnan(places[cell[3]]).all()
