@@ -232,7 +232,7 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
     warn_of_strips(rails, parameters, progress)
     warn_of_steps(rails, centerlines, progress)
     rails = doubting_steps(rails, centerlines)
-    heads = head_widths(sources[0], parameters.gauges, progress) if rails else None
+    heads = head_widths(sources[0], parameters.gauges, progress, rails) if rails else None
     geometry = _measure_tracks(centerlines, rails, sources, parameters, runner, measuring)
     if geometry:
         count = sum(len(track.chainage_m) for track in geometry)

@@ -13,12 +13,13 @@ from .clouds.points import Request
 from .errors import CloudError, ParameterError
 from .heads.gauge_estimate import measure_spacings
 from .heads.roads import MIN_WIDER_M
+from .heads.sections import likelier_width
 from .parameters import Parameters
 from .progress import SILENT, Progress
-from .rails import HEAD_OFF_M, HeadWidths
+from .rails import HEAD_OFF_M, HeadWidths, RailLine
 from .squares.density import fullest_square
 from .squares.grid import PointSource
-from .standards import Gauge, RailStandard, closest_standard
+from .standards import HEAD_WIDTH_RANGE_MM, Gauge, RailStandard, closest_standard
 from .tracks.widths_by_gauge import width_at
 
 SAMPLE_M = 50.0
@@ -94,8 +95,13 @@ def _is_off_by(factor: float, xyz: np.ndarray, spacings_m: Sequence[float], para
     return min(abs(measured[0] - one) for one in spacings_m) <= parameters.centerline_tolerance_m
 
 
-def head_widths(source: PointSource, gauges: Sequence[Gauge], progress: Progress) -> HeadWidths:
+def head_widths(
+    source: PointSource, gauges: Sequence[Gauge], progress: Progress, rails: Sequence[RailLine] = ()
+) -> HeadWidths:
     """Measure how wide heads look, and warn the user if another width is stated.
+
+    The spread of the points decides; where it is a little more than stated, which noise and side faces do as well, the
+    outline of the heads does.
 
     Parameters
     ----------
@@ -104,6 +110,8 @@ def head_widths(source: PointSource, gauges: Sequence[Gauge], progress: Progress
     gauges : sequence of Gauge
         As stated; the one that fits the distance of most rails counts.
     progress : Progress
+    rails : sequence of RailLine
+        Lines on the heads, in the frame of the source.
     """
     points = fullest_square(source)
     if points.strips is not None:  # strips side by side would look like a wider head
@@ -115,12 +123,22 @@ def head_widths(source: PointSource, gauges: Sequence[Gauge], progress: Progress
     if measured is None:
         return HeadWidths(float("nan"), gauges[0][1])
     stated_m = width_at(measured[0], gauges)
-    widths = HeadWidths(measured[1], stated_m)
+    seen_m = measured[1]
+    if rails and HEAD_OFF_M < seen_m - stated_m < MIN_WIDER_M:
+        lines = [rail.xyz[:, :2] - points.frame.shift_to(source.frame)[:2] for rail in rails]
+        seen_m = likelier_width(lines, xyz, (stated_m, seen_m))
+    widths = HeadWidths(seen_m, stated_m)
+    measured = measured[0], seen_m
     if widths.differ:
         seen = f"Heads look {1000 * widths.seen_m:.0f} mm wide, {1000 * stated_m:.0f} mm are stated"
         standard = closest_standard(*measured)
         fits = standard is not None and abs(standard.head_width_m - widths.seen_m) <= HEAD_OFF_M
-        if widths.seen_m > stated_m + MIN_WIDER_M:
+        if 1000 * widths.seen_m < HEAD_WIDTH_RANGE_MM[0]:
+            progress.warning(
+                f"Points show a band {1000 * widths.seen_m:.0f} mm wide rather than heads of {1000 * stated_m:.0f} mm, "
+                "as where the scanner sees one face of each. The lines are on the axes if that width is right."
+            )
+        elif widths.seen_m > stated_m + MIN_WIDER_M:
             progress.warning(
                 f"{seen}: road or dirt next to them is classified as rail. Where it hides one edge of a head and the "
                 "other is at gauge, the line follows that one. Check the classification elsewhere."

@@ -267,7 +267,7 @@ def warn_of_strips(rails: Sequence[RailLine], parameters: Parameters, progress: 
         progress.warning(
             f"Heads are blurred or too wide on {STATION_STEP_M * np.sum(count == 1):.0f} m of rail, as by passes of "
             f"the scanner up to {_largest(spread_m[count == 1])}, whose points state neither source id nor GPS time: "
-            "sigma_mm contains half of it. Export the cloud with them, or pass by pass."
+            "sigma_mm and sigmaz_mm contain half of it. Export the cloud with them, or pass by pass."
         )
 
 

@@ -218,7 +218,8 @@ def _measured(
     axial |= axial.sum() < MIN_POINTS
     t = supporting.t[axial]
     residual_m = level_z[head][top][axial] - profile.at(t)
-    support = replace(support, sigmaz_m=height_error(t, residual_m, support.t, parameters.smoothing_z_m))
+    by_chance_m = height_error(t, residual_m, support.t, parameters.smoothing_z_m)
+    support = replace(support, sigmaz_m=np.hypot(by_chance_m, np.nan_to_num(support.heights_m)))
     if strips is not None:
         support = strips.added_to(support, parameters.align)
     support = support.between(start, end)

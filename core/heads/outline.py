@@ -277,6 +277,11 @@ def fit_section(counts: np.ndarray, outline: Outline, grid: Grid, start: Section
     return section
 
 
+def log_likelihood(counts: np.ndarray, section: Section, outline: Outline, grid: Grid) -> float:
+    """Return the logarithm of the likelihood of the points in each bin, (b,), given a section that explains them."""
+    return _log_likelihood(counts, section, Blurred.at(section.place, outline, grid))
+
+
 def _start(outline: Outline) -> Section:
     """Return a head in the middle of the bins, all parts of which have the same share."""
     count = len(outline.parts) + 1

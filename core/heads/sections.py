@@ -6,14 +6,16 @@ station then show how far it is off there. See docs/method.md section 6.8.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, WINDOWS, station_count
+from ..polyline import length_along, project
+from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, WINDOWS, search_distance, station_count
 from .level import in_head_frame
-from .outline import CROWN_RADIUS_M, Grid, Outline, Scores, Section, fit_section
+from .outline import CROWN_RADIUS_M, MIN_NOISE_M, Grid, Outline, Scores, Section, fit_section, log_likelihood
 
 MIN_SECTION_POINTS = 250
 """Points that a section needs for its parts to be told apart."""
@@ -48,9 +50,17 @@ too wide, and their axis would be wherever the scanner seems to look from."""
 SETTLED_WIDTH_M, WIDTH_ROUNDS = 0.0005, 5
 """Change of the width at which this ends, and most rounds; each finds two thirds of what is left."""
 
-BLURRED_M, BLURRED_RATIO = 0.004, 1.4
+BLURRED_M, BLURRED_RATIO = 0.0035, 1.3
 """Blur of the edges beyond the noise in height, and ratio of the noise across to that in height, from which a head is
 blurred. Worn corners blur edges by 2 mm, and the two noises of a scanner differ by a fifth."""
+
+FLAT_SHARE, TWO_LEVELS, APART_M = 0.3, -0.4, 0.003
+"""Part of the head's width to either side of its axis that has no corners; excess kurtosis of the heights there from
+which they are on two levels, and half the least distance of these. Noise has 0 or more, and two passes -2 (d² / (d² +
+noise²))², at half their distance d: -0.5 where d is the noise. Heights rounded to half of it have -0.1."""
+
+CORE_SIGMAS, SURE_SIGMAS = 4.0, 4.0
+"""Standard deviations from which heights are those of weeds, and of the kurtosis, √(24 / n), from which it is sure."""
 
 WIDENED_M = 0.008
 """Excess of the width from which passes may have widened the head; without round corners it looks 7 mm wider."""
@@ -76,9 +86,9 @@ class Middles:
         Inverse variance of it, 1/m², that the points next to a station alone contribute, and those of its window.
     common : (s,) array
         Standard error that all stations of a section share, metres.
-    blur : (s,) array
-        Standard deviation across of the places at which the points of a section show the head, metres; 0 where they
-        agree. It is half the distance of two passes of the scanner.
+    blur, blur_up : (s,) arrays
+        Standard deviations, across and in height, of the places at which the points of a section show the head, metres;
+        0 where they agree. They are half the distance of two passes of the scanner.
     """
 
     offset: np.ndarray
@@ -86,6 +96,13 @@ class Middles:
     in_window: np.ndarray
     common: np.ndarray
     blur: np.ndarray
+    blur_up: np.ndarray
+
+    @classmethod
+    def unknown(cls, count: int) -> Middles:
+        """Return those of stations of which nothing is known."""
+        nothing = np.full(count, np.nan)
+        return cls(nothing, np.zeros(count), np.zeros(count), nothing.copy(), np.zeros(count), np.zeros(count))
 
 
 def outline_middles(
@@ -104,7 +121,7 @@ def outline_middles(
         Where the head stands alone and its edges are visible.
     """
     count = station_count(length_m)
-    middles = Middles(np.full(count, np.nan), np.zeros(count), np.zeros(count), np.full(count, np.nan), np.zeros(count))
+    middles = Middles.unknown(count)
     left, up = in_head_frame(t, across, z, head_width_m)
     station = np.minimum((t / STATION_STEP_M).astype(int), count - 1)
     head, grid = Head(head_width_m, Outline.of(head_width_m)), Grid.of(head_width_m)
@@ -129,8 +146,15 @@ def outline_middles(
         pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
         middles.offset[part] = np.where(seen[part], middles.offset[part] - pull, np.nan)
         middles.common[part] = np.hypot(np.hypot(scores.common_m, PROFILE_SIGMA_M), PULL_DOUBT * pull)
-        if _is_crowned(left[here], up[here], head_width_m):
-            middles.blur[part] = _blur(section, width_m - head_width_m, middles.offset[part])
+        on_crown = np.abs(left[here] - section.place[0]) < FLAT_SHARE * head_width_m
+        middles.blur_up[part] = apart_m = _half_apart(_above_crown(left[here], up[here], section.place)[on_crown])
+        middles.blur[part] = _blur(
+            section,
+            width_m - head_width_m,
+            middles.offset[part],
+            apart_m,
+            _is_crowned(left[here], up[here], head_width_m),
+        )
     return middles
 
 
@@ -172,19 +196,71 @@ def _is_crowned(left: np.ndarray, up: np.ndarray, head_width_m: float) -> bool:
     return bool(curvature > CROWNED_SHARE / CROWN_RADIUS_M)
 
 
-def _blur(section: Section, wider_m: float, offset: np.ndarray) -> float:
+def _above_crown(left: np.ndarray, up: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Return the heights of points, (n,) metres, above the crown of a head at a place."""
+    return up - place[1] - place[2] * left + (left - place[0]) ** 2 / (2 * CROWN_RADIUS_M)
+
+
+def _half_apart(above: np.ndarray) -> float:
+    """Return half the distance of two levels on which heights, (n,) metres, are, as of two passes; 0 if on one.
+
+    The fourth moment distinguishes two levels from noise: the sum of both has the fourth cumulant -2 d⁴.
+    """
+    above = above - np.median(above) if len(above) else above
+    above = above[np.abs(above) <= CORE_SIGMAS * 1.4826 * np.median(np.abs(above))] if len(above) else above
+    if len(above) < MIN_SECTION_POINTS:
+        return 0.0
+    variance = float(np.var(above))
+    kurtosis = float(np.mean((above - above.mean()) ** 4)) / variance**2 - 3 if variance else 0.0
+    apart_m = np.sqrt(variance) * max(-0.5 * kurtosis, 0.0) ** 0.25
+    sure = kurtosis <= min(TWO_LEVELS, -SURE_SIGMAS * np.sqrt(24 / len(above)))
+    return float(apart_m) if sure and apart_m >= APART_M else 0.0
+
+
+def _blur(section: Section, wider_m: float, offset: np.ndarray, apart_up_m: float, is_crowned: bool) -> float:
     """Return by how much the edges of a head are blurred beyond the noise; see `Middles.blur`.
 
-    Where the line wanders about the head, by its `offset`, (k,) metres, it blurs the section as well. Passes from
-    either side each show the edge that they are shifted to: they widen the head, by `wider_m`, rather than blur it.
+    Where the line wanders about the head, by its `offset`, (k,) metres, it blurs the section as well, and so do passes
+    in height, by `apart_up_m`. A head that is flat to its edges looks both blurred and wider. Passes from either side
+    each show the edge that they are shifted to: they widen the head, by `wider_m`, rather than blur it.
     """
     across_m, height_m = np.exp(section.place[4:])
     known = offset[np.isfinite(offset)]
     across_m = np.sqrt(max(across_m**2 - (np.var(known) if len(known) else 0.0), 0.0))
+    height_m = np.sqrt(max(height_m**2 - apart_up_m**2, MIN_NOISE_M**2))
     blur_m = np.sqrt(max(across_m**2 - height_m**2, 0.0))
     is_blurred = blur_m >= BLURRED_M and across_m >= BLURRED_RATIO * height_m and wider_m >= -WRONG_WIDTH_M
-    widened_m = 0.5 * wider_m if WIDENED_M < wider_m < MAX_WRONG_WIDTH_M else 0.0
-    return float(np.hypot(blur_m if is_blurred and wider_m < MAX_WRONG_WIDTH_M else 0.0, widened_m))
+    is_blurred &= wider_m < (MAX_WRONG_WIDTH_M if is_crowned else WRONG_WIDTH_M)
+    widened_m = 0.5 * wider_m if is_crowned and WIDENED_M < wider_m < MAX_WRONG_WIDTH_M else 0.0
+    return float(np.hypot(blur_m if is_blurred else 0.0, widened_m))
+
+
+def likelier_width(lines: Sequence[np.ndarray], xyz: np.ndarray, widths_m: Sequence[float]) -> float:
+    """Return which of several widths of heads explains points best, metres; the first if they do not show it.
+
+    Other than the spread of the points, this does not depend on their noise and on how much of the faces is classified.
+
+    Parameters
+    ----------
+    lines : sequence of (k, 2) arrays
+        Rails in plan.
+    xyz : (n, 3) array
+        Points.
+    widths_m : sequence of float
+    """
+    grid, outlines = Grid.of(max(widths_m)), [Outline.of(width_m) for width_m in widths_m]
+    feet = project(lines, xyz[:, :2], search_distance(max(widths_m)))
+    likelihood = np.zeros(len(widths_m))
+    for number, line in enumerate(lines):
+        own = feet.of(number)
+        bins = grid.number(*in_head_frame(own.t, own.across, xyz[own.point, 2], widths_m[0]))
+        for first, last in _borders(station_count(float(length_along(line)[-1]))):
+            here = bins[slice(*np.searchsorted(own.t, [first * STATION_STEP_M, last * STATION_STEP_M]))]
+            counts = np.bincount(here[here >= 0], minlength=grid.size).astype(float)
+            if counts.sum() >= MIN_SECTION_POINTS:
+                fits = [fit_section(counts, outline, grid) for outline in outlines]
+                likelihood += [log_likelihood(counts, fit, one, grid) for fit, one in zip(fits, outlines)]
+    return widths_m[int(np.argmax(likelihood))]
 
 
 def _borders(count: int) -> list[tuple[int, int]]:

@@ -12,13 +12,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from ..lines.paek import VARIANCE_FACTOR
 from ..lines.smoothing import smooth_profile
 from ..polyline import distance_to
 from ..rails import Support
-from .edges import BLUR_BINS, HALF_HEAD_BINS, STATION_STEP_M, CrossSections, histograms
+from .edges import BLUR_BINS, HALF_HEAD_BINS, STATION_STEP_M, VIEW_STATIONS, CrossSections, histograms
 from .level import on_top, robust_sigma
 from .roads import MIN_WIDER_M, bands, hidden_edges
 from .sections import Middles, outline_middles, with_outline
@@ -78,6 +78,7 @@ def measure_support(
     Returns
     -------
     Support
+        Its error of height is only what passes of the scanner differ by; `height_error` is the rest.
     """
     top, noise_m = on_top(t, across, z, head_width_m)
     stations, counts, wide_counts = histograms(t[top], across[top], length_m, head_width_m)
@@ -110,16 +111,20 @@ def measure_support(
     wander = _wander(points, counts.sum(axis=1), head_width_m, smoothing_m)
     sigma = np.sqrt(sampling**2 + view**2 + bridging**2 + beyond_chance + wander**2)
     support = Support(stations, points, np.hypot(np.where(known, sigma, unseen), bridge))
-    return support if marked else _with_blur(support, by_outline.blur)
+    return support if marked else _with_blur(support, by_outline.blur, by_outline.blur_up)
 
 
-def _with_blur(support: Support, blur_m: np.ndarray) -> Support:
-    """Add what blurs the head across, (s,) metres, as of passes of the scanner that lie apart by twice that."""
-    if not blur_m.any():
+def _with_blur(support: Support, blur_m: np.ndarray, blur_up_m: np.ndarray) -> Support:
+    """Add what blurs the head across and in height, (s,) metres, as of passes of the scanner apart by twice that.
+
+    Next to it, where one of the passes may go on alone, the line is as much in doubt.
+    """
+    largest_m = np.maximum(blur_m, blur_up_m)
+    if not largest_m.any():
         return support
-    apart_m = np.where(blur_m > 0, 2 * blur_m, np.nan)
-    strips = np.column_stack([np.ones(len(blur_m)), apart_m, blur_m])
-    return replace(support, sigma_m=np.hypot(support.sigma_m, blur_m), strips=strips)
+    across_m, up_m = (maximum_filter1d(one, 2 * VIEW_STATIONS + 1) for one in (blur_m, blur_up_m))
+    strips = np.column_stack([np.ones(len(blur_m)), np.where(largest_m > 0, 2 * largest_m, np.nan), across_m])
+    return replace(support, sigma_m=np.hypot(support.sigma_m, across_m), strips=strips, sigmaz_m=up_m)
 
 
 def _wander(points: np.ndarray, in_window: np.ndarray, head_width_m: float, smoothing_m: float) -> np.ndarray:

@@ -9,9 +9,11 @@ from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.gauge_estimate import SEEN_SHARE
 from rail_extract.core.parameters import Parameters
 from rail_extract.core.progress import Progress
+from rail_extract.core.rails import RailLine
 from rail_extract.core.squares.grid import MemorySource
 from rail_extract.core.standard_checks import head_widths, warn_of_gauge
 from rail_extract.laboratory.curves import Element, trace, transition_curve
+from rail_extract.laboratory.scenes.adversarial import from_the_side
 from rail_extract.laboratory.scenes.strips import two_passes
 
 WIDTH = 0.072
@@ -84,3 +86,16 @@ def test_passes_side_by_side_without_a_mark_are_said():
         assert head_widths(source, ((1.435, 0.072),), heard).differ == bool(count)
         assert len(heard.said) == count
         assert all("passes of the scanner lie apart" in text for text in heard.said)
+
+
+def test_noise_and_faces_do_not_widen_heads_and_a_single_face_is_no_head():
+    for scene, said in (
+        (from_the_side("all", 39, 60.0, noise_m=0.006, length_m=30.0), ""),
+        (from_the_side("one", 44, 20.0, noise_m=0.004, length_m=30.0, top_share=0.0), "one face of each"),
+    ):
+        heard = Warnings()
+        rails = [RailLine(rail, 1, 10, 1.0, 1.0, 1.0, 0.0) for rail in scene.rails]
+        source = MemorySource(scene.rail_points(), 500.0)
+        head_widths(source, ((1.435, 0.072),), heard, rails)
+        assert len(heard.said) == bool(said)
+        assert all(said in text for text in heard.said)

@@ -1,7 +1,14 @@
 import numpy as np
 import pytest
 from rail_extract.core.heads.edges import VIEW_STATIONS, station_count
-from rail_extract.core.heads.sections import Middles, _pull, outline_middles, with_outline
+from rail_extract.core.heads.sections import (
+    Middles,
+    _half_apart,
+    _pull,
+    likelier_width,
+    outline_middles,
+    with_outline,
+)
 from rail_extract.laboratory.scenes.scanner import Scanner, scan
 from rail_extract.laboratory.scenes.tracks import Railhead
 
@@ -96,7 +103,40 @@ def test_what_is_no_head_shows_no_middle():
 def test_edges_are_corrected_by_what_the_outline_shows_elsewhere():
     by_edges = np.array([0.005, 0.006, np.nan, 0.004, 0.009])
     nothing = np.zeros(5)
-    by_outline = Middles(np.array([0.001, 0.002, 0.0, np.nan, np.nan]), nothing, nothing, nothing, nothing)
+    by_outline = Middles(np.array([0.001, 0.002, 0.0, np.nan, np.nan]), nothing, nothing, nothing, nothing, nothing)
     np.testing.assert_allclose(with_outline(by_edges, by_outline), [0.001, 0.002, 0.0, 0.0, 0.005], atol=1e-12)
-    unknown = Middles(np.full(5, np.nan), nothing, nothing, nothing, nothing)
+    unknown = Middles(np.full(5, np.nan), nothing, nothing, nothing, nothing, nothing)
     np.testing.assert_array_equal(with_outline(by_edges, unknown), by_edges)
+
+
+@pytest.mark.parametrize(("across_mm", "up_mm"), [(0, 0), (4, 0), (10, 0), (20, 0), (30, 0), (0, 4), (0, 12), (0, 16)])
+def test_two_passes_blur_the_head_by_half_of_their_distance(across_mm, up_mm):
+    passes = [scanned(80, noise_m=0.004, seed=seed) for seed in (1, 2)]
+    for sign, one in zip((0.5, -0.5), passes):
+        one[1] += sign * across_mm / 1000
+        one[2] += sign * up_mm / 1000
+    both = np.concatenate(passes, axis=1)
+    middles = middles_of(both[:, np.argsort(both[0])])
+    expected = [half if half > 3 else 0 for half in (across_mm / 2, up_mm / 2)]
+    found = [1000 * np.median(one) for one in (middles.blur, middles.blur_up)]
+    assert found == pytest.approx(expected, rel=0.12)
+
+
+def test_noise_with_weeds_or_rounded_to_half_of_it_is_no_second_level():
+    random = np.random.RandomState(0)
+    noise = 0.004 * random.standard_normal(4000)
+    weeds = np.append(noise, random.uniform(0, 0.06, 200))
+    assert [_half_apart(one) for one in (noise, weeds, np.round(noise, 3) // 0.002 * 0.002, noise[:100])] == 4 * [0.0]
+    assert _half_apart(np.concatenate([noise - 0.005, noise + 0.005])) == pytest.approx(0.005, rel=0.05)
+    assert _half_apart(np.zeros(0)) == 0.0 and _half_apart(np.zeros(4000)) == 0.0
+
+
+@pytest.mark.parametrize("width_m", [0.066, 0.072, 0.078])
+def test_the_outline_shows_which_width_heads_have_whatever_the_noise(width_m):
+    heads = [scanned(80, noise_m=0.006, seed=seed, width_m=width_m) for seed in (1, 2)]
+    heads[1][1] += 1.5
+    line = np.column_stack([np.arange(0, LENGTH, 0.5), np.zeros(int(2 * LENGTH))])
+    lines, xyz = [line, line + [0, 1.5]], np.concatenate(heads, axis=1).T
+    assert likelier_width(lines, xyz, (0.066, 0.072)) == min(width_m, 0.072)
+    assert likelier_width(lines, xyz, (0.072, 0.078)) == max(width_m, 0.072)
+    assert likelier_width(lines, xyz[:100], (0.072, 0.078)) == 0.072
