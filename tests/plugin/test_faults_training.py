@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from faults import REFUSED, Fault
+from rail_extract.core.frpdf.models import FOLDER
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
 pytest.importorskip("torch")
@@ -75,6 +76,12 @@ FAULTS = [
     ),
     Fault("training cancelled while the cloud is read", cancelled(1), REFUSED, "Cancelled; nothing was written."),
     Fault(
+        "training from weights of the network that cleans rasters",
+        labelled(START=FOLDER / "frpdf_fast.npz"),
+        REFUSED,
+        "frpdf_fast.npz holds the weights of something else: choose a file that Train rail classifier has written.",
+    ),
+    Fault(
         "classification with METHOD LEARNED and no weights: those shipped are used",
         labelled(METHOD="LEARNED"),
         run="classifyrailpoints",
@@ -105,6 +112,13 @@ FAULTS = [
         weights("something else"),
         REFUSED,
         "weights.npz holds the weights of something else: choose a file that Train rail classifier has written.",
+        run="classifyrailpoints",
+    ),
+    Fault(
+        "classification with weights of the network that cleans rasters",
+        labelled(METHOD="LEARNED", WEIGHTS=FOLDER / "frpdf_fast.npz"),
+        REFUSED,
+        "frpdf_fast.npz holds the weights of something else: choose a file that Train rail classifier has written.",
         run="classifyrailpoints",
     ),
     Fault(

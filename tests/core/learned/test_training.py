@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.errors import Cancelled, ParameterError
+from rail_extract.core.errors import Cancelled, ModelError, ParameterError
 from rail_extract.core.learned.examples import POINT, Examples, save_index, write_square
 from rail_extract.core.progress import Progress
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_bar, with_track
@@ -10,6 +10,7 @@ from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_bar, wit
 torch = pytest.importorskip("torch")
 
 from rail_extract.core.learned import training  # noqa: E402
+from rail_extract.core.learned.model import save  # noqa: E402
 from rail_extract.core.learned.training import Figures, Settings, train, varied  # noqa: E402
 
 SIDE = 40.0
@@ -103,6 +104,34 @@ def test_an_interrupted_training_gives_the_same_weights(examples, tmp_path):
     (twice / training.CHECKPOINT).write_bytes(b"cut")
     with pytest.raises(ParameterError, match=r"checkpoint.pt is damaged: delete the folder .*twice and train again"):
         train(examples, Settings(1), twice, "CPU")
+
+
+def test_a_full_graphics_card_is_said_in_a_sentence_and_the_checkpoint_stays(examples, tmp_path, monkeypatch):
+    with pytest.raises(Cancelled):
+        train(examples, Settings(1), tmp_path, "CPU", CancelledAfter(1))
+    kept = (tmp_path / training.CHECKPOINT).read_bytes()
+
+    def full(self, features, layers):
+        raise torch.cuda.OutOfMemoryError("CUDA out of memory")
+
+    monkeypatch.setattr(training.RandLaNet, "forward", full)
+    with pytest.raises(ModelError, match=r"too little free memory for 2 blocks at once: close .* continues from"):
+        train(examples, Settings(1), tmp_path, "CPU")
+    assert (tmp_path / training.CHECKPOINT).read_bytes() == kept
+
+
+def test_a_training_starts_from_weights(examples, tmp_path):
+    first, second = tmp_path / "first", tmp_path / "second"
+    first.mkdir()
+    second.mkdir()
+    learned = train(examples, Settings(1, seed=1), first, "CPU")
+    save(tmp_path / "first.npz", learned.network)
+    begun = train(examples, Settings(1, start=tmp_path / "first.npz"), second, "CPU")
+    weights = [torch.nn.utils.parameters_to_vector(one.network.parameters()) for one in (learned, begun)]
+    moved = (weights[1] - weights[0]).norm() / weights[0].norm()
+    assert 1e-4 < moved < 0.1
+    with pytest.raises(ParameterError, match="second holds another training"):
+        train(examples, Settings(1), second, "CPU")
 
 
 def test_the_loss_falls_and_the_output_is_calibrated(examples, tmp_path):
