@@ -24,10 +24,6 @@ HALF = 0.5
 MEMORY = 8
 """Windows whose median gives the number of points that a head has."""
 
-OUTER_M = 0.008
-"""Of two edges whose places differ by less, the outer one of the track is followed: the stock rail continues there,
-and the blade of a switch begins at its inner side."""
-
 EQUAL_M = 0.010
 """Two heads whose distances from the expected course differ by less are equally likely."""
 
@@ -225,8 +221,7 @@ class _Walk:
     def _choose(self, pairs: list[Pair], section: Section) -> tuple[Head | None, Head | None, Reason | None]:
         """Choose the head that continues the rail, with the other rail, or say why there is none.
 
-        Of several heads, the one near the course is taken that has the other rail at the gauge. Where both rails of a
-        track part from others, as at the blades of a switch, it is the outer one.
+        Of several heads, the one near the course is taken that has the other rail at the gauge.
         """
         if not pairs:
             return None, None, self._failure(section)
@@ -235,18 +230,13 @@ class _Walk:
         for pair in rivals:
             if self._strangeness(pair) - self._strangeness(best) < EQUAL_M and self._are_apart(best[0], pair[0]):
                 return None, None, Reason.CHOICE
-        close = [pair for pair in rivals if best[0] and self._strangeness(pair) - self._strangeness(best) < OUTER_M]
-        return (*next(filter(self._is_outer, (best, *close)), best), None)
+        return (*best, None)
 
     def _are_apart(self, one: Head | None, other: Head | None) -> bool:
         """Return whether two heads are two rails, and not the edges of one."""
         if one is None or other is None or not (one.is_free and other.is_free):
             return False
         return abs(one.across_m - other.across_m) >= self._settings.head_width_m
-
-    def _is_outer(self, pair: Pair) -> bool:
-        """Return whether the side of a head away from the other rail is free."""
-        return bool(self._start.side and pair[0] and pair[0].clear[0 if self._start.side > 0 else 1])
 
     def _missing_m(self) -> float:
         """Return what a rail that is not seen counts as its distance from the course: half a head, and the accuracy."""
