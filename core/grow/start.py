@@ -72,6 +72,8 @@ class Start:
         1 if the other rail of the track lies to the left, -1 to the right, 0 if none was found.
     level_m : float
         Height of the other rail above this one.
+    free : float
+        Share of the windows in which both sides of the head are free.
     """
 
     xyz: np.ndarray
@@ -81,6 +83,7 @@ class Start:
     flush: bool
     side: int
     level_m: float
+    free: float
 
 
 def window_m(per_m: float, settings: GrowSettings) -> float:
@@ -102,7 +105,10 @@ def find_start(points: Points, seed: np.ndarray, settings: GrowSettings) -> Star
     reach_m = float(np.clip(REACH_POINTS_PER_M / per_m2, *REACH_M))
     rail = patch[_classified(patch, seed, settings)]
     sure = _found(points, near, rail, seed, reach_m, beam, settings)
-    return sure or _found(points, near, _standing(patch, settings), seed, reach_m, beam, settings)
+    if sure is not None:
+        return sure
+    start = _found(points, near, _standing(patch, settings), seed, reach_m, beam, settings)
+    return start if start is not None and start.free >= MIN_COVER else None
 
 
 def _classified(patch: np.ndarray, seed: np.ndarray, settings: GrowSettings) -> np.ndarray:
@@ -224,15 +230,15 @@ def _start(
     xy = ahead.xy + stations[:, None] * ahead.heading + across[:, None] * ahead.left
     flush = float(np.mean([head.flush for head in heads])) > 0.5
     side, level_m = _other_rail(points, ahead, reach_m, beam, settings)
-    free = [head.is_free for head in heads]
+    free = float(np.mean([head.is_free for head in heads]))
     known = [np.isfinite(head.bed_m) for head in heads]
-    if np.mean(known) < MIN_COVER or (not side and np.mean(free) < MIN_COVER):
+    if np.mean(known) < MIN_COVER or (not side and free < MIN_COVER):
         return None
     along, offset, above = ahead.coordinates(near)
     band_m = settings.parameters.tolerance_z_m + beam.level_m
     on = (np.abs(along) <= reach_m) & (np.abs(offset) <= settings.head_width_m / 2) & (np.abs(above) <= band_m)
     per_m = float(np.count_nonzero(on)) / (2 * reach_m)
-    return Start(np.column_stack([xy, z]), ahead.heading, beam, per_m, flush, side, level_m)
+    return Start(np.column_stack([xy, z]), ahead.heading, beam, per_m, flush, side, level_m, free)
 
 
 def _windows(

@@ -1,12 +1,13 @@
 """From a raw cloud to rails through qgis_process: classified and then extracted, and in one call."""
 
+import csv
 import json
 
 import laspy
 import numpy as np
 import pytest
 from lines import farthest, read_lines
-from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
+from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, TOP_M, flat, rough, with_track
 
 CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
 
@@ -60,5 +61,35 @@ def test_a_cloud_that_does_not_exist_is_one_sentence(qgis_process, tmp_path):
     run = qgis_process({"INPUT": "gone.laz", "OUTPUT": tmp_path / "o.laz"}, algorithm="railextract:classifyrailpoints")
     assert run.returncode == 1
     assert "gone.laz does not exist" in run.stdout + run.stderr
+    assert "Traceback" not in run.stdout + run.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_rails_grow_from_a_seed_and_say_where_they_stop(succeed, folder, raw):
+    path, on = raw
+    along, across = np.array([np.cos(0.3), np.sin(0.3)]), np.array([-np.sin(0.3), np.cos(0.3)])
+    seed = CORNER[:2] + MIDDLE + 0.75 * across
+    output, stops = folder / "gewachsen.laz", folder / "Enden.csv"
+    found = succeed("growrailpoints", {"INPUT": path, "SEED": f"{seed[0]},{seed[1]}", "OUTPUT": output, "STOPS": stops})
+    rail = laspy.read(output).classification == 10
+    assert found["RAIL_POINTS"] == rail.sum()
+    assert (rail & on).sum() / on.sum() > 0.95
+    assert (rail & on).sum() / rail.sum() > 0.97
+    assert found["PAIRED_LENGTH"] == pytest.approx(2 * 10 / np.cos(0.3), abs=2.0)
+    assert found["SINGLE_LENGTH"] == 0
+    rows = list(csv.DictReader(stops.open(encoding="utf-8")))
+    assert [row["reason"] for row in rows] == ["the cloud ends"] * 2
+    places = np.array([row["WKT"].split("(")[1][:-1].split() for row in rows], dtype=float) - CORNER
+    assert (places[:, :2] - MIDDLE) @ across == pytest.approx([0.7535, 0.7535], abs=0.01)
+    assert np.abs((places[:, :2] - MIDDLE) @ along) == pytest.approx([5.0, 5.0], abs=0.8)
+    assert places[:, 2] == pytest.approx([TOP_M, TOP_M], abs=0.01)
+
+
+def test_a_seed_off_the_rails_is_one_sentence(qgis_process, folder, raw, tmp_path):
+    x, y = CORNER[:2] + MIDDLE
+    parameters = {"INPUT": raw[0], "SEED": f"{x},{y}", "CRS": "EPSG:32643", "OUTPUT": tmp_path / "o.laz"}
+    run = qgis_process(parameters, algorithm="railextract:growrailpoints")
+    assert run.returncode == 1
+    assert "No seed lies on a rail: put seeds within 0.25 m of railheads" in run.stdout + run.stderr
     assert "Traceback" not in run.stdout + run.stderr
     assert not list(tmp_path.iterdir())

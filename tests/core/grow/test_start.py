@@ -6,7 +6,7 @@ from rail_extract.core.grow.points import Buckets
 from rail_extract.core.grow.settings import DENSE, THIN, GrowSettings
 from rail_extract.core.grow.start import find_start
 from rail_extract.core.parameters import GrowParameters
-from rail_extract.laboratory.scenes.raw_shapes import TOP_M
+from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, TOP_M, flat, rough, with_bar
 from rail_extract.laboratory.scenes.raw_strips import GAUGE_M, SPACING_M, WIDTH_M, strip
 
 
@@ -53,3 +53,15 @@ def test_a_single_rail_has_no_side():
     track = strip(14.0, rails=[lambda s: np.full_like(s, 0.3)])
     start = find_start(Buckets(track.xyz), track.at(7.0, 0.3), growing())
     assert start.side == 0
+
+
+@pytest.mark.parametrize("edge", [1, -1])
+def test_the_edge_of_a_trough_is_not_a_rail_though_one_lies_at_the_gauge(edge):
+    rng = np.random.RandomState(3)
+    xyz, _ = with_bar(flat(12.0, rng=rng, per_m2=2000), WIDTH_M, 0.3, SPACING_M)
+    xyz, _ = with_bar(xyz, 0.34, 0.3, -edge * (0.34 - WIDTH_M) / 2)
+    xyz = rough(xyz, rng)
+    turn = np.array([-np.sin(0.3), np.cos(0.3)])
+    points = Buckets(xyz)
+    assert find_start(points, MIDDLE, growing()) is None
+    assert find_start(points, MIDDLE + SPACING_M * turn, growing()).xyz[2, 2] == pytest.approx(TOP_M, abs=0.01)
