@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from ..clouds.points import RailPoints
 from ..errors import CloudError
-from ..polyline import project
+from ..polyline import project, runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine
 from .grid import PointSource, Square, around, lay_out
@@ -105,7 +105,8 @@ def warn_of_unexplained(source: PointSource, rails: Sequence[RailLine], progress
         shift = source.frame.shift_to(square.frame)
         xy = source.near(square, 0.0).xyz[:, :2]
         xy = xy[:: len(xy) // MAX_SAMPLE + 1]
-        feet = project([rail.xyz[:, :2] + shift[:2] for rail in rails], xy, EXPLAINED_M)
+        lines = [part for rail in rails for part in _parts_near(rail.xyz[:, :2] + shift[:2], square, EXPLAINED_M)]
+        feet = project(lines, xy, EXPLAINED_M)
         near, total = near + len(np.unique(feet.point)), total + len(xy)
     if near < MIN_EXPLAINED_SHARE * total:
         progress.warning(
@@ -117,6 +118,15 @@ def warn_of_unexplained(source: PointSource, rails: Sequence[RailLine], progress
 def fullest_square(source: PointSource) -> RailPoints:
     """Return the points of the square of a class that has the most."""
     return source.near(_fullest(source)[0], 0.0)
+
+
+def _parts_near(line: np.ndarray, square: Square, margin_m: float) -> list[np.ndarray]:
+    """Return the parts of a line, (n, 2), that can be at most `margin_m` from a square: all segments whose box is."""
+    if square.is_whole_plane:
+        return [line]
+    low, high = np.minimum(line[:-1], line[1:]), np.maximum(line[:-1], line[1:])
+    near = ((high >= -margin_m) & (low <= square.side_m + margin_m)).all(axis=1)
+    return [line[first : last + 2] for first, last in runs(near)]
 
 
 def _fullest(source: PointSource) -> list[Square]:
