@@ -12,6 +12,7 @@ from qgis.PyQt.QtCore import QObject, Qt
 from qgis.PyQt.QtGui import QIcon
 from qgis.PyQt.QtWidgets import QAction, QToolBar
 
+from . import compat
 from .i18n import tr
 from .model_action import OpenModelAction
 from .notices import notices
@@ -20,6 +21,7 @@ from .review.report import ReportOpener
 from .sample_action import OpenSampleAction
 from .setup import package_setting
 from .setup.dependencies import is_installed
+from .view_3d_action import NAME, show_in_3d
 
 if TYPE_CHECKING:
     from .growing.tool import GrowRails
@@ -59,6 +61,10 @@ class Windows(QObject):
         sample = QAction(QIcon(str(ICON)), self._actions[0].name, iface.mainWindow())
         sample.triggered.connect(lambda: self._actions[0].execute())
         self._entries = [sample]
+        if compat.OPENS_3D_VIEWS:
+            view_3d = QAction(QIcon(str(ICON)), NAME, iface.mainWindow())
+            view_3d.triggered.connect(lambda: show_in_3d(iface))
+            self._entries.append(view_3d)
         if is_installed("numpy"):
             self._entries += [self._add_dock(iface), self._add_toolbar(iface)]
         for entry in self._entries:

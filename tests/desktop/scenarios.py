@@ -10,6 +10,7 @@ from pathlib import Path
 from driver import Driver, algorithm, choose, close, install, later, open_batch, open_dialog, press_run, window
 from qgis.core import (
     QgsCoordinateReferenceSystem,
+    QgsGeometry,
     QgsPointCloudLayer,
     QgsPointXY,
     QgsProject,
@@ -20,7 +21,7 @@ from qgis.core import (
 from qgis.PyQt.QtCore import QObject, QPoint, Qt, QUrl, pyqtSlot
 from qgis.PyQt.QtGui import QDesktopServices
 from qgis.PyQt.QtTest import QTest
-from qgis.PyQt.QtWidgets import QDialogButtonBox, QDockWidget, QFileDialog, QGroupBox, QLineEdit
+from qgis.PyQt.QtWidgets import QDialogButtonBox, QDockWidget, QFileDialog, QGroupBox, QLineEdit, QMenu
 from qgis.utils import iface, plugins
 
 SAMPLE, ARCHIVE = os.environ["RAIL_EXTRACT_SAMPLE"], os.environ["RAIL_EXTRACT_ZIP"]
@@ -185,6 +186,23 @@ def review(driver: Driver) -> Iterator:
     driver.keep("scale", iface.mapCanvas().extent().width())
     yield 1.0
     driver.picture("review_rejected")
+    yield from _show_in_3d(driver, menu)
+
+
+def _show_in_3d(driver: Driver, menu: QMenu) -> Iterator:
+    """Show the rails in 3D, if QGIS lets plugins open a view."""
+    entry = next((one for one in menu.actions() if one.text() == "Show Lines in 3D"), None)
+    if entry is None:
+        return
+    rails = next(one for one in QgsProject.instance().mapLayers().values() if one.name() == "Rails: sample")
+    iface.setActiveLayer(rails)
+    entry.trigger()
+    (view,) = iface.mapCanvases3D()
+    yield 5.0
+    driver.picture("lines_in_3d")
+    seen = QgsGeometry.fromPolygonXY([view.scene().viewFrustum2DExtent()]).boundingBox()
+    driver.keep("lines seen in 3D", seen.contains(rails.extent()))
+    driver.keep("width seen in 3D", seen.width() / rails.extent().width())
 
 
 def growing(driver: Driver) -> Iterator:

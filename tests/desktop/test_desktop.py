@@ -94,7 +94,8 @@ def test_saved_raster_has_its_system(run_scenario):
 
 def test_the_menu_opens_the_sample(run_scenario):
     session = run_scenario("review")
-    assert session["menu"] == ["Open the Sample…", "Review Findings", "Grow Rails"]
+    in_3d = ["Show Lines in 3D"] if session["version"] >= 33600 else []
+    assert session["menu"] == ["Open the Sample…", *in_3d, "Review Findings", "Grow Rails"]
     assert session["sample"].endswith("rail_extract/resources/sample/sample.laz")
     assert session["standard"] == "IN_75R_1000"
 
@@ -116,6 +117,14 @@ def test_findings_are_reviewed_in_the_dock(run_scenario):
     decided = {feature["finding"]: feature["review"] for feature in layer}
     assert len(decided) == total
     assert (decided[1], decided[2], set(list(decided.values())[2:])) == ("accepted", "rejected", {""})
+
+
+def test_a_3d_view_opens_on_the_lines(run_scenario):
+    session = run_scenario("review")
+    if session["version"] < 33600:
+        pytest.skip("This QGIS does not let a plugin open a 3D view.")
+    assert session["lines seen in 3D"]
+    assert 1 <= session["width seen in 3D"] < 10
 
 
 def test_a_clicked_rail_grows_and_is_classified(run_scenario):

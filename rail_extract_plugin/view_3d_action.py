@@ -1,0 +1,33 @@
+"""The menu entry "Show Lines in 3D": a 3D map view that opens on the lines of the selected layer."""
+
+from __future__ import annotations
+
+from math import isnan
+from typing import Any
+
+from qgis.core import QgsVectorLayer
+
+from .i18n import tr
+
+NAME = tr("Show Lines in 3D")
+
+
+def show_in_3d(iface: Any) -> None:
+    """Open a 3D map view above the lines of the selected layer, with its ground below them.
+
+    Parameters
+    ----------
+    iface : qgis.gui.QgisInterface
+        Of a QGIS that `compat.OPENS_3D_VIEWS`.
+    """
+    layer = iface.activeLayer()
+    lowest_m = layer.extent3D().zMinimum() if isinstance(layer, QgsVectorLayer) else float("nan")
+    if isnan(lowest_m):
+        iface.messageBar().pushWarning(NAME, tr("Select a layer of 3D lines first, such as rails or centerlines."))
+        return
+    extent = iface.mapCanvas().mapSettings().layerExtentToOutputExtent(layer, layer.extent())
+    view = iface.createNewMapCanvas3D(layer.name())
+    # The camera is as far above the ground as it takes to see the extent. The ground of a new view is at height zero,
+    # and the camera with it below lines in the mountains.
+    view.mapSettings().setTerrainElevationOffset(lowest_m)
+    view.scene().setViewFrom2DExtent(extent)
