@@ -12,6 +12,9 @@ CHECK = .check/bin/python
 AS_PACKAGE = .check/src
 ENVIRONMENT = build/environment.sh
 
+# A new system has no list of packages yet.
+INSTALL = exec >&2; $(SUDO) apt-get update -q && \
+	$(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends
 APT_PACKAGES = git qgis python3-qgis python3-venv python3-pip python3-numpy python3-scipy python3-matplotlib python3-pyproj
 SYSTEM_MODULES = qgis.core numpy scipy matplotlib pyproj ensurepip
 
@@ -34,7 +37,7 @@ test: check plugin  ## run every test: check, core with PyTorch, plugin and, thr
 
 .PHONY: test-desktop
 test-desktop: plugin  ## test the real QGIS application on a virtual display
-	@command -v xvfb-run > /dev/null || $(SUDO) apt-get install -q -y --no-install-recommends xvfb xauth >&2
+	@command -v xvfb-run > /dev/null || { $(INSTALL) xvfb xauth; }
 	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest tests/desktop
 
 .PHONY: fuzz
@@ -51,7 +54,7 @@ test-qgis: plugin  ## run the tests that need QGIS: plugin and, through qgis_pro
 
 .PHONY: test-latest test-3.40
 test-latest test-3.40: test-%:  ## run the same with Debian testing's QGIS, or with the backports' 3.40, in a chroot
-	@command -v mmdebstrap > /dev/null || $(SUDO) apt-get install -q -y mmdebstrap debian-archive-keyring >&2
+	@command -v mmdebstrap > /dev/null || { $(INSTALL) mmdebstrap debian-archive-keyring; }
 	@$(SUDO) $(SYSTEM_PYTHON) tools/chroot.py $* '$(TORCH)' $(TORCH_BUILDS) $(filter-out git,$(APT_PACKAGES))
 
 .PHONY: lint
@@ -108,7 +111,7 @@ $(ENVIRONMENT): tools/environment.py .venv/installed
 
 # An environment without QGIS and PyTorch, for `make check`.
 .check/installed: requirements.txt tools/check-requirements.txt pyproject.toml
-	@$(SYSTEM_PYTHON) -c "import ensurepip" 2>/dev/null || { $(SUDO) apt-get update -q && $(SUDO) apt-get install -q -y python3-venv; } >&2
+	@$(SYSTEM_PYTHON) -c "import ensurepip" 2>/dev/null || { $(INSTALL) python3-venv; }
 	@echo "Installing Python packages into .check" >&2
 	@mkdir -p build && grep -v '^torch' requirements.txt > build/requirements-check.txt
 	@$(SYSTEM_PYTHON) -m venv .check
@@ -137,6 +140,5 @@ $(ENVIRONMENT): tools/environment.py .venv/installed
 system:
 	@$(SYSTEM_PYTHON) tools/find_modules.py $(SYSTEM_MODULES) 2>/dev/null || { \
 		echo "Installing QGIS from the distribution's packages$(if $(SUDO), with sudo): $(APT_PACKAGES)" >&2; \
-		$(SUDO) apt-get update -q >&2; \
-		$(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $(APT_PACKAGES) >&2; \
+		$(INSTALL) $(APT_PACKAGES); \
 	}
