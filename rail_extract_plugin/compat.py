@@ -19,7 +19,7 @@ else:
     INTEGER, REAL, TEXT = QVariant.Int, QVariant.Double, QVariant.String
 
 OPENS_3D_VIEWS = Qgis.QGIS_VERSION_INT >= 33600
-"""Whether a plugin can open a 3D map view, and a layer knows the lowest of its heights."""
+"""Whether a plugin can open a 3D map view."""
 
 DIGITS = 20
 """Width of a number with decimals. Without a width, a shapefile field would have one digit; without decimals either, 15

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isnan
+from math import isfinite
 from typing import Any
 
 from qgis.core import QgsVectorLayer
@@ -21,13 +21,19 @@ def show_in_3d(iface: Any) -> None:
         Of a QGIS that `compat.OPENS_3D_VIEWS`.
     """
     layer = iface.activeLayer()
-    lowest_m = layer.extent3D().zMinimum() if isinstance(layer, QgsVectorLayer) else float("nan")
-    if isnan(lowest_m):
+    heights = _heights(layer) if isinstance(layer, QgsVectorLayer) else []
+    if not heights:
         iface.messageBar().pushWarning(NAME, tr("Select a layer of 3D lines first, such as rails or centerlines."))
         return
     extent = iface.mapCanvas().mapSettings().layerExtentToOutputExtent(layer, layer.extent())
     view = iface.createNewMapCanvas3D(layer.name())
     # The camera is as far above the ground as it takes to see the extent. The ground of a new view is at height zero,
     # and the camera with it below lines in the mountains.
-    view.mapSettings().setTerrainElevationOffset(lowest_m)
+    view.mapSettings().setTerrainElevationOffset(min(heights))
     view.scene().setViewFrom2DExtent(extent)
+
+
+def _heights(layer: QgsVectorLayer) -> list[float]:
+    """Return the lowest height of each feature that has any; a layer in memory does not know its own."""
+    shapes = (feature.geometry().constGet() for feature in layer.getFeatures() if feature.hasGeometry())
+    return [height for height in (shape.boundingBox3D().zMinimum() for shape in shapes) if isfinite(height)]

@@ -64,7 +64,9 @@ def dialogs(driver: Driver) -> Iterator:
     """Install the plugin, open every dialog, press its buttons, and run Check installation."""
     yield from install(ARCHIVE)
     browser = Browser()
-    for name in NAMES:
+    able = [name for name in NAMES if algorithm(name).canExecute()[0]]
+    driver.keep("without their packages", [name for name in NAMES if name not in able])
+    for name in able:
         dialog = yield from open_dialog(name)
         for group in dialog.findChildren(QGroupBox):
             group.setProperty("collapsed", False)
@@ -212,14 +214,14 @@ def growing(driver: Driver) -> Iterator:
     layer.setCrs(QgsCoordinateReferenceSystem("EPSG:32643"))
     QgsProject.instance().setCrs(layer.crs())
     iface.setActiveLayer(QgsProject.instance().addMapLayer(layer))
-    canvas.setExtent(QgsRectangle.fromCenterAndSize(ON_RAIL, 40, 40))
     menu = next(one for one in iface.pluginMenu().actions() if one.text() == "Rail Extract").menu()
     next(one for one in menu.actions() if one.text() == "Grow Rails").trigger()
     tool = plugins["rail_extract"].windows.growing
     tool.standards.setCurrentIndex(tool.standards.findData(PART["STANDARD"]))
-    yield 1.0
     click = partial(QTest.mouseClick, canvas.viewport(), Qt.MouseButton.LeftButton)
     for _ in range(2):
+        canvas.setExtent(QgsRectangle.fromCenterAndSize(ON_RAIL, 20, 20))
+        yield 1.0
         pixel = canvas.getCoordinateTransform().transform(ON_RAIL)
         click(pos=QPoint(round(pixel.x()), round(pixel.y())))
         yield lambda: not tool.is_growing

@@ -28,9 +28,11 @@ def test_no_error_and_no_crash(run_scenario, scenario):
 
 def test_every_dialog_opens_and_its_help(run_scenario):
     session = run_scenario("dialogs")
-    assert session["dialogs"] == NAMES
+    unable = session["without their packages"]
+    assert unable in ([], ["trainrailclassifier"])  # it needs PyTorch, of which some Pythons have no build
+    assert session["dialogs"] == [name for name in NAMES if name not in unable]
     pages = [Path(address.replace("file://", "")).name for address in session["help"]]
-    assert pages == ["parameters.html"] * 9 + ["troubleshooting.html"] * 2
+    assert pages == ["parameters.html"] * (9 - len(unable)) + ["troubleshooting.html"] * 2
 
 
 def test_cloud_is_chosen_from_clouds_alone(run_scenario):
