@@ -110,9 +110,9 @@ class Destination:
         sweep(file.parent, _complete)
         try:
             _check_writable(path, file)
+            check_closed(file)
         except OSError as error:
             raise _unwritable(path, error) from error
-        check_closed(file)
         return cls(path, file, identity(file))
 
     @contextmanager
@@ -186,6 +186,35 @@ class Destination:
                 kept = _keep_beside(new, self.file)
                 reason = error if isinstance(error, DiskError) else f"{self.path} can't be replaced ({_reason(error)})."
                 raise DiskError(f"{reason} The new file is {kept}.") from error
+
+
+def replace_folder(scratch: Path, target: Path) -> None:
+    """Move a new folder to its name; if the run is killed in between, the next one that writes there completes it.
+
+    Parameters
+    ----------
+    scratch : Path
+        Temporary folder next to the target, with the new folder in the folder `NEW`.
+    target : Path
+        Folder that may exist.
+
+    Raises
+    ------
+    OSError
+        It can't be moved. The old folder is in its place again.
+    """
+    new, old = scratch / NEW / target.name, scratch / OLD / target.name
+    old.parent.mkdir()
+    (scratch / MOVING).write_text(json.dumps([target.name] * 2), encoding="utf-8")
+    has_old = target.exists()
+    if has_old:
+        target.replace(old)
+    try:
+        new.replace(target)
+    except OSError:
+        if has_old:
+            old.replace(target)
+        raise
 
 
 def _check_writable(path: Path, file: Path) -> None:

@@ -17,6 +17,8 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +26,18 @@ import laspy
 import numpy as np
 from osgeo import gdal, ogr
 from qgis.core import QgsApplication, QgsProcessingContext
-from rail_extract.core.disk import Destination
+from rail_extract.core.clouds.points import ask
+from rail_extract.core.clouds.readers import list_files
+from rail_extract.core.disk import Destination, identity
 from rail_extract.core.frame import LocalFrame
+from rail_extract.core.labelling.files import Choice, Labels, Output, write_labelled
+from rail_extract.core.progress import SILENT
 from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import rasterize
 from rail_extract.core.raster_file import header_for
 from rail_extract.core.scratch import MARK, MIN_UNMARKED_AGE_S, PREFIX
-from rail_extract.core.standards import resolve
+from rail_extract.core.standards import SEARCHED_CLASSES, resolve
+from rail_extract.core.tasks import InTurn
 from rail_extract.rail_extract_plugin.algorithms.frpdf_cleanup import FrpdfCleanup
 from rail_extract.rail_extract_plugin.algorithms.vectorize_rails import VectorizeRails
 from rail_extract.rail_extract_plugin.writing.layers import RAILS, write_lines, write_raster
@@ -45,6 +52,8 @@ FRAME = LocalFrame(np.array([500_000.0, 3_000_000.0, 0.0]), 1.0, 1.0, None)
 
 POINTS = 20_000
 """Points of a cloud."""
+
+TILES = ("west.laz", "east.las")
 
 LEFT_OVER = re.compile(rf"{re.escape(PREFIX)}\w+")
 
@@ -121,12 +130,8 @@ def read_page(path: Path) -> set[int]:
 
 
 def write_points(destination: Destination, version: int) -> None:
-    """Write a cloud in which the class of every point is the version."""
-    cloud = laspy.LasData(laspy.LasHeader(version="1.4", point_format=6))
-    cloud.xyz = np.random.default_rng(1).uniform(0, 100, (POINTS, 3))
-    cloud.classification = np.full(POINTS, version % 200)
-    with destination.replacing() as new:
-        cloud.write(new)
+    """Write a classified copy in which the class of every point is the version."""
+    _write_copies([raw_tiles()[0]], Output(destination, (), None), version)
 
 
 def read_points(path: Path) -> set[int]:
@@ -135,19 +140,52 @@ def read_points(path: Path) -> set[int]:
     return set(np.unique(codes).tolist()) if len(codes) == POINTS else {-len(codes)}
 
 
+def write_tiles(destination: Destination, version: int) -> None:
+    """Write classified copies of tiles, and their catalogue."""
+    output = Output(destination, tuple(tile.name for tile in raw_tiles()), None)
+    _write_copies(raw_tiles(), replace(output, before=identity(output.folder)), version)
+
+
+def read_tiles(path: Path) -> set[int]:
+    """Return the versions, modulo 200, of the points of tiles."""
+    return set().union(*map(read_points, list_files(path)))
+
+
+@lru_cache(maxsize=1)
+def raw_tiles() -> list[Path]:
+    """Write raw clouds into a folder of their own, once."""
+    folder = Path(tempfile.mkdtemp())
+    for name in TILES:
+        cloud = laspy.LasData(laspy.LasHeader(version="1.4", point_format=6))
+        cloud.xyz = np.random.default_rng(1).uniform(0, 100, (POINTS, 3))
+        cloud.write(folder / name)
+    return [folder / name for name in TILES]
+
+
+def _write_copies(tiles: list[Path], output: Output, version: int) -> None:
+    """Write the copies as Classify Rail Points does once it has found the rail points: here, all points."""
+    request = ask(tiles, SEARCHED_CLASSES)
+    with tempfile.TemporaryDirectory() as folder:
+        labels = Labels(request, Path(folder))
+        labels.add(np.arange(labels.point_count))
+        write_labelled(request, Choice(version % 200), labels, output, InTurn(), SILENT)
+
+
 FORMATS: dict[str, tuple[str, Callable[[Destination, int], None], Callable[[Path], set[int]]]] = {
     **{suffix: (f"rails.{suffix}", write_layer, read_layer) for suffix in ("gpkg", "shp", "geojson", "fgb", "gml")},
     "csv": ("rails.csv", write_layer, read_layer),
     "dxf": ("rails.dxf", write_layer, read_drawing),
     "gpkg table": ("rails.gpkg", write_table, read_table),
     "tif": ("rails.tif", write_cells, read_cells),
+    "las": ("rails.las", write_points, read_points),
     "laz": ("rails.laz", write_points, read_points),
+    "tiles": ("rails.vpc", write_tiles, read_tiles),
     "html": ("rails.html", write_page, read_page),
 }
 """By format: name of the file, and how a version is written and read."""
 
-SETS = (".shp", ".csv")
-"""Suffixes of outputs of several files, whose main file is absent for a moment."""
+SETS = (".shp", ".gml", ".csv", ".vpc")
+"""Suffixes of outputs of several files, whose main file or folder is absent for a moment."""
 
 
 def _write(algorithm: Any, destination: Destination, write: Callable[..., Any]) -> None:
@@ -192,7 +230,7 @@ def kill_once(name: str, folder: Path, first: int, after_s: float) -> str:
     os.kill(process, signal.SIGKILL)
     os.waitpid(process, 0)
     os.close(reader), os.close(writer)
-    absent = not (folder / file).exists()
+    absent = not (folder / file).exists() or (file.endswith(".vpc") and not (folder / file).with_suffix("").exists())
     before = None if absent else versions(read, folder / file)
     for left in folder.iterdir():
         if LEFT_OVER.fullmatch(left.name):

@@ -233,6 +233,8 @@ def _files_of(path: Path) -> Sequence[Path]:
             f"{path} does not exist: give a {_any_of((*READERS, *CATALOGUES))} file, or a folder of tiles, on this "
             "computer."
         )
+    if not path.is_dir() and not path.is_file():
+        raise CloudError(f"{path} is a pipe or a device, not a file: copy the cloud into a file.")
     if not path.is_dir():
         return CATALOGUES.get(path.suffix.lower(), lambda file: [file])(path)
     # On file systems other than its own, macOS puts a hidden file next to each: its name starts with a dot.

@@ -32,6 +32,10 @@ LENGTHS = {
 """Options in metres, each an attribute of `GrowParameters` without its unit."""
 
 
+MAX_COORDINATE = 1e10
+"""Largest coordinate of a seed, in any unit of length: the earth's circumference is 4e9 cm."""
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     add_tiles_arguments(parser)
@@ -113,6 +117,8 @@ def _seeds(args: argparse.Namespace, crs_wkt: str | None) -> list[np.ndarray]:
     for text in args.seed:
         try:
             x, y = (float(word) for word in text.split(","))
+            if not max(abs(x), abs(y)) <= MAX_COORDINATE:
+                raise ValueError
         except ValueError:
             raise ParameterError(f'--seed "{text}" should be two numbers: x,y.') from None
         seeds.append(np.array([[x, y]]))

@@ -79,6 +79,8 @@ def read_mask(path: Path, crs_wkt: str | None) -> Mask:
 
 def _parts(path: Path, crs_wkt: str | None) -> list[shapely.Geometry]:
     """Read the single geometries of a file, in another coordinate system; those that it does not cover are left out."""
+    if path.is_fifo():
+        raise ParameterError(f"{path} is a pipe, not a file: give a GeoPackage or GeoJSON file.")
     with _explained(path):
         meta, _, shapes, _ = pyogrio.raw.read(path, columns=[], force_2d=True)
         parts = shapely.get_parts(shapely.from_wkb(shapes)) if shapes is not None else []

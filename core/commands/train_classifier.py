@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import time
 from pathlib import Path
 
@@ -52,6 +53,8 @@ def run(args: argparse.Namespace) -> None:
     """
     if args.epochs < 1:
         raise ParameterError(f"--epochs must be 1 or more, not {args.epochs}.")
+    if args.card is not None and os.path.realpath(args.card) == os.path.realpath(args.weights):
+        raise ParameterError("--weights and --card are the same file: give each its own name.")
     plan = Plan(numbers_in(args.rail_classes, "--rail-classes", int), args.epochs, args.seed, args.device, args.start)
     check_training(args.weights, plan)
     standard = resolve(args.standard, args.gauge, args.head_width)

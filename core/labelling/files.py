@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ from ..clouds.points import Request
 from ..clouds.readers import CATALOGUES, READERS, list_files
 from ..clouds.rewriting import check_class, rewrite
 from ..clouds.vpc import CatalogueTile, catalogue_text
-from ..disk import Destination, alone_in, identity, writing
+from ..disk import NEW, Destination, alone_in, identity, replace_folder, writing
 from ..errors import DiskError, ParameterError, RailExtractError
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
@@ -73,8 +74,8 @@ class Output:
 
     @property
     def folder(self) -> Path:
-        """Folder of the tiles."""
-        return self.file.with_suffix("")
+        """Folder of the tiles; if it is a symbolic link, the folder itself."""
+        return _folder_at(self.file)
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,10 @@ class Result:
     file: Path
     point_count: int
     figures: SearchFigures
+
+
+def _folder_at(catalogue: Path) -> Path:
+    return Path(os.path.realpath(catalogue.with_suffix("")))
 
 
 def plan_output(paths: Sequence[Path], output: Path, class_code: int, progress: Progress = SILENT) -> Output:
@@ -130,9 +135,9 @@ def plan_output(paths: Sequence[Path], output: Path, class_code: int, progress: 
     plain = _without_copc(output, progress)
     names = () if is_single else _tile_names(files, progress)
     main = plain if is_single else plain.with_name(plain.stem + CATALOGUE)
-    folder = main.with_suffix("")
+    folder = _folder_at(main)
     written = [main] if is_single else [folder / name for name in names]
-    if {file.resolve() for file in files} & {file.resolve() for file in written}:
+    if set(map(os.path.realpath, files)) & set(map(os.path.realpath, written)):
         raise ParameterError("The classified cloud would replace the cloud that is read: choose another name.")
     if names:
         _check_folder(folder, names)
@@ -278,9 +283,10 @@ class _Writer:
 
     def write_tiles(self, output: Output, runner: Runner, progress: Progress) -> None:
         """Write all tiles into a temporary folder, then move it to its name and write the catalogue."""
-        with writing(output.file.parent), scratch_folder(output.file.parent) as scratch:
-            new = scratch / "tiles"
-            new.mkdir()
+        parent = output.folder.parent
+        with writing(parent), scratch_folder(parent) as scratch:
+            new = scratch / NEW / output.folder.name
+            new.mkdir(parents=True)
             tasks = {
                 place: Task(
                     f"Writing {name}", _write_tile, (self, place, str(new / name)), weight=header.point_count + 1
@@ -290,11 +296,12 @@ class _Writer:
             counts = list(in_listed_order(tasks, runner.run(tasks, progress)))
             _check_complete(runner)
             tiles = [
-                CatalogueTile(f"./{output.folder.name}/{name}", count, header.extent)
+                CatalogueTile(f"./{output.file.stem}/{name}", count, header.extent)
                 for name, count, header in zip(output.names, counts, self._request.headers)
             ]
-            _move_tiles(output, new, scratch / "old")
-        output.destination.write_text(catalogue_text(tiles, self._request.zero.crs_wkt))
+            with output.destination.replacing() as catalogue:
+                catalogue.write_text(catalogue_text(tiles, self._request.zero.crs_wkt), encoding="utf-8")
+                _move_tiles(output, scratch)
 
     def _classes(self, xyz: np.ndarray, codes: np.ndarray, rail: np.ndarray) -> np.ndarray:
         """Return the new classes of points, (n,)."""
@@ -346,8 +353,8 @@ def _check_folder(folder: Path, names: Sequence[str]) -> None:
         raise DiskError(f"{folder} exists and holds other files: choose another name.")
 
 
-def _move_tiles(output: Output, new: Path, old: Path) -> None:
-    """Move a new folder of tiles to its name; the old one is back in its place if that fails.
+def _move_tiles(output: Output, scratch: Path) -> None:
+    """Move a new folder of tiles from a temporary folder to its name; the old one stays if that fails.
 
     Raises
     ------
@@ -359,12 +366,4 @@ def _move_tiles(output: Output, new: Path, old: Path) -> None:
         if identity(folder) not in (None, output.before):
             raise DiskError(f"{folder} was changed by another program in the meantime. Nothing was written.")
         _check_folder(folder, output.names)
-        if not folder.exists():
-            new.replace(folder)
-            return
-        folder.replace(old)
-        try:
-            new.replace(folder)
-        except OSError:
-            old.replace(folder)
-            raise
+        replace_folder(scratch, folder)

@@ -232,6 +232,50 @@ with destination.replacing() as new:
 """
 
 
+def test_a_name_that_is_too_long_with_the_suffixes_of_logs_is_refused(tmp_path):
+    with pytest.raises(DiskError, match="can't be written"):
+        Destination.at(tmp_path / ("a" * 250))
+
+
+KILLED_FOLDER = """
+import os, signal, sys
+from pathlib import Path
+from rail_extract.core.disk import NEW, replace_folder
+from rail_extract.core.scratch import scratch_folder
+
+target, left, replace = Path(sys.argv[1]), int(sys.argv[2]), Path.replace
+
+def count(self, other):
+    global left
+    if not left:
+        os.kill(os.getpid(), signal.SIGKILL)
+    left -= 1
+    return replace(self, other)
+
+with scratch_folder(target.parent) as scratch:
+    new = scratch / NEW / target.name
+    new.mkdir(parents=True)
+    (new / "tile").write_text("new")
+    Path.replace = count
+    replace_folder(scratch, target)
+"""
+
+
+@pytest.mark.parametrize(
+    ("has_old", "moves", "text"), [(True, 0, "old"), (True, 1, "new"), (True, 2, "new"), (False, 0, "new")]
+)
+def test_killed_at_any_move_a_folder_is_old_or_new_after_the_next_run(tmp_path, has_old, moves, text):
+    target = tmp_path / "tiles"
+    if has_old:
+        target.mkdir()
+        (target / "tile").write_text("old")
+    subprocess.run([sys.executable, "-c", KILLED_FOLDER, str(target), str(moves)])
+    age(tmp_path)
+    Destination.at(tmp_path / "other.txt")
+    assert (target / "tile").read_text() == text
+    assert temporary(tmp_path) == []
+
+
 @pytest.mark.parametrize("text", ["", "[]", "[1, 2]", "{}", "null", "[" * 100_000])
 def test_a_damaged_list_of_moves_is_removed(tmp_path, text):
     killed = tmp_path / f"{PREFIX}{'0' * 12}"

@@ -1,6 +1,7 @@
 """Formats by suffix, and the files that a path stands for."""
 
 import json
+import os
 
 import laspy
 import numpy as np
@@ -120,6 +121,13 @@ def test_no_path_is_refused():
 def test_a_name_that_the_system_does_not_accept_is_refused():
     with pytest.raises(CloudError, match=r"can't be read \(File name too long\)|does not exist"):
         readers.list_files(["a" * 5000])
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no such pipes")
+def test_a_pipe_is_refused_instead_of_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "a.laz")
+    with pytest.raises(CloudError, match="is a pipe or a device"):
+        readers.list_files([tmp_path / "a.laz"])
 
 
 def test_missing_path_is_refused_with_the_suffixes(tmp_path):

@@ -66,6 +66,8 @@ def test_stops_are_written_with_their_reason(raw, tmp_path, name):
     [
         ([], "A rail is followed from seeds: give --seeds or --seed."),
         (["--seed", "5"], '--seed "5" should be two numbers: x,y.'),
+        (["--seed", "nan,5"], '--seed "nan,5" should be two numbers: x,y.'),
+        (["--seed", "1e300,5"], '--seed "1e300,5" should be two numbers: x,y.'),
         (["--seed", "1,2"], "No seed lies in the cloud"),
         (["--seed", f"{X},{Y}", "--window", "0"], "--window must be a positive number."),
         (["--seed", f"{X},{Y}", "--max-outliers", "-1"], "--max-outliers must be 0 or more, not -1."),

@@ -1,5 +1,7 @@
 """Classified copies of files: classes change, everything else stays; tiles and catalogue."""
 
+import sys
+
 import numpy as np
 import pytest
 from rail_extract.core.classify.settings import Settings
@@ -165,6 +167,20 @@ class Backwards(InTurn):
                 self.failures.append(f"{tasks[name].label} failed (reason).")
             else:
                 yield name, result
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows lets few users make links")
+def test_a_link_to_the_folder_of_tiles_stays_and_a_link_to_itself_is_refused(tmp_path, scene):
+    tiles = [save(tmp_path / f"{name}.las", scene[0]) for name in "ab"]
+    (tmp_path / "real").mkdir()
+    (tmp_path / "new").symlink_to("real")
+    result, _ = classify(tmp_path, tiles, tmp_path / "new.vpc")
+    assert (tmp_path / "new").is_symlink()
+    assert sorted(one.name for one in (tmp_path / "real").iterdir()) == ["a.las", "b.las"]
+    assert [len(laspy.read(tile).points) for tile in list_tiles(result.file)] == [len(scene[0])] * 2
+    (tmp_path / "loop.las").symlink_to("loop.las")
+    with pytest.raises(DiskError, match="can't be written"):
+        classify(tmp_path, tiles[:1], tmp_path / "loop.las")
 
 
 def test_any_runner_gives_the_same_files(tmp_path, scene):
