@@ -17,7 +17,8 @@ from .clouds.las import CloudHeader
 from .clouds.points import RailPoints, Request
 from .errors import CloudError, NoRailPointsError, NoTrackError, RailExtractError
 from .frpdf.models import choose
-from .labelling.spooling import spool_found
+from .grow.settings import GrowSettings
+from .labelling.spooling import spool_found, spool_grown
 from .parameters import ALIGNED, Parameters
 from .progress import SILENT, Progress, Recording, counted
 from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
@@ -115,6 +116,7 @@ def extract_files(
     progress: Progress = SILENT,
     classify: bool = False,
     weights: Path | None = None,
+    seeds: Sequence[np.ndarray] = (),
 ) -> RailNetwork:
     """Extract rails and centerlines from files of points, however large, with any runner.
 
@@ -133,6 +135,9 @@ def extract_files(
         `standards.SEARCHED_CLASSES` then.
     weights : Path, optional
         Weights of the network that finds them; None means geometry.
+    seeds : sequence of (k, 2) array
+        Places on railheads, k = 1, or lines along them, in units of the CRS, if only the rails that grow from these
+        are to be extracted; the request is for the same classes.
 
     Returns
     -------
@@ -154,10 +159,14 @@ def extract_files(
     side_m = square_side(parameters)
     progress = recording = Recording(progress)
     reading, rest = progress.divide((READING, DRAWING + PAIRING + MEASURING))
-    if classify:
-        settings = Settings(parameters.gauges_m, parameters.head_width_m, weights=weights)
+    if classify or len(seeds):
         with scratch_folder(folder) as scratch:
-            source, figures = spool_found(request, settings, side_m, scratch, runner, reading)
+            if classify:
+                settings = Settings(parameters.gauges_m, parameters.head_width_m, weights=weights)
+                source, figures = spool_found(request, settings, side_m, scratch, runner, reading)
+            else:
+                own = GrowSettings(parameters.gauge_m, parameters.head_width_m)
+                source, figures = spool_grown(request, seeds, own, side_m, scratch, reading)
             network = _walk([source], parameters, runner, rest)
         return replace(network, warnings=recording.warnings, search=figures)
     warn_of_gauge(request, parameters, progress)

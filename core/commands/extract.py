@@ -38,6 +38,7 @@ from .options import (
     gauges_of,
     limited,
     numbers_in,
+    shapes_module,
 )
 
 NEEDS = {name: name for name in ("distributed", "cryptography", "pyogrio", "shapely", "rasterio")}
@@ -98,6 +99,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "find the rail points of a raw cloud first; --rail-classes is ignored"
     cloud.add_argument("--classify", action="store_true", help=text)
     add_method_arguments(cloud)
+    text = "points or lines on railheads: extract the rails that grow from these; --rail-classes is ignored"
+    cloud.add_argument("--seeds", type=Path, metavar="FILE", help=text)
     cloud.add_argument("--rail-classes", default="10", help="classes of rail points, such as 10,11 (default: 10)")
     text = "take all rail classes for one, for tracks whose rails are of different classes"
     cloud.add_argument("--merge-classes", action="store_true", help=text)
@@ -230,7 +233,10 @@ def _run_in(
     from ..cluster.workers import Certificates, connect
 
     codes, extent = numbers_in(args.rail_classes, "--rail-classes", int), extent_of(args.extent)
-    codes = SEARCHED_CLASSES if args.classify else codes
+    if args.classify and args.seeds is not None:
+        raise ParameterError("--classify finds all rails, and --seeds those that are pointed at: give one of them.")
+    raw = args.classify or args.seeds is not None
+    codes = SEARCHED_CLASSES if raw else codes
     weights = _weights(args)
     progress = Estimating(Console())
     files = _certificate_files(args, progress)
@@ -239,8 +245,9 @@ def _run_in(
         runner = DaskRunner(client, folder)
         request = ask(args.tiles, codes, args.crs, extent, progress, unreadable=runner.failures)
         request = limited(request, args)
-        request = replace(request, merged=args.merge_classes and not args.classify)
-        network = extract_files(request, folder.resolve(), parameters, runner, progress, args.classify, weights)
+        request = replace(request, merged=args.merge_classes and not raw)
+        seeds = shapes_module("--seeds").read_seeds(args.seeds, request.zero.crs_wkt) if args.seeds else ()
+        network = extract_files(request, folder.resolve(), parameters, runner, progress, args.classify, weights, seeds)
     _write(network, args, standard, parameters, extent, outputs)
     print(f"{len(network.rails)} rails, {sum(rail.length_m for rail in network.rails) / 1000:.3f} km")
     print(f"{len(network.centerlines)} centerlines, {sum(one.length_m for one in network.centerlines) / 1000:.3f} km")

@@ -7,7 +7,7 @@ place where a rail is followed (docs/growing.md).
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -105,14 +105,41 @@ def grow_files(
     RailExtractError
         No seed lies on a rail.
     """
-    finding, labelling, rewriting = progress.divide((6.0, 1.0, 3.0))
-    squares, growths = grow_all(request, seeds, settings, folder, finding)
-    labels, figures = Labels(request, folder), _lengths(growths)
-    for points in labelling.follow(squares.keys()):
-        figures += _labelled(squares.read(points), growths, settings, request, labels)
-    _report(growths, figures, settings, request, progress)
+    growing, rewriting = progress.divide((7.0, 3.0))
+    labels = Labels(request, folder)
+
+    def keep(points: np.ndarray) -> None:
+        with writing(folder):
+            labels.add(points["number"])
+
+    growths, figures = grow_points(request, seeds, settings, folder, keep, growing)
     write_labelled(request, choice, labels, output, runner, rewriting)
     return Grown(output.file, labels.point_count, figures, _stops(growths))
+
+
+def grow_points(
+    request: Request,
+    seeds: Sequence[np.ndarray],
+    settings: GrowSettings,
+    folder: Path,
+    keep: Callable[[np.ndarray], None],
+    progress: Progress = SILENT,
+) -> tuple[list[Growth], SearchFigures]:
+    """Follow rails from seeds, and hand the points on them, (n,) `finding.POINT` in metres, to `keep` by squares.
+
+    The other parameters, and errors, are those of `grow_files`.
+    """
+    finding, labelling = progress.divide((6.0, 1.0))
+    squares, growths = grow_all(request, seeds, settings, folder, finding)
+    figures = _lengths(growths)
+    for key in labelling.follow(squares.keys()):
+        points = squares.read(key)
+        points = points[_on_rails(points["xyz"], growths, settings)]
+        if len(points):
+            keep(points)
+            figures += _figures(points["xyz"], settings)
+    _report(growths, figures, settings, request, progress)
+    return growths, figures
 
 
 def grow_all(
@@ -216,13 +243,13 @@ class Squares:
         """Append the points of a file to the files of their squares."""
         wanted = np.zeros(LAST_CLASS + 1, dtype=bool)
         wanted[list(self._request.class_codes)] = True
-        for xyz, codes, _, valid in read_points(path, progress, self._request.leave_out):
+        for xyz, codes, marks, valid in read_points(path, progress, self._request.leave_out):
             kept = np.flatnonzero(valid & wanted[codes] & self._request.holds(xyz))
             places = self._request.zero.to_local(xyz[kept])
             near = ((places[:, :2] >= self._low) & (places[:, :2] <= self._high)).all(axis=1)
             kept, places = kept[near], places[near]
             points = np.empty(len(kept), POINT)
-            points["xyz"], points["number"] = places, kept + first
+            points["xyz"], points["number"], points["mark"] = places, kept + first, marks[kept]
             first += len(xyz)
             with writing(self._folder.parent):
                 for key, number in points_by_square(places, SIDE_M).items() if len(places) else ():
@@ -258,11 +285,8 @@ class Squares:
         return self._folder / f"{key[0]}_{key[1]}"
 
 
-def _labelled(
-    points: np.ndarray, growths: Sequence[Growth], settings: GrowSettings, request: Request, labels: Labels
-) -> SearchFigures:
-    """Label the points of a square that are on rails, and count them."""
-    xyz = points["xyz"]
+def _on_rails(xyz: np.ndarray, growths: Sequence[Growth], settings: GrowSettings) -> np.ndarray:
+    """Return which points of a square, (n, 3), are on rails, (n,) bool."""
     low, high = xyz[:, :2].min(axis=0) - SIDE_M, xyz[:, :2].max(axis=0) + SIDE_M
     rails = [
         rail
@@ -270,13 +294,13 @@ def _labelled(
         for rail in growth.rails
         if ((rail.xyz[:, :2] >= low) & (rail.xyz[:, :2] <= high)).all(axis=1).any()
     ]
-    rail = on_rails(rails, xyz, settings)
-    if not rail.any():
-        return SearchFigures()
-    with writing(labels.folder):
-        labels.add(points["number"][rail])
-    cells = np.floor(xyz[rail, :2] / cell_size(settings.gauge_m, settings.head_width_m) + BORDER_CELLS)
-    return SearchFigures(points=int(rail.sum()), cells=len(np.unique(cells, axis=0)), squares=1)
+    return on_rails(rails, xyz, settings)
+
+
+def _figures(xyz: np.ndarray, settings: GrowSettings) -> SearchFigures:
+    """Count the rail points of a square, (n, 3), and their cells."""
+    cells = np.floor(xyz[:, :2] / cell_size(settings.gauge_m, settings.head_width_m) + BORDER_CELLS)
+    return SearchFigures(points=len(xyz), cells=len(np.unique(cells, axis=0)))
 
 
 def _lengths(growths: Sequence[Growth]) -> SearchFigures:

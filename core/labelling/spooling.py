@@ -1,13 +1,17 @@
-"""Rail points found in a raw cloud, sorted into the squares of the extraction."""
+"""Rail points found in a raw cloud, or grown from seeds, sorted into the squares of the extraction."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+
+import numpy as np
 
 from ..classify.settings import Settings
 from ..clouds.points import Request
 from ..disk import writing
 from ..errors import NoRailPointsError
+from ..grow.settings import GrowSettings
 from ..progress import Progress
 from ..rails import SearchFigures
 from ..scratch import scratch_folder
@@ -15,6 +19,7 @@ from ..squares.spool import Census, SpooledFile, SpooledPoints, gather
 from ..standards import RAIL_CLASS
 from ..tasks import Runner
 from .finding import find_rail_points, report
+from .growing import grow_points
 
 
 def spool_found(
@@ -52,5 +57,44 @@ def spool_found(
             "the rail points yourself."
         )
     report(figures, progress)
+    return _gathered(request, side_m, folder, census), figures
+
+
+def spool_grown(
+    request: Request,
+    seeds: Sequence[np.ndarray],
+    settings: GrowSettings,
+    side_m: float,
+    folder: Path,
+    progress: Progress,
+) -> tuple[SpooledPoints, SearchFigures]:
+    """Follow rails from seeds and sort their points into the squares of the extraction, as class `RAIL_CLASS`.
+
+    Parameters
+    ----------
+    seeds : sequence of (k, 2) array
+        See `growing.grow_files`.
+    settings : GrowSettings
+    request, side_m, folder, progress
+        See `spool_found`.
+
+    Raises
+    ------
+    RailExtractError
+        See `growing.grow_files`.
+    """
+    census = Census()
+
+    def keep(points: np.ndarray) -> None:
+        with writing(folder):
+            census.add(RAIL_CLASS, request.zero.to_crs(points["xyz"]), points["mark"], request.zero, side_m, folder)
+
+    with writing(folder), scratch_folder(folder) as scratch:
+        _, figures = grow_points(request, seeds, settings, scratch, keep, progress)
+    return _gathered(request, side_m, folder, census), figures
+
+
+def _gathered(request: Request, side_m: float, folder: Path, census: Census) -> SpooledPoints:
+    """Return the points that were sorted."""
     (source,) = gather(request, side_m, [SpooledFile(str(folder), census.report())])
-    return source, figures
+    return source

@@ -283,6 +283,7 @@ def _search(found: SearchFigures | None) -> str:
             "Rails level with the pavement are found by their grooves, and less accurately.",
         ),
     ]
+    rows = rows if found.squares else rows[:4]  # rails that grow from seeds are not searched by squares
     written = tag("div", table(("Found", "", "What it means"), rows), class_="scroll")
     return _section("Rail points in the raw cloud", written.replace("<table>", '<table class="words">'))
 

@@ -36,6 +36,8 @@ from ..writing.whole_files import write_each
 from .base import CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from ...core.clouds.points import Request
     from ...core.rails import RailNetwork
 
@@ -50,6 +52,7 @@ class Job:
     other_gauges: tuple[Gauge, ...]
     command: str
     weights: Path | None
+    seeds: tuple[np.ndarray, ...]
 
 
 class ExtractRails(RailAlgorithm):
@@ -82,6 +85,7 @@ class ExtractRails(RailAlgorithm):
             inputs.merge_classes(),
             inputs.classify(),
             *groups.method(),
+            inputs.seeds_in_raw(),
             *groups.rail(detect=True),
             *groups.area(),
             groups.model(is_advanced=True),
@@ -110,21 +114,27 @@ class ExtractRails(RailAlgorithm):
         if not any(is_wanted(parameters.get(name), context) for name in names):
             raise ParameterError(f"No output is chosen: name at least one of {', '.join(names)}.")
         values = ParameterValues(self, parameters, context)
-        classify = values.flag("CLASSIFY")
+        classify, grow = values.flag("CLASSIFY"), values.filled("SEEDS")
+        if classify and grow:
+            raise ParameterError("CLASSIFY finds all rails, and SEEDS those that are pointed at: choose one of them.")
         if classify and values.detects():
             raise ParameterError("DETECT measures classified points, which CLASSIFY does not need: choose STANDARD.")
+        if grow and values.detects():
+            raise ParameterError("DETECT measures classified points, which SEEDS do not need: choose STANDARD.")
         if values.choice("METHOD") == LEARNED and not classify:
             raise ParameterError("METHOD LEARNED is for raw clouds: set CLASSIFY, or choose GEOMETRY.")
         weights = values.weights()
         standard = values.standard(DEFAULT if values.detects() else None)
         choose_model(standard.gauge_m, standard.head_width_m, values.choice("MODEL"))
+        cloud = values.cloud("INPUT")
         return Job(
-            values.cloud("INPUT"),
-            SEARCHED_CLASSES if classify else values.class_codes(),
+            cloud,
+            SEARCHED_CLASSES if classify or grow else values.class_codes(),
             standard,
             values.other_gauges(standard),
             masked(self.asPythonCommand(parameters, context)),
             weights,
+            values.seeds(cloud) if grow else (),
         )
 
     def _detected(self, job: Job, request: Request, values: ParameterValues, progress: Progress) -> Job:
@@ -145,7 +155,8 @@ class ExtractRails(RailAlgorithm):
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
         request = request_points(job.cloud, job.class_codes, values.extent, progress)
-        request = replace(request, merged=values.flag("MERGE_CLASSES") and not values.flag("CLASSIFY"))
+        classify = values.flag("CLASSIFY")
+        request = replace(request, merged=values.flag("MERGE_CLASSES") and not classify and not job.seeds)
         if values.detects():
             job = self._detected(job, request, values, progress)
         settings = values.settings(job.standard, job.other_gauges)
@@ -157,9 +168,8 @@ class ExtractRails(RailAlgorithm):
             quality_step_m=values.number("STEP") if quality or findings or report else None,
             keep_cleaned=cleaned,
         )
-        classify = values.flag("CLASSIFY")
         with points_folder() as folder:
-            network = extract_files(request, folder, settings, InTurn(), progress, classify, job.weights)
+            network = extract_files(request, folder, settings, InTurn(), progress, classify, job.weights, job.seeds)
         progress.check()
         for failure in network.failures:
             progress.warning(failure)

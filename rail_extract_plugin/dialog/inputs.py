@@ -87,6 +87,18 @@ def seeds() -> Definitions:
     )
 
 
+def seeds_in_raw() -> QgsProcessingParameterDefinition:
+    """Define the places in a raw cloud from which rails grow that are to be extracted."""
+    point, line = QgsProcessing.SourceType.TypeVectorPoint, QgsProcessing.SourceType.TypeVectorLine
+    return advanced(
+        QgsProcessingParameterFeatureSource("SEEDS", tr("Seeds in a raw cloud"), [point, line], optional=True),
+        tr(
+            "Points on railheads, or lines along them: only the rails that grow from these are extracted, as Grow Rail "
+            "Points from Seeds follows them. The rail classes are ignored."
+        ),
+    )
+
+
 def merge_classes() -> QgsProcessingParameterDefinition:
     """Define whether the rail classes are to be taken for one."""
     return advanced(

@@ -121,6 +121,21 @@ FAULTS = [
         REFUSED,
         "… can't be written to (…): free space on the disk, or choose another folder.",
     ),
+    Fault("extraction of rails off their seeds", seeds(BESIDE), REFUSED, NO_RAIL, run="extractrails"),
+    Fault(
+        "extraction from seeds, and of all rails",
+        seeds(ON_RAIL, CLASSIFY=True),
+        REFUSED,
+        "CLASSIFY finds all rails, and SEEDS those that are pointed at: choose one of them.",
+        run="extractrails",
+    ),
+    Fault(
+        "rail standard to be detected from seeds",
+        seeds(ON_RAIL, STANDARD="DETECT"),
+        REFUSED,
+        "DETECT measures classified points, which SEEDS do not need: choose STANDARD.",
+        run="extractrails",
+    ),
     *(
         Fault(f"growth cancelled at {percent} %", cancelled(percent), REFUSED, "Cancelled; nothing was written.")
         for percent in (10, 40, 65)

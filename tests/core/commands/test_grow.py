@@ -7,6 +7,11 @@ import numpy as np
 import pyproj
 import pytest
 from rail_extract.__main__ import main
+from rail_extract.core.clouds.points import ask
+from rail_extract.core.parameters import Parameters
+from rail_extract.core.pipeline import extract_files
+from rail_extract.core.standards import SEARCHED_CLASSES
+from rail_extract.core.tasks import InTurn
 from rail_extract.laboratory.scenes.raw_strips import SPACING_M, strip
 
 CORNER = np.array([500_000.0, 5_000_000.0, 100.0])
@@ -59,6 +64,29 @@ def test_stops_are_written_with_their_reason(raw, tmp_path, name):
     assert places[:, 1] == pytest.approx(Y, abs=0.02)
     assert columns[-2].tolist() == [1, 2]
     assert columns[-1].tolist() == ["the cloud ends"] * 2
+
+
+def test_rails_grow_and_are_extracted_in_one_call(tmp_path):
+    """Of two tracks, only the one with the seed."""
+    lefts = np.array([0.5, -0.5, 3.5, 2.5]) * SPACING_M
+    rails = [lambda along, left=left: np.full_like(along, left) for left in lefts]
+    tracks = strip(16.0, rails=rails, per_m2=800, half_width_m=6.0)
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.scales, header.offsets = [0.0005] * 3, CORNER
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = (tracks.xyz + CORNER).T
+    cloud.write(tmp_path / "two.las")
+    request = ask([tmp_path / "two.las"], SEARCHED_CLASSES)
+    seeds = [np.atleast_2d(CORNER[:2] + tracks.at(8.0, lefts[0]))]
+    parameters = Parameters(1.435, 0.072, passes=1, engine="OPENCV")
+    folder = tmp_path / "work"
+    folder.mkdir()
+    network = extract_files(request, folder, parameters, InTurn(), seeds=seeds)
+    assert [rail.length_m for rail in network.rails] == pytest.approx([15.5, 15.5], abs=0.6)
+    middles = sorted(float(np.median(network.frame.to_crs(rail.xyz)[:, 1])) - CORNER[1] for rail in network.rails)
+    assert middles == pytest.approx([-SPACING_M / 2, SPACING_M / 2], abs=0.01)
+    assert network.search.paired_m == pytest.approx(32, abs=2)
+    assert not list(folder.iterdir())
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ PARAMETERS = [
     ("CLASSIFY", "boolean", False),
     ("METHOD", "enum", "GEOMETRY"),
     ("WEIGHTS", "file", None),
+    ("SEEDS", "source", None),
     ("STANDARD", "enum", "EN_60E1_1435"),
     ("GAUGE", "number", None),
     ("HEAD_WIDTH", "number", None),
@@ -65,7 +66,7 @@ OUTPUTS = {
 
 RESULTS = {"RAILS", "CENTERLINES", "QUALITY", "FINDINGS", "CLEANED", "REPORT"}
 ESSENTIAL = {"INPUT", "RAIL_CLASSES", "CLASSIFY", "STANDARD", "GAUGE", "HEAD_WIDTH", "EXTENT", "MAX_GAP"} | RESULTS
-OPTIONAL = {"WEIGHTS", "GAUGE", "HEAD_WIDTH", "EXTENT", "MASK", "CRS", "LEAVE_OUT", "OTHER_GAUGES"} | RESULTS
+OPTIONAL = {"WEIGHTS", "SEEDS", "GAUGE", "HEAD_WIDTH", "EXTENT", "MASK", "CRS", "LEAVE_OUT", "OTHER_GAUGES"} | RESULTS
 
 
 CORE_DEFAULTS = {name: getattr(Parameters, field) for name, field in {**NUMBERS, **CHOICES}.items()}
