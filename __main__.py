@@ -31,6 +31,8 @@ INTERRUPTED = 130
 
 CANCELLED = "Cancelled; nothing was written."
 
+NO_MEMORY = "Not enough memory: choose a smaller extent."
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code; only the module of this command is imported."""
@@ -72,6 +74,9 @@ def _run(module: ModuleType, args: argparse.Namespace) -> int:
         return module.run(args) or 0
     except errors.RailExtractError as error:
         print(error, file=sys.stderr)
+        return 1
+    except MemoryError:
+        print(NO_MEMORY, file=sys.stderr)
         return 1
     except errors.Cancelled as cancelled:
         print(str(cancelled) or CANCELLED, file=sys.stderr)

@@ -32,6 +32,9 @@ CATALOGUES: dict[str, Callable[[Path], Sequence[Path]]] = {".vpc": list_tiles}
 NOT_OF_THE_FILE = (RailExtractError, Cancelled, MemoryError, KeyboardInterrupt, SystemExit, GeneratorExit)
 """What a reader raises for other reasons than an unforeseen damage of the file."""
 
+NO_THREADS = "ThreadPoolBuildError"
+"""Word of what lazrs raises where there is too little memory for its threads."""
+
 IMPOSSIBLE = (None, errno.EINVAL, errno.EOVERFLOW)
 """Codes of an `OSError` that a damaged file causes, such as by a position before its start."""
 
@@ -197,6 +200,8 @@ def explained(path: Path) -> Iterator[None]:
                 f"{path.name} can't be read ({error.strerror}): check its permissions, the disk or the network drive."
             ) from error
         reason = " ".join(str(error).split()) or type(error).__name__
+        if NO_THREADS in reason:
+            raise MemoryError(reason) from error
         raise CloudError(f"{path.name} is cut off or damaged ({reason}): copy or export it again.") from error
 
 

@@ -36,6 +36,19 @@ def scene(size=10.0):
     return rough(xyz, rng), on
 
 
+def test_too_little_memory_is_one_sentence(tmp_path, monkeypatch, capsys):
+    """Also where lazrs finds none for its threads."""
+    for error in (MemoryError("Unable to allocate 9 GiB"), Exception("ThreadPoolBuildError { kind: IOError }")):
+
+        def fail(*_, error=error, **__):
+            raise error
+
+        monkeypatch.setattr("laspy.open", fail)
+        (tmp_path / "raw.las").write_bytes(b"LASF")
+        assert main(["classify", str(tmp_path / "raw.las"), "--output", str(tmp_path / "new.las")]) == 1
+        assert capsys.readouterr().err.endswith("Not enough memory: choose a smaller extent.\n")
+
+
 def test_a_classified_copy_is_written(save, tmp_path, capsys):
     xyz, on = scene()
     new = tmp_path / "out" / "new.las"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.rails import RailLine
-from rail_extract.core.tracks.widths_by_gauge import widths_by_gauge
+from rail_extract.core.tracks.widths_by_gauge import width_at, widths_by_gauge
 
 GAUGES = ((1.435, 0.072), (1.0, 0.066))
 WIDE, NARROW = (sum(one) for one in GAUGES)
@@ -30,3 +30,8 @@ def test_each_rail_has_the_width_of_its_track(lefts, widths):
 
 def test_one_width_for_all_needs_no_partner():
     assert widths_by_gauge(rails_at(0.0, 1.066), ((1.435, 0.072), (1.0, 0.072)), 0.05).tolist() == [0.072, 0.072]
+
+
+@pytest.mark.parametrize(("spacing_m", "width_m"), [(WIDE, 0.072), (NARROW, 0.066), (1.25, 0.066), (1.32, 0.072)])
+def test_a_distance_has_the_width_of_the_nearest_gauge(spacing_m, width_m):
+    assert width_at(spacing_m, GAUGES) == width_m

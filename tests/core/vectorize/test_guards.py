@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.lines.network import LineNetwork
-from rail_extract.core.vectorize.guards import drop_guards
+from rail_extract.core.vectorize.guards import MAX_LENGTH_M, drop_guards
 
 
 def loose(*lines):
@@ -27,6 +27,11 @@ def test_a_guard_rail_is_dropped_and_a_separate_rail_stays():
 @pytest.mark.parametrize(("length_m", "left"), [(7.8, 1), (8.2, 2)])
 def test_longer_lines_are_rails_of_a_flat_switch(length_m, left):
     assert len(drop_guards(loose(along_x(0, 40), along_x(10, 10 + length_m, 0.116))).lines) == left
+
+
+def test_a_line_of_just_this_length_is_a_rail():
+    line = np.array([[10.0, 0.116], [10.0 + MAX_LENGTH_M, 0.116]])
+    assert len(drop_guards(loose(along_x(0, 40), line)).lines) == 2
 
 
 @pytest.mark.parametrize(("apart_m", "left"), [(0.14, 1), (0.16, 2)])
