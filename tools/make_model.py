@@ -47,8 +47,9 @@ RESULTS = {
 }
 """Results of the model by step, and the output of the step that each is; rails know their tracks once paired."""
 
-WITHOUT_STEP = ("CLASSIFY",)
-"""Parameters of Extract Rails that no step of the model has: Classify Rail Points can be put before it."""
+WITHOUT_STEP = ("CLASSIFY", "METHOD", "WEIGHTS", "SEEDS")
+"""Parameters of Extract Rails that no step of the model has: Classify Rail Points or Grow Rail Points from Seeds can be
+put before it."""
 
 COLUMN, ROW = 260, 130
 """Spacing of the boxes in the model designer."""
