@@ -20,11 +20,18 @@ from dialog_pictures import HELP_SHARE, SIZES, dialog_pictures, start_qgis  # no
 from PIL import Image  # noqa: E402
 from qgis.core import (  # noqa: E402
     QgsApplication,
+    QgsCoordinateReferenceSystem,
+    QgsFeature,
+    QgsGeometry,
     QgsMapLayer,
     QgsMapRendererParallelJob,
     QgsMapSettings,
+    QgsMarkerSymbol,
+    QgsPointCloudLayer,
+    QgsPointXY,
     QgsProject,
     QgsRectangle,
+    QgsSingleSymbolRenderer,
     QgsVectorLayer,
     QgsVectorLayerCache,
 )
@@ -33,12 +40,16 @@ from qgis.gui import (  # noqa: E402
     QgsAttributeTableModel,
     QgsAttributeTableView,
     QgsMapCanvas,
+    QgsMessageBar,
 )
 from qgis.PyQt.QtCore import QSize  # noqa: E402
 from qgis.PyQt.QtGui import QColor  # noqa: E402
 from qgis.PyQt.QtWidgets import QMainWindow, QWidget  # noqa: E402
 from rail_extract.core.frame import LocalFrame  # noqa: E402
 from rail_extract.core.standards import resolve  # noqa: E402
+from rail_extract.laboratory.scenes.raw_catalogue import turnout  # noqa: E402
+from rail_extract.laboratory.scenes.scene import Scene  # noqa: E402
+from rail_extract.laboratory.scenes.write import write_cloud  # noqa: E402
 from rail_extract.rail_extract_plugin.reading.clouds import CloudSource  # noqa: E402
 from rail_extract.rail_extract_plugin.writing.run import properties_of  # noqa: E402
 
@@ -80,6 +91,14 @@ DETAIL_M = 16.0
 """Width of the detailed map on the ground, which shows individual stations, in metres."""
 
 
+GROWN_SEED, GROWN_M, GROWN_TURN, DRAWN = 5, 80.0, -40.0, 150_000
+"""Seed of the raw cloud on which rails are clicked, width of the map in metres, degrees by which it is turned, and
+points that are drawn."""
+
+GROWN_SIZE = QSize(1000, 300)
+
+SOMEWHERE = LocalFrame(np.array([500_000.0, 3_000_000.0, 100.0]))
+
 COLORS = 128
 """Colours of a picture's palette: no colour changes by more than a few of 255 levels."""
 
@@ -103,6 +122,7 @@ def main() -> None:
             _table(layer, FOLDER / f"table_{layer.name()}.png")
         _report(folder / OUTPUTS["REPORT"], FOLDER / "report.png")
         _review(folder / OUTPUTS["FINDINGS"], layers[2], FOLDER / "review.png")
+        _growing(folder / "raw.laz", FOLDER / "growing.png")
         del layers
     for picture in sorted(FOLDER.glob("*.png")):
         _shrink(picture)
@@ -195,6 +215,51 @@ def _review(path: Path, rails: QgsVectorLayer, picture: Path) -> None:
     dock.grab().save(str(picture))
     dock.close_for_good()
     project.clear()
+
+
+def _growing(cloud: Path, picture: Path) -> None:
+    """Draw the map after two clicks with the tool Grow Rails: before a switch, and on its branch."""
+    from rail_extract.rail_extract_plugin.growing.tool import GrowRails
+
+    scene = turnout(GROWN_SEED)
+    write_cloud(Scene("raw", scene.xyz, np.ones(len(scene.xyz), np.uint8), (), (), scene.standard, SOMEWHERE), cloud)
+    layer = QgsPointCloudLayer(str(cloud), "raw", "pdal")  # invalid in a QGIS without PDAL
+    layer.setCrs(QgsCoordinateReferenceSystem("EPSG:32643"))
+    QgsProject.instance().addMapLayer(layer)
+    points = _points(scene.xyz[:, :2] + SOMEWHERE.origin[:2], layer.crs())
+    canvas, bar, window = QgsMapCanvas(), QgsMessageBar(), QMainWindow()
+    canvas.resize(GROWN_SIZE)
+    canvas.setDestinationCrs(layer.crs())
+    canvas.setLayers([points])
+    ends = [rail[place] + SOMEWHERE.origin for rail, place in ((scene.rails[0], 20), (scene.rails[-1], -20))]
+    middle = np.mean(scene.xyz[:, :2], axis=0) + SOMEWHERE.origin[:2]
+    height = GROWN_M * GROWN_SIZE.height() / GROWN_SIZE.width()
+    canvas.setExtent(QgsRectangle.fromCenterAndSize(QgsPointXY(*middle), GROWN_M, height))
+    canvas.setRotation(GROWN_TURN)
+    canvas.show()
+    tool = GrowRails(canvas, bar, lambda: layer, window)
+    for place in ends:
+        tool.click(QgsPointXY(*place[:2]))
+        while tool.is_growing:
+            QgsApplication.processEvents()
+    canvas.refresh()
+    canvas.waitWhileRendering()
+    QgsApplication.processEvents()
+    canvas.grab().save(str(picture))
+    tool.close_for_good()
+    QgsProject.instance().clear()
+
+
+def _points(xy: np.ndarray, crs: QgsCoordinateReferenceSystem) -> QgsVectorLayer:
+    """Make a layer of some of the points of a cloud, (n, 2)."""
+    layer = QgsVectorLayer("MultiPoint", "points", "memory")
+    layer.setCrs(crs)
+    feature = QgsFeature()
+    feature.setGeometry(QgsGeometry.fromMultiPointXY([QgsPointXY(*place) for place in xy[:: len(xy) // DRAWN]]))
+    layer.dataProvider().addFeature(feature)
+    symbol = QgsMarkerSymbol.createSimple({"size": "0.25", "color": "120,120,120", "outline_style": "no"})
+    layer.setRenderer(QgsSingleSymbolRenderer(symbol))
+    return layer
 
 
 def _report(page: Path, picture: Path) -> None:
