@@ -5,11 +5,14 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-from qgis.core import QgsVectorLayer
+from qgis.core import QgsVector3D, QgsVectorLayer
 
 from .i18n import tr
 
 NAME = tr("Show Lines in 3D")
+
+TILT_DEG = 45.0
+"""Angle between the view and the vertical: plan and heights are both seen."""
 
 
 def show_in_3d(iface: Any) -> None:
@@ -27,10 +30,12 @@ def show_in_3d(iface: Any) -> None:
         return
     extent = iface.mapCanvas().mapSettings().layerExtentToOutputExtent(layer, layer.extent())
     view = iface.createNewMapCanvas3D(layer.name())
-    # The camera is as far above the ground as it takes to see the extent. The ground of a new view is at height zero,
-    # and the camera with it below lines in the mountains.
-    view.mapSettings().setTerrainElevationOffset(min(heights))
+    # A new view looks at height zero. In the mountains its camera would be below the lines.
+    settings, camera = view.mapSettings(), view.cameraController()
+    settings.setTerrainElevationOffset(min(heights))
     view.scene().setViewFrom2DExtent(extent)
+    middle = QgsVector3D(extent.center().x(), extent.center().y(), min(heights))
+    camera.setLookingAtPoint(settings.mapToWorldCoordinates(middle), camera.distance(), TILT_DEG, 0.0)
 
 
 def _heights(layer: QgsVectorLayer) -> list[float]:

@@ -38,8 +38,8 @@ PART = {
 }
 """Parameters for 20 m of the sample's three tracks, for runs of a second or two."""
 
-ON_RAIL = QgsPointXY(578256.73, 2494330.32)
-"""A place on a rail of the sample."""
+ON_RAIL = QgsPointXY(578250.91, 2494323.23)
+"""A place on a rail of the sample, from which a click may be 0.1 m off."""
 
 POOL_S = 35.0
 """Time after which Qt has ended the thread of a run: 30 s without work, and some more."""
@@ -204,7 +204,9 @@ def _show_in_3d(driver: Driver, menu: QMenu) -> Iterator:
     driver.picture("lines_in_3d")
     seen = QgsGeometry.fromPolygonXY([view.scene().viewFrustum2DExtent()]).boundingBox()
     driver.keep("lines seen in 3D", seen.contains(rails.extent()))
-    driver.keep("width seen in 3D", seen.width() / rails.extent().width())
+    settings, camera = view.mapSettings(), view.cameraController()
+    driver.keep("height looked at", settings.worldToMapCoordinates(camera.lookingAtPoint()).z())
+    driver.keep("height of rails", next(rails.getFeatures()).geometry().vertexAt(0).z())
 
 
 def growing(driver: Driver) -> Iterator:

@@ -126,7 +126,7 @@ def test_a_3d_view_opens_on_the_lines(run_scenario):
     if session["version"] < 33600:
         pytest.skip("This QGIS does not let a plugin open a 3D view.")
     assert session["lines seen in 3D"]
-    assert 1 <= session["width seen in 3D"] < 10
+    assert abs(session["height looked at"] - session["height of rails"]) < 2
 
 
 def test_a_clicked_rail_grows_and_is_classified(run_scenario):
