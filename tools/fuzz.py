@@ -8,7 +8,9 @@ a seed, so that `python tools/fuzz.py KIND:SEED` makes and reads one again. A te
 from __future__ import annotations
 
 import argparse
+import faulthandler
 import os
+import re
 import resource
 import select
 import signal
@@ -37,6 +39,9 @@ READY = "ready"
 READ, REFUSED, FAILED = "read", "refused", "failed"
 """Outcomes that a watched process reports; `FAILED` is followed by the reason."""
 
+MAX_PLACES = 4
+"""Innermost lines of Python that are named where a process died."""
+
 FRESH_AFTER = 2000
 """Files after which a process is replaced, so that its memory does not count for the next."""
 
@@ -59,6 +64,7 @@ def outcome_of(kind: Kind, path: Path) -> str:
 
 def work(kind: Kind, folder: Path) -> None:
     """Read the files of the seeds that come in, line by line, and report each; the watched process runs this."""
+    faulthandler.enable()
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # libraries write what they like
     good = kind.make(folder)
@@ -108,7 +114,9 @@ class Watched:
         if line:
             return line
         code = self._process.wait()
-        return f"{FAILED} {signal.Signals(-code).name if code < 0 else f'exit code {code}'}"
+        places = re.findall(r'File "(\S+)", line (\d+)', Path(self._log.name).read_text(errors="replace"))
+        where = ", ".join(f"{Path(file).name}:{line}" for file, line in places[:MAX_PLACES])
+        return f"{FAILED} {signal.Signals(-code).name if code < 0 else f'exit code {code}'} {where}".rstrip()
 
     def _cpu_s(self) -> float:
         try:

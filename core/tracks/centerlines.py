@@ -92,7 +92,7 @@ def build_centerlines(
     chains = chain_pairs(rails, pairs, parameters.max_gap_m, parameters.tolerance_m)
     steps = progress.span(0.5, 0.95).split(len(chains))
     drawn = [_draw(rails, chain, gauge_m, head_width_m, parameters, step) for chain, step in zip(chains, steps)]
-    kept = [line for line in drawn if line.length_m >= parameters.min_length_m]
+    kept = [line for line in drawn if line is not None and line.length_m >= parameters.min_length_m]
     forked = fork_centerlines(kept, progress.span(0.95, 1.0))
     ordered = sorted(forked, key=lambda line: tuple(line.xyz[0, :2]))
     return tuple(replace(line, track_id=number) for number, line in enumerate(ordered, start=1))
@@ -124,8 +124,8 @@ def _draw(
     head_width_m: float,
     parameters: CenterlineParameters,
     progress: Progress,
-) -> Centerline:
-    """Draw the centerline of one track."""
+) -> Centerline | None:
+    """Draw the centerline of one track; None if its rails are nowhere opposite each other."""
     half = 0.5 * (gauge_m + head_width_m)
     provisional = provisional_centerline(rails, chain, half, single_rail_limit(parameters.max_gap_m))
     stations, _ = resample(provisional, PROVISIONAL_STEP_M)
@@ -134,6 +134,8 @@ def _draw(
     xyz = midway(stations, normals, left, right, 2 * half)
     apart = left.distance_m + right.distance_m
     both = ~np.isnan(apart)
+    if not both.any():
+        return None
     cant = (left.height_m - right.height_m)[both]
     gauge = np.hypot(apart[both], np.nan_to_num(cant)) - head_width_m
     if all(is_closed(rails[number].xyz) for pair in chain.pairs for number in (pair.left, pair.right)):

@@ -32,13 +32,19 @@ SIDE_TOLERANCE = 1e-6
 """Relative difference allowed between the two sides of a cell, because writers round."""
 
 
+MIN_CELL_M, MAX_CELL_M = 0.001, 0.5
+"""Range of the sides of cells: smaller ones show the roughness of a head, and in larger ones two rails of the narrowest
+gauge touch."""
+
+
 def read_header(path: Path) -> RasterHeader:
     """Read and check everything except the cells.
 
     Raises
     ------
     RasterError
-        The file is not a raster or is rotated, its cells are not square, or the class of a band is unknown.
+        The file is not a raster or is rotated, its cells are not square or too small or too large for rails, or the
+        class of a band is unknown.
     CrsError
         Its coordinate system is not in units of length.
     """
@@ -49,6 +55,11 @@ def read_header(path: Path) -> RasterHeader:
             raise RasterError(f"{path.name} is rotated or its cells are not square: warp it to square cells, north up.")
         wkt = dataset.GetProjection() or None
         unit_m = units(parse_crs(wkt))[0] if wkt else 1.0
+        if not MIN_CELL_M <= width * unit_m <= MAX_CELL_M:
+            raise RasterError(
+                f"{path.name} has cells of {width * unit_m:.3g} m, and rails are seen in cells of {MIN_CELL_M:g} to "
+                f"{MAX_CELL_M:g} m: rasterize the points again, or check the coordinate system."
+            )
         return RasterHeader(
             class_codes=_class_codes(dataset, path.name),
             frame=LocalFrame(np.array([x, y, 0.0]), unit_m, unit_m, wkt),

@@ -196,6 +196,13 @@ RASTERS = [
         "rail.tif is rotated or its cells are not square: warp it to square cells, north up.",
     ),
     Fault(
+        "cells of 40 m, as of a raster whose unit is wrong",
+        of_raster(grid=(500_000, 40, 0, 3_000_000, 0, -40)),
+        REFUSED,
+        "rail.tif has cells of 40 m, and rails are seen in cells of 0.001 to 0.5 m: rasterize the points again, or "
+        "check the coordinate system.",
+    ),
+    Fault(
         "south-up raster",
         of_raster(grid=(500_000, CELL_M, 0, 3_000_000, 0, CELL_M)),
         REFUSED,

@@ -51,7 +51,7 @@ def test_every_failure_is_seen_and_the_next_file_is_read(tmp_path, monkeypatch):
         2: "not one line",
         3: "BaseException",
         4: "memory",
-        5: "SIGABRT",
+        5: "SIGABRT script.py",
         6: "hang",
     }
 

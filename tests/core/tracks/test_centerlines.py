@@ -269,3 +269,12 @@ def test_a_smoothed_ring_closes_with_even_steps():
     steps = np.hypot(*np.diff(smooth[:, :2], axis=0).T)
     assert steps == pytest.approx(np.median(steps), rel=0.01)
     assert np.abs(np.hypot(*smooth[:, :2].T) - 20).max() < 0.002
+
+
+def test_rails_that_are_nowhere_opposite_each_other_are_no_track():
+    """A stray vertex folds the second rail back onto itself, and no station meets both."""
+    rails = rails_of(
+        np.array([[0.0, 0, 0], [2, 0, 0], [5, 0, 0], [6, 0, 0]]),
+        np.array([[26.877888746, SPACING, 0], [2, SPACING, 0], [5, SPACING, 0], [6, SPACING, 0]]),
+    )
+    assert build_centerlines(rails, GAUGE, WIDTH, CenterlineParameters(min_length_m=0.0)) == ()
