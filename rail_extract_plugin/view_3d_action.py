@@ -13,6 +13,8 @@ NAME = tr("Show Lines in 3D")
 
 TILT_DEG = 45.0
 """Angle between the view and the vertical: plan and heights are both seen."""
+ROOM = 1.5
+"""Factor by which the extent is enlarged: less of the front than of the middle fits into an inclined view."""
 
 
 def show_in_3d(iface: Any) -> None:
@@ -29,6 +31,7 @@ def show_in_3d(iface: Any) -> None:
         iface.messageBar().pushWarning(NAME, tr("Select a layer of 3D lines first, such as rails or centerlines."))
         return
     extent = iface.mapCanvas().mapSettings().layerExtentToOutputExtent(layer, layer.extent())
+    extent.scale(ROOM)
     view = iface.createNewMapCanvas3D(layer.name())
     # A new view looks at height zero. In the mountains its camera would be below the lines.
     settings, camera = view.mapSettings(), view.cameraController()
