@@ -83,6 +83,13 @@ class Coarse:
         cell = (row - first_row) * np.int32(shape[1]) + (column - first_column)
         return cls(first_column, first_row, shape, cell, np.bincount(cell, minlength=shape[0] * shape[1]))
 
+    def cells(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Coarse cells of places, (k, 2): their numbers, and whether they lie in the grid, (k,) each; 0 outside."""
+        column, row = (np.floor(values / COARSE_M).astype(np.int64) for values in xy.T)
+        row, column = row - self.row, column - self.column
+        inside = (row >= 0) & (row < self.shape[0]) & (column >= 0) & (column < self.shape[1])
+        return np.where(inside, row * self.shape[1] + column, 0), inside
+
     def offsets(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Distance of each point from the middle of its cell, to the east and to the north."""
         row, column = np.divmod(self.cell, np.int32(self.shape[1]))
@@ -131,6 +138,13 @@ class Bed:
             nearer = other < height[chosen]
             height[chosen[nearer]], level[chosen[nearer]] = other[nearer], number
         return height, level
+
+    def slopes(self, xy: np.ndarray) -> np.ndarray:
+        """Return the slope of the flattest level at places, (k, 2): height per length, (k,); 0 where there is none."""
+        cell, inside = self.coarse.cells(xy)
+        slope = np.hypot(self.planes[:, 1, cell], self.planes[:, 2, cell])
+        slope = np.where(inside & np.isfinite(slope), slope, np.inf).min(axis=0)
+        return np.where(np.isfinite(slope), slope, 0.0)
 
 
 def find_bed(coarse: Coarse, dx: np.ndarray, dy: np.ndarray, z: np.ndarray) -> Bed:

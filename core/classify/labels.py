@@ -18,6 +18,9 @@ HEAD_M = 0.11
 MEAN_M = 0.30
 """Half the side of the window of the mean top."""
 
+UNDER_MEAN_M = 0.02
+"""Tops this far below the mean are left out of it: a wide beam at the side of a head blends it with the ballast."""
+
 NEAREST, MIN_AXES = 6, 2
 """Axes that are looked at for a place, and how many of them it must lie on: where two heads part there are some of
 each, and single axes are led astray by a guard rail."""
@@ -100,9 +103,16 @@ def label(tops: Tops, heads: np.ndarray, cell: np.ndarray, height: np.ndarray, t
     around = _with_neighbours(tops.grid, heads)
     window = Window(tops.grid, around, round(MEAN_M / tops.grid.cell_m))
     top = np.full(image.size, np.inf, dtype=np.float32)
-    top[around] = window.sums(np.where(image, tops.top, 0)) / window.sums(image) / MILLIMETRES
+    top[around] = _mean_tops(window, tops, image)
+    image.ravel()[heads] = tops.top.ravel()[heads] >= (top[heads] - UNDER_MEAN_M) * MILLIMETRES
+    top[around] = _mean_tops(window, tops, image)
     above = height - top[cell]
     return np.flatnonzero((above >= -tolerances.below_m) & (above <= tolerances.above_m))
+
+
+def _mean_tops(window: Window, tops: Tops, image: np.ndarray) -> np.ndarray:
+    """Mean top of the cells of an image in each window, (k,) metres."""
+    return window.sums(np.where(image, tops.top, 0)) / np.maximum(window.sums(image), 1) / MILLIMETRES
 
 
 @dataclass(frozen=True)

@@ -89,13 +89,27 @@ def long_enough(
     """
     if not len(lines.axis):
         return np.zeros(0, dtype=bool)
-    piece = pieces_of(len(lines.axis), pairs)
-    with_partner = (np.bincount(piece, paired) > LEAST_PAIRED * np.bincount(piece))[piece]
-    kept = _reaches(lines.axis, piece, LEAST_SINGLE_M, open_ended) & keep_single
-    pair = np.flatnonzero(with_partner)
+    kept = _reaches(lines.axis, pieces_of(len(lines.axis), pairs), LEAST_SINGLE_M, open_ended) & keep_single
+    pair = np.flatnonzero(with_partner(pairs, paired))
     piece = pieces_of(len(pair), links(lines.of(pair), max(HIDDEN_M, lines.reach_m)))
-    kept[pair] = _reaches(lines.axis[pair], piece, LEAST_M, open_ended[pair])
-    return kept
+    long = np.zeros(len(paired), dtype=bool)
+    long[pair] = _reaches(lines.axis[pair], piece, LEAST_M, open_ended[pair])
+    return kept | continuing(lines, long)
+
+
+def with_partner(pairs: np.ndarray, paired: np.ndarray) -> np.ndarray:
+    """Return which cells belong to pieces that have a partner, (n,) bool; see `long_enough`."""
+    piece = pieces_of(len(paired), pairs)
+    return (np.bincount(piece, paired) > LEAST_PAIRED * np.bincount(piece))[piece]
+
+
+def continuing(lines: Lines, chosen: np.ndarray) -> np.ndarray:
+    """Return which cells are chosen, or continue such a cell with gaps of at most `HIDDEN_M`, (n,) bool.
+
+    Under a parked train, the other rail may be hidden.
+    """
+    piece = pieces_of(len(chosen), links(lines, max(HIDDEN_M, lines.reach_m)))
+    return (np.bincount(piece, chosen) > 0)[piece]
 
 
 def _reaches(xy: np.ndarray, piece: np.ndarray, least_m: float, open_ended: np.ndarray) -> np.ndarray:

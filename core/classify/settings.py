@@ -42,8 +42,8 @@ class Tolerances:
         Width beyond that of a head up to which the top of a piece may be one, with a partner and without. Measured: up
         to 8 mm, and 42 mm on thin clouds; kerbs of 150 mm 42 mm, on thin clouds 63 mm.
     width_rounds : int
-        Rounds in which this width is measured. From the second on, points that do not fit a bar are left out: those of
-        a guard rail, where beams are narrow enough to show it apart.
+        Rounds in which this width is measured where there is a partner. From the second on, points that do not fit a
+        bar are left out: those of a guard rail, where beams are narrow enough to show it apart.
     """
 
     along_m: float
@@ -77,8 +77,8 @@ THIN = Tolerances(
     spread_m=0.060,
     strip_m=0.065,
     partner_m=0.07,
-    below_m=0.055,
-    above_m=0.040,
+    below_m=0.045,
+    above_m=0.065,
     beside_m=0.035,
     wider_m=0.05,
     wider_single_m=0.04,

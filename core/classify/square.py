@@ -8,13 +8,13 @@ import numpy as np
 
 from ..frame import ORIGIN_STEP
 from ..rails import SearchFigures
-from .bed import COARSE_M, Coarse, find_bed
+from .bed import COARSE_M, Bed, Coarse, find_bed
 from .figures import shares_of_length
 from .flush import Flush, flush_rails
 from .labels import Near, label, whole_heads
 from .lines import Lines, Marks, centred, find_lines
 from .partner import runs_inside, stations_with_partner
-from .pieces import LEAST_PAIRED, links, long_enough, lower_than_beside, pieces_of
+from .pieces import continuing, links, long_enough, lower_than_beside, pieces_of, with_partner
 from .settings import DENSE, MARGIN_M, THIN, Settings, Tolerances
 from .sides import stands_free
 from .tops import HIGH_M, MILLIMETRES, Grid, Tops, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
@@ -42,6 +42,9 @@ SINGLE_COVER = 0.75
 SINGLE_HEIGHT_M = 0.12
 """Least height above the bed of a rail without a partner: lower things are edges of slopes, kerbs and boards."""
 
+SINGLE_SLOPE = 0.4
+"""Steepest bed of a rail without a partner: that of the shoulder of a ballast bed is 0.67. Where the far side of a
+slope is hidden, its crest looks like a bar."""
 
 NOISE_ACROSS_M = 0.01
 """Distance beyond the side of a head within which the top of a cell counts towards its axis: less than half the gap
@@ -138,14 +141,15 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> Classified:
     z = (xyz[:, 2] - ORIGIN_STEP * np.floor(xyz[:, 2].min() / ORIGIN_STEP)).astype(np.float32)
     coarse = Coarse.around(x, y)
     dx, dy = coarse.offsets(x, y)
-    height, _ = find_bed(coarse, dx, dy, z).heights(dx, dy, z)
+    bed = find_bed(coarse, dx, dy, z)
+    height, _ = bed.heights(dx, dy, z)
     near = np.flatnonzero(height <= HIGH_M)
     if not len(near):
         return nothing
     height = height[near]
     grid, cell = Grid.around(x[near], y[near], settings.cell_m)
     tops = tops_of(grid, cell, height, z[near])
-    standing = _standing(xyz[near, :2], cell, height, coarse, tops, settings)
+    standing = _standing(xyz[near, :2], cell, height, bed, tops, settings)
     flush = flush_rails(coarse, near, xyz[near, :2], height, grid, cell, settings)
     rail = nothing.rail
     found = near[np.union1d(standing.points, flush.points)]
@@ -175,18 +179,18 @@ class Standing:
 
 
 def _standing(
-    xy: np.ndarray, cell: np.ndarray, height: np.ndarray, coarse: Coarse, tops: Tops, settings: Settings
+    xy: np.ndarray, cell: np.ndarray, height: np.ndarray, bed: Bed, tops: Tops, settings: Settings
 ) -> Standing:
     """Find rails that stand out of their bed."""
     found = Candidates.find(tops, xy, cell, height)
-    density = _density(coarse, tops.grid.middles(found.marks))
+    density = _density(bed.coarse, tops.grid.middles(found.marks))
     tolerances = THIN if density < THIN_PER_M2 else DENSE
     reach_m = float(np.clip(REACH_POINTS_PER_M / density, *REACH_M))
     kept = _kept(found, reach_m, tolerances, settings)
     heads = whole_heads(tops, _completed(found, kept, settings, tolerances), tolerances)
     chosen = label(tops, heads, cell, height, tolerances)
     beside = Near.find(xy[chosen], kept.lines)
-    narrow = _narrow(kept, beside, settings, tolerances)
+    narrow = _narrow(kept, beside, bed, settings, tolerances)
     wanted = narrow.copy()
     if settings.guide is not None:
         wanted &= settings.guide.keeps(kept.lines, kept.pairs, settings.spacings_m, tolerances.partner_m)
@@ -226,10 +230,8 @@ def beside_guide(lines: Lines, settings: Settings) -> np.ndarray:
 
 def _density(coarse: Coarse, xy: np.ndarray) -> float:
     """Points per square metre around candidates, (k, 2) places."""
-    column, row = (np.floor(values / COARSE_M).astype(np.int64) for values in xy.T)
-    row, column = row - coarse.row, column - coarse.column
-    inside = (row >= 0) & (row < coarse.shape[0]) & (column >= 0) & (column < coarse.shape[1])
-    cells = np.unique(row[inside] * coarse.shape[1] + column[inside])
+    cell, inside = coarse.cells(xy)
+    cells = np.unique(cell[inside])
     counts = coarse.count[cells]
     counts = counts[counts > 0]
     return float(np.quantile(counts, DENSITY_QUANTILE)) / COARSE_M**2 if len(counts) else np.inf
@@ -281,18 +283,19 @@ def _near_axes(marks: Marks, kept: Kept, settings: Settings, height_m: float) ->
     return near.on((settings.head_width_m + settings.cell_m) / 2, level)
 
 
-def _narrow(kept: Kept, points: Near, settings: Settings, tolerances: Tolerances) -> np.ndarray:
+def _narrow(kept: Kept, points: Near, bed: Bed, settings: Settings, tolerances: Tolerances) -> np.ndarray:
     """Return which cells belong to pieces whose tops are as narrow as a railhead, (n,) bool.
 
-    Those without a partner must also stand as high as a rail does that is not buried in ballast.
+    Those without a partner must also stand as high as a rail does that is not buried in ballast, on a bed that is not
+    steeper than a track's.
     """
     if not len(kept.cell):
         return np.zeros(0, dtype=bool)
     piece = pieces_of(len(kept.cell), kept.pairs)
-    width_m = points.widths(piece, tolerances.width_rounds)
     size = np.bincount(piece)
-    height_m = np.bincount(piece, kept.lines.height) / size
-    single = np.bincount(piece, kept.paired) <= LEAST_PAIRED * size
-    wider_m = width_m - settings.head_width_m
-    alone = (wider_m < tolerances.wider_single_m) & (height_m >= SINGLE_HEIGHT_M)
-    return np.where(single, alone, wider_m < tolerances.wider_m)[piece]
+    height_m, slope = (np.bincount(piece, value) / size for value in (kept.lines.height, bed.slopes(kept.lines.axis)))
+    alone = points.widths(piece, 1) < settings.head_width_m + tolerances.wider_single_m
+    alone &= (height_m >= SINGLE_HEIGHT_M) & (slope <= SINGLE_SLOPE)
+    narrow = points.widths(piece, tolerances.width_rounds) < settings.head_width_m + tolerances.wider_m
+    rail = continuing(kept.lines, with_partner(kept.pairs, kept.paired))
+    return np.where(rail, narrow[piece], alone[piece])

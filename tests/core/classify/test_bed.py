@@ -85,3 +85,15 @@ def test_the_order_of_points_does_not_matter():
     xyz[:, 2] += 0.02 * rng.standard_normal(len(xyz))
     order = rng.permutation(len(xyz))
     np.testing.assert_array_equal(heights(xyz)[0][order], heights(xyz[order])[0])
+
+
+def test_the_slope_of_the_flattest_level_is_stated():
+    rng = np.random.RandomState(3)
+    ground, deck = cloud(rng), cloud(rng)[:900]
+    ground[:, 2], deck[:, 2] = 0.5 * ground[:, 0], 0.1 * deck[:, 0] + 4.0
+    xyz = np.concatenate([ground, deck])
+    x, y, z = xyz.T
+    coarse = Coarse.around(x, y)
+    bed = find_bed(coarse, *coarse.offsets(x, y), z.astype(np.float32))
+    slopes = bed.slopes(np.array([[2.2, 4.2], [2.2, 0.3], [50.0, 50.0]]))
+    np.testing.assert_allclose(slopes, [0.5, 0.1, 0.0], atol=0.03)

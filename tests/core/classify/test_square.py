@@ -71,6 +71,29 @@ def test_a_rail_behind_a_wheel_at_the_end_of_the_cloud_is_labelled():
     assert found[behind[~wheel]].mean() > 0.95
 
 
+def test_wide_beams_do_not_lower_the_head():
+    rng = np.random.RandomState(13)
+    xyz, on = with_track(flat(20.0, rng=rng, per_m2=150), GAUGE, WIDTH, 0.3)
+    xyz = rough(xyz, rng, 0.015, 0.02)
+    _, across = turned(xyz, 0.3)
+    side = on & (np.abs(np.abs(across) - SPACING / 2) > 0.015)
+    xyz[side, 2] -= rng.uniform(0.0, 0.12, side.sum())
+    head = on & (xyz[:, 2] > TOP_M - 0.035) & inner(xyz, 18)
+    found = classify_square(xyz, SETTINGS).rail
+    assert found[head].mean() > 0.97
+    assert (xyz[found, 2] > TOP_M - 0.055).mean() > 0.93
+
+
+@pytest.mark.parametrize(("slope", "kept"), [(0.1, True), (0.9, False)])
+def test_the_crest_of_a_slope_whose_far_side_is_hidden_is_not_a_lone_rail(slope, kept):
+    rng = np.random.RandomState(14)
+    xyz, on = with_bar(flat(8.0, rng=rng, per_m2=2000), WIDTH, 0.2, height_m=0.2)
+    _, across = turned(xyz, 0.2)
+    xyz[:, 2] += slope * across
+    found = classify_square(xyz[across < 0.05], SETTINGS)
+    assert found.rail.any() == kept
+
+
 @pytest.mark.parametrize(("length", "kept"), [(4.8, False), (5.2, True)])
 def test_lone_bars(length, kept):
     xyz, on = with_bar(flat(8.0), WIDTH, 0.2, length_m=length)

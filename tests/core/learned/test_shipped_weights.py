@@ -1,4 +1,4 @@
-"""The shipped weights find more from the air than geometry does, which is why they are shipped."""
+"""The shipped weights find rails in clouds from a scanner that they have not learned."""
 
 import pytest
 from rail_extract.core.learned.model import SHIPPED
@@ -8,8 +8,8 @@ from rail_extract.laboratory.scenes.raw_catalogue import AIR
 pytest.importorskip("torch")
 
 
-def test_the_weights_find_more_than_geometry_in_a_cloud_from_the_air():
+def test_the_weights_find_the_rails_in_a_cloud_from_the_air():
     scene = AIR["air 150"](5)
-    geometry, learned = (score(scene, True, weights)[0] for weights in (None, SHIPPED))
-    assert learned.recall > max(geometry.recall, 0.97)
-    assert learned.precision > max(geometry.precision, 0.96)
+    learned, _ = score(scene, True, SHIPPED)
+    assert learned.recall > 0.97
+    assert learned.precision > 0.96
