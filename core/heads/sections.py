@@ -27,6 +27,9 @@ one half to the other, and how well that is known: 22 to 36 mm, on branches seen
 MIN_HALF_POINTS = 250
 """Points in half a section that show its view: their share is known to 0.03, which pulls by a millimetre."""
 
+MAX_CHANGE = 0.2
+"""Change of this share from which it is not the view that changes: half of the head is in the shadow of something."""
+
 SHARE_STATIONS = 8
 """Stations, 2 m, in which the share of points on the left is found; their median is that of the half."""
 
@@ -50,7 +53,7 @@ too wide, and their axis would be wherever the scanner seems to look from."""
 SETTLED_WIDTH_M, WIDTH_ROUNDS = 0.0005, 5
 """Change of the width at which this ends, and most rounds; each finds two thirds of what is left."""
 
-BLURRED_M, BLURRED_RATIO = 0.0035, 1.3
+BLURRED_M, BLURRED_RATIO = 0.0037, 1.35
 """Blur of the edges beyond the noise in height, and ratio of the noise across to that in height, from which a head is
 blurred. Worn corners blur edges by 2 mm, and the two noises of a scanner differ by a fifth."""
 
@@ -286,6 +289,8 @@ def _pull(station: np.ndarray, is_left: np.ndarray, count: int) -> np.ndarray:
     if min(half, len(station) - half) < MIN_HALF_POINTS:
         return np.zeros(count)
     change = _share(station[half:], is_left[half:]) - _share(station[:half], is_left[:half])
+    if abs(change) > MAX_CHANGE:
+        return np.zeros(count)
     return PULL_M * change * np.linspace(-1.0, 1.0, count)
 
 

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from rail_extract.core.heads.own_level import on_own_level
+from rail_extract.core.heads.own_level import _chain, on_own_level
 
 WIDTH = 0.072
 
@@ -71,3 +71,13 @@ def test_weeds_are_not_on_the_level():
 def test_few_points_are_left_alone():
     (found,) = own(band(0, 5, 10))
     assert found.all()
+
+
+@pytest.mark.parametrize(("step_m", "first"), [(0.003, 0.0), (0.03, 40.0)])
+def test_a_piece_that_a_bin_off_by_chance_begins_continues_its_level(step_m, first):
+    """The last bins of the piece before it and its first ones are next to each other."""
+    one = np.column_stack([np.arange(0.0, 46.0), np.zeros(46)])
+    other = np.column_stack([np.arange(40.0, 240.0), np.full(200, step_m)])
+    chain = _chain([one, other], 0.015)
+    assert chain[0, 0] == first and chain[-1, 0] == 239.0
+    assert (np.diff(chain[:, 0]) >= 0).all()

@@ -287,3 +287,23 @@ def test_a_line_on_one_face_moves_onto_the_axis():
     outer = outer[outer[:, 2] < -0.013]
     (refined,) = refine(network_of(wavy_line(60, 0.005, 30) + [0.0, 0.034]), cloud(outer, corner), WIDTH).lines
     assert rms(refined[:, 1]) < 0.003
+
+
+def test_stairs_shorter_than_the_windows_are_smoothed_off():
+    line = wavy_line(80, 0.003, 1.7)
+    refined = refine(network_of(line), cloud(head(80, 60)), WIDTH).lines[0]
+    assert rms(refined[:, 1]) < 0.0015
+
+
+@pytest.mark.parametrize("height_m", [1.4, 2.6])
+def test_lines_that_refine_moved_are_settled(height_m):
+    """A head seen from the side: another run moves its line by a fraction of its standard error."""
+    curve = trace([Element(60.0)])
+    track = Track(curve, GAUGE + WIDTH)
+    scanner = Scanner(noise_m=0.005, face_share=1.0, left_m=4.5, height_m=height_m, half_range_m=25.0)
+    points = scan(track.railhead(-1), WIDTH, track.centerline, scanner, np.random.RandomState(2))
+    line = wavy_line(60, 0.0, 30) + [0.0, 0.02 - track.spacing_m / 2]
+    refined = refine(network_of(line), cloud(points), WIDTH)
+    assert abs(np.mean(refined.lines[0][:, 1]) + track.spacing_m / 2) < 0.0003
+    again = refine(refined, cloud(points), WIDTH)
+    assert abs(np.mean(again.lines[0][:, 1] - np.interp(again.lines[0][:, 0], *refined.lines[0].T))) < 0.0003

@@ -59,7 +59,9 @@ def test_heads_that_are_flat_to_their_edges_keep_the_stated_width():
     assert abs(np.nanmean(middles.offset)) < 0.0005
 
 
-@pytest.mark.parametrize(("last", "density", "pull_m"), [(0.5, 30, 0.0), (0.7, 30, 0.0028), (0.7, 1, 0.0)])
+@pytest.mark.parametrize(
+    ("last", "density", "pull_m"), [(0.5, 30, 0.0), (0.7, 30, 0.0028), (0.7, 1, 0.0), (1.0, 30, 0.0)]
+)
 def test_a_view_that_changes_pulls_the_ends_of_a_section(last, density, pull_m):
     """The share of points on the left half of the head changes along 40 m, if there are enough points to say so."""
     random, count = np.random.RandomState(0), VIEW_STATIONS
