@@ -212,11 +212,22 @@ def test_ground_has_no_rail(tmp_path):
     result, progress = classify(tmp_path, [save(tmp_path / "raw.las", xyz)], tmp_path / "new.copc.laz")
     assert result.file == tmp_path / "new.laz"
     assert (laspy.read(result.file).classification == 2).all()
-    assert [one.split(":")[0] for one in progress.warnings] == [
-        "new.copc.laz is written as new.laz",
+    assert progress.warnings[0] == "new.copc.laz is written as new.laz: COPC files can't be written."
+    assert [one.split(":")[0] for one in progress.warnings[1:]] == [
         "The cloud states no coordinate system",
         "No rail was found",
     ]
+
+
+def test_rails_without_their_bed_are_not_found_and_the_warning_says_why(tmp_path, scene):
+    xyz, on = scene
+    source = save(tmp_path / "rails.las", xyz[on])
+    result, progress = classify(tmp_path, [source], tmp_path / "new.las")
+    assert result.figures.points == 0
+    assert progress.warnings[-1] == (
+        "No rail was found: check the rail standard and the unit of the coordinates. A cloud that contains only "
+        "rail points needs no classification."
+    )
 
 
 def test_what_cannot_be_done_is_refused(tmp_path, scene):
