@@ -89,7 +89,7 @@ def grow_files(
     output : Output
         From `files.plan_output`, for the files of the request.
     folder : Path
-        Existing folder for temporary files, 32 bytes per point within reach; the caller removes it.
+        Existing folder for temporary files, 36 bytes per point within reach; the caller removes it.
     runner : Runner
         Writes the files.
     progress : Progress

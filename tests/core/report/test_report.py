@@ -372,6 +372,8 @@ def test_what_was_found_in_a_raw_cloud_is_listed():
     assert cells["Cells with points per metre"] == "10"
     assert (cells["Squares with rails"], cells["Thin squares"], cells["Paved squares"]) == ("6", "2", "1")
     assert "Rail points in the raw cloud" not in page(track())
+    grown = replace(network(track()), search=SearchFigures(points=500, paired_m=20.0))
+    assert "Squares with rails" not in build_page(grown, (1.435,), "cloud.laz")
 
 
 def test_a_track_that_steps_to_the_side_is_not_good():
