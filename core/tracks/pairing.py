@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..parameters import Parameters
 from ..polyline import interpolate, left_normals, length_along, project
 from ..progress import SILENT, Progress
 from ..rails import RailLine
@@ -92,7 +93,7 @@ def pair_rails(
     rails: Sequence[RailLine],
     gauge_m: float,
     head_width_m: float,
-    tolerance_m: float = 0.05,
+    tolerance_m: float = Parameters.centerline_tolerance_m,
     other_spacings_m: Sequence[float] = (),
     progress: Progress = SILENT,
 ) -> tuple[RailPair, ...]:

@@ -3,7 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rail_extract.core.rails import RailLine
-from rail_extract.core.tracks.pairing import find_candidates, pair_rails
+from rail_extract.core.tracks.pairing import (
+    WANDER_STATIONS,
+    _abreast,
+    _OffsetCurve,
+    _wander,
+    find_candidates,
+    pair_rails,
+)
 from rail_extract.core.tracks.parallels import find_parallels
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 
@@ -178,3 +185,31 @@ def test_a_rail_whose_other_partner_is_as_good_keeps_both():
     """Where three rails are at the gauge, nothing shows which two are a track."""
     widths = beside(CURVED, SPACING, 0.0, -SPACING - 0.005)
     assert len(pair_rails(rails_of(*widths), GAUGE, WIDTH)) == 2
+
+
+def offset_curve(*places):
+    xy = np.array(places, dtype=float)
+    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
+    return _OffsetCurve(xy, s, s + 100)
+
+
+def test_stations_are_abreast_where_curves_are_within_the_tolerance():
+    x = np.arange(0, 20.01, 0.25)
+    line = offset_curve(*np.column_stack([x, np.zeros(len(x))]))
+    bulging = offset_curve((0, 0.01), (7, 0.01), (8, 0.5), (11, 0.5), (12, 0.01), (20, 0.01))
+    (before, at_before), (after, at_after) = _abreast(line, bulging, 0.05)
+    assert before[[0, -1]] == pytest.approx([0.0, 7.05], abs=0.1)
+    assert after[[0, -1]] == pytest.approx([11.95, 20.0], abs=0.1)
+    assert at_before[[0, -1]] == pytest.approx([0.0, 7.05], abs=0.1)
+    length_m = bulging.s[-1]
+    assert at_after[[0, -1]] == pytest.approx([length_m - 8.05, length_m], abs=0.1)
+
+
+def test_a_steady_change_is_no_wander_and_a_wave_is_one():
+    steps = np.arange(40.0)
+    assert _wander(0.3 * steps) == pytest.approx(0.0, abs=1e-12)
+    assert _wander(0.01 * (-1) ** steps) == pytest.approx(0.01, rel=0.02)
+    assert _wander(np.where(steps == 20, 1.0, 0.0)) == pytest.approx(0.0, abs=1e-12)  # most windows are steady
+    assert _wander(np.array([0.0, 5.0])) == 0.0
+    assert _wander(np.array([0.0, 3.0, 0.0])) == pytest.approx(np.sqrt(2.0))
+    assert WANDER_STATIONS == 11
