@@ -216,7 +216,7 @@ def test_vectorize_with_points_follows_the_railheads_in_every_unit(
     assert outcome.results["RAIL_LENGTH"] == pytest.approx(24, abs=0.5)
     lines = sorted((line * unit_m for line in read_lines(rails)), key=lambda line: line[0, 1])
     for line, side in zip(lines, (-0.7535, 0.7535)):
-        assert np.abs(line[:, 1] + south_m - 3_000_000 - side).max() < 0.004
+        assert np.abs(line[:, 1] + south_m - 3_000_000 - side).max() < 0.005  # at the ends, which points show less
         assert np.abs(line[:, 2] - 100).max() < 0.004
     assert all(items["class_code"] == 10 and items["points"] > 1000 for _, items in read_features(rails))
 
