@@ -10,7 +10,6 @@ from pathlib import Path
 from driver import Driver, algorithm, choose, close, install, later, open_batch, open_dialog, press_run, window
 from qgis.core import (
     QgsCoordinateReferenceSystem,
-    QgsGeometry,
     QgsPointCloudLayer,
     QgsPointXY,
     QgsProject,
@@ -202,10 +201,11 @@ def _show_in_3d(driver: Driver, menu: QMenu) -> Iterator:
     (view,) = iface.mapCanvases3D()
     yield 5.0
     driver.picture("lines_in_3d")
-    seen = QgsGeometry.fromPolygonXY([view.scene().viewFrustum2DExtent()]).boundingBox()
-    driver.keep("lines seen in 3D", seen.contains(rails.extent()))
-    settings, camera = view.mapSettings(), view.cameraController()
-    driver.keep("height looked at", settings.worldToMapCoordinates(camera.lookingAtPoint()).z())
+    camera, extent = view.cameraController(), rails.extent()
+    place = view.mapSettings().worldToMapCoordinates(camera.lookingAtPoint())
+    driver.keep("looks at the rails", extent.contains(QgsPointXY(place.x(), place.y())))
+    driver.keep("distance to extent", camera.distance() / max(extent.width(), extent.height()))
+    driver.keep("height looked at", place.z())
     driver.keep("height of rails", next(rails.getFeatures()).geometry().vertexAt(0).z())
 
 

@@ -125,7 +125,8 @@ def test_a_3d_view_opens_on_the_lines(run_scenario):
     session = run_scenario("review")
     if session["version"] < 33600:
         pytest.skip("This QGIS does not let a plugin open a 3D view.")
-    assert session["lines seen in 3D"]
+    assert session["looks at the rails"]
+    assert 1.2 < session["distance to extent"] < 4
     assert abs(session["height looked at"] - session["height of rails"]) < 2
 
 
