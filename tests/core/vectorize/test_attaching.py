@@ -21,9 +21,10 @@ def along_x(start, end, y=0.0):
     return np.column_stack([x, np.full(len(x), y)])
 
 
+@pytest.mark.parametrize("sense", [1, -1])
 @pytest.mark.parametrize("radius", [190, 500, 1200])
-def test_a_branch_is_extended_tangentially_to_its_stock_rail(radius):
-    stock = along_x(0, 60)
+def test_a_branch_is_extended_tangentially_to_its_stock_rail(radius, sense):
+    stock = along_x(0, 60)[::sense]
     arc = trace([Element(40, 1 / radius, 1 / radius)], (10.0, 0.0)).xy[::5]
     branch = arc[arc[:, 1] > 0.12]
     network = attach_branches(loose(stock, branch), cKDTree(np.concatenate([stock, arc])), 5.0)
