@@ -71,7 +71,12 @@ def lengths(xy: np.ndarray, piece: np.ndarray) -> np.ndarray:
 
 
 def long_enough(
-    lines: Lines, pairs: np.ndarray, paired: np.ndarray, open_ended: np.ndarray, keep_single: bool
+    lines: Lines,
+    pairs: np.ndarray,
+    paired: np.ndarray,
+    open_ended: np.ndarray,
+    keep_single: bool,
+    least_m: float = LEAST_M,
 ) -> np.ndarray:
     """Return which cells belong to pieces that are kept, (n,) bool.
 
@@ -86,6 +91,8 @@ def long_enough(
         already run through the whole margin.
     keep_single : bool
         Whether pieces without a partner are kept.
+    least_m : float
+        Shortest piece with a partner.
     """
     if not len(lines.axis):
         return np.zeros(0, dtype=bool)
@@ -93,7 +100,7 @@ def long_enough(
     pair = np.flatnonzero(with_partner(pairs, paired))
     piece = pieces_of(len(pair), links(lines.of(pair), max(HIDDEN_M, lines.reach_m)))
     long = np.zeros(len(paired), dtype=bool)
-    long[pair] = _reaches(lines.axis[pair], piece, LEAST_M, open_ended[pair])
+    long[pair] = _reaches(lines.axis[pair], piece, least_m, open_ended[pair])
     return kept | continuing(lines, long)
 
 

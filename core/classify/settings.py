@@ -9,6 +9,7 @@ import numpy as np
 
 from ..raster import cell_size
 from .guide import Guide
+from .pieces import LEAST_M
 
 SQUARE_CELLS = 1024
 """Side of the squares that are classified one after another, in cells: 41 m at 1435 mm, images of 2 to 4 MB."""
@@ -38,6 +39,8 @@ class Tolerances:
     beside_m : float
         Distance beyond the side of the head within which a point is still on it: the axis is known to a centimetre, and
         the beam is as wide.
+    least_m : float
+        Shortest piece of a rail that has its partner.
     wider_m, wider_single_m : float
         Width beyond that of a head up to which the top of a piece may be one, with a partner and without. Measured: up
         to 8 mm, and 42 mm on thin clouds; kerbs of 150 mm 42 mm, on thin clouds 63 mm.
@@ -53,6 +56,7 @@ class Tolerances:
     below_m: float
     above_m: float
     beside_m: float
+    least_m: float
     wider_m: float
     wider_single_m: float
     width_rounds: int
@@ -66,6 +70,7 @@ DENSE = Tolerances(
     below_m=0.040,
     above_m=0.025,
     beside_m=0.02,
+    least_m=LEAST_M,
     wider_m=0.025,
     wider_single_m=0.012,
     width_rounds=5,
@@ -80,6 +85,7 @@ THIN = Tolerances(
     below_m=0.045,
     above_m=0.065,
     beside_m=0.035,
+    least_m=2 * LEAST_M,
     wider_m=0.05,
     wider_single_m=0.04,
     width_rounds=1,

@@ -253,7 +253,9 @@ def _kept(found: Candidates, reach_m: float, tolerances: Tolerances, settings: S
     kept = kept.of(~lower_than_beside(kept.lines, tolerances.spread_m))
     low, high = -MARGIN_M + reach_m / 2, settings.side_m + MARGIN_M - reach_m / 2
     open_ended = np.any((kept.lines.axis < low) | (kept.lines.axis > high), axis=1)
-    return kept.of(long_enough(kept.lines, kept.pairs, kept.paired, open_ended, settings.keep_single))
+    return kept.of(
+        long_enough(kept.lines, kept.pairs, kept.paired, open_ended, settings.keep_single, tolerances.least_m)
+    )
 
 
 def _certain(lines: Lines, paired: np.ndarray, pairs: np.ndarray) -> np.ndarray:

@@ -111,6 +111,12 @@ def test_paired_bars(length, kept):
     assert found.figures.paired_m == pytest.approx(2 * length if kept else 0, rel=0.15)
 
 
+@pytest.mark.parametrize(("length", "kept"), [(2.4, False), (4.0, True)])
+def test_paired_bars_in_a_thin_cloud(length, kept):
+    xyz, _ = with_track(flat(9.0, rng=np.random.RandomState(15), per_m2=300), GAUGE, WIDTH, 0.2, length_m=length)
+    assert classify_square(xyz, SETTINGS).rail.any() == kept
+
+
 def test_feet_and_webs_are_not_labelled():
     rng = np.random.RandomState(6)
     ground = flat(6.0, rng=rng, per_m2=3000)
