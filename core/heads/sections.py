@@ -62,6 +62,9 @@ FLAT_SHARE, TWO_LEVELS, APART_M = 0.3, -0.4, 0.003
 which they are on two levels, and half the least distance of these. Noise has 0 or more, and two passes -2 (d² / (d² +
 noise²))², at half their distance d: -0.5 where d is the noise. Heights rounded to half of it have -0.1."""
 
+ON_HEAD_M = 0.005
+"""Distance of a line from its head (RMS) up to which it shows the blur of the head: further off, it was displaced."""
+
 CORE_SIGMAS, SURE_SIGMAS = 4.0, 4.0
 """Standard deviations from which heights are those of weeds, and of the kurtosis, √(24 / n), from which it is sure."""
 
@@ -229,6 +232,8 @@ def _blur(section: Section, wider_m: float, offset: np.ndarray, apart_up_m: floa
     """
     across_m, height_m = np.exp(section.place[4:])
     known = offset[np.isfinite(offset)]
+    if len(known) and np.sqrt(np.mean(known**2)) > ON_HEAD_M:
+        return 0.0
     across_m = np.sqrt(max(across_m**2 - (np.var(known) if len(known) else 0.0), 0.0))
     height_m = np.sqrt(max(height_m**2 - apart_up_m**2, MIN_NOISE_M**2))
     blur_m = np.sqrt(max(across_m**2 - height_m**2, 0.0))
