@@ -62,6 +62,9 @@ FLAT_SHARE, TWO_LEVELS, APART_M = 0.3, -0.4, 0.003
 which they are on two levels, and half the least distance of these. Noise has 0 or more, and two passes -2 (d² / (d² +
 noise²))², at half their distance d: -0.5 where d is the noise. Heights rounded to half of it have -0.1."""
 
+FLAT_BLUR_M = 0.009
+"""Blur from which a head without a round top is not flat to its edges, but shown by passes 20 mm apart or more."""
+
 ON_HEAD_M = 0.005
 """Distance of a line from its head (RMS) up to which it shows the blur of the head: further off, it was displaced."""
 
@@ -238,7 +241,7 @@ def _blur(section: Section, wider_m: float, offset: np.ndarray, apart_up_m: floa
     height_m = np.sqrt(max(height_m**2 - apart_up_m**2, MIN_NOISE_M**2))
     blur_m = np.sqrt(max(across_m**2 - height_m**2, 0.0))
     is_blurred = blur_m >= BLURRED_M and across_m >= BLURRED_RATIO * height_m and wider_m >= -WRONG_WIDTH_M
-    is_blurred &= wider_m < (MAX_WRONG_WIDTH_M if is_crowned else WRONG_WIDTH_M)
+    is_blurred &= wider_m < MAX_WRONG_WIDTH_M if is_crowned else wider_m < WRONG_WIDTH_M and blur_m > FLAT_BLUR_M
     widened_m = 0.5 * wider_m if is_crowned and WIDENED_M < wider_m < MAX_WRONG_WIDTH_M else 0.0
     return float(np.hypot(blur_m if is_blurred else 0.0, widened_m))
 
