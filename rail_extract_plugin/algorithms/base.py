@@ -144,9 +144,12 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         try:
             results = self.compute(self._job, parameters, context, progress)
         except BaseException as error:
-            raise QgsProcessingException(sentence_for(error, self.parameterDefinitions())) from None
-        progress.set_fraction(1)
-        return results
+            reason = sentence_for(error, self.parameterDefinitions())
+        else:
+            progress.set_fraction(1)
+            return results
+        # PyQt keeps what is raised here: with the error as its context, files that it refers to would stay open.
+        raise QgsProcessingException(reason)
 
     def _add_report(self, definition: QgsProcessingParameterDefinition) -> None:
         """Declare a report as a file: the batch dialog of several QGIS versions never ends after a web page."""
