@@ -8,6 +8,7 @@ at work on a file when it is killed. After each kill, the version is read, and t
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import random
 import re
@@ -155,11 +156,15 @@ def read_tiles(path: Path) -> set[int]:
 def raw_tiles() -> list[Path]:
     """Write raw clouds into a folder of their own, once."""
     folder = Path(tempfile.mkdtemp())
+    elsewhere(lambda: _write_tiles(folder))
+    return [folder / name for name in TILES]
+
+
+def _write_tiles(folder: Path) -> None:
     for name in TILES:
         cloud = laspy.LasData(laspy.LasHeader(version="1.4", point_format=6))
         cloud.xyz = np.random.default_rng(1).uniform(0, 100, (POINTS, 3))
         cloud.write(folder / name)
-    return [folder / name for name in TILES]
 
 
 def _write_copies(tiles: list[Path], output: Output, version: int) -> None:
@@ -194,6 +199,30 @@ def _write(algorithm: Any, destination: Destination, write: Callable[..., Any]) 
     algorithm.initAlgorithm()
     algorithm.destinations = {"OUTPUT": destination}
     write(algorithm, {"OUTPUT": str(destination.path)}, context)
+
+
+def elsewhere(call: Callable[[], set[int] | None]) -> set[int]:
+    """Call in a process of its own, and return the result.
+
+    The threads that decompress LAZ do not survive a fork: if this process had begun them, later ones would wait for
+    them for ever, and a kill would never meet a write.
+    """
+    reader, writer = os.pipe()
+    process = os.fork()
+    if process == 0:
+        code = 1
+        try:
+            os.write(writer, json.dumps(sorted(call() or ())).encode())
+            code = 0
+        except BaseException as error:
+            print(f"{error!r}", flush=True)
+        os._exit(code)
+    os.close(writer)
+    with os.fdopen(reader) as stream:
+        found = stream.read()
+    if os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]):
+        raise RuntimeError("A process ended with an error.")
+    return set(json.loads(found))
 
 
 def kill_once(name: str, folder: Path, first: int, after_s: float) -> str:
@@ -249,9 +278,9 @@ def kill_once(name: str, folder: Path, first: int, after_s: float) -> str:
 def versions(read: Callable[[Path], set[int]], path: Path) -> set[int]:
     """Return the versions in a file; a file that cannot be read has several, one of which is negative."""
     try:
-        return read(path)
-    except Exception as error:
-        return {-1, hash(repr(error)) % 1000}
+        return elsewhere(lambda: read(path))
+    except RuntimeError:
+        return {-1, -2}
 
 
 def kill_often(name: str, times: int, seed: int = 1) -> Counter[str]:
@@ -260,7 +289,8 @@ def kill_often(name: str, times: int, seed: int = 1) -> Counter[str]:
     file, write, _ = FORMATS[name]
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        write(Destination.at(folder / file), 1)
+        raw_tiles()
+        elsewhere(lambda: write(Destination.at(folder / file), 1))
         for number in range(times):
             found[kill_once(name, folder, 2 + number, MAX_S * moments.random())] += 1
     return found

@@ -13,9 +13,10 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
-from kills import FORMATS, start_qgis, versions
+from kills import FORMATS, elsewhere, raw_tiles, start_qgis, versions
 from rail_extract.core.disk import Destination
 from rail_extract.core.errors import RailExtractError
 
@@ -97,11 +98,13 @@ def race_once(name: str, folder: Path, first: int, delays_s: tuple[float, float]
 def race_often(name: str, times: int, seed: int = 1) -> Counter[str]:
     """Let pairs of runs write a format, each second pair into an empty folder, and count what is there afterwards."""
     moments, found = random.Random(seed), Counter[str]()
+    file, write, _ = FORMATS[name]
+    raw_tiles()
     for number in range(times):
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place)
             if number % 2 or "table" in name:  # two runs cannot both add the first table to a file that is not there
-                FORMATS[name][1](Destination.at(folder / FORMATS[name][0]), 1)
+                elsewhere(partial(write, Destination.at(folder / file), 1))
             found[race_once(name, folder, 2, (0.0, MAX_DELAY_S * moments.uniform(-1, 1) % MAX_DELAY_S))] += 1
     return found
 

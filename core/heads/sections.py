@@ -79,6 +79,14 @@ CROWNED_SHARE, CROWN_SHARE, CROWN_BAND_M = 0.5, 0.4, 0.006
 measured: within this share of the head's width from its axis, and this far from the top. A head that is flat to its
 edges looks 11 mm wider than it is, and blurred, as one that several passes show."""
 
+FLAT_RING, FLAT_DROP_M = (0.40, 0.47), 0.0012
+"""Distances from the axis, as shares of the head's width, between which corners are; and by how much less they lie
+below the middle of a head that is flat to its edges. Those of the outline are 2.5 to 5 mm below it."""
+
+BEYOND_RING, MAX_BEYOND = (0.53, 0.60), 0.2
+"""Distances from the axis at which a flat head has no points, as shares of its width, and their most density there
+compared with that between the corners and the axis: passes 15 mm apart have half of it there."""
+
 PROFILE_SIGMA_M = 0.0004
 """Standard error of the middle that comes from the outline itself: real heads chain more radii, and are worn."""
 
@@ -149,20 +157,23 @@ def outline_middles(
             continue
         scores = Scores.of(counts, section, head.outline, grid)
         part = slice(first, last)
-        middles.offset[part], middles.information[part], middles.in_window[part] = _in_windows(
+        offset, middles.information[part], middles.in_window[part] = _in_windows(
             section.place[0], scores.by_bin[bins[here]], station[here] - first, last - first
         )
         pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
-        middles.offset[part] = np.where(seen[part], middles.offset[part] - pull, np.nan)
+        offset = np.where(seen[part], offset - pull, np.nan)
+        is_crowned = _is_crowned(left[here], up[here], head_width_m)
+        if is_crowned or not _is_flat(left[here] - section.place[0], up[here], head_width_m):
+            middles.offset[part] = offset
         middles.common[part] = np.hypot(np.hypot(scores.common_m, PROFILE_SIGMA_M), PULL_DOUBT * pull)
         on_crown = np.abs(left[here] - section.place[0]) < FLAT_SHARE * head_width_m
         middles.blur_up[part] = apart_m = _half_apart(_above_crown(left[here], up[here], section.place)[on_crown])
         middles.blur[part] = _blur(
             section,
             width_m - head_width_m,
-            middles.offset[part],
+            offset,
             apart_m,
-            _is_crowned(left[here], up[here], head_width_m),
+            is_crowned,
         )
     return middles
 
@@ -194,6 +205,24 @@ def _fitted(counts: np.ndarray, head: Head, grid: Grid, start: Section | None) -
         width_m = found.width_m + section.place[3]
     settled = abs(width_m - found.width_m) <= least_m and width_m <= MAX_HEAD_WIDTH_M
     return (section, found, width_m) if settled else (first, head, width_m)
+
+
+def _is_flat(left: np.ndarray, up: np.ndarray, head_width_m: float) -> bool:
+    """Return whether points, by their offsets from the axis and heights, (n,) metres, show a head without corners.
+
+    Its outline is not that of a rail, which lies anywhere across it with little doubt; its two edges show its middle.
+    """
+    left, up = left[np.abs(up) < CROWN_BAND_M] / head_width_m, up[np.abs(up) < CROWN_BAND_M]
+    middle = up[np.abs(left) < CROWN_SHARE]
+    sides = [up[(side * left > FLAT_RING[0]) & (side * left < FLAT_RING[1])] for side in (-1, 1)]
+    if min(len(middle), *map(len, sides)) < ENOUGH_POINTS:
+        return False
+    beyond = np.count_nonzero((np.abs(left) > BEYOND_RING[0]) & (np.abs(left) < BEYOND_RING[1]))
+    if beyond * CROWN_SHARE > MAX_BEYOND * len(middle) * (BEYOND_RING[1] - BEYOND_RING[0]):
+        return False
+    drop_m = np.mean(middle) - np.mean([np.mean(side) for side in sides])
+    doubt_m = np.sqrt(np.mean([np.var(side) / len(side) for side in sides]))
+    return bool(drop_m + 2 * doubt_m < FLAT_DROP_M)
 
 
 def _is_crowned(left: np.ndarray, up: np.ndarray, head_width_m: float) -> bool:

@@ -49,14 +49,27 @@ def test_the_axis_stays_where_another_width_is_stated():
     assert abs(np.nanmean(middles_of(points).offset)) < 0.001
 
 
-def test_heads_that_are_flat_to_their_edges_keep_the_stated_width():
-    """They look 10 mm wider than an outline with round corners; fitted as such, their axis is up to 5 mm off."""
+def flat(noise_m, apart_m=0.0, count=30_000):
+    """Chainage, offset and height of points on heads without corners, half of them by a pass that lies apart."""
     random = np.random.RandomState(0)
-    t, count = np.sort(random.uniform(0, LENGTH, 30_000)), 30_000
-    points = np.array([t, random.uniform(-0.036, 0.036, count), 0.002 * random.normal(size=count)])
-    middles = middles_of(points)
-    assert np.nanmax(np.abs(middles.offset)) < 0.0025
-    assert abs(np.nanmean(middles.offset)) < 0.0005
+    across = random.uniform(-WIDTH / 2, WIDTH / 2, count) + random.choice([-apart_m / 2, apart_m / 2], count)
+    noise = noise_m * random.normal(size=(2, count))
+    return np.array([np.sort(random.uniform(0, LENGTH, count)), across + noise[0], noise[1]])
+
+
+@pytest.mark.parametrize("noise_m", [0.0, 0.002, 0.004])
+def test_the_outline_does_not_show_the_middle_of_heads_without_corners(noise_m):
+    """They look 10 mm wider than an outline with round corners; fitted as such, their axis is up to 5 mm off."""
+    assert np.isnan(middles_of(flat(noise_m)).offset).all()
+    assert np.isfinite(middles_of(scanned(60, noise_m=max(noise_m, 0.001))).offset).all()
+
+
+def test_passes_side_by_side_are_no_head_without_corners():
+    one, other = scanned(60, noise_m=0.004), scanned(60, noise_m=0.004, seed=1) + [[0], [0.015], [0]]
+    both = np.column_stack([one, other])
+    middles = middles_of(both[:, np.argsort(both[0])])
+    assert np.isfinite(middles.offset).all()
+    assert middles.offset.mean() == pytest.approx(0.0075, abs=0.002)
 
 
 @pytest.mark.parametrize(

@@ -23,4 +23,4 @@ def test_a_killed_run_leaves_the_old_output_or_the_new_one():
 
 
 def test_of_two_runs_onto_one_output_one_wins_and_the_other_says_so():
-    assert len(run("races.py", 2).splitlines()) == 12
+    assert len(run("races.py", 2).splitlines()) == 13
