@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..polyline import interpolate, length_along, project
-from ..rails import Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry, cell_borders
+from ..rails import STRIP_OFF_M, Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry, cell_borders
 from ..tracks.jumps import find_steps
 
 GAUGE_OFF_MM = 10.0
@@ -110,6 +110,12 @@ class TrackFindings:
         """Plan length."""
         return float(self.geometry.cells_m.sum())
 
+    @property
+    def strips_apart_m(self) -> float:
+        """Plan length on which strips differ by as much as the user is warned of."""
+        apart = np.nan_to_num(self.geometry.strip_mm) >= 1000 * STRIP_OFF_M
+        return float(self.geometry.cells_m[apart].sum())
+
     def length_of(self, doubt: Doubt) -> float:
         """Return the length in doubt for a reason."""
         return float(self.geometry.cells_m[self.doubtful[doubt]].sum())
@@ -175,8 +181,9 @@ class Findings:
             return 1.0
         hole_m = sum(hole.length_m for hole in self.holes)
         lonely = self.lonely_m / self.rails_m if self.rails_m else 0.0
-        stepped = self.stepped_m / self.length_m if self.stepped_m else 0.0
-        return max(lonely, stepped, hole_m / (self.length_m + hole_m) if hole_m else 0.0)
+        off_m = max(self.stepped_m, sum(track.strips_apart_m for track in self.tracks))
+        off = off_m / self.length_m if off_m else 0.0
+        return max(lonely, off, hole_m / (self.length_m + hole_m) if hole_m else 0.0)
 
     @property
     def length_m(self) -> float:

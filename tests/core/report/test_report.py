@@ -267,6 +267,15 @@ def test_the_headline_counts_lone_rails(length_m, words):
 
 
 @pytest.mark.parametrize(
+    ("strip_mm", "length", "words"),
+    [(2.9, 101, "Good thr"), (3.1, 2, "Good thr"), (3.1, 4, "Good, exc"), (8.0, 101, "Usable")],
+)
+def test_a_track_on_which_strips_differ_is_not_good_throughout(strip_mm, length, words):
+    apart = np.where(np.arange(101) < length, strip_mm, np.nan)
+    assert headline(page(track(strip_mm=apart))).startswith(words)
+
+
+@pytest.mark.parametrize(
     ("seen_m", "words"), [(0.062, "Usable"), (0.082, "Usable"), (0.0765, "Good thr"), (np.nan, "Good thr")]
 )
 def test_heads_of_another_width_than_stated_are_not_good(seen_m, words):
