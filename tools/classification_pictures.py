@@ -30,8 +30,6 @@ from rail_extract.core.classify.tops import (  # noqa: E402
     TOP_M,
     Grid,
     Tops,
-    highest_of_blocks,
-    narrow_tops,
     tops_of,
 )
 from rail_extract.core.labelling.cloud import classify_cloud  # noqa: E402
@@ -110,10 +108,8 @@ def scene() -> Scene:
     near = np.flatnonzero(height <= HIGH_M)
     grid, cell = Grid.around(x[near], y[near], settings.cell_m)
     tops = tops_of(grid, cell, height[near], z[near].astype(np.float32))
-    cells = narrow_tops(tops)
-    marks = highest_of_blocks(tops, cells)
-    kept = square._kept(tops, cells, marks, 1.0, DENSE, settings)
-    return Scene(raw, settings, height, tops, marks, kept)
+    found = square.Candidates.find(tops, raw.xyz[near, :2], cell, height[near])
+    return Scene(raw, settings, height, tops, found.marks, square._kept(found, 1.0, DENSE, settings))
 
 
 def bed() -> Figure:

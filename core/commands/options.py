@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -158,7 +159,23 @@ def extent_of(text: str | None) -> tuple[float, float, float, float] | None:
 
 
 class Console(Progress):
-    """Prints steps, remaining time and warnings to the error output."""
+    """Prints steps, remaining time and warnings to the error output; Ctrl-C cancels it.
+
+    Python drops the exception of a Ctrl-C that comes during a finalizer or some callbacks. The run then ends at its
+    next check for cancellation.
+    """
+
+    def __init__(self) -> None:
+        self._interrupted = False
+        signal.signal(signal.SIGINT, self._interrupt)
+
+    def _interrupt(self, *_: object) -> None:
+        self._interrupted = True
+        raise KeyboardInterrupt
+
+    def is_cancelled(self) -> bool:
+        """Return whether there was a Ctrl-C."""
+        return self._interrupted
 
     def status(self, text: str) -> None:
         """Print the current activity."""

@@ -80,8 +80,9 @@ class _Until(Console):
     """Cancels after a time."""
 
     def __init__(self, minutes: float) -> None:
+        super().__init__()
         self._end = time.monotonic() + 60 * minutes
 
     def is_cancelled(self) -> bool:
-        """Return whether the time is over."""
-        return time.monotonic() > self._end
+        """Return whether the time is over, or there was a Ctrl-C."""
+        return super().is_cancelled() or time.monotonic() > self._end
