@@ -75,14 +75,14 @@ DIALOGS = {
 }
 """Names of the dialogs' pictures, and their names in the guide."""
 
-MAP_SIZE, TABLE_HEIGHT, REPORT_SIZE = QSize(1000, 480), 230, (1140, 2265)
+MAP_SIZE, TABLE_HEIGHT, REPORT_SIZE = QSize(1000, 480), 230, (1140, 3200)
 """Pixels."""
 
 REVIEW_SIZE = (380, 520)
 """Pixels of the dock."""
 
-REPORT_TOP = 1300
-"""Height of the report above the plots of the first track, in pixels."""
+REPORT_TOP, PLOTS_TOP = 1300, 2320
+"""Height of the picture of the report's top, and of the report above the plots of the first track, in pixels."""
 
 SPLITTER, BUTTONS = 27, 400
 """Width of a dialog to the right of its fields without the help, and height below them, in pixels."""
@@ -274,7 +274,7 @@ def _report(page: Path, picture: Path) -> None:
     subprocess.run([*command, page.as_uri()], check=True, capture_output=True)
     shutil.copy(picture, FOLDER / "report_track.png")
     _crop(picture, bottom=REPORT_SIZE[1] - REPORT_TOP)
-    _crop(FOLDER / "report_track.png", top=REPORT_TOP)
+    _crop(FOLDER / "report_track.png", top=PLOTS_TOP)
 
 
 def _crop(picture: Path, top: int = 0, right: int = 0, bottom: int = 0) -> None:
