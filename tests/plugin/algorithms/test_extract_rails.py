@@ -232,7 +232,7 @@ def test_findings_are_the_table_of_the_report(run, write_cloud, track, tmp_path)
     assert [finding["reason"] for finding in findings] == ["gauge off by more than 10 mm", "a rail has no points"]
     wide, bare = findings
     assert (wide["from_m"], wide["to_m"]) == pytest.approx((20, 30), abs=2)
-    assert wide["gauge_mm"] == pytest.approx(1455, abs=2)
+    assert wide["gauge_mm"] == pytest.approx(1455, abs=3)  # where it is widest
     assert (bare["from_m"], bare["to_m"]) == pytest.approx((8, 11), abs=1)
     assert bare.geometry().length() == pytest.approx(bare["to_m"] - bare["from_m"], abs=0.1)
     table = re.findall("<tr>(.*?)</tr>", paths["REPORT"].read_text(encoding="utf-8").split("Where to look")[1])[1:3]
