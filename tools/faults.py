@@ -32,8 +32,8 @@ TRIED = (
         "damaged files of eighteen kinds: LAS, LAZ, COPC and classified copies of them, catalogues, lists of names, "
         "weights and interrupted trainings, folders of earlier runs, vector layers and rasters; 50,000 catalogues, "
         "50,000 results of squares, 65,000 of all other kinds on several days",
-        "none ends in a traceback, takes more than 1 GB, or hangs, after what was found has been mended; one LAZ file of "
-        "8,764 with damaged compressed bytes ends lazrs, and the process with it, and one raster did so once",
+        "none ends in a traceback, takes more than 1 GB, or hangs, after what was found has been mended; one LAZ file "
+        "of 8,764 with damaged compressed bytes ends lazrs, and the process with it, and one raster did so once",
     ),
     (
         "tools/kills.py 50",
