@@ -45,7 +45,7 @@ from .steps import (
 )
 from .tasks import Context, InTurn, Runner, Task
 from .tracks.geometry import measure_track_geometry
-from .tracks.jumps import doubting_steps
+from .tracks.jumps import doubting_steps, steps_of
 from .tracks.strip_courses import strip_courses
 from .tracks.widths_by_gauge import widths_by_gauge
 
@@ -239,8 +239,9 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
     rails = with_tracks(rails, centerlines, progress)
     warn_of_split_classes(rails, parameters, progress)
     warn_of_strips(rails, parameters, progress)
-    warn_of_steps(rails, centerlines, progress)
-    rails = doubting_steps(rails, centerlines)
+    stepping = steps_of(centerlines, rails)
+    warn_of_steps(stepping, progress)
+    rails = doubting_steps(rails, stepping)
     heads = head_widths(sources[0], parameters.gauges, progress, rails) if rails else None
     geometry = _measure_tracks(centerlines, rails, sources, parameters, runner, measuring)
     if geometry:

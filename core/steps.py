@@ -38,7 +38,7 @@ from .squares.pieces import SquareRails, trim
 from .squares.seams import join
 from .standards import distinct_gauges
 from .tracks.centerlines import CenterlineParameters, build_centerlines
-from .tracks.jumps import find_steps
+from .tracks.jumps import Steps
 from .tracks.lone import assign_tracks
 from .tracks.widths_by_gauge import widths_by_gauge
 from .vectorize import vectorize
@@ -220,16 +220,16 @@ def warn_of_rails(rails: Sequence[RailLine], class_code: int, parameters: Parame
     warn_if_out_of_reach(rails, parameters.head_width_m, parameters.smoothing_xy_m, progress)
 
 
-def warn_of_steps(rails: Sequence[RailLine], centerlines: Sequence[Centerline], progress: Progress) -> None:
+def warn_of_steps(steps: Sequence[tuple[Centerline, Steps]], progress: Progress) -> None:
     """Warn the user of tracks that step to the side.
 
     Parameters
     ----------
-    rails : sequence of RailLine
-    centerlines : sequence of Centerline
+    steps : sequence of Centerline and Steps
+        From `jumps.steps_of`.
     progress : Progress
     """
-    found = [(line.track_id, *step) for line in centerlines for step in find_steps(line, rails)]
+    found = [(line.track_id, *step) for line, own in steps for step in own]
     if found:
         largest = sorted(found, key=lambda one: -abs(one[2]))[:MAX_LISTED]
         words = [f"{1000 * abs(step_m):.0f} mm at {at_m:.0f} m of track {track}" for track, at_m, step_m in largest]

@@ -38,7 +38,16 @@ STEP_SIGMAS, STEP_GAIN = 5.0, 2.75
 whose errors are alike over a metre."""
 
 
-def find_steps(track: Centerline, rails: Sequence[RailLine]) -> list[tuple[float, float]]:
+Steps = list[tuple[float, float]]
+"""Chainage of each step of a track, and its size to the left in metres."""
+
+
+def steps_of(centerlines: Sequence[Centerline], rails: Sequence[RailLine]) -> list[tuple[Centerline, Steps]]:
+    """Return each track with its steps; see `find_steps`."""
+    return [(line, find_steps(line, rails)) for line in centerlines]
+
+
+def find_steps(track: Centerline, rails: Sequence[RailLine]) -> Steps:
     """Find the steps of a track: places where a rail on either side steps the same way.
 
     At switches one of the rails may be off for some metres, as no pass of a scanner puts it.
@@ -92,17 +101,16 @@ def _peaks(t: np.ndarray, across: np.ndarray) -> list[tuple[float, float]]:
     return sorted(found)
 
 
-def doubting_steps(rails: Sequence[RailLine], centerlines: Sequence[Centerline]) -> list[RailLine]:
+def doubting_steps(rails: Sequence[RailLine], steps: Sequence[tuple[Centerline, Steps]]) -> list[RailLine]:
     """Add half of the steps of tracks to the standard errors of their rails: on either side, one pass may be right.
 
     Parameters
     ----------
     rails : sequence of RailLine
         With their tracks.
-    centerlines : sequence of Centerline
-        All tracks of these rails.
+    steps : sequence of Centerline and Steps
+        All tracks of these rails, from `steps_of`.
     """
-    steps = [(line, find_steps(line, rails)) for line in centerlines]
     doubted = []
     for rail in rails:
         found = [

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rail_extract.core.rails import Centerline, RailLine, Support
-from rail_extract.core.tracks.jumps import doubting_steps, find_steps
+from rail_extract.core.tracks.jumps import doubting_steps, find_steps, steps_of
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 
 
@@ -58,7 +58,7 @@ def test_half_of_a_step_is_in_doubt_on_either_side():
     curve = trace([Element(80.0, 1 / 800, 1 / 800)], heading=0.3)
     middle, left, right = (stepped(beside(curve, left_m), 33.0, 0.03) for left_m in (0.0, 0.75, -0.75))
     rails = [rail(1, left), rail(2, right[::-1]), rail(3, left)]
-    *doubted, kept = doubting_steps(rails, [track(middle, (1,), (2,))])
+    *doubted, kept = doubting_steps(rails, steps_of([track(middle, (1,), (2,))], rails))
     for one in doubted:
         assert np.allclose(one.support.sigma_m, np.hypot(0.001, 0.015), rtol=0.06)
         assert np.allclose(one.support.strips[:, 1], 0.03, rtol=0.06)
@@ -73,7 +73,7 @@ def test_a_track_does_not_step_where_one_of_its_rails_does_not(other_m):
     middle = stepped(curve, 33.0, 0.02)
     one = track(middle, (1,), (2,))
     assert find_steps(track(middle), ()) and not find_steps(one, rails)
-    assert doubting_steps(rails, [one]) == rails
+    assert doubting_steps(rails, steps_of([one], rails)) == rails
 
 
 @pytest.mark.parametrize(("sigma_m", "steps"), [(0.001, 1), (0.006, 0)])
@@ -85,7 +85,7 @@ def test_both_rails_show_a_step_that_the_centerline_hides_unless_it_is_chance(si
     found = find_steps(smooth, rails)
     assert len(found) == steps
     assert all(at_m == pytest.approx(40, abs=0.5) and size_m == pytest.approx(0.012, rel=0.1) for at_m, size_m in found)
-    assert find_steps(smooth, doubting_steps(rails, [smooth])) == found
+    assert find_steps(smooth, doubting_steps(rails, steps_of([smooth], rails))) == found
 
 
 def test_an_abrupt_arc_is_no_step_of_two_rails():
