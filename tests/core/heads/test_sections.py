@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 from rail_extract.core.heads.edges import VIEW_STATIONS, station_count
+from rail_extract.core.heads.outline import MIN_NOISE_M, Section
 from rail_extract.core.heads.sections import (
     Middles,
+    _blur,
     _half_apart,
     _pull,
     likelier_width,
@@ -155,3 +157,17 @@ def test_the_outline_shows_which_width_heads_have_whatever_the_noise(width_m):
     assert likelier_width(lines, xyz, (0.066, 0.072)) == min(width_m, 0.072)
     assert likelier_width(lines, xyz, (0.072, 0.078)) == max(width_m, 0.072)
     assert likelier_width(lines, xyz[:100], (0.072, 0.078)) == 0.072
+
+
+@pytest.mark.parametrize(
+    ("across_mm", "up_mm", "apart_up_mm", "wander_mm", "blur_mm"),
+    [(6.5, 5, 4, 0, 5.766), (6.5, 3, 0, 2.5, 5.196), (6.5, 4, 4, 0, None), (4.5, 3, 0, 0, 0), (9, 3, 0, 6, 0)],
+)
+def test_edges_are_blurred_by_what_neither_noise_nor_passes_in_height_nor_wandering_lines_explain(
+    across_mm, up_mm, apart_up_mm, wander_mm, blur_mm
+):
+    section = Section(np.array([0, 0, 0, 0, np.log(across_mm / 1000), np.log(up_mm / 1000)]), np.zeros(1))
+    offset = wander_mm / 1000 * np.array([1, -1, np.nan])
+    blur_mm = np.sqrt(across_mm**2 - (1000 * MIN_NOISE_M) ** 2) if blur_mm is None else blur_mm
+    blur = _blur(section, 0.0, offset, apart_up_mm / 1000, is_crowned=True)
+    assert 1000 * blur == pytest.approx(blur_mm, abs=0.001)

@@ -104,3 +104,14 @@ def test_rows_state_places_and_offsets_in_the_plane():
     # The line now runs north, and its left is in the west.
     np.testing.assert_allclose(rows[rows[:, 2] == 3, 3].mean(), -0.010, atol=0.001)
     np.testing.assert_allclose(rows[rows[:, 2] == 8, 3].mean(), 0.010, atol=0.001)
+
+
+def test_a_strip_does_not_show_a_rail_in_a_road_flush_with_it():
+    """For 24 m one strip sees road to both sides of the head: its offset there is unknown, not 0."""
+    points, line = rail([(3, 0.010, 0.0, 0, LENGTH_M), (8, -0.010, 0.0, 0, LENGTH_M)])
+    x = np.random.RandomState(1).uniform(18, 42, 12_000)
+    road = np.column_stack([x, x**2 / 1200 + np.linspace(-0.15, 0.15, len(x)), 0.003 * x])
+    strips = np.append(points.strips, np.full(len(x), 3, dtype=np.uint16))
+    (found,) = strips_along([line], replace(points, xyz=np.concatenate([points.xyz, road]), strips=strips), HEAD_M)
+    assert found.count[[10, 30]].tolist() == [2, 1] and np.isnan(found.spread_m[30])
+    np.testing.assert_allclose(found.across[0, 5:40], 0.010, atol=0.002)

@@ -6,8 +6,10 @@ from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.pairing import (
     WANDER_STATIONS,
     _abreast,
+    _Match,
     _OffsetCurve,
     _wander,
+    _without_rivals,
     find_candidates,
     pair_rails,
 )
@@ -213,3 +215,22 @@ def test_a_steady_change_is_no_wander_and_a_wave_is_one():
     assert _wander(np.array([0.0, 5.0])) == 0.0
     assert _wander(np.array([0.0, 3.0, 0.0])) == pytest.approx(np.sqrt(2.0))
     assert WANDER_STATIONS == 11
+
+
+def test_a_single_station_out_of_tolerance_divides_a_section():
+    x = np.arange(0, 20.01, 0.5)
+    line = offset_curve(*np.column_stack([x, np.zeros(len(x))]))
+    pointed = offset_curve((0, 0), (9.95, 0), (10, 0.0685), (10.05, 0), (20, 0))
+    (before, _), (after, _) = _abreast(line, pointed, 0.05)
+    assert [*before[[0, -1]], *after[[0, -1]]] == pytest.approx([0.0, 9.975, 10.025, 20.0])
+
+
+@pytest.mark.parametrize(("lost_m", "left_m"), [(10.0, [10.0]), (11.0, [])])
+def test_a_match_stays_if_half_of_it_or_less_is_lost_to_a_better_partner(lost_m, left_m):
+    t = np.arange(0, 20) + 0.5
+    worse = _Match(0, 1, t, t, 1, -1, 0.0)
+    claimed = np.array([-1.0, lost_m + 0.6])
+    better = _Match(0, 2, claimed, claimed, -1, 1, 0.0)
+    kept = _without_rivals([worse, better], [0.05, 0.01])
+    assert [match.length_m + 1 for match in kept if match.b == 1] == left_m
+    assert [match.length_m for match in kept if match.b == 2] == [lost_m + 1.6]
