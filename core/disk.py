@@ -106,12 +106,12 @@ class Destination:
             Its folder or the old file is not writable, something other than a file has this name, or the old file is
             open in another program.
         """
-        file = Path(os.path.realpath(path))
-        sweep(file.parent, _complete)
         try:
+            file = Path(os.path.realpath(path))
+            sweep(file.parent, _complete)
             _check_writable(path, file)
             check_closed(file)
-        except OSError as error:
+        except (OSError, ValueError) as error:  # ValueError: a name that no system can have
             raise _unwritable(path, error) from error
         return cls(path, file, identity(file))
 
@@ -248,14 +248,15 @@ def _state(file: Path) -> tuple[int, int]:
     return state.st_mtime_ns, state.st_size
 
 
-def _unwritable(path: Path, error: OSError) -> DiskError:
-    remedy = "free space on the disk, or choose" if error.errno in (None, *FULL) else "choose"
+def _unwritable(path: Path, error: OSError | ValueError) -> DiskError:
+    may_be_full = isinstance(error, OSError) and error.errno in (None, *FULL)
+    remedy = "free space on the disk, or choose" if may_be_full else "choose"
     return DiskError(f"The output {path} can't be written ({_reason(error)}): {remedy} another place.")
 
 
-def _reason(error: OSError) -> str:
-    """Return the operating system's words; some errors of Python's own have none."""
-    return error.strerror or str(error)
+def _reason(error: OSError | ValueError) -> str:
+    """Return the operating system's words; errors of Python's own have none."""
+    return getattr(error, "strerror", None) or str(error)
 
 
 def _keep_rights(file: Path, old: Path, main: Path) -> None:

@@ -230,6 +230,15 @@ def _custom(gauge_m: float, head_width_m: float) -> RailStandard:
     return RailStandard(CUSTOM, label, gauge_m, head_width_m)
 
 
+def is_class(word: str) -> bool:
+    """Return whether a text is a class. Python refuses to read numbers of thousands of digits.
+
+    >>> is_class("10"), is_class("256"), is_class("ten")
+    (True, False, False)
+    """
+    return re.fullmatch(r"\d{1,9}", word) is not None and int(word) <= LAST_CLASS
+
+
 def read_gauges(
     text: str, what: str, standard: RailStandard, tolerance_m: float, has_parameter: bool = True
 ) -> tuple[Gauge, ...]:

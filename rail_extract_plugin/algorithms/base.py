@@ -13,6 +13,7 @@ from qgis.core import (
     QgsProcessingFeedback,
     QgsProcessingOutputFile,
     QgsProcessingParameterDefinition,
+    QgsProcessingParameterFeatureSink,
 )
 from qgis.PyQt.QtGui import QIcon
 
@@ -27,7 +28,7 @@ from ..feedback import QgisProgress
 from ..i18n import tr
 from ..paths import ICONS, PICTURES
 from ..setup.dependencies import explain_missing, missing_packages
-from ..writing.destinations import appends, destinations
+from ..writing.destinations import PAGE, appends, check_layer_name, check_page_name, destinations
 from ..writing.styling import NO_PROPERTIES
 from .sentences import COMMAND_LINE, sentence_for
 
@@ -158,8 +159,13 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     def _destinations(self, parameters: dict[str, Any], context: QgsProcessingContext) -> dict[str, Destination]:
         """Check the files of the outputs, and remember what they replace."""
-        names = [output.name() for output in self.destinationParameterDefinitions()]
-        return destinations({name: parameters.get(name) for name in names}, context)
+        outputs = self.destinationParameterDefinitions()
+        for output in outputs:
+            if isinstance(output, QgsProcessingParameterFeatureSink):
+                check_layer_name(output.name(), parameters.get(output.name()), context)
+            elif output.defaultFileExtension() == PAGE:
+                check_page_name(output.name(), parameters.get(output.name()), context)
+        return destinations({output.name(): parameters.get(output.name()) for output in outputs}, context)
 
     def _read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Any:
         """Check the values that need no file, then read the parameters."""

@@ -104,7 +104,7 @@ class ClassifyRailPoints(RailAlgorithm):
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
         gauges_m = (job.standard.gauge_m, *(gauge_m for gauge_m, _ in job.other_gauges))
-        choice = Choice(job.class_code, int(values.number("CONTENT")) == 1, values.flag("RESET"))
+        choice = Choice(job.class_code, self.parameterAsEnum(parameters, "CONTENT", context) == 1, values.flag("RESET"))
         output = plan_output(job.cloud.paths, job.output, job.class_code, progress)
         request = request_points(job.cloud, SEARCHED_CLASSES, values.extent, progress)
         guide = None

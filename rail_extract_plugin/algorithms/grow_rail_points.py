@@ -93,8 +93,8 @@ class GrowRailPoints(RailAlgorithm):
         from ...core.labelling.growing import grow_files
         from ...core.tasks import InTurn
 
-        values, progress = ParameterValues(self, parameters, context), Estimating(progress)
-        choice = Choice(job.class_code, int(values.number("CONTENT")) == 1, reset=False)
+        progress = Estimating(progress)
+        choice = Choice(job.class_code, self.parameterAsEnum(parameters, "CONTENT", context) == 1, reset=False)
         output = plan_output(job.cloud.paths, job.output, job.class_code, progress)
         request = request_points(job.cloud, SEARCHED_CLASSES, lambda crs: None, progress)
         settings = GrowSettings(job.standard.gauge_m, job.standard.head_width_m, job.parameters)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
+    NULL,
     QgsCoordinateReferenceSystem,
     QgsProcessingAlgorithm,
     QgsProcessingContext,
@@ -18,7 +19,17 @@ from qgis.core import (
 
 from ...core.errors import ParameterError, RailExtractError, RasterError
 from ...core.parameters import GrowParameters, Parameters
-from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, Gauge, RailStandard, read_gauges, resolve
+from ...core.standards import (
+    CUSTOM,
+    DEFAULT,
+    DETECT,
+    LAST_CLASS,
+    Gauge,
+    RailStandard,
+    is_class,
+    read_gauges,
+    resolve,
+)
 from ..reading.clouds import CloudSource, checked_crs, cloud_source
 from ..systems import prepare_system, system
 
@@ -110,7 +121,7 @@ class ParameterValues:
 
     def filled(self, name: str) -> bool:
         """Return whether a value was entered."""
-        return self._parameters.get(name) not in (None, "")
+        return self._parameters.get(name) not in (None, "", NULL)
 
     def raster(self, name: str) -> tuple[Path, RasterHeader]:
         """Return the file of a raster and its header.
@@ -246,13 +257,15 @@ class ParameterValues:
         Raises
         ------
         ParameterError
-            The extent has no area.
+            The extent has no area, or an infinite one.
         """
-        extent = self._algorithm.parameterAsExtent(self._parameters, "EXTENT", self._context, crs)
-        if not self.filled("EXTENT") or extent.isNull():
+        if not self.filled("EXTENT"):
             return None
-        if extent.isEmpty():
-            raise ParameterError("EXTENT has no area: give a rectangle as xmin,xmax,ymin,ymax, or leave it empty.")
+        extent = self._algorithm.parameterAsExtent(self._parameters, "EXTENT", self._context, crs)
+        if extent.isEmpty() or not extent.isFinite():
+            raise ParameterError(
+                "EXTENT has no area, or an infinite one: give a rectangle as xmin,xmax,ymin,ymax, or leave it empty."
+            )
         return extent.xMinimum(), extent.yMinimum(), extent.xMaximum(), extent.yMaximum()
 
     def engine(self) -> str:
@@ -321,7 +334,7 @@ def class_numbers(text: str, what: str) -> tuple[int, ...]:
         The text is not a list of classes, or is empty.
     """
     words = _words(text)
-    if not words or not all(word.isdecimal() and int(word) <= LAST_CLASS for word in words):
+    if not words or not all(map(is_class, words)):
         raise ParameterError(f'{what} "{text}" must be whole numbers from 0 to {LAST_CLASS} such as 10 or 10,11.')
     return tuple(dict.fromkeys(int(word) for word in words))
 

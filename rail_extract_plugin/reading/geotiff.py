@@ -16,7 +16,7 @@ from ...core.frame import LocalFrame
 from ...core.progress import SILENT, Progress
 from ...core.raster import RailRaster
 from ...core.raster_file import BLOCK, EXTENT_TAG, GAUGE_TAG, HEAD_TAG, MODEL_TAG, NO_DATA, RasterHeader
-from ...core.standards import LAST_CLASS, RAIL_CLASS
+from ...core.standards import RAIL_CLASS, is_class
 
 CREATION = (
     "TILED=YES",
@@ -186,7 +186,7 @@ def _unreadable(path: Path) -> RasterError:
 def _class_codes(dataset: gdal.Dataset, name: str) -> tuple[int, ...]:
     """Return the class of each band from its description."""
     texts = [dataset.GetRasterBand(number).GetDescription() for number in range(1, dataset.RasterCount + 1)]
-    if texts and all(text.isdecimal() and int(text) <= LAST_CLASS for text in texts):
+    if texts and all(map(is_class, texts)):
         codes = tuple(int(text) for text in texts)
         if len(set(codes)) < len(codes):
             raise RasterError(f"{name} has several bands for one class ({', '.join(texts)}): give one band per class.")

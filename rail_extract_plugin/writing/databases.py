@@ -8,7 +8,10 @@ from qgis.core import QgsAbstractDatabaseProviderConnection, QgsDataSourceUri, Q
 
 from ...core.errors import RailExtractError
 
-POSTGRES = re.compile("(?:postgis|postgres):(?://)?(.*)", re.DOTALL)
+POSTGIS = "postgis"
+"""QGIS's other name for its provider of tables on a PostgreSQL server."""
+
+POSTGRES = re.compile(f"(?:{POSTGIS}|postgres):(?://)?(.*)", re.DOTALL)
 """Outputs on a PostgreSQL server, as QGIS writes them."""
 
 DEFAULT_SCHEMA = "public"

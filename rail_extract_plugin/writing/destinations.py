@@ -22,14 +22,24 @@ from qgis.core import (
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
 from ..systems import prepare_system
-from .databases import check_database
+from .databases import POSTGIS, check_database
 
 TABLE = "ogr:"
 """Prefix of destinations that are a table of a file."""
 
 
+PROVIDER = re.compile("(.{3,}?):.*", re.DOTALL)
+"""What QGIS's sinks take for the name of a data provider: all that comes before a colon, even in the path of a file."""
+
+PAGE = "html"
+PAGES = ("", ".html", ".htm")
+"""Suffixes of reports."""
+
 EXCHANGED = (".dxf", ".csv")
 """Suffixes of files for other programs, which QGIS's sinks do not write; see `core.exchange`."""
+
+RESERVED = "gpkg"
+"""No table of a GeoPackage that holds data may begin with it."""
 
 ESCAPE = "%[0-9A-Fa-f]{2}"
 """SQLite decodes these in the path of a GeoPackage that GDAL opens for reading."""
@@ -68,10 +78,46 @@ def destinations(values: Mapping[str, Any], context: QgsProcessingContext) -> di
                     f"The output {path} can't be opened after it is written, because {escape[0]} stands for another "
                     "character in the path of a GeoPackage: choose another name."
                 )
+            if path.suffix.lower() == ".gpkg" and (table_of(value, context) or path.stem).lower().startswith(RESERVED):
+                raise RailExtractError(
+                    f"{name} can't be a table with a name that begins with {RESERVED}, which is reserved in a "
+                    "GeoPackage: choose another name."
+                )
             destination = Destination.at(path)
             found[name] = files.setdefault(destination.file, destination)
     _check_distinct({name: (found[name].file, table_of(values[name], context)) for name in found})
     return found
+
+
+def check_layer_name(name: str, value: Any, context: QgsProcessingContext) -> None:
+    """Check before the run that QGIS can write a layer of this name.
+
+    Raises
+    ------
+    RailExtractError
+        QGIS takes what comes before a colon for a data provider, and there is no such provider.
+    """
+    text = _text(value, context)
+    file, found = output_file(value, context), PROVIDER.fullmatch(text)
+    if file is not None and file.suffix.lower() in EXCHANGED:
+        return  # not written by QGIS
+    if found and found[1] not in (*QgsProviderRegistry.instance().providerList(), POSTGIS):
+        raise RailExtractError(
+            f"{name} can't be written to {text}, because QGIS takes what comes before the colon for a data provider: "
+            "choose a file without a colon in its path."
+        )
+
+
+def check_page_name(name: str, value: Any, context: QgsProcessingContext) -> None:
+    """Check before the run that a report does not replace a file of another kind, such as the cloud that is read.
+
+    Raises
+    ------
+    RailExtractError
+    """
+    path = output_file(value, context)
+    if path is not None and path.suffix.lower() not in PAGES:
+        raise RailExtractError(f"{name} can't be {path.name}: let it end in .html.")
 
 
 def _prepare_layer(name: str, path: Path, table: str) -> None:

@@ -110,6 +110,16 @@ def a_folder(folder):
     return folder / "rails.gpkg"
 
 
+def in_a_folder_with_a_colon(folder):
+    (folder / "at 10:30").mkdir()
+    return folder / "at 10:30" / "rails.gpkg"
+
+
+def over_the_cloud(bench):
+    parameters = cloud(bench)
+    return {**parameters, "REPORT": parameters["INPUT"]}
+
+
 def without_outputs(bench):
     return {**cloud(bench), **dict.fromkeys(("RAILS", "CENTERLINES", "QUALITY", "FINDINGS", "CLEANED"))}
 
@@ -379,6 +389,13 @@ FAULTS = [
         "path of a GeoPackage: choose another name.",
     ),
     Fault(
+        "GeoPackage with a reserved name",
+        output(lambda folder: folder / "gpkg_rails.gpkg"),
+        REFUSED,
+        "RAILS can't be a table with a name that begins with gpkg, which is reserved in a GeoPackage: choose another "
+        "name.",
+    ),
+    Fault(
         "output on a read-only disk",
         output(lambda folder: "/proc/rails.gpkg"),
         REFUSED,
@@ -389,6 +406,32 @@ FAULTS = [
         output(lambda folder: folder / f"{'r' * 300}.gpkg"),
         REFUSED,
         "The output …/rrr….gpkg can't be written (File name too long): choose another place.",
+    ),
+    Fault(
+        "output with a name that no file can have",
+        lambda bench: {**cloud(bench), "REPORT": f"{bench.folder}/a\0b.html"},
+        REFUSED,
+        "The output … can't be written (embedded null byte): choose another place.",
+    ),
+    Fault(
+        "layer in a folder with a colon",
+        output(in_a_folder_with_a_colon),
+        REFUSED,
+        "RAILS can't be written to …/at 10:30/rails.gpkg, because QGIS takes what comes before the colon for a data "
+        "provider: choose a file without a colon in its path.",
+    ),
+    Fault(
+        "layer of an unknown data provider",
+        output(lambda folder: "EPSG:25832"),
+        REFUSED,
+        "RAILS can't be written to EPSG:25832, because QGIS takes what comes before the colon for a data provider: "
+        "choose a file without a colon in its path.",
+    ),
+    Fault(
+        "report with the name of the cloud",
+        over_the_cloud,
+        REFUSED,
+        "REPORT can't be cloud.las: let it end in .html.",
     ),
     *(
         Fault(

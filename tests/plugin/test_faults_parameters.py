@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from faults import REFUSED, WARNED, Fault
+from qgis.core import QgsVectorLayer
 
 TITLE = "Parameters"
 
@@ -19,6 +20,10 @@ NUMBERS = (*POSITIVE, "ITERATIONS", "MAX_GAP", "GAP_ANGLE", "SIMPLIFY_XY", "SIMP
 def with_(**parameters):
     """A valid cloud and these parameters."""
     return lambda bench: {"INPUT": bench.cloud(bench.track(length_m=6.0)), **parameters}
+
+
+def with_extent_of_nothing(bench):
+    return with_(EXTENT=QgsVectorLayer("Point?crs=EPSG:32643", "none", "memory"))(bench)
 
 
 def same_file(bench):
@@ -146,6 +151,12 @@ FAULTS = [
         'RAIL_CLASSES "300" must be whole numbers from 0 to 255 such as 10 or 10,11.',
     ),
     Fault(
+        "class of 5,000 digits",
+        with_(RAIL_CLASSES="9" * 5000),
+        REFUSED,
+        'RAIL_CLASSES "999…" must be whole numbers from 0 to 255 such as 10 or 10,11.',
+    ),
+    Fault(
         "class without points",
         with_(RAIL_CLASSES="11"),
         REFUSED,
@@ -200,7 +211,20 @@ FAULTS = [
         "extent without area",
         with_(EXTENT="500000,500000,3000000,3000001"),
         REFUSED,
-        "EXTENT has no area: give a rectangle as xmin,xmax,ymin,ymax, or leave it empty.",
+        "EXTENT has no area, or an infinite one: give a rectangle as xmin,xmax,ymin,ymax, or leave it empty.",
+    ),
+    *(
+        Fault(
+            f"extent {what}",
+            prepare,
+            REFUSED,
+            "EXTENT has no area, or an infinite one: give a rectangle as xmin,xmax,ymin,ymax, or leave it empty.",
+        )
+        for what, prepare in (
+            ("of zeros", with_(EXTENT="0,0,0,0")),
+            ("of a layer without features", with_extent_of_nothing),
+            ("with an infinite side", with_(EXTENT="-inf,inf,0,1")),
+        )
     ),
     Fault(
         "invalid extent",

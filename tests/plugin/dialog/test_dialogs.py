@@ -149,7 +149,7 @@ CONTRADICTIONS = [
     ({"RAIL_CLASSES": "256"}, 'RAIL_CLASSES "256" must be whole numbers from 0 to 255'),
     ({"OTHER_GAUGES": "metre gauge"}, 'OTHER_GAUGES "metre gauge" must be millimetres'),
     ({"OTHER_GAUGES": "1450"}, "can't be distinguished within CENTERLINE_TOLERANCE"),
-    ({"EXTENT": "500000,500000,3000000,3000010"}, "EXTENT has no area"),
+    ({"EXTENT": "500000,500000,3000000,3000010"}, "EXTENT has no area, or an infinite one"),
     ({"CRS": "EPSG:4326"}, "CRS EPSG:4326 is in degrees, where lengths can't be measured: choose a projected one"),
     ({"ENGINE": "OPENCV", "DEVICE": "CUDA"}, "set DEVICE to AUTO, or ENGINE to TORCH"),
     ({"INPUT": "gone.laz"}, "gone.laz does not exist"),
