@@ -30,8 +30,17 @@ MAX_SINE = np.sin(np.radians(10.0))
 SPACING_BIN_M = 0.01
 """Width of the bins in which the most common spacing is sought: the spacing of one track varies by less."""
 
-STATIONS_AT_ONCE = 20_000
-"""Stations searched at once, with a few hundred thousand neighbours: limits the memory."""
+STATIONS_AT_ONCE = 5_000
+"""Stations searched at once, with some hundred thousand neighbours, and 8 million at most: limits the memory."""
+
+CROWD_M, CROWD = 1.0, 75
+"""A square of this side with more stations than this, of 25 lines or more, shows no rails but copies of lines: at most
+ten heads of rails fit next to each other. Each pair of lines would be compared."""
+
+CROWDED = (
+    "More than 25 lines lie within 1 m of each other on {:.0f} m of their length, which is not paired: remove copies "
+    "of lines."
+)
 
 
 @dataclass(frozen=True)
@@ -82,7 +91,11 @@ def find_parallels(rails: Sequence[RailLine], reach_m: float = MAX_SPACING_M, pr
     progress : Progress
     """
     codes = np.array([rail.class_code for rail in rails])
-    number, stations, t, tangents, normals = _stations(rails)
+    columns = _stations(rails)
+    crowded = _is_crowded(columns[1])
+    number, stations, t, tangents, normals = (column[~crowded] for column in columns)
+    if crowded.any():
+        progress.warning(CROWDED.format(SAMPLE_STEP_M * crowded.sum()))
     tree = cKDTree(stations)
     found = []
     for start in progress.follow(range(0, len(stations), STATIONS_AT_ONCE)):
@@ -99,7 +112,17 @@ def find_parallels(rails: Sequence[RailLine], reach_m: float = MAX_SPACING_M, pr
         p, q = p[abreast], q[abreast]
         same = np.einsum("ij,ij->i", tangents[p], tangents[q]) > 0
         found.append((number[p], number[q], t[p], t[q], left[abreast], same))
+    if not found:
+        none = np.empty(0, dtype=int)
+        return Parallels(none, none, np.empty(0), np.empty(0), np.empty(0), none > 0)
     return Parallels(*(np.concatenate(column) for column in zip(*found)))
+
+
+def _is_crowded(stations: np.ndarray) -> np.ndarray:
+    """Return which stations lie in a square with more stations than rails can have, (n,) bool."""
+    squares = np.floor(stations / CROWD_M) @ [1.0, 2.0**26]  # a number for each square
+    _, square, counts = np.unique(squares, return_inverse=True, return_counts=True)
+    return (counts > CROWD)[square]
 
 
 def _stations(rails: Sequence[RailLine]) -> tuple[np.ndarray, ...]:

@@ -422,6 +422,15 @@ LINES = [
         {"CENTERLINE_COUNT": 2},
     ),
     Fault(
+        "2,000 copies of a line",
+        lines(*[LEFT] * 2000),
+        WARNED,
+        "1999 of 2000 lines are duplicates: their results appear twice. More than 25 lines lie within 1 m of each "
+        "other on … m of their length, which is not paired: remove copies of lines. No two rails run parallel: there "
+        "are rails but no track centerlines.",
+        {"CENTERLINE_COUNT": 0},
+    ),
+    Fault(
         "repeated vertices",
         lines(LEFT.replace("(", "(500000 3000001.507 100, 500000 3000001.507 100, "), RIGHT),
         gives=ONE_TRACK,
