@@ -64,9 +64,8 @@ def attach_branches(network: LineNetwork, seen: cKDTree, max_gap_m: float, progr
     """
     if not network.lines:
         return network
-    reach_m = MAX_BACK_M + MIN_AHEAD_M
-    low = np.array([line.min(axis=0) for line in network.lines]) - reach_m
-    high = np.array([line.max(axis=0) for line in network.lines]) + reach_m
+    low = np.array([line.min(axis=0) for line in network.lines]) - MAX_BESIDE_M
+    high = np.array([line.max(axis=0) for line in network.lines]) + MAX_BESIDE_M
     for end in progress.follow(np.flatnonzero(network.degrees()[network.ends.ravel()] == 1).tolist()):
         from_end = network.from_end(end)
         if length_along(from_end)[-1] < FIT_M:

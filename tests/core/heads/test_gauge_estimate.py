@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.heads.gauge_estimate import measure_spacings
-from rail_extract.core.standards import STANDARDS, closest_standard
+from rail_extract.core.standards import GAUGE_RANGE_MM, HEAD_WIDTH_RANGE_MM, STANDARDS, closest_standard
 
 
 def track(spacing_m, width_m, length_m=30.0, density=300, noise_m=0.003, heading=0.6, seed=1):
@@ -67,3 +67,11 @@ def test_one_rail_or_too_few_points_give_none():
 def test_closest_standard(spacing_m, width_m, name):
     standard = closest_standard(spacing_m, width_m)
     assert (standard and standard.name) == name
+
+
+@pytest.mark.parametrize("end", [0, 1])
+def test_rails_are_a_track_from_the_least_to_the_largest_gauge_with_the_widest_heads(end):
+    spacing_m = (GAUGE_RANGE_MM[end] + HEAD_WIDTH_RANGE_MM[end]) / 1000
+    beyond_m = 0.02 if end else -0.02
+    assert measure_spacings(track(spacing_m - beyond_m, 0.07)).include(spacing_m - beyond_m, 0.003)
+    assert not len(measure_spacings(track(spacing_m + beyond_m, 0.07)).distance_m)

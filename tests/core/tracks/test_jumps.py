@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rail_extract.core.rails import Centerline, RailLine, Support
-from rail_extract.core.tracks.jumps import doubting_steps, find_steps, steps_of
+from rail_extract.core.tracks.jumps import ARM_M, _peaks, doubting_steps, find_steps, steps_of
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 
 
@@ -92,3 +92,14 @@ def test_an_abrupt_arc_is_no_step_of_two_rails():
     curve = trace([Element(40.0), Element(30.0, 1 / 60, 1 / 60)], heading=2.0)
     rails = [rail(number, beside(curve, left_m).xy) for number, left_m in ((1, 0.75), (2, -0.75))]
     assert find_steps(track(curve.xy, (1,), (2,)), rails) == []
+
+
+def test_the_largest_of_the_steps_that_share_an_arm_counts():
+    t = np.arange(0.0, 60.0, 0.5)
+    across = np.zeros(len(t))
+    for place, size in ((10.0, 0.02), (10.0 + 2 * ARM_M, -0.01), (40.0, -0.03), (40.5, 0.025)):
+        across[t == place] = size
+    assert _peaks(t, across) == [(10.0, 0.02), (40.0, -0.03)]
+    across[t == 10.5 + 2 * ARM_M] = -0.01
+    assert _peaks(t, across) == [(10.0, 0.02), (10.5 + 2 * ARM_M, -0.01), (40.0, -0.03)]
+    assert _peaks(t, 0 * across) == _peaks(t[:0], across[:0]) == []

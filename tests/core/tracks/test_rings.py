@@ -26,7 +26,7 @@ def test_closed_rails_start_abreast():
     assert open_line is lines[2]
 
 
-@pytest.mark.parametrize("turns", [1.001, 0.999])
+@pytest.mark.parametrize("turns", [1.001, 1.0, 0.999])
 def test_a_centerline_is_closed_if_its_ends_are_close(turns):
     line = ring(turns=turns)
     closed = closed_centerline(line)
