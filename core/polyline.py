@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -20,6 +21,9 @@ POINTS_AT_ONCE = 500_000
 
 POINTS_FOR_THREADS = 10_000
 """Fewer points are projected by a single thread: on two cores, starting the threads takes 0.3 ms, the points 2 ms."""
+
+MAX_THREADS = 256
+"""Scipy would start any number."""
 
 CLOSED_M = 0.01
 """Largest distance between the ends of a closed line; the ends of extracted rings coincide, even after thinning."""
@@ -196,7 +200,8 @@ def threads() -> int:
     Other numerical libraries follow the same variable; Dask sets it for its workers.
     """
     number = os.environ.get("OMP_NUM_THREADS", "")
-    return int(number) if number.isdecimal() and int(number) else -1
+    wanted = int(number) if re.fullmatch(r"\d{1,9}", number) else 0
+    return min(wanted, MAX_THREADS) or -1
 
 
 @dataclass(frozen=True)

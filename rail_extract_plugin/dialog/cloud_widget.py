@@ -93,7 +93,7 @@ class CloudWidget(QWidget):
     def _folder(self) -> str:
         """Folder in which a dialog begins."""
         path = Path(self.combo.currentText())
-        return str(path.parent) if path.is_absolute() else QgsSettings().value(LAST_FOLDER, "")
+        return str(path.parent) if path.is_absolute() else str(QgsSettings().value(LAST_FOLDER, ""))
 
     def _take(self, path: str) -> None:
         """Show what a dialog selected; nothing changes if it was cancelled."""

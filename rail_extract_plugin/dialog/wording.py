@@ -16,9 +16,13 @@ NAME = r"(?<![\w./\\])[A-Z][A-Z_]+(?![\w/\\]|\.\w)"
 """A word in capitals that is not part of a path."""
 
 
+OVERLONG, SHOWN = r"\S{500,}", 100
+"""A word longer than the name of any file, and how many of its characters are shown: a window grows with its text."""
+
+
 def for_user(sentence: str, definitions: Sequence[QgsProcessingParameterDefinition]) -> str:
     """Return the sentence without passwords, and with labels for parameter names if this QGIS has windows."""
-    sentence = masked(sentence)
+    sentence = re.sub(OVERLONG, lambda word: f"{word[0][:SHOWN]}…", masked(sentence))
     return with_labels(sentence, definitions) if QgsApplication.platform() == WITH_DIALOGS else sentence
 
 

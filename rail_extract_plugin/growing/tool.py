@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from html import escape
 
 from qgis.core import (
     Qgis,
@@ -312,7 +313,7 @@ class GrowRails(QObject):
     def _say(self, text: str) -> None:
         """Show a message above the map."""
         self.message = text
-        self._messages.pushMessage(tr("Grow Rails"), text, Qgis.MessageLevel.Info, MESSAGE_S)
+        self._messages.pushMessage(tr("Grow Rails"), escape(text), Qgis.MessageLevel.Info, MESSAGE_S)
 
     def _enable(self) -> None:
         """Enable what can be done."""

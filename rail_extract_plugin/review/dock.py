@@ -12,6 +12,7 @@ from qgis.core import (
     QgsVectorLayer,
 )
 from qgis.PyQt import sip
+from qgis.PyQt.QtCore import Qt
 from qgis.PyQt.QtWidgets import QComboBox, QDockWidget, QGridLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from ..i18n import tr
@@ -55,6 +56,8 @@ class ReviewDock(QDockWidget):
         self.count, self.reason, self.text, self.note, self.problem = (QLabel() for _ in range(5))
         for label in (self.reason, self.text, self.note, self.problem):
             label.setWordWrap(True)
+            # Otherwise Qt takes values of a layer for HTML, and opens the pictures that they name.
+            label.setTextFormat(Qt.TextFormat.PlainText)
         self.reason.setStyleSheet("font-weight: 600")
         self.problem.setStyleSheet("color: #d62839")
         self.buttons = {

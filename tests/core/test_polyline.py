@@ -96,7 +96,10 @@ def test_lines_start_in_the_west_or_in_the_south_if_they_run_north(step, turned)
     assert starts_at_its_end(np.array([[5.0, 5.0], np.add([5.0, 5.0], step)])) is turned
 
 
-@pytest.mark.parametrize(("variable", "number"), [("1", 1), ("12", 12), ("", -1), ("0", -1), ("4,2", -1), (None, -1)])
+VARIABLES = [("1", 1), ("12", 12), ("", -1), ("0", -1), ("4,2", -1), (None, -1), ("999999999", 256), ("9" * 5000, -1)]
+
+
+@pytest.mark.parametrize(("variable", "number"), VARIABLES)
 def test_the_environment_limits_the_threads(monkeypatch, variable, number):
     if variable is None:
         monkeypatch.delenv("OMP_NUM_THREADS", raising=False)

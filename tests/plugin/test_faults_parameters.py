@@ -154,7 +154,7 @@ FAULTS = [
         "class of 5,000 digits",
         with_(RAIL_CLASSES="9" * 5000),
         REFUSED,
-        'RAIL_CLASSES "999…" must be whole numbers from 0 to 255 such as 10 or 10,11.',
+        f'RAIL_CLASSES "{"9" * 99}… must be whole numbers from 0 to 255 such as 10 or 10,11.',
     ),
     Fault(
         "class without points",

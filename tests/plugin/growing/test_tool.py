@@ -139,6 +139,11 @@ def test_without_a_cloud_it_says_what_to_do(qgis, canvas, plugin, growing):
     assert growing.message == "Select a point cloud in the layer panel, then click on a rail."
 
 
+def test_messages_are_not_read_as_html(growing):
+    growing._say("<img src='//server/share/x.las'> does not exist")
+    assert "&lt;img" in growing.bar.currentItem().text()
+
+
 def test_a_second_cloud_has_to_wait(qgis, canvas, layer, growing):
     growing.click(place(6.0, SPACING_M / 2))
     wait(qgis, growing)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from qgis.core import NULL, QgsCoordinateReferenceSystem, QgsFeature, QgsGeometry, QgsProject, QgsVectorLayer
 from qgis.gui import QgsMapCanvas
+from qgis.PyQt.QtCore import Qt
 from qgis.PyQt.QtWidgets import QMainWindow
 from rail_extract.core.fields import FINDING_FIELDS, RAIL_FIELDS
 from rail_extract.core.frame import LocalFrame
@@ -102,6 +103,15 @@ def test_findings_come_in_their_order_with_words_and_figures(load, dock):
     shown.buttons["next"].click()
     assert shown.text.text() == "Track 1, 8.0 to 10.0 m: gauge 1440.0 mm."
     assert not shown.buttons["next"].isEnabled()
+
+
+def test_values_of_a_layer_are_not_read_as_html(load, dock):
+    load("Findings", FINDING_FIELDS, [section(2.0, 4.0, finding=1, reason="<img src='//server/share/x.png'>")])
+    shown = dock()
+    assert shown.reason.text() == "<img src='//server/share/x.png'>"
+    assert {label.textFormat() for label in (shown.reason, shown.text, shown.note, shown.problem)} == {
+        Qt.TextFormat.PlainText
+    }
 
 
 def test_the_map_shows_the_place(load, dock):
