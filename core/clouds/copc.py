@@ -6,23 +6,17 @@ in memory, and does not end where pages of a damaged octree refer to each other.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .laz import ChunkTable
+from .laz import Chunk
 from .readers import Extent
 
 if TYPE_CHECKING:
     import laspy
-
-try:
-    import lazrs
-except ImportError:
-    lazrs = None
 
 ENTRY = np.dtype([("level", "<i4"), ("key", "<i4", 3), ("at", "<u8"), ("size", "<i4"), ("points", "<i4")])
 """Entry of the octree: depth and place of a node, and position, bytes and points of its chunk."""
@@ -30,30 +24,18 @@ ENTRY = np.dtype([("level", "<i4"), ("key", "<i4", 3), ("at", "<u8"), ("size", "
 PAGE = -1
 """Number of points that marks an entry for another page of the octree."""
 
-CHUNKS_AT = 8
-"""Bytes between the start of the point data and the first chunk: the position of the chunk table."""
-
 MAX_LEVEL = 30
 """Deepest level of an octree: below it, a node of a cloud 1000 km long is a millimetre wide."""
 
 
-@dataclass(frozen=True)
-class Chunk:
-    """A compressed chunk of points: its position in the file, bytes, and number of points."""
-
-    at: int
-    size: int
-    points: int
-
-
-def chunks_in(path: Path, header: laspy.LasHeader, table: ChunkTable, extent: Extent) -> tuple[Chunk, ...] | None:
+def chunks_in(path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], extent: Extent) -> tuple[Chunk, ...] | None:
     """List the chunks that may hold points of an extent, in the order of the file.
 
     Parameters
     ----------
     path : Path
     header : laspy.LasHeader
-    table : list of tuple
+    chunks : sequence of Chunk
         From `laz.read_chunk_table`.
     extent : tuple of float
 
@@ -67,9 +49,7 @@ def chunks_in(path: Path, header: laspy.LasHeader, table: ChunkTable, extent: Ex
         return None
     nodes = _nodes(path, info.hierarchy_root_offset, info.hierarchy_root_size)
     nodes = nodes[np.argsort(nodes["at"], kind="stable")]
-    points, sizes = np.array([one for one in table if one[0]], dtype=np.int64).reshape(-1, 2).T
-    starts = header.offset_to_point_data + CHUNKS_AT + np.cumsum(np.append(0, sizes[:-1]))[: len(sizes)]
-    stated = np.stack([starts, sizes, points]).astype(np.int64)
+    stated = np.array([(chunk.at, chunk.size, chunk.points) for chunk in chunks], dtype=np.int64).reshape(-1, 3).T
     found = np.stack([nodes["at"].astype(np.int64), nodes["size"], nodes["points"]])
     levels_fit = ((nodes["level"] >= 0) & (nodes["level"] <= MAX_LEVEL)).all()
     if not np.array_equal(found, stated) or not levels_fit or not np.isfinite([*info.center, info.halfsize]).all():
@@ -96,49 +76,3 @@ def _nodes(path: Path, root_at: int, root_size: int) -> np.ndarray:
             nodes.append(entries[entries["points"] > 0])
             pages += [(int(one["at"]), int(one["size"])) for one in entries[entries["points"] == PAGE]]
     return np.concatenate(nodes)
-
-
-def read_chunks(
-    path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], fields: laspy.DecompressionSelection, most: int
-) -> Iterator[laspy.ScaleAwarePointRecord]:
-    """Read chunks, several at once as long as they hold no more than `most` points.
-
-    Parameters
-    ----------
-    path : Path
-    header : laspy.LasHeader
-    chunks : sequence of Chunk
-    fields : laspy.DecompressionSelection
-        What to decompress.
-    most : int
-    """
-    from laspy.point.record import PackedPointRecord, ScaleAwarePointRecord
-
-    record = header.vlrs.get("LasZipVlr")[0].record_data
-    with path.open("rb") as file:
-        for group in _groups(chunks, most):
-            held = b"".join(_read_at(file, chunk) for chunk in group)
-            points = np.empty(sum(chunk.points for chunk in group) * header.point_format.size, dtype=np.uint8)
-            table = [(chunk.points, chunk.size) for chunk in group]
-            lazrs.decompress_points_with_chunk_table(held, record, points, table, fields.to_lazrs())
-            packed = PackedPointRecord.from_buffer(points, header.point_format)
-            yield ScaleAwarePointRecord(packed.array, packed.point_format, header.scales, header.offsets)
-
-
-def _read_at(file, chunk: Chunk) -> bytes:
-    file.seek(chunk.at)
-    return file.read(chunk.size)
-
-
-def _groups(chunks: Sequence[Chunk], most: int) -> Iterator[list[Chunk]]:
-    """Divide chunks into groups of no more than `most` points, or of one chunk."""
-    group: list[Chunk] = []
-    count = 0
-    for chunk in chunks:
-        if group and count + chunk.points > most:
-            yield group
-            group, count = [], 0
-        group.append(chunk)
-        count += chunk.points
-    if group:
-        yield group

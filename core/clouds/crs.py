@@ -31,6 +31,9 @@ MIN_UNIT_M, MAX_UNIT_M = 0.001, 2000.0
 UNITS_OF_LENGTH = ("LinearUnit", "Unit")
 """Types of unit in PROJJSON that are lengths; the other types are angles, scales, times and parameters."""
 
+MAX_COORDINATE = 1e10
+"""Largest coordinate, in any unit of length: the earth's circumference is 4e9 cm."""
+
 MAX_NAME = 80
 """Characters of a coordinate system's name that a message quotes: files may state any text."""
 

@@ -14,7 +14,7 @@ from ..errors import CloudError, EmptyCloudError
 from ..parameters import OVERLAP, SYNTHETIC
 from ..progress import SILENT, Progress
 from . import copc, laz
-from .crs import crs_of_geokeys, import_pyproj
+from .crs import MAX_COORDINATE, crs_of_geokeys, import_pyproj
 from .passes import marks_of
 from .readers import Chunk, CloudHeader, Extent, Points
 
@@ -44,9 +44,6 @@ MAX_SCALE = 1000.0
 
 MAX_EMPTY = 64
 """Most bytes between the header and the end of a file without points: LAZ files have an empty table of chunks there."""
-
-MAX_OFFSET = 1e10
-"""Largest coordinate, in units of the CRS: the earth's circumference is 4e9 cm."""
 
 MAX_POINT_FORMAT, FORMAT_BITS = 10, 0x3F
 """Last point format of LAS 1.4, and the bits of the byte that hold it; the others mark compressed points."""
@@ -99,13 +96,11 @@ def _chunks(
         header, done, some = reader.header, 0, None
         timed = "gps_time" in header.point_format.dimension_names
         if header.are_points_compressed:
-            table = laz.read_chunk_table(path, header)
-            laz.check_layers(path, header, table, progress)
-            some = copc.chunks_in(path, header, table, extent) if extent is not None else None
+            chunks = laz.read_chunk_table(path, header)
+            laz.check_layers(path, header, chunks, progress)
+            some = copc.chunks_in(path, header, chunks, extent) if extent is not None else None
         total = header.point_count if some is None else sum(one.points for one in some)
-        most = chunk_size(header)
-        parts = reader.chunk_iterator(most) if some is None else copc.read_chunks(path, header, some, FIELDS, most)
-        for chunk in parts:
+        for chunk in read_blocks(path, reader, FIELDS, some):
             progress.check()
             gps_time = np.asarray(chunk.gps_time) if timed else None
             marks = marks_of(np.asarray(chunk.point_source_id), header.file_source_id, gps_time)
@@ -127,9 +122,28 @@ def _valid(chunk: laspy.ScaleAwarePointRecord, leave_out: Sequence[str]) -> np.n
     return valid
 
 
-def chunk_size(header: laspy.LasHeader) -> int:
-    """Return the number of points to read at once."""
-    return max(1, min(CHUNK, MAX_READ // header.point_format.size))
+def read_blocks(
+    path: Path,
+    reader: laspy.LasReader,
+    fields: laspy.DecompressionSelection,
+    chunks: Sequence[laz.Chunk] | None = None,
+) -> Iterator[laspy.ScaleAwarePointRecord]:
+    """Read the points of a file block by block.
+
+    Parameters
+    ----------
+    path : Path
+    reader : LasReader
+    fields : DecompressionSelection
+        What to decompress.
+    chunks : sequence of Chunk, optional
+        Compressed chunks to read; all by default.
+    """
+    header = reader.header
+    most = max(1, min(CHUNK, MAX_READ // header.point_format.size))
+    if not header.are_points_compressed:
+        return reader.chunk_iterator(most)
+    return laz.read_chunks(path, header, laz.read_chunk_table(path, header) if chunks is None else chunks, fields, most)
 
 
 def _coordinates(chunk: laspy.ScaleAwarePointRecord, keep: np.ndarray | slice) -> np.ndarray:
@@ -192,7 +206,7 @@ def _check_header(path: Path, header: laspy.LasHeader) -> None:
             )
         raise EmptyCloudError(f"{path.name} has no points: leave it out, or export it again.")
     scales_fit = np.isfinite(header.scales).all() and (header.scales > 0).all()
-    offsets_fit = (np.abs(header.offsets) <= MAX_OFFSET).all()
+    offsets_fit = (np.abs(header.offsets) <= MAX_COORDINATE).all()
     if not scales_fit or (header.scales > MAX_SCALE).any() or not offsets_fit:
         raise CloudError(f"{path.name} has a damaged header (coordinate scale or offset): export it again.")
     if header.are_points_compressed:

@@ -1,16 +1,20 @@
-"""Checks of compressed clouds (LAZ, COPC) before they are decompressed.
+"""Reader of the chunks of compressed clouds (LAZ, COPC), which are checked before they are decompressed.
 
-lazrs allocates whatever a file states, and the program ends if that fails. These checks therefore compare every size in
-a file with the size of the file first. The layout of chunks is that of LASzip's specification, version 1.4 R15.
+lazrs allocates whatever a file states, and the program ends if that fails or if a chunk makes lazrs call itself without
+end. Every size in a file is therefore compared with the size of the file first, and every chunk is searched for bytes
+that no encoder writes. The layout of chunks is that of LASzip's specification, version 1.4 R15.
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from os import SEEK_END
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
+
+import numpy as np
 
 from ..errors import CloudError
 from ..progress import SILENT, Progress
@@ -42,11 +46,32 @@ EXTRA_BYTES = 14
 COMPRESSOR, ITEM_COUNT, ITEMS_AT, ITEM = "<H", "<H", 34, "<HHH"
 """Parts of the LASzip record: its first and last numbers, then type, size and version of each item."""
 
-ChunkTable = list[tuple[int, int]]
-"""Number of points and of bytes of each chunk; in files with chunks of one size, the last may hold fewer points."""
+FIRST_CHUNK = 8
+"""Bytes between the start of the point data and the first chunk: the position of the chunk table."""
+
+TIMES_LAYER = 8
+"""Number of the layer of GPS times."""
+
+ERASED = b"\xff"
+"""Byte of which storage consists where nothing was written. lazrs decodes a run of them as one change after another
+between sequences of GPS times, calls itself for each, and ends the program after some 30,000; encoders write one change
+in a row."""
+
+MAX_ERASED, MAX_ERASED_TIMES = 15, 6
+"""Longest run of erased bytes that is decompressed: in chunks without layers, where runs from 32 bytes have ended the
+program, and in layers of GPS times, where runs from 8 have. By chance, 7 such bytes occur once in 70 million GB."""
 
 
-def read_chunk_table(path: Path, header: laspy.LasHeader) -> ChunkTable:
+@dataclass(frozen=True)
+class Chunk:
+    """A compressed chunk of points: its position in the file, bytes, and number of points."""
+
+    at: int
+    size: int
+    points: int
+
+
+def read_chunk_table(path: Path, header: laspy.LasHeader) -> tuple[Chunk, ...]:
     """Read the table of chunks, and refuse a file whose chunks do not fit it or do not hold the stated points.
 
     Raises
@@ -77,17 +102,26 @@ def read_chunk_table(path: Path, header: laspy.LasHeader) -> ChunkTable:
     least = most if vlr.uses_variable_size_chunks() or not table else most - table[-1][0]
     if not least <= header.point_count <= most:
         raise _other_count(path, header.point_count, most if least == most else f"{least} to {most}")
-    return table
+    return tuple(_chunks(table, header))
 
 
-def check_layers(path: Path, header: laspy.LasHeader, table: ChunkTable, progress: Progress = SILENT) -> None:
+def _chunks(table: Sequence[tuple[int, int]], header: laspy.LasHeader) -> Iterator[Chunk]:
+    """Yield the chunks that hold points; where all are of one size, the last may hold fewer than the table states."""
+    at, left = header.offset_to_point_data + FIRST_CHUNK, header.point_count
+    for points, held in table:
+        if points and held:  # some writers end with an empty chunk
+            yield Chunk(at, held, min(points, left))
+        at, left = at + held, left - points
+
+
+def check_layers(path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], progress: Progress = SILENT) -> None:
     """Refuse a file with a chunk that is smaller than its layers, or whose chunks hold another number of points.
 
     Parameters
     ----------
     path : Path
     header : laspy.LasHeader
-    table : list of tuple
+    chunks : sequence of Chunk
         From `read_chunk_table`.
     progress : Progress
 
@@ -96,20 +130,86 @@ def check_layers(path: Path, header: laspy.LasHeader, table: ChunkTable, progres
     CloudError
     """
     record = _record(path, header)
-    if struct.unpack_from(COMPRESSOR, record)[0] != LAYERED:
+    if not _is_layered(record):
         return
-    layers, point_size = sum(_layers(record)), header.point_format.size
-    start, total = header.offset_to_point_data + 8, 0
+    head, total = _head(record, header), 0
     with path.open("rb") as file:
-        for points, held in filter(all, table):  # some writers end with an empty chunk
+        for chunk in chunks:
             progress.check()
-            file.seek(start + point_size)
-            stated, *sizes = struct.unpack(f"<{1 + layers}I", file.read(4 + 4 * layers))
-            if stated > points or point_size + 4 + 4 * layers + sum(sizes) > held:
+            file.seek(chunk.at)
+            stated, *sizes = _layer_sizes(file.read(head), header)
+            if stated > chunk.points or head + sum(sizes) > chunk.size:
                 raise _misfit(path)
-            start, total = start + held, total + stated
+            total += stated
     if total != header.point_count:
         raise _other_count(path, header.point_count, total)
+
+
+def read_chunks(
+    path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], fields: laspy.DecompressionSelection, most: int
+) -> Iterator[laspy.ScaleAwarePointRecord]:
+    """Decompress chunks, several at once as long as they hold no more than `most` points.
+
+    Parameters
+    ----------
+    path : Path
+    header : laspy.LasHeader
+    chunks : sequence of Chunk
+        From `read_chunk_table`.
+    fields : laspy.DecompressionSelection
+        What to decompress.
+    most : int
+        Points in what is yielded.
+
+    Raises
+    ------
+    CloudError
+        A chunk contains erased bytes.
+    """
+    from laspy.point.record import PackedPointRecord, ScaleAwarePointRecord
+
+    record = _record(path, header)
+    with path.open("rb") as file:
+        for group in _groups(chunks, most):
+            held = [_read(file, chunk) for chunk in group]
+            if any(_is_erased(one, record, header) for one in held):
+                raise CloudError(f"{path.name} is damaged: parts of its points are erased; copy or export it again.")
+            points = np.empty(sum(chunk.points for chunk in group) * header.point_format.size, dtype=np.uint8)
+            table = [(chunk.points, chunk.size) for chunk in group]
+            lazrs.decompress_points_with_chunk_table(b"".join(held), record, points, table, fields.to_lazrs())
+            packed = PackedPointRecord.from_buffer(points, header.point_format)
+            for start in range(0, len(packed), most):
+                part = packed.array[start : start + most]
+                yield ScaleAwarePointRecord(part, packed.point_format, header.scales, header.offsets)
+
+
+def _groups(chunks: Sequence[Chunk], most: int) -> Iterator[list[Chunk]]:
+    """Divide chunks into groups of no more than `most` points, or of one chunk."""
+    group: list[Chunk] = []
+    count = 0
+    for chunk in chunks:
+        if group and count + chunk.points > most:
+            yield group
+            group, count = [], 0
+        group.append(chunk)
+        count += chunk.points
+    if group:
+        yield group
+
+
+def _read(file: BinaryIO, chunk: Chunk) -> bytes:
+    file.seek(chunk.at)
+    return file.read(chunk.size)
+
+
+def _is_erased(chunk: bytes, record: bytes, header: laspy.LasHeader) -> bool:
+    """Return whether the part of a chunk that holds the compressed GPS times contains a run of erased bytes."""
+    if not _is_layered(record):
+        return chunk.find(ERASED * (MAX_ERASED + 1), header.point_format.size) >= 0
+    head = _head(record, header)
+    _, *sizes = _layer_sizes(chunk[:head], header)
+    start, end = (head + sum(sizes[:count]) for count in (TIMES_LAYER, TIMES_LAYER + 1))
+    return chunk.find(ERASED * (MAX_ERASED_TIMES + 1), start, end) >= 0
 
 
 def _record(path: Path, header: laspy.LasHeader) -> bytes:
@@ -132,12 +232,27 @@ def _find_table(file: BinaryIO, points_at: int) -> int:
     return struct.unpack("<q", stated)[0] if len(stated) == 8 else 0
 
 
-def _layers(record: bytes) -> Iterator[int]:
-    """Yield the number of layers of each compressed item."""
+def _is_layered(record: bytes) -> bool:
+    return struct.unpack_from(COMPRESSOR, record)[0] == LAYERED
+
+
+def _head(record: bytes, header: laspy.LasHeader) -> int:
+    """Return the bytes at the start of a layered chunk: a point, the number of points, and the sizes of the layers."""
+    layers = sum(size if kind == EXTRA_BYTES else LAYERS[kind] for kind, size in _items(record))
+    return header.point_format.size + 4 * (1 + layers)
+
+
+def _layer_sizes(head: bytes, header: laspy.LasHeader) -> tuple[int, ...]:
+    """Return the number of points and the bytes of each layer, from the start of a layered chunk."""
+    return tuple(np.frombuffer(head, "<u4", offset=header.point_format.size).tolist())
+
+
+def _items(record: bytes) -> Iterator[tuple[int, int]]:
+    """Yield the type and the size of each compressed item."""
     (count,) = struct.unpack_from(ITEM_COUNT, record, ITEMS_AT - 2)
     for number in range(count):
         kind, size, _ = struct.unpack_from(ITEM, record, ITEMS_AT + number * struct.calcsize(ITEM))
-        yield size if kind == EXTRA_BYTES else LAYERS[kind]
+        yield kind, size
 
 
 def _misfit(path: Path) -> CloudError:

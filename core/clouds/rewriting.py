@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..progress import SILENT, Progress
-from .las import chunk_size, laspy
+from .las import laspy, read_blocks
 from .laz import lazrs
 from .readers import explained
 
@@ -59,7 +59,7 @@ def rewrite(path: Path, new: Path, change: Change, progress: Progress = SILENT) 
     """Write a copy of a file with other classes, and return how many points it has.
 
     The order of the points, their other dimensions, the scale and the records of the header stay. A COPC file becomes
-    a LAZ or LAS file without the records of its octree.
+    a LAZ or LAS file without the records of its octree, and LAS 1.0, which laspy does not write, becomes 1.2.
 
     Parameters
     ----------
@@ -84,6 +84,7 @@ def rewrite(path: Path, new: Path, change: Change, progress: Progress = SILENT) 
         header = reader.header
         for record in header.vlrs.get_by_id(COPC):
             header.vlrs.remove(record)
+        header.version = _version(header)
         with explained(path):
             for record in header.vlrs:
                 record.user_id.encode("ascii")  # otherwise laspy can't write it
@@ -103,6 +104,14 @@ def rewrite(path: Path, new: Path, change: Change, progress: Progress = SILENT) 
         if header.number_of_evlrs:
             _append_records(path, header.start_of_first_evlr, header.number_of_evlrs, new)
     return written
+
+
+def _version(header: laspy.LasHeader) -> laspy.header.Version:
+    """Return the version of a header, or another one if laspy does not write its point format in this version."""
+    number, dims = header.point_format.id, laspy.point.dims
+    if number in dims.VERSION_TO_POINT_FMT.get(str(header.version), ()):
+        return header.version
+    return laspy.header.Version.from_str(dims.preferred_file_version_for_point_format(number))
 
 
 def _append_records(path: Path, start: int, count: int, new: Path) -> None:
@@ -151,7 +160,7 @@ def _chunks(path: Path, reader: laspy.LasReader, progress: Progress) -> Iterator
     """Read a file chunk by chunk; what laspy raises because of the file becomes a `CloudError`."""
     done = 0
     with explained(path):
-        for chunk in reader.chunk_iterator(chunk_size(reader.header)):
+        for chunk in read_blocks(path, reader, laspy.DecompressionSelection.all()):
             progress.check()
             yield chunk
             done += len(chunk)

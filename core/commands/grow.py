@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..clouds.crs import MAX_COORDINATE
 from ..clouds.points import ask
 from ..disk import writing
 from ..errors import ParameterError
@@ -30,10 +31,6 @@ LENGTHS = {
     "max_length": "length that is followed to either side of a seed",
 }
 """Options in metres, each an attribute of `GrowParameters` without its unit."""
-
-
-MAX_COORDINATE = 1e10
-"""Largest coordinate of a seed, in any unit of length: the earth's circumference is 4e9 cm."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -24,7 +24,7 @@ from qgis.core import (
     QgsWkbTypes,
 )
 
-from ...core.clouds.crs import parse_crs, units, warn_of_scale
+from ...core.clouds.crs import MAX_COORDINATE, parse_crs, units, warn_of_scale
 from ...core.clouds.mask import Mask
 from ...core.errors import CrsError, RailExtractError
 from ...core.fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
@@ -244,10 +244,11 @@ def _read(
     ]
     if not found:
         raise RailExtractError(f"{name} has no lines: give a line layer.")
-    lost = next((feature.id() for feature, vertices in found if not np.isfinite(vertices[:, :2]).all()), None)
+    lost = next((feature.id() for feature, vertices in found if _is_impossible(vertices)), None)
     if lost is not None:
         raise RailExtractError(
-            f"{name} has a line (feature {lost}) with a coordinate that is not a number: repair or delete it."
+            f"{name} has a line (feature {lost}) with a coordinate that is not a number, or larger than "
+            f"{MAX_COORDINATE:.0e}: repair or delete it."
         )
     stray = next((feature.id() for feature, vertices in found if _is_stray(vertices[:, :2] * horizontal_unit_m)), None)
     if stray is not None:
@@ -258,6 +259,13 @@ def _read(
         warn_of_scale(parse_crs(crs_wkt), [tuple(middle[:2])], "The lines are", progress, "them")
     frame = LocalFrame(origin, horizontal_unit_m, vertical_unit_m, crs_wkt)
     return [(feature, frame.to_local(vertices)) for feature, vertices in found], frame
+
+
+def _is_impossible(vertices: np.ndarray) -> bool:
+    """Return whether a vertex, of (n, 3), has no place in plan, or a coordinate larger than that of any place."""
+    return not (np.abs(vertices[:, :2]) <= MAX_COORDINATE).all() or bool(
+        (np.abs(vertices[:, 2]) > MAX_COORDINATE).any()
+    )
 
 
 def _is_stray(xy: np.ndarray) -> bool:

@@ -107,6 +107,19 @@ def with_large_layer(data):
     return overwritten(points_at(data) + 8 + POINT_6 + 4 + 8 * 4, b"\xff\xff\xff\xe4")(data)
 
 
+def with_erased_times(bench):
+    """A file of which a part of the compressed GPS times is erased."""
+    path = bench.cloud(bench.track(length_m=6.0), "cloud.laz")
+    cloud = laspy.read(path)
+    cloud.gps_time = 1e8 + 1e-6 * np.arange(len(cloud))
+    cloud.write(path)
+    data = path.read_bytes()
+    sizes_at = points_at(data) + 8 + POINT_6 + 4
+    before = sum(struct.unpack_from("<8I", data, sizes_at))
+    path.write_bytes(overwritten(sizes_at + 4 * 9 + before, b"\xff" * 16)(data))
+    return {"INPUT": path}
+
+
 def rewritten(change, name="cloud.las", version=None, point_format=None):
     """A cloud changed and rewritten with laspy."""
 
@@ -397,6 +410,12 @@ FAULTS = [
         damaged(with_large_layer, "cloud.laz"),
         REFUSED,
         "cloud.laz is damaged: its compressed chunks don't fit the file; export it again.",
+    ),
+    Fault(
+        "LAZ with an erased part, on which lazrs would end the program",
+        with_erased_times,
+        REFUSED,
+        "cloud.laz is damaged: parts of its points are erased; copy or export it again.",
     ),
     Fault(
         "COPC with 1 point stated in the header and 3600 in the chunk table",

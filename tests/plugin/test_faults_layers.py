@@ -394,13 +394,29 @@ LINES = [
         "coordinate of NaN",
         lines(line((500000, 3000001.507, 100), (500003, NAN, 100), (500006, 3000001.507, 100)), RIGHT),
         REFUSED,
-        "INPUT has a line (feature 1) with a coordinate that is not a number: repair or delete it.",
+        "INPUT has a line (feature 1) with a coordinate that is not a number, or larger than 1e+10: "
+        "repair or delete it.",
     ),
     Fault(
         "infinite coordinate",
         lines(line((500000, 3000001.507, 100), (INFINITE, 3000001.507, 100)), RIGHT),
         REFUSED,
-        "INPUT has a line (feature 1) with a coordinate that is not a number: repair or delete it.",
+        "INPUT has a line (feature 1) with a coordinate that is not a number, or larger than 1e+10: "
+        "repair or delete it.",
+    ),
+    Fault(
+        "coordinates of 1e154",
+        lines(line((0, 1e154, 100), (0, 1e154, 1e90), (9, 1e154, 100)), RIGHT),
+        REFUSED,
+        "INPUT has a line (feature 1) with a coordinate that is not a number, or larger than 1e+10: "
+        "repair or delete it.",
+    ),
+    Fault(
+        "height of 1e90",
+        lines(line((500000, 3000001.507, 100), (500006, 3000001.507, 1e90)), RIGHT),
+        REFUSED,
+        "INPUT has a line (feature 1) with a coordinate that is not a number, or larger than 1e+10: "
+        "repair or delete it.",
     ),
     Fault(
         "stray vertex 1000 km away",

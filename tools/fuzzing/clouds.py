@@ -36,7 +36,7 @@ def chunks_of_any_size() -> Iterator[None]:
 
 
 def small_cloud(version: str, point_format: int) -> laspy.LasData:
-    """Make a cloud of 300 points with a coordinate system, a record and extra bytes."""
+    """Make a cloud of 300 points with a coordinate system, GPS times, a record and extra bytes."""
     header = laspy.LasHeader(version=version, point_format=point_format)
     header.scales, header.offsets = [0.001] * 3, [500_000, 3_000_000, 0]
     header.vlrs.append(laspy.VLR("someone", 7, "a record", b"x" * 40))
@@ -45,6 +45,7 @@ def small_cloud(version: str, point_format: int) -> laspy.LasData:
     cloud = laspy.LasData(header)
     cloud.xyz = header.offsets + np.random.default_rng(1).uniform(0, 5, (300, 3))
     cloud.classification = np.full(300, RAIL, dtype=np.uint8)
+    cloud.gps_time = 1e8 + 1e-6 * np.arange(300)
     if version == "1.4":
         cloud.evlrs = laspy.vlrs.vlrlist.VLRList([laspy.VLR("someone", 8, "a late record", b"y" * 90)])
     return cloud

@@ -51,11 +51,9 @@ def write_copc(path, count=4000):
         cloud.write(path)
     with laspy.open(path) as reader:
         root_at, table = reader.header.start_of_first_evlr + 60, laz.read_chunk_table(path, reader.header)
-        at = reader.header.offset_to_point_data + 8
-    entries = b""
-    for node, (points, size) in zip(nodes.tolist(), table):
-        entries += struct.pack("<4iQ2i", *node, at, size, points)
-        at += size
+    entries = b"".join(
+        struct.pack("<4iQ2i", *node, one.at, one.size, one.points) for node, one in zip(nodes.tolist(), table)
+    )
     info = struct.pack("<5d2Q2d", *(LOW + HALF_M), HALF_M, 1.0, root_at, len(entries), 0.0, 1.0)
     data = bytearray(path.read_bytes())
     place = data.index(b"copc\0") - 2 + 54
