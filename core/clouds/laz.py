@@ -132,17 +132,19 @@ def check_layers(path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], p
     record = _record(path, header)
     if not _is_layered(record):
         return
-    head, total = _head(record, header), 0
+    head, held = _head(record, header), []
     with path.open("rb") as file:
         for chunk in chunks:
             progress.check()
             file.seek(chunk.at)
             stated, *sizes = _layer_sizes(file.read(head), header)
-            if stated > chunk.points or head + sum(sizes) > chunk.size:
+            if head + sum(sizes) > chunk.size:
                 raise _misfit(path)
-            total += stated
-    if total != header.point_count:
-        raise _other_count(path, header.point_count, total)
+            held.append(stated)
+    if sum(held) != header.point_count:
+        raise _other_count(path, header.point_count, sum(held))
+    if held != [chunk.points for chunk in chunks]:
+        raise _misfit(path)
 
 
 def read_chunks(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -42,6 +43,9 @@ metres over this length."""
 
 MAX_SPIKE_M = 10_000.0
 """A longer straight segment from which the line turns back has a stray vertex."""
+
+MAX_WHOLE, ID = 2**31 - 1, re.compile(r"\s*\d{1,10}\s*")
+"""Largest whole number of a field in every format, and an id in a list of them."""
 
 GEOMETRY_AS_IT_IS = QgsProcessingFeatureSource.Flag.FlagSkipGeometryValidityChecks
 
@@ -355,7 +359,7 @@ def _attributes(
         if column.kind is str:
             found[column.name] = _ids(feature, column.name)
         elif column.kind is int:
-            found[column.name] = int(_number(feature, column.name, defaults.get(column.name, 0)))
+            found[column.name] = _whole(feature, column.name, int(defaults.get(column.name, 0)))
         else:
             found[column.name] = _number(feature, column.name, defaults.get(column.name, math.nan))
     return found
@@ -370,10 +374,19 @@ def _number(feature: QgsFeature, name: str, default: float) -> float:
     return value if math.isfinite(value) else default
 
 
+def _whole(feature: QgsFeature, name: str, default: int) -> int:
+    """Return the number in a field without its fraction, or `default` if it does not fit a field of whole numbers."""
+    value = _number(feature, name, default)
+    return int(value) if abs(value) <= MAX_WHOLE else default
+
+
 def _ids(feature: QgsFeature, name: str) -> tuple[int, ...]:
     """Return the ids in a field such as "3,5"; none if the field is missing or holds something else."""
     words = str(_value(feature, name) or "").split(",")
-    return tuple(int(word) for word in words) if all(word.strip().isdecimal() for word in words) else ()
+    if not all(ID.fullmatch(word) for word in words):
+        return ()
+    ids = tuple(int(word) for word in words)
+    return ids if max(ids) <= MAX_WHOLE else ()
 
 
 def _gaps(feature: QgsFeature, xyz: np.ndarray) -> np.ndarray:

@@ -488,6 +488,16 @@ LINES = [
         gives=ONE_TRACK,
     ),
     Fault(
+        "class code of 1e300",
+        lines(LEFT, RIGHT, fields="&field=class_code:double", values=[(1e300,), (1e300,)]),
+        gives=ONE_TRACK,
+    ),
+    Fault(
+        "ids of 5,000 digits",
+        lines(LEFT, RIGHT, fields="&field=track_ids:string(9999)", values=[("9" * 5000,), ("9" * 5000,)]),
+        gives=ONE_TRACK,
+    ),
+    Fault(
         "equal rail_id on two rails",
         lines(LEFT, RIGHT, fields="&field=rail_id:integer", values=[(1,), (1,)]),
         gives=ONE_TRACK,
