@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.heads.edges import station_count
+from rail_extract.core.heads.edges import VIEW_STATIONS, station_count
 from rail_extract.core.heads.elevation import ElevationParameters, elevate
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.heads.sections import PROFILE_SIGMA_M
@@ -12,8 +12,13 @@ from rail_extract.core.heads.uncertainty import (
     UNSURE_GRADIENT_CHANGE,
     VARIANCE_FACTOR,
     _averaged,
+    _bridge_error,
+    _sampling,
+    _wander,
+    _with_blur,
     height_error,
     measure_support,
+    on_one_face,
 )
 from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.polyline import interpolate, length_along, project
@@ -208,3 +213,55 @@ def test_a_head_that_passes_from_either_side_widen_is_in_sigma():
     found = support(t, across * (1 + 0.011 / WIDTH), z)
     assert np.median(found.strips[:, 1]) == pytest.approx(0.011, abs=0.002)
     assert (found.sigma_m > 0.0045).all()
+
+
+@pytest.mark.parametrize(("side", "seen_m"), [(0, -0.001), (1, 0.001)])
+def test_a_middle_from_a_single_edge_errs_by_its_corner(side, seen_m):
+    """The line is where this edge alone puts the middle, so nothing else is in doubt."""
+    t, across, z = head(12.0, 10_000, noise=0.001)
+    free = np.ones((2, station_count(12.0)), dtype=bool)
+    free[side] = False
+    alone = measure_support(t, across + seen_m, z, 12.0, WIDTH, 0.8, UNSEEN, free)
+    assert np.median(alone.sigma_m) == pytest.approx(0.0012, abs=0.0001)
+
+
+def test_edges_err_by_chance_as_counts_do():
+    """Of 1000 points per metre across, blurred by 3 and 4 mm; two edges that count equally err less by the root of 2."""
+    density, weight = np.full((2, 3), 1000.0), np.array([[1.0, 0.0, 0.5], [0.0, 0.0, 0.5]])
+    one_m = np.sqrt(np.sqrt(np.pi) * 0.005**2 / (2 * 0.003 * 1000))
+    np.testing.assert_allclose(_sampling(density, weight, 0.004, 0.003), [one_m, 0.0, one_m / np.sqrt(2)])
+
+
+def test_lines_err_where_there_are_no_points_by_an_unknown_curvature():
+    stations = np.array([1.0, 4.0, 5.0, 7.0, 12.0])
+    expected = UNSURE_CURVATURE * np.array([3 * 3, 0, 1 * 5, 3 * 3, 2 * 2]) / 2
+    np.testing.assert_allclose(_bridge_error(np.array([4.0, 10.0]), stations), expected)
+
+
+def test_a_line_on_one_face_has_the_points_of_its_face_and_its_doubt():
+    before = Support(np.arange(0.125, 1.5, 0.25), np.full(6, 9), np.full(6, 1.0))
+    found = on_one_face(before, np.array([0.1, 0.2, 0.3, 1.49, 1.6]), 0.004)
+    assert found.points.tolist() == [2, 1, 0, 0, 0, 2]
+    expected = np.hypot(0.004, _bridge_error(np.array([0.1, 0.2, 0.3, 1.49, 1.6]), before.t))
+    np.testing.assert_allclose(found.sigma_m, expected)
+
+
+def test_a_head_that_every_point_of_a_window_shows_does_not_wander():
+    points = np.full(40, 10)
+    averaged = _averaged(points, 0.8)[20]
+    wander = _wander(points, np.where(np.arange(40) < 20, averaged, 4 * averaged), WIDTH, 0.8)
+    assert wander[10] == pytest.approx(0.0, abs=1e-6)
+    assert wander[25] == pytest.approx(WIDTH * np.sqrt(0.75 / (12 * averaged)))
+
+
+def test_blur_is_in_doubt_as_far_as_one_pass_may_go_on_alone():
+    count = 3 * VIEW_STATIONS
+    plain = Support(np.arange(count) * 0.25, np.full(count, 9), np.full(count, 0.003))
+    blur, blur_up = np.zeros(count), np.zeros(count)
+    blur[-1], blur_up[-1] = 0.004, 0.006
+    found = _with_blur(plain, blur, blur_up)
+    near = np.arange(count) >= count - 1 - VIEW_STATIONS
+    np.testing.assert_allclose(found.sigma_m, np.where(near, 0.005, 0.003))
+    np.testing.assert_allclose(found.sigmaz_m, np.where(near, 0.006, 0.0))
+    assert found.strips[-1].tolist() == [1.0, 0.012, 0.004] and np.isnan(found.strips[:-1, 1]).all()
+    assert _with_blur(plain, 0 * blur, 0 * blur) is plain
