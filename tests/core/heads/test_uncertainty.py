@@ -226,7 +226,7 @@ def test_a_middle_from_a_single_edge_errs_by_its_corner(side, seen_m):
 
 
 def test_edges_err_by_chance_as_counts_do():
-    """Of 1000 points per metre across, blurred by 3 and 4 mm; two edges that count equally err less by the root of 2."""
+    """Of 1000 points per metre across, blurred by 3 and 4 mm; two edges err less by the root of 2."""
     density, weight = np.full((2, 3), 1000.0), np.array([[1.0, 0.0, 0.5], [0.0, 0.0, 0.5]])
     one_m = np.sqrt(np.sqrt(np.pi) * 0.005**2 / (2 * 0.003 * 1000))
     np.testing.assert_allclose(_sampling(density, weight, 0.004, 0.003), [one_m, 0.0, one_m / np.sqrt(2)])
