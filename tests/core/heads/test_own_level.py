@@ -1,10 +1,6 @@
 import numpy as np
 import pytest
-from rail_extract.core.heads.level import LEVEL_BIN_M
 from rail_extract.core.heads.own_level import (
-    DRIFT,
-    SAGITTA,
-    STEP_M,
     _chain,
     _gradient,
     _Levels,
@@ -116,7 +112,7 @@ def test_the_fullest_level_of_a_bin_is_the_first_and_three_points_make_one():
 
 
 def test_a_level_steps_by_more_than_chance_explains():
-    for off_m, expected_m in ((0.0005, STEP_M[0]), (0.002, 4 * 1.4826 * 0.002), (0.02, STEP_M[1])):
+    for off_m, expected_m in ((0.0005, 0.008), (0.002, 4 * 1.4826 * 0.002), (0.02, 0.015)):
         bins, heights = np.repeat(np.arange(81), 2), np.zeros(162)
         heights[::2] = np.cumsum(off_m * np.resize([0, 1, -1, -1, 1, 0, -1, 1], 81))
         heights[1::2] = 5.0  # what stands on the head
@@ -125,7 +121,7 @@ def test_a_level_steps_by_more_than_chance_explains():
 
 def test_a_rail_leaves_the_straight_line_between_known_bins_by_its_sagitta():
     found = _sagitta(np.array([5, 10, 14, 20, 30]), np.array([10, 20]))
-    np.testing.assert_allclose(found, [0, 0, SAGITTA * 4 * 6 * LEVEL_BIN_M**2, 0, 0])
+    np.testing.assert_allclose(found, [0, 0, 5e-5 * 2 * 3, 0, 0])
 
 
 @pytest.mark.parametrize(("skipped", "step_m", "lengths"), [(3, 0.0, [22]), (4, 0.0, [12, 10]), (1, 0.01, [12, 10])])
@@ -154,8 +150,8 @@ def level(start, end, up):
     ("other", "kept"),
     [
         (level(60, 100, 0.0), [0, 1]),  # a gap of 10 m
-        (level(60, 100, 0.009 + DRIFT * 10.0), [0, 1]),
-        (level(60, 100, 0.06 + DRIFT * 10.0), [0]),  # further off than its gradient explains
+        (level(60, 100, 0.009 + 0.04), [0, 1]),
+        (level(60, 100, 0.06 + 0.04), [0]),  # further off than its gradient explains
         (level(300, 340, 0.107), [0, 1]),
         (level(300, 340, 0.12), [0]),  # longer gaps are not seen through
         (level(40, 80, 0.049), [0, 1]),  # another pass

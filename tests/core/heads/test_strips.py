@@ -9,8 +9,6 @@ from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.elevation import ElevationParameters, elevate
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.heads.strips import (
-    DRIFT_LENGTH_M,
-    DRIFT_M,
     _from_mean,
     _inner,
     _prior,
@@ -151,9 +149,9 @@ def test_the_offset_of_a_strip_drifts_by_two_centimetres_and_forgets_over_fifty_
     information = (matrix.T @ matrix).toarray()
     offsets = np.arange(360).reshape(120, 3)[:, 1]
     covariance = np.linalg.inv(information[np.ix_(offsets, offsets)])
-    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), DRIFT_M, rtol=0.02)
-    away = np.arange(120) / DRIFT_LENGTH_M
-    np.testing.assert_allclose(covariance[0] / DRIFT_M**2, (1 + away) * np.exp(-away), atol=0.03)
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), 0.02, rtol=0.02)
+    away = np.arange(120) / 50.0
+    np.testing.assert_allclose(covariance[0] / 0.02**2, (1 + away) * np.exp(-away), atol=0.03)
     assert not information[np.ix_(offsets, offsets + 1)].any() and not target.any()
 
 
@@ -168,3 +166,15 @@ def test_strips_that_meet_are_off_by_half_of_their_step_whatever_the_line_does()
     np.testing.assert_allclose(found[:, 25:35], [[0.008], [-0.008]] * np.ones(10), atol=0.0006)
     np.testing.assert_allclose(found[0] + found[1], 0.0, atol=0.002)
     np.testing.assert_allclose(found[0, 8:13], found[0, 20], atol=0.002)
+
+
+def test_points_at_the_very_end_of_a_line_are_in_its_last_station():
+    """Feet may lie a little beyond the end of a line, here one of whole metres."""
+    random = np.random.RandomState(0)
+    x = np.tile(np.linspace(0, 20.0004, 4000), 2)
+    xyz = np.column_stack([x, random.uniform(-0.036, 0.036, 8000), np.zeros(8000)])
+    strips = np.repeat([1, 2], 4000).astype(np.uint16)
+    line = np.column_stack([np.linspace(0, 20, 201), np.zeros(201)])
+    (found,) = strips_along([line], RailPoints(xyz, LocalFrame(np.zeros(3)), 10, strips), HEAD_M)
+    assert found.points.shape == (2, 20)
+    assert found.points[:, 10] == pytest.approx(200, rel=0.05)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.heads import top
-from rail_extract.core.heads.top import MIN_POINTS, PROFILE_BIN_M, TAIL_M, Profile, find_top
+from rail_extract.core.heads.top import MIN_POINTS, PROFILE_BIN_M, TAIL_M, Profile, _under_disc, find_top
 
 WIDTH = 0.072
 
@@ -59,3 +59,18 @@ def test_the_height_is_that_on_the_axis_without_faces_and_weeds(noise_m):
 def test_too_few_points_show_no_top(count):
     found = find_top(*points(count), WIDTH, 0.3, 0.03, 3.0)
     assert (found is None) == (count < MIN_POINTS)
+
+
+@pytest.mark.parametrize("noise_m", [0.0, 0.002, 0.0045])
+def test_points_on_top_are_as_far_below_the_disc_as_their_noise_explains(noise_m):
+    random = np.random.default_rng(1)
+    t = np.sort(random.uniform(0, 20, 20_000))
+    z = random.normal(0, noise_m, len(t))
+    z[:: len(t) // 40] = 5 * noise_m  # the disc rests on these
+    limit_m = min(0.03, max(0.01, 6.0 * noise_m))
+    probes = np.arange(3, len(t), 500)
+    for depth_m, is_on_top in ((0.8 * limit_m, True), (1.25 * limit_m, False)):
+        z[probes] = 5 * noise_m - depth_m
+        found, noise = _under_disc(t, z, 0.3, 0.03)
+        assert np.mean(found[probes] == is_on_top) > 0.9
+        assert noise == pytest.approx(max(noise_m, 0.001), abs=0.0006)

@@ -1,6 +1,7 @@
 """Smoothed networks: lines that met still meet."""
 
 import numpy as np
+import pytest
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.lines.network_smoothing import NETWORK_STATIONS_PER_SIGMA, bend_through, smooth_network
 from rail_extract.core.lines.smoothing import smooth_line
@@ -112,3 +113,16 @@ def test_bending_a_line_equals_one_dense_system():
     expected = line + fading(t[:, None] - t[places]) @ weights
     bend_through(line, t, places, targets)
     np.testing.assert_allclose(line, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("turned", [(False, False), (False, True), (True, False), (True, True)])
+def test_free_ends_of_lines_that_run_on_are_smoothed_as_those_of_one_line(turned):
+    line = wavy(np.arange(0, 20, 0.1), np.zeros(200), 3)
+    ends = np.array([[0, 1], [1, 2]])
+    lines = tuple(one[::-1] if turn else one for one, turn in zip((line[:101], line[100:]), turned))
+    ends = np.array([pair[::-1] if turn else pair for pair, turn in zip(ends, turned)])
+    smoothed = smooth_network(LineNetwork(lines, line[[0, 100, -1]], ends), SIGMA)
+    (expected,) = smooth_network(LineNetwork((line,), line[[0, -1]], np.array([[0, 1]])), SIGMA).lines
+    for own, turn in zip(smoothed.lines, turned):
+        own = own[::-1] if turn else own
+        np.testing.assert_allclose(own[:, 1], np.interp(own[:, 0], *expected.T), atol=5e-5)

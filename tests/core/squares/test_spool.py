@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from rail_extract.core.errors import Cancelled, NoRailPointsError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.progress import Progress
 from rail_extract.core.squares.grid import MemorySource, Square, lay_out
-from rail_extract.core.squares.spool import SpooledPoints, spool
+from rail_extract.core.squares.spool import SpooledPoints, _fingerprint, spool
 
 SIDE = 30.0
 
@@ -210,3 +211,11 @@ def test_points_at_one_place_are_read_with_a_single_copy(tmp_path):
         tracemalloc.stop()
     np.testing.assert_array_equal(near.xyz, points)
     assert peak < 2.5 * points.nbytes
+
+
+def test_the_order_of_classes_counts_where_the_first_one_holds_all_points(files):
+    request = ask(files, [10, 11])
+    names = set()
+    for merged, codes in ((False, (10, 11)), (False, (11, 10)), (True, (10, 11)), (True, (11, 10))):
+        names.add(_fingerprint(replace(request, merged=merged, class_codes=codes), request.headers[0], SIDE))
+    assert len(names) == 3
