@@ -1,5 +1,6 @@
 import numpy as np
-from rail_extract.core.heads.neighbours import free_edges
+import pytest
+from rail_extract.core.heads.neighbours import _offset, free_edges
 
 WIDTH = 0.072
 RIGHT, LEFT = 0, 1
@@ -49,3 +50,17 @@ def test_crossing_heads_hide_both_edges_where_they_overlap_and_one_edge_next_to_
 
 def test_without_lines_there_are_no_edges():
     assert free_edges([], WIDTH) == []
+
+
+@pytest.mark.parametrize(
+    ("angle_deg", "across_m"), [(0, 0.3), (30, 0.3 - 0.1 * np.tan(np.pi / 6)), (59, 0.3 - 0.1 * np.tan(np.radians(59)))]
+)
+def test_a_line_is_met_abeam_unless_it_is_steep(angle_deg, across_m):
+    """The other line is 0.1 m ahead and 0.3 m to the left there."""
+    angle = np.radians(angle_deg)
+    other_normal = np.array([[-np.sin(angle), np.cos(angle)]])
+    step, normal = np.array([[0.1, 0.3]]), np.array([[0.0, 1.0]])
+    assert _offset(step, normal, other_normal) == pytest.approx([across_m])
+    assert _offset(step, normal, -other_normal) == pytest.approx([across_m])
+    steep = np.array([[-np.sin(1.06), np.cos(1.06)]])
+    assert _offset(step, normal, steep) == pytest.approx([0.3])

@@ -7,7 +7,7 @@ from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.edges import station_count
 from rail_extract.core.heads.elevation import ElevationParameters, elevate
 from rail_extract.core.heads.refinement import refine
-from rail_extract.core.heads.roads import hidden_edges, onto_heads
+from rail_extract.core.heads.roads import _at_gauge, _Band, hidden_edges, onto_heads
 from rail_extract.core.lines.network import LineNetwork
 
 WIDTH, SPACING, LENGTH = 0.056, 1.491, 40.0
@@ -84,3 +84,18 @@ def test_one_edge_is_hidden_on_the_side_of_the_road():
     assert not hidden_edges(t, random.uniform(-0.06, 0.06, 6000), LENGTH, WIDTH, free).any()
     band = random.uniform(-0.5 * WIDTH, 0.5 * WIDTH + 0.05, 6000)
     assert not hidden_edges(t, band, LENGTH, WIDTH, free & False).any()
+
+
+@pytest.mark.parametrize(
+    ("right_off_m", "left_off_m", "chosen"),
+    [(0.014, 0.070, 1), (0.016, 0.070, None), (-0.014, 0.028, 1), (0.010, -0.021, None), (0.040, -0.003, 0)],
+)
+def test_an_end_of_a_band_is_at_gauge_within_15_mm_and_by_12_mm_more_than_the_other(right_off_m, left_off_m, chosen):
+    (line, other) = drawn(0.0, -SPACING)
+    ends = [line + [0, left_off_m], line + [0, right_off_m]]
+    band = _Band((ends[0], ends[1]), (ends[0][::10], ends[1][::10]))
+    found = _at_gauge(line, band, [(other,)], [SPACING, 1.06])
+    assert found is (line if chosen is None else ends[chosen])
+    half = other[: len(other) // 2 - 5]
+    assert _at_gauge(line, band, [(half,)], [SPACING]) is line
+    assert _at_gauge(line, None, [(other,)], [SPACING]) is line

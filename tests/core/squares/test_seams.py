@@ -9,7 +9,7 @@ from rail_extract.core.polyline import length_along, project
 from rail_extract.core.rails import RailLine, Support
 from rail_extract.core.squares.grid import HALO_M, Square, unique_keys
 from rail_extract.core.squares.pieces import trim
-from rail_extract.core.squares.seams import join
+from rail_extract.core.squares.seams import closed_ring, join
 
 SIDE, REACH = 40.0, 20.0
 FRAME = LocalFrame(np.zeros(3))
@@ -166,3 +166,19 @@ def test_a_deviation_between_two_squares_adds_no_line():
         results.append(trim([rail(line - square.frame.shift_to(FRAME))], square))
     (line,) = join(results, FRAME)
     assert line.length_m == pytest.approx(x[-1] - x[0], abs=0.01)
+
+
+def test_the_ends_of_a_ring_meet_halfway_without_a_step():
+    angle = np.linspace(0, 2 * np.pi, 1401)
+    off = np.array([0.01, -0.02, 0.006])
+    xyz = np.column_stack([30 * np.cos(angle), 30 * np.sin(angle), 0 * angle]) + np.linspace(0, 1, 1401)[:, None] * off
+    ring = closed_ring(rail(xyz)).xyz
+    np.testing.assert_allclose(ring[[0, -1]], [[30.005, -0.01, 0.003]] * 2, atol=1e-9)
+    along = length_along(xyz[:, :2])
+    np.testing.assert_array_equal((ring == xyz).all(axis=1), np.minimum(along, along[-1] - along) >= 2 * HALO_M)
+    shift = ring - xyz
+    np.testing.assert_allclose(shift[:-1], -shift[:0:-1], atol=1e-5)
+    assert np.abs(np.diff(shift[:700, 2])).max() < 1e-4
+    apart = rail(xyz + np.linspace(0, 1, 1401)[:, None] * [0.5, 0, 0])
+    short = rail(xyz[:: 1400 // 4] * [0.05, 0.05, 1])
+    assert closed_ring(apart) is apart and closed_ring(short) is short

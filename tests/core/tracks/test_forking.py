@@ -3,7 +3,7 @@ import pytest
 from rail_extract.core.lines.thinning import thin
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.centerlines import build_centerlines
-from rail_extract.core.tracks.forking import MAX_APART_M, _angle, _extended
+from rail_extract.core.tracks.forking import MAX_APART_M, _angle, _extended, _seen_from
 from rail_extract.laboratory.curves import Element, trace
 from rail_extract.laboratory.rasters.turnouts import FORMS, branch
 from rail_extract.laboratory.ruler.lines import compare_lines
@@ -172,3 +172,13 @@ def test_a_branch_that_leaves_its_arc_late_is_not_extended(at_m, is_extended):
     if at_m is not None:
         branch[(x >= at_m) & (x < at_m + 2), 1] += 0.05
     assert (_extended(branch, through) is not None) == is_extended
+
+
+@pytest.mark.parametrize(("at_m", "first_m", "last_m"), [(0.0, 0, 149), (250.2, 101, 400), (499.0, 350, 500)])
+def test_a_line_is_seen_to_150_m_from_a_place(at_m, first_m, last_m):
+    line = np.column_stack([np.arange(0, 501.0), np.zeros((501, 2))])
+    seen = _seen_from(np.array([at_m, -1.0, 0.0]), line)
+    assert line[seen][[0, -1], 0].tolist() == [first_m, last_m]
+    returning = np.concatenate([line, line[::-1] + [0, 5.0, 0]])
+    assert _seen_from(np.array([0.0, -1.0, 0.0]), returning) == slice(0, 150)
+    assert _seen_from(line[3], line[:5]) == slice(0, 5)
