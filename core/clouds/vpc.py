@@ -21,8 +21,9 @@ def list_tiles(catalogue: Path) -> tuple[Path, ...]:
     """
     try:
         items = json.loads(catalogue.read_text(encoding="utf-8"))["features"]
-        # Other assets, such as the overview, repeat points of the tiles.
-        tiles = tuple(catalogue.parent / item["assets"]["data"]["href"] for item in items)
+        # Other assets, such as the overview, repeat points of the tiles. Nothing is looked up a million times.
+        hrefs = dict.fromkeys(item["assets"]["data"]["href"] for item in items)
+        tiles = tuple(catalogue.parent / href for href in hrefs)
     except (ValueError, TypeError, KeyError, AttributeError, OSError, RecursionError) as error:
         raise CloudError(f"{catalogue.name} is not a virtual point cloud: build it again from its tiles.") from error
     if not tiles:

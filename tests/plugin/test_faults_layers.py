@@ -333,6 +333,12 @@ RASTERS = [
         "the raster too.",
     ),
     Fault("output that overwrites the input", over_itself, run="frpdfcleanup"),
+    Fault(
+        "raster of 16 million cells that are all rail",
+        of_raster(cells=np.ones((1, 4000, 4000), np.uint8), options=["COMPRESS=DEFLATE"]),
+        REFUSED,
+        "rail.tif is not a rail raster, because 100% of its cells are rail: give the output of Rasterize Rail Points.",
+    ),
 ]
 
 LINES = [

@@ -31,6 +31,14 @@ def write_catalogue(path, *names):
     return path
 
 
+def test_a_tile_that_a_catalogue_repeats_is_looked_up_once(tmp_path, monkeypatch):
+    write_cloud(tmp_path / "a.las")
+    looked_up, exists = [], os.path.exists
+    monkeypatch.setattr("rail_extract.core.clouds.vpc.os.path.exists", lambda p: looked_up.append(p) or exists(p))
+    assert readers.list_files(write_catalogue(tmp_path / "all.vpc", *["a.las"] * 1000)) == (tmp_path / "a.las",)
+    assert looked_up.count(tmp_path / "a.las") == 1
+
+
 def test_header_states_count_extent_and_coordinate_system(tmp_path):
     xyz = write_cloud(tmp_path / "a.laz")
     header = readers.read_header(tmp_path / "a.laz")
