@@ -31,6 +31,9 @@ CREATION = (
 SIDE_TOLERANCE = 1e-6
 """Relative difference allowed between the two sides of a cell, because writers round."""
 
+PLACE_TOLERANCE = 1e-3
+"""Share of a cell to which the coordinates of the raster must be exact: those of 1e13 m are not."""
+
 
 MIN_CELL_M, MAX_CELL_M = 0.001, 0.5
 """Range of the sides of cells: smaller ones show the roughness of a head, and in larger ones two rails of the narrowest
@@ -65,6 +68,8 @@ def read_header(path: Path) -> RasterHeader:
                 f"{path.name} has cells of {width * unit_m:.3g} m, and rails are seen in cells of {MIN_CELL_M:g} to "
                 f"{MAX_CELL_M:g} m: rasterize the points again, or check the coordinate system."
             )
+        if not math.ulp(x) + math.ulp(y) < PLACE_TOLERANCE * width:
+            raise RasterError(f"{path.name} begins at {x:g}, {y:g}, where no rails can be: rasterize the points again.")
         return RasterHeader(
             class_codes=_class_codes(dataset, path.name),
             frame=LocalFrame(np.array([x, y, 0.0]), unit_m, unit_m, wkt),
@@ -220,7 +225,7 @@ def _numbers(dataset: gdal.Dataset, tag: str, count: int) -> tuple[float, ...] |
         numbers = tuple(float(word) for word in text.split(","))
     except ValueError:
         numbers = ()
-    if len(numbers) != count:
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
         raise RasterError(f"The tag {tag} of the raster can't be {text!r}: rasterize the points again.")
     return numbers
 

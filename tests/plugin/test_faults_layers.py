@@ -333,6 +333,21 @@ RASTERS = [
         "the raster too.",
     ),
     Fault("output that overwrites the input", over_itself, run="frpdfcleanup"),
+    *(
+        Fault(
+            f"raster that begins at {x:g}",
+            of_raster(grid=(x, CELL_M, 0, 3_000_000, 0, -CELL_M)),
+            REFUSED,
+            f"rail.tif begins at {x:g}, 3e+06, where no rails can be: rasterize the points again.",
+        )
+        for x in (1e300, float("nan"))
+    ),
+    Fault(
+        "raster with an infinite extent",
+        of_raster(tags={**TAGS, "RAIL_EXTENT": "-inf,0,inf,1"}),
+        REFUSED,
+        "The tag RAIL_EXTENT of the raster can't be '-inf,0,inf,1': rasterize the points again.",
+    ),
     Fault(
         "raster of 16 million cells that are all rail",
         of_raster(cells=np.ones((1, 4000, 4000), np.uint8), options=["COMPRESS=DEFLATE"]),
