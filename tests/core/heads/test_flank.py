@@ -47,3 +47,22 @@ def test_points_that_may_be_on_either_face_are_half_a_head_unsure():
     flank = find_flank(t, random.normal(0.01, 0.004, 3000), random.normal(-0.024, 0.008, 3000), WIDTH)
     assert flank.left_m == pytest.approx(0.01, abs=0.001)
     assert flank.sigma_m == WIDTH / 2
+
+
+@pytest.mark.parametrize(
+    ("width_m", "beyond_m", "is_face"),
+    [
+        (0.020, 0.011, 0),
+        (0.020, 0.013, 1),
+        (0.0315, 0.013, 1),
+        (0.0325, 0.013, 0),
+        (0.004, 0.070, 1),
+        (0.004, 0.073, 0),
+    ],
+)
+def test_a_face_is_a_narrow_band_higher_than_wide_and_less_than_twice_its_depth(width_m, beyond_m, is_face):
+    random = np.random.default_rng(0)
+    t = np.sort(random.uniform(0, 60, 3000))
+    across, z = random.uniform(-0.5, 0.5, (2, 3000))
+    found = find_flank(t, width_m * across, (width_m + beyond_m / 0.9) * z, WIDTH)  # 0.9 is between the percentiles
+    assert (found is not None) == bool(is_face)
