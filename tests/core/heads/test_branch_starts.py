@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
-from rail_extract.core.heads.branch_starts import slide_branches
+from rail_extract.core.heads.branch_starts import _blade, _Parting, _power, _section, slide_branches
 from rail_extract.core.lines.network import LineNetwork
+from rail_extract.core.lines.parting import ARC, STRAIGHT
 
 WIDTH, TOE, LENGTH = 0.072, 30.0, 80.0
 
@@ -109,3 +110,42 @@ def test_other_lines_still_meet_the_branch_that_was_given_a_new_start():
     for node, line, vertex in after.passes.tolist():
         np.testing.assert_array_equal(after.lines[line][vertex], after.nodes[node])
     np.testing.assert_array_equal(after.nodes[after.ends[2, 0]], third[0])
+
+
+@pytest.mark.parametrize(
+    ("apart", "section"),
+    [
+        ([0.02, 0.05, 0.11, 0.15, 0.21, 0.25, 0.15], (2, 5)),
+        ([0.12, 0.09, 0.11, 0.15], (2, 4)),
+        ([0.12, 0.15, 0.3, 0.02], (0, 2)),
+        ([0.3, 0.12], (0, 0)),
+    ],
+)
+def test_lines_part_between_the_last_place_too_near_and_the_first_too_far(apart, section):
+    assert _section(np.array(apart), 0.1, 0.22) == section
+
+
+@pytest.mark.parametrize(
+    ("on_arc", "on_head", "power"), [(0, 19, ARC), (0, 20, STRAIGHT), (39, 100, STRAIGHT), (40, 100, ARC)]
+)
+def test_a_blade_is_straight_where_an_arc_would_have_its_head_and_there_are_few_points(on_arc, on_head, power):
+    assert _power(np.array([on_arc, on_head])) == power
+
+
+@pytest.mark.parametrize(("touch", "first"), [(5.0, 15.0), (15.0, 5.0)])
+def test_a_blade_has_a_vertex_every_decimetre_and_leaves_along_its_law(touch, first):
+    line = np.array([[0.0, 2.0], [20.0, 2.0]])
+    for power in (STRAIGHT, ARC):
+        blade = _blade(line, touch, first, -0.2, power)
+        share = np.arange(1, 100) / 100
+        np.testing.assert_allclose(blade, np.column_stack([touch + share * (first - touch), 2 - 0.2 * share**power]))
+    assert len(_blade(line, touch, touch + 0.05, 0.1, ARC)) == 0
+
+
+def test_a_straight_blade_is_fitted_up_to_its_heel():
+    way = np.arange(5.0, 15.0, 0.1)
+    apart = np.where(way < 10, 0.03 * (way - 5), 0.15 + 0.06 * (way - 10))
+    parting = _Parting(0.0, 0, 1.0, way, apart, 1.0, 0)
+    assert parting.law(STRAIGHT).touch == pytest.approx(5.0, abs=0.01)
+    behind = _Parting(0.0, 0, 1.0, way[60:], apart[60:], 1.0, 0)
+    assert behind.law(STRAIGHT).touch == pytest.approx(7.5, abs=0.01)
