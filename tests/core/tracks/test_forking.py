@@ -1,9 +1,17 @@
 import numpy as np
 import pytest
 from rail_extract.core.lines.thinning import thin
-from rail_extract.core.rails import RailLine
+from rail_extract.core.rails import Centerline, RailLine
 from rail_extract.core.tracks.centerlines import build_centerlines
-from rail_extract.core.tracks.forking import MAX_APART_M, _angle, _extended, _seen_from
+from rail_extract.core.tracks.forking import (
+    MAX_APART_M,
+    _angle,
+    _extended,
+    _near_ends,
+    _seen_from,
+    _with_bridged,
+    _with_vertex,
+)
 from rail_extract.laboratory.curves import Element, trace
 from rail_extract.laboratory.rasters.turnouts import FORMS, branch
 from rail_extract.laboratory.ruler.lines import compare_lines
@@ -182,3 +190,35 @@ def test_a_line_is_seen_to_150_m_from_a_place(at_m, first_m, last_m):
     returning = np.concatenate([line, line[::-1] + [0, 5.0, 0]])
     assert _seen_from(np.array([0.0, -1.0, 0.0]), returning) == slice(0, 150)
     assert _seen_from(line[3], line[:5]) == slice(0, 5)
+
+
+@pytest.mark.parametrize(("off_m", "count"), [(0.0018, 5), (0.0022, 6)])
+def test_a_vertex_within_two_millimetres_moves_to_the_place_of_the_fork(off_m, count):
+    line = np.column_stack([np.arange(5.0), np.zeros(5), np.arange(5.0)])
+    place = np.array([2.0 + off_m, 0.0, 7.0])
+    forked = _with_vertex(line, place)
+    assert len(forked) == count and line[2].tolist() == [2.0, 0.0, 2.0]
+    np.testing.assert_array_equal(forked[count - 3], place)
+    np.testing.assert_array_equal(
+        np.delete(forked, count - 3, axis=0), np.delete(line, 2, axis=0) if count == 5 else line
+    )
+
+
+def centerline(*places):
+    return Centerline(np.column_stack([places, np.zeros(len(places))]), 1, 10, (1,), (2,), 1435.0, 1.0, 0.0, 0.0, 0.5)
+
+
+def test_ends_are_near_the_line_whose_stations_are_nearest():
+    through, other = centerline((0.0, 0.0), (50.0, 0.0)), centerline((0.0, -0.5), (50.0, -0.5))
+    branch = centerline((20.2, 0.25), (40.0, 5.0))
+    assert list(_near_ends([through, branch])) == [(1, 0, 0)]
+    turned = centerline((40.0, 5.0), (20.2, 0.25))
+    assert (1, -1, 0) in list(_near_ends([through, turned, other]))
+    assert list(_near_ends([through, centerline((20.2, 0.82), (40.0, 5.0))])) == []
+    assert list(_near_ends([through])) == []
+
+
+def test_an_extension_is_bridged_and_a_shorter_branch_is_not():
+    branch = centerline((10.0, 0.0), (30.0, 0.0))
+    assert _with_bridged(branch, np.array([[4.0, 0, 0], [30.0, 0, 0]])).bridged_m == pytest.approx(branch.bridged_m + 6)
+    assert _with_bridged(branch, np.array([[14.0, 0, 0], [30.0, 0, 0]])).bridged_m == branch.bridged_m
