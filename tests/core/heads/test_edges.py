@@ -9,6 +9,7 @@ from rail_extract.core.heads.edges import (
     MAX_SHIFT_BINS,
     RIM_BINS,
     WINDOWS,
+    CrossSections,
     histograms,
     mean_offsets,
     middles,
@@ -76,3 +77,12 @@ def test_mean_offsets_leave_out_points_further_than_a_head_and_empty_windows():
     _, found = mean_offsets(np.tile(t, 3), np.concatenate([across, *far]), LENGTH_M, WIDTH)
     np.testing.assert_allclose(found[:40], 0.010, atol=1e-3)
     assert np.isnan(found[50:]).all()
+
+
+def test_densities_are_those_of_the_nine_bins_to_either_side_of_a_border():
+    counts = np.random.default_rng(0).integers(0, 50, (3, 2 * HALF_RANGE_BINS)).astype(float)
+    sections, start = CrossSections.of(counts), np.array([-15, 0, 7])
+    left = [row[HALF_RANGE_BINS + at :][:9] for row, at in zip(counts, start)]
+    right = [row[: HALF_RANGE_BINS + at][-9:] for row, at in zip(counts, start)]
+    np.testing.assert_allclose(sections._density(start, 1), np.mean(left, axis=1))
+    np.testing.assert_allclose(sections._density(start, -1), np.mean(right, axis=1))
