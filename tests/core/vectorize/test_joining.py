@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.lines.network import LineNetwork
-from rail_extract.core.vectorize.joining import join_gaps
+from rail_extract.core.vectorize.joining import _View, join_gaps, unseen_m
 from rail_extract.core.vectorize.junctions import (
     run_through,
 )
@@ -79,3 +79,30 @@ def test_at_least_one_of_two_joined_ends_is_free(second_is_free):
     joined = join_gaps(network.tidy(), 5.0, 10.0)
     assert len(joined.lines) == (3 if second_is_free else 4)
     check_invariants(joined)
+
+
+def test_a_curve_is_unseen_where_cells_are_more_than_ten_centimetres_away():
+    seen = cKDTree(np.concatenate([along_x(0, 5, 0.09), along_x(5, 10, 0.11), along_x(10, 15, -0.09)]))
+    assert unseen_m(along_x(0, 15), seen) == pytest.approx(5.0, abs=0.11)
+    assert unseen_m(np.empty((0, 2)), seen) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("place", "does"),
+    [((5, 0.89), 1), ((5, -0.89), 1), ((5, 0.92), 0), ((5, -0.92), 0), ((-5, 0), 0)],
+)
+def test_an_end_faces_what_lies_ahead_within_an_angle_and_half_a_cell(place, does):
+    view = _View(np.array([[2.0, 3.0]]), np.array([[0.0, 1.0]]))
+    ahead, left = place
+    assert view.faces(np.array([[2.0 - left, 3.0 + ahead]]), 10.0).tolist() == [bool(does)]
+
+
+@pytest.mark.parametrize(("gap_m", "count"), [(4.8, 1), (5.2, 2)])
+def test_gaps_are_bridged_up_to_their_limit(gap_m, count):
+    assert len(join_gaps(loose(along_x(0, 20), along_x(19.9 + gap_m, 45)), 5.0, 10.0).lines) == count
+
+
+@pytest.mark.parametrize(("length_m", "count"), [(0.15, 2), (0.35, 1)])
+def test_pieces_without_a_direction_are_not_joined(length_m, count):
+    piece = np.array([[21.0, 0.0], [21.0 + length_m, 0.0]])
+    assert len(join_gaps(loose(along_x(0, 20), piece), 5.0, 10.0).lines) == count
