@@ -131,11 +131,11 @@ def _draw(
     stations, _ = resample(provisional, PROVISIONAL_STEP_M)
     normals = left_normals(stations)
     left, right = _meetings(rails, chain, stations, normals, half, parameters, progress.span(0.0, 0.67))
-    xyz = midway(stations, normals, left, right, 2 * half)
     apart = left.distance_m + right.distance_m
     both = ~np.isnan(apart)
     if not both.any():
         return None
+    xyz = midway(stations, normals, left, right)
     cant = (left.height_m - right.height_m)[both]
     gauge = np.hypot(apart[both], np.nan_to_num(cant)) - head_width_m
     if all(is_closed(rails[number].xyz) for pair in chain.pairs for number in (pair.left, pair.right)):

@@ -163,13 +163,7 @@ def at_gauge(left: Meeting, right: Meeting, spacing_m: float, tolerance_m: float
     return left.without(astray & ~left.paired), right.without(astray & ~right.paired)
 
 
-def midway(
-    stations: np.ndarray,
-    normals: np.ndarray,
-    left: Meeting,
-    right: Meeting,
-    spacing_m: float,
-) -> np.ndarray:
+def midway(stations: np.ndarray, normals: np.ndarray, left: Meeting, right: Meeting) -> np.ndarray:
     """Find the middle between both rails at stations.
 
     Where one rail is missing, the middle is half the median spacing from the other; stations without any rail are left
@@ -180,8 +174,7 @@ def midway(
     stations, normals : (n, 2) arrays
         Stations between the rails and unit vectors to the left.
     left, right : Meeting
-    spacing_m : float
-        Spacing to use if no station meets both rails.
+        At least one station meets both rails.
 
     Returns
     -------
@@ -189,7 +182,7 @@ def midway(
     """
     to_left, to_right = left.distance_m, right.distance_m
     both = to_left + to_right
-    usual = np.nanmedian(both) if np.isfinite(both).any() else spacing_m
+    usual = np.nanmedian(both)
     shift = np.where(np.isnan(both), np.where(np.isnan(to_left), usual / 2 - to_right, to_left - usual / 2), 0.0)
     shift = np.where(np.isnan(both), shift, (to_left - to_right) / 2)
     known = ~np.isnan(shift)

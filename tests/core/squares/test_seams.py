@@ -9,7 +9,7 @@ from rail_extract.core.polyline import length_along, project
 from rail_extract.core.rails import RailLine, Support
 from rail_extract.core.squares.grid import HALO_M, Square, unique_keys
 from rail_extract.core.squares.pieces import trim
-from rail_extract.core.squares.seams import closed_ring, join
+from rail_extract.core.squares.seams import _attached, closed_ring, join
 
 SIDE, REACH = 40.0, 20.0
 FRAME = LocalFrame(np.zeros(3))
@@ -182,3 +182,17 @@ def test_the_ends_of_a_ring_meet_halfway_without_a_step():
     apart = rail(xyz + np.linspace(0, 1, 1401)[:, None] * [0.5, 0, 0])
     short = rail(xyz[:: 1400 // 4] * [0.05, 0.05, 1])
     assert closed_ring(apart) is apart and closed_ring(short) is short
+
+
+@pytest.mark.parametrize(("x", "count"), [(55.0, 12), (50.02, 11)])
+@pytest.mark.parametrize("side", [0, -1])
+def test_a_branch_ends_in_a_vertex_of_the_line_it_left_also_on_a_gradient(x, count, side):
+    through = rail(np.column_stack([np.arange(0, 101.0, 10), np.zeros(11), np.arange(0, 21.0, 2)]))
+    branch = rail(np.array([[x, 0.01, 0.0], [x + 9, 1.0, 0.0], [x + 20, 4.0, 0.0]])[:: 1 if side == 0 else -1])
+    ended, met = _attached(branch, side, through)
+    place = [55.0, 0.0, 11.0] if count == 12 else [50.0, 0.0, 10.0]
+    assert len(met.xyz) == count and (np.diff(met.xyz[:, 0]) > 0).all()
+    np.testing.assert_allclose(ended.xyz[side], place, atol=1e-9)
+    assert (met.xyz == ended.xyz[side]).all(axis=1).sum() == 1
+    away = rail(branch.xyz + [0, 0.1, 0])
+    assert _attached(away, side, through) == (away, through)

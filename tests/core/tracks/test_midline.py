@@ -56,11 +56,9 @@ def test_the_middle_is_half_the_usual_spacing_from_a_rail_without_a_partner():
     stations, normals = np.column_stack([x, np.full(5, 0.1)]), np.tile([0.0, 1.0], (5, 1))
     left = meeting([0.65, 0.65, NAN, 0.65, NAN], 0.10 + 0.01 * x)
     right = meeting([0.85, 0.85, 0.85, NAN, NAN], 0.04 + 0.01 * x)
-    found = midway(stations, normals, left, right, 1.435)
+    found = midway(stations, normals, left, right)
     expected = np.column_stack([x, np.zeros(5), 0.07 + 0.01 * x])[:4]
     np.testing.assert_allclose(found, expected, atol=1e-12)
-    alone = midway(stations, normals, meeting(5 * [NAN]), meeting(5 * [0.85], 0.04), 1.5)
-    np.testing.assert_allclose(alone, np.column_stack([x, np.zeros(5), np.full(5, 0.04)]), atol=1e-12)
 
 
 def test_rails_outside_their_sections_must_keep_the_gauge():
