@@ -127,3 +127,18 @@ def test_the_frame_of_a_head_is_turned_with_it(slope):
     side[::20] = 0.03  # points of a face hang 30 mm below the top
     left, up = in_head_frame(t, across, z - side, WIDTH)
     assert (left - across)[::20] == pytest.approx(-0.03 * slope, abs=0.0006)
+
+
+def test_what_is_known_of_a_head_does_not_depend_on_its_height_and_gradient():
+    t, across, z = head(half_m=0.05)
+    blended = z - 0.02 * np.minimum(np.abs(across) / (0.5 * WIDTH), 1) ** 2
+    risen_m = 7.0 + 0.03 * t
+    for points in (z, blended):
+        assert is_blended(t, across, points + risen_m, WIDTH) == is_blended(t, across, points, WIDTH)
+        fall, own = (blended_fall(t, across, one, WIDTH) for one in (points + risen_m, points))
+        np.testing.assert_allclose(fall, own, atol=0.0005)
+    (top, noise_m), (own_top, own_noise_m) = (on_top(t, across, one, WIDTH) for one in (z + risen_m, z))
+    assert np.mean(top == own_top) > 0.99 and noise_m == pytest.approx(own_noise_m, rel=0.1)
+    up, own_up = (in_head_frame(t, across, one, WIDTH)[1] for one in (z + risen_m, z))
+    inner = (t > 0.5) & (t < 19.5)  # the level of the first and last half bin is that of their middle
+    np.testing.assert_allclose(up[inner], own_up[inner], atol=0.003)
