@@ -261,3 +261,13 @@ def test_wide_beams_that_blend_the_head_with_the_ballast_do_not_lower_it(density
     xyz = np.column_stack([x, across, -0.17 * beyond]) + random.normal(0, [0, 0.003, 0.012], (count, 3))
     (rail,) = elevate(network_of(straight_line(80)), cloud(xyz[xyz[:, 2] > -0.06]), PARAMETERS)
     assert abs(height_error(rail)[0]) < 0.0035
+
+
+def test_a_rail_that_shows_one_face_is_as_high_as_its_top():
+    """The middle of what is seen of the face is about 22 mm below the top."""
+    random = np.random.default_rng(0)
+    x = np.sort(random.uniform(0, 30, 3000))
+    xyz = np.column_stack([x, random.normal(0, 0.002, 3000), 4.0 + random.uniform(-0.012, 0.012, 3000)])
+    (rail,) = elevate(network_of(straight_line(30.0)), cloud(xyz), PARAMETERS)
+    assert np.median(rail.xyz[:, 2]) == pytest.approx(4.022, abs=0.005)
+    assert rail.points == 3000

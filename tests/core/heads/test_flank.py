@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from rail_extract.core.heads.flank import FLANK_SIGMA_M, find_flank
+from rail_extract.core.heads.flank import find_flank
 from rail_extract.laboratory.scenes.scanner import Scanner, scan
 from rail_extract.laboratory.scenes.tracks import Railhead
 
@@ -29,7 +29,7 @@ def test_the_axis_follows_from_one_face(noise_m, off_m):
         flank = find_flank(t, side * (across - off_m), z, WIDTH)
         assert flank.left_m == pytest.approx(-side * off_m, abs=0.001)
         assert flank.top_m == pytest.approx(0.019, abs=0.004)
-        assert flank.sigma_m == FLANK_SIGMA_M
+        assert flank.sigma_m == 0.0012
 
 
 def test_a_head_with_its_crown_is_not_a_face():

@@ -140,3 +140,14 @@ def test_what_a_step_may_be_comes_from_bends_and_from_the_error_of_the_line():
     at = np.argmin(np.abs(places[:, 0] - 20))
     assert bend[at] == pytest.approx(BEND_M2 / 100, rel=0.05) and bend[:5].max() < 1e-6
     assert len(_steps_along(line[:190])[0]) == 0 and not _steps_along(line)[3].any()
+
+
+@pytest.mark.parametrize(("spread_m", "expected_m"), [(np.nan, 0.03), (0.02, 0.03), (0.05, 0.05)])
+def test_the_spread_of_strips_is_at_least_the_step(spread_m, expected_m):
+    curve = trace([Element(80.0, 1 / 800, 1 / 800)], heading=0.3)
+    middle, left, right = (stepped(beside(curve, left_m), 33.0, 0.03) for left_m in (0.0, 0.75, -0.75))
+    rails = [rail(1, left), rail(2, right)]
+    strips = np.tile([2.0, spread_m, 0.004], (320, 1))
+    rails = [replace(one, support=replace(one.support, strips=strips)) for one in rails]
+    for one in doubting_steps(rails, steps_of([track(middle, (1,), (2,))], rails)):
+        assert np.allclose(one.support.strips, [2.0, expected_m, np.hypot(0.004, 0.015)], rtol=0.06)
