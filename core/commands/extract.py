@@ -16,7 +16,7 @@ from ..clouds.points import ask
 from ..disk import Destination
 from ..errors import ParameterError, RailExtractError
 from ..fields import CENTERLINE_FIELDS, FINDING_FIELDS, RAIL_FIELDS
-from ..frpdf import DEVICES, ENGINES
+from ..frpdf import DEVICES, ENGINES, MAX_PASSES
 from ..frpdf.models import NAMES, choose
 from ..learned.model import weights_for
 from ..parameters import DEFAULT_STEP_M, LEARNED, STRIPS, Parameters
@@ -43,6 +43,9 @@ from .options import (
 
 NEEDS = {name: name for name in ("distributed", "cryptography", "pyogrio", "shapely", "rasterio")}
 """Modules and packages of the extra "cluster"; rasterio is needed for `--cleaned` only."""
+
+MAX_WORKERS = 1000
+"""More than a computer has cores; starting more would only use up its memory."""
 
 INCOMPLETE = 2
 """Exit code of a run that has written results in which some files or squares are missing."""
@@ -185,6 +188,9 @@ def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameter
             raise ParameterError(
                 f"The option {_option(name)} can't be {getattr(args, name, value)}: give a larger number."
             )
+    for name, value, largest in (("iterations", args.iterations, MAX_PASSES), ("workers", workers + 1, MAX_WORKERS)):
+        if value > largest:
+            raise ParameterError(f"The option {_option(name)} can't be {value}: give {largest} or less.")
     return Parameters(
         standard.gauge_m,
         standard.head_width_m,

@@ -257,7 +257,7 @@ RASTERS = [
         "tags that are NaN",
         of_raster(tags={"RAIL_GAUGE_MM": "nan", "RAIL_HEAD_MM": "72"}),
         REFUSED,
-        "A gauge of nan mm is not possible: give millimetres from 500 to 2000.",
+        "The tag RAIL_GAUGE_MM of the raster can't be 'nan': rasterize the points again.",
     ),
     Fault(
         "tag with an invalid extent",
