@@ -173,7 +173,7 @@ def test_edges_are_blurred_by_what_neither_noise_nor_passes_in_height_nor_wander
     assert 1000 * blur == pytest.approx(blur_mm, abs=0.001)
 
 
-@pytest.mark.parametrize(("count", "apart_m"), [(240, 0.0), (260, 0.005)])
+@pytest.mark.parametrize(("count", "apart_m"), [(249, 0.0), (250, 0.005)])
 def test_two_levels_are_told_by_250_points(count, apart_m):
     levels = 0.005 * np.resize([1, -1], count) + 0.0005 * np.random.RandomState(0).standard_normal(count)
     assert _half_apart(levels) == pytest.approx(apart_m, rel=0.05)
