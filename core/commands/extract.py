@@ -44,6 +44,9 @@ from .options import (
 NEEDS = {name: name for name in ("distributed", "cryptography", "pyogrio", "shapely", "rasterio")}
 """Modules and packages of the extra "cluster"; rasterio is needed for `--cleaned` only."""
 
+LAST_PORT = 65_535
+"""Largest number of a port; 0 stands for any that is free."""
+
 MAX_WORKERS = 1000
 """More than a computer has cores; starting more would only use up its memory."""
 
@@ -292,6 +295,8 @@ def _certificate_files(args: argparse.Namespace, progress: Progress) -> tuple[Pa
         raise ParameterError("A scheduler at tls:// needs the options --tls-ca, --tls-cert and --tls-key.")
     if not secured and files != (None, None, None):
         raise ParameterError("The options --tls-ca, --tls-cert and --tls-key need a --scheduler at tls://.")
+    if args.dashboard is not None and not 0 <= args.dashboard <= LAST_PORT:
+        raise ParameterError(f"--dashboard must be a number from 0 to {LAST_PORT}, not {args.dashboard}.")
     if args.scheduler and args.dashboard is not None:
         raise ParameterError("The option --dashboard is for local workers: a running scheduler has its own.")
     if args.scheduler and not secured:

@@ -193,6 +193,7 @@ def test_an_output_that_is_a_folder_is_refused_before_the_run(tiles, tmp_path, c
         (["--scheduler", "tcp://127.0.0.1:1", "--tls-ca", "ca.pem"], "need a --scheduler at tls://"),
         (["--tls-key", "key.pem"], "need a --scheduler at tls://"),
         (["--scheduler", "tcp://127.0.0.1:1", "--dashboard", "0"], "--dashboard is for local workers"),
+        (["--dashboard", "99999"], "--dashboard must be a number from 0 to 65535, not 99999."),
         (
             ["--scheduler", "tls://127.0.0.1:1", *(f"--tls-{one}=gone.pem" for one in ("ca", "cert", "key"))],
             "can't be used (No such file or directory): give PEM files",
