@@ -166,7 +166,6 @@ def fuzz(kind: Kind, seeds: Iterable[int], until: float = float("inf")) -> tuple
     counts: Counter = Counter()
     failures: dict[int, str] = {}
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "good").mkdir()
         watched = None
         try:
             for seed in seeds:
@@ -175,7 +174,7 @@ def fuzz(kind: Kind, seeds: Iterable[int], until: float = float("inf")) -> tuple
                 if watched is None or not watched.is_alive or watched.files >= FRESH_AFTER:
                     if watched is not None:
                         watched.end()
-                    watched = Watched(kind, Path(folder) / "good")
+                    watched = Watched(kind, Path(tempfile.mkdtemp(dir=folder)))
                 outcome, _, reason = watched.ask(seed).partition(" ")
                 counts[outcome] += 1
                 if outcome not in (READ, REFUSED):

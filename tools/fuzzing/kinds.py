@@ -242,7 +242,7 @@ def _make_moving(folder: Path) -> list[Path]:
 
     killed = folder / f"{scratch.PREFIX}{'0' * 12}"
     for name in (disk.NEW, disk.OLD):
-        (killed / name).mkdir(parents=True, exist_ok=True)
+        (killed / name).mkdir(parents=True)
         (killed / name / "a.shp").write_bytes(b"shp")
         (killed / name / "a.dbf").write_bytes(b"dbf")
     (killed / disk.MOVING).write_text('["a.shp", "a.dbf"]', encoding="utf-8")
