@@ -93,14 +93,14 @@ def _chunks(
 ) -> Iterator[tuple[laspy.ScaleAwarePointRecord, np.ndarray, np.ndarray, np.ndarray, bool]]:
     """Check a file and read it: points, classes, marks, which are valid, and whether the file is read as a whole."""
     with _open(path) as reader:
-        header, done, some = reader.header, 0, None
+        header, done, chunks, some = reader.header, 0, None, None
         timed = "gps_time" in header.point_format.dimension_names
         if header.are_points_compressed:
             chunks = laz.read_chunk_table(path, header)
             laz.check_layers(path, header, chunks, progress)
             some = copc.chunks_in(path, header, chunks, extent) if extent is not None else None
         total = header.point_count if some is None else sum(one.points for one in some)
-        for chunk in read_blocks(path, reader, FIELDS, some):
+        for chunk in read_blocks(path, reader, FIELDS, chunks if some is None else some):
             progress.check()
             gps_time = np.asarray(chunk.gps_time) if timed else None
             marks = marks_of(np.asarray(chunk.point_source_id), header.file_source_id, gps_time)

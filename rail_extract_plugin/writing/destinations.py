@@ -95,7 +95,7 @@ def check_layer_name(name: str, value: Any, context: QgsProcessingContext) -> No
     Raises
     ------
     RailExtractError
-        QGIS takes what comes before a colon for a data provider, and there is no such provider.
+        QGIS reads what comes before a colon as the name of a data provider, and no provider has this name.
     """
     text = _text(value, context)
     file, found = output_file(value, context), PROVIDER.fullmatch(text)

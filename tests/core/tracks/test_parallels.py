@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.progress import Progress
+from rail_extract.core.progress import Progress, Recording
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.parallels import find_parallels, most_common_spacing
 from rail_extract.laboratory.curves import Element, trace, transition_curve
@@ -49,21 +49,13 @@ def test_rails_far_apart_or_crossing_have_no_spacing():
     assert most_common_spacing(rails_of(STRAIGHT.xy), 3.0) is None
 
 
-class Warnings(Progress):
-    def __init__(self):
-        self.texts = []
-
-    def warning(self, text):
-        self.texts.append(text)
-
-
 def test_a_crowd_of_lines_is_left_out_with_a_warning():
-    heard, track = Warnings(), tracks(STRAIGHT, 0.0)
+    heard, track = Recording(Progress()), tracks(STRAIGHT, 0.0)
     copies = [trace([Element(20.0)]).xy + [200.0, 0.0]] * 40
     parallels = find_parallels(rails_of(*track, *copies), progress=heard)
     assert set(zip(parallels.a, parallels.b)) == {(0, 1)}
-    assert heard.texts == [
+    assert heard.warnings == (
         "More than 25 lines lie within 1 m of each other on 820 m of their length, which is not paired: remove copies "
-        "of lines."
-    ]
+        "of lines.",
+    )
     assert not len(find_parallels(rails_of(*copies)).a)
