@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .lines import Lines
-from .tops import DEPTH_M, HIGH_M, Tops
+from .tops import HIGH_M, Tops, depth_m
 
 ACROSS_M = (0.09, 0.13, 0.17, 0.21, 0.25, 0.29)
 """Distances from the axis at which the surroundings are looked at: from beyond the head to the next 0.2 m."""
@@ -31,6 +31,7 @@ def stands_free(tops: Tops, marks: np.ndarray, lines: Lines) -> np.ndarray:
     """
     along = np.linspace(-0.5, 0.5, ALONG) * lines.reach_m
     free = np.ones(len(lines.axis), dtype=bool)
+    depth = depth_m(lines.height)
     z = tops.z.ravel()
     for side in (1, -1):
         distances = np.zeros(len(free), dtype=np.int64)
@@ -41,7 +42,7 @@ def stands_free(tops: Tops, marks: np.ndarray, lines: Lines) -> np.ndarray:
                 rise = z[cell] - z[marks]
                 wall = inside & tops.high.ravel()[cell]
                 seen += wall | (inside & (np.abs(rise) < HIGH_M))
-                high += wall | (inside & (rise >= -DEPTH_M) & (rise < HIGH_M))
+                high += wall | (inside & (rise >= -depth) & (rise < HIGH_M))
             distances += 2 * high > seen
         free &= distances <= MAX_HIGH
     return free

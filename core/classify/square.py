@@ -14,7 +14,8 @@ from .flush import Flush, flush_rails
 from .labels import Near, label, whole_heads
 from .lines import Lines, Marks, centred, find_lines
 from .partner import runs_inside, stations_with_partner
-from .pieces import continuing, links, long_enough, lower_than_beside, pieces_of, with_partner
+from .pieces import LEAST_M, continuing, lengths, links, long_enough, lower_than_beside, pieces_of, with_partner
+from .ridges import Ridges
 from .settings import DENSE, MARGIN_M, THIN, Settings, Tolerances
 from .sides import stands_free
 from .tops import HIGH_M, MILLIMETRES, Grid, Tops, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
@@ -45,6 +46,10 @@ SINGLE_HEIGHT_M = 0.12
 SINGLE_SLOPE = 0.4
 """Steepest bed of a rail without a partner: that of the shoulder of a ballast bed is 0.67. Where the far side of a
 slope is hidden, its crest looks like a bar."""
+
+LEAST_BLUNT_M = 2 * LEAST_M
+"""Shortest piece of a blunt rail with its partner: less of it lies opposite something else by chance, because any mound
+of this width is as round."""
 
 NOISE_ACROSS_M = 0.01
 """Distance beyond the side of a head within which the top of a cell counts towards its axis: less than half the gap
@@ -190,7 +195,7 @@ def _standing(
     heads = whole_heads(tops, _completed(found, kept, settings, tolerances), tolerances)
     chosen = label(tops, heads, cell, height, tolerances)
     beside = Near.find(xy[chosen], kept.lines)
-    narrow = _narrow(kept, beside, bed, settings, tolerances)
+    narrow = _narrow(kept, Shown(xy, height, beside, bed), settings, tolerances)
     wanted = narrow.copy()
     if settings.guide is not None:
         wanted &= settings.guide.keeps(kept.lines, kept.pairs, settings.spacings_m, tolerances.partner_m)
@@ -285,19 +290,53 @@ def _near_axes(marks: Marks, kept: Kept, settings: Settings, height_m: float) ->
     return near.on((settings.head_width_m + settings.cell_m) / 2, level)
 
 
-def _narrow(kept: Kept, points: Near, bed: Bed, settings: Settings, tolerances: Tolerances) -> np.ndarray:
-    """Return which cells belong to pieces whose tops are as narrow as a railhead, (n,) bool.
+@dataclass(frozen=True)
+class Shown:
+    """What the points show of the kept cells.
 
-    Those without a partner must also stand as high as a rail does that is not buried in ballast, on a bed that is not
-    steeper than a track's.
+    Attributes
+    ----------
+    xy, height : (n, 2) and (n,) arrays
+        All points near the bed.
+    beside : Near
+        Those in the height of the heads.
+    bed : Bed
     """
+
+    xy: np.ndarray
+    height: np.ndarray
+    beside: Near
+    bed: Bed
+
+
+def _narrow(kept: Kept, shown: Shown, settings: Settings, tolerances: Tolerances) -> np.ndarray:
+    """Return which cells belong to pieces that are as narrow as a railhead looks in this cloud, (n,) bool."""
     if not len(kept.cell):
         return np.zeros(0, dtype=bool)
     piece = pieces_of(len(kept.cell), kept.pairs)
+    narrow = shown.beside.widths(piece, tolerances.width_rounds) < settings.head_width_m + tolerances.wider_m
+    alone = _stands_alone(kept, piece, shown, settings, tolerances)
+    partnered = with_partner(kept.pairs, kept.paired)
+    if alone.any() or not narrow[piece[partnered]].all():
+        ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
+        length_m = lengths(kept.lines.axis, piece)
+        blur_m = ridges.blur_m(length_m)
+        narrow |= ridges.may_be_heads(settings.head_width_m, blur_m) & (length_m >= LEAST_BLUNT_M)
+        alone &= blur_m < settings.head_width_m / 2
+    return np.where(continuing(kept.lines, partnered), narrow[piece], alone[piece])
+
+
+def _stands_alone(
+    kept: Kept, piece: np.ndarray, shown: Shown, settings: Settings, tolerances: Tolerances
+) -> np.ndarray:
+    """Return which pieces may be rails without a partner, (pieces,) bool.
+
+    They are as narrow as a head, stand as high as a rail does that is not buried in ballast, and their bed is not
+    steeper than a track's.
+    """
     size = np.bincount(piece)
-    height_m, slope = (np.bincount(piece, value) / size for value in (kept.lines.height, bed.slopes(kept.lines.axis)))
-    alone = points.widths(piece, 1) < settings.head_width_m + tolerances.wider_single_m
-    alone &= (height_m >= SINGLE_HEIGHT_M) & (slope <= SINGLE_SLOPE)
-    narrow = points.widths(piece, tolerances.width_rounds) < settings.head_width_m + tolerances.wider_m
-    rail = continuing(kept.lines, with_partner(kept.pairs, kept.paired))
-    return np.where(rail, narrow[piece], alone[piece])
+    height_m, slope = (
+        np.bincount(piece, value) / size for value in (kept.lines.height, shown.bed.slopes(kept.lines.axis))
+    )
+    narrow = shown.beside.widths(piece, 1) < settings.head_width_m + tolerances.wider_single_m
+    return narrow & (height_m >= SINGLE_HEIGHT_M) & (slope <= SINGLE_SLOPE)

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..raster import BORDER_CELLS
 
-LOW_M, TOP_M = 0.055, 0.40
-"""Heights of railheads above the bed: from yards that are filled with ballast to heavy rails on plates."""
+LOW_M, TOP_M = 0.04, 0.40
+"""Heights of railheads above the bed: from rails that are buried up to the head to heavy rails on plates."""
 
 HIGH_M = 0.95
 """Points between `TOP_M` and this mark walls, fences, masts, wheels and plants; wires and bridges are higher."""
@@ -17,14 +17,15 @@ HIGH_M = 0.95
 WINDOW_M = 0.26
 """Half the side of the window in which a top must be narrow: the window holds one rail and its surroundings."""
 
-DEPTH_M = 0.045
-"""Cells up to this far below a top count as part of it: the height of a head."""
+DEPTH_M, DEPTH_SHARE = 0.045, 0.4
+"""Cells up to this far below a top count as part of it: the height of a head, and at most this share of the height above
+the bed. The ballast beside a rail that is buried up to the head is 4 cm lower than its top."""
 
 MAX_SHARE = 0.50
 """Largest share of the other seen cells of the window that the top may fill: a rail fills 0.14 to 0.25, with its foot
 or a guard rail 0.38, ballast and kerbs half and more."""
 
-SLAB_M = 0.025
+SLAB_M = 0.0125
 """Tops are compared with their surroundings at thresholds this far apart."""
 
 EMPTY = np.int16(-32768)
@@ -129,6 +130,11 @@ def tops_of(grid: Grid, cell: np.ndarray, height: np.ndarray, z: np.ndarray) -> 
     return Tops(grid, *(values.reshape(grid.shape) for values in (top, highest, seen, high)))
 
 
+def depth_m(height_m: np.ndarray | float) -> np.ndarray | float:
+    """Depth below a top down to which a cell still counts as part of it, metres, by the top's height above the bed."""
+    return np.minimum(DEPTH_M, DEPTH_SHARE * height_m)
+
+
 def narrow_tops(tops: Tops) -> np.ndarray:
     """Cells whose top is in the band of railheads, narrow, and free of high points, (k,) cell numbers in order."""
     top = tops.top.ravel()
@@ -137,10 +143,11 @@ def narrow_tops(tops: Tops) -> np.ndarray:
         return candidates
     window = Window(tops.grid, candidates, round(WINDOW_M / tops.grid.cell_m))
     seen = window.sums(tops.seen)
-    slab = (top[candidates] - round(LOW_M * MILLIMETRES)) // round(SLAB_M * MILLIMETRES)
+    slab = ((top[candidates] - LOW_M * MILLIMETRES) // (SLAB_M * MILLIMETRES)).astype(np.int64)
     share = np.zeros(len(candidates))
     for number in np.unique(slab).tolist():
-        threshold = (LOW_M + (number + 0.5) * SLAB_M - DEPTH_M) * MILLIMETRES
+        middle_m = LOW_M + (number + 0.5) * SLAB_M
+        threshold = (middle_m - depth_m(middle_m)) * MILLIMETRES
         chosen = np.flatnonzero(slab == number)
         others = window.of(chosen).sums((tops.top >= threshold) | tops.high) - 1
         share[chosen] = others / np.maximum(seen[chosen] - 1, 1)
@@ -212,7 +219,8 @@ def middles_of_tops(tops: Tops, cells: np.ndarray, xy: np.ndarray, cell: np.ndar
         NaN for all other cells.
     """
     low = np.full(tops.top.size, np.inf, dtype=np.float32)
-    low[cells] = tops.top.ravel()[cells] / MILLIMETRES - DEPTH_M
+    top_m = tops.top.ravel()[cells] / MILLIMETRES
+    low[cells] = top_m - depth_m(top_m)
     on = np.flatnonzero((height >= low[cell]) & (height <= TOP_M))
     places = np.full((tops.top.size, 2), np.nan)
     places[cells] = centroids(cell[on], xy[on])
