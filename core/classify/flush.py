@@ -12,16 +12,20 @@ from scipy.ndimage import binary_dilation
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from .bed import Coarse
+from .bed import COARSE_M, Coarse
 from .lines import Lines, Marks, find_lines
 from .partner import partners
 from .pieces import lengths, links, pieces_of
 from .settings import Settings
 from .tops import TENTHS_OF_MM, Grid, centroids
 
-MIN_POINTS, MIN_SHARE, LEVEL_M, NEAR_BED_M = 60, 0.65, 0.008, 0.03
-"""A coarse cell is paved if it has more points than this, and this share of them lies this close to their mean height;
-the mean is that of the points near the bed. Ballast scatters by 12 mm and more."""
+MIN_PER_M2 = 800.0
+"""Least points per square metre of a pavement that shows grooves: they are 35 mm apart then, and each groove of 42 mm
+holds a row of them. Between points that are further apart, a groove and a wave of the pavement look alike."""
+
+MIN_SHARE, LEVEL_M, NEAR_BED_M = 0.65, 0.008, 0.03
+"""A coarse cell is paved if this share of its points lies this close to their mean height; the mean is that of the
+points near the bed. Ballast scatters by 12 mm and more."""
 
 CAVITY_M = (0.012, 0.19)
 """Depth of points in a groove below the pavement: from three times a good scanner's noise to a rail's height."""
@@ -153,7 +157,7 @@ def _pavement(coarse: Coarse, cell: np.ndarray, height: np.ndarray) -> np.ndarra
     count = np.bincount(cell[near], minlength=cells)
     level = np.bincount(cell[near], tenths, cells) / np.maximum(count, 1)
     flat = np.bincount(cell[near][np.abs(tenths - level[cell[near]]) < LEVEL_M * TENTHS_OF_MM], minlength=cells)
-    paved = (coarse.count > MIN_POINTS) & (flat > MIN_SHARE * np.bincount(cell, minlength=cells))
+    paved = (coarse.count > MIN_PER_M2 * COARSE_M**2) & (flat > MIN_SHARE * np.bincount(cell, minlength=cells))
     grown = binary_dilation(paved.reshape(coarse.shape), np.ones((3, 3))).ravel()
     return np.where(grown, level / TENTHS_OF_MM, np.nan)
 

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .lines import Lines
+from .pieces import lengths
 from .tops import MILLIMETRES
 
 REACH_M = 0.30
@@ -38,9 +39,9 @@ deviation."""
 BLUR_QUANTILE = 0.25
 """Quantile of the ridges' roundness, by length, that stands for the blur of the square: earth is round in any cloud."""
 
-MAX_WIDTH, MAX_BLUR = 1.15, 1.5
-"""Largest width by that of a head with the ridge's blur, and largest blur that counts by that of the square. Measured:
-ridges of rails up to 1.03 and 1.2 times, kerbs of 150 mm 1.3 times and more."""
+MAX_WIDTH = 1.1
+"""Largest width of a ridge by that of a head with the blur of the square. Measured: rails up to 1.07, mounds of ballast
+1.2 and more."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +54,12 @@ class Ridges:
         Width at half the height; NaN where a side is not seen as far down as that.
     spread_m : (pieces,) array
         Standard deviation of the Gaussian ridge whose sides are as steep; NaN likewise.
+    length_m : (pieces,) array
     """
 
     width_m: np.ndarray
     spread_m: np.ndarray
+    length_m: np.ndarray
 
     @classmethod
     def measure(cls, xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray) -> Ridges:
@@ -78,29 +81,27 @@ class Ridges:
             top = np.fmax(*(side[:, 0] for side in sides))
             places = np.array([_levels(side, top) for side in sides])
             spread_m = np.mean(places[:, 2] - places[:, 0], axis=0) / EDGE_PER_SIGMA
-        return cls(places[:, 1].sum(axis=0), spread_m)
+        return cls(places[:, 1].sum(axis=0), spread_m, lengths(lines.axis, piece))
 
-    def blur_m(self, length_m: np.ndarray) -> float:
-        """Blur of the square by the lengths of the pieces, (pieces,): a standard deviation; 0 where nothing shows it."""
+    @property
+    def blur_m(self) -> float:
+        """Blur of the square: a standard deviation, metres; 0 where nothing shows it."""
         seen = np.flatnonzero(np.isfinite(self.spread_m))
         if not len(seen):
             return 0.0
         order = seen[np.argsort(self.spread_m[seen])]
-        below = np.cumsum(length_m[order])
+        below = np.cumsum(self.length_m[order])
         return float(self.spread_m[order[np.searchsorted(below, BLUR_QUANTILE * below[-1])]])
 
-    def may_be_heads(self, head_width_m: float, blur_m: float) -> np.ndarray:
-        """Return which ridges are as narrow as a head with their blur, which may not exceed that of the square by much.
+    def are_blunt(self, head_width_m: float) -> bool:
+        """Return whether the blur hides how wide a head is."""
+        return self.blur_m > head_width_m / 2
 
-        Parameters
-        ----------
-        head_width_m : float
-        blur_m : float
-            Blur of the square; see `blur_m`.
-        """
+    def may_be_heads(self, head_width_m: float) -> np.ndarray:
+        """Return which ridges are not wider than a head with the blur of the square, (pieces,) bool."""
+        widest_m = MAX_WIDTH * WIDTH_PER_SIGMA * np.hypot(head_width_m / np.sqrt(12), self.blur_m)
         with np.errstate(invalid="ignore"):
-            spread_m = np.minimum(self.spread_m, MAX_BLUR * blur_m)
-            return self.width_m < MAX_WIDTH * WIDTH_PER_SIGMA * np.hypot(head_width_m / np.sqrt(12), spread_m)
+            return self.width_m < widest_m
 
 
 def _sections(xy: np.ndarray, height: np.ndarray, lines: Lines, piece: np.ndarray) -> np.ndarray:

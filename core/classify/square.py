@@ -14,7 +14,7 @@ from .flush import Flush, flush_rails
 from .labels import Near, label, whole_heads
 from .lines import Lines, Marks, centred, find_lines
 from .partner import runs_inside, stations_with_partner
-from .pieces import LEAST_M, continuing, lengths, links, long_enough, lower_than_beside, pieces_of, with_partner
+from .pieces import continuing, lengths, links, long_enough, lower_than_beside, pieces_of, with_partner
 from .ridges import Ridges
 from .settings import DENSE, MARGIN_M, THIN, Settings, Tolerances
 from .sides import stands_free
@@ -47,9 +47,9 @@ SINGLE_SLOPE = 0.4
 """Steepest bed of a rail without a partner: that of the shoulder of a ballast bed is 0.67. Where the far side of a
 slope is hidden, its crest looks like a bar."""
 
-LEAST_BLUNT_M = 2 * LEAST_M
-"""Shortest piece of a blunt rail with its partner: less of it lies opposite something else by chance, because any mound
-of this width is as round."""
+LEAST_BLUNT_M = 5.0
+"""Shortest piece of a rail with its partner where heads are blunt: any mound of this width is as round, and up to 4 m of
+one lie opposite something else by chance. Rails without a partner are not told from mounds at all."""
 
 NOISE_ACROSS_M = 0.01
 """Distance beyond the side of a head within which the top of a cell counts towards its axis: less than half the gap
@@ -256,11 +256,15 @@ def _kept(found: Candidates, reach_m: float, tolerances: Tolerances, settings: S
     inside = runs_inside(kept.lines, kept.paired, kept.pairs, settings.gauges_m, settings.head_width_m)
     kept = kept.of(~inside)
     kept = kept.of(~lower_than_beside(kept.lines, tolerances.spread_m))
-    low, high = -MARGIN_M + reach_m / 2, settings.side_m + MARGIN_M - reach_m / 2
+    return kept.of(_long(kept, settings, settings.keep_single, tolerances.least_m))
+
+
+def _long(kept: Kept, settings: Settings, keep_single: bool, least_m: float) -> np.ndarray:
+    """Return which cells belong to pieces that are long enough or run out of the square, (n,) bool."""
+    inset_m = MARGIN_M - kept.lines.reach_m / 2
+    low, high = -inset_m, settings.side_m + inset_m
     open_ended = np.any((kept.lines.axis < low) | (kept.lines.axis > high), axis=1)
-    return kept.of(
-        long_enough(kept.lines, kept.pairs, kept.paired, open_ended, settings.keep_single, tolerances.least_m)
-    )
+    return long_enough(kept.lines, kept.pairs, kept.paired, open_ended, keep_single, least_m)
 
 
 def _certain(lines: Lines, paired: np.ndarray, pairs: np.ndarray) -> np.ndarray:
@@ -317,13 +321,15 @@ def _narrow(kept: Kept, shown: Shown, settings: Settings, tolerances: Tolerances
     narrow = shown.beside.widths(piece, tolerances.width_rounds) < settings.head_width_m + tolerances.wider_m
     alone = _stands_alone(kept, piece, shown, settings, tolerances)
     partnered = with_partner(kept.pairs, kept.paired)
-    if alone.any() or not narrow[piece[partnered]].all():
-        ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
-        length_m = lengths(kept.lines.axis, piece)
-        blur_m = ridges.blur_m(length_m)
-        narrow |= ridges.may_be_heads(settings.head_width_m, blur_m) & (length_m >= LEAST_BLUNT_M)
-        alone &= blur_m < settings.head_width_m / 2
-    return np.where(continuing(kept.lines, partnered), narrow[piece], alone[piece])
+    chosen = np.where(continuing(kept.lines, partnered), narrow[piece], alone[piece])
+    if not alone.any() and narrow[piece[partnered]].all():
+        return chosen
+    ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
+    if not ridges.are_blunt(settings.head_width_m):
+        return chosen
+    chosen = continuing(kept.lines, partnered) & (narrow | ridges.may_be_heads(settings.head_width_m))[piece]
+    chosen[chosen] = _long(kept.of(chosen), settings, False, LEAST_BLUNT_M)
+    return chosen
 
 
 def _stands_alone(
