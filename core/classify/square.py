@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from .flush import Flush, flush_rails
 from .labels import Near, label, whole_heads
 from .lines import Lines, Marks, centred, find_lines
 from .partner import runs_inside, stations_with_partner
-from .pieces import continuing, lengths, links, long_enough, lower_than_beside, pieces_of, with_partner
-from .ridges import Ridges
+from .pieces import continuing, links, long_enough, lower_than_beside, pieces_of, with_partner
+from .ridges import Ridges, cells_beside, on_crests
 from .settings import DENSE, MARGIN_M, THIN, Settings, Tolerances
 from .sides import stands_free
 from .tops import HIGH_M, MILLIMETRES, Grid, Tops, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
@@ -47,9 +47,13 @@ SINGLE_SLOPE = 0.4
 """Steepest bed of a rail without a partner: that of the shoulder of a ballast bed is 0.67. Where the far side of a
 slope is hidden, its crest looks like a bar."""
 
+BLUNT_BELOW_M = 0.12
+"""Depth below the mean top down to which the points beside a crest are on a blunt head: the ridge falls by up to 5 cm
+there; noise and a bed that slopes add as much. A limit that cut the lower side off would move the line."""
+
 LEAST_BLUNT_M = 5.0
-"""Shortest piece of a rail with its partner where heads are blunt: any mound of this width is as round, and up to 4 m of
-one lie opposite something else by chance. Rails without a partner are not told from mounds at all."""
+"""Shortest piece of a rail with its partner where heads are blunt. Any mound of this width is as round, and up to 4 m of
+one are opposite something else by chance; without a partner, a rail cannot be told from a mound."""
 
 NOISE_ACROSS_M = 0.01
 """Distance beyond the side of a head within which the top of a cell counts towards its axis: less than half the gap
@@ -195,7 +199,14 @@ def _standing(
     heads = whole_heads(tops, _completed(found, kept, settings, tolerances), tolerances)
     chosen = label(tops, heads, cell, height, tolerances)
     beside = Near.find(xy[chosen], kept.lines)
-    narrow = _narrow(kept, Shown(xy, height, beside, bed), settings, tolerances)
+    narrow, blur_m = _narrow(kept, Shown(xy, height, beside, bed), settings, tolerances)
+    if blur_m and narrow.any():
+        kept, narrow = kept.of(narrow), np.ones(narrow.sum(), dtype=bool)
+        kept = replace(kept, lines=on_crests(xy, height, kept.lines, blur_m))
+        half_m = settings.head_width_m / 2 + tolerances.beside_m
+        heads = cells_beside(tops.grid, kept.lines, half_m)
+        chosen = label(tops, heads, cell, height, replace(tolerances, below_m=BLUNT_BELOW_M))
+        beside = Near.find(xy[chosen], kept.lines)
     wanted = narrow.copy()
     if settings.guide is not None:
         wanted &= settings.guide.keeps(kept.lines, kept.pairs, settings.spacings_m, tolerances.partner_m)
@@ -313,23 +324,30 @@ class Shown:
     bed: Bed
 
 
-def _narrow(kept: Kept, shown: Shown, settings: Settings, tolerances: Tolerances) -> np.ndarray:
-    """Return which cells belong to pieces that are as narrow as a railhead looks in this cloud, (n,) bool."""
+def _narrow(kept: Kept, shown: Shown, settings: Settings, tolerances: Tolerances) -> tuple[np.ndarray, float]:
+    """Find the cells of pieces that are as narrow as a railhead looks in this cloud.
+
+    Returns
+    -------
+    (n,) bool array
+    blur_m : float
+        Blur of the square if it hides how wide a head is; otherwise 0.
+    """
     if not len(kept.cell):
-        return np.zeros(0, dtype=bool)
+        return np.zeros(0, dtype=bool), 0.0
     piece = pieces_of(len(kept.cell), kept.pairs)
     narrow = shown.beside.widths(piece, tolerances.width_rounds) < settings.head_width_m + tolerances.wider_m
     alone = _stands_alone(kept, piece, shown, settings, tolerances)
     partnered = with_partner(kept.pairs, kept.paired)
     chosen = np.where(continuing(kept.lines, partnered), narrow[piece], alone[piece])
     if not alone.any() and narrow[piece[partnered]].all():
-        return chosen
+        return chosen, 0.0
     ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
     if not ridges.are_blunt(settings.head_width_m):
-        return chosen
+        return chosen, 0.0
     chosen = continuing(kept.lines, partnered) & (narrow | ridges.may_be_heads(settings.head_width_m))[piece]
     chosen[chosen] = _long(kept.of(chosen), settings, False, LEAST_BLUNT_M)
-    return chosen
+    return chosen, ridges.blur_m
 
 
 def _stands_alone(

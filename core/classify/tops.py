@@ -18,8 +18,8 @@ WINDOW_M = 0.26
 """Half the side of the window in which a top must be narrow: the window holds one rail and its surroundings."""
 
 DEPTH_M, DEPTH_SHARE = 0.045, 0.4
-"""Cells up to this far below a top count as part of it: the height of a head, and at most this share of the height above
-the bed. The ballast beside a rail that is buried up to the head is 4 cm lower than its top."""
+"""Cells up to this far below a top count as part of it: the height of a head, and at most this share of the height
+above the bed. The ballast beside a rail that is buried up to the head is 4 cm lower than its top."""
 
 MAX_SHARE = 0.50
 """Largest share of the other seen cells of the window that the top may fill: a rail fills 0.14 to 0.25, with its foot

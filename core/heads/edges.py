@@ -123,38 +123,6 @@ def histograms(
     return stations_along(length_m), chosen, windows[-1]
 
 
-def mean_offsets(
-    t: np.ndarray, across: np.ndarray, length_m: float, head_width_m: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Find the mean offset of the points within a head's width of a line, in windows along it.
-
-    Parameters
-    ----------
-    t, across : (n,) arrays
-        Chainage of the points and offset to the left of the line, metres.
-    length_m : float
-        Length of the line.
-    head_width_m : float
-
-    Returns
-    -------
-    stations, offset : (s,) arrays
-        Centres of the shortest windows with enough points, and the offsets, metres; NaN in windows without.
-    """
-    rows = station_count(length_m)
-    near = np.abs(across) <= head_width_m
-    row = np.minimum((t[near] / STATION_STEP_M).astype(int), rows - 1)
-    sums = np.array([np.bincount(row, weights, minlength=rows) for weights in (None, across[near])], dtype=float)
-    windows = [uniform_filter1d(sums, size, axis=1, mode="constant") * size for size in WINDOWS]
-    chosen = windows[-1].copy()
-    for window in windows[-2::-1]:
-        enough = window[0] >= ENOUGH_POINTS
-        chosen[:, enough] = window[:, enough]
-    count, total = chosen
-    known = count > 0.5
-    return stations_along(length_m), np.where(known, total / np.where(known, count, 1.0), np.nan)
-
-
 def middles(counts: np.ndarray, wide_counts: np.ndarray, free: np.ndarray) -> np.ndarray:
     """Return the offset of the head's middle in each window, (s,) in bins to the left; NaN where no edges are visible.
 

@@ -18,9 +18,10 @@ from ..parameters import Parameters
 from ..polyline import Feet, interpolate, length_along, project, resample, starts_at_its_end
 from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
+from .blunt import Ridge, wander
 from .edges import Widths, search_distance, stations_along, widest
 from .flank import find_flank
-from .level import AXIS_SHARE, blended_fall, rough_level
+from .level import AXIS_SHARE, rough_level
 from .neighbours import free_edges
 from .own_level import on_own_level
 from .strips import StripOffsets, aligned, measure_strips
@@ -175,9 +176,11 @@ def _measured(
     head = np.abs(feet.across) <= min(0.5 * parameters.head_width_m, parameters.tolerance_xy_m)
     if head.sum() < MIN_POINTS:
         return None
+    along = length_along(line)
     flank = find_flank(feet.t, feet.across, z, parameters.head_width_m)
+    ridge = None if flank else Ridge.find(feet.t, feet.across, z, along[-1], parameters.head_width_m)
     if flank is None:
-        level_z = z + blended_fall(feet.t, feet.across, z, parameters.head_width_m)
+        level_z = z if ridge is None else z + ridge.fall(feet.across)
         found = find_top(
             feet.t[head],
             feet.across[head],
@@ -194,24 +197,26 @@ def _measured(
         level_z, (head, top) = z, np.ones((2, len(z)), dtype=bool)
         profile = Profile.through(feet.t, rough_level(feet.t, z) + flank.top_m, parameters.smoothing_z_m)
     supporting = feet[head][top]
-    along = length_along(line)
     start, end = _supported(supporting.t, along[-1], free_ends)
     stations = np.concatenate([[start], along[(along > start) & (along < end)], [end]])
     gaps = find_gaps(supporting.t, start, end)
     bridged = float(np.sum(gaps[:, 1] - gaps[:, 0]))
     resid = float(np.sqrt(np.mean(supporting.across**2)))
-    support = measure_support(
-        feet.t,
-        feet.across,
-        z,
-        along[-1],
-        parameters.head_width_m,
-        parameters.smoothing_xy_m,
-        unseen_m=parameters.unseen_m,
-        free=edges,
-        near=near,
-        marked=strips is not None,
-    )
+    if ridge is not None:
+        support = ridge.support(supporting.t, interpolate(line, along, ridge.t), parameters.unseen_m)
+    else:
+        support = measure_support(
+            feet.t,
+            feet.across,
+            z,
+            along[-1],
+            parameters.head_width_m,
+            parameters.smoothing_xy_m,
+            unseen_m=parameters.unseen_m,
+            free=edges,
+            near=near,
+            marked=strips is not None,
+        )
     if flank is not None:
         support = on_one_face(support, feet.t, flank.sigma_m)
     axial = np.abs(supporting.across) <= AXIS_SHARE * parameters.head_width_m
@@ -219,6 +224,8 @@ def _measured(
     t = supporting.t[axial]
     residual_m = level_z[head][top][axial] - profile.at(t)
     by_chance_m = height_error(t, residual_m, support.t, parameters.smoothing_z_m)
+    if ridge is not None:
+        by_chance_m = np.hypot(by_chance_m, wander(profile.at(support.t)))
     support = replace(support, sigmaz_m=np.hypot(by_chance_m, np.nan_to_num(support.heights_m)))
     if strips is not None:
         support = strips.added_to(support, parameters.align)

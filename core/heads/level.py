@@ -56,8 +56,12 @@ BLENDED_M = 0.006
 do. Seen by narrow beams, the round corners fall by 1 to 2 mm, and the rim of a line that is off the head by more, but
 not both."""
 
-CROWN_HEADS, RIM_HEADS = 0.2, (0.3, 0.5)
-"""Parts of the head width on either side of the axis: the crown, and the rims."""
+CROWN_HEADS, RIM_HEADS, SHOULDER_HEADS = 0.2, (0.3, 0.5), (0.6, 0.8)
+"""Parts of the head width on either side of the axis: the crown, the rims, and what is beyond a head that is not
+blurred."""
+
+SHOULDER_SHARE = 0.5
+"""Points per width on either shoulder, as a share of those on the crown, from which a blurred head goes on there."""
 
 
 def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -91,40 +95,27 @@ def _median_filtered(t: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def is_blended(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> bool:
-    """Return whether heights fall from the crown to both rims, so that the head has no edges that could be seen."""
-    head = np.abs(across) <= RIM_HEADS[1] * head_width_m
+    """Return whether heights fall from the crown to both sides, so that the head has no edges that could be seen.
+
+    Beams from the air show this on the rims of the head, dense matching of photographs on shoulders beyond them.
+    """
+    near = np.abs(across) <= SHOULDER_HEADS[1] * head_width_m
+    head = np.abs(across[near]) <= RIM_HEADS[1] * head_width_m
     if head.sum() < MIN_ON_HEAD:
         return False
-    above, heads = z[head] - rough_level(t[head], z[head]), across[head] / head_width_m
+    level = rough_level(t[near][head], z[near][head])
+    above, heads = z[near] - np.interp(t[near], t[near][head], level), across[near] / head_width_m
     crown = np.abs(heads) < CROWN_HEADS
-    rims = [side * heads > RIM_HEADS[0] for side in (1, -1)]
-    if not (crown.any() and all(rim.any() for rim in rims)):
+    if not crown.any():
         return False
-    return bool(np.median(above[crown]) - max(np.median(above[rim]) for rim in rims) > BLENDED_M)
-
-
-def blended_fall(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> np.ndarray:
-    """Return how far beams that blend the head and the ballast lower points, (n,) metres; zeros for narrow beams.
-
-    The share of the ballast in a beam grows with the distance from the axis: up to the rims the fall is a parabola.
-
-    Parameters
-    ----------
-    t, across, z : (n,) arrays
-        Chainage (increasing), offset to the left and height of points near the line, metres.
-    head_width_m : float
-    """
-    if not is_blended(t, across, z, head_width_m):
-        return np.zeros(len(t))
-    rim_m = RIM_HEADS[0] * head_width_m
-    near, square = np.abs(across) <= rim_m, np.minimum(np.abs(across), rim_m) ** 2
-    above, x = z[near] - rough_level(t[near], z[near]), square[near]
-    used, bend = np.ones(len(above), dtype=bool), 0.0
-    for _ in range(SLOPE_ROUNDS):
-        bend, level = np.polynomial.polynomial.polyfit(x[used], above[used], 1)[::-1]
-        off = above - level - bend * x
-        used = np.abs(off) <= OFF_TOP_SIGMAS * robust_sigma(off)
-    return max(-bend, 0.0) * square
+    for low, high in (RIM_HEADS, SHOULDER_HEADS):
+        sides = [(side * heads > low) & (side * heads <= high) for side in (1, -1)]
+        least = max(SHOULDER_SHARE * (high - low) / (2 * CROWN_HEADS) * crown.sum(), 1) if low > RIM_HEADS[0] else 1
+        if min(side.sum() for side in sides) >= least:
+            fall_m = np.median(above[crown]) - max(np.median(above[side]) for side in sides)
+            if fall_m > BLENDED_M:
+                return True
+    return False
 
 
 def robust_sigma(values: np.ndarray) -> float:

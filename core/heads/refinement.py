@@ -18,10 +18,11 @@ from ..lines.smoothing import smooth_profile
 from ..parameters import Parameters
 from ..polyline import Feet, interpolate, left_normals, length_along, project
 from ..progress import SILENT, Progress
+from .blunt import Ridge
 from .branch_starts import APART_HEADS, slide_branches
-from .edges import HALF_HEAD_BINS, Widths, histograms, mean_offsets, middles, search_distance, widest
+from .edges import HALF_HEAD_BINS, Widths, histograms, middles, search_distance, widest
 from .flank import Flank, find_flank
-from .level import MIN_ON_HEAD, is_blended, on_top
+from .level import MIN_ON_HEAD, on_top
 from .neighbours import free_edges
 from .own_level import on_own_level
 from .roads import hidden_edges
@@ -157,12 +158,12 @@ def _shifted(
         top, _ = on_top(mine.t, mine.across, z, head_width_m)
         along = length_along(line)
         free = edges[number] & ~hidden_edges(mine.t[top], mine.across[top], along[-1], head_width_m, edges[number])
-        blended = is_blended(mine.t, mine.across, z, head_width_m)
-        if blended:
-            stations, middle = mean_offsets(mine.t, mine.across, along[-1], head_width_m)
+        ridge = Ridge.find(mine.t, mine.across, z, along[-1], head_width_m)
+        if ridge is not None:
+            stations, middle = ridge.t, ridge.offset_m
         else:
             stations, middle = _middles(mine.t[top], mine.across[top], along[-1], head_width_m, free)
-        if by_outline and not blended:
+        if by_outline and ridge is None:
             seen = np.isfinite(middle) & free.all(axis=0)
             middle = with_outline(middle, outline_middles(mine.t, mine.across, z, along[-1], head_width_m, seen))
         known = np.isfinite(middle)

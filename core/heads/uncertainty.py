@@ -89,10 +89,10 @@ def measure_support(
     by_edges = edges.middles_in(counts, wide_counts) * bin_m
     known = np.isfinite(by_edges)
     unseen = np.hypot(unseen_m, _either_end(wide_counts, head_width_m))
-    bridge = _bridge_error(t, stations)
+    bridge = bridge_error(t, stations)
     if near is not None and len(near) > len(t):
         # The line follows what covers the head, which lies on it or next to it.
-        bridge = np.minimum(bridge, np.hypot(_bridge_error(near, stations), BESIDE_HEADS * head_width_m))
+        bridge = np.minimum(bridge, np.hypot(bridge_error(near, stations), BESIDE_HEADS * head_width_m))
     if known.sum() < 2:
         return Support(stations, points, np.hypot(unseen, bridge if len(t) else 0.0))
     averaged = np.maximum(_averaged(points, smoothing_m), counts.sum(axis=1))
@@ -155,7 +155,7 @@ def on_one_face(support: Support, t: np.ndarray, sigma_m: float) -> Support:
     """Replace the support of a line whose points, at chainages `t` (n,), are on one face; its axis has `sigma_m`."""
     places = np.minimum((t / STATION_STEP_M).astype(int), len(support.t) - 1)
     points = np.bincount(places, minlength=len(support.t))
-    return replace(support, points=points, sigma_m=np.hypot(sigma_m, _bridge_error(t, support.t)))
+    return replace(support, points=points, sigma_m=np.hypot(sigma_m, bridge_error(t, support.t)))
 
 
 def height_error(t: np.ndarray, residual_m: np.ndarray, stations: np.ndarray, smoothing_m: float) -> np.ndarray:
@@ -172,7 +172,7 @@ def height_error(t: np.ndarray, residual_m: np.ndarray, stations: np.ndarray, sm
     """
     points = np.bincount(np.minimum((t / STATION_STEP_M).astype(int), len(stations) - 1), minlength=len(stations))
     sampling = robust_sigma(residual_m) / np.sqrt(np.maximum(_averaged(points, smoothing_m), 1.0))
-    bridge = _bridge_error(t, stations) * (UNSURE_GRADIENT_CHANGE / UNSURE_CURVATURE)
+    bridge = bridge_error(t, stations) * (UNSURE_GRADIENT_CHANGE / UNSURE_CURVATURE)
     return np.sqrt(sampling**2 + TOP_SIGMA_M**2 + bridge**2)
 
 
@@ -186,7 +186,7 @@ def _either_end(counts: np.ndarray, head_width_m: float) -> np.ndarray:
     return np.where(wider_m > MIN_WIDER_M, 0.5 * wider_m, 0.0)
 
 
-def _bridge_error(t: np.ndarray, stations: np.ndarray) -> np.ndarray:
+def bridge_error(t: np.ndarray, stations: np.ndarray) -> np.ndarray:
     """Estimate by how much a line errs where it has no point at all, (s,) metres: nothing shows its curvature there.
 
     Between two known places, at distances a and b, an error k of the curvature moves a line by k a b / 2; beyond the

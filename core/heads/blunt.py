@@ -1,0 +1,135 @@
+"""Blunt heads: beams from the air and dense matching of photographs blur a head to a round ridge without edges.
+
+Across, the ridge is a parabola. Its crest is the axis of the head. Where the line of the crest wanders about a stiff
+curve, the cloud errs, because a rail does not bend that quickly. See docs/method.md section 6.10.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import savgol_filter
+
+from ..polyline import left_normals
+from ..rails import Support
+from .edges import STATION_STEP_M, station_count, stations_along
+from .level import OFF_TOP_SIGMAS, SLOPE_ROUNDS, is_blended, robust_sigma, rough_level
+from .uncertainty import bridge_error
+
+REACH_HEADS = 1.0
+"""Distance from the line, in head widths, within which the ridge is a parabola: a Gaussian of 7 cm is, to a tenth."""
+
+WINDOW = 33
+"""Stations that share one crest, 8.25 m: 16 mm of noise moves the crest by 3 mm over this length, and by 6 mm over 2 m.
+The line itself follows curves; only its offsets are averaged."""
+
+MIN_BEND = 0.5
+"""Least bend of the parabola, 1/m: a radius of 2 m. A flatter top has no crest."""
+
+PRIOR_OFFSET_M = 0.02
+"""Expected offset of the line from the crest, half a cell: it keeps the line where points are few."""
+
+STIFF_PLAN, STIFF_PROFILE = (201, 3), (301, 2)
+"""Stations of a stiff curve, and its degree: 50 m of a clothoid in plan, 75 m of a parabola in height. Errors of dense
+matching are alike over 5 to 20 m. What is longer than this is taken for the shape of the track."""
+
+
+@dataclass(frozen=True)
+class Ridge:
+    """The crest of a blunt head along its line.
+
+    Attributes
+    ----------
+    t : (s,) array
+        Equidistant chainages, see `edges.stations_along`.
+    offset_m, by_chance_m : (s,) arrays
+        Offset of the crest to the left of the line, and its standard error by the noise of single points; NaN where no
+        points are near.
+    bend : float
+        Curvature of the parabola, 1/m.
+    """
+
+    t: np.ndarray
+    offset_m: np.ndarray
+    by_chance_m: np.ndarray
+    bend: float
+
+    @classmethod
+    def find(
+        cls, t: np.ndarray, across: np.ndarray, z: np.ndarray, length_m: float, head_width_m: float
+    ) -> Ridge | None:
+        """Fit one parabola, and a crest for each window, to the points of a line; None if its head is not blunt.
+
+        Parameters
+        ----------
+        t, across, z : (n,) arrays
+            Chainage (increasing), offset to the left and height of points near the line, metres.
+        length_m : float
+            Length of the line.
+        head_width_m : float
+        """
+        if not is_blended(t, across, z, head_width_m):
+            return None
+        rows = station_count(length_m)
+        near = np.abs(across) <= REACH_HEADS * head_width_m
+        row = np.minimum((t[near] / STATION_STEP_M).astype(int), rows - 1)
+        x, up = across[near], z[near] - rough_level(t[near], z[near])
+        used = np.ones(len(x), dtype=bool)
+        for _ in range(SLOPE_ROUNDS):
+            bend = max(-2 * float(np.polynomial.polynomial.polyfit(x[used], up[used], 2)[2]), MIN_BEND)
+            flat = up + 0.5 * bend * x**2
+            noise_m = robust_sigma(flat[used])
+            level, slope, spread = _slopes(row[used], rows, x[used], flat[used], noise_m / (bend * PRIOR_OFFSET_M))
+            used = np.abs(flat - level[row] - slope[row] * x) <= OFF_TOP_SIGMAS * noise_m
+        return cls(stations_along(length_m), slope / bend, noise_m / (bend * np.sqrt(spread)), bend)
+
+    def fall(self, across: np.ndarray) -> np.ndarray:
+        """Return how far the ridge is below its crest at distances from it, (n,) metres each."""
+        return 0.5 * self.bend * across**2
+
+    def support(self, t: np.ndarray, line: np.ndarray, unseen_m: float) -> Support:
+        """Return how well points support a finished line, without its errors of height.
+
+        Parameters
+        ----------
+        t : (n,) array
+            Chainages of the points on the head, increasing.
+        line : (s, 2) array
+            Places of the stations.
+        unseen_m : float
+            Standard deviation of the line where no points are near.
+        """
+        points = np.bincount(np.minimum((t / STATION_STEP_M).astype(int), len(self.t) - 1), minlength=len(self.t))
+        sigma_m = np.where(np.isfinite(self.by_chance_m), np.hypot(self.by_chance_m, wander(line)), unseen_m)
+        return Support(self.t, points, np.hypot(sigma_m, bridge_error(t, self.t)))
+
+
+def _slopes(
+    row: np.ndarray, rows: int, x: np.ndarray, flat: np.ndarray, prior_m: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Fit level and slope across to the points of each window, (rows,) each; NaN in windows without points.
+
+    The third array is the information about the slope: the sum of the squares of the offsets about their mean, m², to
+    which the prior adds `prior_m` squared.
+    """
+    sums = np.array([np.bincount(row, one, rows) for one in (np.ones_like(x), x, flat, x * x, x * flat)])
+    count, sx, sy, xx, xy = uniform_filter1d(sums, WINDOW, axis=1, mode="constant") * WINDOW
+    count = np.where(count > 0.5, count, np.nan)
+    spread = xx - sx**2 / count + prior_m**2
+    slope = (xy - sx * sy / count) / spread
+    return (sy - slope * sx) / count, slope, spread
+
+
+def wander(line: np.ndarray) -> float:
+    """Return the standard deviation of a line about a stiff curve: of heights, (s,), or across a plan, (s, 2), metres.
+
+    The median over the line counts, so that the abrupt curvature of a turnout does not.
+    """
+    stations, degree = STIFF_PROFILE if line.ndim == 1 else STIFF_PLAN
+    size = min(stations, len(line) - 1 + len(line) % 2)
+    if size <= degree + 1:
+        return 0.0
+    off = line - savgol_filter(line, size, degree, axis=0)
+    return robust_sigma(off if line.ndim == 1 else np.einsum("ij,ij->i", off, left_normals(line)))
