@@ -91,7 +91,8 @@ def motorway(world: World) -> None:
         guard_beam(world, side * (ROAD_HALF_M + 0.3), float(_road(np.array(ROAD_HALF_M))), -side)
     for place in SEALS_M:
         _strip(world, place, *SEAL_M)
-    world.add(*np.transpose(BARRIER_M), WALL)
+    barrier = np.array(BARRIER_M)
+    world.add(barrier[:, 0], barrier[:, 1], WALL)
 
 
 def _road(across: np.ndarray) -> np.ndarray:
