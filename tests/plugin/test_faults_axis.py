@@ -124,7 +124,7 @@ FAULTS = [
         "POST_FIELD.",
     ),
     Fault(
-        "post with a text that is no kilometre",
+        "post with another text than a kilometre",
         given(POSTS=posts((0, 3, "km one"), (200, 3, "1.2"), fields="&field=km:string(9)")),
         REFUSED,
         "POSTS has a row (feature 1) whose field km is 'km one' and no kilometre: correct it, or delete the row.",
