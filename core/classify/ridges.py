@@ -28,7 +28,8 @@ BIN_M = 0.01
 BINS = 2 * round(REACH_M / BIN_M)
 
 BASE_M = 0.20
-"""Distance from the axis within which a side is lowest at its base: the shoulder of the ballast may fall further on."""
+"""Distance from the axis within which a side is lowest at its base, and of which the outer half must be seen: the
+shoulder of the ballast may fall further on."""
 
 LEVELS = (0.25, 0.5, 0.75)
 """Parts of the way down from the top to the base at which the width of a side is measured."""
@@ -109,7 +110,8 @@ class Ridges:
 
     def may_be_heads(self, head_width_m: float) -> np.ndarray:
         """Return which ridges are not wider than a head with the blur of the square, (pieces,) bool."""
-        widest_m = MAX_WIDTH * WIDTH_PER_SIGMA * np.hypot(head_width_m / np.sqrt(12), self.blur_m)
+        blurred_m = WIDTH_PER_SIGMA * np.hypot(head_width_m / np.sqrt(12), self.blur_m)
+        widest_m = MAX_WIDTH * max(head_width_m, blurred_m)
         with np.errstate(invalid="ignore"):
             return self.width_m < widest_m
 
@@ -203,8 +205,10 @@ def _levels(side: np.ndarray, top: np.ndarray) -> np.ndarray:
         Heights outwards from the axis.
     top : (pieces,) array
     """
-    base = np.fmin.reduce(side[:, : round(BASE_M / BIN_M)], axis=1)
+    bins = round(BASE_M / BIN_M)
     unseen = np.isnan(side)
+    has_base = ~unseen[:, bins // 2 : bins].all(axis=1)
+    base = np.where(has_base, np.fmin.reduce(side[:, :bins], axis=1), np.nan)
     rows = np.arange(len(side))
     found = []
     for share in LEVELS:

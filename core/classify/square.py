@@ -52,8 +52,8 @@ BLUNT_BELOW_M = 0.12
 there; noise and a bed that slopes add as much. A limit that cut the lower side off would move the line."""
 
 LEAST_BLUNT_M = 5.0
-"""Shortest piece of a rail with its partner where heads are blunt. Any mound of this width is as round, and up to 4 m of
-one are opposite something else by chance; without a partner, a rail cannot be told from a mound."""
+"""Shortest piece of a rail with its partner where heads are blunt. Any mound of this width is as round, and up to 4 m
+of one are opposite something else by chance; without a partner, a rail cannot be told from a mound."""
 
 NOISE_ACROSS_M = 0.01
 """Distance beyond the side of a head within which the top of a cell counts towards its axis: less than half the gap

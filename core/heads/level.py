@@ -56,11 +56,11 @@ BLENDED_M = 0.006
 do. Seen by narrow beams, the round corners fall by 1 to 2 mm, and the rim of a line that is off the head by more, but
 not both."""
 
-CROWN_HEADS, RIM_HEADS, SHOULDER_HEADS = 0.2, (0.3, 0.5), (0.6, 0.8)
+CROWN_HEADS, RIM_HEADS, SHOULDER_HEADS = 0.2, (0.3, 0.5), (0.55, 0.75)
 """Parts of the head width on either side of the axis: the crown, the rims, and what is beyond a head that is not
 blurred."""
 
-SHOULDER_SHARE = 0.5
+SHOULDER_SHARE = 0.33
 """Points per width on either shoulder, as a share of those on the crown, from which a blurred head goes on there."""
 
 

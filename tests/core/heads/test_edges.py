@@ -11,7 +11,6 @@ from rail_extract.core.heads.edges import (
     WINDOWS,
     CrossSections,
     histograms,
-    mean_offsets,
     middles,
     search_distance,
     stations_along,
@@ -51,12 +50,10 @@ def test_the_shortest_window_with_eighty_points_is_used(per_m, window):
 
 
 @pytest.mark.parametrize("offset_m", [-0.024, -0.004, 0.0, 0.014])
-def test_the_middle_is_between_both_edges_and_mean_offsets_are_those_of_the_points(offset_m):
+def test_the_middle_is_between_both_edges(offset_m):
     _, counts, wide = histograms(*head(1000, offset_m), LENGTH_M, WIDTH)
     free = np.ones((2, len(counts)), dtype=bool)
     np.testing.assert_allclose(middles(counts, wide, free), offset_m / 0.002, atol=0.3)
-    stations, found = mean_offsets(*head(1000, offset_m), LENGTH_M, WIDTH)
-    np.testing.assert_allclose(found[:-1], offset_m, atol=1e-4)
     one_edge = free & [[True], [False]]  # its round corner hides a part of the head
     assert middles(counts, wide, one_edge)[40] == pytest.approx(offset_m / 0.002 - 1.6, abs=0.2)
     assert middles(counts, wide, ~one_edge & free)[40] == pytest.approx(offset_m / 0.002 + 1.6, abs=0.2)
@@ -69,14 +66,6 @@ def test_lines_too_far_from_the_head_and_points_without_edges_show_no_middle():
         assert np.isnan(middles(counts, wide, free)).all()
     _, counts, wide = histograms(*head(1000), LENGTH_M, WIDTH)
     assert np.isnan(middles(counts, wide, ~free)).all()
-
-
-def test_mean_offsets_leave_out_points_further_than_a_head_and_empty_windows():
-    t, across = head(400, 0.010, span_m=(0.0, 8.0))
-    far = np.full(len(t), 0.0721), np.full(len(t), -0.0721)
-    _, found = mean_offsets(np.tile(t, 3), np.concatenate([across, *far]), LENGTH_M, WIDTH)
-    np.testing.assert_allclose(found[:40], 0.010, atol=1e-3)
-    assert np.isnan(found[50:]).all()
 
 
 def test_densities_are_those_of_the_nine_bins_to_either_side_of_a_border():

@@ -12,10 +12,10 @@ from rail_extract.core.heads.uncertainty import (
     UNSURE_GRADIENT_CHANGE,
     VARIANCE_FACTOR,
     _averaged,
-    _bridge_error,
     _sampling,
     _wander,
     _with_blur,
+    bridge_error,
     height_error,
     measure_support,
     on_one_face,
@@ -235,14 +235,14 @@ def test_edges_err_by_chance_as_counts_do():
 def test_lines_err_where_there_are_no_points_by_an_unknown_curvature():
     stations = np.array([1.0, 4.0, 5.0, 7.0, 12.0])
     expected = UNSURE_CURVATURE * np.array([3 * 3, 0, 1 * 5, 3 * 3, 2 * 2]) / 2
-    np.testing.assert_allclose(_bridge_error(np.array([4.0, 10.0]), stations), expected)
+    np.testing.assert_allclose(bridge_error(np.array([4.0, 10.0]), stations), expected)
 
 
 def test_a_line_on_one_face_has_the_points_of_its_face_and_its_doubt():
     before = Support(np.arange(0.125, 1.5, 0.25), np.full(6, 9), np.full(6, 1.0))
     found = on_one_face(before, np.array([0.1, 0.2, 0.3, 1.49, 1.6]), 0.004)
     assert found.points.tolist() == [2, 1, 0, 0, 0, 2]
-    expected = np.hypot(0.004, _bridge_error(np.array([0.1, 0.2, 0.3, 1.49, 1.6]), before.t))
+    expected = np.hypot(0.004, bridge_error(np.array([0.1, 0.2, 0.3, 1.49, 1.6]), before.t))
     np.testing.assert_allclose(found.sigma_m, expected)
 
 

@@ -1,0 +1,74 @@
+import numpy as np
+import pytest
+from rail_extract.core.heads.blunt import Ridge, wander
+from scipy.ndimage import gaussian_filter1d
+
+WIDTH, LENGTH_M, BEND = 0.072, 40.0, 8.0
+
+
+def ridge_points(offset_m=0.0, noise_m=0.015, slope=0.0, per_m=40, seed=0):
+    """Points of a blurred head, 56 mm to either side of its crest, as the classification gives them."""
+    rng = np.random.default_rng(seed)
+    t = np.sort(rng.uniform(0, LENGTH_M, int(per_m * LENGTH_M)))
+    x = rng.uniform(-0.056, 0.056, len(t))
+    z = 100.0 + 0.01 * t - 0.5 * BEND * x**2 + slope * x + rng.normal(0, noise_m, len(t))
+    return t, x + offset_m, z
+
+
+@pytest.mark.parametrize("offset_m", [-0.006, 0.0, 0.006])
+def test_the_crest_is_found_within_its_standard_error(offset_m):
+    t, across, z = ridge_points(offset_m)
+    ridge = Ridge.find(t, across, z, LENGTH_M, WIDTH)
+    assert ridge.bend == pytest.approx(BEND, rel=0.15)
+    error = (ridge.offset_m - offset_m)[20:-20]
+    assert np.sqrt(np.mean(error**2)) < 0.006
+    assert 0.5 < np.sqrt(np.mean((error / ridge.by_chance_m[20:-20]) ** 2)) < 1.6
+
+
+def test_points_on_one_side_of_the_crest_do_not_move_it():
+    t, across, z = ridge_points(noise_m=0.004)
+    kept = (across > -0.02) | (np.arange(len(t)) % 2 == 0)
+    ridge = Ridge.find(t[kept], across[kept], z[kept], LENGTH_M, WIDTH)
+    assert np.abs(ridge.offset_m[20:-20]).max() < 0.004
+    assert across[kept].mean() > 0.004  # the mean of the points would
+
+
+def test_a_flat_head_is_not_blunt():
+    t, across, z = ridge_points(noise_m=0.002)
+    assert Ridge.find(t, across, z + 0.5 * BEND * across**2, LENGTH_M, WIDTH) is None
+
+
+def test_a_ridge_falls_from_its_crest_as_its_bend_says():
+    t, across, z = ridge_points(noise_m=0.002)
+    ridge = Ridge.find(t, across, z, LENGTH_M, WIDTH)
+    assert ridge.fall(np.array([0.0, 0.05, -0.05])) == pytest.approx([0.0, 0.01, 0.01], rel=0.05)
+
+
+def test_support_holds_what_the_line_wanders_and_grows_across_a_gap():
+    t, across, z = ridge_points(noise_m=0.004)
+    kept = (t < 15) | (t > 25)
+    ridge = Ridge.find(t[kept], across[kept], z[kept], LENGTH_M, WIDTH)
+    waves = 0.008 * np.sin(2 * np.pi * ridge.t / 9.0)
+    support = ridge.support(t[kept], np.column_stack([ridge.t, waves]), 0.012)
+    assert support.points.sum() == kept.sum()
+    assert support.sigma_m[10] == pytest.approx(0.008 * 1.4826 * np.sin(np.pi / 4), rel=0.3)
+    assert support.sigma_m[80] > 2 * support.sigma_m[10]
+
+
+@pytest.mark.parametrize("kind", ["plan", "heights"])
+def test_a_wandering_line_is_told_from_the_shape_of_a_track(kind):
+    s = np.arange(0, 600, 0.25)
+    rng = np.random.default_rng(1)
+    noise = gaussian_filter1d(rng.normal(0, 1, len(s)), 6)  # alike over 1.5 m
+    noise *= 0.006 / noise.std()
+    if kind == "plan":
+        clothoid = s**3 / (6 * 300 * 600)
+        track, wandering = (np.column_stack([s, clothoid + one]) for one in (0 * noise, noise))
+    else:
+        track, wandering = (s**2 / (2 * 3000) + one for one in (0 * noise, noise))
+    assert wander(wandering) == pytest.approx(0.006, rel=0.25)
+    assert wander(track) < 0.0011  # the least noise that is stated is a millimetre
+
+
+def test_lines_of_a_few_stations_cannot_wander():
+    assert wander(np.zeros(3)) == 0.0
