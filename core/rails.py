@@ -375,10 +375,14 @@ HEAD_OFF_M = 0.005
 
 @dataclass(frozen=True)
 class HeadWidths:
-    """Width of the railheads as the points show it, NaN if they do not, and as it is stated, metres."""
+    """Width of the railheads as the points show it, NaN if they do not, and as it is stated, metres.
+
+    Blunt heads show no width: they are round ridges, which beams or images have blurred.
+    """
 
     seen_m: float
     stated_m: float
+    blunt: bool = False
 
     @property
     def differ(self) -> bool:
@@ -406,6 +410,10 @@ class SearchFigures:
         Squares with rails; those among them that are thin, and those with rails in pavement.
     along_m, across_m : float
         Length of rails near the guide that run along it, and across it, whether they are kept or not.
+    blunt_m : float
+        Length of rails where the blur of the cloud hides how wide a head is.
+    blur_m2 : float
+        The blur there, a standard deviation, times this length.
     """
 
     points: int = 0
@@ -417,6 +425,8 @@ class SearchFigures:
     paved: int = 0
     along_m: float = 0.0
     across_m: float = 0.0
+    blunt_m: float = 0.0
+    blur_m2: float = 0.0
 
     def __add__(self, other: SearchFigures) -> SearchFigures:
         return SearchFigures(*(one + more for one, more in zip(astuple(self), astuple(other))))
@@ -426,6 +436,11 @@ class SearchFigures:
         """Cells per metre of rail; 0 without rails."""
         length_m = self.paired_m + self.single_m
         return self.cells / length_m if length_m else 0.0
+
+    @property
+    def blur_m(self) -> float:
+        """Mean blur where heads are blunt, metres; 0 where they are not."""
+        return self.blur_m2 / self.blunt_m if self.blunt_m else 0.0
 
 
 @dataclass(frozen=True)

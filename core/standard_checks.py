@@ -11,6 +11,7 @@ import numpy as np
 
 from .clouds.points import Request
 from .errors import CloudError, ParameterError
+from .heads.blunt import blunt_share
 from .heads.gauge_estimate import measure_spacings
 from .heads.roads import MIN_WIDER_M
 from .heads.sections import likelier_width
@@ -24,6 +25,9 @@ from .tracks.widths_by_gauge import width_at
 
 SAMPLE_M = 50.0
 """Half the side of the area whose points show the width of the heads."""
+
+MOST = 0.5
+"""Share of the length of rail that shows blunt heads from which those of the cloud are blunt."""
 
 FEET = (0.3048, 1 / 0.3048)
 """Factors by which coordinates are wrong if feet are stated as metres, or metres as feet."""
@@ -120,12 +124,19 @@ def head_widths(
     xyz = points.xyz
     place = xyz[np.argmin(np.abs(xyz[:, :2] - np.median(xyz[:, :2], axis=0)).max(axis=1)), :2]
     measured = measure_spacings(xyz[np.abs(xyz[:, :2] - place).max(axis=1) <= SAMPLE_M]).most_common()
+    lines = [rail.xyz[:, :2] - points.frame.shift_to(source.frame)[:2] for rail in rails]
+    stated_m = gauges[0][1] if measured is None else width_at(measured[0], gauges)
+    if blunt_share(lines, xyz, stated_m) > MOST:
+        progress.warning(
+            f"Heads are blunt: the points show round ridges without edges where heads of {1000 * stated_m:.0f} mm are, "
+            "as matched images and wide beams do. Lines follow the crests, and sigma_mm and sigmaz_mm state how far "
+            "these wander: gauge and cant cannot be better, and the width of the heads is not measured."
+        )
+        return HeadWidths(float("nan"), stated_m, blunt=True)
     if measured is None:
-        return HeadWidths(float("nan"), gauges[0][1])
-    stated_m = width_at(measured[0], gauges)
+        return HeadWidths(float("nan"), stated_m)
     seen_m = measured[1]
     if rails and HEAD_OFF_M < seen_m - stated_m < MIN_WIDER_M:
-        lines = [rail.xyz[:, :2] - points.frame.shift_to(source.frame)[:2] for rail in rails]
         seen_m = likelier_width(lines, xyz, (stated_m, seen_m))
     widths = HeadWidths(seen_m, stated_m)
     measured = measured[0], seen_m

@@ -22,7 +22,7 @@ from pictures import draw_pictures  # noqa: E402
 from rail_extract.core.classify import square  # noqa: E402
 from rail_extract.core.classify.bed import Coarse, find_bed  # noqa: E402
 from rail_extract.core.classify.lines import Lines, Marks, find_lines  # noqa: E402
-from rail_extract.core.classify.settings import DENSE, Settings  # noqa: E402
+from rail_extract.core.classify.settings import DENSE, HEADS, Settings  # noqa: E402
 from rail_extract.core.classify.tops import (  # noqa: E402
     HIGH_M,
     LOW_M,
@@ -102,13 +102,13 @@ def scene() -> Scene:
     settings = Settings((STANDARD.gauge_m,), STANDARD.head_width_m)
     x, y, z = raw.xyz.T
     coarse = Coarse.around(x, y)
-    height, _ = find_bed(coarse, *coarse.offsets(x, y), z.astype(np.float32)).heights(
-        *coarse.offsets(x, y), z.astype(np.float32)
-    )
+    bed = find_bed(coarse, *coarse.offsets(x, y), z.astype(np.float32))
+    height, _ = bed.heights(*coarse.offsets(x, y), z.astype(np.float32))
     near = np.flatnonzero(height <= HIGH_M)
     grid, cell = Grid.around(x[near], y[near], settings.cell_m)
     tops = tops_of(grid, cell, height[near], z[near].astype(np.float32))
-    found = square.Candidates.find(tops, raw.xyz[near, :2], cell, height[near])
+    shown = square.Shown(raw.xyz[near, :2], cell, height[near], bed, tops)
+    found = square.Candidates.find(shown, HEADS)
     return Scene(raw, settings, height, tops, found.marks, square._kept(found, 1.0, DENSE, settings))
 
 

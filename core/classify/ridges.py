@@ -130,6 +130,8 @@ def on_crests(xy: np.ndarray, height: np.ndarray, lines: Lines, blur_m: float) -
     blur_m : float
         Standard deviation of the ridges.
     """
+    if not len(lines.axis):
+        return lines
     count, rise = _profiles(xy, height, lines, np.arange(len(lines.axis)))
     same = _along(lines)
     count, rise = same @ count, same @ rise

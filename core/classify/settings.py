@@ -10,6 +10,7 @@ import numpy as np
 from ..raster import cell_size
 from .guide import Guide
 from .pieces import LEAST_M
+from .tops import LOW_M, Band
 
 SQUARE_CELLS = 1024
 """Side of the squares that are classified one after another, in cells: 41 m at 1435 mm, images of 2 to 4 MB."""
@@ -41,6 +42,8 @@ class Tolerances:
         the beam is as wide.
     least_m : float
         Shortest piece of a rail that has its partner.
+    band : Band
+        Tops that may be those of rails.
     wider_m, wider_single_m : float
         Width beyond that of a head up to which the top of a piece may be one, with a partner and without. Measured: up
         to 8 mm, and 42 mm on thin clouds; kerbs of 150 mm 42 mm, on thin clouds 63 mm.
@@ -57,10 +60,16 @@ class Tolerances:
     above_m: float
     beside_m: float
     least_m: float
+    band: Band
     wider_m: float
     wider_single_m: float
     width_rounds: int
 
+
+HEADS = Band(low_m=LOW_M, depth_share=1.0, slab_m=0.025)
+BURIED = Band(low_m=0.04, depth_share=0.4, slab_m=0.012)
+"""Tops of rails, and those of rails that are buried up to the head. A smooth surface shows these, too; a rough one has
+as much relief anywhere."""
 
 DENSE = Tolerances(
     along_m=0.035,
@@ -71,6 +80,7 @@ DENSE = Tolerances(
     above_m=0.025,
     beside_m=0.02,
     least_m=LEAST_M,
+    band=HEADS,
     wider_m=0.025,
     wider_single_m=0.012,
     width_rounds=5,
@@ -86,11 +96,17 @@ THIN = Tolerances(
     above_m=0.065,
     beside_m=0.035,
     least_m=2 * LEAST_M,
+    band=HEADS,
     wider_m=0.05,
     wider_single_m=0.04,
     width_rounds=1,
 )
 """For scanners in the air: a beam of 4 to 9 cm blends the head and the ballast."""
+
+BLUNT = replace(DENSE, band=BURIED, least_m=5.0, below_m=0.12)
+"""For clouds that blur a head to a round ridge. Any mound of its width is as round, and up to 4 m of one are opposite
+something else by chance. Beside its crest, the ridge falls by up to 5 cm; noise and a bed that slopes add as much. A
+limit that cut the lower side off would move the line."""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .lines import Lines
-from .tops import HIGH_M, Tops, depth_m
+from .tops import HIGH_M, Band, Tops
 
 ACROSS_M = (0.09, 0.13, 0.17, 0.21, 0.25, 0.29)
 """Distances from the axis at which the surroundings are looked at: from beyond the head to the next 0.2 m."""
@@ -18,12 +18,13 @@ MAX_HIGH = 4
 a cable trough, or of the shoulder of the ballast takes all."""
 
 
-def stands_free(tops: Tops, marks: np.ndarray, lines: Lines) -> np.ndarray:
+def stands_free(tops: Tops, band: Band, marks: np.ndarray, lines: Lines) -> np.ndarray:
     """Return which lines have lower ground, or nothing seen, on each side, (n,) bool.
 
     Parameters
     ----------
     tops : Tops
+    band : Band
     marks : (n,) int array
         Cells.
     lines : Lines
@@ -31,7 +32,7 @@ def stands_free(tops: Tops, marks: np.ndarray, lines: Lines) -> np.ndarray:
     """
     along = np.linspace(-0.5, 0.5, ALONG) * lines.reach_m
     free = np.ones(len(lines.axis), dtype=bool)
-    depth = depth_m(lines.height)
+    depth_m = band.depth_m(lines.height)
     z = tops.z.ravel()
     for side in (1, -1):
         distances = np.zeros(len(free), dtype=np.int64)
@@ -42,7 +43,7 @@ def stands_free(tops: Tops, marks: np.ndarray, lines: Lines) -> np.ndarray:
                 rise = z[cell] - z[marks]
                 wall = inside & tops.high.ravel()[cell]
                 seen += wall | (inside & (np.abs(rise) < HIGH_M))
-                high += wall | (inside & (rise >= -depth) & (rise < HIGH_M))
+                high += wall | (inside & (rise >= -depth_m) & (rise < HIGH_M))
             distances += 2 * high > seen
         free &= distances <= MAX_HIGH
     return free

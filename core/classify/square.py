@@ -16,9 +16,9 @@ from .lines import Lines, Marks, centred, find_lines
 from .partner import runs_inside, stations_with_partner
 from .pieces import continuing, links, long_enough, lower_than_beside, pieces_of, with_partner
 from .ridges import Ridges, cells_beside, on_crests
-from .settings import DENSE, MARGIN_M, THIN, Settings, Tolerances
+from .settings import BLUNT, DENSE, HEADS, MARGIN_M, THIN, Settings, Tolerances
 from .sides import stands_free
-from .tops import HIGH_M, MILLIMETRES, Grid, Tops, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
+from .tops import HIGH_M, MILLIMETRES, Band, Grid, Tops, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
 
 THIN_PER_M2 = 400.0
 """Points per square metre below which a square is thin: no scanner on a vehicle, or far from it."""
@@ -43,21 +43,43 @@ SINGLE_COVER = 0.75
 SINGLE_HEIGHT_M = 0.12
 """Least height above the bed of a rail without a partner: lower things are edges of slopes, kerbs and boards."""
 
+LEAST_SINGLE_WIDTH = 0.5
+"""Least width of a rail without a partner, by that of a head: edges of ruts and furrows that a scanner sees from one
+side are sharp crests."""
+
 SINGLE_SLOPE = 0.4
 """Steepest bed of a rail without a partner: that of the shoulder of a ballast bed is 0.67. Where the far side of a
 slope is hidden, its crest looks like a bar."""
 
-BLUNT_BELOW_M = 0.12
-"""Depth below the mean top down to which the points beside a crest are on a blunt head: the ridge falls by up to 5 cm
-there; noise and a bed that slopes add as much. A limit that cut the lower side off would move the line."""
+MOST = 0.5
+"""Share of the cells with a partner on tops as narrow as a head up to which a blunt square is searched for ridges."""
 
-LEAST_BLUNT_M = 5.0
-"""Shortest piece of a rail with its partner where heads are blunt. Any mound of this width is as round, and up to 4 m
-of one are opposite something else by chance; without a partner, a rail cannot be told from a mound."""
+LEAST_BLUNT_HEIGHT_M = 0.07
+"""Least mean height above the bed of a piece of a blunt rail: half of what images show of one, as where ballast reaches
+the head. Two lines of kerb stones at gauge, 6.5 cm high, are as narrow."""
 
 NOISE_ACROSS_M = 0.01
 """Distance beyond the side of a head within which the top of a cell counts towards its axis: less than half the gap
 to a guard rail, from which on the axis would lie between both."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a square shows near its bed.
+
+    Attributes
+    ----------
+    xy, cell, height : (n, 2), (n,) and (n,) arrays
+        Points: places, cells and heights above the bed.
+    bed : Bed
+    tops : Tops
+    """
+
+    xy: np.ndarray
+    cell: np.ndarray
+    height: np.ndarray
+    bed: Bed
+    tops: Tops
 
 
 @dataclass(frozen=True)
@@ -81,10 +103,11 @@ class Candidates:
     places: np.ndarray
 
     @classmethod
-    def find(cls, tops: Tops, xy: np.ndarray, cell: np.ndarray, height: np.ndarray) -> Candidates:
-        """Find the narrow tops; the arguments are those of `middles_of_tops`."""
-        cells = narrow_tops(tops)
-        return cls(tops, cells, highest_of_blocks(tops, cells), middles_of_tops(tops, cells, xy, cell, height))
+    def find(cls, shown: Shown, band: Band) -> Candidates:
+        """Find the narrow tops in a band."""
+        tops, cells = shown.tops, narrow_tops(shown.tops, band)
+        middles = middles_of_tops(tops, band, cells, shown.xy, shown.cell, shown.height)
+        return cls(tops, cells, highest_of_blocks(tops, cells), middles)
 
     def at(self, cells: np.ndarray) -> Marks:
         """Return places and heights of some of the cells."""
@@ -158,7 +181,7 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> Classified:
     height = height[near]
     grid, cell = Grid.around(x[near], y[near], settings.cell_m)
     tops = tops_of(grid, cell, height, z[near])
-    standing = _standing(xyz[near, :2], cell, height, bed, tops, settings)
+    standing = _standing(Shown(xyz[near, :2], cell, height, bed, tops), settings)
     flush = flush_rails(coarse, near, xyz[near, :2], height, grid, cell, settings)
     rail = nothing.rail
     found = near[np.union1d(standing.points, flush.points)]
@@ -179,39 +202,59 @@ class Standing:
         Whether the square is thin.
     rails : Kept
         Those that the guide leaves out as well.
+    blur_m : float
+        Blur of the square if it hides how wide a head is; otherwise 0.
     """
 
     points: np.ndarray
     kept: Kept
     thin: bool
     rails: Kept
+    blur_m: float
 
 
-def _standing(
-    xy: np.ndarray, cell: np.ndarray, height: np.ndarray, bed: Bed, tops: Tops, settings: Settings
-) -> Standing:
+def _standing(shown: Shown, settings: Settings) -> Standing:
     """Find rails that stand out of their bed."""
-    found = Candidates.find(tops, xy, cell, height)
-    density = _density(bed.coarse, tops.grid.middles(found.marks))
+    found = Candidates.find(shown, HEADS)
+    density = _density(shown.bed.coarse, shown.tops.grid.middles(found.marks))
     tolerances = THIN if density < THIN_PER_M2 else DENSE
     reach_m = float(np.clip(REACH_POINTS_PER_M / density, *REACH_M))
     kept = _kept(found, reach_m, tolerances, settings)
-    heads = whole_heads(tops, _completed(found, kept, settings, tolerances), tolerances)
-    chosen = label(tops, heads, cell, height, tolerances)
-    beside = Near.find(xy[chosen], kept.lines)
-    narrow, blur_m = _narrow(kept, Shown(xy, height, beside, bed), settings, tolerances)
-    if blur_m and narrow.any():
-        kept, narrow = kept.of(narrow), np.ones(narrow.sum(), dtype=bool)
-        kept = replace(kept, lines=on_crests(xy, height, kept.lines, blur_m))
-        half_m = settings.head_width_m / 2 + tolerances.beside_m
-        heads = cells_beside(tops.grid, kept.lines, half_m)
-        chosen = label(tops, heads, cell, height, replace(tolerances, below_m=BLUNT_BELOW_M))
-        beside = Near.find(xy[chosen], kept.lines)
+    heads = whole_heads(shown.tops, _completed(found, kept, settings, tolerances), tolerances)
+    chosen = label(shown.tops, heads, shown.cell, shown.height, tolerances)
+    beside = Near.find(shown.xy[chosen], kept.lines)
+    narrow, blur_m = _narrow(kept, beside, shown, settings, tolerances)
+    if blur_m:
+        kept, chosen = _blunt_heads(shown, reach_m, settings)
+        beside, narrow = Near.find(shown.xy[chosen], kept.lines), np.ones(len(kept.cell), dtype=bool)
     wanted = narrow.copy()
     if settings.guide is not None:
         wanted &= settings.guide.keeps(kept.lines, kept.pairs, settings.spacings_m, tolerances.partner_m)
     on = beside.on(settings.head_width_m / 2 + tolerances.beside_m, wanted[beside.cell])
-    return Standing(chosen[on], kept.of(wanted), tolerances is THIN, kept.of(narrow))
+    return Standing(chosen[on], kept.of(wanted), tolerances is THIN, kept.of(narrow), blur_m)
+
+
+def _blunt_heads(shown: Shown, reach_m: float, settings: Settings) -> tuple[Kept, np.ndarray]:
+    """Find heads that are blurred to round ridges.
+
+    Returns
+    -------
+    Kept
+        Cells with their axes on the crests; all of them with a partner, because a mound of this width is as round.
+    (k,) int array
+        Numbers of the points on the heads.
+    """
+    kept = _kept(Candidates.find(shown, BLUNT.band), reach_m, BLUNT, settings)
+    if len(kept.cell):
+        piece = pieces_of(len(kept.cell), kept.pairs)
+        ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
+        heads = ridges.may_be_heads(settings.head_width_m)
+        kept = kept.of((heads & (_mean(kept.lines.height, piece) >= LEAST_BLUNT_HEIGHT_M))[piece])
+        kept = replace(kept, paired=_paired(kept.lines, settings, BLUNT))
+        kept = kept.of(_long(kept, settings, False, BLUNT.least_m))
+        kept = replace(kept, lines=on_crests(shown.xy, shown.height, kept.lines, ridges.blur_m))
+    cells = cells_beside(shown.tops.grid, kept.lines, settings.head_width_m / 2 + BLUNT.beside_m)
+    return kept, label(shown.tops, cells, shown.cell, shown.height, BLUNT)
 
 
 def _figures(
@@ -223,6 +266,7 @@ def _figures(
     flush_m = shares_of_length(flush.lines, settings.head_width_m)[settings.own(flush.lines.axis)]
     near_m = beside_guide(standing.rails.lines, settings) + beside_guide(flush.rails, settings)
     there = bool(rail.any())
+    blunt_m = float(share_m.sum()) if standing.blur_m else 0.0
     return SearchFigures(
         points=int(rail.sum()),
         paired_m=float(share_m[kept.paired].sum() + flush_m.sum()),
@@ -233,6 +277,8 @@ def _figures(
         paved=int(len(flush_m) > 0),
         along_m=float(near_m[0]),
         across_m=float(near_m[1]),
+        blunt_m=blunt_m,
+        blur_m2=blunt_m * standing.blur_m,
     )
 
 
@@ -259,15 +305,19 @@ def _kept(found: Candidates, reach_m: float, tolerances: Tolerances, settings: S
     good = np.flatnonzero((lines.cover >= MIN_COVER) & (lines.pure >= MIN_PURE))
     half_m = settings.head_width_m / 2 + NOISE_ACROSS_M
     lines = centred(lines.of(good), found.at(found.cells), half_m, tolerances.along_m)
-    free = stands_free(found.tops, found.marks[good], lines)
+    free = stands_free(found.tops, tolerances.band, found.marks[good], lines)
     lines, marks = lines.of(free), found.marks[good[free]]
-    paired = stations_with_partner(lines, settings.spacings_m, tolerances.partner_m) >= MIN_STATIONS
-    pairs = links(lines)
+    paired, pairs = _paired(lines, settings, tolerances), links(lines)
     kept = Kept(lines, marks, paired, pairs).of(_certain(lines, paired, pairs))
     inside = runs_inside(kept.lines, kept.paired, kept.pairs, settings.gauges_m, settings.head_width_m)
     kept = kept.of(~inside)
     kept = kept.of(~lower_than_beside(kept.lines, tolerances.spread_m))
     return kept.of(_long(kept, settings, settings.keep_single, tolerances.least_m))
+
+
+def _paired(lines: Lines, settings: Settings, tolerances: Tolerances) -> np.ndarray:
+    """Return which cells have a partner, (n,) bool."""
+    return stations_with_partner(lines, settings.spacings_m, tolerances.partner_m) >= MIN_STATIONS
 
 
 def _long(kept: Kept, settings: Settings, keep_single: bool, least_m: float) -> np.ndarray:
@@ -305,62 +355,56 @@ def _near_axes(marks: Marks, kept: Kept, settings: Settings, height_m: float) ->
     return near.on((settings.head_width_m + settings.cell_m) / 2, level)
 
 
-@dataclass(frozen=True)
-class Shown:
-    """What the points show of the kept cells.
+def _narrow(
+    kept: Kept, beside: Near, shown: Shown, settings: Settings, tolerances: Tolerances
+) -> tuple[np.ndarray, float]:
+    """Find the cells of pieces that are as narrow as a railhead.
 
-    Attributes
+    Parameters
     ----------
-    xy, height : (n, 2) and (n,) arrays
-        All points near the bed.
+    kept : Kept
     beside : Near
-        Those in the height of the heads.
-    bed : Bed
-    """
-
-    xy: np.ndarray
-    height: np.ndarray
-    beside: Near
-    bed: Bed
-
-
-def _narrow(kept: Kept, shown: Shown, settings: Settings, tolerances: Tolerances) -> tuple[np.ndarray, float]:
-    """Find the cells of pieces that are as narrow as a railhead looks in this cloud.
+        Points in the height of the heads, and the cells near them.
+    shown : Shown
+    settings : Settings
+    tolerances : Tolerances
 
     Returns
     -------
     (n,) bool array
     blur_m : float
-        Blur of the square if it hides how wide a head is; otherwise 0.
+        Blur of the square if most rails with a partner are wider for it; otherwise 0.
     """
     if not len(kept.cell):
         return np.zeros(0, dtype=bool), 0.0
     piece = pieces_of(len(kept.cell), kept.pairs)
-    narrow = shown.beside.widths(piece, tolerances.width_rounds) < settings.head_width_m + tolerances.wider_m
-    alone = _stands_alone(kept, piece, shown, settings, tolerances)
+    narrow = beside.widths(piece, tolerances.width_rounds) < settings.head_width_m + tolerances.wider_m
+    alone = _stands_alone(kept, piece, beside, shown.bed, settings, tolerances)
     partnered = with_partner(kept.pairs, kept.paired)
-    chosen = np.where(continuing(kept.lines, partnered), narrow[piece], alone[piece])
-    if not alone.any() and narrow[piece[partnered]].all():
-        return chosen, 0.0
-    ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
-    if not ridges.are_blunt(settings.head_width_m):
-        return chosen, 0.0
-    chosen = continuing(kept.lines, partnered) & (narrow | ridges.may_be_heads(settings.head_width_m))[piece]
-    chosen[chosen] = _long(kept.of(chosen), settings, False, LEAST_BLUNT_M)
-    return chosen, ridges.blur_m
+    wide = bool(partnered.any()) and narrow[piece[partnered]].mean() < MOST
+    blur_m = 0.0
+    if wide or alone.any():
+        ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
+        alone &= not ridges.are_blunt(settings.head_width_m)
+        blur_m = ridges.blur_m if wide and ridges.are_blunt(settings.head_width_m) else 0.0
+    return np.where(continuing(kept.lines, partnered), narrow[piece], alone[piece]), blur_m
 
 
 def _stands_alone(
-    kept: Kept, piece: np.ndarray, shown: Shown, settings: Settings, tolerances: Tolerances
+    kept: Kept, piece: np.ndarray, beside: Near, bed: Bed, settings: Settings, tolerances: Tolerances
 ) -> np.ndarray:
     """Return which pieces may be rails without a partner, (pieces,) bool.
 
     They are as narrow as a head, stand as high as a rail does that is not buried in ballast, and their bed is not
     steeper than a track's.
     """
-    size = np.bincount(piece)
-    height_m, slope = (
-        np.bincount(piece, value) / size for value in (kept.lines.height, shown.bed.slopes(kept.lines.axis))
-    )
-    narrow = shown.beside.widths(piece, 1) < settings.head_width_m + tolerances.wider_single_m
-    return narrow & (height_m >= SINGLE_HEIGHT_M) & (slope <= SINGLE_SLOPE)
+    width_m = beside.widths(piece, 1)
+    narrow = width_m < settings.head_width_m + tolerances.wider_single_m
+    narrow &= width_m > LEAST_SINGLE_WIDTH * settings.head_width_m
+    high = _mean(kept.lines.height, piece) >= SINGLE_HEIGHT_M
+    return narrow & high & (_mean(bed.slopes(kept.lines.axis), piece) <= SINGLE_SLOPE)
+
+
+def _mean(values: np.ndarray, piece: np.ndarray) -> np.ndarray:
+    """Return the mean of the cells' values, (cells,), over each piece, (pieces,)."""
+    return np.bincount(piece, values) / np.bincount(piece)

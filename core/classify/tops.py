@@ -8,8 +8,8 @@ import numpy as np
 
 from ..raster import BORDER_CELLS
 
-LOW_M, TOP_M = 0.04, 0.40
-"""Heights of railheads above the bed: from rails that are buried up to the head to heavy rails on plates."""
+LOW_M, TOP_M = 0.055, 0.40
+"""Heights of railheads above the bed: from yards that are filled with ballast to heavy rails on plates."""
 
 HIGH_M = 0.95
 """Points between `TOP_M` and this mark walls, fences, masts, wheels and plants; wires and bridges are higher."""
@@ -17,21 +17,40 @@ HIGH_M = 0.95
 WINDOW_M = 0.26
 """Half the side of the window in which a top must be narrow: the window holds one rail and its surroundings."""
 
-DEPTH_M, DEPTH_SHARE = 0.045, 0.4
-"""Cells up to this far below a top count as part of it: the height of a head, and at most this share of the height
-above the bed. The ballast beside a rail that is buried up to the head is 4 cm lower than its top."""
+DEPTH_M = 0.045
+"""Cells up to this far below a top count as part of it: the height of a head."""
 
 MAX_SHARE = 0.50
 """Largest share of the other seen cells of the window that the top may fill: a rail fills 0.14 to 0.25, with its foot
 or a guard rail 0.38, ballast and kerbs half and more."""
 
-SLAB_M = 0.0125
-"""Tops are compared with their surroundings at thresholds this far apart."""
-
 EMPTY = np.int16(-32768)
 """Top of a cell without points."""
 
 MILLIMETRES, TENTHS_OF_MM = 1000, 10_000
+
+
+@dataclass(frozen=True)
+class Band:
+    """Which tops may be those of rails.
+
+    Attributes
+    ----------
+    low_m : float
+        Least height above the bed.
+    depth_share : float
+        Cells that are lower by this share of the height, or by `DEPTH_M` if that is less, are not part of the top.
+    slab_m : float
+        Tops are compared with their surroundings at thresholds this far apart.
+    """
+
+    low_m: float
+    depth_share: float
+    slab_m: float
+
+    def depth_m(self, height_m: np.ndarray | float) -> np.ndarray | float:
+        """Return the depth below a top down to which cells are part of it, metres, by its height above the bed."""
+        return np.minimum(DEPTH_M, self.depth_share * height_m)
 
 
 @dataclass(frozen=True)
@@ -130,24 +149,19 @@ def tops_of(grid: Grid, cell: np.ndarray, height: np.ndarray, z: np.ndarray) -> 
     return Tops(grid, *(values.reshape(grid.shape) for values in (top, highest, seen, high)))
 
 
-def depth_m(height_m: np.ndarray | float) -> np.ndarray | float:
-    """Depth below a top down to which a cell still counts as part of it, metres, by the top's height above the bed."""
-    return np.minimum(DEPTH_M, DEPTH_SHARE * height_m)
-
-
-def narrow_tops(tops: Tops) -> np.ndarray:
+def narrow_tops(tops: Tops, band: Band) -> np.ndarray:
     """Cells whose top is in the band of railheads, narrow, and free of high points, (k,) cell numbers in order."""
     top = tops.top.ravel()
-    candidates = np.flatnonzero((top >= LOW_M * MILLIMETRES) & ~_around(tops.high).ravel())
+    candidates = np.flatnonzero((top >= band.low_m * MILLIMETRES) & ~_around(tops.high).ravel())
     if not len(candidates):
         return candidates
     window = Window(tops.grid, candidates, round(WINDOW_M / tops.grid.cell_m))
     seen = window.sums(tops.seen)
-    slab = ((top[candidates] - LOW_M * MILLIMETRES) // (SLAB_M * MILLIMETRES)).astype(np.int64)
+    slab = (top[candidates] - round(band.low_m * MILLIMETRES)) // round(band.slab_m * MILLIMETRES)
     share = np.zeros(len(candidates))
     for number in np.unique(slab).tolist():
-        middle_m = LOW_M + (number + 0.5) * SLAB_M
-        threshold = (middle_m - depth_m(middle_m)) * MILLIMETRES
+        middle_m = band.low_m + (number + 0.5) * band.slab_m
+        threshold = (middle_m - band.depth_m(middle_m)) * MILLIMETRES
         chosen = np.flatnonzero(slab == number)
         others = window.of(chosen).sums((tops.top >= threshold) | tops.high) - 1
         share[chosen] = others / np.maximum(seen[chosen] - 1, 1)
@@ -202,12 +216,15 @@ def _sums_along(image: np.ndarray, reach: int, axis: int) -> np.ndarray:
     return total
 
 
-def middles_of_tops(tops: Tops, cells: np.ndarray, xy: np.ndarray, cell: np.ndarray, height: np.ndarray) -> np.ndarray:
+def middles_of_tops(
+    tops: Tops, band: Band, cells: np.ndarray, xy: np.ndarray, cell: np.ndarray, height: np.ndarray
+) -> np.ndarray:
     """Find the mean place of the points on top of some cells: truer than the middle of a cell that is half on a head.
 
     Parameters
     ----------
     tops : Tops
+    band : Band
     cells : (k,) int array
         In rising order.
     xy, cell, height : (n, 2), (n,) and (n,) arrays
@@ -220,7 +237,7 @@ def middles_of_tops(tops: Tops, cells: np.ndarray, xy: np.ndarray, cell: np.ndar
     """
     low = np.full(tops.top.size, np.inf, dtype=np.float32)
     top_m = tops.top.ravel()[cells] / MILLIMETRES
-    low[cells] = top_m - depth_m(top_m)
+    low[cells] = top_m - band.depth_m(top_m)
     on = np.flatnonzero((height >= low[cell]) & (height <= TOP_M))
     places = np.full((tops.top.size, 2), np.nan)
     places[cells] = centroids(cell[on], xy[on])

@@ -36,6 +36,9 @@ CHUNK = 250_000
 """Points read at once: about 10 MB, and read in much less than the half second within which a run must react to a
 cancel."""
 
+FIRST_POINTS = 10_000
+"""Points that are asked whether a scanner measured them."""
+
 MIN_HEADER, HEADER_14, VLR_HEADER, EVLR_HEADER = 227, 375, 54, 60
 """Sizes in bytes, from the LAS 1.2 and 1.4 specifications."""
 
@@ -152,11 +155,19 @@ def _coordinates(chunk: laspy.ScaleAwarePointRecord, keep: np.ndarray | slice) -
     return raw * chunk.scales + chunk.offsets
 
 
+def shows_scanner(path: Path) -> bool:
+    """Return whether the first points have what only a scanner measures; see `readers.shows_scanner`."""
+    with _open(path, FIELDS | _PARTS.INTENSITY) as reader:
+        points = reader.read_points(FIRST_POINTS)
+    measured = [points.intensity, *([points.gps_time] if "gps_time" in points.array.dtype.names else [])]
+    return any(np.ptp(values) > 0 for values in measured) or bool(np.max(points.number_of_returns) > 1)
+
+
 @contextmanager
-def _open(path: Path) -> Iterator[laspy.LasReader]:
+def _open(path: Path, fields: laspy.DecompressionSelection = FIELDS) -> Iterator[laspy.LasReader]:
     """Open a file and check it; what laspy and lazrs raise on a damaged file is left to `readers`."""
     _check_start(path)
-    with laspy.open(path, read_evlrs=False, decompression_selection=FIELDS) as reader:
+    with laspy.open(path, read_evlrs=False, decompression_selection=fields) as reader:
         _check_header(path, reader.header)
         yield reader
 

@@ -94,6 +94,9 @@ class Reader(Protocol):
     def read_points(self, path: Path, progress: Progress = SILENT, leave_out: Sequence[str] = ()) -> Iterator[Points]:
         """Read all points of a file chunk by chunk; see `read_points`."""
 
+    def shows_scanner(self, path: Path) -> bool:
+        """Return whether the first points of a file have what only a scanner measures; see `shows_scanner`."""
+
 
 def read_header(path: Path) -> CloudHeader:
     """Read and check the header of one file, without its points.
@@ -105,6 +108,15 @@ def read_header(path: Path) -> CloudHeader:
     """
     with explained(path):
         return _reader(path).read_header(path)
+
+
+def shows_scanner(path: Path) -> bool:
+    """Return whether the first points of a file have intensities, GPS times or several returns, as a scanner's have.
+
+    Points that are matched from images have none of these. Raises errors as `read_header` does.
+    """
+    with explained(path):
+        return _reader(path).shows_scanner(path)
 
 
 def first_header(paths: Paths) -> CloudHeader:

@@ -6,15 +6,16 @@ curve, the cloud errs, because a rail does not bend that quickly. See docs/metho
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import savgol_filter
 
-from ..polyline import left_normals
+from ..polyline import left_normals, project
 from ..rails import Support
-from .edges import STATION_STEP_M, station_count, stations_along
+from .edges import STATION_STEP_M, search_distance, station_count, stations_along
 from .level import OFF_TOP_SIGMAS, SLOPE_ROUNDS, is_blended, robust_sigma, rough_level
 from .uncertainty import bridge_error
 
@@ -85,10 +86,6 @@ class Ridge:
             used = np.abs(flat - level[row] - slope[row] * x) <= OFF_TOP_SIGMAS * noise_m
         return cls(stations_along(length_m), slope / bend, noise_m / (bend * np.sqrt(spread)), bend)
 
-    def fall(self, across: np.ndarray) -> np.ndarray:
-        """Return how far the ridge is below its crest at distances from it, (n,) metres each."""
-        return 0.5 * self.bend * across**2
-
     def support(self, t: np.ndarray, line: np.ndarray, unseen_m: float) -> Support:
         """Return how well points support a finished line, without its errors of height.
 
@@ -120,6 +117,20 @@ def _slopes(
     spread = xx - sx**2 / count + prior_m**2
     slope = (xy - sx * sy / count) / spread
     return (sy - slope * sx) / count, slope, spread
+
+
+def blunt_share(lines: Sequence[np.ndarray], xyz: np.ndarray, head_width_m: float) -> float:
+    """Return the share of the length of lines, (k, 2) each, along which points, (n, 3), show blunt heads."""
+    if not lines:
+        return 0.0
+    feet = project(lines, xyz[:, :2], search_distance(head_width_m))
+    shown_m = np.zeros(2)
+    for number in range(len(lines)):
+        own = feet.of(number)
+        if len(own.t):
+            blunt = is_blended(own.t, own.across, xyz[own.point, 2], head_width_m)
+            shown_m[int(blunt)] += np.ptp(own.t)
+    return float(shown_m[1] / max(shown_m.sum(), 1e-9))
 
 
 def wander(line: np.ndarray) -> float:

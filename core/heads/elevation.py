@@ -21,7 +21,7 @@ from ..rails import RailLine, Support
 from .blunt import Ridge, wander
 from .edges import Widths, search_distance, stations_along, widest
 from .flank import find_flank
-from .level import AXIS_SHARE, rough_level
+from .level import AXIS_SHARE, blended_fall, rough_level
 from .neighbours import free_edges
 from .own_level import on_own_level
 from .strips import StripOffsets, aligned, measure_strips
@@ -180,7 +180,7 @@ def _measured(
     flank = find_flank(feet.t, feet.across, z, parameters.head_width_m)
     ridge = None if flank else Ridge.find(feet.t, feet.across, z, along[-1], parameters.head_width_m)
     if flank is None:
-        level_z = z if ridge is None else z + ridge.fall(feet.across)
+        level_z = z + blended_fall(feet.t, feet.across, z, parameters.head_width_m)
         found = find_top(
             feet.t[head],
             feet.across[head],

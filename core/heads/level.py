@@ -118,6 +118,30 @@ def is_blended(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: f
     return False
 
 
+def blended_fall(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> np.ndarray:
+    """Return how far beams that blend the head and the ballast lower points, (n,) metres; zeros for narrow beams.
+
+    The share of the ballast in a beam grows with the distance from the axis: up to the rims the fall is a parabola.
+
+    Parameters
+    ----------
+    t, across, z : (n,) arrays
+        Chainage (increasing), offset to the left and height of points near the line, metres.
+    head_width_m : float
+    """
+    if not is_blended(t, across, z, head_width_m):
+        return np.zeros(len(t))
+    rim_m = RIM_HEADS[0] * head_width_m
+    near, square = np.abs(across) <= rim_m, np.minimum(np.abs(across), rim_m) ** 2
+    above, x = z[near] - rough_level(t[near], z[near]), square[near]
+    used, bend = np.ones(len(above), dtype=bool), 0.0
+    for _ in range(SLOPE_ROUNDS):
+        bend, level = np.polynomial.polynomial.polyfit(x[used], above[used], 1)[::-1]
+        off = above - level - bend * x
+        used = np.abs(off) <= OFF_TOP_SIGMAS * robust_sigma(off)
+    return max(-bend, 0.0) * square
+
+
 def robust_sigma(values: np.ndarray) -> float:
     """Estimate the standard deviation of values from their median absolute deviation, which outliers hardly affect."""
     if not len(values):

@@ -191,7 +191,7 @@ def classify_files(
             labels.add(found.number)
         figures += found.figures
     _check_complete(runner)
-    report(figures, progress)
+    report(figures, request, progress)
     write_labelled(request, choice, labels, output, runner, rewriting)
     return Result(output.file, labels.point_count, figures)
 

@@ -16,7 +16,7 @@ from ..classify.guide import MIDDLE_M, Guide
 from ..classify.settings import MARGIN_M, Settings
 from ..classify.square import Classified, classify_square
 from ..clouds.points import Request
-from ..clouds.readers import CloudHeader, read_points
+from ..clouds.readers import CloudHeader, read_points, shows_scanner
 from ..disk import writing
 from ..errors import CloudError, NoRailPointsError, ParameterError
 from ..frame import LocalFrame
@@ -31,6 +31,9 @@ from ..tasks import Context, Runner, Task, in_listed_order
 POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8"), ("mark", "<u4")])
 """A point on disk: coordinates in units of the CRS, its number among all points of all files, and its mark, see
 `passes.marks_of`, or its class."""
+
+FEW_FILES = 3
+"""Files whose first points are asked whether a scanner measured them."""
 
 FEW_IN_SQUARE, MANY_SQUARES = 20, 100
 """Chunks of points that are spread over more squares than this, with fewer points in each, are not in the unit that the
@@ -132,8 +135,8 @@ def guide_of(request: Request, lines: Sequence[np.ndarray], distance_m: float, o
     return guide
 
 
-def report(figures: SearchFigures, progress: Progress) -> None:
-    """Inform the user of what was found and of what to doubt."""
+def report(figures: SearchFigures, request: Request, progress: Progress) -> None:
+    """Inform the user of what was found in the cloud of a request, and of what to doubt."""
     if figures.across_m > figures.along_m:
         progress.warning(
             f"The guide crosses the tracks: {figures.across_m:.0f} m of the rails near it run across it, and "
@@ -161,6 +164,19 @@ def report(figures: SearchFigures, progress: Progress) -> None:
             f"The rails have {figures.cells_per_m:.1f} cells with points per metre; below {ENOUGH_CELLS_PER_M:.0f}, "
             "lines are less accurate and may have gaps: use a denser cloud."
         )
+    if figures.blunt_m:
+        progress.warning(
+            f"Heads are blunt on {figures.blunt_m:.0f} m of rail: the cloud blurs what it shows by "
+            f"{100 * figures.blur_m:.0f} cm{_as_from_images(request)}, so that a head is a round ridge. Rails are told "
+            "from other ridges by their partner and length, and rails without a partner are left out."
+        )
+
+
+def _as_from_images(request: Request) -> str:
+    """Say that a cloud seems to be matched from images, if it does."""
+    if any(shows_scanner(header.path) for header in request.headers[:FEW_FILES]):
+        return ""
+    return " (it seems to be matched from images, for no point has an intensity, a GPS time or a second return)"
 
 
 @dataclass(frozen=True)

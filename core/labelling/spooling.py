@@ -56,7 +56,7 @@ def spool_found(
             "No rail was found in the raw cloud: check the rail standard and the unit of the coordinates, or classify "
             "the rail points yourself."
         )
-    report(figures, progress)
+    report(figures, request, progress)
     return _gathered(request, side_m, folder, census), figures
 
 

@@ -297,6 +297,13 @@ def _search(found: SearchFigures | None) -> str:
             "Rails level with the pavement are found by their grooves, and less accurately.",
         ),
     ]
+    if found.blunt_m:
+        blunt = (
+            "Rails with blunt heads",
+            f"{metres(found.blunt_m)}, by {1000 * found.blur_m:.0f} mm",
+            "Beams or images blur the head to a round ridge: its width and its edges cannot be seen.",
+        )
+        rows.append(blunt)
     rows = rows if found.squares else rows[:4]  # rails that grow from seeds are not searched by squares
     written = tag("div", table(("Found", "", "What it means"), rows), class_="scroll")
     return _section("Rail points in the raw cloud", written.replace("<table>", '<table class="words">'))

@@ -99,3 +99,20 @@ def test_noise_and_faces_do_not_widen_heads_and_a_single_face_is_no_head():
         head_widths(source, ((1.435, 0.072),), heard, rails)
         assert len(heard.said) == bool(said)
         assert all(said in text for text in heard.said)
+
+
+def test_blunt_heads_are_said_and_their_width_is_not_measured():
+    rng = np.random.default_rng(5)
+    points = heads_of(LINE, 0.112)
+    left = np.abs((points[:, :2] - LINE.xy[0]) @ LINE.left_normal[0]) - 0.5 * (1.435 + WIDTH)
+    points[:, 2] = rng.normal(0, 0.012, len(points)) - 5.0 * left**2
+    rails = []
+    for side in (0.5, -0.5):
+        xy = LINE.xy + side * (1.435 + WIDTH) * LINE.left_normal
+        rails.append(RailLine(np.column_stack([xy, np.zeros(len(xy))]), 1, 10, 1.0, 1.0, 1.0, 0.0))
+    heard = Warnings()
+    source = MemorySource(RailPoints(points, LocalFrame(np.zeros(3)), 10), 500.0)
+    widths = head_widths(source, ((1.435, WIDTH),), heard, rails)
+    assert widths.blunt and not widths.differ and np.isnan(widths.seen_m)
+    (warning,) = heard.said
+    assert warning.startswith("Heads are blunt") and "72 mm" in warning

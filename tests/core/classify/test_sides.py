@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.classify.lines import Lines
+from rail_extract.core.classify.settings import HEADS
 from rail_extract.core.classify.sides import stands_free
 from rail_extract.core.classify.tops import Grid, tops_of
 from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, flat, with_bar
@@ -14,7 +15,7 @@ def free(xyz, left=0.0):
     tops = tops_of(grid, cell, xyz[:, 2].astype(np.float32), xyz[:, 2].astype(np.float32))
     axis = MIDDLE[None] + [[0.0, left]]
     line = Lines(axis, np.array([0.17]), np.zeros(1), np.ones(1), np.ones(1), 1.0)
-    return bool(stands_free(tops, grid.cells(axis)[0], line)[0])
+    return bool(stands_free(tops, HEADS, grid.cells(axis)[0], line)[0])
 
 
 def test_a_rail_stands_free():

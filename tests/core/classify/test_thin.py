@@ -85,4 +85,6 @@ def test_figures_add_up():
     one, other = SearchFigures(10, 1.0, 2.0, 30, 1, 1, 0), SearchFigures(5, 4.0, 3.0, 20, 1, 0, 1)
     assert one + other == SearchFigures(15, 5.0, 5.0, 50, 2, 1, 1)
     assert (one + other).cells_per_m == 5.0
-    assert SearchFigures().cells_per_m == 0.0
+    assert SearchFigures().cells_per_m == SearchFigures().blur_m == 0.0
+    blunt = SearchFigures(blunt_m=30.0, blur_m2=30.0 * 0.05) + SearchFigures(blunt_m=10.0, blur_m2=10.0 * 0.07) + one
+    assert blunt.blur_m == pytest.approx(0.055)

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from rail_extract.core.classify.settings import BURIED, HEADS
 from rail_extract.core.classify.tops import EMPTY, Grid, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
 from rail_extract.core.raster import rasterize
 from rail_extract.laboratory.scenes.raw_shapes import flat, turned, with_bar
@@ -39,7 +40,7 @@ def test_a_top_is_the_highest_point_below_the_band_and_higher_ones_mark_the_cell
 def test_a_bar_of_a_railhead_is_found_with_all_its_cells(angle):
     xyz, on = with_bar(flat(), WIDTH, angle)
     found, cell = tops(xyz)
-    candidates = set(narrow_tops(found).tolist())
+    candidates = set(narrow_tops(found, HEADS).tolist())
     here = inner(xyz)
     assert set(cell[on & here].tolist()) == candidates & set(cell[here].tolist())
 
@@ -54,7 +55,7 @@ def test_a_wide_bar_a_kerb_and_a_wall_are_not_candidates(angle):
     near = np.abs(turned(walls, angle)[1]) < 0.01
     walls[near, 2] = np.random.RandomState(1).uniform(0, 2.0, near.sum())
     for xyz in (wide, kerb, walls):
-        assert not len(narrow_tops(tops(xyz)[0]))
+        assert not len(narrow_tops(tops(xyz)[0], HEADS))
 
 
 def test_a_bar_in_a_thin_cloud_is_found():
@@ -64,11 +65,19 @@ def test_a_bar_in_a_thin_cloud_is_found():
         xyz, on = with_bar(flat(6.0, rng=rng, per_m2=30), WIDTH, 0.3)
         found, cell = tops(xyz)
         on &= inner(xyz)
-        candidates = narrow_tops(found)
+        candidates = narrow_tops(found, HEADS)
         hits += np.isin(cell[on], candidates).sum()
         seen += on.sum()
     assert seen > 100
     assert hits / seen >= 0.99
+
+
+@pytest.mark.parametrize(("band", "finds"), [(HEADS, False), (BURIED, True)])
+def test_a_rail_that_is_buried_up_to_the_head_is_found_on_a_smooth_surface(band, finds):
+    xyz, on = with_bar(flat(), WIDTH)
+    xyz[:, 2] = np.where(on, 0.065, 0.035)
+    found, cell = tops(xyz)
+    assert np.isin(cell[on & inner(xyz)], narrow_tops(found, band)).mean() == (1.0 if finds else 0.0)
 
 
 def test_blocks_keep_their_highest_cell():
@@ -81,6 +90,6 @@ def test_blocks_keep_their_highest_cell():
 def test_the_middle_of_a_top_leaves_out_lower_points_and_other_cells():
     xyz = np.array([[0.025, 0.01, 0.2], [0.035, 0.02, 0.17], [0.005, 0.03, 0.1], [0.06, 0.02, 0.2], [0.5, 0.5, 0.05]])
     found, cell = tops(xyz)
-    places = middles_of_tops(found, cell[:1], xyz[:, :2], cell, xyz[:, 2].astype(np.float32))
+    places = middles_of_tops(found, HEADS, cell[:1], xyz[:, :2], cell, xyz[:, 2].astype(np.float32))
     np.testing.assert_allclose(places[cell[0]], [0.03, 0.015], atol=1e-4)
     assert np.isnan(places[cell[3]]).all()

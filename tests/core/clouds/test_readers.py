@@ -148,3 +148,14 @@ def test_other_formats_are_refused_with_the_remedy(tmp_path, name, what):
     (tmp_path / name).write_bytes(b"ply")
     with pytest.raises(CloudError, match=f"^{name} is {what} file, .* convert it to LAS or LAZ"):
         readers.list_files(tmp_path / name)
+
+
+@pytest.mark.parametrize("measured", ["", "intensity", "gps_time", "number_of_returns"])
+def test_what_only_a_scanner_measures_tells_clouds_from_those_of_images(tmp_path, measured):
+    path = tmp_path / "cloud.laz"
+    write_cloud(path)
+    cloud = laspy.read(path)
+    for name in ("intensity", "gps_time", "number_of_returns"):
+        cloud[name] = np.arange(len(cloud)) % 3 + 1 if name == measured else np.ones(len(cloud), dtype=int)
+    cloud.write(path)
+    assert readers.shows_scanner(path) == bool(measured)

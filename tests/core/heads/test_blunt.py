@@ -38,12 +38,6 @@ def test_a_flat_head_is_not_blunt():
     assert Ridge.find(t, across, z + 0.5 * BEND * across**2, LENGTH_M, WIDTH) is None
 
 
-def test_a_ridge_falls_from_its_crest_as_its_bend_says():
-    t, across, z = ridge_points(noise_m=0.002)
-    ridge = Ridge.find(t, across, z, LENGTH_M, WIDTH)
-    assert ridge.fall(np.array([0.0, 0.05, -0.05])) == pytest.approx([0.0, 0.01, 0.01], rel=0.05)
-
-
 def test_support_holds_what_the_line_wanders_and_grows_across_a_gap():
     t, across, z = ridge_points(noise_m=0.004)
     kept = (t < 15) | (t > 25)

@@ -380,6 +380,9 @@ def test_what_was_found_in_a_raw_cloud_is_listed():
     assert cells["Rails without a partner"] == metres(12.6)
     assert cells["Cells with points per metre"] == "10"
     assert (cells["Squares with rails"], cells["Thin squares"], cells["Paved squares"]) == ("6", "2", "1")
+    assert "Rails with blunt heads" not in html
+    blunt = replace(network(track()), search=replace(found, blunt_m=200.0, blur_m2=200.0 * 0.055))
+    assert f"{metres(200.0)}, by 55 mm" in build_page(blunt, (1.435,), "cloud.laz")
     assert "Rail points in the raw cloud" not in page(track())
     grown = replace(network(track()), search=SearchFigures(points=500, paired_m=20.0))
     assert "Squares with rails" not in build_page(grown, (1.435,), "cloud.laz")
