@@ -21,6 +21,7 @@ from qgis.core import (  # noqa: E402
 )
 from rail_extract.core.fields import (  # noqa: E402
     CENTERLINE_FIELDS,
+    DIFFERENCE_FIELDS,
     EXTENT_FIELDS,
     FINDING_FIELDS,
     QUALITY_FIELDS,
@@ -48,6 +49,7 @@ LAYERS = {
     "Centerlines": CENTERLINE_FIELDS,
     "Track geometry": QUALITY_FIELDS,
     "Kilometres": (*STATION_FIELDS, *EXTENT_FIELDS),
+    "Differences": DIFFERENCE_FIELDS,
     "Findings": FINDING_FIELDS,
     "Stops": STOP_FIELDS,
 }

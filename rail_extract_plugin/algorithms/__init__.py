@@ -3,6 +3,7 @@
 from .build_track_centerlines import BuildTrackCenterlines
 from .check_installation import CheckInstallation
 from .classify_rail_points import ClassifyRailPoints
+from .compare_tracks import CompareTracks
 from .extract_rails import ExtractRails
 from .frpdf_cleanup import FrpdfCleanup
 from .grow_rail_points import GrowRailPoints
@@ -23,6 +24,7 @@ ALGORITHMS = (
     BuildTrackCenterlines,
     MeasureTrackGeometry,
     StationAlongAxis,
+    CompareTracks,
     TrainRailClassifier,
     InstallPackages,
     CheckInstallation,

@@ -164,6 +164,30 @@ def points_of_rails() -> QgsProcessingParameterDefinition:
     )
 
 
+def surveys() -> Definitions:
+    """Define the lines that are compared, and the rails of their tracks."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    rails = tr("For centerlines: the rails of these tracks, for differences of gauge and cant.")
+    return (
+        helped(
+            QgsProcessingParameterFeatureSource("REFERENCE", tr("Reference"), [line]),
+            tr("Rails or centerlines of the earlier survey, of the design, or of a control measurement."),
+        ),
+        helped(
+            QgsProcessingParameterFeatureSource("INPUT", tr("Lines to compare"), [line]),
+            tr("The same kind of lines of the later survey, in the same coordinate system."),
+        ),
+        helped(
+            QgsProcessingParameterFeatureSource("REFERENCE_RAILS", tr("Rails of the reference"), [line], optional=True),
+            rails,
+        ),
+        helped(
+            QgsProcessingParameterFeatureSource("RAILS", tr("Rails of the lines to compare"), [line], optional=True),
+            rails,
+        ),
+    )
+
+
 def places() -> QgsProcessingParameterDefinition:
     """Define the layer whose features are to get kilometres."""
     kind = QgsProcessing.SourceType.TypeVectorAnyGeometry

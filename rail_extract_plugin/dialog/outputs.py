@@ -52,6 +52,35 @@ def _layer(name: str, label: str, kind: QgsProcessing.SourceType, optional: bool
     return made
 
 
+def differences() -> QgsProcessingParameterDefinition:
+    """Define the layer of differences between two surveys."""
+    point = QgsProcessing.SourceType.TypeVectorPoint
+    return helped(
+        _layer("OUTPUT", tr("Differences"), point, optional=True),
+        tr("Points along the lines of the reference with the differences, and along lines that it does not have."),
+    )
+
+
+def comparison_report() -> QgsProcessingParameterDefinition:
+    """Define the report on a comparison."""
+    return helped(_page(), tr("A web page with what has moved, the constant shift and the distribution."))
+
+
+def comparison_figures() -> Numbers:
+    """Define the figures about a comparison."""
+    return (
+        QgsProcessingOutputNumber("COMPARED_LENGTH", tr("Length on lines of both surveys [m]")),
+        QgsProcessingOutputNumber("MOVED_LENGTH", tr("Length that has moved [m]")),
+        QgsProcessingOutputNumber("MISSING_LENGTH", tr("Length of the reference without a line [m]")),
+        QgsProcessingOutputNumber("EXTRA_LENGTH", tr("Length of lines that the reference does not have [m]")),
+        QgsProcessingOutputNumber("ACROSS_RMS", tr("Differences across, root mean square [mm]")),
+        QgsProcessingOutputNumber("HEIGHT_RMS", tr("Differences in height, root mean square [mm]")),
+        QgsProcessingOutputNumber("SHIFT_EAST", tr("Constant shift east [mm]")),
+        QgsProcessingOutputNumber("SHIFT_NORTH", tr("Constant shift north [mm]")),
+        QgsProcessingOutputNumber("SHIFT_UP", tr("Constant shift up [mm]")),
+    )
+
+
 def stationed() -> QgsProcessingParameterDefinition:
     """Define the copy of a layer with kilometres."""
     kind = QgsProcessing.SourceType.TypeVectorAnyGeometry

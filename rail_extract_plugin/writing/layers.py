@@ -30,6 +30,7 @@ from ...core.errors import RailExtractError
 from ...core.fields import (
     BRIDGED,
     CENTERLINE_FIELDS,
+    DIFFERENCE_FIELDS,
     FINDING_FIELDS,
     KM_FIELDS,
     LENGTH,
@@ -51,6 +52,7 @@ from .whole_files import write_whole
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.comparison.tracks import LineDifferences, TrackComparison
     from ...core.frame import LocalFrame
     from ...core.grow.growth import Stop
     from ...core.rails import Centerline, RailLine, TrackGeometry
@@ -74,6 +76,7 @@ class LayerKind:
 RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELDS, "centerlines")
 QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
 STOPS = LayerKind(STOP_FIELDS, "stops")
+DIFFERENCES = LayerKind(DIFFERENCE_FIELDS, "differences")
 PLACES = "places"
 """What copies of layers of any kind are called in drawings; they have no style."""
 
@@ -135,7 +138,7 @@ def copies(originals: Sequence[QgsFeature], columns: QgsFields, rows: Sequence[S
         yield feature
 
 
-def is_flat(lines: Sequence[Line | TrackGeometry]) -> bool:
+def is_flat(lines: Sequence[Line | TrackGeometry | LineDifferences]) -> bool:
     """Return whether there are lines, and none has heights."""
     return bool(lines) and all(any(map(math.isnan, line.xyz[:, 2])) for line in lines)
 
@@ -234,6 +237,37 @@ def write_stops(
         for number, stop in enumerate(stops, 1)
     )
     return _write(algorithm, name, STOPS, QgsWkbTypes.Type.PointZ, made, frame, parameters, context)
+
+
+def write_differences(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    found: TrackComparison,
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the stations of a comparison as points.
+
+    Parameters
+    ----------
+    found : TrackComparison
+    algorithm, name, frame, parameters, context
+        See `write_lines`.
+    """
+    flat = is_flat(found.lines)
+    made = (
+        _difference(line, at, frame, flat) for line in found.lines for at in range(len(line.state)) if line.state[at]
+    )
+    shape = QgsWkbTypes.Type.Point if flat else QgsWkbTypes.Type.PointZ
+    return _write(algorithm, name, DIFFERENCES, shape, made, frame, parameters, context)
+
+
+def _difference(line: LineDifferences, at: int, frame: LocalFrame, flat: bool) -> QgsFeature:
+    """Convert one station of a comparison to a feature."""
+    place = QgsPoint(*frame.to_crs(line.xyz[at])[: 2 if flat else 3].tolist())
+    values = [getattr(line, column.name) for column in DIFFERENCES.columns[1:]]
+    return _feature(QgsGeometry(place), [line.line_id, *(value[at] for value in values)], DIFFERENCES.columns)
 
 
 def write_raster(

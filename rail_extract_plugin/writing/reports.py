@@ -13,6 +13,7 @@ from ...core.disk import Destination
 from ..notices import notices
 
 if TYPE_CHECKING:
+    from ...core.comparison.tracks import TrackComparison
     from ...core.rails import RailNetwork
     from ...core.report import Origin
 
@@ -51,6 +52,38 @@ def write_report(
     if not path:
         return {}
     written = write_page(algorithm, name, path, origin.report(network))
+    notices.report_written.emit(path)
+    return written
+
+
+def write_comparison(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    found: TrackComparison,
+    counts_shift: bool,
+    source: str,
+    facts: Mapping[str, str],
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the report on a comparison to an output; see `write_report`.
+
+    Parameters
+    ----------
+    algorithm : QgsProcessingAlgorithm
+    name : str
+    found : TrackComparison
+    counts_shift, source, facts
+        See `build_comparison`.
+    parameters : dict
+    context : QgsProcessingContext
+    """
+    from ...core.report.comparison import build_comparison
+
+    path = algorithm.parameterAsFileOutput(parameters, name, context)
+    if not path:
+        return {}
+    written = write_page(algorithm, name, path, build_comparison(found, counts_shift, source, facts))
     notices.report_written.emit(path)
     return written
 

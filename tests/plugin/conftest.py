@@ -219,6 +219,7 @@ OUTPUTS = {
     "buildtrackcenterlines": ("OUTPUT.gpkg",),
     "measuretrackgeometry": ("OUTPUT.gpkg",),
     "stationalongaxis": ("OUTPUT.gpkg",),
+    "comparetracks": ("OUTPUT.gpkg", "REPORT.html"),
     "trainrailclassifier": ("WEIGHTS.npz",),
 }
 """Outputs of the algorithms, each a file in the folder of the test."""

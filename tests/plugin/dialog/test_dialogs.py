@@ -21,7 +21,14 @@ NAMES = (
         "vectorizerails",
         "buildtrackcenterlines",
     ),
-    *("measuretrackgeometry", "stationalongaxis", "trainrailclassifier", "installpackages", "checkinstallation"),
+    *(
+        "measuretrackgeometry",
+        "stationalongaxis",
+        "comparetracks",
+        "trainrailclassifier",
+        "installpackages",
+        "checkinstallation",
+    ),
 )
 SMALLEST_ICON = 16
 
@@ -112,7 +119,7 @@ def test_every_algorithm_has_its_own_icon(make):
 
 @pytest.mark.parametrize(
     ("word", "found"),
-    [("rail", 12), ("gleis", 10), ("voie", 10), ("vía", 10), ("railway", 10), ("laz", 6), ("gauge", 3), ("torch", 1)],
+    [("rail", 13), ("gleis", 11), ("voie", 11), ("vía", 11), ("railway", 11), ("laz", 6), ("gauge", 4), ("torch", 1)],
 )
 def test_toolbox_search(make, word, found):
     assert sum(any(word in tag.lower() for tag in make(name).tags()) for name in NAMES) == found
