@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from qgis.core import QgsApplication
 
 from .provider import RailExtractProvider
+from .runs.running import stop_all
 from .setup import package_folders
 
 if TYPE_CHECKING:
@@ -42,7 +43,8 @@ class RailExtractPlugin:
         self.windows = Windows(self.iface)
 
     def unload(self) -> None:
-        """Remove everything that was registered."""
+        """Remove everything that was registered, after the ends of all runs."""
+        stop_all()
         if self.windows is not None:
             self.windows.remove()
             self.windows = None
