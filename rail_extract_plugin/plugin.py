@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from qgis.core import QgsApplication
 
+from .algorithms.base import RailAlgorithm
 from .provider import RailExtractProvider
 from .runs.running import stop_all
 from .setup import package_folders
@@ -44,7 +45,7 @@ class RailExtractPlugin:
 
     def unload(self) -> None:
         """Remove everything that was registered, after the ends of all runs."""
-        stop_all()
+        stop_all(RailAlgorithm)
         if self.windows is not None:
             self.windows.remove()
             self.windows = None

@@ -34,21 +34,28 @@ def running(feedback: QgsProcessingFeedback) -> Iterator[None]:
         _running.pop(feedback, None)
 
 
-def stop_all() -> None:
+def stop_all(kind: type[QgsProcessingAlgorithm]) -> None:
     """Cancel all runs and tasks of the plugin, wait for their ends, then close its dialogs; in the main thread.
 
     A dialog that stays open would use the provider, which is deleted when the plugin is unloaded.
+
+    Parameters
+    ----------
+    kind : type
+        Base of the plugin's algorithms.
     """
     tasks = [task for task in QgsApplication.taskManager().activeTasks() if _is_own(task)]
     for one in (*_running, *tasks):
         one.cancel()
     end = time.monotonic() + PATIENCE_S
-    while _is_any_active(tasks) and time.monotonic() < end:
-        # What a run does in the main thread when it ends happens here.
-        QApplication.processEvents()
+    is_active = True
+    while is_active and time.monotonic() < end:
+        is_active = _is_any_active(tasks)
         time.sleep(INTERVAL_S)
+        # What a run does in the main thread when it ends happens here, once more after the thread has ended.
+        QApplication.processEvents()
     for window in QApplication.topLevelWidgets():
-        if isinstance(window, QDialog) and _is_of_plugin(getattr(window, "algorithm", None)):
+        if isinstance(window, QDialog) and hasattr(window, "algorithm") and isinstance(window.algorithm(), kind):
             window.close()
 
 
@@ -60,14 +67,8 @@ def _is_own(task: QgsTask) -> bool:
 
 
 def _is_any_active(tasks: Sequence[QgsTask]) -> bool:
-    """Return whether a run is under way in another thread, or the end of a task has not been shown yet."""
+    """Return whether a run is under way in another thread, or a task of the plugin."""
     if any(thread != threading.get_ident() for thread in _running.values()):
         return True
     active = QgsApplication.taskManager().activeTasks()
     return any(task in active for task in tasks)
-
-
-def _is_of_plugin(algorithm_of) -> bool:
-    """Return whether a dialog is one of an algorithm of the plugin."""
-    algorithm = algorithm_of() if callable(algorithm_of) else None
-    return isinstance(algorithm, QgsProcessingAlgorithm) and algorithm.id().startswith(f"{PROVIDER}:")

@@ -219,7 +219,7 @@ def unload(driver: Driver) -> Iterator:
         log = dialog.findChild(QTextEdit, "txtLog")
         yield lambda log=log: "Reading 1 file" in log.toPlainText()
         said = f"said when {name}"
-        dialog.algorithmFinished.connect(lambda *_, said=said, log=log: driver.keep(said, log.toPlainText()))
+        log.textChanged.connect(lambda said=said, log=log: driver.keep(said, log.toPlainText()))
         yield 0.5
         driver.picture(f"{name}_before")
         later(partial(unloadPlugin if name == "disabled" else reloadPlugin, "rail_extract"))
