@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Union
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ..curves import Curve, Element, trace
 from ..rasters.turnouts import FORMS, branch
 from .plain import canted, rolling, spacing
 from .raw import BALLAST, RawScene, Thing, scan_world
+from .raw_photogrammetry import Photogrammetry
 from .raw_scanner import RawScanner
 from .raw_things import (
     car_park,
@@ -36,6 +38,14 @@ from .tracks import Track
 STANDARD = STANDARDS["EN_60E1_1435"]
 TRAIN = RawScanner()
 CAR = RawScanner(profile_step_m=0.06, ray_step_rad=0.003, left_m=0.0, height_m=2.4, noise_m=0.004)
+DRONE = Photogrammetry()
+BLUNT = Photogrammetry(blur_m=0.065, blur_varies=0.35, widening_m=0.025, wave_m=0.012, noise_m=0.009, stray_share=0.01)
+"""Images of a drone, and less sharp ones."""
+
+AGAIN = Photogrammetry(shift_m=(0.03, -0.02, 0.025), epoch=1)
+"""Images of the same place on another day, registered with an error of some centimetres."""
+
+Scanning = Union[RawScanner, Photogrammetry]
 
 
 def from_air(per_m2: float, noise_m: float, left_m: float = 8.0, height_m: float = 80.0) -> RawScanner:
@@ -64,10 +74,15 @@ def thing(make: Callable[..., None], *args: object) -> Thing:
 
 
 def double_track(
-    seed: int, scanner: RawScanner = TRAIN, second: RawScanner | None = None, name: str = "double"
+    seed: int,
+    scanner: Scanning = TRAIN,
+    second: RawScanner | None = None,
+    name: str = "double",
+    curvature: float = 1 / 700,
+    cant_m: float = 0.09,
 ) -> RawScene:
-    """Double track in a curve of 700 m with cant, masts and wires, a trough, plants beside the bed."""
-    curve = line(60.0, 1 / 700, 0.35)
+    """Double track in a curve with cant, masts and wires, a trough, plants beside the bed."""
+    curve = line(60.0, curvature, 0.35)
     things: list[Thing] = [
         ground,
         running_rails,
@@ -76,7 +91,7 @@ def double_track(
         thing(plants, 60, (-9.0, -4.5)),
     ]
     scanners = [scanner] if second is None else [scanner, second]
-    return scan_world(name, parallel(curve, (0.0, 4.2), 0.09), STANDARD, scanners, things, seed)
+    return scan_world(name, parallel(curve, (0.0, 4.2), cant_m), STANDARD, scanners, things, seed)
 
 
 def masts_at(left_m: float) -> Thing:
@@ -84,7 +99,7 @@ def masts_at(left_m: float) -> Thing:
     return thing(masts, left_m)
 
 
-def station(seed: int) -> RawScene:
+def station(seed: int, scanner: Scanning = TRAIN) -> RawScene:
     """Three tracks, platforms on both sides, and a train parked on the far track."""
     curve = line(70.0, 0.0, 1.2)
     things: list[Thing] = [
@@ -95,10 +110,10 @@ def station(seed: int) -> RawScene:
         thing(train, 2, 22.0, 70.0),
         masts_at(6.6),
     ]
-    return scan_world("station", parallel(curve, (0.0, 4.3, 8.8)), STANDARD, [TRAIN], things, seed)
+    return scan_world("station", parallel(curve, (0.0, 4.3, 8.8)), STANDARD, [scanner], things, seed)
 
 
-def turnout(seed: int, form: str = "300-1:9", scanner: RawScanner = TRAIN) -> RawScene:
+def turnout(seed: int, form: str = "300-1:9", scanner: Scanning = TRAIN) -> RawScene:
     """Turnout with its check rails, and a second track."""
     shape = next(candidate for candidate in FORMS if candidate.name == form)
     main = trace([Element(40.0 + shape.arc_m)], (3.0, 5.0), heading=-0.7)
@@ -280,6 +295,18 @@ AIR: dict[str, Callable[[int], RawScene]] = {
 }
 """From the air: points per square metre; the noise is in the scene's name."""
 
+_canted = partial(double_track, curvature=1 / 450, cant_m=0.13)
+
+PHOTO: dict[str, Callable[[int], RawScene]] = {
+    "photo straight": partial(double_track, scanner=DRONE, name="photo straight", curvature=0.0, cant_m=0.0),
+    "photo curve": partial(_canted, scanner=DRONE, name="photo curve"),
+    "photo curve again": partial(_canted, scanner=AGAIN, name="photo curve again"),
+    "photo curve blunt": partial(_canted, scanner=BLUNT, name="photo curve blunt"),
+    "photo turnout": partial(turnout, scanner=DRONE),
+    "photo station": partial(station, scanner=DRONE),
+}
+"""Surveys by images; the same curve twice, by two surveys."""
+
 NEGATIVE: dict[str, Callable[[int], RawScene]] = {
     "forest": partial(forest, scanner=CAR),
     "forest from the air": partial(forest, scanner=from_air(150, 0.02)),
@@ -293,4 +320,4 @@ NEGATIVE: dict[str, Callable[[int], RawScene]] = {
 }
 """Places without rails."""
 
-RAW_SCENES = {**MOBILE, **FLUSH, **AIR, **NEGATIVE}
+RAW_SCENES = {**MOBILE, **FLUSH, **AIR, **PHOTO, **NEGATIVE}
