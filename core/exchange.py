@@ -37,7 +37,15 @@ APPLICATION = "RAIL_EXTRACT"
 MAX_TEXT = 255
 """Longest text of extended data."""
 
-DRAWN = {"rails": "RAILS", "centerlines": "TRACK", "quality": "STATIONS", "findings": "FINDINGS", "stops": "STOPS"}
+DRAWN = {
+    "rails": "RAILS",
+    "centerlines": "TRACK",
+    "quality": "STATIONS",
+    "findings": "FINDINGS",
+    "stops": "STOPS",
+    "elements": "ELEMENTS",
+    "axes": "ALIGNMENT",
+}
 """First word of the layers in a drawing, by output."""
 
 COLOURS = {"RAILS": 5, "TRACK": 1, "STATIONS": 3, "ALIGNMENT": 1, "PLAN": 7, "PROFILE": 3, "CANT": 5}

@@ -14,9 +14,9 @@ import numpy as np
 
 from .delivery import PROGRAM, Delivery, names
 from .elements import Alignment
+from .equations import Piece, Stations, stations_of
 from .ifc_segments import Segment, cant_segments, plan_segments, point, vertical_segments
-from .stations import Piece, Stations, stations_of
-from .step import DERIVED, Enum, Measure, Ref, StepFile, guid
+from .step import DERIVED, Enum, Measure, Ref, StepFile, Whole, guid
 
 SCHEMA, VIEW = "IFC4X3_ADD2", "Alignment-basedView"
 
@@ -57,7 +57,7 @@ class _Model:
         metre = add("IfcSIUnit", DERIVED, Enum("LENGTHUNIT"), None, Enum("METRE"))
         radian = add("IfcSIUnit", DERIVED, Enum("PLANEANGLEUNIT"), None, Enum("RADIAN"))
         zero = add("IfcAxis2Placement3D", point(self.file, 0.0, 0.0, 0.0), None, None)
-        space = add("IfcGeometricRepresentationContext", None, "Model", 3, PRECISION_M, zero, None)
+        space = add("IfcGeometricRepresentationContext", None, "Model", Whole(3), PRECISION_M, zero, None)
         self._footprint, self._axis = (
             add(
                 "IfcGeometricRepresentationSubContext",

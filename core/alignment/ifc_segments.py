@@ -65,7 +65,7 @@ def _plan_segment(file: StepFile, one: PlanElement, transition: Enum) -> Segment
         # The curvature of the parent curve at distance u from its inflection is change * u.
         change = (one.k_to - one.k_from) / one.length_m
         constant = math.copysign(1.0 / math.sqrt(abs(change)), change)
-        parent = file.add("IfcClothoid", placement_2d(file, point(file, 0.0, 0.0), 0.0), constant)
+        parent = _clothoid(file, constant)
         start = one.k_from / change
     return Segment(design, _curve(file, transition, placement_2d(file, place, heading), start, length, parent))
 
@@ -141,7 +141,12 @@ def _cant_segment(
     up = file.add("IfcDirection", (0.0, -math.sin(tilt), math.cos(tilt)))
     ahead = file.add("IfcDirection", (1.0, 0.0, 0.0))
     place = file.add("IfcAxis2Placement3D", point(file, along, 0.0, 0.0), up, ahead)
-    return Segment(design, _curve(file, transition, place, 0.0, one.length_m, line(file)))
+    parent = line(file)
+    if one.type == "ramp":
+        # It says that the tilt changes linearly: the middle between the rails does not rise.
+        rise = one.cant_to_m - one.cant_from_m
+        parent = _clothoid(file, math.copysign(one.length_m**1.5 / math.sqrt(abs(rise)), rise))
+    return Segment(design, _curve(file, transition, place, 0.0, one.length_m, parent))
 
 
 def _transitions(bends: Sequence[tuple[float, float]]) -> list[Enum]:
@@ -154,6 +159,10 @@ def _transitions(bends: Sequence[tuple[float, float]]) -> list[Enum]:
 def _curve(file: StepFile, transition: Enum, place: Ref, start: float, length: float, parent: Ref) -> Ref:
     measures = (Measure("IFCLENGTHMEASURE", value) for value in (start, length))
     return file.add("IfcCurveSegment", transition, place, *measures, parent)
+
+
+def _clothoid(file: StepFile, constant: float) -> Ref:
+    return file.add("IfcClothoid", placement_2d(file, point(file, 0.0, 0.0), 0.0), constant)
 
 
 def line(file: StepFile) -> Ref:

@@ -18,7 +18,7 @@ import numpy as np
 
 from .delivery import PROGRAM, Delivery, names
 from .elements import Alignment, PlanElement, VerticalElement
-from .stations import Stations, stations_of
+from .equations import Stations, stations_of
 
 NAMESPACE = "http://www.landxml.org/schema/LandXML-1.2"
 
@@ -77,9 +77,7 @@ def write_landxml(path: Path, alignments: Sequence[Alignment], delivery: Deliver
     ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 
 
-def _write_alignment(
-    parent: ET.Element, name: str, alignment: Alignment, delivery: Delivery, circles: bool
-) -> None:
+def _write_alignment(parent: ET.Element, name: str, alignment: Alignment, delivery: Delivery, circles: bool) -> None:
     stations = stations_of(alignment)
     start = stations.pieces[0].station if stations and stations.pieces[0].rises else alignment.s_from
     internal = start - alignment.s_from
@@ -99,7 +97,7 @@ def _write_alignment(
 
 
 def _split(alignment: Alignment) -> Iterator[PlanElement]:
-    """Yield the plan elements; a clothoid from a curve into its reverse in two parts, as a spiral has a single `rot`."""
+    """Yield the plan elements; a clothoid between a curve and its reverse in two parts, as a spiral has one `rot`."""
     for one in alignment.plan:
         if one.k_from * one.k_to >= 0:
             yield one

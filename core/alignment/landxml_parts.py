@@ -19,7 +19,7 @@ from ..frame import LocalFrame
 from ..progress import Progress
 from .curves import displaced
 from .elements import Alignment, CantElement, Element, Figures, PlanElement, VerticalElement
-from .stations import SAME_PLACE_M, Piece, Stations
+from .equations import SAME_PLACE_M, Piece, Stations
 
 MAX_MISFIT_M = 0.02
 """Largest difference between the stated ends of an element and those that its length and radii give, metres: programs
@@ -92,9 +92,7 @@ def parts_of(node: ET.Element, name: str) -> list[Part]:
     return found
 
 
-def placed(
-    parts: Sequence[Part], frame: LocalFrame, east_first: bool, progress: Progress
-) -> tuple[PlanElement, ...]:
+def placed(parts: Sequence[Part], frame: LocalFrame, east_first: bool, progress: Progress) -> tuple[PlanElement, ...]:
     """Return plan elements in local metres, from `s` = 0.
 
     Parameters
@@ -368,7 +366,7 @@ def _numbers(text: Optional[str], count: int, where: str) -> list[float]:
     except ValueError:
         found = []
     if len(found) < count or not all(map(math.isfinite, found)):
-        raise AlignmentFileError(f"The {where} is no list of numbers ({(text or '').strip()[:40]!r}): repair it.")
+        raise AlignmentFileError(f"The {where} is not a list of numbers ({(text or '').strip()[:40]!r}): repair it.")
     return found
 
 
@@ -389,5 +387,5 @@ def _optional(node: ET.Element, name: str, where: str) -> Optional[float]:
     except ValueError:
         value = math.nan
     if math.isnan(value):
-        raise AlignmentFileError(f"The {where} states {text[:40]!r} as its {name}, which is no number: repair it.")
+        raise AlignmentFileError(f"The {where} states {text[:40]!r} as its {name}, which is not a number: repair it.")
     return value

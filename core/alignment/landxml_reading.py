@@ -17,8 +17,6 @@ from .elements import Alignment, PlanElement
 from .landxml_parts import Part, cant_of, parts_of, placed, profile_of, stations_of_file, with_kilometres
 from .xml_branches import branches
 
-WANTED = ("Units", "CoordinateSystem", "Alignments")
-
 METRE = ("meter", "metre")
 
 EPSG_CODE = re.compile(r"\s*(?:EPSG:)?(\d{4,6})\s*")
@@ -52,8 +50,8 @@ def read_landxml(path: Path, east_first: bool = False, progress: Progress = SILE
     Returns
     -------
     tuple of Alignment
-        In local metres of one frame, which has the coordinate system if the file states its code. Tracks are numbered
-        in the order of the file; `s` starts at 0.
+        In local metres of one frame without a coordinate system. Tracks are numbered in the order of the file; `s`
+        starts at 0.
 
     Raises
     ------
@@ -61,16 +59,9 @@ def read_landxml(path: Path, east_first: bool = False, progress: Progress = SILE
         The file is damaged, or states something that can't be read.
     """
     _check_kind(path)
-    units, epsg, nodes = None, None, []
-    for branch in branches(path, "LandXML", WANTED, progress):
-        if branch.tag == "Units":
-            units = branch
-        elif branch.tag == "CoordinateSystem":
-            epsg = EPSG_CODE.fullmatch(branch.get("epsgCode", ""))
-        else:
-            nodes += branch.findall("Alignment")
-    _check_units(path.name, units, progress)
-    drawn = [node for node in nodes if node.find("CoordGeom") is not None]
+    found = list(branches(path, "LandXML", ("Units", "Alignments"), progress))
+    _check_units(path.name, [unit for branch in found if branch.tag == "Units" for unit in branch], progress)
+    drawn = [node for branch in found for node in branch.iterfind("Alignment") if node.find("CoordGeom") is not None]
     if not drawn:
         raise AlignmentFileError(
             f"{path.name} has no alignment with a CoordGeom: export the alignments from the design program, too."
@@ -78,11 +69,26 @@ def read_landxml(path: Path, east_first: bool = False, progress: Progress = SILE
     wheres = [f"alignment {node.get('name', '')[:60] or number} of {path.name}" for number, node in enumerate(drawn, 1)]
     plans = [parts_of(node, where) for node, where in zip(drawn, wheres)]
     _check_turns(path.name, [part for plan in plans for part in plan], east_first)
-    frame = _frame(plans[0][0], epsg, east_first)
+    start = plans[0][0].start if east_first else plans[0][0].start[::-1]
+    frame = LocalFrame(np.append(np.round(start / ORIGIN_STEP) * ORIGIN_STEP, 0.0))
     return tuple(
         _alignment(node, where, track_id, placed(plan, frame, east_first, progress), frame, progress)
         for node, where, track_id, plan in zip(drawn, wheres, _track_ids(drawn), plans)
     )
+
+
+def stated_system(path: Path) -> Optional[str]:
+    """Return the code of the coordinate system that a LandXML file states before its alignments, such as EPSG:25832.
+
+    Raises
+    ------
+    AlignmentFileError
+        The file is damaged or of another kind.
+    """
+    _check_kind(path)
+    first = next(branches(path, "LandXML", ("CoordinateSystem", "Alignments")), None)
+    code = EPSG_CODE.fullmatch(first.get("epsgCode", "")) if first is not None else None
+    return f"EPSG:{code[1]}" if code else None
 
 
 def _alignment(
@@ -106,13 +112,6 @@ def _track_ids(nodes: Sequence[ET.Element]) -> list[int]:
     return numbers if len(set(numbers)) == len(nodes) else list(range(1, len(nodes) + 1))
 
 
-def _frame(first: Part, epsg: Optional[re.Match], east_first: bool) -> LocalFrame:
-    """Return the local frame of a file."""
-    start = first.start if east_first else first.start[::-1]
-    origin = np.append(np.round(start / ORIGIN_STEP) * ORIGIN_STEP, 0.0)
-    return LocalFrame(origin, crs_wkt=f"EPSG:{epsg[1]}" if epsg else None)
-
-
 def _check_kind(path: Path) -> None:
     """Refuse files of other kinds that are given by mistake."""
     try:
@@ -125,9 +124,8 @@ def _check_kind(path: Path) -> None:
         raise AlignmentFileError(f"{path.name} is {kind or 'empty'}, not LandXML: export the alignments as LandXML.")
 
 
-def _check_units(name: str, units: Optional[ET.Element], progress: Progress) -> None:
+def _check_units(name: str, stated: Sequence[ET.Element], progress: Progress) -> None:
     """Refuse lengths in other units than metres."""
-    stated = [child for child in units if child.tag in ("Metric", "Imperial")] if units is not None else []
     unit = stated[0].get("linearUnit", "") if stated else ""
     if not unit:
         progress.warning(f"{name} states no unit of length: it is read as metres.")

@@ -34,7 +34,14 @@ class Measure:
     """Value with the name of its type, where an attribute admits several types."""
 
     type: str
-    value: float | str
+    value: float | bool
+
+
+@dataclass(frozen=True)
+class Whole:
+    """Number of the type INTEGER; all others are written as REAL."""
+
+    value: int
 
 
 DERIVED = Enum("")
@@ -55,7 +62,7 @@ class StepFile:
         entity : str
             Name of its type, such as IfcProject.
         *attributes : object
-            None, bool, int, float, str, `Ref`, `Enum`, `Measure`, or a sequence of these.
+            None, bool, number, str, `Whole`, `Ref`, `Enum`, `Measure`, or a sequence of these.
         """
         number = len(self._lines) + 1
         self._lines.append(f"#{number}={entity.upper()}({','.join(map(written, attributes))});\n")
@@ -90,8 +97,8 @@ def guid(*names: object) -> str:
 def written(value: Any) -> str:
     """Write a value.
 
-    >>> written(("Gleis 1 'Süd'", None, True, 2, 0.5, Ref(7), Enum("LINE"), Measure("IFCLENGTHMEASURE", 1.0), DERIVED))
-    "('Gleis 1 ''S\\\\X2\\\\00FC\\\\X0\\\\d''',$,.T.,2,0.5,#7,.LINE.,IFCLENGTHMEASURE(1.0),*)"
+    >>> written(("Track 1", None, True, Whole(2), 1, 0.5, Ref(7), Enum("LINE"), Measure("IFCLENGTHMEASURE", 1.0), DERIVED))
+    "('Track 1',$,.T.,2,1.0,0.5,#7,.LINE.,IFCLENGTHMEASURE(1.0),*)"
     """
     if value is None:
         return "$"
@@ -107,7 +114,7 @@ def written(value: Any) -> str:
         return f"{value.type}({written(value.value)})"
     if isinstance(value, Sequence):
         return f"({','.join(map(written, value))})"
-    return str(value) if isinstance(value, int) else _real(float(value))
+    return str(value.value) if isinstance(value, Whole) else _real(float(value))
 
 
 def _real(value: float) -> str:

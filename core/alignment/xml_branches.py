@@ -17,15 +17,13 @@ CHUNK = 1 << 18
 """Bytes parsed between two checks for cancellation: some milliseconds."""
 
 MAX_NODES, MAX_CHARACTERS = 2_000_000, 100_000_000
-"""Largest branches: a hundred times those of the alignments of a whole railway, and some hundred megabytes of memory."""
+"""Largest branches: a hundred times those of a whole railway, and some hundred megabytes of memory."""
 
 MAX_DEPTH = 100
 """Deepest nesting: that of LandXML is ten."""
 
 
-def branches(
-    path: Path, root: str, names: Collection[str], progress: Progress = SILENT
-) -> Iterator[ET.Element]:
+def branches(path: Path, root: str, names: Collection[str], progress: Progress = SILENT) -> Iterator[ET.Element]:
     """Yield the children of the root with the given names, in the order of the file, whole; others are passed over.
 
     Parameters
@@ -97,9 +95,7 @@ class _Gardener:
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         name = tag.rpartition(":")[2]
         if self._depth == 0 and name != self._root:
-            raise AlignmentFileError(
-                f"{self._name} is XML of another kind: its root is {name[:40]}, not {self._root}."
-            )
+            raise AlignmentFileError(f"{self._name} is XML of another kind: its root is {name[:40]}, not {self._root}.")
         if self._open or (self._depth == 1 and name in self._names):
             self._nodes += 1
             self._check_size()

@@ -1,7 +1,7 @@
-"""Stations of an alignment: the kilometres, in metres, that its file states along the curve, with their jumps.
+"""Stations of an alignment as design files state them: metres that continue along the curve, with equations at jumps.
 
-A design file knows the distance along the curve; where kilometres do not continue it, as at a gap or an overlap of the
-line's kilometres, it has an equation with the station behind and the station ahead.
+Kilometres come from an axis, on which numbers may be missing or twice, and on which a parallel track is longer or
+shorter. A design file knows the distance along the track's own curve, and states where stations do not continue it.
 """
 
 from __future__ import annotations
@@ -9,11 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Optional
 
+import numpy as np
+
 from .elements import Alignment
 
 MIN_JUMP_M = 0.05
-"""Smallest jump of the stations that becomes an equation, metres: kilometres come from an axis, on which a parallel
-track gains or loses millimetres from element to element."""
+"""Smallest jump of the stations that becomes an equation, metres: a track beside its axis gains or loses millimetres
+from element to element."""
 
 SAME_PLACE_M = 1e-4
 """Places along the curve that differ by less are the same, metres: files have four decimals or more."""
@@ -70,17 +72,35 @@ class Stations:
 
 
 def stations_of(alignment: Alignment) -> Optional[Stations]:
-    """Return the stations that the kilometres of the plan elements make; None if no element states a kilometre."""
-    known = [one for one in alignment.plan if one.figures.km_from is not None]
+    """Return the stations that the kilometres of the plan elements make; None if no element states both of its own.
+
+    `km_from` and `km_to` may be those of the two ends in order along the track, or the smaller and the larger one.
+    """
+    known = [one for one in alignment.plan if None not in (one.figures.km_from, one.figures.km_to)]
     if not known:
         return None
-    last = known[-1].figures.km_to if known[-1].figures.km_to is not None else known[-1].figures.km_from
-    rises = last >= known[0].figures.km_from
+    ends = [(one.figures.km_from, one.figures.km_to) for one in known]
+    rises = sum(ends[-1]) >= sum(ends[0]) if len(ends) > 1 else ends[0][1] >= ends[0][0]
     pieces: list[Piece] = []
-    for one in known:
-        piece = Piece(one.s_from, 1000.0 * one.figures.km_from, rises)
+    for one, own in zip(known, ends):
+        piece = Piece(one.s_from, 1000.0 * (min(own) if rises else max(own)), rises)
         if not pieces or abs(pieces[-1].at(piece.s) - piece.station) >= MIN_JUMP_M:
             pieces.append(piece)
     start = Piece(alignment.s_from, pieces[0].at(alignment.s_from), rises)
     return Stations((start, *pieces[1:]))
 
+
+def measured(alignment: Alignment) -> np.ndarray:
+    """Return the vertices of the whole curve with the kilometre of each, (n, 4), local metres and kilometres.
+
+    A jump of the kilometres has two vertices at the same place. Kilometres are NaN if they are unknown.
+    """
+    s = alignment.stations(alignment.s_from, alignment.s_to)
+    stations = stations_of(alignment)
+    if stations is None:
+        return np.column_stack([alignment.xyz(s), np.full(len(s), np.nan)])
+    jumps = np.array([piece.s for piece in stations.pieces[1:]])
+    s = np.sort(np.concatenate([s[~np.isin(s, jumps)], jumps, jumps]))
+    repeated = np.append(False, np.diff(s) == 0)
+    known = [stations.ahead(place) if again else stations.behind(place) for place, again in zip(s, repeated)]
+    return np.column_stack([alignment.xyz(s), np.array(known) / 1000.0])
