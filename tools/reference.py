@@ -20,7 +20,9 @@ from qgis.core import (  # noqa: E402
     QgsProcessingProvider,
 )
 from rail_extract.core.fields import (  # noqa: E402
+    AXIS_FIELDS,
     CENTERLINE_FIELDS,
+    ELEMENT_FIELDS,
     FINDING_FIELDS,
     QUALITY_FIELDS,
     RAIL_FIELDS,
@@ -47,6 +49,8 @@ LAYERS = {
     "Track geometry": QUALITY_FIELDS,
     "Findings": FINDING_FIELDS,
     "Stops": STOP_FIELDS,
+    "Elements": ELEMENT_FIELDS,
+    "Axes": AXIS_FIELDS,
 }
 
 

@@ -97,8 +97,8 @@ def guid(*names: object) -> str:
 def written(value: Any) -> str:
     """Write a value.
 
-    >>> written(("Track 1", None, True, Whole(2), 1, 0.5, Ref(7), Enum("LINE"), Measure("IFCLENGTHMEASURE", 1.0), DERIVED))
-    "('Track 1',$,.T.,2,1.0,0.5,#7,.LINE.,IFCLENGTHMEASURE(1.0),*)"
+    >>> written(("Track 1", None, True, Whole(2), 1, Ref(7), Enum("LINE"), Measure("IFCLENGTHMEASURE", 1), DERIVED))
+    "('Track 1',$,.T.,2,1.0,#7,.LINE.,IFCLENGTHMEASURE(1.0),*)"
     """
     if value is None:
         return "$"

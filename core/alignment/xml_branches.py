@@ -78,7 +78,7 @@ class _Gardener:
             self._parser.Parse(chunk, not chunk)
         except (expat.ExpatError, LookupError, ValueError) as error:  # ValueError: an encoding that no parser knows
             raise AlignmentFileError(
-                f"{self._name} is cut off, damaged or no XML ({error}): write it again in the program that made it."
+                f"{self._name} is cut off, damaged or not XML ({error}): write it again in the program that made it."
             ) from None
 
     def harvest(self) -> list[ET.Element]:

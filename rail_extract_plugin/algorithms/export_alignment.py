@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsProcessingContext, QgsProcessingFeatureSource
+from qgis.core import QgsCoordinateReferenceSystem, QgsProcessingContext, QgsProcessingFeatureSource
 
 from ...core.disk import Destination
 from ...core.errors import CrsError, ParameterError
@@ -38,6 +38,7 @@ class Job:
     """The values of the parameters."""
 
     source: QgsProcessingFeatureSource
+    crs: QgsCoordinateReferenceSystem
     standard: RailStandard
     path: Path
     circles: bool
@@ -65,7 +66,7 @@ class ExportAlignment(RailAlgorithm):
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs in the order of the interface."""
-        for definition in (inputs.elements(), *groups.rail(), groups.vertical_curves(), outputs.alignment_file()):
+        for definition in (*inputs.elements(), *groups.rail(), groups.vertical_curves(), outputs.alignment_file()):
             self.addParameter(definition)
         for output in outputs.alignment_figures():
             self.addOutput(output)
@@ -76,11 +77,13 @@ class ExportAlignment(RailAlgorithm):
 
         values = ParameterValues(self, parameters, context)
         source = values.table("INPUT")
-        prepare_system(wkt_of(source.sourceCrs()) or None)
+        crs = source.sourceCrs() if source.sourceCrs().isValid() else values.projected_crs()
+        prepare_system(wkt_of(crs) or None)
         path = Path(self.parameterAsFileOutput(parameters, "OUTPUT", context))
         if path.suffix.lower() not in FORMATS:
             raise ParameterError(f"OUTPUT can't be {path.name}: let it end in .xml for LandXML, in .ifc or in .dxf.")
-        return Job(source, values.standard(), path, values.choice("VERTICAL_CURVES") == groups.VERTICAL_CURVES[0])
+        circles = values.choice("VERTICAL_CURVES") == groups.VERTICAL_CURVES[0]
+        return Job(source, crs, values.standard(), path, circles)
 
     def compute(
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
@@ -89,7 +92,7 @@ class ExportAlignment(RailAlgorithm):
         from ...core.alignment.delivery import check_joined
         from ..reading.element_tables import read_elements
 
-        alignments, frame = read_elements(job.source, progress.span(0, READING))
+        alignments, frame = read_elements(job.source, job.crs, progress.span(0, READING))
         if (frame.horizontal_unit_m, frame.vertical_unit_m) != (1.0, 1.0):
             raise CrsError(
                 "INPUT is in feet, and files for design software are written in metres: fit the lines in a coordinate "

@@ -62,11 +62,12 @@ class ImportAlignment(RailAlgorithm):
         """Read and check the parameters and the coordinate system of the file, in the main thread."""
         from ...core.alignment.landxml_reading import stated_system
         from ...core.clouds.crs import parse_crs, units
+        from ..reading.line_layers import wkt_of
 
         values = ParameterValues(self, parameters, context)
         path, crs = Path(self.parameterAsFile(parameters, "INPUT", context)), values.projected_crs()
         stated = stated_system(path)
-        wkt = parse_crs(stated).to_wkt() if stated else crs.toWkt() if crs.isValid() else None
+        wkt = parse_crs(stated).to_wkt() if stated else wkt_of(crs) or None
         if wkt and units(parse_crs(wkt))[0] != 1.0:
             raise CrsError(
                 f"{path.name} is in metres, but its coordinate system {stated or crs.authid()} is not: choose another "

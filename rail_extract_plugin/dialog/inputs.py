@@ -163,12 +163,18 @@ def points_of_rails() -> QgsProcessingParameterDefinition:
     )
 
 
-def elements() -> QgsProcessingParameterDefinition:
-    """Define the parameter for an element table."""
+def elements() -> Definitions:
+    """Define the parameters for an element table."""
     table = QgsProcessing.SourceType.TypeVector
-    return helped(
-        QgsProcessingParameterFeatureSource("INPUT", tr("Elements"), [table]),
-        tr("Element table of Fit Alignment or Import Alignment; it may be edited. Its geometries are not used."),
+    return (
+        helped(
+            QgsProcessingParameterFeatureSource("INPUT", tr("Elements"), [table]),
+            tr("Element table of Fit Alignment or Import Alignment; it may be edited. Its geometries are not used."),
+        ),
+        advanced(
+            QgsProcessingParameterCrs("CRS", tr("CRS of a table without one"), optional=True),
+            tr("Projected coordinate system in metres for a table without geometries; other tables keep their own."),
+        ),
     )
 
 

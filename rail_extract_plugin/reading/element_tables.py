@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from qgis.core import NULL, QgsFeatureRequest, QgsProcessingFeatureSource
+from qgis.core import NULL, QgsCoordinateReferenceSystem, QgsFeatureRequest, QgsProcessingFeatureSource
 
 from ...core.alignment.elements import Alignment
 from ...core.alignment.table import alignments
@@ -20,13 +20,18 @@ KEY_FIELDS = ("layout", "s_from", "s_to")
 
 
 def read_elements(
-    source: QgsProcessingFeatureSource, progress: Progress = SILENT, name: str = "INPUT"
+    source: QgsProcessingFeatureSource,
+    crs: QgsCoordinateReferenceSystem,
+    progress: Progress = SILENT,
+    name: str = "INPUT",
 ) -> tuple[list[Alignment], LocalFrame]:
     """Read the alignments of an element table; its geometries are not used.
 
     Parameters
     ----------
     source : QgsProcessingFeatureSource
+    crs : QgsCoordinateReferenceSystem
+        Of x and y; a table without geometries has none of its own.
     progress : Progress
     name : str
         Name of the layer's parameter, for messages.
@@ -52,7 +57,7 @@ def read_elements(
     starts = [(row["x"], row["y"]) for row in rows if _is_number(row.get("x")) and _is_number(row.get("y"))]
     if not starts:
         raise RailExtractError(f"{name} has no element in plan with x and y: give a table with layout H.")
-    crs_wkt, horizontal_unit_m, vertical_unit_m = system_of(source.sourceCrs(), progress)
+    crs_wkt, horizontal_unit_m, vertical_unit_m = system_of(crs, progress)
     origin = np.append(np.round(np.median(starts, axis=0) / ORIGIN_STEP) * ORIGIN_STEP, 0.0)
     frame = LocalFrame(origin, horizontal_unit_m, vertical_unit_m, crs_wkt)
     return alignments(rows, frame), frame

@@ -20,6 +20,8 @@ def test_toolbox_offers_the_algorithms(qgis, plugin):
             "vectorizerails",
             "buildtrackcenterlines",
             "measuretrackgeometry",
+            "exportalignment",
+            "importalignment",
             "trainrailclassifier",
             "installpackages",
             "checkinstallation",

@@ -21,6 +21,7 @@ NAMES = (
         "vectorizerails",
         "buildtrackcenterlines",
     ),
+    *("exportalignment", "importalignment"),
     *("measuretrackgeometry", "trainrailclassifier", "installpackages", "checkinstallation"),
 )
 SMALLEST_ICON = 16
