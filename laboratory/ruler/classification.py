@@ -105,8 +105,15 @@ def score(scene: RawScene, wide: bool = False, weights: Path | None = None) -> t
     return result, found.rail
 
 
+def hectares(scene: RawScene) -> float:
+    """Return the area of a scene, by the square metres that hold points."""
+    return len(np.unique(np.floor(scene.xyz[:, :2]).astype(int), axis=0)) / 1e4
+
+
 def lines_from(scene: RawScene, rail: np.ndarray, model: str = Parameters.model) -> Match:
     """Extract rails from labelled points, (n,) bool, and compare them with the truth."""
+    if not rail.any():
+        return match([], scene.shown)
     points = RailPoints(scene.xyz[rail], scene.frame, RAIL)
     gauge_m, head_width_m = scene.standard.gauge_m, scene.standard.head_width_m
     parameters = Parameters(gauge_m, head_width_m, other_gauges_m=scene.other_gauges_m, model=model)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Union
 
@@ -14,6 +15,7 @@ from ..rasters.turnouts import FORMS, branch
 from .plain import canted, rolling, spacing
 from .raw import BALLAST, RawScene, Thing, scan_world
 from .raw_photogrammetry import Photogrammetry
+from .raw_places import barriers_along, building_site, farmland, kerbed_car_park, motorway
 from .raw_scanner import RawScanner
 from .raw_things import (
     car_park,
@@ -240,12 +242,24 @@ def air(seed: int, per_m2: float, noise_m: float) -> RawScene:
     return scan_world(name, parallel(curve, (0.0, 4.2), 0.09), STANDARD, [from_air(per_m2, noise_m)], things, seed)
 
 
-def empty_place(name: str, seed: int, scanner: RawScanner, things: list[Thing]) -> RawScene:
+def empty_place(name: str, seed: int, scanner: Scanning, things: list[Thing]) -> RawScene:
     """Scan a place without rails."""
     return scan_world(name, [], STANDARD, [scanner], things, seed, BALLAST, line(45.0, 1 / 300, 0.6))
 
 
-def forest(seed: int, scanner: RawScanner) -> RawScene:
+def wide_place(name: str, seed: int, scanner: Scanning, lay: Thing) -> RawScene:
+    """Scan a third of a hectare without rails."""
+    return scan_world(name, [], STANDARD, [scanner], [lay], seed, BALLAST, line(80.0, 1 / 600, 0.6), half_width_m=20.0)
+
+
+def barriers(seed: int, scanner: Scanning) -> RawScene:
+    """Scan double track between guard rails, next to a road."""
+    curve = line(60.0, 1 / 900, 0.35)
+    things: list[Thing] = [ground, running_rails, masts_at(-3.4), barriers_along]
+    return scan_world("barriers", parallel(curve, (0.0, 4.2), 0.05), STANDARD, [scanner], things, seed)
+
+
+def forest(seed: int, scanner: Scanning) -> RawScene:
     """Scan a hilly forest with undergrowth."""
 
     def floor(world: World) -> None:
@@ -255,7 +269,7 @@ def forest(seed: int, scanner: RawScanner) -> RawScene:
     return empty_place("forest", seed, scanner, [floor, undergrowth, thing(trees, 25, (-13.0, 13.0))])
 
 
-def quarry(seed: int, scanner: RawScanner) -> RawScene:
+def quarry(seed: int, scanner: Scanning) -> RawScene:
     """Scan a quarry: benches of rubble."""
 
     def rubble(world: World) -> None:
@@ -317,7 +331,25 @@ NEGATIVE: dict[str, Callable[[int], RawScene]] = {
     "car park": lambda seed: empty_place("car park", seed, CAR, [car_park]),
     "quarry": partial(quarry, scanner=CAR),
     "quarry from the air": partial(quarry, scanner=from_air(120, 0.015)),
+    "motorway": lambda seed: wide_place("motorway", seed, replace(CAR, left_m=3.0), motorway),
+    "kerbs": lambda seed: wide_place("kerbs", seed, CAR, kerbed_car_park),
+    "building site": lambda seed: wide_place("building site", seed, CAR, building_site),
+    "farmland": lambda seed: wide_place("farmland", seed, replace(CAR, left_m=-8.0), farmland),
+    "farmland from the air": lambda seed: wide_place("farmland", seed, from_air(200, 0.015), farmland),
+    "photo street": lambda seed: empty_place("street", seed, DRONE, [street]),
+    "photo quarry": partial(quarry, scanner=DRONE),
+    "photo motorway": lambda seed: wide_place("motorway", seed, DRONE, motorway),
+    "photo motorway blunt": lambda seed: wide_place("motorway", seed, BLUNT, motorway),
+    "photo kerbs": lambda seed: wide_place("kerbs", seed, DRONE, kerbed_car_park),
+    "photo building site": lambda seed: wide_place("building site", seed, DRONE, building_site),
+    "photo farmland": lambda seed: wide_place("farmland", seed, DRONE, farmland),
 }
 """Places without rails."""
 
-RAW_SCENES = {**MOBILE, **FLUSH, **AIR, **PHOTO, **NEGATIVE}
+BESIDE: dict[str, Callable[[int], RawScene]] = {
+    "barriers": partial(barriers, scanner=TRAIN),
+    "photo barriers": partial(barriers, scanner=DRONE),
+}
+"""Rails with something like rails next to them."""
+
+RAW_SCENES = {**MOBILE, **FLUSH, **AIR, **PHOTO, **NEGATIVE, **BESIDE}
