@@ -70,7 +70,8 @@ def check_joined(alignment: Alignment) -> None:
     ParameterError
         There is a gap in plan, in height or along the curve.
     """
-    for elements in (alignment.plan, alignment.vertical, alignment.cant):
+    layouts: tuple[Sequence[Element], ...] = alignment.plan, alignment.vertical, alignment.cant
+    for elements in layouts:
         for number, (one, after) in enumerate(zip(elements, elements[1:]), start=1):
             gap_m = _gap_m(alignment, one, after)
             if gap_m > MAX_GAP_M:

@@ -76,14 +76,18 @@ def stations_of(alignment: Alignment) -> Optional[Stations]:
 
     `km_from` and `km_to` may be those of the two ends in order along the track, or the smaller and the larger one.
     """
-    known = [one for one in alignment.plan if None not in (one.figures.km_from, one.figures.km_to)]
+    known = [
+        (one.s_from, one.figures.km_from, one.figures.km_to)
+        for one in alignment.plan
+        if one.figures.km_from is not None and one.figures.km_to is not None
+    ]
     if not known:
         return None
-    ends = [(one.figures.km_from, one.figures.km_to) for one in known]
-    rises = sum(ends[-1]) >= sum(ends[0]) if len(ends) > 1 else ends[0][1] >= ends[0][0]
+    (_, *first), (_, *last) = known[0], known[-1]
+    rises = sum(last) >= sum(first) if len(known) > 1 else last[1] >= last[0]
     pieces: list[Piece] = []
-    for one, own in zip(known, ends):
-        piece = Piece(one.s_from, 1000.0 * (min(own) if rises else max(own)), rises)
+    for s, *ends in known:
+        piece = Piece(s, 1000.0 * (min(ends) if rises else max(ends)), rises)
         if not pieces or abs(pieces[-1].at(piece.s) - piece.station) >= MIN_JUMP_M:
             pieces.append(piece)
     start = Piece(alignment.s_from, pieces[0].at(alignment.s_from), rises)

@@ -136,7 +136,7 @@ def _write_piece(
         meet = _intersection(start, piece.heading, end, float(alone.headings(s)[0]))
         points = {"Start": start, "PI": meet, "End": end}
     for name, place in points.items():
-        x, y, _ = alignment.frame.to_crs([*place, 0.0])
+        x, y, _ = alignment.frame.to_crs(np.append(place, 0.0))
         ET.SubElement(node, name).text = f"{_written(y)} {_written(x)}"
 
 
@@ -239,7 +239,7 @@ def _curve(one: VerticalElement, circles: bool) -> tuple[str, dict[str, str]]:
 def _write_meeting(
     parent: ET.Element, kind: str, alignment: Alignment, station: float, z: float, facts: dict[str, str]
 ) -> None:
-    height = float(alignment.frame.to_crs([0.0, 0.0, z])[2])
+    height = float(alignment.frame.to_crs(np.array([0.0, 0.0, z]))[2])
     ET.SubElement(parent, kind, facts).text = f"{_written(station)} {_written(height)}"
 
 

@@ -80,7 +80,7 @@ def parts_of(node: ET.Element, name: str) -> list[Part]:
     """
     readers = {"Line": _line, "Curve": _curve, "Spiral": _spiral}
     found = []
-    for number, child in enumerate((one for one in node.find("CoordGeom") if one.tag != "Feature"), start=1):
+    for number, child in enumerate((one for one in node.iterfind("CoordGeom/*") if one.tag != "Feature"), start=1):
         where = f"{child.tag} {number} of {name}"
         if child.tag not in readers:
             raise AlignmentFileError(f"The {where} is neither line, arc nor clothoid: export an alignment of these.")
@@ -129,7 +129,7 @@ def placed(parts: Sequence[Part], frame: LocalFrame, east_first: bool, progress:
 def _placed(part: Part, s: float, frame: LocalFrame, east_first: bool) -> PlanElement:
     """Return an element whose chord runs from the stated start to the stated end."""
     places = [place if east_first else place[::-1] for place in (part.start, part.end)]
-    start, end = (frame.to_local([*place, 0.0])[:2] for place in places)
+    start, end = (frame.to_local(np.append(place, 0.0))[:2] for place in places)
     u, k_from = np.array([part.length_m]), np.array([part.k_from])
     change = np.array([(part.k_to - part.k_from) / part.length_m])
     way, chord = displaced(u, np.zeros(1), k_from, change)[0], end - start
@@ -224,7 +224,7 @@ def profile_of(node: ET.Element, name: str, progress: Progress) -> tuple[Vertica
 
 
 def _tangents_and_curves(
-    s: Sequence[float], z: Sequence[float], grades: Sequence[float], lengths: Sequence[float], name: str
+    s: Sequence[float], z: Sequence[float], grades: np.ndarray, lengths: Sequence[float], name: str
 ) -> Iterator[VerticalElement]:
     """Yield the elements between points where tangents meet."""
     done, height = s[0], z[0]
@@ -323,11 +323,12 @@ def stations_of_file(node: ET.Element, name: str) -> Stations:
 
 def with_kilometres(alignment: Alignment, stations: Stations) -> Alignment:
     """Return an alignment with the kilometres of the ends of all its elements."""
-    layouts = {
-        name: tuple(replace(one, figures=_kilometres(one, stations)) for one in getattr(alignment, name))
-        for name in ("plan", "vertical", "cant")
-    }
-    return replace(alignment, **layouts)
+    return replace(
+        alignment,
+        plan=tuple(replace(one, figures=_kilometres(one, stations)) for one in alignment.plan),
+        vertical=tuple(replace(one, figures=_kilometres(one, stations)) for one in alignment.vertical),
+        cant=tuple(replace(one, figures=_kilometres(one, stations)) for one in alignment.cant),
+    )
 
 
 def _kilometres(one: Element, stations: Stations) -> Figures:

@@ -101,7 +101,7 @@ def _alignment(
 ) -> Alignment:
     """Return an alignment with its profile, cant and kilometres."""
     stations = stations_of_file(node, where)
-    profile, cant = (read(node, where, progress) for read in (profile_of, cant_of))
+    profile, cant = profile_of(node, where, progress), cant_of(node, where, progress)
     return with_kilometres(Alignment(track_id, frame, plan, profile, cant, node.get("name", "")), stations)
 
 

@@ -53,7 +53,7 @@ class ExportAlignment(RailAlgorithm):
     TAGS = (*RAIL_WORDS, *ALIGNMENT_WORDS, "LandXML", "IFC", "DXF", "export", "BIM", "CAD")
     NEEDS = (("numpy",), ("scipy",), ("pyproj",))
     SUMMARY = "Writes the elements of tracks as LandXML, IFC or DXF for design software."
-    GUIDE = "alignment_tutorial"
+    PICTURE = "alignment.svg"
     HELP = (
         "Takes the element table of Fit Alignment or Import Alignment. The name of the file decides the format:\n\n"
         ".xml: LandXML 1.2 with plan, profile, cant and station equations. Points are written northing first.\n\n"

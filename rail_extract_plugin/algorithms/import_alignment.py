@@ -43,7 +43,7 @@ class ImportAlignment(RailAlgorithm):
     TAGS = (*RAIL_WORDS, *ALIGNMENT_WORDS, "LandXML", "import", "design", "axis", "tamping")
     NEEDS = (("numpy",), ("scipy",), ("pyproj",))
     SUMMARY = "Reads the alignments of a LandXML file as an element table and as axes with kilometres."
-    GUIDE = "alignment_tutorial"
+    PICTURE = "alignment.svg"
     HELP = (
         "Reads lines, arcs and clothoids, profiles with circles or parabolas, cant and station equations. Other "
         "transition curves are refused.\n\n"

@@ -118,7 +118,7 @@ REFUSED = {
     "is empty": b"\n"[:0],
     "root is gml": "<gml/>",
     "cut off, damaged or not XML": landxml()[:-60],
-    "damaged or not XML \\(syntax": "Northing;Easting\n1;2\n",
+    "damaged or not XML \\(not well-formed": "Northing;Easting\n1;2\n",
     "declares a document type": BOMB + landxml(),
     "has no alignment": landxml().replace("CoordGeom", "Other"),
     "of type bloss": landxml(LINE + SPIRAL.replace("clothoid", "bloss")),

@@ -234,6 +234,8 @@ def test_layers_can_be_drawn(styled, style):
         "quality": ("POINT Z (500050 3000000 1)", {"track_id": 1, "gauge_mm": 1435.0, "bridged": 1}),
         "findings": (LINE, {"finding": 1, "review": "accepted"}),
         "stops": ("POINT Z (500050 3000000 1)", {"stop": 1, "reason": "the cloud ends"}),
+        "elements": (LINE, {"type": "arc"}),
+        "axes": (LINE, {"track_id": 1}),
     }
     layer = styled(style, [rows[style]])
     settings = QgsMapSettings()
@@ -248,7 +250,7 @@ def test_layers_can_be_drawn(styled, style):
     image = job.renderedImage()
     seen = {image.pixelColor(x, y).name() for x in range(60, 200) for y in range(100, 200)}
     colours = {"rails": "#1565c0", "centerlines": "#e64a19", "quality": "#f28e2b", "findings": "#84b397"}
-    assert {**colours, "stops": "#e64a19"}[style] in seen
+    assert {**colours, "stops": "#e64a19", "elements": "#1565c0", "axes": "#8e5bb5"}[style] in seen
 
 
 @pytest.mark.parametrize("style", ["rails", "centerlines", "findings"])
