@@ -43,6 +43,8 @@ DRAWN = {
     "quality": "STATIONS",
     "findings": "FINDINGS",
     "stops": "STOPS",
+    "places": "PLACES",
+    "differences": "DIFFERENCES",
     "elements": "ELEMENTS",
     "axes": "ALIGNMENT",
 }

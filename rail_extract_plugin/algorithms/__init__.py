@@ -11,6 +11,7 @@ from .import_alignment import ImportAlignment
 from .install_packages import InstallPackages
 from .measure_track_geometry import MeasureTrackGeometry
 from .rasterize_rail_points import RasterizeRailPoints
+from .station_along_axis import StationAlongAxis
 from .train_rail_classifier import TrainRailClassifier
 from .vectorize_rails import VectorizeRails
 
@@ -23,6 +24,7 @@ ALGORITHMS = (
     VectorizeRails,
     BuildTrackCenterlines,
     MeasureTrackGeometry,
+    StationAlongAxis,
     ExportAlignment,
     ImportAlignment,
     TrainRailClassifier,

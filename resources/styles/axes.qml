@@ -6,7 +6,7 @@
         <layer class="SimpleLine" enabled="1" pass="0" locked="0">
           <Option type="Map">
             <Option name="line_color" type="QString" value="142,91,181,255"/>
-            <Option name="line_width" type="QString" value="0.5"/>
+            <Option name="line_width" type="QString" value="0.8"/>
             <Option name="line_width_unit" type="QString" value="MM"/>
             <Option name="line_style" type="QString" value="solid"/>
             <Option name="capstyle" type="QString" value="flat"/>

@@ -218,6 +218,7 @@ OUTPUTS = {
     "vectorizerails": ("OUTPUT.gpkg",),
     "buildtrackcenterlines": ("OUTPUT.gpkg",),
     "measuretrackgeometry": ("OUTPUT.gpkg",),
+    "stationalongaxis": ("OUTPUT.gpkg",),
     "exportalignment": ("OUTPUT.xml",),
     "importalignment": ("ELEMENTS.gpkg", "AXIS.gpkg"),
     "trainrailclassifier": ("WEIGHTS.npz",),

@@ -20,6 +20,7 @@ def test_toolbox_offers_the_algorithms(qgis, plugin):
             "vectorizerails",
             "buildtrackcenterlines",
             "measuretrackgeometry",
+            "stationalongaxis",
             "exportalignment",
             "importalignment",
             "trainrailclassifier",
