@@ -228,7 +228,7 @@ EXPORTED = [
         "The element 2 of layout H of track 1 is of type arc and has no radius: fill one, or make it a line.",
     ),
     Fault(
-        "an ending that is no format",
+        "an ending that is not a format",
         lambda bench: {**of_table()(bench), "OUTPUT": bench.folder / "out" / "design.dwg"},
         REFUSED,
         "OUTPUT can't be design.dwg: let it end in .xml for LandXML, in .ifc or in .dxf.",
