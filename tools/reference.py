@@ -20,10 +20,14 @@ from qgis.core import (  # noqa: E402
     QgsProcessingProvider,
 )
 from rail_extract.core.fields import (  # noqa: E402
+    AXIS_FIELDS,
     CENTERLINE_FIELDS,
+    ELEMENT_FIELDS,
+    EXTENT_FIELDS,
     FINDING_FIELDS,
     QUALITY_FIELDS,
     RAIL_FIELDS,
+    STATION_FIELDS,
     STOP_FIELDS,
     Field,
 )
@@ -45,8 +49,11 @@ LAYERS = {
     "Rails": RAIL_FIELDS,
     "Centerlines": CENTERLINE_FIELDS,
     "Track geometry": QUALITY_FIELDS,
+    "Kilometres": (*STATION_FIELDS, *EXTENT_FIELDS),
     "Findings": FINDING_FIELDS,
     "Stops": STOP_FIELDS,
+    "Elements": ELEMENT_FIELDS,
+    "Axes": AXIS_FIELDS,
 }
 
 

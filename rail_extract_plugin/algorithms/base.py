@@ -52,6 +52,8 @@ RAIL_WORDS = (
 CLOUD_WORDS = ("lidar", "las", "laz", "copc", "point cloud", "laser scanning", "Punktwolke", "nuage de points")
 TRACK_WORDS = ("gauge", "cant", "superelevation", "alignment", "Spurweite", "Gleisachse", "Überhöhung", "écartement")
 
+ALIGNMENT_WORDS = ("alignment", "elements", "straight", "clothoid", "arc", "Trasse", "Trassierung", "tracé")
+
 
 class RailAlgorithm(QgsProcessingAlgorithm):
     """An algorithm of Rail Extract in the toolbox.

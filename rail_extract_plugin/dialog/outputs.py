@@ -52,6 +52,24 @@ def _layer(name: str, label: str, kind: QgsProcessing.SourceType, optional: bool
     return made
 
 
+def stationed() -> QgsProcessingParameterDefinition:
+    """Define the copy of a layer with kilometres."""
+    kind = QgsProcessing.SourceType.TypeVectorAnyGeometry
+    return helped(
+        _layer("OUTPUT", tr("Layer with kilometres"), kind, optional=False),
+        tr("The features of the layer with all their fields, and with axis, kilometre, offset and side."),
+    )
+
+
+def station_figures() -> Numbers:
+    """Define the figures about places along an axis."""
+    return (
+        QgsProcessingOutputNumber("PLACE_COUNT", tr("Number of features with a kilometre")),
+        QgsProcessingOutputNumber("BEYOND_COUNT", tr("Number of features without a kilometre")),
+        QgsProcessingOutputNumber("AMBIGUOUS_COUNT", tr("Number of features with an ambiguous kilometre")),
+    )
+
+
 def findings() -> QgsProcessingParameterDefinition:
     """Define the layer of places to look at."""
     line = QgsProcessing.SourceType.TypeVectorLine
@@ -67,6 +85,41 @@ def stops() -> QgsProcessingParameterDefinition:
     return helped(
         _layer("STOPS", tr("Stops"), point, optional=True),
         tr("Points where a rail is not followed further, with the reason."),
+    )
+
+
+def elements() -> QgsProcessingParameterDefinition:
+    """Define the element table."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return helped(
+        _layer("ELEMENTS", tr("Elements"), line, optional=False),
+        tr("The element table: a line for each element in plan, in height and of cant, with its figures."),
+    )
+
+
+def axes() -> QgsProcessingParameterDefinition:
+    """Define the layer of alignments as lines."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return helped(
+        _layer("AXIS", tr("Axes"), line, optional=True),
+        tr("A line for each alignment, less than a millimetre off the exact curve, with kilometres as M values."),
+    )
+
+
+def alignment_file() -> QgsProcessingParameterDefinition:
+    """Define the file for design software."""
+    kinds = tr("LandXML files (*.xml);;IFC files (*.ifc);;DXF files (*.dxf)")
+    return helped(
+        QgsProcessingParameterFileDestination("OUTPUT", tr("File for design software"), kinds),
+        tr("The name decides the format: .xml is LandXML 1.2, .ifc is IFC 4.3, .dxf is DXF of release 12."),
+    )
+
+
+def alignment_figures() -> Numbers:
+    """Define the figures about alignments."""
+    return (
+        QgsProcessingOutputNumber("ALIGNMENT_COUNT", tr("Number of alignments")),
+        QgsProcessingOutputNumber("ELEMENT_COUNT", tr("Number of elements")),
     )
 
 

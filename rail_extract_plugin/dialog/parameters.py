@@ -55,6 +55,8 @@ MAX_EPOCHS, MAX_SEED = 10_000, 2**31 - 1
 """Weeks on any computer, and the largest seed of a random generator."""
 
 
+VERTICAL_CURVES = ("CIRCLES", "PARABOLAS")
+
 STANDARD_WIDGET = {"widget_wrapper": {"class": f"{__package__}.standard_widget.StandardWidgetWrapper"}}
 """Metadata by which QGIS finds the list of standards. Models contain it: the class never changes its place."""
 
@@ -144,6 +146,17 @@ def head() -> Definitions:
     standard.setHelp(tr("Rail profile, which gives the railhead width, and the gauge that findings compare with."))
     advanced(gauge, tr("Gauge that findings compare with, instead of that of the standard."))
     return standard, gauge, head_width
+
+
+def vertical_curves() -> QgsProcessingParameterDefinition:
+    """Define how LandXML states the curves of a profile."""
+    return advanced(
+        choice("VERTICAL_CURVES", tr("Curves of the profile in LandXML"), VERTICAL_CURVES, VERTICAL_CURVES[0]),
+        tr(
+            "CIRCLES writes circles, as railways state them; PARABOLAS writes parabolas of the same length. Between "
+            "the same gradients they differ by less than a millimetre."
+        ),
+    )
 
 
 def area() -> Definitions:
