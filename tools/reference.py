@@ -20,7 +20,9 @@ from qgis.core import (  # noqa: E402
     QgsProcessingProvider,
 )
 from rail_extract.core.fields import (  # noqa: E402
+    AXIS_FIELDS,
     CENTERLINE_FIELDS,
+    ELEMENT_FIELDS,
     EXTENT_FIELDS,
     FINDING_FIELDS,
     QUALITY_FIELDS,
@@ -50,6 +52,8 @@ LAYERS = {
     "Kilometres": (*STATION_FIELDS, *EXTENT_FIELDS),
     "Findings": FINDING_FIELDS,
     "Stops": STOP_FIELDS,
+    "Elements": ELEMENT_FIELDS,
+    "Axes": AXIS_FIELDS,
 }
 
 

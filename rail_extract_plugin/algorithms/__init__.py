@@ -3,9 +3,11 @@
 from .build_track_centerlines import BuildTrackCenterlines
 from .check_installation import CheckInstallation
 from .classify_rail_points import ClassifyRailPoints
+from .export_alignment import ExportAlignment
 from .extract_rails import ExtractRails
 from .frpdf_cleanup import FrpdfCleanup
 from .grow_rail_points import GrowRailPoints
+from .import_alignment import ImportAlignment
 from .install_packages import InstallPackages
 from .measure_track_geometry import MeasureTrackGeometry
 from .rasterize_rail_points import RasterizeRailPoints
@@ -23,6 +25,8 @@ ALGORITHMS = (
     BuildTrackCenterlines,
     MeasureTrackGeometry,
     StationAlongAxis,
+    ExportAlignment,
+    ImportAlignment,
     TrainRailClassifier,
     InstallPackages,
     CheckInstallation,

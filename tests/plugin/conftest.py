@@ -219,6 +219,8 @@ OUTPUTS = {
     "buildtrackcenterlines": ("OUTPUT.gpkg",),
     "measuretrackgeometry": ("OUTPUT.gpkg",),
     "stationalongaxis": ("OUTPUT.gpkg",),
+    "exportalignment": ("OUTPUT.xml",),
+    "importalignment": ("ELEMENTS.gpkg", "AXIS.gpkg"),
     "trainrailclassifier": ("WEIGHTS.npz",),
 }
 """Outputs of the algorithms, each a file in the folder of the test."""

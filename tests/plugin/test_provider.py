@@ -21,6 +21,8 @@ def test_toolbox_offers_the_algorithms(qgis, plugin):
             "buildtrackcenterlines",
             "measuretrackgeometry",
             "stationalongaxis",
+            "exportalignment",
+            "importalignment",
             "trainrailclassifier",
             "installpackages",
             "checkinstallation",
