@@ -233,3 +233,12 @@ ELEMENT_FIELDS = (
     Field("dev_rms_round_mm", float, "dev_rms_mm with the round radii, millimetres", 2),
 )
 """The element table: `alignment.table` writes and reads its rows. A shapefile cuts its long names."""
+
+AXIS_FIELDS = (
+    Field("track_id", int, "number of the track"),
+    Field("name", str, "name of the alignment in its file"),
+    Field("length_m", float, "length in plan, metres", 3),
+    Field("km_from", float, "kilometre of the start", 6),
+    Field("km_to", float, "kilometre of the end", 6),
+)
+"""Alignments as lines whose M values are kilometres."""

@@ -20,8 +20,10 @@ from qgis.core import (  # noqa: E402
     QgsProcessingProvider,
 )
 from rail_extract.core.fields import (  # noqa: E402
+    AXIS_FIELDS,
     CENTERLINE_FIELDS,
     DIFFERENCE_FIELDS,
+    ELEMENT_FIELDS,
     EXTENT_FIELDS,
     FINDING_FIELDS,
     QUALITY_FIELDS,
@@ -52,6 +54,8 @@ LAYERS = {
     "Differences": DIFFERENCE_FIELDS,
     "Findings": FINDING_FIELDS,
     "Stops": STOP_FIELDS,
+    "Elements": ELEMENT_FIELDS,
+    "Axes": AXIS_FIELDS,
 }
 
 

@@ -48,7 +48,7 @@ def build_comparison(found: TrackComparison, counts_shift: bool, source: str, fa
         _tiles(found),
         _section("Differences", tag("div", table(HEADINGS, _rows(found)), class_="scroll"), *_distributions(found)),
         *_places(found),
-        *(_section(f"Line {line.line_id}", _profile(line)) for line in found.lines if (line.state == BOTH).sum() > 1),
+        *(_profiles(line, counts_shift) for line in found.lines if (line.state == BOTH).sum() > 1),
         _section(
             "How it was made", tag("dl", *_facts(facts)), *(tag("p", text(note), class_="notes") for note in NOTES)
         ),
@@ -192,12 +192,13 @@ def _largest(values: np.ndarray) -> str:
     return _figure(float(known[np.argmax(np.abs(known))])) if len(known) else ""
 
 
-def _profile(line: LineDifferences) -> str:
-    """Draw the differences along a line, over the band in which nothing has moved."""
+def _profiles(line: LineDifferences, counts_shift: bool) -> str:
+    """Draw the differences along a line, with the limits beyond which it has moved."""
+    centers = (0 * line.shift_mm, 0 * line.shiftz_mm) if counts_shift else (line.shift_mm, line.shiftz_mm)
     along = float(line.chainage_m[0]), float(line.chainage_m[-1])
     columns = (
-        ("Across, positive to the left", line.across_mm, line.shift_mm, line.sigma_mm),
-        ("Height", line.height_mm, line.shiftz_mm, line.sigmaz_mm),
+        ("Across, positive to the left", line.across_mm, centers[0], line.sigma_mm),
+        ("Height", line.height_mm, centers[1], line.sigmaz_mm),
         ("Gauge", line.gauge_mm, None, None),
         ("Cant", line.cant_mm, None, None),
     )
@@ -213,7 +214,9 @@ def _profile(line: LineDifferences) -> str:
     ]
     name = tag("text", text("chainage [m]"), x=WIDTH - RIGHT, y=bottom + 32, class_="tick end")
     box = f"0 0 {WIDTH:g} {bottom + AXIS:g}"
-    return tag("svg", *panels, *marks, name, viewBox=box, role="img", aria_label=f"Differences of line {line.line_id}")
+    label = f"Differences of line {line.line_id}"
+    drawn = tag("svg", *panels, *marks, name, viewBox=box, role="img", aria_label=label)
+    return _section(f"Line {line.line_id}", drawn)
 
 
 def _panel(

@@ -20,6 +20,7 @@ from ..writing.layers import write_differences
 from ..writing.reports import write_comparison
 from ..writing.whole_files import write_each
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
+from .toolbox_groups import ALIGNMENT
 
 if TYPE_CHECKING:
     from ...core.comparison.tracks import TrackComparison
@@ -44,6 +45,7 @@ class CompareTracks(RailAlgorithm):
 
     NAME = "comparetracks"
     LABEL = "Compare tracks"
+    GROUP = ALIGNMENT
     TAGS = (
         *RAIL_WORDS,
         *TRACK_WORDS,

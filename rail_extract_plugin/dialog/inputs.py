@@ -5,9 +5,11 @@ from __future__ import annotations
 from qgis.core import (
     QgsProcessing,
     QgsProcessingParameterBoolean,
+    QgsProcessingParameterCrs,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterFeatureSource,
     QgsProcessingParameterField,
+    QgsProcessingParameterFile,
     QgsProcessingParameterPoint,
     QgsProcessingParameterRasterLayer,
     QgsProcessingParameterString,
@@ -164,6 +166,44 @@ def points_of_rails() -> QgsProcessingParameterDefinition:
     )
 
 
+def elements() -> Definitions:
+    """Define the parameters for an element table."""
+    table = QgsProcessing.SourceType.TypeVector
+    return (
+        helped(
+            QgsProcessingParameterFeatureSource("INPUT", tr("Elements"), [table]),
+            tr("Element table of Fit Alignment or Import Alignment; it may be edited. Its geometries are not used."),
+        ),
+        advanced(
+            QgsProcessingParameterCrs("CRS", tr("CRS of a table without one"), optional=True),
+            tr("Projected coordinate system in metres for a table without geometries; other tables keep their own."),
+        ),
+    )
+
+
+def landxml() -> Definitions:
+    """Define the parameters for a LandXML file."""
+    behaviour = QgsProcessingParameterFile.Behavior.File
+    kinds = tr("LandXML files (*.xml *.landxml);;All files (*)")
+    return (
+        helped(
+            QgsProcessingParameterFile("INPUT", tr("LandXML file"), behaviour, fileFilter=kinds),
+            tr("LandXML 1.0 to 1.2 in metres, with alignments of lines, arcs and clothoids."),
+        ),
+        helped(
+            QgsProcessingParameterCrs("CRS", tr("CRS of a file without one"), optional=True),
+            tr("Projected coordinate system in metres for a file that does not state one; other files keep their own."),
+        ),
+        advanced(
+            QgsProcessingParameterBoolean("EAST_FIRST", tr("Points are written easting first"), defaultValue=False),
+            tr(
+                "For files that, against the format, write the easting of points before their northing. All curves of "
+                "such a file turn to the other side than it states."
+            ),
+        ),
+    )
+
+
 def surveys() -> Definitions:
     """Define the lines that are compared, and the rails of their tracks."""
     line = QgsProcessing.SourceType.TypeVectorLine
@@ -182,7 +222,7 @@ def surveys() -> Definitions:
             rails,
         ),
         helped(
-            QgsProcessingParameterFeatureSource("RAILS", tr("Rails of the lines to compare"), [line], optional=True),
+            QgsProcessingParameterFeatureSource("RAILS", tr("Rails to compare"), [line], optional=True),
             rails,
         ),
     )

@@ -117,6 +117,41 @@ def stops() -> QgsProcessingParameterDefinition:
     )
 
 
+def elements() -> QgsProcessingParameterDefinition:
+    """Define the element table."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return helped(
+        _layer("ELEMENTS", tr("Elements"), line, optional=False),
+        tr("The element table: a line for each element in plan, in height and of cant, with its figures."),
+    )
+
+
+def axes() -> QgsProcessingParameterDefinition:
+    """Define the layer of alignments as lines."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return helped(
+        _layer("AXIS", tr("Axes"), line, optional=True),
+        tr("A line for each alignment, less than a millimetre off the exact curve, with kilometres as M values."),
+    )
+
+
+def alignment_file() -> QgsProcessingParameterDefinition:
+    """Define the file for design software."""
+    kinds = tr("LandXML files (*.xml);;IFC files (*.ifc);;DXF files (*.dxf)")
+    return helped(
+        QgsProcessingParameterFileDestination("OUTPUT", tr("File for design software"), kinds),
+        tr("The name decides the format: .xml is LandXML 1.2, .ifc is IFC 4.3, .dxf is DXF of release 12."),
+    )
+
+
+def alignment_figures() -> Numbers:
+    """Define the figures about alignments."""
+    return (
+        QgsProcessingOutputNumber("ALIGNMENT_COUNT", tr("Number of alignments")),
+        QgsProcessingOutputNumber("ELEMENT_COUNT", tr("Number of elements")),
+    )
+
+
 def cleaned() -> QgsProcessingParameterDefinition:
     """Define the raster that the network returns."""
     return helped(

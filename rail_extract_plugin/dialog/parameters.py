@@ -30,7 +30,7 @@ from ...core.parameters import (
 )
 from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS, UNCONFIRMED_PROFILES
 from ..i18n import tr
-from .definitions import MM_DECIMALS, Definitions, advanced, choice, helped, number
+from .definitions import MM_DECIMALS, Definitions, advanced, choice, choices, helped, number
 
 TORCH_BUILDS = ("NONE", "CPU", "CUDA")
 
@@ -58,6 +58,8 @@ MAX_REACH_M = 2.0
 MAX_EPOCHS, MAX_SEED = 10_000, 2**31 - 1
 """Weeks on any computer, and the largest seed of a random generator."""
 
+
+VERTICAL_CURVES = ("CIRCLES", "PARABOLAS")
 
 STANDARD_WIDGET = {"widget_wrapper": {"class": f"{__package__}.standard_widget.StandardWidgetWrapper"}}
 """Metadata by which QGIS finds the list of standards. Models contain it: the class never changes its place."""
@@ -150,6 +152,17 @@ def head() -> Definitions:
     return standard, gauge, head_width
 
 
+def vertical_curves() -> QgsProcessingParameterDefinition:
+    """Define how LandXML states the curves of a profile."""
+    return advanced(
+        choice("VERTICAL_CURVES", tr("Curves of the profile in LandXML"), VERTICAL_CURVES, VERTICAL_CURVES[0]),
+        tr(
+            "CIRCLES writes circles, as railways state them; PARABOLAS writes parabolas of the same length. Between "
+            "the same gradients they differ by less than a millimetre."
+        ),
+    )
+
+
 def area() -> Definitions:
     """Define the extent and the coordinate system of the cloud."""
     return (
@@ -179,14 +192,7 @@ def crs() -> QgsProcessingParameterDefinition:
 def leave_out() -> QgsProcessingParameterDefinition:
     """Define which points are left out by their flag."""
     return advanced(
-        QgsProcessingParameterEnum(
-            "LEAVE_OUT",
-            tr("Points to leave out"),
-            list(LEAVE_OUT),
-            allowMultiple=True,
-            optional=True,
-            usesStaticStrings=True,
-        ),
+        choices("LEAVE_OUT", tr("Points to leave out"), LEAVE_OUT),
         tr(
             "OVERLAP leaves out points that are marked as overlap of strips, SYNTHETIC those that are marked as "
             "computed, not measured. Withheld points are always left out."
@@ -469,8 +475,8 @@ def comparison() -> Definitions:
         "IGNORE_SHIFT", tr("Leave a constant shift out of account"), defaultValue=defaults.ignore_shift
     )
     errors = (
-        ("REFERENCE_SIGMA", tr("Standard error of the reference [mm]")),
-        ("INPUT_SIGMA", tr("Standard error of the lines to compare [mm]")),
+        ("REFERENCE_SIGMA", tr("Standard error, reference [mm]")),
+        ("INPUT_SIGMA", tr("Standard error, lines [mm]")),
     )
     return (
         *(helped(number(name, label, optional=True, decimals=MM_DECIMALS), sigma) for name, label in errors),

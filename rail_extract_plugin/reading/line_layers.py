@@ -259,7 +259,7 @@ def _read(
     source: QgsProcessingFeatureSource, progress: Progress, name: str
 ) -> tuple[list[tuple[QgsFeature, np.ndarray]], LocalFrame]:
     """Read the features, and the vertices of each of their parts, (n, 3) local metres."""
-    crs_wkt, horizontal_unit_m, vertical_unit_m = _system(source.sourceCrs(), progress)
+    crs_wkt, horizontal_unit_m, vertical_unit_m = system_of(source.sourceCrs(), progress)
     request = QgsFeatureRequest()
     found = [
         (feature, vertices)
@@ -301,7 +301,7 @@ def _is_stray(xy: np.ndarray) -> bool:
     return bool(lengths_m.max() > MAX_SEGMENT_M or spikes_m.max(initial=0.0) > MAX_SPIKE_M)
 
 
-def _system(crs: QgsCoordinateReferenceSystem, progress: Progress) -> tuple[str | None, float, float]:
+def system_of(crs: QgsCoordinateReferenceSystem, progress: Progress) -> tuple[str | None, float, float]:
     """Return the coordinate system as WKT, and its horizontal and vertical units in metres."""
     if not crs.isValid():
         progress.warning("The lines have no coordinate system: their coordinates are taken as metres.")

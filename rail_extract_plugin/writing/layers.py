@@ -28,9 +28,11 @@ from qgis.core import (
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
 from ...core.fields import (
+    AXIS_FIELDS,
     BRIDGED,
     CENTERLINE_FIELDS,
     DIFFERENCE_FIELDS,
+    ELEMENT_FIELDS,
     FINDING_FIELDS,
     KM_FIELDS,
     LENGTH,
@@ -52,6 +54,7 @@ from .whole_files import write_whole
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.alignment.elements import Alignment
     from ...core.comparison.tracks import LineDifferences, TrackComparison
     from ...core.frame import LocalFrame
     from ...core.grow.growth import Stop
@@ -77,6 +80,7 @@ RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELD
 QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
 STOPS = LayerKind(STOP_FIELDS, "stops")
 DIFFERENCES = LayerKind(DIFFERENCE_FIELDS, "differences")
+ELEMENTS, AXES = LayerKind(ELEMENT_FIELDS, "elements"), LayerKind(AXIS_FIELDS, "axes")
 PLACES = "places"
 """What copies of layers of any kind are called in drawings; they have no style."""
 
@@ -100,9 +104,8 @@ def features(lines: Sequence[Line], columns: Sequence[Field], frame: LocalFrame)
     """
     flat = is_flat(lines)
     for line in lines:
-        coordinates = frame.to_crs(line.xyz).T[: 2 if flat else 3].tolist()
         values = [getattr(line, column.name) for column in columns]
-        yield _feature(QgsGeometry(QgsLineString(*coordinates)), values, columns)
+        yield _feature(QgsGeometry(QgsLineString(*_columns(line.xyz, frame, flat))), values, columns)
 
 
 def stations(tracks: Sequence[TrackGeometry], frame: LocalFrame) -> Iterator[QgsFeature]:
@@ -237,6 +240,68 @@ def write_stops(
         for number, stop in enumerate(stops, 1)
     )
     return _write(algorithm, name, STOPS, QgsWkbTypes.Type.PointZ, made, frame, parameters, context)
+
+
+def write_elements(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    alignments: Sequence[Alignment],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the element table of alignments, each element with its curve.
+
+    Parameters
+    ----------
+    alignments : sequence of Alignment
+        In the given frame.
+    algorithm, name, frame, parameters, context
+        See `write_lines`.
+    """
+    from ...core.alignment.table import rows
+
+    flat = not any(alignment.vertical for alignment in alignments)
+    made = (
+        _feature(
+            QgsGeometry(QgsLineString(*_columns(alignment.drawn(one.s_from, one.s_to), frame, flat))),
+            [row[column.name] for column in ELEMENTS.columns],
+            ELEMENTS.columns,
+        )
+        for alignment in alignments
+        for one, row in zip(alignment.elements, rows(alignment))
+    )
+    shape = QgsWkbTypes.Type.LineString if flat else QgsWkbTypes.Type.LineStringZ
+    return _write(algorithm, name, ELEMENTS, shape, made, frame, parameters, context)
+
+
+def write_axes(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    alignments: Sequence[Alignment],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write alignments as lines with kilometres as M values; see `write_elements`."""
+    from ...core.alignment.equations import measured
+
+    flat = not any(alignment.vertical for alignment in alignments)
+    shape = QgsWkbTypes.Type.LineStringM if flat else QgsWkbTypes.Type.LineStringZM
+
+    def axis(alignment: Alignment) -> QgsFeature:
+        xyzm = measured(alignment)
+        columns = _columns(xyzm[:, :3], frame, flat)
+        line = QgsLineString(*columns, *([[]] if flat else []), xyzm[:, 3].tolist())
+        length_m, kilometres = alignment.s_to - alignment.s_from, (xyzm[0, 3], xyzm[-1, 3])
+        return _feature(QgsGeometry(line), (alignment.track_id, alignment.name, length_m, *kilometres), AXES.columns)
+
+    return _write(algorithm, name, AXES, shape, map(axis, alignments), frame, parameters, context)
+
+
+def _columns(xyz: np.ndarray, frame: LocalFrame, flat: bool) -> list[list[float]]:
+    """Return x, y and, unless it is left out, z of vertices, (n, 3) local metres, in coordinates of the layer."""
+    return frame.to_crs(xyz).T[: 2 if flat else 3].tolist()
 
 
 def write_differences(

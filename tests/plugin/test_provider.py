@@ -22,6 +22,8 @@ def test_toolbox_offers_the_algorithms(qgis, plugin):
             "measuretrackgeometry",
             "stationalongaxis",
             "comparetracks",
+            "exportalignment",
+            "importalignment",
             "trainrailclassifier",
             "installpackages",
             "checkinstallation",

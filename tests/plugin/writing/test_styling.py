@@ -25,8 +25,10 @@ from qgis.PyQt.QtCore import QSize
 from qgis.PyQt.QtGui import QColor
 from qgis.PyQt.QtXml import QDomDocument
 from rail_extract.core.fields import (
+    AXIS_FIELDS,
     CENTERLINE_FIELDS,
     DIFFERENCE_FIELDS,
+    ELEMENT_FIELDS,
     FINDING_FIELDS,
     QUALITY_FIELDS,
     RAIL_FIELDS,
@@ -47,6 +49,8 @@ KINDS = {
     "findings": ("LineStringZ", FINDING_FIELDS),
     "stops": ("PointZ", STOP_FIELDS),
     "differences": ("PointZ", DIFFERENCE_FIELDS),
+    "elements": ("LineStringZ", ELEMENT_FIELDS),
+    "axes": ("LineStringZM", AXIS_FIELDS),
 }
 
 
@@ -129,6 +133,12 @@ def test_quality_is_coloured_by_the_deviation_from_the_median_gauge_of_the_track
 def test_findings_are_coloured_by_their_review(styled):
     rows = [(LINE, {"finding": 1, "review": review}) for review in (None, "", "accepted", "rejected")]
     assert colours(styled("findings", rows)) == ["#d62839", "#d62839", "#2e7d4f", "#787878"]
+
+
+def test_elements_are_coloured_by_type_and_drawn_once(styled):
+    types = ("line", "clothoid", "arc", "grade", "parabola", "constant", "ramp")
+    found = colours(styled("elements", [(LINE, {"type": one}) for one in types]))
+    assert found == ["#546e7a", "#f28e2b", "#1565c0", None, None, None, None]
 
 
 @pytest.mark.parametrize("style", KINDS)
@@ -228,6 +238,8 @@ def test_layers_can_be_drawn(styled, style):
         "findings": (LINE, {"finding": 1, "review": "accepted"}),
         "stops": ("POINT Z (500050 3000000 1)", {"stop": 1, "reason": "the cloud ends"}),
         "differences": ("POINT Z (500050 3000000 1)", {"line_id": 1, "state": "both", "moved": 1}),
+        "elements": (LINE, {"type": "arc"}),
+        "axes": (LINE, {"track_id": 1}),
     }
     layer = styled(style, [rows[style]])
     settings = QgsMapSettings()
@@ -242,7 +254,8 @@ def test_layers_can_be_drawn(styled, style):
     image = job.renderedImage()
     seen = {image.pixelColor(x, y).name() for x in range(60, 200) for y in range(100, 200)}
     colours = {"rails": "#1565c0", "centerlines": "#e64a19", "quality": "#f28e2b", "findings": "#84b397"}
-    assert {**colours, "stops": "#e64a19", "differences": "#b2182b"}[style] in seen
+    colours |= {"differences": "#b2182b"}
+    assert {**colours, "stops": "#e64a19", "elements": "#1565c0", "axes": "#8e5bb5"}[style] in seen
 
 
 @pytest.mark.parametrize("style", ["rails", "centerlines", "findings"])
