@@ -24,7 +24,7 @@ NOTES = (
     "Differences are the later survey minus the reference: across, positive to the left of the reference, and in "
     "height, positive above it. They contain the constant shift. Cant is the left rail minus the right one.",
     f"A place has moved if its difference, without the constant shift unless that counts, exceeds {SURE:g} standard "
-    "errors of the difference across or in height. By chance alone, one place in 370 does so in each.",
+    "errors of the difference across or in height. By chance, one place in 370 exceeds them in each.",
 )
 
 
