@@ -22,6 +22,7 @@ from qgis.core import (  # noqa: E402
 from rail_extract.core.fields import (  # noqa: E402
     AXIS_FIELDS,
     CENTERLINE_FIELDS,
+    DEVIATION_FIELDS,
     ELEMENT_FIELDS,
     EXTENT_FIELDS,
     FINDING_FIELDS,
@@ -53,6 +54,7 @@ LAYERS = {
     "Findings": FINDING_FIELDS,
     "Stops": STOP_FIELDS,
     "Elements": ELEMENT_FIELDS,
+    "Deviations": DEVIATION_FIELDS,
     "Axes": AXIS_FIELDS,
 }
 

@@ -24,7 +24,7 @@ FINDINGS = "findings"
 
 NO_PROPERTIES: Mapping[str, str] = {}
 
-BOTTOM_TO_TOP = ("raster", "findings", "rails", "centerlines", "axes", "elements", "quality", "stops")
+BOTTOM_TO_TOP = ("raster", "findings", "rails", "centerlines", "axes", "elements", "deviations", "quality", "stops")
 """Order of the layers in the group, by style."""
 
 
