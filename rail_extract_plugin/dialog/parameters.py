@@ -29,7 +29,7 @@ from ...core.parameters import (
 )
 from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS, UNCONFIRMED_PROFILES
 from ..i18n import tr
-from .definitions import MM_DECIMALS, Definitions, advanced, choice, helped, number
+from .definitions import MM_DECIMALS, Definitions, advanced, choice, choices, helped, number
 
 TORCH_BUILDS = ("NONE", "CPU", "CUDA")
 
@@ -188,14 +188,7 @@ def crs() -> QgsProcessingParameterDefinition:
 def leave_out() -> QgsProcessingParameterDefinition:
     """Define which points are left out by their flag."""
     return advanced(
-        QgsProcessingParameterEnum(
-            "LEAVE_OUT",
-            tr("Points to leave out"),
-            list(LEAVE_OUT),
-            allowMultiple=True,
-            optional=True,
-            usesStaticStrings=True,
-        ),
+        choices("LEAVE_OUT", tr("Points to leave out"), LEAVE_OUT),
         tr(
             "OVERLAP leaves out points that are marked as overlap of strips, SYNTHETIC those that are marked as "
             "computed, not measured. Withheld points are always left out."
