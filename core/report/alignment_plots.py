@@ -24,8 +24,8 @@ STRIP, LABEL = 22.0, 46.0
 """Height of the strip of elements, and the least width of an element with a text, in units of the picture."""
 
 HALF_CHORD_M, HALF_BASE_M = 10, 5
-"""Measured curvature is that of the circle through three points, and the gradient that between two points, so far
-apart: those of the track geometry."""
+"""Distances between the three points whose circle gives the measured curvature, and from a place to the two points
+that give its gradient, metres: those of the track geometry."""
 
 STEP_M = 1.5
 """Places further apart belong to different parts of a track: deviations are given by the metre."""
