@@ -234,6 +234,14 @@ ELEMENT_FIELDS = (
 )
 """The element table: `alignment.table` writes and reads its rows. A shapefile cuts its long names."""
 
+DEVIATION_FIELDS = (
+    Field("track_id", int, "number of the track"),
+    Field("s", float, "distance along the design in plan, metres", 2),
+    Field("slew_mm", float, "measured minus design across, positive to the left, millimetres", 2),
+    Field("lift_mm", float, "measured minus design in height, millimetres", 2),
+    Field("cant_diff_mm", float, "measured minus design cant, millimetres; empty where the cant is unknown", 2),
+)
+
 AXIS_FIELDS = (
     Field("track_id", int, "number of the track"),
     Field("name", str, "name of the alignment in its file"),

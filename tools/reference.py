@@ -22,6 +22,7 @@ from qgis.core import (  # noqa: E402
 from rail_extract.core.fields import (  # noqa: E402
     AXIS_FIELDS,
     CENTERLINE_FIELDS,
+    DEVIATION_FIELDS,
     DIFFERENCE_FIELDS,
     ELEMENT_FIELDS,
     EXTENT_FIELDS,
@@ -55,6 +56,7 @@ LAYERS = {
     "Findings": FINDING_FIELDS,
     "Stops": STOP_FIELDS,
     "Elements": ELEMENT_FIELDS,
+    "Deviations": DEVIATION_FIELDS,
     "Axes": AXIS_FIELDS,
 }
 

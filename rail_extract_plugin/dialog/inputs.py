@@ -181,6 +181,18 @@ def elements() -> Definitions:
     )
 
 
+def tracks_beside_design() -> QgsProcessingParameterDefinition:
+    """Define the measured tracks that are compared with a design."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return helped(
+        QgsProcessingParameterFeatureSource("TRACKS", tr("Measured tracks"), [line], optional=True),
+        tr(
+            "Centerlines that lie along the alignments, for deviations and report; each is compared with the alignment "
+            "beside it, up to 2 m away."
+        ),
+    )
+
+
 def landxml() -> Definitions:
     """Define the parameters for a LandXML file."""
     behaviour = QgsProcessingParameterFile.Behavior.File

@@ -121,8 +121,25 @@ def elements() -> QgsProcessingParameterDefinition:
     """Define the element table."""
     line = QgsProcessing.SourceType.TypeVectorLine
     return helped(
-        _layer("ELEMENTS", tr("Elements"), line, optional=False),
+        _layer("ELEMENTS", tr("Elements"), line, optional=True),
         tr("The element table: a line for each element in plan, in height and of cant, with its figures."),
+    )
+
+
+def deviations() -> QgsProcessingParameterDefinition:
+    """Define the layer of deviations from a design."""
+    point = QgsProcessing.SourceType.TypeVectorPoint
+    return helped(
+        _layer("DEVIATIONS", tr("Deviations"), point, optional=True),
+        tr("Points along the design, one per metre, with slew, lift and difference of cant: measured minus design."),
+    )
+
+
+def alignment_report() -> QgsProcessingParameterDefinition:
+    """Define the report on alignments."""
+    return helped(
+        _page(),
+        tr("A web page with a diagram of each track: curvature, cant, gradient, elements, slews and lifts, to print."),
     )
 
 

@@ -31,6 +31,7 @@ from ...core.fields import (
     AXIS_FIELDS,
     BRIDGED,
     CENTERLINE_FIELDS,
+    DEVIATION_FIELDS,
     DIFFERENCE_FIELDS,
     ELEMENT_FIELDS,
     FINDING_FIELDS,
@@ -54,6 +55,7 @@ from .whole_files import write_whole
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.alignment.deviations import Deviations
     from ...core.alignment.elements import Alignment
     from ...core.comparison.tracks import LineDifferences, TrackComparison
     from ...core.frame import LocalFrame
@@ -81,6 +83,7 @@ QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIEL
 STOPS = LayerKind(STOP_FIELDS, "stops")
 DIFFERENCES = LayerKind(DIFFERENCE_FIELDS, "differences")
 ELEMENTS, AXES = LayerKind(ELEMENT_FIELDS, "elements"), LayerKind(AXIS_FIELDS, "axes")
+DEVIATIONS = LayerKind(DEVIATION_FIELDS, "deviations")
 PLACES = "places"
 """What copies of layers of any kind are called in drawings; they have no style."""
 
@@ -297,6 +300,27 @@ def write_axes(
         return _feature(QgsGeometry(line), (alignment.track_id, alignment.name, length_m, *kilometres), AXES.columns)
 
     return _write(algorithm, name, AXES, shape, map(axis, alignments), frame, parameters, context)
+
+
+def write_deviations(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    found: Sequence[Deviations],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the deviations of tracks from their designs as points on the designs; see `write_elements`."""
+    flat = all(math.isnan(one.xyz[0, 2]) for one in found)
+    made = (
+        _feature(QgsGeometry(QgsPoint(*place[: 2 if flat else 3])), (one.track_id, *row), DEVIATIONS.columns)
+        for one in found
+        for place, *row in zip(
+            frame.to_crs(one.xyz).tolist(), *(getattr(one, column.name) for column in DEVIATIONS.columns[1:])
+        )
+    )
+    shape = QgsWkbTypes.Type.Point if flat else QgsWkbTypes.Type.PointZ
+    return _write(algorithm, name, DEVIATIONS, shape, made, frame, parameters, context)
 
 
 def _columns(xyz: np.ndarray, frame: LocalFrame, flat: bool) -> list[list[float]]:

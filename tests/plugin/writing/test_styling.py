@@ -27,6 +27,7 @@ from qgis.PyQt.QtXml import QDomDocument
 from rail_extract.core.fields import (
     AXIS_FIELDS,
     CENTERLINE_FIELDS,
+    DEVIATION_FIELDS,
     DIFFERENCE_FIELDS,
     ELEMENT_FIELDS,
     FINDING_FIELDS,
@@ -51,6 +52,7 @@ KINDS = {
     "differences": ("PointZ", DIFFERENCE_FIELDS),
     "elements": ("LineStringZ", ELEMENT_FIELDS),
     "axes": ("LineStringZM", AXIS_FIELDS),
+    "deviations": ("PointZ", DEVIATION_FIELDS),
 }
 
 
@@ -240,6 +242,7 @@ def test_layers_can_be_drawn(styled, style):
         "differences": ("POINT Z (500050 3000000 1)", {"line_id": 1, "state": "both", "moved": 1}),
         "elements": (LINE, {"type": "arc"}),
         "axes": (LINE, {"track_id": 1}),
+        "deviations": ("POINT Z (500050 3000000 1)", {"track_id": 1, "slew_mm": 12.0}),
     }
     layer = styled(style, [rows[style]])
     settings = QgsMapSettings()
@@ -254,8 +257,8 @@ def test_layers_can_be_drawn(styled, style):
     image = job.renderedImage()
     seen = {image.pixelColor(x, y).name() for x in range(60, 200) for y in range(100, 200)}
     colours = {"rails": "#1565c0", "centerlines": "#e64a19", "quality": "#f28e2b", "findings": "#84b397"}
-    colours |= {"differences": "#b2182b"}
-    assert {**colours, "stops": "#e64a19", "elements": "#1565c0", "axes": "#8e5bb5"}[style] in seen
+    colours.update(stops="#e64a19", elements="#1565c0", axes="#8e5bb5", deviations="#b2182b", differences="#b2182b")
+    assert colours[style] in seen
 
 
 @pytest.mark.parametrize("style", ["rails", "centerlines", "findings"])
