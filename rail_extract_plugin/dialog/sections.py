@@ -16,6 +16,7 @@ SECTIONS = {
         *("SIMPLIFY_XY", "SIMPLIFY_Z", "MIN_LENGTH", "STRIPS"),
     ),
     tr("Tracks"): ("GAUGE", "HEAD_WIDTH", "OTHER_GAUGES", "CENTERLINE_TOLERANCE", "STEP"),
+    tr("Files of alignments"): ("VERTICAL_CURVES", "EAST_FIRST"),
 }
 """Parameters by section."""
 
