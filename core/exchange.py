@@ -35,7 +35,16 @@ APPLICATION = "RAIL_EXTRACT"
 MAX_TEXT = 255
 """Longest text of extended data."""
 
-DRAWN = {"rails": "RAILS", "centerlines": "TRACK", "quality": "STATIONS", "findings": "FINDINGS", "stops": "STOPS"}
+DRAWN = {
+    "rails": "RAILS",
+    "centerlines": "TRACK",
+    "airborne": "TRACK",
+    "quality": "STATIONS",
+    "stations": "STATIONS",
+    "findings": "FINDINGS",
+    "stops": "STOPS",
+    "guides": "GUIDES",
+}
 """First word of the layers in a drawing, by output."""
 
 COLOURS = {"RAILS": 5, "TRACK": 1, "STATIONS": 3}
@@ -44,7 +53,7 @@ COLOURS = {"RAILS": 5, "TRACK": 1, "STATIONS": 3}
 OTHER_COLOUR = 30
 """Orange, for findings and stops."""
 
-ID_FIELDS = ("rail_id", "track_id", "finding", "class_code")
+ID_FIELDS = ("rail_id", "track_id", "guide_id", "finding", "class_code")
 """Fields that a row of a vertex has."""
 
 

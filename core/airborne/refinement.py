@@ -44,9 +44,12 @@ PARABOLA = 4
 LEAST_SIGMA_M = 0.004
 """Standard error of a section below which the scanner itself is not good enough."""
 
-TURN_M, SLOPE_M = 0.045, 0.017
-"""Standard deviations of the third differences of a track in plan over 10 m, and of the second ones of its height: a
-curve of 300 m radius whose transition is 60 m long has 0.056 m, and most lines less."""
+TURNS_M, SLOPE_M = (0.01, 0.025, 0.06, 0.2), 0.017
+"""Standard deviations of the third differences of a track in plan over 10 m, of which one is chosen, and of the second
+ones of its height: a curve of 300 m radius whose transition is 60 m long has 0.056 m, the toe of a switch 0.3 m."""
+
+LOOSER = 1.1
+"""A curve that turns more must predict better by this factor than one that turns less."""
 
 COURSE_TURN_M, COURSE_M = 0.03, 0.12
 """The same for the first curve, through the courses of 5 m, and the standard error of their places."""
@@ -255,18 +258,33 @@ def _shows(found: Fit, points: np.ndarray) -> np.ndarray:
 
 
 def _curve(line: Axis, t: np.ndarray, sections: Sections) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the curve through the middles, its standard error, and how far the middles lie beside it."""
+    """Return the curve through the middles, its standard error, and how far the middles lie beside it.
+
+    How much a track turns is chosen by generalised cross-validation: a straight allows less than a switch.
+    """
+    tried = [_bent(line, t, sections, turn_m) for turn_m in TURNS_M]
+    return min(enumerate(tried), key=lambda one: LOOSER ** one[0] * one[1][0])[1][1]
+
+
+def _bent(
+    line: Axis, t: np.ndarray, sections: Sections, turn_m: float
+) -> tuple[float, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Return the error of prediction of a curve that turns so much, and the curve as `_curve` does."""
     place, normal = line.at(t)
     shows = sections.shows
     target = place + np.where(shows, sections.offset, 0.0)[:, None] * normal
     weight, robust = np.where(shows, sections.sigma**-2, HOLD_M**-2), np.ones(len(t))
     for _ in range(ROBUST_PASSES):
-        curve = smooth(target, weight * robust, TURN_M, 3)
+        curve = smooth(target, weight * robust, turn_m, 3)
         beside = ((target - curve.values) * normal).sum(axis=1)
-        robust = np.where(shows, 1 / (1 + (beside / sections.sigma / OUTLIER) ** 2) ** 2, 1.0)
+        squares = (beside / sections.sigma / OUTLIER) ** 2
+        robust = np.where(shows, 1 / (1 + squares) ** 2, 1.0)
+    loss = (OUTLIER**2 * squares / (1 + squares))[shows].sum()
+    free = max(shows.sum() - (curve.variance * weight * robust)[shows].sum(), 1.0)
     good = shows & (robust > 0.2)
     spread = np.sqrt(np.mean((beside / sections.sigma)[good] ** 2)) if good.sum() > 5 else 1.0
-    return curve.values, np.sqrt(curve.variance) * np.clip(spread, 0.5, 3.0), beside
+    sigma = np.sqrt(curve.variance) * np.clip(spread, 0.5, 3.0)
+    return float(loss / free**2), (curve.values, sigma, beside)
 
 
 def strips_apart(refined: Refined, length_m: float = 50.0) -> float:

@@ -76,27 +76,10 @@ def run(args: argparse.Namespace) -> None:
     with (
         writing(planned.file.parent),
         scratch_folder(planned.file.parent) as folder,
-        _runner(args.workers, folder) as runner,
+        runner_of(args.workers, folder) as runner,
     ):
         result = classify_files(request, settings, choice, planned, folder, runner, progress)
     print_figures(result.figures, result.point_count)
-
-
-@contextmanager
-def _runner(workers: int, folder: Path) -> Iterator[Runner]:
-    """Execute tasks in this process, or in several of their own."""
-    if workers == 1:
-        yield InTurn()
-        return
-    try:
-        from ..cluster.runner import DaskRunner
-        from ..cluster.workers import connect
-    except ImportError as error:
-        raise ParameterError(
-            "--workers needs the package distributed: in a clone, run pip install .[cluster]."
-        ) from error
-    with connect(None, workers) as client:
-        yield DaskRunner(client, folder / "tasks")
 
 
 def _guide(args: argparse.Namespace, request: Request) -> Guide | None:

@@ -17,11 +17,33 @@ SPACING_M = 1.507
 
 @dataclass(frozen=True)
 class Design:
-    """A railway: its world, its tracks, and the line along which it is flown."""
+    """A railway.
+
+    Attributes
+    ----------
+    world : World
+    tracks : tuple of Track
+    where : (n, 2) array
+        Line along which it is flown.
+    width_m : float
+        Distance from this line up to which it is flown.
+    parked : tuple of (int, float, float)
+        Trains: the track that each hides, and chainages of its ends.
+    """
 
     world: World
     tracks: tuple[Track, ...]
     where: np.ndarray
+    width_m: float = 12.0
+    parked: tuple[tuple[int, float, float], ...] = ()
+
+    def is_hidden(self, number: int, along_m: np.ndarray) -> np.ndarray:
+        """Return which chainages of a track lie under a train, or within half a section of its ends, (n,) bool."""
+        hidden = np.zeros(len(along_m), dtype=bool)
+        for track, start_m, end_m in self.parked:
+            if track == number:
+                hidden |= (along_m > start_m - 5.0) & (along_m < end_m + 5.0)
+        return hidden
 
     def truth(self, number: int) -> np.ndarray:
         """Return the true centerline of a track, (n, 3), top of rails, every `STEP_M`."""
@@ -63,8 +85,13 @@ def curved_line(
     beside = (np.arange(tracks) - (tracks - 1) / 2) * spacing_m
     laid = tuple(Track(curve, SPACING_M, height, cant, left_m=float(left)) for left in beside)
     world = World(laid, ballast_m=rng.uniform(0.0, 0.04), six_foot_m=rng.uniform(0.25, 0.45), seed=seed)
-    _furnish(world, length_m, rng)
-    return Design(world, laid, curve.xy[::4])
+    parked = _furnish(world, length_m, rng)
+    return Design(world, laid, curve.xy[::4], parked=parked)
+
+
+def canted_curve(seed: int) -> Design:
+    """Return a double track in a curve with 150 mm of cant."""
+    return curved_line(seed, cant_m=0.15, radius_m=np.random.RandomState(seed).choice([300.0, 400.0, 550.0]))
 
 
 def yard(seed: int) -> Design:
@@ -92,7 +119,7 @@ def yard(seed: int) -> Design:
         z = height[int(toe_m / STEP_M) :]
         laid.append(Track(branch, SPACING_M, np.interp(branch.chainage, start.chainage, z), 0.0))
     world = World(tuple(laid), ballast_m=rng.uniform(0.0, 0.04), six_foot_m=0.25, seed=seed)
-    return Design(world, tuple(laid), main.xy[::4])
+    return Design(world, tuple(laid), main.xy[::4], width_m=24.0)
 
 
 def _heights(curve: Curve, rng: np.random.RandomState) -> np.ndarray:
@@ -101,8 +128,8 @@ def _heights(curve: Curve, rng: np.random.RandomState) -> np.ndarray:
     return 100.0 + grade * curve.chainage + 0.4 * np.sin(curve.chainage / 180.0 + phase)
 
 
-def _furnish(world: World, length_m: float, rng: np.random.RandomState) -> None:
-    """Lay troughs, a platform, and a parked train."""
+def _furnish(world: World, length_m: float, rng: np.random.RandomState) -> tuple[tuple[int, float, float], ...]:
+    """Lay troughs, a platform, and a parked train; return which track the train hides, and where."""
     axes = [Axis.of_track(track) for track in world.tracks]
     lid = box(0.17, rng.uniform(-0.16, -0.02))
     if len(axes) > 1 and rng.random_sample() < 0.6:
@@ -114,6 +141,8 @@ def _furnish(world: World, length_m: float, rng: np.random.RandomState) -> None:
     if rng.random_sample() < 0.5:
         start = rng.uniform(0.1, 0.4) * length_m
         world.bands.append(Band(axes[-1].beside(0.0), box(1.5, 3.7), start, start + 90.0))
+        return ((len(axes) - 1, start, start + 90.0),)
+    return ()
 
 
 def box(half_m: float, up_m: float) -> np.ndarray:

@@ -27,6 +27,8 @@ from qgis.core import (
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
 from ...core.fields import (
+    AIRBORNE_FIELDS,
+    AIRBORNE_STATION_FIELDS,
     BRIDGED,
     CENTERLINE_FIELDS,
     FINDING_FIELDS,
@@ -48,6 +50,7 @@ from .whole_files import write_whole
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.airborne.survey import AirborneLine, AirborneTrack
     from ...core.frame import LocalFrame
     from ...core.grow.growth import Stop
     from ...core.rails import Centerline, RailLine, TrackGeometry
@@ -55,7 +58,7 @@ if TYPE_CHECKING:
     from ...core.raster_file import RasterHeader
     from ...core.report import Finding
 
-    Line = Union[RailLine, Centerline, Finding]
+    Line = Union[RailLine, Centerline, Finding, AirborneLine]
 
 KINDS = {int: INTEGER, float: REAL, str: TEXT}
 
@@ -71,6 +74,7 @@ class LayerKind:
 RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELDS, "centerlines")
 QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
 STOPS = LayerKind(STOP_FIELDS, "stops")
+AIRBORNE, STATIONS = LayerKind(AIRBORNE_FIELDS, "airborne"), LayerKind(AIRBORNE_STATION_FIELDS, "stations")
 
 
 def fields(columns: Sequence[Field]) -> QgsFields:
@@ -106,7 +110,7 @@ def stations(tracks: Sequence[TrackGeometry], frame: LocalFrame) -> Iterator[Qgs
             yield _feature(QgsGeometry(QgsPoint(x, y) if math.isnan(z) else QgsPoint(x, y, z)), row, QUALITY.columns)
 
 
-def is_flat(lines: Sequence[Line | TrackGeometry]) -> bool:
+def is_flat(lines: Sequence[Line | TrackGeometry | AirborneTrack]) -> bool:
     """Return whether there are lines, and none has heights."""
     return bool(lines) and all(any(map(math.isnan, line.xyz[:, 2])) for line in lines)
 
@@ -182,6 +186,35 @@ def write_stations(
     shape = QgsWkbTypes.Type.Point if is_flat(tracks) else QgsWkbTypes.Type.PointZ
     made = stations(tracks, frame)
     return _write(algorithm, name, QUALITY, shape, made, frame, parameters, context)
+
+
+def write_airborne_stations(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    tracks: Sequence[AirborneTrack],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the stations along guides as points.
+
+    Parameters
+    ----------
+    tracks : sequence of AirborneTrack
+    algorithm, name, frame, parameters, context
+        See `write_lines`.
+    """
+    shape = QgsWkbTypes.Type.Point if is_flat(tracks) else QgsWkbTypes.Type.PointZ
+    return _write(algorithm, name, STATIONS, shape, _airborne_stations(tracks, frame), frame, parameters, context)
+
+
+def _airborne_stations(tracks: Sequence[AirborneTrack], frame: LocalFrame) -> Iterator[QgsFeature]:
+    for track in tracks:
+        profiles = (getattr(track, column.name) for column in STATIONS.columns[2:])
+        ids = [number or None for number in track.track_id.tolist()]
+        for (x, y, z), *row in zip(frame.to_crs(track.xyz).tolist(), ids, repeat(track.guide_id), *profiles):
+            place = QgsPoint(x, y) if math.isnan(z) else QgsPoint(x, y, z)
+            yield _feature(QgsGeometry(place), row, STATIONS.columns)
 
 
 def write_stops(

@@ -24,7 +24,7 @@ FINDINGS = "findings"
 
 NO_PROPERTIES: Mapping[str, str] = {}
 
-BOTTOM_TO_TOP = ("raster", "findings", "rails", "centerlines", "quality", "stops")
+BOTTOM_TO_TOP = ("raster", "findings", "rails", "centerlines", "airborne", "quality", "stations", "stops")
 """Order of the layers in the group, by style."""
 
 
