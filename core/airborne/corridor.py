@@ -70,8 +70,8 @@ class Corridor:
 
     def kept(self, which: np.ndarray) -> Corridor:
         """Return some of the points, by a mask or by their numbers."""
-        columns = (one[which] for one in (self.t, self.across, self.height, self.strip))
-        return Corridor(*columns, self.start_m, self.level)
+        t, across, height, strip = (one[which] for one in (self.t, self.across, self.height, self.strip))
+        return Corridor(t, across, height, strip, self.start_m, self.level)
 
 
 def gather(points: Points, axis: Axis, reach_m: float) -> Corridor | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -136,7 +136,10 @@ def _check_inside(request: Request, guides: Sequence[Guide], axes: Sequence[Axis
         return
     unit_m = request.zero.horizontal_unit_m
     inside = [
-        ((axis.xy[:, None] > extents[:, :2] * unit_m - reach_m) & (axis.xy[:, None] < extents[:, 2:] * unit_m + reach_m))
+        (
+            (axis.xy[:, None] > extents[:, :2] * unit_m - reach_m)
+            & (axis.xy[:, None] < extents[:, 2:] * unit_m + reach_m)
+        )
         .all(axis=-1)
         .any()
         for axis in axes
@@ -195,7 +198,8 @@ def spool_file(
     folder : Path
     context : Context
     """
-    header, counts = request.headers[number], {}
+    header = request.headers[number]
+    counts: dict[Key, int] = {}
     chunks = read_classes(header.path, request.class_codes, context.progress, areas, request.leave_out)
     for xyz, _, marks, _ in chunks:
         kept = request.holds(xyz)

@@ -153,34 +153,61 @@ def refine(points: Points, axis: Axis, across: np.ndarray, shape: Shape) -> Refi
     place, normal = axis.at(middles)
     first = smooth(place + across[:, None] * normal, np.full(len(place), COURSE_M**-2), COURSE_TURN_M, 3)
     line = _axis_through(first.values, middles, axis)
-    measured, spacing_m, shows = replace(shape, rough_m=SECTION_ROUGH_M), shape.spacing_m, None
+    found: _Round | None = None
     for reach_m in REACHES_M:
-        corridor = gather(points, line, HALF_M + MARGIN_M)
-        if corridor is None:
+        found = _round(points, line, shape, found.sections.shows if found else None, reach_m)
+        if found is None:
             return None
-        measured, spacing_m = measure(corridor, shape, shows)
-        sections = fit_sections(corridor, measured, reach_m)
-        shows = sections.shows
-        if not shows.any():
-            return None
-        t = corridor.start_m + (np.arange(len(shows)) + 0.5) * STATION_M
-        xy, sigma, beside = _curve(line, t, sections)
-        line, seen_on = _axis_through(xy, t, axis), line
-    level = sections.found.level[:, None] + corridor.level_at(t)[:, None]
-    noise = np.maximum(measured.noise_m / np.sqrt(np.maximum(sections.points, 1)), LEAST_SIGMA_M)
-    heights = smooth(level, np.where(shows, noise**-2, 0.0), SLOPE_M, 2)
+        line, seen_on = _axis_through(found.xy, found.t, axis), line
+    return None if found is None else _with_heights(found, seen_on)
+
+
+@dataclass(frozen=True)
+class _Round:
+    """A line after one round; see `Refined`."""
+
+    t: np.ndarray
+    xy: np.ndarray
+    sigma: np.ndarray
+    beside: np.ndarray
+    sections: Sections
+    shape: Shape
+    spacing_m: float
+    corridor: Corridor
+
+
+def _round(points: Points, line: Axis, shape: Shape, shows: np.ndarray | None, reach_m: float) -> _Round | None:
+    """Measure the ridges along a line, fit its sections, and draw the curve through them."""
+    corridor = gather(points, line, HALF_M + MARGIN_M)
+    if corridor is None:
+        return None
+    measured, spacing_m = measure(corridor, shape, shows)
+    sections = fit_sections(corridor, measured, reach_m)
+    if not sections.shows.any():
+        return None
+    t = corridor.start_m + (np.arange(len(sections.shows)) + 0.5) * STATION_M
+    xy, sigma, beside = _curve(line, t, sections)
+    return _Round(t, xy, sigma, beside, sections, measured, spacing_m, corridor)
+
+
+def _with_heights(last: _Round, axis: Axis) -> Refined:
+    """Smooth the heights of the bed as well."""
+    sections, noise_m = last.sections, last.shape.noise_m
+    level = sections.found.level[:, None] + last.corridor.level_at(last.t)[:, None]
+    noise = np.maximum(noise_m / np.sqrt(np.maximum(sections.points, 1)), LEAST_SIGMA_M)
+    heights = smooth(level, np.where(sections.shows, noise**-2, 0.0), SLOPE_M, 2)
     return Refined(
-        seen_on,
-        t,
-        xy,
-        sigma,
+        axis,
+        last.t,
+        last.xy,
+        last.sigma,
         heights.values[:, 0],
         np.sqrt(heights.variance),
         sections,
-        beside,
-        measured,
-        spacing_m,
-        corridor,
+        last.beside,
+        last.shape,
+        last.spacing_m,
+        last.corridor,
     )
 
 
@@ -218,9 +245,7 @@ def measure(corridor: Corridor, shape: Shape, shows: np.ndarray | None) -> tuple
     spacing_m = spacings[int(np.argmax([fit(count, mean, u, one).both[0] for one in spacings]))].spacing_m
     residual = height - mean[0][np.clip(np.floor((across + HALF_M) / PROFILE_BIN_M).astype(np.int64), 0, bins - 1)]
     noise_m = 1.4826 * float(np.median(np.abs(residual - np.median(residual)))) if len(residual) else shape.noise_m
-    found = Shape(
-        shape.spacing_m, tried[best].width_m, height_m, max(noise_m, 0.01), SECTION_ROUGH_M, SECTION_SPREAD
-    )
+    found = Shape(shape.spacing_m, tried[best].width_m, height_m, max(noise_m, 0.01), SECTION_ROUGH_M, SECTION_SPREAD)
     return found, spacing_m
 
 
@@ -241,7 +266,9 @@ def fit_sections(corridor: Corridor, shape: Shape, reach_m: float, length_m: flo
     offset = place[middle] + np.clip(leant / sharp, -PARABOLA * BIN_M, PARABOLA * BIN_M)
     at = np.clip(np.rint(offset / BIN_M).astype(np.int64) + aside, 0, places - 1)
     points = windows(count, width)[rows, at].sum(axis=1)
-    here = Fit(*(getattr(found, name)[rows, at] for name in ("gain", "both", "flaw", "most", "height", "level", "tilt")))
+    here = Fit(
+        *(getattr(found, name)[rows, at] for name in ("gain", "both", "flaw", "most", "height", "level", "tilt"))
+    )
     shows = _shows(here, points) & (np.abs(offset) < reach_m - EDGE_M)
     return Sections(offset, np.maximum(1 / np.sqrt(sharp), LEAST_SIGMA_M), here, points, shows)
 
@@ -269,7 +296,7 @@ def _curve(line: Axis, t: np.ndarray, sections: Sections) -> tuple[np.ndarray, n
 def _bent(
     line: Axis, t: np.ndarray, sections: Sections, turn_m: float
 ) -> tuple[float, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Return the error of prediction of a curve that turns so much, and the curve as `_curve` does."""
+    """Return how badly a curve with this spread of third differences predicts, and the curve as `_curve` does."""
     place, normal = line.at(t)
     shows = sections.shows
     target = place + np.where(shows, sections.offset, 0.0)[:, None] * normal

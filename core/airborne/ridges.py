@@ -217,7 +217,8 @@ class _Normal:
         none = 0.5 * stiff * height_m**2
         both = 0.5 * (self.data[BOTH] + stiff * height_m) ** 2 / (self.product[BOTH, BOTH] + stiff) - none
         single = np.maximum(
-            self._pair((LEFT, RIGHT_EDGE), stiff, height_m) - none, self._pair((RIGHT, LEFT_EDGE), stiff, height_m) - none
+            self._pair((LEFT, RIGHT_EDGE), stiff, height_m) - none,
+            self._pair((RIGHT, LEFT_EDGE), stiff, height_m) - none,
         )
         bank = np.maximum(self._pair((LEFT_EDGE, RIGHT_EDGE), BEND**-2, 0.0), self._bend(BOWED_FREELY))
         bank = np.maximum(bank, self._bend(BENT))

@@ -263,7 +263,8 @@ def lines_of(
     tracks: Sequence[AirborneTrack], gauge_mm: float
 ) -> tuple[tuple[AirborneTrack, ...], tuple[AirborneLine, ...]]:
     """Draw the lines of tracks where they are seen, and number the stations by them."""
-    numbered, lines = [], []
+    numbered: list[AirborneTrack] = []
+    lines: list[AirborneLine] = []
     for track in tracks:
         ids = np.zeros(len(track.s_m), dtype=np.int64)
         for part in _runs(track):

@@ -49,7 +49,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--guide", type=Path, required=True, metavar="FILE", help=text)
     output = parser.add_argument_group("outputs", "Existing files are replaced. GeoPackages may be the same file.")
     output.add_argument("--centerlines", type=Path, required=True, help="GeoPackage (or .dxf, .csv) for the lines")
-    output.add_argument("--stations", type=Path, help="GeoPackage for a point every 10 m, with what is not seen and why")
+    output.add_argument(
+        "--stations", type=Path, help="GeoPackage for a point every 10 m, with what is not seen and why"
+    )
     output.add_argument("--findings", type=Path, help="GeoPackage for the places to look at")
     output.add_argument("--report", type=Path, help="HTML file for the report")
     add_cloud_arguments(parser)

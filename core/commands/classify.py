@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from ..classify.guide import Guide
@@ -19,7 +17,6 @@ from ..parameters import DEFAULT_GUIDE_DISTANCE_M
 from ..progress import Estimating
 from ..scratch import scratch_folder
 from ..standards import SEARCHED_CLASSES, resolve
-from ..tasks import InTurn, Runner
 from .copies import add_label_arguments, add_tiles_arguments, check_rail_class, planned_output, print_figures
 from .options import (
     Console,
@@ -28,6 +25,7 @@ from .options import (
     extent_of,
     gauges_of,
     limited,
+    runner_of,
     shapes_module,
 )
 

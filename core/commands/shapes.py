@@ -125,7 +125,7 @@ def _parts(path: Path, crs_wkt: str | None) -> list[shapely.Geometry]:
         raise ParameterError(f"{path} is a pipe, not a file: give a GeoPackage or GeoJSON file.")
     with _explained(path):
         meta, _, shapes, _ = pyogrio.raw.read(path, columns=[], force_2d=True)
-        parts = shapely.get_parts(shapely.from_wkb(shapes)) if shapes is not None else []
+        parts = shapely.get_parts(shapely.from_wkb(shapes)) if shapes is not None else np.empty(0, object)
         return _transformed(parts, meta["crs"], crs_wkt)
 
 

@@ -66,8 +66,8 @@ def airborne_summary(survey: Survey) -> list[str]:
     """Return the verdict and what it rests on, in sentences for a log."""
     return [
         _verdict(survey)[1],
-        f"{metres(survey.seen_m)} of {metres(survey.guides_m)} along {len(survey.tracks)} guides are seen, in {len(survey.lines)} "
-        "lines.",
+        f"{metres(survey.seen_m)} of {metres(survey.guides_m)} along {len(survey.tracks)} guides are seen, "
+        f"in {len(survey.lines)} lines.",
     ]
 
 
@@ -99,10 +99,19 @@ def airborne_page(survey: Survey, source: str, facts: Mapping[str, str]) -> str:
     body = [
         tag("h1", text("Track centerlines from airborne lidar")),
         tag("p", text(source), class_="source"),
-        tag("div", tag("strong", text(words)), tag("ul", *(tag("li", text(one)) for one in notes)), class_=f"verdict {kind}"),
+        tag(
+            "div",
+            tag("strong", text(words)),
+            tag("ul", *(tag("li", text(one)) for one in notes)),
+            class_=f"verdict {kind}",
+        ),
         tag("section", tag("h2", text("Tracks")), tag("div", _tracks(survey), class_="scroll")),
         tag("section", tag("h2", text("Where to look")), tag("div", _places(survey), class_="scroll tall")),
-        tag("section", tag("h2", text("How it was made")), _facts({**facts, "Density": f"{survey.density:.1f} points per square metre"})),
+        tag(
+            "section",
+            tag("h2", text("How it was made")),
+            _facts({**facts, "Density": f"{survey.density:.1f} points per square metre"}),
+        ),
     ]
     head = ('<meta charset="utf-8">', tag("title", text(f"Rail Extract: {source}")), f"<style>{STYLE}</style>")
     return f"<!DOCTYPE html>\n{tag('html', tag('head', *head), tag('body', tag('main', *body)), lang='en')}\n"
@@ -130,10 +139,7 @@ def _row(track: AirborneTrack) -> tuple[object, ...]:
 
 def _places(survey: Survey) -> str:
     found = airborne_findings(survey)
-    rows = (
-        (one.finding, one.track_id or "", f"{one.from_m:,.0f} to {one.to_m:,.0f} m", one.reason)
-        for one in found
-    )
+    rows = ((one.finding, one.track_id or "", f"{one.from_m:,.0f} to {one.to_m:,.0f} m", one.reason) for one in found)
     return table(("Finding", "Line", "Along the guide", "Why"), rows).replace("<table>", '<table class="words">')
 
 

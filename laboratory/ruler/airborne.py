@@ -64,8 +64,12 @@ class Stationwise:
             return float(seen.mean()) if len(seen) else np.nan, 0.0, np.nan, np.nan, 0.0
         rms = np.sqrt(np.mean(self.across_m[right] ** 2))
         share = right.sum() / seen.sum()
-        return float(seen.mean()), float(share), 1000 * float(rms), 1000 * float(self.height_m[right].std()), float(
-            self.within[seen].mean()
+        return (
+            float(seen.mean()),
+            float(share),
+            1000 * float(rms),
+            1000 * float(self.height_m[right].std()),
+            float(self.within[seen].mean()),
         )
 
 

@@ -66,7 +66,10 @@ def airborne_stations() -> QgsProcessingParameterDefinition:
     point = QgsProcessing.SourceType.TypeVectorPoint
     return helped(
         _layer("STATIONS", tr("Stations"), point, optional=True),
-        tr("A point every 10 m along each guide: bed, cant, radius, gradient, standard errors; or why nothing is seen."),
+        tr(
+            "A point every 10 m along each guide: whether the track is seen, or why not; bed, cant, radius, gradient "
+            "and standard errors."
+        ),
     )
 
 

@@ -53,7 +53,7 @@ MAX_LENGTH_M = 100_000.0
 
 
 MAX_REACH_M, MAX_FOOTPRINT_M, MAX_RAIL_M = 6.0, 2.0, 0.5
-"""Beyond, a guide means another track, a footprint covers both rails, and a rail is no rail."""
+"""Beyond, a guide means another track, a footprint covers both rails, and a rail is not a rail."""
 
 MAX_EPOCHS, MAX_SEED = 10_000, 2**31 - 1
 """Weeks on any computer, and the largest seed of a random generator."""
@@ -105,7 +105,7 @@ def airborne() -> Definitions:
         ),
         helped(
             number("RAIL_HEIGHT", tr("Rails above the bed [m]"), AirborneParameters.rail_height_m, 0.0, MAX_RAIL_M),
-            tr("Top of the rails above the bed between them, which is what the cloud shows. It depends on the ballast."),
+            tr("Top of the rails above the bed between them, which the points show. It depends on the ballast."),
         ),
     )
 

@@ -130,7 +130,7 @@ def read_guide(
 def read_tracks_meant(
     source: QgsProcessingFeatureSource, crs: QgsCoordinateReferenceSystem, context: QgsProcessingContext
 ) -> tuple[Guide, ...]:
-    """Read the lines of a guide in the coordinate system of the cloud, with name, reference and gauge if it states them.
+    """Read the lines of a guide in the coordinate system of the cloud, with the name, reference and gauge of each.
 
     Parameters
     ----------

@@ -276,7 +276,7 @@ def write_raster(
     return {name: path}
 
 
-def figures_of(lines: Sequence[RailLine | Centerline], what: str) -> dict[str, Any]:
+def figures_of(lines: Sequence[RailLine | Centerline] | Sequence[AirborneLine], what: str) -> dict[str, Any]:
     """Return the number and length of lines as outputs: RAIL_COUNT and RAIL_LENGTH if `what` is RAIL."""
     return {f"{what}_COUNT": len(lines), f"{what}_LENGTH": LENGTH.value(sum(line.length_m for line in lines))}
 
