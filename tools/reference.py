@@ -20,6 +20,8 @@ from qgis.core import (  # noqa: E402
     QgsProcessingProvider,
 )
 from rail_extract.core.fields import (  # noqa: E402
+    AIRBORNE_FIELDS,
+    AIRBORNE_STATION_FIELDS,
     CENTERLINE_FIELDS,
     FINDING_FIELDS,
     QUALITY_FIELDS,
@@ -47,6 +49,8 @@ LAYERS = {
     "Track geometry": QUALITY_FIELDS,
     "Findings": FINDING_FIELDS,
     "Stops": STOP_FIELDS,
+    "Centerlines from airborne lidar": AIRBORNE_FIELDS,
+    "Stations from airborne lidar": AIRBORNE_STATION_FIELDS,
 }
 
 

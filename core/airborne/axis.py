@@ -16,6 +16,9 @@ STEP_M = 1.0
 MIN_VERTEX_M = 8.0
 """Distance below which vertices of a guide are left out: their errors would bend the curve between them."""
 
+LONG_RUN = 2.0
+"""A run this many times as long as the one next to it is straight up to it."""
+
 SMOOTHED_M = 4.0
 """Standard deviation of the smoothing of a guide, which rounds its kinks; a curve of 300 m radius moves by 3 cm."""
 
@@ -107,7 +110,7 @@ def axis_of_guide(vertices: np.ndarray) -> Axis:
 
     The curve removes the error of chords, which is 0.67 m where the vertices of a curve of 300 m radius are 40 m apart.
     """
-    kept = _apart(vertices)
+    kept = _without_bulges(_apart(vertices))
     along = length_along(kept)
     fine = np.arange(0.0, along[-1], STEP_M / 4)
     curve = Akima1DInterpolator(along, kept)(fine) if len(kept) > 2 else interpolate(kept, along, fine)
@@ -125,6 +128,22 @@ def _apart(vertices: np.ndarray) -> np.ndarray:
     if len(kept) > 1 and np.hypot(*(vertices[-1] - vertices[kept[-1]])) < MIN_VERTEX_M:
         kept.pop()
     return vertices[[*kept, len(vertices) - 1]]
+
+
+def _without_bulges(vertices: np.ndarray) -> np.ndarray:
+    """Add a vertex to a straight run where it meets a much shorter one: the curve beyond would bend it."""
+    steps = np.hypot(*np.diff(vertices, axis=0).T)
+    added = [vertices[:1]]
+    for number in range(len(steps)):
+        start, end, length_m = vertices[number], vertices[number + 1], steps[number]
+        before_m = steps[number - 1] if number else np.inf
+        after_m = steps[number + 1] if number + 1 < len(steps) else np.inf
+        if length_m > LONG_RUN * before_m:
+            added.append((start + before_m / length_m * (end - start))[None])
+        if length_m > LONG_RUN * after_m:
+            added.append((end - after_m / length_m * (end - start))[None])
+        added.append(end[None])
+    return np.concatenate(added)
 
 
 def _smoothed(xy: np.ndarray) -> np.ndarray:

@@ -79,8 +79,9 @@ def survey_files(
     ParameterError
         No guide lies in the cloud, or one is too short.
     """
+    _check_degrees(request, guides)
     axes = [_axis(guide, request) for guide in guides]
-    _check_inside(request, guides, axes, parameters.reach_m)
+    _check_inside(request, axes, parameters.reach_m)
     squares = pieces_by_square(axes)
     reading, fitting = progress.divide((1.0, 2.0))
     progress.status("Reading the points along the guides")
@@ -117,6 +118,15 @@ def survey_files(
     return Survey(numbered, lines, frame, density, tuple(warnings))
 
 
+def _check_degrees(request: Request, guides: Sequence[Guide]) -> None:
+    """Refuse guides that are in degrees without saying so: a cloud has no such small coordinates."""
+    largest = np.nanmax(np.abs([header.extent for header in request.headers]))
+    if largest > 360 and all((np.abs(guide.xy[:, :2]) <= [180, 90]).all() for guide in guides):
+        raise ParameterError(
+            "The guides are in degrees, but state another coordinate system or none: assign WGS 84 (EPSG:4326)."
+        )
+
+
 def _axis(guide: Guide, request: Request) -> Axis:
     """Return the axis of a guide in metres."""
     xy = request.zero.to_local(np.column_stack([guide.xy[:, :2], np.zeros(len(guide.xy))]))[:, :2]
@@ -129,7 +139,7 @@ def _axis(guide: Guide, request: Request) -> Axis:
     return axis_of_guide(xy)
 
 
-def _check_inside(request: Request, guides: Sequence[Guide], axes: Sequence[Axis], reach_m: float) -> None:
+def _check_inside(request: Request, axes: Sequence[Axis], reach_m: float) -> None:
     """Refuse guides of which none lies in the cloud; headers may state an extent that is not a number."""
     extents = np.array([header.extent for header in request.headers], dtype=float)
     if not np.isfinite(extents).all():
@@ -146,8 +156,6 @@ def _check_inside(request: Request, guides: Sequence[Guide], axes: Sequence[Axis
     ]
     if any(inside):
         return
-    if all((np.abs(guide.xy[:, :2]) <= [180, 90]).all() for guide in guides):
-        raise ParameterError("The guides are in degrees, but state no coordinate system: assign WGS 84 (EPSG:4326).")
     raise ParameterError(
         "No guide lies in the cloud: check the coordinate system of the guides, and that the cloud covers the line."
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,6 +45,9 @@ factor."""
 
 FOOTPRINT_SHARE = 0.04
 """Standard error across by the ballast beside the rails, as a share of the footprint."""
+
+STRIP_SHARE = 0.5
+"""Share of half the distance between strips by which the fit, which lies between them, may be off their middle."""
 
 BED_SIGMA_M = 0.03
 """Standard deviation of the rails' height above the bed, which depends on the fill of the ballast."""
@@ -201,7 +204,7 @@ def _judged(axes: Sequence[Axis], lines: dict[int, _Line], footprint_m: float) -
         distance, apart = _others(number, axes, places)
         toe = np.where(distance < TOE_M, TOE_FACTOR, 1.0)
         blur = FOOTPRINT_SHARE * footprint_m
-        sigma = toe * np.sqrt(refined.sigma**2 + blur**2 + strips_apart(refined) ** 2)
+        sigma = toe * np.sqrt(refined.sigma**2 + blur**2 + (STRIP_SHARE * strips_apart(refined)) ** 2)
         reason = _reasons(line)
         reason[(reason == SEEN) & (distance < TWIN_M) & (apart > GUIDES_APART_M)] = TWIN
         stations = Stations(
@@ -234,7 +237,7 @@ def _reasons(line: _Line) -> np.ndarray:
     """Return why the stations of a line are not seen, by what shows along it."""
     refined, found = line.refined, line.refined.sections.found
     count = len(refined.t)
-    gain, flaw, most = (median_filter(one, LONG, mode="nearest") for one in (found.gain, found.flaw, found.most))
+    gain, flaw, most = (_long(found.gain, np.max), _long(found.flaw, np.min), _long(found.most, np.max))
     enough = found.both > np.minimum(OWN_GAIN, OWN_SHARE * found.most)
     enough &= (gain > LONG_GAIN * most) & (np.abs(refined.sections.offset) < REACH_M)
     flat = flaw < FLAT
@@ -253,6 +256,16 @@ def _reasons(line: _Line) -> np.ndarray:
     ):
         reason[holds] = code
     return reason
+
+
+VERTEX_M = 0.1
+"""Distance between the vertices of a line from which distances are measured."""
+
+
+def _long(values: np.ndarray, best: Callable[..., np.ndarray]) -> np.ndarray:
+    """Return the best median over `LONG` sections of which each is one: beside a train, those on its other side."""
+    shifts = (-(LONG // 2), 0, LONG // 2)
+    return best([median_filter(values, LONG, mode="nearest", origin=shift) for shift in shifts], axis=0)
 
 
 REACH_M = 0.24
@@ -275,8 +288,8 @@ def _others(number: int, axes: Sequence[Axis], places: dict[int, np.ndarray]) ->
 
 
 def _dense(xy: np.ndarray) -> np.ndarray:
-    """Return a line with vertices every metre."""
-    steps = int(STATION_M)
+    """Return a line with vertices every `VERTEX_M`, so that the nearest one is hardly farther than the line."""
+    steps = int(round(STATION_M / VERTEX_M))
     at = np.arange(0, (len(xy) - 1) * steps + 1) / steps
     return np.column_stack([np.interp(at, np.arange(len(xy)), column) for column in xy.T])
 

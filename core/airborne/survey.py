@@ -304,7 +304,7 @@ def _drawn(track: AirborneTrack, part: slice) -> np.ndarray:
     s_m = track.s_m[part]
     count = int(np.ceil((s_m[-1] - s_m[0] + STATION_M) / VERTEX_M))
     at = np.linspace(s_m[0] - STATION_M / 2, s_m[-1] + STATION_M / 2, count + 1)
-    return CubicSpline(s_m, track.xyz[part], bc_type="natural")(at)
+    return CubicSpline(s_m, track.xyz[part])(at)
 
 
 def _rms(values: np.ndarray) -> float:

@@ -13,7 +13,7 @@ from ...core.clouds.las import laspy
 from ..scenes.write import MADE, SCALE_M
 from .flight import AirborneCloud
 
-CRS, ORIGIN = "EPSG:25832", np.array([500_000.0, 5_500_000.0, 0.0])
+CRS, ORIGIN = "EPSG:25832", np.array([500_400.0, 5_500_400.0, 0.0])
 """Coordinate system of the files, and where the zero of a design lies in it."""
 
 GROUND = 2

@@ -26,7 +26,8 @@ from qgis.utils import iface, plugins
 SAMPLE, ARCHIVE = os.environ["RAIL_EXTRACT_SAMPLE"], os.environ["RAIL_EXTRACT_ZIP"]
 
 NAMES = (
-    *("extractrails", "classifyrailpoints", "growrailpoints", "rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
+    *("extractrails", "classifyrailpoints", "growrailpoints", "airbornecenterlines"),
+    *("rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
     *("buildtrackcenterlines", "measuretrackgeometry", "trainrailclassifier", "installpackages", "checkinstallation"),
 )
 

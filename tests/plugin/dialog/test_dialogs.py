@@ -16,6 +16,7 @@ NAMES = (
         "extractrails",
         "classifyrailpoints",
         "growrailpoints",
+        "airbornecenterlines",
         "rasterizerailpoints",
         "frpdfcleanup",
         "vectorizerails",
