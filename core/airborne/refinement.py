@@ -48,7 +48,7 @@ TURNS_M, SLOPE_M = (0.01, 0.025, 0.06, 0.2), 0.017
 """Standard deviations of the third differences of a track in plan over 10 m, of which one is chosen, and of the second
 ones of its height: a curve of 300 m radius whose transition is 60 m long has 0.056 m, the toe of a switch 0.3 m."""
 
-LOOSER = 1.1
+LOOSER = 1.5
 """A curve that turns more must predict better by this factor than one that turns less."""
 
 COURSE_TURN_M, COURSE_M = 0.03, 0.12

@@ -81,8 +81,8 @@ class AirborneCenterlines(RailAlgorithm):
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read and check the parameters, in the main thread."""
         values = ParameterValues(self, parameters, context)
-        standard, cloud = values.standard(), values.cloud("INPUT")
-        codes = class_numbers(values.text("CLASSES"), "CLASSES") if values.filled("CLASSES") else SEARCHED_CLASSES
+        standard, cloud, classes = values.standard(), values.cloud("INPUT"), values.text("CLASSES").strip()
+        codes = class_numbers(classes, "CLASSES") if classes else SEARCHED_CLASSES
         command = masked(self.asPythonCommand(parameters, context))
         return Job(cloud, codes, standard, values.airborne(standard), values.tracks_meant(cloud), command)
 

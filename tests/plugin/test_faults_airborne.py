@@ -61,10 +61,15 @@ FAULTS = [
         "mobile lidar as airborne cloud",
         guided(ALONG, density=800),
         REFUSED,
-        "The cloud has 800 points per square metre along the guides, as mobile lidar has: use Extract Rails, which "
+        "The cloud has 799 points per square metre along the guides, as mobile lidar has: use Extract Rails, which "
         "finds the single railheads and is more accurate there.",
     ),
-    Fault("text as classes of an airborne cloud", guided(ALONG, CLASSES="ground"), REFUSED, "CLASSES"),
+    Fault(
+        "text as classes of an airborne cloud",
+        guided(ALONG, CLASSES="ground"),
+        REFUSED,
+        'CLASSES "ground" must be whole numbers from 0 to 255 such as 10 or 10,11.',
+    ),
 ]
 
 
