@@ -131,6 +131,43 @@ QUALITY_FIELDS = (
 )
 """In a `TrackGeometry`, the first is a single value and the others have a value for each station."""
 
+STATION_FIELDS = (
+    Field("axis", str, "name of the axis; empty, as are the following fields, beyond the ends of all axes"),
+    Field("piece", int, "number of the section of the axis between two jumps of the kilometres, from 1"),
+    Field("km", float, "kilometre along the axis", 6),
+    Field("km_text", str, "the kilometre as railways write it"),
+    Field("offset_m", float, "distance from the axis, metres; positive to the left as kilometres increase", 3),
+    Field("side", str, "left, right or on: side of the axis"),
+    Field("ambiguous", int, "1 where another place of an axis is nearly as close, so that the kilometre may be wrong"),
+)
+"""In `Kilometres`; with an axis, points of the track geometry have them as well."""
+
+KM_FIELDS = tuple(field for field in STATION_FIELDS if field.name in ("km", "km_text"))
+"""With an axis, findings have those of their worst place."""
+
+EXTENT_FIELDS = (
+    Field("km_from", float, "smallest kilometre of its vertices", 6),
+    Field("km_to", float, "largest kilometre of its vertices", 6),
+)
+"""Further fields of lines and polygons, whose `km` is that of a place in their middle."""
+
+DIFFERENCE_FIELDS = (
+    Field("line_id", int, "rail_id or track_id of the line of the reference; where it is extra, of the other survey"),
+    Field("input_id", int, "the same of the other survey's line; empty where it is missing"),
+    Field("chainage_m", float, "plan distance from the start of the line of line_id, metres", 2),
+    Field("state", str, "both, missing in the other survey, or extra in it"),
+    Field("across_mm", float, "difference across, millimetres; positive to the left of the reference", 1),
+    Field("height_mm", float, "difference in height, millimetres; positive above the reference", 1),
+    Field("gauge_mm", float, "difference of the gauge, millimetres", 1),
+    Field("cant_mm", float, "difference of the cant, left minus right along the reference, millimetres", 1),
+    Field("sigma_mm", float, "standard error of the difference across, millimetres", 2),
+    Field("sigmaz_mm", float, "standard error of the difference in height, millimetres", 2),
+    Field("shift_mm", float, "part of across_mm that is the constant shift, millimetres", 1),
+    Field("shiftz_mm", float, "part of height_mm that is the constant shift, millimetres", 1),
+    Field("moved", int, "1 where the line has moved by more than three standard errors, across or in height; else 0"),
+)
+"""All differences are those of the other survey from the reference."""
+
 FINDING_FIELDS = (
     Field(
         "finding",
@@ -190,3 +227,58 @@ GUIDE_FIELDS = (
     Field("score", float, "how clearly it looks like a track: 1 is the least that is proposed", 2),
     LENGTH,
 )
+ELEMENT_FIELDS = (
+    Field("track_id", int, "number of the track"),
+    Field("no", int, "number of the element within its track and layout, from 1"),
+    Field("layout", str, "H in plan, V in height, C for cant"),
+    Field("type", str, "in plan line, arc or clothoid; in height grade or parabola; for cant constant or ramp"),
+    Field("km_from", float, "kilometre of the start; empty without an axis", 6),
+    Field("km_to", float, "kilometre of the end; empty without an axis", 6),
+    Field("s_from", float, "start: distance along the design in plan, from the first vertex of the line, metres", 4),
+    Field("s_to", float, "end, metres", 4),
+    Field("length_m", float, "length of the element in plan, metres", 4),
+    Field(
+        "r1_m",
+        float,
+        "radius at the start, metres; in plan positive to the left, in height positive in a sag; empty where straight",
+        4,
+    ),
+    Field("r2_m", float, "radius at the end, metres", 4),
+    Field("a_param", float, "parameter A of a clothoid, metres", 4),
+    Field("rot", str, "L for a curve to the left, R to the right"),
+    Field("x", float, "start, in the units of the coordinate system", 5),
+    Field("y", float, "start, in the units of the coordinate system", 5),
+    Field("z", float, "height of the start, in the units of the coordinate system", 5),
+    Field("azimuth_gon", float, "direction at the start, gon clockwise from grid north", 6),
+    Field("heading", float, "the same in radians, counterclockwise from the x axis", 9),
+    Field("grade1_pm", float, "gradient at the start, per mille; positive uphill", 5),
+    Field("grade2_pm", float, "gradient at the end, per mille", 5),
+    Field("cant1_mm", float, "cant at the start, left rail minus right rail, millimetres", 3),
+    Field("cant2_mm", float, "cant at the end, millimetres", 3),
+    Field("dev_rms_mm", float, "deviation of the measured track from the element, root mean square, millimetres", 2),
+    Field("dev_max_mm", float, "largest deviation, with its sign, millimetres", 2),
+    Field("sigma_r_m", float, "standard error of the radius of an arc or a parabola, metres", 4),
+    Field("sigma_len_m", float, "standard error of the length, metres", 4),
+    Field("sigma_s_m", float, "standard error of s_from, metres", 4),
+    Field("joint", str, "how the element begins: G2 if curvature, gradient or cant continue, G1 if they jump"),
+    Field("r_round_m", float, "proposed round radius, metres; empty if none fits the measured track", 3),
+    Field("dev_rms_round_mm", float, "dev_rms_mm with the round radii, millimetres", 2),
+)
+"""The element table: `alignment.table` writes and reads its rows. A shapefile cuts its long names."""
+
+DEVIATION_FIELDS = (
+    Field("track_id", int, "number of the track"),
+    Field("s", float, "distance along the design in plan, metres", 2),
+    Field("slew_mm", float, "measured minus design across, positive to the left, millimetres", 2),
+    Field("lift_mm", float, "measured minus design in height, millimetres", 2),
+    Field("cant_diff_mm", float, "measured minus design cant, millimetres; empty where the cant is unknown", 2),
+)
+
+AXIS_FIELDS = (
+    Field("track_id", int, "number of the track"),
+    Field("name", str, "name of the alignment in its file"),
+    Field("length_m", float, "length in plan, metres", 3),
+    Field("km_from", float, "kilometre of the start", 6),
+    Field("km_to", float, "kilometre of the end", 6),
+)
+"""Alignments as lines whose M values are kilometres."""

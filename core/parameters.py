@@ -179,3 +179,23 @@ class AirborneParameters:
     def spacing_of(self, gauge_m: float | None = None) -> float:
         """Return the distance between the middles of the railheads, on this gauge or that of the run."""
         return (gauge_m or self.gauge_m) + self.head_width_m
+
+
+@dataclass(frozen=True)
+class ComparisonParameters:
+    """How the lines of two surveys are compared.
+
+    Attributes
+    ----------
+    reach_m : float
+        Largest distance at which two lines are the same: more than a track moves between two surveys, and less than
+        that of the rails of the narrowest gauge.
+    step_m : float
+        Distance between stations.
+    ignore_shift : bool
+        Whether a constant shift does not count as a movement.
+    """
+
+    reach_m: float = 0.5
+    step_m: float = 1.0
+    ignore_shift: bool = True

@@ -6,15 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ...core.polyline import length_along
-
-STEP_M = 0.05
-"""Length of the pieces that are compared; a chord of this length deviates from an arc of 25 m by 0.01 mm."""
-
-CANDIDATES = 4
-"""Number of nearest pieces to search: near a place there may be two pieces of a line and a second line."""
+from ...core.comparison.pieces import cut, nearest
 
 
 @dataclass(frozen=True)
@@ -112,7 +105,7 @@ class Match:
         """Compare lines and truth that are at most this distance apart in plan."""
         there, back = self.there.within(tolerance_m), self.back.within(tolerance_m)
         return Comparison(
-            completeness=there.length_m / self.there.length_m,
+            completeness=there.length_m / self.there.length_m if self.truth_count else np.nan,
             correctness=back.length_m / self.back.length_m if len(self.line) else 0.0,
             lateral_rmse_m=_worse(_rms(there.lateral), _rms(back.lateral)),
             lateral_p95_m=_worse(_p95(there.lateral), _p95(back.lateral)),
@@ -122,49 +115,17 @@ class Match:
             height_bias_m=_worse(_mean(there.height), _mean(back.height)),
             line_count=self.line_count,
             truth_count=self.truth_count,
-            length_ratio=self.back.length_m / self.there.length_m,
+            length_ratio=self.back.length_m / self.there.length_m if self.truth_count else np.nan,
         )
+
+    def wrong_m(self, tolerance_m: float = 0.05) -> float:
+        """Return the length of the lines that is not within the tolerance of a true line, metres."""
+        return self.back.length_m - self.back.within(tolerance_m).length_m
 
     def share_within(self, sigma_m: np.ndarray, tolerance_m: float = 0.05) -> float:
         """Return the share of lateral errors along the lines that are at most the standard error there, (n,) metres."""
         near = self.back.distance <= tolerance_m
         return float(_mean(np.abs(self.back.lateral[near]) <= sigma_m[near]))
-
-
-@dataclass(frozen=True)
-class Pieces:
-    """Short straight pieces of polylines.
-
-    Attributes
-    ----------
-    start, end : (n, 3) array
-        Metres.
-    number : (n,) int array
-        Number of the line of each piece.
-    t : (n,) array
-        Plan distance of the middle of each piece from the start of its line.
-    """
-
-    start: np.ndarray
-    end: np.ndarray
-    number: np.ndarray
-    t: np.ndarray
-
-    @property
-    def middle(self) -> np.ndarray:
-        """Points midway between the ends, (n, 3)."""
-        return 0.5 * (self.start + self.end)
-
-    @property
-    def left(self) -> np.ndarray:
-        """Unit vectors to the left in plan, (n, 2)."""
-        along = (self.end - self.start)[:, :2]
-        return np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
-
-    @property
-    def lengths(self) -> np.ndarray:
-        """Lengths in space, (n,)."""
-        return np.linalg.norm(self.end - self.start, axis=1)
 
 
 def compare_lines(
@@ -192,9 +153,13 @@ def match(extracted: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> Match
     Parameters
     ----------
     extracted, truth : sequence of (n, 3) array
-        Polylines in metres.
+        Polylines in metres. Without truth, all lines are infinitely far from it.
     """
     lines, true = cut(extracted), cut(truth)
+    if not len(true.start):
+        nothing = np.full(len(lines.start), np.inf)
+        back = Offsets(nothing, nothing, nothing, lines.lengths)
+        return Match(back.within(0.0), back, lines.number, lines.t, len(extracted), 0)
     if not len(lines.start):
         nothing = np.full(len(true.start), np.inf)
         there = Offsets(nothing, nothing, nothing, true.lengths)
@@ -204,48 +169,6 @@ def match(extracted: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> Match
     feet, piece = nearest(lines.middle, true)
     back = Offsets.between(feet, lines.middle, true.left[piece], lines.lengths)
     return Match(there, back, lines.number, lines.t, len(extracted), len(truth))
-
-
-def cut(lines: Sequence[np.ndarray]) -> Pieces:
-    """Cut polylines into pieces of equal length, at most `STEP_M`."""
-    starts, ends, middles, counts = [np.empty((0, 3))], [np.empty((0, 3))], [np.empty(0)], []
-    for line in lines:
-        chainage = length_along(np.asarray(line)[:, :2])
-        count = int(np.ceil(chainage[-1] / STEP_M))
-        at = np.linspace(0, chainage[-1], count + 1)
-        places = np.column_stack([np.interp(at, chainage, column) for column in np.asarray(line, dtype=float).T])
-        starts.append(places[:-1])
-        ends.append(places[1:])
-        middles.append(0.5 * (at[:-1] + at[1:]))
-        counts.append(count)
-    numbers = np.repeat(np.arange(len(lines)), counts)
-    return Pieces(np.concatenate(starts), np.concatenate(ends), numbers, np.concatenate(middles))
-
-
-def nearest(places: np.ndarray, pieces: Pieces) -> tuple[np.ndarray, np.ndarray]:
-    """Find the nearest point on any piece, in plan.
-
-    Parameters
-    ----------
-    places : (n, 3) array
-    pieces : Pieces
-
-    Returns
-    -------
-    feet : (n, 3) array
-        Points on the pieces.
-    numbers : (n,) int array
-        Piece of each point.
-    """
-    count = min(CANDIDATES, len(pieces.start))
-    _, candidates = cKDTree(pieces.middle[:, :2]).query(places[:, :2], k=np.arange(1, count + 1))
-    start, step = pieces.start[candidates], (pieces.end - pieces.start)[candidates]
-    ahead = np.sum((places[:, None, :2] - start[..., :2]) * step[..., :2], axis=2)
-    share = np.clip(ahead / np.sum(step[..., :2] ** 2, axis=2), 0, 1)
-    feet = start + share[..., None] * step
-    distance = np.linalg.norm(feet[..., :2] - places[:, None, :2], axis=2)
-    rows, best = np.arange(len(places)), np.argmin(distance, axis=1)
-    return feet[rows, best], candidates[rows, best]
 
 
 def _worse(a: float, b: float) -> float:

@@ -16,6 +16,7 @@ from qgis.core import (
     QgsProcessingParameterFeatureSink,
 )
 from qgis.PyQt.QtGui import QIcon
+from qgis.PyQt.QtWidgets import QWidget
 
 from ...core.disk import Destination
 from ...core.progress import Progress
@@ -27,10 +28,12 @@ from ..dialog.wording import for_user
 from ..feedback import QgisProgress
 from ..i18n import tr
 from ..paths import ICONS, PICTURES
+from ..runs.running import running
 from ..setup.dependencies import explain_missing, missing_packages
 from ..writing.destinations import PAGE, appends, check_layer_name, check_page_name, destinations
 from ..writing.styling import NO_PROPERTIES
 from .sentences import COMMAND_LINE, sentence_for
+from .toolbox_groups import RAILS, SETUP, Group
 
 # Search terms, also in the languages of the larger railways: the toolbox search compares whole words.
 RAIL_WORDS = (
@@ -49,6 +52,8 @@ RAIL_WORDS = (
 CLOUD_WORDS = ("lidar", "las", "laz", "copc", "point cloud", "laser scanning", "Punktwolke", "nuage de points")
 TRACK_WORDS = ("gauge", "cant", "superelevation", "alignment", "Spurweite", "Gleisachse", "Überhöhung", "écartement")
 
+ALIGNMENT_WORDS = ("alignment", "elements", "straight", "clothoid", "arc", "Trasse", "Trassierung", "tracé")
+
 
 class RailAlgorithm(QgsProcessingAlgorithm):
     """An algorithm of Rail Extract in the toolbox.
@@ -59,8 +64,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     NAME = ""
     LABEL = ""
-    GROUP = "Rails and tracks"
-    GROUP_ID = "railsandtracks"
+    GROUP: Group = RAILS
     TAGS: tuple[str, ...] = ()
     SUMMARY = ""
     HELP = ""
@@ -143,7 +147,8 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         """Compute in any thread; every error becomes one sentence."""
         progress = QgisProgress(feedback, self.parameterDefinitions())
         try:
-            results = self.compute(self._job, parameters, context, progress)
+            with running(feedback):
+                results = self.compute(self._job, parameters, context, progress)
         except BaseException as error:
             reason = sentence_for(error, self.parameterDefinitions())
         else:
@@ -190,11 +195,15 @@ class RailAlgorithm(QgsProcessingAlgorithm):
             return False, sentence_for(error, self.parameterDefinitions())
 
     def _usable_labels(self) -> list[str]:
-        """Labels of the provider's algorithms in this group whose packages are all installed."""
+        """Labels of the provider's algorithms, except those for the setup, whose packages are all installed."""
         mates = self.provider().algorithms() if self.provider() else ()
-        return [
-            mate.displayName() for mate in mates if mate.GROUP_ID == self.GROUP_ID and not missing_packages(mate.NEEDS)
-        ]
+        return [mate.displayName() for mate in mates if mate.GROUP is not SETUP and not missing_packages(mate.NEEDS)]
+
+    def createCustomParametersWidget(self, parent: QWidget | None = None) -> QWidget:
+        """Return the dialog for one run, which QGIS would build itself otherwise."""
+        from ..runs.run_dialog import RunDialog
+
+        return RunDialog(self, parent)
 
     def createInstance(self) -> RailAlgorithm:
         """Create an instance for a run."""
@@ -210,11 +219,11 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     def group(self) -> str:
         """Return the label of the group."""
-        return tr(self.GROUP)
+        return tr(self.GROUP.label)
 
     def groupId(self) -> str:
         """Return the identifier of the group."""
-        return self.GROUP_ID
+        return self.GROUP.id
 
     def tags(self) -> list[str]:
         """Return the search terms."""

@@ -39,6 +39,10 @@ if TYPE_CHECKING:
     from ...core.airborne.survey import Guide
     from ...core.clouds.mask import Mask
     from ...core.raster_file import RasterHeader
+    from ..reading.axes import PlacedAxes
+
+INCREASING, DECREASING = DIRECTIONS = ("INCREASING", "DECREASING")
+"""Whether kilometres increase from the first vertex of an axis."""
 
 NUMBERS = {
     "SMOOTHING_XY": "smoothing_xy_m",
@@ -177,7 +181,7 @@ class ParameterValues:
         return read_guide(self._line_source("GUIDE"), system(checked_crs(cloud)), self._context)
 
     def tracks_meant(self, cloud: CloudSource) -> tuple[Guide, ...]:
-        """Read the lines of GUIDE with what the layer states of them; none if it is empty.
+        """Read the lines of GUIDE with what the layer states of them.
 
         Raises
         ------
@@ -186,14 +190,53 @@ class ParameterValues:
         """
         from ..reading.line_layers import read_tracks_meant
 
-        if not self.filled("GUIDE"):
-            return ()
         return read_tracks_meant(self._line_source("GUIDE"), system(checked_crs(cloud)), self._context)
 
     def airborne(self, standard: RailStandard) -> AirborneParameters:
         """Read how tracks are looked for in an airborne cloud."""
         lengths = {field: self.number(name) for name, field in AIRBORNE.items()}
         return AirborneParameters(standard.gauge_m, standard.head_width_m, **lengths)
+
+    def has_axis(self) -> bool:
+        """Return whether AXIS is filled in.
+
+        Raises
+        ------
+        ParameterError
+            It is not, but what states its kilometres is.
+        """
+        lone = next((name for name in ("START_KM", "POSTS", "JUMPS") if self.filled(name)), None)
+        if lone and not self.filled("AXIS"):
+            raise ParameterError(f"{lone} needs the line that it applies to: choose AXIS.")
+        return self.filled("AXIS")
+
+    def axes(self, crs: QgsCoordinateReferenceSystem) -> PlacedAxes:
+        """Read AXIS and what states its kilometres, in a coordinate system.
+
+        Raises
+        ------
+        RailExtractError
+            They can't be transformed, state no kilometres or contradict each other.
+        """
+        from ...core.alignment.stations import Start
+        from ..reading.axes import AxisSources, read_axes
+
+        start_km = self.optional_number("START_KM")
+        start = None if start_km is None else Start(start_km, self.choice("DIRECTION") == DECREASING)
+        posts, jumps = (self.table(name) if self.filled(name) else None for name in ("POSTS", "JUMPS"))
+        sources = AxisSources(self._line_source("AXIS"), start, posts, self.text("POST_FIELD"), jumps)
+        return read_axes(sources, crs, self.choice("FORMAT"), self._context)
+
+    def axis_crs(self) -> QgsCoordinateReferenceSystem:
+        """Return the coordinate system of AXIS."""
+        return self._line_source("AXIS").sourceCrs()
+
+    def table(self, name: str) -> QgsProcessingFeatureSource:
+        """Return a layer or a table."""
+        source = self._algorithm.parameterAsSource(self._parameters, name, self._context)
+        if source is None:
+            raise RailExtractError(f"{name} is not a readable layer: choose another one.")
+        return source
 
     def seeds(self, cloud: CloudSource) -> tuple[np.ndarray, ...]:
         """Read SEEDS and SEED, in the coordinate system of the cloud.
@@ -263,6 +306,19 @@ class ParameterValues:
     def cloud(self, name: str) -> CloudSource:
         """Return the files of a cloud; the parameter CRS, if any, applies to files that state no coordinate system."""
         source = cloud_source(self._parameters.get(name), self._context)
+        crs = self.projected_crs()
+        source = replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
+        prepare_system(checked_crs(source))
+        return replace(source, mask=self._mask(source), leave_out=self._left_out())
+
+    def projected_crs(self) -> QgsCoordinateReferenceSystem:
+        """Return the coordinate system CRS, an invalid one if it is empty.
+
+        Raises
+        ------
+        ParameterError
+            It is not a coordinate system, or it is in degrees.
+        """
         crs = self._algorithm.parameterAsCrs(self._parameters, "CRS", self._context)
         if self.filled("CRS") and not crs.isValid():
             raise ParameterError(f"CRS {self._parameters['CRS']} is not a coordinate system: choose one from the list.")
@@ -270,9 +326,7 @@ class ParameterValues:
             raise ParameterError(
                 f"CRS {crs.authid()} is in degrees, where lengths can't be measured: choose a projected one."
             )
-        source = replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
-        prepare_system(checked_crs(source))
-        return replace(source, mask=self._mask(source), leave_out=self._left_out())
+        return crs
 
     def extent(self, crs: QgsCoordinateReferenceSystem) -> tuple[float, float, float, float] | None:
         """Read EXTENT in `crs`: west, south, east and north limits.

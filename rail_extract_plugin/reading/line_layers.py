@@ -28,6 +28,7 @@ from qgis.core import (
 from ...core.airborne.survey import Guide, gauge_of
 from ...core.clouds.crs import MAX_COORDINATE, parse_crs, units, warn_of_scale
 from ...core.clouds.mask import Mask
+from ...core.comparison.tracks import SurveyedLine
 from ...core.errors import CrsError, RailExtractError
 from ...core.fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
 from ...core.frame import ORIGIN_STEP, LocalFrame
@@ -101,6 +102,25 @@ def read_centerlines(
     return tuple(_centerline(feature, xyz) for feature, xyz in found), frame
 
 
+def read_surveyed(
+    source: QgsProcessingFeatureSource, progress: Progress, name: str
+) -> tuple[tuple[SurveyedLine, ...], LocalFrame]:
+    """Read all parts of all lines with their standard errors, as `read_rails` does.
+
+    A line's number is its `rail_id`, else its `track_id`, else the id of its feature. With a `track_id` only, it is a
+    centerline.
+
+    Parameters
+    ----------
+    source, progress, name
+        See `read_rails`.
+    """
+    found, frame = _read(source, progress, name)
+    names = source.fields().names()
+    id_field = next((one for one in ("rail_id", "track_id") if one in names), "")
+    return tuple(_surveyed(feature, xyz, id_field) for feature, xyz in found), frame
+
+
 def read_guide(
     source: QgsProcessingFeatureSource, crs: QgsCoordinateReferenceSystem, context: QgsProcessingContext
 ) -> tuple[np.ndarray, ...]:
@@ -143,8 +163,8 @@ def read_tracks_meant(
         Guide(
             feature.id(),
             vertices[:, :2],
-            gauge_of(_value(feature, "gauge")),
-            *(str(_value(feature, name) or "") for name in ("name", "ref")),
+            gauge_of(value_of(feature, "gauge")),
+            *(str(value_of(feature, name) or "") for name in ("name", "ref")),
         )
         for feature, shape in zip(features, shapes)
         for vertices in _parts(shape, CHORD_TOLERANCE_M)
@@ -204,7 +224,7 @@ def read_place(
         It can't be transformed.
     """
     shape = QgsGeometry.fromPointXY(place)
-    if not _transform(shape, QgsCoordinateTransform(own, crs, context.transformContext())):
+    if not transform(shape, QgsCoordinateTransform(own, crs, context.transformContext())):
         raise CrsError("SEED can't be transformed to the coordinate system of the cloud: pick it on the cloud.")
     return np.array([[shape.asPoint().x(), shape.asPoint().y()]])
 
@@ -246,7 +266,7 @@ def _transformed(
     """Return the geometries of a layer in another coordinate system."""
     change = QgsCoordinateTransform(source.sourceCrs(), crs, context.transformContext())
     shapes = [feature.geometry() for feature in source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS)]
-    if not all(_transform(shape, change) for shape in shapes):
+    if not all(transform(shape, change) for shape in shapes):
         raise CrsError(
             f"{name} can't be transformed to the coordinate system of the cloud ({crs.authid() or crs.description()}): "
             "check that both are assigned as the data were made."
@@ -254,7 +274,7 @@ def _transformed(
     return shapes
 
 
-def _transform(shape: QgsGeometry, change: QgsCoordinateTransform) -> bool:
+def transform(shape: QgsGeometry, change: QgsCoordinateTransform) -> bool:
     """Transform a geometry; False if it lies outside of the area of one of the systems."""
     try:
         shape.transform(change)
@@ -267,7 +287,7 @@ def _read(
     source: QgsProcessingFeatureSource, progress: Progress, name: str
 ) -> tuple[list[tuple[QgsFeature, np.ndarray]], LocalFrame]:
     """Read the features, and the vertices of each of their parts, (n, 3) local metres."""
-    crs_wkt, horizontal_unit_m, vertical_unit_m = _system(source.sourceCrs(), progress)
+    crs_wkt, horizontal_unit_m, vertical_unit_m = system_of(source.sourceCrs(), progress)
     request = QgsFeatureRequest()
     found = [
         (feature, vertices)
@@ -309,7 +329,7 @@ def _is_stray(xy: np.ndarray) -> bool:
     return bool(lengths_m.max() > MAX_SEGMENT_M or spikes_m.max(initial=0.0) > MAX_SPIKE_M)
 
 
-def _system(crs: QgsCoordinateReferenceSystem, progress: Progress) -> tuple[str | None, float, float]:
+def system_of(crs: QgsCoordinateReferenceSystem, progress: Progress) -> tuple[str | None, float, float]:
     """Return the coordinate system as WKT, and its horizontal and vertical units in metres."""
     if not crs.isValid():
         progress.warning("The lines have no coordinate system: their coordinates are taken as metres.")
@@ -360,6 +380,12 @@ def _rail(feature: QgsFeature, xyz: np.ndarray, default_class: int) -> RailLine:
     return RailLine(xyz, **{**values, "gaps": _gaps(feature, xyz)})
 
 
+def _surveyed(feature: QgsFeature, xyz: np.ndarray, id_field: str) -> SurveyedLine:
+    number = _whole(feature, id_field, feature.id())
+    sigma_mm, sigmaz_mm = (_number(feature, name, math.nan) for name in ("sigma_mm", "sigmaz_mm"))
+    return SurveyedLine(number, xyz, sigma_mm / 1000, sigmaz_mm / 1000, id_field != "track_id")
+
+
 def _centerline(feature: QgsFeature, xyz: np.ndarray) -> Centerline:
     defaults = {"track_id": feature.id()}
     return Centerline(xyz, **_attributes(feature, Centerline, CENTERLINE_FIELDS, defaults))
@@ -396,7 +422,7 @@ def _attributes(
 def _number(feature: QgsFeature, name: str, default: float) -> float:
     """Return the number in a field, or `default` if the field is missing or holds no finite number."""
     try:
-        value = float(_value(feature, name))
+        value = float(value_of(feature, name))
     except (TypeError, ValueError):
         return default
     return value if math.isfinite(value) else default
@@ -410,7 +436,7 @@ def _whole(feature: QgsFeature, name: str, default: int) -> int:
 
 def _ids(feature: QgsFeature, name: str) -> tuple[int, ...]:
     """Return the ids in a field such as "3,5"; none if the field is missing or holds something else."""
-    words = str(_value(feature, name) or "").split(",")
+    words = str(value_of(feature, name) or "").split(",")
     if not all(ID.fullmatch(word) for word in words):
         return ()
     ids = tuple(int(word) for word in words)
@@ -419,7 +445,7 @@ def _ids(feature: QgsFeature, name: str) -> tuple[int, ...]:
 
 def _gaps(feature: QgsFeature, xyz: np.ndarray) -> np.ndarray:
     """Return the sections in the field `gaps`, (k, 2) metres; none if the field does not hold those of this line."""
-    words = str(_value(feature, "gaps") or "").split(",")
+    words = str(value_of(feature, "gaps") or "").split(",")
     try:
         gaps = np.array([[float(bound) for bound in word.split("-")] for word in words], dtype=float)
     except ValueError:
@@ -429,7 +455,7 @@ def _gaps(feature: QgsFeature, xyz: np.ndarray) -> np.ndarray:
     return gaps if in_order else NO_GAPS.copy()
 
 
-def _value(feature: QgsFeature, name: str) -> Any:
+def value_of(feature: QgsFeature, name: str) -> Any:
     """Return the value of a field, or None if the field is missing or empty."""
     index = feature.fields().lookupField(name)
     value = feature.attribute(index) if index >= 0 else NULL

@@ -21,6 +21,7 @@ from qgis.core import (
     QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingOutputLayerDefinition,
+    QgsVertexIterator,
     QgsWkbTypes,
 )
 
@@ -29,13 +30,19 @@ from ...core.errors import RailExtractError
 from ...core.fields import (
     AIRBORNE_FIELDS,
     AIRBORNE_STATION_FIELDS,
+    AXIS_FIELDS,
     BRIDGED,
     CENTERLINE_FIELDS,
+    DEVIATION_FIELDS,
+    DIFFERENCE_FIELDS,
+    ELEMENT_FIELDS,
     FINDING_FIELDS,
+    KM_FIELDS,
     LENGTH,
     QUALITY_FIELDS,
     RAIL_FIELDS,
     SIGMA,
+    STATION_FIELDS,
     STOP_FIELDS,
     UNKNOWN_IN_METRES,
     Field,
@@ -51,6 +58,9 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ...core.airborne.survey import AirborneLine, AirborneTrack
+    from ...core.alignment.deviations import Deviations
+    from ...core.alignment.elements import Alignment
+    from ...core.comparison.tracks import LineDifferences, TrackComparison
     from ...core.frame import LocalFrame
     from ...core.grow.growth import Stop
     from ...core.rails import Centerline, RailLine, TrackGeometry
@@ -75,6 +85,11 @@ RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELD
 QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
 STOPS = LayerKind(STOP_FIELDS, "stops")
 AIRBORNE, STATIONS = LayerKind(AIRBORNE_FIELDS, "airborne"), LayerKind(AIRBORNE_STATION_FIELDS, "stations")
+DIFFERENCES = LayerKind(DIFFERENCE_FIELDS, "differences")
+ELEMENTS, AXES = LayerKind(ELEMENT_FIELDS, "elements"), LayerKind(AXIS_FIELDS, "axes")
+DEVIATIONS = LayerKind(DEVIATION_FIELDS, "deviations")
+PLACES = "places"
+"""What copies of layers of any kind are called in drawings; they have no style."""
 
 
 def fields(columns: Sequence[Field]) -> QgsFields:
@@ -96,21 +111,44 @@ def features(lines: Sequence[Line], columns: Sequence[Field], frame: LocalFrame)
     """
     flat = is_flat(lines)
     for line in lines:
-        coordinates = frame.to_crs(line.xyz).T[: 2 if flat else 3].tolist()
         values = [getattr(line, column.name) for column in columns]
-        yield _feature(QgsGeometry(QgsLineString(*coordinates)), values, columns)
+        yield _feature(QgsGeometry(QgsLineString(*_columns(line.xyz, frame, flat))), values, columns)
 
 
 def stations(tracks: Sequence[TrackGeometry], frame: LocalFrame) -> Iterator[QgsFeature]:
     """Convert the stations of measured tracks to point features in the cloud's coordinates."""
     for track in tracks:
         places = frame.to_crs(track.xyz).tolist()
-        profiles = (getattr(track, column.name) for column in QUALITY.columns[1:])
+        profiles = [getattr(track, column.name) for column in QUALITY.columns[1:]]
+        if track.kilometres is not None:
+            profiles += [getattr(track.kilometres, column.name) for column in STATION_FIELDS]
+        columns = quality_of(tracks).columns
         for (x, y, z), *row in zip(places, repeat(track.track_id), *profiles):
-            yield _feature(QgsGeometry(QgsPoint(x, y) if math.isnan(z) else QgsPoint(x, y, z)), row, QUALITY.columns)
+            yield _feature(QgsGeometry(QgsPoint(x, y) if math.isnan(z) else QgsPoint(x, y, z)), row, columns)
 
 
-def is_flat(lines: Sequence[Line | TrackGeometry | AirborneTrack]) -> bool:
+def quality_of(tracks: Sequence[TrackGeometry]) -> LayerKind:
+    """Return the fields of the stations of tracks: with an axis, also their places along it."""
+    located = any(track.kilometres is not None for track in tracks)
+    return LayerKind((*QUALITY_FIELDS, *STATION_FIELDS), QUALITY.style) if located else QUALITY
+
+
+def findings_of(found: Sequence[Finding]) -> LayerKind:
+    """Return the fields of findings: with an axis, also their kilometres."""
+    located = any(finding.km_text is not None for finding in found)
+    return LayerKind((*FINDING_FIELDS, *KM_FIELDS), FINDINGS.style) if located else FINDINGS
+
+
+def copies(originals: Sequence[QgsFeature], columns: QgsFields, rows: Sequence[Sequence[Any]]) -> Iterator[QgsFeature]:
+    """Copy features with further values, (n, k), for the last fields of `columns`."""
+    for original, row in zip(originals, rows):
+        feature = QgsFeature(columns)
+        feature.setGeometry(original.geometry())
+        feature.setAttributes([*original.attributes(), *row[: columns.count() - len(original.attributes())]])
+        yield feature
+
+
+def is_flat(lines: Sequence[Line | TrackGeometry | LineDifferences] | Sequence[AirborneTrack]) -> bool:
     """Return whether there are lines, and none has heights."""
     return bool(lines) and all(any(map(math.isnan, line.xyz[:, 2])) for line in lines)
 
@@ -185,7 +223,7 @@ def write_stations(
     """
     shape = QgsWkbTypes.Type.Point if is_flat(tracks) else QgsWkbTypes.Type.PointZ
     made = stations(tracks, frame)
-    return _write(algorithm, name, QUALITY, shape, made, frame, parameters, context)
+    return _write(algorithm, name, quality_of(tracks), shape, made, frame, parameters, context)
 
 
 def write_airborne_stations(
@@ -238,6 +276,120 @@ def write_stops(
         for number, stop in enumerate(stops, 1)
     )
     return _write(algorithm, name, STOPS, QgsWkbTypes.Type.PointZ, made, frame, parameters, context)
+
+
+def write_elements(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    alignments: Sequence[Alignment],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the element table of alignments, each element with its curve.
+
+    Parameters
+    ----------
+    alignments : sequence of Alignment
+        In the given frame.
+    algorithm, name, frame, parameters, context
+        See `write_lines`.
+    """
+    from ...core.alignment.table import rows
+
+    flat = not any(alignment.vertical for alignment in alignments)
+    made = (
+        _feature(
+            QgsGeometry(QgsLineString(*_columns(alignment.drawn(one.s_from, one.s_to), frame, flat))),
+            [row[column.name] for column in ELEMENTS.columns],
+            ELEMENTS.columns,
+        )
+        for alignment in alignments
+        for one, row in zip(alignment.elements, rows(alignment))
+    )
+    shape = QgsWkbTypes.Type.LineString if flat else QgsWkbTypes.Type.LineStringZ
+    return _write(algorithm, name, ELEMENTS, shape, made, frame, parameters, context)
+
+
+def write_axes(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    alignments: Sequence[Alignment],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write alignments as lines with kilometres as M values; see `write_elements`."""
+    from ...core.alignment.equations import measured
+
+    flat = not any(alignment.vertical for alignment in alignments)
+    shape = QgsWkbTypes.Type.LineStringM if flat else QgsWkbTypes.Type.LineStringZM
+
+    def axis(alignment: Alignment) -> QgsFeature:
+        xyzm = measured(alignment)
+        columns = _columns(xyzm[:, :3], frame, flat)
+        line = QgsLineString(*columns, *([[]] if flat else []), xyzm[:, 3].tolist())
+        length_m, kilometres = alignment.s_to - alignment.s_from, (xyzm[0, 3], xyzm[-1, 3])
+        return _feature(QgsGeometry(line), (alignment.track_id, alignment.name, length_m, *kilometres), AXES.columns)
+
+    return _write(algorithm, name, AXES, shape, map(axis, alignments), frame, parameters, context)
+
+
+def write_deviations(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    found: Sequence[Deviations],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the deviations of tracks from their designs as points on the designs; see `write_elements`."""
+    flat = all(math.isnan(one.xyz[0, 2]) for one in found)
+    made = (
+        _feature(QgsGeometry(QgsPoint(*place[: 2 if flat else 3])), (one.track_id, *row), DEVIATIONS.columns)
+        for one in found
+        for place, *row in zip(
+            frame.to_crs(one.xyz).tolist(), *(getattr(one, column.name) for column in DEVIATIONS.columns[1:])
+        )
+    )
+    shape = QgsWkbTypes.Type.Point if flat else QgsWkbTypes.Type.PointZ
+    return _write(algorithm, name, DEVIATIONS, shape, made, frame, parameters, context)
+
+
+def _columns(xyz: np.ndarray, frame: LocalFrame, flat: bool) -> list[list[float]]:
+    """Return x, y and, unless it is left out, z of vertices, (n, 3) local metres, in coordinates of the layer."""
+    return frame.to_crs(xyz).T[: 2 if flat else 3].tolist()
+
+
+def write_differences(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    found: TrackComparison,
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the stations of a comparison as points.
+
+    Parameters
+    ----------
+    found : TrackComparison
+    algorithm, name, frame, parameters, context
+        See `write_lines`.
+    """
+    flat = is_flat(found.lines)
+    made = (
+        _difference(line, at, frame, flat) for line in found.lines for at in range(len(line.state)) if line.state[at]
+    )
+    shape = QgsWkbTypes.Type.Point if flat else QgsWkbTypes.Type.PointZ
+    return _write(algorithm, name, DIFFERENCES, shape, made, frame, parameters, context)
+
+
+def _difference(line: LineDifferences, at: int, frame: LocalFrame, flat: bool) -> QgsFeature:
+    """Convert one station of a comparison to a feature."""
+    place = QgsPoint(*frame.to_crs(line.xyz[at])[: 2 if flat else 3].tolist())
+    values = [getattr(line, column.name) for column in DIFFERENCES.columns[1:]]
+    return _feature(QgsGeometry(place), [line.line_id, *(value[at] for value in values)], DIFFERENCES.columns)
 
 
 def write_raster(
@@ -313,16 +465,69 @@ def _write(
     if destination is not None and destination.file.suffix.lower() in EXCHANGED:
         return _exchange(algorithm, name, kind, shape, made, frame, parameters, context)
     columns, crs = fields(kind.columns), output_crs(frame.crs_wkt)
+    layer_id = _layer(algorithm, name, columns, shape, made, crs, lost_part(frame.crs_wkt), parameters, context)
+    if not layer_id:
+        return {}
+    _style(algorithm, name, layer_id, kind.style, context)
+    return {name: layer_id}
+
+
+def write_copy(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    columns: QgsFields,
+    shape: QgsWkbTypes.Type,
+    made: Iterator[QgsFeature],
+    crs: QgsCoordinateReferenceSystem,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write a copy of a layer of any kind, with other fields.
+
+    Parameters
+    ----------
+    columns : QgsFields
+    shape : QgsWkbTypes.Type
+    made : iterator of QgsFeature
+    crs : QgsCoordinateReferenceSystem
+    algorithm, name, parameters, context
+        See `write_lines`.
+    """
+    destination, wkt = algorithm.destinations.get(name), crs.toWkt() if crs.isValid() else None
+    if destination is not None and destination.file.suffix.lower() in EXCHANGED:
+        import numpy as np
+
+        from ...core.clouds.crs import parse_crs, units
+        from ...core.frame import LocalFrame
+
+        if QgsWkbTypes.geometryType(shape) == QgsWkbTypes.GeometryType.PolygonGeometry:
+            raise RailExtractError(f"{name} can't be {destination.path.name} for polygons: choose a GeoPackage.")
+        kind = LayerKind(tuple(Field(one.name(), float if one.isNumeric() else str, "") for one in columns), PLACES)
+        unit_m = units(parse_crs(wkt))[0] if wkt and not crs.isGeographic() else 1.0
+        frame = LocalFrame(np.zeros(3), unit_m, crs_wkt=wkt)
+        return _exchange(algorithm, name, kind, shape, made, frame, parameters, context)
+    layer_id = _layer(algorithm, name, columns, shape, made, crs, lost_part(wkt), parameters, context)
+    return {name: layer_id} if layer_id else {}
+
+
+def _layer(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    columns: QgsFields,
+    shape: QgsWkbTypes.Type,
+    made: Iterator[QgsFeature],
+    crs: QgsCoordinateReferenceSystem,
+    lost: str | None,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> str:
+    """Write features to a layer, and return its id; empty if the user skipped it."""
 
     def write(value: Any) -> tuple[str, int]:
         sink, layer_id = algorithm.parameterAsSink({**parameters, name: value}, name, context, columns, shape, crs)
         return (layer_id, add_features(sink, made)) if sink else ("", 0)
 
-    layer_id = write_whole(parameters.get(name), context, destination, write, lost_part(frame.crs_wkt))
-    if not layer_id:
-        return {}
-    _style(algorithm, name, layer_id, kind.style, context)
-    return {name: layer_id}
+    return write_whole(parameters.get(name), context, algorithm.destinations.get(name), write, lost)
 
 
 def _exchange(
@@ -339,7 +544,11 @@ def _exchange(
     from ...core.exchange import DRAWN, Shape, write_shapes
 
     destination, value = algorithm.destinations[name], parameters.get(name)
-    shapes = (Shape(vertices_of(feature), _plain(feature.attributes())) for feature in made)
+    shapes = (
+        Shape(_vertices(part.vertices()), _plain(feature.attributes()))
+        for feature in made
+        for part in feature.geometry().constParts()
+    )
     is_line = QgsWkbTypes.geometryType(shape) == QgsWkbTypes.GeometryType.LineGeometry
     with destination.replacing() as new:
         write_shapes(new, shapes, kind.columns, frame, DRAWN[kind.style], is_line)
@@ -353,14 +562,18 @@ def _exchange(
 
 def vertices_of(feature: QgsFeature) -> np.ndarray:
     """Return the vertices of a line or a point, (n, 3) in units of its layer; heights are NaN where there are none."""
+    return _vertices(feature.geometry().vertices())
+
+
+def _vertices(vertices: QgsVertexIterator) -> np.ndarray:
     import numpy as np
 
-    return np.array([(vertex.x(), vertex.y(), vertex.z()) for vertex in feature.geometry().vertices()], dtype=float)
+    return np.array([(vertex.x(), vertex.y(), vertex.z()) for vertex in vertices], dtype=float)
 
 
 def _plain(values: Sequence[Any]) -> list[Any]:
-    """Return attributes with None where they are empty."""
-    return [None if value == NULL else value for value in values]
+    """Return attributes with None where they are empty, and dates as text."""
+    return [None if value == NULL else value.toString() if hasattr(value, "toString") else value for value in values]
 
 
 def _style(

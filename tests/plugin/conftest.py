@@ -219,6 +219,10 @@ OUTPUTS = {
     "vectorizerails": ("OUTPUT.gpkg",),
     "buildtrackcenterlines": ("OUTPUT.gpkg",),
     "measuretrackgeometry": ("OUTPUT.gpkg",),
+    "stationalongaxis": ("OUTPUT.gpkg",),
+    "comparetracks": ("OUTPUT.gpkg", "REPORT.html"),
+    "exportalignment": ("OUTPUT.xml",),
+    "importalignment": ("ELEMENTS.gpkg", "AXIS.gpkg"),
     "trainrailclassifier": ("WEIGHTS.npz",),
 }
 """Outputs of the algorithms, each a file in the folder of the test."""

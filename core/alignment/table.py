@@ -1,0 +1,180 @@
+"""The element table: alignments as rows with the fields `core.fields.ELEMENT_FIELDS`, and back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
+from itertools import groupby
+from typing import Any, Optional
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..fields import ELEMENT_FIELDS
+from ..frame import LocalFrame
+from .elements import Alignment, CantElement, Element, Figures, PlanElement, VerticalElement
+
+Row = Mapping[str, Any]
+
+GON = 200.0 / math.pi
+"""Gon in a radian."""
+
+LAYOUTS = (PlanElement.layout, VerticalElement.layout, CantElement.layout)
+
+
+def rows(alignment: Alignment) -> list[dict[str, Any]]:
+    """Return the rows of an alignment, unrounded: plan, then height, then cant, in order along the track."""
+    layouts: tuple[Sequence[Element], ...] = (alignment.plan, alignment.vertical, alignment.cant)
+    return [_row(alignment, number, one) for elements in layouts for number, one in enumerate(elements, 1)]
+
+
+def alignments(table: Iterable[Row], frame: LocalFrame) -> list[Alignment]:
+    """Return the alignments of an element table, in order of their track.
+
+    Parameters
+    ----------
+    table : iterable of mappings
+        Rows by the name of the field, in any order; see `core.fields.ELEMENT_FIELDS`. Start, end, place and direction
+        of the start, type and radii are read in plan; height and gradients, or cant, in the other layouts.
+    frame : LocalFrame
+        Of the places in the alignments.
+
+    Raises
+    ------
+    ParameterError
+        A row lacks a value or states an impossible one, or a track has no plan.
+    """
+    known = [row for row in table if _layout(row)]
+    tracks = sorted({row.get("track_id") for row in known}, key=lambda number: (number is not None, number))
+    return [_alignment(number, [row for row in known if row.get("track_id") == number], frame) for number in tracks]
+
+
+def _alignment(track_id: Optional[int], table: list[Row], frame: LocalFrame) -> Alignment:
+    """Return the alignment of one track."""
+    table = sorted(table, key=lambda row: (LAYOUTS.index(row["layout"]), float(_needed(row, "s_from"))))
+    by_layout = {layout: list(members) for layout, members in groupby(table, key=lambda row: row["layout"])}
+    if "H" not in by_layout:
+        raise ParameterError(
+            f"The element table has no row with layout H for track {track_id}: give it the elements in plan, too."
+        )
+    return Alignment(
+        track_id,
+        frame,
+        tuple(_plan_element(row, frame) for row in by_layout["H"]),
+        tuple(_vertical_element(row, frame) for row in by_layout.get("V", ())),
+        tuple(_cant_element(row) for row in by_layout.get("C", ())),
+    )
+
+
+def _row(alignment: Alignment, number: int, element: Element) -> dict[str, Any]:
+    """Return the row of an element."""
+    place = alignment.frame.to_crs(alignment.xyz(np.array([element.s_from]))[0])
+    heading = float(alignment.headings(np.array([element.s_from]))[0])
+    row = dict.fromkeys((one.name for one in ELEMENT_FIELDS), None)
+    row.update(
+        track_id=alignment.track_id,
+        no=number,
+        layout=element.layout,
+        type=element.type,
+        s_from=element.s_from,
+        s_to=element.s_to,
+        length_m=element.length_m,
+        x=float(place[0]),
+        y=float(place[1]),
+        z=None if math.isnan(place[2]) else float(place[2]),
+        azimuth_gon=(100.0 - heading * GON) % 400.0,
+        heading=math.remainder(heading, math.tau),
+    )
+    row.update({one.name: getattr(element.figures, one.name) for one in fields(Figures)})
+    row.update(_shape(element))
+    return row
+
+
+def _shape(element: Element) -> dict[str, Any]:
+    """Return the fields that only one layout fills."""
+    if isinstance(element, CantElement):
+        return {"cant1_mm": 1000.0 * element.cant_from_m, "cant2_mm": 1000.0 * element.cant_to_m}
+    if isinstance(element, VerticalElement):
+        radius = 1.0 / element.curvature if element.type == "parabola" else None
+        grades = {"grade1_pm": 1000.0 * element.grade_from, "grade2_pm": 1000.0 * element.grade_to}
+        return {**grades, "r1_m": radius, "r2_m": radius}
+    change = element.k_to - element.k_from
+    bend = element.k_from + element.k_to
+    return {
+        "r1_m": 1.0 / element.k_from if element.k_from else None,
+        "r2_m": 1.0 / element.k_to if element.k_to else None,
+        "a_param": math.sqrt(element.length_m / abs(change)) if change else None,
+        "rot": ("L" if bend > 0 else "R") if bend else None,
+    }
+
+
+def _layout(row: Row) -> Optional[str]:
+    """Return the layout of a row, None in an empty row."""
+    layout = row.get("layout")
+    if layout is None and row.get("s_from") is None:
+        return None
+    if layout not in LAYOUTS:
+        raise ParameterError(f"The element table has the layout {layout!r}: write H, V or C.")
+    return str(layout)
+
+
+def _plan_element(row: Row, frame: LocalFrame) -> PlanElement:
+    """Return the element of a row in plan; its type decides which radii count."""
+    kind, place = row.get("type"), frame.to_local(np.array([_needed(row, "x"), _needed(row, "y"), 0.0]))
+    ends = {"line": (None, None), "arc": (row.get("r1_m"),) * 2, "clothoid": (row.get("r1_m"), row.get("r2_m"))}
+    if kind not in ends:
+        raise ParameterError(f"{_where(row)} has the type {kind!r}: in plan, write line, arc or clothoid.")
+    if kind != "line" and ends[kind] == (None, None):
+        raise ParameterError(f"{_where(row)} is of type {kind} and has no radius: fill one, or make it a line.")
+    k_from, k_to = (_bend(row, radius) for radius in ends[kind])
+    start = *_extent(row), float(place[0]), float(place[1]), _needed(row, "heading")
+    return PlanElement(*start, k_from, k_to, _figures(row))
+
+
+def _vertical_element(row: Row, frame: LocalFrame) -> VerticalElement:
+    """Return the element of a row in height."""
+    z = float(frame.to_local(np.array([0.0, 0.0, _needed(row, "z")]))[2])
+    grade_from, grade_to = (_needed(row, name) / 1000.0 for name in ("grade1_pm", "grade2_pm"))
+    return VerticalElement(*_extent(row), z, grade_from, grade_to, _figures(row))
+
+
+def _cant_element(row: Row) -> CantElement:
+    """Return the element of a row of cant."""
+    cant_from_m, cant_to_m = (_needed(row, name) / 1000.0 for name in ("cant1_mm", "cant2_mm"))
+    return CantElement(*_extent(row), cant_from_m, cant_to_m, _figures(row))
+
+
+def _extent(row: Row) -> tuple[float, float]:
+    """Return start and length."""
+    s_from, s_to = _needed(row, "s_from"), _needed(row, "s_to")
+    if s_to <= s_from:
+        raise ParameterError(f"{_where(row)} ends at s_to = {s_to:g} m: let it end after its start.")
+    return s_from, s_to - s_from
+
+
+def _bend(row: Row, radius: Any) -> float:
+    """Return the curvature for a radius; 0 where it is empty."""
+    if radius is None:
+        return 0.0
+    if not math.isfinite(float(radius)) or float(radius) == 0.0:
+        raise ParameterError(f"{_where(row)} has the radius {radius}: leave it empty where the track is straight.")
+    return 1.0 / float(radius)
+
+
+def _figures(row: Row) -> Figures:
+    """Return what the row states besides the shape."""
+    return Figures(**{one.name: row.get(one.name) for one in fields(Figures)})
+
+
+def _needed(row: Row, name: str) -> float:
+    """Return a number that a row must have."""
+    value = row.get(name)
+    if isinstance(value, (int, float)) and math.isfinite(value):
+        return float(value)
+    raise ParameterError(f"{_where(row)} has no value in the field {name}: fill it, or remove the row.")
+
+
+def _where(row: Row) -> str:
+    """Name a row in a message."""
+    return f"The element {row.get('no')} of layout {row.get('layout')} of track {row.get('track_id')}"

@@ -1,0 +1,74 @@
+"""The element table: rows of alignments, and alignments from rows."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from rail_extract.core.alignment.elements import Alignment, CantElement, Figures, VerticalElement, chained
+from rail_extract.core.alignment.table import alignments, rows
+from rail_extract.core.errors import ParameterError
+from rail_extract.core.fields import ELEMENT_FIELDS
+from rail_extract.core.frame import LocalFrame
+
+FRAME = LocalFrame(np.array([23_460_000.0, 6_675_000.0, 100.0]))
+
+
+def design(track_id=1):
+    plan = chained((3.0, 4.0), np.pi / 2, [(80.0, 0, 0), (60.0, 0, -1 / 400), (90.0, -1 / 400, -1 / 400)])
+    first = dataclasses.replace(plan[0], figures=Figures(joint="G2", sigma_len_m=0.02))
+    vertical = (VerticalElement(0, 100, 5, 0.01, 0.01), VerticalElement(100, 130, 6, 0.01, -0.003))
+    cant = (CantElement(0, 80, 0, 0), CantElement(80, 60, 0, 0.1))
+    return Alignment(track_id, FRAME, (first, *plan[1:]), vertical, cant)
+
+
+def test_a_table_gives_back_the_alignment():
+    given = [design(2), design(1)]
+    back = alignments([row for one in given for row in rows(one)], FRAME)
+    assert [one.track_id for one in back] == [1, 2]
+    s = np.linspace(0, 230, 40)
+    for one in back:
+        np.testing.assert_allclose(one.xyz(s), given[0].xyz(s), atol=1e-8)
+        np.testing.assert_allclose(one.cants(s), given[0].cants(s), atol=1e-12)
+        assert [part.type for part in one.elements] == [part.type for part in given[0].elements]
+        assert one.plan[0].figures == given[0].plan[0].figures
+
+
+def test_rows_have_every_field_and_state_the_values_of_the_design():
+    table = rows(design())
+    assert all(set(row) == {field.name for field in ELEMENT_FIELDS} for row in table)
+    assert [(row["layout"], row["no"], row["type"]) for row in table] == [
+        *(("H", 1, "line"), ("H", 2, "clothoid"), ("H", 3, "arc")),
+        *(("V", 1, "grade"), ("V", 2, "parabola"), ("C", 1, "constant"), ("C", 2, "ramp")),
+    ]
+    line, clothoid, arc, _, parabola, _, ramp = table
+    assert (line["x"], line["y"], line["z"]) == pytest.approx((23_460_003.0, 6_675_004.0, 105.0))
+    assert (line["azimuth_gon"], line["rot"], line["r1_m"]) == (pytest.approx(0.0, abs=1e-9), None, None)
+    assert (clothoid["r1_m"], clothoid["r2_m"]) == (None, pytest.approx(-400))
+    assert clothoid["a_param"] == pytest.approx(np.sqrt(60 * 400))
+    assert (arc["rot"], arc["s_from"], arc["s_to"]) == ("R", 140, 230)
+    assert arc["azimuth_gon"] == pytest.approx(60 / 800 * 200 / np.pi)
+    assert parabola["r1_m"] == pytest.approx(-130 / 0.013)
+    assert (ramp["cant1_mm"], ramp["cant2_mm"]) == (0, 100)
+
+
+@pytest.mark.parametrize(
+    ("row", "values", "words"),
+    [
+        (0, {"layout": "Q"}, "layout 'Q'"),
+        (0, {"x": None}, "no value in the field x"),
+        (0, {"s_to": 0.0}, "end after its start"),
+        (0, {"type": "curve"}, "line, arc or clothoid"),
+        (2, {"r1_m": None}, "has no radius"),
+        (2, {"r1_m": 0.0}, "leave it empty"),
+    ],
+)
+def test_a_wrong_row_is_named(row, values, words):
+    table = rows(design())
+    table[row].update(values)
+    with pytest.raises(ParameterError, match=words):
+        alignments(table, FRAME)
+
+
+def test_a_track_without_a_plan_is_refused():
+    with pytest.raises(ParameterError, match="layout H"):
+        alignments([row for row in rows(design()) if row["layout"] != "H"], FRAME)
