@@ -20,7 +20,7 @@ from ..writing.layers import AIRBORNE, FINDINGS, figures_of, write_airborne_stat
 from ..writing.reports import write_shown
 from ..writing.run import properties_of
 from ..writing.whole_files import write_each
-from .base import CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, RailAlgorithm
+from .base import CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, TRACK_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
     from ...core.airborne.survey import Guide, Survey
@@ -43,6 +43,7 @@ class AirborneCenterlines(RailAlgorithm):
 
     NAME = "airbornecenterlines"
     LABEL = "Track centerlines from airborne lidar"
+    GROUP = RAW_CLOUDS
     TAGS = (*RAIL_WORDS, *CLOUD_WORDS, *TRACK_WORDS, "airborne", "ALS", "national", "OpenStreetMap", "centerline")
     NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
     SUMMARY = "Fits the centerlines of tracks in airborne lidar, along lines that say which tracks are meant."
