@@ -63,12 +63,13 @@ class ImportAlignment(RailAlgorithm):
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs in the order of the interface."""
-        deviations = outputs.deviations()
-        deviations.setCreateByDefault(False)
+        deviations, report = outputs.deviations(), outputs.alignment_report()
+        for needs_tracks in (deviations, report):
+            needs_tracks.setCreateByDefault(False)
         tracks = inputs.tracks_beside_design()
         for definition in (*inputs.landxml(), tracks, outputs.elements(), outputs.axes(), deviations):
             self.addParameter(definition)
-        self._add_report(outputs.alignment_report())
+        self._add_report(report)
         for output in outputs.alignment_figures():
             self.addOutput(output)
 

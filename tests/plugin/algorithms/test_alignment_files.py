@@ -99,6 +99,12 @@ def test_axes_have_kilometres_as_m_values(exported, imported):
     assert np.interp(12.05, [one.m() for one in vertices], off) == pytest.approx(50, abs=0.01)
 
 
+def test_a_dialog_asks_for_no_output_that_needs_tracks(qgis, plugin):
+    algorithm = qgis.processingRegistry().createAlgorithmById("railextract:importalignment")
+    asked = [one.name() for one in algorithm.destinationParameterDefinitions() if one.createByDefault()]
+    assert asked == ["ELEMENTS", "AXIS"]
+
+
 def test_tracks_are_compared_with_the_design_beside_them(exported, run_step, context, tmp_path):
     _, path = exported("a.xml", table(design(), design(5)))
     other, s = design(5), np.arange(12.0, 350.0, 4.0)
