@@ -185,6 +185,34 @@ def test_map_tips_say_what_is_under_the_mouse(styled, style, values, said):
         assert words in tip
 
 
+ARC = {"layout": "H", "type": "arc", "r1_m": -500.0, "r2_m": -500.0, "length_m": 80.0, "track_id": 3}
+GRADE = {"layout": "V", "type": "grade", "grade1_pm": 2.5, "grade2_pm": 2.5, "length_m": 40.0}
+
+
+@pytest.mark.parametrize(
+    ("style", "values", "label", "tip"),
+    [
+        ("elements", ARC, "R -500, 80.0 m", "Radius: -500.0 to -500.0"),
+        (
+            "elements",
+            {**ARC, "type": "clothoid", "a_param": 200.0, "r1_m": None},
+            "A 200, 80.0 m",
+            "straight to -500.0",
+        ),
+        ("elements", GRADE, None, "Gradient: 2.50 to 2.50 ‰"),
+        ("axes", {"name": "Siding", "km_from": 12.5, "km_to": 13.0}, "Siding km 12.500", "12.500 to 13.000"),
+    ],
+)
+def test_labels_and_tips_of_alignments(styled, style, values, label, tip):
+    layer = styled(style, [(LINE, values)])
+    scopes = QgsExpressionContext(QgsExpressionContextUtils.globalProjectLayerScopes(layer))
+    scopes.setFeature(next(layer.getFeatures()))
+    expression = QgsExpression(layer.labeling().settings().fieldName)
+    found = expression.evaluate(scopes)
+    assert not expression.hasParserError() and (found or None) == label
+    assert tip in QgsExpression.replaceExpressionText(layer.mapTipTemplate(), scopes)
+
+
 def test_the_review_is_chosen_from_a_list(styled):
     layer = styled("findings")
     widget = layer.editorWidgetSetup(layer.fields().lookupField("review"))
