@@ -20,7 +20,8 @@ from ..writing.layers import AIRBORNE, FINDINGS, figures_of, write_airborne_stat
 from ..writing.reports import write_shown
 from ..writing.run import properties_of
 from ..writing.whole_files import write_each
-from .base import CLOUD_WORDS, RAIL_WORDS, RAW_CLOUDS, TRACK_WORDS, RailAlgorithm
+from .base import CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, RailAlgorithm
+from .toolbox_groups import RAW_CLOUDS
 
 if TYPE_CHECKING:
     from ...core.airborne.survey import Guide, Survey
