@@ -17,6 +17,7 @@ NAMES = (
         "extractrails",
         "classifyrailpoints",
         "growrailpoints",
+        "airbornecenterlines",
         "rasterizerailpoints",
         "frpdfcleanup",
         "vectorizerails",

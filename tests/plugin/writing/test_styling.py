@@ -33,6 +33,7 @@ from rail_extract.core.fields import (
     FINDING_FIELDS,
     QUALITY_FIELDS,
     RAIL_FIELDS,
+    STATION_FIELDS,
     STOP_FIELDS,
 )
 from rail_extract.core.frame import LocalFrame
@@ -151,6 +152,16 @@ def test_fields_have_names_in_words_with_units(styled, style):
         assert alias and alias != field.name
         for ending, unit in (("_mm", "[mm]"), ("_m", "[m]"), ("_pm", "[‰]")):
             assert alias.endswith(unit) or not field.name.endswith(ending) or alias.endswith("[mm]"), alias
+
+
+def test_fields_of_kilometres_have_names_in_words(styled):
+    layer = styled("quality")
+    layer.dataProvider().addAttributes(fields(STATION_FIELDS).toList())
+    layer.updateFields()
+    layer.loadNamedStyle(str(STYLES / "quality.qml"))
+    names = [layer.attributeAlias(layer.fields().lookupField(field.name)) for field in STATION_FIELDS]
+    assert names[2:5] == ["Kilometre", "Kilometre as text", "Offset from the axis [m]"]
+    assert all(names)
 
 
 @pytest.mark.parametrize(
