@@ -151,6 +151,23 @@ EXTENT_FIELDS = (
 )
 """Further fields of lines and polygons, whose `km` is that of a place in their middle."""
 
+DIFFERENCE_FIELDS = (
+    Field("line_id", int, "rail_id or track_id of the line of the reference; where it is extra, of the other survey"),
+    Field("input_id", int, "the same of the other survey's line; empty where it is missing"),
+    Field("chainage_m", float, "plan distance from the start of the line of line_id, metres", 2),
+    Field("state", str, "both, missing in the other survey, or extra in it"),
+    Field("across_mm", float, "difference across, millimetres; positive to the left of the reference", 1),
+    Field("height_mm", float, "difference in height, millimetres; positive above the reference", 1),
+    Field("gauge_mm", float, "difference of the gauge, millimetres", 1),
+    Field("cant_mm", float, "difference of the cant, left minus right along the reference, millimetres", 1),
+    Field("sigma_mm", float, "standard error of the difference across, millimetres", 2),
+    Field("sigmaz_mm", float, "standard error of the difference in height, millimetres", 2),
+    Field("shift_mm", float, "part of across_mm that is the constant shift, millimetres", 1),
+    Field("shiftz_mm", float, "part of height_mm that is the constant shift, millimetres", 1),
+    Field("moved", int, "1 where the line has moved by more than three standard errors, across or in height; else 0"),
+)
+"""All differences are those of the other survey from the reference."""
+
 FINDING_FIELDS = (
     Field(
         "finding",
@@ -178,6 +195,38 @@ STOP_FIELDS = (
     Field("reason", str, "why the rail is not followed further"),
 )
 
+AIRBORNE_FIELDS = (
+    Field("track_id", int, "number of the line"),
+    Field("guide_id", int, "number of its guide: that of the feature, or of the proposal"),
+    LENGTH,
+    Field("seen_m", float, "length on which the track is seen, metres", 1),
+    Field("sigma_mm", float, "standard error across where it is seen, without the flight's own error, millimetres", 1),
+    Field("sigmaz_mm", float, "standard error of the height, likewise, millimetres", 1),
+    Field("gauge_mm", float, "gauge that was looked for: that of the guide, or of the run, millimetres", 1),
+    Field("name", str, "name of the guide"),
+    Field("ref", str, "reference of the guide, such as the number of the line"),
+)
+AIRBORNE_STATION_FIELDS = (
+    Field("track_id", int, "number of the line; empty where there is none"),
+    Field("guide_id", int, "number of the guide"),
+    Field("s_m", float, "plan distance from the start of the guide, metres", 1),
+    Field("seen", int, "1 where the track is seen, else 0"),
+    Field("sigma_mm", float, "standard error across, without the flight's own error, millimetres", 1),
+    Field("sigmaz_mm", float, "standard error of the height, likewise, millimetres", 1),
+    Field("bed_m", float, "height of the bed between the rails, in the unit of the cloud", 3),
+    Field("cant_mm", float, "cant: left minus right, seen along the guide, millimetres", 0),
+    Field("radius_m", float, "radius in plan over 80 m, positive in left-hand curves, empty above 10 km, metres", 0),
+    Field("grade_pm", float, "gradient over 80 m, per mille; positive uphill", 2),
+    Field("margin", float, "score of the course above that of one elsewhere", 1),
+    Field("reason", str, "why the track is not seen; at a switch, that another one is near"),
+)
+"""In an `AirborneTrack`, `guide_id` is a single value and the others have a value for each station."""
+
+GUIDE_FIELDS = (
+    Field("guide_id", int, "number of the proposal"),
+    Field("score", float, "how clearly it looks like a track: 1 is the least that is proposed", 2),
+    LENGTH,
+)
 ELEMENT_FIELDS = (
     Field("track_id", int, "number of the track"),
     Field("no", int, "number of the element within its track and layout, from 1"),
@@ -216,3 +265,20 @@ ELEMENT_FIELDS = (
     Field("dev_rms_round_mm", float, "dev_rms_mm with the round radii, millimetres", 2),
 )
 """The element table: `alignment.table` writes and reads its rows. A shapefile cuts its long names."""
+
+DEVIATION_FIELDS = (
+    Field("track_id", int, "number of the track"),
+    Field("s", float, "distance along the design in plan, metres", 2),
+    Field("slew_mm", float, "measured minus design across, positive to the left, millimetres", 2),
+    Field("lift_mm", float, "measured minus design in height, millimetres", 2),
+    Field("cant_diff_mm", float, "measured minus design cant, millimetres; empty where the cant is unknown", 2),
+)
+
+AXIS_FIELDS = (
+    Field("track_id", int, "number of the track"),
+    Field("name", str, "name of the alignment in its file"),
+    Field("length_m", float, "length in plan, metres", 3),
+    Field("km_from", float, "kilometre of the start", 6),
+    Field("km_to", float, "kilometre of the end", 6),
+)
+"""Alignments as lines whose M values are kilometres."""

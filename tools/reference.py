@@ -20,7 +20,13 @@ from qgis.core import (  # noqa: E402
     QgsProcessingProvider,
 )
 from rail_extract.core.fields import (  # noqa: E402
+    AIRBORNE_FIELDS,
+    AIRBORNE_STATION_FIELDS,
+    AXIS_FIELDS,
     CENTERLINE_FIELDS,
+    DEVIATION_FIELDS,
+    DIFFERENCE_FIELDS,
+    ELEMENT_FIELDS,
     EXTENT_FIELDS,
     FINDING_FIELDS,
     QUALITY_FIELDS,
@@ -48,8 +54,14 @@ LAYERS = {
     "Centerlines": CENTERLINE_FIELDS,
     "Track geometry": QUALITY_FIELDS,
     "Kilometres": (*STATION_FIELDS, *EXTENT_FIELDS),
+    "Differences": DIFFERENCE_FIELDS,
     "Findings": FINDING_FIELDS,
     "Stops": STOP_FIELDS,
+    "Centerlines from airborne lidar": AIRBORNE_FIELDS,
+    "Stations from airborne lidar": AIRBORNE_STATION_FIELDS,
+    "Elements": ELEMENT_FIELDS,
+    "Deviations": DEVIATION_FIELDS,
+    "Axes": AXIS_FIELDS,
 }
 
 

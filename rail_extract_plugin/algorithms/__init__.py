@@ -1,11 +1,15 @@
 """The algorithms of the toolbox, one module each."""
 
+from .airborne_centerlines import AirborneCenterlines
 from .build_track_centerlines import BuildTrackCenterlines
 from .check_installation import CheckInstallation
 from .classify_rail_points import ClassifyRailPoints
+from .compare_tracks import CompareTracks
+from .export_alignment import ExportAlignment
 from .extract_rails import ExtractRails
 from .frpdf_cleanup import FrpdfCleanup
 from .grow_rail_points import GrowRailPoints
+from .import_alignment import ImportAlignment
 from .install_packages import InstallPackages
 from .measure_track_geometry import MeasureTrackGeometry
 from .rasterize_rail_points import RasterizeRailPoints
@@ -17,12 +21,16 @@ ALGORITHMS = (
     ExtractRails,
     ClassifyRailPoints,
     GrowRailPoints,
+    AirborneCenterlines,
     RasterizeRailPoints,
     FrpdfCleanup,
     VectorizeRails,
     BuildTrackCenterlines,
     MeasureTrackGeometry,
     StationAlongAxis,
+    CompareTracks,
+    ExportAlignment,
+    ImportAlignment,
     TrainRailClassifier,
     InstallPackages,
     CheckInstallation,

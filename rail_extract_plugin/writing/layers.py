@@ -28,8 +28,14 @@ from qgis.core import (
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
 from ...core.fields import (
+    AIRBORNE_FIELDS,
+    AIRBORNE_STATION_FIELDS,
+    AXIS_FIELDS,
     BRIDGED,
     CENTERLINE_FIELDS,
+    DEVIATION_FIELDS,
+    DIFFERENCE_FIELDS,
+    ELEMENT_FIELDS,
     FINDING_FIELDS,
     KM_FIELDS,
     LENGTH,
@@ -51,6 +57,10 @@ from .whole_files import write_whole
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.airborne.survey import AirborneLine, AirborneTrack
+    from ...core.alignment.deviations import Deviations
+    from ...core.alignment.elements import Alignment
+    from ...core.comparison.tracks import LineDifferences, TrackComparison
     from ...core.frame import LocalFrame
     from ...core.grow.growth import Stop
     from ...core.rails import Centerline, RailLine, TrackGeometry
@@ -58,7 +68,7 @@ if TYPE_CHECKING:
     from ...core.raster_file import RasterHeader
     from ...core.report import Finding
 
-    Line = Union[RailLine, Centerline, Finding]
+    Line = Union[RailLine, Centerline, Finding, AirborneLine]
 
 KINDS = {int: INTEGER, float: REAL, str: TEXT}
 
@@ -74,6 +84,10 @@ class LayerKind:
 RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELDS, "centerlines")
 QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
 STOPS = LayerKind(STOP_FIELDS, "stops")
+AIRBORNE, STATIONS = LayerKind(AIRBORNE_FIELDS, "airborne"), LayerKind(AIRBORNE_STATION_FIELDS, "stations")
+DIFFERENCES = LayerKind(DIFFERENCE_FIELDS, "differences")
+ELEMENTS, AXES = LayerKind(ELEMENT_FIELDS, "elements"), LayerKind(AXIS_FIELDS, "axes")
+DEVIATIONS = LayerKind(DEVIATION_FIELDS, "deviations")
 PLACES = "places"
 """What copies of layers of any kind are called in drawings; they have no style."""
 
@@ -97,9 +111,8 @@ def features(lines: Sequence[Line], columns: Sequence[Field], frame: LocalFrame)
     """
     flat = is_flat(lines)
     for line in lines:
-        coordinates = frame.to_crs(line.xyz).T[: 2 if flat else 3].tolist()
         values = [getattr(line, column.name) for column in columns]
-        yield _feature(QgsGeometry(QgsLineString(*coordinates)), values, columns)
+        yield _feature(QgsGeometry(QgsLineString(*_columns(line.xyz, frame, flat))), values, columns)
 
 
 def stations(tracks: Sequence[TrackGeometry], frame: LocalFrame) -> Iterator[QgsFeature]:
@@ -135,7 +148,7 @@ def copies(originals: Sequence[QgsFeature], columns: QgsFields, rows: Sequence[S
         yield feature
 
 
-def is_flat(lines: Sequence[Line | TrackGeometry]) -> bool:
+def is_flat(lines: Sequence[Line | TrackGeometry | LineDifferences] | Sequence[AirborneTrack]) -> bool:
     """Return whether there are lines, and none has heights."""
     return bool(lines) and all(any(map(math.isnan, line.xyz[:, 2])) for line in lines)
 
@@ -213,6 +226,35 @@ def write_stations(
     return _write(algorithm, name, quality_of(tracks), shape, made, frame, parameters, context)
 
 
+def write_airborne_stations(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    tracks: Sequence[AirborneTrack],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the stations along guides as points.
+
+    Parameters
+    ----------
+    tracks : sequence of AirborneTrack
+    algorithm, name, frame, parameters, context
+        See `write_lines`.
+    """
+    shape = QgsWkbTypes.Type.Point if is_flat(tracks) else QgsWkbTypes.Type.PointZ
+    return _write(algorithm, name, STATIONS, shape, _airborne_stations(tracks, frame), frame, parameters, context)
+
+
+def _airborne_stations(tracks: Sequence[AirborneTrack], frame: LocalFrame) -> Iterator[QgsFeature]:
+    for track in tracks:
+        profiles = (getattr(track, column.name) for column in STATIONS.columns[2:])
+        ids = [number or None for number in track.track_id.tolist()]
+        for (x, y, z), *row in zip(frame.to_crs(track.xyz).tolist(), ids, repeat(track.guide_id), *profiles):
+            place = QgsPoint(x, y) if math.isnan(z) else QgsPoint(x, y, z)
+            yield _feature(QgsGeometry(place), row, STATIONS.columns)
+
+
 def write_stops(
     algorithm: QgsProcessingAlgorithm,
     name: str,
@@ -234,6 +276,120 @@ def write_stops(
         for number, stop in enumerate(stops, 1)
     )
     return _write(algorithm, name, STOPS, QgsWkbTypes.Type.PointZ, made, frame, parameters, context)
+
+
+def write_elements(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    alignments: Sequence[Alignment],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the element table of alignments, each element with its curve.
+
+    Parameters
+    ----------
+    alignments : sequence of Alignment
+        In the given frame.
+    algorithm, name, frame, parameters, context
+        See `write_lines`.
+    """
+    from ...core.alignment.table import rows
+
+    flat = not any(alignment.vertical for alignment in alignments)
+    made = (
+        _feature(
+            QgsGeometry(QgsLineString(*_columns(alignment.drawn(one.s_from, one.s_to), frame, flat))),
+            [row[column.name] for column in ELEMENTS.columns],
+            ELEMENTS.columns,
+        )
+        for alignment in alignments
+        for one, row in zip(alignment.elements, rows(alignment))
+    )
+    shape = QgsWkbTypes.Type.LineString if flat else QgsWkbTypes.Type.LineStringZ
+    return _write(algorithm, name, ELEMENTS, shape, made, frame, parameters, context)
+
+
+def write_axes(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    alignments: Sequence[Alignment],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write alignments as lines with kilometres as M values; see `write_elements`."""
+    from ...core.alignment.equations import measured
+
+    flat = not any(alignment.vertical for alignment in alignments)
+    shape = QgsWkbTypes.Type.LineStringM if flat else QgsWkbTypes.Type.LineStringZM
+
+    def axis(alignment: Alignment) -> QgsFeature:
+        xyzm = measured(alignment)
+        columns = _columns(xyzm[:, :3], frame, flat)
+        line = QgsLineString(*columns, *([[]] if flat else []), xyzm[:, 3].tolist())
+        length_m, kilometres = alignment.s_to - alignment.s_from, (xyzm[0, 3], xyzm[-1, 3])
+        return _feature(QgsGeometry(line), (alignment.track_id, alignment.name, length_m, *kilometres), AXES.columns)
+
+    return _write(algorithm, name, AXES, shape, map(axis, alignments), frame, parameters, context)
+
+
+def write_deviations(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    found: Sequence[Deviations],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the deviations of tracks from their designs as points on the designs; see `write_elements`."""
+    flat = all(math.isnan(one.xyz[0, 2]) for one in found)
+    made = (
+        _feature(QgsGeometry(QgsPoint(*place[: 2 if flat else 3])), (one.track_id, *row), DEVIATIONS.columns)
+        for one in found
+        for place, *row in zip(
+            frame.to_crs(one.xyz).tolist(), *(getattr(one, column.name) for column in DEVIATIONS.columns[1:])
+        )
+    )
+    shape = QgsWkbTypes.Type.Point if flat else QgsWkbTypes.Type.PointZ
+    return _write(algorithm, name, DEVIATIONS, shape, made, frame, parameters, context)
+
+
+def _columns(xyz: np.ndarray, frame: LocalFrame, flat: bool) -> list[list[float]]:
+    """Return x, y and, unless it is left out, z of vertices, (n, 3) local metres, in coordinates of the layer."""
+    return frame.to_crs(xyz).T[: 2 if flat else 3].tolist()
+
+
+def write_differences(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    found: TrackComparison,
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the stations of a comparison as points.
+
+    Parameters
+    ----------
+    found : TrackComparison
+    algorithm, name, frame, parameters, context
+        See `write_lines`.
+    """
+    flat = is_flat(found.lines)
+    made = (
+        _difference(line, at, frame, flat) for line in found.lines for at in range(len(line.state)) if line.state[at]
+    )
+    shape = QgsWkbTypes.Type.Point if flat else QgsWkbTypes.Type.PointZ
+    return _write(algorithm, name, DIFFERENCES, shape, made, frame, parameters, context)
+
+
+def _difference(line: LineDifferences, at: int, frame: LocalFrame, flat: bool) -> QgsFeature:
+    """Convert one station of a comparison to a feature."""
+    place = QgsPoint(*frame.to_crs(line.xyz[at])[: 2 if flat else 3].tolist())
+    values = [getattr(line, column.name) for column in DIFFERENCES.columns[1:]]
+    return _feature(QgsGeometry(place), [line.line_id, *(value[at] for value in values)], DIFFERENCES.columns)
 
 
 def write_raster(
@@ -272,7 +428,7 @@ def write_raster(
     return {name: path}
 
 
-def figures_of(lines: Sequence[RailLine | Centerline], what: str) -> dict[str, Any]:
+def figures_of(lines: Sequence[RailLine | Centerline] | Sequence[AirborneLine], what: str) -> dict[str, Any]:
     """Return the number and length of lines as outputs: RAIL_COUNT and RAIL_LENGTH if `what` is RAIL."""
     return {f"{what}_COUNT": len(lines), f"{what}_LENGTH": LENGTH.value(sum(line.length_m for line in lines))}
 

@@ -24,7 +24,10 @@ FINDINGS = "findings"
 
 NO_PROPERTIES: Mapping[str, str] = {}
 
-BOTTOM_TO_TOP = ("raster", "findings", "rails", "centerlines", "quality", "stops")
+BOTTOM_TO_TOP = (
+    *("raster", "findings", "rails", "centerlines", "airborne", "axes", "elements"),
+    *("deviations", "quality", "stations", "differences", "stops"),
+)
 """Order of the layers in the group, by style."""
 
 

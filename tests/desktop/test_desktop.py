@@ -6,13 +6,14 @@ from pathlib import Path
 import pytest
 from osgeo import gdal, ogr
 
-SCENARIOS = ("dialogs", "rails", "review", "growing", "deliveries", "batch", "model")
+SCENARIOS = ("dialogs", "wheel", "unload", "rails", "review", "growing", "deliveries", "alignments", "batch", "model")
 
 DIES_AT_EXIT = ("rails", 340)
 """Scenario and version in which QGIS dies after it was closed, as it also does after two runs of its own algorithms."""
 
 NAMES = [
-    *("extractrails", "classifyrailpoints", "growrailpoints", "rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
+    *("extractrails", "classifyrailpoints", "growrailpoints", "airbornecenterlines"),
+    *("rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
     *("buildtrackcenterlines", "measuretrackgeometry", "trainrailclassifier", "installpackages", "checkinstallation"),
 ]
 
@@ -55,6 +56,29 @@ def test_check_of_the_installation_shows_its_result(run_scenario):
     log = run_scenario("dialogs")["check"]
     assert "Rail Extract works here. Self test passed: 100.0% of the true rails found" in log
     assert "PASSED: True" in log.replace("'", "")  # newer QGIS writes no quotes
+
+
+def test_a_wheel_that_passes_over_fields_changes_nothing(run_scenario):
+    session = run_scenario("wheel")
+    assert len(session["changed"]) >= 12
+    assert {name: new for name, new in session["changed"].items() if new} == {}
+    assert session["what is around a list gets the wheel"]
+    assert session["changed with the focus"] == 1
+
+
+def test_a_standard_is_remembered_from_runs_only(run_scenario):
+    session = run_scenario("wheel")
+    assert session["chosen and closed"] != "EN_60E1_1435"
+    assert session["after it was closed"] == "EN_60E1_1435"
+    assert session["chosen and run"] == session["after it was run"] == session["chosen and closed"]
+
+
+def test_the_plugin_is_disabled_and_updated_during_a_run(run_scenario):
+    session = run_scenario("unload")
+    for name in ("disabled", "updated"):
+        assert "Cancelled; nothing was written." in session[f"said when {name}"]
+    assert session["without the plugin"]
+    assert "Results:" in session["log"]
 
 
 def test_rails_are_found_and_loaded(run_scenario):
@@ -161,6 +185,21 @@ def test_lines_from_files_are_judged(run_scenario):
     dataset = ogr.Open(str(session.folder / "found.gpkg"))
     reasons = {feature["reason"] for feature in dataset.GetLayer(0)}
     assert reasons <= {"a rail has no points", "gauge off by more than 10 mm", "standard error above 5 mm"}
+
+
+def test_kilometres_and_differences_from_their_dialogs(run_scenario):
+    session = run_scenario("alignments")
+    kilometres = session["kilometres"]
+    assert len(kilometres["rows"]) == 6
+    assert all(7.5 < km < 7.8 and offset_m > 0 for km, offset_m, _ in kilometres["rows"])
+    assert "beyond" not in session["station log"]
+    results = session["compare results"]
+    assert results["MISSING_LENGTH"] == results["EXTRA_LENGTH"] == 0
+    assert results["SHIFT_UP"] == pytest.approx(10, abs=0.3)
+    assert all(9 < height < 11 for height in session["heights"])  # the shift is also along the gradient
+    assert session["legend"][0] == "moved by more than three standard errors"
+    assert session["saved"] == 0
+    assert "have moved by more than 3 standard errors" in session["compare log"]
 
 
 def test_batch_writes_what_is_named_and_skips_what_is_blank(run_scenario):

@@ -213,12 +213,16 @@ OUTPUTS = {
     "extractrails": ("RAILS.gpkg", "CENTERLINES.shp", "QUALITY.gpkg", "FINDINGS.gpkg", "CLEANED.tif"),
     "classifyrailpoints": ("OUTPUT.laz",),
     "growrailpoints": ("OUTPUT.laz",),
+    "airbornecenterlines": ("CENTERLINES.gpkg", "STATIONS.gpkg", "FINDINGS.gpkg"),
     "rasterizerailpoints": ("OUTPUT.tif",),
     "frpdfcleanup": ("OUTPUT.tif",),
     "vectorizerails": ("OUTPUT.gpkg",),
     "buildtrackcenterlines": ("OUTPUT.gpkg",),
     "measuretrackgeometry": ("OUTPUT.gpkg",),
     "stationalongaxis": ("OUTPUT.gpkg",),
+    "comparetracks": ("OUTPUT.gpkg", "REPORT.html"),
+    "exportalignment": ("OUTPUT.xml",),
+    "importalignment": ("ELEMENTS.gpkg", "AXIS.gpkg"),
     "trainrailclassifier": ("WEIGHTS.npz",),
 }
 """Outputs of the algorithms, each a file in the folder of the test."""
