@@ -1,7 +1,7 @@
 """Blunt heads: beams from the air and dense matching of photographs blur a head to a round ridge without edges.
 
 Across, the ridge is a parabola. Its crest is the axis of the head. Where the line of the crest wanders about a stiff
-curve, the cloud errs, because a rail does not bend that quickly. See docs/method.md section 6.10.
+curve, the cloud errs, because a rail does not bend that quickly. See docs/method.md section 6.11.
 """
 
 from __future__ import annotations
@@ -29,8 +29,9 @@ The line itself follows curves; only its offsets are averaged."""
 MIN_BEND = 0.5
 """Least bend of the parabola, 1/m: a radius of 2 m. A flatter top has no crest."""
 
-PRIOR_OFFSET_M = 0.02
-"""Expected offset of the line from the crest, half a cell: it keeps the line where points are few."""
+LEANING_M = 0.008
+"""Standard deviation of the mean of the points about the crest: labels lean to the side on which the bed is higher.
+Where noise hides the crest, the mean says more."""
 
 STIFF_PLAN, STIFF_PROFILE = (201, 3), (301, 2)
 """Stations of a stiff curve, and its degree: 50 m of a clothoid in plan, 75 m of a parabola in height. Errors of dense
@@ -82,7 +83,9 @@ class Ridge:
             bend = max(-2 * float(np.polynomial.polynomial.polyfit(x[used], up[used], 2)[2]), MIN_BEND)
             flat = up + 0.5 * bend * x**2
             noise_m = robust_sigma(flat[used])
-            level, slope, spread = _slopes(row[used], rows, x[used], flat[used], noise_m / (bend * PRIOR_OFFSET_M))
+            level, slope, spread = _slopes(
+                row[used], rows, x[used], flat[used], bend, (noise_m / bend / LEANING_M) ** 2
+            )
             used = np.abs(flat - level[row] - slope[row] * x) <= OFF_TOP_SIGMAS * noise_m
         return cls(stations_along(length_m), slope / bend, noise_m / (bend * np.sqrt(spread)), bend)
 
@@ -104,18 +107,18 @@ class Ridge:
 
 
 def _slopes(
-    row: np.ndarray, rows: int, x: np.ndarray, flat: np.ndarray, prior_m: float
+    row: np.ndarray, rows: int, x: np.ndarray, flat: np.ndarray, bend: float, prior_m2: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Fit level and slope across to the points of each window, (rows,) each; NaN in windows without points.
 
-    The third array is the information about the slope: the sum of the squares of the offsets about their mean, m², to
-    which the prior adds `prior_m` squared.
+    The third array is the information about the slope: the sum of the squares of the offsets about their mean, m², and
+    that of the prior, by which the crest is at the mean of the points.
     """
     sums = np.array([np.bincount(row, one, rows) for one in (np.ones_like(x), x, flat, x * x, x * flat)])
     count, sx, sy, xx, xy = uniform_filter1d(sums, WINDOW, axis=1, mode="constant") * WINDOW
     count = np.where(count > 0.5, count, np.nan)
-    spread = xx - sx**2 / count + prior_m**2
-    slope = (xy - sx * sy / count) / spread
+    spread = xx - sx**2 / count + prior_m2
+    slope = (xy - sx * sy / count + prior_m2 * bend * sx / count) / spread
     return (sy - slope * sx) / count, slope, spread
 
 

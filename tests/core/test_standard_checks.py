@@ -103,7 +103,7 @@ def test_noise_and_faces_do_not_widen_heads_and_a_single_face_is_no_head():
 
 def test_blunt_heads_are_said_and_their_width_is_not_measured():
     rng = np.random.default_rng(5)
-    points = heads_of(LINE, 0.112)
+    points = heads_of(LINE, 0.112, gauge_m=1.435 + WIDTH - 0.112)
     left = np.abs((points[:, :2] - LINE.xy[0]) @ LINE.left_normal[0]) - 0.5 * (1.435 + WIDTH)
     points[:, 2] = rng.normal(0, 0.012, len(points)) - 5.0 * left**2
     rails = []
