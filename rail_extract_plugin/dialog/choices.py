@@ -22,6 +22,14 @@ WORDS = {
     "MODEL": {"AUTO": tr("Automatic"), "base": tr("Network of the paper"), "fast": tr("Smaller, faster network")},
     "ENGINE": {"AUTO": tr("The faster one"), "TORCH": tr("PyTorch"), "OPENCV": tr("OpenCV")},
     "DEVICE": {"AUTO": tr("GPU if there is one"), "CPU": tr("Processor"), "CUDA": tr("Nvidia GPU")},
+    "DIRECTION": {"INCREASING": tr("Increasing"), "DECREASING": tr("Decreasing")},
+    "FORMAT": {
+        "HECTOMETRES": tr("12.3+45.67"),
+        "KILOMETRES": tr("12+345.67"),
+        "GERMAN": tr("12,3 + 45"),
+        "MILES": tr("7 mi 1180.52 yd"),
+    },
+    "VERTICAL_CURVES": {"CIRCLES": tr("Circles"), "PARABOLAS": tr("Parabolas")},
     "TORCH": {"NONE": tr("Do not install"), "CPU": tr("For the processor (CPU)"), "CUDA": tr("For an Nvidia GPU")},
 }
 """Words by id, by parameter."""

@@ -352,9 +352,12 @@ def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, Any]:
     }
 
 
-def output_crs(wkt: str | None) -> QgsCoordinateReferenceSystem:
-    """Return the coordinate system for an output: `UNKNOWN_IN_METRES` if the cloud has none."""
-    return system(wkt or UNKNOWN_IN_METRES)
+def output_crs(wkt: str | None, is_file: bool) -> QgsCoordinateReferenceSystem:
+    """Return the coordinate system for an output; for a cloud without one, `UNKNOWN_IN_METRES` in files only.
+
+    QGIS marks a layer in memory that has none, and asks for it.
+    """
+    return system(wkt or (UNKNOWN_IN_METRES if is_file else None))
 
 
 def _write(
@@ -373,7 +376,7 @@ def _write(
     destination = algorithm.destinations.get(name)
     if destination is not None and destination.file.suffix.lower() in EXCHANGED:
         return _exchange(algorithm, name, kind, shape, made, frame, parameters, context)
-    columns, crs = fields(kind.columns), output_crs(frame.crs_wkt)
+    columns, crs = fields(kind.columns), output_crs(frame.crs_wkt, destination is not None)
     layer_id = _layer(algorithm, name, columns, shape, made, crs, lost_part(frame.crs_wkt), parameters, context)
     if not layer_id:
         return {}
