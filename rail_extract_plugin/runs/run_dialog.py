@@ -14,6 +14,7 @@ from qgis.core import (
     Qgis,
     QgsApplication,
     QgsProcessingAlgorithm,
+    QgsProcessingContext,
     QgsProcessingFeedback,
     QgsProcessingParameterDefinition,
 )
@@ -45,7 +46,6 @@ class RunDialog(AlgorithmDialog):
         self._follower = LinkFollower(self.findChild(QTextEdit, "txtLog"))
         self._failure: type | None = None
         self._standard = ""
-        self.algorithmFinished.connect(self._finished)
         notices.run_failed.connect(self._note_failure)
         notices.standard_proposed.connect(self._note_standard)
 
@@ -68,13 +68,25 @@ class RunDialog(AlgorithmDialog):
         if feedback is self.feedback:
             self._standard = name
 
-    def _finished(self, successful: bool, results: dict[str, Any]) -> None:
+    def finish(
+        self,
+        successful: bool,
+        result: dict[str, Any],
+        context: QgsProcessingContext,
+        feedback: QgsProcessingFeedback,
+        in_place: bool = False,
+    ) -> None:
+        """Show the end of a run; `AlgorithmDialog` calls this, whereas its signal does not come after a failure."""
+        super().finish(successful, result, context, feedback, in_place)
+        self.after_run(successful, result, context)
+
+    def after_run(self, successful: bool, results: dict[str, Any], context: QgsProcessingContext) -> None:
         """Keep the standard that was run with, and offer what may follow."""
         standard = self.mainWidget().wrappers.get("STANDARD")
         if standard is not None:
             standard.remember()
         if successful:
-            steps = list(after_success(self, results, self.context, self._standard))
+            steps = list(after_success(self, results, context, self._standard))
         else:
             steps = list(after_failure(self, self._failure, self._standard))
             for step in steps:

@@ -54,14 +54,14 @@ def chosen(dialog, standard):
     combo.activated.emit(combo.currentIndex())
 
 
-def test_a_choice_is_remembered_once_a_run_has_used_it(dialog, wrapper):
+def test_a_choice_is_remembered_once_a_run_has_used_it(dialog, wrapper, context):
     first = dialog()
     chosen(first, "IN_75R_1000")
     first.close()
     assert wrapper().value() == "DETECT"
-    first.algorithmFinished.emit(True, {})
+    first.after_run(True, {}, context)
     assert wrapper().value() == "IN_75R_1000"
     assert wrapper("rasterizerailpoints").value() == "IN_75R_1000"
     chosen(first, "DETECT")
-    first.algorithmFinished.emit(True, {})
+    first.after_run(True, {}, context)
     assert wrapper("rasterizerailpoints").value() == "EN_60E1_1435"
