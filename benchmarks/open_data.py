@@ -28,7 +28,8 @@ from rail_extract.core.parameters import Parameters
 from rail_extract.core.pipeline import extract_rails
 from rail_extract.core.rails import RailLine
 from rail_extract.core.standards import RAIL_CLASS, RailStandard, closest_standard, resolve
-from rail_extract.laboratory.ruler.lines import Pieces, cut, nearest
+from rail_extract.laboratory.ruler.agreement import HEADER, agreement
+from rail_extract.laboratory.ruler.lines import cut, nearest
 from scipy.spatial import cKDTree
 
 CELL_M, HEAD_M = 0.25, 0.040
@@ -40,9 +41,6 @@ NEAR_M = 0.10
 ON_HEAD_M, BELOW_M, ON_TOP_M = 0.06, 0.012, 0.02
 """Distance from the line, and depth below it, of the points that show its error across: the sides of a head, of which a
 scanner sees one, are deeper. Distance of those that show its error in height."""
-
-SAME_RAIL_M = 0.30
-"""Lines of two runs this close are the same rail: registrations differ by centimetres."""
 
 PLACES = 20
 """Places that are evaluated by default."""
@@ -426,54 +424,17 @@ def warn_of_class(total: Result, rail_class: int) -> None:
 
 def print_repeated(visits: Sequence[Visit]) -> None:
     """Print how well the rails of each two runs agree where both show them."""
-    runs = sorted({visit.run for visit in visits if visit.rails})
-    pairs = [(one, other, agreement(visits, one, other)) for one, other in combinations(runs, 2)]
-    pairs = [(one, other, found) for one, other, found in pairs if len(found)]
-    if not pairs:
+    rails: dict[str, list[RailLine]] = {}
+    for visit in visits:
+        rails.setdefault(visit.run, []).extend(visit.rails)
+    pairs = [(one, other, agreement(rails[one], rails[other])) for one, other in combinations(sorted(rails), 2)]
+    if all(found is None for _, _, found in pairs):
         print("No rail was found by two runs.")
         return
-    print(f"{'runs':<56}{'m':>6}{'across mm':>16}{'height mm':>16}{'/ sigma':>12}")
-    for one, other, (length_m, *both) in pairs:
-        parts, ratios = [], []
-        for apart_m, sigma_m in zip(both[:2], both[2:]):
-            parts.append(f"{1000 * np.mean(apart_m):.1f} ± {1000 * np.std(apart_m):.1f}")
-            ratios.append(f"{np.sqrt(np.mean(((apart_m - np.mean(apart_m)) / sigma_m) ** 2)):.2f}")
-        print(f"{one + ', ' + other:<56}{np.sum(length_m):>6.0f}{parts[0]:>16}{parts[1]:>16}{' '.join(ratios):>12}")
-
-
-def agreement(visits: Sequence[Visit], one: str, other: str) -> np.ndarray:
-    """Differences between the rails of two runs, along those of the second; (0,) if they share none.
-
-    Returns
-    -------
-    (5, n) array
-        Length of each piece, differences across and in height, and the standard errors stated for these, metres.
-    """
-    first, second = ([rail for visit in visits if visit.run == run for rail in visit.rails] for run in (one, other))
-    if not first or not second:
-        return np.empty(0)
-    there, here = (cut([rail.xyz for rail in rails]) for rails in (first, second))
-    feet, number = nearest(here.middle, there)
-    step = here.middle - feet
-    near = np.hypot(step[:, 0], step[:, 1]) <= SAME_RAIL_M
-    if not near.any():
-        return np.empty(0)
-    across = np.sum(step[:, :2] * there.left[number], axis=1)
-    mine = np.flatnonzero(near)
-    sigma_m = np.hypot(sigmas(first, there, number[mine]), sigmas(second, here, mine))
-    return np.stack([here.lengths[mine], across[mine], step[mine, 2], *sigma_m])
-
-
-def sigmas(rails: Sequence[RailLine], pieces: Pieces, chosen: np.ndarray) -> np.ndarray:
-    """Stated standard errors across and in height at some pieces, (2, k) metres."""
-    found = np.empty((2, len(chosen)))
-    number, t = pieces.number[chosen], pieces.t[chosen]
-    for rail in np.unique(number):
-        support = rails[rail].support
-        mine = number == rail
-        for line, values in zip(found, (support.sigma_m, support.heights_m)):
-            line[mine] = np.interp(t[mine], support.t, values)
-    return found
+    print(f"{'runs':<60}{HEADER}")
+    for one, other, found in pairs:
+        if found is not None:
+            print(f"{one + ', ' + other:<60}{found.text()}")
 
 
 if __name__ == "__main__":

@@ -46,6 +46,7 @@ DRAWN = {
     "places": "PLACES",
     "differences": "DIFFERENCES",
     "elements": "ELEMENTS",
+    "deviations": "DEVIATIONS",
     "axes": "ALIGNMENT",
 }
 """First word of the layers in a drawing, by output."""

@@ -22,6 +22,8 @@ from qgis.core import (  # noqa: E402
 from rail_extract.core.fields import (  # noqa: E402
     AXIS_FIELDS,
     CENTERLINE_FIELDS,
+    DEVIATION_FIELDS,
+    DIFFERENCE_FIELDS,
     ELEMENT_FIELDS,
     EXTENT_FIELDS,
     FINDING_FIELDS,
@@ -50,9 +52,11 @@ LAYERS = {
     "Centerlines": CENTERLINE_FIELDS,
     "Track geometry": QUALITY_FIELDS,
     "Kilometres": (*STATION_FIELDS, *EXTENT_FIELDS),
+    "Differences": DIFFERENCE_FIELDS,
     "Findings": FINDING_FIELDS,
     "Stops": STOP_FIELDS,
     "Elements": ELEMENT_FIELDS,
+    "Deviations": DEVIATION_FIELDS,
     "Axes": AXIS_FIELDS,
 }
 

@@ -3,6 +3,7 @@
 from .build_track_centerlines import BuildTrackCenterlines
 from .check_installation import CheckInstallation
 from .classify_rail_points import ClassifyRailPoints
+from .compare_tracks import CompareTracks
 from .export_alignment import ExportAlignment
 from .extract_rails import ExtractRails
 from .frpdf_cleanup import FrpdfCleanup
@@ -25,6 +26,7 @@ ALGORITHMS = (
     BuildTrackCenterlines,
     MeasureTrackGeometry,
     StationAlongAxis,
+    CompareTracks,
     ExportAlignment,
     ImportAlignment,
     TrainRailClassifier,

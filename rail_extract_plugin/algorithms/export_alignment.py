@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from configparser import ConfigParser
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsCoordinateReferenceSystem, QgsProcessingContext, QgsProcessingFeatureSource
 
+from ...core import VERSION
 from ...core.disk import Destination
 from ...core.errors import CrsError, ParameterError
 from ...core.progress import Progress
@@ -17,7 +17,6 @@ from ...core.standards import RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
-from ..paths import METADATA
 from ..systems import prepare_system
 from .base import ALIGNMENT_WORDS, RAIL_WORDS, RailAlgorithm
 from .toolbox_groups import ALIGNMENT
@@ -130,7 +129,4 @@ def _delivery(job: Job, crs_wkt: str | None) -> Delivery:
     from ...core.clouds.crs import codes_and_names, parse_crs
 
     epsg, system, heights = codes_and_names(parse_crs(crs_wkt)) if crs_wkt else (None, "", "")
-    metadata = ConfigParser(interpolation=None)
-    metadata.read(METADATA, encoding="utf-8")
-    version = metadata.get("general", "version")
-    return Delivery(job.standard.gauge_m, job.standard.head_width_m, epsg, system, heights, version)
+    return Delivery(job.standard.gauge_m, job.standard.head_width_m, epsg, system, heights, VERSION)

@@ -22,14 +22,12 @@ WORDS = {
     "MODEL": {"AUTO": tr("Automatic"), "base": tr("Network of the paper"), "fast": tr("Smaller, faster network")},
     "ENGINE": {"AUTO": tr("The faster one"), "TORCH": tr("PyTorch"), "OPENCV": tr("OpenCV")},
     "DEVICE": {"AUTO": tr("GPU if there is one"), "CPU": tr("Processor"), "CUDA": tr("Nvidia GPU")},
-    "DIRECTION": {"INCREASING": tr("Increasing"), "DECREASING": tr("Decreasing")},
+    "DIRECTION": {"INCREASING": tr("Increase"), "DECREASING": tr("Decrease")},
     "FORMAT": {
-        "HECTOMETRES": tr("12.3+45.67"),
-        "KILOMETRES": tr("12+345.67"),
-        "GERMAN": tr("12,3 + 45"),
-        "MILES": tr("7 mi 1180.52 yd"),
+        **{"HECTOMETRES": tr("12.3+45.67"), "KILOMETRES": tr("12+345.67")},
+        **{"GERMAN": tr("12,3 + 46"), "MILES": tr("7 mi 1181.39 yd")},
     },
-    "VERTICAL_CURVES": {"CIRCLES": tr("Circles"), "PARABOLAS": tr("Parabolas")},
+    "VERTICAL_CURVES": {"CIRCLES": tr("Circles, as for railways"), "PARABOLAS": tr("Parabolas, as for roads")},
     "TORCH": {"NONE": tr("Do not install"), "CPU": tr("For the processor (CPU)"), "CUDA": tr("For an Nvidia GPU")},
 }
 """Words by id, by parameter."""

@@ -181,6 +181,18 @@ def elements() -> Definitions:
     )
 
 
+def tracks_beside_design() -> QgsProcessingParameterDefinition:
+    """Define the measured tracks that are compared with a design."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return helped(
+        QgsProcessingParameterFeatureSource("TRACKS", tr("Measured tracks"), [line], optional=True),
+        tr(
+            "Centerlines that lie along the alignments, for deviations and report; each is compared with the alignment "
+            "beside it, up to 2 m away."
+        ),
+    )
+
+
 def landxml() -> Definitions:
     """Define the parameters for a LandXML file."""
     behaviour = QgsProcessingParameterFile.Behavior.File
@@ -200,6 +212,30 @@ def landxml() -> Definitions:
                 "For files that, against the format, write the easting of points before their northing. All curves of "
                 "such a file turn to the other side than it states."
             ),
+        ),
+    )
+
+
+def surveys() -> Definitions:
+    """Define the lines that are compared, and the rails of their tracks."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    rails = tr("For centerlines: the rails of these tracks, for differences of gauge and cant.")
+    return (
+        helped(
+            QgsProcessingParameterFeatureSource("REFERENCE", tr("Reference"), [line]),
+            tr("Rails or centerlines of the earlier survey, of the design, or of a control measurement."),
+        ),
+        helped(
+            QgsProcessingParameterFeatureSource("INPUT", tr("Lines to compare"), [line]),
+            tr("The same kind of lines of the later survey, in the same coordinate system."),
+        ),
+        helped(
+            QgsProcessingParameterFeatureSource("REFERENCE_RAILS", tr("Rails of the reference"), [line], optional=True),
+            rails,
+        ),
+        helped(
+            QgsProcessingParameterFeatureSource("RAILS", tr("Rails to compare"), [line], optional=True),
+            rails,
         ),
     )
 

@@ -24,6 +24,7 @@ from ...core.parameters import (
     LEAVE_OUT,
     METHODS,
     STRIPS,
+    ComparisonParameters,
     GrowParameters,
     Parameters,
 )
@@ -50,6 +51,9 @@ MAX_CROWN_RADIUS_M = 10_000.0
 MAX_LENGTH_M = 100_000.0
 """Longer than any gap to close, any minimum line length and any step between stations."""
 
+
+MAX_REACH_M = 2.0
+"""Two tracks are further apart than this."""
 
 MAX_EPOCHS, MAX_SEED = 10_000, 2**31 - 1
 """Weeks on any computer, and the largest seed of a random generator."""
@@ -459,6 +463,30 @@ def growth() -> Definitions:
         tr("The other rail of the track, at the gauge, is followed as well. Otherwise only the one with the seed."),
     )
     return (both, *lengths, outliers, longest)
+
+
+def comparison() -> Definitions:
+    """Define how two surveys are compared."""
+    sigma = tr("Across and in height, where lines state none; 0 for a design. Empty: the scatter shows it.")
+    defaults = ComparisonParameters()
+    reach = number("REACH", tr("Greatest distance of the same line [m]"), defaults.reach_m, 0.01, MAX_REACH_M)
+    step = number("STEP", tr("Step of the comparison [m]"), defaults.step_m, 0.1, MAX_LENGTH_M)
+    shift = QgsProcessingParameterBoolean(
+        "IGNORE_SHIFT", tr("Leave a constant shift out of account"), defaultValue=defaults.ignore_shift
+    )
+    errors = (
+        ("REFERENCE_SIGMA", tr("Standard error, reference [mm]")),
+        ("INPUT_SIGMA", tr("Standard error, lines [mm]")),
+    )
+    return (
+        *(helped(number(name, label, optional=True, decimals=MM_DECIMALS), sigma) for name, label in errors),
+        helped(
+            shift,
+            tr("moved is judged without the shift that most of the length shares. Switch it off for a design."),
+        ),
+        advanced(reach, tr("Lines further from those of the reference are not the same line: missing and extra.")),
+        advanced(step, tr("Distance between the points along each line.")),
+    )
 
 
 def pairing() -> Definitions:

@@ -27,6 +27,7 @@ from qgis.core import (
 
 from ...core.clouds.crs import MAX_COORDINATE, parse_crs, units, warn_of_scale
 from ...core.clouds.mask import Mask
+from ...core.comparison.tracks import SurveyedLine
 from ...core.errors import CrsError, RailExtractError
 from ...core.fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
 from ...core.frame import ORIGIN_STEP, LocalFrame
@@ -98,6 +99,25 @@ def read_centerlines(
     """
     found, frame = _read(source, progress, name)
     return tuple(_centerline(feature, xyz) for feature, xyz in found), frame
+
+
+def read_surveyed(
+    source: QgsProcessingFeatureSource, progress: Progress, name: str
+) -> tuple[tuple[SurveyedLine, ...], LocalFrame]:
+    """Read all parts of all lines with their standard errors, as `read_rails` does.
+
+    A line's number is its `rail_id`, else its `track_id`, else the id of its feature. With a `track_id` only, it is a
+    centerline.
+
+    Parameters
+    ----------
+    source, progress, name
+        See `read_rails`.
+    """
+    found, frame = _read(source, progress, name)
+    names = source.fields().names()
+    id_field = next((one for one in ("rail_id", "track_id") if one in names), "")
+    return tuple(_surveyed(feature, xyz, id_field) for feature, xyz in found), frame
 
 
 def read_guide(
@@ -330,6 +350,12 @@ def _rail(feature: QgsFeature, xyz: np.ndarray, default_class: int) -> RailLine:
     defaults = {"rail_id": feature.id(), "class_code": default_class}
     values = _attributes(feature, RailLine, RAIL_FIELDS, defaults)
     return RailLine(xyz, **{**values, "gaps": gaps_of(feature, xyz)})
+
+
+def _surveyed(feature: QgsFeature, xyz: np.ndarray, id_field: str) -> SurveyedLine:
+    number = _whole(feature, id_field, feature.id())
+    sigma_mm, sigmaz_mm = (_number(feature, name, math.nan) for name in ("sigma_mm", "sigmaz_mm"))
+    return SurveyedLine(number, xyz, sigma_mm / 1000, sigmaz_mm / 1000, id_field != "track_id")
 
 
 def _centerline(feature: QgsFeature, xyz: np.ndarray) -> Centerline:

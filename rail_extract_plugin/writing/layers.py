@@ -31,6 +31,8 @@ from ...core.fields import (
     AXIS_FIELDS,
     BRIDGED,
     CENTERLINE_FIELDS,
+    DEVIATION_FIELDS,
+    DIFFERENCE_FIELDS,
     ELEMENT_FIELDS,
     FINDING_FIELDS,
     KM_FIELDS,
@@ -53,7 +55,9 @@ from .whole_files import write_whole
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.alignment.deviations import Deviations
     from ...core.alignment.elements import Alignment
+    from ...core.comparison.tracks import LineDifferences, TrackComparison
     from ...core.frame import LocalFrame
     from ...core.grow.growth import Stop
     from ...core.rails import Centerline, RailLine, TrackGeometry
@@ -77,7 +81,9 @@ class LayerKind:
 RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELDS, "centerlines")
 QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
 STOPS = LayerKind(STOP_FIELDS, "stops")
+DIFFERENCES = LayerKind(DIFFERENCE_FIELDS, "differences")
 ELEMENTS, AXES = LayerKind(ELEMENT_FIELDS, "elements"), LayerKind(AXIS_FIELDS, "axes")
+DEVIATIONS = LayerKind(DEVIATION_FIELDS, "deviations")
 PLACES = "places"
 """What copies of layers of any kind are called in drawings; they have no style."""
 
@@ -138,7 +144,7 @@ def copies(originals: Sequence[QgsFeature], columns: QgsFields, rows: Sequence[S
         yield feature
 
 
-def is_flat(lines: Sequence[Line | TrackGeometry]) -> bool:
+def is_flat(lines: Sequence[Line | TrackGeometry | LineDifferences]) -> bool:
     """Return whether there are lines, and none has heights."""
     return bool(lines) and all(any(map(math.isnan, line.xyz[:, 2])) for line in lines)
 
@@ -296,9 +302,61 @@ def write_axes(
     return _write(algorithm, name, AXES, shape, map(axis, alignments), frame, parameters, context)
 
 
+def write_deviations(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    found: Sequence[Deviations],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the deviations of tracks from their designs as points on the designs; see `write_elements`."""
+    flat = all(math.isnan(one.xyz[0, 2]) for one in found)
+    made = (
+        _feature(QgsGeometry(QgsPoint(*place[: 2 if flat else 3])), (one.track_id, *row), DEVIATIONS.columns)
+        for one in found
+        for place, *row in zip(
+            frame.to_crs(one.xyz).tolist(), *(getattr(one, column.name) for column in DEVIATIONS.columns[1:])
+        )
+    )
+    shape = QgsWkbTypes.Type.Point if flat else QgsWkbTypes.Type.PointZ
+    return _write(algorithm, name, DEVIATIONS, shape, made, frame, parameters, context)
+
+
 def _columns(xyz: np.ndarray, frame: LocalFrame, flat: bool) -> list[list[float]]:
     """Return x, y and, unless it is left out, z of vertices, (n, 3) local metres, in coordinates of the layer."""
     return frame.to_crs(xyz).T[: 2 if flat else 3].tolist()
+
+
+def write_differences(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    found: TrackComparison,
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the stations of a comparison as points.
+
+    Parameters
+    ----------
+    found : TrackComparison
+    algorithm, name, frame, parameters, context
+        See `write_lines`.
+    """
+    flat = is_flat(found.lines)
+    made = (
+        _difference(line, at, frame, flat) for line in found.lines for at in range(len(line.state)) if line.state[at]
+    )
+    shape = QgsWkbTypes.Type.Point if flat else QgsWkbTypes.Type.PointZ
+    return _write(algorithm, name, DIFFERENCES, shape, made, frame, parameters, context)
+
+
+def _difference(line: LineDifferences, at: int, frame: LocalFrame, flat: bool) -> QgsFeature:
+    """Convert one station of a comparison to a feature."""
+    place = QgsPoint(*frame.to_crs(line.xyz[at])[: 2 if flat else 3].tolist())
+    values = [getattr(line, column.name) for column in DIFFERENCES.columns[1:]]
+    return _feature(QgsGeometry(place), [line.line_id, *(value[at] for value in values)], DIFFERENCES.columns)
 
 
 def write_raster(

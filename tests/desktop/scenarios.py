@@ -13,6 +13,8 @@ from driver import Driver, algorithm, choose, close, install, later, open_batch,
 from qgis.core import (
     QgsApplication,
     QgsCoordinateReferenceSystem,
+    QgsFeature,
+    QgsGeometry,
     QgsPointCloudLayer,
     QgsPointXY,
     QgsProject,
@@ -43,6 +45,7 @@ from qgis.utils import iface, loadPlugin, plugins, reloadPlugin, startPlugin, un
 
 RAW = os.environ["RAIL_EXTRACT_RAW"]
 SAMPLE, ARCHIVE = os.environ["RAIL_EXTRACT_SAMPLE"], os.environ["RAIL_EXTRACT_ZIP"]
+TRUTH = Path(SAMPLE).with_name("sample_truth.geojson")
 
 NAMES = (
     *("extractrails", "classifyrailpoints", "growrailpoints", "rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
@@ -474,6 +477,53 @@ def deliveries(driver: Driver) -> Iterator:
     yield from close(dialog)
     driver.keep("opened", browser.urls)
     driver.picture("measured")
+
+
+def alignments(driver: Driver) -> Iterator:
+    """Give the sample's true rails kilometres, compare them with moved copies of themselves, and save both."""
+    yield from install(ARCHIVE)
+    truth = QgsVectorLayer(f"{TRUTH}|subset=kind = 'rail'", "truth", "ogr")
+    later_survey = QgsVectorLayer("LineStringZ?crs=EPSG:32643", "later", "memory")
+    for feature in truth.getFeatures():
+        shape = feature.geometry()
+        shape.translate(0.0, 0.05, 0.01)
+        feature.setGeometry(shape)
+        feature.setFields(later_survey.fields(), True)
+        later_survey.dataProvider().addFeature(feature)
+    box = truth.extent()
+    axis = QgsVectorLayer("LineString?crs=EPSG:32643", "axis", "memory")
+    line = QgsFeature()
+    ends = QgsPointXY(box.xMinimum() - 20, box.yMinimum()), QgsPointXY(box.xMaximum() + 20, box.yMinimum())
+    line.setGeometry(QgsGeometry.fromPolylineXY(ends))
+    axis.dataProvider().addFeature(line)
+    QgsProject.instance().addMapLayers([truth, later_survey, axis])
+    dialog = yield from open_dialog("stationalongaxis")
+    saved = str(driver.folder / "stationed.gpkg")
+    dialog.setParameters({"INPUT": truth.id(), "AXIS": axis.id(), "START_KM": 7.5, "OUTPUT": saved})
+    driver.picture("station_dialog")
+    driver.keep("station log", (yield from press_run(dialog)))
+    yield from close(dialog)
+    found = QgsVectorLayer(saved, "stationed", "ogr")
+    rows = [(one["km"], one["offset_m"], one.geometry().vertexAt(0).x()) for one in found.getFeatures()]
+    driver.keep("kilometres", {"rows": rows, "start": ends[0].x(), "south": ends[0].y()})
+    dialog = yield from open_dialog("comparetracks")
+    given = {"REFERENCE": truth.id(), "INPUT": later_survey.id(), "REFERENCE_SIGMA": 1, "INPUT_SIGMA": 1}
+    outputs = {"OUTPUT": "TEMPORARY_OUTPUT", "REPORT": str(driver.folder / "comparison.html")}
+    dialog.setParameters({**given, "IGNORE_SHIFT": False, **outputs})
+    driver.picture("compare_dialog")
+    driver.keep("compare log", (yield from press_run(dialog)))
+    driver.keep("compare results", dialog.results())
+    yield from close(dialog)
+    (made,) = QgsProject.instance().mapLayersByName("Differences")
+    iface.mapCanvas().setExtent(made.extent())
+    yield 1.0
+    driver.picture("differences")
+    driver.keep("heights", sorted({one["height_mm"] for one in made.getFeatures()}))
+    driver.keep("legend", [item.label() for item in made.renderer().legendSymbolItems()])
+    saved = str(driver.folder / "differences.gpkg")
+    options = QgsVectorFileWriter.SaveVectorOptions()
+    QgsVectorFileWriter.writeAsVectorFormatV3(made, saved, QgsProject.instance().transformContext(), options)
+    driver.keep("saved", QgsVectorLayer(saved, "again", "ogr").featureCount() - made.featureCount())
 
 
 def batch(driver: Driver) -> Iterator:

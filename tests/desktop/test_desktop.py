@@ -17,6 +17,7 @@ SCENARIOS = (
     "review",
     "growing",
     "deliveries",
+    "alignments",
     "batch",
     "model",
 )
@@ -242,6 +243,21 @@ def test_lines_from_files_are_judged(run_scenario):
     dataset = ogr.Open(str(session.folder / "found.gpkg"))
     reasons = {feature["reason"] for feature in dataset.GetLayer(0)}
     assert reasons <= {"a rail has no points", "gauge off by more than 10 mm", "standard error above 5 mm"}
+
+
+def test_kilometres_and_differences_from_their_dialogs(run_scenario):
+    session = run_scenario("alignments")
+    kilometres = session["kilometres"]
+    assert len(kilometres["rows"]) == 6
+    assert all(7.5 < km < 7.8 and offset_m > 0 for km, offset_m, _ in kilometres["rows"])
+    assert "beyond" not in session["station log"]
+    results = session["compare results"]
+    assert results["MISSING_LENGTH"] == results["EXTRA_LENGTH"] == 0
+    assert results["SHIFT_UP"] == pytest.approx(10, abs=0.3)
+    assert all(9 < height < 11 for height in session["heights"])  # the shift is also along the gradient
+    assert session["legend"][0] == "moved by more than three standard errors"
+    assert session["saved"] == 0
+    assert "have moved by more than 3 standard errors" in session["compare log"]
 
 
 def test_batch_writes_what_is_named_and_skips_what_is_blank(run_scenario):

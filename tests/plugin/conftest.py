@@ -219,6 +219,7 @@ OUTPUTS = {
     "buildtrackcenterlines": ("OUTPUT.gpkg",),
     "measuretrackgeometry": ("OUTPUT.gpkg",),
     "stationalongaxis": ("OUTPUT.gpkg",),
+    "comparetracks": ("OUTPUT.gpkg", "REPORT.html"),
     "exportalignment": ("OUTPUT.xml",),
     "importalignment": ("ELEMENTS.gpkg", "AXIS.gpkg"),
     "trainrailclassifier": ("WEIGHTS.npz",),

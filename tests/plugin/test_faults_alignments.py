@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 from faults import FINE, REFUSED, WARNED, Fault
-from qgis.core import QgsFeature, QgsVectorLayer
+from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
 from rail_extract.core.fields import ELEMENT_FIELDS
 from rail_extract.rail_extract_plugin.writing.layers import fields
 
@@ -47,6 +47,14 @@ def of_file(text=None, name="design.xml", **parameters):
         return {"INPUT": path, **parameters}
 
     return prepare
+
+
+def line_at(bench, x):
+    bench.layer = QgsVectorLayer("LineString?crs=EPSG:25832", "tracks", "memory")
+    feature = QgsFeature()
+    feature.setGeometry(QgsGeometry.fromWkt(f"LineString({x} 5804300, {x + 90} 5804300)"))
+    bench.layer.dataProvider().addFeature(feature)
+    return bench.layer
 
 
 IMPORTED = [
@@ -164,6 +172,18 @@ IMPORTED = [
         of_file(landxml(head=METRIC + '<CoordinateSystem epsgCode="2222"/>')),
         REFUSED,
         "design.xml is in metres, but its coordinate system EPSG:2222 is not: choose another CRS, or correct the file.",
+    ),
+    Fault(
+        "deviations without tracks",
+        lambda bench: {**of_file()(bench), "DEVIATIONS": bench.folder / "out" / "AXIS2.gpkg"},
+        REFUSED,
+        "DEVIATIONS and REPORT compare measured tracks with the alignments: choose TRACKS.",
+    ),
+    Fault(
+        "tracks elsewhere",
+        lambda bench: {**of_file()(bench), "TRACKS": line_at(bench, 579_000.0)},
+        REFUSED,
+        "None of TRACKS lies along an alignment of INPUT: check the coordinate system of both.",
     ),
     Fault(
         "a file that does not exist",

@@ -21,6 +21,7 @@ def test_toolbox_offers_the_algorithms(qgis, plugin):
             "buildtrackcenterlines",
             "measuretrackgeometry",
             "stationalongaxis",
+            "comparetracks",
             "exportalignment",
             "importalignment",
             "trainrailclassifier",

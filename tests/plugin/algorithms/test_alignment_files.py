@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from osgeo import ogr
-from qgis.core import QgsFeature, QgsProcessingUtils, QgsVectorLayer, QgsWkbTypes
+from qgis.core import NULL, QgsFeature, QgsGeometry, QgsLineString, QgsProcessingUtils, QgsVectorLayer, QgsWkbTypes
 from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
 from rail_extract.core.alignment.table import rows
 from rail_extract.core.fields import ELEMENT_FIELDS
@@ -97,6 +97,37 @@ def test_axes_have_kilometres_as_m_values(exported, imported):
     assert (vertices[0].z(), axis["name"], axis["km_to"]) == (50.0, "Track 4", 12.36)
     off = [vertex.distance(vertices[0]) for vertex in vertices]
     assert np.interp(12.05, [one.m() for one in vertices], off) == pytest.approx(50, abs=0.01)
+
+
+def test_a_dialog_asks_for_no_output_that_needs_tracks(qgis, plugin):
+    algorithm = qgis.processingRegistry().createAlgorithmById("railextract:importalignment")
+    asked = [one.name() for one in algorithm.destinationParameterDefinitions() if one.createByDefault()]
+    assert asked == ["ELEMENTS", "AXIS"]
+
+
+def test_tracks_are_compared_with_the_design_beside_them(exported, run_step, context, tmp_path):
+    _, path = exported("a.xml", table(design(), design(5)))
+    other, s = design(5), np.arange(12.0, 350.0, 4.0)
+    heading = other.headings(s)
+    xyz = FRAME.to_crs(
+        other.xyz(s) + np.column_stack([-np.sin(heading), np.cos(heading), np.full(len(s), 0.4)]) * 0.015
+    )
+    tracks = QgsVectorLayer("LineStringZ?crs=EPSG:25832&field=track_id:integer", "survey", "memory")
+    feature = QgsFeature(tracks.fields())
+    feature.setGeometry(QgsGeometry(QgsLineString(*xyz.T.tolist())))
+    feature["track_id"] = 9
+    tracks.dataProvider().addFeature(feature)
+    outputs = {"ELEMENTS": None, "AXIS": None, "DEVIATIONS": "memory:", "REPORT": tmp_path / "r.html"}
+    outcome = run_step("importalignment", {"INPUT": path, "TRACKS": tracks, **outputs})
+    assert outcome.ok, outcome.error
+    found = list(QgsProcessingUtils.mapLayerFromString(outcome.results["DEVIATIONS"], context).getFeatures())
+    assert [one["s"] for one in found] == list(range(12, 349))
+    assert {one["track_id"] for one in found} == {9}
+    assert [one["slew_mm"] for one in found] == pytest.approx([15.0] * len(found), abs=0.02)
+    assert [one["lift_mm"] for one in found] == pytest.approx([6.0] * len(found), abs=0.3)
+    assert {one["cant_diff_mm"] for one in found} == {NULL}
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "<b>15.0 mm</b><span>slew, RMS" in page and "Track 5</h2>" in page and "is a proposal" not in page
 
 
 def test_gdal_reads_the_dxf(exported):

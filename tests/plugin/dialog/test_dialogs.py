@@ -24,7 +24,7 @@ NAMES = (
         "buildtrackcenterlines",
     ),
     *("measuretrackgeometry", "stationalongaxis", "trainrailclassifier", "installpackages", "checkinstallation"),
-    *("exportalignment", "importalignment"),
+    *("exportalignment", "importalignment", "comparetracks"),
 )
 SMALLEST_ICON = 16
 
@@ -135,7 +135,7 @@ def test_every_algorithm_has_its_own_icon(make):
 
 @pytest.mark.parametrize(
     ("word", "found"),
-    [("rail", 14), ("gleis", 12), ("voie", 12), ("vía", 12), ("railway", 12), ("laz", 6), ("gauge", 3), ("torch", 1)],
+    [("rail", 15), ("gleis", 13), ("voie", 13), ("vía", 13), ("railway", 13), ("laz", 6), ("gauge", 4), ("torch", 1)],
 )
 def test_toolbox_search(make, word, found):
     assert sum(any(word in tag.lower() for tag in make(name).tags()) for name in NAMES) == found

@@ -27,10 +27,13 @@ from qgis.PyQt.QtXml import QDomDocument
 from rail_extract.core.fields import (
     AXIS_FIELDS,
     CENTERLINE_FIELDS,
+    DEVIATION_FIELDS,
+    DIFFERENCE_FIELDS,
     ELEMENT_FIELDS,
     FINDING_FIELDS,
     QUALITY_FIELDS,
     RAIL_FIELDS,
+    STATION_FIELDS,
     STOP_FIELDS,
 )
 from rail_extract.core.frame import LocalFrame
@@ -47,8 +50,10 @@ KINDS = {
     "quality": ("PointZ", QUALITY_FIELDS),
     "findings": ("LineStringZ", FINDING_FIELDS),
     "stops": ("PointZ", STOP_FIELDS),
+    "differences": ("PointZ", DIFFERENCE_FIELDS),
     "elements": ("LineStringZ", ELEMENT_FIELDS),
     "axes": ("LineStringZM", AXIS_FIELDS),
+    "deviations": ("PointZ", DEVIATION_FIELDS),
 }
 
 
@@ -149,6 +154,16 @@ def test_fields_have_names_in_words_with_units(styled, style):
             assert alias.endswith(unit) or not field.name.endswith(ending) or alias.endswith("[mm]"), alias
 
 
+def test_fields_of_kilometres_have_names_in_words(styled):
+    layer = styled("quality")
+    layer.dataProvider().addAttributes(fields(STATION_FIELDS).toList())
+    layer.updateFields()
+    layer.loadNamedStyle(str(STYLES / "quality.qml"))
+    names = [layer.attributeAlias(layer.fields().lookupField(field.name)) for field in STATION_FIELDS]
+    assert names[2:5] == ["Kilometre", "Kilometre as text", "Offset from the axis [m]"]
+    assert all(names)
+
+
 @pytest.mark.parametrize(
     ("style", "values", "said"),
     [
@@ -156,17 +171,46 @@ def test_fields_have_names_in_words_with_units(styled, style):
         ("centerlines", {"track_id": 2, "gauge_mm": 1436.04}, ["Track 2", "Gauge: 1,436.0 mm", "Cant: unknown"]),
         ("quality", {"track_id": 2, "chainage_m": 17.0}, ["Track 2, 17.0 m", "Gauge: unknown"]),
         ("stops", {"stop": 2, "reason": "the cloud ends"}, ["Stop 2", "the cloud ends"]),
+        ("differences", {"line_id": 3, "chainage_m": 5.0, "state": "both"}, ["Line 3, 5 m: both", "height ? mm"]),
         ("findings", {"finding": 4, "reason": "gauge off", "track_id": 1}, ["4: gauge off", "Track 1", "Review: open"]),
     ],
 )
 def test_map_tips_say_what_is_under_the_mouse(styled, style, values, said):
-    shape = "POINT Z (500000 3000000 1)" if style in ("quality", "stops") else LINE
+    shape = "POINT Z (500000 3000000 1)" if style in ("quality", "stops", "differences") else LINE
     layer = styled(style, [(shape, values)])
     scopes = QgsExpressionContext(QgsExpressionContextUtils.globalProjectLayerScopes(layer))
     scopes.setFeature(next(layer.getFeatures()))
     tip = QgsExpression.replaceExpressionText(layer.mapTipTemplate(), scopes)
     for words in said:
         assert words in tip
+
+
+ARC = {"layout": "H", "type": "arc", "r1_m": -500.0, "r2_m": -500.0, "length_m": 80.0, "track_id": 3}
+GRADE = {"layout": "V", "type": "grade", "grade1_pm": 2.5, "grade2_pm": 2.5, "length_m": 40.0}
+
+
+@pytest.mark.parametrize(
+    ("style", "values", "label", "tip"),
+    [
+        ("elements", ARC, "R -500, 80.0 m", "Radius: -500.0 to -500.0"),
+        (
+            "elements",
+            {**ARC, "type": "clothoid", "a_param": 200.0, "r1_m": None},
+            "A 200, 80.0 m",
+            "straight to -500.0",
+        ),
+        ("elements", GRADE, None, "Gradient: 2.50 to 2.50 ‰"),
+        ("axes", {"name": "Siding", "km_from": 12.5, "km_to": 13.0}, "Siding km 12.500", "12.500 to 13.000"),
+    ],
+)
+def test_labels_and_tips_of_alignments(styled, style, values, label, tip):
+    layer = styled(style, [(LINE, values)])
+    scopes = QgsExpressionContext(QgsExpressionContextUtils.globalProjectLayerScopes(layer))
+    scopes.setFeature(next(layer.getFeatures()))
+    expression = QgsExpression(layer.labeling().settings().fieldName)
+    found = expression.evaluate(scopes)
+    assert not expression.hasParserError() and (found or None) == label
+    assert tip in QgsExpression.replaceExpressionText(layer.mapTipTemplate(), scopes)
 
 
 def test_the_review_is_chosen_from_a_list(styled):
@@ -234,8 +278,10 @@ def test_layers_can_be_drawn(styled, style):
         "quality": ("POINT Z (500050 3000000 1)", {"track_id": 1, "gauge_mm": 1435.0, "bridged": 1}),
         "findings": (LINE, {"finding": 1, "review": "accepted"}),
         "stops": ("POINT Z (500050 3000000 1)", {"stop": 1, "reason": "the cloud ends"}),
+        "differences": ("POINT Z (500050 3000000 1)", {"line_id": 1, "state": "both", "moved": 1}),
         "elements": (LINE, {"type": "arc"}),
         "axes": (LINE, {"track_id": 1}),
+        "deviations": ("POINT Z (500050 3000000 1)", {"track_id": 1, "slew_mm": 12.0}),
     }
     layer = styled(style, [rows[style]])
     settings = QgsMapSettings()
@@ -250,7 +296,8 @@ def test_layers_can_be_drawn(styled, style):
     image = job.renderedImage()
     seen = {image.pixelColor(x, y).name() for x in range(60, 200) for y in range(100, 200)}
     colours = {"rails": "#1565c0", "centerlines": "#e64a19", "quality": "#f28e2b", "findings": "#84b397"}
-    assert {**colours, "stops": "#e64a19", "elements": "#1565c0", "axes": "#8e5bb5"}[style] in seen
+    colours.update(stops="#e64a19", elements="#1565c0", axes="#8e5bb5", deviations="#b2182b", differences="#b2182b")
+    assert colours[style] in seen
 
 
 @pytest.mark.parametrize("style", ["rails", "centerlines", "findings"])
