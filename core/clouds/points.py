@@ -51,7 +51,7 @@ class RailPoints:
         return replace(self, xyz=self.xyz[which], strips=None if self.strips is None else self.strips[which])
 
 
-def _strips(xyz: np.ndarray, marks: np.ndarray) -> np.ndarray:
+def strips_of(xyz: np.ndarray, marks: np.ndarray) -> np.ndarray:
     """Return the strips, (n,), of points, (n, 3) local metres, by their marks."""
     found, number = np.unique(marks, return_inverse=True)
     places = np.floor(xyz[:, :2] / PLACE_M).astype(np.int64)
@@ -119,7 +119,7 @@ def read_requested(request: Request, progress: Progress = SILENT) -> tuple[RailP
     xyz, codes, marks = _collect(request, progress)
     frame = request.frame_at([np.unique(column, return_counts=True) for column in origin_steps(xyz).T])
     local = frame.to_local(xyz)
-    strips = _strips(local, marks)
+    strips = strips_of(local, marks)
     return tuple(
         RailPoints(local[codes == code], frame, int(code), several(strips[codes == code])) for code in np.unique(codes)
     )

@@ -52,6 +52,37 @@ def _layer(name: str, label: str, kind: QgsProcessing.SourceType, optional: bool
     return made
 
 
+def airborne_centerlines() -> QgsProcessingParameterDefinition:
+    """Define the layer of tracks seen in an airborne cloud."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return helped(
+        _layer("CENTERLINES", tr("Track centerlines"), line, optional=True),
+        tr("Lines in the middle of the tracks at the top of the rails, where they are seen, with standard errors."),
+    )
+
+
+def airborne_stations() -> QgsProcessingParameterDefinition:
+    """Define the layer of stations along guides."""
+    point = QgsProcessing.SourceType.TypeVectorPoint
+    return helped(
+        _layer("STATIONS", tr("Stations"), point, optional=True),
+        tr(
+            "A point every 10 m along each guide: whether the track is seen, or why not; bed, cant, radius, gradient "
+            "and standard errors."
+        ),
+    )
+
+
+def airborne_figures() -> Numbers:
+    """Define the figures about tracks seen in an airborne cloud."""
+    return (
+        *centerline_figures(),
+        QgsProcessingOutputNumber("GUIDE_LENGTH", tr("Length of the guides [m]")),
+        QgsProcessingOutputNumber("SEEN_LENGTH", tr("Length on which tracks are seen [m]")),
+        QgsProcessingOutputNumber("DENSITY", tr("Points per square metre along the guides")),
+    )
+
+
 def differences() -> QgsProcessingParameterDefinition:
     """Define the layer of differences between two surveys."""
     point = QgsProcessing.SourceType.TypeVectorPoint

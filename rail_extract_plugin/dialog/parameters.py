@@ -24,6 +24,7 @@ from ...core.parameters import (
     LEAVE_OUT,
     METHODS,
     STRIPS,
+    AirborneParameters,
     ComparisonParameters,
     GrowParameters,
     Parameters,
@@ -51,6 +52,9 @@ MAX_CROWN_RADIUS_M = 10_000.0
 MAX_LENGTH_M = 100_000.0
 """Longer than any gap to close, any minimum line length and any step between stations."""
 
+
+MAX_GUIDE_REACH_M, MAX_FOOTPRINT_M, MAX_RAIL_M = 6.0, 2.0, 0.5
+"""Beyond, a guide means another track, a footprint covers both rails, and a rail is not a rail."""
 
 MAX_REACH_M = 2.0
 """Two tracks are further apart than this."""
@@ -87,6 +91,27 @@ def rail(detect: bool = False) -> Definitions:
         advanced(
             number("HEAD_WIDTH", tr("Railhead width [mm]"), minimum=1.0, optional=True, decimals=MM_DECIMALS),
             tr("Width of the head of one rail. Leave empty to use the value of the standard."),
+        ),
+    )
+
+
+def airborne() -> Definitions:
+    """Define how tracks are looked for in an airborne cloud."""
+    return (
+        helped(
+            number("REACH", tr("Reach [m]"), AirborneParameters.reach_m, 0.5, MAX_GUIDE_REACH_M),
+            tr("Largest distance of a track from its guide."),
+        ),
+        helped(
+            number("FOOTPRINT", tr("Footprint [m]"), AirborneParameters.footprint_m, 0.01, MAX_FOOTPRINT_M),
+            tr(
+                "Diameter of the laser beam on the ground: flying height times divergence, such as 1000 m times 0.25 "
+                "mrad. Where it is not known, 0.3 m suits most flights; the report states what the rails look like."
+            ),
+        ),
+        helped(
+            number("RAIL_HEIGHT", tr("Rails above the bed [m]"), AirborneParameters.rail_height_m, 0.0, MAX_RAIL_M),
+            tr("Top of the rails above the bed between them, which the points show. It depends on the ballast."),
         ),
     )
 

@@ -25,6 +25,7 @@ from qgis.core import (
     QgsWkbTypes,
 )
 
+from ...core.airborne.survey import Guide, gauge_of
 from ...core.clouds.crs import MAX_COORDINATE, parse_crs, units, warn_of_scale
 from ...core.clouds.mask import Mask
 from ...core.comparison.tracks import SurveyedLine
@@ -144,6 +145,33 @@ def read_guide(
     if not lines:
         raise RailExtractError("GUIDE has no lines: give a line layer.")
     return lines
+
+
+def read_tracks_meant(
+    source: QgsProcessingFeatureSource, crs: QgsCoordinateReferenceSystem, context: QgsProcessingContext
+) -> tuple[Guide, ...]:
+    """Read the lines of a guide in the coordinate system of the cloud, with the name, reference and gauge of each.
+
+    Parameters
+    ----------
+    source, crs, context
+        See `read_guide`.
+    """
+    shapes = _transformed(source, crs, context, "GUIDE")
+    features = source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS)
+    guides = tuple(
+        Guide(
+            feature.id(),
+            vertices[:, :2],
+            gauge_of(value_of(feature, "gauge")),
+            *(str(value_of(feature, name) or "") for name in ("name", "ref")),
+        )
+        for feature, shape in zip(features, shapes)
+        for vertices in _parts(shape, CHORD_TOLERANCE_M)
+    )
+    if not guides:
+        raise RailExtractError("GUIDE has no lines: give a line layer.")
+    return guides
 
 
 def read_seeds(

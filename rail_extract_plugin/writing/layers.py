@@ -28,6 +28,8 @@ from qgis.core import (
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
 from ...core.fields import (
+    AIRBORNE_FIELDS,
+    AIRBORNE_STATION_FIELDS,
     AXIS_FIELDS,
     BRIDGED,
     CENTERLINE_FIELDS,
@@ -55,6 +57,7 @@ from .whole_files import write_whole
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.airborne.survey import AirborneLine, AirborneTrack
     from ...core.alignment.deviations import Deviations
     from ...core.alignment.elements import Alignment
     from ...core.comparison.tracks import LineDifferences, TrackComparison
@@ -65,7 +68,7 @@ if TYPE_CHECKING:
     from ...core.raster_file import RasterHeader
     from ...core.report import Finding
 
-    Line = Union[RailLine, Centerline, Finding]
+    Line = Union[RailLine, Centerline, Finding, AirborneLine]
 
 KINDS = {int: INTEGER, float: REAL, str: TEXT}
 
@@ -81,6 +84,7 @@ class LayerKind:
 RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELDS, "centerlines")
 QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
 STOPS = LayerKind(STOP_FIELDS, "stops")
+AIRBORNE, STATIONS = LayerKind(AIRBORNE_FIELDS, "airborne"), LayerKind(AIRBORNE_STATION_FIELDS, "stations")
 DIFFERENCES = LayerKind(DIFFERENCE_FIELDS, "differences")
 ELEMENTS, AXES = LayerKind(ELEMENT_FIELDS, "elements"), LayerKind(AXIS_FIELDS, "axes")
 DEVIATIONS = LayerKind(DEVIATION_FIELDS, "deviations")
@@ -144,7 +148,7 @@ def copies(originals: Sequence[QgsFeature], columns: QgsFields, rows: Sequence[S
         yield feature
 
 
-def is_flat(lines: Sequence[Line | TrackGeometry | LineDifferences]) -> bool:
+def is_flat(lines: Sequence[Line | TrackGeometry | LineDifferences] | Sequence[AirborneTrack]) -> bool:
     """Return whether there are lines, and none has heights."""
     return bool(lines) and all(any(map(math.isnan, line.xyz[:, 2])) for line in lines)
 
@@ -220,6 +224,35 @@ def write_stations(
     shape = QgsWkbTypes.Type.Point if is_flat(tracks) else QgsWkbTypes.Type.PointZ
     made = stations(tracks, frame)
     return _write(algorithm, name, quality_of(tracks), shape, made, frame, parameters, context)
+
+
+def write_airborne_stations(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    tracks: Sequence[AirborneTrack],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the stations along guides as points.
+
+    Parameters
+    ----------
+    tracks : sequence of AirborneTrack
+    algorithm, name, frame, parameters, context
+        See `write_lines`.
+    """
+    shape = QgsWkbTypes.Type.Point if is_flat(tracks) else QgsWkbTypes.Type.PointZ
+    return _write(algorithm, name, STATIONS, shape, _airborne_stations(tracks, frame), frame, parameters, context)
+
+
+def _airborne_stations(tracks: Sequence[AirborneTrack], frame: LocalFrame) -> Iterator[QgsFeature]:
+    for track in tracks:
+        profiles = (getattr(track, column.name) for column in STATIONS.columns[2:])
+        ids = [number or None for number in track.track_id.tolist()]
+        for (x, y, z), *row in zip(frame.to_crs(track.xyz).tolist(), ids, repeat(track.guide_id), *profiles):
+            place = QgsPoint(x, y) if math.isnan(z) else QgsPoint(x, y, z)
+            yield _feature(QgsGeometry(place), row, STATIONS.columns)
 
 
 def write_stops(
@@ -395,7 +428,7 @@ def write_raster(
     return {name: path}
 
 
-def figures_of(lines: Sequence[RailLine | Centerline], what: str) -> dict[str, Any]:
+def figures_of(lines: Sequence[RailLine | Centerline] | Sequence[AirborneLine], what: str) -> dict[str, Any]:
     """Return the number and length of lines as outputs: RAIL_COUNT and RAIL_LENGTH if `what` is RAIL."""
     return {f"{what}_COUNT": len(lines), f"{what}_LENGTH": LENGTH.value(sum(line.length_m for line in lines))}
 

@@ -26,8 +26,8 @@ FINDINGS = "findings"
 NO_PROPERTIES: Mapping[str, str] = {}
 
 BOTTOM_TO_TOP = (
-    *("raster", "findings", "rails", "centerlines", "axes", "elements"),
-    *("deviations", "quality", "differences", "stops"),
+    *("raster", "findings", "rails", "centerlines", "airborne", "axes", "elements"),
+    *("deviations", "quality", "stations", "differences", "stops"),
 )
 """Order of the layers in the group, by style."""
 

@@ -26,7 +26,8 @@ DIES_AT_EXIT = ("rails", 340)
 """Scenario and version in which QGIS dies after it was closed, as it also does after two runs of its own algorithms."""
 
 NAMES = [
-    *("extractrails", "classifyrailpoints", "growrailpoints", "rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
+    *("extractrails", "classifyrailpoints", "growrailpoints", "airbornecenterlines"),
+    *("rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
     *("buildtrackcenterlines", "measuretrackgeometry", "trainrailclassifier", "installpackages", "checkinstallation"),
 ]
 

@@ -18,6 +18,7 @@ NAMES = (
         "extractrails",
         "classifyrailpoints",
         "growrailpoints",
+        "airbornecenterlines",
         "rasterizerailpoints",
         "frpdfcleanup",
         "vectorizerails",
