@@ -29,7 +29,7 @@ from ...core.parameters import (
     GrowParameters,
     Parameters,
 )
-from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS, UNCONFIRMED_PROFILES
+from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS
 from ..i18n import tr
 from .definitions import MM_DECIMALS, Definitions, advanced, choice, choices, helped, number
 
@@ -71,24 +71,24 @@ STANDARD_WIDGET = {"widget_wrapper": {"class": f"{__package__}.standard_widget.S
 
 def rail(detect: bool = False) -> Definitions:
     """Define the rail standard, gauge and railhead width; with `detect`, the points may tell them."""
-    hint = tr(" DETECT measures the rails in part of the points and takes the standard that fits.") if detect else ""
+    hint = tr(" DETECT measures the rails in part of the points, and says how sure it is.") if detect else ""
     standard = choice("STANDARD", tr("Rail standard"), (*STANDARDS, CUSTOM, *([DETECT] if detect else [])), DEFAULT)
     standard.setMetadata(STANDARD_WIDGET)
     return (
         helped(
             standard,
             tr(
-                "Rail profile and gauge, which give the rail spacing and the railhead width: EN_60E1_1435 is the "
-                "profile 60E1 of EN 13674 on 1435 mm gauge. CUSTOM takes both from the two fields below. Widths not "
-                "confirmed by a table: {}."
-            ).format(", ".join(UNCONFIRMED_PROFILES))
+                "Rail profile and gauge, which give the rail spacing and the railhead width. CUSTOM takes both from "
+                "GAUGE "
+                "and HEAD_WIDTH."
+            )
             + hint,
         ),
-        helped(
+        advanced(
             number("GAUGE", tr("Gauge [mm]"), minimum=1.0, optional=True, decimals=MM_DECIMALS),
             tr("Distance between the inner faces of the two railheads. Leave empty to use the value of the standard."),
         ),
-        helped(
+        advanced(
             number("HEAD_WIDTH", tr("Railhead width [mm]"), minimum=1.0, optional=True, decimals=MM_DECIMALS),
             tr("Width of the head of one rail. Leave empty to use the value of the standard."),
         ),
@@ -191,7 +191,7 @@ def vertical_curves() -> QgsProcessingParameterDefinition:
 def area() -> Definitions:
     """Define the extent and the coordinate system of the cloud."""
     return (
-        helped(
+        advanced(
             QgsProcessingParameterExtent("EXTENT", tr("Extent"), optional=True),
             tr("Only points inside this rectangle are read. Leave empty to read all points."),
         ),
@@ -309,7 +309,7 @@ def lines() -> Definitions:
 
 def max_gap() -> QgsProcessingParameterDefinition:
     """Define the longest gap to close."""
-    return helped(
+    return advanced(
         number("MAX_GAP", tr("Longest gap to close [m]"), Parameters.max_gap_m, maximum=MAX_LENGTH_M),
         tr(
             "Line ends up to this distance apart are joined if they point at each other; 0 joins none. Where only one "
@@ -364,8 +364,8 @@ def method() -> Definitions:
                 "WEIGHTS", tr("Weights of the classifier"), optional=True, fileFilter=tr("Weights (*.npz)")
             ),
             tr(
-                "The file that Train Rail Classifier has written, for METHOD LEARNED. Leave empty to use the weights "
-                "that were trained on simulated clouds."
+                "The file that Train Rail Classifier has written, for LEARNED. Leave empty to use the weights that "
+                "were trained on simulated clouds."
             ),
         ),
     )
@@ -445,7 +445,7 @@ def content() -> Definitions:
         ),
         helped(
             QgsProcessingParameterEnum("CONTENT", tr("Content of the output"), contents, defaultValue=0),
-            tr("0 writes the whole cloud, 1 only the points on rails."),
+            tr("The whole cloud (0), or only the points on rails (1)."),
         ),
     )
 
