@@ -11,16 +11,19 @@ where G is the second integral of a ramp from 0 to 1. With `order` 1, slope s is
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg.lapack import dgeqrf
 
 JUMP_M = 1e-6
 """A jump is computed as a ramp of this length, metres, far below any effect."""
 
 LONGEST_SHIFT_M = 50.0
 """Expected largest shift of a joint in a step, metres: it keeps a joint in place that the data do not see."""
+
+LEAST_GAIN = 0.05
+"""Fall of chi-square below which a further step is not worth it."""
 
 ROOM_SHARE = 0.45
 """Share of the room to its neighbours that a joint may take in a step, so that two cannot pass each other."""
@@ -105,36 +108,41 @@ class Chain:
         return replace(self, p=inner[0::2], q=inner[1::2])
 
 
-def columns(chain: Chain, samples: Samples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def columns(chain: Chain, samples: Samples) -> tuple[np.ndarray, np.ndarray]:
     """Return the columns of the model.
 
     Returns
     -------
     base : (n, order + m) array
         Of offset, slope and the bends of all parts.
-    by_p, by_q : (n, m - 1) array
-        Derivatives of G with respect to the ends of each joint.
+    by : (n, 2 m - 2) array
+        Derivatives of G by the ends of each joint: p and q of the first, of the second, and so on.
     """
+    count = len(chain.bends)
     x = (samples.s - chain.start)[:, None]
     d = np.maximum(chain.q - chain.p, JUMP_M)
     ahead = x - (chain.p - chain.start)
-    u = np.clip(ahead, 0.0, d)
+    u = np.minimum(np.maximum(ahead, 0.0), d)
     v = np.maximum(ahead - d, 0.0)
-    half_spread = 0.5 * samples.spread[:, None]
+    ratio = u / d
+    base, by = np.empty((len(x), chain.order + count + 1)), np.empty((len(x), 2 * count - 2))
+    base[:, 0] = 1.0
     if chain.order == 1:
-        g = u * u / (2.0 * d) + v
-        by_p = -0.5 * (ahead > 0.5 * d)
-        by_q = by_p
-        whole = [np.ones_like(x), x]
+        g = 0.5 * u * ratio + v
+        by[:, 0::2] = by[:, 1::2] = -0.5 * (ahead > 0.5 * d)
+        base[:, 1] = x[:, 0]
     else:
-        ratio = u / d
-        g = u * u * ratio / 6.0 + v * (0.5 * d + 0.5 * v) + half_spread * ratio
-        third, half_v = u * ratio * ratio / 6.0, 0.5 * v
-        by_p = third - 0.5 * u * ratio - half_v
-        by_q = -third - half_v
-        whole = [np.ones_like(x), x, 0.5 * x * x + half_spread]
-    g = np.concatenate([whole[-1], g, np.zeros_like(x)], axis=1)
-    return np.concatenate([*whole[:-1], g[:, :-1] - g[:, 1:]], axis=1), by_p, by_q
+        half_spread = 0.5 * samples.spread[:, None]
+        g = u * u * ratio / 6.0 + 0.5 * v * (d + v) + half_spread * ratio
+        third, half = u * ratio * ratio / 6.0, 0.5 * v
+        by[:, 0::2] = third - 0.5 * u * ratio - half
+        by[:, 1::2] = -third - half
+        base[:, 1] = x[:, 0]
+        base[:, 2] = (0.5 * x * x + half_spread)[:, 0]
+    base[:, chain.order + 1 : -1] = g
+    base[:, -1] = 0.0
+    base[:, chain.order : -1] -= base[:, chain.order + 1 :]
+    return base[:, :-1], by
 
 
 def fitted(chain: Chain, samples: Samples, least_m: float, steps: int) -> tuple[Chain, float]:
@@ -147,34 +155,32 @@ def fitted(chain: Chain, samples: Samples, least_m: float, steps: int) -> tuple[
     least_m : float
         Least length of a part or a ramp, metres.
     steps : int
+        Largest number of steps.
     """
     best, best_rss = chain, np.inf
+    free, unknown = np.array((True,) * chain.order + chain.curved), chain.unknown
+    chosen = (unknown[:, None] == np.arange(unknown.max(initial=-1) + 1)).astype(float)
     for step in range(steps + 1):
-        base, by_p, by_q = columns(chain, samples)
-        free = np.concatenate([np.ones(chain.order, dtype=bool), chain.curved])
-        unknown = chain.unknown
-        change = np.diff(chain.bends)
-        knot_columns = np.zeros((len(samples.s), int(unknown.max(initial=-1)) + 1))
-        for j in range(len(change)):
-            for by, number in ((by_p, unknown[2 * j]), (by_q, unknown[2 * j + 1])):
-                if number >= 0:
-                    knot_columns[:, number] += change[j] * by[:, j]
-        linear = int(free.sum())
-        matrix = np.column_stack([base[:, free], knot_columns, samples.y]) * samples.root[:, None]
-        factor = np.linalg.qr(matrix, mode="r")
-        rss = float(factor[linear:, -1] @ factor[linear:, -1])
-        values = np.zeros(len(free))
+        base, by = columns(chain, samples)
+        by_knots = (by * np.repeat(np.diff(chain.bends), 2)) @ chosen
+        matrix = np.concatenate([base[:, free], by_knots, samples.y[:, None]], axis=1) * samples.root[:, None]
+        factor = np.triu(dgeqrf(matrix)[0][: matrix.shape[1]])
+        linear = matrix.shape[1] - by_knots.shape[1] - 1
+        rest = factor[linear:, -1]
+        rss, values = float(rest @ rest), np.zeros(len(free))
         values[free] = _solved(factor[:linear, :linear], factor[:linear, -1])
+        was_flat = not chain.bends.any()
         chain = replace(chain, bends=values[chain.order :])
-        if rss < best_rss:
+        gain = best_rss - rss
+        if gain > 0:
             best, best_rss = chain, rss
-        if step == steps or not knot_columns.shape[1]:
+        if step == steps or not len(chosen) or (gain < LEAST_GAIN and step > 1):
             break
-        if step == 0 and not change.any():
+        if was_flat:
             continue
         lower = factor[linear:-1, linear:-1]
         normal = lower.T @ lower + np.eye(len(lower)) / LONGEST_SHIFT_M**2
-        shift = np.linalg.solve(normal, lower.T @ factor[linear:-1, -1])
+        shift = np.linalg.solve(normal, lower.T @ rest[:-1])
         chain = _moved(chain, unknown, shift, least_m)
     return best, best_rss
 

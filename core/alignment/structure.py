@@ -29,7 +29,7 @@ SHOULDER_M = 150.0
 SCREEN_STEPS, FIT_STEPS = 3, 6
 """Gauss-Newton steps for a first look at a candidate, and for one that may be accepted."""
 
-HANGING = 3.0
+HANGING = 3.7
 """Residuals hang together if the sum of some neighbours exceeds this many times its standard error."""
 
 SAME_M = 12.0
