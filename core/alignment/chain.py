@@ -41,7 +41,7 @@ class Samples:
         Variance of the distance within the block, square metres: the mean of a bent signal is off by half of it times
         the bend.
     root : (n,) array
-        Square root of the weight of the block, 1/m: of its points' number over their variance.
+        Square root of the weight of the block, 1/m: inverse of the standard deviation of what is independent in it.
     """
 
     s: np.ndarray
@@ -49,7 +49,7 @@ class Samples:
     spread: np.ndarray
     root: np.ndarray
 
-    def __getitem__(self, which: np.ndarray) -> Samples:
+    def __getitem__(self, which: np.ndarray | slice) -> Samples:
         return Samples(self.s[which], self.y[which], self.spread[which], self.root[which])
 
 
@@ -190,8 +190,7 @@ def residuals(chain: Chain, samples: Samples) -> np.ndarray:
     base = columns(chain, samples)[0]
     rest = (samples.y - base[:, chain.order :] @ chain.bends) * samples.root
     loose = base[:, : chain.order] * samples.root[:, None]
-    rest = rest - loose @ np.linalg.lstsq(loose, rest, rcond=None)[0]
-    return rest[np.argsort(samples.s)]
+    return rest - loose @ np.linalg.lstsq(loose, rest, rcond=None)[0]
 
 
 def _solved(upper: np.ndarray, right: np.ndarray) -> np.ndarray:

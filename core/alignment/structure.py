@@ -46,10 +46,10 @@ class Blocks:
     """Distance at which the first block begins, metres."""
 
     @classmethod
-    def of(cls, s: np.ndarray, y: np.ndarray, weight: np.ndarray) -> Blocks:
-        """Average a signal whose points have the weights `weight`, (n,) 1/m²; those with weight 0 are left out."""
-        used = weight > 0
-        s, y, weight = s[used], y[used], weight[used]
+    def of(cls, s: np.ndarray, y: np.ndarray, share: np.ndarray, sigma: float) -> Blocks:
+        """Average a signal whose points count as `share`, (n,), of one; those with 0 are left out."""
+        used = share > 0
+        s, y, weight = s[used], y[used], share[used] / sigma**2
         number = ((s - s[0]) // FINE_M).astype(int)
         return cls(_averaged(s, y, weight, number), _averaged(s, y, weight, number // COARSE), float(s[0]))
 
@@ -63,7 +63,9 @@ class Blocks:
             for one in (fine, coarse)
         )
         a, b = fine[where_fine < NEAR_M], coarse[where_coarse >= NEAR_M]
-        return Samples(*(np.concatenate([getattr(a, name), getattr(b, name)]) for name in ("s", "y", "spread", "root")))
+        both = [np.concatenate([getattr(a, name), getattr(b, name)]) for name in ("s", "y", "spread", "root")]
+        order = np.argsort(both[0])
+        return Samples(*(values[order] for values in both))
 
     @staticmethod
     def _inside(samples: Samples, chain: Chain) -> Samples:
