@@ -194,5 +194,15 @@ ELEMENT_FIELDS = (
     Field("joint", str, "how the element begins: G2 if curvature, gradient or cant continue, G1 if they jump"),
     Field("r_round_m", float, "proposed round radius, metres; empty if none fits the measured track", 3),
     Field("dev_rms_round_mm", float, "dev_rms_mm with the round radii, millimetres", 2),
+    Field("r_fit_m", float, "radius of an arc as fitted; the next fit holds r1_m where you change it", 4),
+    Field("s_fit_m", float, "s_from as fitted; the next fit holds s_from where you change it", 4),
 )
 """The element table: `alignment.table` writes and reads its rows. A shapefile cuts its long names."""
+
+DEVIATION_FIELDS = (
+    Field("track_id", int, "number of the track"),
+    Field("s", float, "distance along the design in plan, metres", 2),
+    Field("slew_mm", float, "measured minus design across, positive to the left, millimetres", 2),
+    Field("lift_mm", float, "measured minus design in height, millimetres", 2),
+    Field("cant_diff_mm", float, "measured minus design cant, millimetres; empty where the cant is unknown", 2),
+)

@@ -11,6 +11,7 @@ where G is the second integral of a ramp from 0 to 1. With `order` 1, slope s is
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -106,6 +107,58 @@ class Chain:
     def with_knots(self, inner: np.ndarray) -> Chain:
         """Return the chain with other joints, (2 m - 2,)."""
         return replace(self, p=inner[0::2], q=inner[1::2])
+
+
+@dataclass(frozen=True)
+class Span:
+    """A stretch of a chain that is to be assembled: a part, or a ramp between two parts.
+
+    Attributes
+    ----------
+    start, end : float
+        Distances, metres.
+    is_ramp : bool
+    curved : bool
+        Whether the bend of a part is free.
+    bend : float
+        Of a part; of a ramp, that at its end.
+    before : float
+        Bend at the start of a ramp.
+    """
+
+    start: float
+    end: float
+    is_ramp: bool
+    curved: bool = True
+    bend: float = 0.0
+    before: float = 0.0
+
+
+def assembled(spans: Sequence[Span], order: int) -> Chain:
+    """Return the chain of spans that follow each other: parts meet in jumps, and ramps in a part without length."""
+    curved: list[bool] = []
+    bends: list[float] = []
+    p: list[float] = []
+    q: list[float] = []
+    was_ramp = False
+    for span in spans:
+        if span.is_ramp:
+            if was_ramp or not curved:
+                curved.append(True)
+                bends.append(span.before)
+            p.append(span.start)
+            q.append(span.end)
+        else:
+            if curved and not was_ramp:
+                p.append(span.start)
+                q.append(span.start)
+            curved.append(span.curved)
+            bends.append(span.bend)
+        was_ramp = span.is_ramp
+    if was_ramp:
+        curved.append(True)
+        bends.append(spans[-1].bend)
+    return Chain(spans[0].start, spans[-1].end, np.array(bends), tuple(curved), np.array(p), np.array(q), order)
 
 
 def columns(chain: Chain, samples: Samples) -> tuple[np.ndarray, np.ndarray]:

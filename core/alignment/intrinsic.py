@@ -15,32 +15,24 @@ SPACING_M = 1.0
 """Least mean distance of the points, metres: of closer points, errors of 2 mm would lengthen the line by 1 in 10,000."""
 
 
-def thinned(line: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Average the vertices of a line that are closer than `SPACING_M`.
+def groups(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Divide the vertices of a line into groups that are averaged, so that points are `SPACING_M` apart or more.
 
     Parameters
     ----------
-    line : (n, 3) array
-        Vertices, metres, no two in the same place.
-    values : (n, m) array
-        Further values at the vertices.
+    xy : (n, 2) array
+        Vertices, metres.
 
     Returns
     -------
-    points : (k, 3) array
-        The first and the last vertex are kept.
-    values : (k, m) array
-    counts : (k,) int array
-        Vertices in each point.
+    starts, counts : (k,) int array
+        First vertex of each group, and its number of vertices. The first and the last vertex are groups of their own.
     """
-    s = length_along(line[:, :2])
-    number = np.floor(s / SPACING_M + 0.5).astype(int)
-    number[-1] = max(number[-1], number[-2] + 1)
-    number[0] = -1 if number[1] == 0 else 0
-    starts = np.flatnonzero(np.diff(number, prepend=number[0] - 1))
-    counts = np.diff(starts, append=len(s))
-    both = np.add.reduceat(np.column_stack([line, values]), starts) / counts[:, None]
-    return both[:, :3], both[:, 3:], counts
+    s = length_along(xy)
+    number = np.floor((s + 0.5 * SPACING_M) / SPACING_M).astype(int)
+    number[0], number[-1] = -1, number[-1] + 1
+    starts = np.flatnonzero(np.diff(number, prepend=-2))
+    return starts, np.diff(starts, append=len(s))
 
 
 def lateral_signal(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

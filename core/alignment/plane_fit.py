@@ -6,7 +6,8 @@ end of an element the start of the next one. The curvature of a clothoid's end i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import sparse
@@ -47,6 +48,25 @@ class Points:
     xy: np.ndarray
     s: np.ndarray
     weight: np.ndarray
+
+
+@dataclass(frozen=True)
+class Held:
+    """What is held in the fit.
+
+    Attributes
+    ----------
+    bends : mapping of int to float
+        Curvature of parts of the chain by their number, 1/m.
+    starts : mapping of int to float
+        Where elements start, by their number, metres.
+    """
+
+    bends: Mapping[int, float] = field(default_factory=dict)
+    starts: Mapping[int, float] = field(default_factory=dict)
+
+
+NOTHING = Held()
 
 
 @dataclass(frozen=True)
@@ -121,7 +141,7 @@ class _Solver:
         return (self.factor.solve(right)[: len(self.scale)] * self.scale[:, None]).T
 
 
-def fit_plan(chain: Chain, points: Points, progress: Progress = SILENT) -> PlanFit:
+def fit_plan(chain: Chain, points: Points, held: Held = NOTHING, progress: Progress = SILENT) -> PlanFit:
     """Fit the elements of a chain to points.
 
     Parameters
@@ -129,14 +149,17 @@ def fit_plan(chain: Chain, points: Points, progress: Progress = SILENT) -> PlanF
     chain : Chain
         The structure and first values.
     points : Points
+    held : Held
     progress : Progress
     """
     state = _first_state(chain, points)
     feet = points.s.copy()
+    number = np.where(chain.curved, np.cumsum(chain.curved) - 1, -1)
+    numbers = Held({int(number[part]): bend for part, bend in held.bends.items()}, held.starts)
     for _ in range(ROUNDS):
         progress.check()
         feet, across, jacobian = _seen(state, points, feet)
-        constraints, gaps = _constraints(state)
+        constraints, gaps = _with_held(*_constraints(state), state, numbers)
         weighted = jacobian.multiply(points.weight[:, None]).tocsr()
         solver = _Solver(jacobian.T @ weighted, constraints)
         change = solver.step(-(weighted.T @ across), -gaps)
@@ -256,6 +279,27 @@ def _constraints(state: _State) -> tuple[sparse.csr_matrix, np.ndarray]:
     shape = (len(gaps), 4 * count + bends)
     flat = (np.concatenate(rows), np.concatenate(columns))
     return sparse.coo_matrix((np.concatenate(values), flat), shape=shape).tocsr(), gaps
+
+
+def _with_held(
+    constraints: sparse.csr_matrix, gaps: np.ndarray, state: _State, held: Held
+) -> tuple[sparse.csr_matrix, np.ndarray]:
+    """Add what is held to the constraints; here, curvatures have the numbers of the unknowns."""
+    first = 3 * len(state.length)
+    rows, more = [constraints], [gaps]
+    for number, bend in held.bends.items():
+        rows.append(_row(constraints.shape[1], [first + number]))
+        more.append(np.array([state.bend[number] - bend]))
+    for number, start in held.starts.items():
+        lengths = first + len(state.bend) + np.arange(number)
+        rows.append(_row(constraints.shape[1], lengths))
+        more.append(np.array([state.length[:number].sum() - start]))
+    return sparse.vstack(rows, format="csr"), np.concatenate(more)
+
+
+def _row(size: int, columns: Sequence[int]) -> sparse.csr_matrix:
+    """Return a row with ones in some columns."""
+    return sparse.csr_matrix((np.ones(len(columns)), (np.zeros(len(columns), int), columns)), shape=(1, size))
 
 
 def _take(state: _State, change: np.ndarray) -> float:

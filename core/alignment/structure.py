@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..progress import SILENT, Progress
-from .chain import Chain, Samples, fitted, residuals
+from .chain import Chain, Samples, Span, assembled, fitted, residuals
 from .moves import richer, simpler
 from .partition import Piece
 
@@ -105,28 +105,8 @@ class Rules:
 
 def from_pieces(pieces: Sequence[Piece], order: int, rules: Rules) -> Chain:
     """Return a chain with the pieces of a partition: those of highest degree are ramps if there are ramps."""
-    line, ramp = order - 1, order + 1
-    curved: list[bool] = []
-    p: list[float] = []
-    q: list[float] = []
-    was_ramp = False
-    for piece in pieces:
-        if piece.degree == ramp:
-            if was_ramp or not curved:
-                curved.append(True)
-            p.append(piece.start)
-            q.append(piece.end)
-        else:
-            if curved and not was_ramp:
-                p.append(piece.start)
-                q.append(piece.start)
-            curved.append(piece.degree != line)
-        was_ramp = piece.degree == ramp
-    if was_ramp:
-        curved.append(True)
-    chain = Chain(
-        pieces[0].start, pieces[-1].end, np.zeros(len(curved)), tuple(curved), np.array(p), np.array(q), order
-    )
+    spans = [Span(one.start, one.end, one.degree > order, one.degree == order) for one in pieces]
+    chain = assembled(spans, order)
     return chain if rules.jumps or order == 1 else _without_jumps(chain, rules.least_m)
 
 
