@@ -24,6 +24,9 @@ MEDIAN_SHARE = 0.6745
 FAR = 3.0
 """Distance in correlation lengths beyond which the misalignment is independent: the correlation is below 0.0002."""
 
+SURE = 3.0
+"""Errors are shared by neighbours if the products of their residuals exceed this many standard errors."""
+
 OUTLIER = 2.0
 """A piece with a mean square this many times the median is left out: an element begins within it."""
 
@@ -104,12 +107,22 @@ def estimated(pieces: Sequence[tuple[np.ndarray, int]], step_m: float, floor_m: 
         kinds[max(size for size in SIZES if size <= len(rest)), degree] += len(rest)
     lags = step_m * np.arange(SIZES[-1])
     white = _expected_of(kinds, np.where(lags == 0, 1.0, 0.0))
+    alone = float(white @ seen / (white @ white))
+    if not _hang_together(seen - alone * white, alone, sum(kinds.values())):
+        return Noise(max(math.sqrt(alone), floor_m))
     found = []
     for length in LENGTHS_M:
         shared = _expected_of(kinds, np.exp(-((lags / length) ** 2)))
         (own, common), misfit = nnls(np.column_stack([white, shared]), seen)
         found.append((misfit, Noise(max(math.sqrt(own), floor_m), math.sqrt(common), length)))
     return min(found, key=lambda one: one[0])[1]
+
+
+def _hang_together(products: np.ndarray, variance: float, count: int) -> bool:
+    """Return whether products of residuals at lags, (LAGS,), are more than those of independent errors would be."""
+    sums = np.cumsum(products[1:])
+    error = variance * np.sqrt(count * np.arange(1, LAGS))
+    return bool((sums > SURE * error).any())
 
 
 def _usual(pieces: list[tuple[np.ndarray, int]]) -> list[tuple[np.ndarray, int]]:
