@@ -35,7 +35,15 @@ APPLICATION = "RAIL_EXTRACT"
 MAX_TEXT = 255
 """Longest text of extended data."""
 
-DRAWN = {"rails": "RAILS", "centerlines": "TRACK", "quality": "STATIONS", "findings": "FINDINGS", "stops": "STOPS"}
+DRAWN = {
+    "rails": "RAILS",
+    "centerlines": "TRACK",
+    "quality": "STATIONS",
+    "findings": "FINDINGS",
+    "stops": "STOPS",
+    "places": "PLACES",
+    "differences": "DIFFERENCES",
+}
 """First word of the layers in a drawing, by output."""
 
 COLOURS = {"RAILS": 5, "TRACK": 1, "STATIONS": 3}

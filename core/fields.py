@@ -131,6 +131,26 @@ QUALITY_FIELDS = (
 )
 """In a `TrackGeometry`, the first is a single value and the others have a value for each station."""
 
+STATION_FIELDS = (
+    Field("axis", str, "name of the axis; empty, as are the following fields, beyond the ends of all axes"),
+    Field("piece", int, "number of the section of the axis between two jumps of the kilometres, from 1"),
+    Field("km", float, "kilometre along the axis", 6),
+    Field("km_text", str, "the kilometre as railways write it"),
+    Field("offset_m", float, "distance from the axis, metres; positive to the left as kilometres increase", 3),
+    Field("side", str, "left, right or on: side of the axis"),
+    Field("ambiguous", int, "1 where another place of an axis is nearly as close, so that the kilometre may be wrong"),
+)
+"""In `Kilometres`; with an axis, points of the track geometry have them as well."""
+
+KM_FIELDS = tuple(field for field in STATION_FIELDS if field.name in ("km", "km_text"))
+"""With an axis, findings have those of their worst place."""
+
+EXTENT_FIELDS = (
+    Field("km_from", float, "smallest kilometre of its vertices", 6),
+    Field("km_to", float, "largest kilometre of its vertices", 6),
+)
+"""Further fields of lines and polygons, whose `km` is that of a place in their middle."""
+
 FINDING_FIELDS = (
     Field(
         "finding",

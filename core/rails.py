@@ -236,6 +236,51 @@ def cell_borders(chainage: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
+class Kilometres:
+    """Places along the axis of a railway; (n,) arrays. See docs/stationing.md.
+
+    Attributes
+    ----------
+    axis : object
+        Name of the axis; None where the place is beyond all axes, as are the following then, and `km` NaN.
+    piece : object
+        Number of the section of the axis between two jumps of the kilometres, from 1.
+    km : float
+    km_text : object
+        The kilometre as railways write it.
+    offset_m : float
+        Distance from the axis, positive to the left as the kilometres increase.
+    side : object
+        "left", "right" or "on".
+    ambiguous : object
+        Whether another place of an axis is nearly as close.
+    """
+
+    axis: np.ndarray
+    piece: np.ndarray
+    km: np.ndarray
+    km_text: np.ndarray
+    offset_m: np.ndarray
+    side: np.ndarray
+    ambiguous: np.ndarray
+
+    @classmethod
+    def empty(cls, count: int) -> Kilometres:
+        """Return `count` places without a kilometre."""
+        made = {name: np.full(count, None, dtype=object) for name in ("axis", "piece", "km_text", "side", "ambiguous")}
+        return cls(km=np.full(count, np.nan), offset_m=np.full(count, np.nan), **made)
+
+    def part(self, start: int, end: int) -> Kilometres:
+        """Return the places from number `start` to before `end`."""
+        return Kilometres(*(column[start:end] for column in vars(self).values()))
+
+    def put(self, which: np.ndarray, others: Kilometres) -> None:
+        """Set the places marked in `which`, (n,) bool, to others."""
+        for name, column in vars(self).items():
+            column[which] = getattr(others, name)
+
+
+@dataclass(frozen=True)
 class TrackGeometry:
     """Geometry of one track at stations along its centerline; (n,) arrays, NaN where it is unknown.
 
@@ -268,6 +313,8 @@ class TrackGeometry:
         Largest distance between two of them, across or in height; NaN where there is only one.
     sigmaz_mm : float
         Standard error of the centerline's height.
+    kilometres : Kilometres or None
+        Places of the stations along an axis; None without one.
     """
 
     track_id: int
@@ -284,6 +331,7 @@ class TrackGeometry:
     strips: np.ndarray
     strip_mm: np.ndarray
     sigmaz_mm: np.ndarray
+    kilometres: Kilometres | None = None
 
     @property
     def cells_m(self) -> np.ndarray:

@@ -15,7 +15,10 @@ DOCS = ROOT / "docs"
 FOLDER = "resources/guide"
 """Folder of the pages in the plugin."""
 
-PAGES = ("README", "tutorial", "parameters", "reference", "limits", "troubleshooting", "faults", "accuracy", "scaling")
+PAGES = (
+    *("README", "tutorial", "parameters", "reference", "limits", "troubleshooting", "faults", "accuracy", "scaling"),
+    "stationing",
+)
 """Pages for users; the other pages of the folder are for developers."""
 
 EXTENSIONS = ("fenced_code", "sane_lists", "tables", "toc")

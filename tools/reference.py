@@ -21,9 +21,11 @@ from qgis.core import (  # noqa: E402
 )
 from rail_extract.core.fields import (  # noqa: E402
     CENTERLINE_FIELDS,
+    EXTENT_FIELDS,
     FINDING_FIELDS,
     QUALITY_FIELDS,
     RAIL_FIELDS,
+    STATION_FIELDS,
     STOP_FIELDS,
     Field,
 )
@@ -45,6 +47,7 @@ LAYERS = {
     "Rails": RAIL_FIELDS,
     "Centerlines": CENTERLINE_FIELDS,
     "Track geometry": QUALITY_FIELDS,
+    "Kilometres": (*STATION_FIELDS, *EXTENT_FIELDS),
     "Findings": FINDING_FIELDS,
     "Stops": STOP_FIELDS,
 }

@@ -72,6 +72,7 @@ DIALOGS = {
     "extractrails_wide": "dialog",
     "extractrails_all": "dialog_all",
     "installpackages_wide": "install_packages",
+    "stationalongaxis_wide": "station_along_axis",
 }
 """Names of the dialogs' pictures, and their names in the guide."""
 

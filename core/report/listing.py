@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ..polyline import length_along
-from ..rails import RailLine, RailNetwork
+from ..rails import RailLine, RailNetwork, TrackGeometry
 from ..tracks.jumps import ARM_M
 from .findings import DOUBTS, OFF_GAUGE, Findings, Hole, Place, TrackFindings, examine
 
@@ -51,6 +52,8 @@ class Finding:
         Points on both rails, or on the lone rail.
     review : str
         For the user's decision.
+    km, km_text : float, str or None
+        Kilometre of the worst place; NaN and None without an axis.
     """
 
     reason: str
@@ -69,6 +72,8 @@ class Finding:
     sigmaz_mm: float = np.nan
     points: int | None = None
     review: str = ""
+    km: float = np.nan
+    km_text: str | None = None
 
 
 def list_findings(network: RailNetwork, gauges_m: Sequence[float]) -> tuple[Finding, ...]:
@@ -121,7 +126,16 @@ def _of_place(track: TrackFindings, place: Place, error_mm: np.ndarray) -> Findi
         sigma_mm=float(geometry.sigma_mm[worst]),
         sigmaz_mm=float(geometry.sigmaz_mm[worst]),
         points=int(geometry.points[within].sum()),
+        **_kilometre(geometry, geometry.chainage_m[worst]),
     )
+
+
+def _kilometre(geometry: TrackGeometry, at_m: float) -> dict[str, Any]:
+    """Return the kilometre of the station nearest to a chainage; nothing without an axis."""
+    if geometry.kilometres is None:
+        return {}
+    nearest = np.argmin(np.abs(geometry.chainage_m - at_m))
+    return {"km": float(geometry.kilometres.km[nearest]), "km_text": geometry.kilometres.km_text[nearest]}
 
 
 def _of_step(track: TrackFindings, at_m: float, size_mm: float) -> Finding:
@@ -137,6 +151,7 @@ def _of_step(track: TrackFindings, at_m: float, size_mm: float) -> Finding:
         from_m=start_m,
         to_m=end_m,
         worst_m=at_m,
+        **_kilometre(track.geometry, at_m),
     )
 
 

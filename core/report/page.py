@@ -178,8 +178,12 @@ def _findings(findings: Findings) -> str:
     found = listed(findings)
     if not found:
         return ""
-    headings = ("Finding", "Where", "Chainage", "In doubt", "Worst at", "Gauge", "Standard error", "Why")
-    written = tag("div", table(headings, map(_finding, found)), class_="scroll tall")
+    headings = ["Finding", "Where", "Chainage", "In doubt", "Worst at", "Gauge", "Standard error", "Why"]
+    rows: list[tuple[object, ...]] = list(map(_finding, found))
+    if any(finding.km_text for finding in found):
+        headings.append("Kilometre of the worst place")
+        rows = [(*row, finding.km_text or "") for row, finding in zip(rows, found)]
+    written = tag("div", table(headings, rows), class_="scroll tall")
     note = "The first findings may do most harm: they are in the order of possible error times length."
     return _section("Where to look", written.replace("<table>", '<table class="words">'), _note(note))
 
@@ -204,7 +208,7 @@ def _figure(value: float, unit: str) -> str:
 
 def _tracks(findings: Findings) -> str:
     """Write the table of tracks."""
-    headings = (
+    headings = [
         "Track",
         "Length",
         "Gauge",
@@ -215,8 +219,11 @@ def _tracks(findings: Findings) -> str:
         "Standard error",
         "of the height",
         "No points",
-    )
-    rows = [_row(track) for track in findings.tracks]
+    ]
+    rows: list[tuple[str, ...]] = [_row(track) for track in findings.tracks]
+    if any(track.geometry.kilometres is not None for track in findings.tracks):
+        headings.append("Kilometres")
+        rows = [(*row, _kilometres(track)) for row, track in zip(rows, findings.tracks)]
     return _section("Tracks", tag("div", table(headings, rows), class_="scroll"))
 
 
@@ -234,6 +241,13 @@ def _row(track: TrackFindings) -> tuple[str, ...]:
         _median(geometry.sigmaz_mm),
         metres(track.length_of(UNSUPPORTED)),
     )
+
+
+def _kilometres(track: TrackFindings) -> str:
+    """Write the kilometres of the first and the last station that have one."""
+    along = track.geometry.kilometres
+    known = [] if along is None else [text for text in along.km_text if text]
+    return f"{known[0]} to {known[-1]}" if known else "none"
 
 
 def _span(values: np.ndarray, unit: str) -> str:

@@ -77,9 +77,26 @@ def draw_profiles(track: TrackFindings, height_m: np.ndarray) -> str:
         tag("text", text(f"{chainage:,g}"), x=_across(chainage, along), y=bottom + 16, class_="tick middle")
         for chainage in ticks(along[0], along[-1], TICKS_ACROSS)
     ]
-    name = tag("text", text("chainage [m]"), x=WIDTH - RIGHT, y=bottom + 32, class_="tick end")
+    axis += _kilometres(track, bottom + 32)
+    name = tag("text", text("chainage [m]"), x=LEFT - 8, y=bottom + 16, class_="tick end")
     label = f"Profiles of track {track.line.track_id}"
     return tag("svg", *drawn, *axis, name, viewBox=f"0 0 {WIDTH:g} {bottom + AXIS:g}", role="img", aria_label=label)
+
+
+def _kilometres(track: TrackFindings, y: float) -> list[str]:
+    """Write the kilometres along the axis below the chainages."""
+    along, kilometres = track.geometry.chainage_m, track.geometry.kilometres
+    if kilometres is None:
+        return []
+    at = ticks(along[0], along[-1], TICKS_ACROSS)
+    nearest = np.argmin(np.abs(along[:, None] - at), axis=0)
+    marks = [
+        tag(
+            "text", text(kilometres.km_text[number] or ""), x=float(_across(chainage, along)), y=y, class_="tick middle"
+        )
+        for chainage, number in zip(at, nearest)
+    ]
+    return [*marks, tag("text", text("kilometre"), x=LEFT - 8, y=y, class_="tick end")]
 
 
 def ticks(low: float, high: float, count: int) -> np.ndarray:

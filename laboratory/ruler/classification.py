@@ -28,6 +28,9 @@ BESIDE_M, BESIDE_WIDE_M = 0.03, 0.05
 NEAR_TOP_M = (-0.07, 0.05)
 """Heights that such points have above the top of the rail."""
 
+ON_SURFACE_M = (-0.15, 0.10)
+"""The same on a blunted surface, where the ridge of a rail is as wide as two heads and wavy."""
+
 
 @dataclass(frozen=True)
 class Score:
@@ -102,26 +105,37 @@ def score(scene: RawScene, wide: bool = False, weights: Path | None = None) -> t
     return result, found.rail
 
 
+def hectares(scene: RawScene) -> float:
+    """Return the area of a scene, by the square metres that hold points."""
+    return len(np.unique(np.floor(scene.xyz[:, :2]).astype(int), axis=0)) / 1e4
+
+
 def lines_from(scene: RawScene, rail: np.ndarray, model: str = Parameters.model) -> Match:
     """Extract rails from labelled points, (n,) bool, and compare them with the truth."""
+    if not rail.any():
+        return match([], scene.shown)
     points = RailPoints(scene.xyz[rail], scene.frame, RAIL)
     gauge_m, head_width_m = scene.standard.gauge_m, scene.standard.head_width_m
     parameters = Parameters(gauge_m, head_width_m, other_gauges_m=scene.other_gauges_m, model=model)
     network = extract_rails([points], parameters)
-    return match([line.xyz for line in network.rails], scene.rails)
+    return match([line.xyz for line in network.rails], scene.shown)
 
 
 def truth(scene: RawScene, rail: np.ndarray, wide: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Points on heads down to `FACE_M`, and labelled points right beside a head, (n,) bool each."""
+    """Points on heads down to `FACE_M`, and labelled points right beside a head, (n,) bool each.
+
+    On a surface from images, points are on heads whose place is on a head, whatever their height.
+    """
     head, beside = np.zeros(len(rail), dtype=bool), np.zeros(len(rail), dtype=bool)
     if not scene.rails:
         return head, beside
     chosen = np.flatnonzero(scene.head | rail)
-    feet, _ = nearest(scene.xyz[chosen], cut(scene.rails))
+    feet, _ = nearest(scene.xyz[chosen], cut(scene.shown))
     across = np.linalg.norm((scene.xyz[chosen] - feet)[:, :2], axis=1)
     above = scene.xyz[chosen, 2] - feet[:, 2]
-    head[chosen] = scene.head[chosen] & (above > -FACE_M)
-    half_m = scene.standard.head_width_m / 2 + (BESIDE_WIDE_M if wide else BESIDE_M)
-    low_m, high_m = NEAR_TOP_M
+    blunted = scene.crests is not None
+    low_m, high_m = ON_SURFACE_M if blunted else NEAR_TOP_M
+    head[chosen] = scene.head[chosen] & (above > (low_m if blunted else -FACE_M))
+    half_m = scene.standard.head_width_m / 2 + (BESIDE_WIDE_M if wide or blunted else BESIDE_M)
     beside[chosen] = (across < half_m) & (above > low_m) & (above < high_m)
     return head, beside

@@ -112,7 +112,7 @@ class Match:
         """Compare lines and truth that are at most this distance apart in plan."""
         there, back = self.there.within(tolerance_m), self.back.within(tolerance_m)
         return Comparison(
-            completeness=there.length_m / self.there.length_m,
+            completeness=there.length_m / self.there.length_m if self.truth_count else np.nan,
             correctness=back.length_m / self.back.length_m if len(self.line) else 0.0,
             lateral_rmse_m=_worse(_rms(there.lateral), _rms(back.lateral)),
             lateral_p95_m=_worse(_p95(there.lateral), _p95(back.lateral)),
@@ -122,8 +122,12 @@ class Match:
             height_bias_m=_worse(_mean(there.height), _mean(back.height)),
             line_count=self.line_count,
             truth_count=self.truth_count,
-            length_ratio=self.back.length_m / self.there.length_m,
+            length_ratio=self.back.length_m / self.there.length_m if self.truth_count else np.nan,
         )
+
+    def wrong_m(self, tolerance_m: float = 0.05) -> float:
+        """Return the length of the lines that is not within the tolerance of a true line, metres."""
+        return self.back.length_m - self.back.within(tolerance_m).length_m
 
     def share_within(self, sigma_m: np.ndarray, tolerance_m: float = 0.05) -> float:
         """Return the share of lateral errors along the lines that are at most the standard error there, (n,) metres."""
@@ -192,9 +196,13 @@ def match(extracted: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> Match
     Parameters
     ----------
     extracted, truth : sequence of (n, 3) array
-        Polylines in metres.
+        Polylines in metres. Without truth, all lines are infinitely far from it.
     """
     lines, true = cut(extracted), cut(truth)
+    if not len(true.start):
+        nothing = np.full(len(lines.start), np.inf)
+        back = Offsets(nothing, nothing, nothing, lines.lengths)
+        return Match(back.within(0.0), back, lines.number, lines.t, len(extracted), 0)
     if not len(lines.start):
         nothing = np.full(len(true.start), np.inf)
         there = Offsets(nothing, nothing, nothing, true.lengths)

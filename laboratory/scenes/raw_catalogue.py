@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
+from typing import Union
 
 import numpy as np
 
@@ -12,6 +14,8 @@ from ..curves import Curve, Element, trace
 from ..rasters.turnouts import FORMS, branch
 from .plain import canted, rolling, spacing
 from .raw import BALLAST, RawScene, Thing, scan_world
+from .raw_photogrammetry import Photogrammetry
+from .raw_places import barriers_along, building_site, farmland, kerbed_car_park, motorway
 from .raw_scanner import RawScanner
 from .raw_things import (
     car_park,
@@ -36,6 +40,14 @@ from .tracks import Track
 STANDARD = STANDARDS["EN_60E1_1435"]
 TRAIN = RawScanner()
 CAR = RawScanner(profile_step_m=0.06, ray_step_rad=0.003, left_m=0.0, height_m=2.4, noise_m=0.004)
+DRONE = Photogrammetry()
+BLUNT = Photogrammetry(blur_m=0.065, blur_varies=0.35, widening_m=0.025, wave_m=0.012, noise_m=0.009, stray_share=0.01)
+"""Images of a drone, and less sharp ones."""
+
+AGAIN = Photogrammetry(shift_m=(0.03, -0.02, 0.025), epoch=1)
+"""Images of the same place on another day, registered with an error of some centimetres."""
+
+Scanning = Union[RawScanner, Photogrammetry]
 
 
 def from_air(per_m2: float, noise_m: float, left_m: float = 8.0, height_m: float = 80.0) -> RawScanner:
@@ -64,10 +76,15 @@ def thing(make: Callable[..., None], *args: object) -> Thing:
 
 
 def double_track(
-    seed: int, scanner: RawScanner = TRAIN, second: RawScanner | None = None, name: str = "double"
+    seed: int,
+    scanner: Scanning = TRAIN,
+    second: RawScanner | None = None,
+    name: str = "double",
+    curvature: float = 1 / 700,
+    cant_m: float = 0.09,
 ) -> RawScene:
-    """Double track in a curve of 700 m with cant, masts and wires, a trough, plants beside the bed."""
-    curve = line(60.0, 1 / 700, 0.35)
+    """Double track in a curve with cant, masts and wires, a trough, plants beside the bed."""
+    curve = line(60.0, curvature, 0.35)
     things: list[Thing] = [
         ground,
         running_rails,
@@ -76,7 +93,7 @@ def double_track(
         thing(plants, 60, (-9.0, -4.5)),
     ]
     scanners = [scanner] if second is None else [scanner, second]
-    return scan_world(name, parallel(curve, (0.0, 4.2), 0.09), STANDARD, scanners, things, seed)
+    return scan_world(name, parallel(curve, (0.0, 4.2), cant_m), STANDARD, scanners, things, seed)
 
 
 def masts_at(left_m: float) -> Thing:
@@ -84,7 +101,7 @@ def masts_at(left_m: float) -> Thing:
     return thing(masts, left_m)
 
 
-def station(seed: int) -> RawScene:
+def station(seed: int, scanner: Scanning = TRAIN) -> RawScene:
     """Three tracks, platforms on both sides, and a train parked on the far track."""
     curve = line(70.0, 0.0, 1.2)
     things: list[Thing] = [
@@ -95,10 +112,10 @@ def station(seed: int) -> RawScene:
         thing(train, 2, 22.0, 70.0),
         masts_at(6.6),
     ]
-    return scan_world("station", parallel(curve, (0.0, 4.3, 8.8)), STANDARD, [TRAIN], things, seed)
+    return scan_world("station", parallel(curve, (0.0, 4.3, 8.8)), STANDARD, [scanner], things, seed)
 
 
-def turnout(seed: int, form: str = "300-1:9", scanner: RawScanner = TRAIN) -> RawScene:
+def turnout(seed: int, form: str = "300-1:9", scanner: Scanning = TRAIN) -> RawScene:
     """Turnout with its check rails, and a second track."""
     shape = next(candidate for candidate in FORMS if candidate.name == form)
     main = trace([Element(40.0 + shape.arc_m)], (3.0, 5.0), heading=-0.7)
@@ -225,12 +242,24 @@ def air(seed: int, per_m2: float, noise_m: float) -> RawScene:
     return scan_world(name, parallel(curve, (0.0, 4.2), 0.09), STANDARD, [from_air(per_m2, noise_m)], things, seed)
 
 
-def empty_place(name: str, seed: int, scanner: RawScanner, things: list[Thing]) -> RawScene:
+def empty_place(name: str, seed: int, scanner: Scanning, things: list[Thing]) -> RawScene:
     """Scan a place without rails."""
     return scan_world(name, [], STANDARD, [scanner], things, seed, BALLAST, line(45.0, 1 / 300, 0.6))
 
 
-def forest(seed: int, scanner: RawScanner) -> RawScene:
+def wide_place(name: str, seed: int, scanner: Scanning, lay: Thing) -> RawScene:
+    """Scan a third of a hectare without rails."""
+    return scan_world(name, [], STANDARD, [scanner], [lay], seed, BALLAST, line(80.0, 1 / 600, 0.6), half_width_m=20.0)
+
+
+def barriers(seed: int, scanner: Scanning) -> RawScene:
+    """Scan double track between guard rails, next to a road."""
+    curve = line(60.0, 1 / 900, 0.35)
+    things: list[Thing] = [ground, running_rails, masts_at(-3.4), barriers_along]
+    return scan_world("barriers", parallel(curve, (0.0, 4.2), 0.05), STANDARD, [scanner], things, seed)
+
+
+def forest(seed: int, scanner: Scanning) -> RawScene:
     """Scan a hilly forest with undergrowth."""
 
     def floor(world: World) -> None:
@@ -240,7 +269,7 @@ def forest(seed: int, scanner: RawScanner) -> RawScene:
     return empty_place("forest", seed, scanner, [floor, undergrowth, thing(trees, 25, (-13.0, 13.0))])
 
 
-def quarry(seed: int, scanner: RawScanner) -> RawScene:
+def quarry(seed: int, scanner: Scanning) -> RawScene:
     """Scan a quarry: benches of rubble."""
 
     def rubble(world: World) -> None:
@@ -280,6 +309,18 @@ AIR: dict[str, Callable[[int], RawScene]] = {
 }
 """From the air: points per square metre; the noise is in the scene's name."""
 
+_canted = partial(double_track, curvature=1 / 450, cant_m=0.13)
+
+PHOTO: dict[str, Callable[[int], RawScene]] = {
+    "photo straight": partial(double_track, scanner=DRONE, name="photo straight", curvature=0.0, cant_m=0.0),
+    "photo curve": partial(_canted, scanner=DRONE, name="photo curve"),
+    "photo curve again": partial(_canted, scanner=AGAIN, name="photo curve again"),
+    "photo curve blunt": partial(_canted, scanner=BLUNT, name="photo curve blunt"),
+    "photo turnout": partial(turnout, scanner=DRONE),
+    "photo station": partial(station, scanner=DRONE),
+}
+"""Surveys by images; the same curve twice, by two surveys."""
+
 NEGATIVE: dict[str, Callable[[int], RawScene]] = {
     "forest": partial(forest, scanner=CAR),
     "forest from the air": partial(forest, scanner=from_air(150, 0.02)),
@@ -290,7 +331,25 @@ NEGATIVE: dict[str, Callable[[int], RawScene]] = {
     "car park": lambda seed: empty_place("car park", seed, CAR, [car_park]),
     "quarry": partial(quarry, scanner=CAR),
     "quarry from the air": partial(quarry, scanner=from_air(120, 0.015)),
+    "motorway": lambda seed: wide_place("motorway", seed, replace(CAR, left_m=3.0), motorway),
+    "kerbs": lambda seed: wide_place("kerbs", seed, CAR, kerbed_car_park),
+    "building site": lambda seed: wide_place("building site", seed, CAR, building_site),
+    "farmland": lambda seed: wide_place("farmland", seed, replace(CAR, left_m=-8.0), farmland),
+    "farmland from the air": lambda seed: wide_place("farmland", seed, from_air(200, 0.015), farmland),
+    "photo street": lambda seed: empty_place("street", seed, DRONE, [street]),
+    "photo quarry": partial(quarry, scanner=DRONE),
+    "photo motorway": lambda seed: wide_place("motorway", seed, DRONE, motorway),
+    "photo motorway blunt": lambda seed: wide_place("motorway", seed, BLUNT, motorway),
+    "photo kerbs": lambda seed: wide_place("kerbs", seed, DRONE, kerbed_car_park),
+    "photo building site": lambda seed: wide_place("building site", seed, DRONE, building_site),
+    "photo farmland": lambda seed: wide_place("farmland", seed, DRONE, farmland),
 }
 """Places without rails."""
 
-RAW_SCENES = {**MOBILE, **FLUSH, **AIR, **NEGATIVE}
+BESIDE: dict[str, Callable[[int], RawScene]] = {
+    "barriers": partial(barriers, scanner=TRAIN),
+    "photo barriers": partial(barriers, scanner=DRONE),
+}
+"""Rails with something like rails next to them."""
+
+RAW_SCENES = {**MOBILE, **FLUSH, **AIR, **PHOTO, **NEGATIVE, **BESIDE}

@@ -63,6 +63,12 @@ class RawScanner:
     view_rad: tuple[float, float] = (-np.pi, np.pi)
     shift_m: tuple[float, float] = (0.0, 0.0)
 
+    def stations(self, length_m: float) -> np.ndarray:
+        """Places of the profiles along a reference line: the carrier's speed swings by 15 %."""
+        count = int(length_m / self.profile_step_m * 1.2)
+        station = np.cumsum(self.profile_step_m * (1 + 0.15 * np.sin(np.arange(count) * self.profile_step_m / 10)))
+        return station[station < length_m]
+
 
 @dataclass(frozen=True)
 class Segments:

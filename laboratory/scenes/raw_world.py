@@ -179,7 +179,6 @@ class World:
 def ways_of(reference: Curve, station: np.ndarray, tracks: Sequence[Track]) -> list[Way]:
     """Cut tracks with the profiles perpendicular to a reference line."""
     ways = []
-    tree = cKDTree(reference.xy)
     for track in tracks:
         axis = track.centerline
         cant = np.broadcast_to(track.cant_m, len(axis)) / track.spacing_m
@@ -188,11 +187,7 @@ def ways_of(reference: Curve, station: np.ndarray, tracks: Sequence[Track]) -> l
             left = np.full(len(axis), float(track.left_m))
             secant = np.ones(len(axis))
         else:
-            sample = tree.query(axis[:, :2])[1]
-            step = axis[:, :2] - reference.xy[sample]
-            left = np.sum(step * reference.left_normal[sample], axis=1)
-            forward = np.column_stack([np.cos(reference.heading), np.sin(reference.heading)])[sample]
-            at = reference.chainage[sample] + np.sum(step * forward, axis=1)
+            sample, at, left = along_and_left(reference, axis[:, :2])
             secant = 1 / np.cos(track.curve.heading - reference.heading[sample])
             order = np.argsort(at)
             at, left, axis, cant, secant = at[order], left[order], axis[order], cant[order], secant[order]
@@ -201,6 +196,15 @@ def ways_of(reference: Curve, station: np.ndarray, tracks: Sequence[Track]) -> l
         )
         ways.append(Way(place, top, slope, secant, track.spacing_m))
     return ways
+
+
+def along_and_left(reference: Curve, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nearest sample of a reference line to each place, (n,), its chainage and its distance to the left."""
+    sample = cKDTree(reference.xy).query(xy)[1]
+    step = xy - reference.xy[sample]
+    forward = np.column_stack([np.cos(reference.heading), np.sin(reference.heading)])[sample]
+    at = reference.chainage[sample] + np.sum(step * forward, axis=1)
+    return sample, at, np.sum(step * reference.left_normal[sample], axis=1)
 
 
 def outline(head_width_m: float) -> tuple[np.ndarray, np.ndarray]:

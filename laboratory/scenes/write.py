@@ -14,6 +14,7 @@ from ...core.clouds.crs import parse_crs
 from ...core.clouds.las import laspy
 from ...core.errors import CloudError, ParameterError
 from .catalogue import SCENES
+from .raw import RawScene
 from .scene import Scene
 
 SCALE_M = 0.001
@@ -21,6 +22,14 @@ SCALE_M = 0.001
 
 TRUTH_DECIMALS = 4
 """Decimals of the coordinates of true lines: a tenth of a millimetre."""
+
+POINTS_PER_S = 500_000
+"""Points that a scanner measures in a second."""
+
+TONES = np.array(
+    [90, 130, 70, 220, 60, 120, 150, 140, 170, 160, 110, 120, 40, 80, 100, 120], dtype=np.uint16
+) * np.uint16(256)
+"""Colour and intensity of each kind of point, see `raw_world.KINDS`: ballast is dark, railheads are bright."""
 
 MADE = date(2025, 1, 1)
 """Date in the header of the file, fixed so that the same scene gives the same file."""
@@ -40,6 +49,34 @@ def write_cloud(scene: Scene, path: Path) -> None:
     cloud.classification = scene.classification
     if scene.strips is not None:
         cloud.point_source_id = scene.strips
+    cloud.write(path)
+
+
+def write_raw(scene: RawScene, path: Path) -> None:
+    """Write a raw scene as LAS 1.4 without rail classes.
+
+    A survey by images has colours and the classes of a ground filter, but no intensity and no time (format 2); a scan
+    has intensities and times (format 6).
+    """
+    of_images = scene.classification is not None
+    header = laspy.LasHeader(version="1.4", point_format=2 if of_images else 6)
+    header.scales = np.full(3, SCALE_M)
+    header.offsets = scene.frame.origin
+    header.creation_date = MADE
+    header.generating_software = "Rail Extract scenes"
+    if scene.frame.crs_wkt:
+        header.add_crs(parse_crs(scene.frame.crs_wkt))
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = scene.frame.to_crs(scene.xyz).T
+    cloud.return_number = cloud.number_of_returns = np.ones(len(scene.xyz), dtype=np.uint8)
+    tone = TONES[scene.kind]
+    if of_images:
+        cloud.classification = scene.classification
+        cloud.red = cloud.green = cloud.blue = tone
+    else:
+        cloud.classification = np.ones(len(scene.xyz), dtype=np.uint8)
+        cloud.intensity = tone
+        cloud.gps_time = np.arange(len(scene.xyz)) / POINTS_PER_S
     cloud.write(path)
 
 

@@ -9,6 +9,7 @@ from .grow_rail_points import GrowRailPoints
 from .install_packages import InstallPackages
 from .measure_track_geometry import MeasureTrackGeometry
 from .rasterize_rail_points import RasterizeRailPoints
+from .station_along_axis import StationAlongAxis
 from .train_rail_classifier import TrainRailClassifier
 from .vectorize_rails import VectorizeRails
 
@@ -21,6 +22,7 @@ ALGORITHMS = (
     VectorizeRails,
     BuildTrackCenterlines,
     MeasureTrackGeometry,
+    StationAlongAxis,
     TrainRailClassifier,
     InstallPackages,
     CheckInstallation,

@@ -31,6 +31,7 @@ from ..setup.dependencies import explain_missing, missing_packages
 from ..writing.destinations import PAGE, appends, check_layer_name, check_page_name, destinations
 from ..writing.styling import NO_PROPERTIES
 from .sentences import COMMAND_LINE, sentence_for
+from .toolbox_groups import RAILS, SETUP, Group
 
 # Search terms, also in the languages of the larger railways: the toolbox search compares whole words.
 RAIL_WORDS = (
@@ -59,8 +60,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     NAME = ""
     LABEL = ""
-    GROUP = "Rails and tracks"
-    GROUP_ID = "railsandtracks"
+    GROUP: Group = RAILS
     TAGS: tuple[str, ...] = ()
     SUMMARY = ""
     HELP = ""
@@ -190,11 +190,9 @@ class RailAlgorithm(QgsProcessingAlgorithm):
             return False, sentence_for(error, self.parameterDefinitions())
 
     def _usable_labels(self) -> list[str]:
-        """Labels of the provider's algorithms in this group whose packages are all installed."""
+        """Labels of the provider's algorithms, except those for the setup, whose packages are all installed."""
         mates = self.provider().algorithms() if self.provider() else ()
-        return [
-            mate.displayName() for mate in mates if mate.GROUP_ID == self.GROUP_ID and not missing_packages(mate.NEEDS)
-        ]
+        return [mate.displayName() for mate in mates if mate.GROUP is not SETUP and not missing_packages(mate.NEEDS)]
 
     def createInstance(self) -> RailAlgorithm:
         """Create an instance for a run."""
@@ -210,11 +208,11 @@ class RailAlgorithm(QgsProcessingAlgorithm):
 
     def group(self) -> str:
         """Return the label of the group."""
-        return tr(self.GROUP)
+        return tr(self.GROUP.label)
 
     def groupId(self) -> str:
         """Return the identifier of the group."""
-        return self.GROUP_ID
+        return self.GROUP.id
 
     def tags(self) -> list[str]:
         """Return the search terms."""

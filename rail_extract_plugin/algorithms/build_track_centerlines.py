@@ -15,6 +15,7 @@ from ..dialog.parameter_values import ParameterValues
 from ..writing.destinations import is_wanted
 from ..writing.layers import CENTERLINES, RAILS, figures_of, write_lines
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
+from .toolbox_groups import STEPS
 
 READING = 0.1
 """Fraction of the progress bar for reading the lines."""
@@ -33,6 +34,7 @@ class BuildTrackCenterlines(RailAlgorithm):
 
     NAME = "buildtrackcenterlines"
     LABEL = "Build track centerlines"
+    GROUP = STEPS
     TAGS = (*RAIL_WORDS, *TRACK_WORDS, "centerline", "centreline", "axis")
     NEEDS = (("numpy",), ("scipy",), ("pyproj",))
     SUMMARY = "Pairs rails that are one gauge apart and draws the line midway between the two rails of each track."

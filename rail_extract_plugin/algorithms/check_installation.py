@@ -21,6 +21,7 @@ from ..setup.dependencies import missing_packages
 from ..writing.reports import write_check
 from .base import RailAlgorithm
 from .extract_rails import ExtractRails
+from .toolbox_groups import SETUP
 
 
 class CheckInstallation(RailAlgorithm):
@@ -28,8 +29,7 @@ class CheckInstallation(RailAlgorithm):
 
     NAME = "checkinstallation"
     LABEL = "Check installation"
-    GROUP = "Setup"
-    GROUP_ID = "setup"
+    GROUP = SETUP
     GUIDE = "troubleshooting"
     TAGS = ("rail", "setup", "version", "versions", "test", "diagnose", "support", "gpu", "cuda", "engine")
     SUMMARY = "Lists the versions, the engine and the models in use, and tests them on a short piece of track."

@@ -15,6 +15,7 @@ from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource, points_folder, request_points
 from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
+from .toolbox_groups import RAW_CLOUDS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -40,6 +41,7 @@ class ClassifyRailPoints(RailAlgorithm):
 
     NAME = "classifyrailpoints"
     LABEL = "Classify rail points"
+    GROUP = RAW_CLOUDS
     TAGS = (*RAIL_WORDS, *CLOUD_WORDS, "classification", "raw", "segmentation", "Klassifizierung")
     PICTURE = "gauge.svg"
     NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))

@@ -17,15 +17,15 @@ from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
 from ..dialog.passwords import masked
-from ..reading.clouds import CloudSource, points_folder, request_points
+from ..reading.clouds import CloudSource, checked_crs, points_folder, request_points
 from ..systems import system
 from ..writing.destinations import is_wanted
 from ..writing.layers import (
     CENTERLINES,
-    FINDINGS,
     RAILS,
     figures_of,
     figures_of_stations,
+    findings_of,
     write_lines,
     write_raster,
     write_stations,
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
     from ...core.clouds.points import Request
     from ...core.rails import RailNetwork
+    from ..reading.axes import PlacedAxes
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,7 @@ class Job:
     command: str
     weights: Path | None
     seeds: tuple[np.ndarray, ...]
+    axes: PlacedAxes | None
 
 
 class ExtractRails(RailAlgorithm):
@@ -75,7 +77,8 @@ class ExtractRails(RailAlgorithm):
         "standard error of a line's lateral position, and bridged_m the length without points. Findings are the places "
         "to look at, the most harmful first. Track geometry is a "
         "layer of points along each track with gauge, cant, twist, radius and gradient. STATION_COUNT, SIGMA and "
-        "BRIDGED_LENGTH summarize the track geometry, measured for this layer, for the findings or for the report."
+        "BRIDGED_LENGTH summarize the track geometry, measured for this layer, for the findings or for the report. "
+        "With an axis, all three have kilometres."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
@@ -94,6 +97,7 @@ class ExtractRails(RailAlgorithm):
             *groups.pairing(),
             groups.strips(),
             groups.step(),
+            *inputs.axis(optional=True),
         ):
             self.addParameter(definition)
         for destination in (outputs.rails("RAILS", optional=True), outputs.centerlines("CENTERLINES", optional=True)):
@@ -135,7 +139,17 @@ class ExtractRails(RailAlgorithm):
             masked(self.asPythonCommand(parameters, context)),
             weights,
             values.seeds(cloud) if grow else (),
+            self._axes(cloud, parameters, context),
         )
+
+    def _axes(self, cloud: CloudSource, parameters: dict[str, Any], context: QgsProcessingContext) -> PlacedAxes | None:
+        """Read the axes in the coordinate system of the cloud; None without any."""
+        values = ParameterValues(self, parameters, context)
+        if not values.has_axis():
+            return None
+        if not any(is_wanted(parameters.get(name), context) for name in ("QUALITY", "FINDINGS", "REPORT")):
+            raise ParameterError("AXIS gives QUALITY, FINDINGS and REPORT kilometres: name at least one of these.")
+        return values.axes(system(checked_crs(cloud)))
 
     def _detected(self, job: Job, request: Request, values: ParameterValues, progress: Progress) -> Job:
         """Return the job with the rail standard that fits the points."""
@@ -171,6 +185,8 @@ class ExtractRails(RailAlgorithm):
         with points_folder() as folder:
             network = extract_files(request, folder, settings, InTurn(), progress, classify, job.weights, job.seeds)
         progress.check()
+        if job.axes:
+            network = replace(network, geometry=job.axes.along(network.geometry, network.frame, progress))
         for failure in network.failures:
             progress.warning(failure)
         origin = Origin(job.cloud.paths, job.standard, job.other_gauges, job.command, settings)
@@ -182,7 +198,7 @@ class ExtractRails(RailAlgorithm):
             "RAILS": lambda: write_lines(self, "RAILS", RAILS, network.rails, frame, *rest),
             "CENTERLINES": lambda: write_lines(self, "CENTERLINES", CENTERLINES, network.centerlines, frame, *rest),
             "QUALITY": lambda: write_stations(self, "QUALITY", network.geometry, frame, *rest),
-            "FINDINGS": lambda: write_lines(self, "FINDINGS", FINDINGS, found, frame, *rest),
+            "FINDINGS": lambda: write_lines(self, "FINDINGS", findings_of(found), found, frame, *rest),
             "REPORT": lambda: write_report(self, "REPORT", network, origin, *rest),
         }
         for sentence in summary(network, origin.gauges_m):

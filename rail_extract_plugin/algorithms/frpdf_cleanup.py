@@ -17,6 +17,7 @@ from ..dialog.parameter_values import ParameterValues
 from ..i18n import tr
 from ..writing.layers import write_raster
 from .base import RAIL_WORDS, RailAlgorithm
+from .toolbox_groups import STEPS
 
 if TYPE_CHECKING:
     from ...core.raster_file import RasterHeader
@@ -39,6 +40,7 @@ class FrpdfCleanup(RailAlgorithm):
 
     NAME = "frpdfcleanup"
     LABEL = "Clean rail raster (FRPDF)"
+    GROUP = STEPS
     TAGS = (*RAIL_WORDS, "raster", "neural network", "deep learning", "clean", "repair", "gaps", "noise")
     PICTURE = "raster.svg"
     NEEDS = (("numpy",), ("pyproj",), ("cv2", "torch"))

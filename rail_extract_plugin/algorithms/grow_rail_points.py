@@ -18,6 +18,7 @@ from ..reading.clouds import CloudSource, points_folder, request_points
 from ..writing.layers import write_stops
 from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
 from .classify_rail_points import ClassifyRailPoints, classified_results
+from .toolbox_groups import RAW_CLOUDS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -40,6 +41,7 @@ class GrowRailPoints(RailAlgorithm):
 
     NAME = "growrailpoints"
     LABEL = "Grow rail points from seeds"
+    GROUP = RAW_CLOUDS
     TAGS = (*RAIL_WORDS, *CLOUD_WORDS, "classification", "raw", "seed", "interactive", "follow", "Klassifizierung")
     PICTURE = "gauge.svg"
     NEEDS = ClassifyRailPoints.NEEDS

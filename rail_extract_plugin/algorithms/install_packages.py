@@ -16,6 +16,7 @@ from ..i18n import tr
 from ..setup import package_folders
 from ..setup.dependencies import OPTIONAL, PACKAGES, is_installed
 from .base import RailAlgorithm
+from .toolbox_groups import SETUP
 
 BUILDS = {
     ("CPU", "linux"): ("--index-url", "https://download.pytorch.org/whl/cpu"),
@@ -37,8 +38,7 @@ class InstallPackages(RailAlgorithm):
 
     NAME = "installpackages"
     LABEL = "Install packages"
-    GROUP = "Setup"
-    GROUP_ID = "setup"
+    GROUP = SETUP
     GUIDE = "troubleshooting"
     TAGS = ("rail", "setup", "install", "python", "pip", "dependencies", "laspy", "opencv", "torch", "pytorch")
     SUMMARY = "Installs the Python packages that Rail Extract needs and this QGIS lacks."

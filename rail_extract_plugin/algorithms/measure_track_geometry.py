@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsProcessingContext
 
-from ...core.fields import QUALITY_FIELDS
+from ...core.fields import QUALITY_FIELDS, STATION_FIELDS
 from ...core.parameters import Parameters
 from ...core.progress import Progress, Recording
 from ...core.standards import CUSTOM, Gauge, RailStandard, resolve
@@ -19,7 +19,7 @@ from ..dialog.parameter_values import ParameterValues
 from ..dialog.passwords import masked
 from ..reading.clouds import CloudSource, points_folder
 from ..writing.destinations import is_wanted
-from ..writing.layers import FINDINGS, figures_of_stations, write_lines, write_stations
+from ..writing.layers import figures_of_stations, findings_of, write_lines, write_stations
 from ..writing.reports import write_report
 from ..writing.run import properties_of
 from ..writing.whole_files import write_each
@@ -27,6 +27,7 @@ from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
     from ...core.rails import TrackGeometry
+    from ..reading.axes import PlacedAxes
 
 READING, MEASURING = 0.3, 0.9
 """Fractions of the progress bar at which lines and cloud are read, and at which the rails are measured."""
@@ -42,6 +43,7 @@ class Job:
     other_gauges: tuple[Gauge, ...]
     cloud: CloudSource | None
     command: str
+    axes: PlacedAxes | None
 
     @property
     def gauges(self) -> tuple[Gauge, ...]:
@@ -68,6 +70,9 @@ class MeasureTrackGeometry(RailAlgorithm):
             "the place.",
             "The findings and the report compare the gauge with that of the standard, with Gauge and with Other "
             "gauges, whichever is nearest.",
+            "With an axis, points, findings and report have kilometres as well: "
+            + "; ".join(f"{field.name}: {field.meaning}" for field in STATION_FIELDS)
+            + ".",
         )
     )
 
@@ -75,9 +80,10 @@ class MeasureTrackGeometry(RailAlgorithm):
         """Declare the parameters and outputs in the order of the interface."""
         layers = (inputs.centerlines(), inputs.rails_of_tracks(), inputs.points_of_rails())
         settings = (groups.step(), *groups.head(), groups.other_gauges(), groups.leave_out())
+        axis = inputs.axis(optional=True)
         findings = outputs.findings()
         findings.setCreateByDefault(False)
-        for definition in (*layers, *settings, outputs.quality(), findings):
+        for definition in (*layers, *settings, *axis, outputs.quality(), findings):
             self.addParameter(definition)
         self._add_report(outputs.report())
         for output in outputs.quality_figures():
@@ -98,6 +104,7 @@ class MeasureTrackGeometry(RailAlgorithm):
             values.other_gauges(standard) if standard else (),
             values.cloud("POINTS") if values.filled("POINTS") else None,
             masked(self.asPythonCommand(parameters, context)),
+            values.axes(values.lines("INPUT").sourceCrs()) if values.has_axis() else None,
         )
 
     def compute(
@@ -125,6 +132,8 @@ class MeasureTrackGeometry(RailAlgorithm):
         check_gauges(tracks, measured, progress)
         progress.check()
         frame, rest = tracks.frame, (parameters, context)
+        if job.axes:
+            measured = job.axes.along(measured, frame, progress)
         if job.cloud:
             codes = tuple(cloud.class_code for cloud in tracks.clouds)
             self.layer_properties = properties_of(job.cloud, codes, job.head_width_m, frame)
@@ -137,7 +146,7 @@ class MeasureTrackGeometry(RailAlgorithm):
             progress.info(sentence)
         writers = {
             "OUTPUT": lambda: write_stations(self, "OUTPUT", measured, frame, *rest),
-            "FINDINGS": lambda: write_lines(self, "FINDINGS", FINDINGS, found, frame, *rest),
+            "FINDINGS": lambda: write_lines(self, "FINDINGS", findings_of(found), found, frame, *rest),
             "REPORT": lambda: write_report(self, "REPORT", network, origin, *rest),
         }
         return {**write_each(writers, *rest), **figures_of_stations(measured)}

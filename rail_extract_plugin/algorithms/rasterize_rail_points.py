@@ -19,6 +19,7 @@ from ..reading.clouds import CloudSource, read_points
 from ..systems import system
 from ..writing.layers import write_raster
 from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
+from .toolbox_groups import STEPS
 
 READING = 0.8
 """Fraction of the progress bar for reading the cloud."""
@@ -38,6 +39,7 @@ class RasterizeRailPoints(RailAlgorithm):
 
     NAME = "rasterizerailpoints"
     LABEL = "Rasterize rail points"
+    GROUP = STEPS
     TAGS = (*RAIL_WORDS, *CLOUD_WORDS, "raster", "cells", "image")
     PICTURE = "raster.svg"
     NEEDS = (("numpy",), ("laspy",), ("lazrs",), ("pyproj",))

@@ -17,6 +17,7 @@ from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource, request_points
 from ..writing.reports import write_page
 from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
+from .toolbox_groups import RAW_CLOUDS
 
 if TYPE_CHECKING:
     from ...core.labelling.training import Plan
@@ -36,6 +37,7 @@ class TrainRailClassifier(RailAlgorithm):
 
     NAME = "trainrailclassifier"
     LABEL = "Train rail classifier"
+    GROUP = RAW_CLOUDS
     TAGS = (*RAIL_WORDS, *CLOUD_WORDS, "classification", "training", "RandLA-Net", "deep learning", "neural network")
     PICTURE = "gauge.svg"
     NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",), ("torch",))

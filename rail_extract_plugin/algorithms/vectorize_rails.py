@@ -16,6 +16,7 @@ from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource
 from ..writing.layers import RAILS, figures_of, write_lines
 from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
+from .toolbox_groups import STEPS
 
 if TYPE_CHECKING:
     from ...core.rails import RailLine
@@ -40,6 +41,7 @@ class VectorizeRails(RailAlgorithm):
 
     NAME = "vectorizerails"
     LABEL = "Vectorize rails"
+    GROUP = STEPS
     TAGS = (*RAIL_WORDS, *CLOUD_WORDS, "raster", "vectorize", "line", "3d")
     PICTURE = "gauge.svg"
     NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))

@@ -7,15 +7,18 @@ from qgis.core import (
     QgsProcessingParameterBoolean,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterFeatureSource,
+    QgsProcessingParameterField,
     QgsProcessingParameterPoint,
     QgsProcessingParameterRasterLayer,
     QgsProcessingParameterString,
 )
 
+from ...core.alignment.km_text import HECTOMETRES, NOTATIONS
 from ...core.standards import RAIL_CLASS
 from ..i18n import tr
 from .cloud_parameter import CloudParameter
-from .definitions import Definitions, advanced, helped
+from .definitions import UNBOUNDED, Definitions, advanced, choice, helped, number
+from .parameter_values import DIRECTIONS, INCREASING
 
 
 def cloud() -> Definitions:
@@ -158,4 +161,65 @@ def points_of_rails() -> QgsProcessingParameterDefinition:
     return helped(
         CloudParameter("POINTS", tr("Point cloud (layer, file or folder)"), optional=True),
         tr("The cloud from which the rails were extracted: it gives heights, sigma_mm and points for each station."),
+    )
+
+
+def places() -> QgsProcessingParameterDefinition:
+    """Define the layer whose features are to get kilometres."""
+    kind = QgsProcessing.SourceType.TypeVectorAnyGeometry
+    return helped(
+        QgsProcessingParameterFeatureSource("INPUT", tr("Layer"), [kind]),
+        tr("Points, lines or polygons. A line counts where it is half way, a polygon at a place inside."),
+    )
+
+
+def axis(optional: bool) -> Definitions:
+    """Define the axis and what states its kilometres; where it is optional, all of it is advanced."""
+    show = advanced if optional else helped
+    line, point = QgsProcessing.SourceType.TypeVectorLine, QgsProcessing.SourceType.TypeVectorPoint
+    posts = QgsProcessingParameterFeatureSource("POSTS", tr("Kilometre posts"), [point], optional=True)
+    kinds = QgsProcessingParameterField.DataType
+    field = QgsProcessingParameterField(
+        "POST_FIELD", tr("Field of the posts with the kilometre"), None, "POSTS", kinds.Any, False, True
+    )
+    table = QgsProcessing.SourceType.TypeVector
+    jumps = QgsProcessingParameterFeatureSource("JUMPS", tr("Jumps of the kilometres"), [table], optional=True)
+    return (
+        show(
+            QgsProcessingParameterFeatureSource("AXIS", tr("Axis"), [line], optional=optional),
+            tr(
+                "Line that carries the kilometres: with M values in kilometres or metres, or with the fields below. In "
+                "another coordinate system it is transformed."
+            ),
+        ),
+        show(
+            number("START_KM", tr("Start of the axis [km]"), minimum=-UNBOUNDED, optional=True, decimals=6),
+            tr("Kilometre at the first vertex of the axis, for an axis that is a single line. It overrides M values."),
+        ),
+        show(
+            choice("DIRECTION", tr("Kilometres along the axis"), DIRECTIONS, INCREASING),
+            tr("Whether kilometres increase or decrease from the start of the axis; used with its start kilometre."),
+        ),
+        show(
+            posts,
+            tr(
+                "Points of kilometre or hectometre posts up to 50 m beside the axis. Kilometres are interpolated "
+                "between them. They override the start and M values."
+            ),
+        ),
+        show(field, tr("Numbers, or texts such as 12.3+45. Empty means the first of km, kilometre, km_text, station.")),
+        show(
+            jumps,
+            tr(
+                "Table with the fields km_back, the kilometre before each jump, and km_ahead, the one behind it, in "
+                "the order of increasing kilometres."
+            ),
+        ),
+        show(
+            choice("FORMAT", tr("Kilometres as text"), tuple(NOTATIONS), HECTOMETRES),
+            tr(
+                "HECTOMETRES writes 12.3+45.67, KILOMETRES 12+345.67, GERMAN 12,3 + 46, and MILES 7 mi 1181.39 yd, in "
+                "miles and yards."
+            ),
+        ),
     )

@@ -52,6 +52,24 @@ def _layer(name: str, label: str, kind: QgsProcessing.SourceType, optional: bool
     return made
 
 
+def stationed() -> QgsProcessingParameterDefinition:
+    """Define the copy of a layer with kilometres."""
+    kind = QgsProcessing.SourceType.TypeVectorAnyGeometry
+    return helped(
+        _layer("OUTPUT", tr("Layer with kilometres"), kind, optional=False),
+        tr("The features of the layer with all their fields, and with axis, kilometre, offset and side."),
+    )
+
+
+def station_figures() -> Numbers:
+    """Define the figures about places along an axis."""
+    return (
+        QgsProcessingOutputNumber("PLACE_COUNT", tr("Number of features with a kilometre")),
+        QgsProcessingOutputNumber("BEYOND_COUNT", tr("Number of features without a kilometre")),
+        QgsProcessingOutputNumber("AMBIGUOUS_COUNT", tr("Number of features with an ambiguous kilometre")),
+    )
+
+
 def findings() -> QgsProcessingParameterDefinition:
     """Define the layer of places to look at."""
     line = QgsProcessing.SourceType.TypeVectorLine

@@ -38,6 +38,10 @@ if TYPE_CHECKING:
 
     from ...core.clouds.mask import Mask
     from ...core.raster_file import RasterHeader
+    from ..reading.axes import PlacedAxes
+
+INCREASING, DECREASING = DIRECTIONS = ("INCREASING", "DECREASING")
+"""Whether kilometres increase from the first vertex of an axis."""
 
 NUMBERS = {
     "SMOOTHING_XY": "smoothing_xy_m",
@@ -171,6 +175,47 @@ class ParameterValues:
                 raise ParameterError("ONLY_GUIDED needs lines to compare tracks with: choose GUIDE.")
             return ()
         return read_guide(self._line_source("GUIDE"), system(checked_crs(cloud)), self._context)
+
+    def has_axis(self) -> bool:
+        """Return whether AXIS is filled in.
+
+        Raises
+        ------
+        ParameterError
+            It is not, but what states its kilometres is.
+        """
+        lone = next((name for name in ("START_KM", "POSTS", "JUMPS") if self.filled(name)), None)
+        if lone and not self.filled("AXIS"):
+            raise ParameterError(f"{lone} needs the line that it applies to: choose AXIS.")
+        return self.filled("AXIS")
+
+    def axes(self, crs: QgsCoordinateReferenceSystem) -> PlacedAxes:
+        """Read AXIS and what states its kilometres, in a coordinate system.
+
+        Raises
+        ------
+        RailExtractError
+            They can't be transformed, state no kilometres or contradict each other.
+        """
+        from ...core.alignment.stations import Start
+        from ..reading.axes import AxisSources, read_axes
+
+        start_km = self.optional_number("START_KM")
+        start = None if start_km is None else Start(start_km, self.choice("DIRECTION") == DECREASING)
+        posts, jumps = (self.table(name) if self.filled(name) else None for name in ("POSTS", "JUMPS"))
+        sources = AxisSources(self._line_source("AXIS"), start, posts, self.text("POST_FIELD"), jumps)
+        return read_axes(sources, crs, self.choice("FORMAT"), self._context)
+
+    def axis_crs(self) -> QgsCoordinateReferenceSystem:
+        """Return the coordinate system of AXIS."""
+        return self._line_source("AXIS").sourceCrs()
+
+    def table(self, name: str) -> QgsProcessingFeatureSource:
+        """Return a layer or a table."""
+        source = self._algorithm.parameterAsSource(self._parameters, name, self._context)
+        if source is None:
+            raise RailExtractError(f"{name} is not a readable layer: choose another one.")
+        return source
 
     def seeds(self, cloud: CloudSource) -> tuple[np.ndarray, ...]:
         """Read SEEDS and SEED, in the coordinate system of the cloud.

@@ -176,7 +176,7 @@ def read_place(
         It can't be transformed.
     """
     shape = QgsGeometry.fromPointXY(place)
-    if not _transform(shape, QgsCoordinateTransform(own, crs, context.transformContext())):
+    if not transform(shape, QgsCoordinateTransform(own, crs, context.transformContext())):
         raise CrsError("SEED can't be transformed to the coordinate system of the cloud: pick it on the cloud.")
     return np.array([[shape.asPoint().x(), shape.asPoint().y()]])
 
@@ -218,7 +218,7 @@ def _transformed(
     """Return the geometries of a layer in another coordinate system."""
     change = QgsCoordinateTransform(source.sourceCrs(), crs, context.transformContext())
     shapes = [feature.geometry() for feature in source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS)]
-    if not all(_transform(shape, change) for shape in shapes):
+    if not all(transform(shape, change) for shape in shapes):
         raise CrsError(
             f"{name} can't be transformed to the coordinate system of the cloud ({crs.authid() or crs.description()}): "
             "check that both are assigned as the data were made."
@@ -226,7 +226,7 @@ def _transformed(
     return shapes
 
 
-def _transform(shape: QgsGeometry, change: QgsCoordinateTransform) -> bool:
+def transform(shape: QgsGeometry, change: QgsCoordinateTransform) -> bool:
     """Transform a geometry; False if it lies outside of the area of one of the systems."""
     try:
         shape.transform(change)
@@ -368,7 +368,7 @@ def _attributes(
 def _number(feature: QgsFeature, name: str, default: float) -> float:
     """Return the number in a field, or `default` if the field is missing or holds no finite number."""
     try:
-        value = float(_value(feature, name))
+        value = float(value_of(feature, name))
     except (TypeError, ValueError):
         return default
     return value if math.isfinite(value) else default
@@ -382,7 +382,7 @@ def _whole(feature: QgsFeature, name: str, default: int) -> int:
 
 def _ids(feature: QgsFeature, name: str) -> tuple[int, ...]:
     """Return the ids in a field such as "3,5"; none if the field is missing or holds something else."""
-    words = str(_value(feature, name) or "").split(",")
+    words = str(value_of(feature, name) or "").split(",")
     if not all(ID.fullmatch(word) for word in words):
         return ()
     ids = tuple(int(word) for word in words)
@@ -391,7 +391,7 @@ def _ids(feature: QgsFeature, name: str) -> tuple[int, ...]:
 
 def _gaps(feature: QgsFeature, xyz: np.ndarray) -> np.ndarray:
     """Return the sections in the field `gaps`, (k, 2) metres; none if the field does not hold those of this line."""
-    words = str(_value(feature, "gaps") or "").split(",")
+    words = str(value_of(feature, "gaps") or "").split(",")
     try:
         gaps = np.array([[float(bound) for bound in word.split("-")] for word in words], dtype=float)
     except ValueError:
@@ -401,7 +401,7 @@ def _gaps(feature: QgsFeature, xyz: np.ndarray) -> np.ndarray:
     return gaps if in_order else NO_GAPS.copy()
 
 
-def _value(feature: QgsFeature, name: str) -> Any:
+def value_of(feature: QgsFeature, name: str) -> Any:
     """Return the value of a field, or None if the field is missing or empty."""
     index = feature.fields().lookupField(name)
     value = feature.attribute(index) if index >= 0 else NULL

@@ -21,6 +21,7 @@ from qgis.core import (
     QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingOutputLayerDefinition,
+    QgsVertexIterator,
     QgsWkbTypes,
 )
 
@@ -30,10 +31,12 @@ from ...core.fields import (
     BRIDGED,
     CENTERLINE_FIELDS,
     FINDING_FIELDS,
+    KM_FIELDS,
     LENGTH,
     QUALITY_FIELDS,
     RAIL_FIELDS,
     SIGMA,
+    STATION_FIELDS,
     STOP_FIELDS,
     UNKNOWN_IN_METRES,
     Field,
@@ -71,6 +74,8 @@ class LayerKind:
 RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELDS, "centerlines")
 QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
 STOPS = LayerKind(STOP_FIELDS, "stops")
+PLACES = "places"
+"""What copies of layers of any kind are called in drawings; they have no style."""
 
 
 def fields(columns: Sequence[Field]) -> QgsFields:
@@ -101,9 +106,33 @@ def stations(tracks: Sequence[TrackGeometry], frame: LocalFrame) -> Iterator[Qgs
     """Convert the stations of measured tracks to point features in the cloud's coordinates."""
     for track in tracks:
         places = frame.to_crs(track.xyz).tolist()
-        profiles = (getattr(track, column.name) for column in QUALITY.columns[1:])
+        profiles = [getattr(track, column.name) for column in QUALITY.columns[1:]]
+        if track.kilometres is not None:
+            profiles += [getattr(track.kilometres, column.name) for column in STATION_FIELDS]
+        columns = quality_of(tracks).columns
         for (x, y, z), *row in zip(places, repeat(track.track_id), *profiles):
-            yield _feature(QgsGeometry(QgsPoint(x, y) if math.isnan(z) else QgsPoint(x, y, z)), row, QUALITY.columns)
+            yield _feature(QgsGeometry(QgsPoint(x, y) if math.isnan(z) else QgsPoint(x, y, z)), row, columns)
+
+
+def quality_of(tracks: Sequence[TrackGeometry]) -> LayerKind:
+    """Return the fields of the stations of tracks: with an axis, also their places along it."""
+    located = any(track.kilometres is not None for track in tracks)
+    return LayerKind((*QUALITY_FIELDS, *STATION_FIELDS), QUALITY.style) if located else QUALITY
+
+
+def findings_of(found: Sequence[Finding]) -> LayerKind:
+    """Return the fields of findings: with an axis, also their kilometres."""
+    located = any(finding.km_text is not None for finding in found)
+    return LayerKind((*FINDING_FIELDS, *KM_FIELDS), FINDINGS.style) if located else FINDINGS
+
+
+def copies(originals: Sequence[QgsFeature], columns: QgsFields, rows: Sequence[Sequence[Any]]) -> Iterator[QgsFeature]:
+    """Copy features with further values, (n, k), for the last fields of `columns`."""
+    for original, row in zip(originals, rows):
+        feature = QgsFeature(columns)
+        feature.setGeometry(original.geometry())
+        feature.setAttributes([*original.attributes(), *row[: columns.count() - len(original.attributes())]])
+        yield feature
 
 
 def is_flat(lines: Sequence[Line | TrackGeometry]) -> bool:
@@ -181,7 +210,7 @@ def write_stations(
     """
     shape = QgsWkbTypes.Type.Point if is_flat(tracks) else QgsWkbTypes.Type.PointZ
     made = stations(tracks, frame)
-    return _write(algorithm, name, QUALITY, shape, made, frame, parameters, context)
+    return _write(algorithm, name, quality_of(tracks), shape, made, frame, parameters, context)
 
 
 def write_stops(
@@ -280,16 +309,69 @@ def _write(
     if destination is not None and destination.file.suffix.lower() in EXCHANGED:
         return _exchange(algorithm, name, kind, shape, made, frame, parameters, context)
     columns, crs = fields(kind.columns), output_crs(frame.crs_wkt)
+    layer_id = _layer(algorithm, name, columns, shape, made, crs, lost_part(frame.crs_wkt), parameters, context)
+    if not layer_id:
+        return {}
+    _style(algorithm, name, layer_id, kind.style, context)
+    return {name: layer_id}
+
+
+def write_copy(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    columns: QgsFields,
+    shape: QgsWkbTypes.Type,
+    made: Iterator[QgsFeature],
+    crs: QgsCoordinateReferenceSystem,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write a copy of a layer of any kind, with other fields.
+
+    Parameters
+    ----------
+    columns : QgsFields
+    shape : QgsWkbTypes.Type
+    made : iterator of QgsFeature
+    crs : QgsCoordinateReferenceSystem
+    algorithm, name, parameters, context
+        See `write_lines`.
+    """
+    destination, wkt = algorithm.destinations.get(name), crs.toWkt() if crs.isValid() else None
+    if destination is not None and destination.file.suffix.lower() in EXCHANGED:
+        import numpy as np
+
+        from ...core.clouds.crs import parse_crs, units
+        from ...core.frame import LocalFrame
+
+        if QgsWkbTypes.geometryType(shape) == QgsWkbTypes.GeometryType.PolygonGeometry:
+            raise RailExtractError(f"{name} can't be {destination.path.name} for polygons: choose a GeoPackage.")
+        kind = LayerKind(tuple(Field(one.name(), float if one.isNumeric() else str, "") for one in columns), PLACES)
+        unit_m = units(parse_crs(wkt))[0] if wkt and not crs.isGeographic() else 1.0
+        frame = LocalFrame(np.zeros(3), unit_m, crs_wkt=wkt)
+        return _exchange(algorithm, name, kind, shape, made, frame, parameters, context)
+    layer_id = _layer(algorithm, name, columns, shape, made, crs, lost_part(wkt), parameters, context)
+    return {name: layer_id} if layer_id else {}
+
+
+def _layer(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    columns: QgsFields,
+    shape: QgsWkbTypes.Type,
+    made: Iterator[QgsFeature],
+    crs: QgsCoordinateReferenceSystem,
+    lost: str | None,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> str:
+    """Write features to a layer, and return its id; empty if the user skipped it."""
 
     def write(value: Any) -> tuple[str, int]:
         sink, layer_id = algorithm.parameterAsSink({**parameters, name: value}, name, context, columns, shape, crs)
         return (layer_id, add_features(sink, made)) if sink else ("", 0)
 
-    layer_id = write_whole(parameters.get(name), context, destination, write, lost_part(frame.crs_wkt))
-    if not layer_id:
-        return {}
-    _style(algorithm, name, layer_id, kind.style, context)
-    return {name: layer_id}
+    return write_whole(parameters.get(name), context, algorithm.destinations.get(name), write, lost)
 
 
 def _exchange(
@@ -306,7 +388,11 @@ def _exchange(
     from ...core.exchange import DRAWN, Shape, write_shapes
 
     destination, value = algorithm.destinations[name], parameters.get(name)
-    shapes = (Shape(vertices_of(feature), _plain(feature.attributes())) for feature in made)
+    shapes = (
+        Shape(_vertices(part.vertices()), _plain(feature.attributes()))
+        for feature in made
+        for part in feature.geometry().constParts()
+    )
     is_line = QgsWkbTypes.geometryType(shape) == QgsWkbTypes.GeometryType.LineGeometry
     with destination.replacing() as new:
         write_shapes(new, shapes, kind.columns, frame, DRAWN[kind.style], is_line)
@@ -320,14 +406,18 @@ def _exchange(
 
 def vertices_of(feature: QgsFeature) -> np.ndarray:
     """Return the vertices of a line or a point, (n, 3) in units of its layer; heights are NaN where there are none."""
+    return _vertices(feature.geometry().vertices())
+
+
+def _vertices(vertices: QgsVertexIterator) -> np.ndarray:
     import numpy as np
 
-    return np.array([(vertex.x(), vertex.y(), vertex.z()) for vertex in feature.geometry().vertices()], dtype=float)
+    return np.array([(vertex.x(), vertex.y(), vertex.z()) for vertex in vertices], dtype=float)
 
 
 def _plain(values: Sequence[Any]) -> list[Any]:
-    """Return attributes with None where they are empty."""
-    return [None if value == NULL else value for value in values]
+    """Return attributes with None where they are empty, and dates as text."""
+    return [None if value == NULL else value.toString() if hasattr(value, "toString") else value for value in values]
 
 
 def _style(

@@ -218,6 +218,7 @@ OUTPUTS = {
     "vectorizerails": ("OUTPUT.gpkg",),
     "buildtrackcenterlines": ("OUTPUT.gpkg",),
     "measuretrackgeometry": ("OUTPUT.gpkg",),
+    "stationalongaxis": ("OUTPUT.gpkg",),
     "trainrailclassifier": ("WEIGHTS.npz",),
 }
 """Outputs of the algorithms, each a file in the folder of the test."""

@@ -20,6 +20,7 @@ def test_toolbox_offers_the_algorithms(qgis, plugin):
             "vectorizerails",
             "buildtrackcenterlines",
             "measuretrackgeometry",
+            "stationalongaxis",
             "trainrailclassifier",
             "installpackages",
             "checkinstallation",
@@ -47,9 +48,19 @@ def test_help_shows_what_gauge_and_railhead_are(qgis, plugin, name):
     assert {picture.pixelColor(x, 50).name() for x in range(picture.width())} >= {"#1565c0", "#e64a19"}
 
 
+def test_the_main_job_stands_apart_from_raw_clouds_and_single_steps(plugin):
+    groups = {}
+    for algorithm in plugin.provider.algorithms():
+        groups.setdefault(algorithm.group(), set()).add(algorithm.name())
+    assert groups["Rails and tracks"] == {"extractrails", "measuretrackgeometry"}
+    assert groups["Raw clouds"] >= {"classifyrailpoints", "growrailpoints", "trainrailclassifier"}
+    assert groups["Single steps"] == {"rasterizerailpoints", "frpdfcleanup", "vectorizerails", "buildtrackcenterlines"}
+    assert groups["Setup"] == {"installpackages", "checkinstallation"}
+    assert set(groups) <= {"Rails and tracks", "Alignment", "Raw clouds", "Single steps", "Setup"}
+
+
 def test_every_parameter_explains_itself(plugin):
     for algorithm in plugin.provider.algorithms():
-        assert algorithm.group() in ("Rails and tracks", "Setup")
         for definition in algorithm.parameterDefinitions():
             assert definition.help(), (algorithm.id(), definition.name())
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from rail_extract.core.standards import STANDARDS
 from rail_extract.laboratory.rasters.turnouts import FORMS, branch
-from rail_extract.laboratory.ruler.classification import lines_from, score
-from rail_extract.laboratory.ruler.lines import cut, nearest
+from rail_extract.laboratory.ruler.classification import hectares, lines_from, score
+from rail_extract.laboratory.ruler.lines import cut, match, nearest
 from rail_extract.laboratory.scenes.plain import spacing
 from rail_extract.laboratory.scenes.raw import scan_world
 from rail_extract.laboratory.scenes.raw_catalogue import MOBILE, NEGATIVE, parallel
@@ -132,6 +132,17 @@ def test_lines_of_the_labels_lie_on_the_rails(plain):
     pytest.importorskip("torch")
     found = lines_from(plain, plain.head).within(0.05)
     assert found.completeness > 0.98
+
+
+def test_lines_without_truth_are_wrong_over_their_whole_length(plain):
+    found = match([np.array([[0.0, 0, 0], [30, 0, 0]]), np.array([[0.0, 5, 0], [0, 17, 0]])], [])
+    assert found.wrong_m() == pytest.approx(42.0)
+    assert found.within(0.05).correctness == 0.0
+    assert np.isnan(found.within(0.05).completeness)
+    nothing = lines_from(plain, np.zeros(len(plain.xyz), dtype=bool))
+    assert nothing.wrong_m() == 0.0 and nothing.within(0.05).completeness == 0.0
+    # 15 m long and 28 m wide; squares at its edges are partly outside.
+    assert hectares(plain) == pytest.approx(0.042, rel=0.15)
 
 
 @pytest.mark.parametrize("name", ["street", "car park", "quarry from the air"])

@@ -284,3 +284,38 @@ def assert_refused(outcome, sentence):
     assert sentence in outcome.error
     assert "Traceback" not in outcome.error
     assert "\n" not in outcome.error.strip()
+
+
+def test_an_axis_gives_stations_findings_and_report_their_kilometres(run_step, context, tmp_path):
+    """The axis is a straight beside the curve: kilometres come from it and not from the length of the track."""
+    middle, left, right = curved_track()
+    axis = layer_of([(np.array([[0.0, 0], [70, 0]]) + PLACE[:2])], "LineString")
+    given = {"INPUT": layer_of([middle]), "RAILS": layer_of([left, right[:61]]), "AXIS": axis, "START_KM": 7.35}
+    outputs = {"OUTPUT": "memory:", "FINDINGS": "memory:", "REPORT": tmp_path / "report.html"}
+    outcome = run_step("measuretrackgeometry", {**given, **outputs})
+    assert outcome.ok, outcome.error
+    stations, findings = (context.getMapLayer(outcome.results[name]) for name in ("OUTPUT", "FINDINGS"))
+    names = ["axis", "piece", "km", "km_text", "offset_m", "side", "ambiguous"]
+    assert stations.fields().names()[-8:] == ["sigmaz_mm", *names]
+    rows = list(stations.getFeatures())
+    east = np.array([feature.geometry().asPoint().x() for feature in rows]) - PLACE[0]
+    north = np.array([feature.geometry().asPoint().y() for feature in rows]) - PLACE[1]
+    np.testing.assert_allclose([feature["km"] for feature in rows], 7.35 + east / 1000, atol=2e-6)
+    np.testing.assert_allclose([feature["offset_m"] for feature in rows], north, atol=0.001)
+    assert {feature["side"] for feature in rows[1:]} == {"left"}
+    assert rows[30]["km_text"] == "7.3+79.95"
+    assert findings.fields().names()[-2:] == ["km", "km_text"]
+    worst = next(findings.getFeatures())
+    nearest = min(rows, key=lambda feature: abs(feature["chainage_m"] - worst["worst_m"]))
+    assert (worst["km"], worst["km_text"]) == (nearest["km"], nearest["km_text"])
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert f"<td>{worst['km_text']}</td>" in page
+    assert f"<td>{rows[0]['km_text']} to {rows[-1]['km_text']}</td>" in page
+    assert ">7.3+79.95</text>" in page  # below the profiles
+
+
+def test_what_states_kilometres_needs_an_axis(run_step):
+    middle, left, right = curved_track()
+    given = {"INPUT": layer_of([middle]), "RAILS": layer_of([left, right]), "OUTPUT": "memory:"}
+    outcome = run_step("measuretrackgeometry", {**given, "START_KM": 3})
+    assert (outcome.ok, outcome.error) == (False, "START_KM needs the line that it applies to: choose AXIS.")

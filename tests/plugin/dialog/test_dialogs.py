@@ -21,7 +21,7 @@ NAMES = (
         "vectorizerails",
         "buildtrackcenterlines",
     ),
-    *("measuretrackgeometry", "trainrailclassifier", "installpackages", "checkinstallation"),
+    *("measuretrackgeometry", "stationalongaxis", "trainrailclassifier", "installpackages", "checkinstallation"),
 )
 SMALLEST_ICON = 16
 
@@ -112,7 +112,7 @@ def test_every_algorithm_has_its_own_icon(make):
 
 @pytest.mark.parametrize(
     ("word", "found"),
-    [("rail", 11), ("gleis", 9), ("voie", 9), ("vía", 9), ("railway", 9), ("laz", 6), ("gauge", 3), ("torch", 1)],
+    [("rail", 12), ("gleis", 10), ("voie", 10), ("vía", 10), ("railway", 10), ("laz", 6), ("gauge", 3), ("torch", 1)],
 )
 def test_toolbox_search(make, word, found):
     assert sum(any(word in tag.lower() for tag in make(name).tags()) for name in NAMES) == found

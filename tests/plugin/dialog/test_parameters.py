@@ -38,6 +38,13 @@ PARAMETERS = [
     ("CENTERLINE_TOLERANCE", "number", 0.05),
     ("STRIPS", "enum", "AS_THEY_ARE"),
     ("STEP", "number", 1.0),
+    ("AXIS", "source", None),
+    ("START_KM", "number", None),
+    ("DIRECTION", "enum", "INCREASING"),
+    ("POSTS", "source", None),
+    ("POST_FIELD", "field", None),
+    ("JUMPS", "source", None),
+    ("FORMAT", "enum", "HECTOMETRES"),
     ("RAILS", "sink", None),
     ("CENTERLINES", "sink", None),
     ("QUALITY", "sink", None),
@@ -67,6 +74,7 @@ OUTPUTS = {
 RESULTS = {"RAILS", "CENTERLINES", "QUALITY", "FINDINGS", "CLEANED", "REPORT"}
 ESSENTIAL = {"INPUT", "RAIL_CLASSES", "CLASSIFY", "STANDARD", "GAUGE", "HEAD_WIDTH", "EXTENT", "MAX_GAP"} | RESULTS
 OPTIONAL = {"WEIGHTS", "SEEDS", "GAUGE", "HEAD_WIDTH", "EXTENT", "MASK", "CRS", "LEAVE_OUT", "OTHER_GAUGES"} | RESULTS
+OPTIONAL |= {"AXIS", "START_KM", "POSTS", "POST_FIELD", "JUMPS"}
 
 
 CORE_DEFAULTS = {name: getattr(Parameters, field) for name, field in {**NUMBERS, **CHOICES}.items()}
@@ -116,7 +124,7 @@ def test_labels_of_quantities_state_their_unit(algorithm):
     unitless = {"ITERATIONS"}
     for definition in algorithm.parameterDefinitions():
         if definition.type() == "number" and definition.name() not in unitless:
-            assert definition.description().endswith(("[m]", "[mm]", "[°]"))
+            assert definition.description().endswith(("[m]", "[mm]", "[°]", "[km]"))
 
 
 @pytest.mark.parametrize(("text", "numbers"), [("10", (10,)), ("10,11", (10, 11)), (" 11; 10 11", (11, 10))])

@@ -1,0 +1,256 @@
+"""Places beside an axis: foot, offset and side, and the kilometre there.
+
+See docs/stationing.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..polyline import left_normals, length_along, resample
+from ..progress import SILENT, Progress
+from ..rails import Kilometres
+from .km_text import write_km
+from .stationing import Stationing
+
+PIECE_M = 10.0
+"""Longest part of a segment of the axis among which the nearest is sought, metres."""
+
+CANDIDATES = 8
+"""Parts with the nearest middles, of which one has the foot: of parts of 10 m, middles are at most 5 m off it."""
+
+SAMPLE_M = 5.0
+"""Spacing of the places at which a second foot is sought, metres; chords of this length are within 6 mm of R 500 m."""
+
+APART_M, CLEARLY = 50.0, 1.2
+"""A second foot makes a place ambiguous if it is at least this far along the axis from the first, metres, and less than
+this many times as far from the place: the inside of a curve, or a place between two lines."""
+
+BEYOND_M = 1.0
+"""Places up to this far beyond an end of the axis have the kilometre of its end, metres; others have none."""
+
+ON_AXIS_M = 0.0005
+"""Places closer to the axis are on neither side of it: less than the last decimal of the offset, metres."""
+
+PLACES_AT_ONCE = 20_000
+"""Places whose feet are computed at once: between two checks for cancellation."""
+
+
+@dataclass(frozen=True)
+class Feet:
+    """Feet of places on an axis; (n,) arrays.
+
+    Attributes
+    ----------
+    s : float
+        Plan distance of the foot from the first vertex, metres.
+    left_m : float
+        Distance of the place from its foot, positive to the left.
+    beyond_m : float
+        How far the place lies beyond the nearer end, 0 between the ends.
+    """
+
+    s: np.ndarray
+    left_m: np.ndarray
+    beyond_m: np.ndarray
+
+    @property
+    def distance_m(self) -> np.ndarray:
+        """Distance of the place from the axis, (n,)."""
+        return np.hypot(self.left_m, self.beyond_m)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A line that carries the kilometres of a railway, directed with them.
+
+    Attributes
+    ----------
+    name : str
+    xy : (n, 2) array
+        Vertices, metres; no two successive ones are equal.
+    stationing : Stationing
+    """
+
+    name: str
+    xy: np.ndarray
+    stationing: Stationing
+
+    @cached_property
+    def along(self) -> np.ndarray:
+        """Plan distance of each vertex from the first, (n,) metres."""
+        return length_along(self.xy)
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Unit vectors to the left, (n, 2): at a vertex, of the bisector of its two segments."""
+        return left_normals(self.xy)
+
+    @cached_property
+    def _parts(self) -> tuple[cKDTree, np.ndarray]:
+        """Middles of parts of segments, and the segment of each."""
+        steps = self._steps
+        counts = np.ceil(np.hypot(*steps.T) / PIECE_M).astype(int)
+        segment = np.repeat(np.arange(len(steps)), counts)
+        first = np.repeat(np.cumsum(counts) - counts, counts)
+        share = (np.arange(len(segment)) - first + 0.5) / counts[segment]
+        return cKDTree(self.xy[segment] + share[:, None] * steps[segment]), segment
+
+    @cached_property
+    def _samples(self) -> tuple[cKDTree, np.ndarray]:
+        """Places at equal distances, and their `s`."""
+        places, s = resample(self.xy, SAMPLE_M)
+        return cKDTree(places), s
+
+    def feet(self, xy: np.ndarray) -> Feet:
+        """Find the feet of places, (k, 2) metres.
+
+        The foot is on the normal through the place. Normals turn evenly from the bisector at one vertex to that at the
+        next, so that feet move steadily along the axis on both sides of a bend. Where normals cross on the inside of a
+        bend, the foot is that of the plain perpendicular.
+        """
+        segment, last = self._nearest_segments(xy), len(self.xy) - 2
+        plain, length = self._perpendicular(segment, xy)
+        past = np.maximum(np.where(segment == 0, -plain, 0.0), np.where(segment == last, plain - 1, 0.0))
+        beyond = length * np.maximum(past, 0.0)
+        around = np.clip(segment + np.array([[-1], [0], [1]]), 0, last)
+        shares = np.stack([self._fan(one, xy) for one in around])
+        away = np.stack([self._away(one, share, xy) for one, share in zip(around, shares)])
+        away[~((shares >= 0) & (shares <= 1))] = np.inf
+        best, places = np.argmin(away, axis=0), np.arange(len(xy))
+        on_fan = np.isfinite(away[best, places]) & (beyond <= 0)
+        segment = np.where(on_fan, around[best, places], segment)
+        share = np.where(on_fan, shares[best, places], np.clip(plain, 0.0, 1.0))
+        side = np.sign(_cross(self._steps[segment], xy - self._place(segment, share)))
+        across = np.sqrt(np.maximum(self._away(segment, share, xy) ** 2 - beyond**2, 0.0))
+        return Feet(self.along[segment] + share * np.diff(self.along)[segment], side * across, beyond)
+
+    @cached_property
+    def _steps(self) -> np.ndarray:
+        """Vectors of the segments, (n - 1, 2)."""
+        return np.diff(self.xy, axis=0)
+
+    def _perpendicular(self, segment: np.ndarray, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the share of segments at which the perpendicular meets places, (k,), and the segments' lengths."""
+        step = self._steps[segment]
+        length = np.hypot(*step.T)
+        return np.einsum("ij,ij->i", xy - self.xy[segment], step) / length**2, length
+
+    def _nearest_segments(self, xy: np.ndarray) -> np.ndarray:
+        """Return the number of the nearest segment for each place, (k,)."""
+        tree, segments = self._parts
+        count = min(CANDIDATES, len(segments))
+        _, parts = tree.query(xy, k=np.arange(1, count + 1))
+        candidates = segments[parts]
+        start, step = self.xy[candidates], self._steps[candidates]
+        ahead = np.sum((xy[:, None] - start) * step, axis=2) / np.sum(step**2, axis=2)
+        feet = start + np.clip(ahead, 0.0, 1.0)[..., None] * step
+        distance = np.linalg.norm(feet - xy[:, None], axis=2)
+        return candidates[np.arange(len(xy)), np.argmin(distance, axis=1)]
+
+    def _fan(self, segment: np.ndarray, xy: np.ndarray) -> np.ndarray:
+        """Return the share of segments at which the normal passes through places, (k,); NaN where none does.
+
+        The place P is on the normal at the share u if (P - A - u d) x (a + u e) = 0, with the segment's start A and
+        vector d, its normal a at the start, and the change e of the normal: a quadratic equation, of which the root
+        that stays where e vanishes is the foot.
+        """
+        away, step = xy - self.xy[segment], self._steps[segment]
+        normal = self.normals[segment]
+        turn = self.normals[segment + 1] - normal
+        constant, square = _cross(away, normal), -_cross(step, turn)
+        linear = _cross(away, turn) - _cross(step, normal)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            root = np.sqrt(linear**2 - 4 * square * constant)
+            return -2 * constant / (linear + np.sign(linear) * root)
+
+    def _place(self, segment: np.ndarray, share: np.ndarray) -> np.ndarray:
+        return self.xy[segment] + share[:, None] * self._steps[segment]
+
+    def _away(self, segment: np.ndarray, share: np.ndarray, xy: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(xy - self._place(segment, share), axis=1)
+
+    def ambiguous(self, xy: np.ndarray, feet: Feet) -> np.ndarray:
+        """Return whether places, (k, 2), have a second foot that may as well be meant, (k,) bool."""
+        tree, _ = self._samples
+        reach = CLEARLY * feet.distance_m
+        near = tree.query_ball_point(xy, np.hypot(reach, SAMPLE_M / 2), return_sorted=True)
+        places = zip(xy, feet.s, reach, near)
+        return np.array([self._has_second(place, foot, at, np.array(ids)) for place, foot, at, ids in places], bool)
+
+    def _has_second(self, place: np.ndarray, foot: float, reach_m: float, ids: np.ndarray) -> bool:
+        """Return whether a place has another foot within reach among samples, ascending."""
+        tree, s = self._samples
+        if not len(ids) or (np.abs(s[ids] - foot) < APART_M).all():
+            return False
+        distance = np.linalg.norm(tree.data[ids] - place, axis=1)
+        follows = np.diff(ids) == 1
+        before = np.where(np.append(False, follows), np.append(np.inf, distance[:-1]), np.inf)
+        after = np.where(np.append(follows, False), np.append(distance[1:], np.inf), np.inf)
+        feet = ids[(distance <= before) & (distance <= after) & (np.abs(s[ids] - foot) >= APART_M)]
+        return any(_distance_to_chords(place, tree.data[max(at - 1, 0) : at + 2]) < reach_m for at in feet)
+
+
+def locate(axes: Sequence[Axis], xy: np.ndarray, notation: str, progress: Progress = SILENT) -> Kilometres:
+    """Find kilometre, offset and side of places along the nearest of several axes.
+
+    Parameters
+    ----------
+    axes : sequence of Axis
+    xy : (n, 2) array
+        Metres, in the plane of the axes.
+    notation : str
+        One of `km_text.NOTATIONS`.
+    progress : Progress
+
+    Returns
+    -------
+    Kilometres
+        Places further than `BEYOND_M` beyond the ends of all axes have none.
+    """
+    parts = range(0, len(xy), PLACES_AT_ONCE)
+    found = [_locate(axes, xy[start : start + PLACES_AT_ONCE]) for start in progress.follow(parts)]
+    if not found:
+        return Kilometres.empty(0)
+    axis, s, left_m, ambiguous = (np.concatenate(column) for column in zip(*found))
+    made = Kilometres.empty(len(xy))
+    for number, one in enumerate(axes):
+        mine = np.flatnonzero(axis == number)
+        piece, km = one.stationing.at(s[mine])
+        counts_from = one.stationing.counts_from()[piece]
+        made.axis[mine], made.piece[mine], made.km[mine] = one.name, piece + 1, km
+        made.km_text[mine] = [write_km(value, notation, again) for value, again in zip(np.round(km, 6), counts_from)]
+        made.offset_m[mine], made.ambiguous[mine] = left_m[mine], ambiguous[mine]
+        made.side[mine] = np.select([left_m[mine] > ON_AXIS_M, left_m[mine] < -ON_AXIS_M], ["left", "right"], "on")
+    return made
+
+
+def _locate(axes: Sequence[Axis], xy: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return the number of the nearest axis (-1 without one), `s`, the offset and whether they are ambiguous."""
+    feet = [one.feet(xy) for one in axes]
+    distance = np.stack([np.where(one.beyond_m <= BEYOND_M, one.distance_m, np.inf) for one in feet])
+    nearest, rows = np.argmin(distance, axis=0), np.arange(len(xy))
+    shortest = distance[nearest, rows]
+    ambiguous = np.sum(distance < CLEARLY * shortest, axis=0) > 1
+    for number, (one, own) in enumerate(zip(axes, feet)):
+        mine = np.flatnonzero((nearest == number) & ~ambiguous & np.isfinite(shortest))
+        ambiguous[mine] = one.ambiguous(xy[mine], Feet(own.s[mine], own.left_m[mine], own.beyond_m[mine]))
+    s, left_m = (np.stack([getattr(one, name) for one in feet])[nearest, rows] for name in ("s", "left_m"))
+    return np.where(np.isfinite(shortest), nearest, -1), s, left_m, ambiguous
+
+
+def _distance_to_chords(place: np.ndarray, chain: np.ndarray) -> float:
+    """Return the distance of a place, (2,), from a polyline, (n, 2)."""
+    step = np.diff(chain, axis=0)
+    share = np.clip(np.sum((place - chain[:-1]) * step, axis=1) / np.sum(step**2, axis=1), 0.0, 1.0)
+    return float(np.linalg.norm(chain[:-1] + share[:, None] * step - place, axis=1).min())
+
+
+def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the cross products of vectors, (k, 2) each, as (k,)."""
+    return one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]

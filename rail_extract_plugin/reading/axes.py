@@ -1,0 +1,250 @@
+"""Axes with kilometres read from vector layers, in the plane in which places are to be located."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from qgis.core import (
+    QgsAbstractGeometry,
+    QgsCoordinateReferenceSystem,
+    QgsCoordinateTransform,
+    QgsFeature,
+    QgsFeatureRequest,
+    QgsGeometry,
+    QgsProcessingContext,
+    QgsProcessingFeatureSource,
+    QgsWkbTypes,
+)
+
+from ...core.alignment.axis import locate
+from ...core.alignment.km_text import read_km
+from ...core.alignment.stationing import Jump
+from ...core.alignment.stations import Axes, AxisLine, Post, Start, make_axes
+from ...core.clouds.crs import parse_crs, units
+from ...core.errors import CrsError, RailExtractError
+from ...core.frame import LocalFrame
+from ...core.progress import SILENT, Progress
+from ...core.rails import Kilometres, TrackGeometry
+from .line_layers import CHORD_TOLERANCE_M, GEOMETRY_AS_IT_IS, transform, value_of, wkt_of
+
+NAME_FIELDS = ("axis", "name", "ref")
+"""Fields of an axis layer that name an axis, the first one that exists."""
+
+KM_FIELDS = ("km", "kilometre", "kilometer", "km_text", "station")
+"""Fields of a post layer with the kilometre, the first one that exists, if none is chosen."""
+
+BACK, AHEAD = "km_back", "km_ahead"
+"""Fields of the table of jumps."""
+
+
+@dataclass(frozen=True)
+class AxisSources:
+    """The layers that state kilometres, and what goes with them; None where a layer is not given."""
+
+    axis: QgsProcessingFeatureSource
+    start: Start | None
+    posts: QgsProcessingFeatureSource | None
+    post_field: str
+    jumps: QgsProcessingFeatureSource | None
+
+
+@dataclass(frozen=True)
+class PlacedAxes:
+    """Axes in the plane of a coordinate system.
+
+    Attributes
+    ----------
+    axes : Axes
+        In metres from the zero of the coordinate system.
+    unit_m : float
+        Length of the unit of its coordinates.
+    notation : str
+        One of `km_text.NOTATIONS`.
+    """
+
+    axes: Axes
+    unit_m: float
+    notation: str
+
+    def locate(self, xy: np.ndarray, progress: Progress = SILENT) -> Kilometres:
+        """Find the kilometres of places, (n, 2) in coordinates of the system, and say what is in doubt."""
+        for notice in self.axes.notices:
+            progress.warning(notice)
+        found = self.kilometres(xy, progress)
+        beyond, ambiguous = int(np.isnan(found.km).sum()), sum(map(bool, found.ambiguous))
+        if beyond:
+            progress.warning(f"{beyond} of {len(xy)} places are beyond the ends of AXIS: their kilometres are empty.")
+        if ambiguous:
+            progress.warning(
+                f"{ambiguous} of {len(xy)} places are nearly as close to another place of AXIS: check the kilometres "
+                "of those whose field ambiguous is 1."
+            )
+        return found
+
+    def along(
+        self, tracks: Sequence[TrackGeometry], frame: LocalFrame, progress: Progress = SILENT
+    ) -> tuple[TrackGeometry, ...]:
+        """Return measured tracks with the kilometres of their stations, and say what is in doubt."""
+        places = [frame.to_crs(track.xyz)[:, :2] for track in tracks]
+        found = self.locate(np.concatenate([np.empty((0, 2)), *places]), progress)
+        ends = np.cumsum([len(one) for one in places], dtype=int)
+        own = (found.part(end - len(one), end) for one, end in zip(places, ends))
+        return tuple(replace(track, kilometres=kilometres) for track, kilometres in zip(tracks, own))
+
+    def kilometres(self, xy: np.ndarray, progress: Progress = SILENT) -> Kilometres:
+        """Find the same, without a word."""
+        return locate(self.axes.axes, xy * self.unit_m, self.notation, progress)
+
+
+def read_axes(
+    sources: AxisSources, crs: QgsCoordinateReferenceSystem, notation: str, context: QgsProcessingContext
+) -> PlacedAxes:
+    """Read axes and what states their kilometres, transformed to a coordinate system.
+
+    Parameters
+    ----------
+    sources : AxisSources
+    crs : QgsCoordinateReferenceSystem
+        Projected, or invalid for coordinates in metres that nothing transforms.
+    notation : str
+        One of `km_text.NOTATIONS`.
+    context : QgsProcessingContext
+
+    Raises
+    ------
+    CrsError
+        A layer can't be transformed.
+    RailExtractError
+        A layer lacks what it should state, or they contradict each other.
+    """
+    unit_m = units(parse_crs(wkt_of(crs)))[0] if crs.isValid() else 1.0
+    lines = list(_lines(sources.axis, crs, unit_m, context))
+    if not lines:
+        raise RailExtractError("AXIS has no lines: give a line layer.")
+    posts = [] if sources.posts is None else _posts(sources.posts, sources.post_field, crs, unit_m, context)
+    jumps = [] if sources.jumps is None else _jumps(sources.jumps)
+    made = make_axes(lines, sources.start, posts, jumps)
+    if sources.axis.sourceCrs().isValid() and crs.isValid() and sources.axis.sourceCrs() != crs:
+        theirs, ours = (one.authid() or one.description() for one in (sources.axis.sourceCrs(), crs))
+        made = Axes(made.axes, (f"AXIS is in {theirs} and was transformed to {ours}.", *made.notices))
+    return PlacedAxes(made, unit_m, notation)
+
+
+def plane_of(axis: QgsCoordinateReferenceSystem, places: QgsCoordinateReferenceSystem) -> QgsCoordinateReferenceSystem:
+    """Return the coordinate system in which places are located: that of the axis, else that of the places.
+
+    Raises
+    ------
+    CrsError
+        Both are in degrees.
+    """
+    for crs in (axis, places):
+        if crs.isValid() and not crs.isGeographic():
+            return crs
+    if axis.isGeographic() or places.isGeographic():
+        raise CrsError(
+            "AXIS and INPUT are in degrees, where lengths can't be measured: reproject AXIS, for example to the UTM "
+            "zone of the place."
+        )
+    return axis
+
+
+def shapes_in(
+    source: QgsProcessingFeatureSource, crs: QgsCoordinateReferenceSystem, context: QgsProcessingContext, name: str
+) -> Iterator[tuple[QgsFeature, QgsGeometry]]:
+    """Yield the features of a layer with their geometries in another coordinate system.
+
+    Raises
+    ------
+    CrsError
+        A geometry can't be transformed.
+    """
+    change = QgsCoordinateTransform(source.sourceCrs(), crs, context.transformContext())
+    for feature in source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS):
+        shape = QgsGeometry(feature.geometry())
+        if not transform(shape, change):
+            raise CrsError(
+                f"{name} can't be transformed to {crs.authid() or crs.description()}, in which kilometres are "
+                "measured: check that both coordinate systems are assigned as the data were made."
+            )
+        yield feature, shape
+
+
+def _lines(
+    source: QgsProcessingFeatureSource,
+    crs: QgsCoordinateReferenceSystem,
+    unit_m: float,
+    context: QgsProcessingContext,
+) -> Iterator[AxisLine]:
+    """Yield the parts of all lines that have a length."""
+    named = next((name for name in NAME_FIELDS if source.fields().lookupField(name) >= 0), None)
+    for feature, shape in shapes_in(source, crs, context, "AXIS"):
+        name = (value_of(feature, named) if named else None) or ""
+        maximum = QgsAbstractGeometry.SegmentationToleranceType.MaximumDifference
+        shape.convertToStraightSegment(CHORD_TOLERANCE_M / unit_m, maximum)
+        for part in shape.constParts():
+            vertices = [(one.x() * unit_m, one.y() * unit_m, one.m()) for one in part.vertices()]
+            xym = np.array(vertices, dtype=float).reshape(-1, 3)
+            if not np.isfinite(xym[:, :2]).all():
+                raise RailExtractError(
+                    f"AXIS has a line (feature {feature.id()}) with a coordinate that is not a number: repair it."
+                )
+            if len(xym) > 1 and (np.ptp(xym[:, :2], axis=0) > 0).any():
+                yield AxisLine(str(name), xym[:, :2], xym[:, 2])
+
+
+def _posts(
+    source: QgsProcessingFeatureSource,
+    field: str,
+    crs: QgsCoordinateReferenceSystem,
+    unit_m: float,
+    context: QgsProcessingContext,
+) -> list[Post]:
+    """Read the posts."""
+    name = field or next((one for one in KM_FIELDS if source.fields().lookupField(one) >= 0), "")
+    if not name:
+        raise RailExtractError(
+            f"POSTS has no field {', '.join(KM_FIELDS)}: choose the field with the kilometre in POST_FIELD."
+        )
+    found = []
+    for feature, shape in shapes_in(source, crs, context, "POSTS"):
+        if QgsWkbTypes.geometryType(shape.wkbType()) != QgsWkbTypes.GeometryType.PointGeometry or shape.isEmpty():
+            continue
+        km = _km(feature, name, "POSTS")
+        found += [Post(np.array([one.x(), one.y()]) * unit_m, km) for one in shape.vertices()]
+    if not found:
+        raise RailExtractError("POSTS has no points: give a point layer.")
+    return found
+
+
+def _jumps(source: QgsProcessingFeatureSource) -> list[Jump]:
+    """Read the table of jumps."""
+    for name in (BACK, AHEAD):
+        if source.fields().lookupField(name) < 0:
+            raise RailExtractError(
+                f"JUMPS has no field {name}: give a table with {BACK}, the kilometre before each jump, and {AHEAD}, "
+                "the one behind it."
+            )
+    rows = source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS)
+    return [Jump(_km(feature, BACK, "JUMPS"), _km(feature, AHEAD, "JUMPS")) for feature in rows]
+
+
+def _km(feature: QgsFeature, field: str, name: str) -> float:
+    """Return the kilometre in a field, a number or a text such as 12.3+45.
+
+    Raises
+    ------
+    RailExtractError
+        It is something else.
+    """
+    value = value_of(feature, field)
+    km = read_km(value) if isinstance(value, str) else value
+    if isinstance(km, (int, float)) and math.isfinite(km):
+        return float(km)
+    raise RailExtractError(
+        f"{name} has a row (feature {feature.id()}) whose field {field} is {value!r} and no kilometre: correct it, or "
+        "delete the row."
+    )

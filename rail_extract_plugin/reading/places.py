@@ -1,0 +1,123 @@
+"""The features of a layer and their places along axes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from qgis.core import (
+    QgsCoordinateReferenceSystem,
+    QgsFeature,
+    QgsGeometry,
+    QgsProcessingContext,
+    QgsProcessingFeatureSource,
+    QgsWkbTypes,
+)
+
+from ...core.fields import EXTENT_FIELDS, STATION_FIELDS, Field
+from ...core.progress import Progress
+from ...core.rails import Kilometres
+from .axes import PlacedAxes, shapes_in
+
+NOWHERE = np.full(2, np.nan)
+"""Place of a feature without geometry."""
+
+
+@dataclass(frozen=True)
+class LocatedFeatures:
+    """Features of a layer, in its own coordinates, and their kilometres.
+
+    Attributes
+    ----------
+    features : list of QgsFeature
+    kilometres : Kilometres
+        Of each feature.
+    extents_km : (n, 2) array
+        Smallest and largest kilometre of the vertices of each feature; NaN without any.
+    """
+
+    features: list[QgsFeature]
+    kilometres: Kilometres
+    extents_km: np.ndarray
+
+    def rows(self) -> list[list[Any]]:
+        """Return the values of `STATION_FIELDS`, then of `EXTENT_FIELDS`, for each feature."""
+        profiles = [getattr(self.kilometres, column.name) for column in STATION_FIELDS]
+        columns = zip((*STATION_FIELDS, *EXTENT_FIELDS), (*profiles, *self.extents_km.T))
+        return [list(row) for row in zip(*([field.value(known) for known in own] for field, own in columns))]
+
+    def figures(self) -> dict[str, int]:
+        """Return the numbers of features with, without and with an ambiguous kilometre, as outputs."""
+        known = int(np.isfinite(self.kilometres.km).sum())
+        doubtful = sum(map(bool, self.kilometres.ambiguous))
+        return {"PLACE_COUNT": known, "BEYOND_COUNT": len(self.features) - known, "AMBIGUOUS_COUNT": doubtful}
+
+
+def station_fields(source: QgsProcessingFeatureSource) -> tuple[Field, ...]:
+    """Return the fields that the features of a layer get."""
+    is_point = QgsWkbTypes.geometryType(source.wkbType()) == QgsWkbTypes.GeometryType.PointGeometry
+    return STATION_FIELDS if is_point else (*STATION_FIELDS, *EXTENT_FIELDS)
+
+
+def locate_features(
+    source: QgsProcessingFeatureSource,
+    axes: PlacedAxes,
+    crs: QgsCoordinateReferenceSystem,
+    context: QgsProcessingContext,
+    progress: Progress,
+) -> LocatedFeatures:
+    """Find the kilometres of the features of a layer.
+
+    Parameters
+    ----------
+    source : QgsProcessingFeatureSource
+    axes : PlacedAxes
+    crs : QgsCoordinateReferenceSystem
+        Of the axes.
+    context : QgsProcessingContext
+    progress : Progress
+
+    Raises
+    ------
+    CrsError
+        A feature can't be transformed to the plane of the axes.
+    """
+    found = list(progress.span(0, 0.3).follow(shapes_in(source, crs, context, "INPUT"), source.featureCount()))
+    places = np.array([_place(shape) for _, shape in found]).reshape(-1, 2)
+    known = np.isfinite(places).all(axis=1)
+    kilometres = Kilometres.empty(len(found))
+    kilometres.put(known, axes.locate(places[known], progress.span(0.3, 0.7)))
+    extents_km = _extents([shape for _, shape in found], axes, progress.span(0.7, 1.0))
+    return LocatedFeatures([feature for feature, _ in found], kilometres, extents_km)
+
+
+def _place(shape: QgsGeometry) -> np.ndarray:
+    """Return where a feature counts, (2,): half way along a line, inside a polygon, in the mean of points."""
+    if shape.isNull() or shape.isEmpty():
+        return NOWHERE
+    kind = QgsWkbTypes.geometryType(shape.wkbType())
+    if kind == QgsWkbTypes.GeometryType.LineGeometry:
+        point = shape.interpolate(shape.length() / 2)
+    elif kind == QgsWkbTypes.GeometryType.PolygonGeometry:
+        point = shape.pointOnSurface()
+    else:
+        point = shape.centroid()
+    if point.isNull():
+        return NOWHERE
+    return np.array([point.constGet().x(), point.constGet().y()])
+
+
+def _extents(shapes: list[QgsGeometry], axes: PlacedAxes, progress: Progress) -> np.ndarray:
+    """Return the smallest and the largest kilometre of the vertices of shapes other than points, (n, 2)."""
+    numbers, vertices = [], []
+    for number, shape in enumerate(shapes):
+        if QgsWkbTypes.geometryType(shape.wkbType()) != QgsWkbTypes.GeometryType.PointGeometry:
+            own = [(vertex.x(), vertex.y()) for vertex in shape.vertices()]
+            vertices += own
+            numbers += [number] * len(own)
+    extents = np.full((len(shapes), 2), np.nan)
+    km = axes.kilometres(np.array(vertices).reshape(-1, 2), progress).km
+    np.fmin.at(extents[:, 0], numbers, km)
+    np.fmax.at(extents[:, 1], numbers, km)
+    return extents

@@ -1,0 +1,197 @@
+"""Kilometres of the features of layers: sources, coordinate systems, kinds of layers, fields and messages."""
+
+import numpy as np
+import pytest
+from qgis.core import (
+    NULL,
+    QgsCoordinateReferenceSystem,
+    QgsCoordinateTransform,
+    QgsFeature,
+    QgsGeometry,
+    QgsVectorLayer,
+)
+
+EAST, NORTH = 500_000, 3_000_000
+FIELDS = ["axis", "piece", "km", "km_text", "offset_m", "side", "ambiguous"]
+
+
+def layer(kind, *texts, fields="", values=(), crs="EPSG:32643"):
+    """Make a memory layer of shapes whose coordinates count from the corner."""
+    made = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "layer", "memory")
+    for number, text in enumerate(texts):
+        feature = QgsFeature(made.fields())
+        if text:
+            shape = QgsGeometry.fromWkt(text)
+            shape.translate(EAST, NORTH)
+            feature.setGeometry(shape)
+        if values:
+            feature.setAttributes(list(values[number]))
+        assert made.dataProvider().addFeature(feature)
+    return made
+
+
+def table(rows):
+    made = QgsVectorLayer("None?field=km_back:double&field=km_ahead:double", "jumps", "memory")
+    for row in rows:
+        feature = QgsFeature(made.fields())
+        feature.setAttributes(list(row))
+        assert made.dataProvider().addFeature(feature)
+    return made
+
+
+AXIS = "LINESTRING(0 0, 1000 0)"
+AXIS_M = "LINESTRING M(0 0 12000, 1000 0 13000)"
+PLACES = ("POINT(100 4)", "POINT(250.5 -2.5)", "POINT(999 0)")
+
+
+def moved(source, crs):
+    """The same layer in another coordinate system."""
+    target = QgsCoordinateReferenceSystem(crs)
+    made = QgsVectorLayer(f"LineStringM?crs={crs}", "moved", "memory")
+    change = QgsCoordinateTransform(source.crs(), target, source.transformContext())
+    for feature in source.getFeatures():
+        shape = feature.geometry().densifyByCount(50)
+        shape.transform(change)
+        feature.setGeometry(shape)
+        assert made.dataProvider().addFeature(feature)
+    return made
+
+
+@pytest.fixture
+def station(run_step, context, new_feedback):
+    """Run, and return results, values by field, and what was said."""
+
+    def run(places, axis, **parameters):
+        feedback = new_feedback()
+        given = {"INPUT": places, "AXIS": axis, "OUTPUT": "memory:", **parameters}
+        outcome = run_step("stationalongaxis", given, feedback)
+        assert outcome.ok, outcome.error
+        made = context.getMapLayer(outcome.results["OUTPUT"])
+        rows = [feature.attributes() for feature in made.getFeatures()]
+        names = made.fields().names()
+        values = {name: [None if row[at] == NULL else row[at] for row in rows] for at, name in enumerate(names)}
+        return outcome.results, values, feedback.warnings
+
+    return run
+
+
+def test_points_get_kilometre_offset_and_side_and_keep_their_fields(station):
+    places = layer("Point", *PLACES, fields="&field=signal:string(9)", values=[("A",), ("B",), ("C",)])
+    results, values, warnings = station(places, layer("LineStringM", AXIS_M))
+    assert list(values) == ["signal", *FIELDS]
+    assert values["signal"] == ["A", "B", "C"]
+    assert values["km"] == [12.1, 12.2505, 12.999]
+    assert values["km_text"] == ["12.1+00.00", "12.2+50.50", "12.9+99.00"]
+    assert values["offset_m"] == [4.0, -2.5, 0.0]
+    assert values["side"] == ["left", "right", "on"]
+    assert values["axis"] == ["1"] * 3
+    assert values["piece"] == [1] * 3
+    assert values["ambiguous"] == [0] * 3
+    assert (results["PLACE_COUNT"], results["BEYOND_COUNT"], results["AMBIGUOUS_COUNT"]) == (3, 0, 0)
+    assert warnings == []
+
+
+@pytest.mark.parametrize(
+    ("notation", "text"),
+    [("HECTOMETRES", "12.2+50.50"), ("KILOMETRES", "12+250.50"), ("GERMAN", "12,2 + 50"), ("MILES", "7 mi 1077.31 yd")],
+)
+def test_formats(station, notation, text):
+    _, values, _ = station(layer("Point", PLACES[1]), layer("LineStringM", AXIS_M), FORMAT=notation)
+    assert values["km_text"] == [text]
+
+
+def test_start_and_direction(station):
+    places, axis = layer("Point", *PLACES), layer("LineString", AXIS)
+    _, values, _ = station(places, axis, START_KM=5.0)
+    assert values["km"] == [5.1, 5.2505, 5.999]
+    _, values, _ = station(places, axis, START_KM=5.0, DIRECTION="DECREASING")
+    assert values["km"] == [4.9, 4.7495, 4.001]
+    assert values["offset_m"] == [-4.0, 2.5, 0.0]
+
+
+def test_posts_with_texts_and_a_field_of_their_own(station):
+    posts = layer(
+        "Point", "POINT(0 3)", "POINT(500 -3)", fields="&field=board:string(9)", values=[("7,5 + 0",), ("8.0",)]
+    )
+    _, values, _ = station(layer("Point", *PLACES), layer("LineString", AXIS), POSTS=posts, POST_FIELD="board")
+    assert values["km"] == [7.6, 7.7505, 8.499]
+
+
+def test_jumps_with_a_gap_and_an_overlap(station):
+    places = layer("Point", "POINT(150 0)", "POINT(350 0)", "POINT(650 0)")
+    jumps = table([(2.2, 2.3), (2.6, 2.45)])
+    _, values, _ = station(places, layer("LineString", AXIS), START_KM=2.0, JUMPS=jumps, FORMAT="GERMAN")
+    assert values["km"] == [2.15, 2.45, 2.6]
+    assert values["piece"] == [1, 2, 3]
+    assert values["km_text"] == ["2,1 + 50", "2,4 + 50", "2,6 + 0"]
+    places = layer("Point", "POINT(480 0)")
+    _, values, _ = station(places, layer("LineString", AXIS), START_KM=2.0, JUMPS=jumps, FORMAT="GERMAN")
+    assert values["km_text"] == ["2,4 + 180"]  # counts on from 2,4 because 2,45 comes again
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:32644"])
+def test_an_axis_in_another_system_is_transformed_and_that_is_said(station, crs):
+    axis = moved(layer("LineStringM", AXIS_M), crs)
+    _, values, warnings = station(layer("Point", *PLACES), axis)
+    np.testing.assert_allclose(values["km"], [12.1, 12.2505, 12.999], atol=2e-6)
+    np.testing.assert_allclose(values["offset_m"], [4.0, -2.5, 0.0], atol=0.02)
+    assert (warnings == [f"AXIS is in {crs} and was transformed to EPSG:32643."]) == (crs == "EPSG:4326")
+
+
+def test_lines_and_polygons_get_the_kilometres_of_their_ends(station):
+    axis = layer("LineStringM", AXIS_M)
+    _, values, _ = station(layer("LineString", "LINESTRING(100 4, 300 6)"), axis)
+    assert (values["km"], values["km_from"], values["km_to"]) == ([12.2], [12.1], [12.3])
+    _, values, _ = station(layer("Polygon", "POLYGON((100 4, 300 4, 300 9, 100 9, 100 4))"), axis)
+    assert (values["km_from"], values["km_to"], values["side"]) == ([12.1], [12.3], ["left"])
+
+
+def test_what_has_no_kilometre_stays_and_is_counted(station):
+    places = layer("Point", PLACES[0], "POINT(1005 2)", None)
+    results, values, warnings = station(places, layer("LineStringM", AXIS_M))
+    assert values["km"] == [12.1, None, None]
+    assert values["axis"] == ["1", None, None]
+    assert (results["PLACE_COUNT"], results["BEYOND_COUNT"]) == (1, 2)
+    assert warnings == ["1 of 2 places are beyond the ends of AXIS: their kilometres are empty."]
+
+
+def test_an_ambiguous_foot_is_said(station):
+    axis = layer("LineStringM", "LINESTRING M(0 0 0, 500 0 500, 500 100 600, 0 100 1100)")
+    results, values, warnings = station(layer("Point", "POINT(200 48)", "POINT(200 10)"), axis)
+    assert values["ambiguous"] == [1, 0]
+    assert results["AMBIGUOUS_COUNT"] == 1
+    assert len(warnings) == 1
+    assert warnings[0].startswith("1 of 2 places are nearly as close to another place of AXIS")
+
+
+def test_fields_of_the_same_name_stay(station):
+    places = layer("Point", PLACES[0], fields="&field=km:double", values=[(99.0,)])
+    _, values, _ = station(places, layer("LineStringM", AXIS_M))
+    assert (values["km"], values["km_2"]) == ([99.0], [12.1])
+
+
+def test_axes_have_the_names_of_their_field(station):
+    axes = layer(
+        "LineStringM",
+        AXIS_M,
+        "LINESTRING M(0 300 5000, 1000 300 6000)",
+        fields="&field=name:string(9)",
+        values=[("1700",), ("1701",)],
+    )
+    _, values, _ = station(layer("Point", "POINT(100 4)", "POINT(100 296)"), axes)
+    assert values["axis"] == ["1700", "1701"]
+    assert values["km"] == [12.1, 5.1]
+
+
+@pytest.mark.parametrize("name", ["stations.csv", "stations.dxf", "Größe 1.gpkg", "stations.geojson"])
+def test_files(station, run_step, tmp_path, name):
+    outcome = run_step(
+        "stationalongaxis",
+        {
+            "INPUT": layer("MultiPoint", "MULTIPOINT((100 4))"),
+            "AXIS": layer("LineStringM", AXIS_M),
+            "OUTPUT": tmp_path / name,
+        },
+    )
+    assert outcome.ok, outcome.error
+    assert "12.1+00.00" in (tmp_path / name).read_bytes().decode("latin-1")
