@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Optional
 
@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import ParameterError
 from ..frame import LocalFrame
 from ..parameters import JUMPS, FitParameters
-from ..polyline import is_closed, length_along, runs, runs
+from ..polyline import is_closed, length_along, runs
 from ..progress import SILENT, Progress, counted
 from .chain import Chain
 from .elements import Alignment, Element, Figures, PlanElement
@@ -19,7 +19,7 @@ from .given import chain_of, given_of
 from .intrinsic import groups, lateral_signal
 from .layouts import cants, heights, snapped
 from .noise import Noise
-from .plane_fit import NOTHING, PlanFit, Points, fit_plan
+from .plane_fit import NOTHING, FitError, PlanFit, Points, fit_plan
 from .rounding import off_element, with_round_radii
 from .signals import CANT, HEIGHT, PLAN, Kind, Signal, find_structure, noise_of, refitted
 from .uncertainty import chain_errors, plan_errors, remaining
@@ -46,15 +46,16 @@ class Track:
     track_id : int
     xyz : (n, 3) array
         Vertices of the centerline, local metres.
-    cant_m : (n,) array
-        Left rail minus right rail, metres; NaN where it is unknown.
+    cant : (k, 2) array
+        Plan distance from the first vertex, increasing, and cant there, left rail minus right rail; metres. Empty if it
+        is unknown.
     is_bridged : (n,) bool array
-        Whether the line bridges a gap there; such vertices do not count.
+        Whether the line bridges a gap at the vertex; such vertices do not count.
     """
 
     track_id: int
     xyz: np.ndarray
-    cant_m: np.ndarray
+    cant: np.ndarray
     is_bridged: np.ndarray
 
 
@@ -64,7 +65,7 @@ class Deviations:
 
     Attributes
     ----------
-    track_id : int
+    track_id : int or None
     s : (n,) array
         Distance along the design, metres.
     xyz : (n, 3) array
@@ -73,7 +74,7 @@ class Deviations:
         Measured minus design: across, positive to the left; in height; of the cant. NaN where unknown.
     """
 
-    track_id: int
+    track_id: Optional[int]
     s: np.ndarray
     xyz: np.ndarray
     slew_mm: np.ndarray
@@ -103,10 +104,19 @@ class Fit:
 
 @dataclass(frozen=True)
 class Measured:
-    """Points of a track: its vertices, those averaged that are closer than a metre."""
+    """Points of a track: its vertices, those averaged that are closer than a metre.
+
+    Attributes
+    ----------
+    xyz : (n, 3) array
+    along : (n,) array
+        Plan distance from the first vertex along the line.
+    share : (n,) array
+        Number of vertices in each point that do not bridge a gap.
+    """
 
     xyz: np.ndarray
-    cant_m: np.ndarray
+    along: np.ndarray
     share: np.ndarray
 
 
@@ -144,9 +154,50 @@ def fit_track(
     first, last = _holding(track.track_id, elements, settings.tolerance_m, progress)
     alignment = Alignment(track.track_id, frame, elements[first : last + 1])
     alignment = _with_heights(alignment, plan.fit, measured, settings, fixed, in_height)
-    alignment = _with_cants(alignment, plan.fit, measured, settings, fixed, of_cant)
-    deviations = _deviations(alignment, plan.fit, measured)
+    alignment = _with_cants(alignment, plan.fit, measured, track, settings, fixed, of_cant)
+    deviations = _deviations(alignment, plan.fit, measured, track)
     return Fit(alignment, deviations, float(np.sqrt(np.mean(deviations.slew_mm**2))), plan.noise)
+
+
+def fit_tracks(
+    tracks: Sequence[Track],
+    frame: LocalFrame,
+    settings: FitParameters,
+    fixed: Mapping[Optional[int], Alignment],
+    progress: Progress = SILENT,
+) -> list[Fit]:
+    """Fit the design elements of tracks; those that cannot have any are named and left out.
+
+    Parameters
+    ----------
+    tracks : sequence of Track
+    frame : LocalFrame
+    settings : FitParameters
+    fixed : mapping of int to Alignment
+        Elements by track, whose types, and edited radii and ends, are held.
+    progress : Progress
+
+    Raises
+    ------
+    ParameterError
+        No track can have an alignment, or `fixed` has none of the tracks.
+    """
+    if fixed and not any(track.track_id in fixed for track in tracks):
+        raise ParameterError("FIXED has no elements of the tracks in INPUT: give the table of these tracks.")
+    shares = progress.divide([float(length_along(track.xyz[:, :2])[-1]) + 1.0 for track in tracks])
+    fits: list[Fit] = []
+    refusals: list[ParameterError] = []
+    for track, share in zip(tracks, shares):
+        progress.status(f"Fitting track {track.track_id}")
+        try:
+            fits.append(fit_track(track, frame, settings, fixed.get(track.track_id), share))
+        except ParameterError as error:
+            refusals.append(error)
+    if not fits:
+        raise refusals[0]
+    for refusal in refusals:
+        progress.warning(str(refusal))
+    return fits
 
 
 def _check(track: Track) -> None:
@@ -167,32 +218,21 @@ def _check(track: Track) -> None:
 def _points(track: Track) -> Measured:
     """Return the points of a track."""
     starts, counts = groups(track.xyz[:, :2])
-    known = np.isfinite(track.cant_m)
-    columns = np.column_stack([track.xyz, np.where(known, track.cant_m, 0.0), known, ~track.is_bridged])
-    sums = np.add.reduceat(columns, starts)
-    xyz = sums[:, :3] / counts[:, None]
-    with np.errstate(invalid="ignore"):
-        cant = np.where(sums[:, 4] > 0, sums[:, 3] / sums[:, 4], np.nan)
-    step = np.diff(xyz[:, :2], axis=0)
+    along = length_along(track.xyz[:, :2])
+    sums = np.add.reduceat(np.column_stack([track.xyz, along, ~track.is_bridged]), starts)
+    made = Measured(sums[:, :3] / counts[:, None], sums[:, 3] / counts, sums[:, 4])
+    step = np.diff(made.xyz[:, :2], axis=0)
     turn = np.abs(np.angle(np.exp(1j * np.diff(np.arctan2(step[:, 1], step[:, 0])))))
     if turn.max(initial=0.0) > TURNS_BACK_RAD:
-        x, y = track.xyz[starts[int(turn.argmax()) + 1], :2]
         raise ParameterError(
-            f"The line of track {track.track_id} turns back {length_along(xyz[:, :2])[int(turn.argmax()) + 1]:.0f} m "
-            "from its start: remove the stray vertices there, or cut the line."
+            f"The line of track {track.track_id} turns back {made.along[int(turn.argmax()) + 1]:.0f} m from its start: "
+            "remove the stray vertices there, or cut the line."
         )
-    return Measured(xyz, cant, sums[:, 5])
-
-
-@dataclass(frozen=True)
-class _Plan:
-    """The fit in plan, with the noise that was assumed and the noise that is left."""
-
-    chain: Chain
-    fit: PlanFit
-    points: Points
-    used_m: float
-    noise: Noise
+    if np.count_nonzero(made.share) < LEAST_POINTS:
+        raise ParameterError(
+            f"Track {track.track_id} has fewer than {LEAST_POINTS} points outside of bridged gaps: leave it out."
+        )
+    return made
 
 
 @dataclass(frozen=True)
@@ -223,7 +263,7 @@ def _fit_in_plan(
     points = Points(measured.xyz[:, :2], s, measured.share / used_m**2)
     try:
         fit = fit_plan(chain, points, held, progress)
-    except (RuntimeError, np.linalg.LinAlgError) as error:
+    except (FitError, RuntimeError, np.linalg.LinAlgError) as error:
         raise _lost(track_id) from error
     if not np.isfinite(fit.across).all():
         raise _lost(track_id)
@@ -258,9 +298,7 @@ def _stated(plan: _Plan) -> tuple[PlanElement, ...]:
     return tuple(made)
 
 
-def _holding(
-    track_id: int, elements: Sequence[PlanElement], tolerance_m: float, progress: Progress
-) -> tuple[int, int]:
+def _holding(track_id: int, elements: Sequence[PlanElement], tolerance_m: float, progress: Progress) -> tuple[int, int]:
     """Return the first and the last element of the longest part of the fit that holds; warn if it is not the whole."""
     limit_mm = 1000.0 * HOLDS * tolerance_m
     holds = np.array([(one.figures.dev_rms_mm or 0.0) <= limit_mm for one in elements])
@@ -291,7 +329,7 @@ def _with_heights(
     progress: Progress,
 ) -> Alignment:
     """Return an alignment with grades and parabolas."""
-    signal = _signal(alignment, fit, measured.xyz[:, 2], measured.share, HEIGHT)
+    signal = _signal(alignment, fit.s, measured.xyz[:, 2], measured.share, HEIGHT)
     shape = fixed.vertical if fixed else ()
     chain, used = _chain(signal, [one.type == "parabola" for one in shape], shape, settings, progress)
     chain = replace(chain, start=alignment.s_from, end=alignment.s_to)
@@ -303,14 +341,15 @@ def _with_cants(
     alignment: Alignment,
     fit: PlanFit,
     measured: Measured,
+    track: Track,
     settings: FitParameters,
     fixed: Optional[Alignment],
     progress: Progress,
 ) -> Alignment:
     """Return an alignment with constant cants and ramps, as far as the cant is known."""
-    known = np.isfinite(measured.cant_m) & (measured.share > 0)
-    signal = _signal(alignment, fit, np.where(known, measured.cant_m, 0.0), known.astype(float), CANT)
-    if np.count_nonzero(signal.share) < LEAST_CANT_POINTS:
+    s = np.interp(track.cant[:, 0], measured.along, fit.s)
+    signal = _signal(alignment, s, track.cant[:, 1], np.ones(len(s)), CANT)
+    if len(signal.s) < LEAST_CANT_POINTS:
         return alignment
     shape = fixed.cant if fixed else ()
     chain, used = _chain(signal, [one.type == "ramp" for one in shape], shape, settings, progress)
@@ -320,11 +359,11 @@ def _with_cants(
     return replace(alignment, cant=cants(chain, signal, used, replace(errors, s=np.where(sure, 0.0, errors.s))))
 
 
-def _signal(alignment: Alignment, fit: PlanFit, values: np.ndarray, share: np.ndarray, kind: Kind) -> Signal:
+def _signal(alignment: Alignment, s: np.ndarray, values: np.ndarray, share: np.ndarray, kind: Kind) -> Signal:
     """Return values along the design, where their points count."""
-    used = (fit.s >= alignment.s_from) & (fit.s <= alignment.s_to) & (share > 0)
-    order = np.argsort(fit.s[used], kind="stable")
-    return Signal(fit.s[used][order], values[used][order], share[used][order], kind)
+    used = (s >= alignment.s_from) & (s <= alignment.s_to) & (share > 0)
+    order = np.argsort(s[used], kind="stable")
+    return Signal(s[used][order], values[used][order], share[used][order], kind)
 
 
 def _chain(
@@ -339,21 +378,14 @@ def _chain(
     return refitted(chain, signal, used, least_m), used
 
 
-def _deviations(alignment: Alignment, fit: PlanFit, measured: Measured) -> Deviations:
-    """Return the deviations by the metre."""
-    count = int(np.floor(alignment.s_to - alignment.s_from)) + 1
-    s = alignment.s_from + np.arange(count)
-    order = np.argsort(fit.s, kind="stable")
-    feet = fit.s[order]
+def _deviations(alignment: Alignment, fit: PlanFit, measured: Measured, track: Track) -> Deviations:
+    """Return the deviations by the metre, interpolated between the points."""
+    s = alignment.s_from + np.arange(int(np.floor(alignment.s_to - alignment.s_from)) + 1)
     lift = measured.xyz[:, 2] - alignment.heights(fit.s)
-    cant = (measured.cant_m - alignment.cants(fit.s))[order]
-    known = np.isfinite(cant)
-    cant_diff = np.interp(s, feet[known], cant[known], np.nan, np.nan) if known.any() else np.full(count, np.nan)
-    return Deviations(
-        alignment.track_id,
-        s,
-        alignment.xyz(s),
-        1000.0 * np.interp(s, feet, fit.across[order]),
-        1000.0 * np.interp(s, feet, lift[order]),
-        1000.0 * cant_diff,
-    )
+    cant = np.full(len(s), np.nan)
+    if alignment.cant:
+        feet = np.interp(track.cant[:, 0], measured.along, fit.s)
+        cant = np.interp(s, feet, track.cant[:, 1] - alignment.cants(feet))
+        cant[(s < alignment.cant[0].s_from) | (s > alignment.cant[-1].s_to)] = np.nan
+    slew, lift = (np.interp(s, fit.s, values) for values in (fit.across, lift))
+    return Deviations(alignment.track_id, s, alignment.xyz(s), 1000.0 * slew, 1000.0 * lift, 1000.0 * cant)

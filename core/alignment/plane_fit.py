@@ -18,8 +18,21 @@ from .chain import Chain
 from .curves import PANEL_RAD, UNIT_NODES, UNIT_WEIGHTS, displaced, turned
 from .elements import PlanElement
 
-ROUNDS, CLOSED_M = 25, 1e-7
-"""Largest number of Gauss-Newton steps, and the gap between elements and the change at which they end, metres."""
+ROUNDS, CLOSED_M, OPEN_M = 40, 1e-6, 1e-5
+"""Largest number of steps, the gap between elements and the change at which they end, and the gap beyond which the fit
+has failed, metres."""
+
+GAP_M = 0.001
+"""Gap that weighs as much as a residual of one standard deviation when a step is judged, metres (or radians)."""
+
+LEAST_FALL, MOST_RISE = 1e-4, 0.1
+"""Fall of chi-square at which the fit ends, and the rise that a step may cause while it closes the gaps."""
+
+STIFF, STIFFER = 1e-5, 30.0
+"""Damping after a failed step, and its growth after another one, as shares of the diagonal."""
+
+MOST_TURN_RAD = 20.0
+"""Largest turn of an element: three circles."""
 
 SHARE = 0.4
 """Share of its length by which an element may shrink or grow in a step."""
@@ -119,11 +132,11 @@ class _State:
 class _Solver:
     """The equations of a step, with the constraints as further unknowns; scaled, so that all units are alike."""
 
-    def __init__(self, normal: sparse.spmatrix, constraints: sparse.spmatrix) -> None:
+    def __init__(self, normal: sparse.spmatrix, constraints: sparse.spmatrix, ridge: float) -> None:
         diagonal = normal.diagonal()
-        self.scale = 1.0 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+        self.scale = 1.0 / np.sqrt(np.maximum(diagonal, 1.0))
         scaling = sparse.diags(self.scale)
-        a = scaling @ normal @ scaling + RIDGE * sparse.identity(len(self.scale))
+        a = scaling @ normal @ scaling + ridge * sparse.identity(len(self.scale))
         c = constraints @ scaling
         self.weights = 1.0 / np.sqrt(np.asarray(c.multiply(c).sum(axis=1)).ravel())
         c = sparse.diags(self.weights) @ c
@@ -152,22 +165,64 @@ def fit_plan(chain: Chain, points: Points, held: Held = NOTHING, progress: Progr
     held : Held
     progress : Progress
     """
-    state = _first_state(chain, points)
-    feet = points.s.copy()
     number = np.where(chain.curved, np.cumsum(chain.curved) - 1, -1)
     numbers = Held({int(number[part]): bend for part, bend in held.bends.items()}, held.starts)
+    now = _Look.at(_first_state(chain, points), points, points.s, numbers)
+    ridge = RIDGE
     for _ in range(ROUNDS):
         progress.check()
-        feet, across, jacobian = _seen(state, points, feet)
-        constraints, gaps = _with_held(*_constraints(state), state, numbers)
-        weighted = jacobian.multiply(points.weight[:, None]).tocsr()
-        solver = _Solver(jacobian.T @ weighted, constraints)
-        change = solver.step(-(weighted.T @ across), -gaps)
-        moved = _take(state, change)
-        if max(moved, np.abs(gaps).max(initial=0.0)) < CLOSED_M:
+        change = now.solver(points, ridge).step(-(now.weighted(points).T @ now.across), -now.gaps)
+        state, moved = _taken(now.state, change)
+        after = _Look.at(state, points, now.feet, numbers) if _is_sane(state) else None
+        if after is None or after.merit(points) > now.merit(points) + MOST_RISE:
+            ridge = max(ridge * STIFFER, STIFF)
+            continue
+        fallen = now.merit(points) - after.merit(points)
+        now, ridge = after, max(ridge / STIFFER, RIDGE)
+        if np.abs(now.gaps).max(initial=0.0) < CLOSED_M and (moved < CLOSED_M or fallen < LEAST_FALL):
             break
-    feet, across, jacobian = _seen(state, points, feet)
-    return PlanFit(_elements(state), across, feet, state.nodes, jacobian, solver)
+    if np.abs(now.gaps).max(initial=0.0) > OPEN_M:
+        raise FitError
+    return PlanFit(
+        _elements(now.state), now.across, now.feet, now.state.nodes, now.jacobian, now.solver(points, RIDGE)
+    )
+
+
+class FitError(Exception):
+    """The elements could not be joined."""
+
+
+@dataclass(frozen=True)
+class _Look:
+    """A state with what follows from it: feet, distances across with their derivatives, gaps with theirs."""
+
+    state: _State
+    feet: np.ndarray
+    across: np.ndarray
+    jacobian: sparse.csr_matrix
+    constraints: sparse.csr_matrix
+    gaps: np.ndarray
+
+    @classmethod
+    def at(cls, state: _State, points: Points, feet: np.ndarray, held: Held) -> _Look:
+        constraints, gaps = _with_held(*_constraints(state), state, held)
+        return cls(state, *_seen(state, points, feet), constraints, gaps)
+
+    def weighted(self, points: Points) -> sparse.csr_matrix:
+        return sparse.diags(points.weight) @ self.jacobian
+
+    def solver(self, points: Points, ridge: float) -> _Solver:
+        return _Solver(self.jacobian.T @ self.weighted(points), self.constraints, ridge)
+
+    def merit(self, points: Points) -> float:
+        """Return the sum of squared residuals, with those of the gaps as if they were known to a millimetre."""
+        value = float(points.weight @ self.across**2 + np.sum((self.gaps / GAP_M) ** 2))
+        return value if np.isfinite(value) else np.inf
+
+
+def _is_sane(state: _State) -> bool:
+    """Return whether no element winds up, as those of a failed step do."""
+    return bool(np.isfinite(state.pose).all() and (np.abs(state.ends).max(axis=1) * state.length).max() < MOST_TURN_RAD)
 
 
 def _first_state(chain: Chain, points: Points) -> _State:
@@ -297,25 +352,25 @@ def _with_held(
     return sparse.vstack(rows, format="csr"), np.concatenate(more)
 
 
-def _row(size: int, columns: Sequence[int]) -> sparse.csr_matrix:
+def _row(size: int, columns: Sequence[int] | np.ndarray) -> sparse.csr_matrix:
     """Return a row with ones in some columns."""
     return sparse.csr_matrix((np.ones(len(columns)), (np.zeros(len(columns), int), columns)), shape=(1, size))
 
 
-def _take(state: _State, change: np.ndarray) -> float:
-    """Apply a step; return its largest shift of a place or length."""
+def _taken(state: _State, change: np.ndarray) -> tuple[_State, float]:
+    """Return the state after a step, and the largest shift of a place or length."""
     count, bends = len(state.length), len(state.bend)
     pose = change[: 3 * count].reshape(-1, 3)
     longer = np.clip(change[3 * count + bends :], -SHARE * state.length, SHARE * state.length)
-    state.pose = state.pose + pose
-    state.bend = state.bend + change[3 * count : 3 * count + bends]
-    state.length = state.length + longer
-    return max(float(np.abs(pose[:, :2]).max()), float(np.abs(longer).max()))
+    bend = state.bend + change[3 * count : 3 * count + bends]
+    moved = max(float(np.abs(pose[:, :2]).max()), float(np.abs(longer).max()))
+    return _State(state.pose + pose, bend, state.length + longer, state.nodes), moved
 
 
 def _elements(state: _State) -> tuple[PlanElement, ...]:
     """Return the elements."""
     rows = zip(state.starts, state.length, state.pose, state.ends)
     return tuple(
-        PlanElement(float(s), float(length), *map(float, pose), *map(float, ends)) for s, length, pose, ends in rows
+        PlanElement(float(s), float(length), float(x), float(y), float(heading), float(k_from), float(k_to))
+        for s, length, (x, y, heading), (k_from, k_to) in rows
     )

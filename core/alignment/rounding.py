@@ -43,7 +43,8 @@ def with_round_radii(
     of_part = [number for number, one in enumerate(elements) if one.type != "clothoid"]
     before = _chi_square(fit, points)
     while any(proposed):
-        held = {int(part): 1.0 / proposed[one] for part, one in zip(parts, of_part) if proposed[one]}
+        radii = [(int(part), proposed[one]) for part, one in zip(parts, of_part)]
+        held = {part: 1.0 / radius for part, radius in radii if radius}
         rounded = fit_plan(chain, points, Held(held), progress)
         if _chi_square(rounded, points) - before <= MOST_RISE * len(held):
             break

@@ -4,6 +4,7 @@ from .build_track_centerlines import BuildTrackCenterlines
 from .check_installation import CheckInstallation
 from .classify_rail_points import ClassifyRailPoints
 from .extract_rails import ExtractRails
+from .fit_alignment import FitAlignment
 from .frpdf_cleanup import FrpdfCleanup
 from .grow_rail_points import GrowRailPoints
 from .install_packages import InstallPackages
@@ -23,6 +24,7 @@ ALGORITHMS = (
     BuildTrackCenterlines,
     MeasureTrackGeometry,
     StationAlongAxis,
+    FitAlignment,
     TrainRailClassifier,
     InstallPackages,
     CheckInstallation,

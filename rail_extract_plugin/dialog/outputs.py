@@ -189,3 +189,28 @@ def quality_figures() -> Numbers:
 def engine() -> QgsProcessingOutputString:
     """Define the name of the engine."""
     return QgsProcessingOutputString("ENGINE_USED", tr("Engine that ran the network"))
+
+
+def alignment() -> tuple[QgsProcessingParameterDefinition, ...]:
+    """Define the layers of fitted elements and of deviations from them."""
+    line, point = QgsProcessing.SourceType.TypeVectorLine, QgsProcessing.SourceType.TypeVectorPoint
+    return (
+        helped(
+            _layer("ELEMENTS", tr("Elements"), line, optional=True),
+            tr("The exact curve of each element in plan, height and cant, with its table."),
+        ),
+        helped(
+            _layer("DEVIATIONS", tr("Deviations"), point, optional=True),
+            tr(
+                "Points along the design, one per metre, with slew, lift and difference of cant: measured minus design."
+            ),
+        ),
+    )
+
+
+def alignment_figures() -> Numbers:
+    """Define the figures about fitted elements."""
+    return (
+        QgsProcessingOutputNumber("ELEMENT_COUNT", tr("Number of elements")),
+        QgsProcessingOutputNumber("RMS", tr("Root mean square of the slews [mm]")),
+    )

@@ -99,7 +99,7 @@ def features(lines: Sequence[Line], columns: Sequence[Field], frame: LocalFrame)
     for line in lines:
         coordinates = frame.to_crs(line.xyz).T[: 2 if flat else 3].tolist()
         values = [getattr(line, column.name) for column in columns]
-        yield _feature(QgsGeometry(QgsLineString(*coordinates)), values, columns)
+        yield feature_of(QgsGeometry(QgsLineString(*coordinates)), values, columns)
 
 
 def stations(tracks: Sequence[TrackGeometry], frame: LocalFrame) -> Iterator[QgsFeature]:
@@ -111,7 +111,7 @@ def stations(tracks: Sequence[TrackGeometry], frame: LocalFrame) -> Iterator[Qgs
             profiles += [getattr(track.kilometres, column.name) for column in STATION_FIELDS]
         columns = quality_of(tracks).columns
         for (x, y, z), *row in zip(places, repeat(track.track_id), *profiles):
-            yield _feature(QgsGeometry(QgsPoint(x, y) if math.isnan(z) else QgsPoint(x, y, z)), row, columns)
+            yield feature_of(QgsGeometry(QgsPoint(x, y) if math.isnan(z) else QgsPoint(x, y, z)), row, columns)
 
 
 def quality_of(tracks: Sequence[TrackGeometry]) -> LayerKind:
@@ -189,7 +189,9 @@ def write_lines(
         The output cannot be written.
     """
     shape = QgsWkbTypes.Type.LineString if is_flat(lines) else QgsWkbTypes.Type.LineStringZ
-    return _write(algorithm, name, kind, shape, features(lines, kind.columns, frame), frame, parameters, context)
+    return write_features(
+        algorithm, name, kind, shape, features(lines, kind.columns, frame), frame, parameters, context
+    )
 
 
 def write_stations(
@@ -210,7 +212,7 @@ def write_stations(
     """
     shape = QgsWkbTypes.Type.Point if is_flat(tracks) else QgsWkbTypes.Type.PointZ
     made = stations(tracks, frame)
-    return _write(algorithm, name, quality_of(tracks), shape, made, frame, parameters, context)
+    return write_features(algorithm, name, quality_of(tracks), shape, made, frame, parameters, context)
 
 
 def write_stops(
@@ -230,10 +232,10 @@ def write_stops(
         See `write_lines`.
     """
     made = (
-        _feature(QgsGeometry(QgsPoint(*frame.to_crs(stop.xyz).tolist())), (number, stop.reason.value), STOPS.columns)
+        feature_of(QgsGeometry(QgsPoint(*frame.to_crs(stop.xyz).tolist())), (number, stop.reason.value), STOPS.columns)
         for number, stop in enumerate(stops, 1)
     )
-    return _write(algorithm, name, STOPS, QgsWkbTypes.Type.PointZ, made, frame, parameters, context)
+    return write_features(algorithm, name, STOPS, QgsWkbTypes.Type.PointZ, made, frame, parameters, context)
 
 
 def write_raster(
@@ -292,7 +294,7 @@ def output_crs(wkt: str | None) -> QgsCoordinateReferenceSystem:
     return system(wkt or UNKNOWN_IN_METRES)
 
 
-def _write(
+def write_features(
     algorithm: QgsProcessingAlgorithm,
     name: str,
     kind: LayerKind,
@@ -428,7 +430,8 @@ def _style(
     style_on_load(layer_id, style, context, algorithm.layer_properties, title)
 
 
-def _feature(geometry: QgsGeometry, values: Sequence[Any], columns: Sequence[Field]) -> QgsFeature:
+def feature_of(geometry: QgsGeometry, values: Sequence[Any], columns: Sequence[Field]) -> QgsFeature:
+    """Make a feature; the fields round its values."""
     feature = QgsFeature()
     feature.setGeometry(geometry)
     feature.setAttributes([column.value(value) for column, value in zip(columns, values)])
