@@ -111,7 +111,7 @@ class Chain:
 
 @dataclass(frozen=True)
 class Span:
-    """A stretch of a chain that is to be assembled: a part, or a ramp between two parts.
+    """A part of a chain that is to be assembled, or a ramp between two parts.
 
     Attributes
     ----------

@@ -41,7 +41,7 @@ def given_of(fixed: Alignment, length_m: float) -> Given:
     ----------
     fixed : Alignment
     length_m : float
-        Length of the measured line; the table's first and last element are stretched to its ends.
+        Length of the measured line; the table's first and last element are continued to its ends.
     """
     plan = list(fixed.plan)
     joints = [_joint(before, after) for before, after in zip(plan[:-1], plan[1:])]
@@ -64,7 +64,7 @@ def given_of(fixed: Alignment, length_m: float) -> Given:
 
 
 def _joint(before: PlanElement, after: PlanElement) -> float:
-    """Return where two elements meet: where one of them was edited, or where the row between them is missing, midway."""
+    """Return where two elements meet: midway if the row between them is missing."""
     if abs(before.s_to - after.s_from) < TOUCHING_M or _is_edited(after):
         return after.s_from
     return 0.5 * (before.s_to + after.s_from)

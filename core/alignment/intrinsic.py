@@ -1,7 +1,7 @@
 """The plan of a track as a signal of one variable: lateral position along the line.
 
 The direction of a chord is that of the curve at its middle. Its sum along the line, y, therefore has the curvature as
-its second derivative, for any turn: a line is a polynomial of degree 1 in y, an arc of degree 2, a clothoid of degree 3.
+its second derivative, for any turn: a line is a polynomial of degree 1, an arc of degree 2, a clothoid of degree 3.
 Lateral errors of the points appear in y as they are.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 from ..polyline import length_along
 
 SPACING_M = 1.0
-"""Least mean distance of the points, metres: of closer points, errors of 2 mm would lengthen the line by 1 in 10,000."""
+"""Least distance of the points, metres: errors of 2 mm lengthen a line with closer points by 1 in 10,000."""
 
 
 def groups(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ import numpy as np
 from .chain import Chain
 
 RAMPS_M = (8.0, 32.0)
-"""Lengths of a ramp that replaces a jump, metres; the fit stretches it."""
+"""Lengths of a ramp that replaces a jump, metres; the fit lengthens it."""
 
 SPLITS = (0.2, 0.4, 0.6, 0.8)
 """Where a ramp or a part is divided, as shares of its length."""

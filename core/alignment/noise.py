@@ -53,7 +53,7 @@ class Noise:
     length_m: float = LENGTHS_M[0]
 
     def covariance(self, lag_m: np.ndarray) -> np.ndarray:
-        """Return the covariance of the misalignment at places so far apart, square metres."""
+        """Return the covariance of the misalignment at places with this distance, square metres."""
         return self.shared_m**2 * np.exp(-((lag_m / self.length_m) ** 2))
 
     def effective_m(self, step_m: float) -> float:

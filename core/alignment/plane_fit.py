@@ -7,7 +7,7 @@ end of an element the start of the next one. The curvature of a clothoid's end i
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import sparse
@@ -25,11 +25,14 @@ has failed, metres."""
 GAP_M = 0.001
 """Gap that weighs as much as a residual of one standard deviation when a step is judged, metres (or radians)."""
 
-LEAST_FALL, MOST_RISE = 1e-4, 0.1
-"""Fall of chi-square at which the fit ends, and the rise that a step may cause while it closes the gaps."""
+LEAST_CHANGE = 1e-3
+"""Change of chi-square at which the fit ends."""
 
-STIFF, STIFFER = 1e-5, 30.0
-"""Damping after a failed step, and its growth after another one, as shares of the diagonal."""
+RISE_SHARE, MOST_RISE = 0.01, 10.0
+"""Rise of chi-square, as a share and beyond it, that a step may cause while it closes the gaps."""
+
+STIFF, STIFFER, STIFFEST = 1e-5, 30.0, 100.0
+"""Damping after a failed step, its growth after another one, and where the fit ends, as shares of the diagonal."""
 
 MOST_TURN_RAD = 20.0
 """Largest turn of an element: three circles."""
@@ -166,6 +169,9 @@ def fit_plan(chain: Chain, points: Points, held: Held = NOTHING, progress: Progr
     progress : Progress
     """
     number = np.where(chain.curved, np.cumsum(chain.curved) - 1, -1)
+    bends = chain.bends.copy()
+    bends[list(held.bends)] = list(held.bends.values())
+    chain = replace(chain, bends=bends)
     numbers = Held({int(number[part]): bend for part, bend in held.bends.items()}, held.starts)
     now = _Look.at(_first_state(chain, points), points, points.s, numbers)
     ridge = RIDGE
@@ -174,18 +180,18 @@ def fit_plan(chain: Chain, points: Points, held: Held = NOTHING, progress: Progr
         change = now.solver(points, ridge).step(-(now.weighted(points).T @ now.across), -now.gaps)
         state, moved = _taken(now.state, change)
         after = _Look.at(state, points, now.feet, numbers) if _is_sane(state) else None
-        if after is None or after.merit(points) > now.merit(points) + MOST_RISE:
+        if after is None or after.merit(points) > now.merit(points) * (1.0 + RISE_SHARE) + MOST_RISE:
             ridge = max(ridge * STIFFER, STIFF)
+            if ridge > STIFFEST:
+                break
             continue
         fallen = now.merit(points) - after.merit(points)
         now, ridge = after, max(ridge / STIFFER, RIDGE)
-        if np.abs(now.gaps).max(initial=0.0) < CLOSED_M and (moved < CLOSED_M or fallen < LEAST_FALL):
+        if np.abs(now.gaps).max(initial=0.0) < CLOSED_M and (moved < CLOSED_M or abs(fallen) < LEAST_CHANGE):
             break
     if np.abs(now.gaps).max(initial=0.0) > OPEN_M:
         raise FitError
-    return PlanFit(
-        _elements(now.state), now.across, now.feet, now.state.nodes, now.jacobian, now.solver(points, RIDGE)
-    )
+    return PlanFit(_elements(now.state), now.across, now.feet, now.state.nodes, now.jacobian, now.solver(points, RIDGE))
 
 
 class FitError(Exception):

@@ -45,10 +45,10 @@ class FitAlignment(RailAlgorithm):
     HELP = "\n\n".join(
         (
             "Takes centerlines of Extract Rails or any other 3D lines of tracks. Number, type and ends of the elements "
-            "are found, and all elements of a track are fitted at once. Without cant from Track geometry or from rails, "
-            "elements in plan and height are given.",
-            "A fitted design is a proposal and no record: an element that moves the track by less than its misalignment "
-            "cannot be seen. The fields sigma_r_m, sigma_len_m and sigma_s_m state how well each is known.",
+            "are found, and all elements of a track are fitted at once. Cant is fitted if track geometry or rails "
+            "are given.",
+            "A fitted design is a proposal, not a record: an element that moves the track less than misalignment does "
+            "can't be seen. The fields sigma_r_m, sigma_len_m and sigma_s_m state how well each is known.",
             "To correct it, edit the table, for example r1_m, s_from or type, delete rows, and give it back as FIXED: "
             "types and all values that you changed are held, and the rest is fitted again.",
         )

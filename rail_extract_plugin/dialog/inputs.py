@@ -242,7 +242,7 @@ def cant_of_tracks() -> Definitions:
             QgsProcessingParameterFeatureSource("QUALITY", tr("Track geometry"), [point], optional=True),
             tr(
                 "Points of Extract Rails or Measure Track Geometry for these tracks: their cant gives elements, and "
-                "stretches without rail points do not count."
+                "sections without rail points do not count."
             ),
         ),
         helped(

@@ -25,7 +25,7 @@ QUALITY_NEEDS = ("track_id", "chainage_m", "cant_mm")
 """Fields of the track geometry that state the cant."""
 
 FIXED_NEEDS = ("layout", "type", "s_from", "s_to")
-"""Fields without which a table is no element table."""
+"""Fields that make a table one of elements."""
 
 
 def read_tracks(
