@@ -356,7 +356,7 @@ def _with_cants(
     errors = chain_errors(chain, signal, used)
     chain, moved = snapped(chain, alignment.plan, signal, used, errors)
     sure = np.concatenate([[False], moved])
-    return replace(alignment, cant=cants(chain, signal, used, replace(errors, s=np.where(sure, 0.0, errors.s))))
+    return replace(alignment, cant=cants(chain, signal, used, replace(errors, s=np.where(sure, np.nan, errors.s))))
 
 
 def _signal(alignment: Alignment, s: np.ndarray, values: np.ndarray, share: np.ndarray, kind: Kind) -> Signal:

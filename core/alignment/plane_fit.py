@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Optional
 
 import numpy as np
 from scipy import sparse
@@ -22,8 +23,8 @@ ROUNDS, CLOSED_M, OPEN_M = 40, 1e-6, 1e-5
 """Largest number of steps, the gap between elements and the change at which they end, and the gap beyond which the fit
 has failed, metres."""
 
-GAP_M = 0.001
-"""Gap that weighs as much as a residual of one standard deviation when a step is judged, metres (or radians)."""
+CLOSING_ROUNDS = 8
+"""Largest number of steps that only close gaps."""
 
 LEAST_CHANGE = 1e-3
 """Change of chi-square at which the fit ends."""
@@ -177,21 +178,18 @@ def fit_plan(chain: Chain, points: Points, held: Held = NOTHING, progress: Progr
     ridge = RIDGE
     for _ in range(ROUNDS):
         progress.check()
-        change = now.solver(points, ridge).step(-(now.weighted(points).T @ now.across), -now.gaps)
-        state, moved = _taken(now.state, change)
-        after = _Look.at(state, points, now.feet, numbers) if _is_sane(state) else None
-        if after is None or after.merit(points) > now.merit(points) * (1.0 + RISE_SHARE) + MOST_RISE:
+        after, moved = now.stepped(points, numbers, ridge)
+        if after is None or not after.is_better(now):
             ridge = max(ridge * STIFFER, STIFF)
             if ridge > STIFFEST:
                 break
             continue
-        fallen = now.merit(points) - after.merit(points)
+        fallen = now.chi_square - after.chi_square
         now, ridge = after, max(ridge / STIFFER, RIDGE)
-        if np.abs(now.gaps).max(initial=0.0) < CLOSED_M and (moved < CLOSED_M or abs(fallen) < LEAST_CHANGE):
+        if now.gap_m < CLOSED_M and (moved < CLOSED_M or abs(fallen) < LEAST_CHANGE):
             break
-    if np.abs(now.gaps).max(initial=0.0) > OPEN_M:
-        raise FitError
-    return PlanFit(_elements(now.state), now.across, now.feet, now.state.nodes, now.jacobian, now.solver(points, RIDGE))
+    now = _closed(now, points, numbers)
+    return PlanFit(_elements(now.state), now.across, now.feet, now.state.nodes, now.jacobian, now.solver(RIDGE))
 
 
 class FitError(Exception):
@@ -208,22 +206,51 @@ class _Look:
     jacobian: sparse.csr_matrix
     constraints: sparse.csr_matrix
     gaps: np.ndarray
+    weight: np.ndarray
 
     @classmethod
     def at(cls, state: _State, points: Points, feet: np.ndarray, held: Held) -> _Look:
         constraints, gaps = _with_held(*_constraints(state), state, held)
-        return cls(state, *_seen(state, points, feet), constraints, gaps)
+        return cls(state, *_seen(state, points, feet), constraints, gaps, points.weight)
 
-    def weighted(self, points: Points) -> sparse.csr_matrix:
-        return sparse.diags(points.weight) @ self.jacobian
+    @property
+    def weighted(self) -> sparse.csr_matrix:
+        return sparse.diags(self.weight) @ self.jacobian
 
-    def solver(self, points: Points, ridge: float) -> _Solver:
-        return _Solver(self.jacobian.T @ self.weighted(points), self.constraints, ridge)
+    @property
+    def chi_square(self) -> float:
+        return float(self.weight @ self.across**2)
 
-    def merit(self, points: Points) -> float:
-        """Return the sum of squared residuals, with those of the gaps as if they were known to a millimetre."""
-        value = float(points.weight @ self.across**2 + np.sum((self.gaps / GAP_M) ** 2))
-        return value if np.isfinite(value) else np.inf
+    @property
+    def gap_m(self) -> float:
+        """Largest gap between elements, metres or radians."""
+        return float(np.abs(self.gaps).max(initial=0.0))
+
+    def solver(self, ridge: float) -> _Solver:
+        return _Solver(self.jacobian.T @ self.weighted, self.constraints, ridge)
+
+    def stepped(self, points: Points, held: Held, ridge: float) -> tuple[Optional[_Look], float]:
+        """Return the look after a step, None if it makes no sense, and the largest shift."""
+        change = self.solver(ridge).step(-(self.weighted.T @ self.across), -self.gaps)
+        state, moved = _taken(self.state, change)
+        return (_Look.at(state, points, self.feet, held) if _is_sane(state) else None), moved
+
+    def is_better(self, before: _Look) -> bool:
+        """Return whether gaps were closed without the fit being lost."""
+        closes = before.gap_m > CLOSED_M and self.gap_m < 0.5 * before.gap_m
+        return closes or self.chi_square <= before.chi_square * (1.0 + RISE_SHARE) + MOST_RISE
+
+
+def _closed(look: _Look, points: Points, held: Held) -> _Look:
+    """Return a look in which elements meet, moved no more than that needs."""
+    for _ in range(CLOSING_ROUNDS):
+        if look.gap_m < CLOSED_M:
+            return look
+        after, _ = look.stepped(points, held, STIFFEST)
+        look = after if after is not None else look
+    if look.gap_m > OPEN_M:
+        raise FitError
+    return look
 
 
 def _is_sane(state: _State) -> bool:

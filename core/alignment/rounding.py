@@ -16,8 +16,8 @@ from .plane_fit import Held, PlanFit, Points, fit_plan
 STEPS_M = (1000.0, 500.0, 100.0, 50.0, 25.0, 10.0, 5.0, 1.0)
 """Steps of round radii, the roundest first, metres."""
 
-SIGMAS = 2.0
-"""A radius may be rounded by this many standard errors."""
+SIGMAS = (2.0, 1.0)
+"""A radius may be rounded by this many standard errors; if the track does not fit all that are, by fewer."""
 
 MOST_RISE = 6.6
 """Largest rise of chi-square for a rounded radius: its 1 % level."""
@@ -38,38 +38,38 @@ def with_round_radii(
         With standard errors of their radii.
     progress : Progress
     """
-    proposed = [round_radius(one) for one in elements]
     parts = np.flatnonzero(chain.extents[1] > chain.extents[0])
     of_part = [number for number, one in enumerate(elements) if one.type != "clothoid"]
     before = _chi_square(fit, points)
-    while any(proposed):
+    for sigmas in SIGMAS:
+        proposed = [round_radius(one, sigmas) for one in elements]
         radii = [(int(part), proposed[one]) for part, one in zip(parts, of_part)]
         held = {part: 1.0 / radius for part, radius in radii if radius}
+        if not held:
+            break
         rounded = fit_plan(chain, points, Held(held), progress)
         if _chi_square(rounded, points) - before <= MOST_RISE * len(held):
-            break
-        shifts = [_sigmas(one, radius) for one, radius in zip(elements, proposed)]
-        proposed[int(np.argmax(shifts))] = None
-    else:
-        return tuple(elements)
-    return tuple(
-        replace(
-            one,
-            figures=replace(one.figures, r_round_m=radius, dev_rms_round_mm=off_element(rounded, points, number)[0]),
-        )
-        for number, (one, radius) in enumerate(zip(elements, proposed))
-    )
+            return tuple(
+                _with_round(one, radius, off_element(rounded, points, number)[0])
+                for number, (one, radius) in enumerate(zip(elements, proposed))
+            )
+    return tuple(elements)
 
 
-def round_radius(one: PlanElement) -> Optional[float]:
-    """Return the roundest radius of an arc within its standard error, signed; None if there is none."""
+def _with_round(one: PlanElement, radius: Optional[float], rms_mm: Optional[float]) -> PlanElement:
+    """Return an element with a proposal."""
+    return replace(one, figures=replace(one.figures, r_round_m=radius, dev_rms_round_mm=rms_mm))
+
+
+def round_radius(one: PlanElement, sigmas: float) -> Optional[float]:
+    """Return the roundest radius of an arc within so many standard errors, signed; None if there is none."""
     sigma = one.figures.sigma_r_m
     if one.type != "arc" or sigma is None:
         return None
     radius = 1.0 / one.k_from
     for step in STEPS_M:
         rounded = step * round(radius / step)
-        if rounded and abs(rounded - radius) <= SIGMAS * sigma:
+        if rounded and abs(rounded - radius) <= sigmas * sigma:
             return float(rounded)
     return None
 
@@ -86,8 +86,3 @@ def off_element(fit: PlanFit, points: Points, number: int) -> tuple[Optional[flo
 
 def _chi_square(fit: PlanFit, points: Points) -> float:
     return float(points.weight @ fit.across**2)
-
-
-def _sigmas(one: PlanElement, radius: Optional[float]) -> float:
-    """Return by how many standard errors a radius was rounded."""
-    return abs(radius - 1.0 / one.k_from) / one.figures.sigma_r_m if radius and one.figures.sigma_r_m else -1.0
