@@ -89,7 +89,7 @@ def measured(scene: RawScene, wide: bool) -> Row:
         row.labelled += int(on.sum())
         row.right += int((on & (head | beside)).sum())
         for number, grown in enumerate(growth.rails):
-            step = grown.xyz - nearest(grown.xyz, cut(scene.rails))[0]
+            step = grown.xyz - nearest(grown.xyz, cut(scene.shown))[0]
             across = np.hypot(step[:, 0], step[:, 1])
             near = across <= RIGHT_M
             share_m = np.gradient(length_along(grown.xyz[:, :2]))

@@ -29,10 +29,14 @@ SEED, SEEDS, EMPTY_SEEDS = 2026, (11, 12), (11,)
 LEARNED = (
     *("double", "two passes", "fast", "station", "turnout 1:9", "turnout 1:18.5", "yard", "metro", "viaduct"),
     "far track",
+    *("photo straight", "photo curve", "photo curve blunt", "photo turnout", "photo station"),
 )
 """Scenes with rails that the training has seen with other seeds."""
 
-EMPTY = ("forest", "street", "car park", "quarry")
+EMPTY = (
+    *("forest", "street", "car park", "quarry"),
+    *("photo street", "photo quarry", "photo motorway", "photo kerbs", "photo farmland"),
+)
 """Scenes without rails that the training has seen."""
 
 APART_M, COLUMNS = 200.0, 6
@@ -57,11 +61,15 @@ SCENES = {**RAW_SCENES, **OTHERS, **BESIDE}
 
 COMPARED = {
     "seen in training, other seed": ("double", "station", "turnout 1:9", "yard", "viaduct", "far track"),
+    "surveys by images": ("photo straight", "photo curve", "photo curve blunt", "photo turnout", "photo station"),
     "other track": ("narrow", "dual gauge", "crossing", "tram"),
     "other noise or spacing": tuple(OTHERS),
     "other scanner, from the air": tuple(AIR),
     "other scanner, on a road": tuple(BESIDE),
-    "no rails": ("car park", "street from the air", "quarry"),
+    "no rails": (
+        *("car park", "street from the air", "quarry"),
+        *("photo street", "photo motorway", "photo building site", "photo farmland"),
+    ),
 }
 """Scenes of the published comparison, by what the training has not seen of them."""
 

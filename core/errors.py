@@ -31,6 +31,10 @@ class RasterError(RailExtractError):
     """A raster does not meet the requirements of a step."""
 
 
+class AlignmentFileError(RailExtractError):
+    """A file of alignments is missing, damaged or states what can't be read."""
+
+
 class ModelError(RailExtractError):
     """The network's weights are missing, are damaged or don't fit the rail standard."""
 

@@ -10,6 +10,7 @@ in a .prj file, as GDAL reads them; or it has one row per vertex.
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from .alignment.elements import Alignment, CantElement, Element, VerticalElement
 from .clouds.crs import parse_crs
 from .fields import Field
 from .frame import LocalFrame
@@ -43,17 +45,30 @@ DRAWN = {
     "stops": "STOPS",
     "places": "PLACES",
     "differences": "DIFFERENCES",
+    "elements": "ELEMENTS",
+    "deviations": "DEVIATIONS",
+    "axes": "ALIGNMENT",
 }
 """First word of the layers in a drawing, by output."""
 
-COLOURS = {"RAILS": 5, "TRACK": 1, "STATIONS": 3}
-"""Colour of a layer by the first word of its name: blue, red, green."""
+COLOURS = {"RAILS": 5, "TRACK": 1, "STATIONS": 3, "ALIGNMENT": 1, "PLAN": 7, "PROFILE": 3, "CANT": 5}
+"""Colour of a layer by the first word of its name: blue, red, green; black on paper for elements in plan."""
+
+LAYOUTS = {"H": "PLAN", "V": "PROFILE", "C": "CANT"}
+"""First word of the layers of element points and their texts."""
+
+TEXT_M = 0.8
+"""Height of the texts in a drawing, metres: legible beside the track at a scale of 1:500."""
 
 OTHER_COLOUR = 30
 """Orange, for findings and stops."""
 
 ID_FIELDS = ("rail_id", "track_id", "finding", "class_code")
 """Fields that a row of a vertex has."""
+
+
+Entity = tuple[str, Iterator[tuple[int, Any]]]
+"""Layer of an entity of a drawing, and its groups: codes and values."""
 
 
 @dataclass(frozen=True)
@@ -140,34 +155,103 @@ def _written(place: np.ndarray) -> list[str]:
     return ["" if np.isnan(value) else f"{value:.{DECIMALS}f}" for value in place]
 
 
+def write_alignments(path: Path, alignments: Sequence[Alignment]) -> None:
+    """Write alignments as a DXF file: a 3D polyline for each, and a point with a text where an element begins.
+
+    The curve of track 7 is on the layer ALIGNMENT_7, the elements are on PLAN_7, PROFILE_7 and CANT_7.
+
+    Parameters
+    ----------
+    path : Path
+    alignments : sequence of Alignment
+
+    Raises
+    ------
+    OSError
+        The file cannot be written.
+    """
+    entities: list[Entity] = []
+    for alignment in alignments:
+        track = "" if alignment.track_id is None else f"_{alignment.track_id}"
+        curve = alignment.frame.to_crs(alignment.drawn(alignment.s_from, alignment.s_to))
+        layer = f"ALIGNMENT{track}"
+        entities.append((layer, _polyline(curve, layer, ())))
+        for one in alignment.elements:
+            layer = f"{LAYOUTS[one.layout]}{track}"
+            entities.append((layer, _element_point(alignment, one, layer)))
+    with path.open("w", encoding="ascii", errors="replace", newline="\r\n") as file:
+        _put_drawing(file, entities)
+
+
+def _element_point(alignment: Alignment, one: Element, layer: str) -> Iterator[tuple[int, Any]]:
+    """Yield the groups of the point where an element begins, and of its text, which runs away from the track."""
+    at = np.array([one.s_from])
+    place = alignment.frame.to_crs(alignment.xyz(at))[0]
+    yield from _point(place, layer, ())
+    aside = (math.degrees(float(alignment.headings(at)[0])) - 90.0) % 360.0
+    yield from ((0, "TEXT"), (8, layer), *_coordinates(place), (40, TEXT_M / alignment.frame.horizontal_unit_m))
+    yield from ((1, f"  {label_of(one)}"), (50, aside))
+
+
+def label_of(one: Element) -> str:
+    """Return an element in words.
+
+    >>> label_of(CantElement(0.0, 40.0, 0.0, -0.12))
+    'ramp 0 to -120 mm, L 40.00'
+    """
+    length = f"L {one.length_m:.2f}"
+    if isinstance(one, CantElement):
+        return f"{one.type} {_from_to(1000 * one.cant_from_m, 1000 * one.cant_to_m, '.0f')} mm, {length}"
+    if isinstance(one, VerticalElement):
+        grades = f"{_from_to(1000 * one.grade_from, 1000 * one.grade_to, '.2f')} per mille"
+        return f"{one.type} {grades}, {length}" + (f", R {1 / one.curvature:.0f}" if one.curvature else "")
+    radii = [f"{1 / bend:.2f}" if bend else "straight" for bend in (one.k_from, one.k_to)]
+    curve = f" R {' to '.join(dict.fromkeys(radii))}" if one.type != "line" else ""
+    return f"{one.type}{curve}, {length}"
+
+
+def _from_to(start: float, end: float, digits: str) -> str:
+    """Write one number, or two that differ."""
+    return " to ".join(dict.fromkeys(f"{value + 0.0:{digits}}" for value in (start, end)))
+
+
 def _write_dxf(file: TextIO, shapes: Sequence[Shape], fields: Sequence[Field], kind: str, is_line: bool) -> None:
+    """Write shapes with their fields."""
+    entities: list[Entity] = []
+    for shape in shapes:
+        layer = _layer(shape, fields, kind)
+        data = [(1001, APPLICATION), *((1000, text) for text in _texts(shape, fields))]
+        drawn = _polyline(shape.xyz, layer, data) if is_line else _point(shape.xyz[0], layer, data)
+        entities.append((layer, drawn))
+    _put_drawing(file, entities)
+
+
+def _put_drawing(file: TextIO, entities: Sequence[Entity]) -> None:
     """Write a DXF file of release 12."""
-    layers = [_layer(shape, fields, kind) for shape in shapes]
     groups: list[tuple[int, Any]] = [(0, "SECTION"), (2, "HEADER"), (9, "$ACADVER"), (1, "AC1009"), (0, "ENDSEC")]
     groups += [(0, "SECTION"), (2, "TABLES")]
     groups += _table("APPID", [[(2, APPLICATION), (70, 0)]])
     groups += _table("LTYPE", [[(2, "CONTINUOUS"), (70, 0), (3, "Solid line"), (72, 65), (73, 0), (40, 0.0)]])
-    names = sorted(set(layers))
+    names = sorted({layer for layer, _ in entities})
     groups += _table("LAYER", [[(2, name), (70, 0), (62, _colour(name)), (6, "CONTINUOUS")] for name in names])
     groups += [(0, "ENDSEC"), (0, "SECTION"), (2, "ENTITIES")]
     _put(file, groups)
-    for shape, layer in zip(shapes, layers):
-        data = [(1001, APPLICATION), *((1000, text) for text in _texts(shape, fields))]
-        _put(file, [*(_polyline(shape, layer, data) if is_line else _point(shape, layer, data))])
+    for _, entity in entities:
+        _put(file, entity)
     _put(file, [(0, "ENDSEC"), (0, "EOF")])
 
 
-def _polyline(shape: Shape, layer: str, data: Sequence[tuple[int, Any]]) -> Iterator[tuple[int, Any]]:
+def _polyline(xyz: np.ndarray, layer: str, data: Sequence[tuple[int, Any]]) -> Iterator[tuple[int, Any]]:
     """Yield the groups of a 3D polyline."""
     yield from ((0, "POLYLINE"), (8, layer), (66, 1), (10, 0.0), (20, 0.0), (30, 0.0), (70, 8), *data)
-    for place in shape.xyz:
+    for place in xyz:
         yield from ((0, "VERTEX"), (8, layer), *_coordinates(place), (70, 32))
     yield from ((0, "SEQEND"), (8, layer))
 
 
-def _point(shape: Shape, layer: str, data: Sequence[tuple[int, Any]]) -> Iterator[tuple[int, Any]]:
+def _point(place: np.ndarray, layer: str, data: Sequence[tuple[int, Any]]) -> Iterator[tuple[int, Any]]:
     """Yield the groups of a point."""
-    yield from ((0, "POINT"), (8, layer), *_coordinates(shape.xyz[0]), *data)
+    yield from ((0, "POINT"), (8, layer), *_coordinates(place), *data)
 
 
 def _coordinates(place: np.ndarray) -> list[tuple[int, Any]]:

@@ -151,6 +151,23 @@ EXTENT_FIELDS = (
 )
 """Further fields of lines and polygons, whose `km` is that of a place in their middle."""
 
+DIFFERENCE_FIELDS = (
+    Field("line_id", int, "rail_id or track_id of the line of the reference; where it is extra, of the other survey"),
+    Field("input_id", int, "the same of the other survey's line; empty where it is missing"),
+    Field("chainage_m", float, "plan distance from the start of the line of line_id, metres", 2),
+    Field("state", str, "both, missing in the other survey, or extra in it"),
+    Field("across_mm", float, "difference across, millimetres; positive to the left of the reference", 1),
+    Field("height_mm", float, "difference in height, millimetres; positive above the reference", 1),
+    Field("gauge_mm", float, "difference of the gauge, millimetres", 1),
+    Field("cant_mm", float, "difference of the cant, left minus right along the reference, millimetres", 1),
+    Field("sigma_mm", float, "standard error of the difference across, millimetres", 2),
+    Field("sigmaz_mm", float, "standard error of the difference in height, millimetres", 2),
+    Field("shift_mm", float, "part of across_mm that is the constant shift, millimetres", 1),
+    Field("shiftz_mm", float, "part of height_mm that is the constant shift, millimetres", 1),
+    Field("moved", int, "1 where the line has moved by more than three standard errors, across or in height; else 0"),
+)
+"""All differences are those of the other survey from the reference."""
+
 FINDING_FIELDS = (
     Field(
         "finding",
@@ -226,3 +243,12 @@ DEVIATION_FIELDS = (
     Field("lift_mm", float, "measured minus design in height, millimetres", 2),
     Field("cant_diff_mm", float, "measured minus design cant, millimetres; empty where the cant is unknown", 2),
 )
+
+AXIS_FIELDS = (
+    Field("track_id", int, "number of the track"),
+    Field("name", str, "name of the alignment in its file"),
+    Field("length_m", float, "length in plan, metres", 3),
+    Field("km_from", float, "kilometre of the start", 6),
+    Field("km_to", float, "kilometre of the end", 6),
+)
+"""Alignments as lines whose M values are kilometres."""

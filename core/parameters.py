@@ -176,3 +176,23 @@ class FitParameters:
     min_length_m: float = 5.0
     transitions: str = JUMPS
     rounded: bool = True
+
+
+@dataclass(frozen=True)
+class ComparisonParameters:
+    """How the lines of two surveys are compared.
+
+    Attributes
+    ----------
+    reach_m : float
+        Largest distance at which two lines are the same: more than a track moves between two surveys, and less than
+        that of the rails of the narrowest gauge.
+    step_m : float
+        Distance between stations.
+    ignore_shift : bool
+        Whether a constant shift does not count as a movement.
+    """
+
+    reach_m: float = 0.5
+    step_m: float = 1.0
+    ignore_shift: bool = True

@@ -141,7 +141,7 @@ SAME_GAUGE_M = 0.02
 deviates less."""
 
 SAME_M = 0.002
-"""Difference between two standards that measuring does not show: the default one is preferred by this much."""
+"""Difference between two standards that measuring does not show: the default profile is preferred by this much."""
 
 STANDARDS = _standards()
 """All standards by name, except CUSTOM."""
@@ -220,7 +220,8 @@ def closest_standard(spacing_m: float, head_width_m: float) -> RailStandard | No
 
     def misfit(standard: RailStandard) -> float:
         spacing_off_m = abs(standard.gauge_m + standard.head_width_m - spacing_m)
-        return spacing_off_m + abs(standard.head_width_m - head_width_m) - SAME_M * (standard.name == DEFAULT)
+        usual = standard.name.rsplit("_", 1)[0] == DEFAULT.rsplit("_", 1)[0]
+        return spacing_off_m + abs(standard.head_width_m - head_width_m) - SAME_M * usual
 
     return min((one for one in STANDARDS.values() if one.gauge_m == nearest_m), key=misfit)
 

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 from qgis.core import QgsApplication
 
+from .algorithms.base import RailAlgorithm
 from .provider import RailExtractProvider
+from .runs.running import stop_all
 from .setup import package_folders
 
 if TYPE_CHECKING:
@@ -42,7 +44,8 @@ class RailExtractPlugin:
         self.windows = Windows(self.iface)
 
     def unload(self) -> None:
-        """Remove everything that was registered."""
+        """Remove everything that was registered, after the ends of all runs."""
+        stop_all(RailAlgorithm)
         if self.windows is not None:
             self.windows.remove()
             self.windows = None

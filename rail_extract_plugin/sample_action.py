@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from qgis.core import QgsApplication
-
 from .i18n import tr
 from .paths import SAMPLE
-from .toolbox_action import EXTRACT_RAILS, ToolboxAction
+from .toolbox_action import ToolboxAction
 
 PARAMETERS = {"INPUT": str(SAMPLE / "sample.laz"), "STANDARD": "IN_75R_1000"}
 """The sample, and the standard of its rails."""
@@ -20,9 +18,6 @@ class OpenSampleAction(ToolboxAction):
 
     def execute(self) -> None:
         """Open the dialog."""
-        from processing.gui.AlgorithmDialog import AlgorithmDialog
+        from .runs.run_dialog import open_dialog
 
-        algorithm = QgsApplication.processingRegistry().createAlgorithmById(EXTRACT_RAILS)
-        self.dialog = AlgorithmDialog(algorithm)
-        self.dialog.setParameters(PARAMETERS)
-        self.dialog.show()
+        self.dialog = open_dialog("extractrails", PARAMETERS)

@@ -20,7 +20,11 @@ from qgis.core import (  # noqa: E402
     QgsProcessingProvider,
 )
 from rail_extract.core.fields import (  # noqa: E402
+    AXIS_FIELDS,
     CENTERLINE_FIELDS,
+    DEVIATION_FIELDS,
+    DIFFERENCE_FIELDS,
+    ELEMENT_FIELDS,
     EXTENT_FIELDS,
     FINDING_FIELDS,
     QUALITY_FIELDS,
@@ -48,8 +52,12 @@ LAYERS = {
     "Centerlines": CENTERLINE_FIELDS,
     "Track geometry": QUALITY_FIELDS,
     "Kilometres": (*STATION_FIELDS, *EXTENT_FIELDS),
+    "Differences": DIFFERENCE_FIELDS,
     "Findings": FINDING_FIELDS,
     "Stops": STOP_FIELDS,
+    "Elements": ELEMENT_FIELDS,
+    "Deviations": DEVIATION_FIELDS,
+    "Axes": AXIS_FIELDS,
 }
 
 

@@ -73,6 +73,7 @@ DIALOGS = {
     "extractrails_all": "dialog_all",
     "installpackages_wide": "install_packages",
     "stationalongaxis_wide": "station_along_axis",
+    "comparetracks_wide": "compare_tracks",
 }
 """Names of the dialogs' pictures, and their names in the guide."""
 

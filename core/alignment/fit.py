@@ -14,6 +14,7 @@ from ..parameters import JUMPS, FitParameters
 from ..polyline import is_closed, length_along, runs
 from ..progress import SILENT, Progress, counted
 from .chain import Chain
+from .deviations import Deviations
 from .elements import Alignment, Element, Figures, PlanElement
 from .given import chain_of, given_of
 from .intrinsic import groups, lateral_signal
@@ -57,29 +58,6 @@ class Track:
     xyz: np.ndarray
     cant: np.ndarray
     is_bridged: np.ndarray
-
-
-@dataclass(frozen=True)
-class Deviations:
-    """How far a track lies off its design, by the metre.
-
-    Attributes
-    ----------
-    track_id : int or None
-    s : (n,) array
-        Distance along the design, metres.
-    xyz : (n, 3) array
-        Place on the design, local metres.
-    slew_mm, lift_mm, cant_diff_mm : (n,) array
-        Measured minus design: across, positive to the left; in height; of the cant. NaN where unknown.
-    """
-
-    track_id: Optional[int]
-    s: np.ndarray
-    xyz: np.ndarray
-    slew_mm: np.ndarray
-    lift_mm: np.ndarray
-    cant_diff_mm: np.ndarray
 
 
 @dataclass(frozen=True)

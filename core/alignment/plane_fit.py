@@ -38,6 +38,9 @@ STIFF, STIFFER, STIFFEST = 1e-5, 30.0, 100.0
 MOST_TURN_RAD = 20.0
 """Largest turn of an element: three circles."""
 
+LEAST_M = 1.0
+"""Least length of an element, metres: one that the points would make shorter keeps this length."""
+
 SHARE = 0.4
 """Share of its length by which an element may shrink or grow in a step."""
 
@@ -77,10 +80,13 @@ class Held:
         Curvature of parts of the chain by their number, 1/m.
     starts : mapping of int to float
         Where elements start, by their number, metres.
+    lengths : mapping of int to float
+        Lengths of elements, by their number, metres.
     """
 
     bends: Mapping[int, float] = field(default_factory=dict)
     starts: Mapping[int, float] = field(default_factory=dict)
+    lengths: Mapping[int, float] = field(default_factory=dict)
 
 
 NOTHING = Held()
@@ -178,7 +184,13 @@ def fit_plan(chain: Chain, points: Points, held: Held = NOTHING, progress: Progr
     ridge = RIDGE
     for _ in range(ROUNDS):
         progress.check()
-        after, moved = now.stepped(points, numbers, ridge)
+        change = now.change(ridge)
+        short = [one for one in now.shrinking(change, LEAST_M) if one not in numbers.lengths]
+        if short:
+            numbers = replace(numbers, lengths={**numbers.lengths, **dict.fromkeys(short, LEAST_M)})
+            now = _Look.at(now.state, points, now.feet, numbers)
+            continue
+        after, moved = now.stepped(points, numbers, change)
         if after is None or not after.is_better(now):
             ridge = max(ridge * STIFFER, STIFF)
             if ridge > STIFFEST:
@@ -229,9 +241,17 @@ class _Look:
     def solver(self, ridge: float) -> _Solver:
         return _Solver(self.jacobian.T @ self.weighted, self.constraints, ridge)
 
-    def stepped(self, points: Points, held: Held, ridge: float) -> tuple[Optional[_Look], float]:
-        """Return the look after a step, None if it makes no sense, and the largest shift."""
-        change = self.solver(ridge).step(-(self.weighted.T @ self.across), -self.gaps)
+    def change(self, ridge: float) -> np.ndarray:
+        """Return the change of the unknowns in a step."""
+        return self.solver(ridge).step(-(self.weighted.T @ self.across), -self.gaps)
+
+    def shrinking(self, change: np.ndarray, least_m: float) -> list[int]:
+        """Return the numbers of the elements that a change would make shorter than the least length."""
+        after = self.state.length + change[-len(self.state.length) :]
+        return np.flatnonzero(after < least_m).tolist()
+
+    def stepped(self, points: Points, held: Held, change: np.ndarray) -> tuple[Optional[_Look], float]:
+        """Return the look after a change, None if it makes no sense, and the largest shift."""
         state, moved = _taken(self.state, change)
         return (_Look.at(state, points, self.feet, held) if _is_sane(state) else None), moved
 
@@ -246,7 +266,7 @@ def _closed(look: _Look, points: Points, held: Held) -> _Look:
     for _ in range(CLOSING_ROUNDS):
         if look.gap_m < CLOSED_M:
             return look
-        after, _ = look.stepped(points, held, STIFFEST)
+        after, _ = look.stepped(points, held, look.change(STIFFEST))
         look = after if after is not None else look
     if look.gap_m > OPEN_M:
         raise FitError
@@ -378,6 +398,9 @@ def _with_held(
     for number, bend in held.bends.items():
         rows.append(_row(constraints.shape[1], [first + number]))
         more.append(np.array([state.bend[number] - bend]))
+    for number, length in held.lengths.items():
+        rows.append(_row(constraints.shape[1], [first + len(state.bend) + number]))
+        more.append(np.array([state.length[number] - length]))
     for number, start in held.starts.items():
         lengths = first + len(state.bend) + np.arange(number)
         rows.append(_row(constraints.shape[1], lengths))

@@ -11,7 +11,7 @@ import numpy as np
 from ..progress import SILENT, Progress
 from .chain import Chain
 from .elements import PlanElement
-from .plane_fit import Held, PlanFit, Points, fit_plan
+from .plane_fit import FitError, Held, PlanFit, Points, fit_plan
 
 STEPS_M = (1000.0, 500.0, 100.0, 50.0, 25.0, 10.0, 5.0, 1.0)
 """Steps of round radii, the roundest first, metres."""
@@ -47,7 +47,10 @@ def with_round_radii(
         held = {part: 1.0 / radius for part, radius in radii if radius}
         if not held:
             break
-        rounded = fit_plan(chain, points, Held(held), progress)
+        try:
+            rounded = fit_plan(chain, points, Held(held), progress)
+        except FitError:
+            continue
         if _chi_square(rounded, points) - before <= MOST_RISE * len(held):
             return tuple(
                 _with_round(one, radius, off_element(rounded, points, number)[0])

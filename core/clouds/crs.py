@@ -45,6 +45,9 @@ BASELINE_M = 100.0
 """Length on which the scale factor is measured: short enough for the factor to be constant along it, and long
 compared with the rounding of degrees."""
 
+AREA_DEG = 2.0
+"""How far outside of the area of its system a railway may lie, degrees: grids are used beyond their borders."""
+
 WGS_84 = "EPSG:4326"
 
 SAME_PLACE = 1e-3
@@ -180,6 +183,39 @@ def _lengths(part: pyproj.CRS) -> list[float]:
 def name_of(crs: pyproj.CRS) -> str:
     """Return the name of a coordinate system as a message quotes it: on one line, and not too long."""
     return " ".join(crs.name.split())[:MAX_NAME]
+
+
+def codes_and_names(crs: pyproj.CRS) -> tuple[int | None, str, str]:
+    """Return the EPSG code of the plan, None without one, its name, and the name of the heights, empty without one.
+
+    >>> codes_and_names(parse_crs("EPSG:25832+7837"))
+    (25832, 'ETRS89 / UTM zone 32N', 'DHHN2016 height')
+    """
+    plane, parts = _plane(crs), _unbound(crs).sub_crs_list
+    return plane.to_epsg(), plane.name, parts[1].name if len(parts) > 1 else ""
+
+
+def lies_in_area(crs: pyproj.CRS, xy: tuple[float, float]) -> bool:
+    """Return whether a place, in units of a projected system, lies in or near the area for which it is made.
+
+    It does also where the area is unknown.
+
+    >>> lies_in_area(parse_crs("EPSG:25832"), (550_000.0, 5_800_000.0))
+    True
+    >>> lies_in_area(parse_crs("EPSG:25832"), (5_800_000.0, 550_000.0))
+    False
+    """
+    pyproj, plane = import_pyproj(), _plane(crs)
+    area = plane.area_of_use or crs.area_of_use
+    if area is None or area.west > area.east:
+        return True
+    try:
+        longitude, latitude = pyproj.Transformer.from_crs(plane, WGS_84, always_xy=True).transform(*xy)
+    except pyproj.exceptions.ProjError:
+        return True
+    east, north = longitude - area.west, latitude - area.south
+    width, height = area.east - area.west, area.north - area.south
+    return bool(-AREA_DEG <= east <= width + AREA_DEG and -AREA_DEG <= north <= height + AREA_DEG)
 
 
 def is_geographic(crs: pyproj.CRS) -> bool:

@@ -60,7 +60,7 @@ class Origin:
             "Rail": self.standard.label,
             "Gauge": ", ".join(f"{1000 * gauge_m:g} mm" for gauge_m in self.gauges_m),
             "Railhead width": ", ".join(self._head_widths()),
-            "Coordinate system": _title(network.frame.crs_wkt),
+            "Coordinate system": title_of(network.frame.crs_wkt),
             "Parameters": _stated(self.parameters) if self.parameters else "",
             "Command": self.command,
         }
@@ -91,7 +91,7 @@ def _stated(parameters: Parameters) -> str:
     return ", ".join(stated)
 
 
-def _title(crs_wkt: str | None) -> str:
+def title_of(crs_wkt: str | None) -> str:
     """Code and name of a coordinate system, as QGIS shows them."""
     if not crs_wkt:
         return "none stated: metres"

@@ -72,3 +72,24 @@ dd { margin: 0; overflow-wrap: anywhere; }
 @media print { body { background: none; } .tall { max-height: none; }
               section, .verdict, .tile { break-inside: avoid; } }
 """
+
+ALIGNMENT_STYLE = """
+svg .frame { fill: none; stroke: var(--line); }
+svg .design { fill: none; stroke: #f4a261; stroke-width: 5; stroke-linejoin: round; opacity: 0.75; }
+svg .jump { stroke: var(--unsure); stroke-width: 1.4; stroke-dasharray: 4 3; }
+svg.alignment { margin: 0 0 14px; break-inside: avoid; }
+svg rect.element { stroke: var(--paper); stroke-width: 1; }
+svg rect.line { fill: #b0bec5; }
+svg rect.clothoid { fill: #f8bf7f; }
+svg rect.arc { fill: #90bdf0; }
+svg text.onelement { fill: var(--ink); }
+i.designed { background: #f4a261; }
+i.element { height: 10px; }
+i.line { background: #b0bec5; }
+i.clothoid { background: #f8bf7f; }
+i.arc { background: #90bdf0; }
+@page { size: A4 landscape; margin: 12mm; }
+@media print { main { max-width: none; padding: 0; } section { break-inside: auto; }
+               * { print-color-adjust: exact; -webkit-print-color-adjust: exact; } }
+"""
+"""Further rules for the report on alignments."""

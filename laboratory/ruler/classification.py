@@ -11,13 +11,14 @@ import numpy as np
 
 from ...core.classify.settings import Settings
 from ...core.clouds.points import RailPoints
+from ...core.comparison.pieces import cut, nearest
 from ...core.labelling.cloud import classify_cloud
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_rails
-from ...core.rails import SearchFigures
+from ...core.rails import RailNetwork, SearchFigures
 from ..scenes.raw import RawScene
 from ..scenes.scene import RAIL
-from .lines import Match, cut, match, nearest
+from .lines import Match, match
 
 FACE_M = 0.035
 """Depth of the side faces that count as head, as in the classified scenes."""
@@ -112,13 +113,18 @@ def hectares(scene: RawScene) -> float:
 
 def lines_from(scene: RawScene, rail: np.ndarray, model: str = Parameters.model) -> Match:
     """Extract rails from labelled points, (n,) bool, and compare them with the truth."""
+    network = draw(scene, rail, model)
+    return match([] if network is None else [line.xyz for line in network.rails], scene.shown)
+
+
+def draw(scene: RawScene, rail: np.ndarray, model: str = Parameters.model) -> RailNetwork | None:
+    """Extract rails from labelled points, (n,) bool; None without any."""
     if not rail.any():
-        return match([], scene.shown)
+        return None
     points = RailPoints(scene.xyz[rail], scene.frame, RAIL)
     gauge_m, head_width_m = scene.standard.gauge_m, scene.standard.head_width_m
-    parameters = Parameters(gauge_m, head_width_m, other_gauges_m=scene.other_gauges_m, model=model)
-    network = extract_rails([points], parameters)
-    return match([line.xyz for line in network.rails], scene.shown)
+    parameters = Parameters(gauge_m, head_width_m, other_gauges_m=scene.other_gauges_m, model=model, quality_step_m=1.0)
+    return extract_rails([points], parameters)
 
 
 def truth(scene: RawScene, rail: np.ndarray, wide: bool) -> tuple[np.ndarray, np.ndarray]:

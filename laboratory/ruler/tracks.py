@@ -7,12 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...core.comparison.crossing import ASTRAY_M, spacing_and_cant
+from ...core.comparison.pieces import cut
 from ...core.polyline import interpolate, left_normals, length_along, project
 from ...core.rails import Centerline, RailLine, TrackGeometry
-from .lines import cut, nearest
-
-ASTRAY_M = 0.10
-"""Distance from its expected place, relative to the centerline, at which a line is not the rail of the track."""
 
 CURVED_M = 1500.0
 """Greatest radius that is compared: above it, the versine of a chord of 20 m is below 35 mm."""
@@ -55,7 +53,9 @@ def compare_tracks(
         own = [rail.xyz for rail in rails if rail.rail_id in (*centerline.left_ids, *centerline.right_ids)]
         middle, left = _places(centerline.xyz)
         half_m = (centerline.gauge_mm / 1000 + head_width_m) / 2
-        found, true = (_gauge_and_cant(middle, half_m * left, lines) for lines in (own, truth))
+        found, true = (
+            spacing_and_cant(middle + half_m * left, middle - half_m * left, cut(lines)) for lines in (own, truth)
+        )
         errors.append(found - true)
     error = np.concatenate(errors)
     error = error[np.isfinite(error).all(axis=1)]
@@ -99,7 +99,8 @@ def compare_geometry(
     plain, curved = [np.empty((0, 2))], [np.empty(0)]
     for track in geometry:
         half_m = (np.nanmedian(track.gauge_mm) / 1000 + head_width_m) / 2
-        true = _gauge_and_cant(track.xyz[:, :2], half_m * left_normals(track.xyz), rails)
+        middle, to_left = track.xyz[:, :2], half_m * left_normals(track.xyz)
+        true = spacing_and_cant(middle + to_left, middle - to_left, cut(rails))
         measured = np.column_stack([track.gauge_mm / 1000 + head_width_m, track.cant_mm / 1000])
         plain.append(measured - true)
         radius = _true_radius(track.xyz[:, :2], centerlines)
@@ -144,15 +145,3 @@ def _places(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     normals = left_normals(line[:, :2])
     places, left = (np.column_stack([np.interp(at, t, c) for c in values[:, :2].T]) for values in (line, normals))
     return places, left
-
-
-def _gauge_and_cant(middle: np.ndarray, to_left: np.ndarray, lines: Sequence[np.ndarray]) -> np.ndarray:
-    """Return distance and height difference of the rails left and right of places, (n, 2); NaN where one is missing."""
-    pieces = cut(lines)
-    sides = []
-    for place in (middle + to_left, middle - to_left):
-        feet, _ = nearest(np.column_stack([place, np.zeros(len(place))]), pieces)
-        astray = np.linalg.norm(feet[:, :2] - place, axis=1) > ASTRAY_M
-        sides.append(np.where(astray[:, None], np.nan, feet))
-    step = sides[0] - sides[1]
-    return np.column_stack([np.linalg.norm(step, axis=1), step[:, 2]])

@@ -44,9 +44,6 @@ DRONE = Photogrammetry()
 BLUNT = Photogrammetry(blur_m=0.065, blur_varies=0.35, widening_m=0.025, wave_m=0.012, noise_m=0.009, stray_share=0.01)
 """Images of a drone, and less sharp ones."""
 
-AGAIN = Photogrammetry(shift_m=(0.03, -0.02, 0.025), epoch=1)
-"""Images of the same place on another day, registered with an error of some centimetres."""
-
 Scanning = Union[RawScanner, Photogrammetry]
 
 
@@ -57,6 +54,11 @@ def from_air(per_m2: float, noise_m: float, left_m: float = 8.0, height_m: float
     return RawScanner(
         step_m, step_m / height_m, left_m, height_m, noise_m, 4 * height_m, 0.05, wide=True, view_rad=(-half, half)
     )
+
+
+def another_day(camera: Photogrammetry) -> Photogrammetry:
+    """Survey of the same place with other errors, registered some centimetres aside."""
+    return replace(camera, epoch=camera.epoch + 1, shift_m=(0.03, -0.02, 0.025))
 
 
 def line(length_m: float, curvature: float, heading: float) -> Curve:
@@ -309,15 +311,18 @@ AIR: dict[str, Callable[[int], RawScene]] = {
 }
 """From the air: points per square metre; the noise is in the scene's name."""
 
-_canted = partial(double_track, curvature=1 / 450, cant_m=0.13)
+SURVEYED: dict[str, Callable[..., RawScene]] = {
+    "straight": partial(double_track, name="straight", curvature=0.0, cant_m=0.0),
+    "curve": partial(double_track, name="curve", curvature=1 / 450, cant_m=0.13),
+    "turnout": turnout,
+    "station": station,
+}
+"""Places that drones survey; each takes a seed and the scanner."""
 
 PHOTO: dict[str, Callable[[int], RawScene]] = {
-    "photo straight": partial(double_track, scanner=DRONE, name="photo straight", curvature=0.0, cant_m=0.0),
-    "photo curve": partial(_canted, scanner=DRONE, name="photo curve"),
-    "photo curve again": partial(_canted, scanner=AGAIN, name="photo curve again"),
-    "photo curve blunt": partial(_canted, scanner=BLUNT, name="photo curve blunt"),
-    "photo turnout": partial(turnout, scanner=DRONE),
-    "photo station": partial(station, scanner=DRONE),
+    **{f"photo {name}": partial(make, scanner=DRONE) for name, make in SURVEYED.items()},
+    "photo curve again": partial(SURVEYED["curve"], scanner=another_day(DRONE)),
+    "photo curve blunt": partial(SURVEYED["curve"], scanner=BLUNT),
 }
 """Surveys by images; the same curve twice, by two surveys."""
 

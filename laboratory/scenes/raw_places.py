@@ -58,6 +58,13 @@ BEAM_SIZE_M = (0.08, 0.20)
 """Width and height of a beam of formwork."""
 
 
+RIDGE_STEP_M, RIDGE_M = 0.75, 0.11
+"""Distance of the ridges of potatoes, of which two are a gauge and a head apart, and half their height."""
+
+POTATOES_M = (8.5 * RIDGE_STEP_M, 24.5 * RIDGE_STEP_M)
+"""Where the ridges begin and end across: in furrows."""
+
+
 def places(world: World, *edges: np.ndarray) -> np.ndarray:
     """Places across a world, (m,), with those of edges among them."""
     even = np.arange(-world.half_width_m, world.half_width_m + ACROSS_STEP_M, ACROSS_STEP_M)
@@ -160,8 +167,8 @@ def farmland(world: World) -> None:
     for middle, apart, depth in ((0.0, 1.5, 0.10), (-8.0, 1.8, 0.14)):
         for side in (1, -1):
             height -= depth * np.exp(-0.5 * ((across - middle - wander - side * apart / 2) / 0.16) ** 2)
-    ridges = (across > 6.0) & (across < 18.0)
-    height += ridges * 0.11 * (np.cos(2 * np.pi * across / 0.75) + 1)
+    first_m, last_m = POTATOES_M
+    height += RIDGE_M * (np.cos(2 * np.pi * across / RIDGE_STEP_M) + 1) * ((across > first_m) & (across < last_m))
     lay(world, across, height, GROUND, SOIL_M)
     plants(world, 1500, (-18.0, 5.5), (0.03, 0.25), (0.05, 0.25), 0.0)
     plants(world, 500, (6.0, 18.0), (0.1, 0.3), (0.1, 0.25), 0.1)

@@ -3,10 +3,13 @@
 from .build_track_centerlines import BuildTrackCenterlines
 from .check_installation import CheckInstallation
 from .classify_rail_points import ClassifyRailPoints
+from .compare_tracks import CompareTracks
+from .export_alignment import ExportAlignment
 from .extract_rails import ExtractRails
 from .fit_alignment import FitAlignment
 from .frpdf_cleanup import FrpdfCleanup
 from .grow_rail_points import GrowRailPoints
+from .import_alignment import ImportAlignment
 from .install_packages import InstallPackages
 from .measure_track_geometry import MeasureTrackGeometry
 from .rasterize_rail_points import RasterizeRailPoints
@@ -25,6 +28,9 @@ ALGORITHMS = (
     MeasureTrackGeometry,
     StationAlongAxis,
     FitAlignment,
+    CompareTracks,
+    ExportAlignment,
+    ImportAlignment,
     TrainRailClassifier,
     InstallPackages,
     CheckInstallation,

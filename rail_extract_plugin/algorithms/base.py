@@ -16,6 +16,7 @@ from qgis.core import (
     QgsProcessingParameterFeatureSink,
 )
 from qgis.PyQt.QtGui import QIcon
+from qgis.PyQt.QtWidgets import QWidget
 
 from ...core.disk import Destination
 from ...core.progress import Progress
@@ -27,6 +28,7 @@ from ..dialog.wording import for_user
 from ..feedback import QgisProgress
 from ..i18n import tr
 from ..paths import ICONS, PICTURES
+from ..runs.running import running
 from ..setup.dependencies import explain_missing, missing_packages
 from ..writing.destinations import PAGE, appends, check_layer_name, check_page_name, destinations
 from ..writing.styling import NO_PROPERTIES
@@ -49,6 +51,8 @@ RAIL_WORDS = (
 )
 CLOUD_WORDS = ("lidar", "las", "laz", "copc", "point cloud", "laser scanning", "Punktwolke", "nuage de points")
 TRACK_WORDS = ("gauge", "cant", "superelevation", "alignment", "Spurweite", "Gleisachse", "Überhöhung", "écartement")
+
+ALIGNMENT_WORDS = ("alignment", "elements", "straight", "clothoid", "arc", "Trasse", "Trassierung", "tracé")
 
 
 class RailAlgorithm(QgsProcessingAlgorithm):
@@ -143,7 +147,8 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         """Compute in any thread; every error becomes one sentence."""
         progress = QgisProgress(feedback, self.parameterDefinitions())
         try:
-            results = self.compute(self._job, parameters, context, progress)
+            with running(feedback):
+                results = self.compute(self._job, parameters, context, progress)
         except BaseException as error:
             reason = sentence_for(error, self.parameterDefinitions())
         else:
@@ -193,6 +198,12 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         """Labels of the provider's algorithms, except those for the setup, whose packages are all installed."""
         mates = self.provider().algorithms() if self.provider() else ()
         return [mate.displayName() for mate in mates if mate.GROUP is not SETUP and not missing_packages(mate.NEEDS)]
+
+    def createCustomParametersWidget(self, parent: QWidget | None = None) -> QWidget:
+        """Return the dialog for one run, which QGIS would build itself otherwise."""
+        from ..runs.run_dialog import RunDialog
+
+        return RunDialog(self, parent)
 
     def createInstance(self) -> RailAlgorithm:
         """Create an instance for a run."""

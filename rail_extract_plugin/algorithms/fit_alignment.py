@@ -12,7 +12,9 @@ from ...core.progress import Progress
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
-from ..writing.alignments import figures_of_fits, write_deviations, write_elements
+from ..dialog.passwords import masked
+from ..writing.layers import figures_of_fits, write_deviations, write_elements
+from ..writing.reports import write_alignment_report
 from ..writing.whole_files import write_each
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 from .toolbox_groups import ALIGNMENT
@@ -30,6 +32,7 @@ class Job:
     rails: QgsProcessingFeatureSource | None
     fixed: QgsProcessingFeatureSource | None
     settings: FitParameters
+    command: str
 
 
 class FitAlignment(RailAlgorithm):
@@ -57,9 +60,12 @@ class FitAlignment(RailAlgorithm):
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs in the order of the interface."""
         layers = (inputs.tracks_to_fit(), *inputs.cant_of_tracks())
-        for definition in (*layers, *groups.alignment(), inputs.fixed(), *outputs.alignment()):
+        for definition in (*layers, *groups.alignment(), inputs.fixed(), outputs.elements(), outputs.deviations()):
             self.addParameter(definition)
-        for output in outputs.alignment_figures():
+        report = outputs.alignment_report()
+        report.setCreateByDefault(False)
+        self._add_report(report)
+        for output in outputs.fit_figures():
             self.addOutput(output)
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
@@ -76,6 +82,7 @@ class FitAlignment(RailAlgorithm):
                 values.choice("TRANSITIONS"),
                 values.flag("ROUND"),
             ),
+            masked(self.asPythonCommand(parameters, context)),
         )
 
     def compute(
@@ -89,8 +96,11 @@ class FitAlignment(RailAlgorithm):
         fixed = read_fixed(job.fixed, frame) if job.fixed else {}
         fits = fit_tracks(tracks, frame, job.settings, fixed, progress.span(READING, FITTING))
         rest = (parameters, context)
+        courses = [(one.alignment, one.deviations) for one in fits]
+        name, facts = job.tracks.sourceName(), {"Command": job.command}
         writers = {
-            "ELEMENTS": lambda: write_elements(self, "ELEMENTS", fits, frame, *rest),
-            "DEVIATIONS": lambda: write_deviations(self, "DEVIATIONS", fits, frame, *rest),
+            "ELEMENTS": lambda: write_elements(self, "ELEMENTS", [one.alignment for one in fits], frame, *rest),
+            "DEVIATIONS": lambda: write_deviations(self, "DEVIATIONS", [one.deviations for one in fits], frame, *rest),
+            "REPORT": lambda: write_alignment_report(self, "REPORT", courses, name, facts, True, *rest),
         }
         return {**write_each(writers, *rest), **figures_of_fits(fits)}

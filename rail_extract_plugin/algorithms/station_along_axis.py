@@ -21,6 +21,7 @@ from ..dialog.parameter_values import ParameterValues
 from ..systems import prepare_system
 from ..writing.layers import copies, fields, write_copy
 from .base import RAIL_WORDS, RailAlgorithm
+from .toolbox_groups import ALIGNMENT
 
 if TYPE_CHECKING:
     from ..reading.axes import PlacedAxes
@@ -43,6 +44,7 @@ class StationAlongAxis(RailAlgorithm):
 
     NAME = "stationalongaxis"
     LABEL = "Station along axis"
+    GROUP = ALIGNMENT
     TAGS = (*RAIL_WORDS, "kilometre", "chainage", "stationing", "linear referencing", "mileage", "Kilometrierung")
     NEEDS = (("numpy",), ("scipy",), ("pyproj",))
     SUMMARY = "Gives the features of any layer their kilometre along the axis of the railway, with offset and side."

@@ -48,8 +48,12 @@ def number(
     return made
 
 
+CHOICE_WIDGET = {"widget_wrapper": {"class": f"{__package__}.choice_widget.ChoiceWidgetWrapper"}}
+"""Metadata by which QGIS finds the list in words. Models contain it: the class never changes its place."""
+
+
 def choice(name: str, label: str, options: tuple[str, ...], default: str) -> QgsProcessingParameterEnum:
-    """Define a choice among static strings.
+    """Define a choice among ids; `choices.WORDS` has the words that dialogs show for them.
 
     Parameters
     ----------
@@ -57,7 +61,18 @@ def choice(name: str, label: str, options: tuple[str, ...], default: str) -> Qgs
     options : tuple of str
     default : str
     """
-    return QgsProcessingParameterEnum(name, label, list(options), defaultValue=default, usesStaticStrings=True)
+    made = QgsProcessingParameterEnum(name, label, list(options), defaultValue=default, usesStaticStrings=True)
+    made.setMetadata(CHOICE_WIDGET)
+    return made
+
+
+def choices(name: str, label: str, options: tuple[str, ...]) -> QgsProcessingParameterEnum:
+    """Define a choice of any number of ids, none by default; see `choice`."""
+    made = QgsProcessingParameterEnum(
+        name, label, list(options), allowMultiple=True, optional=True, usesStaticStrings=True
+    )
+    made.setMetadata(CHOICE_WIDGET)
+    return made
 
 
 def helped(definition: QgsProcessingParameterDefinition, text: str) -> QgsProcessingParameterDefinition:

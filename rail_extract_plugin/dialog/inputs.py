@@ -5,9 +5,11 @@ from __future__ import annotations
 from qgis.core import (
     QgsProcessing,
     QgsProcessingParameterBoolean,
+    QgsProcessingParameterCrs,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterFeatureSource,
     QgsProcessingParameterField,
+    QgsProcessingParameterFile,
     QgsProcessingParameterPoint,
     QgsProcessingParameterRasterLayer,
     QgsProcessingParameterString,
@@ -161,6 +163,80 @@ def points_of_rails() -> QgsProcessingParameterDefinition:
     return helped(
         CloudParameter("POINTS", tr("Point cloud (layer, file or folder)"), optional=True),
         tr("The cloud from which the rails were extracted: it gives heights, sigma_mm and points for each station."),
+    )
+
+
+def elements() -> Definitions:
+    """Define the parameters for an element table."""
+    table = QgsProcessing.SourceType.TypeVector
+    return (
+        helped(
+            QgsProcessingParameterFeatureSource("INPUT", tr("Elements"), [table]),
+            tr("Element table of Fit Alignment or Import Alignment; it may be edited. Its geometries are not used."),
+        ),
+        advanced(
+            QgsProcessingParameterCrs("CRS", tr("CRS of a table without one"), optional=True),
+            tr("Projected coordinate system in metres for a table without geometries; other tables keep their own."),
+        ),
+    )
+
+
+def tracks_beside_design() -> QgsProcessingParameterDefinition:
+    """Define the measured tracks that are compared with a design."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return helped(
+        QgsProcessingParameterFeatureSource("TRACKS", tr("Measured tracks"), [line], optional=True),
+        tr(
+            "Centerlines that lie along the alignments, for deviations and report; each is compared with the alignment "
+            "beside it, up to 2 m away."
+        ),
+    )
+
+
+def landxml() -> Definitions:
+    """Define the parameters for a LandXML file."""
+    behaviour = QgsProcessingParameterFile.Behavior.File
+    kinds = tr("LandXML files (*.xml *.landxml);;All files (*)")
+    return (
+        helped(
+            QgsProcessingParameterFile("INPUT", tr("LandXML file"), behaviour, fileFilter=kinds),
+            tr("LandXML 1.0 to 1.2 in metres, with alignments of lines, arcs and clothoids."),
+        ),
+        helped(
+            QgsProcessingParameterCrs("CRS", tr("CRS of a file without one"), optional=True),
+            tr("Projected coordinate system in metres for a file that does not state one; other files keep their own."),
+        ),
+        advanced(
+            QgsProcessingParameterBoolean("EAST_FIRST", tr("Points are written easting first"), defaultValue=False),
+            tr(
+                "For files that, against the format, write the easting of points before their northing. All curves of "
+                "such a file turn to the other side than it states."
+            ),
+        ),
+    )
+
+
+def surveys() -> Definitions:
+    """Define the lines that are compared, and the rails of their tracks."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    rails = tr("For centerlines: the rails of these tracks, for differences of gauge and cant.")
+    return (
+        helped(
+            QgsProcessingParameterFeatureSource("REFERENCE", tr("Reference"), [line]),
+            tr("Rails or centerlines of the earlier survey, of the design, or of a control measurement."),
+        ),
+        helped(
+            QgsProcessingParameterFeatureSource("INPUT", tr("Lines to compare"), [line]),
+            tr("The same kind of lines of the later survey, in the same coordinate system."),
+        ),
+        helped(
+            QgsProcessingParameterFeatureSource("REFERENCE_RAILS", tr("Rails of the reference"), [line], optional=True),
+            rails,
+        ),
+        helped(
+            QgsProcessingParameterFeatureSource("RAILS", tr("Rails to compare"), [line], optional=True),
+            rails,
+        ),
     )
 
 

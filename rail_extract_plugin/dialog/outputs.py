@@ -52,6 +52,35 @@ def _layer(name: str, label: str, kind: QgsProcessing.SourceType, optional: bool
     return made
 
 
+def differences() -> QgsProcessingParameterDefinition:
+    """Define the layer of differences between two surveys."""
+    point = QgsProcessing.SourceType.TypeVectorPoint
+    return helped(
+        _layer("OUTPUT", tr("Differences"), point, optional=True),
+        tr("Points along the lines of the reference with the differences, and along lines that it does not have."),
+    )
+
+
+def comparison_report() -> QgsProcessingParameterDefinition:
+    """Define the report on a comparison."""
+    return helped(_page(), tr("A web page with what has moved, the constant shift and the distribution."))
+
+
+def comparison_figures() -> Numbers:
+    """Define the figures about a comparison."""
+    return (
+        QgsProcessingOutputNumber("COMPARED_LENGTH", tr("Length on lines of both surveys [m]")),
+        QgsProcessingOutputNumber("MOVED_LENGTH", tr("Length that has moved [m]")),
+        QgsProcessingOutputNumber("MISSING_LENGTH", tr("Length of the reference without a line [m]")),
+        QgsProcessingOutputNumber("EXTRA_LENGTH", tr("Length of lines that the reference does not have [m]")),
+        QgsProcessingOutputNumber("ACROSS_RMS", tr("Differences across, root mean square [mm]")),
+        QgsProcessingOutputNumber("HEIGHT_RMS", tr("Differences in height, root mean square [mm]")),
+        QgsProcessingOutputNumber("SHIFT_EAST", tr("Constant shift east [mm]")),
+        QgsProcessingOutputNumber("SHIFT_NORTH", tr("Constant shift north [mm]")),
+        QgsProcessingOutputNumber("SHIFT_UP", tr("Constant shift up [mm]")),
+    )
+
+
 def stationed() -> QgsProcessingParameterDefinition:
     """Define the copy of a layer with kilometres."""
     kind = QgsProcessing.SourceType.TypeVectorAnyGeometry
@@ -85,6 +114,58 @@ def stops() -> QgsProcessingParameterDefinition:
     return helped(
         _layer("STOPS", tr("Stops"), point, optional=True),
         tr("Points where a rail is not followed further, with the reason."),
+    )
+
+
+def elements() -> QgsProcessingParameterDefinition:
+    """Define the element table."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return helped(
+        _layer("ELEMENTS", tr("Elements"), line, optional=True),
+        tr("The element table: a line for each element in plan, in height and of cant, with its figures."),
+    )
+
+
+def deviations() -> QgsProcessingParameterDefinition:
+    """Define the layer of deviations from a design."""
+    point = QgsProcessing.SourceType.TypeVectorPoint
+    return helped(
+        _layer("DEVIATIONS", tr("Deviations"), point, optional=True),
+        tr("Points along the design, one per metre, with slew, lift and difference of cant: measured minus design."),
+    )
+
+
+def alignment_report() -> QgsProcessingParameterDefinition:
+    """Define the report on alignments."""
+    return helped(
+        _page(),
+        tr("A web page with a diagram of each track: curvature, cant, gradient, elements, slews and lifts, to print."),
+    )
+
+
+def axes() -> QgsProcessingParameterDefinition:
+    """Define the layer of alignments as lines."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return helped(
+        _layer("AXIS", tr("Axes"), line, optional=True),
+        tr("A line for each alignment, less than a millimetre off the exact curve, with kilometres as M values."),
+    )
+
+
+def alignment_file() -> QgsProcessingParameterDefinition:
+    """Define the file for design software."""
+    kinds = tr("LandXML files (*.xml);;IFC files (*.ifc);;DXF files (*.dxf)")
+    return helped(
+        QgsProcessingParameterFileDestination("OUTPUT", tr("File for design software"), kinds),
+        tr("The name decides the format: .xml is LandXML 1.2, .ifc is IFC 4.3, .dxf is DXF of release 12."),
+    )
+
+
+def alignment_figures() -> Numbers:
+    """Define the figures about alignments."""
+    return (
+        QgsProcessingOutputNumber("ALIGNMENT_COUNT", tr("Number of alignments")),
+        QgsProcessingOutputNumber("ELEMENT_COUNT", tr("Number of elements")),
     )
 
 
@@ -191,24 +272,7 @@ def engine() -> QgsProcessingOutputString:
     return QgsProcessingOutputString("ENGINE_USED", tr("Engine that ran the network"))
 
 
-def alignment() -> tuple[QgsProcessingParameterDefinition, ...]:
-    """Define the layers of fitted elements and of deviations from them."""
-    line, point = QgsProcessing.SourceType.TypeVectorLine, QgsProcessing.SourceType.TypeVectorPoint
-    return (
-        helped(
-            _layer("ELEMENTS", tr("Elements"), line, optional=True),
-            tr("The exact curve of each element in plan, height and cant, with its table."),
-        ),
-        helped(
-            _layer("DEVIATIONS", tr("Deviations"), point, optional=True),
-            tr(
-                "Points along the design, one per metre, with slew, lift and difference of cant: measured minus design."
-            ),
-        ),
-    )
-
-
-def alignment_figures() -> Numbers:
+def fit_figures() -> Numbers:
     """Define the figures about fitted elements."""
     return (
         QgsProcessingOutputNumber("ELEMENT_COUNT", tr("Number of elements")),

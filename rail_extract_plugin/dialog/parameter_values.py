@@ -285,6 +285,19 @@ class ParameterValues:
     def cloud(self, name: str) -> CloudSource:
         """Return the files of a cloud; the parameter CRS, if any, applies to files that state no coordinate system."""
         source = cloud_source(self._parameters.get(name), self._context)
+        crs = self.projected_crs()
+        source = replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
+        prepare_system(checked_crs(source))
+        return replace(source, mask=self._mask(source), leave_out=self._left_out())
+
+    def projected_crs(self) -> QgsCoordinateReferenceSystem:
+        """Return the coordinate system CRS, an invalid one if it is empty.
+
+        Raises
+        ------
+        ParameterError
+            It is not a coordinate system, or it is in degrees.
+        """
         crs = self._algorithm.parameterAsCrs(self._parameters, "CRS", self._context)
         if self.filled("CRS") and not crs.isValid():
             raise ParameterError(f"CRS {self._parameters['CRS']} is not a coordinate system: choose one from the list.")
@@ -292,9 +305,7 @@ class ParameterValues:
             raise ParameterError(
                 f"CRS {crs.authid()} is in degrees, where lengths can't be measured: choose a projected one."
             )
-        source = replace(source, crs_wkt=crs.toWkt()) if crs.isValid() else source
-        prepare_system(checked_crs(source))
-        return replace(source, mask=self._mask(source), leave_out=self._left_out())
+        return crs
 
     def extent(self, crs: QgsCoordinateReferenceSystem) -> tuple[float, float, float, float] | None:
         """Read EXTENT in `crs`: west, south, east and north limits.

@@ -25,13 +25,14 @@ from ...core.parameters import (
     METHODS,
     STRIPS,
     TRANSITIONS,
+    ComparisonParameters,
     FitParameters,
     GrowParameters,
     Parameters,
 )
 from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS, UNCONFIRMED_PROFILES
 from ..i18n import tr
-from .definitions import MM_DECIMALS, Definitions, advanced, choice, helped, number
+from .definitions import MM_DECIMALS, Definitions, advanced, choice, choices, helped, number
 
 TORCH_BUILDS = ("NONE", "CPU", "CUDA")
 
@@ -56,9 +57,14 @@ MAX_LENGTH_M = 100_000.0
 MIN_FIT_TOLERANCE_MM, MAX_ELEMENT_M = 0.1, 1000.0
 """No scanner resolves a smaller tolerance, and no element that is left out on purpose is longer."""
 
+MAX_REACH_M = 2.0
+"""Two tracks are further apart than this."""
+
 MAX_EPOCHS, MAX_SEED = 10_000, 2**31 - 1
 """Weeks on any computer, and the largest seed of a random generator."""
 
+
+VERTICAL_CURVES = ("CIRCLES", "PARABOLAS")
 
 STANDARD_WIDGET = {"widget_wrapper": {"class": f"{__package__}.standard_widget.StandardWidgetWrapper"}}
 """Metadata by which QGIS finds the list of standards. Models contain it: the class never changes its place."""
@@ -151,6 +157,17 @@ def head() -> Definitions:
     return standard, gauge, head_width
 
 
+def vertical_curves() -> QgsProcessingParameterDefinition:
+    """Define how LandXML states the curves of a profile."""
+    return advanced(
+        choice("VERTICAL_CURVES", tr("Curves of the profile in LandXML"), VERTICAL_CURVES, VERTICAL_CURVES[0]),
+        tr(
+            "CIRCLES writes circles, as railways state them; PARABOLAS writes parabolas of the same length. Between "
+            "the same gradients they differ by less than a millimetre."
+        ),
+    )
+
+
 def area() -> Definitions:
     """Define the extent and the coordinate system of the cloud."""
     return (
@@ -180,14 +197,7 @@ def crs() -> QgsProcessingParameterDefinition:
 def leave_out() -> QgsProcessingParameterDefinition:
     """Define which points are left out by their flag."""
     return advanced(
-        QgsProcessingParameterEnum(
-            "LEAVE_OUT",
-            tr("Points to leave out"),
-            list(LEAVE_OUT),
-            allowMultiple=True,
-            optional=True,
-            usesStaticStrings=True,
-        ),
+        choices("LEAVE_OUT", tr("Points to leave out"), LEAVE_OUT),
         tr(
             "OVERLAP leaves out points that are marked as overlap of strips, SYNTHETIC those that are marked as "
             "computed, not measured. Withheld points are always left out."
@@ -458,6 +468,30 @@ def growth() -> Definitions:
         tr("The other rail of the track, at the gauge, is followed as well. Otherwise only the one with the seed."),
     )
     return (both, *lengths, outliers, longest)
+
+
+def comparison() -> Definitions:
+    """Define how two surveys are compared."""
+    sigma = tr("Across and in height, where lines state none; 0 for a design. Empty: the scatter shows it.")
+    defaults = ComparisonParameters()
+    reach = number("REACH", tr("Greatest distance of the same line [m]"), defaults.reach_m, 0.01, MAX_REACH_M)
+    step = number("STEP", tr("Step of the comparison [m]"), defaults.step_m, 0.1, MAX_LENGTH_M)
+    shift = QgsProcessingParameterBoolean(
+        "IGNORE_SHIFT", tr("Leave a constant shift out of account"), defaultValue=defaults.ignore_shift
+    )
+    errors = (
+        ("REFERENCE_SIGMA", tr("Standard error, reference [mm]")),
+        ("INPUT_SIGMA", tr("Standard error, lines [mm]")),
+    )
+    return (
+        *(helped(number(name, label, optional=True, decimals=MM_DECIMALS), sigma) for name, label in errors),
+        helped(
+            shift,
+            tr("moved is judged without the shift that most of the length shares. Switch it off for a design."),
+        ),
+        advanced(reach, tr("Lines further from those of the reference are not the same line: missing and extra.")),
+        advanced(step, tr("Distance between the points along each line.")),
+    )
 
 
 def pairing() -> Definitions:

@@ -1,13 +1,16 @@
-"""Messages in the user's terms: in QGIS's windows a parameter is called by its label, not by its name in scripts."""
+"""Messages in the user's terms: QGIS's windows show labels of parameters and words for choices instead of ids."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
 
-from qgis.core import QgsApplication, QgsProcessingParameterDefinition
+from qgis.core import QgsApplication, QgsProcessingParameterDefinition, QgsProcessingParameterEnum
 
+from .choices import WORDS
 from .passwords import masked
+
+Definitions = Sequence[QgsProcessingParameterDefinition]
 
 WITH_DIALOGS = "desktop"
 """QGIS's name for the platform with windows."""
@@ -20,13 +23,33 @@ OVERLONG, SHOWN = r"\S{500,}", 100
 """A word longer than the name of any file, and how many of its characters are shown: a window grows with its text."""
 
 
-def for_user(sentence: str, definitions: Sequence[QgsProcessingParameterDefinition]) -> str:
-    """Return the sentence without passwords, and with labels for parameter names if this QGIS has windows."""
+def for_user(sentence: str, definitions: Definitions) -> str:
+    """Return the sentence without passwords, and with labels and words for ids if this QGIS has windows."""
     sentence = re.sub(OVERLONG, lambda word: f"{word[0][:SHOWN]}…", masked(sentence))
     return with_labels(sentence, definitions) if QgsApplication.platform() == WITH_DIALOGS else sentence
 
 
-def with_labels(sentence: str, definitions: Sequence[QgsProcessingParameterDefinition]) -> str:
-    """Replace the names of parameters with their labels in quotes."""
+def with_labels(sentence: str, definitions: Definitions, about: str = "") -> str:
+    """Replace the names of parameters with their labels, and the ids of choices with their words, both in quotes.
+
+    Parameters
+    ----------
+    sentence : str
+    definitions : sequence of QgsProcessingParameterDefinition
+    about : str
+        Parameter that the sentence is about; an id that several parameters have is a choice of this one, or of the one
+        that was named last.
+    """
     labels = {definition.name(): definition.description() for definition in definitions}
-    return re.sub(NAME, lambda name: f'"{labels[name[0]]}"' if name[0] in labels else name[0], sentence)
+    lists = [one.name() for one in definitions if isinstance(one, QgsProcessingParameterEnum) and one.name() in WORDS]
+    named = about
+
+    def in_words(found: re.Match[str]) -> str:
+        nonlocal named
+        if found[0] in labels:
+            named = found[0]
+            return f'"{labels[named]}"'
+        words = [WORDS[one][found[0]] for one in (named, *lists) if found[0] in WORDS.get(one, {})]
+        return f'"{words[0]}"' if words else found[0]
+
+    return re.sub(NAME, in_words, sentence)

@@ -19,6 +19,7 @@ from qgis.core import (
     QgsPointXY,
     QgsProcessingContext,
     QgsProject,
+    QgsSettings,
     QgsVectorLayer,
     QgsWkbTypes,
 )
@@ -31,6 +32,8 @@ from qgis.PyQt.QtWidgets import QAction, QComboBox, QWidget
 from ...core.errors import RailExtractError
 from ...core.standards import DEFAULT, STANDARDS
 from ..algorithms.grow_rail_points import GrowRailPoints
+from ..dialog.standard_setting import LAST
+from ..dialog.wheel import ignore_wheel
 from ..i18n import tr
 from ..paths import ICONS
 from ..reading.clouds import cloud_source
@@ -139,7 +142,9 @@ class GrowRails(QObject):
         self.standards.setToolTip(tr("Rail standard of the rails that are clicked"))
         for name, standard in STANDARDS.items():
             self.standards.addItem(standard.label, name)
-        self.standards.setCurrentIndex(self.standards.findData(DEFAULT))
+        last = self.standards.findData(QgsSettings().value(LAST))
+        self.standards.setCurrentIndex(last if last >= 0 else self.standards.findData(DEFAULT))
+        ignore_wheel(self.standards)
         QgsProject.instance().layersRemoved.connect(self._forget_removed)
         self._enable()
 
@@ -246,7 +251,7 @@ class GrowRails(QObject):
 
     def accept(self) -> None:
         """Open the dialog of the algorithm with the seeds as a layer, and clear the map."""
-        from processing.gui.AlgorithmDialog import AlgorithmDialog
+        from ..runs.run_dialog import open_dialog
 
         if self.is_growing or not self.seeds or self._layer is None:
             return
@@ -255,10 +260,7 @@ class GrowRails(QObject):
             "SEEDS": self._seed_layer().id(),
             "STANDARD": self.standards.currentData(),
         }
-        algorithm = QgsApplication.processingRegistry().createAlgorithmById(f"railextract:{GrowRailPoints.NAME}")
-        self.dialog = AlgorithmDialog(algorithm, parent=self.parent())
-        self.dialog.setParameters(values)
-        self.dialog.show()
+        self.dialog = open_dialog(GrowRailPoints.NAME, values, self.parent())
         self.clear()
 
     def _seed_layer(self) -> QgsVectorLayer:

@@ -27,6 +27,7 @@ from qgis.core import (
 
 from ...core.clouds.crs import MAX_COORDINATE, parse_crs, units, warn_of_scale
 from ...core.clouds.mask import Mask
+from ...core.comparison.tracks import SurveyedLine
 from ...core.errors import CrsError, RailExtractError
 from ...core.fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
 from ...core.frame import ORIGIN_STEP, LocalFrame
@@ -98,6 +99,25 @@ def read_centerlines(
     """
     found, frame = _read(source, progress, name)
     return tuple(_centerline(feature, xyz) for feature, xyz in found), frame
+
+
+def read_surveyed(
+    source: QgsProcessingFeatureSource, progress: Progress, name: str
+) -> tuple[tuple[SurveyedLine, ...], LocalFrame]:
+    """Read all parts of all lines with their standard errors, as `read_rails` does.
+
+    A line's number is its `rail_id`, else its `track_id`, else the id of its feature. With a `track_id` only, it is a
+    centerline.
+
+    Parameters
+    ----------
+    source, progress, name
+        See `read_rails`.
+    """
+    found, frame = _read(source, progress, name)
+    names = source.fields().names()
+    id_field = next((one for one in ("rail_id", "track_id") if one in names), "")
+    return tuple(_surveyed(feature, xyz, id_field) for feature, xyz in found), frame
 
 
 def read_guide(
@@ -239,7 +259,7 @@ def _read(
     source: QgsProcessingFeatureSource, progress: Progress, name: str
 ) -> tuple[list[tuple[QgsFeature, np.ndarray]], LocalFrame]:
     """Read the features, and the vertices of each of their parts, (n, 3) local metres."""
-    crs_wkt, horizontal_unit_m, vertical_unit_m = _system(source.sourceCrs(), progress)
+    crs_wkt, horizontal_unit_m, vertical_unit_m = system_of(source.sourceCrs(), progress)
     request = QgsFeatureRequest()
     found = [
         (feature, vertices)
@@ -281,7 +301,7 @@ def _is_stray(xy: np.ndarray) -> bool:
     return bool(lengths_m.max() > MAX_SEGMENT_M or spikes_m.max(initial=0.0) > MAX_SPIKE_M)
 
 
-def _system(crs: QgsCoordinateReferenceSystem, progress: Progress) -> tuple[str | None, float, float]:
+def system_of(crs: QgsCoordinateReferenceSystem, progress: Progress) -> tuple[str | None, float, float]:
     """Return the coordinate system as WKT, and its horizontal and vertical units in metres."""
     if not crs.isValid():
         progress.warning("The lines have no coordinate system: their coordinates are taken as metres.")
@@ -330,6 +350,12 @@ def _rail(feature: QgsFeature, xyz: np.ndarray, default_class: int) -> RailLine:
     defaults = {"rail_id": feature.id(), "class_code": default_class}
     values = _attributes(feature, RailLine, RAIL_FIELDS, defaults)
     return RailLine(xyz, **{**values, "gaps": _gaps(feature, xyz)})
+
+
+def _surveyed(feature: QgsFeature, xyz: np.ndarray, id_field: str) -> SurveyedLine:
+    number = _whole(feature, id_field, feature.id())
+    sigma_mm, sigmaz_mm = (_number(feature, name, math.nan) for name in ("sigma_mm", "sigmaz_mm"))
+    return SurveyedLine(number, xyz, sigma_mm / 1000, sigmaz_mm / 1000, id_field != "track_id")
 
 
 def _centerline(feature: QgsFeature, xyz: np.ndarray) -> Centerline:

@@ -11,21 +11,18 @@ from qgis.core import NULL, QgsFeatureRequest, QgsProcessingFeatureSource
 from ...core.alignment.cant_of_rails import cant_of_rails
 from ...core.alignment.elements import Alignment
 from ...core.alignment.fit import Track
-from ...core.alignment.table import alignments
 from ...core.errors import RailExtractError
-from ...core.fields import ELEMENT_FIELDS
 from ...core.frame import LocalFrame
 from ...core.polyline import length_along
 from ...core.progress import Progress
 from ...core.rails import Centerline
+from ..systems import system
 from .area_points import check_same_plane
+from .element_tables import read_elements
 from .line_layers import GEOMETRY_AS_IT_IS, read_centerlines, read_rails
 
 QUALITY_NEEDS = ("track_id", "chainage_m", "cant_mm")
 """Fields of the track geometry that state the cant."""
-
-FIXED_NEEDS = ("layout", "type", "s_from", "s_to")
-"""Fields that make a table one of elements."""
 
 
 def read_tracks(
@@ -85,16 +82,15 @@ def _rails(source: QgsProcessingFeatureSource, frame: LocalFrame, progress: Prog
 
 
 def read_fixed(source: QgsProcessingFeatureSource, frame: LocalFrame) -> dict[int | None, Alignment]:
-    """Read a corrected element table: alignments by their track.
+    """Read a corrected element table: alignments by their track. Its places are not used.
 
     Raises
     ------
     RailExtractError
-        It lacks a field, or a row is wrong.
+        It is not an element table, or a row is wrong.
     """
-    _check_fields(source, FIXED_NEEDS, "FIXED", "the table of elements that this algorithm has written")
-    table = list(_rows(source, [field.name for field in ELEMENT_FIELDS]))
-    return {one.track_id: one for one in alignments(table, frame)}
+    crs = source.sourceCrs() if source.sourceCrs().isValid() else system(frame.crs_wkt or "")
+    return {one.track_id: one for one in read_elements(source, crs, name="FIXED")[0]}
 
 
 def _check_fields(source: QgsProcessingFeatureSource, names: Sequence[str], layer: str, remedy: str) -> None:

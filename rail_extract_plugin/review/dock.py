@@ -15,6 +15,7 @@ from qgis.PyQt import sip
 from qgis.PyQt.QtCore import Qt
 from qgis.PyQt.QtWidgets import QComboBox, QDockWidget, QGridLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
+from ..dialog.wheel import ignore_wheel
 from ..i18n import tr
 from .findings import ACCEPTED, OPEN, REJECTED, Review, decide, findings_layers, reviews
 from .section_view import SectionView
@@ -53,6 +54,7 @@ class ReviewDock(QDockWidget):
     def _build(self) -> None:
         """Create the widgets."""
         self.layers, self.view = QComboBox(), SectionView()
+        ignore_wheel(self.layers)
         self.count, self.reason, self.text, self.note, self.problem = (QLabel() for _ in range(5))
         for label in (self.reason, self.text, self.note, self.problem):
             label.setWordWrap(True)

@@ -40,5 +40,6 @@ class ReportOpener(QObject):
 
 
 def _visible(kind: str) -> bool:
-    """Return whether a window of a class, given by name, is visible."""
-    return any(type(window).__name__ == kind and window.isVisible() for window in QApplication.topLevelWidgets())
+    """Return whether a window of a class, given by name, or of one that extends it is visible."""
+    windows = (window for window in QApplication.topLevelWidgets() if window.isVisible())
+    return any(kind in (one.__name__ for one in type(window).__mro__) for window in windows)

@@ -28,8 +28,12 @@ from qgis.core import (
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
 from ...core.fields import (
+    AXIS_FIELDS,
     BRIDGED,
     CENTERLINE_FIELDS,
+    DEVIATION_FIELDS,
+    DIFFERENCE_FIELDS,
+    ELEMENT_FIELDS,
     FINDING_FIELDS,
     KM_FIELDS,
     LENGTH,
@@ -51,6 +55,10 @@ from .whole_files import write_whole
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.alignment.deviations import Deviations
+    from ...core.alignment.elements import Alignment
+    from ...core.alignment.fit import Fit
+    from ...core.comparison.tracks import LineDifferences, TrackComparison
     from ...core.frame import LocalFrame
     from ...core.grow.growth import Stop
     from ...core.rails import Centerline, RailLine, TrackGeometry
@@ -74,6 +82,9 @@ class LayerKind:
 RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELDS, "centerlines")
 QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
 STOPS = LayerKind(STOP_FIELDS, "stops")
+DIFFERENCES = LayerKind(DIFFERENCE_FIELDS, "differences")
+ELEMENTS, AXES = LayerKind(ELEMENT_FIELDS, "elements"), LayerKind(AXIS_FIELDS, "axes")
+DEVIATIONS = LayerKind(DEVIATION_FIELDS, "deviations")
 PLACES = "places"
 """What copies of layers of any kind are called in drawings; they have no style."""
 
@@ -97,9 +108,8 @@ def features(lines: Sequence[Line], columns: Sequence[Field], frame: LocalFrame)
     """
     flat = is_flat(lines)
     for line in lines:
-        coordinates = frame.to_crs(line.xyz).T[: 2 if flat else 3].tolist()
         values = [getattr(line, column.name) for column in columns]
-        yield feature_of(QgsGeometry(QgsLineString(*coordinates)), values, columns)
+        yield _feature(QgsGeometry(QgsLineString(*_columns(line.xyz, frame, flat))), values, columns)
 
 
 def stations(tracks: Sequence[TrackGeometry], frame: LocalFrame) -> Iterator[QgsFeature]:
@@ -111,7 +121,7 @@ def stations(tracks: Sequence[TrackGeometry], frame: LocalFrame) -> Iterator[Qgs
             profiles += [getattr(track.kilometres, column.name) for column in STATION_FIELDS]
         columns = quality_of(tracks).columns
         for (x, y, z), *row in zip(places, repeat(track.track_id), *profiles):
-            yield feature_of(QgsGeometry(QgsPoint(x, y) if math.isnan(z) else QgsPoint(x, y, z)), row, columns)
+            yield _feature(QgsGeometry(QgsPoint(x, y) if math.isnan(z) else QgsPoint(x, y, z)), row, columns)
 
 
 def quality_of(tracks: Sequence[TrackGeometry]) -> LayerKind:
@@ -135,7 +145,7 @@ def copies(originals: Sequence[QgsFeature], columns: QgsFields, rows: Sequence[S
         yield feature
 
 
-def is_flat(lines: Sequence[Line | TrackGeometry]) -> bool:
+def is_flat(lines: Sequence[Line | TrackGeometry | LineDifferences]) -> bool:
     """Return whether there are lines, and none has heights."""
     return bool(lines) and all(any(map(math.isnan, line.xyz[:, 2])) for line in lines)
 
@@ -189,9 +199,7 @@ def write_lines(
         The output cannot be written.
     """
     shape = QgsWkbTypes.Type.LineString if is_flat(lines) else QgsWkbTypes.Type.LineStringZ
-    return write_features(
-        algorithm, name, kind, shape, features(lines, kind.columns, frame), frame, parameters, context
-    )
+    return _write(algorithm, name, kind, shape, features(lines, kind.columns, frame), frame, parameters, context)
 
 
 def write_stations(
@@ -212,7 +220,7 @@ def write_stations(
     """
     shape = QgsWkbTypes.Type.Point if is_flat(tracks) else QgsWkbTypes.Type.PointZ
     made = stations(tracks, frame)
-    return write_features(algorithm, name, quality_of(tracks), shape, made, frame, parameters, context)
+    return _write(algorithm, name, quality_of(tracks), shape, made, frame, parameters, context)
 
 
 def write_stops(
@@ -232,10 +240,124 @@ def write_stops(
         See `write_lines`.
     """
     made = (
-        feature_of(QgsGeometry(QgsPoint(*frame.to_crs(stop.xyz).tolist())), (number, stop.reason.value), STOPS.columns)
+        _feature(QgsGeometry(QgsPoint(*frame.to_crs(stop.xyz).tolist())), (number, stop.reason.value), STOPS.columns)
         for number, stop in enumerate(stops, 1)
     )
-    return write_features(algorithm, name, STOPS, QgsWkbTypes.Type.PointZ, made, frame, parameters, context)
+    return _write(algorithm, name, STOPS, QgsWkbTypes.Type.PointZ, made, frame, parameters, context)
+
+
+def write_elements(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    alignments: Sequence[Alignment],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the element table of alignments, each element with its curve.
+
+    Parameters
+    ----------
+    alignments : sequence of Alignment
+        In the given frame.
+    algorithm, name, frame, parameters, context
+        See `write_lines`.
+    """
+    from ...core.alignment.table import rows
+
+    flat = not any(alignment.vertical for alignment in alignments)
+    made = (
+        _feature(
+            QgsGeometry(QgsLineString(*_columns(alignment.drawn(one.s_from, one.s_to), frame, flat))),
+            [row[column.name] for column in ELEMENTS.columns],
+            ELEMENTS.columns,
+        )
+        for alignment in alignments
+        for one, row in zip(alignment.elements, rows(alignment))
+    )
+    shape = QgsWkbTypes.Type.LineString if flat else QgsWkbTypes.Type.LineStringZ
+    return _write(algorithm, name, ELEMENTS, shape, made, frame, parameters, context)
+
+
+def write_axes(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    alignments: Sequence[Alignment],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write alignments as lines with kilometres as M values; see `write_elements`."""
+    from ...core.alignment.equations import measured
+
+    flat = not any(alignment.vertical for alignment in alignments)
+    shape = QgsWkbTypes.Type.LineStringM if flat else QgsWkbTypes.Type.LineStringZM
+
+    def axis(alignment: Alignment) -> QgsFeature:
+        xyzm = measured(alignment)
+        columns = _columns(xyzm[:, :3], frame, flat)
+        line = QgsLineString(*columns, *([[]] if flat else []), xyzm[:, 3].tolist())
+        length_m, kilometres = alignment.s_to - alignment.s_from, (xyzm[0, 3], xyzm[-1, 3])
+        return _feature(QgsGeometry(line), (alignment.track_id, alignment.name, length_m, *kilometres), AXES.columns)
+
+    return _write(algorithm, name, AXES, shape, map(axis, alignments), frame, parameters, context)
+
+
+def write_deviations(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    found: Sequence[Deviations],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the deviations of tracks from their designs as points on the designs; see `write_elements`."""
+    flat = all(math.isnan(one.xyz[0, 2]) for one in found)
+    made = (
+        _feature(QgsGeometry(QgsPoint(*place[: 2 if flat else 3])), (one.track_id, *row), DEVIATIONS.columns)
+        for one in found
+        for place, *row in zip(
+            frame.to_crs(one.xyz).tolist(), *(getattr(one, column.name) for column in DEVIATIONS.columns[1:])
+        )
+    )
+    shape = QgsWkbTypes.Type.Point if flat else QgsWkbTypes.Type.PointZ
+    return _write(algorithm, name, DEVIATIONS, shape, made, frame, parameters, context)
+
+
+def _columns(xyz: np.ndarray, frame: LocalFrame, flat: bool) -> list[list[float]]:
+    """Return x, y and, unless it is left out, z of vertices, (n, 3) local metres, in coordinates of the layer."""
+    return frame.to_crs(xyz).T[: 2 if flat else 3].tolist()
+
+
+def write_differences(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    found: TrackComparison,
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the stations of a comparison as points.
+
+    Parameters
+    ----------
+    found : TrackComparison
+    algorithm, name, frame, parameters, context
+        See `write_lines`.
+    """
+    flat = is_flat(found.lines)
+    made = (
+        _difference(line, at, frame, flat) for line in found.lines for at in range(len(line.state)) if line.state[at]
+    )
+    shape = QgsWkbTypes.Type.Point if flat else QgsWkbTypes.Type.PointZ
+    return _write(algorithm, name, DIFFERENCES, shape, made, frame, parameters, context)
+
+
+def _difference(line: LineDifferences, at: int, frame: LocalFrame, flat: bool) -> QgsFeature:
+    """Convert one station of a comparison to a feature."""
+    place = QgsPoint(*frame.to_crs(line.xyz[at])[: 2 if flat else 3].tolist())
+    values = [getattr(line, column.name) for column in DIFFERENCES.columns[1:]]
+    return _feature(QgsGeometry(place), [line.line_id, *(value[at] for value in values)], DIFFERENCES.columns)
 
 
 def write_raster(
@@ -289,12 +411,20 @@ def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, Any]:
     }
 
 
+def figures_of_fits(fits: Sequence[Fit]) -> dict[str, Any]:
+    """Return the number of elements, and the root mean square of the slews in millimetres, as outputs."""
+    squares = sum(float((fit.deviations.slew_mm**2).sum()) for fit in fits)
+    count = sum(len(fit.deviations.s) for fit in fits)
+    elements = sum(len(fit.alignment.elements) for fit in fits)
+    return {"ELEMENT_COUNT": elements, "RMS": round(math.sqrt(squares / count), 3)}
+
+
 def output_crs(wkt: str | None) -> QgsCoordinateReferenceSystem:
     """Return the coordinate system for an output: `UNKNOWN_IN_METRES` if the cloud has none."""
     return system(wkt or UNKNOWN_IN_METRES)
 
 
-def write_features(
+def _write(
     algorithm: QgsProcessingAlgorithm,
     name: str,
     kind: LayerKind,
@@ -430,8 +560,7 @@ def _style(
     style_on_load(layer_id, style, context, algorithm.layer_properties, title)
 
 
-def feature_of(geometry: QgsGeometry, values: Sequence[Any], columns: Sequence[Field]) -> QgsFeature:
-    """Make a feature; the fields round its values."""
+def _feature(geometry: QgsGeometry, values: Sequence[Any], columns: Sequence[Field]) -> QgsFeature:
     feature = QgsFeature()
     feature.setGeometry(geometry)
     feature.setAttributes([column.value(value) for column, value in zip(columns, values)])

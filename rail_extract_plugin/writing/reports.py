@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from datetime import datetime
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,9 @@ from ...core.disk import Destination
 from ..notices import notices
 
 if TYPE_CHECKING:
+    from ...core.alignment.deviations import Deviations
+    from ...core.alignment.elements import Alignment
+    from ...core.comparison.tracks import TrackComparison
     from ...core.rails import RailNetwork
     from ...core.report import Origin
 
@@ -51,6 +55,79 @@ def write_report(
     if not path:
         return {}
     written = write_page(algorithm, name, path, origin.report(network))
+    notices.report_written.emit(path)
+    return written
+
+
+def write_alignment_report(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    courses: Sequence[tuple[Alignment, Deviations]],
+    source: str,
+    facts: Mapping[str, str],
+    fitted: bool,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the report on alignments to an output; see `write_report`.
+
+    Parameters
+    ----------
+    courses : sequence of (Alignment, Deviations)
+    source : str
+        Name of the measured tracks.
+    facts : mapping of str to str
+        Facts to state by name, besides date, version and coordinate system.
+    fitted : bool
+        Whether the alignments were fitted to the tracks.
+    algorithm, name, parameters, context
+        See `write_report`.
+    """
+    from ...core import VERSION
+    from ...core.report import build_alignment_page
+    from ...core.report.origin import title_of
+
+    path = algorithm.parameterAsFileOutput(parameters, name, context)
+    if not path:
+        return {}
+    stated = {
+        "Date": f"{datetime.now():%Y-%m-%d %H:%M}",
+        "Version": f"Rail Extract {VERSION}",
+        "Coordinate system": title_of(courses[0][0].frame.crs_wkt),
+    }
+    written = write_page(algorithm, name, path, build_alignment_page(courses, source, {**stated, **facts}, fitted))
+    notices.report_written.emit(path)
+    return written
+
+
+def write_comparison(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    found: TrackComparison,
+    counts_shift: bool,
+    source: str,
+    facts: Mapping[str, str],
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the report on a comparison to an output; see `write_report`.
+
+    Parameters
+    ----------
+    algorithm : QgsProcessingAlgorithm
+    name : str
+    found : TrackComparison
+    counts_shift, source, facts
+        See `build_comparison`.
+    parameters : dict
+    context : QgsProcessingContext
+    """
+    from ...core.report.comparison import build_comparison
+
+    path = algorithm.parameterAsFileOutput(parameters, name, context)
+    if not path:
+        return {}
+    written = write_page(algorithm, name, path, build_comparison(found, counts_shift, source, facts))
     notices.report_written.emit(path)
     return written
 

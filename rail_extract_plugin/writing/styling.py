@@ -24,7 +24,10 @@ FINDINGS = "findings"
 
 NO_PROPERTIES: Mapping[str, str] = {}
 
-BOTTOM_TO_TOP = ("raster", "findings", "rails", "centerlines", "quality", "stops")
+BOTTOM_TO_TOP = (
+    *("raster", "findings", "rails", "centerlines", "axes", "elements"),
+    *("deviations", "quality", "differences", "stops"),
+)
 """Order of the layers in the group, by style."""
 
 

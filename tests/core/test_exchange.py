@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rail_extract.core.exchange import MAX_TEXT, Shape, write_shapes
+from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
+from rail_extract.core.exchange import MAX_TEXT, Shape, write_alignments, write_shapes
 from rail_extract.core.fields import CENTERLINE_FIELDS, FINDING_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
 from rail_extract.core.frame import LocalFrame
 
@@ -115,3 +116,26 @@ def test_coordinates_are_kept_to_a_tenth_of_a_millimetre(tmp_path_factory, place
     starts = [at for at, group in enumerate(found) if group == (0, "VERTEX")]
     drawn = [[float(value) for _, value in found[at + 2 : at + 5]] for at in starts]
     np.testing.assert_allclose(drawn, written, atol=1e-9)
+
+
+def test_an_alignment_is_a_polyline_with_a_point_and_a_text_for_each_element(tmp_path):
+    plan = chained((10.0, 20.0), 0.0, [(100.0, 0, 0), (60.0, 0, -1 / 500), (80.0, -1 / 500, -1 / 500)])
+    profile, cant = (VerticalElement(0, 240, 50, 0.01, 0.0),), (CantElement(0, 240, 0.02, 0.12),)
+    design = Alignment(7, LocalFrame(np.array([1000.0, 2000.0, 0.0])), plan, profile, cant)
+    path = tmp_path / "design.dxf"
+    write_alignments(path, [design])
+    found = groups(path)
+    layers = [value for code, value in found if code == 8]
+    assert {"ALIGNMENT_7", "PLAN_7", "PROFILE_7", "CANT_7"} == set(layers)
+    assert [value for code, value in found if code == 1][1:] == [
+        "  line, L 100.00",
+        "  clothoid R straight to -500.00, L 60.00",
+        "  arc R -500.00, L 80.00",
+        "  parabola 10.00 to 0.00 per mille, L 240.00, R -24000",
+        "  ramp 20 to 120 mm, L 240.00",
+    ]
+    vertices = [at for at, group in enumerate(found) if group == (0, "VERTEX")]
+    places = [[float(value) for _, value in found[at + 2 : at + 5]] for at in vertices]
+    assert places[0] == [1010, 2020, 50] and places[-1][2] == 51.2
+    points = [at for at, group in enumerate(found) if group == (0, "POINT")]
+    assert [float(found[at + 2][1]) for at in points[:3]] == pytest.approx([1010, 1110, 1170], abs=0.2)

@@ -118,9 +118,9 @@ def later(call: Callable[[], Any]) -> None:
 
 
 def window(kind: str) -> QWidget | None:
-    """Return the visible window of a class, given by name; None where there is none."""
-    found = (one for one in QApplication.topLevelWidgets() if type(one).__name__ == kind and one.isVisible())
-    return next(found, None)
+    """Return the visible window of a class, given by name, or of one that extends it; None where there is none."""
+    visible = (one for one in QApplication.topLevelWidgets() if one.isVisible())
+    return next((one for one in visible if kind in (base.__name__ for base in type(one).__mro__)), None)
 
 
 def install(archive: str) -> Iterator:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from driver import Driver, algorithm, choose, close, install, later, open_batch, open_dialog, press_run, window
 from qgis.core import (
+    QgsApplication,
     QgsCoordinateReferenceSystem,
     QgsPointCloudLayer,
     QgsPointXY,
@@ -17,11 +18,24 @@ from qgis.core import (
     QgsVectorFileWriter,
     QgsVectorLayer,
 )
-from qgis.PyQt.QtCore import QObject, QPoint, Qt, QUrl, pyqtSlot
-from qgis.PyQt.QtGui import QDesktopServices
+from qgis.PyQt import sip
+from qgis.PyQt.QtCore import QObject, QPoint, QPointF, Qt, QUrl, pyqtSlot
+from qgis.PyQt.QtGui import QDesktopServices, QWheelEvent
 from qgis.PyQt.QtTest import QTest
-from qgis.PyQt.QtWidgets import QDialogButtonBox, QDockWidget, QFileDialog, QGroupBox, QLineEdit, QMenu
-from qgis.utils import iface, plugins
+from qgis.PyQt.QtWidgets import (
+    QAbstractSpinBox,
+    QApplication,
+    QComboBox,
+    QDialogButtonBox,
+    QDockWidget,
+    QFileDialog,
+    QGroupBox,
+    QLineEdit,
+    QMenu,
+    QTextEdit,
+    QWidget,
+)
+from qgis.utils import iface, loadPlugin, plugins, reloadPlugin, startPlugin, unloadPlugin
 
 SAMPLE, ARCHIVE = os.environ["RAIL_EXTRACT_SAMPLE"], os.environ["RAIL_EXTRACT_ZIP"]
 
@@ -121,6 +135,106 @@ def _answer(chooser: QFileDialog, path: str) -> Iterator:
     later(chooser.findChild(QDialogButtonBox).button(QDialogButtonBox.StandardButton.Open).click)
     yield lambda: window("QFileDialog") is None
     yield 0.5
+
+
+def wheel(driver: Driver) -> Iterator:
+    """Turn the wheel over every list and number of all dialogs, of the toolbar and of the dock, and close dialogs."""
+    yield from install(ARCHIVE)
+    changed: dict[str, list] = {}
+    for name in [name for name in NAMES if algorithm(name).canExecute()[0]]:
+        dialog = yield from open_dialog(name)
+        for group in dialog.findChildren(QGroupBox):
+            group.setProperty("collapsed", False)
+        yield 0.3
+        dialog.buttonBox().setFocus()
+        changed[name] = [label for one in _fields(dialog.mainWidget()) for label in _turn_over(one)]
+        yield from close(dialog)
+    windows = plugins["rail_extract"].windows
+    windows.dock.layers.addItems(["one", "two"])
+    changed["toolbar"], changed["dock"] = _turn_over(windows.growing.standards), _turn_over(windows.dock.layers)
+    driver.keep("changed", changed)
+    dialog = yield from open_dialog("extractrails")
+    standard = dialog.mainWidget().wrappers["STANDARD"]
+    driver.keep("what is around a list gets the wheel", not _wheel(standard.widget).isAccepted())
+    QApplication.setActiveWindow(dialog)  # which no window manager does here
+    standard.widget.setFocus()
+    driver.keep("changed with the focus", len(_turn_over(standard.widget)))
+    driver.picture("wheel")
+    yield from close(dialog)
+    yield from _run_or_not(driver)
+
+
+def _run_or_not(driver: Driver) -> Iterator:
+    """Choose a standard in a dialog that is closed, and in one that runs; keep what the next dialog begins with."""
+    for name, press in (("closed", False), ("run", True)):
+        dialog = yield from open_dialog("rasterizerailpoints")
+        wrapper = dialog.mainWidget().wrappers["STANDARD"]
+        wrapper.widget.setFocus()
+        for _ in range(3):
+            QTest.keyClick(wrapper.widget, Qt.Key.Key_Up)
+        dialog.setParameters({"INPUT": SAMPLE, "EXTENT": PART["EXTENT"]})
+        driver.keep(f"chosen and {name}", wrapper.value())
+        if press:
+            yield from press_run(dialog)
+        yield from close(dialog)
+        dialog = yield from open_dialog("rasterizerailpoints")
+        driver.keep(f"after it was {name}", dialog.mainWidget().wrappers["STANDARD"].value())
+        yield from close(dialog)
+
+
+def _fields(root: QWidget) -> list[QWidget]:
+    """Return the lists and numbers of a dialog that are visible."""
+    found = [*root.findChildren(QComboBox), *root.findChildren(QAbstractSpinBox)]
+    return [one for one in found if one.isVisible() and one.isEnabled()]
+
+
+def _turn_over(field: QWidget) -> list[str]:
+    """Turn the wheel over a field, as far as a hand does at once; returns what it shows then if that is new."""
+    shown = field.currentText if isinstance(field, QComboBox) else field.text
+    before = shown()
+    for _ in range(3):
+        _wheel(field)
+    return [shown()] if shown() != before else []
+
+
+def _wheel(field: QWidget) -> QWheelEvent:
+    """Turn the wheel by one notch over a field; a wheel that the field does not accept scrolls what is around it."""
+    place = field.rect().center()
+    turn = (QPoint(0, 0), QPoint(0, -120), Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier)
+    phase = Qt.ScrollPhase.NoScrollPhase
+    event = QWheelEvent(QPointF(place), QPointF(field.mapToGlobal(place)), *turn, phase, False)
+    QApplication.sendEvent(field, event)
+    return event
+
+
+def unload(driver: Driver) -> Iterator:
+    """Disable the plugin during a run and while a rail grows, enable it again, run, and update it during a run."""
+    yield from install(ARCHIVE)
+    values = {"INPUT": SAMPLE, "STANDARD": PART["STANDARD"], "FINDINGS": None, "REPORT": None}
+    for name in ("disabled", "updated"):
+        dialog = yield from open_dialog("extractrails")
+        dialog.setParameters(values)
+        button = dialog.buttonBox().button(QDialogButtonBox.StandardButton.Ok)
+        later(button.click)
+        log = dialog.findChild(QTextEdit, "txtLog")
+        yield lambda log=log: "Reading 1 file" in log.toPlainText()
+        said = f"said when {name}"
+        log.textChanged.connect(lambda said=said, log=log: driver.keep(said, log.toPlainText()))
+        yield 0.5
+        driver.picture(f"{name}_before")
+        later(partial(unloadPlugin if name == "disabled" else reloadPlugin, "rail_extract"))
+        yield lambda dialog=dialog: sip.isdeleted(dialog) or not dialog.isVisible()
+        yield 2.0
+        driver.picture(f"{name}_after")
+        if name == "disabled":
+            driver.keep("without the plugin", QgsApplication.processingRegistry().providerById("railextract") is None)
+            loadPlugin("rail_extract")
+            startPlugin("rail_extract")
+        yield lambda: QgsApplication.processingRegistry().providerById("railextract")
+    dialog = yield from open_dialog("rasterizerailpoints")
+    dialog.setParameters({"INPUT": SAMPLE, "STANDARD": PART["STANDARD"], "EXTENT": PART["EXTENT"]})
+    driver.keep("log", (yield from press_run(dialog)))
+    yield from close(dialog)
 
 
 def rails(driver: Driver) -> Iterator:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from osgeo import gdal, ogr
 
-SCENARIOS = ("dialogs", "rails", "review", "growing", "deliveries", "batch", "model")
+SCENARIOS = ("dialogs", "wheel", "unload", "rails", "review", "growing", "deliveries", "batch", "model")
 
 DIES_AT_EXIT = ("rails", 340)
 """Scenario and version in which QGIS dies after it was closed, as it also does after two runs of its own algorithms."""
@@ -55,6 +55,29 @@ def test_check_of_the_installation_shows_its_result(run_scenario):
     log = run_scenario("dialogs")["check"]
     assert "Rail Extract works here. Self test passed: 100.0% of the true rails found" in log
     assert "PASSED: True" in log.replace("'", "")  # newer QGIS writes no quotes
+
+
+def test_a_wheel_that_passes_over_fields_changes_nothing(run_scenario):
+    session = run_scenario("wheel")
+    assert len(session["changed"]) >= 12
+    assert {name: new for name, new in session["changed"].items() if new} == {}
+    assert session["what is around a list gets the wheel"]
+    assert session["changed with the focus"] == 1
+
+
+def test_a_standard_is_remembered_from_runs_only(run_scenario):
+    session = run_scenario("wheel")
+    assert session["chosen and closed"] != "EN_60E1_1435"
+    assert session["after it was closed"] == "EN_60E1_1435"
+    assert session["chosen and run"] == session["after it was run"] == session["chosen and closed"]
+
+
+def test_the_plugin_is_disabled_and_updated_during_a_run(run_scenario):
+    session = run_scenario("unload")
+    for name in ("disabled", "updated"):
+        assert "Cancelled; nothing was written." in session[f"said when {name}"]
+    assert session["without the plugin"]
+    assert "Results:" in session["log"]
 
 
 def test_rails_are_found_and_loaded(run_scenario):

@@ -219,6 +219,10 @@ OUTPUTS = {
     "buildtrackcenterlines": ("OUTPUT.gpkg",),
     "measuretrackgeometry": ("OUTPUT.gpkg",),
     "stationalongaxis": ("OUTPUT.gpkg",),
+    "fitalignment": ("ELEMENTS.gpkg", "DEVIATIONS.gpkg"),
+    "comparetracks": ("OUTPUT.gpkg", "REPORT.html"),
+    "exportalignment": ("OUTPUT.xml",),
+    "importalignment": ("ELEMENTS.gpkg", "AXIS.gpkg"),
     "trainrailclassifier": ("WEIGHTS.npz",),
 }
 """Outputs of the algorithms, each a file in the folder of the test."""

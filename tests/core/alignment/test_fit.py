@@ -49,11 +49,11 @@ def test_a_line_without_noise_gives_its_design_back():
 
 @pytest.fixture(scope="module")
 def branch_lines():
-    """Fits of two random designs of 25 elements with white noise of 2 mm."""
+    """Fits of two random designs of 15 elements with white noise of 2 mm."""
     made = []
     for seed in (1, 2):
         random = np.random.default_rng(seed)
-        one = random_design(random, FAMILIES["branch line"], 25)
+        one = random_design(random, FAMILIES["branch line"], 15)
         made.append((one, fit(track(one, seed, cant=True, white_m=0.002))))
     return made
 
@@ -78,7 +78,7 @@ def test_deviations_are_measured_minus_design(branch_lines):
         np.testing.assert_allclose(np.diff(away.s), 1.0, atol=1e-9)
         np.testing.assert_allclose(away.xyz[:, :2], found.alignment.places(away.s), atol=1e-9)
         assert np.std(away.lift_mm) == pytest.approx(2.0, abs=0.3)
-        assert np.nanstd(away.cant_diff_mm) == pytest.approx(0.4, abs=0.1)
+        assert np.nanstd(away.cant_diff_mm) == pytest.approx(0.45, abs=0.15)
         assert one.s_to == pytest.approx(found.alignment.s_to, abs=0.5)
 
 
@@ -167,8 +167,11 @@ def test_an_edited_radius_and_start_are_held_and_the_rest_follows():
 
 
 def test_an_element_that_was_removed_stays_away():
-    measured = track(design(), seed=2)
-    held = fit(measured, corrected(fit(measured), lambda table: table.pop(1)))
+    shapes = [(120.0, 0, 0), (15.0, 0, 1 / 400), (150.0, 1 / 400, 1 / 400), (50.0, 1 / 400, 0), (140.0, 0, 0)]
+    measured = track(design(shapes), white_m=0.0005)
+    free = fit(measured)
+    assert free.alignment.plan[1].type == "clothoid"
+    held = fit(measured, corrected(free, lambda table: table.pop(1)))
     assert [one.type for one in held.alignment.plan] == ["line", "arc", "clothoid", "line"]
 
 

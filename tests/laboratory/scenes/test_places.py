@@ -96,5 +96,8 @@ def test_a_building_site_has_containers_and_beams(place):
 def test_ridges_of_potatoes_repeat_every_three_quarters_of_a_metre(place):
     scene, along, left = named(place, "farmland")
     bare = (scene.kind == GROUND) & (left > 7) & (left < 17)
+    edge = scene.kind == GROUND
+    before, after = (np.median(scene.xyz[edge & (np.abs(left - at) < 0.05), 2]) for at in (6.28, 6.48))
+    assert abs(after - before) < 0.06
     wave = np.exp(2j * np.pi * left[bare] / 0.75)
     assert np.abs(np.mean(wave * scene.xyz[bare, 2])) == pytest.approx(0.11 / 2, rel=0.15)

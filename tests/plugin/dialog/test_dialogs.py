@@ -9,6 +9,7 @@ from qgis.PyQt.QtCore import QUrl
 from qgis.PyQt.QtGui import QImage
 from qgis.PyQt.QtWidgets import QScrollArea, QSplitter, QTextBrowser
 from rail_extract.rail_extract_plugin.dialog import guide
+from rail_extract.rail_extract_plugin.dialog.choices import WORDS
 from rail_extract.rail_extract_plugin.dialog.wording import for_user, with_labels
 
 NAMES = (
@@ -22,6 +23,7 @@ NAMES = (
         "buildtrackcenterlines",
     ),
     *("measuretrackgeometry", "stationalongaxis", "trainrailclassifier", "installpackages", "checkinstallation"),
+    *("exportalignment", "importalignment", "comparetracks", "fitalignment"),
 )
 SMALLEST_ICON = 16
 
@@ -33,12 +35,10 @@ def make(qgis, plugin):
 
 @pytest.fixture
 def open_dialog(qgis, make):
-    from processing.gui.AlgorithmDialog import AlgorithmDialog
-
     opened = []
 
     def open_dialog(name):
-        opened.append(AlgorithmDialog(make(name)))
+        opened.append(make(name).createCustomParametersWidget())
         opened[-1].show()
         qgis.processEvents()
         return opened[-1]
@@ -112,7 +112,7 @@ def test_every_algorithm_has_its_own_icon(make):
 
 @pytest.mark.parametrize(
     ("word", "found"),
-    [("rail", 12), ("gleis", 10), ("voie", 10), ("vía", 10), ("railway", 10), ("laz", 6), ("gauge", 3), ("torch", 1)],
+    [("rail", 15), ("gleis", 13), ("voie", 13), ("vía", 13), ("railway", 13), ("laz", 6), ("gauge", 4), ("torch", 1)],
 )
 def test_toolbox_search(make, word, found):
     assert sum(any(word in tag.lower() for tag in make(name).tags()) for name in NAMES) == found
@@ -170,9 +170,41 @@ def test_messages_in_dialogs_use_labels(make):
     algorithm = make("extractrails")
     definitions = algorithm.parameterDefinitions()
     said = "The standard CUSTOM needs both: fill in GAUGE and HEAD_WIDTH, not MAX_GAPS or OUTPUT/CRS.gpkg."
-    shown = said.replace("GAUGE", '"Gauge [mm]"').replace("HEAD_WIDTH", '"Railhead width [mm]"')
+    words = {"CUSTOM": WORDS["STANDARD"]["CUSTOM"], "GAUGE": "Gauge [mm]", "HEAD_WIDTH": "Railhead width [mm]"}
+    shown = re.sub(r"\b(CUSTOM|GAUGE|HEAD_WIDTH)\b", lambda found: f'"{words[found[0]]}"', said)
     assert with_labels(said, definitions) == shown
     assert for_user(said, definitions) == said  # no QGIS with windows runs here
+
+
+def test_an_id_of_several_choices_has_the_words_of_the_parameter_named_before(make):
+    algorithm = make("extractrails")  # which owns its parameters
+    definitions = algorithm.parameterDefinitions()
+    said = "ENGINE OPENCV can't use DEVICE CUDA: set DEVICE to AUTO, or ENGINE to AUTO."
+    assert with_labels(said, definitions) == (
+        '"Engine of the network" "OpenCV" can\'t use "Device of the network" "Nvidia GPU": set "Device of the network" '
+        'to "GPU if there is one", or "Engine of the network" to "The faster one".'
+    )
+    assert with_labels("AUTO is best.", definitions, "MODEL") == '"Automatic" is best.'
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_lists_show_words_and_give_ids(open_dialog, name):
+    wrappers = open_dialog(name).mainWidget().wrappers
+    for definition in open_dialog(name).algorithm().parameterDefinitions():
+        if definition.type() == "enum" and definition.usesStaticStrings():
+            combo = wrappers[definition.name()].widget
+            texts = [combo.itemText(row) for row in range(combo.count())]
+            assert not [text for text in texts if re.fullmatch("[A-Z_]{4,}", text)]
+            assert len(set(texts)) == len(texts)
+
+
+def test_several_choices_are_one_entry_of_a_list(open_dialog):
+    wrapper = open_dialog("extractrails").mainWidget().wrappers["LEAVE_OUT"]
+    texts = [wrapper.widget.itemText(row) for row in range(wrapper.widget.count())]
+    assert texts == ["None", "Overlap of strips", "Synthetic points", "Overlap of strips and synthetic points"]
+    for given, value in {"OVERLAP,SYNTHETIC": ["OVERLAP", "SYNTHETIC"], "SYNTHETIC": ["SYNTHETIC"], "": []}.items():
+        wrapper.setValue(given)
+        assert wrapper.value() == value
 
 
 def test_dialog_refuses_a_cloud_in_degrees(open_dialog, context, write_cloud, track):

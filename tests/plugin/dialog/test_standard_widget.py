@@ -1,25 +1,30 @@
 import pytest
 from qgis.core import QgsSettings
 from rail_extract.core.standards import STANDARDS
-
-LAST = "rail_extract/standard"
+from rail_extract.rail_extract_plugin.dialog.standard_setting import LAST
 
 
 @pytest.fixture
-def wrapper(qgis, plugin):
-    """Open a dialog and give what connects it with the list of standards."""
-    from processing.gui.AlgorithmDialog import AlgorithmDialog
-
+def dialog(qgis, plugin):
+    """Open a dialog."""
     opened = []
 
-    def wrapper(name="extractrails"):
-        opened.append(AlgorithmDialog(qgis.processingRegistry().createAlgorithmById(f"railextract:{name}")))
-        return opened[-1].mainWidget().wrappers["STANDARD"]
+    def dialog(name="extractrails"):
+        opened.append(
+            qgis.processingRegistry().createAlgorithmById(f"railextract:{name}").createCustomParametersWidget()
+        )
+        return opened[-1]
 
-    yield wrapper
+    yield dialog
     QgsSettings().remove(LAST)
-    for dialog in opened:
-        dialog.close()
+    for one in opened:
+        one.close()
+
+
+@pytest.fixture
+def wrapper(dialog):
+    """Open a dialog and give what connects it with the list of standards."""
+    return lambda name="extractrails": dialog(name).mainWidget().wrappers["STANDARD"]
 
 
 def test_standards_are_listed_in_words_by_region(wrapper):
@@ -27,7 +32,7 @@ def test_standards_are_listed_in_words_by_region(wrapper):
     texts = [combo.itemText(row) for row in range(combo.count())]
     assert texts[:3] == [
         "Detect from the points",
-        "Custom: gauge and railhead width as below",
+        "Custom: gauge and railhead width of the advanced parameters",
         "Australia: AS 41 kg/m, 1067 mm, head 63.5 mm",
     ]
     assert texts[2:] == sorted(texts[2:])
@@ -41,13 +46,21 @@ def test_only_extract_rails_detects(wrapper):
     assert combo.findData("CUSTOM") == 0
 
 
-def test_last_choice_of_a_user_is_remembered(wrapper):
-    first = wrapper()
-    first.setValue("IN_75R_1000")
+def chosen(dialog, standard):
+    """Choose a standard as a user does."""
+    combo = dialog.mainWidget().wrappers["STANDARD"].widget
+    combo.setCurrentIndex(combo.findData(standard))
+    combo.activated.emit(combo.currentIndex())
+
+
+def test_a_choice_is_remembered_once_a_run_has_used_it(dialog, wrapper):
+    first = dialog()
+    chosen(first, "IN_75R_1000")
+    first.close()
     assert wrapper().value() == "EN_60E1_1435"
-    first.widget.activated.emit(first.widget.currentIndex())
+    first.algorithmFinished.emit(True, {})
     assert wrapper().value() == "IN_75R_1000"
     assert wrapper("rasterizerailpoints").value() == "IN_75R_1000"
-    first.setValue("DETECT")
-    first.widget.activated.emit(first.widget.currentIndex())
+    chosen(first, "DETECT")
+    first.algorithmFinished.emit(True, {})
     assert wrapper("rasterizerailpoints").value() == "EN_60E1_1435"

@@ -24,7 +24,17 @@ from qgis.core import (
 from qgis.PyQt.QtCore import QSize
 from qgis.PyQt.QtGui import QColor
 from qgis.PyQt.QtXml import QDomDocument
-from rail_extract.core.fields import CENTERLINE_FIELDS, FINDING_FIELDS, QUALITY_FIELDS, RAIL_FIELDS, STOP_FIELDS
+from rail_extract.core.fields import (
+    AXIS_FIELDS,
+    CENTERLINE_FIELDS,
+    DEVIATION_FIELDS,
+    DIFFERENCE_FIELDS,
+    ELEMENT_FIELDS,
+    FINDING_FIELDS,
+    QUALITY_FIELDS,
+    RAIL_FIELDS,
+    STOP_FIELDS,
+)
 from rail_extract.core.frame import LocalFrame
 from rail_extract.rail_extract_plugin import compat
 from rail_extract.rail_extract_plugin.paths import STYLES
@@ -39,6 +49,10 @@ KINDS = {
     "quality": ("PointZ", QUALITY_FIELDS),
     "findings": ("LineStringZ", FINDING_FIELDS),
     "stops": ("PointZ", STOP_FIELDS),
+    "differences": ("PointZ", DIFFERENCE_FIELDS),
+    "elements": ("LineStringZ", ELEMENT_FIELDS),
+    "axes": ("LineStringZM", AXIS_FIELDS),
+    "deviations": ("PointZ", DEVIATION_FIELDS),
 }
 
 
@@ -123,6 +137,12 @@ def test_findings_are_coloured_by_their_review(styled):
     assert colours(styled("findings", rows)) == ["#d62839", "#d62839", "#2e7d4f", "#787878"]
 
 
+def test_elements_are_coloured_by_type_and_drawn_once(styled):
+    types = ("line", "clothoid", "arc", "grade", "parabola", "constant", "ramp")
+    found = colours(styled("elements", [(LINE, {"type": one}) for one in types]))
+    assert found == ["#546e7a", "#f28e2b", "#1565c0", None, None, None, None]
+
+
 @pytest.mark.parametrize("style", KINDS)
 def test_fields_have_names_in_words_with_units(styled, style):
     layer = styled(style)
@@ -140,11 +160,12 @@ def test_fields_have_names_in_words_with_units(styled, style):
         ("centerlines", {"track_id": 2, "gauge_mm": 1436.04}, ["Track 2", "Gauge: 1,436.0 mm", "Cant: unknown"]),
         ("quality", {"track_id": 2, "chainage_m": 17.0}, ["Track 2, 17.0 m", "Gauge: unknown"]),
         ("stops", {"stop": 2, "reason": "the cloud ends"}, ["Stop 2", "the cloud ends"]),
+        ("differences", {"line_id": 3, "chainage_m": 5.0, "state": "both"}, ["Line 3, 5 m: both", "height ? mm"]),
         ("findings", {"finding": 4, "reason": "gauge off", "track_id": 1}, ["4: gauge off", "Track 1", "Review: open"]),
     ],
 )
 def test_map_tips_say_what_is_under_the_mouse(styled, style, values, said):
-    shape = "POINT Z (500000 3000000 1)" if style in ("quality", "stops") else LINE
+    shape = "POINT Z (500000 3000000 1)" if style in ("quality", "stops", "differences") else LINE
     layer = styled(style, [(shape, values)])
     scopes = QgsExpressionContext(QgsExpressionContextUtils.globalProjectLayerScopes(layer))
     scopes.setFeature(next(layer.getFeatures()))
@@ -218,6 +239,10 @@ def test_layers_can_be_drawn(styled, style):
         "quality": ("POINT Z (500050 3000000 1)", {"track_id": 1, "gauge_mm": 1435.0, "bridged": 1}),
         "findings": (LINE, {"finding": 1, "review": "accepted"}),
         "stops": ("POINT Z (500050 3000000 1)", {"stop": 1, "reason": "the cloud ends"}),
+        "differences": ("POINT Z (500050 3000000 1)", {"line_id": 1, "state": "both", "moved": 1}),
+        "elements": (LINE, {"type": "arc"}),
+        "axes": (LINE, {"track_id": 1}),
+        "deviations": ("POINT Z (500050 3000000 1)", {"track_id": 1, "slew_mm": 12.0}),
     }
     layer = styled(style, [rows[style]])
     settings = QgsMapSettings()
@@ -232,7 +257,8 @@ def test_layers_can_be_drawn(styled, style):
     image = job.renderedImage()
     seen = {image.pixelColor(x, y).name() for x in range(60, 200) for y in range(100, 200)}
     colours = {"rails": "#1565c0", "centerlines": "#e64a19", "quality": "#f28e2b", "findings": "#84b397"}
-    assert {**colours, "stops": "#e64a19"}[style] in seen
+    colours.update(stops="#e64a19", elements="#1565c0", axes="#8e5bb5", deviations="#b2182b", differences="#b2182b")
+    assert colours[style] in seen
 
 
 @pytest.mark.parametrize("style", ["rails", "centerlines", "findings"])

@@ -1,0 +1,92 @@
+"""How far measured tracks lie off given alignments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Optional
+
+import numpy as np
+
+from .elements import Alignment
+
+BESIDE_M = 2.0
+"""Largest median distance of a track from its alignment, metres: that of its neighbour is at least 3.4 m away."""
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """How far a track lies off its design, by the metre.
+
+    Attributes
+    ----------
+    track_id : int or None
+    s : (n,) array
+        Distance along the design, metres.
+    xyz : (n, 3) array
+        Place on the design, local metres.
+    slew_mm, lift_mm, cant_diff_mm : (n,) array
+        Measured minus design: across, positive to the left; in height; of the cant. NaN where unknown.
+    """
+
+    track_id: Optional[int]
+    s: np.ndarray
+    xyz: np.ndarray
+    slew_mm: np.ndarray
+    lift_mm: np.ndarray
+    cant_diff_mm: np.ndarray
+
+
+def beside(alignments: Sequence[Alignment], xy: np.ndarray) -> Optional[Alignment]:
+    """Return the alignment along which a line lies; None if it lies along none.
+
+    Parameters
+    ----------
+    alignments : sequence of Alignment
+    xy : (n, 2) array
+        Vertices of the line, local metres of the alignments.
+    """
+    distances = [(_distance_m(alignment, xy), number) for number, alignment in enumerate(alignments)]
+    nearest_m, number = min(distances, default=(np.inf, 0))
+    return alignments[number] if nearest_m <= BESIDE_M else None
+
+
+def _distance_m(alignment: Alignment, xy: np.ndarray) -> float:
+    """Return the median distance of a line from an alignment; infinite if it lies past its ends."""
+    foot = alignment.foot(xy)
+    inside = foot.past_m == 0
+    return float(np.median(np.abs(foot.across_m[inside]))) if np.count_nonzero(inside) > 1 else np.inf
+
+
+def deviations_of(
+    alignment: Alignment, track_id: Optional[int], xyz: np.ndarray, along: np.ndarray, cant: np.ndarray
+) -> Deviations:
+    """Return how far a line lies off an alignment, interpolated between its vertices.
+
+    Parameters
+    ----------
+    alignment : Alignment
+    track_id : int or None
+        Of the line.
+    xyz : (n, 3) array
+        Vertices of the line, local metres of the alignment; some of them beside it. The line may run against it.
+    along : (n,) array
+        Plan distance of the vertices from the first one, metres.
+    cant : (k, 2) array
+        Plan distance from the first vertex, increasing, and cant there, left rail minus right rail along the line,
+        metres; empty if it is unknown.
+    """
+    foot = alignment.foot(xyz[:, :2])
+    inside = foot.past_m == 0
+    order = np.argsort(foot.s[inside], kind="stable")
+    feet, across, z = foot.s[inside][order], foot.across_m[inside][order], xyz[inside, 2][order]
+    s = np.arange(np.ceil(feet[0]), np.floor(feet[-1]) + 1.0)
+    slew, lift = (np.interp(s, feet, values) for values in (across, z - alignment.heights(feet)))
+    turned = foot.s[-1] < foot.s[0]
+    cant_diff = np.full(len(s), np.nan)
+    if len(cant):
+        at = np.interp(cant[:, 0], along, foot.s)
+        diff = np.where(turned, -cant[:, 1], cant[:, 1]) - alignment.cants(at)
+        order = np.argsort(at, kind="stable")
+        cant_diff = np.interp(s, at[order], diff[order], left=np.nan, right=np.nan)
+    return Deviations(track_id, s, alignment.xyz(s), 1000 * slew, 1000 * lift, 1000 * cant_diff)

@@ -1,0 +1,150 @@
+"""Alignments of a LandXML file: those of this program, and those of other programs."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Optional
+
+import numpy as np
+
+from ..errors import AlignmentFileError
+from ..frame import ORIGIN_STEP, LocalFrame
+from ..progress import SILENT, Progress
+from .elements import Alignment, PlanElement
+from .landxml_parts import Part, cant_of, parts_of, placed, profile_of, stations_of_file, with_kilometres
+from .xml_branches import branches
+
+METRE = ("meter", "metre")
+
+EPSG_CODE = re.compile(r"\s*(?:EPSG:)?(\d{4,6})\s*")
+
+OWN_NAME = re.compile(r"Track (\d{1,9})")
+"""Name that this program gives to a track."""
+
+HEADS = {
+    b"ISO-10303-21": "an IFC file",
+    b"PK\x03\x04": "a ZIP archive",
+    b"LASF": "a point cloud",
+    b"SQLite format 3": "a GeoPackage",
+    b"  0\r\nSECTION": "a DXF file",
+    b"  0\nSECTION": "a DXF file",
+    b"%PDF": "a PDF file",
+}
+"""How files begin that are given by mistake."""
+
+
+def read_landxml(path: Path, east_first: bool = False, progress: Progress = SILENT) -> tuple[Alignment, ...]:
+    """Read the alignments of a LandXML file.
+
+    Parameters
+    ----------
+    path : Path
+    east_first : bool
+        Whether points are written easting first, against the format.
+    progress : Progress
+        Takes warnings.
+
+    Returns
+    -------
+    tuple of Alignment
+        In local metres of one frame without a coordinate system. Tracks are numbered in the order of the file; `s`
+        starts at 0.
+
+    Raises
+    ------
+    AlignmentFileError
+        The file is damaged, or states something that can't be read.
+    """
+    _check_kind(path)
+    found = list(branches(path, "LandXML", ("Units", "Alignments"), progress))
+    _check_units(path.name, [unit for branch in found if branch.tag == "Units" for unit in branch], progress)
+    drawn = [node for branch in found for node in branch.iterfind("Alignment") if node.find("CoordGeom") is not None]
+    if not drawn:
+        raise AlignmentFileError(
+            f"{path.name} has no alignment with a CoordGeom: export the alignments from the design program, too."
+        )
+    wheres = [f"alignment {node.get('name', '')[:60] or number} of {path.name}" for number, node in enumerate(drawn, 1)]
+    plans = [parts_of(node, where) for node, where in zip(drawn, wheres)]
+    _check_turns(path.name, [part for plan in plans for part in plan], east_first)
+    start = plans[0][0].start if east_first else plans[0][0].start[::-1]
+    frame = LocalFrame(np.append(np.round(start / ORIGIN_STEP) * ORIGIN_STEP, 0.0))
+    return tuple(
+        _alignment(node, where, track_id, placed(plan, frame, east_first, progress), frame, progress)
+        for node, where, track_id, plan in zip(drawn, wheres, _track_ids(drawn), plans)
+    )
+
+
+def stated_system(path: Path) -> Optional[str]:
+    """Return the code of the coordinate system that a LandXML file states before its alignments, such as EPSG:25832.
+
+    Raises
+    ------
+    AlignmentFileError
+        The file is damaged or of another kind.
+    """
+    _check_kind(path)
+    first = next(branches(path, "LandXML", ("CoordinateSystem", "Alignments")), None)
+    code = EPSG_CODE.fullmatch(first.get("epsgCode", "")) if first is not None else None
+    return f"EPSG:{code[1]}" if code else None
+
+
+def _alignment(
+    node: ET.Element,
+    where: str,
+    track_id: int,
+    plan: tuple[PlanElement, ...],
+    frame: LocalFrame,
+    progress: Progress,
+) -> Alignment:
+    """Return an alignment with its profile, cant and kilometres."""
+    stations = stations_of_file(node, where)
+    profile, cant = profile_of(node, where, progress), cant_of(node, where, progress)
+    return with_kilometres(Alignment(track_id, frame, plan, profile, cant, node.get("name", "")), stations)
+
+
+def _track_ids(nodes: Sequence[ET.Element]) -> list[int]:
+    """Return the numbers in the names if this program has given them, else numbers from 1."""
+    found = [OWN_NAME.fullmatch(node.get("name") or "") for node in nodes]
+    numbers = [int(one[1]) for one in found if one]
+    return numbers if len(set(numbers)) == len(nodes) else list(range(1, len(nodes) + 1))
+
+
+def _check_kind(path: Path) -> None:
+    """Refuse files of other kinds that are given by mistake."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(64).lstrip(b"\xef\xbb\xbf")
+    except OSError as error:
+        raise AlignmentFileError(f"{path} can't be read ({error.strerror}): check its name and your rights.") from error
+    kind = next((kind for start, kind in HEADS.items() if head.startswith(start)), None)
+    if kind or not head:
+        raise AlignmentFileError(f"{path.name} is {kind or 'empty'}, not LandXML: export the alignments as LandXML.")
+
+
+def _check_units(name: str, stated: Sequence[ET.Element], progress: Progress) -> None:
+    """Refuse lengths in other units than metres."""
+    unit = stated[0].get("linearUnit", "") if stated else ""
+    if not unit:
+        progress.warning(f"{name} states no unit of length: it is read as metres.")
+    elif unit not in METRE:
+        raise AlignmentFileError(
+            f"{name} is in another unit than metres ({unit[:40]}): export it again with metres as the unit of length."
+        )
+
+
+def _check_turns(name: str, parts: Sequence[Part], east_first: bool) -> None:
+    """Check that curves turn to the side that they state: easting and northing exchanged mirror the plane."""
+    votes = [(part, (part.k_from + part.k_to) * part.seen * (-1.0 if east_first else 1.0)) for part in parts]
+    against = [part for part, vote in votes if vote < 0]
+    if not against:
+        return
+    if not any(vote > 0 for _, vote in votes):
+        first, remedy = ("northing", "leave EAST_FIRST off") if east_first else ("easting", "set EAST_FIRST")
+        raise AlignmentFileError(
+            f"All curves of {name} turn to the other side than they state, because its points are written {first} "
+            f"first: {remedy}."
+        )
+    raise AlignmentFileError(f"The {against[0].where} turns to the other side than it states: repair it.")

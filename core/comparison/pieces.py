@@ -1,0 +1,95 @@
+"""Lines cut into short pieces, and the nearest place on any of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..polyline import length_along
+
+STEP_M = 0.05
+"""Length of the pieces that are compared; a chord of this length deviates from an arc of 25 m by 0.01 mm."""
+
+CANDIDATES = 4
+"""Number of nearest pieces to search: near a place there may be two pieces of a line and a second line."""
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Short straight pieces of polylines.
+
+    Attributes
+    ----------
+    start, end : (n, 3) array
+        Metres.
+    number : (n,) int array
+        Number of the line of each piece.
+    t : (n,) array
+        Plan distance of the middle of each piece from the start of its line.
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    number: np.ndarray
+    t: np.ndarray
+
+    @property
+    def middle(self) -> np.ndarray:
+        """Points midway between the ends, (n, 3)."""
+        return 0.5 * (self.start + self.end)
+
+    @property
+    def left(self) -> np.ndarray:
+        """Unit vectors to the left in plan, (n, 2)."""
+        along = (self.end - self.start)[:, :2]
+        return np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """Lengths in space, (n,)."""
+        return np.linalg.norm(self.end - self.start, axis=1)
+
+
+def cut(lines: Sequence[np.ndarray]) -> Pieces:
+    """Cut polylines into pieces of equal length, at most `STEP_M`."""
+    starts, ends, middles, counts = [np.empty((0, 3))], [np.empty((0, 3))], [np.empty(0)], []
+    for line in lines:
+        chainage = length_along(np.asarray(line)[:, :2])
+        count = int(np.ceil(chainage[-1] / STEP_M))
+        at = np.linspace(0, chainage[-1], count + 1)
+        places = np.column_stack([np.interp(at, chainage, column) for column in np.asarray(line, dtype=float).T])
+        starts.append(places[:-1])
+        ends.append(places[1:])
+        middles.append(0.5 * (at[:-1] + at[1:]))
+        counts.append(count)
+    numbers = np.repeat(np.arange(len(lines)), counts)
+    return Pieces(np.concatenate(starts), np.concatenate(ends), numbers, np.concatenate(middles))
+
+
+def nearest(places: np.ndarray, pieces: Pieces) -> tuple[np.ndarray, np.ndarray]:
+    """Find the nearest point on any piece, in plan.
+
+    Parameters
+    ----------
+    places : (n, 3) array
+    pieces : Pieces
+
+    Returns
+    -------
+    feet : (n, 3) array
+        Points on the pieces.
+    numbers : (n,) int array
+        Piece of each point.
+    """
+    count = min(CANDIDATES, len(pieces.start))
+    _, candidates = cKDTree(pieces.middle[:, :2]).query(places[:, :2], k=np.arange(1, count + 1))
+    start, step = pieces.start[candidates], (pieces.end - pieces.start)[candidates]
+    ahead = np.sum((places[:, None, :2] - start[..., :2]) * step[..., :2], axis=2)
+    share = np.clip(ahead / np.sum(step[..., :2] ** 2, axis=2), 0, 1)
+    feet = start + share[..., None] * step
+    distance = np.linalg.norm(feet[..., :2] - places[:, None, :2], axis=2)
+    rows, best = np.arange(len(places)), np.argmin(distance, axis=1)
+    return feet[rows, best], candidates[rows, best]

@@ -1,0 +1,66 @@
+"""The constant shift of one survey against another, found in differences of which some are movements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+SMALLEST_M = 1e-4
+"""Differences from the shift below this count alike, metres: it is below the noise of any survey."""
+
+STEPS = 50
+"""Steps of the iteration, of which twenty are enough even where a third of the length has moved."""
+
+STRAIGHT = 0.1
+"""Smallest ratio of the two singular values of the directions across the tracks from which a shift in both directions
+shows: tracks whose direction varies by less than some six degrees show only the shift across."""
+
+
+@dataclass(frozen=True)
+class Shift:
+    """A constant shift of the later survey, metres.
+
+    Attributes
+    ----------
+    plan_m : (2,) array
+        East and north; for tracks of one direction, the part across them.
+    up_m : float
+        NaN without heights.
+    both : bool
+        Whether the tracks show the shift in both directions of the plan.
+    """
+
+    plan_m: np.ndarray
+    up_m: float
+    both: bool
+
+
+def find_shift(across_m: np.ndarray, height_m: np.ndarray, left: np.ndarray) -> Shift:
+    """Find the shift that most of the length shares: that with the smallest sum of absolute differences.
+
+    Up to half of the length may have moved without effect on it.
+
+    Parameters
+    ----------
+    across_m, height_m : (n,) array
+        Differences across, positive to the left, and in height; NaN where unknown.
+    left : (n, 2) array
+        Unit vectors to the left.
+    """
+    known = np.isfinite(across_m)
+    values = np.linalg.svd(left[known], compute_uv=False) if known.any() else np.zeros(2)
+    plan_m = _least_absolute(left[known], across_m[known]) if known.any() else np.zeros(2)
+    heights = height_m[np.isfinite(height_m)]
+    both = bool(len(values) > 1 and values[1] >= STRAIGHT * values[0] > 0)
+    return Shift(plan_m, float(np.median(heights)) if len(heights) else np.nan, both)
+
+
+def _least_absolute(rows: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Solve rows @ x = values for the smallest sum of absolute residuals, by weights of their reciprocals."""
+    weight = np.ones(len(values))
+    x: np.ndarray = np.zeros(rows.shape[1])
+    for _ in range(STEPS):
+        x, *_ = np.linalg.lstsq(rows * weight[:, None], values * weight, rcond=STRAIGHT)
+        weight = 1 / np.sqrt(np.maximum(np.abs(values - rows @ x), SMALLEST_M))
+    return x

@@ -1,0 +1,155 @@
+"""Compare Tracks: lines of two surveys, or of a survey and a design, metre by metre."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from datetime import datetime
+from typing import TYPE_CHECKING, Any
+
+from qgis.core import QgsProcessingContext, QgsProcessingFeatureSource
+
+from ...core.errors import ParameterError
+from ...core.fields import DIFFERENCE_FIELDS
+from ...core.progress import Progress
+from ..dialog import inputs, outputs
+from ..dialog import parameters as groups
+from ..dialog.parameter_values import ParameterValues
+from ..dialog.passwords import masked
+from ..writing.layers import write_differences
+from ..writing.reports import write_comparison
+from ..writing.whole_files import write_each
+from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
+from .toolbox_groups import ALIGNMENT
+
+if TYPE_CHECKING:
+    from ...core.comparison.tracks import TrackComparison
+
+READING, COMPARING = 0.3, 0.9
+"""Fractions of the progress bar at which the lines are read, and at which they are compared."""
+
+SURVEYS = {"REFERENCE": ("REFERENCE_RAILS", "REFERENCE_SIGMA"), "INPUT": ("RAILS", "INPUT_SIGMA")}
+"""Rails and standard error of each survey, by its lines."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """The layers of both surveys by the name of their parameter, and the command that repeats the run."""
+
+    sources: dict[str, QgsProcessingFeatureSource]
+    command: str
+
+
+class CompareTracks(RailAlgorithm):
+    """The algorithm ``railextract:comparetracks``."""
+
+    NAME = "comparetracks"
+    LABEL = "Compare tracks"
+    GROUP = ALIGNMENT
+    TAGS = (
+        *RAIL_WORDS,
+        *TRACK_WORDS,
+        "compare",
+        "difference",
+        "deviation",
+        "movement",
+        "monitoring",
+        "design",
+        "control",
+    )
+    NEEDS = (("numpy",), ("scipy",), ("pyproj",))
+    SUMMARY = (
+        "Compares the lines of two surveys, or of a survey and a design, metre by metre: what has moved, and where."
+    )
+    PICTURE = "comparison.svg"
+    GUIDE = "comparison"
+    HELP = "\n\n".join(
+        (
+            "The reference is the earlier survey, the design, or a control measurement. Its lines are rails or "
+            "centerlines; the same kind of lines is compared with it. Between rails, gauge and cant are compared as "
+            "well; for centerlines, give the rails of both surveys.",
+            "\n".join(f"{field.name}: {field.meaning}." for field in DIFFERENCE_FIELDS),
+            "Standard errors come from the fields sigma_mm and sigmaz_mm of the lines, else from the two fields below. "
+            "Where neither states one, the scatter of the differences stands for it, and the run says so.",
+            "A constant shift between the surveys, as from two positions of a base station, is estimated so that it "
+            "is the same for most of the length, and stated apart.",
+        )
+    )
+
+    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
+        """Declare the parameters and outputs in the order of the interface."""
+        for definition in (*inputs.surveys(), *groups.comparison(), outputs.differences()):
+            self.addParameter(definition)
+        self._add_report(outputs.comparison_report())
+        for output in outputs.comparison_figures():
+            self.addOutput(output)
+
+    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+        """Read and check the parameters, in the main thread."""
+        values = ParameterValues(self, parameters, context)
+        rails = [name for name, _ in SURVEYS.values() if values.filled(name)]
+        if len(rails) == 1:
+            other = next(name for name, _ in SURVEYS.values() if name not in rails)
+            raise ParameterError(f"Gauge and cant are compared between the rails of both surveys: choose {other}, too.")
+        return Job(
+            {name: values.lines(name) for name in (*SURVEYS, *rails)},
+            masked(self.asPythonCommand(parameters, context)),
+        )
+
+    def compute(
+        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
+    ) -> dict[str, Any]:
+        """Compare the lines, then write points and report."""
+        from ...core.comparison.tracks import compare_surveys
+        from ...core.parameters import ComparisonParameters
+        from ...core.report.comparison import describe_shift, verdict_on
+        from ..reading.surveys import read_surveys
+
+        values = ParameterValues(self, parameters, context)
+        stated = {name: values.optional_number(sigma) for name, (_, sigma) in SURVEYS.items()}
+        surveys = read_surveys(job.sources, SURVEYS, stated, progress.span(0, READING))
+        ignored = values.flag("IGNORE_SHIFT")
+        settings = ComparisonParameters(values.number("REACH"), values.number("STEP"), ignored)
+        found = compare_surveys(surveys.reference, surveys.other, settings, progress.span(READING, COMPARING))
+        progress.check()
+        for sentence in (verdict_on(found), describe_shift(found)):
+            progress.info(sentence)
+        if not found.values("across_mm").size:
+            progress.warning(
+                "The two surveys have no line in common: check that they are of the same place, and REACH."
+            )
+        elif math.isfinite(found.estimated_m):
+            progress.warning(
+                "A survey states no standard error: the scatter of the differences stands for it, "
+                f"{1000 * found.estimated_m:.1f} mm across. Fill in REFERENCE_SIGMA and INPUT_SIGMA if it is known."
+            )
+        rest = (parameters, context)
+        source = " against ".join(job.sources[name].sourceName() for name in ("INPUT", "REFERENCE"))
+        facts = {"Date": f"{datetime.now():%Y-%m-%d %H:%M}", "Command": job.command}
+        writers = {
+            "OUTPUT": lambda: write_differences(self, "OUTPUT", found, surveys.frame, *rest),
+            "REPORT": lambda: write_comparison(self, "REPORT", found, not ignored, source, facts, *rest),
+        }
+        return {**write_each(writers, *rest), **_figures(found)}
+
+
+def _figures(found: TrackComparison) -> dict[str, Any]:
+    """Return lengths in metres, and root mean squares and the shift in millimetres, as outputs; None if unknown."""
+    import numpy as np
+
+    from ...core.comparison.tracks import BOTH, EXTRA, MISSING
+
+    across, height = (found.values(name) for name in ("across_mm", "height_mm"))
+    east, north = 1000 * found.shift.plan_m if len(across) else (np.nan, np.nan)
+    numbers = {
+        "COMPARED_LENGTH": found.length_of(BOTH),
+        "MOVED_LENGTH": found.moved_m,
+        "MISSING_LENGTH": found.length_of(MISSING),
+        "EXTRA_LENGTH": found.length_of(EXTRA),
+        "ACROSS_RMS": np.sqrt(np.mean(across**2)) if len(across) else np.nan,
+        "HEIGHT_RMS": np.sqrt(np.mean(height**2)) if len(height) else np.nan,
+        "SHIFT_EAST": east,
+        "SHIFT_NORTH": north,
+        "SHIFT_UP": 1000 * found.shift.up_m,
+    }
+    return {name: round(float(value), 2) + 0.0 if np.isfinite(value) else None for name, value in numbers.items()}

@@ -1,0 +1,182 @@
+"""Import Alignment: the alignments of a LandXML file as elements and axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from qgis.core import QgsProcessingContext, QgsProcessingFeatureSource
+
+from ...core.errors import AlignmentFileError, CrsError, ParameterError, RailExtractError
+from ...core.progress import Progress
+from ..dialog import inputs, outputs
+from ..dialog.parameter_values import ParameterValues
+from ..dialog.passwords import masked
+from ..systems import prepare_system
+from ..writing.destinations import is_wanted
+from ..writing.layers import write_axes, write_deviations, write_elements
+from ..writing.reports import write_alignment_report
+from ..writing.whole_files import write_each
+from .base import ALIGNMENT_WORDS, RAIL_WORDS, RailAlgorithm
+from .toolbox_groups import ALIGNMENT
+
+if TYPE_CHECKING:
+    from ...core.alignment.deviations import Deviations
+    from ...core.alignment.elements import Alignment
+    from ...core.frame import LocalFrame
+
+READING = 0.7
+"""Fraction of the progress bar at which the file is read."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """The file, its coordinate system as WKT, None without one, and how it is read and compared."""
+
+    path: Path
+    crs_wkt: str | None
+    east_first: bool
+    tracks: QgsProcessingFeatureSource | None
+    command: str
+
+
+class ImportAlignment(RailAlgorithm):
+    """The algorithm ``railextract:importalignment``."""
+
+    NAME = "importalignment"
+    LABEL = "Import alignment"
+    GROUP = ALIGNMENT
+    TAGS = (*RAIL_WORDS, *ALIGNMENT_WORDS, "LandXML", "import", "design", "axis", "tamping")
+    NEEDS = (("numpy",), ("scipy",), ("pyproj",))
+    SUMMARY = "Reads the alignments of a LandXML file as an element table and as axes with kilometres."
+    PICTURE = "alignment.svg"
+    HELP = (
+        "Reads lines, arcs and clothoids, profiles with circles or parabolas, cant and station equations. Other "
+        "transition curves are refused.\n\n"
+        "The element table is that of Fit Alignment: it can be edited and exported. The axes have kilometres as M "
+        "values: Station Along Axis takes them.\n\n"
+        "With measured tracks that lie along the alignments, the run states how far they lie off them: slews, lifts, "
+        "and a report with a diagram of each track."
+    )
+
+    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
+        """Declare the parameters and outputs in the order of the interface."""
+        deviations, report = outputs.deviations(), outputs.alignment_report()
+        for needs_tracks in (deviations, report):
+            needs_tracks.setCreateByDefault(False)
+        tracks = inputs.tracks_beside_design()
+        for definition in (*inputs.landxml(), tracks, outputs.elements(), outputs.axes(), deviations):
+            self.addParameter(definition)
+        self._add_report(report)
+        for output in outputs.alignment_figures():
+            self.addOutput(output)
+
+    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+        """Read and check the parameters and the coordinate system of the file, in the main thread."""
+        from ...core.alignment.landxml_reading import stated_system
+        from ...core.clouds.crs import parse_crs, units
+        from ..reading.line_layers import wkt_of
+
+        values = ParameterValues(self, parameters, context)
+        path, crs = Path(self.parameterAsFile(parameters, "INPUT", context)), values.projected_crs()
+        tracks = values.lines("TRACKS") if values.filled("TRACKS") else None
+        if tracks is None and any(is_wanted(parameters.get(name), context) for name in ("DEVIATIONS", "REPORT")):
+            raise ParameterError("DEVIATIONS and REPORT compare measured tracks with the alignments: choose TRACKS.")
+        stated = stated_system(path)
+        crs = tracks.sourceCrs() if tracks is not None and not crs.isValid() else crs
+        wkt = parse_crs(stated).to_wkt() if stated else wkt_of(crs) or None
+        if wkt and units(parse_crs(wkt))[0] != 1.0:
+            raise CrsError(
+                f"{path.name} is in metres, but its coordinate system {stated or crs.authid()} is not: choose another "
+                "CRS, or correct the file."
+            )
+        prepare_system(wkt)
+        return Job(path, wkt, values.flag("EAST_FIRST"), tracks, masked(self.asPythonCommand(parameters, context)))
+
+    def compute(
+        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
+    ) -> dict[str, Any]:
+        """Read the file and write the layers."""
+        from ...core.alignment.landxml_reading import read_landxml
+
+        read = read_landxml(job.path, job.east_first, progress.span(0, READING))
+        frame = replace(read[0].frame, crs_wkt=job.crs_wkt)
+        alignments = tuple(replace(one, frame=frame) for one in read)
+        _check_place(job, frame, progress)
+        courses = _compared(job.tracks, alignments, frame, progress.span(READING, 1)) if job.tracks is not None else []
+        rest = (parameters, context)
+        facts = {"LandXML file": job.path.name, "Command": job.command}
+        writers = {
+            "ELEMENTS": lambda: write_elements(self, "ELEMENTS", alignments, frame, *rest),
+            "AXIS": lambda: write_axes(self, "AXIS", alignments, frame, *rest),
+            "DEVIATIONS": lambda: write_deviations(self, "DEVIATIONS", [found for _, found in courses], frame, *rest),
+            "REPORT": lambda: write_alignment_report(self, "REPORT", courses, _name(job), facts, False, *rest),
+        }
+        count = sum(len(alignment.elements) for alignment in alignments)
+        written = write_each(writers, parameters, context)
+        return {**written, "ALIGNMENT_COUNT": len(alignments), "ELEMENT_COUNT": count}
+
+
+def _name(job: Job) -> str:
+    """Return the name of the layer of tracks."""
+    return job.tracks.sourceName() if job.tracks is not None else ""
+
+
+def _compared(
+    source: QgsProcessingFeatureSource, alignments: Sequence[Alignment], frame: LocalFrame, progress: Progress
+) -> list[tuple[Alignment, Deviations]]:
+    """Return the deviations of each track with the alignment beside it.
+
+    Raises
+    ------
+    RailExtractError
+        No track lies along an alignment.
+    """
+    import numpy as np
+
+    from ...core.alignment.deviations import beside, deviations_of
+    from ...core.polyline import length_along
+    from ..reading.area_points import check_same_plane
+    from ..reading.line_layers import read_centerlines
+
+    lines, theirs = read_centerlines(source, progress, "TRACKS")
+    check_same_plane("TRACKS", theirs.crs_wkt, "INPUT", frame)
+    shift, found, lost = theirs.shift_to(frame), [], []
+    for line in lines:
+        xyz = line.xyz + shift
+        alignment = beside(alignments, xyz[:, :2])
+        if alignment is None:
+            lost.append(str(line.track_id))
+            continue
+        along = length_along(xyz[:, :2])
+        found.append((alignment, deviations_of(alignment, line.track_id, xyz, along, np.zeros((0, 2)))))
+    if not found:
+        raise RailExtractError("None of TRACKS lies along an alignment of INPUT: check the coordinate system of both.")
+    if lost:
+        progress.warning(f"Tracks {', '.join(lost)} do not lie along an alignment: they are left out.")
+    return found
+
+
+def _check_place(job: Job, frame: LocalFrame, progress: Progress) -> None:
+    """Refuse easting and northing that are exchanged, as the area of the coordinate system shows; warn of other places.
+
+    Raises
+    ------
+    AlignmentFileError
+    """
+    from ...core.clouds.crs import lies_in_area, name_of, parse_crs
+
+    if job.crs_wkt is None:
+        progress.warning(f"{job.path.name} states no coordinate system: choose CRS to see its tracks in their place.")
+        return
+    crs, (x, y, _) = parse_crs(job.crs_wkt), frame.origin
+    if lies_in_area(crs, (x, y)):
+        return
+    if lies_in_area(crs, (y, x)):
+        first, remedy = ("northing", "leave EAST_FIRST off") if job.east_first else ("easting", "set EAST_FIRST")
+        raise AlignmentFileError(
+            f"{job.path.name} lies in the area of {name_of(crs)} if its points are written {first} first: {remedy}."
+        )
+    progress.warning(f"{job.path.name} lies outside the area of {name_of(crs)}: check its coordinate system.")

@@ -1,0 +1,29 @@
+"""The sections of the advanced parameters in a dialog, in order."""
+
+from __future__ import annotations
+
+from ..i18n import tr
+
+SECTIONS = {
+    tr("Cloud"): ("MERGE_CLASSES", "EXTENT", "MASK", "CRS", "LEAVE_OUT"),
+    tr("Raw clouds"): (
+        *("METHOD", "WEIGHTS", "SEEDS", "SEED", "GUIDE", "GUIDE_DISTANCE", "ONLY_GUIDED", "KEEP_SINGLE", "RAIL_CLASS"),
+        *("CONTENT", "RESET", "START", "SEARCH", "THICKNESS", "WINDOW", "MIN_HEIGHT", "MAX_OUTLIERS", "MAX_LENGTH"),
+    ),
+    tr("Network"): ("MODEL", "ITERATIONS", "ENGINE", "DEVICE"),
+    tr("Lines"): (
+        *("SMOOTHING_XY", "SMOOTHING_Z", "TOLERANCE_XY", "TOLERANCE_Z", "CROWN_RADIUS", "MAX_GAP", "GAP_ANGLE"),
+        *("SIMPLIFY_XY", "SIMPLIFY_Z", "MIN_LENGTH", "STRIPS"),
+    ),
+    tr("Tracks"): ("GAUGE", "HEAD_WIDTH", "OTHER_GAUGES", "CENTERLINE_TOLERANCE", "STEP"),
+    tr("Files of alignments"): ("VERTICAL_CURVES", "EAST_FIRST"),
+}
+"""Parameters by section."""
+
+OTHERS, RESULTS = tr("Others"), tr("More results")
+"""The last sections: of parameters that `SECTIONS` does not list, and of outputs."""
+
+
+def section_of(parameter: str) -> str:
+    """Return the section of a parameter."""
+    return next((title for title, names in SECTIONS.items() if parameter in names), OTHERS)

@@ -1,0 +1,1 @@
+"""The dialog in which an algorithm runs, and what it offers afterwards."""

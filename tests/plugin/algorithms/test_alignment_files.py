@@ -1,0 +1,163 @@
+"""Export Alignment and Import Alignment in QGIS: element tables, files, axes."""
+
+import re
+
+import numpy as np
+import pytest
+from osgeo import ogr
+from qgis.core import NULL, QgsFeature, QgsGeometry, QgsLineString, QgsProcessingUtils, QgsVectorLayer, QgsWkbTypes
+from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
+from rail_extract.core.alignment.table import rows
+from rail_extract.core.fields import ELEMENT_FIELDS
+from rail_extract.core.frame import LocalFrame
+from rail_extract.rail_extract_plugin.writing.layers import fields
+
+SHAPES = [
+    (100.0, 0, 0),
+    (60.0, 0, 1 / 500),
+    (80.0, 1 / 500, 1 / 500),
+    (70.0, 1 / 500, -1 / 400),
+    (50.0, -0.0025, -0.0025),
+]
+FRAME = LocalFrame(np.array([578_200.0, 5_804_300.0, 0.0]))
+
+
+def design(track_id=4):
+    vertical = [VerticalElement(0, 200, 50, 0.01, 0.01), VerticalElement(200, 160, 52, 0.01, -0.02)]
+    cant = [CantElement(0, 100, 0, 0), CantElement(100, 60, 0, -0.1), CantElement(160, 200, -0.1, -0.1)]
+    return Alignment(track_id, FRAME, chained((10.0, 20.0 * track_id), 0.4, SHAPES), tuple(vertical), tuple(cant))
+
+
+def table(*alignments, change=None):
+    """An element table without geometries, as a spreadsheet has it."""
+    layer = QgsVectorLayer("NoGeometry", "elements", "memory")
+    layer.dataProvider().addAttributes(fields(ELEMENT_FIELDS).toList())
+    layer.updateFields()
+    for row in (row for alignment in alignments for row in rows(alignment)):
+        feature = QgsFeature(layer.fields())
+        for column in ELEMENT_FIELDS:
+            feature[column.name] = column.value(row[column.name])
+        if change:
+            change(feature)
+        layer.dataProvider().addFeature(feature)
+    return layer
+
+
+@pytest.fixture
+def exported(run_step, tmp_path):
+    def export(name, source=None, **parameters):
+        path = tmp_path / name
+        given = {"INPUT": source or table(design()), "CRS": "EPSG:25832", "OUTPUT": path}
+        outcome = run_step("exportalignment", {**given, **parameters})
+        return outcome, path
+
+    return export
+
+
+@pytest.fixture
+def imported(run_step, context):
+    def read(path, **parameters):
+        outcome = run_step("importalignment", {"INPUT": path, "ELEMENTS": "memory:", "AXIS": "memory:", **parameters})
+        assert outcome.ok, outcome.error
+        found = (QgsProcessingUtils.mapLayerFromString(outcome.results[name], context) for name in ("ELEMENTS", "AXIS"))
+        return outcome.results, *found
+
+    return read
+
+
+def test_a_table_becomes_landxml_and_a_table_again(exported, imported):
+    outcome, path = exported("Süd strecke.xml", table(design(), design(5)))
+    assert outcome.ok, outcome.error
+    assert (outcome.results["ALIGNMENT_COUNT"], outcome.results["ELEMENT_COUNT"]) == (2, 20)
+    results, elements, axes = imported(path)
+    assert elements.crs().authid() == axes.crs().authid() == "EPSG:25832"
+    assert (results["ALIGNMENT_COUNT"], results["ELEMENT_COUNT"]) == (2, 22)
+    found = [one for one in elements.getFeatures() if one["track_id"] == 5]
+    plan = [one for one in found if one["layout"] == "H"]
+    assert [one["type"] for one in plan] == ["line", "clothoid", "arc", "clothoid", "clothoid", "arc"]
+    assert [one["r1_m"] for one in plan][2] == 500 and plan[-1]["r2_m"] == -400
+    assert [one["cant2_mm"] for one in found if one["layout"] == "C"] == [0, -100, -100]
+    (line, *_) = plan
+    assert (line["x"], line["y"]) == (578_210, 5_804_400)
+    assert line.geometry().length() == pytest.approx(100.0, abs=1e-3)
+
+
+def test_axes_have_kilometres_as_m_values(exported, imported):
+    def with_km(feature):
+        if feature["layout"] == "H":
+            feature["km_from"], feature["km_to"] = (12 + feature[name] / 1000 for name in ("s_from", "s_to"))
+
+    outcome, path = exported("a.xml", table(design(), change=with_km))
+    assert outcome.ok, outcome.error
+    _, _, axes = imported(path)
+    (axis,) = axes.getFeatures()
+    assert QgsWkbTypes.displayString(axes.wkbType()) == "LineStringZM"
+    vertices = list(axis.geometry().vertices())
+    assert (vertices[0].m(), vertices[-1].m()) == (12.0, pytest.approx(12.36))
+    assert (vertices[0].z(), axis["name"], axis["km_to"]) == (50.0, "Track 4", 12.36)
+    off = [vertex.distance(vertices[0]) for vertex in vertices]
+    assert np.interp(12.05, [one.m() for one in vertices], off) == pytest.approx(50, abs=0.01)
+
+
+def test_a_dialog_asks_for_no_output_that_needs_tracks(qgis, plugin):
+    algorithm = qgis.processingRegistry().createAlgorithmById("railextract:importalignment")
+    asked = [one.name() for one in algorithm.destinationParameterDefinitions() if one.createByDefault()]
+    assert asked == ["ELEMENTS", "AXIS"]
+
+
+def test_tracks_are_compared_with_the_design_beside_them(exported, run_step, context, tmp_path):
+    _, path = exported("a.xml", table(design(), design(5)))
+    other, s = design(5), np.arange(12.0, 350.0, 4.0)
+    heading = other.headings(s)
+    xyz = FRAME.to_crs(
+        other.xyz(s) + np.column_stack([-np.sin(heading), np.cos(heading), np.full(len(s), 0.4)]) * 0.015
+    )
+    tracks = QgsVectorLayer("LineStringZ?crs=EPSG:25832&field=track_id:integer", "survey", "memory")
+    feature = QgsFeature(tracks.fields())
+    feature.setGeometry(QgsGeometry(QgsLineString(*xyz.T.tolist())))
+    feature["track_id"] = 9
+    tracks.dataProvider().addFeature(feature)
+    outputs = {"ELEMENTS": None, "AXIS": None, "DEVIATIONS": "memory:", "REPORT": tmp_path / "r.html"}
+    outcome = run_step("importalignment", {"INPUT": path, "TRACKS": tracks, **outputs})
+    assert outcome.ok, outcome.error
+    found = list(QgsProcessingUtils.mapLayerFromString(outcome.results["DEVIATIONS"], context).getFeatures())
+    assert [one["s"] for one in found] == list(range(12, 349))
+    assert {one["track_id"] for one in found} == {9}
+    assert [one["slew_mm"] for one in found] == pytest.approx([15.0] * len(found), abs=0.02)
+    assert [one["lift_mm"] for one in found] == pytest.approx([6.0] * len(found), abs=0.3)
+    assert {one["cant_diff_mm"] for one in found} == {NULL}
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "<b>15.0 mm</b><span>slew, RMS" in page and "Track 5</h2>" in page and "is a proposal" not in page
+
+
+def test_gdal_reads_the_dxf(exported):
+    outcome, path = exported("a.dxf")
+    assert outcome.ok, outcome.error
+    dataset = ogr.Open(str(path))
+    features = list(dataset.GetLayer(0))  # GDAL crashes if nothing refers to a feature
+    found = [(one["Layer"], one.GetGeometryRef().GetGeometryName(), one["Text"]) for one in features]
+    kinds = [(layer, kind, bool(text)) for layer, kind, text in found]
+    assert kinds.count(("ALIGNMENT_4", "LINESTRING", False)) == 1
+    assert kinds.count(("PLAN_4", "POINT", False)) == kinds.count(("PLAN_4", "POINT", True)) == 5
+    assert {text.strip() for _, _, text in found if text} >= {"line, L 100.00", "arc R 500.00, L 80.00"}
+    points = next(one for one in features if one["Layer"] == "ALIGNMENT_4").GetGeometryRef().GetPoints()
+    expected = FRAME.to_crs(design().xyz(np.array([0.0, 360.0])))
+    np.testing.assert_allclose([points[0], points[-1]], expected, atol=1e-3)
+
+
+def test_ifc_states_the_system_and_gauge(exported):
+    outcome, path = exported("a.ifc", STANDARD="IN_75R_1000")
+    assert outcome.ok, outcome.error
+    text = path.read_text(encoding="ascii")
+    assert "IFCPROJECTEDCRS('EPSG:25832','ETRS89 / UTM zone 32N'" in text
+    assert re.search(r"IFCMAPCONVERSION\(#\d+,#\d+,578\d00\.0,5804\d00\.0,", text)
+    assert re.search(r"IFCALIGNMENTCANT\(.*,1\.06\d*\);", text)
+
+
+def test_a_log_of_the_reader_is_shown(run_step, tmp_path, new_feedback, exported):
+    _, path = exported("a.xml", CRS=None)
+    heard = new_feedback()
+    assert run_step("importalignment", {"INPUT": path, "ELEMENTS": "memory:"}, heard).ok
+    assert any("choose CRS" in one for one in heard.warnings)
+    assert run_step("importalignment", {"INPUT": path, "ELEMENTS": "memory:", "CRS": "EPSG:31467"}, heard).ok
+    assert any("outside the area" in one for one in heard.warnings)

@@ -1,0 +1,147 @@
+"""Lines of two surveys compared in QGIS: fields, states, shift, report and units."""
+
+import numpy as np
+import pytest
+from qgis.core import NULL, QgsFeature, QgsGeometry, QgsLineString, QgsVectorLayer
+
+CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
+NAMES = (
+    "line_id input_id chainage_m state across_mm height_mm gauge_mm cant_mm sigma_mm sigmaz_mm shift_mm shiftz_mm moved"
+)
+SPACING_M = 1.507
+
+
+def layer_of(lines, fields="", values=(), crs="EPSG:32643", unit_m=1.0, kind="LineStringZ"):
+    """Make a memory layer of lines, (n, 3) metres from the corner."""
+    made = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "lines", "memory")
+    for number, line in enumerate(lines):
+        feature = QgsFeature(made.fields())
+        columns = (np.asarray(line) / unit_m + CORNER).T[: 3 if kind.endswith("Z") else 2]
+        feature.setGeometry(QgsGeometry(QgsLineString(*columns.tolist())))
+        if values:
+            feature.setAttributes(list(values[number]))
+        assert made.dataProvider().addFeature(feature)
+    return made
+
+
+def arc(left_m=0.0, up_m=0.0, bump_m=0.0, length_m=100.0):
+    s = np.arange(0, length_m + 0.25, 0.5)
+    r = 300.0 - left_m - np.where((s >= 40) & (s <= 60), bump_m, 0.0)
+    return np.column_stack([r * np.sin(s / 300), 300 - r * np.cos(s / 300), np.full(len(s), up_m)])
+
+
+RAIL_FIELDS = "&field=rail_id:integer&field=sigma_mm:double&field=sigmaz_mm:double"
+
+
+def rails(left_m=0.0, numbers=(4, 5), sigma_mm=1.0, **changed):
+    lines = [arc(left_m + SPACING_M / 2, **changed), arc(left_m - SPACING_M / 2, **changed)]
+    return layer_of(lines, RAIL_FIELDS, [(number, sigma_mm, sigma_mm) for number in numbers])
+
+
+@pytest.fixture
+def compare(run_step, context, new_feedback):
+    """Compare, and return results, values by field, and what was said."""
+
+    def run(reference, lines, **parameters):
+        feedback = new_feedback()
+        given = {"REFERENCE": reference, "INPUT": lines, "OUTPUT": "memory:", **parameters}
+        outcome = run_step("comparetracks", given, feedback)
+        assert outcome.ok, outcome.error
+        layer = context.getMapLayer(outcome.results["OUTPUT"])
+        rows = [feature.attributes() for feature in layer.getFeatures()]
+        columns = {
+            name: np.array([None if row[at] == NULL else row[at] for row in rows], dtype=object)
+            for at, name in enumerate(layer.fields().names())
+        }
+        return outcome.results, columns, feedback
+
+    return run
+
+
+def test_rails_of_two_surveys(compare, tmp_path):
+    page = tmp_path / "report.html"
+    results, values, feedback = compare(rails(), rails(numbers=(8, 9), bump_m=0.012), REPORT=page)
+    assert " ".join(values) == NAMES
+    assert set(zip(values["line_id"], values["input_id"])) == {(4, 8), (5, 9)}
+    chainage = values["chainage_m"].astype(float)
+    bump = (chainage > 42) & (chainage < 58)
+    np.testing.assert_allclose(values["across_mm"][bump].astype(float), 12.0, atol=0.2)
+    np.testing.assert_allclose(values["sigma_mm"].astype(float), 1.41)
+    np.testing.assert_allclose(values["gauge_mm"][bump].astype(float), 0.0, atol=0.2)
+    assert set(values["moved"][bump]) == {1}
+    assert results["MOVED_LENGTH"] == pytest.approx(2 * 20, abs=3)
+    assert results["COMPARED_LENGTH"] == pytest.approx(200, abs=1)
+    assert (results["MISSING_LENGTH"], results["EXTRA_LENGTH"]) == (0, 0)
+    html = page.read_text(encoding="utf-8")
+    assert "have moved by more than 3 standard errors" in html
+    assert html.count("<svg") == 2 + 2  # two distributions, and two lines
+    assert feedback.warnings == []
+
+
+def test_a_constant_shift_is_stated_apart(compare):
+    sides = (SPACING_M / 2, -SPACING_M / 2)
+    moved = [arc(side, length_m=250.0) + [0.03, -0.02, 0.01] for side in sides]
+    later = layer_of(moved, RAIL_FIELDS, [(1, 1.0, 1.0), (2, 1.0, 1.0)])
+    earlier = rails(length_m=250.0)
+    results, values, feedback = compare(earlier, later)
+    shift = [results[name] for name in ("SHIFT_EAST", "SHIFT_NORTH", "SHIFT_UP")]
+    np.testing.assert_allclose(shift, [30, -20, 10], atol=0.2)
+    assert results["MOVED_LENGTH"] == 0
+    np.testing.assert_allclose(values["height_mm"].astype(float), 10.0)
+    np.testing.assert_allclose(values["across_mm"].astype(float), values["shift_mm"].astype(float), atol=0.3)
+    assert any("+30.0 mm east, -20.0 mm north, +10.0 mm up" in line for line in feedback.infos)
+    results, _, _ = compare(earlier, later, IGNORE_SHIFT=False)
+    assert results["MOVED_LENGTH"] == pytest.approx(500, abs=3)
+
+
+def test_a_design_without_standard_errors(compare):
+    """The centerline lies 5 mm beside its design; the survey states 1 mm, the design is exact."""
+    design, survey = layer_of([arc()]), layer_of([arc(0.005)], "&field=track_id:integer", [(3,)])
+    stated = {"REFERENCE_SIGMA": 0, "INPUT_SIGMA": 1, "IGNORE_SHIFT": False}
+    results, values, feedback = compare(design, survey, **stated)
+    assert set(values["input_id"]) == {3}
+    assert set(values["moved"]) == {1}
+    assert results["ACROSS_RMS"] == pytest.approx(5, abs=0.05)
+    assert feedback.warnings == []
+    _, values, feedback = compare(design, survey)
+    assert set(values["moved"]) == {0}
+    assert feedback.warnings == [
+        "A survey states no standard error: the scatter of the differences stands for it, 1.0 mm across. Fill in "
+        "REFERENCE_SIGMA and INPUT_SIGMA if it is known."
+    ]
+
+
+def test_centerlines_with_their_rails(compare):
+    _, values, _ = compare(
+        layer_of([arc()], "&field=track_id:integer", [(1,)]),
+        layer_of([arc(0.002, 0.003)], "&field=track_id:integer", [(1,)]),
+        REFERENCE_RAILS=rails(),
+        RAILS=layer_of([arc(SPACING_M / 2 + 0.004, 0.006), arc(-SPACING_M / 2)], RAIL_FIELDS, [(1, 2, 2), (2, 2, 2)]),
+    )
+    np.testing.assert_allclose(values["gauge_mm"].astype(float), 4.0, atol=0.1)
+    np.testing.assert_allclose(values["cant_mm"].astype(float), 6.0, atol=0.1)
+    np.testing.assert_allclose(values["sigma_mm"].astype(float), np.hypot(1, 2) / np.sqrt(2), atol=0.006)
+
+
+def test_missing_and_extra_lines_have_points(compare):
+    results, values, _ = compare(layer_of([arc()]), layer_of([arc(length_m=60.0), arc(4.0)]))
+    assert results["MISSING_LENGTH"] == pytest.approx(40, abs=1)
+    assert results["EXTRA_LENGTH"] == pytest.approx(100 * 296 / 300, abs=0.5)
+    states, counts = np.unique(values["state"].astype(str), return_counts=True)
+    assert dict(zip(states, counts)).keys() == {"both", "missing", "extra"}
+    assert set(values["input_id"][values["state"] == "missing"]) == {None}
+    assert set(values["across_mm"][values["state"] != "both"]) == {None}
+
+
+def test_feet_give_the_same_millimetres(compare):
+    unit_m = 1200 / 3937
+    one, other = (layer_of([arc(left)], crs="EPSG:2227", unit_m=unit_m) for left in (0.0, 0.01))
+    results, _, _ = compare(one, other)
+    assert results["ACROSS_RMS"] == pytest.approx(10, abs=0.05)
+
+
+def test_lines_without_heights(compare):
+    results, values, _ = compare(layer_of([arc()], kind="LineString"), layer_of([arc(0.01)], kind="LineString"))
+    assert results["ACROSS_RMS"] == pytest.approx(10, abs=0.05)
+    assert results["HEIGHT_RMS"] is results["SHIFT_UP"] is None
+    assert set(values["height_mm"]) == {None}
