@@ -44,6 +44,7 @@ class FitAlignment(RailAlgorithm):
     TAGS = (*RAIL_WORDS, *TRACK_WORDS, "clothoid", "curve", "radius", "horizontal", "vertical", "Trassierung", "tracé")
     NEEDS = (("numpy",), ("scipy",), ("pyproj",))
     SUMMARY = "Finds the straights, clothoids and arcs, grades and cant ramps that tracks were built to."
+    PICTURE = "alignment.svg"
     GUIDE = "alignment"
     HELP = "\n\n".join(
         (

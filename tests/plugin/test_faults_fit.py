@@ -43,8 +43,8 @@ FAULTS = [
         "short line",
         given(lambda: line(30)),
         REFUSED,
-        "The line of track 1 has 30 vertices over 29 m, but a fit needs at least 20 over 50 m: leave it out, or join it "
-        "with the track that continues it.",
+        "The line of track 1 has 30 vertices over 29 m, but a fit needs at least 20 over 50 m: leave it out, or join "
+        "it with the track that continues it.",
     ),
     Fault(
         "ring",
@@ -67,6 +67,6 @@ FAULTS = [
 ]
 
 
-@pytest.mark.parametrize("fault", FAULTS, ids=str)
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_fault(meet, fault):
     meet(fault, "fitalignment")
