@@ -85,7 +85,7 @@ def _has_edited_radius(one: PlanElement) -> bool:
 def chain_of(shape: Sequence[Element], curved: Sequence[bool], signal: Signal) -> Chain:
     """Return the chain of elements in height or of cant, with first values from their ends."""
     first, last = float(signal.s[0]), float(signal.s[-1])
-    inside = [number for number, one in enumerate(shape) if first < one.s_from < last]
+    inside = [number for number, one in enumerate(shape) if number and first < one.s_from < last]
     starts = [first, *(shape[number].s_from for number in inside)]
     flags = [curved[max(inside[0] - 1, 0)] if inside else curved[0], *(curved[number] for number in inside)]
     spans = [Span(start, end, False, flag) for start, end, flag in zip(starts, [*starts[1:], last], flags)]

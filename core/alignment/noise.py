@@ -84,7 +84,9 @@ def independent_m(s: np.ndarray, y: np.ndarray) -> float:
     return float(np.median(np.abs(off) / np.sqrt(square))) / MEDIAN_SHARE
 
 
-def estimated(pieces: Sequence[tuple[np.ndarray, int]], step_m: float, floor_m: float) -> Noise:
+def estimated(
+    pieces: Sequence[tuple[np.ndarray, int]], step_m: float, floor_m: float, only_if_sure: bool = False
+) -> Noise:
     """Return the noise that explains residuals.
 
     The residuals of a polynomial hang together less than the errors, because it follows them; the loss is computed.
@@ -97,6 +99,8 @@ def estimated(pieces: Sequence[tuple[np.ndarray, int]], step_m: float, floor_m: 
         Mean distance between the points.
     floor_m : float
         Least standard deviation of single points, metres.
+    only_if_sure : bool
+        Whether misalignment must exceed what chance explains.
     """
     pieces = _usual([(rest, degree) for rest, degree in pieces if len(rest) >= SIZES[0]])
     if not pieces:
@@ -108,7 +112,7 @@ def estimated(pieces: Sequence[tuple[np.ndarray, int]], step_m: float, floor_m: 
     lags = step_m * np.arange(SIZES[-1])
     white = _expected_of(kinds, np.where(lags == 0, 1.0, 0.0))
     alone = float(white @ seen / (white @ white))
-    if not _hang_together(seen - alone * white, alone, sum(kinds.values())):
+    if only_if_sure and not _hang_together(seen - alone * white, alone, sum(kinds.values())):
         return Noise(max(math.sqrt(alone), floor_m))
     found = []
     for length in LENGTHS_M:

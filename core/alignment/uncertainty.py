@@ -43,7 +43,7 @@ def remaining(fit: PlanFit, points: Points, tolerance_m: float) -> Noise:
     used = points.weight > 0
     pieces = [(rest[mine], RESIDUAL_DEGREE) for rest, mine in zip(np.split(fit.across, bounds), np.split(used, bounds))]
     step = float(points.s[-1]) / (len(points.s) - 1)
-    found = estimated(pieces, step, FLOOR_M)
+    found = estimated(pieces, step, FLOOR_M, only_if_sure=True)
     return Noise(found.white_m, min(found.shared_m, tolerance_m), found.length_m)
 
 
