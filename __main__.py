@@ -16,6 +16,7 @@ COMMANDS = {
     "extract": ("core.commands.extract", "extract rails and track centerlines on several cores or computers"),
     "classify": ("core.commands.classify", "find the rail points of raw clouds and write classified copies"),
     "grow": ("core.commands.grow", "follow rails from seeds and write classified copies of the clouds"),
+    "airborne": ("core.commands.airborne", "fit track centerlines in airborne clouds along guides"),
     "train-classifier": ("core.commands.train_classifier", "train a classifier of rail points on labelled clouds"),
     "onnx": ("core.frpdf.onnx", "write the network for other runtimes"),
     "train": ("laboratory.training.train", "train the network on synthetic rasters"),

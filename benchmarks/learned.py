@@ -29,15 +29,15 @@ SEED, SEEDS, EMPTY_SEEDS = 2026, (11, 12), (11,)
 LEARNED = (
     *("double", "two passes", "fast", "station", "turnout 1:9", "turnout 1:18.5", "yard", "metro", "viaduct"),
     "far track",
-    *("photo straight", "photo curve", "photo curve blunt", "photo turnout", "photo station"),
 )
 """Scenes with rails that the training has seen with other seeds."""
 
-EMPTY = (
-    *("forest", "street", "car park", "quarry"),
-    *("photo street", "photo quarry", "photo motorway", "photo kerbs", "photo farmland"),
-)
+EMPTY = ("forest", "street", "car park", "quarry")
 """Scenes without rails that the training has seen."""
+
+IMAGES = ("photo straight", "photo curve", "photo curve blunt", "photo turnout", "photo station")
+EMPTY_IMAGES = ("photo street", "photo quarry", "photo motorway", "photo kerbs", "photo farmland")
+"""Surveys by images, with rails and without, for a training that sees them as well."""
 
 APART_M, COLUMNS = 200.0, 6
 """Distance between the labelled tiles, and tiles in a row."""
@@ -61,7 +61,7 @@ SCENES = {**RAW_SCENES, **OTHERS, **BESIDE}
 
 COMPARED = {
     "seen in training, other seed": ("double", "station", "turnout 1:9", "yard", "viaduct", "far track"),
-    "surveys by images": ("photo straight", "photo curve", "photo curve blunt", "photo turnout", "photo station"),
+    "surveys by images": IMAGES,
     "other track": ("narrow", "dual gauge", "crossing", "tram"),
     "other noise or spacing": tuple(OTHERS),
     "other scanner, from the air": tuple(AIR),
@@ -80,19 +80,19 @@ def main() -> None:
     parser.add_argument("task", choices=("labelled", "compare"))
     parser.add_argument("path", type=Path, help="folder for the tiles, or weights")
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help="to compare; default: those published")
+    parser.add_argument("--images", action="store_true", help="label surveys by images as well")
     arguments = parser.parse_args()
     if arguments.task == "labelled":
-        write_labelled(arguments.path)
+        write_labelled(arguments.path, arguments.images)
     else:
         compare(arguments.path, arguments.scenes)
 
 
-def write_labelled(folder: Path) -> None:
+def write_labelled(folder: Path, images: bool) -> None:
     """Write the scenes of the training as tiles beside each other, with their rail points classified."""
     folder.mkdir(parents=True, exist_ok=True)
-    jobs = [(name, seed) for seed in SEEDS for name in LEARNED] + [
-        (name, seed) for seed in EMPTY_SEEDS for name in EMPTY
-    ]
+    rails, empty = (LEARNED + IMAGES, EMPTY + EMPTY_IMAGES) if images else (LEARNED, EMPTY)
+    jobs = [(name, seed) for seed in SEEDS for name in rails] + [(name, seed) for seed in EMPTY_SEEDS for name in empty]
     for number, (name, seed) in enumerate(jobs):
         raw = RAW_SCENES[name](seed)
         head, _ = truth(raw, np.zeros(len(raw.xyz), dtype=bool), False)

@@ -40,6 +40,8 @@ MAX_TEXT = 255
 DRAWN = {
     "rails": "RAILS",
     "centerlines": "TRACK",
+    "airborne": "TRACK",
+    "stations": "STATIONS",
     "quality": "STATIONS",
     "findings": "FINDINGS",
     "stops": "STOPS",
@@ -63,7 +65,7 @@ TEXT_M = 0.8
 OTHER_COLOUR = 30
 """Orange, for findings and stops."""
 
-ID_FIELDS = ("rail_id", "track_id", "finding", "class_code")
+ID_FIELDS = ("rail_id", "track_id", "guide_id", "finding", "class_code")
 """Fields that a row of a vertex has."""
 
 

@@ -195,6 +195,38 @@ STOP_FIELDS = (
     Field("reason", str, "why the rail is not followed further"),
 )
 
+AIRBORNE_FIELDS = (
+    Field("track_id", int, "number of the line"),
+    Field("guide_id", int, "number of its guide: that of the feature, or of the proposal"),
+    LENGTH,
+    Field("seen_m", float, "length on which the track is seen, metres", 1),
+    Field("sigma_mm", float, "standard error across where it is seen, without the flight's own error, millimetres", 1),
+    Field("sigmaz_mm", float, "standard error of the height, likewise, millimetres", 1),
+    Field("gauge_mm", float, "gauge that was looked for: that of the guide, or of the run, millimetres", 1),
+    Field("name", str, "name of the guide"),
+    Field("ref", str, "reference of the guide, such as the number of the line"),
+)
+AIRBORNE_STATION_FIELDS = (
+    Field("track_id", int, "number of the line; empty where there is none"),
+    Field("guide_id", int, "number of the guide"),
+    Field("s_m", float, "plan distance from the start of the guide, metres", 1),
+    Field("seen", int, "1 where the track is seen, else 0"),
+    Field("sigma_mm", float, "standard error across, without the flight's own error, millimetres", 1),
+    Field("sigmaz_mm", float, "standard error of the height, likewise, millimetres", 1),
+    Field("bed_m", float, "height of the bed between the rails, in the unit of the cloud", 3),
+    Field("cant_mm", float, "cant: left minus right, seen along the guide, millimetres", 0),
+    Field("radius_m", float, "radius in plan over 80 m, positive in left-hand curves, empty above 10 km, metres", 0),
+    Field("grade_pm", float, "gradient over 80 m, per mille; positive uphill", 2),
+    Field("margin", float, "score of the course above that of one elsewhere", 1),
+    Field("reason", str, "why the track is not seen; at a switch, that another one is near"),
+)
+"""In an `AirborneTrack`, `guide_id` is a single value and the others have a value for each station."""
+
+GUIDE_FIELDS = (
+    Field("guide_id", int, "number of the proposal"),
+    Field("score", float, "how clearly it looks like a track: 1 is the least that is proposed", 2),
+    LENGTH,
+)
 ELEMENT_FIELDS = (
     Field("track_id", int, "number of the track"),
     Field("no", int, "number of the element within its track and layout, from 1"),

@@ -30,6 +30,9 @@ JUMPS, CLOTHOIDS = "JUMPS", "CLOTHOIDS"
 TRANSITIONS = (JUMPS, CLOTHOIDS)
 """Whether the curvature may jump, as in turnouts and sidings, or a clothoid lies between any two radii."""
 
+AIRBORNE_CLASSES = (1, 2)
+"""Classes of an airborne cloud in which tracks are looked for: unclassified and ground."""
+
 DEFAULT_EPOCHS = 10
 """How many times a rail classifier learns from each block with rails."""
 
@@ -176,6 +179,33 @@ class FitParameters:
     min_length_m: float = 5.0
     transitions: str = JUMPS
     rounded: bool = True
+
+
+@dataclass(frozen=True)
+class AirborneParameters:
+    """What the search for tracks in airborne clouds can be told; lengths in metres.
+
+    Attributes
+    ----------
+    gauge_m, head_width_m : float
+        See `Parameters`; a guide may state its own gauge.
+    reach_m : float
+        Largest distance of a track from its guide.
+    footprint_m : float
+        Diameter of the laser beam on the ground.
+    rail_height_m : float
+        Top of the rails above the bed between them.
+    """
+
+    gauge_m: float
+    head_width_m: float
+    reach_m: float = 3.0
+    footprint_m: float = 0.3
+    rail_height_m: float = 0.17
+
+    def spacing_of(self, gauge_m: float | None = None) -> float:
+        """Return the distance between the middles of the railheads, on this gauge or that of the run."""
+        return (gauge_m or self.gauge_m) + self.head_width_m
 
 
 @dataclass(frozen=True)

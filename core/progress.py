@@ -19,8 +19,8 @@ REPORT_EVERY_S = 5.0
 class Progress:
     """Receives the progress of a run; this base class shows nothing and never cancels.
 
-    A front end overrides the methods for what it can show: `set_fraction`, `status`, `info`, `warning`, and
-    `is_cancelled`.
+    A front end overrides the methods for what it can show: `set_fraction`, `status`, `info`, `warning`, `propose`
+    and `is_cancelled`.
     """
 
     def set_fraction(self, fraction: float) -> None:
@@ -34,6 +34,9 @@ class Progress:
 
     def warning(self, text: str) -> None:
         """Report something that the user should look at."""
+
+    def propose(self, standard: str) -> None:
+        """Report the name of a rail standard that fits the points better than the one stated."""
 
     def is_cancelled(self) -> bool:
         """Return whether the user has cancelled the run."""
@@ -96,6 +99,9 @@ class _Relay(Progress):
 
     def warning(self, text: str) -> None:
         self._listener.warning(text)
+
+    def propose(self, standard: str) -> None:
+        self._listener.propose(standard)
 
     def is_cancelled(self) -> bool:
         return self._listener.is_cancelled()

@@ -14,6 +14,7 @@ from qgis.PyQt.QtWidgets import QAction, QToolBar
 
 from . import compat
 from .i18n import tr
+from .links import links
 from .model_action import OpenModelAction
 from .notices import notices
 from .paths import ICON
@@ -49,6 +50,7 @@ class Windows(QObject):
         package_setting.register()
         self._reports = ReportOpener()
         self._reports.register()
+        links.register()
         self.dock: ReviewDock | None = None
         self.growing: GrowRails | None = None
         self._toolbar: QToolBar | None = None
@@ -121,6 +123,7 @@ class Windows(QObject):
             self.growing.deleteLater()
             self.growing = None
         self._reports.deregister()
+        links.deregister()
         package_setting.deregister()
         for action in self._actions:
             action.deregister()

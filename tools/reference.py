@@ -20,6 +20,8 @@ from qgis.core import (  # noqa: E402
     QgsProcessingProvider,
 )
 from rail_extract.core.fields import (  # noqa: E402
+    AIRBORNE_FIELDS,
+    AIRBORNE_STATION_FIELDS,
     AXIS_FIELDS,
     CENTERLINE_FIELDS,
     DEVIATION_FIELDS,
@@ -55,6 +57,8 @@ LAYERS = {
     "Differences": DIFFERENCE_FIELDS,
     "Findings": FINDING_FIELDS,
     "Stops": STOP_FIELDS,
+    "Centerlines from airborne lidar": AIRBORNE_FIELDS,
+    "Stations from airborne lidar": AIRBORNE_STATION_FIELDS,
     "Elements": ELEMENT_FIELDS,
     "Deviations": DEVIATION_FIELDS,
     "Axes": AXIS_FIELDS,

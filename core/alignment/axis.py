@@ -37,7 +37,7 @@ BEYOND_M = 1.0
 ON_AXIS_M = 0.0005
 """Places closer to the axis are on neither side of it: less than the last decimal of the offset, metres."""
 
-PLACES_AT_ONCE = 20_000
+PLACES_AT_ONCE = 5_000
 """Places whose feet are computed at once: between two checks for cancellation."""
 
 

@@ -28,8 +28,10 @@ MAX_LEVEL = 30
 """Deepest level of an octree: below it, a node of a cloud 1000 km long is a millimetre wide."""
 
 
-def chunks_in(path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], extent: Extent) -> tuple[Chunk, ...] | None:
-    """List the chunks that may hold points of an extent, in the order of the file.
+def chunks_in(
+    path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], extent: Extent | np.ndarray
+) -> tuple[Chunk, ...] | None:
+    """List the chunks that may hold points of an extent, or of one of several, in the order of the file.
 
     Parameters
     ----------
@@ -37,7 +39,7 @@ def chunks_in(path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], exte
     header : laspy.LasHeader
     chunks : sequence of Chunk
         From `laz.read_chunk_table`.
-    extent : tuple of float
+    extent : tuple of float, or (k, 4) array
 
     Returns
     -------
@@ -57,7 +59,9 @@ def chunks_in(path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], exte
     side = 2 * info.halfsize / 2.0 ** nodes["level"]
     low = info.center[:2] - info.halfsize + nodes["key"][:, :2] * side[:, None]
     beyond = header.scales[:2]  # coordinates are rounded
-    touched = ((low - beyond <= extent[2:]) & (low + side[:, None] + beyond >= extent[:2])).all(axis=1)
+    touched = np.zeros(len(low), dtype=bool)
+    for area in np.reshape(extent, (-1, 4)):
+        touched |= ((low - beyond <= area[2:]) & (low + side[:, None] + beyond >= area[:2])).all(axis=1)
     return tuple(Chunk(*one) for one in found.T[touched].tolist())
 
 

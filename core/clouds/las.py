@@ -70,7 +70,7 @@ def read_classes(
     path: Path,
     class_codes: Sequence[int],
     progress: Progress = SILENT,
-    extent: Extent | None = None,
+    extent: Extent | np.ndarray | None = None,
     leave_out: Sequence[str] = (),
 ) -> Iterator[Chunk]:
     """Read the points of some classes chunk by chunk; see `readers.read_classes`."""
@@ -89,7 +89,7 @@ def read_points(path: Path, progress: Progress = SILENT, leave_out: Sequence[str
 
 
 def _chunks(
-    path: Path, progress: Progress, extent: Extent | None, leave_out: Sequence[str]
+    path: Path, progress: Progress, extent: Extent | np.ndarray | None, leave_out: Sequence[str]
 ) -> Iterator[tuple[laspy.ScaleAwarePointRecord, np.ndarray, np.ndarray, np.ndarray, bool]]:
     """Check a file and read it: points, classes, marks, which are valid, and whether the file is read as a whole."""
     with _open(path) as reader:

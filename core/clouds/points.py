@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from ..errors import CloudError, CrsError, EmptyCloudError, NoRailPointsError, ParameterError
+from ..errors import CloudError, CrsError, EmptyCloudError, NoRailPointsError, ParameterError, UnclassifiedError
 from ..frame import ORIGIN_STEP, LocalFrame
 from ..progress import SILENT, Progress
 from ..standards import LAST_CLASS
@@ -51,7 +51,7 @@ class RailPoints:
         return replace(self, xyz=self.xyz[which], strips=None if self.strips is None else self.strips[which])
 
 
-def _strips(xyz: np.ndarray, marks: np.ndarray) -> np.ndarray:
+def strips_of(xyz: np.ndarray, marks: np.ndarray) -> np.ndarray:
     """Return the strips, (n,), of points, (n, 3) local metres, by their marks."""
     found, number = np.unique(marks, return_inverse=True)
     places = np.floor(xyz[:, :2] / PLACE_M).astype(np.int64)
@@ -119,7 +119,7 @@ def read_requested(request: Request, progress: Progress = SILENT) -> tuple[RailP
     xyz, codes, marks = _collect(request, progress)
     frame = request.frame_at([np.unique(column, return_counts=True) for column in origin_steps(xyz).T])
     local = frame.to_local(xyz)
-    strips = _strips(local, marks)
+    strips = strips_of(local, marks)
     return tuple(
         RailPoints(local[codes == code], frame, int(code), several(strips[codes == code])) for code in np.unique(codes)
     )
@@ -187,25 +187,39 @@ class Request:
         xmin, ymin, xmax, ymax = zip(*areas)
         return max(xmin), max(ymin), min(xmax), min(ymax)
 
-    def sample(self) -> np.ndarray:
-        """Read the first points requested, (n, 3) metres from one of them; takes a few seconds for a cloud of any size.
+    def sample(self, count: int = SAMPLE_POINTS) -> np.ndarray:
+        """Read the first points requested, (n, 3) metres from one of them; see `sample_with_census`."""
+        return self.sample_with_census(count)[0]
+
+    def sample_with_census(self, count: int = SAMPLE_POINTS) -> tuple[np.ndarray, np.ndarray]:
+        """Read the first points requested; takes a few seconds for a cloud of any size.
+
+        Parameters
+        ----------
+        count : int
+            Number of points that is enough.
+
+        Returns
+        -------
+        xyz : (n, 3) array
+            Metres from one of them.
+        census : (256,) int array
+            Number of points of each class that were passed.
 
         Raises
         ------
         CloudError
             A file is damaged.
         """
-        found, count, passed = [np.empty((0, 3))], 0, 0
-        for header in self.headers:
-            for xyz, _, _, census in self.read(header):
-                found.append(xyz)
-                count, passed = count + len(xyz), passed + int(census.sum())
-                if count >= SAMPLE_POINTS or passed >= MAX_PASSED:
-                    break
-            if count >= SAMPLE_POINTS or passed >= MAX_PASSED:
+        found, passed = [np.empty((0, 3))], np.zeros(LAST_CLASS + 1, dtype=np.int64)
+        chunks = (chunk for header in self.headers for chunk in self.read(header))
+        for xyz, _, _, census in chunks:
+            found.append(xyz)
+            passed += census
+            if sum(map(len, found)) >= count or passed.sum() >= MAX_PASSED:
                 break
         xyz = self.zero.to_local(np.concatenate(found))
-        return xyz - xyz[:1]
+        return xyz - xyz[:1], passed
 
     def shares(self, progress: Progress) -> list[Progress]:
         """Split the progress among the files in proportion to their points."""
@@ -231,9 +245,9 @@ class Request:
                 f"All points of the cloud are marked as {flags}: export the valid points without this mark."
             )
         found = ", ".join(f"{code} ({census[code]})" for code in np.flatnonzero(census))
-        return NoRailPointsError(
+        return UnclassifiedError(
             f"The cloud has no points of class {wanted}; its classes, with the number of points, are {found}: set the "
-            "rail classes."
+            "rail classes or, if nobody has classified the cloud, CLASSIFY."
         )
 
 
@@ -301,7 +315,10 @@ def _shared_system(headers: Sequence[CloudHeader], given: str | None, progress: 
     parsed = {text: parse_crs(text) for text in set(texts) if text}
     crs = common_crs([(header.path.name, parsed.get(text)) for header, text in zip(headers, texts)])
     if crs is None:
-        progress.warning("The cloud states no coordinate system: its coordinates are taken as metres.")
+        progress.warning(
+            "The cloud states no coordinate system: its coordinates are taken as metres. If it has one, choose it as "
+            "CRS."
+        )
         return LocalFrame(np.zeros(3))
     name = headers[0].path.name
     if is_geographic(crs):

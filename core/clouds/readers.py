@@ -86,7 +86,7 @@ class Reader(Protocol):
         path: Path,
         class_codes: Sequence[int],
         progress: Progress = SILENT,
-        extent: Extent | None = None,
+        extent: Extent | np.ndarray | None = None,
         leave_out: Sequence[str] = (),
     ) -> Iterator[Chunk]:
         """Read a file chunk by chunk and keep the points of some classes; see `read_classes`."""
@@ -120,7 +120,7 @@ def read_classes(
     path: Path,
     class_codes: Sequence[int],
     progress: Progress = SILENT,
-    extent: Extent | None = None,
+    extent: Extent | np.ndarray | None = None,
     leave_out: Sequence[str] = (),
 ) -> Iterator[Chunk]:
     """Read a file chunk by chunk and keep the points of some classes; withheld points are left out.
@@ -131,8 +131,9 @@ def read_classes(
     class_codes : sequence of int
         Classes to keep, 0 to 255.
     progress : Progress
-    extent : tuple of float, optional
-        Where points are needed: those elsewhere may be left out where that saves time, as in COPC files.
+    extent : tuple of float or (k, 4) array, optional
+        Where points are needed, one rectangle or several: those elsewhere may be left out where that saves time, as in
+        COPC files.
     leave_out : sequence of str
         Some of `parameters.LEAVE_OUT`: points with these flags are treated like withheld ones.
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from ..classify.guide import Guide
@@ -19,7 +17,6 @@ from ..parameters import DEFAULT_GUIDE_DISTANCE_M
 from ..progress import Estimating
 from ..scratch import scratch_folder
 from ..standards import SEARCHED_CLASSES, resolve
-from ..tasks import InTurn, Runner
 from .copies import add_label_arguments, add_tiles_arguments, check_rail_class, planned_output, print_figures
 from .options import (
     Console,
@@ -28,6 +25,7 @@ from .options import (
     extent_of,
     gauges_of,
     limited,
+    runner_of,
     shapes_module,
 )
 
@@ -76,27 +74,10 @@ def run(args: argparse.Namespace) -> None:
     with (
         writing(planned.file.parent),
         scratch_folder(planned.file.parent) as folder,
-        _runner(args.workers, folder) as runner,
+        runner_of(args.workers, folder) as runner,
     ):
         result = classify_files(request, settings, choice, planned, folder, runner, progress)
     print_figures(result.figures, result.point_count)
-
-
-@contextmanager
-def _runner(workers: int, folder: Path) -> Iterator[Runner]:
-    """Execute tasks in this process, or in several of their own."""
-    if workers == 1:
-        yield InTurn()
-        return
-    try:
-        from ..cluster.runner import DaskRunner
-        from ..cluster.workers import connect
-    except ImportError as error:
-        raise ParameterError(
-            "--workers needs the package distributed: in a clone, run pip install .[cluster]."
-        ) from error
-    with connect(None, workers) as client:
-        yield DaskRunner(client, folder / "tasks")
 
 
 def _guide(args: argparse.Namespace, request: Request) -> Guide | None:

@@ -11,9 +11,10 @@ import numpy as np
 import pyogrio
 import shapely
 
+from ..airborne.survey import AirborneTrack
 from ..disk import Destination
 from ..exchange import DRAWN, Shape, write_shapes
-from ..fields import QUALITY_FIELDS, STOP_FIELDS, UNKNOWN_IN_METRES, Field
+from ..fields import AIRBORNE_STATION_FIELDS, QUALITY_FIELDS, STOP_FIELDS, UNKNOWN_IN_METRES, Field
 from ..frame import LocalFrame
 from ..geopackage import tables_in
 from ..grow.growth import Stop
@@ -90,6 +91,17 @@ def stops_layer(destination: Destination, stops: Sequence[Stop]) -> Layer:
     """Make a layer of the places where rails were not followed further."""
     columns: list[Sequence[Any]] = [range(1, len(stops) + 1), [stop.reason.value for stop in stops]]
     return Layer("stops", destination, STOP_FIELDS, columns, "Point Z", [stop.xyz for stop in stops])
+
+
+def airborne_stations_layer(destination: Destination, tracks: Sequence[AirborneTrack]) -> Layer:
+    """Make a layer of the stations along guides."""
+    columns: list[Sequence[Any]] = [
+        [value for track in tracks for value in np.broadcast_to(getattr(track, field.name), len(track.xyz))]
+        for field in AIRBORNE_STATION_FIELDS
+    ]
+    columns[0] = [int(number) or None for number in columns[0]]
+    places = [place for track in tracks for place in track.xyz]
+    return Layer("stations", destination, AIRBORNE_STATION_FIELDS, columns, "Point Z", places)
 
 
 def write_layers(layers: Sequence[Layer], frame: LocalFrame) -> None:

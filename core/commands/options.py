@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -17,6 +18,7 @@ from ..errors import ParameterError
 from ..parameters import GEOMETRY, LEARNED, LEAVE_OUT, METHODS, Parameters
 from ..progress import Progress
 from ..standards import DEFAULT, Gauge, RailStandard, read_gauges
+from ..tasks import InTurn, Runner
 
 TILES_HELP = (
     "point clouds, virtual point clouds, folders of tiles, or patterns such as tiles/*.laz; @FILE reads the names, one "
@@ -156,6 +158,29 @@ def extent_of(text: str | None) -> tuple[float, float, float, float] | None:
     except ValueError:
         raise ParameterError(f'--extent "{text}" should be four numbers: xmin,ymin,xmax,ymax.') from None
     return xmin, ymin, xmax, ymax
+
+
+@contextmanager
+def runner_of(workers: int, folder: Path) -> Iterator[Runner]:
+    """Execute tasks in this process, or in several of their own.
+
+    Raises
+    ------
+    ParameterError
+        The package that runs them is not installed.
+    """
+    if workers == 1:
+        yield InTurn()
+        return
+    try:
+        from ..cluster.runner import DaskRunner
+        from ..cluster.workers import connect
+    except ImportError as error:
+        raise ParameterError(
+            "--workers needs the package distributed: in a clone, run pip install .[cluster]."
+        ) from error
+    with connect(None, workers) as client:
+        yield DaskRunner(client, folder / "tasks")
 
 
 class Console(Progress):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -40,6 +41,11 @@ class Pieces:
     def middle(self) -> np.ndarray:
         """Points midway between the ends, (n, 3)."""
         return 0.5 * (self.start + self.end)
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """Middles in plan, for searches."""
+        return cKDTree(self.middle[:, :2])
 
     @property
     def left(self) -> np.ndarray:
@@ -85,8 +91,9 @@ def nearest(places: np.ndarray, pieces: Pieces) -> tuple[np.ndarray, np.ndarray]
         Piece of each point.
     """
     count = min(CANDIDATES, len(pieces.start))
-    _, candidates = cKDTree(pieces.middle[:, :2]).query(places[:, :2], k=np.arange(1, count + 1))
-    start, step = pieces.start[candidates], (pieces.end - pieces.start)[candidates]
+    _, candidates = pieces.tree.query(places[:, :2], k=np.arange(1, count + 1))
+    start = pieces.start[candidates]
+    step = pieces.end[candidates] - start
     ahead = np.sum((places[:, None, :2] - start[..., :2]) * step[..., :2], axis=2)
     share = np.clip(ahead / np.sum(step[..., :2] ** 2, axis=2), 0, 1)
     feet = start + share[..., None] * step

@@ -39,6 +39,9 @@ LEAST_SIGMA_M = 0.001
 NORMAL = 1.4826
 """Standard deviation of normally distributed values divided by the median of their absolute values."""
 
+STATIONS_AT_ONCE = 1_000
+"""Stations compared between two checks for cancellation."""
+
 MIN_PAIRED_M = 5.0
 """Shortest length of parallel rails that shows their distance."""
 
@@ -211,7 +214,7 @@ def compare_surveys(
     pieces = own, others
     gauges = _Gauges.of(reference, other, pieces)
     lines = [
-        _compare(line, number, pieces, other, gauges, settings)
+        _compare(line, number, pieces, other, gauges, settings, progress)
         for number, line in enumerate(progress.span(0, 0.8).follow(reference.lines))
     ]
     every = [np.concatenate([getattr(one, name) for one in lines]) for name in ("across_mm", "height_mm", "left")]
@@ -222,7 +225,8 @@ def compare_surveys(
     estimated = any(map(_is_estimated, lines, ours_m))
     lines = [_judged(*one, scatter_m, settings.ignore_shift) for one in zip(lines, ours_m)]
     extra = [
-        _extra(line, number, pieces, settings) for number, line in enumerate(progress.span(0.8, 1).follow(other.lines))
+        _extra(line, number, pieces, settings, progress)
+        for number, line in enumerate(progress.span(0.8, 1).follow(other.lines))
     ]
     return TrackComparison((*lines, *filter(None, extra)), shift, scatter_m[0] if estimated else np.nan)
 
@@ -233,6 +237,13 @@ def _stations(line: np.ndarray, step_m: float) -> tuple[np.ndarray, np.ndarray, 
     t = np.append(np.arange(max(round(along[-1] / step_m), 1)) * step_m, along[-1])
     normals = interpolate(left_normals(line), along, t)
     return t, interpolate(line, along, t), normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def _parts(count: int, progress: Progress) -> Iterator[slice]:
+    """Yield the stations in parts; before each, check for cancellation."""
+    for start in range(0, count, STATIONS_AT_ONCE):
+        progress.check()
+        yield slice(start, start + STATIONS_AT_ONCE)
 
 
 def _paired(
@@ -260,15 +271,19 @@ def _compare(
     other: Survey,
     gauges: _Gauges,
     settings: ComparisonParameters,
+    progress: Progress,
 ) -> LineDifferences:
     """Compare one line of the reference; standard errors are those of the other survey's lines as yet."""
     t, places, left = _stations(line.xyz, settings.step_m)
-    feet, found = _paired(places, left, number, pieces, settings.reach_m)
-    step = feet - places
+    parts = []
+    for part in _parts(len(t), progress):
+        feet, found = _paired(places[part], left[part], number, pieces, settings.reach_m)
+        step = feet - places[part]
+        parts.append((step, found, *gauges.differences(line, places[part, :2], left[part], step[:, :2])))
+    step, found, gauge_m, cant_m = (np.concatenate(column) for column in zip(*parts))
     ids, errors_m = np.full(len(t), None, dtype=object), np.full((len(t), 2), np.nan)
     for one in set(found[found >= 0].tolist()):
         ids[found == one], errors_m[found == one] = other.lines[one].number, other.errors_of(other.lines[one])
-    gauge_m, cant_m = gauges.differences(line, places[:, :2], left, step[:, :2])
     unknown = np.full(len(t), np.nan)
     return LineDifferences(
         line_id=line.number,
@@ -327,11 +342,13 @@ def _is_estimated(line: LineDifferences, ours_m: tuple[float, float]) -> bool:
 
 
 def _extra(
-    line: SurveyedLine, number: int, pieces: tuple[Pieces, Pieces], settings: ComparisonParameters
+    line: SurveyedLine, number: int, pieces: tuple[Pieces, Pieces], settings: ComparisonParameters, progress: Progress
 ) -> LineDifferences | None:
     """Return the stations of a line of the other survey that the reference does not have; None if it has all."""
     t, places, left = _stations(line.xyz, settings.step_m)
-    _, found = _paired(places, left, number, pieces[::-1], settings.reach_m)
+    turned = pieces[1], pieces[0]
+    parts = _parts(len(t), progress)
+    found = np.concatenate([_paired(places[p], left[p], number, turned, settings.reach_m)[1] for p in parts])
     if (found >= 0).all():
         return None
     unknown, alone = np.full(len(t), np.nan), found < 0

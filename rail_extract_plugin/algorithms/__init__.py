@@ -1,5 +1,6 @@
 """The algorithms of the toolbox, one module each."""
 
+from .airborne_centerlines import AirborneCenterlines
 from .build_track_centerlines import BuildTrackCenterlines
 from .check_installation import CheckInstallation
 from .classify_rail_points import ClassifyRailPoints
@@ -21,6 +22,7 @@ ALGORITHMS = (
     ExtractRails,
     ClassifyRailPoints,
     GrowRailPoints,
+    AirborneCenterlines,
     RasterizeRailPoints,
     FrpdfCleanup,
     VectorizeRails,

@@ -53,6 +53,7 @@ class ExportAlignment(RailAlgorithm):
     NEEDS = (("numpy",), ("scipy",), ("pyproj",))
     SUMMARY = "Writes the elements of tracks as LandXML, IFC or DXF for design software."
     PICTURE = "alignment.svg"
+    GUIDE = "alignment_files"
     HELP = (
         "Takes the element table of Fit Alignment or Import Alignment. The name of the file decides the format:\n\n"
         ".xml: LandXML 1.2 with plan, profile, cant and station equations. Points are written northing first.\n\n"

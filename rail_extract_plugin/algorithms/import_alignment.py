@@ -52,6 +52,7 @@ class ImportAlignment(RailAlgorithm):
     NEEDS = (("numpy",), ("scipy",), ("pyproj",))
     SUMMARY = "Reads the alignments of a LandXML file as an element table and as axes with kilometres."
     PICTURE = "alignment.svg"
+    GUIDE = "alignment_files"
     HELP = (
         "Reads lines, arcs and clothoids, profiles with circles or parabolas, cant and station equations. Other "
         "transition curves are refused.\n\n"

@@ -16,6 +16,7 @@ from qgis.core import (
 )
 
 from ...core.alignment.km_text import HECTOMETRES, NOTATIONS
+from ...core.parameters import AIRBORNE_CLASSES
 from ...core.standards import RAIL_CLASS
 from ..i18n import tr
 from .cloud_parameter import CloudParameter
@@ -70,6 +71,37 @@ def guide() -> QgsProcessingParameterDefinition:
         tr(
             "Lines along the tracks, from a map such as OpenStreetMap or drawn by hand. Rails are searched near them "
             "only. Lines in another coordinate system are transformed."
+        ),
+    )
+
+
+def airborne_cloud() -> Definitions:
+    """Define the parameters for an airborne cloud."""
+    return (
+        helped(
+            CloudParameter("INPUT", tr("Airborne point cloud (layer, file or folder)")),
+            tr(
+                "A loaded point cloud layer, or the path of a LAS, LAZ or COPC file, of a folder of such files, or of "
+                "a virtual point cloud (.vpc). Only the points along the guides are used."
+            ),
+        ),
+        helped(
+            QgsProcessingParameterString(
+                "CLASSES", tr("Classes"), defaultValue=",".join(map(str, AIRBORNE_CLASSES)), optional=True
+            ),
+            tr("Classes of the points to use: by default unclassified and ground. Empty uses all but noise."),
+        ),
+    )
+
+
+def tracks_meant() -> QgsProcessingParameterDefinition:
+    """Define the lines that say which tracks are meant."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return helped(
+        QgsProcessingParameterFeatureSource("GUIDE", tr("Guide"), [line]),
+        tr(
+            "One line for each track of the railway, such as railway=rail of OpenStreetMap, up to 3 m off. Give every "
+            "track of a line its guide: they are fitted together. The fields name, ref and gauge are used."
         ),
     )
 

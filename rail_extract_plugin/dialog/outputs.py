@@ -52,6 +52,37 @@ def _layer(name: str, label: str, kind: QgsProcessing.SourceType, optional: bool
     return made
 
 
+def airborne_centerlines() -> QgsProcessingParameterDefinition:
+    """Define the layer of tracks seen in an airborne cloud."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return helped(
+        _layer("CENTERLINES", tr("Track centerlines"), line, optional=True),
+        tr("Lines in the middle of the tracks at the top of the rails, where they are seen, with standard errors."),
+    )
+
+
+def airborne_stations() -> QgsProcessingParameterDefinition:
+    """Define the layer of stations along guides."""
+    point = QgsProcessing.SourceType.TypeVectorPoint
+    return helped(
+        _layer("STATIONS", tr("Stations"), point, optional=True),
+        tr(
+            "A point every 10 m along each guide: whether the track is seen, or why not; bed, cant, radius, gradient "
+            "and standard errors."
+        ),
+    )
+
+
+def airborne_figures() -> Numbers:
+    """Define the figures about tracks seen in an airborne cloud."""
+    return (
+        *centerline_figures(),
+        QgsProcessingOutputNumber("GUIDE_LENGTH", tr("Length of the guides [m]")),
+        QgsProcessingOutputNumber("SEEN_LENGTH", tr("Length on which tracks are seen [m]")),
+        QgsProcessingOutputNumber("DENSITY", tr("Points per square metre along the guides")),
+    )
+
+
 def differences() -> QgsProcessingParameterDefinition:
     """Define the layer of differences between two surveys."""
     point = QgsProcessing.SourceType.TypeVectorPoint
@@ -210,7 +241,7 @@ def weights() -> QgsProcessingParameterDefinition:
     return helped(
         QgsProcessingParameterFileDestination("WEIGHTS", tr("Weights of the classifier"), tr("Weights (*.npz)")),
         tr(
-            "The classifier, for METHOD LEARNED. Until the training is complete, a folder next to it keeps what was "
+            "The trained classifier. Until the training is complete, a folder next to it keeps what was "
             "learned, and a run with the same name continues."
         ),
     )
@@ -262,7 +293,7 @@ def quality_figures() -> Numbers:
     """Define the figures about the measured track geometry."""
     return (
         QgsProcessingOutputNumber("STATION_COUNT", tr("Number of measured stations")),
-        QgsProcessingOutputNumber("SIGMA", tr("Standard error of the centerlines [mm]")),
+        QgsProcessingOutputNumber("SIGMA", tr("Standard error of the centerlines, root mean square [mm]")),
         QgsProcessingOutputNumber("BRIDGED_LENGTH", tr("Length of track where a rail has no points [m]")),
     )
 

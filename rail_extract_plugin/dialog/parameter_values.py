@@ -18,7 +18,7 @@ from qgis.core import (
 )
 
 from ...core.errors import ParameterError, RailExtractError, RasterError
-from ...core.parameters import GrowParameters, Parameters
+from ...core.parameters import AirborneParameters, GrowParameters, Parameters
 from ...core.standards import (
     CUSTOM,
     DEFAULT,
@@ -36,6 +36,7 @@ from ..systems import prepare_system, system
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.airborne.survey import Guide
     from ...core.clouds.mask import Mask
     from ...core.raster_file import RasterHeader
     from ..reading.axes import PlacedAxes
@@ -67,6 +68,9 @@ GROWTH = {
     "MAX_LENGTH": "max_length_m",
 }
 """The same for `GrowParameters`; TOLERANCE_Z has another default there."""
+
+AIRBORNE = {"REACH": "reach_m", "FOOTPRINT": "footprint_m", "RAIL_HEIGHT": "rail_height_m"}
+"""The same for `AirborneParameters`."""
 
 TYPES_WITHOUT_LINES = (
     QgsWkbTypes.GeometryType.PointGeometry,
@@ -175,6 +179,23 @@ class ParameterValues:
                 raise ParameterError("ONLY_GUIDED needs lines to compare tracks with: choose GUIDE.")
             return ()
         return read_guide(self._line_source("GUIDE"), system(checked_crs(cloud)), self._context)
+
+    def tracks_meant(self, cloud: CloudSource) -> tuple[Guide, ...]:
+        """Read the lines of GUIDE with what the layer states of them.
+
+        Raises
+        ------
+        RailExtractError
+            The layer has no lines, or they can't be transformed.
+        """
+        from ..reading.line_layers import read_tracks_meant
+
+        return read_tracks_meant(self._line_source("GUIDE"), system(checked_crs(cloud)), self._context)
+
+    def airborne(self, standard: RailStandard) -> AirborneParameters:
+        """Read how tracks are looked for in an airborne cloud."""
+        lengths = {field: self.number(name) for name, field in AIRBORNE.items()}
+        return AirborneParameters(standard.gauge_m, standard.head_width_m, **lengths)
 
     def has_axis(self) -> bool:
         """Return whether AXIS is filled in.

@@ -25,6 +25,7 @@ from qgis.core import (
     QgsWkbTypes,
 )
 
+from ...core.airborne.survey import Guide, gauge_of
 from ...core.clouds.crs import MAX_COORDINATE, parse_crs, units, warn_of_scale
 from ...core.clouds.mask import Mask
 from ...core.comparison.tracks import SurveyedLine
@@ -144,6 +145,33 @@ def read_guide(
     if not lines:
         raise RailExtractError("GUIDE has no lines: give a line layer.")
     return lines
+
+
+def read_tracks_meant(
+    source: QgsProcessingFeatureSource, crs: QgsCoordinateReferenceSystem, context: QgsProcessingContext
+) -> tuple[Guide, ...]:
+    """Read the lines of a guide in the coordinate system of the cloud, with the name, reference and gauge of each.
+
+    Parameters
+    ----------
+    source, crs, context
+        See `read_guide`.
+    """
+    shapes = _transformed(source, crs, context, "GUIDE")
+    features = source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS)
+    guides = tuple(
+        Guide(
+            feature.id(),
+            vertices[:, :2],
+            gauge_of(value_of(feature, "gauge")),
+            *(str(value_of(feature, name) or "") for name in ("name", "ref")),
+        )
+        for feature, shape in zip(features, shapes)
+        for vertices in _parts(shape, CHORD_TOLERANCE_M)
+    )
+    if not guides:
+        raise RailExtractError("GUIDE has no lines: give a line layer.")
+    return guides
 
 
 def read_seeds(
@@ -349,7 +377,7 @@ def _parts(geometry: QgsGeometry, chord: float) -> Iterator[np.ndarray]:
 def _rail(feature: QgsFeature, xyz: np.ndarray, default_class: int) -> RailLine:
     defaults = {"rail_id": feature.id(), "class_code": default_class}
     values = _attributes(feature, RailLine, RAIL_FIELDS, defaults)
-    return RailLine(xyz, **{**values, "gaps": _gaps(feature, xyz)})
+    return RailLine(xyz, **{**values, "gaps": gaps_of(feature, xyz)})
 
 
 def _surveyed(feature: QgsFeature, xyz: np.ndarray, id_field: str) -> SurveyedLine:
@@ -415,7 +443,7 @@ def _ids(feature: QgsFeature, name: str) -> tuple[int, ...]:
     return ids if max(ids) <= MAX_WHOLE else ()
 
 
-def _gaps(feature: QgsFeature, xyz: np.ndarray) -> np.ndarray:
+def gaps_of(feature: QgsFeature, xyz: np.ndarray) -> np.ndarray:
     """Return the sections in the field `gaps`, (k, 2) metres; none if the field does not hold those of this line."""
     words = str(value_of(feature, "gaps") or "").split(",")
     try:

@@ -28,6 +28,8 @@ from qgis.core import (
 from ...core.disk import Destination
 from ...core.errors import RailExtractError
 from ...core.fields import (
+    AIRBORNE_FIELDS,
+    AIRBORNE_STATION_FIELDS,
     AXIS_FIELDS,
     BRIDGED,
     CENTERLINE_FIELDS,
@@ -55,6 +57,7 @@ from .whole_files import write_whole
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.airborne.survey import AirborneLine, AirborneTrack
     from ...core.alignment.deviations import Deviations
     from ...core.alignment.elements import Alignment
     from ...core.alignment.fit import Fit
@@ -66,7 +69,7 @@ if TYPE_CHECKING:
     from ...core.raster_file import RasterHeader
     from ...core.report import Finding
 
-    Line = Union[RailLine, Centerline, Finding]
+    Line = Union[RailLine, Centerline, Finding, AirborneLine]
 
 KINDS = {int: INTEGER, float: REAL, str: TEXT}
 
@@ -82,6 +85,7 @@ class LayerKind:
 RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELDS, "centerlines")
 QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
 STOPS = LayerKind(STOP_FIELDS, "stops")
+AIRBORNE, STATIONS = LayerKind(AIRBORNE_FIELDS, "airborne"), LayerKind(AIRBORNE_STATION_FIELDS, "stations")
 DIFFERENCES = LayerKind(DIFFERENCE_FIELDS, "differences")
 ELEMENTS, AXES = LayerKind(ELEMENT_FIELDS, "elements"), LayerKind(AXIS_FIELDS, "axes")
 DEVIATIONS = LayerKind(DEVIATION_FIELDS, "deviations")
@@ -145,7 +149,7 @@ def copies(originals: Sequence[QgsFeature], columns: QgsFields, rows: Sequence[S
         yield feature
 
 
-def is_flat(lines: Sequence[Line | TrackGeometry | LineDifferences]) -> bool:
+def is_flat(lines: Sequence[Line | TrackGeometry | LineDifferences] | Sequence[AirborneTrack]) -> bool:
     """Return whether there are lines, and none has heights."""
     return bool(lines) and all(any(map(math.isnan, line.xyz[:, 2])) for line in lines)
 
@@ -221,6 +225,35 @@ def write_stations(
     shape = QgsWkbTypes.Type.Point if is_flat(tracks) else QgsWkbTypes.Type.PointZ
     made = stations(tracks, frame)
     return _write(algorithm, name, quality_of(tracks), shape, made, frame, parameters, context)
+
+
+def write_airborne_stations(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    tracks: Sequence[AirborneTrack],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write the stations along guides as points.
+
+    Parameters
+    ----------
+    tracks : sequence of AirborneTrack
+    algorithm, name, frame, parameters, context
+        See `write_lines`.
+    """
+    shape = QgsWkbTypes.Type.Point if is_flat(tracks) else QgsWkbTypes.Type.PointZ
+    return _write(algorithm, name, STATIONS, shape, _airborne_stations(tracks, frame), frame, parameters, context)
+
+
+def _airborne_stations(tracks: Sequence[AirborneTrack], frame: LocalFrame) -> Iterator[QgsFeature]:
+    for track in tracks:
+        profiles = (getattr(track, column.name) for column in STATIONS.columns[2:])
+        ids = [number or None for number in track.track_id.tolist()]
+        for (x, y, z), *row in zip(frame.to_crs(track.xyz).tolist(), ids, repeat(track.guide_id), *profiles):
+            place = QgsPoint(x, y) if math.isnan(z) else QgsPoint(x, y, z)
+            yield _feature(QgsGeometry(place), row, STATIONS.columns)
 
 
 def write_stops(
@@ -396,7 +429,7 @@ def write_raster(
     return {name: path}
 
 
-def figures_of(lines: Sequence[RailLine | Centerline], what: str) -> dict[str, Any]:
+def figures_of(lines: Sequence[RailLine | Centerline] | Sequence[AirborneLine], what: str) -> dict[str, Any]:
     """Return the number and length of lines as outputs: RAIL_COUNT and RAIL_LENGTH if `what` is RAIL."""
     return {f"{what}_COUNT": len(lines), f"{what}_LENGTH": LENGTH.value(sum(line.length_m for line in lines))}
 
@@ -440,11 +473,14 @@ def _write(
     destination = algorithm.destinations.get(name)
     if destination is not None and destination.file.suffix.lower() in EXCHANGED:
         return _exchange(algorithm, name, kind, shape, made, frame, parameters, context)
-    columns, crs = fields(kind.columns), output_crs(frame.crs_wkt)
+    value = parameters.get(name)
+    # QGIS complains of the system that stands for an unknown one as soon as a layer is in the project.
+    is_shown = destination is None and bool(getattr(value, "destinationProject", None))
+    columns, crs = fields(kind.columns), system(frame.crs_wkt) if is_shown else output_crs(frame.crs_wkt)
     layer_id = _layer(algorithm, name, columns, shape, made, crs, lost_part(frame.crs_wkt), parameters, context)
     if not layer_id:
         return {}
-    _style(algorithm, name, layer_id, kind.style, context)
+    _style(algorithm, name, layer_id, kind.style, context, has_system=frame.crs_wkt is not None)
     return {name: layer_id}
 
 
@@ -553,11 +589,16 @@ def _plain(values: Sequence[Any]) -> list[Any]:
 
 
 def _style(
-    algorithm: QgsProcessingAlgorithm, name: str, layer_id: str, style: str, context: QgsProcessingContext
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    layer_id: str,
+    style: str,
+    context: QgsProcessingContext,
+    has_system: bool = True,
 ) -> None:
     """Apply a style to an output when QGIS loads it, and name it by the cloud of the run."""
     title = algorithm.parameterDefinition(name).description()
-    style_on_load(layer_id, style, context, algorithm.layer_properties, title)
+    style_on_load(layer_id, style, context, algorithm.layer_properties, title, has_system)
 
 
 def _feature(geometry: QgsGeometry, values: Sequence[Any], columns: Sequence[Field]) -> QgsFeature:

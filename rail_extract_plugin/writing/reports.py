@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from html import escape
 from pathlib import Path
@@ -51,10 +51,29 @@ def write_report(
     RailExtractError
         The file cannot be written.
     """
+    return write_shown(algorithm, name, lambda: origin.report(network), parameters, context)
+
+
+def write_shown(
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    build: Callable[[], str],
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, str]:
+    """Write a report that is built only if the user wants it, and have QGIS show it; see `write_report`.
+
+    Parameters
+    ----------
+    build : callable
+        Returns the page.
+    algorithm, name, parameters, context
+        See `write_report`.
+    """
     path = algorithm.parameterAsFileOutput(parameters, name, context)
     if not path:
         return {}
-    written = write_page(algorithm, name, path, origin.report(network))
+    written = write_page(algorithm, name, path, build())
     notices.report_written.emit(path)
     return written
 

@@ -150,7 +150,7 @@
   </renderer-v2>
   <labeling type="simple">
     <settings calloutType="simple">
-      <text-style fieldName="CASE WHEN &quot;layout&quot; = &#x27;H&#x27; THEN CASE &quot;type&quot; WHEN &#x27;arc&#x27; THEN &#x27;R &#x27; || format_number(&quot;r1_m&quot;, 0) || &#x27;, &#x27; WHEN &#x27;clothoid&#x27; THEN &#x27;A &#x27; || format_number(&quot;a_param&quot;, 0) || &#x27;, &#x27; ELSE &#x27;&#x27; END || format_number(&quot;length_m&quot;, 1) || &#x27; m&#x27; END" isExpression="1" fontSize="8" fontSizeUnit="Point" textColor="29,39,51,255" textOpacity="1">
+      <text-style fieldName="CASE WHEN &quot;type&quot; = &#x27;line&#x27; THEN format_number(&quot;length_m&quot;, 1) || &#x27; m&#x27; WHEN &quot;type&quot; = &#x27;arc&#x27; THEN &#x27;R &#x27; || format_number(&quot;r1_m&quot;, 0) || &#x27;, &#x27; || format_number(&quot;length_m&quot;, 1) || &#x27; m&#x27; WHEN &quot;type&quot; = &#x27;clothoid&#x27; THEN &#x27;A &#x27; || format_number(&quot;a_param&quot;, 0) || &#x27;, &#x27; || format_number(&quot;length_m&quot;, 1) || &#x27; m&#x27; END" isExpression="1" fontSize="8" fontSizeUnit="Point" textColor="29,39,51,255" textOpacity="1">
         <text-buffer bufferDraw="1" bufferSize="0.8" bufferSizeUnits="MM" bufferColor="255,255,255,255" bufferOpacity="1"/>
       </text-style>
       <placement placement="2" placementFlags="10" dist="1" distUnits="MM" priority="5"/>
@@ -189,7 +189,7 @@
     <alias field="r_round_m" index="28" name="Round radius proposed [m]"/>
     <alias field="dev_rms_round_mm" index="29" name="Deviation with round radii, RMS [mm]"/>
   </aliases>
-  <mapTip>&lt;b&gt;Track [% &quot;track_id&quot; %], [% &quot;type&quot; %] [% &quot;no&quot; %]&lt;/b&gt;&lt;br&gt;Length: [% format_number(&quot;length_m&quot;, 2) || &#x27; m&#x27; %]&lt;br&gt;[% CASE &quot;layout&quot; WHEN &#x27;H&#x27; THEN &#x27;Radius: &#x27; || coalesce(format_number(&quot;r1_m&quot;, 1), &#x27;straight&#x27;) || &#x27; to &#x27; || coalesce(format_number(&quot;r2_m&quot;, 1), &#x27;straight&#x27;) WHEN &#x27;V&#x27; THEN &#x27;Gradient: &#x27; || format_number(&quot;grade1_pm&quot;, 2) || &#x27; to &#x27; || format_number(&quot;grade2_pm&quot;, 2) || &#x27; ‰&#x27; ELSE &#x27;Cant: &#x27; || format_number(&quot;cant1_mm&quot;, 0) || &#x27; to &#x27; || format_number(&quot;cant2_mm&quot;, 0) || &#x27; mm&#x27; END %]&lt;br&gt;Deviation, RMS: [% coalesce(format_number(&quot;dev_rms_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]</mapTip>
+  <mapTip>&lt;b&gt;Track [% &quot;track_id&quot; %], [% &quot;type&quot; %] [% &quot;no&quot; %]&lt;/b&gt;&lt;br&gt;Length: [% format_number(&quot;length_m&quot;, 2) || &#x27; m&#x27; %]&lt;br&gt;[% CASE WHEN &quot;layout&quot; = &#x27;H&#x27; THEN &#x27;Radius: &#x27; || coalesce(format_number(&quot;r1_m&quot;, 1), &#x27;straight&#x27;) || &#x27; to &#x27; || coalesce(format_number(&quot;r2_m&quot;, 1), &#x27;straight&#x27;) WHEN &quot;layout&quot; = &#x27;V&#x27; THEN &#x27;Gradient: &#x27; || format_number(&quot;grade1_pm&quot;, 2) || &#x27; to &#x27; || format_number(&quot;grade2_pm&quot;, 2) || &#x27; ‰&#x27; ELSE &#x27;Cant: &#x27; || format_number(&quot;cant1_mm&quot;, 0) || &#x27; to &#x27; || format_number(&quot;cant2_mm&quot;, 0) || &#x27; mm&#x27; END %]&lt;br&gt;Deviation, RMS: [% coalesce(format_number(&quot;dev_rms_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>
   <layerGeometryType>1</layerGeometryType>
 </qgis>

@@ -234,6 +234,13 @@
     <alias field="strips" index="10" name="Strips"/>
     <alias field="strip_mm" index="11" name="Distance of the strips [mm]"/>
     <alias field="sigmaz_mm" index="12" name="Standard error of the height [mm]"/>
+    <alias field="axis" index="13" name="Axis"/>
+    <alias field="piece" index="14" name="Section between jumps"/>
+    <alias field="km" index="15" name="Kilometre"/>
+    <alias field="km_text" index="16" name="Kilometre as text"/>
+    <alias field="offset_m" index="17" name="Offset from the axis [m]"/>
+    <alias field="side" index="18" name="Side of the axis"/>
+    <alias field="ambiguous" index="19" name="Kilometre ambiguous"/>
   </aliases>
   <mapTip>&lt;b&gt;Track [% &quot;track_id&quot; %], [% coalesce(format_number(&quot;chainage_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;/b&gt;&lt;br&gt;Gauge: [% coalesce(format_number(&quot;gauge_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Cant: [% coalesce(format_number(&quot;cant_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Twist: [% coalesce(format_number(&quot;twist_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Standard error: [% coalesce(format_number(&quot;sigma_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import sys
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -11,6 +13,8 @@ from driver import Driver, algorithm, choose, close, install, later, open_batch,
 from qgis.core import (
     QgsApplication,
     QgsCoordinateReferenceSystem,
+    QgsFeature,
+    QgsGeometry,
     QgsPointCloudLayer,
     QgsPointXY,
     QgsProject,
@@ -32,15 +36,20 @@ from qgis.PyQt.QtWidgets import (
     QGroupBox,
     QLineEdit,
     QMenu,
+    QPushButton,
+    QTextBrowser,
     QTextEdit,
     QWidget,
 )
 from qgis.utils import iface, loadPlugin, plugins, reloadPlugin, startPlugin, unloadPlugin
 
+RAW = os.environ["RAIL_EXTRACT_RAW"]
 SAMPLE, ARCHIVE = os.environ["RAIL_EXTRACT_SAMPLE"], os.environ["RAIL_EXTRACT_ZIP"]
+TRUTH = Path(SAMPLE).with_name("sample_truth.geojson")
 
 NAMES = (
-    *("extractrails", "classifyrailpoints", "growrailpoints", "rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
+    *("extractrails", "classifyrailpoints", "growrailpoints", "airbornecenterlines"),
+    *("rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
     *("buildtrackcenterlines", "measuretrackgeometry", "trainrailclassifier", "installpackages", "checkinstallation"),
 )
 
@@ -237,6 +246,78 @@ def unload(driver: Driver) -> Iterator:
     yield from close(dialog)
 
 
+def raw(driver: Driver) -> Iterator:
+    """Run on a raw cloud without its tick, take the step that is offered, and save all that was found."""
+    yield from install(ARCHIVE)
+    dialog = yield from open_dialog("extractrails")
+    driver.keep("standard at first", dialog.mainWidget().wrappers["STANDARD"].widget.currentText())
+    dialog.setParameters({"INPUT": RAW, "ITERATIONS": 1})
+    log = dialog.findChild(QTextEdit, "txtLog")
+    driver.keep("refusal", (yield from press_run(dialog)))
+    driver.picture("raw_refused")
+    (offer,) = (one for one in dialog.messageBar().findChildren(QPushButton) if "raw cloud" in one.text())
+    driver.keep("offer", offer.text())
+    offer.click()
+    button = dialog.buttonBox().button(QDialogButtonBox.StandardButton.Ok)
+    yield lambda: not button.isEnabled()
+    yield button.isEnabled
+    yield 1.0
+    driver.keep("log", log.toPlainText())
+    driver.picture("raw_found")
+    layers = [one for one in QgsProject.instance().mapLayers().values() if isinstance(one, QgsVectorLayer)]
+    driver.keep("systems", {layer.name(): layer.crs().toWkt() for layer in layers})
+    driver.keep("bars", [item.text() for item in iface.messageBar().items()])
+    yield from _save_all(driver, log)
+    yield from close(dialog)
+
+
+def _save_all(driver: Driver, log: QTextEdit) -> Iterator:
+    """Follow the link that saves all layers, and open the project that is in the file."""
+    address = re.search('<a href="(railextract:[0-9]+)"[^>]*>(?:<[^>]*>)*Save all layers', log.toHtml())[1]
+    later(partial(QDesktopServices.openUrl, QUrl(address)))
+    chooser = yield lambda: window("QFileDialog")
+    path = str(driver.folder / "all of it.gpkg")
+    chooser.findChild(QLineEdit, "fileNameEdit").setText(path)
+    later(chooser.findChild(QDialogButtonBox).button(QDialogButtonBox.StandardButton.Save).click)
+    yield lambda: Path(path).exists()
+    yield 1.0
+    driver.picture("saved")
+    QgsProject.instance().clear()
+    driver.keep("project is read", QgsProject.instance().read(f"geopackage:{path}?projectName=Rail Extract"))
+    layers = [node.layer() for node in QgsProject.instance().layerTreeRoot().findLayers()]
+    driver.keep("saved layers", [layer.name().partition(":")[0] for layer in layers])
+    driver.keep("saved sources", sorted({Path(layer.source().partition("|")[0]).name for layer in layers}))
+    rails = next(layer for layer in layers if layer.name().startswith("Rails"))
+    driver.keep("saved alias", rails.attributeAlias(rails.fields().lookupField("sigma_mm")))
+    yield 1.0
+    driver.picture("saved_project")
+
+
+def missing(driver: Driver) -> Iterator:
+    """Open an algorithm whose packages are missing, and follow the link of its message."""
+    yield from install(ARCHIVE)
+    kind = type(algorithm("trainrailclassifier"))
+    kind.NEEDS = (("torch_of_nobody",),)
+    packages = sys.modules["rail_extract.rail_extract_plugin.setup.dependencies"]
+    packages.PACKAGES = (packages.Package("torch_of_nobody", "torch"),)
+    packages.OPTIONAL = sys.modules["rail_extract.rail_extract_plugin.runs.missing"].OPTIONAL = ("torch_of_nobody",)
+    later(choose("trainrailclassifier").executeAlgorithm)
+    message = yield lambda: window("MessageDialog")
+    yield 0.5
+    driver.picture("missing")
+    text = message.findChild(QTextBrowser)
+    driver.keep("message", text.toPlainText())
+    address = re.search('<a href="(railextract:[0-9]+)"', text.toHtml())[1]
+    later(partial(text.anchorClicked.emit, QUrl(address)))
+    dialog = yield lambda: window("AlgorithmDialog")
+    yield 0.5
+    driver.keep("opened", dialog.algorithm().name())
+    driver.keep("PyTorch", dialog.mainWidget().wrappers["TORCH"].value())
+    driver.keep("message is closed", window("MessageDialog") is None)
+    driver.picture("missing_install")
+    yield from close(dialog)
+
+
 def rails(driver: Driver) -> Iterator:
     """Extract the sample's rails, wait, save them, and go on working with them."""
     yield from install(ARCHIVE)
@@ -289,6 +370,15 @@ def review(driver: Driver) -> Iterator:
     driver.keep("dock is visible", dock.isVisible())
     yield lambda: not dock.is_reading
     driver.keep("count", dock.count.text())
+    texts = []
+    for number in range(int(dock.count.text().split()[2].rstrip(";"))):
+        dock.go(number)
+        texts.append((dock.reason.text(), dock.text.text()))
+        if "no points" in dock.reason.text() and "rail without" in dock.text.text():
+            yield 0.5
+            driver.picture(f"review_missing_{number}")
+    driver.keep("texts", texts)
+    dock.go(0)
     dock.buttons["next"].click()
     yield 1.0
     driver.picture("review_next")
@@ -388,6 +478,53 @@ def deliveries(driver: Driver) -> Iterator:
     yield from close(dialog)
     driver.keep("opened", browser.urls)
     driver.picture("measured")
+
+
+def alignments(driver: Driver) -> Iterator:
+    """Give the sample's true rails kilometres, compare them with moved copies of themselves, and save both."""
+    yield from install(ARCHIVE)
+    truth = QgsVectorLayer(f"{TRUTH}|subset=kind = 'rail'", "truth", "ogr")
+    later_survey = QgsVectorLayer("LineStringZ?crs=EPSG:32643", "later", "memory")
+    for feature in truth.getFeatures():
+        shape = feature.geometry()
+        shape.translate(0.0, 0.05, 0.01)
+        feature.setGeometry(shape)
+        feature.setFields(later_survey.fields(), True)
+        later_survey.dataProvider().addFeature(feature)
+    box = truth.extent()
+    axis = QgsVectorLayer("LineString?crs=EPSG:32643", "axis", "memory")
+    line = QgsFeature()
+    ends = QgsPointXY(box.xMinimum() - 20, box.yMinimum()), QgsPointXY(box.xMaximum() + 20, box.yMinimum())
+    line.setGeometry(QgsGeometry.fromPolylineXY(ends))
+    axis.dataProvider().addFeature(line)
+    QgsProject.instance().addMapLayers([truth, later_survey, axis])
+    dialog = yield from open_dialog("stationalongaxis")
+    saved = str(driver.folder / "stationed.gpkg")
+    dialog.setParameters({"INPUT": truth.id(), "AXIS": axis.id(), "START_KM": 7.5, "OUTPUT": saved})
+    driver.picture("station_dialog")
+    driver.keep("station log", (yield from press_run(dialog)))
+    yield from close(dialog)
+    found = QgsVectorLayer(saved, "stationed", "ogr")
+    rows = [(one["km"], one["offset_m"], one.geometry().vertexAt(0).x()) for one in found.getFeatures()]
+    driver.keep("kilometres", {"rows": rows, "start": ends[0].x(), "south": ends[0].y()})
+    dialog = yield from open_dialog("comparetracks")
+    given = {"REFERENCE": truth.id(), "INPUT": later_survey.id(), "REFERENCE_SIGMA": 1, "INPUT_SIGMA": 1}
+    outputs = {"OUTPUT": "TEMPORARY_OUTPUT", "REPORT": str(driver.folder / "comparison.html")}
+    dialog.setParameters({**given, "IGNORE_SHIFT": False, **outputs})
+    driver.picture("compare_dialog")
+    driver.keep("compare log", (yield from press_run(dialog)))
+    driver.keep("compare results", dialog.results())
+    yield from close(dialog)
+    (made,) = QgsProject.instance().mapLayersByName("Differences")
+    iface.mapCanvas().setExtent(made.extent())
+    yield 1.0
+    driver.picture("differences")
+    driver.keep("heights", sorted({one["height_mm"] for one in made.getFeatures()}))
+    driver.keep("legend", [item.label() for item in made.renderer().legendSymbolItems()])
+    saved = str(driver.folder / "differences.gpkg")
+    options = QgsVectorFileWriter.SaveVectorOptions()
+    QgsVectorFileWriter.writeAsVectorFormatV3(made, saved, QgsProject.instance().transformContext(), options)
+    driver.keep("saved", QgsVectorLayer(saved, "again", "ogr").featureCount() - made.featureCount())
 
 
 def batch(driver: Driver) -> Iterator:

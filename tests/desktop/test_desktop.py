@@ -1,18 +1,33 @@
 """What a new user meets in the real QGIS; each test looks at what one of the scenarios found."""
 
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
 from osgeo import gdal, ogr
 
-SCENARIOS = ("dialogs", "wheel", "unload", "rails", "review", "growing", "deliveries", "batch", "model")
+SCENARIOS = (
+    "dialogs",
+    "wheel",
+    "unload",
+    "raw",
+    "missing",
+    "rails",
+    "review",
+    "growing",
+    "deliveries",
+    "alignments",
+    "batch",
+    "model",
+)
 
 DIES_AT_EXIT = ("rails", 340)
 """Scenario and version in which QGIS dies after it was closed, as it also does after two runs of its own algorithms."""
 
 NAMES = [
-    *("extractrails", "classifyrailpoints", "growrailpoints", "rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
+    *("extractrails", "classifyrailpoints", "growrailpoints", "airbornecenterlines"),
+    *("rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
     *("buildtrackcenterlines", "measuretrackgeometry", "trainrailclassifier", "installpackages", "checkinstallation"),
 ]
 
@@ -78,6 +93,51 @@ def test_the_plugin_is_disabled_and_updated_during_a_run(run_scenario):
         assert "Cancelled; nothing was written." in session[f"said when {name}"]
     assert session["without the plugin"]
     assert "Results:" in session["log"]
+
+
+def test_a_raw_cloud_without_the_tick_is_explained_and_its_rails_are_found(run_scenario):
+    session = run_scenario("raw")
+    assert session["standard at first"] == "Detect from the points"
+    refusal = session["refusal"]
+    assert "The cloud has no points of class 10" in refusal
+    assert 'if nobody has classified the cloud, "Find the rail points of a raw cloud"' in refusal
+    assert session["offer"] == "Find the rail points of this raw cloud, and run again"
+    assert f"Next: {session['offer']}" in refusal
+    found = session["log"].rpartition("starting")[2]
+    assert re.search(r"Detected .* head \d\d ± \d mm; fits .*, also ", found)
+    assert "'RAIL_COUNT': 2" in found
+    assert "Review the findings" in found or "0 findings" in found
+
+
+def test_layers_of_a_cloud_without_a_system_have_none(run_scenario):
+    session = run_scenario("raw")
+    assert set(session["systems"].values()) == {""}
+    assert 'choose it as "CRS of a cloud without one"' in session["log"]
+    assert not [text for text in session["bars"] if "Undefined" in text]
+
+
+def test_everything_is_saved_as_one_file_with_a_project(run_scenario):
+    session = run_scenario("raw")
+    assert session["project is read"]
+    assert session["saved layers"] == ["Findings", "Track centerlines", "Rails"]
+    assert session["saved sources"] == ["all of it.gpkg"]
+    assert session["saved alias"] == "Standard error [mm]"
+
+
+def test_missing_pytorch_leads_to_its_installation(run_scenario):
+    session = run_scenario("missing")
+    assert "run Install packages, with PyTorch set to CPU" in session["message"]
+    assert (session["opened"], session["PyTorch"]) == ("installpackages", "CPU")
+    assert session["message is closed"]
+
+
+def test_the_dock_names_the_rail_without_points(run_scenario):
+    longest = run_scenario("review")["texts"][0]
+    assert longest[0] == "A rail has no points"
+    named = (
+        r"Left rail without points from 10\.\d to 12\.\d m\. Right rail without points from 1[56]\.\d to 1[78]\.\d m\. "
+    )
+    assert re.search(named + r"Cross-section at 1\d\.\d m\.$", longest[1])
 
 
 def test_rails_are_found_and_loaded(run_scenario):
@@ -184,6 +244,21 @@ def test_lines_from_files_are_judged(run_scenario):
     dataset = ogr.Open(str(session.folder / "found.gpkg"))
     reasons = {feature["reason"] for feature in dataset.GetLayer(0)}
     assert reasons <= {"a rail has no points", "gauge off by more than 10 mm", "standard error above 5 mm"}
+
+
+def test_kilometres_and_differences_from_their_dialogs(run_scenario):
+    session = run_scenario("alignments")
+    kilometres = session["kilometres"]
+    assert len(kilometres["rows"]) == 6
+    assert all(7.5 < km < 7.8 and offset_m > 0 for km, offset_m, _ in kilometres["rows"])
+    assert "beyond" not in session["station log"]
+    results = session["compare results"]
+    assert results["MISSING_LENGTH"] == results["EXTRA_LENGTH"] == 0
+    assert results["SHIFT_UP"] == pytest.approx(10, abs=0.3)
+    assert all(9 < height < 11 for height in session["heights"])  # the shift is also along the gradient
+    assert session["legend"][0] == "moved by more than three standard errors"
+    assert session["saved"] == 0
+    assert "have moved by more than 3 standard errors" in session["compare log"]
 
 
 def test_batch_writes_what_is_named_and_skips_what_is_blank(run_scenario):

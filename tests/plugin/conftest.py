@@ -213,6 +213,7 @@ OUTPUTS = {
     "extractrails": ("RAILS.gpkg", "CENTERLINES.shp", "QUALITY.gpkg", "FINDINGS.gpkg", "CLEANED.tif"),
     "classifyrailpoints": ("OUTPUT.laz",),
     "growrailpoints": ("OUTPUT.laz",),
+    "airbornecenterlines": ("CENTERLINES.gpkg", "STATIONS.gpkg", "FINDINGS.gpkg"),
     "rasterizerailpoints": ("OUTPUT.tif",),
     "frpdfcleanup": ("OUTPUT.tif",),
     "vectorizerails": ("OUTPUT.gpkg",),

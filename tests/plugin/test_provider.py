@@ -15,6 +15,7 @@ def test_toolbox_offers_the_algorithms(qgis, plugin):
             "extractrails",
             "classifyrailpoints",
             "growrailpoints",
+            "airbornecenterlines",
             "rasterizerailpoints",
             "frpdfcleanup",
             "vectorizerails",

@@ -167,7 +167,7 @@ def test_the_part_that_holds_is_given_and_the_rest_is_said():
     line[440:, 1] += 0.4
     progress = Recording(Progress())
     measured = Track(1, line, NONE, np.zeros(len(line), dtype=bool))
-    found = fit(measured, progress=progress, min_length_m=40.0)
+    found = fit(measured, progress=progress, min_length_m=20.0)
     assert found.alignment.s_to < 450
     assert len(progress.warnings) == 1
     assert "does not hold" in progress.warnings[0]

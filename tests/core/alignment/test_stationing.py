@@ -73,6 +73,13 @@ def test_stated_jumps_lie_between_the_posts_that_they_explain():
     assert km_at(stationing, 299, 301, 350) == [4.399, 4.251, 4.3]
 
 
+def test_a_stated_jump_follows_the_scale_between_its_posts():
+    """The axis is 404 m long where the numbers are 400 m: the jump, 300 m behind the first post, is at 303 m."""
+    stationing = stationing_of(404.0, [0.0, 404.0], [4.1, 4.4], [Jump(4.4, 4.3)])
+    assert stationing.jumps == [(pytest.approx(303), Jump(4.4, 4.3))]
+    assert len(stationing.notices) == 1
+
+
 @pytest.mark.parametrize(
     ("s", "km", "jumps", "says"),
     [

@@ -8,7 +8,9 @@ from rail_extract.core.comparison.crossing import spacing_and_cant
 from rail_extract.core.comparison.pieces import cut, nearest
 from rail_extract.core.comparison.shift import find_shift
 from rail_extract.core.comparison.tracks import Survey, SurveyedLine, compare_surveys
+from rail_extract.core.errors import Cancelled
 from rail_extract.core.parameters import ComparisonParameters
+from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
 
 SPACING_M = 1.507
@@ -168,3 +170,19 @@ def test_nearest_places_and_cross_sections():
     assert lines.number[number].tolist() == [0]
     found = spacing_and_cant(np.array([[3.0, 1.45], [3.0, 2.0]]), np.array([[3.0, 0.0], [3.0, 0.0]]), lines)
     np.testing.assert_allclose(found, [[np.hypot(1.5, 0.02), 0.02], [np.nan, np.nan]])
+
+
+def test_a_long_line_is_compared_in_parts_and_can_be_cancelled():
+    class Impatient(Progress):
+        checks = 0
+
+        def is_cancelled(self):
+            self.checks += 1
+            return self.checks > 4
+
+    long = np.column_stack([np.arange(0, 3001.0, 5), np.zeros((601, 2))])
+    found = compare(survey(long), survey(long + [0, 0.01, 0]))
+    np.testing.assert_allclose(found.lines[0].across_mm, 10)
+    assert len(found.lines[0].state) == 3001
+    with pytest.raises(Cancelled):
+        compare_surveys(survey(long), survey(long), ComparisonParameters(), Impatient())

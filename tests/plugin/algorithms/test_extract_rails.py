@@ -152,6 +152,27 @@ def test_a_mask_limits_the_points(run, scene, outputs, crs):
     assert outcome.results["RAIL_LENGTH"] == pytest.approx(12, abs=0.2)
 
 
+def test_an_axis_gives_the_track_geometry_kilometres(run, scene, tmp_path, new_feedback):
+    """The axis runs west, 5 m south of the track, with kilometres as M values."""
+    axis = QgsVectorLayer("LineStringM?crs=EPSG:32643&field=ref:string(9)", "axis", "memory")
+    feature = QgsFeature(axis.fields())
+    feature.setGeometry(QgsGeometry.fromWkt("LINESTRING M(500020 2999995 17.1, 499990 2999995 17.13)"))
+    feature.setAttributes(["4711"])
+    assert axis.dataProvider().addFeature(feature)
+    page, feedback = tmp_path / "report.html", new_feedback()
+    outcome = run({**scene, "AXIS": axis, "QUALITY": tmp_path / "quality.gpkg", "REPORT": page}, feedback)
+    assert outcome.ok, outcome.error
+    assert feedback.warnings == []
+    _, stations = lines_of(tmp_path / "quality.gpkg")
+    assert len(stations) > 8
+    for station in stations:
+        east = station.geometry().constGet().x() - 500_000
+        assert station["km"] == pytest.approx(17.12 - east / 1000, abs=2e-6)
+        assert station["offset_m"] == pytest.approx(-5, abs=0.05)
+        assert (station["axis"], station["side"], station["piece"]) == ("4711", "right", 1)
+    assert f"<td>{stations[0]['km_text']} to {stations[-1]['km_text']}</td>" in page.read_text(encoding="utf-8")
+
+
 def test_a_mask_without_polygons_is_refused(run, scene, outputs):
     mask = QgsVectorLayer("Polygon?crs=EPSG:32643", "mask", "memory")
     outcome = run({**scene, **outputs, "MASK": mask})
@@ -302,7 +323,8 @@ def test_the_log_names_steps_figures_and_verdict(run, scene, new_feedback, tmp_p
         r"Measured: 13 stations, one every 1 m\.",
         r"Engine of the network: OpenCV .*, CPU, float32\.",
         r"Good throughout.*",
-        r"2 rails \(24 m\), 1 track \(12 m\): standard error [\d.]+ mm \(median\), 0\.0 % of the tracks in doubt, "
+        r"2 rails \(24 m\), 1 track \(12 m\): standard error [\d.]+ mm \(median\), [\d.]+ mm \(rms\), 0\.0 % of the "
+        r"tracks in doubt, "
         r"0 findings\.",
     )
     assert len(feedback.infos) == len(patterns)

@@ -33,6 +33,7 @@ from rail_extract.core.fields import (
     FINDING_FIELDS,
     QUALITY_FIELDS,
     RAIL_FIELDS,
+    STATION_FIELDS,
     STOP_FIELDS,
 )
 from rail_extract.core.frame import LocalFrame
@@ -153,6 +154,16 @@ def test_fields_have_names_in_words_with_units(styled, style):
             assert alias.endswith(unit) or not field.name.endswith(ending) or alias.endswith("[mm]"), alias
 
 
+def test_fields_of_kilometres_have_names_in_words(styled):
+    layer = styled("quality")
+    layer.dataProvider().addAttributes(fields(STATION_FIELDS).toList())
+    layer.updateFields()
+    layer.loadNamedStyle(str(STYLES / "quality.qml"))
+    names = [layer.attributeAlias(layer.fields().lookupField(field.name)) for field in STATION_FIELDS]
+    assert names[2:5] == ["Kilometre", "Kilometre as text", "Offset from the axis [m]"]
+    assert all(names)
+
+
 @pytest.mark.parametrize(
     ("style", "values", "said"),
     [
@@ -172,6 +183,34 @@ def test_map_tips_say_what_is_under_the_mouse(styled, style, values, said):
     tip = QgsExpression.replaceExpressionText(layer.mapTipTemplate(), scopes)
     for words in said:
         assert words in tip
+
+
+ARC = {"layout": "H", "type": "arc", "r1_m": -500.0, "r2_m": -500.0, "length_m": 80.0, "track_id": 3}
+GRADE = {"layout": "V", "type": "grade", "grade1_pm": 2.5, "grade2_pm": 2.5, "length_m": 40.0}
+
+
+@pytest.mark.parametrize(
+    ("style", "values", "label", "tip"),
+    [
+        ("elements", ARC, "R -500, 80.0 m", "Radius: -500.0 to -500.0"),
+        (
+            "elements",
+            {**ARC, "type": "clothoid", "a_param": 200.0, "r1_m": None},
+            "A 200, 80.0 m",
+            "straight to -500.0",
+        ),
+        ("elements", GRADE, None, "Gradient: 2.50 to 2.50 ‰"),
+        ("axes", {"name": "Siding", "km_from": 12.5, "km_to": 13.0}, "Siding km 12.500", "12.500 to 13.000"),
+    ],
+)
+def test_labels_and_tips_of_alignments(styled, style, values, label, tip):
+    layer = styled(style, [(LINE, values)])
+    scopes = QgsExpressionContext(QgsExpressionContextUtils.globalProjectLayerScopes(layer))
+    scopes.setFeature(next(layer.getFeatures()))
+    expression = QgsExpression(layer.labeling().settings().fieldName)
+    found = expression.evaluate(scopes)
+    assert not expression.hasParserError() and (found or None) == label
+    assert tip in QgsExpression.replaceExpressionText(layer.mapTipTemplate(), scopes)
 
 
 def test_the_review_is_chosen_from_a_list(styled):

@@ -1,0 +1,155 @@
+"""Points along an axis: chainage, distance to the left, and height above the running level of the bed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .axis import Axis, Points
+
+SECTION_M = 5.0
+"""Length over which the level of the bed is taken."""
+
+BED_M, BED_SHARE = 2.5, 0.4
+"""Distance from the axis within which points state the level of the bed, and their quantile: the bed is the larger
+part of what lies there, and rails and plants are above it."""
+
+LEVEL_JUMP_M, MEDIAN_SECTIONS = 0.4, 9
+"""A level that differs by more from the median of as many sections belongs to something on the track, or under it."""
+
+BELOW_M, ABOVE_M = 1.6, 1.1
+"""Heights about the level outside of which points tell nothing about the track: wires, roofs, slopes."""
+
+CELL_M, CELL_ACROSS_M, TRIM_M = 10.0, 0.25, 0.25
+"""Cells, along and across, from whose median no point lies farther: rails stand less above their bed."""
+
+FEW_POINTS = 5
+"""Number of points in a section up to which its level is taken from its neighbours."""
+
+OWN_LEVEL_M, MIN_SHARED = 2.0, 5
+"""Distance from the axis within which strips are compared, and the number of sections that must show both."""
+
+
+@dataclass(frozen=True)
+class Corridor:
+    """Points along an axis.
+
+    Attributes
+    ----------
+    t, across, height : (n,) arrays
+        Chainage, distance to the left, height above the level, metres.
+    strip : (n,) int array
+        Number of the strip, from 0.
+    start_m : float
+        Chainage at which the first section begins.
+    level : (k,) array
+        Height of the bed in the middle of each section of `SECTION_M`.
+    """
+
+    t: np.ndarray
+    across: np.ndarray
+    height: np.ndarray
+    strip: np.ndarray
+    start_m: float
+    level: np.ndarray
+
+    @property
+    def sections(self) -> int:
+        """Number of sections."""
+        return len(self.level)
+
+    @property
+    def middles(self) -> np.ndarray:
+        """Chainage of the middle of each section, (k,)."""
+        return self.start_m + (np.arange(self.sections) + 0.5) * SECTION_M
+
+    def level_at(self, t: np.ndarray) -> np.ndarray:
+        """Return the level of the bed at chainages."""
+        return np.interp(t, self.middles, self.level)
+
+    def kept(self, which: np.ndarray) -> Corridor:
+        """Return some of the points, by a mask or by their numbers."""
+        t, across, height, strip = (one[which] for one in (self.t, self.across, self.height, self.strip))
+        return Corridor(t, across, height, strip, self.start_m, self.level)
+
+
+def gather(points: Points, axis: Axis, reach_m: float) -> Corridor | None:
+    """See points along an axis, up to a distance from it; None if there is no level to see."""
+    t, across = axis.feet(points)
+    near = np.abs(across) <= reach_m
+    t, across, z = t[near], across[near], points.xyz[near, 2]
+    start_m = float(axis.t[0])
+    count = max(int(np.ceil((axis.t[-1] - start_m) / SECTION_M)), 1)
+    section = np.clip(((t - start_m) / SECTION_M).astype(np.int64), 0, count - 1)
+    level = _level(section, across, z, count)
+    if level is None:
+        return None
+    corridor = Corridor(t, across, z, points.strip[near], start_m, level)
+    corridor = _relative(corridor, corridor.height - corridor.level_at(t))
+    corridor = corridor.kept((corridor.height > -BELOW_M) & (corridor.height < ABOVE_M))
+    corridor = corridor.kept(_near_the_median(corridor))
+    return _levelled_strips(corridor)
+
+
+def _relative(corridor: Corridor, height: np.ndarray) -> Corridor:
+    return Corridor(corridor.t, corridor.across, height, corridor.strip, corridor.start_m, corridor.level)
+
+
+def _level(section: np.ndarray, across: np.ndarray, z: np.ndarray, count: int) -> np.ndarray | None:
+    """Return the level of the bed by section, (count,); None if no section has points."""
+    near = np.abs(across) < BED_M
+    order = np.lexsort((z[near], section[near]))
+    heights, numbers = z[near][order], np.bincount(section[near], minlength=count)
+    first = np.concatenate([[0], np.cumsum(numbers)[:-1]])
+    known = numbers > FEW_POINTS
+    if not known.any():
+        return None
+    level = np.full(count, np.nan)
+    level[known] = heights[(first + (numbers * BED_SHARE).astype(np.int64))[known]]
+    at = np.arange(count)
+    level = np.interp(at, at[known], level[known])
+    padded = np.pad(level, MEDIAN_SECTIONS // 2, mode="reflect", reflect_type="odd") if count > 4 else level
+    if count > 4:
+        median = np.median(np.lib.stride_tricks.sliding_window_view(padded, MEDIAN_SECTIONS), axis=1)
+        level = np.where(np.abs(level - median) < LEVEL_JUMP_M, level, median)
+    return np.convolve(np.pad(level, 2, mode="edge"), np.ones(5) / 5, "valid")
+
+
+def _near_the_median(corridor: Corridor) -> np.ndarray:
+    """Return which points lie near the median of their cell, (n,) bool."""
+    row = ((corridor.t - corridor.start_m) / CELL_M).astype(np.int64)
+    column = np.floor(corridor.across / CELL_ACROSS_M).astype(np.int64)
+    cell = (row - row.min(initial=0)) * 4096 + column + 2048
+    order = np.lexsort((corridor.height, cell))
+    _, first, inverse, count = np.unique(cell[order], return_index=True, return_inverse=True, return_counts=True)
+    median = corridor.height[order][first + count // 2]
+    near = np.empty(len(cell), dtype=bool)
+    near[order] = np.abs(corridor.height[order] - median[inverse]) < TRIM_M
+    return near
+
+
+def _levelled_strips(corridor: Corridor) -> Corridor:
+    """Remove the height of each strip above the mean of all, as their sections show it."""
+    strips = np.unique(corridor.strip)
+    if len(strips) < 2:
+        return corridor
+    near = np.abs(corridor.across) < OWN_LEVEL_M
+    section = np.clip(((corridor.t - corridor.start_m) / SECTION_M).astype(np.int64), 0, corridor.sections - 1)
+    means = np.array([_means(section, corridor.height, near & (corridor.strip == one), corridor) for one in strips])
+    shared = np.isfinite(means).sum(axis=0) > 1
+    if shared.sum() < MIN_SHARED:
+        return corridor
+    steps = np.zeros(len(strips))
+    for _ in range(3):  # each strip against the mean of those that show the section
+        middle = np.nanmean(means[:, shared] - steps[:, None], axis=0)
+        steps += np.nan_to_num(np.nanmedian(means[:, shared] - steps[:, None] - middle, axis=1))
+    steps -= steps.mean()
+    return _relative(corridor, corridor.height - steps[np.searchsorted(strips, corridor.strip)])
+
+
+def _means(section: np.ndarray, height: np.ndarray, which: np.ndarray, corridor: Corridor) -> np.ndarray:
+    """Return the mean height of some points by section, NaN without points."""
+    count = np.bincount(section[which], minlength=corridor.sections)
+    total = np.bincount(section[which], height[which], minlength=corridor.sections)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)

@@ -1,0 +1,153 @@
+"""The course of a track beside its guide: the places that most evidence supports, found by dynamic programming."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .corridor import SECTION_M, Corridor
+from .ridges import HALF_M, Shape, binned, fit, windows
+
+STEP_M, SLOPE_STEP, SLOPES = 0.05, 0.02, 7
+"""Distance between the places that are tried, and the directions of the guide's errors: their step and number."""
+
+BLOCK = 24
+"""Sections that are fitted at once, which limits the memory to about 100 MB."""
+
+LEAST, MOST = -6.0, 40.0
+"""Limits of the evidence of a section, so that none decides alone."""
+
+SATURATION, ALWAYS = 0.2, 1.0
+"""Share of the gain of expected rails up to which evidence counts, and a gain that always does: two real tracks must
+tie, so that the guide decides between them."""
+
+STEP_COST, TURN_COST = 0.5, 1.0
+"""Cost of a place that differs by one step from where the direction leads, and of a turn by one step of direction."""
+
+GUIDE_M, GUIDE_LENGTH_M = 1.2, 20.0
+"""Standard deviation of a guide, and the length over which its error is a new one."""
+
+APART_M = 0.5
+"""Distance beyond which another place is a different answer."""
+
+IMPOSSIBLE = -1e9
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """How well places beside a guide show a track.
+
+    Attributes
+    ----------
+    across : (c,) array
+        Distances of the places to the left of the guide, every `STEP_M`.
+    score : (sections, SLOPES, c) array
+    """
+
+    across: np.ndarray
+    score: np.ndarray
+
+    @property
+    def best(self) -> np.ndarray:
+        """Score of each place in its best direction, (sections, c)."""
+        return self.score.max(axis=1)
+
+
+@dataclass(frozen=True)
+class Course:
+    """A course beside a guide.
+
+    Attributes
+    ----------
+    across : (sections,) array
+        Distance to the left of the guide in the middle of each section of `SECTION_M`.
+    margin : (sections,) array
+        Score of this course above that of the best one that is elsewhere in the section.
+    """
+
+    across: np.ndarray
+    margin: np.ndarray
+
+
+def slopes() -> np.ndarray:
+    """Return the directions that are tried, metres to the left per metre along the guide."""
+    return (np.arange(SLOPES) - SLOPES // 2) * SLOPE_STEP
+
+
+def evidence(corridor: Corridor, reach_m: float, shape: Shape) -> Evidence:
+    """Weigh every place within reach of the axis in every section."""
+    half, places = int(round(HALF_M / STEP_M)), 2 * int(round(reach_m / STEP_M)) + 1
+    width = 2 * half + 1
+    bins = places + width - 1
+    low_m = -(places // 2 + half + 0.5) * STEP_M
+    section = np.floor((corridor.t - corridor.start_m) / SECTION_M).astype(np.int64)
+    ahead = corridor.t - corridor.start_m - (section + 0.5) * SECTION_M
+    tables = [
+        binned(section, corridor.across - slope * ahead, corridor.height, corridor.sections, low_m, bins, STEP_M)
+        for slope in slopes()
+    ]
+    count, height = (np.stack(one, axis=1) for one in zip(*tables))
+    u = (np.arange(width) - half) * STEP_M
+    score = np.empty((corridor.sections, SLOPES, places), np.float32)
+    for first in range(0, corridor.sections, BLOCK):
+        block = slice(first, first + BLOCK)
+        found = fit(windows(count[block], width), windows(height[block], width), u, shape)
+        gain = np.minimum(found.gain, SATURATION * found.most + ALWAYS) - found.flaw
+        score[block] = np.clip(gain, LEAST, MOST)
+    return Evidence((np.arange(places) - places // 2) * STEP_M, score)
+
+
+def guide_prior(across: np.ndarray, sections: int) -> np.ndarray:
+    """Return what a guide says about places beside it, (sections, c)."""
+    return np.tile(-0.5 * (across / GUIDE_M) ** 2 * SECTION_M / GUIDE_LENGTH_M, (sections, 1))
+
+
+def trace(found: Evidence, prior: np.ndarray) -> Course:
+    """Find the course with the largest sum of evidence and prior, (sections, c), less the cost of its turns."""
+    score = found.score + prior[:, None, :]
+    ahead, back = _Move(len(found.across), 1), _Move(len(found.across), -1)
+    best, choices = [score[0]], []
+    for section in score[1:]:
+        reached, choice = ahead(best[-1])
+        best.append(reached + section)
+        choices.append(choice)
+    rest = [np.zeros_like(score[0])]
+    for section in score[:0:-1]:
+        rest.append(back(rest[-1] + section)[0])
+    state = int(np.argmax(best[-1]))
+    states = [state]
+    for choice in reversed(choices):
+        state = int(choice.ravel()[state])
+        states.append(state)
+    across = found.across[np.array(states[::-1]) % len(found.across)]
+    marginal = np.array([(one + other).max(axis=0) for one, other in zip(best, rest[::-1])])
+    elsewhere = np.where(np.abs(found.across - across[:, None]) > APART_M, marginal, IMPOSSIBLE).max(axis=1)
+    return Course(across, marginal.max(axis=1) - elsewhere)
+
+
+class _Move:
+    """The step from a section to the next one, or to the one before: best predecessor of each direction and place."""
+
+    def __init__(self, places: int, direction: int) -> None:
+        lean = np.arange(SLOPES) - SLOPES // 2
+        per_slope = int(round(SECTION_M * SLOPE_STEP / 2 / STEP_M))
+        moved = direction * per_slope * (lean[:, None] + lean)
+        place = np.arange(places)
+        source = place - moved[:, :, None]
+        self._inside = (source >= 0) & (source < places)
+        self._source = np.where(self._inside, source, 0) + np.arange(SLOPES)[None, :, None] * places
+        self._cost = (TURN_COST * np.abs(lean[:, None] - lean))[:, :, None]
+        self._places = places
+
+    def __call__(self, score: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the best score of each state, (SLOPES, places), and the state from which it comes."""
+        beside = np.pad(score, ((0, 0), (1, 1)), constant_values=IMPOSSIBLE)
+        near = np.stack([beside[:, :-2] - STEP_COST, score, beside[:, 2:] - STEP_COST])
+        aside = near.argmax(axis=0)
+        wide = np.take_along_axis(near, aside[None], axis=0)[0]
+        reached = np.where(self._inside, wide.ravel()[self._source], IMPOSSIBLE) - self._cost
+        lean = reached.argmax(axis=1)
+        found = np.take_along_axis(reached, lean[:, None], axis=1)[:, 0]
+        source = np.take_along_axis(self._source, lean[:, None], axis=1)[:, 0]
+        return found, source + aside.ravel()[source] - 1

@@ -1,0 +1,318 @@
+"""The tracks along guides, fitted together, with the verdict on every station: seen, or why not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.spatial import cKDTree
+
+from ..progress import SILENT, Progress
+from .axis import Axis, Points
+from .beside import LENGTH_M, WIDE_M, Beside, look_beside
+from .corridor import gather
+from .course import Course, Evidence, evidence
+from .joint import certainty, courses
+from .refinement import STATION_M, Refined, refine, strips_apart
+from .ridges import HALF_M, Shape
+
+LONG = 7
+"""Sections over which a place must look like a track: one section may be hidden, or mislead."""
+
+LONG_GAIN, FLAT = 0.2, 0.5
+"""Share of the expected gain that the checked gain has over them, and the largest flaw of a flat bed."""
+
+OWN_GAIN, OWN_SHARE = 4.0, 0.2
+"""A section of its own shows a track with this gain, or with this share of what is expected there."""
+
+RIVAL_SHARE = 1.1
+"""Share of a line's score over 50 m that no place so close that it excludes the line may have."""
+
+SURE = 0.9
+"""Least likelihood that the guide means this track and not another one."""
+
+MARGIN = 3.0
+"""Least score of the course above that of one elsewhere."""
+
+TWIN_M, GUIDES_APART_M = 0.4, 2.8
+"""Two results this close, where their guides are this far apart, are one track with two guides."""
+
+SWITCH_M, TOE_M, TOE_FACTOR = 3.0, 0.5, 2.0
+"""Two results this close are those of a switch; this close, both pull each other, and the standard error grows by this
+factor."""
+
+FOOTPRINT_SHARE = 0.04
+"""Standard error across by the ballast beside the rails, as a share of the footprint."""
+
+STRIP_SHARE = 0.5
+"""Share of half the distance between strips by which the fit, which lies between them, may be off their middle."""
+
+BED_SIGMA_M = 0.03
+"""Standard deviation of the rails' height above the bed, which depends on the fill of the ballast."""
+
+ASIDE_M = 0.15
+"""A section whose own rails lie farther from the curve than this does not support it."""
+
+FEW_POINTS = 8
+"""Points on the bed of a section up to which it shows nothing."""
+
+LEAST_EXPECTED = 3.5
+"""Gain that rails must be expected to have in a section of 10 m: below it, density and footprint hide them."""
+
+TURNED_M = 0.15
+"""What a section of 5 m reaches farther to the side where the guide's direction is off most."""
+
+REASONS = (
+    "",
+    "too few points: a bridge above, a tunnel, or a gap of the cloud",
+    "no two rails show: something covers them, or they do not stand out of their bed",
+    "what shows there is not a bed with two rails: the edge of a platform, a trough, or the space between two tracks",
+    "another track fits the guide as well: give each track of the line a guide",
+    "two guides lead to this track: move one of them onto its own track",
+    "the rails found there lie beside the curve",
+    "too few points per square metre for this footprint",
+)
+"""Why a station is not seen; the first is that of a station that is."""
+
+SEEN, EMPTY, HIDDEN, MISLED, UNSURE, TWIN, ASIDE, SPARSE = range(len(REASONS))
+
+
+@dataclass(frozen=True)
+class Stations:
+    """Stations of a track every `STATION_M` along its guide.
+
+    Attributes
+    ----------
+    t : (n,) array
+        Chainage along the guide, metres.
+    xy : (n, 2) array
+        Middle of the track.
+    bed : (n,) array
+        Height of the bed there.
+    tilt : (n,) array
+        Rise of the bed per metre to the left.
+    sigma, sigma_bed : (n,) arrays
+        Standard errors across and of the bed's height, metres.
+    margin : (n,) array
+        Score of the place above that of another one.
+    reason : (n,) int array
+        Place in `REASONS`; 0 where the track is seen.
+    switch : (n,) bool array
+        Whether another track begins or ends beside it.
+    """
+
+    t: np.ndarray
+    xy: np.ndarray
+    bed: np.ndarray
+    tilt: np.ndarray
+    sigma: np.ndarray
+    sigma_bed: np.ndarray
+    margin: np.ndarray
+    reason: np.ndarray
+    switch: np.ndarray
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What was found along a guide.
+
+    Attributes
+    ----------
+    stations : Stations
+    shape : Shape or None
+        Ridges as they were measured; None where no track was found.
+    spacing_m : float
+        Distance of the rails that fits best.
+    others : (k, 2) array
+        Chainages and distances to the left of places that look like tracks and have no guide.
+    """
+
+    stations: Stations
+    shape: Shape | None
+    spacing_m: float
+    others: np.ndarray
+
+
+def fit_tracks(
+    xyz: np.ndarray,
+    strip: np.ndarray,
+    axes: Sequence[Axis],
+    spacings_m: Sequence[float],
+    reach_m: float,
+    footprint_m: float,
+    progress: Progress = SILENT,
+) -> list[Fitted]:
+    """Fit the tracks along the guides of a line.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Points around the guides, metres.
+    strip : (n,) int array
+        Number of the strip of each.
+    axes : sequence of Axis
+        The guides.
+    spacings_m : sequence of float
+        Distance between the middles of the railheads, by guide.
+    reach_m : float
+        Largest distance of a track from its guide.
+    footprint_m : float
+        Diameter of the beam on the ground.
+    progress : Progress
+    """
+    shapes = [Shape.expected(spacing_m, footprint_m) for spacing_m in spacings_m]
+    looking, fitting = progress.divide((3.0, 2.0))
+    near: list[Points] = []
+    found: list[tuple[int, Evidence]] = []
+    for number, axis in looking.follow(list(enumerate(axes)), len(axes)):
+        near.append(axis.points_near(xyz, strip, reach_m + WIDE_M + HALF_M))
+        corridor = gather(near[number], axis, reach_m + HALF_M + TURNED_M)
+        if corridor is not None:
+            found.append((number, evidence(corridor, reach_m, shapes[number])))
+    numbers = [number for number, _ in found]
+    own, scores = courses([axes[number] for number in numbers], [one for _, one in found])
+    lines: dict[int, _Line] = {}
+    for (number, one), course, score in fitting.follow(list(zip(found, own, scores)), len(found)):
+        refined = refine(near[number], axes[number], course.across, shapes[number])
+        if refined is not None:
+            wide = gather(near[number], refined.axis, WIDE_M + HALF_M)
+            beside = look_beside(wide, refined.shape) if wide is not None else None
+            sure = certainty(course, score, one.across)
+            lines[number] = _Line(refined, course, sure, beside)
+    return _judged(axes, lines, footprint_m)
+
+
+@dataclass(frozen=True)
+class _Line:
+    refined: Refined
+    course: Course
+    sure: np.ndarray
+    beside: Beside | None
+
+
+def _judged(axes: Sequence[Axis], lines: dict[int, _Line], footprint_m: float) -> list[Fitted]:
+    """Judge every station of every line, also by the other lines."""
+    places = {number: line.refined.xy for number, line in lines.items()}
+    judged = []
+    for number, axis in enumerate(axes):
+        if number not in lines:
+            judged.append(_nothing(axis))
+            continue
+        line, refined = lines[number], lines[number].refined
+        distance, apart = _others(number, axes, places)
+        toe = np.where(distance < TOE_M, TOE_FACTOR, 1.0)
+        blur = FOOTPRINT_SHARE * footprint_m
+        sigma = toe * np.sqrt(refined.sigma**2 + blur**2 + (STRIP_SHARE * strips_apart(refined)) ** 2)
+        reason = _reasons(line)
+        reason[(reason == SEEN) & (distance < TWIN_M) & (apart > GUIDES_APART_M)] = TWIN
+        stations = Stations(
+            refined.t,
+            refined.xy,
+            refined.bed,
+            refined.sections.found.tilt,
+            sigma,
+            refined.sigma_bed,
+            line.course.margin[np.minimum(np.arange(len(reason)) * 2, len(line.course.margin) - 1)],
+            reason,
+            distance < SWITCH_M,
+        )
+        judged.append(Fitted(stations, refined.shape, refined.spacing_m, _unclaimed(number, lines, places)))
+    return judged
+
+
+def _nothing(axis: Axis) -> Fitted:
+    """Return the stations of a guide along which no track was found."""
+    t = axis.t[0] + (np.arange(max(int(np.ceil((axis.t[-1] - axis.t[0]) / STATION_M)), 1)) + 0.5) * STATION_M
+    unknown = np.full(len(t), np.nan)
+    reason = np.full(len(t), HIDDEN)
+    stations = Stations(
+        t, axis.at(t)[0], unknown, unknown, unknown, unknown, np.zeros(len(t)), reason, np.zeros(len(t), bool)
+    )
+    return Fitted(stations, None, np.nan, np.empty((0, 2)))
+
+
+def _reasons(line: _Line) -> np.ndarray:
+    """Return why the stations of a line are not seen, by what shows along it."""
+    refined, found = line.refined, line.refined.sections.found
+    count = len(refined.t)
+    gain, flaw, most = (_long(found.gain, np.max), _long(found.flaw, np.min), _long(found.most, np.max))
+    enough = found.both > np.minimum(OWN_GAIN, OWN_SHARE * found.most)
+    enough &= (gain > LONG_GAIN * most) & (np.abs(refined.sections.offset) < REACH_M)
+    flat = flaw < FLAT
+    if line.beside is not None:
+        long = np.minimum((np.arange(count) * STATION_M / LENGTH_M).astype(np.int64), len(line.beside.own) - 1)
+        flat &= line.beside.rival[long] < RIVAL_SHARE * np.maximum(line.beside.own[long], 0.0)
+    half = np.minimum(np.arange(count) * 2, len(line.sure) - 1)
+    reason = np.full(count, SEEN)
+    for code, holds in (
+        (UNSURE, (line.sure[half] < SURE) | (line.course.margin[half] < MARGIN)),
+        (ASIDE, np.abs(refined.beside) > ASIDE_M),
+        (MISLED, ~flat),
+        (HIDDEN, ~enough),
+        (SPARSE, most < LEAST_EXPECTED),
+        (EMPTY, refined.sections.points <= FEW_POINTS),
+    ):
+        reason[holds] = code
+    return reason
+
+
+VERTEX_M = 0.1
+"""Distance between the vertices of a line from which distances are measured."""
+
+
+def _long(values: np.ndarray, best: Callable[..., np.ndarray]) -> np.ndarray:
+    """Return the best median over `LONG` sections of which each is one: beside a train, those on its other side."""
+    shifts = (-(LONG // 2), 0, LONG // 2)
+    return best([median_filter(values, LONG, mode="nearest", origin=shift) for shift in shifts], axis=0)
+
+
+REACH_M = 0.24
+"""A section whose rails lie at the end of the last search shows none."""
+
+
+def _others(number: int, axes: Sequence[Axis], places: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distance of each station from the nearest other line, and how far apart their guides are there."""
+    own = places[number]
+    distance, apart = np.full(len(own), np.inf), np.full(len(own), np.inf)
+    for other, xy in places.items():
+        if other == number:
+            continue
+        away = cKDTree(_dense(xy)).query(own)[0]
+        guides = cKDTree(axes[other].xy).query(axes[number].xy)[0]
+        at = np.linspace(0, len(guides) - 1, len(own)).round().astype(np.int64)
+        nearer = away < distance
+        distance, apart = np.where(nearer, away, distance), np.where(nearer, guides[at], apart)
+    return distance, apart
+
+
+def _dense(xy: np.ndarray) -> np.ndarray:
+    """Return a line with vertices every `VERTEX_M`, so that the nearest one is hardly farther than the line."""
+    steps = int(round(STATION_M / VERTEX_M))
+    at = np.arange(0, (len(xy) - 1) * steps + 1) / steps
+    return np.column_stack([np.interp(at, np.arange(len(xy)), column) for column in xy.T])
+
+
+OTHER_SHARE, OTHER_GAIN, CLAIMED_M = 0.5, 10.0, 1.2
+"""A place beside a track looks like another one with this share of its score and this gain over 50 m; it has a guide if
+a line passes this close."""
+
+
+def _unclaimed(number: int, lines: dict[int, _Line], places: dict[int, np.ndarray]) -> np.ndarray:
+    """Return chainages and distances of places beside a line that look like tracks without a guide, (k, 2)."""
+    line = lines[number]
+    if line.beside is None:
+        return np.empty((0, 2))
+    known = cKDTree(np.concatenate([_dense(xy) for xy in places.values()]))
+    found = []
+    for section, (score, own) in enumerate(zip(line.beside.score, line.beside.own)):
+        t = float(line.refined.axis.t[0]) + (section + 0.5) * LENGTH_M
+        for side in (-1, 1):
+            there = np.where(side * line.beside.across > GUIDES_APART_M, score, -np.inf)
+            best = int(there.argmax())
+            place, normal = line.refined.axis.at(np.array([t]))
+            free = known.query(place + line.beside.across[best] * normal)[0][0] > CLAIMED_M
+            if own > OTHER_GAIN and there[best] > max(OTHER_GAIN, OTHER_SHARE * own) and free:
+                found.append((t, float(line.beside.across[best])))
+    return np.array(found).reshape(-1, 2)

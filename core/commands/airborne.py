@@ -1,0 +1,128 @@
+"""The command `python -m rail_extract airborne`: the outputs of Track Centerlines from Airborne Lidar."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+from ..airborne.files import survey_files
+from ..airborne.survey import Guide, Survey
+from ..clouds.points import Request, ask
+from ..disk import Destination, writing
+from ..errors import ParameterError
+from ..fields import AIRBORNE_FIELDS, FINDING_FIELDS
+from ..parameters import AIRBORNE_CLASSES, AirborneParameters
+from ..progress import Estimating
+from ..report.airborne import airborne_findings, airborne_page, airborne_summary
+from ..scratch import scratch_folder
+from ..standards import RailStandard, resolve
+from .options import (
+    LAYERS,
+    TILES_HELP,
+    Console,
+    add_cloud_arguments,
+    destination_of,
+    extent_of,
+    limited,
+    numbers_in,
+    runner_of,
+    shapes_module,
+)
+
+SUFFIXES = {"centerlines": LAYERS, "stations": LAYERS, "findings": LAYERS, "report": (".html", ".htm")}
+"""File name suffixes of each output."""
+
+LENGTHS = {
+    "reach": "largest distance of a track from its guide",
+    "footprint": "diameter of the laser beam on the ground",
+    "rail_height": "top of the rails above the bed between them",
+}
+"""Options in metres, each an attribute of `AirborneParameters` without its unit."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.add_argument("tiles", nargs="+", type=Path, metavar="TILE", help=TILES_HELP)
+    text = "lines along the tracks, one for each, such as OpenStreetMap has them (GeoPackage, GeoJSON)"
+    parser.add_argument("--guide", type=Path, required=True, metavar="FILE", help=text)
+    output = parser.add_argument_group("outputs", "Existing files are replaced. GeoPackages may be the same file.")
+    output.add_argument("--centerlines", type=Path, required=True, help="GeoPackage (or .dxf, .csv) for the lines")
+    output.add_argument(
+        "--stations", type=Path, help="GeoPackage for a point every 10 m, with what is not seen and why"
+    )
+    output.add_argument("--findings", type=Path, help="GeoPackage for the places to look at")
+    output.add_argument("--report", type=Path, help="HTML file for the report")
+    add_cloud_arguments(parser)
+    classes = ",".join(map(str, AIRBORNE_CLASSES))
+    parser.add_argument("--classes", default=classes, help=f"classes of the points to use (default: {classes})")
+    for name, text in LENGTHS.items():
+        value = getattr(AirborneParameters, f"{name}_m")
+        option = f"--{name.replace('_', '-')}"
+        parser.add_argument(option, type=float, default=value, metavar="M", help=f"{text} (default: {value:g})")
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes (default: 1)")
+
+
+def run(args: argparse.Namespace) -> None:
+    """Find the tracks and write.
+
+    Raises
+    ------
+    RailExtractError
+        A parameter is wrong, a file can't be read, or an output can't be written.
+    """
+    standard = resolve(args.standard, args.gauge, args.head_width)
+    parameters = parameters_of(args, standard)
+    if args.workers < 1:
+        raise ParameterError(f"--workers must be 1 or more, not {args.workers}.")
+    progress = Estimating(Console())
+    given = {name: getattr(args, name) for name in SUFFIXES if getattr(args, name) is not None}
+    outputs = {name: destination_of(name, path, SUFFIXES[name]) for name, path in given.items()}
+    codes = numbers_in(args.classes, "--classes", int)
+    request = limited(ask(args.tiles, codes, args.crs, extent_of(args.extent), progress), args)
+    parent = outputs["centerlines"].file.parent
+    with writing(parent), scratch_folder(parent) as folder, runner_of(args.workers, folder) as runner:
+        guides = _guides(args.guide, request)
+        survey = survey_files(request, guides, parameters, folder / "points", runner, progress)
+    _write(survey, outputs, args, standard)
+    for sentence in airborne_summary(survey):
+        print(sentence)
+
+
+def parameters_of(args: argparse.Namespace, standard: RailStandard) -> AirborneParameters:
+    """Return the parameters that the options state.
+
+    Raises
+    ------
+    ParameterError
+        A length is not positive.
+    """
+    lengths = {f"{name}_m": getattr(args, name) for name in LENGTHS}
+    for name in LENGTHS:
+        if not 0 < getattr(args, name) < math.inf:
+            raise ParameterError(f"--{name.replace('_', '-')} must be a positive number.")
+    return AirborneParameters(standard.gauge_m, standard.head_width_m, **lengths)
+
+
+def _guides(path: Path, request: Request) -> list[Guide]:
+    """Read the guides in the coordinate system of the cloud."""
+    return shapes_module("--guide").read_guides(path, request.zero.crs_wkt)
+
+
+def _write(
+    survey: Survey, outputs: Mapping[str, Destination], args: argparse.Namespace, standard: RailStandard
+) -> None:
+    """Write the outputs that were asked for; layers of the same file together."""
+    module = shapes_module("--centerlines", "geopackage")
+    layers = [module.lines_layer("centerlines", outputs["centerlines"], AIRBORNE_FIELDS, survey.lines)]
+    if "stations" in outputs:
+        layers.append(module.airborne_stations_layer(outputs["stations"], survey.tracks))
+    if "findings" in outputs:
+        found = airborne_findings(survey)
+        layers.append(module.lines_layer("findings", outputs["findings"], FINDING_FIELDS, found))
+    for file in dict.fromkeys(layer.destination.file for layer in layers):
+        module.write_layers([layer for layer in layers if layer.destination.file == file], survey.frame)
+    if "report" in outputs:
+        facts = {"Rail": standard.label, "Command": args.command_line}
+        outputs["report"].write_text(airborne_page(survey, args.tiles[0].name, facts))

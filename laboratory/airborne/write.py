@@ -1,0 +1,48 @@
+"""Simulated airborne clouds and their guides as files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ...core.clouds.crs import parse_crs
+from ...core.clouds.las import laspy
+from ..scenes.write import MADE, SCALE_M
+from .flight import AirborneCloud
+
+CRS, ORIGIN = "EPSG:25832", np.array([500_400.0, 5_500_400.0, 0.0])
+"""Coordinate system of the files, and where the zero of a design lies in it."""
+
+GROUND = 2
+"""Class of the points."""
+
+
+def write_airborne(cloud: AirborneCloud, path: Path, class_code: int = GROUND) -> None:
+    """Write a cloud as LAS 1.4, compressed if the name ends in .laz, with a source id for each strip."""
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.scales, header.offsets = np.full(3, SCALE_M), ORIGIN
+    header.creation_date, header.generating_software = MADE, "Rail Extract scenes"
+    header.add_crs(parse_crs(CRS))
+    points = laspy.LasData(header)
+    points.x, points.y, points.z = (cloud.xyz + ORIGIN).T
+    points.classification = np.full(len(cloud.xyz), class_code, np.uint8)
+    points.point_source_id = cloud.strip + 1
+    points.write(path)
+
+
+def write_guides(guides: Sequence[np.ndarray], path: Path, **stated: Sequence[str]) -> None:
+    """Write guides, (k, 2) each, as GeoJSON, with the values of further fields, one for each guide."""
+    features = [
+        {
+            "type": "Feature",
+            "properties": {name: values[number] for name, values in stated.items()},
+            "geometry": {"type": "LineString", "coordinates": (guide + ORIGIN[:2]).round(3).tolist()},
+        }
+        for number, guide in enumerate(guides)
+    ]
+    crs = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:{CRS.replace(':', '::')}"}}
+    collection = {"type": "FeatureCollection", "name": path.stem, "crs": crs, "features": features}
+    path.write_text(json.dumps(collection), encoding="ascii")

@@ -1,0 +1,127 @@
+"""Track Centerlines from Airborne Lidar: fits the track of each guide in a cloud that shows no single railheads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from qgis.core import QgsProcessingContext
+
+from ...core.parameters import AirborneParameters
+from ...core.progress import Estimating, Progress
+from ...core.standards import SEARCHED_CLASSES, RailStandard
+from ..dialog import inputs, outputs
+from ..dialog import parameters as groups
+from ..dialog.parameter_values import ParameterValues, class_numbers
+from ..dialog.passwords import masked
+from ..reading.clouds import CloudSource, points_folder, request_points
+from ..writing.destinations import is_wanted
+from ..writing.layers import AIRBORNE, FINDINGS, figures_of, write_airborne_stations, write_lines
+from ..writing.reports import write_shown
+from ..writing.run import properties_of
+from ..writing.whole_files import write_each
+from .base import CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, RailAlgorithm
+from .toolbox_groups import RAW_CLOUDS
+
+if TYPE_CHECKING:
+    from ...core.airborne.survey import Guide, Survey
+
+
+@dataclass(frozen=True)
+class Job:
+    """The values of the parameters."""
+
+    cloud: CloudSource
+    class_codes: tuple[int, ...]
+    standard: RailStandard
+    parameters: AirborneParameters
+    guides: tuple[Guide, ...]
+    command: str
+
+
+class AirborneCenterlines(RailAlgorithm):
+    """The algorithm ``railextract:airbornecenterlines``."""
+
+    NAME = "airbornecenterlines"
+    LABEL = "Track centerlines from airborne lidar"
+    GROUP = RAW_CLOUDS
+    TAGS = (*RAIL_WORDS, *CLOUD_WORDS, *TRACK_WORDS, "airborne", "ALS", "national", "OpenStreetMap", "centerline")
+    NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
+    SUMMARY = "Fits the centerlines of tracks in airborne lidar, along lines that say which tracks are meant."
+    PICTURE = "gauge.svg"
+    GUIDE = "airborne"
+    HELP = (
+        "For the clouds of national surveys, with 5 to 100 points per square metre, which show no single railheads. "
+        "Choose the cloud and a guide: a line for each track of the railway, up to 3 m off, such as railway=rail of "
+        "OpenStreetMap. The guide decides which track is meant, the points where it lies. Give every track of a line "
+        "its guide: they are fitted together, and one alone may be taken for its neighbour.\n\n"
+        "A line is drawn where the track is seen; it ends where it is not seen for more than 30 m. Each station states "
+        "whether the track is seen there and, if not, why: under trains and bridges, on crossings, on slab track, "
+        "or where the guide fits two tracks. sigma_mm is the standard error of the fit; it leaves out the error of the "
+        "flight against its datum, often 3 to 10 cm.\n\n"
+        "The height is that of the bed between the rails plus RAIL_HEIGHT. For clouds of mobile lidar use Extract "
+        "Rails, which finds each railhead."
+    )
+
+    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
+        """Declare the parameters and outputs in the order of the interface."""
+        for definition in (
+            *inputs.airborne_cloud(),
+            inputs.tracks_meant(),
+            *groups.rail(),
+            *groups.airborne(),
+            *groups.area(),
+            outputs.airborne_centerlines(),
+            outputs.airborne_stations(),
+            outputs.findings(),
+        ):
+            self.addParameter(definition)
+        self._add_report(outputs.report())
+        for output in outputs.airborne_figures():
+            self.addOutput(output)
+
+    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+        """Read and check the parameters, in the main thread."""
+        values = ParameterValues(self, parameters, context)
+        standard, cloud, classes = values.standard(), values.cloud("INPUT"), values.text("CLASSES").strip()
+        codes = class_numbers(classes, "CLASSES") if classes else SEARCHED_CLASSES
+        command = masked(self.asPythonCommand(parameters, context))
+        return Job(cloud, codes, standard, values.airborne(standard), values.tracks_meant(cloud), command)
+
+    def compute(
+        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
+    ) -> dict[str, Any]:
+        """Fit the tracks, then write the outputs."""
+        from ...core.airborne.files import survey_files
+        from ...core.report.airborne import airborne_findings, airborne_summary
+        from ...core.tasks import InTurn
+
+        progress = Estimating(progress)
+        values = ParameterValues(self, parameters, context)
+        request = request_points(job.cloud, job.class_codes, values.extent, progress)
+        with points_folder() as folder:
+            survey = survey_files(request, job.guides, job.parameters, folder / "points", InTurn(), progress)
+        progress.check()
+        found = airborne_findings(survey) if is_wanted(parameters.get("FINDINGS"), context) else ()
+        frame, rest = survey.frame, (parameters, context)
+        self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, frame)
+        for sentence in airborne_summary(survey):
+            progress.info(sentence)
+        writers = {
+            "CENTERLINES": lambda: write_lines(self, "CENTERLINES", AIRBORNE, survey.lines, frame, *rest),
+            "STATIONS": lambda: write_airborne_stations(self, "STATIONS", survey.tracks, frame, *rest),
+            "FINDINGS": lambda: write_lines(self, "FINDINGS", FINDINGS, found, frame, *rest),
+            "REPORT": lambda: write_shown(self, "REPORT", lambda: _page(job, survey), *rest),
+        }
+        written = write_each(writers, parameters, context)
+        lengths_m = {"GUIDE_LENGTH": survey.guides_m, "SEEN_LENGTH": survey.seen_m, "DENSITY": round(survey.density, 1)}
+        return {**written, **figures_of(survey.lines, "CENTERLINE"), **lengths_m}
+
+
+def _page(job: Job, survey: Survey) -> str:
+    """Build the report."""
+    from ...core.report.airborne import airborne_page
+
+    return airborne_page(
+        survey, job.cloud.paths[0].resolve().name, {"Rail": job.standard.label, "Command": job.command}
+    )

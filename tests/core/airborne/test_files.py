@@ -1,0 +1,118 @@
+"""Surveys of files: the same from tiles as from one file, only what lies along the guides, and what is refused."""
+
+from dataclasses import replace
+
+import laspy
+import numpy as np
+import pytest
+from rail_extract.core.airborne import squares
+from rail_extract.core.airborne.files import FLIGHT, survey_files
+from rail_extract.core.airborne.survey import Guide
+from rail_extract.core.clouds.points import ask
+from rail_extract.core.errors import CloudError, NoRailPointsError, ParameterError
+from rail_extract.core.parameters import AirborneParameters
+from rail_extract.core.progress import Progress
+from rail_extract.core.tasks import InTurn
+from rail_extract.laboratory.airborne.flight import AirborneCloud
+from rail_extract.laboratory.airborne.write import ORIGIN, write_airborne
+
+PARAMETERS = AirborneParameters(1.435, 0.072, footprint_m=0.25)
+
+
+class Log(Progress):
+    def __init__(self):
+        self.texts, self.warnings = [], []
+
+    def info(self, text):
+        self.texts.append(text)
+
+    def warning(self, text):
+        self.warnings.append(text)
+
+
+def guides(flown, move=(0.0, 0.0)):
+    return [Guide(number + 1, guide + ORIGIN[:2] + move) for number, guide in enumerate(flown.guides)]
+
+
+def survey(paths, given, folder, parameters=PARAMETERS, codes=(1, 2), progress=None):
+    return survey_files(ask(paths, codes), given, parameters, folder / "points", InTurn(), progress or Log())
+
+
+@pytest.fixture(scope="module")
+def whole(flown, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("whole")
+    write_airborne(flown.cloud, folder / "cloud.laz")
+    log = Log()
+    return survey(folder / "cloud.laz", guides(flown), folder, progress=log), log
+
+
+def test_the_lines_lie_on_the_tracks(flown, whole):
+    found, log = whole
+    assert [line.guide_id for line in found.lines] == [1, 2]
+    assert found.seen_m > 0.95 * found.guides_m
+    assert found.density == pytest.approx(10, rel=0.15)
+    assert FLIGHT in log.texts
+    for line, number in zip(found.lines, (0, 1)):
+        truth = flown.design.truth(number)
+        places = found.frame.to_crs(line.xyz)[:, :2] - ORIGIN[:2]
+        off = np.hypot(*(places[:, None] - truth[None, ::2, :2]).transpose(2, 0, 1)).min(axis=1)
+        assert np.median(off[10:-10]) < 0.15  # samples of the truth are 0.5 m apart
+
+
+def test_tiles_and_squares_give_the_lines_of_one_file(flown, whole, tmp_path, monkeypatch):
+    monkeypatch.setattr(squares, "SIDE_M", 180.0)
+    left = flown.cloud.xyz[:, 0] < np.median(flown.cloud.xyz[:, 0])
+    for name, part in (("a", left), ("b", ~left)):
+        write_airborne(AirborneCloud(flown.cloud.xyz[part], flown.cloud.strip[part]), tmp_path / f"{name}.laz")
+    found = survey(tmp_path, guides(flown), tmp_path)
+    assert len(list((tmp_path / "points").iterdir())) >= 3
+    for one, other in zip(found.tracks, whole[0].tracks):
+        seen = (one.seen & other.seen).astype(bool)
+        assert seen.mean() > 0.9
+        moved = found.frame.to_crs(one.xyz) - whole[0].frame.to_crs(other.xyz)
+        assert np.abs(moved[seen, :2]).max() < 0.02
+
+
+def test_the_gauge_of_a_guide_counts(flown, tmp_path):
+    write_airborne(flown.cloud, tmp_path / "cloud.laz")
+    narrow = [replace(one, gauge_m=1.0) for one in guides(flown)]
+    assert not survey(tmp_path / "cloud.laz", narrow, tmp_path).lines
+
+
+def test_a_guide_outside_of_the_cloud_is_refused(flown, tmp_path):
+    write_airborne(flown.cloud, tmp_path / "cloud.laz")
+    with pytest.raises(ParameterError, match="No guide lies in the cloud"):
+        survey(tmp_path / "cloud.laz", guides(flown, (5000.0, 0.0)), tmp_path)
+    degrees = [Guide(1, np.array([[9.0, 49.6], [9.001, 49.7]]))]
+    with pytest.raises(ParameterError, match="in degrees"):
+        survey(tmp_path / "cloud.laz", degrees, tmp_path)
+
+
+def test_other_classes_and_dense_clouds_are_refused(flown, tmp_path):
+    write_airborne(flown.cloud, tmp_path / "cloud.laz", class_code=6)
+    with pytest.raises(NoRailPointsError, match="no points of class 1, 2 along the guides"):
+        survey(tmp_path / "cloud.laz", guides(flown), tmp_path)
+    near = np.abs(flown.cloud.xyz - flown.design.truth(0)[400]).max(axis=1) < 16
+    dense = np.repeat(flown.cloud.xyz[near], 70, axis=0)
+    dense[:, :2] += np.random.RandomState(1).uniform(-0.3, 0.3, (len(dense), 2))
+    write_airborne(AirborneCloud(dense, np.zeros(len(dense), int)), tmp_path / "dense.laz")
+    with pytest.raises(CloudError, match="use Extract Rails"):
+        survey(tmp_path / "dense.laz", guides(flown), tmp_path)
+
+
+def test_a_sparse_cloud_with_a_wide_footprint_is_a_hint(flown, tmp_path):
+    few = AirborneCloud(flown.cloud.xyz[::4], flown.cloud.strip[::4])
+    write_airborne(few, tmp_path / "cloud.laz")
+    found = survey(tmp_path / "cloud.laz", guides(flown), tmp_path, replace(PARAMETERS, footprint_m=0.5))
+    assert "take the lines as hints" in found.warnings[0]
+
+
+def test_points_far_from_the_guides_are_not_kept(flown, tmp_path):
+    far = flown.cloud.xyz[:2000] + [0.0, 900.0, 0.0]
+    both = AirborneCloud(np.concatenate([flown.cloud.xyz, far]), np.concatenate([flown.cloud.strip, [0] * 2000]))
+    write_airborne(both, tmp_path / "cloud.laz")
+    survey(tmp_path / "cloud.laz", guides(flown), tmp_path)
+    kept = sum(file.stat().st_size for file in (tmp_path / "points").iterdir()) / 28
+    assert kept <= len(flown.cloud.xyz)
+    with laspy.open(tmp_path / "cloud.laz") as reader:
+        assert reader.header.point_count == len(both.xyz)

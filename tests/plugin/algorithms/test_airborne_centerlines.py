@@ -1,0 +1,83 @@
+"""Track Centerlines from Airborne Lidar: layers, figures and attributes from a simulated cloud."""
+
+import numpy as np
+import pytest
+from qgis.core import (
+    QgsCoordinateReferenceSystem,
+    QgsCoordinateTransform,
+    QgsFeature,
+    QgsField,
+    QgsGeometry,
+    QgsPointXY,
+    QgsProject,
+    QgsVectorLayer,
+)
+from qgis.PyQt.QtCore import QVariant
+from rail_extract.laboratory.airborne.designs import curved_line, drawn_together
+from rail_extract.laboratory.airborne.flight import Flight, fly
+from rail_extract.laboratory.airborne.write import CRS, ORIGIN, write_airborne
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    design = curved_line(5, 200.0, cant_m=0.1, radius_m=450.0)
+    design.world.bands.clear()
+    cloud = fly(design.world, design.where, 8.0, Flight(10.0, 0.25, plants=0.03), seed=5)
+    path = tmp_path_factory.mktemp("cloud") / "air ü.laz"
+    write_airborne(cloud, path)
+    return design, path
+
+
+def layer_of(design, crs, off_m=0.4, **stated):
+    layer = QgsVectorLayer(f"LineString?crs={crs}", "guides", "memory")
+    layer.dataProvider().addAttributes([QgsField(name, QVariant.String) for name in stated])
+    layer.updateFields()
+    change = QgsCoordinateTransform(QgsCoordinateReferenceSystem(CRS), layer.crs(), QgsProject.instance())
+    for number, guide in enumerate(drawn_together(design.tracks[-1:] if off_m > 1 else design.tracks, 5, off_m=off_m)):
+        feature = QgsFeature(layer.fields())
+        shape = QgsGeometry.fromPolylineXY([QgsPointXY(x, y) for x, y in guide + ORIGIN[:2]])
+        shape.transform(change)
+        feature.setGeometry(shape)
+        feature.setAttributes([values[number] for values in stated.values()])
+        assert layer.dataProvider().addFeature(feature)
+    return layer
+
+
+def test_lines_stations_and_report_from_guides_in_degrees(flown, run_step, tmp_path, new_feedback):
+    design, path = flown
+    guide = layer_of(design, "EPSG:4326", name=["down", "up"], ref=["1", "1"], gauge=["1435", "1435;1000"])
+    outputs = {name: tmp_path / f"{name}.gpkg" for name in ("CENTERLINES", "STATIONS", "FINDINGS")}
+    values = {"INPUT": path, "GUIDE": guide, "FOOTPRINT": 0.25, "REPORT": tmp_path / "report.html", **outputs}
+    feedback = new_feedback()
+    done = run_step("airbornecenterlines", values, feedback)
+    assert done.ok, done.error
+    assert not feedback.warnings
+    assert done.results["CENTERLINE_COUNT"] == 2
+    assert done.results["SEEN_LENGTH"] >= 0.95 * done.results["GUIDE_LENGTH"]
+    assert done.results["DENSITY"] == pytest.approx(10, rel=0.2)
+    lines = list(QgsVectorLayer(str(outputs["CENTERLINES"]), "lines").getFeatures())
+    assert [(line["name"], line["ref"], line["gauge_mm"]) for line in lines] == [("down", "1", 1435), ("up", "1", 1435)]
+    for line, number in zip(lines, (0, 1)):
+        vertices = np.array([(v.x(), v.y(), v.z()) for v in line.geometry().vertices()]) - ORIGIN
+        truth = design.truth(number)
+        nearest = np.hypot(*(vertices[:, None, :2] - truth[None, :, :2]).transpose(2, 0, 1))
+        inside = (nearest.argmin(axis=1) > 8) & (nearest.argmin(axis=1) < len(truth) - 8)
+        assert np.sqrt(np.mean(nearest.min(axis=1)[inside] ** 2)) < 0.09  # samples of the truth are 0.25 m apart
+        assert np.abs(vertices[inside, 2] - truth[nearest.argmin(axis=1)[inside], 2]).max() < 0.12
+    stations = list(QgsVectorLayer(str(outputs["STATIONS"]), "stations").getFeatures())
+    assert len(stations) == done.results["GUIDE_LENGTH"] / 10
+    assert {station["seen"] for station in stations if station["reason"] == ""} == {1}
+    assert "Good" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_cloud_without_the_track_gives_no_line_but_reasons(flown, run_step, tmp_path):
+    design, path = flown
+    guide = layer_of(design, CRS, off_m=7.0)
+    outputs = {name: tmp_path / f"{name}.gpkg" for name in ("CENTERLINES", "STATIONS", "FINDINGS")}
+    done = run_step("airbornecenterlines", {"INPUT": path, "GUIDE": guide, "FOOTPRINT": 0.25, **outputs})
+    assert done.ok, done.error
+    assert done.results["CENTERLINE_COUNT"] == 0
+    assert done.results["SEEN_LENGTH"] < 30
+    reasons = [one["reason"] for one in QgsVectorLayer(str(outputs["FINDINGS"]), "findings").getFeatures()]
+    assert reasons
+    assert all(reasons)
