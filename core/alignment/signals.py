@@ -16,6 +16,9 @@ from .structure import Blocks, Rules, from_pieces, searched
 NOISE_ROUNDS, SETTLED = 8, 1.15
 """Largest number of partitions for the noise, and the growth of the noise below which it is known."""
 
+FEW_POINTS = 25
+"""Mean number of points in a piece below which a partition may follow the misalignment and hide it."""
+
 FLOOR_M = 0.00005
 """Least standard deviation of a point, metres: below it, coordinates are rounded."""
 
@@ -95,7 +98,8 @@ def noise_of(signal: Signal, tolerance_m: float, progress: Progress = SILENT) ->
     for share in progress.split(NOISE_ROUNDS):
         sigma = noise.effective_m(signal.step_m)
         pieces = partition(s, y, sigma, signal.kind.degrees, share)
-        found = estimated(_residuals(pieces, s, y), signal.step_m, FLOOR_M)
+        is_coarse = len(s) > FEW_POINTS * len(pieces)
+        found = estimated(_residuals(pieces, s, y), signal.step_m, FLOOR_M, only_if_sure=is_coarse)
         noise = Noise(found.white_m, min(found.shared_m, tolerance_m), found.length_m)
         if noise.effective_m(signal.step_m) < SETTLED * sigma:
             break

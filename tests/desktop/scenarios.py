@@ -356,7 +356,7 @@ def review(driver: Driver) -> Iterator:
     browser = Browser()
     menu = next(one for one in iface.pluginMenu().actions() if one.text() == "Rail Extract").menu()
     driver.keep("menu", [action.text() for action in menu.actions()])
-    later(menu.actions()[0].trigger)
+    later(next(one for one in menu.actions() if one.text() == "Open the Sample…").trigger)
     dialog = yield lambda: window("AlgorithmDialog")
     driver.keep("sample", dialog.mainWidget().wrappers["INPUT"].widget.value())
     driver.keep("standard", dialog.mainWidget().wrappers["STANDARD"].parameterValue())

@@ -180,7 +180,8 @@ def test_saved_raster_has_its_system(run_scenario):
 def test_the_menu_opens_the_sample(run_scenario):
     session = run_scenario("review")
     in_3d = ["Show Lines in 3D"] if session["version"] >= 33600 else []
-    assert session["menu"] == ["Open the Sample…", *in_3d, "Review Findings", "Grow Rails"]
+    first = ["Extract Rails…", "Classify Rail Points…", "Grow Rails", "Review Findings"]
+    assert session["menu"] == [*first, *in_3d, "Open the Sample…", "Install Packages…", "Help"]
     assert session["sample"].endswith("rail_extract/resources/sample/sample.laz")
     assert session["standard"] == "IN_75R_1000"
 
