@@ -65,7 +65,7 @@ def _with_round(one: PlanElement, radius: Optional[float], rms_mm: Optional[floa
 
 
 def round_radius(one: PlanElement, sigmas: float) -> Optional[float]:
-    """Return the roundest radius of an arc within so many standard errors, signed; None if there is none."""
+    """Return the roundest radius of an arc within a number of standard errors, signed; None if there is none."""
     sigma = one.figures.sigma_r_m
     if one.type != "arc" or sigma is None:
         return None
