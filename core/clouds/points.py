@@ -27,6 +27,11 @@ MAX_PASSED = 5_000_000
 """Number of points of any class after which a sample ends."""
 
 
+AIRBORNE = "Track Centerlines from Airborne Lidar"
+AIRBORNE_SIDE_M, AIRBORNE_DENSITY = 20.0, (0.5, 60.0)
+"""Least side and points per square metre of a cloud that covers an area and shows no single railheads."""
+
+
 @dataclass(frozen=True)
 class RailPoints:
     """The points of one class.
@@ -245,10 +250,23 @@ class Request:
                 f"All points of the cloud are marked as {flags}: export the valid points without this mark."
             )
         found = ", ".join(f"{code} ({census[code]})" for code in np.flatnonzero(census))
+        airborne = f" For an airborne cloud, use {AIRBORNE}." if self.is_airborne else ""
         return UnclassifiedError(
             f"The cloud has no points of class {wanted}; its classes, with the number of points, are {found}: set the "
-            "rail classes or, if nobody has classified the cloud, CLASSIFY."
+            f"rail classes or, if nobody has classified the cloud, CLASSIFY.{airborne}"
         )
+
+    @property
+    def is_airborne(self) -> bool:
+        """Whether the cloud covers an area, not only a line, and is too thin to show single railheads."""
+        sides = [
+            (high - low) * self.zero.horizontal_unit_m
+            for header in self.headers
+            for low, high in ((header.extent[0], header.extent[2]), (header.extent[1], header.extent[3]))
+        ]
+        area_m2 = float(np.sum(np.prod(np.reshape(sides, (-1, 2)), axis=1)))
+        count = sum(header.point_count for header in self.headers)
+        return min(sides) > AIRBORNE_SIDE_M and AIRBORNE_DENSITY[0] < count / area_m2 < AIRBORNE_DENSITY[1]
 
 
 def ask(

@@ -106,7 +106,7 @@ def airborne() -> Definitions:
             number("FOOTPRINT", tr("Footprint [m]"), AirborneParameters.footprint_m, 0.01, MAX_FOOTPRINT_M),
             tr(
                 "Diameter of the laser beam on the ground: flying height times divergence, such as 1000 m times 0.25 "
-                "mrad. Where it is not known, 0.3 m suits most flights; the report states what the rails look like."
+                "mrad. Where it is not known, 0.3 m suits most flights; a warning says if the rails look wider."
             ),
         ),
         helped(
