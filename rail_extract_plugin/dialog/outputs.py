@@ -301,3 +301,11 @@ def quality_figures() -> Numbers:
 def engine() -> QgsProcessingOutputString:
     """Define the name of the engine."""
     return QgsProcessingOutputString("ENGINE_USED", tr("Engine that ran the network"))
+
+
+def fit_figures() -> Numbers:
+    """Define the figures about fitted elements."""
+    return (
+        QgsProcessingOutputNumber("ELEMENT_COUNT", tr("Number of elements")),
+        QgsProcessingOutputNumber("RMS", tr("Root mean square of the slews [mm]")),
+    )

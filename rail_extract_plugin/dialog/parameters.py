@@ -24,8 +24,10 @@ from ...core.parameters import (
     LEAVE_OUT,
     METHODS,
     STRIPS,
+    TRANSITIONS,
     AirborneParameters,
     ComparisonParameters,
+    FitParameters,
     GrowParameters,
     Parameters,
 )
@@ -52,6 +54,9 @@ MAX_CROWN_RADIUS_M = 10_000.0
 MAX_LENGTH_M = 100_000.0
 """Longer than any gap to close, any minimum line length and any step between stations."""
 
+
+MIN_FIT_TOLERANCE_MM, MAX_ELEMENT_M = 0.1, 1000.0
+"""No scanner resolves a smaller tolerance, and no element that is left out on purpose is longer."""
 
 MAX_GUIDE_REACH_M, MAX_FOOTPRINT_M, MAX_RAIL_M = 6.0, 2.0, 0.5
 """Beyond, a guide means another track, a footprint covers both rails, and a rail is not a rail."""
@@ -527,5 +532,37 @@ def pairing() -> Definitions:
                 MAX_TOLERANCE_M,
             ),
             tr("Rails whose gauge deviates by more than this do not make a track."),
+        ),
+    )
+
+
+def alignment() -> Definitions:
+    """Define how design elements are fitted."""
+    default = FitParameters()
+    tolerance = number(
+        "TOLERANCE",
+        tr("Tolerance [mm]"),
+        1000.0 * default.tolerance_m,
+        minimum=MIN_FIT_TOLERANCE_MM,
+        maximum=1000.0 * MAX_TOLERANCE_M,
+        decimals=MM_DECIMALS,
+    )
+    length = number("MIN_LENGTH", tr("Shortest element [m]"), default.min_length_m, 1.0, MAX_ELEMENT_M)
+    return (
+        helped(
+            tolerance,
+            tr(
+                "How far the track may lie off its design. Misalignment up to this standard deviation is told from "
+                "design by its length; more is followed by elements."
+            ),
+        ),
+        helped(length, tr("Shorter elements are not sought.")),
+        helped(
+            choice("TRANSITIONS", tr("Between two radii"), TRANSITIONS, default.transitions),
+            tr("Jumps of the curvature, as in turnouts and sidings, or clothoids only."),
+        ),
+        helped(
+            QgsProcessingParameterBoolean("ROUND", tr("Propose round radii"), defaultValue=default.rounded),
+            tr("States the roundest radius that the track allows, beside the fitted one."),
         ),
     )

@@ -25,7 +25,7 @@ NAMES = (
         "buildtrackcenterlines",
     ),
     *("measuretrackgeometry", "stationalongaxis", "trainrailclassifier", "installpackages", "checkinstallation"),
-    *("exportalignment", "importalignment", "comparetracks"),
+    *("exportalignment", "importalignment", "comparetracks", "fitalignment"),
 )
 SMALLEST_ICON = 16
 
