@@ -19,12 +19,24 @@ class NoRailPointsError(RailExtractError):
     """The cloud has no points of the rail classes."""
 
 
+class UnclassifiedError(NoRailPointsError):
+    """The cloud has points, but none of the rail classes: perhaps nobody has classified it."""
+
+
 class CrsError(RailExtractError):
     """Lengths can't be computed in the coordinate system, or it is unknown."""
 
 
 class ParameterError(RailExtractError):
     """A parameter is out of range or contradicts another."""
+
+
+class OffRailError(RailExtractError):
+    """No seed lies on a rail."""
+
+
+class OffCloudError(ParameterError):
+    """No seed lies in the cloud."""
 
 
 class RasterError(RailExtractError):

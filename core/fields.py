@@ -197,7 +197,7 @@ STOP_FIELDS = (
 
 AIRBORNE_FIELDS = (
     Field("track_id", int, "number of the line"),
-    Field("guide_id", int, "number of its guide: that of the feature, or of the proposal"),
+    Field("guide_id", int, "number of its guide: that of the feature"),
     LENGTH,
     Field("seen_m", float, "length on which the track is seen, metres", 1),
     Field("sigma_mm", float, "standard error across where it is seen, without the flight's own error, millimetres", 1),
@@ -221,12 +221,6 @@ AIRBORNE_STATION_FIELDS = (
     Field("reason", str, "why the track is not seen; at a switch, that another one is near"),
 )
 """In an `AirborneTrack`, `guide_id` is a single value and the others have a value for each station."""
-
-GUIDE_FIELDS = (
-    Field("guide_id", int, "number of the proposal"),
-    Field("score", float, "how clearly it looks like a track: 1 is the least that is proposed", 2),
-    LENGTH,
-)
 ELEMENT_FIELDS = (
     Field("track_id", int, "number of the track"),
     Field("no", int, "number of the element within its track and layout, from 1"),
@@ -263,6 +257,8 @@ ELEMENT_FIELDS = (
     Field("joint", str, "how the element begins: G2 if curvature, gradient or cant continue, G1 if they jump"),
     Field("r_round_m", float, "proposed round radius, metres; empty if none fits the measured track", 3),
     Field("dev_rms_round_mm", float, "dev_rms_mm with the round radii, millimetres", 2),
+    Field("r_fit_m", float, "radius of an arc as fitted; the next fit holds r1_m where you change it", 4),
+    Field("s_fit_m", float, "s_from as fitted; the next fit holds s_from where you change it", 4),
 )
 """The element table: `alignment.table` writes and reads its rows. A shapefile cuts its long names."""
 

@@ -26,6 +26,10 @@ GEOMETRY, LEARNED = "GEOMETRY", "LEARNED"
 METHODS = (GEOMETRY, LEARNED)
 """What finds rail points in raw clouds: their geometry, or a network that was trained on labelled clouds."""
 
+JUMPS, CLOTHOIDS = "JUMPS", "CLOTHOIDS"
+TRANSITIONS = (JUMPS, CLOTHOIDS)
+"""Whether the curvature may jump, as in turnouts and sidings, or a clothoid lies between any two radii."""
+
 AIRBORNE_CLASSES = (1, 2)
 """Classes of an airborne cloud in which tracks are looked for: unclassified and ground."""
 
@@ -152,6 +156,29 @@ class GrowParameters:
     tolerance_z_m: float = 0.02
     max_outliers: int = 5
     max_length_m: float = 200.0
+
+
+@dataclass(frozen=True)
+class FitParameters:
+    """How design elements are fitted to tracks; lengths in metres.
+
+    Attributes
+    ----------
+    tolerance_m : float
+        How far the track may lie off its design: the largest standard deviation of misalignment that is told from
+        design.
+    min_length_m : float
+        Least length of an element.
+    transitions : str
+        One of `TRANSITIONS`.
+    rounded : bool
+        Whether round radii are proposed.
+    """
+
+    tolerance_m: float = 0.005
+    min_length_m: float = 5.0
+    transitions: str = JUMPS
+    rounded: bool = True
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,15 @@ Item = TypeVar("Item")
 REPORT_EVERY_S = 5.0
 """Interval between reports of the remaining time, and run time before the first."""
 
+LEAST_LEFT_S = 10.0
+"""Remaining time below which none is reported: the estimate would be gone before it is read."""
+
 
 class Progress:
     """Receives the progress of a run; this base class shows nothing and never cancels.
 
-    A front end overrides the methods for what it can show: `set_fraction`, `status`, `info`, `warning`, and
-    `is_cancelled`.
+    A front end overrides the methods for what it can show: `set_fraction`, `status`, `info`, `warning`, `propose`
+    and `is_cancelled`.
     """
 
     def set_fraction(self, fraction: float) -> None:
@@ -34,6 +37,9 @@ class Progress:
 
     def warning(self, text: str) -> None:
         """Report something that the user should look at."""
+
+    def propose(self, standard: str) -> None:
+        """Report the name of a rail standard that fits the points better than the one stated."""
 
     def is_cancelled(self) -> bool:
         """Return whether the user has cancelled the run."""
@@ -97,6 +103,9 @@ class _Relay(Progress):
     def warning(self, text: str) -> None:
         self._listener.warning(text)
 
+    def propose(self, standard: str) -> None:
+        self._listener.propose(standard)
+
     def is_cancelled(self) -> bool:
         return self._listener.is_cancelled()
 
@@ -159,13 +168,15 @@ class Estimating(_Relay):
         before = half if half[0] < now else self._marks[0]
         if before[1] < fraction < 1.0:
             left_s = (1.0 - fraction) * (now - before[0]) / (fraction - before[1])
+            if left_s < LEAST_LEFT_S:
+                return
             self.status(f"{100 * fraction:.0f} % done, about {_rounded(left_s)} left")
 
 
 def _rounded(seconds: float) -> str:
     """Write a time, rounded to the precision of an estimate."""
     if seconds < 90:
-        return f"{max(10 * round(seconds / 10), 10)} seconds"
+        return f"{10 * round(seconds / 10)} seconds"
     if seconds < 5400:
         return f"{round(seconds / 60)} minutes"
     return f"{seconds / 3600:.1f} hours"

@@ -9,10 +9,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .classify.settings import Settings
+from .classify.square import classify_square
 from .clouds.points import Request
 from .errors import CloudError, ParameterError
 from .heads.blunt import blunt_share
-from .heads.gauge_estimate import measure_spacings
+from .heads.gauge_estimate import Spacings, measure_spacings
 from .heads.roads import MIN_WIDER_M
 from .heads.sections import likelier_width
 from .parameters import Parameters
@@ -20,7 +22,7 @@ from .progress import SILENT, Progress
 from .rails import HEAD_OFF_M, HeadWidths, RailLine
 from .squares.density import fullest_square
 from .squares.grid import PointSource
-from .standards import HEAD_WIDTH_RANGE_MM, Gauge, RailStandard, closest_standard
+from .standards import HEAD_WIDTH_RANGE_MM, SAME_GAUGE_M, STANDARDS, Gauge, RailStandard, closest_standard
 from .tracks.widths_by_gauge import width_at
 
 SAMPLE_M = 50.0
@@ -28,6 +30,22 @@ SAMPLE_M = 50.0
 
 MOST = 0.5
 """Share of the length of rail that shows blunt heads from which those of the cloud are blunt."""
+
+TABLES_DIFFER_M = 0.002
+"""By which tables state different widths of one head, and worn heads differ: no measurement tells standards apart that
+are closer."""
+
+MAX_OTHERS = 4
+"""Most standards that fit as well which are named."""
+
+RAW_SAMPLE_POINTS = 5_000_000
+"""Points of a raw cloud that are looked at: a square or more of the densest ones."""
+
+RAW_SQUARES, RAW_SQUARE_M = 2, 40.0
+"""Squares in which rails are looked for, those with most points, which are next to the scanner, and their side."""
+
+RAW_HEAD_M = 0.070
+"""Width of a head that differs by less than 13 mm from that of any standard: heads are found 25 mm wider as well."""
 
 FEET = (0.3048, 1 / 0.3048)
 """Factors by which coordinates are wrong if feet are stated as metres, or metres as feet."""
@@ -40,23 +58,78 @@ def detect_standard(request: Request, progress: Progress = SILENT) -> RailStanda
     ----------
     request : Request
     progress : Progress
-        Is told the standard, and what was measured.
+        Is told the standard, what was measured, and which other standards fit as well.
 
     Raises
     ------
     CloudError
         A file is damaged.
+    NoRailPointsError
+        There is no point of the rail classes.
     ParameterError
         The points are too sparse, or no standard fits.
     """
-    measured = measure_spacings(request.sample()).most_common()
+    xyz, census = request.sample_with_census()
+    if not len(xyz):
+        raise request.explain_none(census)
+    return _detected(measure_spacings(xyz), progress)
+
+
+def detect_in_raw(request: Request, progress: Progress = SILENT) -> RailStandard:
+    """Find the rail standard of a raw cloud: the rail points of its fullest squares are found for each plausible gauge.
+
+    Parameters and errors are those of `detect_standard`; the request is for `standards.SEARCHED_CLASSES`.
+    """
+    xyz, census = request.sample_with_census(RAW_SAMPLE_POINTS)
+    if not len(xyz):
+        raise request.explain_none(census)
+    corners = np.floor(xyz[:, :2] / RAW_SQUARE_M).astype(np.int64)
+    keys, square, counts = np.unique(corners, axis=0, return_inverse=True, return_counts=True)
+    fullest = np.argsort(-counts, kind="stable")[:RAW_SQUARES]
+    best_m, found = 0.0, np.empty((0, 3))
+    for gauge_m, share in zip(_plausible_gauges(), progress.split(len(_plausible_gauges()))):
+        paired_m, rails = 0.0, [np.empty((0, 3))]
+        for number in share.follow(fullest):
+            mine = xyz[square.ravel() == number]
+            corner = np.array([*keys[number] * RAW_SQUARE_M, 0.0])
+            classified = classify_square(mine - corner, Settings((gauge_m,), RAW_HEAD_M))
+            paired_m += classified.figures.paired_m
+            rails.append(mine[classified.rail])
+        if paired_m > best_m:
+            best_m, found = paired_m, np.concatenate(rails)
+    return _detected(measure_spacings(found), progress)
+
+
+def _plausible_gauges() -> list[float]:
+    """Return the gauges of the standards; of two that can't be told apart, the first."""
+    gauges: list[float] = []
+    for gauge_m in sorted({one.gauge_m for one in STANDARDS.values()}):
+        if not gauges or gauge_m - gauges[-1] > SAME_GAUGE_M:
+            gauges.append(gauge_m)
+    return gauges
+
+
+def _detected(spacings: Spacings, progress: Progress) -> RailStandard:
+    """Return the standard that fits what was measured, and say how sure that is."""
+    measured = spacings.most_common()
     standard = closest_standard(*measured) if measured else None
     if measured is None or standard is None:
         found = "" if measured is None else f": rails are {_in_words(*measured)}"
         raise ParameterError(
             f"No rail standard could be detected{found}: choose STANDARD, or fill in GAUGE and HEAD_WIDTH."
         )
-    progress.info(f"Detected {standard.label} ({standard.name}): rails are {_in_words(*measured)}.")
+    off_m = max(TABLES_DIFFER_M, 2 * spacings.width_error_m())
+    others = [
+        one.profile
+        for one in sorted(STANDARDS.values(), key=lambda one: abs(one.head_width_m - measured[1]))
+        if one.gauge_m == standard.gauge_m and abs(one.head_width_m - measured[1]) <= off_m and one != standard
+    ]
+    more = f" and {len(others) - MAX_OTHERS} more" if len(others) > MAX_OTHERS else ""
+    also = f", also {', '.join(others[:MAX_OTHERS])}{more}" if others else ""
+    progress.info(
+        f"Detected {standard.label} ({standard.name}): rails are {1000 * measured[0]:.0f} mm apart, head "
+        f"{1000 * measured[1]:.0f} ± {np.ceil(1000 * off_m):.0f} mm; fits {standard.profile}{also}."
+    )
     return standard
 
 
@@ -89,6 +162,9 @@ def warn_of_gauge(request: Request, parameters: Parameters, progress: Progress) 
         return
     expected = 1000 * (parameters.gauge_m + parameters.head_width_m)
     progress.warning(f"Rails are {_in_words(*measured)}; {expected:.0f} mm apart are expected{_question(*measured)}")
+    standard = closest_standard(*measured)
+    if standard is not None:
+        progress.propose(standard.name)
 
 
 def _is_off_by(factor: float, xyz: np.ndarray, spacings_m: Sequence[float], parameters: Parameters) -> bool:

@@ -61,6 +61,11 @@ class RailStandard:
     region: str = ""
 
     @property
+    def profile(self) -> str:
+        """Name of the profile to show to users, without the gauge."""
+        return self.label.rpartition(",")[0]
+
+    @property
     def description(self) -> str:
         """Region, profile, gauge and head width, as a list sorts them by region."""
         return f"{self.region}: {self.label}, head {1000 * self.head_width_m:g} mm"

@@ -8,6 +8,7 @@ from qgis.core import QgsProcessingFeedback, QgsProcessingParameterDefinition, Q
 
 from ..core.progress import Progress
 from .dialog.wording import for_user
+from .notices import notices
 
 
 class QgisProgress(Progress):
@@ -41,6 +42,10 @@ class QgisProgress(Progress):
     def warning(self, text: str) -> None:
         """Write a warning into the log."""
         self._feedback.pushWarning(for_user(text, self._definitions))
+
+    def propose(self, standard: str) -> None:
+        """Tell the dialog of the run."""
+        notices.standard_proposed.emit(self._feedback, standard)
 
     def is_cancelled(self) -> bool:
         """Return whether the Cancel button was pressed."""

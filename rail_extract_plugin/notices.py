@@ -11,6 +11,12 @@ class _Notices(QObject):
     report_written = pyqtSignal(str)
     """Path of a report."""
 
+    run_failed = pyqtSignal(object, object)
+    """Feedback of a run, and the class of the error that ended it."""
+
+    standard_proposed = pyqtSignal(object, str)
+    """Feedback of a run, and the name of a rail standard that fits the points better."""
+
     findings_loaded = pyqtSignal(str)
     """Id of a layer of findings in the project."""
 

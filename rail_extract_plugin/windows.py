@@ -5,19 +5,24 @@ QGIS imports this module when it starts with windows; nothing else may.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from qgis.core import QgsProject
-from qgis.PyQt.QtCore import QObject, Qt
-from qgis.PyQt.QtGui import QIcon
+from qgis.core import QgsApplication, QgsProject
+from qgis.PyQt.QtCore import QObject, Qt, QUrl
+from qgis.PyQt.QtGui import QDesktopServices, QIcon
 from qgis.PyQt.QtWidgets import QAction, QToolBar
 
 from . import compat
+from .dialog.guide import guide
 from .i18n import tr
+from .links import links
 from .model_action import OpenModelAction
 from .notices import notices
 from .paths import ICON
 from .review.report import ReportOpener
+from .runs.missing import open_installation
+from .runs.run_dialog import open_dialog
 from .sample_action import OpenSampleAction
 from .setup import package_setting
 from .setup.dependencies import is_installed
@@ -49,6 +54,7 @@ class Windows(QObject):
         package_setting.register()
         self._reports = ReportOpener()
         self._reports.register()
+        links.register()
         self.dock: ReviewDock | None = None
         self.growing: GrowRails | None = None
         self._toolbar: QToolBar | None = None
@@ -58,17 +64,37 @@ class Windows(QObject):
 
     def _add_to(self, iface) -> None:
         """Add the menu and, if the package that it needs is installed, the dock."""
-        sample = QAction(QIcon(str(ICON)), self._actions[0].name, iface.mainWindow())
-        sample.triggered.connect(lambda: self._actions[0].execute())
-        self._entries = [sample]
-        if compat.OPENS_3D_VIEWS:
-            view_3d = QAction(QIcon(str(ICON)), NAME, iface.mainWindow())
-            view_3d.triggered.connect(lambda: show_in_3d(iface))
-            self._entries.append(view_3d)
+        self._entries = [
+            self._entry(tr("Extract Rails…"), lambda: self._open("extractrails")),
+            self._entry(tr("Classify Rail Points…"), lambda: self._open("classifyrailpoints")),
+        ]
         if is_installed("numpy"):
-            self._entries += [self._add_dock(iface), self._add_toolbar(iface)]
+            dock = self._add_dock(iface)
+            self._entries += [self._add_toolbar(iface), dock]
+        if compat.OPENS_3D_VIEWS:
+            self._entries.append(self._entry(NAME, lambda: show_in_3d(iface)))
+        self._entries += [
+            self._entry(self._actions[0].name, self._actions[0].execute),
+            self._entry(tr("Install Packages…"), open_installation),
+            self._entry(tr("Help"), lambda: QDesktopServices.openUrl(QUrl(guide("tutorial")))),
+        ]
         for entry in self._entries:
             iface.addPluginToMenu(MENU, entry)
+
+    def _entry(self, text: str, do: Callable[[], None]) -> QAction:
+        """Make an entry of the menu."""
+        made = QAction(QIcon(str(ICON)), text, self._iface.mainWindow())
+        made.triggered.connect(lambda: do())
+        return made
+
+    def _open(self, name: str) -> None:
+        """Open the dialog of an algorithm, or say which packages it lacks."""
+        algorithm = QgsApplication.processingRegistry().algorithmById(f"railextract:{name}")
+        executable, reason = algorithm.canExecute()
+        if executable:
+            self._dialog = open_dialog(name, {}, self._iface.mainWindow())
+        else:
+            self._iface.messageBar().pushWarning(MENU, reason)
 
     def _add_dock(self, iface) -> QAction:
         """Add the dock, and return the menu entry that shows it."""
@@ -121,6 +147,7 @@ class Windows(QObject):
             self.growing.deleteLater()
             self.growing = None
         self._reports.deregister()
+        links.deregister()
         package_setting.deregister()
         for action in self._actions:
             action.deregister()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -56,5 +56,5 @@ def look_beside(corridor: Corridor, shape: Shape) -> Beside:
     total = int(section.max(initial=0)) + 1
     count, height = binned(section, corridor.across, corridor.height, total, low_m, bins, STEP_M)
     u = (np.arange(width) - half) * STEP_M
-    found = fit(windows(count, width), windows(height, width), u, replace(shape), passes=3)
+    found = fit(windows(count, width), windows(height, width), u, shape, passes=3)
     return Beside((np.arange(places) - places // 2) * STEP_M, found.gain - found.flaw)

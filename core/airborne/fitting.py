@@ -58,6 +58,9 @@ ASIDE_M = 0.15
 FEW_POINTS = 8
 """Points on the bed of a section up to which it shows nothing."""
 
+MAX_SIGMA_M = 0.04
+"""Standard error above which a station is not seen: 2.5 times as much is the 10 cm within which it is to be right."""
+
 LEAST_EXPECTED = 3.5
 """Gain that rails must be expected to have in a section of 10 m: below it, density and footprint hide them."""
 
@@ -206,6 +209,7 @@ def _judged(axes: Sequence[Axis], lines: dict[int, _Line], footprint_m: float) -
         blur = FOOTPRINT_SHARE * footprint_m
         sigma = toe * np.sqrt(refined.sigma**2 + blur**2 + (STRIP_SHARE * strips_apart(refined)) ** 2)
         reason = _reasons(line)
+        reason[(reason == SEEN) & (sigma > toe * MAX_SIGMA_M)] = SPARSE
         reason[(reason == SEEN) & (distance < TWIN_M) & (apart > GUIDES_APART_M)] = TWIN
         stations = Stations(
             refined.t,

@@ -9,6 +9,7 @@ from typing import Optional
 import numpy as np
 
 from .elements import Alignment
+from .equations import SAME_PLACE_M
 
 BESIDE_M = 2.0
 """Largest median distance of a track from its alignment, metres: that of its neighbour is at least 3.4 m away."""
@@ -78,9 +79,13 @@ def deviations_of(
     """
     foot = alignment.foot(xyz[:, :2])
     inside = foot.past_m == 0
-    order = np.argsort(foot.s[inside], kind="stable")
-    feet, across, z = foot.s[inside][order], foot.across_m[inside][order], xyz[inside, 2][order]
-    s = np.arange(np.ceil(feet[0]), np.floor(feet[-1]) + 1.0)
+    used = inside.copy()  # and the first vertex past either end, which lies beside the continued end
+    used[1:] |= inside[:-1]
+    used[:-1] |= inside[1:]
+    order = np.argsort((foot.s + foot.past_m)[used], kind="stable")
+    feet, across, z = (values[used][order] for values in (foot.s + foot.past_m, foot.across_m, xyz[:, 2]))
+    first, last = max(feet[0], alignment.s_from), min(feet[-1], alignment.s_to)
+    s = np.arange(np.ceil(first - SAME_PLACE_M), np.floor(last + SAME_PLACE_M) + 1.0)
     slew, lift = (np.interp(s, feet, values) for values in (across, z - alignment.heights(feet)))
     turned = foot.s[-1] < foot.s[0]
     cant_diff = np.full(len(s), np.nan)

@@ -47,6 +47,8 @@ class Figures:
         Proposed round radius, signed.
     dev_rms_round_mm : float or None
         The same as `dev_rms_mm` with round radii.
+    r_fit_m, s_fit_m : float or None
+        Radius and `s_from` as they were fitted: what differs was edited, and is held by the next fit.
     """
 
     joint: Optional[str] = None
@@ -59,6 +61,8 @@ class Figures:
     sigma_s_m: Optional[float] = None
     r_round_m: Optional[float] = None
     dev_rms_round_mm: Optional[float] = None
+    r_fit_m: Optional[float] = None
+    s_fit_m: Optional[float] = None
 
 
 @dataclass(frozen=True)

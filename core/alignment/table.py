@@ -122,7 +122,7 @@ def _layout(row: Row) -> Optional[str]:
 def _plan_element(row: Row, frame: LocalFrame) -> PlanElement:
     """Return the element of a row in plan; its type decides which radii count."""
     kind, place = row.get("type"), frame.to_local(np.array([_needed(row, "x"), _needed(row, "y"), 0.0]))
-    ends = {"line": (None, None), "arc": (row.get("r1_m"),) * 2, "clothoid": (row.get("r1_m"), row.get("r2_m"))}
+    ends = {"line": (None, None), "arc": (_edited_radius(row),) * 2, "clothoid": (row.get("r1_m"), row.get("r2_m"))}
     if kind not in ends:
         raise ParameterError(f"{_where(row)} has the type {kind!r}: in plan, write line, arc or clothoid.")
     if kind != "line" and ends[kind] == (None, None):
@@ -151,6 +151,12 @@ def _extent(row: Row) -> tuple[float, float]:
     if s_to <= s_from:
         raise ParameterError(f"{_where(row)} ends at s_to = {s_to:g} m: let it end after its start.")
     return s_from, s_to - s_from
+
+
+def _edited_radius(row: Row) -> Any:
+    """Return the radius of an arc: of two that differ, the one that is not as it was fitted."""
+    first, second, fitted = (row.get(name) for name in ("r1_m", "r2_m", "r_fit_m"))
+    return second if second is not None and (first is None or first == fitted) else first
 
 
 def _bend(row: Row, radius: Any) -> float:

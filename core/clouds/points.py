@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from ..errors import CloudError, CrsError, EmptyCloudError, NoRailPointsError, ParameterError
+from ..errors import CloudError, CrsError, EmptyCloudError, NoRailPointsError, ParameterError, UnclassifiedError
 from ..frame import ORIGIN_STEP, LocalFrame
 from ..progress import SILENT, Progress
 from ..standards import LAST_CLASS
@@ -25,6 +25,11 @@ PLACE_M = 40.0
 
 MAX_PASSED = 5_000_000
 """Number of points of any class after which a sample ends."""
+
+
+AIRBORNE = "Track Centerlines from Airborne Lidar"
+AIRBORNE_SIDE_M, AIRBORNE_DENSITY = 20.0, (0.5, 60.0)
+"""Least side and points per square metre of a cloud that covers an area and shows no single railheads."""
 
 
 @dataclass(frozen=True)
@@ -187,25 +192,39 @@ class Request:
         xmin, ymin, xmax, ymax = zip(*areas)
         return max(xmin), max(ymin), min(xmax), min(ymax)
 
-    def sample(self) -> np.ndarray:
-        """Read the first points requested, (n, 3) metres from one of them; takes a few seconds for a cloud of any size.
+    def sample(self, count: int = SAMPLE_POINTS) -> np.ndarray:
+        """Read the first points requested, (n, 3) metres from one of them; see `sample_with_census`."""
+        return self.sample_with_census(count)[0]
+
+    def sample_with_census(self, count: int = SAMPLE_POINTS) -> tuple[np.ndarray, np.ndarray]:
+        """Read the first points requested; takes a few seconds for a cloud of any size.
+
+        Parameters
+        ----------
+        count : int
+            Number of points that is enough.
+
+        Returns
+        -------
+        xyz : (n, 3) array
+            Metres from one of them.
+        census : (256,) int array
+            Number of points of each class that were passed.
 
         Raises
         ------
         CloudError
             A file is damaged.
         """
-        found, count, passed = [np.empty((0, 3))], 0, 0
-        for header in self.headers:
-            for xyz, _, _, census in self.read(header):
-                found.append(xyz)
-                count, passed = count + len(xyz), passed + int(census.sum())
-                if count >= SAMPLE_POINTS or passed >= MAX_PASSED:
-                    break
-            if count >= SAMPLE_POINTS or passed >= MAX_PASSED:
+        found, passed = [np.empty((0, 3))], np.zeros(LAST_CLASS + 1, dtype=np.int64)
+        chunks = (chunk for header in self.headers for chunk in self.read(header))
+        for xyz, _, _, census in chunks:
+            found.append(xyz)
+            passed += census
+            if sum(map(len, found)) >= count or passed.sum() >= MAX_PASSED:
                 break
         xyz = self.zero.to_local(np.concatenate(found))
-        return xyz - xyz[:1]
+        return xyz - xyz[:1], passed
 
     def shares(self, progress: Progress) -> list[Progress]:
         """Split the progress among the files in proportion to their points."""
@@ -231,10 +250,23 @@ class Request:
                 f"All points of the cloud are marked as {flags}: export the valid points without this mark."
             )
         found = ", ".join(f"{code} ({census[code]})" for code in np.flatnonzero(census))
-        return NoRailPointsError(
+        airborne = f" For an airborne cloud, use {AIRBORNE}." if self.is_airborne else ""
+        return UnclassifiedError(
             f"The cloud has no points of class {wanted}; its classes, with the number of points, are {found}: set the "
-            "rail classes."
+            f"rail classes or, if nobody has classified the cloud, CLASSIFY.{airborne}"
         )
+
+    @property
+    def is_airborne(self) -> bool:
+        """Whether the cloud covers an area, not only a line, and is too thin to show single railheads."""
+        sides = [
+            (high - low) * self.zero.horizontal_unit_m
+            for header in self.headers
+            for low, high in ((header.extent[0], header.extent[2]), (header.extent[1], header.extent[3]))
+        ]
+        area_m2 = float(np.sum(np.prod(np.reshape(sides, (-1, 2)), axis=1)))
+        count = sum(header.point_count for header in self.headers)
+        return min(sides) > AIRBORNE_SIDE_M and AIRBORNE_DENSITY[0] < count / area_m2 < AIRBORNE_DENSITY[1]
 
 
 def ask(
@@ -301,7 +333,10 @@ def _shared_system(headers: Sequence[CloudHeader], given: str | None, progress: 
     parsed = {text: parse_crs(text) for text in set(texts) if text}
     crs = common_crs([(header.path.name, parsed.get(text)) for header, text in zip(headers, texts)])
     if crs is None:
-        progress.warning("The cloud states no coordinate system: its coordinates are taken as metres.")
+        progress.warning(
+            "The cloud states no coordinate system: its coordinates are taken as metres. If it has one, choose it as "
+            "CRS."
+        )
         return LocalFrame(np.zeros(3))
     name = headers[0].path.name
     if is_geographic(crs):

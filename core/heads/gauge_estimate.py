@@ -76,13 +76,24 @@ class Spacings:
 
     def most_common(self) -> tuple[float, float] | None:
         """Return the most frequent distance and the width of the heads there; None if no distance is frequent."""
-        if not len(self.distance_m):
-            return None
-        counts = np.convolve(np.bincount((self.distance_m / BIN_M).astype(int)), np.ones(3), mode="same")
-        peak = np.abs(self.distance_m - (np.argmax(counts) + 0.5) * BIN_M) <= HALF_PEAK_M
-        if not self._often(peak):
+        peak = self._peak()
+        if not peak.any():
             return None
         return float(np.median(self.distance_m[peak])), float(np.median(self.head_width_m[peak])) / SEEN_SHARE
+
+    def width_error_m(self) -> float:
+        """Return the standard error of the width of the heads at the most frequent distance; NaN without one."""
+        widths = self.head_width_m[self._peak()]
+        # The median of normally distributed values is 1.25 times as uncertain as their mean.
+        return float(1.25 * widths.std() / np.sqrt(len(widths))) if len(widths) else float("nan")
+
+    def _peak(self) -> np.ndarray:
+        """Return which distances are near the most frequent one, (n,) bool; none if no distance is frequent."""
+        if not len(self.distance_m):
+            return np.zeros(0, bool)
+        counts = np.convolve(np.bincount((self.distance_m / BIN_M).astype(int)), np.ones(3), mode="same")
+        peak = np.abs(self.distance_m - (np.argmax(counts) + 0.5) * BIN_M) <= HALF_PEAK_M
+        return peak if self._often(peak) else np.zeros_like(peak)
 
     def _often(self, mask: np.ndarray) -> bool:
         return bool(mask.sum() >= max(1.0, MIN_SHARE * self.places))

@@ -22,7 +22,7 @@ from ..errors import CloudError, NoRailPointsError, ParameterError
 from ..frame import LocalFrame
 from ..learned.model import Classifier
 from ..learned.square import label_square
-from ..progress import SILENT, Progress
+from ..progress import SILENT, Progress, counted
 from ..rails import ENOUGH_CELLS_PER_M, SearchFigures
 from ..squares.grid import Key, Square, points_by_square, unique_keys
 from ..standards import LAST_CLASS
@@ -154,10 +154,12 @@ def report(figures: SearchFigures, request: Request, progress: Progress) -> None
             "rail points needs no classification."
         )
         return
+    verb = "is" if figures.thin == 1 else "are"
+    paved = "has" if figures.paved == 1 else "have"
     progress.info(
-        f"Found {figures.points} rail points: {figures.paired_m:.0f} m of rails with a partner and "
-        f"{figures.single_m:.0f} m of single rails. Of {figures.squares} squares with rails, {figures.thin} are thin "
-        f"and {figures.paved} have rails in pavement."
+        f"Found {counted(figures.points, 'rail point')}: {figures.paired_m:,.0f} m of rails with a partner and "
+        f"{figures.single_m:,.0f} m of single rails. Of {counted(figures.squares, 'square')} with rails, "
+        f"{figures.thin:,} {verb} thin and {figures.paved:,} {paved} rails in pavement."
     )
     if figures.cells_per_m < ENOUGH_CELLS_PER_M:
         progress.warning(

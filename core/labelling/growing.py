@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from ..clouds.points import Request
 from ..clouds.readers import read_points
 from ..disk import writing
-from ..errors import ParameterError, RailExtractError
+from ..errors import OffCloudError, OffRailError
 from ..grow.growth import Growth, Stop, grow, on_rails
 from ..grow.points import Buckets
 from ..grow.settings import GrowSettings
@@ -162,7 +162,7 @@ def grow_all(
         missed += not grown
     parameters = settings.parameters
     if not growths:
-        raise RailExtractError(
+        raise OffRailError(
             f"No seed lies on a rail: put seeds within {parameters.search_m:g} m of railheads that stand "
             f"{parameters.min_height_m:g} m above the bed, and check the rail standard and the unit of the coordinates."
         )
@@ -222,7 +222,7 @@ class Squares:
         corners = self._request.zero.to_local(corners)[:, :2].reshape(-1, 2, 2)
         inside = (places[:, None] >= corners[:, 0] - PATCH_M) & (places[:, None] <= corners[:, 1] + PATCH_M)
         if not inside.all(axis=2).any():
-            raise ParameterError("No seed lies in the cloud: check the place and the coordinate system of the seeds.")
+            raise OffCloudError("No seed lies in the cloud: check the place and the coordinate system of the seeds.")
 
     def fill(self, progress: Progress) -> None:
         """Read the points of the cloud that are within reach."""

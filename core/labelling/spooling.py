@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..classify.settings import Settings
-from ..clouds.points import Request
+from ..clouds.points import AIRBORNE, Request
 from ..disk import writing
 from ..errors import NoRailPointsError
 from ..grow.settings import GrowSettings
@@ -54,7 +54,7 @@ def spool_found(
     if not figures.points:
         raise NoRailPointsError(
             "No rail was found in the raw cloud: check the rail standard and the unit of the coordinates, or classify "
-            "the rail points yourself."
+            "the rail points yourself." + (f" For an airborne cloud, use {AIRBORNE}." if request.is_airborne else "")
         )
     report(figures, request, progress)
     return _gathered(request, side_m, folder, census), figures

@@ -14,7 +14,7 @@ import numpy as np
 from ..polyline import length_along
 from ..rails import RailLine, RailNetwork, TrackGeometry
 from ..tracks.jumps import ARM_M
-from .findings import DOUBTS, OFF_GAUGE, Findings, Hole, Place, TrackFindings, examine
+from .findings import DOUBTS, OFF_GAUGE, UNSUPPORTED, Findings, Hole, Place, TrackFindings, examine
 
 OFF_RAIL_MM = 70.0
 """Possible error where a line is missing, or belongs to no track: a line off by the width of a railhead is off its
@@ -111,7 +111,7 @@ def _of_place(track: TrackFindings, place: Place, error_mm: np.ndarray) -> Findi
     geometry = track.geometry
     within = (geometry.chainage_m >= place.start_m) & (geometry.chainage_m <= place.end_m)
     numbers = np.flatnonzero(within & track.doubtful[place.doubt])
-    worst = numbers[np.argmax(error_mm[numbers])]
+    worst = _middle_of_longest(numbers) if place.doubt is UNSUPPORTED else numbers[np.argmax(error_mm[numbers])]
     return Finding(
         place.doubt.label,
         xyz=track.line.part(place.start_m, place.end_m).xyz,
@@ -136,6 +136,13 @@ def _kilometre(geometry: TrackGeometry, at_m: float) -> dict[str, Any]:
         return {}
     nearest = np.argmin(np.abs(geometry.chainage_m - at_m))
     return {"km": float(geometry.kilometres.km[nearest]), "km_text": geometry.kilometres.km_text[nearest]}
+
+
+def _middle_of_longest(numbers: np.ndarray) -> int:
+    """Return the middle of the longest run of consecutive numbers: a rail is least sure in the middle of a gap."""
+    runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
+    longest = max(runs, key=len)
+    return int(longest[len(longest) // 2])
 
 
 def _of_step(track: TrackFindings, at_m: float, size_mm: float) -> Finding:

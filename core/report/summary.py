@@ -36,9 +36,14 @@ def summary(network: RailNetwork, gauges_m: Sequence[float]) -> tuple[str, str]:
     findings = examine(network, gauges_m)
     sigma = np.concatenate([track.sigma_mm for track in network.geometry])
     known = sigma[np.isfinite(sigma)]
-    error = f"{np.median(known):.1f} mm" if len(known) else "unknown"
+    error = f"{np.median(known):.1f} mm (median), {_rms(known):.1f} mm (rms)" if len(known) else "unknown"
     _, words = verdict(findings)
     return words, (
-        f"{figures}: standard error {error} (median), {100 * findings.share:.1f} % of the tracks in doubt, "
+        f"{figures}: standard error {error}, {100 * findings.share:.1f} % of the tracks in doubt, "
         f"{counted(len(listed(findings)), 'finding')}."
     )
+
+
+def _rms(values: np.ndarray) -> float:
+    """Return the root mean square, which the output SIGMA states."""
+    return float(np.sqrt(np.mean(values**2)))

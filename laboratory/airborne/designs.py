@@ -150,16 +150,6 @@ def box(half_m: float, up_m: float) -> np.ndarray:
     return np.array([[-half_m, up_m], [half_m, up_m]])
 
 
-def drawn(track: Track, seed: int, off_m: float = 0.0, wave_m: float = 1.5, vertex_m: float = 0.4) -> np.ndarray:
-    """Return a guide as somebody draws it, (k, 2): off by a constant, a slow wave, and an error of each vertex."""
-    rng = np.random.RandomState(seed)
-    xy, normal = track.centerline[:, :2], track.curve.left_normal
-    pick = np.unique(np.append(np.arange(0, len(xy), int(40.0 / STEP_M)), len(xy) - 1))
-    along = pick * STEP_M
-    off = off_m + wave_m * np.sin(2 * np.pi * along / 600.0 + rng.uniform(0, 2 * np.pi))
-    return xy[pick] + (off + rng.normal(0, vertex_m, len(pick)))[:, None] * normal[pick]
-
-
 def drawn_together(tracks: Sequence[Track], seed: int, off_m: float = 0.0) -> list[np.ndarray]:
     """Return the guides of all tracks of a line, whose slow waves agree, as they do where one picture was drawn."""
     rng = np.random.RandomState(seed)

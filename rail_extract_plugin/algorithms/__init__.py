@@ -7,6 +7,7 @@ from .classify_rail_points import ClassifyRailPoints
 from .compare_tracks import CompareTracks
 from .export_alignment import ExportAlignment
 from .extract_rails import ExtractRails
+from .fit_alignment import FitAlignment
 from .frpdf_cleanup import FrpdfCleanup
 from .grow_rail_points import GrowRailPoints
 from .import_alignment import ImportAlignment
@@ -28,6 +29,7 @@ ALGORITHMS = (
     BuildTrackCenterlines,
     MeasureTrackGeometry,
     StationAlongAxis,
+    FitAlignment,
     CompareTracks,
     ExportAlignment,
     ImportAlignment,

@@ -24,16 +24,18 @@ from ..dialog.checks import check_values, explain_invalid
 from ..dialog.guide import guide
 from ..dialog.help_panel import help_panel
 from ..dialog.parameter_values import ParameterValues
-from ..dialog.wording import for_user
+from ..dialog.wording import WITH_DIALOGS, for_user
 from ..feedback import QgisProgress
 from ..i18n import tr
+from ..notices import notices
 from ..paths import ICONS, PICTURES
+from ..runs.missing import with_link
 from ..runs.running import running
 from ..setup.dependencies import explain_missing, missing_packages
 from ..writing.destinations import PAGE, appends, check_layer_name, check_page_name, destinations
 from ..writing.styling import NO_PROPERTIES
 from .sentences import COMMAND_LINE, sentence_for
-from .toolbox_groups import RAILS, SETUP, Group
+from .toolbox_groups import RAILS, STEPS, Group
 
 # Search terms, also in the languages of the larger railways: the toolbox search compares whole words.
 RAIL_WORDS = (
@@ -72,6 +74,8 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     """File in the folder of pictures, shown in the help panel of the dialog."""
     GUIDE = "parameters"
     """Page of the guide that the Help button opens."""
+    PAGES: tuple[str, ...] = ("parameters",)
+    """Pages of the guide to which the help panel links."""
     NEEDS: tuple[tuple[str, ...], ...] = ()
     """Required Python modules: of each inner tuple one is enough, and the first is recommended."""
 
@@ -151,6 +155,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
                 results = self.compute(self._job, parameters, context, progress)
         except BaseException as error:
             reason = sentence_for(error, self.parameterDefinitions())
+            notices.run_failed.emit(feedback, type(error))
         else:
             progress.set_fraction(1)
             return results
@@ -190,14 +195,19 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         """Return whether the required packages are installed; the toolbox lists the algorithm in either case."""
         try:
             missing = missing_packages(self.NEEDS)
-            return (not missing, explain_missing(self.displayName(), missing, self._usable_labels()) if missing else "")
+            if not missing:
+                return True, ""
+            reason = explain_missing(self.displayName(), missing, self._usable_labels())
+            return False, with_link(reason, missing) if QgsApplication.platform() == WITH_DIALOGS else reason
         except BaseException as error:
             return False, sentence_for(error, self.parameterDefinitions())
 
     def _usable_labels(self) -> list[str]:
-        """Labels of the provider's algorithms, except those for the setup, whose packages are all installed."""
+        """Labels of the algorithms for classified clouds whose packages are all installed."""
         mates = self.provider().algorithms() if self.provider() else ()
-        return [mate.displayName() for mate in mates if mate.GROUP is not SETUP and not missing_packages(mate.NEEDS)]
+        return [
+            mate.displayName() for mate in mates if mate.GROUP in (RAILS, STEPS) and not missing_packages(mate.NEEDS)
+        ]
 
     def createCustomParametersWidget(self, parent: QWidget | None = None) -> QWidget:
         """Return the dialog for one run, which QGIS would build itself otherwise."""
@@ -238,7 +248,8 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         summary, text = tr(self.SUMMARY), tr(self.HELP)
         if QgsApplication.platform() == COMMAND_LINE:
             return text
-        return help_panel(summary, PICTURES / self.PICTURE if self.PICTURE else None, text, self.parameterDefinitions())
+        picture = PICTURES / self.PICTURE if self.PICTURE else None
+        return help_panel(summary, picture, text, self.parameterDefinitions(), self.PAGES)
 
     def helpUrl(self) -> str:
         """Return the address of the guide's page."""

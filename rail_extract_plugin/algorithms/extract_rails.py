@@ -15,6 +15,7 @@ from ...core.progress import Estimating, Progress
 from ...core.standards import DEFAULT, SEARCHED_CLASSES, Gauge, RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
+from ..dialog.definitions import advanced
 from ..dialog.parameter_values import ParameterValues
 from ..dialog.passwords import masked
 from ..reading.clouds import CloudSource, checked_crs, points_folder, request_points
@@ -67,19 +68,16 @@ class ExtractRails(RailAlgorithm):
     SUMMARY = "Turns lidar points classified as rail into the 3D lines of the railheads and of the track centerlines."
     PICTURE = "gauge.svg"
     HELP = (
-        "Choose the point cloud, the classes of its rail points and the rail standard, then run; the other defaults "
-        "suit most clouds. For a cloud that nobody has classified, tick the box that finds the rail points first. The "
-        "cloud must be in a projected coordinate system; the results are in the same system.\n\n"
-        "A rail line follows the top of the railhead on the axis of the head. The gauge in the results is the 3D "
-        "distance between the two rail lines minus the railhead width; it is not measured 14 mm below the top. Left "
-        "and right are as seen along the line, and cant is left minus right.\n\n"
-        "The report assesses the result in words and plots and shows where it is weak. The field sigma_mm is the "
-        "standard error of a line's lateral position, and bridged_m the length without points. Findings are the places "
-        "to look at, the most harmful first. Track geometry is a "
-        "layer of points along each track with gauge, cant, twist, radius and gradient. STATION_COUNT, SIGMA and "
-        "BRIDGED_LENGTH summarize the track geometry, measured for this layer, for the findings or for the report. "
-        "With an axis, all three have kilometres."
+        "Choose the cloud and press Run; everything else has a default. If nobody has classified the cloud, tick the "
+        "box that finds the rail points. The coordinate system must be a projected one.\n\n"
+        "A rail line follows the top of the railhead on the axis of the head. Gauge is the distance between the two "
+        "rail "
+        "lines minus the railhead width; it is not measured 14 mm below the top. Cant is left minus right, as seen "
+        "along "
+        "the line.\n\n"
+        "The report says where the lines are good and where not. Findings are the places to look at."
     )
+    PAGES = ("parameters", "tutorial", "limits", "troubleshooting")
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs in the order of the interface."""
@@ -100,13 +98,17 @@ class ExtractRails(RailAlgorithm):
             *inputs.axis(optional=True),
         ):
             self.addParameter(definition)
-        for destination in (outputs.rails("RAILS", optional=True), outputs.centerlines("CENTERLINES", optional=True)):
-            self.addParameter(destination)
-        quality, cleaned = outputs.quality("QUALITY"), outputs.cleaned()
+        self.addParameter(outputs.rails("RAILS", optional=True))
+        centerlines, quality, findings, cleaned = (
+            outputs.centerlines("CENTERLINES", optional=True),
+            outputs.quality("QUALITY"),
+            outputs.findings(),
+            outputs.cleaned(),
+        )
         for extra in (quality, cleaned):
             extra.setCreateByDefault(False)
-        for destination in (quality, outputs.findings(), cleaned):
-            self.addParameter(destination)
+        for destination in (centerlines, quality, findings, cleaned):
+            self.addParameter(advanced(destination, destination.help()))
         self._add_report(outputs.report())
         figures = (*outputs.rail_figures(), *outputs.centerline_figures(), *outputs.quality_figures())
         for output in (*figures, outputs.engine()):
@@ -121,12 +123,10 @@ class ExtractRails(RailAlgorithm):
         classify, grow = values.flag("CLASSIFY"), values.filled("SEEDS")
         if classify and grow:
             raise ParameterError("CLASSIFY finds all rails, and SEEDS those that are pointed at: choose one of them.")
-        if classify and values.detects():
-            raise ParameterError("DETECT measures classified points, which CLASSIFY does not need: choose STANDARD.")
         if grow and values.detects():
             raise ParameterError("DETECT measures classified points, which SEEDS do not need: choose STANDARD.")
         if values.choice("METHOD") == LEARNED and not classify:
-            raise ParameterError("METHOD LEARNED is for raw clouds: set CLASSIFY, or choose GEOMETRY.")
+            raise ParameterError("LEARNED is for raw clouds: set CLASSIFY, or choose GEOMETRY for METHOD.")
         weights = values.weights()
         standard = values.standard(DEFAULT if values.detects() else None)
         choose_model(standard.gauge_m, standard.head_width_m, values.choice("MODEL"))
@@ -153,9 +153,10 @@ class ExtractRails(RailAlgorithm):
 
     def _detected(self, job: Job, request: Request, values: ParameterValues, progress: Progress) -> Job:
         """Return the job with the rail standard that fits the points."""
-        from ...core.standard_checks import detect_standard
+        from ...core.standard_checks import detect_in_raw, detect_standard
 
-        standard = values.standard(detect_standard(request, progress).name)
+        detect = detect_in_raw if values.flag("CLASSIFY") else detect_standard
+        standard = values.standard(detect(request, progress.span(0, 0)).name)
         choose_model(standard.gauge_m, standard.head_width_m, values.choice("MODEL"))
         return replace(job, standard=standard, other_gauges=values.other_gauges(standard))
 

@@ -1,4 +1,4 @@
-"""The help panel of a dialog: what the algorithm does, a picture, and the meaning of each parameter."""
+"""The help panel of a dialog: what the algorithm does, a picture, the fields in sight, and links to the guide."""
 
 from __future__ import annotations
 
@@ -9,14 +9,27 @@ from pathlib import Path
 from qgis.core import QgsProcessingParameterDefinition
 
 from ..i18n import tr
+from .guide import guide
+from .wording import with_labels
 
 Definitions = Sequence[QgsProcessingParameterDefinition]
 
 ADVANCED = QgsProcessingParameterDefinition.Flag.FlagAdvanced
 
 
-def help_panel(summary: str, picture: Path | None, text: str, definitions: Definitions) -> str:
+PAGES = {
+    "parameters": tr("All parameters, with pictures"),
+    "tutorial": tr("Tutorial"),
+    "limits": tr("Limits"),
+    "troubleshooting": tr("If something is wrong"),
+}
+"""Titles of the guide's pages."""
+
+
+def help_panel(summary: str, picture: Path | None, text: str, definitions: Definitions, pages: Sequence[str]) -> str:
     """Return the help panel as HTML; QGIS turns each line into a paragraph.
+
+    Advanced parameters are explained by their tooltips and by the guide.
 
     Parameters
     ----------
@@ -26,23 +39,25 @@ def help_panel(summary: str, picture: Path | None, text: str, definitions: Defin
         SVG file, shown at its nominal size.
     definitions : sequence of QgsProcessingParameterDefinition
         Parameters of the dialog, with their help.
+    pages : sequence of str
+        Pages of the guide to link to, of `PAGES`.
     """
     image = [f'<img src="{picture.as_uri()}">'] if picture else []
     prose = [escape(line, quote=False) for line in text.split("\n") if line]
-    common = [one for one in definitions if not one.isDestination() and not one.flags() & ADVANCED]
-    rare = [one for one in definitions if not one.isDestination() and one.flags() & ADVANCED]
-    results = [one for one in definitions if one.isDestination()]
+    common = [one for one in definitions if not one.flags() & ADVANCED]
     fields = [
-        *_section(tr("Parameters"), common),
-        *_section(tr("Advanced parameters"), rare),
-        *_section(tr("Results"), results),
+        *_section(tr("Parameters"), [one for one in common if not one.isDestination()], definitions),
+        *_section(tr("Results"), [one for one in common if one.isDestination()], definitions),
     ]
-    return "\n".join((escape(summary, quote=False), *image, *prose, *fields))
+    addresses = [(PAGES[page], guide(page)) for page in pages if guide(page)]
+    more = " · ".join(f'<a href="{address}">{escape(title)}</a>' for title, address in addresses)
+    return "\n".join((escape(summary, quote=False), *image, *prose, *fields, *filter(None, [more])))
 
 
-def _section(title: str, definitions: Definitions) -> Iterator[str]:
-    """Yield a heading and a line for each parameter; nothing if there are none."""
-    if definitions:
+def _section(title: str, shown: Definitions, definitions: Definitions) -> Iterator[str]:
+    """Yield a heading and a line for each parameter, in words; nothing if there are none."""
+    if shown:
         yield f"<h3>{escape(title)}</h3>"
-    for definition in definitions:
-        yield f"<b>{escape(definition.description())}</b><br>{escape(definition.help(), quote=False)}"
+    for one in shown:
+        text = with_labels(one.help(), definitions, one.name())
+        yield f"<b>{escape(one.description())}</b><br>{escape(text, quote=False)}"

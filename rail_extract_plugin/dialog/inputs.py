@@ -331,3 +331,42 @@ def axis(optional: bool) -> Definitions:
             ),
         ),
     )
+
+
+def tracks_to_fit() -> QgsProcessingParameterDefinition:
+    """Define the parameter for the tracks whose design is wanted."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return helped(
+        QgsProcessingParameterFeatureSource("INPUT", tr("Track centerlines"), [line]),
+        tr("3D lines of tracks, such as the centerlines of Extract Rails. A field track_id numbers them."),
+    )
+
+
+def cant_of_tracks() -> Definitions:
+    """Define the layers from which the cant of tracks is known."""
+    line, point = QgsProcessing.SourceType.TypeVectorLine, QgsProcessing.SourceType.TypeVectorPoint
+    return (
+        helped(
+            QgsProcessingParameterFeatureSource("QUALITY", tr("Track geometry"), [point], optional=True),
+            tr(
+                "Points of Extract Rails or Measure Track Geometry for these tracks: their cant gives elements, and "
+                "sections without rail points do not count."
+            ),
+        ),
+        helped(
+            QgsProcessingParameterFeatureSource("RAILS", tr("Rails"), [line], optional=True),
+            tr("3D lines of both rails, for the cant where there is no track geometry."),
+        ),
+    )
+
+
+def fixed() -> QgsProcessingParameterDefinition:
+    """Define the parameter for a corrected table of elements."""
+    table = QgsProcessing.SourceType.TypeVector
+    return advanced(
+        QgsProcessingParameterFeatureSource("FIXED", tr("Corrected elements"), [table], optional=True),
+        tr(
+            "Elements of an earlier run that you have corrected. Their types are held, and radii and starts that you "
+            "changed; the rest is fitted again."
+        ),
+    )

@@ -241,7 +241,7 @@ def weights() -> QgsProcessingParameterDefinition:
     return helped(
         QgsProcessingParameterFileDestination("WEIGHTS", tr("Weights of the classifier"), tr("Weights (*.npz)")),
         tr(
-            "The classifier, for METHOD LEARNED. Until the training is complete, a folder next to it keeps what was "
+            "The trained classifier. Until the training is complete, a folder next to it keeps what was "
             "learned, and a run with the same name continues."
         ),
     )
@@ -293,7 +293,7 @@ def quality_figures() -> Numbers:
     """Define the figures about the measured track geometry."""
     return (
         QgsProcessingOutputNumber("STATION_COUNT", tr("Number of measured stations")),
-        QgsProcessingOutputNumber("SIGMA", tr("Standard error of the centerlines [mm]")),
+        QgsProcessingOutputNumber("SIGMA", tr("Standard error of the centerlines, root mean square [mm]")),
         QgsProcessingOutputNumber("BRIDGED_LENGTH", tr("Length of track where a rail has no points [m]")),
     )
 
@@ -301,3 +301,11 @@ def quality_figures() -> Numbers:
 def engine() -> QgsProcessingOutputString:
     """Define the name of the engine."""
     return QgsProcessingOutputString("ENGINE_USED", tr("Engine that ran the network"))
+
+
+def fit_figures() -> Numbers:
+    """Define the figures about fitted elements."""
+    return (
+        QgsProcessingOutputNumber("ELEMENT_COUNT", tr("Number of elements")),
+        QgsProcessingOutputNumber("RMS", tr("Root mean square of the slews [mm]")),
+    )

@@ -24,12 +24,14 @@ from ...core.parameters import (
     LEAVE_OUT,
     METHODS,
     STRIPS,
+    TRANSITIONS,
     AirborneParameters,
     ComparisonParameters,
+    FitParameters,
     GrowParameters,
     Parameters,
 )
-from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS, UNCONFIRMED_PROFILES
+from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS
 from ..i18n import tr
 from .definitions import MM_DECIMALS, Definitions, advanced, choice, choices, helped, number
 
@@ -53,6 +55,9 @@ MAX_LENGTH_M = 100_000.0
 """Longer than any gap to close, any minimum line length and any step between stations."""
 
 
+MIN_FIT_TOLERANCE_MM, MAX_ELEMENT_M = 0.1, 1000.0
+"""No scanner resolves a smaller tolerance, and no element that is left out on purpose is longer."""
+
 MAX_GUIDE_REACH_M, MAX_FOOTPRINT_M, MAX_RAIL_M = 6.0, 2.0, 0.5
 """Beyond, a guide means another track, a footprint covers both rails, and a rail is not a rail."""
 
@@ -71,24 +76,24 @@ STANDARD_WIDGET = {"widget_wrapper": {"class": f"{__package__}.standard_widget.S
 
 def rail(detect: bool = False) -> Definitions:
     """Define the rail standard, gauge and railhead width; with `detect`, the points may tell them."""
-    hint = tr(" DETECT measures the rails in part of the points and takes the standard that fits.") if detect else ""
+    hint = tr(" DETECT measures the rails in part of the points, and says how sure it is.") if detect else ""
     standard = choice("STANDARD", tr("Rail standard"), (*STANDARDS, CUSTOM, *([DETECT] if detect else [])), DEFAULT)
     standard.setMetadata(STANDARD_WIDGET)
     return (
         helped(
             standard,
             tr(
-                "Rail profile and gauge, which give the rail spacing and the railhead width: EN_60E1_1435 is the "
-                "profile 60E1 of EN 13674 on 1435 mm gauge. CUSTOM takes both from the two fields below. Widths not "
-                "confirmed by a table: {}."
-            ).format(", ".join(UNCONFIRMED_PROFILES))
+                "Rail profile and gauge, which give the rail spacing and the railhead width. CUSTOM takes both from "
+                "GAUGE "
+                "and HEAD_WIDTH."
+            )
             + hint,
         ),
-        helped(
+        advanced(
             number("GAUGE", tr("Gauge [mm]"), minimum=1.0, optional=True, decimals=MM_DECIMALS),
             tr("Distance between the inner faces of the two railheads. Leave empty to use the value of the standard."),
         ),
-        helped(
+        advanced(
             number("HEAD_WIDTH", tr("Railhead width [mm]"), minimum=1.0, optional=True, decimals=MM_DECIMALS),
             tr("Width of the head of one rail. Leave empty to use the value of the standard."),
         ),
@@ -106,7 +111,7 @@ def airborne() -> Definitions:
             number("FOOTPRINT", tr("Footprint [m]"), AirborneParameters.footprint_m, 0.01, MAX_FOOTPRINT_M),
             tr(
                 "Diameter of the laser beam on the ground: flying height times divergence, such as 1000 m times 0.25 "
-                "mrad. Where it is not known, 0.3 m suits most flights; the report states what the rails look like."
+                "mrad. Where it is not known, 0.3 m suits most flights; a warning says if the rails look wider."
             ),
         ),
         helped(
@@ -191,7 +196,7 @@ def vertical_curves() -> QgsProcessingParameterDefinition:
 def area() -> Definitions:
     """Define the extent and the coordinate system of the cloud."""
     return (
-        helped(
+        advanced(
             QgsProcessingParameterExtent("EXTENT", tr("Extent"), optional=True),
             tr("Only points inside this rectangle are read. Leave empty to read all points."),
         ),
@@ -309,7 +314,7 @@ def lines() -> Definitions:
 
 def max_gap() -> QgsProcessingParameterDefinition:
     """Define the longest gap to close."""
-    return helped(
+    return advanced(
         number("MAX_GAP", tr("Longest gap to close [m]"), Parameters.max_gap_m, maximum=MAX_LENGTH_M),
         tr(
             "Line ends up to this distance apart are joined if they point at each other; 0 joins none. Where only one "
@@ -364,8 +369,8 @@ def method() -> Definitions:
                 "WEIGHTS", tr("Weights of the classifier"), optional=True, fileFilter=tr("Weights (*.npz)")
             ),
             tr(
-                "The file that Train Rail Classifier has written, for METHOD LEARNED. Leave empty to use the weights "
-                "that were trained on simulated clouds."
+                "The file that Train Rail Classifier has written, for LEARNED. Leave empty to use the weights that "
+                "were trained on simulated clouds."
             ),
         ),
     )
@@ -445,7 +450,7 @@ def content() -> Definitions:
         ),
         helped(
             QgsProcessingParameterEnum("CONTENT", tr("Content of the output"), contents, defaultValue=0),
-            tr("0 writes the whole cloud, 1 only the points on rails."),
+            tr("The whole cloud (0), or only the points on rails (1)."),
         ),
     )
 
@@ -527,5 +532,37 @@ def pairing() -> Definitions:
                 MAX_TOLERANCE_M,
             ),
             tr("Rails whose gauge deviates by more than this do not make a track."),
+        ),
+    )
+
+
+def alignment() -> Definitions:
+    """Define how design elements are fitted."""
+    default = FitParameters()
+    tolerance = number(
+        "TOLERANCE",
+        tr("Tolerance [mm]"),
+        1000.0 * default.tolerance_m,
+        minimum=MIN_FIT_TOLERANCE_MM,
+        maximum=1000.0 * MAX_TOLERANCE_M,
+        decimals=MM_DECIMALS,
+    )
+    length = number("MIN_LENGTH", tr("Shortest element [m]"), default.min_length_m, 1.0, MAX_ELEMENT_M)
+    return (
+        helped(
+            tolerance,
+            tr(
+                "How far the track may lie off its design. Misalignment up to this standard deviation is told from "
+                "design by its length; more is followed by elements."
+            ),
+        ),
+        helped(length, tr("Shorter elements are not sought.")),
+        helped(
+            choice("TRANSITIONS", tr("Between two radii"), TRANSITIONS, default.transitions),
+            tr("Jumps of the curvature, as in turnouts and sidings, or clothoids only."),
+        ),
+        helped(
+            QgsProcessingParameterBoolean("ROUND", tr("Propose round radii"), defaultValue=default.rounded),
+            tr("States the roundest radius that the track allows, beside the fitted one."),
         ),
     )

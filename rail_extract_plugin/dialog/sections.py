@@ -16,6 +16,7 @@ SECTIONS = {
         *("SIMPLIFY_XY", "SIMPLIFY_Z", "MIN_LENGTH", "STRIPS"),
     ),
     tr("Tracks"): ("GAUGE", "HEAD_WIDTH", "OTHER_GAUGES", "CENTERLINE_TOLERANCE", "STEP"),
+    tr("Axis"): ("AXIS", "START_KM", "POSTS", "POST_FIELD", "JUMPS", "DIRECTION", "FORMAT"),
     tr("Files of alignments"): ("VERTICAL_CURVES", "EAST_FIRST"),
 }
 """Parameters by section."""

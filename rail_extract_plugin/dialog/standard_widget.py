@@ -8,7 +8,7 @@ from __future__ import annotations
 from qgis.core import QgsSettings
 from qgis.gui import QgsProcessingGui
 
-from ...core.standards import STANDARDS
+from ...core.standards import DETECT, STANDARDS
 from .choice_widget import ChoiceWidgetWrapper
 from .choices import WORDS
 from .standard_setting import LAST
@@ -22,10 +22,14 @@ class StandardWidgetWrapper(ChoiceWidgetWrapper):
         return described(self.parameterDefinition().options())
 
     def postInitialize(self, wrappers: list) -> None:
-        """Begin with the standard of the last run, in the dialog for one run; values that are set later replace it."""
+        """Begin with the standard of the last run, or let it be detected; values that are set later replace this.
+
+        Only in the dialog for one run.
+        """
         options, last = self.parameterDefinition().options(), QgsSettings().value(LAST)
-        if self.dialogType == QgsProcessingGui.WidgetType.Standard and last in options:
-            self.setValue(last)
+        first = next((one for one in (last, DETECT) if one in options), None)
+        if self.dialogType == QgsProcessingGui.WidgetType.Standard and first:
+            self.setValue(first)
 
     def remember(self) -> None:
         """Keep the choice for the next dialog; to be called when a run has used it."""

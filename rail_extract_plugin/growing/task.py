@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 from qgis.core import QgsPointXY, QgsTask
 
-from ...core.errors import Cancelled, RailExtractError
+from ...core.errors import Cancelled, OffCloudError, OffRailError, RailExtractError
+from ...core.parameters import GrowParameters
 from ...core.standards import SEARCHED_CLASSES, RailStandard
 from ..feedback import TaskProgress
+from ..i18n import tr
 from ..reading.clouds import CloudSource, points_folder
 
 if TYPE_CHECKING:
@@ -61,6 +63,10 @@ class GrowTask(QgsTask):
             self._shown = self._grown()
         except Cancelled:
             return False
+        except OffCloudError:
+            self._shown = Shown(text=tr("The cloud has no point here: click on a rail of the cloud."))
+        except OffRailError:
+            self._shown = Shown(text=_missed())
         except RailExtractError as error:
             self._shown = Shown(text=str(error))
         except Exception as error:
@@ -91,3 +97,12 @@ class GrowTask(QgsTask):
         """Pass on what grew, in the main thread."""
         if result:
             self._done(self._shown)
+
+
+def _missed() -> str:
+    """Say to someone who clicked that there is no rail."""
+    search_cm, height_cm = 100 * GrowParameters.search_m, 100 * GrowParameters.min_height_m
+    return tr(
+        "No railhead within {:.0f} cm of the click that stands {:.0f} cm above the bed: zoom in and click on a head. "
+        "If you did, choose the rail standard of this track in the toolbar."
+    ).format(search_cm, height_cm)

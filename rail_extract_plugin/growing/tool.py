@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from html import escape
+from typing import Any
 
 from qgis.core import (
     Qgis,
@@ -27,17 +28,19 @@ from qgis.gui import QgsMapCanvas, QgsMapMouseEvent, QgsMapTool, QgsMessageBar, 
 from qgis.PyQt import sip
 from qgis.PyQt.QtCore import QObject, Qt
 from qgis.PyQt.QtGui import QColor, QIcon
-from qgis.PyQt.QtWidgets import QAction, QComboBox, QWidget
+from qgis.PyQt.QtWidgets import QAction, QComboBox, QFileDialog, QWidget
 
 from ...core.errors import RailExtractError
 from ...core.standards import DEFAULT, STANDARDS
 from ..algorithms.grow_rail_points import GrowRailPoints
+from ..dialog.cloud_parameter import file_filter
 from ..dialog.standard_setting import LAST
 from ..dialog.wheel import ignore_wheel
 from ..i18n import tr
 from ..paths import ICONS
-from ..reading.clouds import cloud_source
+from ..reading.clouds import checked_crs, cloud_source
 from ..setup.dependencies import explain_missing, missing_packages
+from ..systems import system
 from .task import GrowTask, Shown
 
 COLOUR, WIDTH, END_SIZE = "#e64a19", 3, 11
@@ -126,7 +129,7 @@ class GrowRails(QObject):
     ) -> None:
         super().__init__(parent)
         self._canvas, self._messages, self._active_layer = canvas, messages, active_layer
-        self._layer: QgsPointCloudLayer | None = None
+        self._cloud: QgsPointCloudLayer | str | None = None
         self._task: GrowTask | None = None
         self.seeds: list[Seed] = []
         self.dialog: QWidget | None = None
@@ -170,14 +173,17 @@ class GrowRails(QObject):
             self._say(tr("The rail of the last click is still growing: wait, or undo it."))
             return
         try:
-            layer = self._chosen_layer()
-            cloud = cloud_source(layer, QgsProcessingContext())
+            value = self._chosen_cloud()
+            if value is None:
+                return
+            cloud = cloud_source(value, QgsProcessingContext())
+            crs = value.crs() if isinstance(value, QgsPointCloudLayer) else system(checked_crs(cloud))
         except RailExtractError as error:
             self._say(str(error))
             return
-        self._layer, map_crs = layer, self._canvas.mapSettings().destinationCrs()
-        to_layer = QgsCoordinateTransform(map_crs, layer.crs(), QgsProject.instance())
-        seed = Seed(to_layer.transform(place), layer.crs(), [])
+        self._cloud, map_crs = value, self._canvas.mapSettings().destinationCrs()
+        to_cloud = QgsCoordinateTransform(map_crs, crs, QgsProject.instance())
+        seed = Seed(to_cloud.transform(place), crs, [])
         self.seeds.append(seed)
         self._draw(seed, [QgsGeometry.fromPointXY(seed.place)], QgsWkbTypes.GeometryType.PointGeometry)
         standard = STANDARDS[self.standards.currentData()]
@@ -186,29 +192,38 @@ class GrowRails(QObject):
         QgsApplication.taskManager().addTask(self._task)
         self._enable()
 
-    def _chosen_layer(self) -> QgsPointCloudLayer:
-        """Return the layer to grow in: the selected one, or the only cloud of the project.
+    def _chosen_cloud(self) -> QgsPointCloudLayer | str | None:
+        """Return the cloud to grow in: the selected layer, the only one of the project, or a file.
+
+        None if the user was asked for a file and chose none.
 
         Raises
         ------
         RailExtractError
-            There is none, seeds of another layer wait, or packages are missing.
+            There are several layers, seeds of another cloud wait, or packages are missing.
         """
         missing = missing_packages(GrowRailPoints.NEEDS)
         if missing:
             raise RailExtractError(explain_missing(tr("Grow Rails"), missing, []))
-        layer = self._active_layer()
-        if not isinstance(layer, QgsPointCloudLayer):
-            layers = QgsProject.instance().mapLayers().values()
-            clouds = [one for one in layers if isinstance(one, QgsPointCloudLayer)]
-            if len(clouds) != 1:
-                raise RailExtractError(tr("Select a point cloud in the layer panel, then click on a rail."))
-            layer = clouds[0]
-        if self.seeds and layer is not self._layer:
+        active, layers = self._active_layer(), QgsProject.instance().mapLayers().values()
+        clouds = [one for one in layers if isinstance(one, QgsPointCloudLayer)]
+        if len(clouds) > 1 and active not in clouds:
+            raise RailExtractError(tr("Select a point cloud in the layer panel, then click on a rail."))
+        if clouds:
+            chosen = active if active in clouds else clouds[0]
+        else:
+            chosen = self._cloud if isinstance(self._cloud, str) else self._ask_for_file()
+        if self.seeds and chosen != self._cloud:
             raise RailExtractError(
                 tr("Rails of another point cloud are still shown: classify or undo them before you click on this one.")
             )
-        return layer
+        return chosen
+
+    def _ask_for_file(self) -> str | None:
+        """Let the user choose the file of a cloud that this QGIS does not show."""
+        title = tr("Select the point cloud in which rails grow")
+        path, _ = QFileDialog.getOpenFileName(self.parent(), title, "", file_filter())
+        return path or None
 
     def _show(self, seed: Seed, shown: Shown) -> None:
         """Draw what grew, or take the click back if nothing did."""
@@ -250,18 +265,23 @@ class GrowRails(QObject):
         self._enable()
 
     def accept(self) -> None:
-        """Open the dialog of the algorithm with the seeds as a layer, and clear the map."""
+        """Open the dialog of the algorithm with the seeds as a layer; the map is cleared once it has run."""
         from ..runs.run_dialog import open_dialog
 
-        if self.is_growing or not self.seeds or self._layer is None:
+        if self.is_growing or not self.seeds or self._cloud is None:
             return
         values = {
-            "INPUT": self._layer.id(),
+            "INPUT": self._cloud if isinstance(self._cloud, str) else self._cloud.id(),
             "SEEDS": self._seed_layer().id(),
             "STANDARD": self.standards.currentData(),
         }
         self.dialog = open_dialog(GrowRailPoints.NAME, values, self.parent())
-        self.clear()
+        self.dialog.algorithmFinished.connect(self._clear_after)
+
+    def _clear_after(self, successful: bool, results: dict[str, Any]) -> None:
+        """Take all clicks back once their rails are classified; after a failure, they are tried again."""
+        if successful:
+            self.clear()
 
     def _seed_layer(self) -> QgsVectorLayer:
         """Add a layer with the seeds to the project."""
@@ -279,7 +299,7 @@ class GrowRails(QObject):
         self.cancel()
         for seed in list(self.seeds):
             self._remove(seed)
-        self._layer = None
+        self._cloud = self._cloud if isinstance(self._cloud, str) else None
         self._enable()
 
     def cancel(self) -> None:
@@ -309,7 +329,7 @@ class GrowRails(QObject):
 
     def _forget_removed(self, ids: Sequence[str]) -> None:
         """Take all clicks back if their layer was removed."""
-        if self._layer is not None and (sip.isdeleted(self._layer) or self._layer.id() in ids):
+        if isinstance(self._cloud, QgsPointCloudLayer) and (sip.isdeleted(self._cloud) or self._cloud.id() in ids):
             self.clear()
 
     def _say(self, text: str) -> None:

@@ -377,7 +377,7 @@ def _parts(geometry: QgsGeometry, chord: float) -> Iterator[np.ndarray]:
 def _rail(feature: QgsFeature, xyz: np.ndarray, default_class: int) -> RailLine:
     defaults = {"rail_id": feature.id(), "class_code": default_class}
     values = _attributes(feature, RailLine, RAIL_FIELDS, defaults)
-    return RailLine(xyz, **{**values, "gaps": _gaps(feature, xyz)})
+    return RailLine(xyz, **{**values, "gaps": gaps_of(feature, xyz)})
 
 
 def _surveyed(feature: QgsFeature, xyz: np.ndarray, id_field: str) -> SurveyedLine:
@@ -443,7 +443,7 @@ def _ids(feature: QgsFeature, name: str) -> tuple[int, ...]:
     return ids if max(ids) <= MAX_WHOLE else ()
 
 
-def _gaps(feature: QgsFeature, xyz: np.ndarray) -> np.ndarray:
+def gaps_of(feature: QgsFeature, xyz: np.ndarray) -> np.ndarray:
     """Return the sections in the field `gaps`, (k, 2) metres; none if the field does not hold those of this line."""
     words = str(value_of(feature, "gaps") or "").split(",")
     try:

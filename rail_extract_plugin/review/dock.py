@@ -200,12 +200,23 @@ class ReviewDock(QDockWidget):
         self.count.setText(tr("{} of {}; {} reviewed").format(self._at + 1, len(self._found), decided))
         reason = shown.value("reason") or ""
         _say(self.reason, f"{reason[:1].upper()}{reason[1:]}")
-        _say(self.text, f"{shown.where}: {shown.figures}.")
+        _say(self.text, " ".join((f"{shown.where}: {shown.figures}.", *self._missing(shown), *_section(shown))))
         picture = self._sections.picture(shown)
         self.view.show_picture(picture)
         nothing = picture.points is None or not len(picture.points)
         empty = tr("There is no rail point here.") if nothing else ""
         _say(self.note, tr("Reading the points…") if self.is_reading else picture.note or empty)
+
+    def _missing(self, shown: Review) -> list[str]:
+        """Say which rail has no points, and from where to where."""
+        gaps = self._sections.gaps(shown) if self._sections is not None else []
+        return [f"{gap.side} rail without points from {gap.start_m:,.1f} to {gap.end_m:,.1f} m." for gap in gaps]
+
+
+def _section(shown: Review) -> list[str]:
+    """Say where the cross-section is."""
+    at_m = shown.value("worst_m")
+    return [] if at_m is None else [f"Cross-section at {at_m:,.1f} m."]
 
 
 def _say(label: QLabel, text: str) -> None:

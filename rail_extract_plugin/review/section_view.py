@@ -21,6 +21,9 @@ POINT_PX, CROSS_PX, LINE_PX, GAP_PX = 1.6, 6.0, 18.0, 6.0
 WHOLE = 0.35
 """Share of the height for the whole section."""
 
+HEAD_M = 0.04
+"""Height of the outline of a head without points: about that of the heads of all profiles."""
+
 HEADS = 3.0
 """Width of an enlarged head in head widths, so that points next to it are seen, too."""
 
@@ -110,12 +113,15 @@ def _draw(painter: QPainter, panel: Panel, picture: Picture) -> None:
     painter.setBrush(POINT)
     for right, up in picture.points if picture.points is not None else ():
         painter.drawEllipse(panel.place(right, up), POINT_PX, POINT_PX)
-    painter.setPen(QPen(RAIL, 1.6))
-    for right, up in picture.rails:
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    for (right, up), missing in zip(picture.rails, picture.missing):
         place, half = panel.place(right, up), 0.5 * picture.head_width_m * panel.scale
+        painter.setPen(QPen(RAIL, 1.6, Qt.PenStyle.DashLine if missing else Qt.PenStyle.SolidLine))
+        if missing:
+            painter.drawRect(QRectF(place.x() - half, place.y(), 2 * half, HEAD_M * panel.scale))
+            continue
         painter.drawLine(place - QPointF(half, 0), place + QPointF(half, 0))
         painter.drawLine(place - QPointF(0, CROSS_PX), place + QPointF(0, CROSS_PX))
-    painter.setBrush(Qt.BrushStyle.NoBrush)
     painter.setPen(QPen(FRAME))
     painter.drawRect(panel.box.adjusted(0.5, 0.5, -0.5, -0.5))
     painter.setPen(QPen(SOFT))

@@ -11,7 +11,10 @@ import numpy as np
 from qgis.core import QgsProject, QgsTask, QgsVectorLayer
 
 from ...core.errors import Cancelled, RailExtractError
+from ...core.polyline import interpolate, length_along, resample
 from ..feedback import TaskProgress
+from ..i18n import tr
+from ..reading.line_layers import gaps_of
 from ..writing.layers import vertices_of
 from ..writing.run import RUN, RunCloud, cloud_of
 from .findings import Review
@@ -26,6 +29,27 @@ THICKNESS_M = 0.5
 """Points up to this far ahead and behind are shown: fewer than this would not show the heads in sparse clouds."""
 
 
+STEP_M = 0.1
+"""Precision of the chainages at which a rail loses its points, those that the dock writes."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A part of a finding in which one rail has no points: its side, and chainages like those of the finding."""
+
+    side: str
+    start_m: float
+    end_m: float
+
+
+@dataclass(frozen=True)
+class Rail:
+    """A rail of the run: its vertices, (n, 3), and plan distances, (k, 2), between which it has no points, metres."""
+
+    xyz: np.ndarray
+    gaps: np.ndarray
+
+
 @dataclass(frozen=True)
 class Picture:
     """What a cross-section shows, metres to the right and up as seen along the track.
@@ -35,6 +59,8 @@ class Picture:
     points : (n, 2) array or None
         None until they are read.
     rails : (k, 2) array
+    missing : (k,) bool array
+        Whether a rail has no points here: it is where the line is drawn, or opposite to the other one.
     head_width_m : float
     note : str
         What is missing, and why.
@@ -42,6 +68,7 @@ class Picture:
 
     points: np.ndarray | None
     rails: np.ndarray
+    missing: np.ndarray
     head_width_m: float
     note: str = ""
 
@@ -73,30 +100,60 @@ class Sections:
     def picture(self, review: Review) -> Picture:
         """Return what the section of a finding shows."""
         plane, width_m = self._planes[review.feature.id()], self.cloud.head_width_m if self.cloud else 0.07
-        rails, points = self._rails(plane, review, width_m), self.points.get(review.feature.id())
+        rails, missing = self._rails(plane, review, width_m)
+        points = self.points.get(review.feature.id())
         shown = None
         if points is not None:
             seen = plane.seen(points)
             shown = seen[np.abs(seen[:, 0]) <= THICKNESS_M, 1:]
         level = np.array([0.0, _level(rails, shown)])
-        return Picture(None if shown is None else shown - level, np.nan_to_num(rails - level), width_m, self.note)
+        moved = None if shown is None else shown - level
+        return Picture(moved, np.nan_to_num(rails - level), missing, width_m, self.note)
+
+    def gaps(self, review: Review) -> list[Gap]:
+        """Return where which rail of a track has no points, within a finding."""
+        start_m = review.value("from_m")
+        if start_m is None or review.value("rail_id") is not None:
+            return []
+        plane, found = self._planes[review.feature.id()], []
+        stations, along = resample(self._line(review), STEP_M)
+        for rail in _rails_of_run(self._run, self._units_m):
+            places, _ = _crossings(rail, plane)
+            if not len(places):
+                continue
+            side = tr("Right") if places[0, 0] > 0 else tr("Left")
+            for gap in rail.gaps:
+                ends = interpolate(rail.xyz[:, :2], length_along(rail.xyz[:, :2]), gap)
+                first, last = sorted(along[np.argmin(np.hypot(*(stations[:, :2] - end).T))] for end in ends)
+                found.append(Gap(side, start_m + first, start_m + last))
+        return sorted((gap for gap in found if gap.end_m > gap.start_m), key=lambda gap: gap.start_m)
+
+    def _line(self, review: Review) -> np.ndarray:
+        """Return the line of a finding, (n, 3) metres."""
+        return np.nan_to_num(vertices_of(review.feature)) * self._units_m
 
     def _plane(self, review: Review) -> Section:
         from ...core.clouds.sections import section_at
 
-        return section_at(np.nan_to_num(vertices_of(review.feature)) * self._units_m, review.worst_share)
+        return section_at(self._line(review), review.worst_share)
 
-    def _rails(self, plane: Section, review: Review, width_m: float) -> np.ndarray:
-        """Return where the rails of the run cross a plane, or where gauge and cant put them, (k, 2)."""
-        crossings = [plane.crossings(line * self._units_m) for line in _rails_of_run(self._run)]
-        near = [places[np.abs(places[:, 0]) <= REACH_M] for places in crossings]
-        if any(map(len, near)):
-            return np.concatenate(near)
+    def _rails(self, plane: Section, review: Review, width_m: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return where the rails are in a plane, (k, 2), and which of them have no points there, (k,)."""
+        crossings, missing = [np.empty((0, 2))], []
+        for rail in _rails_of_run(self._run, self._units_m):
+            places, at_m = _crossings(rail, plane)
+            crossings.append(places)
+            missing += [bool(np.any((rail.gaps[:, 0] <= at) & (at <= rail.gaps[:, 1]))) for at in at_m]
+        rails = np.concatenate(crossings)
+        if len(rails) == 1 and review.value("track_id") is not None:  # the other rail of the track was not found
+            return np.concatenate([rails, rails * [-1, 1]]), np.array([*missing, True])
+        if len(rails):
+            return rails, np.array(missing)
         gauge, cant = review.value("gauge_mm"), review.value("cant_mm")
         if gauge is None:
-            return np.empty((0, 2))
+            return np.empty((0, 2)), np.empty(0, bool)
         half_m, rise_m = 0.5 * (gauge / 1000 + width_m), 0.0005 * (cant or 0.0)
-        return np.array([[-half_m, rise_m], [half_m, -rise_m]])
+        return np.array([[-half_m, rise_m], [half_m, -rise_m]]), np.zeros(2, bool)
 
 
 class ReadingTask(QgsTask):
@@ -149,8 +206,19 @@ def _level(rails: np.ndarray, points: np.ndarray | None) -> float:
     return 0.0
 
 
-def _rails_of_run(run: str | None) -> list[np.ndarray]:
-    """Return the rails that the same run has loaded, (n, 3) each."""
+def _crossings(rail: Rail, plane: Section) -> tuple[np.ndarray, np.ndarray]:
+    """Return where a rail crosses a plane within reach, (k, 2), and at which of its plan distances, (k,)."""
+    along = length_along(rail.xyz[:, :2])
+    ahead, right, up = plane.seen(rail.xyz).T
+    numbers = np.flatnonzero((ahead[:-1] < 0) != (ahead[1:] < 0))
+    share = ahead[numbers] / (ahead[numbers] - ahead[numbers + 1])
+    rights, ups, at_m = (one[numbers] + share * (one[numbers + 1] - one[numbers]) for one in (right, up, along))
+    near = np.abs(rights) <= REACH_M
+    return np.column_stack([rights, ups])[near], at_m[near]
+
+
+def _rails_of_run(run: str | None, units_m: np.ndarray) -> list[Rail]:
+    """Return the rails that the same run has loaded."""
     layers = QgsProject.instance().mapLayers().values()
     mine = [
         layer
@@ -158,4 +226,6 @@ def _rails_of_run(run: str | None) -> list[np.ndarray]:
         if run and layer.customProperty(RUN) == run and isinstance(layer, QgsVectorLayer)
         if layer.fields().lookupField("rail_id") >= 0 and layer.fields().lookupField("resid_mm") >= 0
     ]
-    return [vertices_of(feature) for layer in mine for feature in layer.getFeatures() if feature.hasGeometry()]
+    features = [feature for layer in mine for feature in layer.getFeatures() if feature.hasGeometry()]
+    lines = [vertices_of(feature) * units_m for feature in features]
+    return [Rail(line, gaps_of(feature, line)) for feature, line in zip(features, lines)]

@@ -5,18 +5,30 @@ QGIS imports this module when it shows a dialog; nothing else may, because there
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from processing.gui.AlgorithmDialog import AlgorithmDialog
 from processing.gui.ParametersPanel import ParametersPanel
-from qgis.core import QgsApplication, QgsProcessingAlgorithm, QgsProcessingParameterDefinition
-from qgis.PyQt.QtWidgets import QDialogButtonBox, QGroupBox, QLabel, QTextEdit, QVBoxLayout, QWidget
+from qgis.core import (
+    Qgis,
+    QgsApplication,
+    QgsProcessingAlgorithm,
+    QgsProcessingContext,
+    QgsProcessingFeedback,
+    QgsProcessingParameterDefinition,
+)
+from qgis.PyQt import sip
+from qgis.PyQt.QtWidgets import QDialogButtonBox, QGroupBox, QLabel, QPushButton, QTextEdit, QVBoxLayout, QWidget
 
 from ..dialog.help_panel import ADVANCED
 from ..dialog.sections import OTHERS, RESULTS, SECTIONS, section_of
 from ..dialog.wheel import ignore_wheel
 from ..dialog.wording import with_labels
-from ..links import LinkFollower
+from ..i18n import tr
+from ..links import LinkFollower, links
+from ..notices import notices
+from .next_steps import Step, after_failure, after_success
 
 
 class RunDialog(AlgorithmDialog):
@@ -32,7 +44,10 @@ class RunDialog(AlgorithmDialog):
         super().__init__(algorithm, parent=parent)
         ignore_wheel(self.mainWidget())
         self._follower = LinkFollower(self.findChild(QTextEdit, "txtLog"))
-        self.algorithmFinished.connect(self._finished)
+        self._failure: type | None = None
+        self._standard = ""
+        notices.run_failed.connect(self._note_failure)
+        notices.standard_proposed.connect(self._note_standard)
 
     def getParametersPanel(self, alg: QgsProcessingAlgorithm, parent: QWidget) -> ParametersPanel:
         """Return the fields; `AlgorithmDialog` asks for them."""
@@ -43,11 +58,59 @@ class RunDialog(AlgorithmDialog):
         self.setParameters(changes)
         self.buttonBox().button(QDialogButtonBox.StandardButton.Ok).click()
 
-    def _finished(self, successful: bool, results: dict[str, Any]) -> None:
-        """Keep the standard that was run with."""
+    def _note_failure(self, feedback: QgsProcessingFeedback, kind: type) -> None:
+        """Keep what kind of error ended the run of this dialog."""
+        if feedback is self.feedback:
+            self._failure = kind
+
+    def _note_standard(self, feedback: QgsProcessingFeedback, name: str) -> None:
+        """Keep the standard that fits the points of the run of this dialog better."""
+        if feedback is self.feedback:
+            self._standard = name
+
+    def finish(
+        self,
+        successful: bool,
+        result: dict[str, Any],
+        context: QgsProcessingContext,
+        feedback: QgsProcessingFeedback,
+        in_place: bool = False,
+    ) -> None:
+        """Show the end of a run; `AlgorithmDialog` calls this, whereas its signal does not come after a failure."""
+        super().finish(successful, result, context, feedback, in_place)
+        self.after_run(successful, result, context)
+
+    def after_run(self, successful: bool, results: dict[str, Any], context: QgsProcessingContext) -> None:
+        """Keep the standard that was run with, and offer what may follow."""
         standard = self.mainWidget().wrappers.get("STANDARD")
         if standard is not None:
             standard.remember()
+        if successful:
+            steps = list(after_success(self, results, context, self._standard))
+        else:
+            steps = list(after_failure(self, self._failure, self._standard))
+            for step in steps:
+                self._offer(step)
+        if steps:
+            offered = " &nbsp;·&nbsp; ".join(links.to(step.text, self._step(step)) for step in steps)
+            self.setInfo(f"<b>{tr('Next:')}</b> {offered}", escapeHtml=False)
+        self._failure, self._standard = None, ""
+
+    def _offer(self, step: Step) -> None:
+        """Offer a step in the message bar."""
+        button = QPushButton(step.text)
+        button.clicked.connect(self._step(step))
+        self.messageBar().pushWidget(button, Qgis.MessageLevel.Warning, 0)
+
+    def _step(self, step: Step) -> Callable[..., None]:
+        """Return a function that takes a step, unless the dialog is gone or at work."""
+
+        def take(*_: Any) -> None:
+            if not sip.isdeleted(self) and self.feedback is None:
+                self.messageBar().clearWidgets()
+                step.take()
+
+        return take
 
 
 class _Panel(ParametersPanel):
@@ -64,9 +127,11 @@ class _Panel(ParametersPanel):
                     self._layouts[RESULTS].addWidget(widget)
         used = {title: layout for title, layout in self._layouts.items() if layout.count()}
         group = self.findChild(QGroupBox, "grpAdvanced").layout()
-        for title, layout in used.items():
-            if len(used) > 1:
-                group.addWidget(_heading(title))
+        # Kept, because Python removes widgets that it has made for a parent that only QGIS refers to.
+        self._headings = [_heading(title) for title in used] if len(used) > 1 else []
+        for number, layout in enumerate(used.values()):
+            if self._headings:
+                group.addWidget(self._headings[number])
             group.addLayout(layout)
 
     def addParameterLabel(self, parameter: QgsProcessingParameterDefinition, label: QWidget) -> None:

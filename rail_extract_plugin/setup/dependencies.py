@@ -74,9 +74,11 @@ def explain_missing(label: str, packages: Sequence[Package], usable: Sequence[st
     nouns = "Python package" if len(packages) == 1 else "Python packages"
     verb, them = "works" if len(usable) == 1 else "work", "it" if len(packages) == 1 else "them"
     others = f" {_listed(usable)} {verb} without {them}." if usable else ""
+    with_torch = any(package.module in OPTIONAL for package in packages)
+    choice, option = (", with PyTorch set to CPU,", " -- TORCH=CPU") if with_torch else ("", "")
     return (
-        f"{label} needs the {nouns} {names}, which this QGIS does not have: run Install packages in the toolbox under "
-        f"Rail Extract, or qgis_process run railextract:installpackages in a shell.{others}"
+        f"{label} needs the {nouns} {names}, which this QGIS does not have: run Install packages{choice} in the "
+        f"toolbox under Rail Extract, or qgis_process run railextract:installpackages{option} in a shell.{others}"
     )
 
 

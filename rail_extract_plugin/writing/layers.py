@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from ...core.airborne.survey import AirborneLine, AirborneTrack
     from ...core.alignment.deviations import Deviations
     from ...core.alignment.elements import Alignment
+    from ...core.alignment.fit import Fit
     from ...core.comparison.tracks import LineDifferences, TrackComparison
     from ...core.frame import LocalFrame
     from ...core.grow.growth import Stop
@@ -443,6 +444,14 @@ def figures_of_stations(tracks: Sequence[TrackGeometry]) -> dict[str, Any]:
     }
 
 
+def figures_of_fits(fits: Sequence[Fit]) -> dict[str, Any]:
+    """Return the number of elements, and the root mean square of the slews in millimetres, as outputs."""
+    squares = sum(float((fit.deviations.slew_mm**2).sum()) for fit in fits)
+    count = sum(len(fit.deviations.s) for fit in fits)
+    elements = sum(len(fit.alignment.elements) for fit in fits)
+    return {"ELEMENT_COUNT": elements, "RMS": round(math.sqrt(squares / count), 3)}
+
+
 def output_crs(wkt: str | None) -> QgsCoordinateReferenceSystem:
     """Return the coordinate system for an output: `UNKNOWN_IN_METRES` if the cloud has none."""
     return system(wkt or UNKNOWN_IN_METRES)
@@ -464,11 +473,14 @@ def _write(
     destination = algorithm.destinations.get(name)
     if destination is not None and destination.file.suffix.lower() in EXCHANGED:
         return _exchange(algorithm, name, kind, shape, made, frame, parameters, context)
-    columns, crs = fields(kind.columns), output_crs(frame.crs_wkt)
+    value = parameters.get(name)
+    # QGIS complains of the system that stands for an unknown one as soon as a layer is in the project.
+    is_shown = destination is None and bool(getattr(value, "destinationProject", None))
+    columns, crs = fields(kind.columns), system(frame.crs_wkt) if is_shown else output_crs(frame.crs_wkt)
     layer_id = _layer(algorithm, name, columns, shape, made, crs, lost_part(frame.crs_wkt), parameters, context)
     if not layer_id:
         return {}
-    _style(algorithm, name, layer_id, kind.style, context)
+    _style(algorithm, name, layer_id, kind.style, context, has_system=frame.crs_wkt is not None)
     return {name: layer_id}
 
 
@@ -577,11 +589,16 @@ def _plain(values: Sequence[Any]) -> list[Any]:
 
 
 def _style(
-    algorithm: QgsProcessingAlgorithm, name: str, layer_id: str, style: str, context: QgsProcessingContext
+    algorithm: QgsProcessingAlgorithm,
+    name: str,
+    layer_id: str,
+    style: str,
+    context: QgsProcessingContext,
+    has_system: bool = True,
 ) -> None:
     """Apply a style to an output when QGIS loads it, and name it by the cloud of the run."""
     title = algorithm.parameterDefinition(name).description()
-    style_on_load(layer_id, style, context, algorithm.layer_properties, title)
+    style_on_load(layer_id, style, context, algorithm.layer_properties, title, has_system)
 
 
 def _feature(geometry: QgsGeometry, values: Sequence[Any], columns: Sequence[Field]) -> QgsFeature:

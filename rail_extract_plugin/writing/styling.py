@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from qgis.core import (
+    QgsCoordinateReferenceSystem,
     QgsMapLayer,
     QgsProcessingContext,
     QgsProcessingFeedback,
@@ -32,13 +33,16 @@ BOTTOM_TO_TOP = (
 
 
 class _Styler(QgsProcessingLayerPostProcessorInterface):
-    def __init__(self, style: str, title: str, properties: Mapping[str, str]) -> None:
+    def __init__(self, style: str, title: str, properties: Mapping[str, str], has_system: bool) -> None:
         super().__init__()
-        self._style, self._title, self._properties = style, title, dict(properties)
+        self._style, self._title, self._properties, self._has_system = style, title, dict(properties), has_system
 
     def postProcessLayer(
         self, layer: QgsMapLayer, context: QgsProcessingContext, feedback: QgsProcessingFeedback
     ) -> None:
+        if not self._has_system:
+            # QGIS marks such a layer and asks for its system; it can't place the one that stands for an unknown one.
+            layer.setCrs(QgsCoordinateReferenceSystem())
         layer.loadNamedStyle(str(STYLES / f"{self._style}.qml"))
         show_lines_in_3d(layer, self._style)
         for name, value in self._properties.items():
@@ -54,10 +58,10 @@ _kept: list[_Styler] = []
 """QGIS calls these after the algorithm has been deleted, holds no reference, and deletes them with its context."""
 
 
-def _styler(style: str, title: str, properties: Mapping[str, str]) -> _Styler:
+def _styler(style: str, title: str, properties: Mapping[str, str], has_system: bool) -> _Styler:
     """Create the object for one layer, and keep it until QGIS deletes it."""
     _kept[:] = [one for one in _kept if not sip.isdeleted(one)]
-    _kept.append(_Styler(style, title, properties))
+    _kept.append(_Styler(style, title, properties, has_system))
     return _kept[-1]
 
 
@@ -67,6 +71,7 @@ def style_on_load(
     context: QgsProcessingContext,
     properties: Mapping[str, str] = NO_PROPERTIES,
     title: str = "",
+    has_system: bool = True,
 ) -> None:
     """Apply a style if QGIS loads the layer after the run.
 
@@ -82,8 +87,10 @@ def style_on_load(
         To be stored with the layer.
     title : str
         Name of the output. A layer with this name gets that of the cloud as well; a model, for example, gives its own.
+    has_system : bool
+        Whether the coordinate system of the layer is known.
     """
     if context.willLoadLayerOnCompletion(layer_id):
         details = context.layerToLoadOnCompletionDetails(layer_id)
-        details.setPostProcessor(_styler(style, title, properties))
+        details.setPostProcessor(_styler(style, title, properties, has_system))
         group_layer(details, tr("Rail Extract"), BOTTOM_TO_TOP.index(style))

@@ -39,7 +39,11 @@ def test_the_estimate_is_exact_at_constant_speed():
     texts = run([(second, second / 1000) for second in range(1, 1001)])
     assert texts[0] == "0 % done, about 17 minutes left"
     assert texts[99] == "50 % done, about 8 minutes left"
-    assert texts[-1].startswith("100 % done") or texts[-1].endswith("about 10 seconds left")
+    assert texts[-1] == "99 % done, about 10 seconds left"
+
+
+def test_less_than_ten_seconds_are_not_announced():
+    assert run([(second, second / 16) for second in range(1, 16)]) == ["31 % done, about 10 seconds left"]
 
 
 def test_the_estimate_follows_the_second_half_of_the_elapsed_time():

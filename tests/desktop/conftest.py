@@ -11,7 +11,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import laspy
+import numpy as np
 import pytest
+from rail_extract.laboratory.scenes.raw_strips import strip
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -55,7 +58,21 @@ class Session:
 
 
 @pytest.fixture(scope="session")
-def run_scenario(tmp_path_factory):
+def raw_cloud(tmp_path_factory):
+    """A raw cloud of 12 m of track that states no coordinate system."""
+    path = tmp_path_factory.mktemp("clouds") / "raw.las"
+    xyz = strip(12.0).xyz + [500_000.0, 3_000_000.0, 100.0]
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.scales, header.offsets = [0.001] * 3, xyz[0]
+    cloud = laspy.LasData(header)
+    cloud.xyz = xyz
+    cloud.classification = np.full(len(xyz), 1, dtype=np.uint8)
+    cloud.write(path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def run_scenario(tmp_path_factory, raw_cloud):
     """Run a scenario, once: tests share what it found."""
     programs = {name: shutil.which(name) for name in ("qgis", "xvfb-run")}
     if not all(programs.values()) or "QGIS_PROCESS" not in os.environ:
@@ -70,6 +87,7 @@ def run_scenario(tmp_path_factory):
             **os.environ,
             "QT_QPA_PLATFORM": "xcb",
             "RAIL_EXTRACT_SAMPLE": str(ROOT / "resources" / "sample" / "sample.laz"),
+            "RAIL_EXTRACT_RAW": str(raw_cloud),
             "RAIL_EXTRACT_ZIP": str(ROOT / "build" / "rail_extract.zip"),
         }
         for name in ("QGIS_PLUGINPATH", "QGIS_CUSTOM_CONFIG_PATH"):

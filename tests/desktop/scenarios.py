@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import sys
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -34,11 +36,14 @@ from qgis.PyQt.QtWidgets import (
     QGroupBox,
     QLineEdit,
     QMenu,
+    QPushButton,
+    QTextBrowser,
     QTextEdit,
     QWidget,
 )
 from qgis.utils import iface, loadPlugin, plugins, reloadPlugin, startPlugin, unloadPlugin
 
+RAW = os.environ["RAIL_EXTRACT_RAW"]
 SAMPLE, ARCHIVE = os.environ["RAIL_EXTRACT_SAMPLE"], os.environ["RAIL_EXTRACT_ZIP"]
 TRUTH = Path(SAMPLE).with_name("sample_truth.geojson")
 
@@ -241,6 +246,78 @@ def unload(driver: Driver) -> Iterator:
     yield from close(dialog)
 
 
+def raw(driver: Driver) -> Iterator:
+    """Run on a raw cloud without its tick, take the step that is offered, and save all that was found."""
+    yield from install(ARCHIVE)
+    dialog = yield from open_dialog("extractrails")
+    driver.keep("standard at first", dialog.mainWidget().wrappers["STANDARD"].widget.currentText())
+    dialog.setParameters({"INPUT": RAW, "ITERATIONS": 1})
+    log = dialog.findChild(QTextEdit, "txtLog")
+    driver.keep("refusal", (yield from press_run(dialog)))
+    driver.picture("raw_refused")
+    (offer,) = (one for one in dialog.messageBar().findChildren(QPushButton) if "raw cloud" in one.text())
+    driver.keep("offer", offer.text())
+    offer.click()
+    button = dialog.buttonBox().button(QDialogButtonBox.StandardButton.Ok)
+    yield lambda: not button.isEnabled()
+    yield button.isEnabled
+    yield 1.0
+    driver.keep("log", log.toPlainText())
+    driver.picture("raw_found")
+    layers = [one for one in QgsProject.instance().mapLayers().values() if isinstance(one, QgsVectorLayer)]
+    driver.keep("systems", {layer.name(): layer.crs().toWkt() for layer in layers})
+    driver.keep("bars", [item.text() for item in iface.messageBar().items()])
+    yield from _save_all(driver, log)
+    yield from close(dialog)
+
+
+def _save_all(driver: Driver, log: QTextEdit) -> Iterator:
+    """Follow the link that saves all layers, and open the project that is in the file."""
+    address = re.search('<a href="(railextract:[0-9]+)"[^>]*>(?:<[^>]*>)*Save all layers', log.toHtml())[1]
+    later(partial(QDesktopServices.openUrl, QUrl(address)))
+    chooser = yield lambda: window("QFileDialog")
+    path = str(driver.folder / "all of it.gpkg")
+    chooser.findChild(QLineEdit, "fileNameEdit").setText(path)
+    later(chooser.findChild(QDialogButtonBox).button(QDialogButtonBox.StandardButton.Save).click)
+    yield lambda: Path(path).exists()
+    yield 1.0
+    driver.picture("saved")
+    QgsProject.instance().clear()
+    driver.keep("project is read", QgsProject.instance().read(f"geopackage:{path}?projectName=Rail Extract"))
+    layers = [node.layer() for node in QgsProject.instance().layerTreeRoot().findLayers()]
+    driver.keep("saved layers", [layer.name().partition(":")[0] for layer in layers])
+    driver.keep("saved sources", sorted({Path(layer.source().partition("|")[0]).name for layer in layers}))
+    rails = next(layer for layer in layers if layer.name().startswith("Rails"))
+    driver.keep("saved alias", rails.attributeAlias(rails.fields().lookupField("sigma_mm")))
+    yield 1.0
+    driver.picture("saved_project")
+
+
+def missing(driver: Driver) -> Iterator:
+    """Open an algorithm whose packages are missing, and follow the link of its message."""
+    yield from install(ARCHIVE)
+    kind = type(algorithm("trainrailclassifier"))
+    kind.NEEDS = (("torch_of_nobody",),)
+    packages = sys.modules["rail_extract.rail_extract_plugin.setup.dependencies"]
+    packages.PACKAGES = (packages.Package("torch_of_nobody", "torch"),)
+    packages.OPTIONAL = sys.modules["rail_extract.rail_extract_plugin.runs.missing"].OPTIONAL = ("torch_of_nobody",)
+    later(choose("trainrailclassifier").executeAlgorithm)
+    message = yield lambda: window("MessageDialog")
+    yield 0.5
+    driver.picture("missing")
+    text = message.findChild(QTextBrowser)
+    driver.keep("message", text.toPlainText())
+    address = re.search('<a href="(railextract:[0-9]+)"', text.toHtml())[1]
+    later(partial(text.anchorClicked.emit, QUrl(address)))
+    dialog = yield lambda: window("AlgorithmDialog")
+    yield 0.5
+    driver.keep("opened", dialog.algorithm().name())
+    driver.keep("PyTorch", dialog.mainWidget().wrappers["TORCH"].value())
+    driver.keep("message is closed", window("MessageDialog") is None)
+    driver.picture("missing_install")
+    yield from close(dialog)
+
+
 def rails(driver: Driver) -> Iterator:
     """Extract the sample's rails, wait, save them, and go on working with them."""
     yield from install(ARCHIVE)
@@ -279,7 +356,7 @@ def review(driver: Driver) -> Iterator:
     browser = Browser()
     menu = next(one for one in iface.pluginMenu().actions() if one.text() == "Rail Extract").menu()
     driver.keep("menu", [action.text() for action in menu.actions()])
-    later(menu.actions()[0].trigger)
+    later(next(one for one in menu.actions() if one.text() == "Open the Sample…").trigger)
     dialog = yield lambda: window("AlgorithmDialog")
     driver.keep("sample", dialog.mainWidget().wrappers["INPUT"].widget.value())
     driver.keep("standard", dialog.mainWidget().wrappers["STANDARD"].parameterValue())
@@ -293,6 +370,15 @@ def review(driver: Driver) -> Iterator:
     driver.keep("dock is visible", dock.isVisible())
     yield lambda: not dock.is_reading
     driver.keep("count", dock.count.text())
+    texts = []
+    for number in range(int(dock.count.text().split()[2].rstrip(";"))):
+        dock.go(number)
+        texts.append((dock.reason.text(), dock.text.text()))
+        if "no points" in dock.reason.text() and "rail without" in dock.text.text():
+            yield 0.5
+            driver.picture(f"review_missing_{number}")
+    driver.keep("texts", texts)
+    dock.go(0)
     dock.buttons["next"].click()
     yield 1.0
     driver.picture("review_next")

@@ -1,12 +1,26 @@
 """What a new user meets in the real QGIS; each test looks at what one of the scenarios found."""
 
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
 from osgeo import gdal, ogr
 
-SCENARIOS = ("dialogs", "wheel", "unload", "rails", "review", "growing", "deliveries", "alignments", "batch", "model")
+SCENARIOS = (
+    "dialogs",
+    "wheel",
+    "unload",
+    "raw",
+    "missing",
+    "rails",
+    "review",
+    "growing",
+    "deliveries",
+    "alignments",
+    "batch",
+    "model",
+)
 
 DIES_AT_EXIT = ("rails", 340)
 """Scenario and version in which QGIS dies after it was closed, as it also does after two runs of its own algorithms."""
@@ -81,6 +95,51 @@ def test_the_plugin_is_disabled_and_updated_during_a_run(run_scenario):
     assert "Results:" in session["log"]
 
 
+def test_a_raw_cloud_without_the_tick_is_explained_and_its_rails_are_found(run_scenario):
+    session = run_scenario("raw")
+    assert session["standard at first"] == "Detect from the points"
+    refusal = session["refusal"]
+    assert "The cloud has no points of class 10" in refusal
+    assert 'if nobody has classified the cloud, "Find the rail points of a raw cloud"' in refusal
+    assert session["offer"] == "Find the rail points of this raw cloud, and run again"
+    assert f"Next: {session['offer']}" in refusal
+    found = session["log"].rpartition("starting")[2]
+    assert re.search(r"Detected .* head \d\d ± \d mm; fits .*, also ", found)
+    assert "'RAIL_COUNT': 2" in found
+    assert "Review the findings" in found or "0 findings" in found
+
+
+def test_layers_of_a_cloud_without_a_system_have_none(run_scenario):
+    session = run_scenario("raw")
+    assert set(session["systems"].values()) == {""}
+    assert 'choose it as "CRS of a cloud without one"' in session["log"]
+    assert not [text for text in session["bars"] if "Undefined" in text]
+
+
+def test_everything_is_saved_as_one_file_with_a_project(run_scenario):
+    session = run_scenario("raw")
+    assert session["project is read"]
+    assert session["saved layers"] == ["Findings", "Track centerlines", "Rails"]
+    assert session["saved sources"] == ["all of it.gpkg"]
+    assert session["saved alias"] == "Standard error [mm]"
+
+
+def test_missing_pytorch_leads_to_its_installation(run_scenario):
+    session = run_scenario("missing")
+    assert "run Install packages, with PyTorch set to CPU" in session["message"]
+    assert (session["opened"], session["PyTorch"]) == ("installpackages", "CPU")
+    assert session["message is closed"]
+
+
+def test_the_dock_names_the_rail_without_points(run_scenario):
+    longest = run_scenario("review")["texts"][0]
+    assert longest[0] == "A rail has no points"
+    named = (
+        r"Left rail without points from 10\.\d to 12\.\d m\. Right rail without points from 1[56]\.\d to 1[78]\.\d m\. "
+    )
+    assert re.search(named + r"Cross-section at 1\d\.\d m\.$", longest[1])
+
+
 def test_rails_are_found_and_loaded(run_scenario):
     session = run_scenario("rails")
     assert session["results"]["RAIL_COUNT"] == 6
@@ -121,7 +180,8 @@ def test_saved_raster_has_its_system(run_scenario):
 def test_the_menu_opens_the_sample(run_scenario):
     session = run_scenario("review")
     in_3d = ["Show Lines in 3D"] if session["version"] >= 33600 else []
-    assert session["menu"] == ["Open the Sample…", *in_3d, "Review Findings", "Grow Rails"]
+    first = ["Extract Rails…", "Classify Rail Points…", "Grow Rails", "Review Findings"]
+    assert session["menu"] == [*first, *in_3d, "Open the Sample…", "Install Packages…", "Help"]
     assert session["sample"].endswith("rail_extract/resources/sample/sample.laz")
     assert session["standard"] == "IN_75R_1000"
 

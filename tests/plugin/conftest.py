@@ -220,6 +220,7 @@ OUTPUTS = {
     "buildtrackcenterlines": ("OUTPUT.gpkg",),
     "measuretrackgeometry": ("OUTPUT.gpkg",),
     "stationalongaxis": ("OUTPUT.gpkg",),
+    "fitalignment": ("ELEMENTS.gpkg", "DEVIATIONS.gpkg"),
     "comparetracks": ("OUTPUT.gpkg", "REPORT.html"),
     "exportalignment": ("OUTPUT.xml",),
     "importalignment": ("ELEMENTS.gpkg", "AXIS.gpkg"),

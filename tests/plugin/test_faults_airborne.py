@@ -11,10 +11,10 @@ CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
 ALONG = "LINESTRING(500000 3000005, 500060 3000005)"
 
 
-def cloud(bench, density=10, class_code=2):
-    """A field of 60 m by 10 m."""
-    count = 600 * density
-    xyz = np.random.RandomState(1).uniform(0, 1, (count, 3)) * [60.0, 10.0, 0.05] + CORNER
+def cloud(bench, density=10, class_code=2, width_m=10.0):
+    """A field 60 m long."""
+    count = int(60 * width_m * density)
+    xyz = np.random.RandomState(1).uniform(0, 1, (count, 3)) * [60.0, width_m, 0.05] + CORNER
     return bench.cloud(xyz, "air.laz", class_code)
 
 
@@ -63,6 +63,23 @@ FAULTS = [
         REFUSED,
         "The cloud has 799 points per square metre along the guides, as mobile lidar has: use Extract Rails, which "
         "finds the single railheads and is more accurate there.",
+    ),
+    Fault(
+        "airborne cloud in Extract Rails",
+        lambda bench: {"INPUT": cloud(bench, width_m=30.0)},
+        REFUSED,
+        "The cloud has no points of class 10; its classes, with the number of points, are 2 (18000): set the rail "
+        "classes or, if nobody has classified the cloud, CLASSIFY. For an airborne cloud, use Track Centerlines from "
+        "Airborne Lidar.",
+        run="extractrails",
+    ),
+    Fault(
+        "raw airborne cloud in Extract Rails",
+        lambda bench: {"INPUT": cloud(bench, width_m=30.0), "CLASSIFY": True},
+        REFUSED,
+        "No rail was found in the raw cloud: check the rail standard and the unit of the coordinates, or classify the "
+        "rail points yourself. For an airborne cloud, use Track Centerlines from Airborne Lidar.",
+        run="extractrails",
     ),
     Fault(
         "text as classes of an airborne cloud",

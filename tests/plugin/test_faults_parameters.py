@@ -161,7 +161,7 @@ FAULTS = [
         with_(RAIL_CLASSES="11"),
         REFUSED,
         "The cloud has no points of class 11; its classes, with the number of points, are 10 (3600): set the rail "
-        "classes.",
+        "classes or, if nobody has classified the cloud, CLASSIFY.",
     ),
     Fault(
         "other gauges as words",

@@ -220,10 +220,10 @@ FAULTS = [
         run="extractrails",
     ),
     Fault(
-        "rail standard to be detected from a raw cloud",
-        raw(CLASSIFY=True, STANDARD="DETECT"),
+        "rail standard to be detected from a raw cloud with ground only",
+        lambda bench: {**ground(bench), "CLASSIFY": True, "STANDARD": "DETECT"},
         REFUSED,
-        "DETECT measures classified points, which CLASSIFY does not need: choose STANDARD.",
+        "No rail standard could be detected: choose STANDARD, or fill in GAUGE and HEAD_WIDTH.",
         run="extractrails",
     ),
 ]

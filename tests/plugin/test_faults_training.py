@@ -125,7 +125,7 @@ FAULTS = [
         "extraction with METHOD LEARNED from a classified cloud",
         labelled(METHOD="LEARNED"),
         REFUSED,
-        "METHOD LEARNED is for raw clouds: set CLASSIFY, or choose GEOMETRY.",
+        "LEARNED is for raw clouds: set CLASSIFY, or choose GEOMETRY for METHOD.",
         run="extractrails",
     ),
 ]

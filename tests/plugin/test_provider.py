@@ -22,6 +22,7 @@ def test_toolbox_offers_the_algorithms(qgis, plugin):
             "buildtrackcenterlines",
             "measuretrackgeometry",
             "stationalongaxis",
+            "fitalignment",
             "comparetracks",
             "exportalignment",
             "importalignment",

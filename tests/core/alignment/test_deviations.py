@@ -5,6 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rail_extract.core.alignment.deviations import beside, deviations_of
+from rail_extract.core.alignment.elements import Alignment, VerticalElement, chained
+from rail_extract.core.frame import LocalFrame
 from rail_extract.core.polyline import length_along
 
 
@@ -34,6 +36,16 @@ def test_a_line_beside_a_design_is_measured_in_either_direction(random_design, s
     np.testing.assert_allclose(found.lift_mm, 1000 * np.interp(found.s, s, lift), atol=1e-3)
     np.testing.assert_allclose(found.cant_diff_mm, 3.0, atol=1e-3)
     np.testing.assert_allclose(found.xyz, design.xyz(found.s))
+
+
+def test_a_line_that_goes_on_past_the_design_is_measured_up_to_its_ends():
+    plan = chained((0.0, 0.0), 0.0, [(100.0, 0, 0)])
+    design = Alignment(1, LocalFrame(np.zeros(3)), plan, (VerticalElement(0, 100, 5, 0.01, 0.01),))
+    xyz = np.array([[-200.0, 9, 9], [-30, 0.03, 4.7], [40, 0.03, 5.4], [120, 0.03, 6.2], [400, 9, 9]])
+    found = deviations_of(design, 1, xyz, length_along(xyz[:, :2]), np.zeros((0, 2)))
+    np.testing.assert_allclose(found.s, np.arange(101))
+    np.testing.assert_allclose(found.slew_mm, 30, atol=1e-6)
+    np.testing.assert_allclose(found.lift_mm, 0, atol=1e-6)
 
 
 def test_without_heights_and_cant_their_deviations_are_unknown(random_design):

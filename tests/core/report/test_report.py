@@ -364,7 +364,8 @@ def test_the_summary_has_the_verdict_and_its_figures():
     whole = network(track(bridged=at(101, 40, 41)), track(2), more_rails=[lone(2.0)])
     assert summary(whole, (1.435,)) == (
         "Good, except for a few places to look at.",
-        "5 rails (402 m), 2 tracks (200 m): standard error 1.5 mm (median), 1.0 % of the tracks in doubt, 2 findings.",
+        "5 rails (402 m), 2 tracks (200 m): standard error 1.5 mm (median), 1.5 mm (rms), 1.0 % of the tracks in "
+        "doubt, 2 findings.",
     )
     assert summary(replace(whole, geometry=()), (1.435,))[1] == "5 rails (402 m), 2 tracks (200 m)."
     assert summary(network(), (1.435,)) == ("No track was found.", "0 rails (0.0 m), 0 tracks (0.0 m).")

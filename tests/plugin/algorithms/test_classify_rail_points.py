@@ -1,5 +1,7 @@
 """Classify Rail Points, and Extract Rails from a raw cloud."""
 
+import re
+
 import laspy
 import numpy as np
 import pytest
@@ -94,7 +96,18 @@ def test_rails_are_extracted_from_the_raw_cloud(raw, run, tmp_path):
     assert QgsVectorLayer(str(rails)).featureCount() == 2
 
 
-def test_detect_needs_classified_points(raw, run, tmp_path):
-    done = run({"INPUT": raw[0], "CLASSIFY": True, "STANDARD": "DETECT", "RAILS": tmp_path / "rails.gpkg"})
-    assert not done.ok
-    assert done.error == "DETECT measures classified points, which CLASSIFY does not need: choose STANDARD."
+def test_the_standard_of_a_raw_cloud_is_detected(raw, run, new_feedback, tmp_path):
+    feedback = new_feedback()
+    values = {"INPUT": raw[0], "CLASSIFY": True, "STANDARD": "DETECT", "ITERATIONS": 1}
+    done = run({**values, "RAILS": tmp_path / "rails.gpkg"}, feedback)
+    assert done.ok, done.error
+    assert done.results["RAIL_COUNT"] == 2
+    (said,) = (text for text in feedback.infos if text.startswith("Detected "))
+    assert re.search(r"rails are 15\d\d mm apart, head \d\d ± \d mm; fits .*, also ", said)
+
+
+def test_a_raw_cloud_without_the_tick_is_explained(raw, run, tmp_path):
+    for standard in ("DETECT", "EN_60E1_1435"):
+        done = run({"INPUT": raw[0], "STANDARD": standard, "RAILS": tmp_path / "rails.gpkg"})
+        assert done.error.startswith("The cloud has no points of class 10; its classes, with the number of points, are")
+        assert done.error.endswith("set the rail classes or, if nobody has classified the cloud, CLASSIFY.")

@@ -323,7 +323,8 @@ def test_the_log_names_steps_figures_and_verdict(run, scene, new_feedback, tmp_p
         r"Measured: 13 stations, one every 1 m\.",
         r"Engine of the network: OpenCV .*, CPU, float32\.",
         r"Good throughout.*",
-        r"2 rails \(24 m\), 1 track \(12 m\): standard error [\d.]+ mm \(median\), 0\.0 % of the tracks in doubt, "
+        r"2 rails \(24 m\), 1 track \(12 m\): standard error [\d.]+ mm \(median\), [\d.]+ mm \(rms\), 0\.0 % of the "
+        r"tracks in doubt, "
         r"0 findings\.",
     )
     assert len(feedback.infos) == len(patterns)

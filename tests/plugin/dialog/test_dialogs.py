@@ -7,9 +7,10 @@ import pytest
 from dialog_pictures import HELP_SHARE, SIZES, dialog_pictures
 from qgis.PyQt.QtCore import QUrl
 from qgis.PyQt.QtGui import QImage
-from qgis.PyQt.QtWidgets import QScrollArea, QSplitter, QTextBrowser
+from qgis.PyQt.QtWidgets import QGroupBox, QLabel, QScrollArea, QSplitter, QTextBrowser
 from rail_extract.rail_extract_plugin.dialog import guide
 from rail_extract.rail_extract_plugin.dialog.choices import WORDS
+from rail_extract.rail_extract_plugin.dialog.help_panel import ADVANCED
 from rail_extract.rail_extract_plugin.dialog.wording import for_user, with_labels
 
 NAMES = (
@@ -24,7 +25,7 @@ NAMES = (
         "buildtrackcenterlines",
     ),
     *("measuretrackgeometry", "stationalongaxis", "trainrailclassifier", "installpackages", "checkinstallation"),
-    *("exportalignment", "importalignment", "comparetracks"),
+    *("exportalignment", "importalignment", "comparetracks", "fitalignment"),
 )
 SMALLEST_ICON = 16
 
@@ -57,7 +58,7 @@ def test_dialog_shows_every_parameter_at_its_default(open_dialog, name):
     assert set(wrappers) == set(definitions)
     for key, definition in definitions.items():
         if definition.type() in ("number", "enum") or key == "RAIL_CLASSES":
-            default = definition.defaultValue()
+            default = definition.defaultValue() if (name, key) != ("extractrails", "STANDARD") else "DETECT"
             nothing_chosen = [] if definition.type() == "enum" and definition.allowMultiple() else None
             assert wrappers[key].parameterValue() == (nothing_chosen if default is None else default)
 
@@ -81,13 +82,35 @@ def test_arrow_steps_of_fields_suit_the_range(open_dialog):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_panel_explains_the_algorithm_and_every_parameter(open_dialog, name):
+def test_panel_explains_the_algorithm_and_the_fields_in_sight(open_dialog, name):
     dialog = open_dialog(name)
     shown = dialog.findChild(QTextBrowser, "textShortHelp").toPlainText().split("\n")
     algorithm = dialog.algorithm()
     assert shown[:2] == [algorithm.displayName(), algorithm.shortDescription()]
-    for definition in algorithm.parameterDefinitions():
-        assert f"{definition.description()}\u2028{definition.help()}" in "\n".join(shown).replace("\n", "\u2028")
+    definitions = algorithm.parameterDefinitions()
+    for definition in definitions:
+        if not definition.flags() & ADVANCED:
+            text = with_labels(definition.help(), definitions, definition.name())
+            assert f"{definition.description()}\u2028{text}" in "\n".join(shown).replace("\n", "\u2028")
+
+
+def test_main_dialog_has_few_fields_in_sight_and_a_short_help(open_dialog):
+    dialog = open_dialog("extractrails")
+    definitions = dialog.algorithm().parameterDefinitions()
+    in_sight = [one.name() for one in definitions if not one.flags() & ADVANCED]
+    assert in_sight == ["INPUT", "RAIL_CLASSES", "CLASSIFY", "STANDARD", "RAILS", "REPORT"]
+    panel = dialog.findChild(QTextBrowser, "textShortHelp")
+    assert len(panel.toPlainText().split()) <= 300
+    assert len(re.findall('<a href="(?:.*?)limits.md"', panel.toHtml())) == 1
+
+
+def test_advanced_fields_are_in_sections(open_dialog):
+    dialog = open_dialog("extractrails")
+    group = dialog.findChild(QGroupBox, "grpAdvanced")
+    layout = group.layout()
+    widgets = [layout.itemAt(place).widget() for place in range(layout.count())]
+    titles = [widget.text() for widget in widgets if isinstance(widget, QLabel)]
+    assert titles == ["Cloud", "Raw clouds", "Network", "Lines", "Tracks", "Axis", "More results"]
 
 
 @pytest.mark.parametrize("name", NAMES)

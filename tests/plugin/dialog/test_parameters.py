@@ -72,7 +72,7 @@ OUTPUTS = {
 }
 
 RESULTS = {"RAILS", "CENTERLINES", "QUALITY", "FINDINGS", "CLEANED", "REPORT"}
-ESSENTIAL = {"INPUT", "RAIL_CLASSES", "CLASSIFY", "STANDARD", "GAUGE", "HEAD_WIDTH", "EXTENT", "MAX_GAP"} | RESULTS
+ESSENTIAL = {"INPUT", "RAIL_CLASSES", "CLASSIFY", "STANDARD", "RAILS", "REPORT"}
 OPTIONAL = {"WEIGHTS", "SEEDS", "GAUGE", "HEAD_WIDTH", "EXTENT", "MASK", "CRS", "LEAVE_OUT", "OTHER_GAUGES"} | RESULTS
 OPTIONAL |= {"AXIS", "START_KM", "POSTS", "POST_FIELD", "JUMPS"}
 
@@ -98,7 +98,7 @@ def test_outputs_match_the_interface(algorithm):
 
 def test_rare_parameters_are_advanced(algorithm):
     advanced = having(algorithm, QgsProcessingParameterDefinition.Flag.FlagAdvanced)
-    assert advanced == {name for name, _, _ in PARAMETERS} - ESSENTIAL
+    assert advanced == {name for name, _, _ in PARAMETERS} - ESSENTIAL | RESULTS - ESSENTIAL
 
 
 def test_optional_parameters(algorithm):

@@ -37,7 +37,8 @@ def test_standards_are_listed_in_words_by_region(wrapper):
     ]
     assert texts[2:] == sorted(texts[2:])
     assert {combo.itemData(row) for row in range(combo.count())} == {*STANDARDS, "CUSTOM", "DETECT"}
-    assert combo.currentText() == "Europe: EN 60E1 (UIC 60), 1435 mm, head 72 mm"
+    assert combo.currentText() == "Detect from the points"
+    assert wrapper("rasterizerailpoints").widget.currentText() == "Europe: EN 60E1 (UIC 60), 1435 mm, head 72 mm"
 
 
 def test_only_extract_rails_detects(wrapper):
@@ -53,14 +54,14 @@ def chosen(dialog, standard):
     combo.activated.emit(combo.currentIndex())
 
 
-def test_a_choice_is_remembered_once_a_run_has_used_it(dialog, wrapper):
+def test_a_choice_is_remembered_once_a_run_has_used_it(dialog, wrapper, context):
     first = dialog()
     chosen(first, "IN_75R_1000")
     first.close()
-    assert wrapper().value() == "EN_60E1_1435"
-    first.algorithmFinished.emit(True, {})
+    assert wrapper().value() == "DETECT"
+    first.after_run(True, {}, context)
     assert wrapper().value() == "IN_75R_1000"
     assert wrapper("rasterizerailpoints").value() == "IN_75R_1000"
     chosen(first, "DETECT")
-    first.algorithmFinished.emit(True, {})
+    first.after_run(True, {}, context)
     assert wrapper("rasterizerailpoints").value() == "EN_60E1_1435"

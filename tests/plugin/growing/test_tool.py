@@ -8,7 +8,7 @@ from qgis.core import QgsCoordinateReferenceSystem, QgsPointCloudLayer, QgsPoint
 from qgis.gui import QgsMapCanvas, QgsMessageBar
 from qgis.PyQt.QtCore import QPoint, Qt
 from qgis.PyQt.QtTest import QTest
-from qgis.PyQt.QtWidgets import QMainWindow
+from qgis.PyQt.QtWidgets import QFileDialog, QMainWindow
 from rail_extract.laboratory.scenes.raw_strips import SPACING_M, strip
 from rail_extract.rail_extract_plugin.growing.tool import GrowRails
 
@@ -91,7 +91,7 @@ def test_a_click_beside_the_rails_is_taken_back_with_a_reason(qgis, canvas, laye
     growing.click(place(6.0, 0.0))
     wait(qgis, growing)
     assert growing.seeds == []
-    assert growing.message.startswith("No seed lies on a rail: put seeds within 0.25 m")
+    assert growing.message.startswith("No railhead within 25 cm of the click that stands 5 cm above the bed")
     assert not growing.undo_action.isEnabled()
 
 
@@ -128,15 +128,37 @@ def test_the_dialog_opens_with_the_seeds_and_runs(qgis, canvas, layer, growing, 
     values = growing.dialog.mainWidget().createProcessingParameters()
     assert values["INPUT"] in (layer.id(), layer.source())
     assert values["STANDARD"] == "EN_49E1_1435"
+    growing.dialog.algorithmFinished.emit(False, {})
+    assert len(growing.seeds) == 1  # to try again
+    growing.dialog.algorithmFinished.emit(True, {})
     assert growing.seeds == []
     done = run_step("growrailpoints", {**values, "INPUT": layer.source(), "OUTPUT": tmp_path / "new.laz"})
     assert done.ok, done.error
     assert done.results["PAIRED_LENGTH"] == pytest.approx(23, abs=1.5)
 
 
-def test_without_a_cloud_it_says_what_to_do(qgis, canvas, plugin, growing):
+def test_a_click_beside_the_cloud_says_so(qgis, canvas, layer, growing):
+    growing.click(place(9000.0, 0.0))
+    wait(qgis, growing)
+    assert growing.message == "The cloud has no point here: click on a rail of the cloud."
+
+
+def test_of_several_clouds_one_is_to_be_selected(qgis, canvas, layer, growing):
+    QgsProject.instance().addMapLayer(QgsPointCloudLayer("", "other", ""))
     growing.click(place(6.0, 0.0))
     assert growing.message == "Select a point cloud in the layer panel, then click on a rail."
+
+
+def test_without_a_layer_a_file_is_taken(qgis, canvas, plugin, growing, write_cloud, monkeypatch):
+    path, asked = str(write_cloud(TRACK.xyz + CORNER, "raw.laz", 2)), []
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *given: (asked.append(given) or path, ""))
+    for along in (4.0, 8.0):
+        growing.click(place(along, SPACING_M / 2))
+        wait(qgis, growing)
+    assert len(asked) == 1
+    assert [len(lines(seed)) for seed in growing.seeds] == [1, 1]
+    growing.accept()
+    assert growing.dialog.mainWidget().createProcessingParameters()["INPUT"] == path
 
 
 def test_messages_are_not_read_as_html(growing):

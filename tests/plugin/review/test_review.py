@@ -101,7 +101,7 @@ def test_findings_come_in_their_order_with_words_and_figures(load, dock):
     assert shown.text.text().startswith("Track 1, 2.0 to 4.0 m")
     assert not shown.buttons["previous"].isEnabled()
     shown.buttons["next"].click()
-    assert shown.text.text() == "Track 1, 8.0 to 10.0 m: gauge 1440.0 mm."
+    assert shown.text.text() == "Track 1, 8.0 to 10.0 m: gauge 1440.0 mm. Cross-section at 9.0 m."
     assert not shown.buttons["next"].isEnabled()
 
 
@@ -206,6 +206,40 @@ def test_the_section_shows_points_and_rails_of_the_run(qgis, load, dock, cloud):
     image = shown.view.grab().toImage()
     seen = {image.pixelColor(x, y).name() for x in range(image.width()) for y in range(image.height())}
     assert {colour.name() for colour in (PAPER, POINT, RAIL)} <= seen
+
+
+def rails_with_gaps(left_gaps, right_gaps):
+    """Rows of the two rails of a track that lead east, (left, right); a rail without its gaps is missing."""
+    half = 1.507 / 2
+    return [
+        (f"LINESTRING Z (500012 {3_000_000 + side} 100, 500000 {3_000_000 + side} 100)", {"rail_id": 1, "gaps": gaps})
+        for side, gaps in ((half, left_gaps), (-half, right_gaps))
+        if gaps is not None
+    ]
+
+
+def test_the_rail_without_points_is_named_and_outlined(qgis, load, dock, cloud):
+    _, properties = cloud
+    load("Rails", RAIL_FIELDS, rails_with_gaps("2.50-3.50,8.50-9.60", ""), properties)
+    load("Findings", FINDING_FIELDS, ROWS, properties)
+    shown = dock()
+    # the line leads west, from 500012: its second gap is from 2.4 to 3.5 m of the track, its first from 8.5 to 9.5 m
+    assert shown.text.text().endswith("Left rail without points from 2.4 to 3.5 m. Cross-section at 3.0 m.")
+    picture = shown._sections.picture(shown._found[0])
+    assert picture.missing.tolist() == [True, False]
+    assert picture.rails[0, 0] == pytest.approx(-1.507 / 2)
+    shown.buttons["next"].click()
+    assert "Left rail without points from 8.5 to 9.5 m." in shown.text.text()
+
+
+def test_a_rail_that_was_not_found_is_outlined_opposite_to_the_other(load, dock, cloud):
+    _, properties = cloud
+    load("Rails", RAIL_FIELDS, rails_with_gaps("", None), properties)
+    load("Findings", FINDING_FIELDS, ROWS, properties)
+    shown = dock()
+    picture = shown._sections.picture(shown._found[0])
+    np.testing.assert_allclose(picture.rails, [[-1.507 / 2, 0], [1.507 / 2, 0]], atol=1e-6)
+    assert picture.missing.tolist() == [False, True]
 
 
 def test_without_the_cloud_gauge_and_cant_place_the_rails(load, dock, cloud):

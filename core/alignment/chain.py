@@ -1,0 +1,269 @@
+"""Chains: signals whose bend is constant or changes linearly, their least squares fit, and the data that they fit.
+
+The bend is the second derivative of the lateral position or of the height, or the first derivative of the cant. Parts F
+with constant bend follow each other; between two of them is a joint [p, q] over which the bend changes linearly, or
+jumps if q = p. A part F may have no length: then two ramps meet. With k the bends of the parts,
+
+    y(s) = offset + slope s + k[0] s² / 2 + sum over the joints of (k[j + 1] - k[j]) G(s; p[j], q[j])
+
+where G is the second integral of a ramp from 0 to 1. With `order` 1, slope s is absent, and the bends count once less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg.lapack import dgeqrf
+
+JUMP_M = 1e-6
+"""A jump is computed as a ramp of this length, metres, far below any effect."""
+
+LONGEST_SHIFT_M = 50.0
+"""Expected largest shift of a joint in a step, metres: it keeps a joint in place that the data do not see."""
+
+LEAST_GAIN = 0.05
+"""Fall of chi-square below which a further step is not worth it."""
+
+ROOM_SHARE = 0.45
+"""Share of the room to its neighbours that a joint may take in a step, so that two cannot pass each other."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The signal as means over blocks.
+
+    Attributes
+    ----------
+    s, y : (n,) array
+        Mean distance and mean signal of a block, metres.
+    spread : (n,) array
+        Variance of the distance within the block, square metres: the mean of a bent signal is off by half of it times
+        the bend.
+    root : (n,) array
+        Square root of the weight of the block, 1/m: inverse of the standard deviation of what is independent in it.
+    """
+
+    s: np.ndarray
+    y: np.ndarray
+    spread: np.ndarray
+    root: np.ndarray
+
+    def __getitem__(self, which: np.ndarray | slice) -> Samples:
+        return Samples(self.s[which], self.y[which], self.spread[which], self.root[which])
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Parts of constant bend and the joints between them, from `start` to `end`.
+
+    Attributes
+    ----------
+    start, end : float
+        Distances, metres.
+    bends : (m,) array
+        Bend of each part, 1/m.
+    curved : tuple of bool
+        Whether the bend of the part is free; else it is 0.
+    p, q : (m - 1,) array
+        Start and end of each joint, metres. Equal values are one unknown; a value equal to `start` or `end` is fixed.
+    order : int
+        How many times the bend is integrated.
+    """
+
+    start: float
+    end: float
+    bends: np.ndarray
+    curved: tuple[bool, ...]
+    p: np.ndarray
+    q: np.ndarray
+    order: int = 2
+
+    @property
+    def knots(self) -> np.ndarray:
+        """Ends of the chain and of all its joints in order, (2 m,)."""
+        inner = np.column_stack([self.p, self.q]).ravel()
+        return np.concatenate([[self.start], inner, [self.end]])
+
+    @property
+    def unknown(self) -> np.ndarray:
+        """Number of the unknown of each knot but the ends, (2 m - 2,); -1 where it is fixed."""
+        knots = self.knots
+        number = np.cumsum(np.diff(knots) > 0)[:-1] - 1
+        fixed = (knots[1:-1] == self.start) | (knots[1:-1] == self.end)
+        return np.where(fixed, -1, number)
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return self.order + sum(self.curved) + int(self.unknown.max(initial=-1)) + 1
+
+    @property
+    def extents(self) -> tuple[np.ndarray, np.ndarray]:
+        """Start and end of each part, (m,) each."""
+        return np.append(self.start, self.q), np.append(self.p, self.end)
+
+    def with_knots(self, inner: np.ndarray) -> Chain:
+        """Return the chain with other joints, (2 m - 2,)."""
+        return replace(self, p=inner[0::2], q=inner[1::2])
+
+
+@dataclass(frozen=True)
+class Span:
+    """A part of a chain that is to be assembled, or a ramp between two parts.
+
+    Attributes
+    ----------
+    start, end : float
+        Distances, metres.
+    is_ramp : bool
+    curved : bool
+        Whether the bend of a part is free.
+    bend : float
+        Of a part; of a ramp, that at its end.
+    before : float
+        Bend at the start of a ramp.
+    """
+
+    start: float
+    end: float
+    is_ramp: bool
+    curved: bool = True
+    bend: float = 0.0
+    before: float = 0.0
+
+
+def assembled(spans: Sequence[Span], order: int) -> Chain:
+    """Return the chain of spans that follow each other: parts meet in jumps, and ramps in a part without length."""
+    curved: list[bool] = []
+    bends: list[float] = []
+    p: list[float] = []
+    q: list[float] = []
+    was_ramp = False
+    for span in spans:
+        if span.is_ramp:
+            if was_ramp or not curved:
+                curved.append(True)
+                bends.append(span.before)
+            p.append(span.start)
+            q.append(span.end)
+        else:
+            if curved and not was_ramp:
+                p.append(span.start)
+                q.append(span.start)
+            curved.append(span.curved)
+            bends.append(span.bend)
+        was_ramp = span.is_ramp
+    if was_ramp:
+        curved.append(True)
+        bends.append(spans[-1].bend)
+    return Chain(spans[0].start, spans[-1].end, np.array(bends), tuple(curved), np.array(p), np.array(q), order)
+
+
+def columns(chain: Chain, samples: Samples) -> tuple[np.ndarray, np.ndarray]:
+    """Return the columns of the model.
+
+    Returns
+    -------
+    base : (n, order + m) array
+        Of offset, slope and the bends of all parts.
+    by : (n, 2 m - 2) array
+        Derivatives of G by the ends of each joint: p and q of the first, of the second, and so on.
+    """
+    count = len(chain.bends)
+    x = (samples.s - chain.start)[:, None]
+    d = np.maximum(chain.q - chain.p, JUMP_M)
+    ahead = x - (chain.p - chain.start)
+    u = np.minimum(np.maximum(ahead, 0.0), d)
+    v = np.maximum(ahead - d, 0.0)
+    ratio = u / d
+    base, by = np.empty((len(x), chain.order + count + 1)), np.empty((len(x), 2 * count - 2))
+    base[:, 0] = 1.0
+    if chain.order == 1:
+        g = 0.5 * u * ratio + v
+        by[:, 0::2] = by[:, 1::2] = -0.5 * (ahead > 0.5 * d)
+        base[:, 1] = x[:, 0]
+    else:
+        half_spread = 0.5 * samples.spread[:, None]
+        g = u * u * ratio / 6.0 + 0.5 * v * (d + v) + half_spread * ratio
+        third, half = u * ratio * ratio / 6.0, 0.5 * v
+        by[:, 0::2] = third - 0.5 * u * ratio - half
+        by[:, 1::2] = -third - half
+        base[:, 1] = x[:, 0]
+        base[:, 2] = (0.5 * x * x + half_spread)[:, 0]
+    base[:, chain.order + 1 : -1] = g
+    base[:, -1] = 0.0
+    base[:, chain.order : -1] -= base[:, chain.order + 1 :]
+    return base[:, :-1], by
+
+
+def fitted(chain: Chain, samples: Samples, least_m: float, steps: int) -> tuple[Chain, float]:
+    """Fit bends and joints by Gauss-Newton steps; return the best chain and its weighted sum of squared residuals.
+
+    Parameters
+    ----------
+    chain : Chain
+    samples : Samples
+    least_m : float
+        Least length of a part or a ramp, metres.
+    steps : int
+        Largest number of steps.
+    """
+    best, best_rss = chain, np.inf
+    free, unknown = np.array((True,) * chain.order + chain.curved), chain.unknown
+    chosen = (unknown[:, None] == np.arange(unknown.max(initial=-1) + 1)).astype(float)
+    for step in range(steps + 1):
+        base, by = columns(chain, samples)
+        by_knots = (by * np.repeat(np.diff(chain.bends), 2)) @ chosen
+        matrix = np.concatenate([base[:, free], by_knots, samples.y[:, None]], axis=1) * samples.root[:, None]
+        factor = np.triu(dgeqrf(matrix)[0][: matrix.shape[1]])
+        linear = matrix.shape[1] - by_knots.shape[1] - 1
+        rest = factor[linear:, -1]
+        rss, values = float(rest @ rest), np.zeros(len(free))
+        values[free] = _solved(factor[:linear, :linear], factor[:linear, -1])
+        was_flat = not chain.bends.any()
+        chain = replace(chain, bends=values[chain.order :])
+        gain = best_rss - rss
+        if gain > 0:
+            best, best_rss = chain, rss
+        if step == steps or not len(chosen) or (gain < LEAST_GAIN and step > 1):
+            break
+        if was_flat:
+            continue
+        lower = factor[linear:-1, linear:-1]
+        normal = lower.T @ lower + np.eye(len(lower)) / LONGEST_SHIFT_M**2
+        shift = np.linalg.solve(normal, lower.T @ rest[:-1])
+        chain = _moved(chain, unknown, shift, least_m)
+    return best, best_rss
+
+
+def residuals(chain: Chain, samples: Samples) -> np.ndarray:
+    """Return the weighted residuals of a chain, (n,), with the best offset and slope, in order of `s`."""
+    base = columns(chain, samples)[0]
+    rest = (samples.y - base[:, chain.order :] @ chain.bends) * samples.root
+    loose = base[:, : chain.order] * samples.root[:, None]
+    return rest - loose @ np.linalg.lstsq(loose, rest, rcond=None)[0]
+
+
+def _solved(upper: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solve a triangular system; a column that nothing determines gets 0."""
+    diagonal = np.abs(np.diag(upper))
+    if diagonal.min(initial=1.0) < 1e-12 * diagonal.max(initial=1.0):
+        return np.linalg.lstsq(upper, right, rcond=1e-12)[0]
+    return np.linalg.solve(upper, right)
+
+
+def _moved(chain: Chain, unknown: np.ndarray, shift: np.ndarray, least_m: float) -> Chain:
+    """Return the chain with joints shifted, as far as there is room."""
+    knots = chain.knots
+    gaps = np.diff(knots)
+    number = np.cumsum(gaps > 0)
+    room = np.full(int(number[-1]), 0.0)
+    room[number[gaps > 0] - 1] = np.maximum(gaps[gaps > 0] - least_m, 0.0) * ROOM_SHARE
+    mine = number[:-1]
+    inner = knots[1:-1].copy()
+    moving = unknown >= 0
+    at = mine[moving]
+    inner[moving] += np.clip(shift[unknown[moving]], -room[at - 1], room[np.minimum(at, len(room) - 1)])
+    return chain.with_knots(inner)

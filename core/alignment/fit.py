@@ -1,0 +1,369 @@
+"""Fit of an alignment to a measured track: elements in plan, height and cant, and how far the track lies off them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Optional
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..frame import LocalFrame
+from ..parameters import JUMPS, FitParameters
+from ..polyline import is_closed, length_along, runs
+from ..progress import SILENT, Progress, counted
+from .chain import Chain
+from .deviations import Deviations
+from .elements import Alignment, Element, Figures, PlanElement
+from .given import chain_of, given_of
+from .intrinsic import groups, lateral_signal
+from .layouts import cants, heights, snapped
+from .noise import Noise
+from .plane_fit import NOTHING, FitError, PlanFit, Points, fit_plan
+from .rounding import off_element, with_round_radii
+from .signals import CANT, HEIGHT, PLAN, Kind, Signal, find_structure, noise_of, refitted
+from .uncertainty import chain_errors, plan_errors, remaining
+
+LEAST_TRACK_M, LEAST_POINTS = 50.0, 20
+"""Least length of a track, metres, and least number of its points: the shortest curve that has a radius."""
+
+TURNS_BACK_RAD = np.pi / 3.0
+"""Largest bend of a line at a vertex: a track that turns back has a stray vertex, or runs through a switch twice."""
+
+HOLDS = 3.0
+"""A fit does not hold where the line is off by more than this many tolerances, as a root mean square."""
+
+LEAST_CANT_POINTS = 20
+"""With fewer places of known cant, it has no elements."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """A measured track.
+
+    Attributes
+    ----------
+    track_id : int
+    xyz : (n, 3) array
+        Vertices of the centerline, local metres.
+    cant : (k, 2) array
+        Plan distance from the first vertex, increasing, and cant there, left rail minus right rail; metres. Empty if it
+        is unknown.
+    is_bridged : (n,) bool array
+        Whether the line bridges a gap at the vertex; such vertices do not count.
+    """
+
+    track_id: int
+    xyz: np.ndarray
+    cant: np.ndarray
+    is_bridged: np.ndarray
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The alignment of a track.
+
+    Attributes
+    ----------
+    alignment : Alignment
+    deviations : Deviations
+    rms_mm : float
+        Root mean square of the slews.
+    noise : Noise
+        What is left of the points' distances from the curve.
+    """
+
+    alignment: Alignment
+    deviations: Deviations
+    rms_mm: float
+    noise: Noise
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Points of a track: its vertices, those averaged that are closer than a metre.
+
+    Attributes
+    ----------
+    xyz : (n, 3) array
+    along : (n,) array
+        Plan distance from the first vertex along the line.
+    share : (n,) array
+        Number of vertices in each point that do not bridge a gap.
+    """
+
+    xyz: np.ndarray
+    along: np.ndarray
+    share: np.ndarray
+
+
+def fit_track(
+    track: Track,
+    frame: LocalFrame,
+    settings: FitParameters,
+    fixed: Optional[Alignment] = None,
+    progress: Progress = SILENT,
+) -> Fit:
+    """Fit the design elements of a track.
+
+    Parameters
+    ----------
+    track : Track
+    frame : LocalFrame
+    settings : FitParameters
+    fixed : Alignment, optional
+        Elements whose types, and edited radii and ends, are held.
+    progress : Progress
+        Warned where the fit does not hold.
+
+    Raises
+    ------
+    ParameterError
+        The line cannot have an alignment, or no part of the fit holds.
+    """
+    _check(track)
+    measured = _points(track)
+    in_plan, in_height, of_cant = progress.divide([4.0, 1.0, 1.0])
+    plan = _fit_in_plan(track.track_id, measured, settings, fixed, in_plan)
+    elements = _stated(plan)
+    if settings.rounded and fixed is None:
+        elements = with_round_radii(plan.chain, plan.points, plan.fit, elements, in_plan)
+    first, last = _holding(track.track_id, elements, settings.tolerance_m, progress)
+    alignment = Alignment(track.track_id, frame, elements[first : last + 1])
+    alignment = _with_heights(alignment, plan.fit, measured, settings, fixed, in_height)
+    alignment = _with_cants(alignment, plan.fit, measured, track, settings, fixed, of_cant)
+    deviations = _deviations(alignment, plan.fit, measured, track)
+    return Fit(alignment, deviations, float(np.sqrt(np.mean(deviations.slew_mm**2))), plan.noise)
+
+
+def fit_tracks(
+    tracks: Sequence[Track],
+    frame: LocalFrame,
+    settings: FitParameters,
+    fixed: Mapping[Optional[int], Alignment],
+    progress: Progress = SILENT,
+) -> list[Fit]:
+    """Fit the design elements of tracks; those that cannot have any are named and left out.
+
+    Parameters
+    ----------
+    tracks : sequence of Track
+    frame : LocalFrame
+    settings : FitParameters
+    fixed : mapping of int to Alignment
+        Elements by track, whose types, and edited radii and ends, are held.
+    progress : Progress
+
+    Raises
+    ------
+    ParameterError
+        No track can have an alignment, or `fixed` has none of the tracks.
+    """
+    if fixed and not any(track.track_id in fixed for track in tracks):
+        raise ParameterError("FIXED has no elements of the tracks in INPUT: give the table of these tracks.")
+    shares = progress.divide([float(length_along(track.xyz[:, :2])[-1]) + 1.0 for track in tracks])
+    fits: list[Fit] = []
+    refusals: list[ParameterError] = []
+    for track, share in zip(tracks, shares):
+        progress.status(f"Fitting track {track.track_id}")
+        try:
+            fits.append(fit_track(track, frame, settings, fixed.get(track.track_id), share))
+        except ParameterError as error:
+            refusals.append(error)
+    if not fits:
+        raise refusals[0]
+    for refusal in refusals:
+        progress.warning(str(refusal))
+    return fits
+
+
+def _check(track: Track) -> None:
+    """Refuse lines that cannot have an alignment."""
+    name, xy = f"The line of track {track.track_id}", track.xyz[:, :2]
+    if np.isnan(track.xyz[:, 2]).any():
+        raise ParameterError(f"{name} has no heights: give a 3D line, such as a centerline of Extract rails.")
+    if is_closed(xy):
+        raise ParameterError(f"{name} ends where it begins: cut the ring into two lines.")
+    length = length_along(xy)[-1]
+    if length < LEAST_TRACK_M or len(xy) < LEAST_POINTS:
+        raise ParameterError(
+            f"{name} has {counted(len(xy), 'vertex', 'vertices')} over {length:.0f} m, but a fit needs at least "
+            f"{LEAST_POINTS} over {LEAST_TRACK_M:.0f} m: leave it out, or join it with the track that continues it."
+        )
+
+
+def _points(track: Track) -> Measured:
+    """Return the points of a track."""
+    starts, counts = groups(track.xyz[:, :2])
+    along = length_along(track.xyz[:, :2])
+    sums = np.add.reduceat(np.column_stack([track.xyz, along, ~track.is_bridged]), starts)
+    made = Measured(sums[:, :3] / counts[:, None], sums[:, 3] / counts, sums[:, 4])
+    step = np.diff(made.xyz[:, :2], axis=0)
+    turn = np.abs(np.angle(np.exp(1j * np.diff(np.arctan2(step[:, 1], step[:, 0])))))
+    if turn.max(initial=0.0) > TURNS_BACK_RAD:
+        raise ParameterError(
+            f"The line of track {track.track_id} turns back {made.along[int(turn.argmax()) + 1]:.0f} m from its start: "
+            "remove the stray vertices there, or cut the line."
+        )
+    if np.count_nonzero(made.share) < LEAST_POINTS:
+        raise ParameterError(
+            f"Track {track.track_id} has fewer than {LEAST_POINTS} points outside of bridged gaps: leave it out."
+        )
+    return made
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """The fit in plan, with the noise that was assumed and the noise that is left."""
+
+    chain: Chain
+    fit: PlanFit
+    points: Points
+    used_m: float
+    noise: Noise
+
+
+def _fit_in_plan(
+    track_id: int, measured: Measured, settings: FitParameters, fixed: Optional[Alignment], progress: Progress
+) -> _Plan:
+    """Return the fitted elements in plan."""
+    s, y = lateral_signal(measured.xyz[:, :2])
+    signal = Signal(s, y, measured.share, PLAN)
+    held = NOTHING
+    if fixed is None:
+        jumps = settings.transitions == JUMPS
+        chain, used = find_structure(signal, settings.tolerance_m, settings.min_length_m, jumps, progress)
+    else:
+        given = given_of(fixed, float(s[-1]))
+        chain, held, used = given.chain, given.held, noise_of(signal, settings.tolerance_m, progress)[0]
+    used_m = used.effective_m(signal.step_m)
+    points = Points(measured.xyz[:, :2], s, measured.share / used_m**2)
+    try:
+        fit = fit_plan(chain, points, held, progress)
+    except (FitError, RuntimeError, np.linalg.LinAlgError) as error:
+        raise _lost(track_id) from error
+    if not np.isfinite(fit.across).all():
+        raise _lost(track_id)
+    return _Plan(chain, fit, points, used_m, remaining(fit, points, settings.tolerance_m))
+
+
+def _lost(track_id: int) -> ParameterError:
+    return ParameterError(
+        f"No chain of elements follows the line of track {track_id}: raise MIN_LENGTH, or smooth the line first."
+    )
+
+
+def _stated(plan: _Plan) -> tuple[PlanElement, ...]:
+    """Return the elements with their figures."""
+    errors = plan_errors(plan.fit, plan.points, plan.used_m, plan.noise)
+    made = []
+    for number, one in enumerate(plan.fit.elements):
+        rms, largest = off_element(plan.fit, plan.points, number)
+        before = plan.fit.elements[number - 1] if number else None
+        bend_error = errors.bend[number]
+        figures = Figures(
+            joint=None if before is None else "G2" if before.k_to == one.k_from else "G1",
+            dev_rms_mm=rms,
+            dev_max_mm=largest,
+            sigma_r_m=float(bend_error / one.k_from**2) if one.type == "arc" else None,
+            sigma_len_m=float(errors.length[number]),
+            sigma_s_m=float(errors.s[number]),
+            r_fit_m=1.0 / one.k_from if one.type == "arc" else None,
+            s_fit_m=one.s_from,
+        )
+        made.append(replace(one, figures=figures))
+    return tuple(made)
+
+
+def _holding(track_id: int, elements: Sequence[PlanElement], tolerance_m: float, progress: Progress) -> tuple[int, int]:
+    """Return the first and the last element of the longest part of the fit that holds; warn if it is not the whole."""
+    limit_mm = 1000.0 * HOLDS * tolerance_m
+    holds = np.array([(one.figures.dev_rms_mm or 0.0) <= limit_mm for one in elements])
+    if holds.all():
+        return 0, len(elements) - 1
+    if not holds.any():
+        raise ParameterError(
+            f"The fit of track {track_id} does not hold: every element is off by more than {limit_mm:.0f} mm, three "
+            "times TOLERANCE; raise TOLERANCE, or smooth the line first."
+        )
+    parts = [(elements[last].s_to - elements[first].s_from, first, last) for first, last in runs(holds)]
+    _, first, last = max(parts)
+    worst = max(elements, key=lambda one: one.figures.dev_rms_mm or 0.0)
+    progress.warning(
+        f"The fit of track {track_id} does not hold from {worst.s_from:.0f} to {worst.s_to:.0f} m: the line is off by "
+        f"{worst.figures.dev_rms_mm:.0f} mm (root mean square), more than three times TOLERANCE. Only the elements "
+        f"from {elements[first].s_from:.0f} to {elements[last].s_to:.0f} m are given, where it holds."
+    )
+    return first, last
+
+
+def _with_heights(
+    alignment: Alignment,
+    fit: PlanFit,
+    measured: Measured,
+    settings: FitParameters,
+    fixed: Optional[Alignment],
+    progress: Progress,
+) -> Alignment:
+    """Return an alignment with grades and parabolas."""
+    signal = _signal(alignment, fit.s, measured.xyz[:, 2], measured.share, HEIGHT)
+    shape = fixed.vertical if fixed else ()
+    chain, used = _chain(signal, [one.type == "parabola" for one in shape], shape, settings, progress)
+    chain = replace(chain, start=alignment.s_from, end=alignment.s_to)
+    errors = chain_errors(chain, signal, used)
+    return replace(alignment, vertical=heights(chain, signal, used, errors))
+
+
+def _with_cants(
+    alignment: Alignment,
+    fit: PlanFit,
+    measured: Measured,
+    track: Track,
+    settings: FitParameters,
+    fixed: Optional[Alignment],
+    progress: Progress,
+) -> Alignment:
+    """Return an alignment with constant cants and ramps, as far as the cant is known."""
+    s = np.interp(track.cant[:, 0], measured.along, fit.s)
+    signal = _signal(alignment, s, track.cant[:, 1], np.ones(len(s)), CANT)
+    if len(signal.s) < LEAST_CANT_POINTS:
+        return alignment
+    shape = fixed.cant if fixed else ()
+    chain, used = _chain(signal, [one.type == "ramp" for one in shape], shape, settings, progress)
+    errors = chain_errors(chain, signal, used)
+    chain, moved = snapped(chain, alignment.plan, signal, used, errors)
+    sure = np.concatenate([[False], moved])
+    return replace(alignment, cant=cants(chain, signal, used, replace(errors, s=np.where(sure, np.nan, errors.s))))
+
+
+def _signal(alignment: Alignment, s: np.ndarray, values: np.ndarray, share: np.ndarray, kind: Kind) -> Signal:
+    """Return values along the design, where their points count."""
+    used = (s >= alignment.s_from) & (s <= alignment.s_to) & (share > 0)
+    order = np.argsort(s[used], kind="stable")
+    return Signal(s[used][order], values[used][order], share[used][order], kind)
+
+
+def _chain(
+    signal: Signal, curved: Sequence[bool], shape: Sequence[Element], settings: FitParameters, progress: Progress
+) -> tuple[Chain, Noise]:
+    """Return the chain of a signal, and its noise."""
+    least_m, tolerance_m = settings.min_length_m, settings.tolerance_m
+    if shape:
+        chain, used = chain_of(shape, curved, signal), noise_of(signal, tolerance_m)[0]
+    else:
+        chain, used = find_structure(signal, tolerance_m, least_m, True, progress)
+    return refitted(chain, signal, used, least_m), used
+
+
+def _deviations(alignment: Alignment, fit: PlanFit, measured: Measured, track: Track) -> Deviations:
+    """Return the deviations by the metre, interpolated between the points."""
+    s = alignment.s_from + np.arange(int(np.floor(alignment.s_to - alignment.s_from)) + 1)
+    lift = measured.xyz[:, 2] - alignment.heights(fit.s)
+    cant = np.full(len(s), np.nan)
+    if alignment.cant:
+        feet = np.interp(track.cant[:, 0], measured.along, fit.s)
+        cant = np.interp(s, feet, track.cant[:, 1] - alignment.cants(feet))
+        cant[(s < alignment.cant[0].s_from) | (s > alignment.cant[-1].s_to)] = np.nan
+    slew, lift = (np.interp(s, fit.s, values) for values in (fit.across, lift))
+    return Deviations(alignment.track_id, s, alignment.xyz(s), 1000.0 * slew, 1000.0 * lift, 1000.0 * cant)

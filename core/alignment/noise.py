@@ -1,0 +1,193 @@
+"""Errors of a measured track: those of single points, and the misalignment that neighbours share."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.linalg import toeplitz
+from scipy.optimize import nnls
+
+LENGTHS_M = (3.0, 5.0, 8.0, 12.0, 18.0, 27.0)
+"""Correlation lengths of the misalignment that are tried, metres: track is out of line over 5 to 30 m."""
+
+LAGS = 30
+"""Number of lags at which the covariance of the residuals is compared."""
+
+MEDIAN_SHARE = 0.6745
+"""Median of the size of normal errors, in units of their standard deviation."""
+
+FAR = 3.0
+"""Distance in correlation lengths beyond which the misalignment is independent: the correlation is below 0.0002."""
+
+SURE = 3.0
+"""Errors are shared by neighbours if the products of their residuals exceed this many standard errors."""
+
+OUTLIER = 2.0
+"""A piece with a mean square this many times the median is left out: an element begins within it."""
+
+SIZES = (8, 12, 18, 27, 40, 60, 90, 135, 200)
+"""Numbers of points of a piece for which the loss by its polynomial is computed; others take the next lower one."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The errors of a signal.
+
+    Attributes
+    ----------
+    white_m : float
+        Standard deviation of the errors of single points that are independent of each other, metres.
+    shared_m : float
+        Standard deviation of the misalignment, metres.
+    length_m : float
+        Distance at which the correlation of the misalignment has fallen to 1/e, metres.
+    """
+
+    white_m: float
+    shared_m: float = 0.0
+    length_m: float = LENGTHS_M[0]
+
+    def covariance(self, lag_m: np.ndarray) -> np.ndarray:
+        """Return the covariance of the misalignment at places with this distance, square metres."""
+        return self.shared_m**2 * np.exp(-((lag_m / self.length_m) ** 2))
+
+    def effective_m(self, step_m: float) -> float:
+        """Return the standard deviation of independent errors that bend long elements as much, metres.
+
+        Parameters
+        ----------
+        step_m : float
+            Distance between the points.
+        """
+        return math.sqrt(self.white_m**2 + self.shared_m**2 * math.sqrt(math.pi) * self.length_m / step_m)
+
+
+def independent_m(s: np.ndarray, y: np.ndarray) -> float:
+    """Return the standard deviation of errors that neighbours do not share, from each point and the four around it."""
+    if len(s) < 2 * SIZES[0]:
+        return 0.0
+    near = [slice(0, -4), slice(1, -3), slice(3, -1), slice(4, None)]
+    middle = s[2:-2]
+    off, square = y[2:-2].copy(), np.ones(len(middle))
+    for one in near:
+        share = np.ones(len(middle))
+        for other in near:
+            if other is not one:
+                share *= (middle - s[other]) / (s[one] - s[other])
+        off -= share * y[one]
+        square += share**2
+    return float(np.median(np.abs(off) / np.sqrt(square))) / MEDIAN_SHARE
+
+
+def estimated(
+    pieces: Sequence[tuple[np.ndarray, int]], step_m: float, floor_m: float, only_if_sure: bool = False
+) -> Noise:
+    """Return the noise that explains residuals.
+
+    The residuals of a polynomial hang together less than the errors, because it follows them; the loss is computed.
+
+    Parameters
+    ----------
+    pieces : sequence of ((n,) array, int)
+        Residuals of a piece in order, metres, and degree of the polynomial that was fitted to it.
+    step_m : float
+        Mean distance between the points.
+    floor_m : float
+        Least standard deviation of single points, metres.
+    only_if_sure : bool
+        Whether misalignment must exceed what chance explains.
+    """
+    pieces = _usual([(rest, degree) for rest, degree in pieces if len(rest) >= SIZES[0]])
+    if not pieces:
+        return Noise(floor_m)
+    seen = np.sum([_products(rest) for rest, _ in pieces], axis=0)
+    kinds: Counter[tuple[int, int]] = Counter()
+    for rest, degree in pieces:
+        kinds[max(size for size in SIZES if size <= len(rest)), degree] += len(rest)
+    lags = step_m * np.arange(SIZES[-1])
+    white = _expected_of(kinds, np.where(lags == 0, 1.0, 0.0))
+    alone = float(white @ seen / (white @ white))
+    if only_if_sure and not _hang_together(seen - alone * white, alone, sum(kinds.values())):
+        return Noise(max(math.sqrt(alone), floor_m))
+    found = []
+    for length in LENGTHS_M:
+        shared = _expected_of(kinds, np.exp(-((lags / length) ** 2)))
+        (own, common), misfit = nnls(np.column_stack([white, shared]), seen)
+        found.append((misfit, Noise(max(math.sqrt(own), floor_m), math.sqrt(common), length)))
+    return min(found, key=lambda one: one[0])[1]
+
+
+def _hang_together(products: np.ndarray, variance: float, count: int) -> bool:
+    """Return whether products of residuals at lags, (LAGS,), are more than those of independent errors would be."""
+    sums = np.cumsum(products[1:])
+    error = variance * np.sqrt(count * np.arange(1, LAGS))
+    return bool((sums > SURE * error).any())
+
+
+def _usual(pieces: list[tuple[np.ndarray, int]]) -> list[tuple[np.ndarray, int]]:
+    """Return the pieces without those that fit badly, because an element begins within them."""
+    if not pieces:
+        return []
+    squares = np.array([rest @ rest / len(rest) for rest, _ in pieces])
+    sizes = np.array([len(rest) for rest, _ in pieces])
+    order = np.argsort(squares)
+    median = squares[order][np.searchsorted(np.cumsum(sizes[order]), 0.5 * sizes.sum())]
+    return [piece for piece, square in zip(pieces, squares) if square <= OUTLIER * median]
+
+
+def _products(rest: np.ndarray) -> np.ndarray:
+    """Return sums of products of residuals at each lag, (LAGS,)."""
+    padded = np.concatenate([rest, np.zeros(LAGS)])
+    return np.array([padded[: len(rest)] @ padded[lag : lag + len(rest)] for lag in range(LAGS)])
+
+
+def _expected_of(kinds: Mapping[tuple[int, int], int], correlation: np.ndarray) -> np.ndarray:
+    """Return the sums of products to expect at each lag, (LAGS,), for errors with a correlation by lag.
+
+    Parameters
+    ----------
+    kinds : mapping
+        Number of points by size of the piece and degree of its polynomial.
+    correlation : (n,) array
+        At each lag.
+    """
+    total = np.zeros(LAGS)
+    for (size, degree), count in kinds.items():
+        base = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, size), degree + 1))[0]
+        rest = toeplitz(correlation[:size])
+        rest = rest - base @ (base.T @ rest)
+        rest -= (rest @ base) @ base.T
+        traces = [np.trace(rest, offset=lag) for lag in range(min(size, LAGS))]
+        total[: len(traces)] += np.multiply(traces, count / size)
+    return total
+
+
+def shared_covariance(s: np.ndarray, noise: Noise) -> sparse.csr_matrix:
+    """Return the covariance of the misalignment at points, (n, n), square metres.
+
+    Parameters
+    ----------
+    s : (n,) array
+        Distances of the points, increasing.
+    noise : Noise
+    """
+    count = len(s)
+    rows, columns, values = [np.arange(count)], [np.arange(count)], [np.full(count, noise.shared_m**2)]
+    lag = 1
+    while lag < count:
+        apart = np.abs(s[lag:] - s[:-lag])
+        near = np.flatnonzero(apart < FAR * noise.length_m)
+        if not len(near):
+            break
+        value = noise.covariance(apart[near])
+        rows += [near, near + lag]
+        columns += [near + lag, near]
+        values += [value, value]
+        lag += 1
+    flat = (np.concatenate(rows), np.concatenate(columns))
+    return sparse.coo_matrix((np.concatenate(values), flat), shape=(count, count)).tocsr()

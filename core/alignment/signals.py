@@ -1,0 +1,157 @@
+"""From a signal to its structure: the noise, a first partition, and the search."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..progress import SILENT, Progress
+from .chain import Chain, columns, fitted
+from .noise import Noise, estimated, independent_m
+from .partition import Piece, partition
+from .structure import Blocks, Rules, from_pieces, searched
+
+NOISE_ROUNDS, SETTLED = 8, 1.15
+"""Largest number of partitions for the noise, and the growth of the noise below which it is known."""
+
+FEW_POINTS = 25
+"""Mean number of points in a piece below which a partition may follow the misalignment and hide it."""
+
+FLOOR_M = 0.00005
+"""Least standard deviation of a point, metres: below it, coordinates are rounded."""
+
+LEAST_PRICE = 8.0
+"""Least cost of a parameter in units of chi-square: with it, noise alone bends a line in one of a hundred cases."""
+
+FINAL_STEPS = 12
+"""Gauss-Newton steps of the last fit of a chain as a whole."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of signal.
+
+    Attributes
+    ----------
+    order : int
+        How many times the bend is integrated.
+    degrees : tuple of int
+        Of the polynomials in the first partition.
+    ramps : bool
+        Whether the bend may change linearly.
+    """
+
+    order: int
+    degrees: tuple[int, ...]
+    ramps: bool
+
+
+PLAN, HEIGHT, CANT = Kind(2, (1, 2, 3), True), Kind(2, (1, 2), False), Kind(1, (0, 1), False)
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A signal along a track.
+
+    Attributes
+    ----------
+    s, y : (n,) array
+        Distance and value, metres.
+    share : (n,) array
+        How much each point counts, 1 for a measured one, 0 in a bridged gap.
+    kind : Kind
+    """
+
+    s: np.ndarray
+    y: np.ndarray
+    share: np.ndarray
+    kind: Kind
+
+    @property
+    def step_m(self) -> float:
+        """Mean distance between the points."""
+        return float(self.s[-1] - self.s[0]) / max(len(self.s) - 1, 1)
+
+    def blocks(self, noise: Noise) -> Blocks:
+        """Return the signal as means, weighted for the noise."""
+        return Blocks.of(self.s, self.y, self.share, noise.effective_m(self.step_m))
+
+
+def noise_of(signal: Signal, tolerance_m: float, progress: Progress = SILENT) -> tuple[Noise, list[Piece]]:
+    """Return the noise of a signal, and the partition for it.
+
+    The finer a partition is, the less is left as noise. From the errors of single points upwards, the noise is raised
+    until a partition leaves no more than it was made for.
+
+    Parameters
+    ----------
+    signal : Signal
+    tolerance_m : float
+        Largest standard deviation of the misalignment.
+    progress : Progress
+    """
+    used = signal.share > 0
+    s, y = signal.s[used], signal.y[used]
+    noise = Noise(max(independent_m(s, y), FLOOR_M))
+    for share in progress.split(NOISE_ROUNDS):
+        sigma = noise.effective_m(signal.step_m)
+        pieces = partition(s, y, sigma, signal.kind.degrees, share)
+        is_coarse = len(s) > FEW_POINTS * len(pieces)
+        found = estimated(_residuals(pieces, s, y), signal.step_m, FLOOR_M, only_if_sure=is_coarse)
+        noise = Noise(found.white_m, min(found.shared_m, tolerance_m), found.length_m)
+        if noise.effective_m(signal.step_m) < SETTLED * sigma:
+            break
+    return noise, pieces
+
+
+def _residuals(pieces: list[Piece], s: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, int]]:
+    """Return the residuals of the polynomials of a partition, and their degrees."""
+    made = []
+    for piece in pieces:
+        first, last = np.searchsorted(s, [piece.start, piece.end])
+        if last - first > piece.degree + 1:
+            x = (s[first:last] - piece.start) / max(piece.end - piece.start, 1.0)
+            base = np.linalg.qr(np.vander(x, piece.degree + 1))[0]
+            y_piece = y[first:last] - y[first]
+            made.append((y_piece - base @ (base.T @ y_piece), piece.degree))
+    return made
+
+
+def find_structure(
+    signal: Signal, tolerance_m: float, least_m: float, jumps: bool, progress: Progress = SILENT
+) -> tuple[Chain, Noise]:
+    """Return the chain that explains a signal, and the noise that is left.
+
+    Parameters
+    ----------
+    signal : Signal
+    tolerance_m : float
+        See `noise_of`.
+    least_m : float
+        Least length of a part or a ramp, metres.
+    jumps : bool
+        Whether the bend may jump; where it cannot change linearly, it always may.
+    progress : Progress
+    """
+    first, second = progress.divide([1.0, 4.0])
+    noise, pieces = noise_of(signal, tolerance_m, first)
+    sigma = noise.effective_m(signal.step_m)
+    price = max(math.log(len(signal.s) * (noise.white_m / sigma) ** 2), LEAST_PRICE)
+    rules = Rules(signal.kind.ramps, jumps or not signal.kind.ramps, least_m, price)
+    chain = from_pieces(pieces, signal.kind.order, rules)
+    return searched(chain, signal.blocks(noise), rules, second), noise
+
+
+def refitted(chain: Chain, signal: Signal, noise: Noise, least_m: float) -> Chain:
+    """Return a chain that is fitted as a whole."""
+    return fitted(chain, signal.blocks(noise).near(chain), least_m, FINAL_STEPS)[0]
+
+
+def start_of(chain: Chain, signal: Signal, noise: Noise) -> np.ndarray:
+    """Return the value at the start of a chain, and with order 2 the slope there, (order,)."""
+    samples = signal.blocks(noise).near(chain)
+    base = columns(chain, samples)[0]
+    rest = (samples.y - base[:, chain.order :] @ chain.bends) * samples.root
+    return np.linalg.lstsq(base[:, : chain.order] * samples.root[:, None], rest, rcond=None)[0]

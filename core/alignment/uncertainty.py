@@ -1,0 +1,125 @@
+"""Standard errors of fitted elements that count the misalignment which neighbouring points share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from .chain import Chain, columns
+from .noise import Noise, estimated, shared_covariance
+from .plane_fit import PlanFit, Points
+from .signals import FLOOR_M, Signal
+
+RESIDUAL_DEGREE = 1
+"""Degree of the polynomial that follows the errors of an element as much as the fit does, which has one and a half
+parameters per element."""
+
+SINGULAR = 1e-13
+"""Share of the largest singular value below which a combination of unknowns is not determined."""
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Standard errors.
+
+    Attributes
+    ----------
+    bend : (e,) array
+        Of the bend of each element, 1/m; 0 where it is straight, NaN where it changes.
+    length, s : (e,) array
+        Of the length of each element and of its start, metres.
+    """
+
+    bend: np.ndarray
+    length: np.ndarray
+    s: np.ndarray
+
+
+def remaining(fit: PlanFit, points: Points, tolerance_m: float) -> Noise:
+    """Return the noise that explains the distances of the points from the fitted curve."""
+    bounds = np.searchsorted(fit.s, [one.s_to for one in fit.elements[:-1]])
+    used = points.weight > 0
+    pieces = [(rest[mine], RESIDUAL_DEGREE) for rest, mine in zip(np.split(fit.across, bounds), np.split(used, bounds))]
+    step = float(points.s[-1]) / (len(points.s) - 1)
+    found = estimated(pieces, step, FLOOR_M, only_if_sure=True)
+    return Noise(found.white_m, min(found.shared_m, tolerance_m), found.length_m)
+
+
+def plan_errors(fit: PlanFit, points: Points, used_m: float, noise: Noise) -> Errors:
+    """Return standard errors of the elements in plan.
+
+    Parameters
+    ----------
+    fit : PlanFit
+    points : Points
+    used_m : float
+        Standard deviation of a single point for which the points were weighted, metres.
+    noise : Noise
+        That they have.
+    """
+    count = len(fit.elements)
+    bends = fit.jacobian.shape[1] - 4 * count
+    rows = fit.solver.covariance_rows(np.arange(3 * count, 4 * count + bends))
+    spread = _spread(fit.jacobian, fit.s, points.weight, used_m, noise)
+    starts = np.vstack([np.zeros(rows.shape[1]), np.cumsum(rows[bends:-1], axis=0)])
+    bend, length, s = (_deviation(one, spread) for one in (rows[:bends], rows[bends:], starts))
+    nodes = fit.nodes
+    known = np.append(bend, 0.0)[nodes[:, 0]]
+    return Errors(np.where(nodes[:, 0] == nodes[:, 1], known, np.nan), length, s)
+
+
+def chain_errors(chain: Chain, signal: Signal, noise: Noise) -> Errors:
+    """Return standard errors of the parts of a chain whose joints are jumps.
+
+    Parameters
+    ----------
+    chain : Chain
+    signal : Signal
+    noise : Noise
+        For which the signal is weighted, and which it has.
+    """
+    samples = signal.blocks(noise).near(chain)
+    base, by = columns(chain, samples)
+    unknown = chain.unknown[1::2]
+    free = np.array((True,) * chain.order + chain.curved)
+    by_knots = (by[:, 0::2] + by[:, 1::2]) * np.diff(chain.bends)
+    jacobian = np.concatenate([base[:, free], by_knots[:, unknown >= 0]], axis=1)
+    weighted = jacobian * samples.root[:, None]
+    scale = np.linalg.norm(weighted, axis=0)
+    scale[scale == 0] = 1.0
+    half = np.linalg.pinv(np.linalg.qr(weighted / scale, mode="r"), rcond=SINGULAR) / scale[:, None]
+    rows = half @ half.T
+    spread = _spread(sparse.csr_matrix(jacobian), samples.s, samples.root**2, noise.effective_m(signal.step_m), noise)
+    size = rows.shape[1]
+    bends = np.zeros((len(chain.bends), size))
+    bends[np.array(chain.curved)] = rows[chain.order : int(free.sum())]
+    starts = np.zeros((len(chain.bends) + 1, size))
+    starts[1:-1][unknown >= 0] = rows[int(free.sum()) :]
+    return Errors(*(_deviation(one, spread) for one in (bends, np.diff(starts, axis=0), starts[:-1])))
+
+
+def _spread(
+    jacobian: sparse.csr_matrix, s: np.ndarray, weight: np.ndarray, used_m: float, noise: Noise
+) -> sparse.csr_matrix:
+    """Return the covariance of the weighted sums that a least squares fit solves for, (u, u).
+
+    Parameters
+    ----------
+    jacobian : (n, u) sparse array
+    s, weight : (n,) array
+        Of the points; the weight is their number over the square of `used_m`.
+    used_m : float
+        Standard deviation of a single point for which they were weighted, metres.
+    noise : Noise
+        That they have.
+    """
+    weighted = sparse.diags(weight) @ jacobian
+    own = weighted.T @ jacobian * (noise.white_m / used_m) ** 2
+    return (own + weighted.T @ (shared_covariance(s, noise) @ weighted)).tocsr()
+
+
+def _deviation(rows: np.ndarray, spread: sparse.csr_matrix) -> np.ndarray:
+    """Return the standard deviations of unknowns from their rows of the inverse normal matrix."""
+    return np.sqrt(np.maximum(np.einsum("ij,ij->i", (spread.T @ rows.T).T, rows), 0.0))

@@ -1,0 +1,107 @@
+"""Fit Alignment: the design elements of tracks in plan, height and cant, and how far the tracks lie off them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from qgis.core import QgsProcessingContext, QgsProcessingFeatureSource
+
+from ...core.parameters import FitParameters
+from ...core.progress import Progress
+from ..dialog import inputs, outputs
+from ..dialog import parameters as groups
+from ..dialog.parameter_values import ParameterValues
+from ..dialog.passwords import masked
+from ..writing.layers import figures_of_fits, write_deviations, write_elements
+from ..writing.reports import write_alignment_report
+from ..writing.whole_files import write_each
+from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
+from .toolbox_groups import ALIGNMENT
+
+READING, FITTING = 0.1, 0.95
+"""Fractions of the progress bar at which lines are read, and at which they are fitted."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """The layers and the settings."""
+
+    tracks: QgsProcessingFeatureSource
+    quality: QgsProcessingFeatureSource | None
+    rails: QgsProcessingFeatureSource | None
+    fixed: QgsProcessingFeatureSource | None
+    settings: FitParameters
+    command: str
+
+
+class FitAlignment(RailAlgorithm):
+    """The algorithm ``railextract:fitalignment``."""
+
+    NAME = "fitalignment"
+    LABEL = "Fit alignment"
+    GROUP = ALIGNMENT
+    TAGS = (*RAIL_WORDS, *TRACK_WORDS, "clothoid", "curve", "radius", "horizontal", "vertical", "Trassierung", "tracé")
+    NEEDS = (("numpy",), ("scipy",), ("pyproj",))
+    SUMMARY = "Finds the straights, clothoids and arcs, grades and cant ramps that tracks were built to."
+    PICTURE = "alignment.svg"
+    GUIDE = "alignment"
+    HELP = "\n\n".join(
+        (
+            "Takes centerlines of Extract Rails or any other 3D lines of tracks. Number, type and ends of the elements "
+            "are found, and all elements of a track are fitted at once. Cant is fitted if track geometry or rails "
+            "are given.",
+            "A fitted design is a proposal, not a record: an element that moves the track less than misalignment does "
+            "can't be seen. The fields sigma_r_m, sigma_len_m and sigma_s_m state how well each is known.",
+            "To correct it, edit the table, for example r1_m, s_from or type, delete rows, and give it back as FIXED: "
+            "types and all values that you changed are held, and the rest is fitted again.",
+        )
+    )
+
+    def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
+        """Declare the parameters and outputs in the order of the interface."""
+        layers = (inputs.tracks_to_fit(), *inputs.cant_of_tracks())
+        for definition in (*layers, *groups.alignment(), inputs.fixed(), outputs.elements(), outputs.deviations()):
+            self.addParameter(definition)
+        report = outputs.alignment_report()
+        report.setCreateByDefault(False)
+        self._add_report(report)
+        for output in outputs.fit_figures():
+            self.addOutput(output)
+
+    def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
+        """Read and check the parameters, in the main thread."""
+        values = ParameterValues(self, parameters, context)
+        return Job(
+            values.lines("INPUT"),
+            values.table("QUALITY") if values.filled("QUALITY") else None,
+            values.lines("RAILS") if values.filled("RAILS") else None,
+            values.table("FIXED") if values.filled("FIXED") else None,
+            FitParameters(
+                values.number("TOLERANCE") / 1000.0,
+                values.number("MIN_LENGTH"),
+                values.choice("TRANSITIONS"),
+                values.flag("ROUND"),
+            ),
+            masked(self.asPythonCommand(parameters, context)),
+        )
+
+    def compute(
+        self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
+    ) -> dict[str, Any]:
+        """Fit each track, then write elements and deviations."""
+        from ...core.alignment.fit import fit_tracks
+        from ..reading.tracks_to_fit import read_fixed, read_tracks
+
+        tracks, frame = read_tracks(job.tracks, job.quality, job.rails, progress.span(0, READING))
+        fixed = read_fixed(job.fixed, frame) if job.fixed else {}
+        fits = fit_tracks(tracks, frame, job.settings, fixed, progress.span(READING, FITTING))
+        rest = (parameters, context)
+        courses = [(one.alignment, one.deviations) for one in fits]
+        name, facts = job.tracks.sourceName(), {"Command": job.command}
+        writers = {
+            "ELEMENTS": lambda: write_elements(self, "ELEMENTS", [one.alignment for one in fits], frame, *rest),
+            "DEVIATIONS": lambda: write_deviations(self, "DEVIATIONS", [one.deviations for one in fits], frame, *rest),
+            "REPORT": lambda: write_alignment_report(self, "REPORT", courses, name, facts, True, *rest),
+        }
+        return {**write_each(writers, *rest), **figures_of_fits(fits)}

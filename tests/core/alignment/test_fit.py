@@ -1,0 +1,211 @@
+"""The fit of alignments to tracks that were made from random designs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
+from rail_extract.core.alignment.fit import Track, fit_track, fit_tracks
+from rail_extract.core.alignment.rounding import round_radius
+from rail_extract.core.alignment.table import alignments, rows
+from rail_extract.core.errors import ParameterError
+from rail_extract.core.frame import LocalFrame
+from rail_extract.core.parameters import FitParameters
+from rail_extract.core.progress import Progress, Recording
+from rail_extract.laboratory.designs import FAMILIES, random_design, surveyed
+from rail_extract.laboratory.ruler.alignments import compared, together
+
+FRAME = LocalFrame(np.zeros(3))
+NONE = np.zeros((0, 2))
+SHAPES = [(120.0, 0, 0), (60.0, 0, 1 / 400), (150.0, 1 / 400, 1 / 400), (50.0, 1 / 400, 0), (140.0, 0, 0)]
+
+
+def design(shapes=SHAPES):
+    vertical = (VerticalElement(0, 200, 50, 0.01, 0.01), VerticalElement(200, 80, 52, 0.01, -0.01))
+    vertical = (*vertical, VerticalElement(280, 240, 52, -0.01, -0.01))
+    cant = (CantElement(0, 120, 0, 0), CantElement(120, 60, 0, -0.08), CantElement(180, 150, -0.08, -0.08))
+    cant = (*cant, CantElement(330, 50, -0.08, 0), CantElement(380, 140, 0, 0))
+    return Alignment(1, FRAME, chained((100.0, 200.0), 0.3, shapes), vertical, cant)
+
+
+def track(one, seed=0, cant=False, **noise):
+    random = np.random.default_rng(seed)
+    line = surveyed(one, random, **noise)
+    s = np.arange(len(line), dtype=float)
+    measured = np.column_stack([s, one.cants(s) + 0.0004 * random.standard_normal(len(s))]) if cant else NONE
+    return Track(1, line, measured, np.zeros(len(line), dtype=bool))
+
+
+def fit(measured, fixed=None, progress=None, **settings):
+    return fit_track(measured, FRAME, FitParameters(**settings), fixed, progress or Progress())
+
+
+def test_a_line_without_noise_gives_its_design_back():
+    found = fit(track(design(), white_m=0.0)).alignment
+    assert [one.type for one in found.plan] == ["line", "clothoid", "arc", "clothoid", "line"]
+    np.testing.assert_allclose([one.s_from for one in found.plan], [0, 120, 180, 330, 380], atol=0.002)
+    assert found.plan[2].k_from == pytest.approx(1 / 400, rel=1e-6)
+
+
+@pytest.fixture(scope="module")
+def branch_lines():
+    """Fits of two random designs of 15 elements with white noise of 2 mm."""
+    made = []
+    for seed in (1, 2):
+        random = np.random.default_rng(seed)
+        one = random_design(random, FAMILIES["branch line"], 15)
+        made.append((one, fit(track(one, seed, cant=True, white_m=0.002))))
+    return made
+
+
+def test_random_designs_are_found_with_the_accuracy_that_the_page_states(branch_lines):
+    met = together([compared(one, found.alignment) for one, found in branch_lines])
+    assert met.found >= 0.95 * met.true
+    assert met.fitted <= 1.08 * met.true
+    assert np.median(met.radius) < 0.0015
+    assert np.quantile(met.radius, 0.9) < 0.01
+    assert np.median(met.ends_m) < 0.15
+    assert np.sqrt(np.mean(met.curve_m**2)) < 0.0005
+    assert met.curves_found >= 0.9 * met.curves_true
+    assert met.ramps_found >= 0.95 * met.ramps_true
+    assert 0.4 < np.sqrt(np.mean(met.radius_scores**2)) < 1.6
+
+
+def test_deviations_are_measured_minus_design(branch_lines):
+    for one, found in branch_lines:
+        assert found.rms_mm == pytest.approx(2.0, abs=0.2)
+        away = found.deviations
+        np.testing.assert_allclose(np.diff(away.s), 1.0, atol=1e-9)
+        np.testing.assert_allclose(away.xyz[:, :2], found.alignment.places(away.s), atol=1e-9)
+        assert np.std(away.lift_mm) == pytest.approx(2.0, abs=0.3)
+        assert np.nanstd(away.cant_diff_mm) == pytest.approx(0.45, abs=0.15)
+        assert 0 <= one.s_to - found.alignment.s_to < 1.01
+
+
+def test_the_reversed_track_gives_the_mirrored_elements():
+    ahead = track(design(), seed=3)
+    back = replace(ahead, xyz=ahead.xyz[::-1])
+    one, other = fit(ahead).alignment, fit(back).alignment
+    length = one.s_to
+    np.testing.assert_allclose([x.s_from for x in one.plan], [length - x.s_to for x in other.plan[::-1]], atol=0.02)
+    np.testing.assert_allclose([x.k_from for x in one.plan], [-x.k_to for x in other.plan[::-1]], atol=2e-7)
+
+
+def test_a_straight_stays_one_element():
+    straight = Alignment(1, FRAME, chained((0.0, 0.0), 1.0, [(400.0, 0, 0)]), (VerticalElement(0, 400, 0, 0, 0),))
+    counts = [len(fit(track(straight, seed, white_m=0.004)).alignment.plan) for seed in range(10)]
+    assert sum(count == 1 for count in counts) >= 9
+
+
+def test_turnouts_have_jumps_unless_clothoids_are_required():
+    siding = design([(80.0, 0, 0), (60.0, 1 / 300, 1 / 300), (80.0, 0, 0), (60.0, -1 / 300, -1 / 300), (80.0, 0, 0)])
+    found = fit(track(siding)).alignment
+    assert [(one.type, one.figures.joint) for one in found.plan] == [
+        ("line", None), ("arc", "G1"), ("line", "G1"), ("arc", "G1"), ("line", "G1")
+    ]  # fmt: skip
+    smooth = fit(track(siding), transitions="CLOTHOIDS").alignment
+    assert {one.figures.joint for one in smooth.plan[1:]} == {"G2"}
+
+
+def test_vertices_may_be_uneven_and_dense():
+    random = np.random.default_rng(8)
+    s = np.cumsum(random.uniform(0.1, 1.9, 520))
+    s = np.concatenate([[0.0], s[s < 519], [520.0]])
+    line = design().xyz(s) + 0.001 * random.standard_normal((len(s), 3))
+    found = fit(Track(1, line, NONE, np.zeros(len(s), dtype=bool))).alignment
+    assert [one.type for one in found.plan] == ["line", "clothoid", "arc", "clothoid", "line"]
+    np.testing.assert_allclose([one.s_from for one in found.plan], [0, 120, 180, 330, 380], atol=0.6)
+
+
+def test_round_radii_are_proposed_within_the_standard_error():
+    found = fit(track(design(), seed=2)).alignment
+    arc = found.plan[2]
+    assert arc.figures.r_round_m == 400
+    assert arc.figures.dev_rms_round_mm == pytest.approx(arc.figures.dev_rms_mm, abs=0.2)
+    assert fit(track(design(), seed=2), rounded=False).alignment.plan[2].figures.r_round_m is None
+    loose = replace(arc, k_from=-1 / 1004.0, k_to=-1 / 1004.0, figures=replace(arc.figures, sigma_r_m=3.0))
+    assert round_radius(loose, 2.0) == -1000
+
+
+def corrected(found, change):
+    """The table of a fit after a person has edited it."""
+    table = rows(found.alignment)
+    change(table)
+    return alignments([row for row in table if row["layout"]], FRAME)[0]
+
+
+def test_an_edited_radius_and_start_are_held_and_the_rest_follows():
+    measured = track(design(), seed=2, cant=True)
+    free = fit(measured)
+
+    def edit(table):
+        table[2].update(r1_m=399.5)
+        table[3].update(s_from=330.3)
+
+    held = fit(measured, corrected(free, edit))
+    assert 1 / held.alignment.plan[2].k_from == pytest.approx(399.5, abs=1e-6)
+    assert held.alignment.plan[3].s_from == pytest.approx(330.3, abs=1e-4)
+    assert [one.type for one in held.alignment.elements] == [one.type for one in free.alignment.elements]
+    assert held.rms_mm > free.rms_mm
+    same = fit(measured, corrected(free, lambda table: None))
+    np.testing.assert_allclose(
+        [one.s_from for one in same.alignment.plan], [one.s_from for one in free.alignment.plan], atol=0.01
+    )
+
+
+def test_an_element_that_was_removed_stays_away():
+    shapes = [(120.0, 0, 0), (15.0, 0, 1 / 400), (150.0, 1 / 400, 1 / 400), (50.0, 1 / 400, 0), (140.0, 0, 0)]
+    measured = track(design(shapes), white_m=0.0005)
+    free = fit(measured)
+    assert free.alignment.plan[1].type == "clothoid"
+    held = fit(measured, corrected(free, lambda table: table.pop(1)))
+    assert [one.type for one in held.alignment.plan] == ["line", "arc", "clothoid", "line"]
+
+
+def test_the_part_that_holds_is_given_and_the_rest_is_said():
+    line = track(design(), seed=2).xyz
+    line[440:, 1] += 0.4
+    progress = Recording(Progress())
+    measured = Track(1, line, NONE, np.zeros(len(line), dtype=bool))
+    found = fit(measured, progress=progress, min_length_m=20.0)
+    assert found.alignment.s_to < 450
+    assert len(progress.warnings) == 1
+    assert "does not hold" in progress.warnings[0]
+    assert max(one.figures.dev_rms_mm for one in found.alignment.plan) < 15
+
+
+def changed(change):
+    line = track(design()).xyz
+    return replace(track(design()), xyz=change(line))
+
+
+def spiked(line):
+    line[200, :2] += [30.0, -30.0]
+    return line
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda line: line * [1, 1, np.nan], "has no heights"),
+        (lambda line: line[:30], "over 29 m"),
+        (spiked, "turns back"),
+        (lambda line: np.concatenate([line, line[:1] + [0, 200, 0], line[:1]]), "ends where it begins"),
+    ],
+)
+def test_lines_that_cannot_have_an_alignment_are_refused(change, words):
+    with pytest.raises(ParameterError, match=words):
+        fit_tracks([changed(change)], FRAME, FitParameters(), {})
+
+
+def test_a_track_that_cannot_be_fitted_does_not_stop_the_others():
+    progress = Recording(Progress())
+    short = replace(changed(lambda line: line[:30]), track_id=7)
+    fits = fit_tracks([short, track(design())], FRAME, FitParameters(), {}, progress)
+    assert [one.alignment.track_id for one in fits] == [1]
+    assert "track 7" in progress.warnings[0]
+
+
+def test_a_table_of_other_tracks_is_refused():
+    with pytest.raises(ParameterError, match="FIXED has no elements"):
+        fit_tracks([track(design())], FRAME, FitParameters(), {9: design()})

@@ -1,0 +1,56 @@
+"""Errors of single points and misalignment, told apart by what partitions leave."""
+
+import numpy as np
+import pytest
+from rail_extract.core.alignment.noise import Noise, estimated, independent_m, shared_covariance
+from rail_extract.core.alignment.signals import PLAN, Signal, noise_of
+
+S = np.arange(0.0, 1200.0)
+
+
+def errors(noise, seed):
+    random = np.random.default_rng(seed)
+    shared = np.zeros(len(S))
+    if noise.shared_m:
+        covariance = noise.covariance(np.abs(S[:, None] - S)) + 1e-12 * np.eye(len(S))
+        shared = np.linalg.cholesky(covariance) @ random.standard_normal(len(S))
+    return shared + noise.white_m * random.standard_normal(len(S))
+
+
+@pytest.mark.parametrize("truth", [Noise(0.002), Noise(0.001, 0.003, 8.0)])
+def test_the_noise_of_a_curve_is_found(truth):
+    y = np.where(S > 500, (S - 500) ** 2 / 1200, 0.0)
+    found = [
+        noise_of(Signal(S, y + errors(truth, seed), np.ones(len(S)), PLAN), 0.01)[0].effective_m(1.0)
+        for seed in range(3)
+    ]
+    assert np.median(found) == pytest.approx(truth.effective_m(1.0), rel=0.35)
+
+
+def test_the_tolerance_limits_the_misalignment():
+    y = errors(Noise(0.001, 0.004, 8.0), 1)
+    assert noise_of(Signal(S, y, np.ones(len(S)), PLAN), 0.001)[0].shared_m <= 0.001
+
+
+def test_the_loss_by_a_polynomial_is_counted():
+    random = np.random.default_rng(3)
+    pieces = []
+    for _ in range(200):
+        y = 0.002 * random.standard_normal(12)
+        base = np.linalg.qr(np.vander(np.linspace(-1, 1, 12), 4))[0]
+        pieces.append((y - base @ (base.T @ y), 3))
+    assert estimated(pieces, 1.0, 1e-5).white_m == pytest.approx(0.002, rel=0.08)
+
+
+def test_errors_of_single_points_are_seen_through_any_curve():
+    y = S**2 / 400 + 0.003 * np.random.default_rng(1).standard_normal(len(S))
+    assert independent_m(S, y) == pytest.approx(0.003, rel=0.1)
+
+
+def test_the_covariance_of_points_is_that_of_their_distance():
+    noise = Noise(0.001, 0.003, 5.0)
+    made = shared_covariance(S[:30], noise).toarray()
+    lag = np.abs(S[:30, None] - S[:30])
+    near = lag < 15
+    np.testing.assert_allclose(made[near], noise.covariance(lag)[near])
+    assert not made[~near].any()

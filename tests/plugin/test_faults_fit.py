@@ -1,0 +1,72 @@
+"""Faults of tracks and tables, in Fit Alignment."""
+
+import numpy as np
+import pytest
+from faults import REFUSED, Fault
+from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+
+TITLE = "Design elements"
+
+
+def line(count=200, kind="LineStringZ", crs="EPSG:32643", shape=None, fields=""):
+    """A layer with one line, straight to the east unless there is another shape."""
+    x = np.arange(count, dtype=float)
+    xy = np.column_stack([500_000 + x, 3_000_000 + 0 * x]) if shape is None else shape
+    places = ", ".join(f"{east} {north}" + (" 50" if kind.endswith("Z") else "") for east, north in xy)
+    made = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "tracks", "memory")
+    feature = QgsFeature(made.fields())
+    feature.setGeometry(QgsGeometry.fromWkt(f"{kind.replace('Z', ' Z')}({places})"))
+    assert made.dataProvider().addFeature(feature)
+    return made
+
+
+def ring():
+    angle = np.linspace(0, 2 * np.pi, 400)
+    return np.column_stack([500_000 + 100 * np.cos(angle), 3_000_000 + 100 * np.sin(angle)])
+
+
+def given(make=line, **parameters):
+    def prepare(bench):
+        return {"INPUT": make(), **{name: value() for name, value in parameters.items()}}
+
+    return prepare
+
+
+FAULTS = [
+    Fault(
+        "line without heights",
+        given(lambda: line(kind="LineString")),
+        REFUSED,
+        "The line of track 1 has no heights: give a 3D line, such as a centerline of Extract rails.",
+    ),
+    Fault(
+        "short line",
+        given(lambda: line(30)),
+        REFUSED,
+        "The line of track 1 has 30 vertices over 29 m, but a fit needs at least 20 over 50 m: leave it out, or join "
+        "it with the track that continues it.",
+    ),
+    Fault(
+        "ring",
+        given(lambda: line(shape=ring())),
+        REFUSED,
+        "The line of track 1 ends where it begins: cut the ring into two lines.",
+    ),
+    Fault(
+        "line that turns back",
+        given(lambda: line(shape=[(500_000 + 100 - abs(100 - x), 3_000_000 + 0.001 * x) for x in range(200)])),
+        REFUSED,
+        "The line of track 1 turns back 100 m from its start: remove the stray vertices there, or cut the line.",
+    ),
+    Fault(
+        "track geometry without cant",
+        given(QUALITY=lambda: line(fields="&field=track_id:integer")),
+        REFUSED,
+        "QUALITY has no field chainage_m: give the track geometry of Extract rails or Measure track geometry.",
+    ),
+]
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_fault(meet, fault):
+    meet(fault, "fitalignment")
