@@ -1,7 +1,7 @@
 """The cross-section of the ridge under each piece: how wide it is, and how blunt.
 
-Dense matching of photographs and wide beams blur what they see: a head becomes a round ridge, wider than a head. Its
-edges tell the blur, and the blur tells how wide a head may look (docs/classification.md).
+Dense matching of photographs and wide beams blur what they see: a head becomes a round ridge, wider than a head. The
+blur follows from the edges, and the largest width that a head may have from the blur (docs/classification.md).
 """
 
 from __future__ import annotations
