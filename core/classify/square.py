@@ -52,7 +52,8 @@ SINGLE_SLOPE = 0.4
 slope is hidden, its crest looks like a bar."""
 
 MOST = 0.5
-"""Share of the cells with a partner on tops as narrow as a head up to which a blunt square is searched for ridges."""
+"""Share of the cells with a partner on tops as narrow as a head up to which a blunt thin square is searched for ridges:
+wide beams blend heads with the ballast, and `THIN` allows for that. In a dense square, one wide top is enough."""
 
 LEAST_BLUNT_HEIGHT_M = 0.07
 """Least mean height above the bed of a piece of a blunt rail: half of what images show of one, as where ballast reaches
@@ -373,7 +374,7 @@ def _narrow(
     -------
     (n,) bool array
     blur_m : float
-        Blur of the square if most rails with a partner are wider for it; otherwise 0.
+        Blur of the square if rails with a partner are wider for it; otherwise 0.
     """
     if not len(kept.cell):
         return np.zeros(0, dtype=bool), 0.0
@@ -381,7 +382,7 @@ def _narrow(
     narrow = beside.widths(piece, tolerances.width_rounds) < settings.head_width_m + tolerances.wider_m
     alone = _stands_alone(kept, piece, beside, shown.bed, settings, tolerances)
     partnered = with_partner(kept.pairs, kept.paired)
-    wide = bool(partnered.any()) and narrow[piece[partnered]].mean() < MOST
+    wide = partnered.any() and narrow[piece[partnered]].mean() < (1.0 if tolerances is DENSE else MOST)
     blur_m = 0.0
     if wide or alone.any():
         ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
