@@ -42,8 +42,8 @@ FLIGHT = (
     "3 to 10 cm: compare with control points."
 )
 
-WIDE_RIDGES, GAUGE_OFF_M = 1.6, 0.035
-"""Ridges this much wider than the footprint makes them, and rails this far from the gauge, are warned of."""
+WIDE_RIDGES = 1.6
+"""Ridges this much wider than the footprint makes them are warned of."""
 
 
 def survey_files(
