@@ -243,7 +243,7 @@ EXPORTED = [
     ),
     Fault(
         "an arc without a radius",
-        of_table(changed(1, r1_m=None)),
+        of_table(changed(1, r1_m=None, r2_m=None)),
         REFUSED,
         "The element 2 of layout H of track 1 is of type arc and has no radius: fill one, or make it a line.",
     ),

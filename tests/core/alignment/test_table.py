@@ -58,7 +58,7 @@ def test_rows_have_every_field_and_state_the_values_of_the_design():
         (0, {"x": None}, "no value in the field x"),
         (0, {"s_to": 0.0}, "end after its start"),
         (0, {"type": "curve"}, "line, arc or clothoid"),
-        (2, {"r1_m": None}, "has no radius"),
+        (2, {"r1_m": None, "r2_m": None}, "has no radius"),
         (2, {"r1_m": 0.0}, "leave it empty"),
     ],
 )
