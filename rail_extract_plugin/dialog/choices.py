@@ -7,7 +7,7 @@ from itertools import chain, combinations
 
 from qgis.core import QgsProcessingParameterEnum
 
-from ...core.parameters import ALIGNED, AS_THEY_ARE, GEOMETRY, LEARNED, OVERLAP, SYNTHETIC
+from ...core.parameters import ALIGNED, AS_THEY_ARE, CLOTHOIDS, GEOMETRY, JUMPS, LEARNED, OVERLAP, SYNTHETIC
 from ...core.standards import CUSTOM, DETECT
 from ..i18n import tr
 
@@ -27,6 +27,7 @@ WORDS = {
         **{"HECTOMETRES": tr("12.3+45.67"), "KILOMETRES": tr("12+345.67")},
         **{"GERMAN": tr("12,3 + 46"), "MILES": tr("7 mi 1181.39 yd")},
     },
+    "TRANSITIONS": {JUMPS: tr("Clothoids, or none"), CLOTHOIDS: tr("Clothoids everywhere")},
     "VERTICAL_CURVES": {"CIRCLES": tr("Circles, as for railways"), "PARABOLAS": tr("Parabolas, as for roads")},
     "TORCH": {"NONE": tr("Do not install"), "CPU": tr("For the processor (CPU)"), "CUDA": tr("For an Nvidia GPU")},
 }

@@ -1,7 +1,7 @@
 import pytest
 from qgis.core import QgsProcessingParameterDefinition
 from rail_extract.core.errors import ParameterError
-from rail_extract.core.parameters import DEFAULT_STEP_M, GrowParameters, Parameters
+from rail_extract.core.parameters import DEFAULT_STEP_M, FitParameters, GrowParameters, Parameters
 from rail_extract.core.standards import STANDARDS
 from rail_extract.rail_extract_plugin.dialog.parameter_values import CHOICES, GROWTH, NUMBERS, class_numbers
 
@@ -81,6 +81,8 @@ CORE_DEFAULTS = {name: getattr(Parameters, field) for name, field in {**NUMBERS,
 CORE_DEFAULTS |= {"ITERATIONS": Parameters.passes, "STEP": DEFAULT_STEP_M}
 GROW_DEFAULTS = {name: getattr(GrowParameters, field) for name, field in GROWTH.items()}
 GROW_DEFAULTS |= {"BOTH": GrowParameters.both, "MAX_OUTLIERS": GrowParameters.max_outliers}
+FIT_DEFAULTS = {"MIN_LENGTH": FitParameters.min_length_m, "TRANSITIONS": FitParameters.transitions}
+OWN_DEFAULTS = {"growrailpoints": GROW_DEFAULTS, "fitalignment": FIT_DEFAULTS}
 
 
 def having(algorithm, flag):
@@ -142,9 +144,9 @@ def test_defaults_match_the_core(plugin):
     seen = set()
     for algorithm in plugin.provider.algorithms():
         for definition in algorithm.parameterDefinitions():
-            defaults = GROW_DEFAULTS if algorithm.name() == "growrailpoints" else CORE_DEFAULTS
+            defaults = OWN_DEFAULTS.get(algorithm.name(), CORE_DEFAULTS)
             if definition.name() in defaults:
                 seen.add(definition.name())
                 default = defaults[definition.name()]
                 assert definition.defaultValue() == default, (algorithm.name(), definition.name())
-    assert seen == {*CORE_DEFAULTS, *GROW_DEFAULTS}
+    assert seen == {*CORE_DEFAULTS, *GROW_DEFAULTS, *FIT_DEFAULTS}
