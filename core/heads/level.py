@@ -60,7 +60,7 @@ CROWN_HEADS, RIM_HEADS, SHOULDER_HEADS = 0.2, (0.3, 0.5), (0.55, 0.75)
 """Parts of the head width on either side of the axis: the crown, the rims, and what is beyond a head that is not
 blurred."""
 
-SHOULDER_SHARE = 0.33
+SHOULDER_SHARE = 0.2
 """Points per width on either shoulder, as a share of those on the crown, from which a blurred head goes on there."""
 
 

@@ -188,6 +188,8 @@
     <alias field="joint" index="27" name="Begins with (G1, G2)"/>
     <alias field="r_round_m" index="28" name="Round radius proposed [m]"/>
     <alias field="dev_rms_round_mm" index="29" name="Deviation with round radii, RMS [mm]"/>
+    <alias field="r_fit_m" index="30" name="Radius of an arc as fitted [m]"/>
+    <alias field="s_fit_m" index="31" name="Start as fitted [m]"/>
   </aliases>
   <mapTip>&lt;b&gt;Track [% &quot;track_id&quot; %], [% &quot;type&quot; %] [% &quot;no&quot; %]&lt;/b&gt;&lt;br&gt;Length: [% format_number(&quot;length_m&quot;, 2) || &#x27; m&#x27; %]&lt;br&gt;[% CASE WHEN &quot;layout&quot; = &#x27;H&#x27; THEN &#x27;Radius: &#x27; || coalesce(format_number(&quot;r1_m&quot;, 1), &#x27;straight&#x27;) || &#x27; to &#x27; || coalesce(format_number(&quot;r2_m&quot;, 1), &#x27;straight&#x27;) WHEN &quot;layout&quot; = &#x27;V&#x27; THEN &#x27;Gradient: &#x27; || format_number(&quot;grade1_pm&quot;, 2) || &#x27; to &#x27; || format_number(&quot;grade2_pm&quot;, 2) || &#x27; ‰&#x27; ELSE &#x27;Cant: &#x27; || format_number(&quot;cant1_mm&quot;, 0) || &#x27; to &#x27; || format_number(&quot;cant2_mm&quot;, 0) || &#x27; mm&#x27; END %]&lt;br&gt;Deviation, RMS: [% coalesce(format_number(&quot;dev_rms_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>
