@@ -7,7 +7,7 @@ used, because programs disagree on their sense.
 from __future__ import annotations
 
 import math
-import xml.etree.ElementTree as ET
+import xml.etree.ElementTree as ET  # nosec B405 - files with a DOCTYPE are refused before any entity is read
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Optional

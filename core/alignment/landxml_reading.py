@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-import xml.etree.ElementTree as ET
+import xml.etree.ElementTree as ET  # nosec B405 - files with a DOCTYPE are refused before any entity is read
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Optional
