@@ -25,7 +25,7 @@ PARAMETERS = [
     ("ENGINE", "enum", "AUTO"),
     ("DEVICE", "enum", "AUTO"),
     ("SMOOTHING_XY", "number", 0.8),
-    ("SMOOTHING_Z", "number", 3.0),
+    ("SMOOTHING_Z", "number", None),
     ("TOLERANCE_XY", "number", 0.10),
     ("TOLERANCE_Z", "number", 0.03),
     ("CROWN_RADIUS", "number", 20.0),
