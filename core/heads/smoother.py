@@ -35,7 +35,7 @@ ROUNDS = 4
 """Rounds in which large values lose weight; a fifth changes the evidence by less than 0.1."""
 
 RIDGE = 1e-6
-"""Information, relative to the mean of the measurements, that is always there, so that few of them suffice."""
+"""Information, relative to the mean of the measurements, that is always there, so that few of them are enough."""
 
 DIFFERENCE = np.array([1.0, -2.0, 1.0])
 """Second difference of neighbouring coefficients."""
@@ -95,12 +95,13 @@ def smooth(t: np.ndarray, values: np.ndarray, information: np.ndarray, start_m: 
     """
     pieces = max(int(np.ceil((end_m - start_m) / KNOT_M)), 1)
     step_m, count = max(end_m - start_m, 1e-3) / pieces, pieces + BAND - 1
-    middle = float(np.average(values, weights=information))
+    trend = _trend(t, values, information, start_m + step_m * (np.arange(count) - 1))
     first, basis = _basis(t, start_m, step_m, count)
+    off = values - np.sum(basis * trend[first + np.arange(BAND)[:, None]], axis=0)
     score = np.zeros(count)
     data = np.zeros((BAND, count))
     for one in range(BAND):
-        score += np.bincount(first + one, information * basis[one] * (values - middle), count)
+        score += np.bincount(first + one, information * basis[one] * off, count)
         for apart in range(BAND - one):
             data[apart] += np.bincount(first + one, information * basis[one] * basis[one + apart], count)
     data[0] += RIDGE * data[0].mean()
@@ -110,7 +111,15 @@ def smooth(t: np.ndarray, values: np.ndarray, information: np.ndarray, start_m: 
     likely = [(one, part) for one, part in zip(fits, share / share.sum()) if part > LEAST_SHARE * share.max()]
     mean = sum(part * one.coefficients for one, part in likely)
     covariance = sum(part * (_covariance(one.factor) + _products(one.coefficients - mean)) for one, part in likely)
-    return Spline(start_m, step_m, middle + mean, covariance)
+    return Spline(start_m, step_m, trend + mean, covariance)
+
+
+def _trend(t: np.ndarray, values: np.ndarray, information: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return the straight line through measurements at `places`, (n,), so that `RIDGE` pulls towards it."""
+    middle, level = (np.average(one, weights=information) for one in (t, values))
+    spread = np.sum(information * (t - middle) ** 2)
+    rise = np.sum(information * (t - middle) * (values - level)) / spread if spread > 0 else 0.0
+    return level + rise * (places - middle)
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.edges import VIEW_STATIONS, station_count
 from rail_extract.core.heads.elevation import ElevationParameters, elevate
+from rail_extract.core.heads.flank import FLANK_TOP_SIGMA_M, Flank
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.heads.sections import PROFILE_SIGMA_M
 from rail_extract.core.heads.top import smoothed
@@ -248,10 +249,11 @@ def test_lines_err_where_there_are_no_points_by_an_unknown_curvature():
 
 def test_a_line_on_one_face_has_the_points_of_its_face_and_its_doubt():
     before = Support(np.arange(0.125, 1.5, 0.25), np.full(6, 9), np.full(6, 1.0))
-    found = on_one_face(before, np.array([0.1, 0.2, 0.3, 1.49, 1.6]), 0.004)
+    found = on_one_face(before, np.array([0.1, 0.2, 0.3, 1.49, 1.6]), Flank(0.0, 0.0, 0.004))
     assert found.points.tolist() == [2, 1, 0, 0, 0, 2]
     expected = np.hypot(0.004, bridge_error(np.array([0.1, 0.2, 0.3, 1.49, 1.6]), before.t))
     np.testing.assert_allclose(found.sigma_m, expected)
+    np.testing.assert_allclose(found.heights_m, FLANK_TOP_SIGMA_M)
 
 
 def test_a_head_that_every_point_of_a_window_shows_does_not_wander():
