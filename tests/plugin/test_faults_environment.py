@@ -299,7 +299,7 @@ FAULTS = [
         "a worker process is ended from outside",
         ended_workers,
         REFUSED,
-        "Reading 0.las failed, because its worker process ended: close other programs that take memory, or set "
+        "Reading ….las failed, because its worker process ended: close other programs that take memory, or set "
         "WORKERS to 1.",
     ),
     Fault("worker processes cannot be started", unknown_interpreter, FINE, gives=TRACK),
