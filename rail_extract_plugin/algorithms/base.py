@@ -19,6 +19,7 @@ from qgis.PyQt.QtGui import QIcon
 from qgis.PyQt.QtWidgets import QWidget
 
 from ...core.disk import Destination
+from ...core.kernels import blas, one_thread
 from ...core.progress import Progress
 from ..dialog.checks import check_values, explain_invalid
 from ..dialog.guide import guide
@@ -153,7 +154,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         """Compute in any thread; every error becomes one sentence."""
         progress = QgisProgress(feedback, self.parameterDefinitions())
         try:
-            with running(feedback):
+            with running(feedback), one_thread(*blas()):
                 results = self.compute(self._job, parameters, context, progress)
         except BaseException as error:
             reason = sentence_for(error, self.parameterDefinitions())
