@@ -34,6 +34,7 @@ from ..runs.missing import with_link
 from ..runs.running import running
 from ..setup.dependencies import explain_missing, missing_packages
 from ..writing.destinations import PAGE, appends, check_layer_name, check_page_name, destinations
+from ..writing.run import new_run
 from ..writing.styling import NO_PROPERTIES
 from .sentences import COMMAND_LINE, sentence_for
 from .toolbox_groups import RAILS, STEPS, Group
@@ -142,6 +143,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         try:
             self.destinations = self._destinations(parameters, context)
             self._job = self._read(parameters, context)
+            self.layer_properties = new_run()
         except BaseException as error:
             raise QgsProcessingException(sentence_for(error, self.parameterDefinitions())) from None
         return True
