@@ -19,7 +19,7 @@ from rail_extract.core.pipeline import Parameters, extract_files
 from rail_extract.core.progress import Progress
 from rail_extract.core.tasks import InTurn, Task
 from rail_extract.core.workers import runner as runner_module
-from rail_extract.core.workers.process import Interpreter
+from rail_extract.core.workers.process import Interpreter, Worker
 from rail_extract.core.workers.runner import Workers, worker_count, workers
 
 FUNCTIONS = """
@@ -256,6 +256,17 @@ def test_little_work_and_work_that_cannot_be_divided_stay_in_this_process(functi
         for tasks in (chain, little):
             assert {number for number, _ in dict(runner.run(tasks)).values()} == {os.getpid()}
         assert os.getpid() not in {number for number, _ in dict(runner.run(much)).values()}
+
+
+def test_no_more_processes_are_started_than_there_are_tasks(functions, monkeypatch):
+    started = []
+    monkeypatch.setattr(runner_module, "Worker", lambda *words: started.append(Worker(*words)) or started[-1])
+    with workers(3) as runner:
+        for count, expected in ((2, 2), (2, 2), (5, 3)):
+            found, _ = run(runner, {number: Task("", functions.add, (number,)) for number in range(count)})
+            assert found == [(number, number) for number in range(count)]
+            assert len(started) == expected
+    assert not any(is_alive(one.number) for one in started)
 
 
 def refuse():
