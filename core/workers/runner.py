@@ -155,8 +155,10 @@ class _Run:
         self._tasks, self._messages, self._progress = tasks, messages, progress
         self._order = turns(tasks)
         self._waiting = list(self._order)
-        self._idle, self._running = list(idle), dict[Worker, Hashable]()
-        self._kept, self._answers = Results(tasks), dict[Hashable, Answer]()
+        self._idle = list(idle)
+        self._running: dict[Worker, Hashable] = {}
+        self._kept = Results(tasks)
+        self._answers: dict[Hashable, Answer] = {}
         self._finished: set[Hashable] = set()
         self._total_s = sum(task.weight for task in tasks.values())
         self._done_s: dict[Hashable, float] = {}

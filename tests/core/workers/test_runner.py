@@ -63,6 +63,10 @@ def slow(folder, context):
         context.progress.set_fraction(number / 1200)
         time.sleep(0.1)
 
+def silent(folder, context):
+    Path(folder, str(os.getpid())).write_text("")
+    time.sleep(60)
+
 def half(context):
     context.progress.status("half")
     time.sleep(0.15)
@@ -230,7 +234,7 @@ from rail_extract.core.tasks import Task
 from rail_extract.core.workers import runner
 runner.WORTH_S = 0.0
 with runner.workers(2) as two:
-    list(two.run({number: Task("", functions.slow, (sys.argv[2],)) for number in range(2)}))
+    list(two.run({number: Task("", functions.silent, (sys.argv[2],)) for number in range(2)}))
 """
 
 
