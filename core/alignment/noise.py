@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from scipy import sparse
 from scipy.linalg import toeplitz
 from scipy.optimize import nnls
 
-LENGTHS_M = (3.0, 5.0, 8.0, 12.0, 18.0, 27.0)
+LENGTHS_M = (3.0, 4.0, 5.0, 6.5, 8.0, 10.0, 12.0, 15.0, 18.0, 22.0, 27.0)
 """Correlation lengths of the misalignment that are tried, metres: track is out of line over 5 to 30 m."""
 
 LAGS = 30
@@ -85,7 +85,7 @@ def independent_m(s: np.ndarray, y: np.ndarray) -> float:
 
 
 def estimated(
-    pieces: Sequence[tuple[np.ndarray, int]], step_m: float, floor_m: float, only_if_sure: bool = False
+    pieces: Sequence[tuple[np.ndarray, float]], step_m: float, floor_m: float, only_if_sure: bool = False
 ) -> Noise:
     """Return the noise that explains residuals.
 
@@ -93,8 +93,9 @@ def estimated(
 
     Parameters
     ----------
-    pieces : sequence of ((n,) array, int)
-        Residuals of a piece in order, metres, and degree of the polynomial that was fitted to it.
+    pieces : sequence of ((n,) array, float)
+        Residuals of a piece in order, metres, and degree of the polynomial that was fitted to it. Between two degrees,
+        as much is lost as a share of the errors loses by either.
     step_m : float
         Mean distance between the points.
     floor_m : float
@@ -106,9 +107,11 @@ def estimated(
     if not pieces:
         return Noise(floor_m)
     seen = np.sum([_products(rest) for rest, _ in pieces], axis=0)
-    kinds: Counter[tuple[int, int]] = Counter()
+    kinds: defaultdict[tuple[int, int], float] = defaultdict(float)
     for rest, degree in pieces:
-        kinds[max(size for size in SIZES if size <= len(rest)), degree] += len(rest)
+        size, lower = max(size for size in SIZES if size <= len(rest)), math.floor(degree)
+        kinds[size, lower] += len(rest) * (1.0 + lower - degree)
+        kinds[size, lower + 1] += len(rest) * (degree - lower)
     lags = step_m * np.arange(SIZES[-1])
     white = _expected_of(kinds, np.where(lags == 0, 1.0, 0.0))
     alone = float(white @ seen / (white @ white))
@@ -122,14 +125,14 @@ def estimated(
     return min(found, key=lambda one: one[0])[1]
 
 
-def _hang_together(products: np.ndarray, variance: float, count: int) -> bool:
+def _hang_together(products: np.ndarray, variance: float, count: float) -> bool:
     """Return whether products of residuals at lags, (LAGS,), are more than those of independent errors would be."""
     sums = np.cumsum(products[1:])
     error = variance * np.sqrt(count * np.arange(1, LAGS))
     return bool((sums > SURE * error).any())
 
 
-def _usual(pieces: list[tuple[np.ndarray, int]]) -> list[tuple[np.ndarray, int]]:
+def _usual(pieces: list[tuple[np.ndarray, float]]) -> list[tuple[np.ndarray, float]]:
     """Return the pieces without those that fit badly, because an element begins within them."""
     if not pieces:
         return []
@@ -146,7 +149,7 @@ def _products(rest: np.ndarray) -> np.ndarray:
     return np.array([padded[: len(rest)] @ padded[lag : lag + len(rest)] for lag in range(LAGS)])
 
 
-def _expected_of(kinds: Mapping[tuple[int, int], int], correlation: np.ndarray) -> np.ndarray:
+def _expected_of(kinds: Mapping[tuple[int, int], float], correlation: np.ndarray) -> np.ndarray:
     """Return the sums of products to expect at each lag, (LAGS,), for errors with a correlation by lag.
 
     Parameters
