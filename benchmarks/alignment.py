@@ -13,7 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 from rail_extract.core.alignment.elements import Alignment
-from rail_extract.core.alignment.fit import Track, fit_track
+from rail_extract.core.alignment.fit import fit_track
+from rail_extract.core.alignment.measured import Track
 from rail_extract.core.parameters import FitParameters
 from rail_extract.laboratory.designs import FAMILIES, Family, random_design, surveyed
 from rail_extract.laboratory.ruler.alignments import Met, compared, together

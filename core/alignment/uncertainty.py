@@ -15,6 +15,9 @@ from .signals import FLOOR_M, Signal
 LEAST_DEGREE, LARGEST_DEGREE = 0.0, 3.0
 """Limits of the degree of a polynomial that follows the errors of an element as much as the fit does."""
 
+SURE = 3.0
+"""Standard errors by which the distances of the points from the fitted curve have to show misalignment."""
+
 SINGULAR = 1e-13
 """Share of the largest singular value below which a combination of unknowns is not determined."""
 
@@ -47,7 +50,7 @@ def remaining(fit: PlanFit, points: Points, tolerance_m: float) -> Noise:
         used = points.weight[part] > 0
         pieces.append((fit.across[part][used], float(np.clip(degree, LEAST_DEGREE, LARGEST_DEGREE))))
     step = float(points.s[-1]) / (len(points.s) - 1)
-    found = estimated(pieces, step, FLOOR_M, only_if_sure=True)
+    found = estimated(pieces, step, FLOOR_M, SURE)
     return Noise(found.white_m, min(found.shared_m, tolerance_m), found.length_m)
 
 
@@ -89,7 +92,6 @@ def chain_errors(chain: Chain, signal: Signal, noise: Noise) -> Errors:
     chain : Chain
     signal : Signal
     noise : Noise
-        For which the signal is weighted, and which it has.
     """
     samples = signal.blocks(noise).near(chain)
     base, by = columns(chain, samples)
@@ -97,18 +99,14 @@ def chain_errors(chain: Chain, signal: Signal, noise: Noise) -> Errors:
     free = np.array((True,) * chain.order + chain.curved)
     by_knots = (by[:, 0::2] + by[:, 1::2]) * np.diff(chain.bends)
     jacobian = np.concatenate([base[:, free], by_knots[:, unknown >= 0]], axis=1)
-    weighted = jacobian * samples.root[:, None]
+    weighted = samples.whitened(jacobian)
     scale = np.linalg.norm(weighted, axis=0)
     scale[scale == 0] = 1.0
     half = np.linalg.pinv(np.linalg.qr(weighted / scale, mode="r"), rcond=SINGULAR) / scale[:, None]
-    rows = half @ half.T
-    spread = _spread(sparse.csr_matrix(jacobian), samples.s, samples.root**2, noise.effective_m(signal.step_m), noise)
-    size = rows.shape[1]
-    bends = np.zeros((len(chain.bends), size))
-    bends[np.array(chain.curved)] = rows[chain.order : int(free.sum())]
-    starts = np.zeros((len(chain.bends) + 1, size))
-    starts[1:-1][unknown >= 0] = rows[int(free.sum()) :]
-    return Errors(*(_deviation(one, spread) for one in (bends, np.diff(starts, axis=0), starts[:-1])))
+    bends, starts = np.zeros((len(chain.bends), len(half))), np.zeros((len(chain.bends) + 1, len(half)))
+    bends[np.array(chain.curved)] = half[chain.order : int(free.sum())]
+    starts[1:-1][unknown >= 0] = half[int(free.sum()) :]
+    return Errors(*(np.linalg.norm(one, axis=1) for one in (bends, np.diff(starts, axis=0), starts[:-1])))
 
 
 def _spread(

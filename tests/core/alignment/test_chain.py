@@ -13,7 +13,7 @@ S = np.arange(0.0, 400.0)
 
 
 def samples(y=None, weight=1.0):
-    return Samples(S, np.zeros_like(S) if y is None else y, np.zeros_like(S), np.full_like(S, weight))
+    return Samples(S, np.zeros_like(S) if y is None else y, np.zeros_like(S), np.full_like(S, weight**-2))
 
 
 def chain(order=2, jump=False):
