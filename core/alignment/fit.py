@@ -295,7 +295,7 @@ def _with_cants(
 ) -> Alignment:
     """Return an alignment with constant cants and ramps, as far as the cant is known."""
     s = np.interp(track.cant[:, 0], measured.along, feet, left=np.nan, right=np.nan)
-    counts = ~strays(*track.cant.T, HOLDS * settings.tolerance_m)
+    counts = ~strays(track.cant[:, 0], track.cant[:, 1], HOLDS * settings.tolerance_m)
     signal = _signal(alignment, s, track.cant[:, 1], counts.astype(float), CANT)
     if len(signal.s) < LEAST_CANT_POINTS:
         return alignment
