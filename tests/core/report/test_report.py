@@ -127,6 +127,15 @@ def test_the_verdict_follows_the_share_in_doubt(count, words):
     assert headline(page(track(bridged=at(101, *range(count))))).startswith(words)
 
 
+@pytest.mark.parametrize(("bridged", "words"), [(0, "Less accurate than a track survey"), (40, "Poor")])
+def test_tracks_that_are_only_inaccurate_are_not_called_poor(bridged, words):
+    sigma = np.full(101, 1.0)
+    sigma[:80] = 7.0
+    html = page(track(sigma_mm=sigma, bridged=at(101, *range(bridged))))
+    assert headline(html).startswith(words)
+    assert ("above 5 mm on 80 % of the length" in headline(html)) == (bridged == 0)
+
+
 def test_each_track_is_judged_by_its_own_gauge():
     line, geometry = track(2, gauge_mm=np.full(101, 1001.0))
     findings = examine(network(track(), (replace(line, gauge_mm=1001.0), geometry)), (1.435, 1.0))
