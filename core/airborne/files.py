@@ -15,7 +15,7 @@ from ..errors import CloudError, NoRailPointsError, ParameterError
 from ..frame import LocalFrame
 from ..parameters import AirborneParameters
 from ..progress import SILENT, Progress
-from ..tasks import Context, Runner, Task
+from ..tasks import READ_S, Context, Runner, Task
 from .axis import Axis, axis_of_guide
 from .beside import WIDE_M
 from .fitting import EMPTY, Fitted, Stations, fit_tracks
@@ -26,6 +26,9 @@ from .survey import AirborneTrack, Guide, Survey, joined_others, lines_of, track
 
 POINT = np.dtype([("xyz", "<f8", 3), ("mark", "<u4")])
 """A point on disk: metres from the zero of the coordinate system, and its mark, see `passes.marks_of`."""
+
+FIT_S = 2e-5
+"""Run time of the fit per point, in seconds."""
 
 MIN_LENGTH_M = 30.0
 """Shorter guides have too few sections for a curve."""
@@ -96,7 +99,9 @@ def survey_files(
     progress.status("Fitting the tracks")
     spacings_m = [parameters.spacing_of(guide.gauge_m) for guide in guides]
     tasks: dict[Key, Task] = {
-        key: Task(f"The square {key}", fit_square, (folder, key, pieces, spacings_m, parameters), weight=counts[key])
+        key: Task(
+            f"The square {key}", fit_square, (folder, key, pieces, spacings_m, parameters), weight=FIT_S * counts[key]
+        )
         for key, pieces in squares.items()
         if key in counts
     }
@@ -181,7 +186,7 @@ def _spool(
         touched = ~((areas[:, :2] > high) | (areas[:, 2:] < low)).any(axis=1)  # an extent of NaN may be anywhere
         if touched.any():
             arguments = (request, number, areas[touched], around, folder)
-            tasks[number] = Task(header.path.name, spool_file, arguments, weight=float(header.point_count))
+            tasks[number] = Task(header.path.name, spool_file, arguments, weight=READ_S * (header.point_count + 1))
     counts: dict[Key, int] = {}
     for _, one in runner.run(tasks, progress):
         for key, count in one.items():

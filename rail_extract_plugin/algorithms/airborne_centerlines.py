@@ -71,6 +71,7 @@ class AirborneCenterlines(RailAlgorithm):
             *groups.rail(),
             *groups.airborne(),
             *groups.area(),
+            groups.workers(),
             outputs.airborne_centerlines(),
             outputs.airborne_stations(),
             outputs.findings(),
@@ -94,13 +95,12 @@ class AirborneCenterlines(RailAlgorithm):
         """Fit the tracks, then write the outputs."""
         from ...core.airborne.files import survey_files
         from ...core.report.airborne import airborne_findings, airborne_summary
-        from ...core.tasks import InTurn
 
         progress = Estimating(progress)
         values = ParameterValues(self, parameters, context)
         request = request_points(job.cloud, job.class_codes, values.extent, progress)
-        with points_folder() as folder:
-            survey = survey_files(request, job.guides, job.parameters, folder / "points", InTurn(), progress)
+        with points_folder() as folder, values.runner() as runner:
+            survey = survey_files(request, job.guides, job.parameters, folder / "points", runner, progress)
         progress.check()
         found = airborne_findings(survey) if is_wanted(parameters.get("FINDINGS"), context) else ()
         frame, rest = survey.frame, (parameters, context)

@@ -18,6 +18,7 @@ from ..dialog import parameters as groups
 from ..dialog.definitions import advanced
 from ..dialog.parameter_values import ParameterValues
 from ..dialog.passwords import masked
+from ..i18n import tr
 from ..reading.clouds import CloudSource, checked_crs, points_folder, request_points
 from ..systems import system
 from ..writing.destinations import is_wanted
@@ -95,6 +96,7 @@ class ExtractRails(RailAlgorithm):
             *groups.pairing(),
             groups.strips(),
             groups.step(),
+            groups.workers(),
             *inputs.axis(optional=True),
         ):
             self.addParameter(definition)
@@ -155,6 +157,7 @@ class ExtractRails(RailAlgorithm):
         """Return the job with the rail standard that fits the points."""
         from ...core.standard_checks import detect_in_raw, detect_standard
 
+        progress.status(tr("Measuring gauge and railheads"))
         detect = detect_in_raw if values.flag("CLASSIFY") else detect_standard
         standard = values.standard(detect(request, progress.span(0, 0)).name)
         choose_model(standard.gauge_m, standard.head_width_m, values.choice("MODEL"))
@@ -166,7 +169,6 @@ class ExtractRails(RailAlgorithm):
         """Extract the rails and tracks, then write the outputs."""
         from ...core.pipeline import extract_files
         from ...core.report import Origin, list_findings, summary
-        from ...core.tasks import InTurn
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
         request = request_points(job.cloud, job.class_codes, values.extent, progress)
@@ -183,8 +185,8 @@ class ExtractRails(RailAlgorithm):
             quality_step_m=values.number("STEP") if quality or findings or report else None,
             keep_cleaned=cleaned,
         )
-        with points_folder() as folder:
-            network = extract_files(request, folder, settings, InTurn(), progress, classify, job.weights, job.seeds)
+        with points_folder() as folder, values.runner() as runner:
+            network = extract_files(request, folder, settings, runner, progress, classify, job.weights, job.seeds)
         progress.check()
         if job.axes:
             network = replace(network, geometry=job.axes.along(network.geometry, network.frame, progress))

@@ -20,7 +20,9 @@ from qgis.core import (
     QgsRectangle,
     QgsVectorLayer,
 )
+from rail_extract.core.kernels import blas
 from rail_extract.core.scratch import PREFIX
+from rail_extract.core.workers import runner
 from rail_extract.rail_extract_plugin.reading.geotiff import read_header
 
 POINTS = f"{PREFIX}*/*/10_*"
@@ -513,3 +515,37 @@ def assert_refused(outcome, message, outputs):
     assert "Traceback" not in outcome.error
     assert "\n" not in outcome.error.strip()
     assert not any(path.exists() for path in outputs.values())
+
+
+@pytest.mark.parametrize("ends", ["well", "badly"])
+def test_libraries_have_one_thread_during_a_run_and_as_many_as_before_afterwards(run, scene, new_feedback, ends):
+    seen, feedback, before = set(), new_feedback(1 if ends == "badly" else None), [one.get() for one in blas()]
+    feedback.progressChanged.connect(lambda _: seen.update(one.get() for one in blas()))
+    try:
+        for one in blas():
+            one.set(2)
+        assert run(scene, feedback).ok == (ends == "well")
+        assert seen == {1}
+        assert {one.get() for one in blas()} == {2}
+    finally:
+        for one, threads in zip(blas(), before):
+            one.set(threads)
+
+
+def test_worker_processes_give_the_same_lines(run, write_cloud, track, tmp_path, new_feedback, monkeypatch):
+    monkeypatch.setattr(runner, "WORTH_S", 0.0)
+    tiles = tmp_path / "täg les"
+    tiles.mkdir()
+    for number in range(3):
+        write_cloud(track() + [12.0 * number, 0, 0], f"{number}.las", folder=tiles)
+    found, said = [], []
+    for count in (1, 2):
+        feedback, rails = new_feedback(), tmp_path / f"{count}.gpkg"
+        assert run({"INPUT": tiles, "ITERATIONS": 1, "WORKERS": count, "RAILS": rails}, feedback).ok
+        found.append([(xyz.tolist(), items) for xyz, items in read_features(rails)])
+        said.append(feedback.infos)
+    assert len(found[0]) == 2
+    assert found[0] == found[1]
+    assert [text for text in said[1] if text.startswith("Up to 2 worker processes")] == [
+        text for text in said[1] if text not in said[0]
+    ]
