@@ -63,6 +63,10 @@ ENOUGH_GAIN, GAIN_SHARE, MOST_EXPECTED = 6.0, 0.3, 60.0
 FEW_POINTS = 8
 """Points on a section's bed up to which it shows nothing."""
 
+SHIFT_LENGTH_M, STRIP_SHIFT_M, MIXED_SECTIONS = 50.0, 0.1, 7
+"""Length of the sections in which strips are fitted alone, standard deviation of the shift between two strips, and the
+sections over which a curve mixes them."""
+
 EDGE_M = 0.01
 """A middle this close to the end of the search lies beyond it."""
 
@@ -279,9 +283,9 @@ LITTLE_SHARP = 1.0
 
 def _shows(found: Fit, points: np.ndarray) -> np.ndarray:
     """Return which sections show two rails, together with those next to them."""
-    together, expected = (np.convolve(one, np.ones(3), "same") for one in (found.gain, found.most))
+    together, expected = (np.convolve(one, np.ones(3), "same") for one in (found.both, found.most))
     enough = together > np.maximum(ENOUGH_GAIN, GAIN_SHARE * np.minimum(expected, MOST_EXPECTED))
-    return enough & (found.gain > 0) & (points > FEW_POINTS)
+    return enough & (found.both > 0) & (points > FEW_POINTS)
 
 
 def _curve(line: Axis, t: np.ndarray, sections: Sections) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -314,18 +318,35 @@ def _bent(
     return float(loss / free**2), (curve.values, sigma, beside)
 
 
-def strips_apart(refined: Refined, length_m: float = 50.0) -> float:
-    """Return half the distance across between strips, beyond what their own errors explain, metres."""
+def strip_error(refined: Refined) -> np.ndarray:
+    """Return the standard error across by the distance between the two main strips, (n,) metres.
+
+    Where both have as many points, the curve lies in their middle; where one is alone, it is off by half the distance.
+    """
     strips, counts = np.unique(refined.corridor.strip, return_counts=True)
     main: Sequence[int] = strips[np.argsort(-counts)][:2].tolist()
+    error = np.zeros(len(refined.t))
     if len(main) < 2:
-        return 0.0
+        return error
+    section = np.clip(((refined.corridor.t - refined.corridor.start_m) / STATION_M).astype(np.int64), 0, len(error) - 1)
     one, other = (
-        fit_sections(refined.corridor.kept(refined.corridor.strip == strip), refined.shape, REACHES_M[-1], length_m)
-        for strip in main
+        np.bincount(section[refined.corridor.strip == strip], minlength=len(error)).astype(float) for strip in main
     )
+    long = np.ones(min(MIXED_SECTIONS, len(error)))
+    mixed = np.convolve(one - other, long, "same") / np.maximum(np.convolve(one + other, long, "same"), 1.0)
+    _, normal = refined.axis.at(refined.t)
+    return np.abs(mixed * (normal @ _strip_shift(refined, main))) / 2
+
+
+def _strip_shift(refined: Refined, strips: Sequence[int]) -> np.ndarray:
+    """Return how far one strip is shifted in plan against another, (2,) metres, as far as it shows across the track."""
+    corridor, fits = refined.corridor, []
+    for strip in strips:
+        fits.append(fit_sections(corridor.kept(corridor.strip == strip), refined.shape, REACHES_M[-1], SHIFT_LENGTH_M))
+    one, other = fits
+    middles = corridor.start_m + (np.arange(len(one.offset)) + 0.5) * SHIFT_LENGTH_M
+    _, normal = refined.axis.at(np.minimum(middles, refined.axis.t[-1]))
     good = (one.found.gain > ENOUGH_GAIN) & (other.found.gain > ENOUGH_GAIN)
-    if good.sum() < 2:
-        return 0.0
-    apart = (one.offset - other.offset)[good] ** 2 - (one.sigma**2 + other.sigma**2)[good]
-    return float(np.sqrt(max(apart.mean(), 0.0))) / 2
+    weight = np.where(good, 1 / (one.sigma**2 + other.sigma**2), 0.0)
+    matrix = (normal * weight[:, None]).T @ normal + np.eye(2) / STRIP_SHIFT_M**2
+    return np.linalg.solve(matrix, normal.T @ (weight * (one.offset - other.offset)))
