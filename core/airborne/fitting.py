@@ -127,15 +127,15 @@ class Fitted:
     stations : Stations
     shape : Shape or None
         Ridges as they were measured; None where no track was found.
-    spacing_m : float
-        Distance of the rails that fits best.
+    shown_m : float
+        Distance of the rails that the points show where it is clearly not the expected one, else NaN.
     others : (k, 2) array
         Chainages and distances to the left of places that look like tracks and have no guide.
     """
 
     stations: Stations
     shape: Shape | None
-    spacing_m: float
+    shown_m: float
     others: np.ndarray
 
 
@@ -223,7 +223,7 @@ def _judged(axes: Sequence[Axis], lines: dict[int, _Line], footprint_m: float) -
             reason,
             distance < SWITCH_M,
         )
-        judged.append(Fitted(stations, refined.shape, refined.spacing_m, _unclaimed(number, lines, places)))
+        judged.append(Fitted(stations, refined.shape, refined.shown_m, _unclaimed(number, lines, places)))
     return judged
 
 

@@ -26,8 +26,12 @@ BIN_M, PROFILE_BIN_M = 0.025, 0.02
 """Width of the bins across in the fit of a section, and in the profile of a whole line."""
 
 WIDTHS_M = np.arange(0.04, 0.24, 0.01)
-SPACINGS_M = np.arange(-0.06, 0.061, 0.02)
-"""Widths of a ridge that are tried, and deviations of the rails' distance."""
+SPACINGS_M = np.arange(-0.12, 0.121, 0.02)
+"""Widths of a ridge that are tried, and deviations of the rails' distance, up to those between neighbouring gauges."""
+
+OTHER_GAIN, OTHER_SHARE, OTHER_M = 40.0, 0.1, 0.045
+"""Log-likelihood of another distance of the rails above that of the expected one, also as a share of its own, and the
+deviation, from which it is said: ballast piled at the rails shifts the ridges by up to 20 mm."""
 
 PROFILE_ROUGH_M, FREE = 0.004, 3.0
 """Roughness of a profile, and the spread of the ridge's height while it is measured."""
@@ -115,8 +119,8 @@ class Refined:
         Distance of the section's own middle from the curve, metres.
     shape : Shape
         Ridges as they were measured.
-    spacing_m : float
-        Distance of the rails that fits best; a check only.
+    shown_m : float
+        Distance of the rails that the points show where it is clearly not the expected one, else NaN.
     corridor : Corridor
     """
 
@@ -129,7 +133,7 @@ class Refined:
     sections: Sections
     beside: np.ndarray
     shape: Shape
-    spacing_m: float
+    shown_m: float
     corridor: Corridor
 
 
@@ -176,7 +180,7 @@ class _Round:
     beside: np.ndarray
     sections: Sections
     shape: Shape
-    spacing_m: float
+    shown_m: float
     corridor: Corridor
 
 
@@ -185,13 +189,13 @@ def _round(points: Points, line: Axis, shape: Shape, shows: np.ndarray | None, r
     corridor = gather(points, line, HALF_M + MARGIN_M)
     if corridor is None:
         return None
-    measured, spacing_m = measure(corridor, shape, shows)
+    measured, shown_m = measure(corridor, shape, shows)
     sections = fit_sections(corridor, measured, reach_m)
     if not sections.shows.any():
         return None
     t = corridor.start_m + (np.arange(len(sections.shows)) + 0.5) * STATION_M
     xy, sigma, beside = _curve(line, t, sections)
-    return _Round(t, xy, sigma, beside, sections, measured, spacing_m, corridor)
+    return _Round(t, xy, sigma, beside, sections, measured, shown_m, corridor)
 
 
 def _with_heights(last: _Round, axis: Axis) -> Refined:
@@ -210,7 +214,7 @@ def _with_heights(last: _Round, axis: Axis) -> Refined:
         sections,
         last.beside,
         last.shape,
-        last.spacing_m,
+        last.shown_m,
         last.corridor,
     )
 
@@ -231,7 +235,7 @@ def _axis_through(xy: np.ndarray, t: np.ndarray, guide: Axis) -> Axis:
 
 
 def measure(corridor: Corridor, shape: Shape, shows: np.ndarray | None) -> tuple[Shape, float]:
-    """Return the ridges that the profile of a whole line shows, and the distance of the rails that fits best."""
+    """Return the ridges that the profile of a whole line shows, and the distance of the rails if it is another one."""
     near = np.abs(corridor.across) < HALF_M
     if shows is not None and shows.any():
         section = ((corridor.t - corridor.start_m) / STATION_M).astype(np.int64)
@@ -245,12 +249,18 @@ def measure(corridor: Corridor, shape: Shape, shows: np.ndarray | None) -> tuple
     fits = [fit(count, mean, u, one) for one in tried]
     best = int(np.argmax([one.both[0] for one in fits]))
     height_m = float(np.clip(fits[best].height[0], LOWEST * shape.height_m, HIGHEST * shape.height_m))
-    spacings = [replace(tried[best], spacing_m=shape.spacing_m + float(more)) for more in SPACINGS_M]
-    spacing_m = spacings[int(np.argmax([fit(count, mean, u, one).both[0] for one in spacings]))].spacing_m
     residual = height - mean[0][np.clip(np.floor((across + HALF_M) / PROFILE_BIN_M).astype(np.int64), 0, bins - 1)]
     noise_m = 1.4826 * float(np.median(np.abs(residual - np.median(residual)))) if len(residual) else shape.noise_m
     found = Shape(shape.spacing_m, tried[best].width_m, height_m, max(noise_m, 0.01), SECTION_ROUGH_M, SECTION_SPREAD)
-    return found, spacing_m
+    return found, _other_spacing(count, mean, u, tried[best])
+
+
+def _other_spacing(count: np.ndarray, mean: np.ndarray, u: np.ndarray, shape: Shape) -> float:
+    """Return the distance of the rails that a profile shows where it is clearly not the expected one, else NaN."""
+    gains = [float(fit(count, mean, u, replace(shape, spacing_m=shape.spacing_m + more)).both[0]) for more in SPACINGS_M]
+    best, expected = int(np.argmax(gains)), gains[len(gains) // 2]
+    clearly = gains[best] - expected > max(OTHER_GAIN, OTHER_SHARE * gains[best])
+    return float(shape.spacing_m + SPACINGS_M[best]) if clearly and abs(SPACINGS_M[best]) > OTHER_M else np.nan
 
 
 def fit_sections(corridor: Corridor, shape: Shape, reach_m: float, length_m: float = STATION_M) -> Sections:
