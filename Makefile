@@ -28,7 +28,7 @@ demo: plugin  ## extract the sample's rails through qgis_process; lines and map 
 
 .PHONY: check
 check: lint  ## lint, types, import rules and the tests that need neither QGIS nor PyTorch; two minutes
-	@PYTHONPATH=$(AS_PACKAGE) $(CHECK) -m pytest -n auto tests/core tests/docs tests/tools
+	@PYTHONPATH=$(AS_PACKAGE) $(CHECK) -m pytest -n auto tests/core tests/docs tests/tools tests/qt6
 
 .PHONY: test
 test: check plugin  ## run every test: check, core with PyTorch, plugin and, through qgis_process, the whole

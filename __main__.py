@@ -70,9 +70,10 @@ def _is_installed(module: str) -> bool:
 
 
 def _run(module: ModuleType, args: argparse.Namespace) -> int:
-    errors = importlib.import_module(".core.errors", __package__)
+    errors, kernels = (importlib.import_module(f".core.{name}", __package__) for name in ("errors", "kernels"))
     try:
-        return module.run(args) or 0
+        with kernels.one_thread(*kernels.blas()):
+            return module.run(args) or 0
     except errors.RailExtractError as error:
         print(error, file=sys.stderr)
         return 1

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from qgis.core import Qgis, QgsField, QgsProcessingContext
+from qgis.core import Qgis, QgsField
 
 if Qgis.QGIS_VERSION_INT >= 33800:
     from qgis.PyQt.QtCore import QMetaType
@@ -20,6 +20,9 @@ else:
 
 OPENS_3D_VIEWS = Qgis.QGIS_VERSION_INT >= 33600
 """Whether a plugin can open a 3D map view."""
+
+GROUPS_LAYERS = Qgis.QGIS_VERSION_INT >= 33200
+"""Whether results can be loaded into a group, in an order."""
 
 DIGITS = 20
 """Width of a number with decimals. Without a width, a shapefile field would have one digit; without decimals either, 15
@@ -37,20 +40,6 @@ def field(name: str, kind, decimals: int = 0) -> QgsField:
     decimals : int
     """
     return QgsField(name, kind, "", DIGITS if decimals else 0, decimals)
-
-
-def group_layer(details: QgsProcessingContext.LayerDetails, group: str, place: int) -> None:
-    """Load a layer into a group, above the layers with a lower `place`; without a group before QGIS 3.32.
-
-    Parameters
-    ----------
-    details : QgsProcessingContext.LayerDetails
-    group : str
-    place : int
-    """
-    if Qgis.QGIS_VERSION_INT >= 33200:
-        details.groupName = group
-        details.layerSortKey = place
 
 
 def set_material(symbol: Any, material: Any) -> None:

@@ -20,5 +20,11 @@ class _Notices(QObject):
     findings_loaded = pyqtSignal(str)
     """Id of a layer of findings in the project."""
 
+    sample_wanted = pyqtSignal()
+    """From a link in a log."""
+
+    packages_installed = pyqtSignal()
+    """After a run after which no Python package is missing that it was to install."""
+
 
 notices = _Notices()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from qgis.core import QgsApplication, QgsProject
 from qgis.PyQt.QtCore import QObject, Qt, QUrl
 from qgis.PyQt.QtGui import QDesktopServices, QIcon
-from qgis.PyQt.QtWidgets import QAction, QToolBar
+from qgis.PyQt.QtWidgets import QAction, QDockWidget, QToolBar
 
 from . import compat
 from .dialog.guide import guide
@@ -27,6 +27,7 @@ from .sample_action import OpenSampleAction
 from .setup import package_setting
 from .setup.dependencies import is_installed
 from .view_3d_action import NAME, show_in_3d
+from .welcome import Welcome
 
 if TYPE_CHECKING:
     from .growing.tool import GrowRails
@@ -34,6 +35,9 @@ if TYPE_CHECKING:
 
 MENU = "Rail Extract"
 """Submenu of QGIS's menu of plugins."""
+
+TOOLBOX = "ProcessingToolbox"
+"""Name of the dock with the toolbox, of which that of the review is a tab."""
 
 
 class Windows(QObject):
@@ -52,12 +56,14 @@ class Windows(QObject):
         for action in self._actions:
             action.register()
         package_setting.register()
+        notices.sample_wanted.connect(self._open_sample)
         self._reports = ReportOpener()
         self._reports.register()
         links.register()
         self.dock: ReviewDock | None = None
         self.growing: GrowRails | None = None
         self._toolbar: QToolBar | None = None
+        self._welcome: Welcome | None = None
         self._entries: list[QAction] = []
         if iface is not None:
             self._add_to(iface)
@@ -80,12 +86,16 @@ class Windows(QObject):
         ]
         for entry in self._entries:
             iface.addPluginToMenu(MENU, entry)
+        self._welcome = Welcome(iface.messageBar(), self._open_sample)
 
     def _entry(self, text: str, do: Callable[[], None]) -> QAction:
         """Make an entry of the menu."""
         made = QAction(QIcon(str(ICON)), text, self._iface.mainWindow())
         made.triggered.connect(lambda: do())
         return made
+
+    def _open_sample(self) -> None:
+        self._actions[0].execute()
 
     def _open(self, name: str) -> None:
         """Open the dialog of an algorithm, or say which packages it lacks."""
@@ -102,7 +112,13 @@ class Windows(QObject):
 
         self.dock = ReviewDock(iface)
         iface.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, self.dock)
+        window = iface.mainWindow()
+        toolbox = window.findChild(QDockWidget, TOOLBOX)
+        if toolbox is not None:
+            window.tabifyDockWidget(toolbox, self.dock)
         self.dock.hide()
+        # QGIS shows at its start what was open at its end.
+        iface.initializationCompleted.connect(self._hide_if_empty)
         notices.findings_loaded.connect(self._show_findings)
         review = self.dock.toggleViewAction()
         review.setText(tr("Review Findings"))
@@ -126,10 +142,17 @@ class Windows(QObject):
             self.dock.show_layer(layer_id)
             self.dock.show()
             self.dock.raise_()
+            self.dock.widget().setFocus()
+
+    def _hide_if_empty(self) -> None:
+        """Close the dock if it has nothing to show."""
+        if self.dock is not None and not self.dock.layers.count():
+            self.dock.hide()
 
     def remove(self) -> None:
         """Take everything away."""
         if self.dock is not None:
+            self._iface.initializationCompleted.disconnect(self._hide_if_empty)
             notices.findings_loaded.disconnect(self._show_findings)
             self.dock.close_for_good()
             self._iface.removeDockWidget(self.dock)
@@ -140,12 +163,16 @@ class Windows(QObject):
             self._iface.mainWindow().removeToolBar(self._toolbar)
             self._toolbar.deleteLater()
             self._toolbar = None
+        if self._welcome is not None:
+            self._welcome.remove()
+            self._welcome = None
         for entry in self._entries:
             self._iface.removePluginMenu(MENU, entry)
         self._entries = []
         if self.growing is not None:
             self.growing.deleteLater()
             self.growing = None
+        notices.sample_wanted.disconnect(self._open_sample)
         self._reports.deregister()
         links.deregister()
         package_setting.deregister()

@@ -15,6 +15,7 @@ os.environ["QT_HASH_SEED"] = "0"  # makes the file reproducible
 
 from qgis.core import (  # noqa: E402
     QgsApplication,
+    QgsProcessingAlgorithm,
     QgsProcessingModelAlgorithm,
     QgsProcessingModelChildAlgorithm,
     QgsProcessingModelChildParameterSource,
@@ -46,6 +47,9 @@ RESULTS = {
     "quality": {"QUALITY": "OUTPUT", "FINDINGS": "FINDINGS", "REPORT": "REPORT"},
 }
 """Results of the model by step, and the output of the step that each is; rails know their tracks once paired."""
+
+FURTHER = {"PAIRED_RAILS": "Rails with the numbers of their tracks"}
+"""Words for the results that Extract Rails does not have."""
 
 WITHOUT_STEP = ("CLASSIFY", "METHOD", "WEIGHTS", "SEEDS")
 """Parameters of Extract Rails that no step of the model has: Classify Rail Points or Grow Rail Points from Seeds can be
@@ -93,7 +97,7 @@ def build() -> QgsProcessingModelAlgorithm:
             if source is not None:
                 child.addParameterSources(definition.name(), [source])
         if step in RESULTS:
-            child.setModelOutputs({result: _output(step, result, number) for result in RESULTS[step]})
+            child.setModelOutputs({result: _output(whole, step, result, number) for result in RESULTS[step]})
         model.addChildAlgorithm(child)
         before = step
     return model
@@ -115,9 +119,10 @@ def _source(step: str, definition, inputs: set[str], before: str | None):
     return QgsProcessingModelChildParameterSource.fromStaticValue(definition.defaultValue())
 
 
-def _output(step: str, result: str, number: int) -> QgsProcessingModelOutput:
-    """Define a result of a step as an output of the model."""
-    output = QgsProcessingModelOutput(result, result.replace("_", " ").capitalize())
+def _output(whole: QgsProcessingAlgorithm, step: str, result: str, number: int) -> QgsProcessingModelOutput:
+    """Define a result of a step as an output of the model, with the words of Extract Rails."""
+    known = whole.parameterDefinition(result)
+    output = QgsProcessingModelOutput(result, known.description() if known else FURTHER[result])
     output.setChildId(step)
     output.setChildOutputName(RESULTS[step][result])
     output.setPosition(QPointF((number + 0.5) * COLUMN, (6 + list(RESULTS[step]).index(result)) * ROW))

@@ -15,6 +15,7 @@ from typing import Any, Callable
 import numpy as np
 
 from ..errors import DeviceExhaustedError
+from ..kernels import Library, one_thread
 from ..progress import Progress
 from . import START, STATISTICS
 from .corridor import Piece
@@ -53,10 +54,13 @@ class LayeredEngine(ABC):
         Cells to be computed at once.
     block : int
         Side of the blocks of cells on which the layers work, which divides the sides and corners of all pieces.
+    library : Library
+        The library that computes, on one thread.
     """
 
     max_cells = 1 << 22
     block: int
+    library: Library
 
     def sweep(
         self,
@@ -68,7 +72,8 @@ class LayeredEngine(ABC):
     ) -> list[np.ndarray]:
         """Run one pass over pieces; see `Engine.sweep`."""
         try:
-            return self._sweep(seen, known, number, pieces, progress)
+            with one_thread(self.library):
+                return self._sweep(seen, known, number, pieces, progress)
         except Exception as error:
             if self._means_no_memory(error):
                 raise DeviceExhaustedError from error

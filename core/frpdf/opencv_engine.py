@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from ..kernels import opencv
 from .folding import FoldedLayer, block_side, fold
 from .layered import LayeredEngine, Step
 from .onnx import layer_to_onnx
@@ -14,6 +15,8 @@ from .onnx import layer_to_onnx
 
 class OpenCvEngine(LayeredEngine):
     """OpenCV on the CPU, in float32."""
+
+    library = opencv()
 
     def __init__(self, arrays: dict[str, np.ndarray]) -> None:
         folded = fold(arrays)

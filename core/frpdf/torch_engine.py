@@ -10,6 +10,7 @@ from torch import Tensor
 from torch.nn.functional import conv2d
 
 from ..errors import ModelError
+from ..kernels import pytorch
 from ..progress import Progress
 from .corridor import Piece
 from .folding import Convolution, FoldedLayer, block_side, fold
@@ -23,6 +24,8 @@ FIRST_FAST_HALF, FIRST_BFLOAT16 = (7, 0), (8, 0)
 
 class TorchEngine(LayeredEngine):
     """PyTorch on the CPU or on CUDA, in bfloat16 or float16 where the device supports it natively."""
+
+    library = pytorch()
 
     def __init__(self, arrays: dict[str, np.ndarray], device: str = "AUTO", exact: bool = False) -> None:
         """Move the weights to the device.

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import ModelError, ParameterError
 from ..frpdf.models import FOLDER
 from ..frpdf.weights import load_arrays, save_arrays
+from ..kernels import one_thread, pytorch
 from ..parameters import LEARNED
 from ..progress import SILENT, Progress
 from .blocks import MAX_POINTS, Block, Thinned, centred
@@ -131,7 +132,7 @@ class Classifier:
         import torch
 
         try:
-            with torch.inference_mode():
+            with torch.inference_mode(), one_thread(pytorch()):
                 return torch.sigmoid(self._network(*inputs(places, self.device))).cpu().numpy()
         except torch.cuda.OutOfMemoryError:
             if not self._may_retreat:

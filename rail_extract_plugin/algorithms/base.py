@@ -19,6 +19,7 @@ from qgis.PyQt.QtGui import QIcon
 from qgis.PyQt.QtWidgets import QWidget
 
 from ...core.disk import Destination
+from ...core.kernels import blas, one_thread
 from ...core.progress import Progress
 from ..dialog.checks import check_values, explain_invalid
 from ..dialog.guide import guide
@@ -33,6 +34,7 @@ from ..runs.missing import with_link
 from ..runs.running import running
 from ..setup.dependencies import explain_missing, missing_packages
 from ..writing.destinations import PAGE, appends, check_layer_name, check_page_name, destinations
+from ..writing.run import new_run
 from ..writing.styling import NO_PROPERTIES
 from .sentences import COMMAND_LINE, sentence_for
 from .toolbox_groups import RAILS, STEPS, Group
@@ -141,6 +143,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         try:
             self.destinations = self._destinations(parameters, context)
             self._job = self._read(parameters, context)
+            self.layer_properties = new_run()
         except BaseException as error:
             raise QgsProcessingException(sentence_for(error, self.parameterDefinitions())) from None
         return True
@@ -151,7 +154,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         """Compute in any thread; every error becomes one sentence."""
         progress = QgisProgress(feedback, self.parameterDefinitions())
         try:
-            with running(feedback):
+            with running(feedback), one_thread(*blas()):
                 results = self.compute(self._job, parameters, context, progress)
         except BaseException as error:
             reason = sentence_for(error, self.parameterDefinitions())

@@ -13,6 +13,7 @@ from ...core.progress import Progress
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
 from ..i18n import tr
+from ..notices import notices
 from ..setup import package_folders
 from ..setup.dependencies import OPTIONAL, PACKAGES, is_installed
 from .base import RailAlgorithm
@@ -79,6 +80,7 @@ class InstallPackages(RailAlgorithm):
             orders.append(Order(("torch",), ("torch",), BUILDS.get((job.torch, sys.platform), ())))
         folder = package_folders.own_folder()
         if not orders:
+            notices.packages_installed.emit()
             progress.info(tr("All packages are installed; there is nothing to do."))
             return {"FOLDER": str(folder), "INSTALLED": ""}
         interpreter = find_interpreter()
@@ -94,4 +96,5 @@ class InstallPackages(RailAlgorithm):
                 raise RailExtractError(tr("{} Already installed: {}.").format(reason, ", ".join(installed))) from error
             package_folders.use()
         progress.info(tr("Installed: {} in {}").format(", ".join(installed), folder))
+        notices.packages_installed.emit()
         return {"FOLDER": str(folder), "INSTALLED": ", ".join(installed)}

@@ -78,13 +78,14 @@ class GrowTask(QgsTask):
 
         from ...core.clouds.points import ask
         from ...core.grow.settings import GrowSettings
+        from ...core.kernels import blas, one_thread
         from ...core.labelling.growing import described, grow_all
 
         request = ask(self._cloud.paths, SEARCHED_CLASSES, self._cloud.crs_wkt)
         request = replace(request, leave_out=self._cloud.leave_out)
         settings = GrowSettings(self._standard.gauge_m, self._standard.head_width_m)
         seed = np.array([[self._seed.x(), self._seed.y()]])
-        with points_folder() as folder:
+        with points_folder() as folder, one_thread(*blas()):
             _, (growth,) = grow_all(request, [seed], settings, folder, TaskProgress(self))
         to_crs = request.zero.to_crs
         return Shown(

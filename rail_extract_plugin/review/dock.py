@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 
 from qgis.core import (
@@ -12,8 +13,18 @@ from qgis.core import (
     QgsVectorLayer,
 )
 from qgis.PyQt import sip
-from qgis.PyQt.QtCore import Qt
-from qgis.PyQt.QtWidgets import QComboBox, QDockWidget, QGridLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from qgis.PyQt.QtCore import Qt, QTimer
+from qgis.PyQt.QtGui import QKeySequence
+from qgis.PyQt.QtWidgets import (
+    QComboBox,
+    QDockWidget,
+    QGridLayout,
+    QLabel,
+    QPushButton,
+    QShortcut,
+    QVBoxLayout,
+    QWidget,
+)
 
 from ..dialog.wheel import ignore_wheel
 from ..i18n import tr
@@ -26,6 +37,9 @@ SURROUNDINGS = 1.6
 
 SMALLEST_MAP_M = 20.0
 """Side of the map for short findings, in units of the layer."""
+
+KEYS = {"previous": "P", "next": "N", ACCEPTED: "A", REJECTED: "R"}
+"""Keys of the buttons. They work while the dock has the focus; elsewhere, QGIS has other uses for these letters."""
 
 
 class ReviewDock(QDockWidget):
@@ -45,6 +59,9 @@ class ReviewDock(QDockWidget):
         self._at = 0
         self._sections: Sections | None = None
         self._task: ReadingTask | None = None
+        self._edited = QTimer(self)  # one reading for all changes of an edit
+        self._edited.setSingleShot(True)
+        self._edited.timeout.connect(self._read_again)
         self._build()
         project = QgsProject.instance()
         project.layersAdded.connect(self.refresh)
@@ -65,17 +82,24 @@ class ReviewDock(QDockWidget):
         self.buttons = {
             name: QPushButton(text)
             for name, text in (
-                ("previous", tr("&Previous")),
-                ("next", tr("&Next")),
-                (ACCEPTED, tr("&Accept")),
-                (REJECTED, tr("&Reject")),
+                ("previous", tr("Previous")),
+                ("next", tr("Next")),
+                (ACCEPTED, tr("Accept")),
+                (REJECTED, tr("Reject")),
             )
         }
+        self.buttons["previous"].setToolTip(tr("Show the finding before."))
+        self.buttons["next"].setToolTip(tr("Show the next finding."))
         self.buttons[ACCEPTED].setToolTip(tr("The lines are right here. Press again to take the decision back."))
         self.buttons[REJECTED].setToolTip(tr("The lines are wrong here. Press again to take the decision back."))
         for name in (ACCEPTED, REJECTED):
             self.buttons[name].setCheckable(True)
+        for name, key in KEYS.items():
+            button, context = self.buttons[name], Qt.ShortcutContext.WidgetWithChildrenShortcut
+            button.setToolTip(tr("{} Key: {}").format(button.toolTip(), key))
+            QShortcut(QKeySequence(key), self, button.click, context=context)
         content, column, grid = QWidget(), QVBoxLayout(), QGridLayout()
+        content.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         for widget in (self.layers, self.count, self.reason, self.text, self.view, self.note, self.problem):
             column.addWidget(widget, 1 if widget is self.view else 0)
         for number, button in enumerate(self.buttons.values()):
@@ -104,8 +128,10 @@ class ReviewDock(QDockWidget):
     def show_layer(self, layer_id: str | None) -> None:
         """Begin with a layer of findings, at the first finding without a decision."""
         self.cancel()
+        self._follow(False)
         layer = QgsProject.instance().mapLayer(layer_id) if layer_id else None
         self._layer = layer if isinstance(layer, QgsVectorLayer) else None
+        self._follow(True)
         self._found = reviews(self._layer) if self._layer else []
         self._sections = Sections(self._layer, self._found) if self._layer else None
         self.layers.setCurrentIndex(self.layers.findData(layer_id))
@@ -114,11 +140,41 @@ class ReviewDock(QDockWidget):
             QgsApplication.taskManager().addTask(self._task)
         undecided = (number for number, one in enumerate(self._found) if one.decision == OPEN)
         self._at = next(undecided, 0)
+        _say(self.problem, "")
+        self._show()
+
+    def _follow(self, begin: bool) -> None:
+        """Begin or stop to follow what happens to the layer elsewhere, such as Undo."""
+        layer = self._layer
+        if layer is None or sip.isdeleted(layer):
+            return
+        edits = (layer.attributeValueChanged, layer.geometryChanged, layer.featureAdded, layer.featureDeleted)
+        for signal in (*edits, layer.afterRollBack, layer.afterCommitChanges):
+            if begin:
+                signal.connect(self._note_edit)
+            else:
+                signal.disconnect(self._note_edit)
+
+    def _note_edit(self, *_) -> None:
+        self._edited.start(0)
+
+    def _read_again(self) -> None:
+        """Show what the layer has after an edit; where lines have come or gone, the review begins again."""
+        if self._layer is None or sip.isdeleted(self._layer):
+            return
+        found = reviews(self._layer)
+        if _places(found) != _places(self._found):
+            self.show_layer(self._layer.id())
+            return
+        shown = self._found[self._at].feature.id() if self._found else None
+        self._found = found
+        self._at = next((number for number, one in enumerate(found) if one.feature.id() == shown), 0)
         self._show()
 
     def go(self, number: int) -> None:
         """Show another finding, in the map as well."""
         self._at = min(max(number, 0), len(self._found) - 1)
+        _say(self.problem, "")
         self._show()
         self.zoom()
 
@@ -156,6 +212,7 @@ class ReviewDock(QDockWidget):
     def close_for_good(self) -> None:
         """Stop reading points and following the project, before the dock is deleted."""
         self.cancel()
+        self._follow(False)
         QgsProject.instance().layersAdded.disconnect(self.refresh)
         QgsProject.instance().layersRemoved.disconnect(self.refresh)
 
@@ -181,7 +238,6 @@ class ReviewDock(QDockWidget):
 
     def _show(self) -> None:
         """Show the current finding."""
-        _say(self.problem, "")
         any_found = bool(self._found)
         for name, button in self.buttons.items():
             button.setEnabled(any_found)
@@ -211,6 +267,11 @@ class ReviewDock(QDockWidget):
         """Say which rail has no points, and from where to where."""
         gaps = self._sections.gaps(shown) if self._sections is not None else []
         return [f"{gap.side} rail without points from {gap.start_m:,.1f} to {gap.end_m:,.1f} m." for gap in gaps]
+
+
+def _places(found: Sequence[Review]) -> dict[int, bytes]:
+    """Return the lines of findings by their ids."""
+    return {one.feature.id(): one.feature.geometry().asWkb().data() for one in found}
 
 
 def _section(shown: Review) -> list[str]:

@@ -19,13 +19,16 @@ POINT_PX, CROSS_PX, LINE_PX, GAP_PX = 1.6, 6.0, 18.0, 6.0
 """Radius of a point, half the height of a rail's mark, height of a line of text, and space between panels."""
 
 WHOLE = 0.35
-"""Share of the height for the whole section."""
+"""Largest share of the height, or half the width, for the whole section."""
+
+WHOLE_HEIGHT_M = 0.8
+"""Height that the whole section shows at least: both heads of a track with the largest cant, and what is near."""
 
 HEAD_M = 0.04
 """Height of the outline of a head without points: about that of the heads of all profiles."""
 
-HEADS = 3.0
-"""Width of an enlarged head in head widths, so that points next to it are seen, too."""
+HEADS, HEADS_HIGH = 3.0, 1.6
+"""Width and height of an enlarged head in head widths at least, so that points next to it are seen, too."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,8 @@ class Panel:
     box : QRectF
     right, up : float
         Middle, metres.
-    width_m : float
+    width_m, height_m : float
+        What is seen at least.
     title : str
     """
 
@@ -45,12 +49,13 @@ class Panel:
     right: float
     up: float
     width_m: float
+    height_m: float
     title: str
 
     @property
     def scale(self) -> float:
         """Pixels per metre, in both directions."""
-        return self.box.width() / self.width_m
+        return min(self.box.width() / self.width_m, max(self.box.height() - LINE_PX, 1.0) / self.height_m)
 
     def place(self, right: float, up: float) -> QPointF:
         """Return where a place of the section is drawn."""
@@ -94,17 +99,27 @@ class SectionView(QWidget):
 
     def _panels(self, picture: Picture) -> Iterator[Panel]:
         """Yield the whole section, and the nearest rail on either side."""
-        width, height = float(self.width()), WHOLE * self.height()
-        yield Panel(QRectF(0, 0, width, height), 0.0, 0.0, 2 * REACH_M, tr("left") + " – " + tr("right"))
-        top, half = height + GAP_PX, 0.5 * (width - GAP_PX)
-        for start, title, mine in (
-            (0.0, tr("left rail"), picture.rails[picture.rails[:, 0] < 0]),
-            (half + GAP_PX, tr("right rail"), picture.rails[picture.rails[:, 0] >= 0]),
-        ):
+        whole, *heads = _boxes(float(self.width()), float(self.height()))
+        yield Panel(whole, 0.0, 0.0, 2 * REACH_M, WHOLE_HEIGHT_M, tr("left") + " – " + tr("right"))
+        sides = picture.rails[:, 0] < 0, picture.rails[:, 0] >= 0
+        least = HEADS * picture.head_width_m, HEADS_HIGH * picture.head_width_m
+        for box, title, side in zip(heads, (tr("left rail"), tr("right rail")), sides):
+            mine = picture.rails[side]
             if len(mine):
                 right, up = mine[np.argmin(np.abs(mine[:, 0]))]
-                box = QRectF(start, top, half, self.height() - top)
-                yield Panel(box, float(right), float(up), HEADS * picture.head_width_m, title)
+                yield Panel(box, float(right), float(up), *least, title)
+
+
+def _boxes(width: float, height: float) -> tuple[QRectF, QRectF, QRectF]:
+    """Return the boxes of the whole section and of both heads: beside each other where this shows heads larger."""
+    high = min(WHOLE * height, width * WHOLE_HEIGHT_M / (2 * REACH_M) + LINE_PX)
+    below, half = height - high - GAP_PX, 0.5 * (width - GAP_PX)
+    if min(half / HEADS, below / HEADS_HIGH) >= min(0.5 * half / HEADS, height / HEADS_HIGH):
+        whole, top = QRectF(0, 0, width, high), high + GAP_PX
+        return whole, QRectF(0, top, half, below), QRectF(half + GAP_PX, top, half, below)
+    quarter = 0.5 * (half - GAP_PX)
+    first, second = QRectF(half + GAP_PX, 0, quarter, height), QRectF(width - quarter, 0, quarter, height)
+    return QRectF(0, 0, half, height), first, second
 
 
 def _draw(painter: QPainter, panel: Panel, picture: Picture) -> None:
@@ -130,5 +145,6 @@ def _draw(painter: QPainter, panel: Panel, picture: Picture) -> None:
 
 
 def _width(panel: Panel) -> str:
-    """Write the width of a panel."""
-    return f"{panel.width_m:g} m" if panel.width_m >= 1 else f"{1000 * panel.width_m:.0f} mm"
+    """Write the width that a panel shows."""
+    width_m = panel.box.width() / panel.scale
+    return f"{width_m:.1f} m" if width_m >= 1 else f"{1000 * width_m:.0f} mm"

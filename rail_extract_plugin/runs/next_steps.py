@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import Qgis, QgsProcessingContext, QgsProcessingUtils, QgsVectorLayer
+from qgis.core import Qgis, QgsProcessingContext, QgsProcessingUtils, QgsProject, QgsVectorLayer
 from qgis.PyQt.QtCore import QUrl
 from qgis.PyQt.QtGui import QDesktopServices
 from qgis.PyQt.QtWidgets import QFileDialog
@@ -17,12 +17,10 @@ from ...core.standards import STANDARDS
 from ..i18n import tr
 from ..notices import notices
 from ..writing.bundle import save_all
+from .missing import INSTALL
 
 if TYPE_CHECKING:
     from .run_dialog import RunDialog
-
-TOP_TO_BOTTOM = ("FINDINGS", "CENTERLINES", "RAILS", "QUALITY", "OUTPUT", "STOPS")
-"""Order of the layers in a GeoPackage's project, by output."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,10 @@ def after_success(
     dialog: RunDialog, results: dict[str, Any], context: QgsProcessingContext, standard: str
 ) -> Iterator[Step]:
     """Yield what to do with the results of a run; see `after_failure`."""
-    layers = _layers(results, context)
+    algorithm = dialog.algorithm()
+    if algorithm.name() == INSTALL and algorithm.provider().algorithm("extractrails").canExecute()[0]:
+        yield Step(tr("Open the sample…"), notices.sample_wanted.emit)
+    layers = _layers([one.name() for one in algorithm.destinationParameterDefinitions()], results, context)
     if "FINDINGS" in layers and layers["FINDINGS"].featureCount():
         findings = layers["FINDINGS"].id()
         yield Step(tr("Review the findings"), lambda: notices.findings_loaded.emit(findings))
@@ -74,11 +75,12 @@ def _again(dialog: RunDialog, **changes: Any) -> Callable[[], None]:
     return lambda: dialog.run_again(changes)
 
 
-def _layers(results: dict[str, Any], context: QgsProcessingContext) -> dict[str, QgsVectorLayer]:
-    """Return the layers of a run that QGIS has loaded, the topmost first, by output."""
-    named = [name for name in TOP_TO_BOTTOM if isinstance(results.get(name), str)]
-    found = {name: QgsProcessingUtils.mapLayerFromString(results[name], context, False) for name in named}
-    return {name: layer for name, layer in found.items() if isinstance(layer, QgsVectorLayer)}
+def _layers(names: Sequence[str], results: dict[str, Any], context: QgsProcessingContext) -> dict[str, QgsVectorLayer]:
+    """Return the layers of lines and points of these outputs that QGIS has loaded, the topmost first, by output."""
+    written = {name: results[name] for name in names if isinstance(results.get(name), str)}
+    found = {QgsProcessingUtils.mapLayerFromString(value, context, False): name for name, value in written.items()}
+    order = QgsProject.instance().layerTreeRoot().layerOrder()
+    return {found[layer]: layer for layer in order if layer in found and isinstance(layer, QgsVectorLayer)}
 
 
 def _save(dialog: RunDialog, layers: dict[str, QgsVectorLayer]) -> None:

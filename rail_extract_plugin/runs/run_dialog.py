@@ -19,7 +19,16 @@ from qgis.core import (
     QgsProcessingParameterDefinition,
 )
 from qgis.PyQt import sip
-from qgis.PyQt.QtWidgets import QDialogButtonBox, QGroupBox, QLabel, QPushButton, QTextEdit, QVBoxLayout, QWidget
+from qgis.PyQt.QtWidgets import (
+    QDialogButtonBox,
+    QGroupBox,
+    QLabel,
+    QPushButton,
+    QTextBrowser,
+    QTextEdit,
+    QVBoxLayout,
+    QWidget,
+)
 
 from ..dialog.help_panel import ADVANCED
 from ..dialog.sections import OTHERS, RESULTS, SECTIONS, section_of
@@ -28,6 +37,7 @@ from ..dialog.wording import with_labels
 from ..i18n import tr
 from ..links import LinkFollower, links
 from ..notices import notices
+from .help_pictures import PictureFitter
 from .next_steps import Step, after_failure, after_success
 
 
@@ -44,6 +54,7 @@ class RunDialog(AlgorithmDialog):
         super().__init__(algorithm, parent=parent)
         ignore_wheel(self.mainWidget())
         self._follower = LinkFollower(self.findChild(QTextEdit, "txtLog"))
+        self._fitter = PictureFitter(self.findChild(QTextBrowser, "textShortHelp"))
         self._failure: type | None = None
         self._standard = ""
         notices.run_failed.connect(self._note_failure)

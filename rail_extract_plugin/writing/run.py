@@ -49,6 +49,11 @@ class RunCloud:
         return f"{first} and {len(self.paths) - 1} more" if len(self.paths) > 1 else first
 
 
+def new_run() -> dict[str, str]:
+    """Return the property that the layers of a new run share."""
+    return {RUN: str(uuid4())}
+
+
 def properties_of(
     cloud: CloudSource, class_codes: Sequence[int], head_width_m: float, frame: LocalFrame
 ) -> dict[str, str]:
@@ -56,7 +61,7 @@ def properties_of(
     paths = [str(path.resolve()) for path in cloud.paths]
     facts = {"paths": paths, "classes": list(class_codes), "crs": cloud.crs_wkt, "head_width_m": head_width_m}
     facts["units_m"] = [frame.horizontal_unit_m, frame.horizontal_unit_m, frame.vertical_unit_m]
-    return {RUN: str(uuid4()), CLOUD: json.dumps(facts)}
+    return {**new_run(), CLOUD: json.dumps(facts)}
 
 
 def cloud_of(layer: QgsMapLayer) -> RunCloud | None:

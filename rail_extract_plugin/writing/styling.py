@@ -6,30 +6,35 @@ from collections.abc import Mapping
 
 from qgis.core import (
     QgsCoordinateReferenceSystem,
+    QgsLayerTree,
     QgsMapLayer,
     QgsProcessingContext,
     QgsProcessingFeedback,
     QgsProcessingLayerPostProcessorInterface,
+    QgsProject,
 )
 from qgis.PyQt import sip
 
-from ..compat import group_layer
+from .. import compat
 from ..i18n import tr
 from ..notices import notices
 from ..paths import STYLES
-from .run import run_name
+from .run import RUN, run_name
 from .view_3d import show_lines_in_3d
 
 FINDINGS = "findings"
 """Style of the findings, which the user is asked to review."""
 
+STYLE = "rail_extract/style"
+"""Name of the property that states the style of a layer."""
+
 NO_PROPERTIES: Mapping[str, str] = {}
 
-BOTTOM_TO_TOP = (
-    *("raster", "findings", "rails", "centerlines", "airborne", "axes", "elements"),
-    *("deviations", "quality", "stations", "differences", "stops"),
+TOP_TO_BOTTOM = (
+    *("stops", "findings", "differences", "deviations", "elements", "axes", "centerlines", "airborne", "rails"),
+    *("stations", "quality", "raster"),
 )
-"""Order of the layers in the group, by style."""
+"""Order of the layers of a run, by style: what is to be looked at first, then the lines, and what they rest on."""
 
 
 class _Styler(QgsProcessingLayerPostProcessorInterface):
@@ -44,14 +49,38 @@ class _Styler(QgsProcessingLayerPostProcessorInterface):
             # QGIS marks such a layer and asks for its system; it can't place the one that stands for an unknown one.
             layer.setCrs(QgsCoordinateReferenceSystem())
         layer.loadNamedStyle(str(STYLES / f"{self._style}.qml"))
+        layer.setCustomProperty(STYLE, self._style)
         show_lines_in_3d(layer, self._style)
         for name, value in self._properties.items():
             layer.setCustomProperty(name, value)
         if layer.name() == self._title:
             layer.setName(run_name(layer, self._title))
+        if not compat.GROUPS_LAYERS:
+            _put_in_order(layer)
         layer.triggerRepaint()
         if self._style == FINDINGS:
             notices.findings_loaded.emit(layer.id())
+
+
+def _put_in_order(layer: QgsMapLayer) -> None:
+    """Sort the layers of a run that are next to the one that has just been loaded."""
+    node = QgsProject.instance().layerTreeRoot().findLayer(layer.id())
+    if node is None:
+        return
+    group = node.parent()
+    loaded = [one for one in group.children() if QgsLayerTree.isLayer(one) and one.layer() is not None]
+    mine = [one for one in loaded if one.layer().customProperty(RUN) == layer.customProperty(RUN)]
+    styles = [one.layer().customProperty(STYLE) for one in mine]
+    if not all(style in TOP_TO_BOTTOM for style in styles):
+        return
+    places = list(map(TOP_TO_BOTTOM.index, styles))
+    if places == sorted(places):
+        return
+    top = group.children().index(mine[0])
+    for number in sorted(range(len(mine)), key=places.__getitem__, reverse=True):
+        group.insertChildNode(top, mine[number].clone())
+    for one in mine:
+        group.removeChildNode(one)
 
 
 _kept: list[_Styler] = []
@@ -75,7 +104,7 @@ def style_on_load(
 ) -> None:
     """Apply a style if QGIS loads the layer after the run.
 
-    All layers of a run go into one group, points above lines above rasters, if QGIS supports groups for results.
+    All layers of a run go into one group if QGIS supports groups for results, in the order of `TOP_TO_BOTTOM`.
 
     Parameters
     ----------
@@ -93,4 +122,6 @@ def style_on_load(
     if context.willLoadLayerOnCompletion(layer_id):
         details = context.layerToLoadOnCompletionDetails(layer_id)
         details.setPostProcessor(_styler(style, title, properties, has_system))
-        group_layer(details, tr("Rail Extract"), BOTTOM_TO_TOP.index(style))
+        if compat.GROUPS_LAYERS:
+            details.groupName = tr("Rail Extract")
+            details.layerSortKey = -TOP_TO_BOTTOM.index(style)

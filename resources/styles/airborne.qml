@@ -1,5 +1,5 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
-<qgis styleCategories="Symbology|Labeling|Symbology3D|Elevation|Fields|MapTips" version="3.22.0" labelsEnabled="1">
+<qgis styleCategories="Symbology|Labeling|Symbology3D|Elevation|Fields|MapTips|AttributeTable" version="3.22.0" labelsEnabled="1">
   <renderer-v2 type="singleSymbol">
     <symbols>
       <symbol name="0" type="line" alpha="1">
@@ -63,6 +63,19 @@
     <alias field="name" index="7" name="Name"/>
     <alias field="ref" index="8" name="Reference"/>
   </aliases>
+  <attributetableconfig>
+    <columns>
+      <column type="field" name="track_id" width="60" hidden="0"/>
+      <column type="field" name="guide_id" width="70" hidden="0"/>
+      <column type="field" name="length_m" width="100" hidden="0"/>
+      <column type="field" name="seen_m" width="90" hidden="0"/>
+      <column type="field" name="sigma_mm" width="160" hidden="0"/>
+      <column type="field" name="sigmaz_mm" width="260" hidden="0"/>
+      <column type="field" name="gauge_mm" width="180" hidden="0"/>
+      <column type="field" name="name" width="160" hidden="0"/>
+      <column type="field" name="ref" width="90" hidden="0"/>
+    </columns>
+  </attributetableconfig>
   <mapTip>&lt;b&gt;[% &quot;ref&quot; %] [% &quot;name&quot; %]&lt;/b&gt;&lt;br&gt;Length: [% format_number(&quot;length_m&quot;, 1) %] m&lt;br&gt;Seen: [% format_number(&quot;seen_m&quot;, 0) %] m&lt;br&gt;Standard error: [% format_number(&quot;sigma_mm&quot;, 0) %] mm</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>
   <layerGeometryType>1</layerGeometryType>

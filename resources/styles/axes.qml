@@ -1,5 +1,5 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
-<qgis styleCategories="Symbology|Labeling|Elevation|Fields|MapTips" version="3.22.0" labelsEnabled="1">
+<qgis styleCategories="Symbology|Labeling|Elevation|Fields|MapTips|AttributeTable" version="3.22.0" labelsEnabled="1">
   <renderer-v2 type="singleSymbol">
     <symbols>
       <symbol name="0" type="line" alpha="1">
@@ -32,6 +32,15 @@
     <alias field="km_from" index="3" name="Kilometre of the start"/>
     <alias field="km_to" index="4" name="Kilometre of the end"/>
   </aliases>
+  <attributetableconfig>
+    <columns>
+      <column type="field" name="track_id" width="70" hidden="0"/>
+      <column type="field" name="name" width="160" hidden="0"/>
+      <column type="field" name="length_m" width="100" hidden="0"/>
+      <column type="field" name="km_from" width="180" hidden="0"/>
+      <column type="field" name="km_to" width="170" hidden="0"/>
+    </columns>
+  </attributetableconfig>
   <mapTip>&lt;b&gt;[% &quot;name&quot; %]&lt;/b&gt;&lt;br&gt;Track [% &quot;track_id&quot; %]&lt;br&gt;Length: [% format_number(&quot;length_m&quot;, 1) || &#x27; m&#x27; %]&lt;br&gt;Kilometre: [% coalesce(format_number(&quot;km_from&quot;, 3) || &#x27; to &#x27; || format_number(&quot;km_to&quot;, 3), &#x27;unknown&#x27;) %]</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>
   <layerGeometryType>1</layerGeometryType>

@@ -1,5 +1,5 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
-<qgis styleCategories="Symbology|Labeling|Symbology3D|Elevation|Fields|MapTips" version="3.22.0" labelsEnabled="1">
+<qgis styleCategories="Symbology|Labeling|Symbology3D|Elevation|Fields|MapTips|AttributeTable" version="3.22.0" labelsEnabled="1">
   <renderer-v2 type="singleSymbol">
     <symbols>
       <symbol name="0" type="line" alpha="1">
@@ -64,6 +64,20 @@
     <alias field="cantmax_mm" index="8" name="Cant, largest [mm]"/>
     <alias field="bridged_m" index="9" name="Without points [m]"/>
   </aliases>
+  <attributetableconfig>
+    <columns>
+      <column type="field" name="track_id" width="70" hidden="0"/>
+      <column type="field" name="class_code" width="70" hidden="0"/>
+      <column type="field" name="left_ids" width="100" hidden="0"/>
+      <column type="field" name="right_ids" width="110" hidden="0"/>
+      <column type="field" name="length_m" width="100" hidden="0"/>
+      <column type="field" name="gauge_mm" width="140" hidden="0"/>
+      <column type="field" name="gaugesd_mm" width="240" hidden="0"/>
+      <column type="field" name="cant_mm" width="140" hidden="0"/>
+      <column type="field" name="cantmax_mm" width="160" hidden="0"/>
+      <column type="field" name="bridged_m" width="160" hidden="0"/>
+    </columns>
+  </attributetableconfig>
   <mapTip>&lt;b&gt;Track [% &quot;track_id&quot; %]&lt;/b&gt;&lt;br&gt;Gauge: [% coalesce(format_number(&quot;gauge_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Cant: [% coalesce(format_number(&quot;cant_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Length: [% coalesce(format_number(&quot;length_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Without points: [% coalesce(format_number(&quot;bridged_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>
   <layerGeometryType>1</layerGeometryType>

@@ -1,5 +1,5 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
-<qgis styleCategories="Symbology|Elevation|Fields|MapTips" version="3.22.0">
+<qgis styleCategories="Symbology|Elevation|Fields|MapTips|AttributeTable" version="3.22.0">
   <renderer-v2 type="graduatedSymbol" attr="slew_mm" graduatedMethod="GraduatedColor">
     <ranges>
       <range lower="-100000" upper="-10" symbol="0" label="more than 10 mm to the right of the design" render="true"/>
@@ -84,6 +84,15 @@
     <alias field="lift_mm" index="3" name="Lift [mm]"/>
     <alias field="cant_diff_mm" index="4" name="Cant, measured minus design [mm]"/>
   </aliases>
+  <attributetableconfig>
+    <columns>
+      <column type="field" name="track_id" width="70" hidden="0"/>
+      <column type="field" name="s" width="230" hidden="0"/>
+      <column type="field" name="slew_mm" width="90" hidden="0"/>
+      <column type="field" name="lift_mm" width="90" hidden="0"/>
+      <column type="field" name="cant_diff_mm" width="250" hidden="0"/>
+    </columns>
+  </attributetableconfig>
   <mapTip>&lt;b&gt;Track [% &quot;track_id&quot; %], [% format_number(&quot;s&quot;, 0) %] m&lt;/b&gt;&lt;br&gt;Slew: [% format_number(&quot;slew_mm&quot;, 1) || &#x27; mm&#x27; %]&lt;br&gt;Lift: [% coalesce(format_number(&quot;lift_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Cant, measured minus design: [% coalesce(format_number(&quot;cant_diff_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Centroid" type="IndividualFeatures" respectLayerSymbol="1"/>
   <layerGeometryType>0</layerGeometryType>

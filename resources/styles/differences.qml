@@ -1,5 +1,5 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
-<qgis styleCategories="Symbology|Elevation|Fields|MapTips" version="3.22.0">
+<qgis styleCategories="Symbology|Elevation|Fields|MapTips|AttributeTable" version="3.22.0">
   <renderer-v2 type="categorizedSymbol" attr="CASE WHEN &quot;state&quot; &lt;&gt; 'both' THEN &quot;state&quot; WHEN &quot;moved&quot; = 1 THEN 'moved' ELSE 'still' END">
     <categories>
       <category value="moved" symbol="0" label="moved by more than three standard errors" render="true"/>
@@ -81,6 +81,23 @@
     <alias field="shiftz_mm" index="11" name="Constant shift in height [mm]"/>
     <alias field="moved" index="12" name="Moved"/>
   </aliases>
+  <attributetableconfig>
+    <columns>
+      <column type="field" name="line_id" width="60" hidden="0"/>
+      <column type="field" name="input_id" width="200" hidden="0"/>
+      <column type="field" name="chainage_m" width="110" hidden="0"/>
+      <column type="field" name="state" width="70" hidden="0"/>
+      <column type="field" name="across_mm" width="110" hidden="0"/>
+      <column type="field" name="height_mm" width="110" hidden="0"/>
+      <column type="field" name="gauge_mm" width="180" hidden="0"/>
+      <column type="field" name="cant_mm" width="180" hidden="0"/>
+      <column type="field" name="sigma_mm" width="210" hidden="0"/>
+      <column type="field" name="sigmaz_mm" width="260" hidden="0"/>
+      <column type="field" name="shift_mm" width="210" hidden="0"/>
+      <column type="field" name="shiftz_mm" width="230" hidden="0"/>
+      <column type="field" name="moved" width="70" hidden="0"/>
+    </columns>
+  </attributetableconfig>
   <mapTip>&lt;b&gt;Line [% &quot;line_id&quot; %], [% &quot;chainage_m&quot; %] m: [% &quot;state&quot; %]&lt;/b&gt;&lt;br&gt;across [% coalesce(&quot;across_mm&quot;, '?') %] mm, height [% coalesce(&quot;height_mm&quot;, '?') %] mm&lt;br&gt;standard errors [% coalesce(&quot;sigma_mm&quot;, '?') %] and [% coalesce(&quot;sigmaz_mm&quot;, '?') %] mm</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>
   <layerGeometryType>0</layerGeometryType>

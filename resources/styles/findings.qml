@@ -1,5 +1,5 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
-<qgis styleCategories="Symbology|Labeling|Symbology3D|Elevation|Fields|MapTips|Forms" version="3.22.0" labelsEnabled="1">
+<qgis styleCategories="Symbology|Labeling|Symbology3D|Elevation|Fields|MapTips|Forms|AttributeTable" version="3.22.0" labelsEnabled="1">
   <renderer-v2 type="categorizedSymbol" attr="coalesce(&quot;review&quot;, '')">
     <categories>
       <category type="string" value="" symbol="0" label="open" render="true"/>
@@ -91,6 +91,24 @@
     <alias field="points" index="12" name="Points"/>
     <alias field="review" index="13" name="Review"/>
   </aliases>
+  <attributetableconfig>
+    <columns>
+      <column type="field" name="finding" width="80" hidden="0"/>
+      <column type="field" name="reason" width="260" hidden="0"/>
+      <column type="field" name="track_id" width="70" hidden="0"/>
+      <column type="field" name="rail_id" width="90" hidden="0"/>
+      <column type="field" name="from_m" width="90" hidden="0"/>
+      <column type="field" name="to_m" width="70" hidden="0"/>
+      <column type="field" name="doubt_m" width="110" hidden="0"/>
+      <column type="field" name="worst_m" width="140" hidden="0"/>
+      <column type="field" name="gauge_mm" width="140" hidden="0"/>
+      <column type="field" name="cant_mm" width="140" hidden="0"/>
+      <column type="field" name="sigma_mm" width="210" hidden="0"/>
+      <column type="field" name="sigmaz_mm" width="300" hidden="0"/>
+      <column type="field" name="points" width="70" hidden="0"/>
+      <column type="field" name="review" width="70" hidden="0"/>
+    </columns>
+  </attributetableconfig>
   <mapTip>&lt;b&gt;[% &quot;finding&quot; %]: [% &quot;reason&quot; %]&lt;/b&gt;&lt;br&gt;[% if(&quot;rail_id&quot; IS NULL, &#x27;Track &#x27; || &quot;track_id&quot;, &#x27;Rail &#x27; || &quot;rail_id&quot;) %], [% coalesce(format_number(&quot;from_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %] to [% coalesce(format_number(&quot;to_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Review: [% if(coalesce(&quot;review&quot;, &#x27;&#x27;) = &#x27;&#x27;, &#x27;open&#x27;, &quot;review&quot;) %]</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>
   <layerGeometryType>1</layerGeometryType>

@@ -1,5 +1,5 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
-<qgis styleCategories="Symbology|Symbology3D|Elevation|Fields|MapTips" version="3.22.0">
+<qgis styleCategories="Symbology|Symbology3D|Elevation|Fields|MapTips|AttributeTable" version="3.22.0">
   <renderer-v2 type="graduatedSymbol" attr="CASE WHEN coalesce(&quot;track_ids&quot;, '') = '' AND coalesce(maximum(length(&quot;track_ids&quot;)), 0) &gt; 0 THEN -1 ELSE coalesce(&quot;sigma_mm&quot;, 999999) END" graduatedMethod="GraduatedColor">
     <ranges>
       <range lower="0" upper="2" symbol="0" label="standard error up to 2 mm" render="true"/>
@@ -90,6 +90,20 @@
     <alias field="gaps" index="8" name="Sections without points"/>
     <alias field="sigmaz_mm" index="9" name="Standard error of the height [mm]"/>
   </aliases>
+  <attributetableconfig>
+    <columns>
+      <column type="field" name="rail_id" width="60" hidden="0"/>
+      <column type="field" name="class_code" width="70" hidden="0"/>
+      <column type="field" name="length_m" width="100" hidden="0"/>
+      <column type="field" name="points" width="70" hidden="0"/>
+      <column type="field" name="resid_mm" width="210" hidden="0"/>
+      <column type="field" name="sigma_mm" width="160" hidden="0"/>
+      <column type="field" name="bridged_m" width="160" hidden="0"/>
+      <column type="field" name="track_ids" width="70" hidden="0"/>
+      <column type="field" name="gaps" width="200" hidden="0"/>
+      <column type="field" name="sigmaz_mm" width="260" hidden="0"/>
+    </columns>
+  </attributetableconfig>
   <mapTip>&lt;b&gt;Rail [% &quot;rail_id&quot; %]&lt;/b&gt;&lt;br&gt;Standard error: [% coalesce(format_number(&quot;sigma_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Length: [% coalesce(format_number(&quot;length_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Without points: [% coalesce(format_number(&quot;bridged_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;[% if(coalesce(&quot;track_ids&quot;, &#x27;&#x27;) = &#x27;&#x27;, &#x27;In no track&#x27;, &#x27;Track &#x27; || &quot;track_ids&quot;) %]</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>
   <layerGeometryType>1</layerGeometryType>

@@ -1,5 +1,5 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
-<qgis styleCategories="Symbology|Labeling|Elevation|Fields|MapTips" version="3.22.0" labelsEnabled="0">
+<qgis styleCategories="Symbology|Labeling|Elevation|Fields|MapTips|AttributeTable" version="3.22.0" labelsEnabled="0">
   <renderer-v2 type="categorizedSymbol" attr="seen">
     <categories>
       <category value="1" symbol="0" label="seen" render="true"/>
@@ -48,6 +48,22 @@
     <alias field="margin" index="10" name="Margin"/>
     <alias field="reason" index="11" name="Reason"/>
   </aliases>
+  <attributetableconfig>
+    <columns>
+      <column type="field" name="track_id" width="60" hidden="0"/>
+      <column type="field" name="guide_id" width="70" hidden="0"/>
+      <column type="field" name="s_m" width="160" hidden="0"/>
+      <column type="field" name="seen" width="60" hidden="0"/>
+      <column type="field" name="sigma_mm" width="160" hidden="0"/>
+      <column type="field" name="sigmaz_mm" width="260" hidden="0"/>
+      <column type="field" name="bed_m" width="150" hidden="0"/>
+      <column type="field" name="cant_mm" width="90" hidden="0"/>
+      <column type="field" name="radius_m" width="100" hidden="0"/>
+      <column type="field" name="grade_pm" width="110" hidden="0"/>
+      <column type="field" name="margin" width="70" hidden="0"/>
+      <column type="field" name="reason" width="260" hidden="0"/>
+    </columns>
+  </attributetableconfig>
   <mapTip>&lt;b&gt;[% format_number(&quot;s_m&quot;, 0) %] m along guide [% &quot;guide_id&quot; %]&lt;/b&gt;&lt;br&gt;Standard error: [% coalesce(format_number(&quot;sigma_mm&quot;, 0) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Cant: [% coalesce(format_number(&quot;cant_mm&quot;, 0) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;[% &quot;reason&quot; %]</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>
   <layerGeometryType>0</layerGeometryType>

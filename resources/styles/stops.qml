@@ -1,5 +1,5 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
-<qgis styleCategories="Symbology|Labeling|Elevation|Fields|MapTips" version="3.22.0" labelsEnabled="1">
+<qgis styleCategories="Symbology|Labeling|Elevation|Fields|MapTips|AttributeTable" version="3.22.0" labelsEnabled="1">
   <renderer-v2 type="singleSymbol">
     <symbols>
       <symbol name="0" type="marker" alpha="1">
@@ -29,6 +29,12 @@
     <alias field="stop" index="0" name="Stop"/>
     <alias field="reason" index="1" name="Reason"/>
   </aliases>
+  <attributetableconfig>
+    <columns>
+      <column type="field" name="stop" width="60" hidden="0"/>
+      <column type="field" name="reason" width="260" hidden="0"/>
+    </columns>
+  </attributetableconfig>
   <mapTip>&lt;b&gt;Stop [% &quot;stop&quot; %]&lt;/b&gt;&lt;br&gt;[% &quot;reason&quot; %]</mapTip>
   <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>
   <layerGeometryType>0</layerGeometryType>

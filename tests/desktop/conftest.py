@@ -14,6 +14,9 @@ from typing import Any
 import laspy
 import numpy as np
 import pytest
+from rail_extract.laboratory.airborne.designs import curved_line, drawn_together
+from rail_extract.laboratory.airborne.flight import Flight, fly
+from rail_extract.laboratory.airborne.write import CRS, ORIGIN, write_airborne
 from rail_extract.laboratory.scenes.raw_strips import strip
 
 HERE = Path(__file__).resolve().parent
@@ -23,6 +26,9 @@ SCREEN = "-screen 0 1600x1000x24"
 
 LIMIT_S = 600
 """After which QGIS is ended; a scenario takes a tenth of this."""
+
+GOES_ON = {"reopened": "review"}
+"""Scenarios that begin with the profile that another one left."""
 
 BEGIN = """
 import sys
@@ -72,8 +78,23 @@ def raw_cloud(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def run_scenario(tmp_path_factory, raw_cloud):
-    """Run a scenario, once: tests share what it found."""
+def airborne_cloud(tmp_path_factory):
+    """An airborne cloud of 200 m of two tracks, with a file of guides, `guides.geojson`, next to it."""
+    folder = tmp_path_factory.mktemp("air")
+    design = curved_line(5, 200.0, cant_m=0.1, radius_m=450.0)
+    write_airborne(fly(design.world, design.where, 8.0, Flight(10.0, 0.25, plants=0.03), seed=5), folder / "air.laz")
+    lines = [(guide + ORIGIN[:2]).tolist() for guide in drawn_together(design.tracks, 5, off_m=0.4)]
+    shapes = [{"type": "LineString", "coordinates": line} for line in lines]
+    features = [{"type": "Feature", "properties": {}, "geometry": shape} for shape in shapes]
+    system = {"type": "name", "properties": {"name": CRS}}
+    guides = {"type": "FeatureCollection", "crs": system, "features": features}
+    (folder / "guides.geojson").write_text(json.dumps(guides), encoding="utf-8")
+    return folder / "air.laz"
+
+
+@pytest.fixture(scope="session")
+def run_scenario(tmp_path_factory, raw_cloud, airborne_cloud):
+    """Run a scenario, once: tests share what it found. One that goes on has the profile of another one."""
     programs = {name: shutil.which(name) for name in ("qgis", "xvfb-run")}
     if not all(programs.values()) or "QGIS_PROCESS" not in os.environ:
         pytest.exit("These tests need QGIS, Xvfb and the environment of make: run `make test-desktop`.", 1)
@@ -88,11 +109,13 @@ def run_scenario(tmp_path_factory, raw_cloud):
             "QT_QPA_PLATFORM": "xcb",
             "RAIL_EXTRACT_SAMPLE": str(ROOT / "resources" / "sample" / "sample.laz"),
             "RAIL_EXTRACT_RAW": str(raw_cloud),
+            "RAIL_EXTRACT_AIRBORNE": str(airborne_cloud),
             "RAIL_EXTRACT_ZIP": str(ROOT / "build" / "rail_extract.zip"),
         }
         for name in ("QGIS_PLUGINPATH", "QGIS_CUSTOM_CONFIG_PATH"):
             environment.pop(name, None)
-        qgis = [programs["qgis"], "--profiles-path", folder / "profiles", "--noversioncheck", "--nologo"]
+        profiles = (run(GOES_ON[scenario]).folder if scenario in GOES_ON else folder) / "profiles"
+        qgis = [programs["qgis"], "--profiles-path", profiles, "--noversioncheck", "--nologo"]
         command = [programs["xvfb-run"], "-a", "-s", SCREEN, *qgis, "--code", begin]
         ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=LIMIT_S)
         results = json.loads((folder / "results.json").read_text(encoding="utf-8"))

@@ -24,7 +24,7 @@ from qgis.core import (
 )
 from qgis.PyQt import sip
 from qgis.PyQt.QtCore import QObject, QPoint, QPointF, Qt, QUrl, pyqtSlot
-from qgis.PyQt.QtGui import QDesktopServices, QWheelEvent
+from qgis.PyQt.QtGui import QDesktopServices, QTextCursor, QTextDocument, QWheelEvent
 from qgis.PyQt.QtTest import QTest
 from qgis.PyQt.QtWidgets import (
     QAbstractSpinBox,
@@ -37,20 +37,22 @@ from qgis.PyQt.QtWidgets import (
     QLineEdit,
     QMenu,
     QPushButton,
+    QTableView,
     QTextBrowser,
     QTextEdit,
     QWidget,
 )
 from qgis.utils import iface, loadPlugin, plugins, reloadPlugin, startPlugin, unloadPlugin
 
-RAW = os.environ["RAIL_EXTRACT_RAW"]
+RAW, AIRBORNE = os.environ["RAIL_EXTRACT_RAW"], os.environ["RAIL_EXTRACT_AIRBORNE"]
 SAMPLE, ARCHIVE = os.environ["RAIL_EXTRACT_SAMPLE"], os.environ["RAIL_EXTRACT_ZIP"]
 TRUTH = Path(SAMPLE).with_name("sample_truth.geojson")
 
 NAMES = (
     *("extractrails", "classifyrailpoints", "growrailpoints", "airbornecenterlines"),
     *("rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
-    *("buildtrackcenterlines", "measuretrackgeometry", "trainrailclassifier", "installpackages", "checkinstallation"),
+    *("buildtrackcenterlines", "measuretrackgeometry", "stationalongaxis", "fitalignment", "comparetracks"),
+    *("exportalignment", "importalignment", "trainrailclassifier", "installpackages", "checkinstallation"),
 )
 
 PART = {
@@ -216,6 +218,49 @@ def _wheel(field: QWidget) -> QWheelEvent:
     return event
 
 
+def welcome(driver: Driver) -> Iterator:
+    """Look at the message after the installation; see that it leads to what is missing, and then to the sample."""
+    yield from install(ARCHIVE)
+    yield 0.5
+    bar = iface.messageBar()
+    driver.keep("at first", _message(bar))
+    driver.picture("welcome")
+    kind, notices = type(algorithm("extractrails")), sys.modules["rail_extract.rail_extract_plugin.notices"].notices
+    packages = sys.modules["rail_extract.rail_extract_plugin.setup.dependencies"]
+    needs, kind.NEEDS = kind.NEEDS, (*kind.NEEDS, ("torch_of_nobody",))
+    packages.PACKAGES += (packages.Package("torch_of_nobody", "torch"),)
+    notices.packages_installed.emit()
+    yield 0.5
+    driver.keep("with a missing package", _message(bar))
+    driver.picture("welcome_missing")
+    later(_button_of(bar).click)
+    dialog = yield lambda: window("AlgorithmDialog")
+    driver.keep("first button opens", dialog.algorithm().name())
+    kind.NEEDS, packages.PACKAGES = needs, packages.PACKAGES[:-1]
+    driver.keep("log of the installation", (yield from press_run(dialog)))
+    driver.picture("welcome_installed")
+    yield from close(dialog)
+    driver.keep("when all is installed", _message(bar))
+    later(_button_of(bar).click)
+    dialog = yield lambda: window("AlgorithmDialog")
+    yield 0.5
+    driver.picture("welcome_sample")
+    driver.keep("second button opens", dialog.mainWidget().wrappers["INPUT"].widget.value())
+    driver.keep("at last", _message(bar))
+    yield from close(dialog)
+
+
+def _message(bar) -> list[str]:
+    """Return the text of the plugin's message and that of its button; empty without one."""
+    button = _button_of(bar)
+    return [bar.currentItem().text(), button.text()] if button else []
+
+
+def _button_of(bar) -> QPushButton | None:
+    item = bar.currentItem()
+    return item.findChild(QPushButton) if item is not None and item.title() == "Rail Extract" else None
+
+
 def unload(driver: Driver) -> Iterator:
     """Disable the plugin during a run and while a rail grows, enable it again, run, and update it during a run."""
     yield from install(ARCHIVE)
@@ -273,8 +318,7 @@ def raw(driver: Driver) -> Iterator:
 
 def _save_all(driver: Driver, log: QTextEdit) -> Iterator:
     """Follow the link that saves all layers, and open the project that is in the file."""
-    address = re.search('<a href="(railextract:[0-9]+)"[^>]*>(?:<[^>]*>)*Save all layers', log.toHtml())[1]
-    later(partial(QDesktopServices.openUrl, QUrl(address)))
+    _follow(log, "Save all layers")
     chooser = yield lambda: window("QFileDialog")
     path = str(driver.folder / "all of it.gpkg")
     chooser.findChild(QLineEdit, "fileNameEdit").setText(path)
@@ -318,6 +362,115 @@ def missing(driver: Driver) -> Iterator:
     yield from close(dialog)
 
 
+def reopened(driver: Driver) -> Iterator:
+    """Begin in the profile of `review`, which was left with the dock open."""
+    yield 1.0
+    dock = iface.mainWindow().findChild(QDockWidget, "RailExtractReview")
+    driver.keep("dock is visible", dock.isVisible())
+    driver.keep("message", _message(iface.messageBar()))
+    driver.picture("reopened")
+    menu = next(one for one in iface.pluginMenu().actions() if one.text() == "Rail Extract").menu()
+    next(one for one in menu.actions() if one.text() == "Review Findings").trigger()
+    iface.mainWindow().findChild(QDockWidget, "ProcessingToolbox").setUserVisible(True)
+    yield 0.5
+    driver.keep("dock opens", dock.isVisible())
+    driver.keep("tabs beside the dock", [one.objectName() for one in iface.mainWindow().tabifiedDockWidgets(dock)])
+
+
+def again(driver: Driver) -> Iterator:
+    """Run with a wrong gauge, follow the link that runs again, then those to the report and to the findings."""
+    yield from install(ARCHIVE)
+    browser = Browser()
+    dialog = yield from open_dialog("extractrails")
+    outputs = {"FINDINGS": str(driver.folder / "found.gpkg"), "REPORT": str(driver.folder / "report.html")}
+    dialog.setParameters({"INPUT": SAMPLE, **PART, **outputs, "STANDARD": "EN_60E1_1435"})
+    log = dialog.findChild(QTextEdit, "txtLog")
+    driver.keep("wrong", (yield from press_run(dialog)))
+    driver.picture("wrong_gauge")
+    _follow(log, "Run again as")
+    button = dialog.buttonBox().button(QDialogButtonBox.StandardButton.Ok)
+    yield lambda: not button.isEnabled()
+    yield button.isEnabled
+    yield 1.0
+    driver.keep("standard", dialog.mainWidget().wrappers["STANDARD"].parameterValue())
+    driver.keep("results", dialog.results())
+    driver.keep("right", log.toPlainText().rpartition("starting")[2])
+    driver.picture("right_gauge")
+    browser.urls.clear()
+    _follow(log, "Open the report")
+    yield 0.5
+    driver.keep("opened", browser.urls)
+    dock = iface.mainWindow().findChild(QDockWidget, "RailExtractReview")
+    dock.hide()
+    _follow(log, "Review the findings")
+    yield 0.5
+    driver.keep("dock is visible", dock.isVisible())
+    yield from _save_all(driver, log)
+    yield from close(dialog)
+
+
+def _follow(log: QTextEdit, text: str) -> None:
+    """Click the last link of a log that begins with a text, with the mouse."""
+    log.moveCursor(QTextCursor.MoveOperation.End)
+    found = log.document().find(text, log.textCursor(), QTextDocument.FindFlag.FindBackward)
+    log.setTextCursor(found)
+    found.setPosition(found.selectionStart() + 3)
+    QTest.mouseClick(log.viewport(), Qt.MouseButton.LeftButton, pos=log.cursorRect(found).center())
+
+
+def elements(driver: Driver) -> Iterator:
+    """Draw tracks from the air along guides, fit their elements, and take these to a design file and back."""
+    yield from install(ARCHIVE)
+    folder = driver.folder
+    dialog = yield from open_dialog("airbornecenterlines")
+    lines = str(folder / "from the air.gpkg")
+    guides = str(Path(AIRBORNE).with_name("guides.geojson"))
+    others = {"STATIONS": "TEMPORARY_OUTPUT", "FINDINGS": "TEMPORARY_OUTPUT", "REPORT": str(folder / "air.html")}
+    dialog.setParameters({"INPUT": AIRBORNE, "GUIDE": guides, "FOOTPRINT": 0.25, "CENTERLINES": lines, **others})
+    driver.picture("air_dialog")
+    driver.keep("air log", (yield from press_run(dialog)))
+    driver.picture("air_log")
+    driver.keep("air", dialog.results())
+    yield from close(dialog)
+    yield 1.0
+    driver.keep("air order", [node.name() for node in QgsProject.instance().layerTreeRoot().findLayers()])
+    driver.picture("air_map")
+    dialog = yield from open_dialog("fitalignment")
+    table = str(folder / "elements.gpkg")
+    dialog.setParameters({"INPUT": lines, "TOLERANCE": 30, "ELEMENTS": table, "DEVIATIONS": "TEMPORARY_OUTPUT"})
+    driver.picture("fit_dialog")
+    driver.keep("fit log", (yield from press_run(dialog)))
+    driver.picture("fit_log")
+    yield from close(dialog)
+    yield 1.0
+    driver.picture("fit_map")
+    saved = QgsVectorLayer(table, "elements", "ogr")
+    rows = [(one["track_id"], one["layout"], one["type"], one["r1_m"]) for one in saved.getFeatures()]
+    driver.keep("elements", [[str(value) for value in row] for row in rows])
+    yield from _exchange(driver, table)
+
+
+def _exchange(driver: Driver, table: str) -> Iterator:
+    """Write an element table as LandXML, and read it back as elements and axes."""
+    folder = driver.folder
+    dialog = yield from open_dialog("exportalignment")
+    design = str(folder / "design.xml")
+    dialog.setParameters({"INPUT": table, "OUTPUT": design})
+    driver.picture("export_dialog")
+    driver.keep("export log", (yield from press_run(dialog)))
+    driver.keep("exported", dialog.results()["ALIGNMENT_COUNT"])
+    yield from close(dialog)
+    dialog = yield from open_dialog("importalignment")
+    axes = str(folder / "axes.gpkg")
+    dialog.setParameters({"INPUT": design, "ELEMENTS": "TEMPORARY_OUTPUT", "AXIS": axes})
+    driver.picture("import_dialog")
+    driver.keep("import log", (yield from press_run(dialog)))
+    driver.keep("imported", dialog.results()["ALIGNMENT_COUNT"])
+    yield from close(dialog)
+    yield 1.0
+    driver.picture("imported_map")
+
+
 def rails(driver: Driver) -> Iterator:
     """Extract the sample's rails, wait, save them, and go on working with them."""
     yield from install(ARCHIVE)
@@ -331,7 +484,7 @@ def rails(driver: Driver) -> Iterator:
     driver.keep("results", results)
     yield from close(dialog)
     layers = {layer.name(): layer for layer in QgsProject.instance().mapLayers().values()}
-    driver.keep("layers", sorted(layers))
+    driver.keep("layers", [node.name() for node in QgsProject.instance().layerTreeRoot().findLayers()])
     driver.picture("rails")
     QgsProject.instance().write(str(driver.folder / "saved.qgs"))
     yield POOL_S
@@ -378,6 +531,10 @@ def review(driver: Driver) -> Iterator:
             yield 0.5
             driver.picture(f"review_missing_{number}")
     driver.keep("texts", texts)
+    _place_dock(driver, dock)
+    yield 1.0
+    driver.picture("review_wide")
+    iface.mainWindow().resizeDocks([dock], [320], Qt.Orientation.Horizontal)
     dock.go(0)
     dock.buttons["next"].click()
     yield 1.0
@@ -391,7 +548,63 @@ def review(driver: Driver) -> Iterator:
     driver.keep("scale", iface.mapCanvas().extent().width())
     yield 1.0
     driver.picture("review_rejected")
+    yield from _review_by_keys(driver, dock)
+    layer = QgsProject.instance().mapLayersByName("findings")[0]
+    driver.keep("order", [node.name() for node in QgsProject.instance().layerTreeRoot().findLayers()])
+    yield from _open_table(driver, layer)
     yield from _show_in_3d(driver, menu)
+
+
+def _place_dock(driver: Driver, dock: QDockWidget) -> None:
+    """Look where the dock is, and make it wide."""
+    window = iface.mainWindow()
+    toolbox = window.findChild(QDockWidget, "ProcessingToolbox")
+    toolbox.setUserVisible(True)
+    QApplication.processEvents()
+    driver.keep("tabs beside the dock", [one.objectName() for one in window.tabifiedDockWidgets(dock)])
+    driver.keep("toolbox as high as the dock", toolbox.height() == dock.height())
+    driver.picture("review_toolbox")
+    dock.raise_()
+    window.resizeDocks([dock], [700], Qt.Orientation.Horizontal)
+
+
+def _review_by_keys(driver: Driver, dock: QDockWidget) -> Iterator:
+    """Go and decide by keys, and undo a decision within an edit session of the layer."""
+    press = partial(QTest.keyClick, dock.widget())
+    at = [dock.count.text()]
+    QApplication.setActiveWindow(iface.mainWindow())  # which no window manager does here
+    dock.widget().setFocus()
+    for key in (Qt.Key.Key_N, Qt.Key.Key_P, Qt.Key.Key_P):
+        press(key)
+        at.append(dock.count.text())
+    driver.keep("by keys", [int(text.split()[0]) for text in at])
+    layer = QgsProject.instance().mapLayersByName("findings")[0]
+    layer.startEditing()
+    dock.go(2)
+    before = dock.count.text()
+    press(Qt.Key.Key_A)
+    press(Qt.Key.Key_R)
+    yield 0.2
+    decided = dock.count.text()
+    for _ in range(2):
+        layer.undoStack().undo()
+    yield 0.2
+    dock.go(2)
+    driver.keep("edited", [before, decided, dock.count.text(), dock.buttons["accepted"].isChecked()])
+    layer.rollBack()
+
+
+def _open_table(driver: Driver, layer: QgsVectorLayer) -> Iterator:
+    """Open the table of a layer, and look at its columns."""
+    table = iface.showAttributeTable(layer)
+    table.resize(1400, 400)
+    yield 1.0
+    driver.picture("review_table")
+    view = table.findChild(QTableView)
+    header, columns = view.model().headerData, range(view.model().columnCount())
+    titles = [header(column, Qt.Orientation.Horizontal) for column in columns]
+    driver.keep("column widths", {str(title): view.columnWidth(column) for column, title in zip(columns, titles)})
+    table.close()
 
 
 def _show_in_3d(driver: Driver, menu: QMenu) -> Iterator:
@@ -472,10 +685,14 @@ def deliveries(driver: Driver) -> Iterator:
     yield from close(dialog)
     dialog = yield from open_dialog("measuretrackgeometry")
     values = {"INPUT": lines["CENTERLINES"], "RAILS": lines["RAILS"], "STANDARD": PART["STANDARD"]}
-    dialog.setParameters({**values, "OUTPUT": "TEMPORARY_OUTPUT", "FINDINGS": str(folder / "found.gpkg")})
+    axis = {"AXIS": lines["CENTERLINES"], "START_KM": 12.0}
+    stations, found = str(folder / "stations.gpkg"), str(folder / "found.gpkg")
+    dialog.setParameters({**values, **axis, "OUTPUT": stations, "FINDINGS": found})
     driver.picture("measure_dialog")
     driver.keep("measure log", (yield from press_run(dialog)))
     yield from close(dialog)
+    km = [one["km"] for one in QgsVectorLayer(stations, "stations", "ogr").getFeatures()]
+    driver.keep("kilometres", [min(km), max(km), len(km)])
     driver.keep("opened", browser.urls)
     driver.picture("measured")
 
@@ -581,6 +798,7 @@ def model(driver: Driver) -> Iterator:
     designer.setDirty(False)
     yield from close(designer)
     layers = QgsProject.instance().mapLayers().values()
+    driver.keep("layers", sorted(layer.name() for layer in layers))
     yield POOL_S
     driver.keep("systems", {layer.name(): layer.crs().toWkt() for layer in layers})
 

@@ -14,7 +14,11 @@ SCENARIOS = (
     "raw",
     "missing",
     "rails",
+    "welcome",
     "review",
+    "reopened",
+    "again",
+    "elements",
     "growing",
     "deliveries",
     "alignments",
@@ -28,7 +32,8 @@ DIES_AT_EXIT = ("rails", 340)
 NAMES = [
     *("extractrails", "classifyrailpoints", "growrailpoints", "airbornecenterlines"),
     *("rasterizerailpoints", "frpdfcleanup", "vectorizerails"),
-    *("buildtrackcenterlines", "measuretrackgeometry", "trainrailclassifier", "installpackages", "checkinstallation"),
+    *("buildtrackcenterlines", "measuretrackgeometry", "stationalongaxis", "fitalignment", "comparetracks"),
+    *("exportalignment", "importalignment", "trainrailclassifier", "installpackages", "checkinstallation"),
 ]
 
 
@@ -47,7 +52,9 @@ def test_every_dialog_opens_and_its_help(run_scenario):
     assert unable in ([], ["trainrailclassifier"])  # it needs PyTorch, of which some Pythons have no build
     assert session["dialogs"] == [name for name in NAMES if name not in unable]
     pages = [Path(address.replace("file://", "")).name for address in session["help"]]
-    assert pages == ["parameters.html"] * (9 - len(unable)) + ["troubleshooting.html"] * 2
+    own = {"airborne", "stationing", "alignment", "comparison", "alignment_files", "troubleshooting"}
+    assert {page.partition(".")[0] for page in pages} == {*own, "parameters"}
+    assert len(pages) == len(NAMES) - len(unable)
 
 
 def test_cloud_is_chosen_from_clouds_alone(run_scenario):
@@ -124,6 +131,49 @@ def test_everything_is_saved_as_one_file_with_a_project(run_scenario):
     assert session["saved alias"] == "Standard error [mm]"
 
 
+def test_the_first_message_leads_to_packages_and_then_to_the_sample(run_scenario):
+    session = run_scenario("welcome")
+    ready = ["The plugin is ready; the sample shows what it does.", "Open the sample…"]
+    assert session["at first"] == session["when all is installed"] == ready
+    text, button = session["with a missing package"]
+    assert (text.rpartition(": ")[2], button) == ("torch_of_nobody.", "Install packages…")
+    assert session["first button opens"] == "installpackages"
+    assert session["log of the installation"].rstrip().endswith("Next: Open the sample…")
+    assert session["second button opens"].endswith("rail_extract/resources/sample/sample.laz")
+    assert session["at last"] == []
+
+
+def test_an_empty_dock_is_closed_at_the_start_and_no_message_comes_twice(run_scenario):
+    session = run_scenario("reopened")
+    assert not session["dock is visible"]
+    assert session["message"] == []
+    assert session["dock opens"]
+    assert "ProcessingToolbox" in session["tabs beside the dock"]
+
+
+def test_a_wrong_gauge_is_corrected_by_a_link(run_scenario):
+    session = run_scenario("again")
+    steps = ["Review the findings", "Open the report", "Save all layers with styles and a project in one GeoPackage…"]
+    assert session["wrong"].rstrip().endswith("  ·  ".join([*steps, "Run again as India 75R, 1000 mm"]))
+    assert session["standard"] == "IN_75R_1000"
+    assert session["results"]["CENTERLINE_COUNT"] == 3
+    assert session["right"].rstrip().endswith("Next: " + "  ·  ".join(steps))
+    (opened,) = session["opened"]
+    assert opened.endswith("report.html")
+    assert session["dock is visible"]
+    assert session["saved layers"] == ["found", "Track centerlines", "Rails"]
+    assert session["saved sources"] == ["all of it.gpkg"]
+
+
+def test_elements_of_tracks_from_the_air_go_to_a_design_file_and_back(run_scenario):
+    session = run_scenario("elements")
+    assert session["air"]["CENTERLINE_COUNT"] == 2
+    assert session["air"]["SEEN_LENGTH"] > 380
+    types = [kind for _, layout, kind, _ in session["elements"] if layout == "H"]
+    assert "arc" in types
+    assert session["exported"] == session["imported"] == 2
+
+
 def test_missing_pytorch_leads_to_its_installation(run_scenario):
     session = run_scenario("missing")
     assert "run Install packages, with PyTorch set to CPU" in session["message"]
@@ -144,7 +194,7 @@ def test_rails_are_found_and_loaded(run_scenario):
     session = run_scenario("rails")
     assert session["results"]["RAIL_COUNT"] == 6
     assert session["results"]["CENTERLINE_COUNT"] == 3
-    titles = ("Cleaned rail raster", "Findings", "Rails", "Track centerlines", "Track geometry")
+    titles = ("Findings", "Track centerlines", "Rails", "Track geometry", "Cleaned rail raster")
     assert session["layers"] == [f"{title}: sample" for title in titles]
 
 
@@ -198,11 +248,25 @@ def test_findings_are_reviewed_in_the_dock(run_scenario):
     assert session["count"] == f"1 of {total}; 0 reviewed"
     assert session["count after"].endswith("2 reviewed")
     assert 20 <= session["scale"] < 100
+    assert session["order"] == ["findings", "Track centerlines: sample", "Rails: sample"]
+    assert session["column widths"]["Reason"] >= 200
     dataset = ogr.Open(str(session.folder / "findings.gpkg"))
     layer = dataset.GetLayer(0)
     decided = {feature["finding"]: feature["review"] for feature in layer}
     assert len(decided) == total
     assert (decided[1], decided[2], set(list(decided.values())[2:])) == ("accepted", "rejected", {""})
+
+
+def test_the_dock_is_a_tab_beside_the_toolbox_obeys_keys_and_follows_undo(run_scenario):
+    session = run_scenario("review")
+    assert "ProcessingToolbox" in session["tabs beside the dock"]
+    assert session["toolbox as high as the dock"]
+    assert session["by keys"] == [3, 4, 3, 2]
+    before, decided, undone, is_accepted = session["edited"]
+    assert before == undone
+    assert (before.split()[0], decided.split()[0]) == ("3", "5")
+    assert int(decided.split()[3]) == int(before.split()[3]) + 2
+    assert not is_accepted
 
 
 def test_a_3d_view_opens_on_the_lines(run_scenario):
@@ -240,6 +304,9 @@ def test_files_for_other_programs_are_written_and_loaded(run_scenario):
 def test_lines_from_files_are_judged(run_scenario):
     session = run_scenario("deliveries")
     assert "% of the tracks in doubt" in session["measure log"]
+    first_km, last_km, count = session["kilometres"]
+    assert (first_km, last_km) == pytest.approx((12.0, 12.022), abs=0.001)
+    assert count > 60
     (opened,) = session["opened"]
     assert opened.endswith(".html")
     dataset = ogr.Open(str(session.folder / "found.gpkg"))

@@ -20,6 +20,7 @@ from qgis.core import (
     QgsRectangle,
     QgsVectorLayer,
 )
+from rail_extract.core.kernels import blas
 from rail_extract.core.scratch import PREFIX
 from rail_extract.rail_extract_plugin.reading.geotiff import read_header
 
@@ -513,3 +514,18 @@ def assert_refused(outcome, message, outputs):
     assert "Traceback" not in outcome.error
     assert "\n" not in outcome.error.strip()
     assert not any(path.exists() for path in outputs.values())
+
+
+@pytest.mark.parametrize("ends", ["well", "badly"])
+def test_libraries_have_one_thread_during_a_run_and_as_many_as_before_afterwards(run, scene, new_feedback, ends):
+    seen, feedback, before = set(), new_feedback(1 if ends == "badly" else None), [one.get() for one in blas()]
+    feedback.progressChanged.connect(lambda _: seen.update(one.get() for one in blas()))
+    try:
+        for one in blas():
+            one.set(2)
+        assert run(scene, feedback).ok == (ends == "well")
+        assert seen == {1}
+        assert {one.get() for one in blas()} == {2}
+    finally:
+        for one, threads in zip(blas(), before):
+            one.set(threads)

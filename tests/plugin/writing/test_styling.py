@@ -25,6 +25,8 @@ from qgis.PyQt.QtCore import QSize
 from qgis.PyQt.QtGui import QColor
 from qgis.PyQt.QtXml import QDomDocument
 from rail_extract.core.fields import (
+    AIRBORNE_FIELDS,
+    AIRBORNE_STATION_FIELDS,
     AXIS_FIELDS,
     CENTERLINE_FIELDS,
     DEVIATION_FIELDS,
@@ -54,6 +56,8 @@ KINDS = {
     "elements": ("LineStringZ", ELEMENT_FIELDS),
     "axes": ("LineStringZM", AXIS_FIELDS),
     "deviations": ("PointZ", DEVIATION_FIELDS),
+    "airborne": ("LineStringZ", AIRBORNE_FIELDS),
+    "stations": ("PointZ", AIRBORNE_STATION_FIELDS),
 }
 
 
@@ -147,7 +151,7 @@ def test_elements_are_coloured_by_type_and_drawn_once(styled):
 @pytest.mark.parametrize("style", KINDS)
 def test_fields_have_names_in_words_with_units(styled, style):
     layer = styled(style)
-    for field in KINDS[style][1]:
+    for field in (one for one in KINDS[style][1] if one.name != "bed_m"):  # in the unit of the cloud
         alias = layer.attributeAlias(layer.fields().lookupField(field.name))
         assert alias and alias != field.name
         for ending, unit in (("_mm", "[mm]"), ("_m", "[m]"), ("_pm", "[‰]")):
@@ -282,6 +286,8 @@ def test_layers_can_be_drawn(styled, style):
         "elements": (LINE, {"type": "arc"}),
         "axes": (LINE, {"track_id": 1}),
         "deviations": ("POINT Z (500050 3000000 1)", {"track_id": 1, "slew_mm": 12.0}),
+        "airborne": (LINE, {"track_id": 1}),
+        "stations": ("POINT Z (500050 3000000 1)", {"track_id": 1, "seen": 1}),
     }
     layer = styled(style, [rows[style]])
     settings = QgsMapSettings()
@@ -296,6 +302,7 @@ def test_layers_can_be_drawn(styled, style):
     image = job.renderedImage()
     seen = {image.pixelColor(x, y).name() for x in range(60, 200) for y in range(100, 200)}
     colours = {"rails": "#1565c0", "centerlines": "#e64a19", "quality": "#f28e2b", "findings": "#84b397"}
+    colours.update(airborne="#e64a19", stations="#2e7d4f")
     colours.update(stops="#e64a19", elements="#1565c0", axes="#8e5bb5", deviations="#b2182b", differences="#b2182b")
     assert colours[style] in seen
 
@@ -323,11 +330,38 @@ def test_elevation_of_layers_is_absolute(styled, style):
 
 
 @pytest.mark.skipif(Qgis.QGIS_VERSION_INT < 33200, reason="no groups for results")
-def test_layers_of_a_run_share_a_group_points_on_top(styled, context):
-    layers = [styled(style) for style in ("quality", "rails", "centerlines")]
+def test_layers_of_a_run_share_a_group_in_order(styled, context):
+    layers = [styled(style) for style in ("findings", "rails", "centerlines")]
     details = [context.layerToLoadOnCompletionDetails(layer.id()) for layer in layers]
     assert {one.groupName for one in details} == {"Rail Extract"}
     assert details[0].layerSortKey > details[2].layerSortKey > details[1].layerSortKey
+
+
+@pytest.mark.skipif(compat.GROUPS_LAYERS, reason="QGIS sorts the layers of a group")
+@pytest.mark.parametrize("loaded", [("quality", "rails", "findings", "centerlines"), ("findings", "quality", "rails")])
+def test_layers_of_a_run_are_in_order_however_they_are_loaded(context, new_feedback, loaded):
+    project, root = QgsProject.instance(), QgsProject.instance().layerTreeRoot()
+    project.addMapLayer(QgsVectorLayer("LineString", "other", "memory"))
+    for style in loaded:
+        layer = QgsVectorLayer("LineStringZ", style, "memory")
+        context.addLayerToLoadOnCompletion(layer.id(), QgsProcessingContext.LayerDetails(style, project, style))
+        style_on_load(layer.id(), style, context, {"rail_extract/run": "one"})
+        project.addMapLayer(layer)
+        context.layerToLoadOnCompletionDetails(layer.id()).postProcessor().postProcessLayer(
+            layer, context, new_feedback()
+        )
+    order = [style for style in ("findings", "centerlines", "rails", "quality") if style in loaded]
+    assert [node.name() for node in root.findLayers()] == [*order, "other"]
+    assert len(project.mapLayers()) == len(loaded) + 1
+
+
+@pytest.mark.parametrize("style", KINDS)
+def test_columns_of_tables_are_as_wide_as_their_titles(styled, style):
+    layer = styled(style)
+    widths = {column.name: column.width for column in layer.attributeTableConfig().columns()}
+    titles = {field.name(): field.displayName() for field in layer.fields()}
+    assert set(titles) <= set(widths)
+    assert {name: widths[name] for name, title in titles.items() if widths[name] < 6 * len(title)} == {}
 
 
 def test_rasters_are_black_on_transparent(qgis, write_cloud, track, run_step, tmp_path):

@@ -1,0 +1,117 @@
+"""Numerical libraries on one thread: none of their operations in a run is long enough to gain from more.
+
+Threads of such libraries spin while they wait for each other, thousands of times in a run. On an idle computer two are
+hardly faster than one; beside other programs they take several times the processor time (docs/scaling.md).
+
+Each library has one setting for its whole process, which other programs in QGIS share. It is therefore changed only
+while a run needs it, and restored by the last of the runs that overlap.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from functools import lru_cache
+from importlib import import_module
+from pathlib import Path
+
+LINKED = ("numpy.linalg._umath_linalg", "scipy.linalg._fblas")
+"""Modules that are linked to the BLAS of their package; each package may have its own."""
+
+SYMBOLS = [f"{prefix}openblas_{{}}_num_threads{suffix}" for prefix in ("", "scipy_") for suffix in ("", "64_")]
+"""Names of OpenBLAS's functions, by what they do: `get` or `set`. Packages rename them, so that theirs do not clash."""
+
+
+@dataclass(frozen=True)
+class Library:
+    """A library that is loaded, and its functions that tell and set the number of its threads."""
+
+    name: str
+    get: Callable[[], int] = field(compare=False)
+    set: Callable[[int], object] = field(compare=False)
+
+
+class _Held:
+    """The libraries that runs keep on one thread: how many runs, and the number of threads before the first."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._runs: dict[Library, int] = {}
+        self._before: dict[Library, int] = {}
+
+    def take(self, library: Library) -> None:
+        with self._lock:
+            if not self._runs.get(library):
+                self._before[library] = library.get()
+                library.set(1)
+            self._runs[library] = self._runs.get(library, 0) + 1
+
+    def release(self, library: Library) -> None:
+        with self._lock:
+            self._runs[library] -= 1
+            if not self._runs[library]:
+                library.set(self._before[library])
+
+
+_HELD = _Held()
+
+
+@contextmanager
+def one_thread(*libraries: Library) -> Iterator[None]:
+    """Keep libraries on one thread; afterwards they have as many as before, once no other run needs one."""
+    with ExitStack() as ends:
+        for library in libraries:
+            _HELD.take(library)
+            ends.callback(_HELD.release, library)
+        yield
+
+
+@lru_cache
+def blas() -> tuple[Library, ...]:
+    """Find the OpenBLAS of numpy and that of scipy; none where these are missing or are built with another BLAS."""
+    found: set[Library] = set()
+    for name in LINKED:
+        try:
+            module = import_module(name)
+        except ImportError:
+            continue
+        for file in (Path(str(module.__file__)), *_beside(module.__name__.split(".")[0])):
+            found.update(_openblas(file))
+    return tuple(found)
+
+
+def pytorch() -> Library:
+    """Return PyTorch, which has to be installed."""
+    import torch
+
+    return Library("PyTorch", torch.get_num_threads, torch.set_num_threads)
+
+
+def opencv() -> Library:
+    """Return OpenCV, which has to be installed."""
+    import cv2
+
+    return Library("OpenCV", cv2.getNumThreads, cv2.setNumThreads)
+
+
+def _beside(package: str) -> Iterator[Path]:
+    """Yield the libraries that a package brings along; on Windows, symbols are found in the library itself only."""
+    folder = Path(str(import_module(package).__file__)).parent
+    for libraries in (folder / ".libs", folder.with_name(f"{package}.libs")):
+        yield from libraries.glob("*openblas*")
+
+
+def _openblas(file: Path) -> Iterator[Library]:
+    """Yield the OpenBLAS that a loaded file is or is linked to; the address of a function tells one from another."""
+    try:
+        linked = ctypes.CDLL(str(file))
+    except OSError:
+        return
+    for symbol in SYMBOLS:
+        if hasattr(linked, symbol.format("set")):
+            get, change = (getattr(linked, symbol.format(which)) for which in ("get", "set"))
+            change.restype = None
+            yield Library(f"OpenBLAS at {ctypes.cast(change, ctypes.c_void_p).value}", get, change)

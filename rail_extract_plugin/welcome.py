@@ -1,0 +1,82 @@
+"""The message after the installation that says what to do next, and has the button for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from qgis.core import Qgis, QgsSettings
+from qgis.gui import QgsMessageBar, QgsMessageBarItem
+from qgis.PyQt import sip
+from qgis.PyQt.QtCore import QObject
+from qgis.PyQt.QtWidgets import QPushButton
+
+from .algorithms.extract_rails import ExtractRails
+from .i18n import tr
+from .notices import notices
+from .runs.missing import open_installation
+from .setup.dependencies import Package, missing_packages
+
+SHOWN = "rail_extract/welcomed_to"
+"""Setting: the step that was shown last."""
+
+INSTALL, SAMPLE = "packages", "sample"
+"""Values of the setting."""
+
+
+class Welcome(QObject):
+    """Leads to the missing packages, and once there are none, to the sample; each is shown once.
+
+    Parameters
+    ----------
+    bar : QgsMessageBar
+    open_sample : callable
+    """
+
+    def __init__(self, bar: QgsMessageBar, open_sample: Callable[[], None]) -> None:
+        super().__init__()
+        self._bar, self._open_sample = bar, open_sample
+        self._item: QgsMessageBarItem | None = None
+        notices.packages_installed.connect(self.show)
+        self.show()
+
+    def show(self) -> None:
+        """Show the next step, unless it was the last one that was shown."""
+        missing = missing_packages(ExtractRails.NEEDS)
+        step = INSTALL if missing else SAMPLE
+        if QgsSettings().value(SHOWN) == step:
+            return
+        QgsSettings().setValue(SHOWN, step)
+        self._close()
+        if missing:
+            self._push(_what_is_missing(missing), tr("Install packages…"), open_installation)
+        else:
+            text = tr("The plugin is ready; the sample shows what it does.")
+            self._push(text, tr("Open the sample…"), self._open_sample)
+
+    def remove(self) -> None:
+        """Take the message away."""
+        notices.packages_installed.disconnect(self.show)
+        self._close()
+
+    def _push(self, text: str, label: str, do: Callable[[], None]) -> None:
+        """Show a message with a button."""
+        self._item, button = self._bar.createMessage(tr("Rail Extract"), text), QPushButton(label)
+
+        def follow() -> None:
+            self._close()
+            do()
+
+        button.clicked.connect(lambda: follow())
+        self._item.layout().addWidget(button)
+        self._bar.pushWidget(self._item, Qgis.MessageLevel.Info, 0)
+
+    def _close(self) -> None:
+        """Remove the message if the user has not closed it."""
+        if self._item is not None and not sip.isdeleted(self._item):
+            self._bar.popWidget(self._item)
+        self._item = None
+
+
+def _what_is_missing(missing: tuple[Package, ...]) -> str:
+    names = ", ".join(package.module for package in missing)
+    return tr("To work, the plugin needs Python packages that this QGIS does not have: {}.").format(names)
