@@ -147,7 +147,8 @@ def _axes(guides: Sequence[Guide], request: Request) -> tuple[list[Guide], list[
             f"Guide {guide.guide_id} is {length_m:.1f} m long: give guides of {MIN_LENGTH_M:g} m or more."
         )
     left_out = [
-        f"Guide {guide.guide_id} is left out, for it is {length_m:.1f} m long: join it to the line that it continues."
+        f"Guide {guide.guide_id} is left out: it is {length_m:.1f} m long, too short alone. Join it to the line "
+        "that it continues."
         for guide, length_m in short
     ]
     return [guide for guide, _ in kept], [axis for _, axis in kept], left_out

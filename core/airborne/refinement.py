@@ -257,7 +257,9 @@ def measure(corridor: Corridor, shape: Shape, shows: np.ndarray | None) -> tuple
 
 def _other_spacing(count: np.ndarray, mean: np.ndarray, u: np.ndarray, shape: Shape) -> float:
     """Return the distance of the rails that a profile shows where it is clearly not the expected one, else NaN."""
-    gains = [float(fit(count, mean, u, replace(shape, spacing_m=shape.spacing_m + more)).both[0]) for more in SPACINGS_M]
+    gains = [
+        float(fit(count, mean, u, replace(shape, spacing_m=shape.spacing_m + more)).both[0]) for more in SPACINGS_M
+    ]
     best, expected = int(np.argmax(gains)), gains[len(gains) // 2]
     clearly = gains[best] - expected > max(OTHER_GAIN, OTHER_SHARE * gains[best])
     return float(shape.spacing_m + SPACINGS_M[best]) if clearly and abs(SPACINGS_M[best]) > OTHER_M else np.nan

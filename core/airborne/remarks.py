@@ -44,8 +44,8 @@ def refuse_mobile(density: float) -> None:
     """
     if density > MOBILE_DENSITY:
         raise CloudError(
-            f"The cloud has {density:.0f} points per square metre along the guides, as mobile lidar has: use Extract "
-            "Rails, which finds the single railheads and is more accurate there."
+            f"The cloud has {density:.0f} points per square metre, as mobile lidar has: use Extract Rails, which finds "
+            "the single railheads and is more accurate there."
         )
 
 
@@ -79,9 +79,7 @@ def on_shapes(found: Sequence[Fitted], parameters: AirborneParameters, spacings_
     ]
 
 
-def on_gauges(
-    guides: Sequence[Guide], fitted: Sequence[Sequence[Fitted]], parameters: AirborneParameters
-) -> list[str]:
+def on_gauges(guides: Sequence[Guide], fitted: Sequence[Sequence[Fitted]], parameters: AirborneParameters) -> list[str]:
     """Warn of guides along which rails at another gauge show, one sentence for those that share both gauges."""
     wrong: dict[tuple[int, int, bool], list[int]] = {}
     for guide, parts in zip(guides, fitted):

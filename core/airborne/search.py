@@ -15,6 +15,7 @@ from scipy.ndimage import distance_transform_edt, map_coordinates, median_filter
 
 from ..progress import SILENT, Progress
 from .ridges import HALF_M, Shape, binned, fit, windows
+from .squares import ROW
 
 CELL_M, AROUND_CELLS = 1.0, 5
 """Cells whose mean height states the ground, and the cells along a side whose median smooths it: a track bed is wider
@@ -50,6 +51,9 @@ ASIDE_M, TURNED_RAD = 1.0, 0.15
 
 CHECK_BIN_M, CHECK_M = 0.05, 0.25
 """Width of the bins in which a find is checked, and how far to the sides."""
+
+RIVALS_M, RIVAL_SHARE = (0.4, 1.1), 0.6
+"""Distances at which another place excludes a find, if it has this share of its score: furrows of a field repeat."""
 
 CHECKED = 4.0
 """Gain of both rails, less the flaws of their bed, that a find must have over a tile."""
@@ -134,8 +138,7 @@ class _Tiles:
 
     def __init__(self, xyh: np.ndarray, corner: np.ndarray) -> None:
         cell = np.floor((xyh[:, :2] - corner) / STEP_M).astype(np.int64)
-        self._row = int(cell[:, 1].max(initial=0)) + 2
-        key = np.maximum(cell[:, 0], 0) * self._row + np.maximum(cell[:, 1], 0)
+        key = cell[:, 0] * ROW + cell[:, 1]
         order = np.argsort(key, kind="stable")
         self._points, self._key, self._corner = xyh[order], key[order], corner
 
@@ -156,7 +159,7 @@ class _Tiles:
         return rows
 
     def _cell(self, i: int, j: int) -> np.ndarray:
-        first, last = np.searchsorted(self._key, [i * self._row + j, i * self._row + j + 1])
+        first, last = np.searchsorted(self._key, [i * ROW + j, i * ROW + j + 1])
         return self._points[first:last]
 
 
@@ -218,12 +221,14 @@ def _scores(local: np.ndarray, spacing_m: float, width_m: float) -> np.ndarray:
 def _check(local: np.ndarray, direction: float, left_m: float, shape: Shape) -> tuple[float, float]:
     """Return the score of a place with all checks of two rails on a bed, and where to the left it is best."""
     across = local[:, 1] * np.cos(direction) - local[:, 0] * np.sin(direction) - left_m
-    half, aside = int(round(HALF_M / CHECK_BIN_M)), int(round(CHECK_M / CHECK_BIN_M))
+    half, aside = int(round(HALF_M / CHECK_BIN_M)), int(round(RIVALS_M[1] / CHECK_BIN_M))
     bins, low_m = 2 * (half + aside) + 1, -(half + aside + 0.5) * CHECK_BIN_M
     section = np.zeros(len(across), dtype=np.int64)
     count, height = binned(section, across, local[:, 2], 1, low_m, bins, CHECK_BIN_M)
     u = (np.arange(2 * half + 1) - half) * CHECK_BIN_M
     found = fit(windows(count, len(u)), windows(height, len(u)), u, shape, passes=3)
-    score = (found.gain - found.flaw)[0]
-    best = int(score.argmax())
-    return float(score[best]), left_m + (best - aside) * CHECK_BIN_M
+    score, place = (found.gain - found.flaw)[0], (np.arange(2 * aside + 1) - aside) * CHECK_BIN_M
+    best = int(np.where(np.abs(place) <= CHECK_M, score, -np.inf).argmax())
+    apart = np.abs(place - place[best])
+    rival = score[(apart > RIVALS_M[0]) & (apart < RIVALS_M[1])].max()
+    return float(score[best]) if rival < RIVAL_SHARE * score[best] else 0.0, left_m + float(place[best])

@@ -100,7 +100,9 @@ def test_a_short_guide_is_left_out_if_others_are_long(flown, tmp_path):
     short = Guide(3, np.array([second.xy[0], second.xy[0] + [9.0, 0.0]]))
     found = survey(tmp_path / "cloud.laz", [first, second, short], tmp_path)
     assert [line.guide_id for line in found.lines] == [1, 2]
-    assert found.warnings == ("Guide 3 is left out, for it is 9.0 m long: join it to the line that it continues.",)
+    assert found.warnings == (
+        "Guide 3 is left out: it is 9.0 m long, too short alone. Join it to the line that it continues.",
+    )
 
 
 def test_a_guide_outside_of_the_cloud_is_refused(flown, tmp_path):

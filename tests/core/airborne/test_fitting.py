@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
-
 from rail_extract.core.airborne.axis import axis_of_guide
 from rail_extract.core.airborne.fitting import EMPTY, HIDDEN, MISLED, SEEN, TWIN, UNSURE, fit_tracks
 from rail_extract.laboratory.airborne.designs import SPACING_M, box
 from rail_extract.laboratory.airborne.flight import Flight, fly
 from rail_extract.laboratory.airborne.ground import Axis, Band, World
 from rail_extract.laboratory.ruler.airborne import Stationwise, compare_stations
+from scipy.spatial import cKDTree
 
 
 def fitted(xyz, strip, guides, reach_m=3.0, footprint_m=0.25):
