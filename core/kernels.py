@@ -25,6 +25,17 @@ SYMBOLS = [f"{prefix}openblas_{{}}_num_threads{suffix}" for prefix in ("", "scip
 """Names of OpenBLAS's functions, by what they do: `get` or `set`. Packages rename them, so that theirs do not clash."""
 
 
+ENVIRONMENT = {
+    **{f"{name}_NUM_THREADS": "1" for name in ("OMP", "MKL", "OPENBLAS", "RAYON")},
+    "OPENCV_FOR_THREADS_NUM": "1",
+    "MALLOC_TRIM_THRESHOLD_": str(256 << 20),
+    "MALLOC_MMAP_THRESHOLD_": str(32 << 20),
+}
+"""Variables of a worker process. The first keep it on one core: there are as many workers as cores. The last are the
+bytes of freed memory that glibc keeps, and the largest array that it takes from them: otherwise each array returns to
+the system, which clears the memory before it lends it again, at a tenth of the run time."""
+
+
 @dataclass(frozen=True)
 class Library:
     """A library that is loaded, and its functions that tell and set the number of its threads."""

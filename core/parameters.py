@@ -33,6 +33,10 @@ TRANSITIONS = (JUMPS, CLOTHOIDS)
 AIRBORNE_CLASSES = (1, 2)
 """Classes of an airborne cloud in which tracks are looked for: unclassified and ground."""
 
+DEFAULT_WORKERS, MAX_WORKERS = 0, 1000
+"""Processes that compute at a time: 0 is one per core, as far as memory allows; the most is a guard against typing
+errors."""
+
 DEFAULT_EPOCHS = 10
 """How many times a rail classifier learns from each block with rails."""
 

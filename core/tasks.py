@@ -1,6 +1,7 @@
 """Tasks and the runners that execute them: `pipeline` describes its work as tasks, and a runner decides where they run.
 
-`InTurn` runs tasks in this process, one after another; `cluster.runner.DaskRunner` runs them on many machines.
+`InTurn` runs tasks in this process, one after another, `workers.runner.Workers` in several processes, and
+`cluster.runner.DaskRunner` on many machines.
 """
 
 from __future__ import annotations
@@ -14,6 +15,9 @@ from typing import Any, Protocol, TypeVar
 from .progress import SILENT, Progress
 
 Name = TypeVar("Name", bound=Hashable)
+
+READ_S = 1e-6
+"""Run time per point that is read or written, compressed, in seconds; the weight of such tasks."""
 
 
 class Once:
@@ -63,7 +67,7 @@ class Task:
     uses : tuple of Name
         Tasks that have to finish first, and whose results this one takes if they did not fail.
     weight : float
-        Expected run time relative to that of other tasks, for the progress.
+        Expected run time in seconds, roughly: for the progress, and to decide whether workers are worth their start.
     returned : bool
         Whether the runner returns the result; otherwise it only passes it to other tasks.
     """
@@ -120,26 +124,21 @@ class InTurn:
 
     def run(self, tasks: Mapping[Name, Task], progress: Progress = SILENT) -> Iterator[tuple[Name, Any]]:
         """Execute tasks; see `Runner.run`."""
-        order = in_order(tasks)
-        waiting = deque(order.get_ready())
-        results = _Results(tasks)
+        results = Results(tasks)
         done, total = 0.0, sum(task.weight for task in tasks.values())
-        while waiting:
+        for name in turns(tasks):
             progress.check()
-            name = waiting.popleft()
             task = tasks[name]
             share = progress.span(done / total, (done + task.weight) / total)
             result = task.function(*task.arguments, Context(results.take(task), self._once, share))
             share.set_fraction(1.0)
             done += task.weight
             results.keep(name, result)
-            order.done(name)
-            waiting.extendleft(reversed(order.get_ready()))
             if task.returned:
                 yield name, result
 
 
-class _Results:
+class Results:
     """Results that further tasks take."""
 
     def __init__(self, tasks: Mapping[Any, Task]) -> None:
@@ -159,6 +158,17 @@ class _Results:
             if not self._uses[name]:
                 del self._kept[name]
         return taken
+
+
+def turns(tasks: Mapping[Name, Task]) -> list[Name]:
+    """Order tasks as listed, except that each comes as soon as its inputs are there."""
+    order, found = in_order(tasks), []
+    waiting = deque(order.get_ready())
+    while waiting:
+        found.append(waiting.popleft())
+        order.done(found[-1])
+        waiting.extendleft(reversed(order.get_ready()))
+    return found
 
 
 def in_order(tasks: Mapping[Name, Task]) -> TopologicalSorter[Name]:

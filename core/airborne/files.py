@@ -23,6 +23,9 @@ from .spooling import density_of, points_of, spool
 from .squares import Key, Piece, pieces_by_square
 from .survey import AirborneTrack, Guide, Survey, joined_others, lines_of, track_of
 
+FIT_S = 2e-5
+"""Run time of the fit per point, in seconds."""
+
 MIN_LENGTH_M = 30.0
 """Shorter guides have too few sections for a curve."""
 
@@ -108,7 +111,9 @@ def _fit(
 ) -> list[list[tuple[Piece, Fitted]]]:
     """Fit all squares that have points, and return what was found along each guide, piece by piece."""
     tasks: dict[Key, Task] = {
-        key: Task(f"The square {key}", fit_square, (folder, key, pieces, spacings_m, parameters), weight=counts[key])
+        key: Task(
+            f"The square {key}", fit_square, (folder, key, pieces, spacings_m, parameters), weight=FIT_S * counts[key]
+        )
         for key, pieces in squares.items()
         if key in counts
     }

@@ -11,7 +11,7 @@ from ..clouds.points import Request
 from ..clouds.readers import read_classes
 from ..disk import writing
 from ..progress import Progress
-from ..tasks import Context, Runner, Task
+from ..tasks import READ_S, Context, Runner, Task
 from .beside import WIDE_M
 from .ridges import HALF_M
 from .squares import Key, Piece, areas_along, cells_around, in_cells
@@ -55,7 +55,7 @@ def spool(
         touched = ~((areas[:, :2] > high) | (areas[:, 2:] < low)).any(axis=1)  # an extent of NaN may be anywhere
         if touched.any():
             arguments = (request, number, areas[touched], around, folder)
-            tasks[number] = Task(header.path.name, spool_file, arguments, weight=float(header.point_count))
+            tasks[number] = Task(header.path.name, spool_file, arguments, weight=READ_S * (header.point_count + 1))
     counts: dict[Key, int] = {}
     for _, one in runner.run(tasks, progress):
         for key, count in one.items():

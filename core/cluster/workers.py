@@ -18,17 +18,11 @@ from distributed.security import Security
 from distributed.system import MEMORY_LIMIT
 
 from ..errors import ParameterError, RailExtractError
+from ..kernels import ENVIRONMENT
 from ..scratch import scratch_folder, sweep
 
 MAX_DEATHS = 10
 """Local workers that may die while they execute a task, for whatever reason, before the task is abandoned."""
-
-ONE_THREAD = tuple(f"{name}_NUM_THREADS" for name in ("OMP", "MKL", "OPENBLAS", "RAYON")) + ("OPENCV_FOR_THREADS_NUM",)
-"""Variables that keep a local worker on one core: there are as many workers as cores."""
-
-MEMORY_KEPT = {"MALLOC_TRIM_THRESHOLD_": 256 << 20, "MALLOC_MMAP_THRESHOLD_": 32 << 20}
-"""Bytes of freed memory that glibc keeps in a local worker, and the largest array that it takes from them. With Dask's
-64 KiB every array returns to the system, which clears the memory before it lends it again: a tenth of the run time."""
 
 HERE = "127.0.0.1"
 """Address that only programs on this computer reach."""
@@ -142,9 +136,8 @@ def connect(
         return
     if workers is None:
         workers = max(min(os.cpu_count() or 1, MEMORY_LIMIT // WORKER_BYTES), 1)
-    environment = {**dict.fromkeys(ONE_THREAD, 1), **MEMORY_KEPT}
     settings: dict[str, object] = {
-        f"distributed.nanny.pre-spawn-environ.{name}": value for name, value in environment.items()
+        f"distributed.nanny.pre-spawn-environ.{name}": value for name, value in ENVIRONMENT.items()
     }
     settings["distributed.scheduler.allowed-failures"] = MAX_DEATHS
     if dashboard_port is None:  # Dask serves pages without a dashboard, too

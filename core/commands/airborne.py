@@ -24,6 +24,7 @@ from .options import (
     TILES_HELP,
     Console,
     add_cloud_arguments,
+    add_workers_argument,
     destination_of,
     extent_of,
     limited,
@@ -72,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         value = getattr(AirborneParameters, f"{name}_m")
         option = f"--{name.replace('_', '-')}"
         parser.add_argument(option, type=float, default=value, metavar="M", help=f"{text} (default: {value:g})")
-    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes (default: 1)")
+    add_workers_argument(parser)
 
 
 def run(args: argparse.Namespace) -> None:
@@ -85,8 +86,6 @@ def run(args: argparse.Namespace) -> None:
     """
     standard = resolve(args.standard, args.gauge, args.head_width)
     parameters = parameters_of(args, standard)
-    if args.workers < 1:
-        raise ParameterError(f"--workers must be 1 or more, not {args.workers}.")
     progress = Estimating(Console())
     _check_outputs(args)
     given = {name: getattr(args, name) for name in SUFFIXES if getattr(args, name) is not None}
@@ -94,7 +93,7 @@ def run(args: argparse.Namespace) -> None:
     codes = numbers_in(args.classes, "--classes", int)
     request = limited(ask(args.tiles, codes, args.crs, extent_of(args.extent), progress), args)
     parent = next(iter(outputs.values())).file.parent
-    with writing(parent), scratch_folder(parent) as folder, runner_of(args.workers, folder) as runner:
+    with writing(parent), scratch_folder(parent) as folder, runner_of(args) as runner:
         if args.guide is None:
             found = propose_guides(request, parameters, folder / "points", runner, progress)
         else:

@@ -22,6 +22,7 @@ from .options import (
     Console,
     add_cloud_arguments,
     add_method_arguments,
+    add_workers_argument,
     extent_of,
     gauges_of,
     limited,
@@ -43,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_method_arguments(parser)
     parser.add_argument("--pairs-only", action="store_true", help="leave out rails without a partner")
     add_label_arguments(parser, "the rail points that are found")
-    parser.add_argument("--workers", type=int, default=1, help="processes that work on the cloud (default: 1)")
+    add_workers_argument(parser)
     text = "keep the rail class of points that are not found; otherwise they become class 1"
     parser.add_argument("--no-reset", action="store_true", help=text)
 
@@ -57,8 +58,6 @@ def run(args: argparse.Namespace) -> None:
         A parameter is wrong, a file can't be read, or the output can't be written.
     """
     check_rail_class(args)
-    if args.workers < 1:
-        raise ParameterError(f"--workers must be 1 or more, not {args.workers}.")
     standard = resolve(args.standard, args.gauge, args.head_width)
     gauges_m = tuple(gauge_m for gauge_m, _ in gauges_of(args, standard))
     if args.only_guided and args.guide is None:
@@ -74,7 +73,7 @@ def run(args: argparse.Namespace) -> None:
     with (
         writing(planned.file.parent),
         scratch_folder(planned.file.parent) as folder,
-        runner_of(args.workers, folder) as runner,
+        runner_of(args) as runner,
     ):
         result = classify_files(request, settings, choice, planned, folder, runner, progress)
     print_figures(result.figures, result.point_count)

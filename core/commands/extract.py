@@ -19,7 +19,7 @@ from ..fields import CENTERLINE_FIELDS, FINDING_FIELDS, RAIL_FIELDS
 from ..frpdf import DEVICES, ENGINES, MAX_PASSES
 from ..frpdf.models import NAMES, choose
 from ..learned.model import weights_for
-from ..parameters import DEFAULT_STEP_M, LEARNED, STRIPS, Parameters
+from ..parameters import DEFAULT_STEP_M, DEFAULT_WORKERS, LEARNED, MAX_WORKERS, STRIPS, Parameters
 from ..pipeline import extract_files
 from ..progress import Estimating, Progress
 from ..rails import RailNetwork
@@ -46,9 +46,6 @@ NEEDS = {name: name for name in ("distributed", "cryptography", "pyogrio", "shap
 
 LAST_PORT = 65_535
 """Largest number of a port; 0 stands for any that is free."""
-
-MAX_WORKERS = 1000
-"""More than a computer has cores; starting more would only use up its memory."""
 
 INCOMPLETE = 2
 """Exit code of a run that has written results in which some files or squares are missing."""
@@ -135,7 +132,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     run.add_argument("--tls-key", type=Path, metavar="PEM", help="private key of this certificate")
     text = "show what local workers do at http://127.0.0.1:PORT, to all users of this computer (default: nowhere)"
     run.add_argument("--dashboard", type=int, metavar="PORT", help=text)
-    run.add_argument("--workers", type=int, help="local workers (default: one per core, or fewer if memory is short)")
+    text = "local workers; 0, the default, is one per core, or fewer if memory is short"
+    run.add_argument("--workers", type=int, default=DEFAULT_WORKERS, metavar="N", help=text)
     run.add_argument("--work", type=Path, help="folder that keeps finished results, so that a restart continues")
     run.add_argument(
         "--square-tiles",
@@ -185,13 +183,12 @@ def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameter
     choose(standard.gauge_m, standard.head_width_m, args.model)
     gauges = gauges_of(args, standard, args.centerline_tolerance)
     numbers = {field.name: getattr(args, _option(field.name)[2:].replace("-", "_")) for field in _number_fields()}
-    workers = 0 if args.workers is None else args.workers - 1
-    for name, value in {**numbers, "iterations": args.iterations, "step": args.step, "workers": workers}.items():
+    for name, value in {**numbers, "iterations": args.iterations, "step": args.step, "workers": args.workers}.items():
         if not (math.isfinite(value) and value >= 0) or (name in POSITIVE and value == 0):
             raise ParameterError(
                 f"The option {_option(name)} can't be {getattr(args, name, value)}: give a larger number."
             )
-    for name, value, largest in (("iterations", args.iterations, MAX_PASSES), ("workers", workers + 1, MAX_WORKERS)):
+    for name, value, largest in (("iterations", args.iterations, MAX_PASSES), ("workers", args.workers, MAX_WORKERS)):
         if value > largest:
             raise ParameterError(f"The option {_option(name)} can't be {value}: give {largest} or less.")
     return Parameters(
@@ -250,7 +247,7 @@ def _run_in(
     progress = Estimating(Console())
     files = _certificate_files(args, progress)
     certificates = Certificates(*files) if files else None
-    with connect(args.scheduler, args.workers, certificates, args.dashboard) as client:
+    with connect(args.scheduler, args.workers or None, certificates, args.dashboard) as client:
         runner = DaskRunner(client, folder)
         request = ask(args.tiles, codes, args.crs, extent, progress, unreadable=runner.failures)
         request = limited(request, args)

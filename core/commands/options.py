@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -15,10 +15,11 @@ from types import ModuleType
 from ..clouds.points import Request
 from ..disk import Destination, writing
 from ..errors import ParameterError
-from ..parameters import GEOMETRY, LEARNED, LEAVE_OUT, METHODS, Parameters
+from ..parameters import DEFAULT_WORKERS, GEOMETRY, LEARNED, LEAVE_OUT, MAX_WORKERS, METHODS, Parameters
 from ..progress import Progress
 from ..standards import DEFAULT, Gauge, RailStandard, read_gauges
-from ..tasks import InTurn, Runner
+from ..tasks import Runner
+from ..workers.runner import workers
 
 TILES_HELP = (
     "point clouds, virtual point clouds, folders of tiles, or patterns such as tiles/*.laz; @FILE reads the names, one "
@@ -160,27 +161,23 @@ def extent_of(text: str | None) -> tuple[float, float, float, float] | None:
     return xmin, ymin, xmax, ymax
 
 
-@contextmanager
-def runner_of(workers: int, folder: Path) -> Iterator[Runner]:
-    """Execute tasks in this process, or in several of their own.
+def add_workers_argument(parser: argparse._ActionsContainer) -> None:
+    """Declare the number of workers."""
+    text = "processes that compute at a time; 0, the default, is one per core, as far as memory allows"
+    parser.add_argument("--workers", type=int, default=DEFAULT_WORKERS, metavar="N", help=text)
+
+
+def runner_of(args: argparse.Namespace) -> AbstractContextManager[Runner]:
+    """Provide the runner with the workers that are asked for.
 
     Raises
     ------
     ParameterError
-        The package that runs them is not installed.
+        No computer has that many.
     """
-    if workers == 1:
-        yield InTurn()
-        return
-    try:
-        from ..cluster.runner import DaskRunner
-        from ..cluster.workers import connect
-    except ImportError as error:
-        raise ParameterError(
-            "--workers needs the package distributed: in a clone, run pip install .[cluster]."
-        ) from error
-    with connect(None, workers) as client:
-        yield DaskRunner(client, folder / "tasks")
+    if not 0 <= args.workers <= MAX_WORKERS:
+        raise ParameterError(f"--workers must be a number from 0 to {MAX_WORKERS}, not {args.workers}.")
+    return workers(args.workers)
 
 
 class Console(Progress):

@@ -20,7 +20,7 @@ from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from ..scratch import scratch_folder
 from ..standards import RAIL_CLASS
-from ..tasks import Context, Runner, Task, in_listed_order
+from ..tasks import READ_S, Context, Runner, Task, in_listed_order
 from .finding import find_rail_points, report
 
 UNCLASSIFIED = 1
@@ -289,7 +289,10 @@ class _Writer:
             new.mkdir(parents=True)
             tasks = {
                 place: Task(
-                    f"Writing {name}", _write_tile, (self, place, str(new / name)), weight=header.point_count + 1
+                    f"Writing {name}",
+                    _write_tile,
+                    (self, place, str(new / name)),
+                    weight=READ_S * (header.point_count + 1),
                 )
                 for place, (name, header) in enumerate(zip(output.names, self._request.headers))
             }

@@ -26,11 +26,14 @@ from ..progress import SILENT, Progress, counted
 from ..rails import ENOUGH_CELLS_PER_M, SearchFigures
 from ..squares.grid import Key, Square, points_by_square, unique_keys
 from ..standards import LAST_CLASS
-from ..tasks import Context, Runner, Task, in_listed_order
+from ..tasks import READ_S, Context, Runner, Task, in_listed_order
 
 POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8"), ("mark", "<u4")])
 """A point on disk: coordinates in units of the CRS, its number among all points of all files, and its mark, see
 `passes.marks_of`, or its class."""
+
+SEARCH_S = 1e-6
+"""Run time of the search per point, in seconds; a network takes ten times as long."""
 
 FEW_FILES = 3
 """Files whose first points are asked whether a scanner measured them."""
@@ -207,7 +210,7 @@ def sort_files(
             f"Reading {header.path.name}",
             _sort_file,
             (replace(request, headers=()), header, int(starts[place]), settings, str(folder), with_class),
-            weight=header.point_count + 1,
+            weight=READ_S * (header.point_count + 1),
         )
         for place, header in enumerate(request.headers)
     }
@@ -271,7 +274,7 @@ def _append(
 def _search_task(key: Key, sorted_files: Sequence[SortedFile], zero: LocalFrame, settings: Settings) -> Task:
     """Make the task that searches a square."""
     files = [str(file) for file in files_of(key, sorted_files)]
-    weight = sum(one.counts.get(key, 0) for one in sorted_files)
+    weight = SEARCH_S * sum(one.counts.get(key, 0) for one in sorted_files)
     arguments = (Square.on_grid(key, settings.side_m, zero), files, settings.at(key))
     return Task(f"Searching square {key}", _search, arguments, weight=weight)
 

@@ -27,6 +27,7 @@ from .toolbox_groups import RAW_CLOUDS
 if TYPE_CHECKING:
     from ...core.airborne.survey import Guide, Survey
     from ...core.clouds.points import Request
+    from ...core.tasks import Runner
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,7 @@ class AirborneCenterlines(RailAlgorithm):
             *groups.rail(),
             *groups.airborne(),
             *groups.area(),
+            groups.workers(),
             outputs.airborne_centerlines(),
             outputs.airborne_stations(),
             outputs.findings(),
@@ -104,22 +106,23 @@ class AirborneCenterlines(RailAlgorithm):
         values = ParameterValues(self, parameters, context)
         request = request_points(job.cloud, job.class_codes, values.extent, progress)
         work = self._fit if job.guides else self._propose
-        return work(job, request, parameters, context, progress)
+        with values.runner() as runner:
+            return work(job, request, runner, parameters, context, progress)
 
     def _propose(
         self,
         job: Job,
         request: Request,
+        runner: Runner,
         parameters: dict[str, Any],
         context: QgsProcessingContext,
         progress: Progress,
     ) -> dict[str, Any]:
         """Search the cloud and write the proposed guides."""
         from ...core.airborne.proposals import propose_guides
-        from ...core.tasks import InTurn
 
         with points_folder() as folder:
-            found = propose_guides(request, job.parameters, folder / "points", InTurn(), progress)
+            found = propose_guides(request, job.parameters, folder / "points", runner, progress)
         progress.check()
         self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, found.frame)
         progress.info(found.summary)
@@ -132,6 +135,7 @@ class AirborneCenterlines(RailAlgorithm):
         self,
         job: Job,
         request: Request,
+        runner: Runner,
         parameters: dict[str, Any],
         context: QgsProcessingContext,
         progress: Progress,
@@ -139,10 +143,9 @@ class AirborneCenterlines(RailAlgorithm):
         """Fit the tracks along the guides and write what was found."""
         from ...core.airborne.files import survey_files
         from ...core.report.airborne import airborne_findings, airborne_summary
-        from ...core.tasks import InTurn
 
         with points_folder() as folder:
-            survey = survey_files(request, job.guides, job.parameters, folder / "points", InTurn(), progress)
+            survey = survey_files(request, job.guides, job.parameters, folder / "points", runner, progress)
         progress.check()
         found = airborne_findings(survey) if is_wanted(parameters.get("FINDINGS"), context) else ()
         frame, rest = survey.frame, (parameters, context)

@@ -153,6 +153,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     ) -> dict:
         """Compute in any thread; every error becomes one sentence."""
         progress = QgisProgress(feedback, self.parameterDefinitions())
+        progress.status(tr("Loading packages"))  # the first run of a session takes a second or two for it
         try:
             with running(feedback), one_thread(*blas()):
                 results = self.compute(self._job, parameters, context, progress)

@@ -69,6 +69,7 @@ class ClassifyRailPoints(RailAlgorithm):
             *groups.guide(),
             *groups.method(),
             *groups.labels(),
+            groups.workers(),
             outputs.classified(),
         ):
             self.addParameter(definition)
@@ -102,7 +103,6 @@ class ClassifyRailPoints(RailAlgorithm):
         from ...core.classify.settings import Settings
         from ...core.labelling.files import Choice, classify_files, plan_output
         from ...core.labelling.finding import guide_of
-        from ...core.tasks import InTurn
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
         gauges_m = (job.standard.gauge_m, *(gauge_m for gauge_m, _ in job.other_gauges))
@@ -113,8 +113,8 @@ class ClassifyRailPoints(RailAlgorithm):
         if job.guide:
             guide = guide_of(request, job.guide, values.number("GUIDE_DISTANCE"), values.flag("ONLY_GUIDED"))
         settings = Settings(gauges_m, job.standard.head_width_m, values.flag("KEEP_SINGLE"), guide, job.weights)
-        with points_folder() as folder:
-            result = classify_files(request, settings, choice, output, folder, InTurn(), progress)
+        with points_folder() as folder, values.runner() as runner:
+            result = classify_files(request, settings, choice, output, folder, runner, progress)
         return classified_results(result.file, result.point_count, result.figures)
 
 

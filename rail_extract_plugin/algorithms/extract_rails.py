@@ -95,6 +95,7 @@ class ExtractRails(RailAlgorithm):
             *groups.pairing(),
             groups.strips(),
             groups.step(),
+            groups.workers(),
             *inputs.axis(optional=True),
         ):
             self.addParameter(definition)
@@ -166,7 +167,6 @@ class ExtractRails(RailAlgorithm):
         """Extract the rails and tracks, then write the outputs."""
         from ...core.pipeline import extract_files
         from ...core.report import Origin, list_findings, summary
-        from ...core.tasks import InTurn
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
         request = request_points(job.cloud, job.class_codes, values.extent, progress)
@@ -183,8 +183,8 @@ class ExtractRails(RailAlgorithm):
             quality_step_m=values.number("STEP") if quality or findings or report else None,
             keep_cleaned=cleaned,
         )
-        with points_folder() as folder:
-            network = extract_files(request, folder, settings, InTurn(), progress, classify, job.weights, job.seeds)
+        with points_folder() as folder, values.runner() as runner:
+            network = extract_files(request, folder, settings, runner, progress, classify, job.weights, job.seeds)
         progress.check()
         if job.axes:
             network = replace(network, geometry=job.axes.along(network.geometry, network.frame, progress))

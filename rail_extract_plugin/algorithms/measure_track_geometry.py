@@ -79,7 +79,7 @@ class MeasureTrackGeometry(RailAlgorithm):
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs in the order of the interface."""
         layers = (inputs.centerlines(), inputs.rails_of_tracks(), inputs.points_of_rails())
-        settings = (groups.step(), *groups.head(), groups.other_gauges(), groups.leave_out())
+        settings = (groups.step(), *groups.head(), groups.other_gauges(), groups.leave_out(), groups.workers())
         axis = inputs.axis(optional=True)
         findings = outputs.findings()
         findings.setCreateByDefault(False)
@@ -114,18 +114,17 @@ class MeasureTrackGeometry(RailAlgorithm):
         from ...core.rails import RailNetwork
         from ...core.report import Origin, list_findings, summary
         from ...core.squares.remeasuring import measure_rails
-        from ...core.tasks import InTurn
         from ...core.tracks.geometry import measure_track_geometry
         from ...core.tracks.widths_by_gauge import widths_by_gauge
         from ..reading.track_inputs import check_gauges, read_inputs, with_measured_gauge
 
         values, progress = ParameterValues(self, parameters, context), Recording(progress)
         lines = values.lines("INPUT"), values.lines("RAILS")
-        with points_folder() as folder:
+        with points_folder() as folder, values.runner() as runner:
             tracks = read_inputs(*lines, job.cloud, folder, progress.span(0, READING))
             measuring = progress.span(READING, MEASURING)
             heads_m = widths_by_gauge(tracks.rails, job.gauges, Parameters.centerline_tolerance_m)
-            rails = measure_rails(tracks.rails, tracks.clouds, heads_m, InTurn(), measuring)
+            rails = measure_rails(tracks.rails, tracks.clouds, heads_m, runner, measuring)
         share = progress.span(MEASURING, 1)
         step_m = values.number("STEP")
         measured = measure_track_geometry(tracks.centerlines, rails, job.head_width_m, step_m, share, job.gauges)

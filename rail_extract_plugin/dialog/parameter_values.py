@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,6 +32,7 @@ from ...core.standards import (
     resolve,
 )
 from ..reading.clouds import CloudSource, checked_crs, cloud_source
+from ..setup.interpreter import known_interpreter
 from ..systems import prepare_system, system
 
 if TYPE_CHECKING:
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
     from ...core.airborne.survey import Guide
     from ...core.clouds.mask import Mask
     from ...core.raster_file import RasterHeader
+    from ...core.tasks import Runner
     from ..reading.axes import PlacedAxes
 
 INCREASING, DECREASING = DIRECTIONS = ("INCREASING", "DECREASING")
@@ -114,6 +117,12 @@ class ParameterValues:
     def optional_number(self, name: str) -> float | None:
         """Read a number that may be left empty."""
         return self.number(name) if self.filled(name) else None
+
+    def runner(self) -> AbstractContextManager[Runner]:
+        """Provide the runner with as many processes as WORKERS asks for."""
+        from ...core.workers.runner import workers
+
+        return workers(int(self.number("WORKERS")), known_interpreter)
 
     def flag(self, name: str) -> bool:
         """Read a choice of yes or no."""

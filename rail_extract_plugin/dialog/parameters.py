@@ -20,8 +20,10 @@ from ...core.parameters import (
     DEFAULT_EPOCHS,
     DEFAULT_GUIDE_DISTANCE_M,
     DEFAULT_STEP_M,
+    DEFAULT_WORKERS,
     GEOMETRY,
     LEAVE_OUT,
+    MAX_WORKERS,
     METHODS,
     STRIPS,
     TRANSITIONS,
@@ -516,6 +518,17 @@ def comparison() -> Definitions:
         ),
         advanced(reach, tr("Lines further from those of the reference are not the same line: missing and extra.")),
         advanced(step, tr("Distance between the points along each line.")),
+    )
+
+
+def workers() -> QgsProcessingParameterDefinition:
+    """Define how many processes compute."""
+    return advanced(
+        number("WORKERS", tr("Processes"), DEFAULT_WORKERS, maximum=MAX_WORKERS, whole=True),
+        tr(
+            "Processes that compute at a time, on squares of a large cloud or on its files; results do not depend on "
+            "them. 0 starts one per core, as far as a quarter of the memory or 2 GB allow; 1 computes in QGIS itself."
+        ),
     )
 
 

@@ -17,6 +17,7 @@ SECTIONS = {
     ),
     tr("Tracks"): ("GAUGE", "HEAD_WIDTH", "OTHER_GAUGES", "CENTERLINE_TOLERANCE", "STEP"),
     tr("Axis"): ("AXIS", "START_KM", "POSTS", "POST_FIELD", "JUMPS", "DIRECTION", "FORMAT"),
+    tr("Computer"): ("WORKERS",),
     tr("Files of alignments"): ("VERTICAL_CURVES", "EAST_FIRST"),
 }
 """Parameters by section."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 from ...core.errors import RailExtractError
+from ...core.workers.process import Interpreter
 from . import processes
 from .dependencies import version_of
 
@@ -20,14 +21,6 @@ except ImportError:
 print(*sys.version_info[:2], __version__)
 """
 # A Python other than that of QGIS prints something else, or has no numpy.
-
-
-@dataclass(frozen=True)
-class Interpreter:
-    """A Python program, and the environment variables that it needs in addition to those of QGIS."""
-
-    program: str
-    changes: dict[str, str] = field(default_factory=dict)
 
 
 def find_interpreter() -> Interpreter:
@@ -52,6 +45,12 @@ def find_interpreter() -> Interpreter:
         "install the packages into a folder with another tool, and set the environment variable RAIL_EXTRACT_PACKAGES "
         "to that folder."
     )
+
+
+@lru_cache
+def known_interpreter() -> Interpreter:
+    """Return the Python program that has been found; it stays the same for as long as QGIS runs."""
+    return find_interpreter()
 
 
 def candidates(executable: Path, prefix: Path, platform: str) -> Iterator[Path]:

@@ -2,13 +2,14 @@
 
 import os
 import shutil
+import signal
 import sqlite3
 import zipfile
 
 import faults
 import numpy as np
 import pytest
-from faults import REFUSED, Fault
+from faults import FINE, REFUSED, Fault
 from osgeo import ogr
 from qgis.core import (
     Qgis,
@@ -21,8 +22,11 @@ from qgis.core import (
 )
 from rail_extract.core import pipeline
 from rail_extract.core.disk import Destination
+from rail_extract.core.errors import RailExtractError
 from rail_extract.core.frpdf import engine, models
+from rail_extract.core.workers import process, runner
 from rail_extract.rail_extract_plugin.algorithms import base
+from rail_extract.rail_extract_plugin.dialog import parameter_values
 from rail_extract.rail_extract_plugin.setup import dependencies
 
 resource = pytest.importorskip("resource", reason="only Unix limits the size of files")
@@ -261,11 +265,44 @@ def failing(module, name, error):
     return prepare
 
 
+def divided(bench):
+    """Two tiles, which are read by two workers however small they are."""
+    (bench.folder / "tiles").mkdir()
+    for number in range(2):
+        bench.cloud(bench.track(length_m=6.0) + [6.0 * number, 0.0, 0.0], f"tiles/{number}.las")
+    bench.patch.setattr(runner, "WORTH_S", 0.0)
+    return {"INPUT": bench.folder / "tiles", "ITERATIONS": 1, "WORKERS": 2}
+
+
+def ended_workers(bench):
+    """The system ends a worker process, as Linux does if memory is short."""
+    bench.patch.setattr(process.Worker, "send", lambda self, task: os.kill(self.number, signal.SIGKILL))
+    return divided(bench)
+
+
+def unknown_interpreter(bench):
+    """The Python program of QGIS is not found."""
+
+    def fail():
+        raise RailExtractError("The Python program of this QGIS was not found.")
+
+    bench.patch.setattr(parameter_values, "known_interpreter", fail)
+    return divided(bench)
+
+
 class Panic(BaseException):
     """As libraries written in Rust raise it."""
 
 
 FAULTS = [
+    Fault(
+        "a worker process is ended from outside",
+        ended_workers,
+        REFUSED,
+        "Reading ….las failed, because its worker process ended: close other programs that take memory, or set "
+        "WORKERS to 1.",
+    ),
+    Fault("worker processes cannot be started", unknown_interpreter, FINE, gives=TRACK),
     Fault(
         "missing package laspy",
         without("laspy"),

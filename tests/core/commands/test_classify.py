@@ -12,6 +12,7 @@ from rail_extract.core.errors import NoRailPointsError
 from rail_extract.core.pipeline import Parameters, extract_files
 from rail_extract.core.standards import SEARCHED_CLASSES
 from rail_extract.core.tasks import InTurn
+from rail_extract.core.workers import runner
 from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, flat, rough, with_track
 
 CORNER = np.array([500_000.0, 5_000_000.0, 100.0])
@@ -59,18 +60,20 @@ def test_a_classified_copy_is_written(save, tmp_path, capsys):
     assert [one.name for one in new.parent.iterdir()] == ["new.las"]
 
 
-def test_workers_change_nothing(save, tmp_path):
-    """Two processes of their own."""
+def test_workers_change_nothing(save, tmp_path, monkeypatch):
+    """However small the cloud is."""
+    monkeypatch.setattr(runner, "WORTH_S", 0.0)
     source = str(save(scene()[0]))
     for count in ("1", "2"):
         assert main(["classify", source, "--output", str(tmp_path / f"{count}.las"), "--workers", count]) == 0
     assert (tmp_path / "1.las").read_bytes() == (tmp_path / "2.las").read_bytes()
 
 
-def test_there_is_a_worker_at_least(save, tmp_path, capsys):
-    options = ["--output", str(tmp_path / "new.las"), "--workers", "0"]
+@pytest.mark.parametrize("count", ["-1", "1001"])
+def test_a_number_of_workers_that_no_computer_has_is_refused(count, save, tmp_path, capsys):
+    options = ["--output", str(tmp_path / "new.las"), "--workers", count]
     assert main(["classify", str(save(scene()[0])), *options]) == 1
-    assert "--workers must be 1 or more, not 0." in capsys.readouterr().err
+    assert f"--workers must be a number from 0 to 1000, not {count}." in capsys.readouterr().err
 
 
 def test_a_class_out_of_range_is_refused(save, tmp_path, capsys):

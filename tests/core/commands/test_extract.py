@@ -180,7 +180,7 @@ def test_an_output_that_is_a_folder_is_refused_before_the_run(tiles, tmp_path, c
         (["--gauge", "300"], "gauge"),
         (["--max-gap", "-1"], "--max-gap"),
         (["--step", "0"], "--step"),
-        (["--workers", "0"], "--workers"),
+        (["--workers", "-1"], "--workers"),
         (["--workers", "100000"], "--workers can't be 100000: give 1000 or less."),
         (["--iterations", "6"], "--iterations can't be 6: give 5 or less."),
         (["--smoothing-xy", "0"], "--smoothing-xy"),

@@ -110,7 +110,7 @@ def test_advanced_fields_are_in_sections(open_dialog):
     layout = group.layout()
     widgets = [layout.itemAt(place).widget() for place in range(layout.count())]
     titles = [widget.text() for widget in widgets if isinstance(widget, QLabel)]
-    assert titles == ["Cloud", "Raw clouds", "Network", "Lines", "Tracks", "Axis", "More results"]
+    assert titles == ["Cloud", "Raw clouds", "Network", "Lines", "Tracks", "Axis", "Computer", "More results"]
 
 
 @pytest.mark.parametrize("name", NAMES)

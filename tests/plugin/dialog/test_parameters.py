@@ -1,7 +1,7 @@
 import pytest
 from qgis.core import QgsProcessingParameterDefinition
 from rail_extract.core.errors import ParameterError
-from rail_extract.core.parameters import DEFAULT_STEP_M, FitParameters, GrowParameters, Parameters
+from rail_extract.core.parameters import DEFAULT_STEP_M, DEFAULT_WORKERS, FitParameters, GrowParameters, Parameters
 from rail_extract.core.standards import STANDARDS
 from rail_extract.rail_extract_plugin.dialog.parameter_values import CHOICES, GROWTH, NUMBERS, class_numbers
 
@@ -38,6 +38,7 @@ PARAMETERS = [
     ("CENTERLINE_TOLERANCE", "number", 0.05),
     ("STRIPS", "enum", "AS_THEY_ARE"),
     ("STEP", "number", 1.0),
+    ("WORKERS", "number", 0),
     ("AXIS", "source", None),
     ("START_KM", "number", None),
     ("DIRECTION", "enum", "INCREASING"),
@@ -78,7 +79,7 @@ OPTIONAL |= {"AXIS", "START_KM", "POSTS", "POST_FIELD", "JUMPS"}
 
 
 CORE_DEFAULTS = {name: getattr(Parameters, field) for name, field in {**NUMBERS, **CHOICES}.items()}
-CORE_DEFAULTS |= {"ITERATIONS": Parameters.passes, "STEP": DEFAULT_STEP_M}
+CORE_DEFAULTS |= {"ITERATIONS": Parameters.passes, "STEP": DEFAULT_STEP_M, "WORKERS": DEFAULT_WORKERS}
 GROW_DEFAULTS = {name: getattr(GrowParameters, field) for name, field in GROWTH.items()}
 GROW_DEFAULTS |= {"BOTH": GrowParameters.both, "MAX_OUTLIERS": GrowParameters.max_outliers}
 FIT_DEFAULTS = {"MIN_LENGTH": FitParameters.min_length_m, "TRANSITIONS": FitParameters.transitions}
@@ -123,7 +124,7 @@ def test_choices_are_static_strings(algorithm, name, options):
 
 
 def test_labels_of_quantities_state_their_unit(algorithm):
-    unitless = {"ITERATIONS"}
+    unitless = {"ITERATIONS", "WORKERS"}
     for definition in algorithm.parameterDefinitions():
         if definition.type() == "number" and definition.name() not in unitless:
             assert definition.description().endswith(("[m]", "[mm]", "[°]", "[km]"))

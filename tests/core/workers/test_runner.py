@@ -1,0 +1,332 @@
+"""Workers on this computer: what they return, say and raise is what one process would, and they end with it."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from rail_extract.core.clouds.points import ask
+from rail_extract.core.errors import Cancelled, RailExtractError
+from rail_extract.core.kernels import blas, one_thread
+from rail_extract.core.pipeline import Parameters, extract_files
+from rail_extract.core.progress import Progress
+from rail_extract.core.tasks import InTurn, Task
+from rail_extract.core.workers import runner as runner_module
+from rail_extract.core.workers.process import Interpreter
+from rail_extract.core.workers.runner import Workers, worker_count, workers
+
+FUNCTIONS = """
+import os, sys, threading, time
+from pathlib import Path
+from rail_extract.core.errors import NoTrackError
+
+def add(number, context):
+    context.progress.info(f"info {number}")
+    if number % 3 == 0:
+        context.progress.warning(f"warning {number}")
+    return number + sum(context.results.values())
+
+def about(context):
+    print("what a library prints")
+    os.system("echo and what a program prints")
+    return os.getpid(), os.environ["OMP_NUM_THREADS"]
+
+def fail(number, after_s, context):
+    time.sleep(after_s)
+    context.progress.warning(f"before {number}")
+    raise NoTrackError(f"task {number}")
+
+class Odd(Exception):
+    def __init__(self):
+        super().__init__("odd")
+        self.lock = threading.Lock()
+
+def fail_oddly(context):
+    raise Odd
+
+def die(context):
+    os._exit(9)
+
+def leave(file, context):
+    Path(file).write_text("")
+
+def slow(folder, context):
+    Path(folder, str(os.getpid())).write_text("")
+    for number in range(600):
+        context.progress.set_fraction(number / 1200)
+        time.sleep(0.1)
+
+def half(context):
+    context.progress.status("half")
+    time.sleep(0.15)
+    context.progress.set_fraction(0.5)
+"""
+
+INTERPRETER = Interpreter(sys.executable)
+
+
+class Log(Progress):
+    def __init__(self, cancel_at=2.0):
+        self.said, self.fractions, self.cancel_at = [], [], cancel_at
+
+    def set_fraction(self, fraction):
+        self.fractions.append(fraction)
+
+    def status(self, text):
+        self.said.append(("status", text))
+
+    def info(self, text):
+        self.said.append(("info", text))
+
+    def warning(self, text):
+        self.said.append(("warning", text))
+
+    def is_cancelled(self):
+        return bool(self.fractions) and self.fractions[-1] >= self.cancel_at
+
+
+@pytest.fixture(scope="module")
+def functions(tmp_path_factory):
+    """A module of tasks that other processes find."""
+    folder = tmp_path_factory.mktemp("functions")
+    (folder / "functions_of_tasks.py").write_text(FUNCTIONS)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(folder))
+        patch.setattr(runner_module, "WORTH_S", 0.0)
+        import functions_of_tasks
+
+        yield functions_of_tasks
+    del sys.modules["functions_of_tasks"]
+
+
+@pytest.fixture(scope="module")
+def two(functions):
+    """A runner with two workers."""
+    runner = Workers(2, lambda: INTERPRETER)
+    yield runner
+    runner.end()
+
+
+def run(runner, tasks, log=None):
+    """Return results in their order, and the error that ended the run, if one did."""
+    found = []
+    try:
+        for one in runner.run(tasks, log or Log()):
+            found.append(one)
+    except RailExtractError as error:
+        return found, str(error)
+    return found, None
+
+
+def is_alive(number):
+    try:
+        os.kill(number, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def wait_until(condition):
+    end = time.monotonic() + 20
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+@st.composite
+def graphs(draw):
+    """For each task, by number, those before it whose results it takes."""
+    count = draw(st.integers(2, 12))
+    return [sorted(draw(st.sets(st.integers(0, number - 1), max_size=3))) if number else [] for number in range(count)]
+
+
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(graphs(), st.sets(st.integers(0, 11), max_size=2))
+def test_results_messages_and_errors_come_as_from_one_process(functions, two, graph, failing):
+    tasks = {
+        number: Task(f"task {number}", functions.add, (number,), needs=tuple(inputs), returned=number % 4 != 1)
+        for number, inputs in enumerate(graph)
+    }
+    for number in failing & set(tasks):
+        tasks[number] = replace(tasks[number], function=functions.fail, arguments=(number, 0.0))
+    expected, found = Log(), Log()
+    assert run(two, tasks, found) == run(InTurn(), tasks, expected)
+    assert [one for one in found.said if "WORKERS" not in one[1]] == expected.said
+
+
+def test_the_first_error_counts_even_if_a_later_one_comes_sooner(functions, two, tmp_path):
+    late = tmp_path / "late"
+    tasks = {
+        1: Task("", functions.add, (1,)),
+        2: Task("", functions.fail, (2, 0.5)),
+        3: Task("", functions.fail, (3, 0.0)),
+        4: Task("", functions.leave, (str(late),)),
+    }
+    log = Log()
+    assert run(two, tasks, log) == ([(1, 1)], "task 2")
+    assert ("warning", "before 3") not in log.said
+    assert not late.exists()
+
+
+def test_an_error_that_cannot_be_sent_says_what_it_was(functions, two):
+    with pytest.raises(RuntimeError, match="Odd: odd"):
+        list(two.run({number: Task("", functions.fail_oddly, ()) for number in range(2)}))
+
+
+def test_workers_have_one_thread_and_what_is_printed_does_no_harm(functions, two):
+    found = dict(two.run({number: Task("", functions.about, (), weight=9) for number in range(4)}))
+    assert {threads for _, threads in found.values()} == {"1"}
+    assert os.getpid() not in {number for number, _ in found.values()}
+
+
+def test_modules_of_the_current_folder_are_not_taken(functions, monkeypatch, tmp_path):
+    for name in ("pickle", "signal", "rail_extract"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit(1)")
+    monkeypatch.chdir(tmp_path)
+    with workers(2) as runner:
+        assert run(runner, {number: Task("", functions.add, (number,)) for number in range(2)})[0] == [(0, 0), (1, 1)]
+
+
+def test_the_progress_rises_to_the_end(functions, two):
+    log = Log()
+    list(two.run({number: Task("", functions.half, (), weight=1 + number) for number in range(4)}, log))
+    assert log.fractions == sorted(log.fractions)
+    assert log.fractions[-1] == pytest.approx(1.0)
+    assert len(log.fractions) == 8
+    assert ("status", "half") in log.said
+
+
+def test_a_cancel_ends_the_processes(functions, tmp_path):
+    log = Log(cancel_at=0.01)
+    with workers(2) as runner:
+        with pytest.raises(Cancelled):
+            list(runner.run({number: Task("", functions.slow, (str(tmp_path),)) for number in range(4)}, log))
+        started = [int(file.name) for file in tmp_path.iterdir()]
+        assert started
+        assert not any(map(is_alive, started))
+
+
+def test_a_worker_that_dies_is_named_by_its_task(functions, two):
+    tasks = {1: Task("Cleaning square (0, 1)", functions.die, ()), 2: Task("", functions.add, (2,))}
+    found, sentence = run(two, tasks)
+    assert found == []
+    assert sentence.startswith("Cleaning square (0, 1) failed, because its worker process ended: ")
+    assert "set WORKERS to 1" in sentence
+    assert run(two, {number: Task("", functions.add, (number,)) for number in range(2)}) == ([(0, 0), (1, 1)], None)
+
+
+KILLED = """
+import os, sys
+sys.path.insert(0, sys.argv[1])
+import functions_of_tasks as functions
+from rail_extract.core.tasks import Task
+from rail_extract.core.workers import runner
+runner.WORTH_S = 0.0
+with runner.workers(2) as two:
+    list(two.run({number: Task("", functions.slow, (sys.argv[2],)) for number in range(2)}))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
+def test_no_process_outlives_a_run_that_is_killed(functions, tmp_path):
+    call = [sys.executable, "-c", KILLED, str(Path(functions.__file__).parent), str(tmp_path)]
+    paths = os.pathsep.join([entry for entry in sys.path if entry])
+    with subprocess.Popen(call, env={**os.environ, "PYTHONPATH": paths}) as process:
+        wait_until(lambda: len(list(tmp_path.iterdir())) == 2)
+        started = [int(file.name) for file in tmp_path.iterdir()]
+        assert all(map(is_alive, started))
+        process.send_signal(signal.SIGKILL)
+    wait_until(lambda: not any(map(is_alive, started)))
+
+
+def test_little_work_and_work_that_cannot_be_divided_stay_in_this_process(functions, monkeypatch):
+    monkeypatch.setattr(runner_module, "WORTH_S", 10.0)
+    chain = {1: Task("", functions.about, (), weight=99), 2: Task("", functions.about, (), needs=(1,), weight=99)}
+    little = {number: Task("", functions.about, (), weight=1) for number in range(4)}
+    much = {number: Task("", functions.about, (), weight=9) for number in range(4)}
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    with workers(2) as runner:
+        for tasks in (chain, little):
+            assert {number for number, _ in dict(runner.run(tasks)).values()} == {os.getpid()}
+        assert os.getpid() not in {number for number, _ in dict(runner.run(much)).values()}
+
+
+def refuse():
+    raise RailExtractError("there is no Python here.")
+
+
+def missing():
+    return Interpreter("/nowhere/python")
+
+
+def ends_at_once():
+    return Interpreter("/bin/false")
+
+
+@pytest.mark.parametrize("interpreter", [refuse, missing, ends_at_once])
+def test_without_workers_this_process_does_the_work_and_says_why(functions, interpreter):
+    log = Log()
+    with workers(2, interpreter) as runner:
+        for _ in range(2):
+            found, _ = run(runner, {number: Task("", functions.add, (number,)) for number in range(2)}, log)
+            assert found == [(0, 0), (1, 1)]
+    reasons = [text for _, text in log.said if text.startswith("One process works alone")]
+    assert len(reasons) == 1
+
+
+def test_one_worker_is_this_process():
+    with workers(1) as runner:
+        assert isinstance(runner, InTurn)
+
+
+def test_the_number_of_workers_follows_cores_and_memory(monkeypatch):
+    monkeypatch.setattr(runner_module, "cores", lambda: 12)
+    for gigabytes, most in ((1, 4), (8, 4), (16, 8), (256, 12)):
+        monkeypatch.setattr(runner_module, "memory_bytes", lambda size=gigabytes: size << 30)
+        assert 2 <= worker_count(0) <= most
+        assert worker_count(0) * runner_module.WORKER_BYTES <= max(2, gigabytes / 4) * 2**30
+    assert worker_count(0) == 12
+    assert worker_count(40) == 40
+    monkeypatch.setattr(runner_module, "cores", lambda: 1)
+    assert worker_count(0) == 1
+
+
+def test_the_memory_of_this_computer_is_known():
+    assert 2**28 < runner_module.memory_bytes() < 2**46
+
+
+def test_lines_are_the_same_to_the_last_bit(functions, tiles, tmp_path):
+    parameters = Parameters(1.435, 0.072, passes=1, engine="OPENCV", square_tiles=4, quality_step_m=1.0)
+    found = []
+    for count in (1, 2, 3):
+        folder = tmp_path / str(count)
+        folder.mkdir()
+        with one_thread(*blas()), workers(count) as runner:
+            found.append(extract_files(ask([tiles], [10]), folder, parameters, runner))
+    assert len(found[0].rails) > 1
+    for other in found[1:]:
+        for name in vars(found[0]):
+            assert difference(getattr(other, name), getattr(found[0], name)) is None
+
+
+def difference(one, other, where="differs"):
+    """Return where two results differ by a bit; None if they do not."""
+    if isinstance(one, np.ndarray):
+        same = (one.dtype, one.shape, one.tobytes()) == (other.dtype, other.shape, other.tobytes())
+        return None if same else where
+    if isinstance(one, (tuple, list)):
+        parts = [(f"[{number}]", *pair) for number, pair in enumerate(zip(one, other))]
+        found = None if len(one) == len(other) else where
+    elif hasattr(one, "__dict__"):
+        parts = [(f".{name}", vars(one)[name], vars(other)[name]) for name in vars(one)]
+        found = None
+    else:
+        return None if type(one) is type(other) and (one == other or one != one) else where
+    return next(filter(None, (difference(*pair, where + name) for name, *pair in parts)), found)
