@@ -105,11 +105,12 @@ def _near(places: np.ndarray, lines: list[np.ndarray]) -> np.ndarray:
     return cKDTree(np.concatenate(lines)).query(places)[0] < ON_TRACK_M
 
 
-def print_searches(seeds: range) -> None:
+def print_searches(rows: list[str], seeds: range) -> None:
     """Print how well guides are proposed."""
     print("| scene | tracks | found | false | false per km2 | s per km2 |")
     print("|---|---|---|---|---|---|")
-    for name, (make, density, footprint_m) in SEARCHES.items():
+    for name in rows:
+        make, density, footprint_m = SEARCHES[name]
         runs = np.array([searched(make(seed), density, footprint_m, seed) for seed in seeds])
         right_m, all_m, false_m, area_km2, seconds = runs.sum(axis=0)
         share = f"{100 * right_m / all_m:.0f} %" if all_m else ""
@@ -125,15 +126,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=3, help="designs of each row (default: 3)")
     parser.add_argument("--first", type=int, default=1, help="seed of the first (default: 1)")
-    parser.add_argument("--rows", nargs="*", choices=FLIGHTS, default=list(FLIGHTS), help="rows (default: all)")
+    parser.add_argument("--rows", nargs="*", choices=[*FLIGHTS, *SEARCHES], help="rows (default: all)")
     parser.add_argument("--search", action="store_true", help="search without guides instead")
     args = parser.parse_args()
     if args.search:
-        print_searches(range(args.first, args.first + args.seeds))
+        print_searches(args.rows or list(SEARCHES), range(args.first, args.first + args.seeds))
         return
     print("| scene | stations | seen | within 10 cm | across, rms | height, sd | 95 % interval | s per km |")
     print("|---|---|---|---|---|---|---|---|")
-    for name in args.rows:
+    for name in args.rows or list(FLIGHTS):
         make, density, footprint_m = FLIGHTS[name]
         runs = [measured(make(seed), density, footprint_m, seed) for seed in range(args.first, args.first + args.seeds)]
         found = Stationwise.joined([one for one, _, _ in runs])

@@ -295,7 +295,7 @@ LITTLE_SHARP = 1.0
 
 def _shows(found: Fit, points: np.ndarray) -> np.ndarray:
     """Return which sections show two rails, together with those next to them."""
-    together, expected = (np.convolve(one, np.ones(3), "same") for one in (found.both, found.most))
+    together, expected = (np.convolve(one, np.ones(3))[1:-1] for one in (found.both, found.most))
     enough = together > np.maximum(ENOUGH_GAIN, GAIN_SHARE * np.minimum(expected, MOST_EXPECTED))
     return enough & (found.both > 0) & (points > FEW_POINTS)
 

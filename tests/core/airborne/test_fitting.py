@@ -149,6 +149,14 @@ def test_no_line_where_there_is_no_track(thing):
     assert not (fitted(cloud.xyz, cloud.strip, [guide])[0].stations.reason == SEEN).any()
 
 
+@pytest.mark.parametrize("length_m", [30, 60, 90])
+def test_short_guides_are_fitted_too(flown, length_m):
+    truth = flown.design.truth(0)[200 : 200 + 4 * length_m + 1 : 40, :2]
+    stations = fitted(flown.cloud.xyz, flown.cloud.strip, [truth])[0].stations
+    assert len(stations.t) == length_m / 10
+    assert (stations.reason == SEEN).mean() > 0.6
+
+
 def test_no_points_give_no_track():
     one = fitted(np.empty((0, 3)), np.empty(0, int), [np.array([[0.0, 0.0], [100.0, 0.0]])])[0]
     assert (one.stations.reason != SEEN).all()
