@@ -47,6 +47,10 @@ class Tolerances:
     wider_m, wider_single_m : float
         Width beyond that of a head up to which the top of a piece may be one, with a partner and without. Measured: up
         to 8 mm, and 42 mm on thin clouds; kerbs of 150 mm 42 mm, on thin clouds 63 mm.
+    sharp_m, sharp_share : float
+        Width beyond that of a head up to which a top is not blurred, and the share of such cells, among those with a
+        partner, below which the blur of the square is measured. Wide beams blend heads with the ballast, and `THIN`
+        allows for that; in a dense square, one wide top is enough.
     width_rounds : int
         Rounds in which this width is measured where there is a partner. From the second on, points that do not fit a
         bar are left out: those of a guard rail, where beams are narrow enough to show it apart.
@@ -63,6 +67,8 @@ class Tolerances:
     band: Band
     wider_m: float
     wider_single_m: float
+    sharp_m: float
+    sharp_share: float
     width_rounds: int
 
 
@@ -83,6 +89,8 @@ DENSE = Tolerances(
     band=HEADS,
     wider_m=0.025,
     wider_single_m=0.012,
+    sharp_m=0.012,
+    sharp_share=1.0,
     width_rounds=5,
 )
 """For scanners on vehicles: beams of a few millimetres, range noise up to 5 mm."""
@@ -99,6 +107,8 @@ THIN = Tolerances(
     band=HEADS,
     wider_m=0.05,
     wider_single_m=0.04,
+    sharp_m=0.05,
+    sharp_share=0.5,
     width_rounds=1,
 )
 """For scanners in the air: a beam of 4 to 9 cm blends the head and the ballast."""

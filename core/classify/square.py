@@ -51,10 +51,6 @@ SINGLE_SLOPE = 0.4
 """Steepest bed of a rail without a partner: that of the shoulder of a ballast bed is 0.67. Where the far side of a
 slope is hidden, its crest looks like a bar."""
 
-MOST = 0.5
-"""Share of the cells with a partner on tops as narrow as a head up to which a blunt thin square is searched for ridges:
-wide beams blend heads with the ballast, and `THIN` allows for that. In a dense square, one wide top is enough."""
-
 LEAST_BLUNT_HEIGHT_M = 0.07
 """Least mean height above the bed of a piece of a blunt rail: half of what images show of one, as where ballast reaches
 the head. Two lines of kerb stones at gauge, 6.5 cm high, are as narrow."""
@@ -379,10 +375,12 @@ def _narrow(
     if not len(kept.cell):
         return np.zeros(0, dtype=bool), 0.0
     piece = pieces_of(len(kept.cell), kept.pairs)
-    narrow = beside.widths(piece, tolerances.width_rounds) < settings.head_width_m + tolerances.wider_m
+    width_m = beside.widths(piece, tolerances.width_rounds)
+    narrow = width_m < settings.head_width_m + tolerances.wider_m
     alone = _stands_alone(kept, piece, beside, shown.bed, settings, tolerances)
     partnered = with_partner(kept.pairs, kept.paired)
-    wide = partnered.any() and narrow[piece[partnered]].mean() < (1.0 if tolerances is DENSE else MOST)
+    sharp = width_m < settings.head_width_m + tolerances.sharp_m
+    wide = partnered.any() and sharp[piece[partnered]].mean() < tolerances.sharp_share
     blur_m = 0.0
     if wide or alone.any():
         ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)

@@ -9,6 +9,7 @@ from typing import Optional
 import numpy as np
 
 from ..progress import SILENT, Progress
+from .blunt import cut
 from .course import LEAST_RADIUS_M, Ahead, lead
 from .points import Points
 from .profile import BED_M, HIGH_M, MIN_POINTS, Head, Section
@@ -144,13 +145,13 @@ class _Walk:
         track = self.track
         off_m = self._off_m()
         beside = ahead.beside(off_m, track.level_m) if self._start.side else None
-        other_section = self._section(beside, track.other_per_m) if beside else None
-        section = self._section(ahead, track.per_m)
+        other_section = self._section(self._start.points, beside, track.other_per_m) if beside else None
+        section = self._section(self._start.points, ahead, track.per_m)
         pairs: list[Pair] = [(head, self._other(other_section, head)) for head in self._candidates(section)]
         if min(map(self._strangeness, pairs), default=np.inf) > self._missing_m():
             alone = self._other(other_section, None)
             pairs += [(None, alone)] if alone else []
-        head, other, failure = self._choose(pairs, section)
+        head, other, failure = self._choose(pairs, ahead)
         # Where only the other rail is seen, it shows how far both are from the course.
         shown = head or other
         left_m, up_m = (shown.across_m, shown.top_m) if shown else (0.0, 0.0)
@@ -187,13 +188,13 @@ class _Walk:
         track.unseen = 0 if head or other else track.unseen + 1
         track.other_unseen = 0 if other else track.other_unseen + 1
 
-    def _section(self, ahead: Ahead, per_m: list[float]) -> Section:
+    def _section(self, points: Points, ahead: Ahead, per_m: list[float]) -> Section:
         """Cut the points at a place."""
         length_m = window_m(float(np.median(per_m[-MEMORY:])), self._settings)
         reach_m = self._settings.parameters.search_m + self._settings.head_width_m / 2 + BED_M
-        along, across, height = ahead.coordinates(self._points.around(ahead.xy, np.hypot(reach_m, length_m / 2)))
+        along, across, height = ahead.coordinates(points.around(ahead.xy, np.hypot(reach_m, length_m / 2)))
         own = (np.abs(along) <= length_m / 2) & (np.abs(across) <= reach_m)
-        return Section(across[own], height[own], self._settings, self._start.beam)
+        return cut(across[own], height[own], self._settings, self._start.beam)
 
     def _gate_m(self, unseen: int) -> float:
         """Return how far a rail can be from its course: half a head, and what the least radius allows."""
@@ -218,13 +219,13 @@ class _Walk:
         found = section.heads(gate_m, 0.0, self._least(self.track.per_m))
         return [one for one in found if abs(one.across_m) <= gate_m and abs(one.top_m) <= rise_m]
 
-    def _choose(self, pairs: list[Pair], section: Section) -> tuple[Head | None, Head | None, Reason | None]:
+    def _choose(self, pairs: list[Pair], ahead: Ahead) -> tuple[Head | None, Head | None, Reason | None]:
         """Choose the head that continues the rail, with the other rail, or say why there is none.
 
         Of several heads, the one near the course is taken that has the other rail at the gauge.
         """
         if not pairs:
-            return None, None, self._failure(section)
+            return None, None, self._failure(ahead)
         pairs = sorted(pairs, key=self._strangeness)
         best, rivals = pairs[0], pairs[1:]
         for pair in rivals:
@@ -265,8 +266,9 @@ class _Walk:
         ]
         return min(found, key=lambda one: abs(one.across_m - left_m), default=None)
 
-    def _failure(self, section: Section) -> Reason:
+    def _failure(self, ahead: Ahead) -> Reason:
         """Say why no head is seen."""
+        section = self._section(self._points, ahead, self.track.per_m)
         if section.is_empty():
             return Reason.CLOUD
         half_m = self._settings.head_width_m / 2

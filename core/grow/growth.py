@@ -9,6 +9,7 @@ import numpy as np
 
 from ..polyline import length_along, project, runs
 from ..progress import SILENT, Progress
+from .blunt import OnHeads
 from .course import smoothed
 from .follow import Reason, Window, follow, turned
 from .points import Points
@@ -83,9 +84,31 @@ class Growth:
     stops: tuple[Stop, ...]
 
 
-def grow(points: Points, seed: np.ndarray, settings: GrowSettings, progress: Progress = SILENT) -> Growth | None:
-    """Follow the rail at a seed, (2,) metres, to both sides; None if there is no rail."""
-    start = find_start(points, seed, settings)
+def grow(
+    points: Points,
+    seed: np.ndarray,
+    settings: GrowSettings,
+    progress: Progress = SILENT,
+    heads: OnHeads | None = None,
+) -> Growth | None:
+    """Follow the rail at a seed to both sides.
+
+    Parameters
+    ----------
+    points : Points
+    seed : (2,) array
+        Metres.
+    settings : GrowSettings
+    progress : Progress
+    heads : OnHeads, optional
+        Of the same points and settings: with one object for all seeds, no square is classified twice.
+
+    Returns
+    -------
+    Growth or None
+        None if there is no rail.
+    """
+    start = find_start(points, seed, settings, heads)
     if start is None:
         return None
     ahead, back = progress.split(2)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from ..classify import settings as classify
 from ..parameters import GrowParameters
 
 THIN_PER_M2 = 400.0
@@ -35,6 +36,8 @@ class Beam:
     steady_m : float
         Largest distance of the windows of a rail from their course, root mean square. Measured: up to 8 mm on dense
         rails and 15 mm on thin ones; undergrowth and rubble 12 to 63 mm.
+    classified : bool
+        Whether heads are looked for where the classification finds some; see `blunt`.
     """
 
     blur_m: float
@@ -47,6 +50,7 @@ class Beam:
     sigma_m: float
     fit_m: float
     steady_m: float
+    classified: bool = False
 
 
 DENSE = Beam(
@@ -76,6 +80,16 @@ THIN = Beam(
     steady_m=0.020,
 )
 """For scanners in the air: a beam of 4 to 9 cm blends the head and the ballast."""
+
+BLUNT = replace(
+    THIN,
+    level_m=0.20,
+    below_m=classify.BLUNT.below_m,
+    above_m=classify.BLUNT.above_m,
+    steady_m=0.035,
+    classified=True,
+)
+"""For clouds that blur a head to a round ridge."""
 
 
 @dataclass(frozen=True)

@@ -10,16 +10,18 @@ from ..classify.bed import Coarse, find_bed
 from ..classify.settings import Settings
 from ..classify.square import classify_square
 from ..classify.tops import TOP_M
+from .blunt import OnHeads, cut
 from .course import Ahead
 from .points import Points
-from .profile import GROOVE_M, HIGH_M, MIN_CONTRAST, Head, Section
-from .settings import DENSE, THIN, THIN_PER_M2, Beam, GrowSettings
+from .profile import GROOVE_M, HIGH_M, MIN_CONTRAST, Head
+from .settings import BLUNT, DENSE, THIN, THIN_PER_M2, Beam, GrowSettings
 
 ANGLES = 90
 """Directions that are tried, over half a turn: at 1 m, a head is 17 mm off at most."""
 
-PATCH_M = 6.0
-"""Reach of the points around a seed that are classified: rails without a partner are known from 5 m on."""
+PATCH_M, PATCH_POINTS = (6.0, 20.0), 500_000
+"""Reach of the points around a seed that are classified, within limits, and their number: rails without a partner are
+known from 5 m on, and the blur of a cloud from tens of metres of ridges."""
 
 REACH_POINTS_PER_M, REACH_M = 120.0, (1.0, 2.0)
 """Reach of the line through a seed: this divided by the points per square metre, within limits; as in `classify`."""
@@ -74,6 +76,8 @@ class Start:
         Height of the other rail above this one.
     free : float
         Share of the windows in which both sides of the head are free.
+    points : Points
+        Where its heads are looked for.
     """
 
     xyz: np.ndarray
@@ -84,6 +88,7 @@ class Start:
     side: int
     level_m: float
     free: float
+    points: Points
 
 
 def window_m(per_m: float, settings: GrowSettings) -> float:
@@ -91,31 +96,44 @@ def window_m(per_m: float, settings: GrowSettings) -> float:
     return float(np.clip(TARGET_POINTS / max(per_m, 1e-9), settings.parameters.window_m, LONGEST_WINDOW_M))
 
 
-def find_start(points: Points, seed: np.ndarray, settings: GrowSettings) -> Start | None:
+def find_start(points: Points, seed: np.ndarray, settings: GrowSettings, heads: OnHeads | None = None) -> Start | None:
     """Find the rail at a seed, (2,); None if there is none within the search distance.
 
-    The points that the classification takes for rails are looked at first, then all.
+    The points that the classification takes for rails are looked at first, then all. In a cloud that blurs heads, only
+    those on heads by the classification count.
     """
-    patch = points.around(seed, PATCH_M)
-    near = patch[np.hypot(*(patch[:, :2] - seed).T) <= REACH_M[1] + settings.parameters.search_m]
+    near = _near(points, seed, settings)
     if not len(near):
         return None
     per_m2 = _density(near, seed)
+    patch = points.around(seed, float(np.clip(np.sqrt(PATCH_POINTS / per_m2) / 2, *PATCH_M)))
     beam = THIN if per_m2 < THIN_PER_M2 else DENSE
     reach_m = float(np.clip(REACH_POINTS_PER_M / per_m2, *REACH_M))
-    rail = patch[_classified(patch, seed, settings)]
-    sure = _found(points, near, rail, seed, reach_m, beam, settings)
+    rail, is_blunt = _classified(patch, seed, settings)
+    if is_blunt:
+        heads = heads or OnHeads(points, settings)
+        near = _near(heads, seed, settings)
+        return _found(heads, near, near, seed, reach_m, BLUNT, settings)
+    sure = _found(points, near, patch[rail], seed, reach_m, beam, settings)
     if sure is not None:
         return sure
     start = _found(points, near, _standing(patch, settings), seed, reach_m, beam, settings)
     return start if start is not None and start.free >= MIN_COVER else None
 
 
-def _classified(patch: np.ndarray, seed: np.ndarray, settings: GrowSettings) -> np.ndarray:
-    """Return which points, (n, 3), lie on rails by the classification, (n,) bool."""
+def _near(points: Points, seed: np.ndarray, settings: GrowSettings) -> np.ndarray:
+    """Return the points, (k, 3), that can be on the line through a seed."""
+    reach_m = REACH_M[1] + settings.parameters.search_m
+    near = points.around(seed, reach_m)
+    return near[np.hypot(*(near[:, :2] - seed).T) <= reach_m]
+
+
+def _classified(patch: np.ndarray, seed: np.ndarray, settings: GrowSettings) -> tuple[np.ndarray, bool]:
+    """Return which points, (n, 3), lie on rails by the classification, (n,) bool, and whether the heads are blunt."""
     own = Settings((settings.gauge_m,), settings.head_width_m)
     corner = np.append(seed - own.side_m / 2, 0.0)
-    return classify_square(patch - corner, own).rail
+    found = classify_square(patch - corner, own)
+    return found.rail, found.figures.blunt_m > 0
 
 
 def _standing(patch: np.ndarray, settings: GrowSettings) -> np.ndarray:
@@ -238,7 +256,7 @@ def _start(
     band_m = settings.parameters.tolerance_z_m + beam.level_m
     on = (np.abs(along) <= reach_m) & (np.abs(offset) <= settings.head_width_m / 2) & (np.abs(above) <= band_m)
     per_m = float(np.count_nonzero(on)) / (2 * reach_m)
-    return Start(np.column_stack([xy, z]), ahead.heading, beam, per_m, flush, side, level_m, free)
+    return Start(np.column_stack([xy, z]), ahead.heading, beam, per_m, flush, side, level_m, free, points)
 
 
 def _windows(
@@ -251,7 +269,7 @@ def _windows(
     half_m = max(window_m(per_m, settings), 0.4 * reach_m) / 2
     for place_m in np.linspace(-0.8, 0.8, 5) * reach_m:
         own = np.abs(along - place_m) <= half_m
-        section = Section(across[own], height[own], settings, beam)
+        section = cut(across[own], height[own], settings, beam)
         found = section.heads(settings.head_width_m / 2)
         if found:
             stations.append(place_m)
@@ -276,7 +294,7 @@ def _other_rail(points: Points, ahead: Ahead, reach_m: float, beam: Beam, settin
         near = points.around(beside.xy, reach_m + CANT_M)
         along, across, height = beside.coordinates(near)
         own = (np.abs(along) <= reach_m) & (np.abs(height) <= 4 * CANT_M)
-        section = Section(across[own], height[own], settings, beam)
+        section = cut(across[own], height[own], settings, beam)
         step_m = settings.parameters.tolerance_z_m + beam.level_m
         for top_m in np.arange(-CANT_M, CANT_M + step_m, step_m):
             for head in section.heads(GAUGE_OFF_M[1], float(top_m)):

@@ -18,6 +18,7 @@ from ..clouds.points import Request
 from ..clouds.readers import read_points
 from ..disk import writing
 from ..errors import OffCloudError, OffRailError
+from ..grow.blunt import OnHeads
 from ..grow.growth import Growth, Stop, grow, on_rails
 from ..grow.points import Buckets
 from ..grow.settings import GrowSettings
@@ -156,8 +157,9 @@ def grow_all(
     squares.fill(reading)
     growths: list[Growth] = []
     missed = 0
+    heads = OnHeads(squares, settings)
     for seed, share in zip(places, growing.split(len(places))):
-        grown = list(_grow_along(squares, seed, settings, share))
+        grown = list(_grow_along(squares, heads, seed, settings, share))
         growths += grown
         missed += not grown
     parameters = settings.parameters
@@ -171,13 +173,15 @@ def grow_all(
     return squares, growths
 
 
-def _grow_along(squares: Squares, places: np.ndarray, settings: GrowSettings, progress: Progress) -> Iterator[Growth]:
+def _grow_along(
+    squares: Squares, heads: OnHeads, places: np.ndarray, settings: GrowSettings, progress: Progress
+) -> Iterator[Growth]:
     """Grow from a seed: from both ends of a line, and from those of its places that no rail has reached."""
     reached = np.empty((0, 2))
     for place in (*places[:1], *places[:0:-1]):
         if len(reached) and np.hypot(*(reached - place).T).min() <= settings.parameters.search_m + SAME_M:
             continue
-        grown = grow(squares, place, settings, progress)
+        grown = grow(squares, place, settings, progress, heads)
         if grown is not None:
             yield grown
             reached = np.concatenate([reached, grown.rails[0].xyz[:, :2]])
@@ -203,7 +207,7 @@ class Squares:
 
     def __init__(self, request: Request, places: np.ndarray, settings: GrowSettings, folder: Path) -> None:
         self._request, self._folder = request, folder
-        reach_m = settings.parameters.max_length_m + PATCH_M
+        reach_m = settings.parameters.max_length_m + PATCH_M[1]
         steps = np.arange(-int(reach_m / SIDE_M) - 1, int(reach_m / SIDE_M) + 2)
         around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
         around = around[np.hypot(*around.T) <= reach_m / SIDE_M + np.sqrt(2)]
@@ -220,7 +224,7 @@ class Squares:
             return
         corners = np.column_stack([extents.reshape(-1, 2), np.zeros(2 * len(extents))])
         corners = self._request.zero.to_local(corners)[:, :2].reshape(-1, 2, 2)
-        inside = (places[:, None] >= corners[:, 0] - PATCH_M) & (places[:, None] <= corners[:, 1] + PATCH_M)
+        inside = (places[:, None] >= corners[:, 0] - PATCH_M[0]) & (places[:, None] <= corners[:, 1] + PATCH_M[0])
         if not inside.all(axis=2).any():
             raise OffCloudError("No seed lies in the cloud: check the place and the coordinate system of the seeds.")
 

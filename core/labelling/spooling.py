@@ -10,7 +10,7 @@ import numpy as np
 from ..classify.settings import Settings
 from ..clouds.points import AIRBORNE, Request
 from ..disk import writing
-from ..errors import NoRailPointsError
+from ..errors import NoRailPointsError, RailExtractError
 from ..grow.settings import GrowSettings
 from ..progress import Progress
 from ..rails import SearchFigures
@@ -43,8 +43,8 @@ def spool_found(
     ------
     NoRailPointsError
         No rail was found, or the extent contains no points.
-    CloudError, DiskError
-        See `find_rail_points`.
+    RailExtractError
+        No rail was found, and a part of the cloud could not be searched; or see `find_rail_points`.
     """
     census, figures = Census(), SearchFigures()
     with writing(folder), scratch_folder(folder) as squares:
@@ -52,6 +52,11 @@ def spool_found(
             census.add(RAIL_CLASS, found.xyz, found.marks, request.zero, side_m, folder)
             figures += found.figures
     if not figures.points:
+        if runner.failures:
+            raise RailExtractError(
+                "No rail was found, and a part of the cloud could not be searched; the last error was: "
+                f"{runner.failures[-1]}"
+            )
         raise NoRailPointsError(
             "No rail was found in the raw cloud: check the rail standard and the unit of the coordinates, or classify "
             "the rail points yourself." + (f" For an airborne cloud, use {AIRBORNE}." if request.is_airborne else "")

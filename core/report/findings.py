@@ -15,6 +15,10 @@ GAUGE_OFF_MM = 10.0
 """Plain track is not left in service with a larger deviation from its gauge. Curves of less than 200 m radius are
 widened by more, and deserve a look."""
 
+GAUGE_SIGMAS = 4.0
+"""Standard errors of the centerline by which a gauge must be off to count: two of the gauge's own, which is twice that
+of a line midway between two rails whose errors are independent."""
+
 UNSURE_MM = 5.0
 """A track survey does not accept larger standard errors of a centerline."""
 
@@ -298,7 +302,8 @@ def _examine_track(
     nominal_mm = min((1000 * gauge_m for gauge_m in gauges_m), key=lambda gauge: abs(gauge - line.gauge_mm))
     with np.errstate(invalid="ignore"):
         unsupported = geometry.bridged | np.isnan(geometry.gauge_mm)
-        off = ~unsupported & (np.abs(geometry.gauge_mm - nominal_mm) > GAUGE_OFF_MM)
+        least_mm = np.fmax(GAUGE_OFF_MM, GAUGE_SIGMAS * geometry.sigma_mm)
+        off = ~unsupported & (np.abs(geometry.gauge_mm - nominal_mm) > least_mm)
         unsure = ~unsupported & ~off & (np.fmax(geometry.sigma_mm, geometry.sigmaz_mm) > UNSURE_MM)
     doubtful = {UNSUPPORTED: unsupported, OFF_GAUGE: off, UNSURE: unsure}
     return TrackFindings(line, geometry, nominal_mm, doubtful, tuple(steps))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .findings import FEW, MANY, SILENT_SHARE, Findings
+from .findings import FEW, MANY, SILENT_SHARE, UNSURE, UNSURE_MM, Findings
 
 VERDICTS = (
     (0.0, "good", "Good throughout: every metre is supported by points, at gauge, with a small standard error."),
@@ -20,4 +20,11 @@ def verdict(findings: Findings) -> tuple[str, str]:
     # What no station shows is a reason to look, not to discard: conductor rails are lone lines, too.
     silent = min(findings.silent_share, MANY) if findings.silent_share > SILENT_SHARE else 0.0
     share = max(findings.share, silent)
+    unsure = findings.length_of(UNSURE) / findings.length_m if findings.tracks else 0.0
+    if share > MANY >= max(share - unsure, silent):
+        # Points at gauge whose cloud resolves no more: nothing is wrong that a setting could mend.
+        return "fair", (
+            f"Less accurate than a track survey accepts: the standard error is above {UNSURE_MM:g} mm on "
+            f"{100 * unsure:.0f} % of the length."
+        )
     return next((kind, words) for limit, kind, words in VERDICTS if share <= limit)

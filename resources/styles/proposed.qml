@@ -59,9 +59,9 @@
   </aliases>
   <attributetableconfig>
     <columns>
-      <column type="field" name="guide_id" width="80" hidden="0"/>
-      <column type="field" name="score" width="90" hidden="0"/>
-      <column type="field" name="length_m" width="100" hidden="0"/>
+      <column type="field" name="guide_id" width="110" hidden="0"/>
+      <column type="field" name="score" width="120" hidden="0"/>
+      <column type="field" name="length_m" width="120" hidden="0"/>
     </columns>
   </attributetableconfig>
   <mapTip>&lt;b&gt;Proposal [% &quot;guide_id&quot; %]&lt;/b&gt;&lt;br&gt;Score: [% format_number(&quot;score&quot;, 0) %] %&lt;br&gt;Length: [% format_number(&quot;length_m&quot;, 0) %] m</mapTip>

@@ -92,7 +92,7 @@ def test_a_network_without_doubt_is_called_good():
 
 def test_every_metre_in_doubt_counts_once_under_the_most_severe_reason():
     gauge = np.full(101, GAUGE_MM)
-    gauge[[20, 21, 50]] = GAUGE_MM + 15, GAUGE_MM - 15, np.nan
+    gauge[[20, 21, 50]] = GAUGE_MM + 40, GAUGE_MM - 15, np.nan
     sigma = np.full(101, 1.0)
     sigma[[20, 80, 81, 82]] = 9.0
     findings = examine(network(track(gauge_mm=gauge, sigma_mm=sigma, bridged=at(101, 21, 22))), (1.435,))
@@ -101,6 +101,15 @@ def test_every_metre_in_doubt_counts_once_under_the_most_severe_reason():
     assert findings.length_of(UNSURE) == pytest.approx(3)
     assert findings.share == pytest.approx(0.07)
     assert findings.length_m == pytest.approx(100)
+
+
+def test_a_gauge_is_off_only_beyond_its_own_standard_error():
+    gauge, sigma = np.full(101, GAUGE_MM), np.full(101, 1.0)
+    gauge[20:40] = GAUGE_MM - 15.0
+    sigma[30:50] = 6.0
+    findings = examine(network(track(gauge_mm=gauge, sigma_mm=sigma)), (1.435,))
+    assert findings.length_of(OFF_GAUGE) == pytest.approx(10)
+    assert findings.length_of(UNSURE) == pytest.approx(20)
 
 
 def test_geometry_is_matched_by_track_whatever_its_order():
@@ -125,6 +134,15 @@ def test_places_state_where_and_how_much():
 @pytest.mark.parametrize(("count", "words"), [(20, "Usable"), (60, "Poor")])
 def test_the_verdict_follows_the_share_in_doubt(count, words):
     assert headline(page(track(bridged=at(101, *range(count))))).startswith(words)
+
+
+@pytest.mark.parametrize(("bridged", "words"), [(0, "Less accurate than a track survey"), (40, "Poor")])
+def test_tracks_that_are_only_inaccurate_are_not_called_poor(bridged, words):
+    sigma = np.full(101, 1.0)
+    sigma[:80] = 7.0
+    html = page(track(sigma_mm=sigma, bridged=at(101, *range(bridged))))
+    assert headline(html).startswith(words)
+    assert ("above 5 mm on 80 % of the length" in headline(html)) == (bridged == 0)
 
 
 def test_each_track_is_judged_by_its_own_gauge():

@@ -364,7 +364,7 @@ def test_columns_of_tables_are_as_wide_as_their_titles(styled, style):
     widths = {column.name: column.width for column in layer.attributeTableConfig().columns()}
     titles = {field.name(): field.displayName() for field in layer.fields()}
     assert set(titles) <= set(widths)
-    assert {name: widths[name] for name, title in titles.items() if widths[name] < 6 * len(title)} == {}
+    assert {name: widths[name] for name, title in titles.items() if widths[name] < 8 * len(title)} == {}
 
 
 def test_rasters_are_black_on_transparent(qgis, write_cloud, track, run_step, tmp_path):
