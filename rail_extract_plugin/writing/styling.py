@@ -45,6 +45,8 @@ class _Styler(QgsProcessingLayerPostProcessorInterface):
     def postProcessLayer(
         self, layer: QgsMapLayer, context: QgsProcessingContext, feedback: QgsProcessingFeedback
     ) -> None:
+        # If a run replaces the file of a layer in the project, it gets this layer, which still reads the old file.
+        layer.reload()
         if not self._has_system:
             # QGIS marks such a layer and asks for its system; it can't place the one that stands for an unknown one.
             layer.setCrs(QgsCoordinateReferenceSystem())

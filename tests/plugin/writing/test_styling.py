@@ -19,6 +19,7 @@ from qgis.core import (
     QgsReadWriteContext,
     QgsRectangle,
     QgsRenderContext,
+    QgsVectorFileWriter,
     QgsVectorLayer,
 )
 from qgis.PyQt.QtCore import QSize
@@ -356,6 +357,27 @@ def test_layers_of_a_run_are_in_order_however_they_are_loaded(context, new_feedb
     order = [style for style in ("findings", "centerlines", "rails", "quality") if style in loaded]
     assert [node.name() for node in root.findLayers()] == [*order, "other"]
     assert len(project.mapLayers()) == len(loaded) + 1
+
+
+def test_a_layer_whose_file_was_replaced_shows_the_new_one(context, new_feedback, tmp_path):
+    def write(path, reason):
+        layer = QgsVectorLayer("LineStringZ?crs=EPSG:32643&field=reason:string", "findings", "memory")
+        feature = QgsFeature(layer.fields())
+        feature["reason"] = reason
+        layer.dataProvider().addFeature(feature)
+        options = QgsVectorFileWriter.SaveVectorOptions()
+        QgsVectorFileWriter.writeAsVectorFormatV3(layer, str(path), context.transformContext(), options)
+
+    shown, new = tmp_path / "findings.gpkg", tmp_path / "new.gpkg"
+    write(shown, "old")
+    layer = QgsProject.instance().addMapLayer(QgsVectorLayer(str(shown), "findings", "ogr"))
+    assert [one["reason"] for one in layer.getFeatures()] == ["old"]
+    write(new, "new")
+    new.replace(shown)
+    context.addLayerToLoadOnCompletion(layer.id(), QgsProcessingContext.LayerDetails("", QgsProject.instance(), ""))
+    style_on_load(layer.id(), "findings", context)
+    context.layerToLoadOnCompletionDetails(layer.id()).postProcessor().postProcessLayer(layer, context, new_feedback())
+    assert [one["reason"] for one in layer.getFeatures()] == ["new"]
 
 
 @pytest.mark.parametrize("style", KINDS)
