@@ -46,6 +46,12 @@ FAULTS = [
     ),
     Fault("guide without lines", guided(), REFUSED, "GUIDE has no lines: give a line layer."),
     Fault(
+        "polygons as guide",
+        guided("POLYGON((500000 3000004, 500060 3000004, 500060 3000006, 500000 3000004))", kind="Polygon"),
+        REFUSED,
+        "GUIDE has the geometry type Polygon: give a line layer.",
+    ),
+    Fault(
         "guide outside of the cloud",
         guided("LINESTRING(510000 3000005, 510060 3000005)"),
         REFUSED,
