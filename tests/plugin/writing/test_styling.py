@@ -34,6 +34,7 @@ from rail_extract.core.fields import (
     DIFFERENCE_FIELDS,
     ELEMENT_FIELDS,
     FINDING_FIELDS,
+    PROPOSED_FIELDS,
     QUALITY_FIELDS,
     RAIL_FIELDS,
     STATION_FIELDS,
@@ -58,6 +59,7 @@ KINDS = {
     "axes": ("LineStringZM", AXIS_FIELDS),
     "deviations": ("PointZ", DEVIATION_FIELDS),
     "airborne": ("LineStringZ", AIRBORNE_FIELDS),
+    "proposed": ("LineStringZ", PROPOSED_FIELDS),
     "stations": ("PointZ", AIRBORNE_STATION_FIELDS),
 }
 
@@ -288,6 +290,7 @@ def test_layers_can_be_drawn(styled, style):
         "axes": (LINE, {"track_id": 1}),
         "deviations": ("POINT Z (500050 3000000 1)", {"track_id": 1, "slew_mm": 12.0}),
         "airborne": (LINE, {"track_id": 1}),
+        "proposed": (LINE, {"guide_id": 1, "score": 90.0}),
         "stations": ("POINT Z (500050 3000000 1)", {"track_id": 1, "seen": 1}),
     }
     layer = styled(style, [rows[style]])
@@ -303,7 +306,7 @@ def test_layers_can_be_drawn(styled, style):
     image = job.renderedImage()
     seen = {image.pixelColor(x, y).name() for x in range(60, 200) for y in range(100, 200)}
     colours = {"rails": "#1565c0", "centerlines": "#e64a19", "quality": "#f28e2b", "findings": "#84b397"}
-    colours.update(airborne="#e64a19", stations="#2e7d4f")
+    colours.update(airborne="#e64a19", proposed="#8e24aa", stations="#2e7d4f")
     colours.update(stops="#e64a19", elements="#1565c0", axes="#8e5bb5", deviations="#b2182b", differences="#b2182b")
     assert colours[style] in seen
 
