@@ -12,7 +12,9 @@ import time
 from dataclasses import replace
 
 import numpy as np
-from rail_extract.core.alignment.fit import Track, fit_track
+from rail_extract.core.alignment.elements import Alignment
+from rail_extract.core.alignment.fit import fit_track
+from rail_extract.core.alignment.measured import Track
 from rail_extract.core.parameters import FitParameters
 from rail_extract.laboratory.designs import FAMILIES, Family, random_design, surveyed
 from rail_extract.laboratory.ruler.alignments import Met, compared, together
@@ -76,7 +78,7 @@ def row(
         random = np.random.default_rng([SEED, number])
         design = random_design(random, family, 100 if length_m is None else 300)
         if length_m is not None:
-            design = replace(design, plan=tuple(one for one in design.plan if one.s_to <= length_m))
+            design = shortened(design, length_m)
         line = surveyed(design, random, white_m, *shared)
         s = np.arange(len(line), dtype=float)
         cant = np.column_stack([s, design.cants(s) + CANT_NOISE_M * random.standard_normal(len(s))])
@@ -86,6 +88,15 @@ def row(
         kilometres += design.s_to / 1000.0
         met.append(compared(design, fit.alignment))
     return _written(title, together(met), seconds / kilometres)
+
+
+def shortened(design: Alignment, length_m: float) -> Alignment:
+    """Return the part of a design up to the last plan element that ends within a length; others end there, too."""
+    plan = tuple(one for one in design.plan if one.s_to <= length_m)
+    vertical, cant = (
+        tuple(one for one in layout if one.s_to <= plan[-1].s_to) for layout in (design.vertical, design.cant)
+    )
+    return replace(design, plan=plan, vertical=vertical, cant=cant)
 
 
 def _written(title: str, met: Met, speed: float) -> str:

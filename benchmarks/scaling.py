@@ -3,7 +3,8 @@
 `python benchmarks/scaling.py` measures a synthetic double track of 1 km and of 10 km, each in a separate process, and
 one worker against two on the longer one, with one thread each. `--km 0.6` is faster; half a kilometre cannot be
 divided. `--memory 500` measures 500 km alone, to see what grows with length: network and drawing are left out, and each
-square has the true lines, so only reading and joining are measured. Compare rows of the same run only.
+square has the true lines, so only reading and joining are measured. `--cores 2` measures 2 km alone, with one process
+and with two, as QGIS starts them, and prints what more would gain. Compare rows of the same run only.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.cluster.runner import DaskRunner
 from rail_extract.core.cluster.workers import connect
+from rail_extract.core.kernels import blas, one_thread
 from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
 from rail_extract.core.rails import RailLine, Support
 from rail_extract.core.squares.grid import HALO_M, Square
@@ -30,6 +32,7 @@ from rail_extract.core.squares.pieces import SquareRails, trim
 from rail_extract.core.squares.spool import SpooledPoints, spool
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.steps import engine_for, square_side
+from rail_extract.core.workers import runner as processes
 from rail_extract.laboratory.curves import Element, trace
 from rail_extract.laboratory.scenes.plain import spacing
 from rail_extract.laboratory.scenes.scanner import Scanner
@@ -60,6 +63,8 @@ NETWORK_KM = 70_000
 
 WORKERS = (2, 16, 64, 256)
 
+PROCESSES = (2, 4, 8, 16)
+
 DRAWN, LAID = "drawn", "laid"
 """Whether lines are drawn from the points, or laid where they truly are."""
 
@@ -72,6 +77,7 @@ def main() -> None:
     parser.add_argument(
         "--memory", type=float, metavar="KM", help="measure only what grows with length, over this length"
     )
+    parser.add_argument("--cores", type=float, metavar="KM", help="measure only processes of this computer on KM")
     parser.add_argument("--skip-workers", action="store_true", help="leave the workers out")
     parser.add_argument("--measure", nargs=2, metavar=("FOLDER", "LINES"), help=argparse.SUPPRESS)
     args = parser.parse_args()
@@ -79,6 +85,10 @@ def main() -> None:
         print(json.dumps(measure(Path(args.measure[0]), args.measure[1] == DRAWN)))
         return
     with tempfile.TemporaryDirectory() as folder:
+        if args.cores:
+            lay_track(Path(folder) / "cores", args.cores)
+            compare_processes(Path(folder) / "cores")
+            return
         if args.memory:
             lay_track(Path(folder) / "memory", args.memory, FEW_POINTS_PER_M)
             show(f"{args.memory:g} km, lines laid", in_own_process(Path(folder) / "memory", LAID))
@@ -122,6 +132,30 @@ def compare_workers(tiles: Path, folder: Path) -> None:
             seconds.append(time.perf_counter() - start)
         print(f"{workers} worker(s) with one thread: {seconds[-1]:.1f} s, {len(found.rails)} rails")
     print(f"Two workers are {seconds[0] / seconds[1]:.2f} times as fast as one")
+
+
+def compare_processes(tiles: Path) -> None:
+    """Run one process, then two, and print what more would gain: work that is not shared takes as long as with one."""
+    engine_for(parameters())  # loads the packages, which happens only once
+    spent = {count: processor_seconds(tiles, count) for count in (1, 2)}
+    for count, (wall_s, own_s, others_s) in spent.items():
+        print(f"{count} process(es): {wall_s:.1f} s; {own_s:.1f} processor seconds here, {others_s:.1f} in workers")
+    _, alone_s, _ = spent[1]
+    _, serial_s, shared_s = spent[2]
+    print(f"Not shared: {100 * serial_s / alone_s:.1f} %; sharing costs {shared_s + serial_s - alone_s:.1f} s")
+    for count in PROCESSES:
+        print(f"  {count} cores: {alone_s / (serial_s + shared_s / count):.1f} times as fast, by processor time")
+
+
+def processor_seconds(tiles: Path, count: int) -> tuple[float, float, float]:
+    """Extract with a number of processes; return seconds, and processor seconds of this process and of the others."""
+    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    own = time.process_time()
+    with tempfile.TemporaryDirectory() as work, one_thread(*blas()), processes.workers(count) as runner:
+        extract_files(ask([tiles], [RAIL]), Path(work), parameters(), runner)
+    after, own = resource.getrusage(resource.RUSAGE_CHILDREN), time.process_time() - own
+    others = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return time.perf_counter() - start, own, others
 
 
 def engine_of_worker() -> None:

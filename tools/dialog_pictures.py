@@ -44,9 +44,7 @@ def dialog_pictures(folder: Path, filled: Mapping[str, Mapping[str, Any]] | None
 
 
 def _pictures(algorithm: QgsProcessingAlgorithm, values: Mapping[str, Any], folder: Path) -> Iterator[Path]:
-    from processing.gui.AlgorithmDialog import AlgorithmDialog
-
-    dialog = AlgorithmDialog(algorithm.create())
+    dialog = algorithm.create().createCustomParametersWidget(None)
     dialog.mainWidget().setParameters(values)
     dialog.show()
     _fold(dialog, True)

@@ -15,6 +15,7 @@ from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
+import laspy  # noqa: E402
 import numpy as np  # noqa: E402
 from dialog_pictures import HELP_SHARE, SIZES, dialog_pictures, start_qgis  # noqa: E402
 from PIL import Image  # noqa: E402
@@ -46,7 +47,7 @@ from qgis.PyQt.QtCore import QSize  # noqa: E402
 from qgis.PyQt.QtGui import QColor  # noqa: E402
 from qgis.PyQt.QtWidgets import QMainWindow, QWidget  # noqa: E402
 from rail_extract.core.frame import LocalFrame  # noqa: E402
-from rail_extract.core.standards import resolve  # noqa: E402
+from rail_extract.core.standards import RAIL_CLASS, resolve  # noqa: E402
 from rail_extract.laboratory.scenes.raw_catalogue import turnout  # noqa: E402
 from rail_extract.laboratory.scenes.scene import Scene  # noqa: E402
 from rail_extract.laboratory.scenes.write import write_cloud  # noqa: E402
@@ -60,10 +61,10 @@ FOLDER = ROOT / "docs" / "pictures"
 STANDARD = "IN_75R_1000"
 
 OUTPUTS = {
-    "QUALITY": "quality.gpkg",
+    "FINDINGS": "findings.gpkg",
     "CENTERLINES": "centerlines.gpkg",
     "RAILS": "rails.gpkg",
-    "FINDINGS": "findings.gpkg",
+    "QUALITY": "quality.gpkg",
     "REPORT": "report.html",
 }
 """The files of a run, from the top layer to the bottom; layers have the names of their styles."""
@@ -80,7 +81,7 @@ DIALOGS = {
 MAP_SIZE, TABLE_HEIGHT, REPORT_SIZE = QSize(1000, 480), 230, (1140, 3200)
 """Pixels."""
 
-REVIEW_SIZE = (380, 520)
+REVIEW_SIZE = (380, 640)
 """Pixels of the dock."""
 
 REPORT_TOP, PLOTS_TOP = 1300, 2320
@@ -99,6 +100,15 @@ points that are drawn."""
 
 GROWN_SIZE = QSize(1000, 300)
 
+LEAD_SIZE, LEAD_M, LEAD_TURN = QSize(1000, 460), 17.0, 24.5
+"""Pixels of the first picture of the README, width of its map in metres, and degrees by which it is turned."""
+
+LEAD_MIDDLE = 0.45
+"""Where its middle is along the sample, of the whole length: where points are missing, noisy and misclassified."""
+
+CLOUD_COLOURS = {1: ("#b9975b", 0.8), 2: ("#bcc3cc", 0.5), 10: ("#3b4452", 0.5)}
+"""Colour and size in millimetres of the sample's points by class: plants, ground, rail."""
+
 SOMEWHERE = LocalFrame(np.array([500_000.0, 3_000_000.0, 100.0]))
 
 COLORS = 128
@@ -115,17 +125,19 @@ def main() -> None:
             shutil.copy(folder / "dialogs" / f"{source}.png", FOLDER / f"{target}.png")
         _crop(FOLDER / "dialog_all.png", right=round(HELP_SHARE * SIZES["wide"][0]) + SPLITTER, bottom=BUTTONS)
         _extract(folder)
-        layers = [_layer(folder / OUTPUTS[output]) for output in ("QUALITY", "CENTERLINES", "RAILS")]
-        whole = layers[2].extent()
+        layers = [_layer(folder / OUTPUTS[output]) for output in ("CENTERLINES", "RAILS", "QUALITY")]
+        lines, rails, points = layers[:2], layers[1], layers[2]
+        whole = rails.extent()
         whole.scale(1.05)
-        _map(layers[1:3], whole, FOLDER / "map.png")
-        _map(layers, _detail(layers[0]), FOLDER / "map_detail.png")
-        for layer in layers[1:3]:
+        _map(lines, whole, FOLDER / "map.png")
+        _map(layers, _detail(points), FOLDER / "map_detail.png")
+        _lead(folder, FOLDER / "lead.png")
+        for layer in lines:
             _table(layer, FOLDER / f"table_{layer.name()}.png")
         _report(folder / OUTPUTS["REPORT"], FOLDER / "report.png")
-        _review(folder / OUTPUTS["FINDINGS"], layers[2], FOLDER / "review.png")
+        _review(folder / OUTPUTS["FINDINGS"], rails, FOLDER / "review.png")
         _growing(folder / "raw.laz", FOLDER / "growing.png")
-        del layers
+        del layers, lines, rails, points
     for picture in sorted(FOLDER.glob("*.png")):
         _shrink(picture)
         print(f"{picture.name}: {picture.stat().st_size / 1000:.0f} kB")
@@ -177,8 +189,11 @@ def _table(layer: QgsVectorLayer, picture: Path) -> None:
     filtered = QgsAttributeTableFilterModel(canvas, model)
     view = QgsAttributeTableView()
     view.setModel(filtered)
-    view.resizeColumnsToContents()
-    view.hideColumn(model.fieldCol(layer.fields().indexOf("fid")))
+    columns = layer.attributeTableConfig()
+    columns.update(layer.fields())
+    columns.setColumnHidden([one.name for one in columns.columns()].index("fid"), True)
+    filtered.setAttributeTableConfig(columns)
+    view.setAttributeTableConfig(columns)
     view.resize(view.horizontalHeader().length() + 30, TABLE_HEIGHT)
     view.show()
     QgsApplication.processEvents()
@@ -252,14 +267,38 @@ def _growing(cloud: Path, picture: Path) -> None:
     QgsProject.instance().clear()
 
 
-def _points(xy: np.ndarray, crs: QgsCoordinateReferenceSystem) -> QgsVectorLayer:
-    """Make a layer of some of the points of a cloud, (n, 2)."""
+def _lead(folder: Path, picture: Path) -> None:
+    """Draw the canvas with findings, centerlines and rails over the points of the sample."""
+    lines = [_layer(folder / OUTPUTS[output]) for output in ("FINDINGS", "CENTERLINES", "RAILS")]
+    cloud, crs = laspy.read(SAMPLE), lines[0].crs()
+    xy, classes = np.column_stack([cloud.x, cloud.y]), np.asarray(cloud.classification)
+    shown = [_points(xy[classes == code], crs, *CLOUD_COLOURS[code]) for code in sorted(CLOUD_COLOURS, reverse=True)]
+    canvas = QgsMapCanvas()
+    canvas.resize(LEAD_SIZE)
+    canvas.setDestinationCrs(crs)
+    canvas.setLayers([*lines, *shown])
+    first, last = xy[classes == RAIL_CLASS].min(axis=0), xy[classes == RAIL_CLASS].max(axis=0)
+    middle = first + LEAD_MIDDLE * (last - first)
+    height = LEAD_M * LEAD_SIZE.height() / LEAD_SIZE.width()
+    canvas.setExtent(QgsRectangle.fromCenterAndSize(QgsPointXY(*middle), LEAD_M, height))
+    canvas.setRotation(LEAD_TURN)
+    canvas.show()
+    canvas.refresh()
+    canvas.waitWhileRendering()
+    QgsApplication.processEvents()
+    canvas.grab().save(str(picture))
+
+
+def _points(
+    xy: np.ndarray, crs: QgsCoordinateReferenceSystem, colour: str = "#787878", size_mm: float = 0.25
+) -> QgsVectorLayer:
+    """Make a layer of points of a cloud, (n, 2), of which at most about `DRAWN` are drawn."""
     layer = QgsVectorLayer("MultiPoint", "points", "memory")
     layer.setCrs(crs)
     feature = QgsFeature()
-    feature.setGeometry(QgsGeometry.fromMultiPointXY([QgsPointXY(*place) for place in xy[:: len(xy) // DRAWN]]))
+    feature.setGeometry(QgsGeometry.fromMultiPointXY([QgsPointXY(*place) for place in xy[:: len(xy) // DRAWN or 1]]))
     layer.dataProvider().addFeature(feature)
-    symbol = QgsMarkerSymbol.createSimple({"size": "0.25", "color": "120,120,120", "outline_style": "no"})
+    symbol = QgsMarkerSymbol.createSimple({"size": str(size_mm), "color": colour, "outline_style": "no"})
     layer.setRenderer(QgsSingleSymbolRenderer(symbol))
     return layer
 

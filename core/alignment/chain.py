@@ -13,9 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Optional
 
 import numpy as np
-from scipy.linalg.lapack import dgeqrf
+from scipy.linalg.lapack import dgeqrf, dtbtrs
 
 JUMP_M = 1e-6
 """A jump is computed as a ramp of this length, metres, far below any effect."""
@@ -41,17 +42,27 @@ class Samples:
     spread : (n,) array
         Variance of the distance within the block, square metres: the mean of a bent signal is off by half of it times
         the bend.
-    root : (n,) array
-        Square root of the weight of the block, 1/m: inverse of the standard deviation of what is independent in it.
+    variance : (n,) array
+        Of what is independent in the mean, square metres.
+    factor : (b, n) array, optional
+        Cholesky factor of the covariance of the means, in the lower form of banded matrices, metres; None if neighbours
+        share no errors.
     """
 
     s: np.ndarray
     y: np.ndarray
     spread: np.ndarray
-    root: np.ndarray
+    variance: np.ndarray
+    factor: Optional[np.ndarray] = None
 
     def __getitem__(self, which: np.ndarray | slice) -> Samples:
-        return Samples(self.s[which], self.y[which], self.spread[which], self.root[which])
+        return Samples(self.s[which], self.y[which], self.spread[which], self.variance[which])
+
+    def whitened(self, columns: np.ndarray) -> np.ndarray:
+        """Return columns, (n, k), in which the errors of the signal are independent with standard deviation 1."""
+        if self.factor is None:
+            return columns / np.sqrt(self.variance)[:, None]
+        return dtbtrs(self.factor, columns, uplo="L")[0]
 
 
 @dataclass(frozen=True)
@@ -201,6 +212,8 @@ def columns(chain: Chain, samples: Samples) -> tuple[np.ndarray, np.ndarray]:
 def fitted(chain: Chain, samples: Samples, least_m: float, steps: int) -> tuple[Chain, float]:
     """Fit bends and joints by Gauss-Newton steps; return the best chain and its weighted sum of squared residuals.
 
+    A chain that has as many parameters as there are samples, or more, stays as it is; its sum is infinite.
+
     Parameters
     ----------
     chain : Chain
@@ -211,12 +224,14 @@ def fitted(chain: Chain, samples: Samples, least_m: float, steps: int) -> tuple[
         Largest number of steps.
     """
     best, best_rss = chain, np.inf
+    if len(samples.s) <= chain.size:
+        return best, best_rss
     free, unknown = np.array((True,) * chain.order + chain.curved), chain.unknown
     chosen = (unknown[:, None] == np.arange(unknown.max(initial=-1) + 1)).astype(float)
     for step in range(steps + 1):
         base, by = columns(chain, samples)
         by_knots = (by * np.repeat(np.diff(chain.bends), 2)) @ chosen
-        matrix = np.concatenate([base[:, free], by_knots, samples.y[:, None]], axis=1) * samples.root[:, None]
+        matrix = samples.whitened(np.concatenate([base[:, free], by_knots, samples.y[:, None]], axis=1))
         factor = np.triu(dgeqrf(matrix)[0][: matrix.shape[1]])
         linear = matrix.shape[1] - by_knots.shape[1] - 1
         rest = factor[linear:, -1]
@@ -239,11 +254,22 @@ def fitted(chain: Chain, samples: Samples, least_m: float, steps: int) -> tuple[
 
 
 def residuals(chain: Chain, samples: Samples) -> np.ndarray:
-    """Return the weighted residuals of a chain, (n,), with the best offset and slope, in order of `s`."""
+    """Return the whitened residuals of a chain, (n,), with the best offset and slope, in order of `s`."""
+    loose, rest, start = _started(chain, samples)
+    return rest - loose @ start
+
+
+def start_of(chain: Chain, samples: Samples) -> np.ndarray:
+    """Return the value at the start of a chain, and with order 2 the slope there, (order,)."""
+    return _started(chain, samples)[2]
+
+
+def _started(chain: Chain, samples: Samples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return whitened columns of offset and slope, (n, order), the whitened rest, (n,), and the values at the start."""
     base = columns(chain, samples)[0]
-    rest = (samples.y - base[:, chain.order :] @ chain.bends) * samples.root
-    loose = base[:, : chain.order] * samples.root[:, None]
-    return rest - loose @ np.linalg.lstsq(loose, rest, rcond=None)[0]
+    rest = samples.y - base[:, chain.order :] @ chain.bends
+    both = samples.whitened(np.column_stack([base[:, : chain.order], rest]))
+    return both[:, :-1], both[:, -1], np.linalg.lstsq(both[:, :-1], both[:, -1], rcond=None)[0]
 
 
 def _solved(upper: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -11,53 +11,26 @@ import numpy as np
 from ..errors import ParameterError
 from ..frame import LocalFrame
 from ..parameters import JUMPS, FitParameters
-from ..polyline import is_closed, length_along, runs
-from ..progress import SILENT, Progress, counted
+from ..polyline import length_along, runs
+from ..progress import SILENT, Progress
 from .chain import Chain
-from .deviations import Deviations
+from .deviations import Deviations, deviations_of
 from .elements import Alignment, Element, Figures, PlanElement
 from .given import chain_of, given_of
-from .intrinsic import groups, lateral_signal
+from .intrinsic import lateral_signal
 from .layouts import cants, heights, snapped
-from .noise import Noise
+from .measured import LEAST_POINTS, Measured, Track, measured_of
+from .noise import Noise, strays
 from .plane_fit import NOTHING, FitError, PlanFit, Points, fit_plan
 from .rounding import off_element, with_round_radii
 from .signals import CANT, HEIGHT, PLAN, Kind, Signal, find_structure, noise_of, refitted
 from .uncertainty import chain_errors, plan_errors, remaining
-
-LEAST_TRACK_M, LEAST_POINTS = 50.0, 20
-"""Least length of a track, metres, and least number of its points: the shortest curve that has a radius."""
-
-TURNS_BACK_RAD = np.pi / 3.0
-"""Largest bend of a line at a vertex: a track that turns back has a stray vertex, or runs through a switch twice."""
 
 HOLDS = 3.0
 """A fit does not hold where the line is off by more than this many tolerances, as a root mean square."""
 
 LEAST_CANT_POINTS = 20
 """With fewer places of known cant, it has no elements."""
-
-
-@dataclass(frozen=True)
-class Track:
-    """A measured track.
-
-    Attributes
-    ----------
-    track_id : int
-    xyz : (n, 3) array
-        Vertices of the centerline, local metres.
-    cant : (k, 2) array
-        Plan distance from the first vertex, increasing, and cant there, left rail minus right rail; metres. Empty if it
-        is unknown.
-    is_bridged : (n,) bool array
-        Whether the line bridges a gap at the vertex; such vertices do not count.
-    """
-
-    track_id: int
-    xyz: np.ndarray
-    cant: np.ndarray
-    is_bridged: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -78,24 +51,6 @@ class Fit:
     deviations: Deviations
     rms_mm: float
     noise: Noise
-
-
-@dataclass(frozen=True)
-class Measured:
-    """Points of a track: its vertices, those averaged that are closer than a metre.
-
-    Attributes
-    ----------
-    xyz : (n, 3) array
-    along : (n,) array
-        Plan distance from the first vertex along the line.
-    share : (n,) array
-        Number of vertices in each point that do not bridge a gap.
-    """
-
-    xyz: np.ndarray
-    along: np.ndarray
-    share: np.ndarray
 
 
 def fit_track(
@@ -122,18 +77,18 @@ def fit_track(
     ParameterError
         The line cannot have an alignment, or no part of the fit holds.
     """
-    _check(track)
-    measured = _points(track)
+    measured = measured_of(track, HOLDS * settings.tolerance_m, progress)
     in_plan, in_height, of_cant = progress.divide([4.0, 1.0, 1.0])
-    plan = _fit_in_plan(track.track_id, measured, settings, fixed, in_plan)
+    measured, plan = _followed(track.track_id, measured, settings, fixed, in_plan)
     elements = _stated(plan)
     if settings.rounded and fixed is None:
         elements = with_round_radii(plan.chain, plan.points, plan.fit, elements, in_plan)
-    first, last = _holding(track.track_id, elements, settings.tolerance_m, progress)
+    elements, feet = _shifted(elements, float(measured.along[0])), plan.fit.s + measured.along[0]
+    first, last = _holding(track.track_id, elements, feet[measured.in_plan > 0], settings.tolerance_m, progress)
     alignment = Alignment(track.track_id, frame, elements[first : last + 1])
-    alignment = _with_heights(alignment, plan.fit, measured, settings, fixed, in_height)
-    alignment = _with_cants(alignment, plan.fit, measured, track, settings, fixed, of_cant)
-    deviations = _deviations(alignment, plan.fit, measured, track)
+    alignment = _with_heights(alignment, feet, measured, settings, fixed, in_height)
+    alignment = _with_cants(alignment, feet, measured, track, settings, fixed, of_cant)
+    deviations = deviations_of(alignment, track.track_id, measured.xyz, measured.along, track.cant)
     return Fit(alignment, deviations, float(np.sqrt(np.mean(deviations.slew_mm**2))), plan.noise)
 
 
@@ -178,41 +133,6 @@ def fit_tracks(
     return fits
 
 
-def _check(track: Track) -> None:
-    """Refuse lines that cannot have an alignment."""
-    name, xy = f"The line of track {track.track_id}", track.xyz[:, :2]
-    if np.isnan(track.xyz[:, 2]).any():
-        raise ParameterError(f"{name} has no heights: give a 3D line, such as a centerline of Extract rails.")
-    if is_closed(xy):
-        raise ParameterError(f"{name} ends where it begins: cut the ring into two lines.")
-    length = length_along(xy)[-1]
-    if length < LEAST_TRACK_M or len(xy) < LEAST_POINTS:
-        raise ParameterError(
-            f"{name} has {counted(len(xy), 'vertex', 'vertices')} over {length:.0f} m, but a fit needs at least "
-            f"{LEAST_POINTS} over {LEAST_TRACK_M:.0f} m: leave it out, or join it with the track that continues it."
-        )
-
-
-def _points(track: Track) -> Measured:
-    """Return the points of a track."""
-    starts, counts = groups(track.xyz[:, :2])
-    along = length_along(track.xyz[:, :2])
-    sums = np.add.reduceat(np.column_stack([track.xyz, along, ~track.is_bridged]), starts)
-    made = Measured(sums[:, :3] / counts[:, None], sums[:, 3] / counts, sums[:, 4])
-    step = np.diff(made.xyz[:, :2], axis=0)
-    turn = np.abs(np.angle(np.exp(1j * np.diff(np.arctan2(step[:, 1], step[:, 0])))))
-    if turn.max(initial=0.0) > TURNS_BACK_RAD:
-        raise ParameterError(
-            f"The line of track {track.track_id} turns back {made.along[int(turn.argmax()) + 1]:.0f} m from its start: "
-            "remove the stray vertices there, or cut the line."
-        )
-    if np.count_nonzero(made.share) < LEAST_POINTS:
-        raise ParameterError(
-            f"Track {track.track_id} has fewer than {LEAST_POINTS} points outside of bridged gaps: leave it out."
-        )
-    return made
-
-
 @dataclass(frozen=True)
 class _Plan:
     """The fit in plan, with the noise that was assumed and the noise that is left."""
@@ -224,12 +144,45 @@ class _Plan:
     noise: Noise
 
 
+class _LostError(ParameterError):
+    """No chain of elements follows a line."""
+
+
+def _followed(
+    track_id: int, measured: Measured, settings: FitParameters, fixed: Optional[Alignment], progress: Progress
+) -> tuple[Measured, _Plan]:
+    """Return the fit in plan, of the line or of the longest part between strays that elements follow, and that part."""
+    parts = [measured] if fixed else [measured.without_stray_ends(), *measured.between_strays()]
+    lost: Optional[_LostError] = None
+    for part in parts:
+        try:
+            plan = _fit_in_plan(track_id, part, settings, fixed, progress)
+        except _LostError as error:
+            lost = lost or error
+            continue
+        if lost is not None:
+            progress.warning(
+                f"No chain of elements follows the line of track {track_id} as a whole. Only the elements from "
+                f"{part.along[0]:.0f} to {part.along[-1]:.0f} m are given."
+            )
+        return part, plan
+    raise lost or _lost(track_id)
+
+
+def _shifted(elements: Sequence[PlanElement], offset_m: float) -> tuple[PlanElement, ...]:
+    """Return elements that start farther along the line."""
+    return tuple(
+        replace(one, s_from=one.s_from + offset_m, figures=replace(one.figures, s_fit_m=one.s_from + offset_m))
+        for one in elements
+    )
+
+
 def _fit_in_plan(
     track_id: int, measured: Measured, settings: FitParameters, fixed: Optional[Alignment], progress: Progress
 ) -> _Plan:
     """Return the fitted elements in plan."""
     s, y = lateral_signal(measured.xyz[:, :2])
-    signal = Signal(s, y, measured.share, PLAN)
+    signal = Signal(s, y, measured.in_plan, PLAN)
     held = NOTHING
     if fixed is None:
         jumps = settings.transitions == JUMPS
@@ -238,7 +191,7 @@ def _fit_in_plan(
         given = given_of(fixed, float(s[-1]))
         chain, held, used = given.chain, given.held, noise_of(signal, settings.tolerance_m, progress)[0]
     used_m = used.effective_m(signal.step_m)
-    points = Points(measured.xyz[:, :2], s, measured.share / used_m**2)
+    points = Points(measured.xyz[:, :2], s, measured.in_plan / used_m**2)
     try:
         fit = fit_plan(chain, points, held, progress)
     except (FitError, RuntimeError, np.linalg.LinAlgError) as error:
@@ -248,8 +201,8 @@ def _fit_in_plan(
     return _Plan(chain, fit, points, used_m, remaining(fit, points, settings.tolerance_m))
 
 
-def _lost(track_id: int) -> ParameterError:
-    return ParameterError(
+def _lost(track_id: int) -> _LostError:
+    return _LostError(
         f"No chain of elements follows the line of track {track_id}: raise MIN_LENGTH, or smooth the line first."
     )
 
@@ -276,18 +229,34 @@ def _stated(plan: _Plan) -> tuple[PlanElement, ...]:
     return tuple(made)
 
 
-def _holding(track_id: int, elements: Sequence[PlanElement], tolerance_m: float, progress: Progress) -> tuple[int, int]:
-    """Return the first and the last element of the longest part of the fit that holds; warn if it is not the whole."""
+def _holding(
+    track_id: int, elements: Sequence[PlanElement], feet: np.ndarray, tolerance_m: float, progress: Progress
+) -> tuple[int, int]:
+    """Return the first and the last element of the longest part of the fit that holds; warn if it is not the whole.
+
+    Parameters
+    ----------
+    track_id : int
+    elements : sequence of PlanElement
+    feet : (n,) array
+        Of the points that count, increasing, metres.
+    tolerance_m : float
+    progress : Progress
+    """
     limit_mm = 1000.0 * HOLDS * tolerance_m
     holds = np.array([(one.figures.dev_rms_mm or 0.0) <= limit_mm for one in elements])
     if holds.all():
         return 0, len(elements) - 1
-    if not holds.any():
+    parts = []
+    for first, last in runs(holds):
+        start, end = elements[first].s_from, elements[last].s_to
+        if np.count_nonzero((feet >= start) & (feet <= end)) >= LEAST_POINTS:
+            parts.append((end - start, first, last))
+    if not parts:
         raise ParameterError(
-            f"The fit of track {track_id} does not hold: every element is off by more than {limit_mm:.0f} mm, three "
+            f"The fit of track {track_id} does not hold: every part is off by more than {limit_mm:.0f} mm, three "
             "times TOLERANCE; raise TOLERANCE, or smooth the line first."
         )
-    parts = [(elements[last].s_to - elements[first].s_from, first, last) for first, last in runs(holds)]
     _, first, last = max(parts)
     worst = max(elements, key=lambda one: one.figures.dev_rms_mm or 0.0)
     progress.warning(
@@ -300,14 +269,14 @@ def _holding(track_id: int, elements: Sequence[PlanElement], tolerance_m: float,
 
 def _with_heights(
     alignment: Alignment,
-    fit: PlanFit,
+    feet: np.ndarray,
     measured: Measured,
     settings: FitParameters,
     fixed: Optional[Alignment],
     progress: Progress,
 ) -> Alignment:
     """Return an alignment with grades and parabolas."""
-    signal = _signal(alignment, fit.s, measured.xyz[:, 2], measured.share, HEIGHT)
+    signal = _signal(alignment, feet, measured.xyz[:, 2], measured.in_height, HEIGHT)
     shape = fixed.vertical if fixed else ()
     chain, used = _chain(signal, [one.type == "parabola" for one in shape], shape, settings, progress)
     chain = replace(chain, start=alignment.s_from, end=alignment.s_to)
@@ -317,7 +286,7 @@ def _with_heights(
 
 def _with_cants(
     alignment: Alignment,
-    fit: PlanFit,
+    feet: np.ndarray,
     measured: Measured,
     track: Track,
     settings: FitParameters,
@@ -325,8 +294,9 @@ def _with_cants(
     progress: Progress,
 ) -> Alignment:
     """Return an alignment with constant cants and ramps, as far as the cant is known."""
-    s = np.interp(track.cant[:, 0], measured.along, fit.s)
-    signal = _signal(alignment, s, track.cant[:, 1], np.ones(len(s)), CANT)
+    s = np.interp(track.cant[:, 0], measured.along, feet, left=np.nan, right=np.nan)
+    counts = ~strays(track.cant[:, 0], track.cant[:, 1], HOLDS * settings.tolerance_m)
+    signal = _signal(alignment, s, track.cant[:, 1], counts.astype(float), CANT)
     if len(signal.s) < LEAST_CANT_POINTS:
         return alignment
     shape = fixed.cant if fixed else ()
@@ -354,16 +324,3 @@ def _chain(
     else:
         chain, used = find_structure(signal, tolerance_m, least_m, True, progress)
     return refitted(chain, signal, used, least_m), used
-
-
-def _deviations(alignment: Alignment, fit: PlanFit, measured: Measured, track: Track) -> Deviations:
-    """Return the deviations by the metre, interpolated between the points."""
-    s = alignment.s_from + np.arange(int(np.floor(alignment.s_to - alignment.s_from)) + 1)
-    lift = measured.xyz[:, 2] - alignment.heights(fit.s)
-    cant = np.full(len(s), np.nan)
-    if alignment.cant:
-        feet = np.interp(track.cant[:, 0], measured.along, fit.s)
-        cant = np.interp(s, feet, track.cant[:, 1] - alignment.cants(feet))
-        cant[(s < alignment.cant[0].s_from) | (s > alignment.cant[-1].s_to)] = np.nan
-    slew, lift = (np.interp(s, fit.s, values) for values in (fit.across, lift))
-    return Deviations(alignment.track_id, s, alignment.xyz(s), 1000.0 * slew, 1000.0 * lift, 1000.0 * cant)

@@ -9,16 +9,17 @@ import numpy as np
 from .chain import Chain
 from .elements import CantElement, Figures, PlanElement, VerticalElement
 from .noise import Noise
-from .signals import Signal, refitted, start_of
+from .signals import Signal, refitted, started
 from .uncertainty import Errors
 
-SNAP_SIGMAS, SNAP_M = 2.58, 3.0
-"""A ramp's end takes the place of a clothoid's end within this many standard errors (1 % level), and metres."""
+SNAP_SIGMAS, SNAP_M = 2.58, 10.0
+"""A ramp's end takes the place of a clothoid's end within this many standard errors (1 % level), and metres: the end of
+a ramp of 5 mm over 150 m is known to 3 m."""
 
 
 def heights(chain: Chain, signal: Signal, noise: Noise, errors: Errors) -> tuple[VerticalElement, ...]:
     """Return grades and parabolas."""
-    z, grade = map(float, start_of(chain, signal, noise))
+    z, grade = map(float, started(chain, signal, noise))
     made = []
     for start, end, bend, figures in _parts(chain, errors):
         length = end - start
@@ -29,7 +30,7 @@ def heights(chain: Chain, signal: Signal, noise: Noise, errors: Errors) -> tuple
 
 def cants(chain: Chain, signal: Signal, noise: Noise, errors: Errors) -> tuple[CantElement, ...]:
     """Return constant cants and ramps."""
-    (cant,) = map(float, start_of(chain, signal, noise))
+    (cant,) = map(float, started(chain, signal, noise))
     made = []
     for start, end, bend, figures in _parts(chain, errors):
         made.append(CantElement(start, end - start, cant, cant + bend * (end - start), figures))

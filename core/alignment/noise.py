@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Optional
 
 import numpy as np
 from scipy import sparse
-from scipy.linalg import toeplitz
+from scipy.linalg import cholesky_banded, toeplitz
 from scipy.optimize import nnls
 
-LENGTHS_M = (3.0, 5.0, 8.0, 12.0, 18.0, 27.0)
+LENGTHS_M = (3.0, 4.0, 5.0, 6.5, 8.0, 10.0, 12.0, 15.0, 18.0, 22.0, 27.0)
 """Correlation lengths of the misalignment that are tried, metres: track is out of line over 5 to 30 m."""
 
 LAGS = 30
@@ -21,11 +22,16 @@ LAGS = 30
 MEDIAN_SHARE = 0.6745
 """Median of the size of normal errors, in units of their standard deviation."""
 
-FAR = 3.0
-"""Distance in correlation lengths beyond which the misalignment is independent: the correlation is below 0.0002."""
+FAR = 4.0
+"""Distance in correlation lengths beyond which the misalignment is independent: the correlation is below 1e-6, so that
+the covariance stays positive when it is cut off there."""
 
-SURE = 3.0
-"""Errors are shared by neighbours if the products of their residuals exceed this many standard errors."""
+STRAY = 6.0
+"""A point does not count if it lies farther off its neighbours than this many times the usual distance: chance does not
+explain it."""
+
+TOGETHER = 5
+"""Strays this many points apart or fewer belong to one bad place, whose other points do not count, either."""
 
 OUTLIER = 2.0
 """A piece with a mean square this many times the median is left out: an element begins within it."""
@@ -66,11 +72,41 @@ class Noise:
         """
         return math.sqrt(self.white_m**2 + self.shared_m**2 * math.sqrt(math.pi) * self.length_m / step_m)
 
+    def factor(self, s: np.ndarray, spread: np.ndarray, variance: np.ndarray) -> Optional[np.ndarray]:
+        """Return the Cholesky factor of the covariance of means over blocks, in the lower form of banded matrices.
 
-def independent_m(s: np.ndarray, y: np.ndarray) -> float:
-    """Return the standard deviation of errors that neighbours do not share, from each point and the four around it."""
-    if len(s) < 2 * SIZES[0]:
-        return 0.0
+        Parameters
+        ----------
+        s, spread : (n,) array
+            Mean and variance of the distances of the points in each block, in order; metres, square metres.
+        variance : (n,) array
+            Of what is independent in the mean, square metres.
+
+        Returns
+        -------
+        (b, n) array or None
+            Metres; None if there is no misalignment.
+        """
+        if not self.shared_m:
+            return None
+        rows = []
+        for lag in range(len(s)):
+            apart = s[lag:] - s[: len(s) - lag]
+            squared = self.length_m**2 + 2.0 * (spread[lag:] + spread[: len(s) - lag])
+            if lag and (apart**2 > FAR**2 * squared).all():
+                break
+            value = self.shared_m**2 * self.length_m * np.exp(-(apart**2) / squared) / np.sqrt(squared)
+            rows.append(np.concatenate([value, np.zeros(lag)]))
+        rows[0] = rows[0] + variance
+        return cholesky_banded(rows, lower=True)
+
+
+def off_neighbours(s: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return how far points lie off the cubic through the four around each, (n - 4,), over its standard deviation.
+
+    The unit is the standard deviation of errors that neighbours do not share. No curve of a track is seen: a jump of
+    the curvature to a radius of 25 m counts 3 mm.
+    """
     near = [slice(0, -4), slice(1, -3), slice(3, -1), slice(4, None)]
     middle = s[2:-2]
     off, square = y[2:-2].copy(), np.ones(len(middle))
@@ -81,38 +117,57 @@ def independent_m(s: np.ndarray, y: np.ndarray) -> float:
                 share *= (middle - s[other]) / (s[one] - s[other])
         off -= share * y[one]
         square += share**2
-    return float(np.median(np.abs(off) / np.sqrt(square))) / MEDIAN_SHARE
+    return off / np.sqrt(square)
 
 
-def estimated(
-    pieces: Sequence[tuple[np.ndarray, int]], step_m: float, floor_m: float, only_if_sure: bool = False
-) -> Noise:
+def independent_m(s: np.ndarray, y: np.ndarray) -> float:
+    """Return the standard deviation of errors that neighbours do not share, from each point and the four around it."""
+    if len(s) < 2 * SIZES[0]:
+        return 0.0
+    return float(np.median(np.abs(off_neighbours(s, y)))) / MEDIAN_SHARE
+
+
+def strays(s: np.ndarray, y: np.ndarray, limit_m: float) -> np.ndarray:
+    """Return which points lie farther off their neighbours than a limit and chance explain, (n,) bool."""
+    found = np.zeros(len(s), dtype=bool)
+    if len(s) >= 2 * SIZES[0]:
+        found[2:-2] = np.abs(off_neighbours(s, y)) > max(limit_m, STRAY * independent_m(s, y))
+    which = np.flatnonzero(found)
+    for first, last in zip(which, which[1:]):
+        found[first:last] = found[first:last] | (last - first <= TOGETHER)
+    return found
+
+
+def estimated(pieces: Sequence[tuple[np.ndarray, float]], step_m: float, floor_m: float, sure: float = 0.0) -> Noise:
     """Return the noise that explains residuals.
 
     The residuals of a polynomial hang together less than the errors, because it follows them; the loss is computed.
 
     Parameters
     ----------
-    pieces : sequence of ((n,) array, int)
-        Residuals of a piece in order, metres, and degree of the polynomial that was fitted to it.
+    pieces : sequence of ((n,) array, float)
+        Residuals of a piece in order, metres, and degree of the polynomial that was fitted to it. Between two degrees,
+        as much is lost as a share of the errors loses by either.
     step_m : float
         Mean distance between the points.
     floor_m : float
         Least standard deviation of single points, metres.
-    only_if_sure : bool
-        Whether misalignment must exceed what chance explains.
+    sure : float
+        Misalignment must exceed what chance explains by this many standard errors; with 0, it need not.
     """
     pieces = _usual([(rest, degree) for rest, degree in pieces if len(rest) >= SIZES[0]])
     if not pieces:
         return Noise(floor_m)
     seen = np.sum([_products(rest) for rest, _ in pieces], axis=0)
-    kinds: Counter[tuple[int, int]] = Counter()
+    kinds: defaultdict[tuple[int, int], float] = defaultdict(float)
     for rest, degree in pieces:
-        kinds[max(size for size in SIZES if size <= len(rest)), degree] += len(rest)
+        size, lower = max(size for size in SIZES if size <= len(rest)), math.floor(degree)
+        kinds[size, lower] += len(rest) * (1.0 + lower - degree)
+        kinds[size, lower + 1] += len(rest) * (degree - lower)
     lags = step_m * np.arange(SIZES[-1])
     white = _expected_of(kinds, np.where(lags == 0, 1.0, 0.0))
     alone = float(white @ seen / (white @ white))
-    if only_if_sure and not _hang_together(seen - alone * white, alone, sum(kinds.values())):
+    if sure and not _hang_together(seen - alone * white, alone, sum(kinds.values()), sure):
         return Noise(max(math.sqrt(alone), floor_m))
     found = []
     for length in LENGTHS_M:
@@ -122,14 +177,14 @@ def estimated(
     return min(found, key=lambda one: one[0])[1]
 
 
-def _hang_together(products: np.ndarray, variance: float, count: int) -> bool:
+def _hang_together(products: np.ndarray, variance: float, count: float, sure: float) -> bool:
     """Return whether products of residuals at lags, (LAGS,), are more than those of independent errors would be."""
     sums = np.cumsum(products[1:])
     error = variance * np.sqrt(count * np.arange(1, LAGS))
-    return bool((sums > SURE * error).any())
+    return bool((sums > sure * error).any())
 
 
-def _usual(pieces: list[tuple[np.ndarray, int]]) -> list[tuple[np.ndarray, int]]:
+def _usual(pieces: list[tuple[np.ndarray, float]]) -> list[tuple[np.ndarray, float]]:
     """Return the pieces without those that fit badly, because an element begins within them."""
     if not pieces:
         return []
@@ -146,7 +201,7 @@ def _products(rest: np.ndarray) -> np.ndarray:
     return np.array([padded[: len(rest)] @ padded[lag : lag + len(rest)] for lag in range(LAGS)])
 
 
-def _expected_of(kinds: Mapping[tuple[int, int], int], correlation: np.ndarray) -> np.ndarray:
+def _expected_of(kinds: Mapping[tuple[int, int], float], correlation: np.ndarray) -> np.ndarray:
     """Return the sums of products to expect at each lag, (LAGS,), for errors with a correlation by lag.
 
     Parameters

@@ -45,7 +45,12 @@ class Piece:
 
 
 def partition(
-    s: np.ndarray, y: np.ndarray, sigma: float, degrees: Sequence[int], progress: Progress = SILENT
+    s: np.ndarray,
+    y: np.ndarray,
+    sigma: float,
+    degrees: Sequence[int],
+    ends: tuple[float, float],
+    progress: Progress = SILENT,
 ) -> list[Piece]:
     """Divide a signal into polynomials.
 
@@ -57,11 +62,13 @@ def partition(
         Standard deviation of the signal's errors, metres.
     degrees : sequence of int
         Degrees that a piece may have, each one more than the one before.
+    ends : (float, float)
+        Start of the first and end of the last piece.
     progress : Progress
     """
-    count = max(int(round((s[-1] - s[0]) / BLOCK_M)), 1)
-    ends = np.linspace(s[0], s[-1], count + 1)
-    firsts = np.searchsorted(s, ends)
+    count = max(int(round((ends[1] - ends[0]) / BLOCK_M)), 1)
+    bounds = np.linspace(*ends, count + 1)
+    firsts = np.searchsorted(s, bounds)
     firsts[-1] = len(s)
     log_n = math.log(max(len(s), 2))
     costs = [(PIECE_PENALTY + DEGREE_PENALTY * degree) * log_n for degree in degrees]
@@ -80,11 +87,11 @@ def partition(
         total = best[starts, None] + rss + costs
         at, which = np.unravel_index(np.argmin(total), total.shape)
         best[block + 1], came[block + 1] = total[at, which], (starts[at], which)
-        behind = ends[block + 1] - ends[starts]
+        behind = bounds[block + 1] - bounds[starts]
         hopeless = best[starts] + rss[:, -1] + costs[0] > best[block + 1] + costs[-1]
         kept = ((behind < KEPT_M) | ~hopeless) & (behind < LONGEST_M)
         starts, factors, rest = starts[kept], factors[kept], rest[kept]
-    return _traced(came, ends, degrees)
+    return _traced(came, bounds, degrees)
 
 
 def _take(factors: np.ndarray, rest: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:

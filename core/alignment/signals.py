@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..progress import SILENT, Progress
-from .chain import Chain, columns, fitted
+from .chain import Chain, fitted, start_of
 from .noise import Noise, estimated, independent_m
 from .partition import Piece, partition
 from .structure import Blocks, Rules, from_pieces, searched
@@ -18,6 +18,10 @@ NOISE_ROUNDS, SETTLED = 8, 1.15
 
 FEW_POINTS = 25
 """Mean number of points in a piece below which a partition may follow the misalignment and hide it."""
+
+LIKELY = 2.0
+"""Standard errors by which the first partitions have to show misalignment: to miss it is worse than to see some where
+there is none, because the search then bends a track with it."""
 
 FLOOR_M = 0.00005
 """Least standard deviation of a point, metres: below it, coordinates are rounded."""
@@ -75,8 +79,8 @@ class Signal:
         return float(self.s[-1] - self.s[0]) / max(len(self.s) - 1, 1)
 
     def blocks(self, noise: Noise) -> Blocks:
-        """Return the signal as means, weighted for the noise."""
-        return Blocks.of(self.s, self.y, self.share, noise.effective_m(self.step_m))
+        """Return the signal as means, with the noise."""
+        return Blocks.of(self.s, self.y, self.share, noise)
 
 
 def noise_of(signal: Signal, tolerance_m: float, progress: Progress = SILENT) -> tuple[Noise, list[Piece]]:
@@ -96,10 +100,11 @@ def noise_of(signal: Signal, tolerance_m: float, progress: Progress = SILENT) ->
     s, y = signal.s[used], signal.y[used]
     noise = Noise(max(independent_m(s, y), FLOOR_M))
     for share in progress.split(NOISE_ROUNDS):
-        sigma = noise.effective_m(signal.step_m)
-        pieces = partition(s, y, sigma, signal.kind.degrees, share)
+        sigma, fine = noise.effective_m(signal.step_m), signal.blocks(noise).fine
+        of_block = sigma * math.sqrt(len(fine.s) / len(s))
+        pieces = partition(fine.s, fine.y, of_block, signal.kind.degrees, (s[0], s[-1]), share)
         is_coarse = len(s) > FEW_POINTS * len(pieces)
-        found = estimated(_residuals(pieces, s, y), signal.step_m, FLOOR_M, only_if_sure=is_coarse)
+        found = estimated(_residuals(pieces, s, y), signal.step_m, FLOOR_M, LIKELY if is_coarse else 0.0)
         noise = Noise(found.white_m, min(found.shared_m, tolerance_m), found.length_m)
         if noise.effective_m(signal.step_m) < SETTLED * sigma:
             break
@@ -149,9 +154,6 @@ def refitted(chain: Chain, signal: Signal, noise: Noise, least_m: float) -> Chai
     return fitted(chain, signal.blocks(noise).near(chain), least_m, FINAL_STEPS)[0]
 
 
-def start_of(chain: Chain, signal: Signal, noise: Noise) -> np.ndarray:
+def started(chain: Chain, signal: Signal, noise: Noise) -> np.ndarray:
     """Return the value at the start of a chain, and with order 2 the slope there, (order,)."""
-    samples = signal.blocks(noise).near(chain)
-    base = columns(chain, samples)[0]
-    rest = (samples.y - base[:, chain.order :] @ chain.bends) * samples.root
-    return np.linalg.lstsq(base[:, : chain.order] * samples.root[:, None], rest, rcond=None)[0]
+    return start_of(chain, signal.blocks(noise).near(chain))

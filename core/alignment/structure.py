@@ -12,6 +12,7 @@ import numpy as np
 from ..progress import SILENT, Progress
 from .chain import Chain, Samples, Span, assembled, fitted, residuals
 from .moves import richer, simpler
+from .noise import Noise
 from .partition import Piece
 
 FINE_M, COARSE = 2.0, 5
@@ -38,20 +39,29 @@ SAME_M = 12.0
 
 @dataclass(frozen=True)
 class Blocks:
-    """A signal as means over fine and coarse blocks."""
+    """A signal as means over fine and coarse blocks.
+
+    Attributes
+    ----------
+    fine, coarse : Samples
+    first : float
+        Distance at which the first block begins, metres.
+    noise : Noise
+        Of the points.
+    """
 
     fine: Samples
     coarse: Samples
     first: float
-    """Distance at which the first block begins, metres."""
+    noise: Noise
 
     @classmethod
-    def of(cls, s: np.ndarray, y: np.ndarray, share: np.ndarray, sigma: float) -> Blocks:
+    def of(cls, s: np.ndarray, y: np.ndarray, share: np.ndarray, noise: Noise) -> Blocks:
         """Average a signal whose points count as `share`, (n,), of one; those with 0 are left out."""
         used = share > 0
-        s, y, weight = s[used], y[used], share[used] / sigma**2
+        s, y, weight = s[used], y[used], share[used] / noise.white_m**2
         number = ((s - s[0]) // FINE_M).astype(int)
-        return cls(_averaged(s, y, weight, number), _averaged(s, y, weight, number // COARSE), float(s[0]))
+        return cls(_averaged(s, y, weight, number), _averaged(s, y, weight, number // COARSE), float(s[0]), noise)
 
     def near(self, chain: Chain) -> Samples:
         """Return the samples for a chain: fine ones near its joints, coarse ones elsewhere."""
@@ -63,9 +73,10 @@ class Blocks:
             for one in (fine, coarse)
         )
         a, b = fine[where_fine < NEAR_M], coarse[where_coarse >= NEAR_M]
-        both = [np.concatenate([getattr(a, name), getattr(b, name)]) for name in ("s", "y", "spread", "root")]
+        both = [np.concatenate([getattr(a, name), getattr(b, name)]) for name in ("s", "y", "spread", "variance")]
         order = np.argsort(both[0])
-        return Samples(*(values[order] for values in both))
+        s, y, spread, variance = (values[order] for values in both)
+        return Samples(s, y, spread, variance, self.noise.factor(s, spread, variance))
 
     @staticmethod
     def _inside(samples: Samples, chain: Chain) -> Samples:
@@ -80,7 +91,7 @@ def _averaged(s: np.ndarray, y: np.ndarray, weight: np.ndarray, number: np.ndarr
     mean = np.add.reduceat(weight * s, starts) / total
     away = s - np.repeat(mean, np.diff(starts, append=len(s)))
     spread = np.add.reduceat(weight * away**2, starts) / total
-    return Samples(mean, np.add.reduceat(weight * y, starts) / total, spread, np.sqrt(total))
+    return Samples(mean, np.add.reduceat(weight * y, starts) / total, spread, 1.0 / total)
 
 
 @dataclass(frozen=True)
@@ -125,7 +136,7 @@ def searched(chain: Chain, blocks: Blocks, rules: Rules, progress: Progress = SI
     ----------
     chain : Chain
     blocks : Blocks
-        Weighted by their standard deviation, so that sums of squared residuals are chi-squares.
+        With their noise, so that sums of squared residuals are chi-squares.
     rules : Rules
     progress : Progress
     """
@@ -138,7 +149,7 @@ def searched(chain: Chain, blocks: Blocks, rules: Rules, progress: Progress = SI
         if m >= len(chain.bends):
             continue
         lo, hi = _window(chain, m)
-        part = _cut(chain, lo, hi)
+        part = _cut(chain, lo, hi, m)
         better, is_changed = _improved(part, m - lo, blocks, rules, accepted)
         done += 1
         progress.set_fraction(done / (done + len(waiting)))
@@ -163,11 +174,11 @@ def _window(chain: Chain, m: int) -> tuple[int, int]:
     return lo, hi
 
 
-def _cut(chain: Chain, lo: int, hi: int) -> Chain:
-    """Return the parts `lo` to `hi` of a chain, the outermost ones shortened."""
+def _cut(chain: Chain, lo: int, hi: int, m: int) -> Chain:
+    """Return the parts `lo` to `hi` of a chain, the outermost ones shortened unless they are `m`."""
     starts, ends = chain.extents
-    start = float(starts[lo]) if lo == hi else max(float(starts[lo]), float(ends[lo]) - SHOULDER_M)
-    end = float(ends[hi]) if lo == hi else min(float(ends[hi]), float(starts[hi]) + SHOULDER_M)
+    start = float(starts[lo]) if lo == m else max(float(starts[lo]), float(ends[lo]) - SHOULDER_M)
+    end = float(ends[hi]) if hi == m else min(float(ends[hi]), float(starts[hi]) + SHOULDER_M)
     return replace(
         chain,
         start=start,
@@ -193,7 +204,7 @@ def _replaced(chain: Chain, lo: int, hi: int, part: Chain) -> Chain:
 def _improved(part: Chain, m: int, blocks: Blocks, rules: Rules, accepted: set[tuple]) -> tuple[Chain, bool]:
     """Return a window refitted, after the best change of its structure if one pays, and whether one does."""
     samples = blocks.near(part)
-    if len(samples.s) < part.size + 2:
+    if len(samples.s) <= part.size:
         return part, False
     now, rss = fitted(part, samples, rules.least_m, FIT_STEPS)
     cost = rss + rules.price * now.size

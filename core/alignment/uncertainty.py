@@ -12,9 +12,11 @@ from .noise import Noise, estimated, shared_covariance
 from .plane_fit import PlanFit, Points
 from .signals import FLOOR_M, Signal
 
-RESIDUAL_DEGREE = 1
-"""Degree of the polynomial that follows the errors of an element as much as the fit does, which has one and a half
-parameters per element."""
+LEAST_DEGREE, LARGEST_DEGREE = 0.0, 3.0
+"""Limits of the degree of a polynomial that follows the errors of an element as much as the fit does."""
+
+SURE = 3.0
+"""Standard errors by which the distances of the points from the fitted curve have to show misalignment."""
 
 SINGULAR = 1e-13
 """Share of the largest singular value below which a combination of unknowns is not determined."""
@@ -39,12 +41,24 @@ class Errors:
 
 def remaining(fit: PlanFit, points: Points, tolerance_m: float) -> Noise:
     """Return the noise that explains the distances of the points from the fitted curve."""
-    bounds = np.searchsorted(fit.s, [one.s_to for one in fit.elements[:-1]])
-    used = points.weight > 0
-    pieces = [(rest[mine], RESIDUAL_DEGREE) for rest, mine in zip(np.split(fit.across, bounds), np.split(used, bounds))]
+    ends = np.searchsorted(fit.s, [one.s_to for one in fit.elements[:-1]])
+    parts = [slice(first, last) for first, last in zip([0, *ends], [*ends, len(fit.s)])]
+    covariance = fit.solver.covariance_rows(np.arange(fit.jacobian.shape[1]))
+    pieces = []
+    for part in parts:
+        degree = _spent(fit.jacobian[part], points.weight[part], covariance) - 1.0
+        used = points.weight[part] > 0
+        pieces.append((fit.across[part][used], float(np.clip(degree, LEAST_DEGREE, LARGEST_DEGREE))))
     step = float(points.s[-1]) / (len(points.s) - 1)
-    found = estimated(pieces, step, FLOOR_M, only_if_sure=True)
+    found = estimated(pieces, step, FLOOR_M, SURE)
     return Noise(found.white_m, min(found.shared_m, tolerance_m), found.length_m)
+
+
+def _spent(jacobian: sparse.csr_matrix, weight: np.ndarray, covariance: np.ndarray) -> float:
+    """Return how many parameters a fit spends on some points: the sum of their leverages."""
+    which = np.unique(jacobian.indices)
+    rows = jacobian[:, which].toarray()
+    return float(np.einsum("i,ij,jk,ik->", weight, rows, covariance[np.ix_(which, which)], rows, optimize=True))
 
 
 def plan_errors(fit: PlanFit, points: Points, used_m: float, noise: Noise) -> Errors:
@@ -78,7 +92,6 @@ def chain_errors(chain: Chain, signal: Signal, noise: Noise) -> Errors:
     chain : Chain
     signal : Signal
     noise : Noise
-        For which the signal is weighted, and which it has.
     """
     samples = signal.blocks(noise).near(chain)
     base, by = columns(chain, samples)
@@ -86,18 +99,14 @@ def chain_errors(chain: Chain, signal: Signal, noise: Noise) -> Errors:
     free = np.array((True,) * chain.order + chain.curved)
     by_knots = (by[:, 0::2] + by[:, 1::2]) * np.diff(chain.bends)
     jacobian = np.concatenate([base[:, free], by_knots[:, unknown >= 0]], axis=1)
-    weighted = jacobian * samples.root[:, None]
+    weighted = samples.whitened(jacobian)
     scale = np.linalg.norm(weighted, axis=0)
     scale[scale == 0] = 1.0
     half = np.linalg.pinv(np.linalg.qr(weighted / scale, mode="r"), rcond=SINGULAR) / scale[:, None]
-    rows = half @ half.T
-    spread = _spread(sparse.csr_matrix(jacobian), samples.s, samples.root**2, noise.effective_m(signal.step_m), noise)
-    size = rows.shape[1]
-    bends = np.zeros((len(chain.bends), size))
-    bends[np.array(chain.curved)] = rows[chain.order : int(free.sum())]
-    starts = np.zeros((len(chain.bends) + 1, size))
-    starts[1:-1][unknown >= 0] = rows[int(free.sum()) :]
-    return Errors(*(_deviation(one, spread) for one in (bends, np.diff(starts, axis=0), starts[:-1])))
+    bends, starts = np.zeros((len(chain.bends), len(half))), np.zeros((len(chain.bends) + 1, len(half)))
+    bends[np.array(chain.curved)] = half[chain.order : int(free.sum())]
+    starts[1:-1][unknown >= 0] = half[int(free.sum()) :]
+    return Errors(*(np.linalg.norm(one, axis=1) for one in (bends, np.diff(starts, axis=0), starts[:-1])))
 
 
 def _spread(

@@ -104,8 +104,9 @@ class Workers:
         RailExtractError
             A process ended.
         """
-        if not self._workers and self._can_start and _is_worth(tasks):
-            self._start(progress)
+        missing = min(self._count, len(tasks)) - len(self._workers)
+        if missing > 0 and self._can_start and _is_worth(tasks):
+            self._start(missing, progress)
         if not self._workers:
             yield from self._in_turn.run(tasks, progress)
             return
@@ -121,21 +122,21 @@ class Workers:
             worker.end()
         self._workers, self._messages = [], SimpleQueue()
 
-    def _start(self, progress: Progress) -> None:
-        """Start all processes; if that fails, this process works alone, and the log says why."""
+    def _start(self, missing: int, progress: Progress) -> None:
+        """Start processes; if that fails, this process works alone, and the log says why."""
+        if not self._workers:
+            progress.info(f"Up to {self._count} worker processes on {counted(cores(), 'core')} (WORKERS).")
         try:
             interpreter = self._interpreter()
-            for _ in range(self._count):
+            for _ in range(missing):
                 self._workers.append(Worker(interpreter, self._messages))
-            for _ in range(self._count):
+            for _ in range(missing):
                 if _next(self._messages, progress)[1] != READY:
                     raise OSError("they end at once")
         except (OSError, RailExtractError) as error:
             self.end()
             self._can_start = False
             progress.info(f"One process works alone, because worker processes can't be started: {error}")
-        else:
-            progress.info(f"{self._count} worker processes on {counted(cores(), 'core')} (WORKERS).")
 
 
 class _Run:
@@ -154,8 +155,10 @@ class _Run:
         self._tasks, self._messages, self._progress = tasks, messages, progress
         self._order = turns(tasks)
         self._waiting = list(self._order)
-        self._idle, self._running = list(idle), dict[Worker, Hashable]()
-        self._kept, self._answers = Results(tasks), dict[Hashable, Answer]()
+        self._idle = list(idle)
+        self._running: dict[Worker, Hashable] = {}
+        self._kept = Results(tasks)
+        self._answers: dict[Hashable, Answer] = {}
         self._finished: set[Hashable] = set()
         self._total_s = sum(task.weight for task in tasks.values())
         self._done_s: dict[Hashable, float] = {}

@@ -18,6 +18,7 @@ from ..dialog import parameters as groups
 from ..dialog.definitions import advanced
 from ..dialog.parameter_values import ParameterValues
 from ..dialog.passwords import masked
+from ..i18n import tr
 from ..reading.clouds import CloudSource, checked_crs, points_folder, request_points
 from ..systems import system
 from ..writing.destinations import is_wanted
@@ -156,6 +157,7 @@ class ExtractRails(RailAlgorithm):
         """Return the job with the rail standard that fits the points."""
         from ...core.standard_checks import detect_in_raw, detect_standard
 
+        progress.status(tr("Measuring gauge and railheads"))
         detect = detect_in_raw if values.flag("CLASSIFY") else detect_standard
         standard = values.standard(detect(request, progress.span(0, 0)).name)
         choose_model(standard.gauge_m, standard.head_width_m, values.choice("MODEL"))

@@ -10,7 +10,7 @@ from qgis.core import NULL, QgsFeatureRequest, QgsProcessingFeatureSource
 
 from ...core.alignment.cant_of_rails import cant_of_rails
 from ...core.alignment.elements import Alignment
-from ...core.alignment.fit import Track
+from ...core.alignment.measured import Track
 from ...core.errors import RailExtractError
 from ...core.frame import LocalFrame
 from ...core.polyline import length_along

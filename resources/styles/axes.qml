@@ -36,9 +36,9 @@
     <columns>
       <column type="field" name="track_id" width="70" hidden="0"/>
       <column type="field" name="name" width="160" hidden="0"/>
-      <column type="field" name="length_m" width="100" hidden="0"/>
-      <column type="field" name="km_from" width="180" hidden="0"/>
-      <column type="field" name="km_to" width="170" hidden="0"/>
+      <column type="field" name="length_m" width="110" hidden="0"/>
+      <column type="field" name="km_from" width="220" hidden="0"/>
+      <column type="field" name="km_to" width="200" hidden="0"/>
     </columns>
   </attributetableconfig>
   <mapTip>&lt;b&gt;[% &quot;name&quot; %]&lt;/b&gt;&lt;br&gt;Track [% &quot;track_id&quot; %]&lt;br&gt;Length: [% format_number(&quot;length_m&quot;, 1) || &#x27; m&#x27; %]&lt;br&gt;Kilometre: [% coalesce(format_number(&quot;km_from&quot;, 3) || &#x27; to &#x27; || format_number(&quot;km_to&quot;, 3), &#x27;unknown&#x27;) %]</mapTip>

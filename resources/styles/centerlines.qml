@@ -68,14 +68,14 @@
     <columns>
       <column type="field" name="track_id" width="70" hidden="0"/>
       <column type="field" name="class_code" width="70" hidden="0"/>
-      <column type="field" name="left_ids" width="100" hidden="0"/>
-      <column type="field" name="right_ids" width="110" hidden="0"/>
-      <column type="field" name="length_m" width="100" hidden="0"/>
-      <column type="field" name="gauge_mm" width="140" hidden="0"/>
-      <column type="field" name="gaugesd_mm" width="240" hidden="0"/>
-      <column type="field" name="cant_mm" width="140" hidden="0"/>
-      <column type="field" name="cantmax_mm" width="160" hidden="0"/>
-      <column type="field" name="bridged_m" width="160" hidden="0"/>
+      <column type="field" name="left_ids" width="110" hidden="0"/>
+      <column type="field" name="right_ids" width="120" hidden="0"/>
+      <column type="field" name="length_m" width="110" hidden="0"/>
+      <column type="field" name="gauge_mm" width="160" hidden="0"/>
+      <column type="field" name="gaugesd_mm" width="280" hidden="0"/>
+      <column type="field" name="cant_mm" width="160" hidden="0"/>
+      <column type="field" name="cantmax_mm" width="180" hidden="0"/>
+      <column type="field" name="bridged_m" width="180" hidden="0"/>
     </columns>
   </attributetableconfig>
   <mapTip>&lt;b&gt;Track [% &quot;track_id&quot; %]&lt;/b&gt;&lt;br&gt;Gauge: [% coalesce(format_number(&quot;gauge_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Cant: [% coalesce(format_number(&quot;cant_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Length: [% coalesce(format_number(&quot;length_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Without points: [% coalesce(format_number(&quot;bridged_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]</mapTip>

@@ -87,10 +87,10 @@
   <attributetableconfig>
     <columns>
       <column type="field" name="track_id" width="70" hidden="0"/>
-      <column type="field" name="s" width="230" hidden="0"/>
-      <column type="field" name="slew_mm" width="90" hidden="0"/>
-      <column type="field" name="lift_mm" width="90" hidden="0"/>
-      <column type="field" name="cant_diff_mm" width="250" hidden="0"/>
+      <column type="field" name="s" width="280" hidden="0"/>
+      <column type="field" name="slew_mm" width="110" hidden="0"/>
+      <column type="field" name="lift_mm" width="110" hidden="0"/>
+      <column type="field" name="cant_diff_mm" width="300" hidden="0"/>
     </columns>
   </attributetableconfig>
   <mapTip>&lt;b&gt;Track [% &quot;track_id&quot; %], [% format_number(&quot;s&quot;, 0) %] m&lt;/b&gt;&lt;br&gt;Slew: [% format_number(&quot;slew_mm&quot;, 1) || &#x27; mm&#x27; %]&lt;br&gt;Lift: [% coalesce(format_number(&quot;lift_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Cant, measured minus design: [% coalesce(format_number(&quot;cant_diff_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]</mapTip>

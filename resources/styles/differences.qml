@@ -84,17 +84,17 @@
   <attributetableconfig>
     <columns>
       <column type="field" name="line_id" width="60" hidden="0"/>
-      <column type="field" name="input_id" width="200" hidden="0"/>
-      <column type="field" name="chainage_m" width="110" hidden="0"/>
+      <column type="field" name="input_id" width="230" hidden="0"/>
+      <column type="field" name="chainage_m" width="130" hidden="0"/>
       <column type="field" name="state" width="70" hidden="0"/>
-      <column type="field" name="across_mm" width="110" hidden="0"/>
-      <column type="field" name="height_mm" width="110" hidden="0"/>
-      <column type="field" name="gauge_mm" width="180" hidden="0"/>
-      <column type="field" name="cant_mm" width="180" hidden="0"/>
-      <column type="field" name="sigma_mm" width="210" hidden="0"/>
-      <column type="field" name="sigmaz_mm" width="260" hidden="0"/>
-      <column type="field" name="shift_mm" width="210" hidden="0"/>
-      <column type="field" name="shiftz_mm" width="230" hidden="0"/>
+      <column type="field" name="across_mm" width="120" hidden="0"/>
+      <column type="field" name="height_mm" width="120" hidden="0"/>
+      <column type="field" name="gauge_mm" width="220" hidden="0"/>
+      <column type="field" name="cant_mm" width="210" hidden="0"/>
+      <column type="field" name="sigma_mm" width="250" hidden="0"/>
+      <column type="field" name="sigmaz_mm" width="310" hidden="0"/>
+      <column type="field" name="shift_mm" width="250" hidden="0"/>
+      <column type="field" name="shiftz_mm" width="280" hidden="0"/>
       <column type="field" name="moved" width="70" hidden="0"/>
     </columns>
   </attributetableconfig>

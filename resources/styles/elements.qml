@@ -194,37 +194,37 @@
   <attributetableconfig>
     <columns>
       <column type="field" name="track_id" width="70" hidden="0"/>
-      <column type="field" name="no" width="70" hidden="0"/>
-      <column type="field" name="layout" width="140" hidden="0"/>
+      <column type="field" name="no" width="80" hidden="0"/>
+      <column type="field" name="layout" width="160" hidden="0"/>
       <column type="field" name="type" width="60" hidden="0"/>
-      <column type="field" name="km_from" width="180" hidden="0"/>
-      <column type="field" name="km_to" width="170" hidden="0"/>
-      <column type="field" name="s_from" width="210" hidden="0"/>
-      <column type="field" name="s_to" width="190" hidden="0"/>
-      <column type="field" name="length_m" width="100" hidden="0"/>
-      <column type="field" name="r1_m" width="190" hidden="0"/>
-      <column type="field" name="r2_m" width="180" hidden="0"/>
-      <column type="field" name="a_param" width="140" hidden="0"/>
-      <column type="field" name="rot" width="140" hidden="0"/>
-      <column type="field" name="x" width="170" hidden="0"/>
-      <column type="field" name="y" width="180" hidden="0"/>
-      <column type="field" name="z" width="160" hidden="0"/>
-      <column type="field" name="azimuth_gon" width="210" hidden="0"/>
-      <column type="field" name="heading" width="230" hidden="0"/>
-      <column type="field" name="grade1_pm" width="210" hidden="0"/>
-      <column type="field" name="grade2_pm" width="190" hidden="0"/>
-      <column type="field" name="cant1_mm" width="180" hidden="0"/>
-      <column type="field" name="cant2_mm" width="170" hidden="0"/>
-      <column type="field" name="dev_rms_mm" width="160" hidden="0"/>
-      <column type="field" name="dev_max_mm" width="190" hidden="0"/>
-      <column type="field" name="sigma_r_m" width="250" hidden="0"/>
-      <column type="field" name="sigma_len_m" width="250" hidden="0"/>
-      <column type="field" name="sigma_s_m" width="250" hidden="0"/>
-      <column type="field" name="joint" width="170" hidden="0"/>
-      <column type="field" name="r_round_m" width="210" hidden="0"/>
-      <column type="field" name="dev_rms_round_mm" width="280" hidden="0"/>
-      <column type="field" name="r_fit_m" width="240" hidden="0"/>
-      <column type="field" name="s_fit_m" width="160" hidden="0"/>
+      <column type="field" name="km_from" width="220" hidden="0"/>
+      <column type="field" name="km_to" width="200" hidden="0"/>
+      <column type="field" name="s_from" width="240" hidden="0"/>
+      <column type="field" name="s_to" width="220" hidden="0"/>
+      <column type="field" name="length_m" width="110" hidden="0"/>
+      <column type="field" name="r1_m" width="220" hidden="0"/>
+      <column type="field" name="r2_m" width="210" hidden="0"/>
+      <column type="field" name="a_param" width="160" hidden="0"/>
+      <column type="field" name="rot" width="160" hidden="0"/>
+      <column type="field" name="x" width="200" hidden="0"/>
+      <column type="field" name="y" width="210" hidden="0"/>
+      <column type="field" name="z" width="190" hidden="0"/>
+      <column type="field" name="azimuth_gon" width="250" hidden="0"/>
+      <column type="field" name="heading" width="270" hidden="0"/>
+      <column type="field" name="grade1_pm" width="240" hidden="0"/>
+      <column type="field" name="grade2_pm" width="220" hidden="0"/>
+      <column type="field" name="cant1_mm" width="220" hidden="0"/>
+      <column type="field" name="cant2_mm" width="200" hidden="0"/>
+      <column type="field" name="dev_rms_mm" width="190" hidden="0"/>
+      <column type="field" name="dev_max_mm" width="220" hidden="0"/>
+      <column type="field" name="sigma_r_m" width="300" hidden="0"/>
+      <column type="field" name="sigma_len_m" width="300" hidden="0"/>
+      <column type="field" name="sigma_s_m" width="290" hidden="0"/>
+      <column type="field" name="joint" width="200" hidden="0"/>
+      <column type="field" name="r_round_m" width="240" hidden="0"/>
+      <column type="field" name="dev_rms_round_mm" width="330" hidden="0"/>
+      <column type="field" name="r_fit_m" width="280" hidden="0"/>
+      <column type="field" name="s_fit_m" width="190" hidden="0"/>
     </columns>
   </attributetableconfig>
   <mapTip>&lt;b&gt;Track [% &quot;track_id&quot; %], [% &quot;type&quot; %] [% &quot;no&quot; %]&lt;/b&gt;&lt;br&gt;Length: [% format_number(&quot;length_m&quot;, 2) || &#x27; m&#x27; %]&lt;br&gt;[% CASE WHEN &quot;layout&quot; = &#x27;H&#x27; THEN &#x27;Radius: &#x27; || coalesce(format_number(&quot;r1_m&quot;, 1), &#x27;straight&#x27;) || &#x27; to &#x27; || coalesce(format_number(&quot;r2_m&quot;, 1), &#x27;straight&#x27;) WHEN &quot;layout&quot; = &#x27;V&#x27; THEN &#x27;Gradient: &#x27; || format_number(&quot;grade1_pm&quot;, 2) || &#x27; to &#x27; || format_number(&quot;grade2_pm&quot;, 2) || &#x27; ‰&#x27; ELSE &#x27;Cant: &#x27; || format_number(&quot;cant1_mm&quot;, 0) || &#x27; to &#x27; || format_number(&quot;cant2_mm&quot;, 0) || &#x27; mm&#x27; END %]&lt;br&gt;Deviation, RMS: [% coalesce(format_number(&quot;dev_rms_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]</mapTip>

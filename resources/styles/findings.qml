@@ -93,20 +93,20 @@
   </aliases>
   <attributetableconfig>
     <columns>
-      <column type="field" name="finding" width="80" hidden="0"/>
+      <column type="field" name="finding" width="90" hidden="0"/>
       <column type="field" name="reason" width="260" hidden="0"/>
       <column type="field" name="track_id" width="70" hidden="0"/>
-      <column type="field" name="rail_id" width="90" hidden="0"/>
-      <column type="field" name="from_m" width="90" hidden="0"/>
-      <column type="field" name="to_m" width="70" hidden="0"/>
-      <column type="field" name="doubt_m" width="110" hidden="0"/>
-      <column type="field" name="worst_m" width="140" hidden="0"/>
-      <column type="field" name="gauge_mm" width="140" hidden="0"/>
-      <column type="field" name="cant_mm" width="140" hidden="0"/>
-      <column type="field" name="sigma_mm" width="210" hidden="0"/>
-      <column type="field" name="sigmaz_mm" width="300" hidden="0"/>
-      <column type="field" name="points" width="70" hidden="0"/>
-      <column type="field" name="review" width="70" hidden="0"/>
+      <column type="field" name="rail_id" width="110" hidden="0"/>
+      <column type="field" name="from_m" width="100" hidden="0"/>
+      <column type="field" name="to_m" width="80" hidden="0"/>
+      <column type="field" name="doubt_m" width="130" hidden="0"/>
+      <column type="field" name="worst_m" width="160" hidden="0"/>
+      <column type="field" name="gauge_mm" width="160" hidden="0"/>
+      <column type="field" name="cant_mm" width="160" hidden="0"/>
+      <column type="field" name="sigma_mm" width="240" hidden="0"/>
+      <column type="field" name="sigmaz_mm" width="360" hidden="0"/>
+      <column type="field" name="points" width="80" hidden="0"/>
+      <column type="field" name="review" width="80" hidden="0"/>
     </columns>
   </attributetableconfig>
   <mapTip>&lt;b&gt;[% &quot;finding&quot; %]: [% &quot;reason&quot; %]&lt;/b&gt;&lt;br&gt;[% if(&quot;rail_id&quot; IS NULL, &#x27;Track &#x27; || &quot;track_id&quot;, &#x27;Rail &#x27; || &quot;rail_id&quot;) %], [% coalesce(format_number(&quot;from_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %] to [% coalesce(format_number(&quot;to_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Review: [% if(coalesce(&quot;review&quot;, &#x27;&#x27;) = &#x27;&#x27;, &#x27;open&#x27;, &quot;review&quot;) %]</mapTip>

@@ -245,25 +245,25 @@
   <attributetableconfig>
     <columns>
       <column type="field" name="track_id" width="70" hidden="0"/>
-      <column type="field" name="chainage_m" width="110" hidden="0"/>
-      <column type="field" name="gauge_mm" width="100" hidden="0"/>
-      <column type="field" name="cant_mm" width="90" hidden="0"/>
-      <column type="field" name="twist_mm" width="160" hidden="0"/>
-      <column type="field" name="radius_m" width="100" hidden="0"/>
-      <column type="field" name="grade_pm" width="110" hidden="0"/>
-      <column type="field" name="sigma_mm" width="160" hidden="0"/>
-      <column type="field" name="points" width="70" hidden="0"/>
-      <column type="field" name="bridged" width="160" hidden="0"/>
-      <column type="field" name="strips" width="70" hidden="0"/>
-      <column type="field" name="strip_mm" width="220" hidden="0"/>
-      <column type="field" name="sigmaz_mm" width="260" hidden="0"/>
+      <column type="field" name="chainage_m" width="130" hidden="0"/>
+      <column type="field" name="gauge_mm" width="110" hidden="0"/>
+      <column type="field" name="cant_mm" width="110" hidden="0"/>
+      <column type="field" name="twist_mm" width="190" hidden="0"/>
+      <column type="field" name="radius_m" width="110" hidden="0"/>
+      <column type="field" name="grade_pm" width="130" hidden="0"/>
+      <column type="field" name="sigma_mm" width="190" hidden="0"/>
+      <column type="field" name="points" width="80" hidden="0"/>
+      <column type="field" name="bridged" width="190" hidden="0"/>
+      <column type="field" name="strips" width="80" hidden="0"/>
+      <column type="field" name="strip_mm" width="260" hidden="0"/>
+      <column type="field" name="sigmaz_mm" width="310" hidden="0"/>
       <column type="field" name="axis" width="60" hidden="0"/>
-      <column type="field" name="piece" width="180" hidden="0"/>
-      <column type="field" name="km" width="90" hidden="0"/>
-      <column type="field" name="km_text" width="150" hidden="0"/>
-      <column type="field" name="offset_m" width="200" hidden="0"/>
-      <column type="field" name="side" width="140" hidden="0"/>
-      <column type="field" name="ambiguous" width="160" hidden="0"/>
+      <column type="field" name="piece" width="210" hidden="0"/>
+      <column type="field" name="km" width="110" hidden="0"/>
+      <column type="field" name="km_text" width="170" hidden="0"/>
+      <column type="field" name="offset_m" width="230" hidden="0"/>
+      <column type="field" name="side" width="160" hidden="0"/>
+      <column type="field" name="ambiguous" width="190" hidden="0"/>
     </columns>
   </attributetableconfig>
   <mapTip>&lt;b&gt;Track [% &quot;track_id&quot; %], [% coalesce(format_number(&quot;chainage_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;/b&gt;&lt;br&gt;Gauge: [% coalesce(format_number(&quot;gauge_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Cant: [% coalesce(format_number(&quot;cant_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Twist: [% coalesce(format_number(&quot;twist_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Standard error: [% coalesce(format_number(&quot;sigma_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]</mapTip>

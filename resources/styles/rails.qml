@@ -94,14 +94,14 @@
     <columns>
       <column type="field" name="rail_id" width="60" hidden="0"/>
       <column type="field" name="class_code" width="70" hidden="0"/>
-      <column type="field" name="length_m" width="100" hidden="0"/>
-      <column type="field" name="points" width="70" hidden="0"/>
-      <column type="field" name="resid_mm" width="210" hidden="0"/>
-      <column type="field" name="sigma_mm" width="160" hidden="0"/>
-      <column type="field" name="bridged_m" width="160" hidden="0"/>
-      <column type="field" name="track_ids" width="70" hidden="0"/>
-      <column type="field" name="gaps" width="200" hidden="0"/>
-      <column type="field" name="sigmaz_mm" width="260" hidden="0"/>
+      <column type="field" name="length_m" width="110" hidden="0"/>
+      <column type="field" name="points" width="80" hidden="0"/>
+      <column type="field" name="resid_mm" width="250" hidden="0"/>
+      <column type="field" name="sigma_mm" width="190" hidden="0"/>
+      <column type="field" name="bridged_m" width="180" hidden="0"/>
+      <column type="field" name="track_ids" width="80" hidden="0"/>
+      <column type="field" name="gaps" width="220" hidden="0"/>
+      <column type="field" name="sigmaz_mm" width="310" hidden="0"/>
     </columns>
   </attributetableconfig>
   <mapTip>&lt;b&gt;Rail [% &quot;rail_id&quot; %]&lt;/b&gt;&lt;br&gt;Standard error: [% coalesce(format_number(&quot;sigma_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Length: [% coalesce(format_number(&quot;length_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Without points: [% coalesce(format_number(&quot;bridged_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;[% if(coalesce(&quot;track_ids&quot;, &#x27;&#x27;) = &#x27;&#x27;, &#x27;In no track&#x27;, &#x27;Track &#x27; || &quot;track_ids&quot;) %]</mapTip>

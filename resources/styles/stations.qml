@@ -52,15 +52,15 @@
     <columns>
       <column type="field" name="track_id" width="60" hidden="0"/>
       <column type="field" name="guide_id" width="70" hidden="0"/>
-      <column type="field" name="s_m" width="160" hidden="0"/>
+      <column type="field" name="s_m" width="190" hidden="0"/>
       <column type="field" name="seen" width="60" hidden="0"/>
-      <column type="field" name="sigma_mm" width="160" hidden="0"/>
-      <column type="field" name="sigmaz_mm" width="260" hidden="0"/>
-      <column type="field" name="bed_m" width="150" hidden="0"/>
-      <column type="field" name="cant_mm" width="90" hidden="0"/>
-      <column type="field" name="radius_m" width="100" hidden="0"/>
-      <column type="field" name="grade_pm" width="110" hidden="0"/>
-      <column type="field" name="margin" width="70" hidden="0"/>
+      <column type="field" name="sigma_mm" width="190" hidden="0"/>
+      <column type="field" name="sigmaz_mm" width="310" hidden="0"/>
+      <column type="field" name="bed_m" width="170" hidden="0"/>
+      <column type="field" name="cant_mm" width="110" hidden="0"/>
+      <column type="field" name="radius_m" width="110" hidden="0"/>
+      <column type="field" name="grade_pm" width="130" hidden="0"/>
+      <column type="field" name="margin" width="80" hidden="0"/>
       <column type="field" name="reason" width="260" hidden="0"/>
     </columns>
   </attributetableconfig>

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from driver import Driver, algorithm, choose, close, install, later, open_batch, open_dialog, press_run, window
 from qgis.core import (
+    NULL,
     QgsApplication,
     QgsCoordinateReferenceSystem,
     QgsFeature,
@@ -405,6 +406,8 @@ def again(driver: Driver) -> Iterator:
     _follow(log, "Review the findings")
     yield 0.5
     driver.keep("dock is visible", dock.isVisible())
+    driver.keep("first finding", dock.reason.text())
+    driver.picture("right_review")
     yield from _save_all(driver, log)
     yield from close(dialog)
 
@@ -685,13 +688,14 @@ def deliveries(driver: Driver) -> Iterator:
     yield from close(dialog)
     dialog = yield from open_dialog("measuretrackgeometry")
     values = {"INPUT": lines["CENTERLINES"], "RAILS": lines["RAILS"], "STANDARD": PART["STANDARD"]}
-    axis = {"AXIS": lines["CENTERLINES"], "START_KM": 12.0}
+    first = QgsVectorLayer(f"{lines['CENTERLINES']}|subset=track_id = 1", "first track", "ogr")
+    axis = {"AXIS": QgsProject.instance().addMapLayer(first).id(), "START_KM": 12.0}
     stations, found = str(folder / "stations.gpkg"), str(folder / "found.gpkg")
     dialog.setParameters({**values, **axis, "OUTPUT": stations, "FINDINGS": found})
     driver.picture("measure_dialog")
     driver.keep("measure log", (yield from press_run(dialog)))
     yield from close(dialog)
-    km = [one["km"] for one in QgsVectorLayer(stations, "stations", "ogr").getFeatures()]
+    km = [one["km"] for one in QgsVectorLayer(stations, "stations", "ogr").getFeatures() if one["km"] != NULL]
     driver.keep("kilometres", [min(km), max(km), len(km)])
     driver.keep("opened", browser.urls)
     driver.picture("measured")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from faults import REFUSED, Fault
+from faults import REFUSED, WARNED, Fault
 from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
 
 TITLE = "Design elements"
@@ -25,6 +25,11 @@ def ring():
     return np.column_stack([500_000 + 100 * np.cos(angle), 3_000_000 + 100 * np.sin(angle)])
 
 
+def stray():
+    """A straight line with a vertex 30 cm beside it."""
+    return [(500_000.0 + x, 3_000_000.0 + 0.3 * (x == 100)) for x in range(200)]
+
+
 def given(make=line, **parameters):
     def prepare(bench):
         return {"INPUT": make(), **{name: value() for name, value in parameters.items()}}
@@ -45,6 +50,21 @@ FAULTS = [
         REFUSED,
         "The line of track 1 has 30 vertices over 29 m, but a fit needs at least 20 over 50 m: leave it out, or join "
         "it with the track that continues it.",
+    ),
+    Fault(
+        "line with few vertices, as digitized",
+        given(lambda: line(shape=[(500_000 + 100 * x, 3_000_000) for x in range(6)])),
+        REFUSED,
+        "The line of track 1 has 6 vertices over 500 m, but a fit needs at least 20 over 50 m: give a line that was "
+        "measured point by point, such as a centerline of Extract rails.",
+    ),
+    Fault(
+        "stray vertex",
+        given(lambda: line(shape=stray())),
+        WARNED,
+        "5 points of track 1, the first 98 m from its start, lie more than 15 mm off the neighbours and do not count: "
+        "look at the line there.",
+        {"ELEMENT_COUNT": 2},
     ),
     Fault(
         "ring",

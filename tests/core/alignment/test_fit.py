@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
-from rail_extract.core.alignment.fit import Track, fit_track, fit_tracks
+from rail_extract.core.alignment.fit import fit_track, fit_tracks
+from rail_extract.core.alignment.measured import Track
 from rail_extract.core.alignment.rounding import round_radius
 from rail_extract.core.alignment.table import alignments, rows
 from rail_extract.core.errors import ParameterError
@@ -117,6 +118,15 @@ def test_vertices_may_be_uneven_and_dense():
     np.testing.assert_allclose([one.s_from for one in found.plan], [0, 120, 180, 330, 380], atol=0.6)
 
 
+@pytest.mark.parametrize("step", [5, 12, 25])
+def test_a_line_with_few_vertices_gives_a_curve_that_follows_it(step):
+    whole = design()
+    s = np.append(np.arange(0.0, 520.0, step), 520.0)
+    found = fit(Track(1, whole.xyz(s), NONE, np.zeros(len(s), dtype=bool))).alignment
+    off = found.foot(whole.places(np.arange(2.0, 518.0))).across_m
+    assert np.abs(off).max() < 0.002 * step
+
+
 def test_round_radii_are_proposed_within_the_standard_error():
     found = fit(track(design(), seed=2)).alignment
     arc = found.plan[2]
@@ -162,16 +172,45 @@ def test_an_element_that_was_removed_stays_away():
     assert [one.type for one in held.alignment.plan] == ["line", "arc", "clothoid", "line"]
 
 
-def test_the_part_that_holds_is_given_and_the_rest_is_said():
+def with_errors(first, last, size_m):
+    """A track whose vertices lie off by random amounts between two metres."""
     line = track(design(), seed=2).xyz
-    line[440:, 1] += 0.4
+    line[first:last, 1] += size_m * np.random.default_rng(4).standard_normal(last - first)
+    return Track(1, line, NONE, np.zeros(len(line), dtype=bool))
+
+
+def test_the_part_that_holds_is_given_and_the_rest_is_said():
     progress = Recording(Progress())
-    measured = Track(1, line, NONE, np.zeros(len(line), dtype=bool))
-    found = fit(measured, progress=progress, min_length_m=20.0)
-    assert found.alignment.s_to < 450
-    assert len(progress.warnings) == 1
-    assert "does not hold" in progress.warnings[0]
+    found = fit(with_errors(400, 521, 0.08), progress=progress)
+    assert 375 < found.alignment.s_to < 410
+    assert [one.type for one in found.alignment.plan[:4]] == ["line", "clothoid", "arc", "clothoid"]
+    assert "do not count" in progress.warnings[0]
+    assert "Only the elements from" in progress.warnings[1]
     assert max(one.figures.dev_rms_mm for one in found.alignment.plan) < 15
+
+
+def test_elements_after_a_bad_start_have_their_distance_from_the_first_vertex():
+    progress = Recording(Progress())
+    found = fit(with_errors(0, 50, 0.08), progress=progress)
+    assert "Only the elements from 51 to 520 m are given" in progress.warnings[1]
+    assert [one.type for one in found.alignment.plan] == ["line", "clothoid", "arc", "clothoid", "line"]
+    assert 45 < found.alignment.s_from < 60
+    np.testing.assert_allclose(np.diff([one.s_from for one in found.alignment.plan[1:]]), [60, 150, 50], atol=1.0)
+    np.testing.assert_allclose(
+        [one.figures.s_fit_m for one in found.alignment.plan], [one.s_from for one in found.alignment.plan]
+    )
+    assert found.deviations.s[0] == np.ceil(found.alignment.s_from)
+
+
+def test_a_stray_vertex_does_not_count_and_is_named():
+    progress, measured = Recording(Progress()), track(design(), seed=2)
+    measured.xyz[250, 1:] += 0.2
+    found = fit(measured, progress=progress)
+    assert [one.type for one in found.alignment.plan] == ["line", "clothoid", "arc", "clothoid", "line"]
+    assert len(found.alignment.vertical) == 3
+    assert len(progress.warnings) == 1
+    assert "the first 248 m from its start, lie more than 15 mm off" in progress.warnings[0]
+    assert found.deviations.slew_mm[250] > 150
 
 
 def changed(change):
@@ -188,7 +227,8 @@ def spiked(line):
     ("change", "words"),
     [
         (lambda line: line * [1, 1, np.nan], "has no heights"),
-        (lambda line: line[:30], "over 29 m"),
+        (lambda line: line[:30], "over 29 m.*join it with"),
+        (lambda line: line[::60], "9 vertices over 480 m.*was measured point by point"),
         (spiked, "turns back"),
         (lambda line: np.concatenate([line, line[:1] + [0, 200, 0], line[:1]]), "ends where it begins"),
     ],

@@ -19,7 +19,7 @@ from rail_extract.core.pipeline import Parameters, extract_files
 from rail_extract.core.progress import Progress
 from rail_extract.core.tasks import InTurn, Task
 from rail_extract.core.workers import runner as runner_module
-from rail_extract.core.workers.process import Interpreter
+from rail_extract.core.workers.process import Interpreter, Worker
 from rail_extract.core.workers.runner import Workers, worker_count, workers
 
 FUNCTIONS = """
@@ -62,6 +62,10 @@ def slow(folder, context):
     for number in range(600):
         context.progress.set_fraction(number / 1200)
         time.sleep(0.1)
+
+def silent(folder, context):
+    Path(folder, str(os.getpid())).write_text("")
+    time.sleep(60)
 
 def half(context):
     context.progress.status("half")
@@ -230,7 +234,7 @@ from rail_extract.core.tasks import Task
 from rail_extract.core.workers import runner
 runner.WORTH_S = 0.0
 with runner.workers(2) as two:
-    list(two.run({number: Task("", functions.slow, (sys.argv[2],)) for number in range(2)}))
+    list(two.run({number: Task("", functions.silent, (sys.argv[2],)) for number in range(2)}))
 """
 
 
@@ -256,6 +260,17 @@ def test_little_work_and_work_that_cannot_be_divided_stay_in_this_process(functi
         for tasks in (chain, little):
             assert {number for number, _ in dict(runner.run(tasks)).values()} == {os.getpid()}
         assert os.getpid() not in {number for number, _ in dict(runner.run(much)).values()}
+
+
+def test_no_more_processes_are_started_than_there_are_tasks(functions, monkeypatch):
+    started = []
+    monkeypatch.setattr(runner_module, "Worker", lambda *words: started.append(Worker(*words)) or started[-1])
+    with workers(3) as runner:
+        for count, expected in ((2, 2), (2, 2), (5, 3)):
+            found, _ = run(runner, {number: Task("", functions.add, (number,)) for number in range(count)})
+            assert found == [(number, number) for number in range(count)]
+            assert len(started) == expected
+    assert not any(is_alive(one.number) for one in started)
 
 
 def refuse():

@@ -546,6 +546,6 @@ def test_worker_processes_give_the_same_lines(run, write_cloud, track, tmp_path,
         said.append(feedback.infos)
     assert len(found[0]) == 2
     assert found[0] == found[1]
-    assert [text for text in said[1] if text.startswith("2 worker processes")] == [
+    assert [text for text in said[1] if text.startswith("Up to 2 worker processes")] == [
         text for text in said[1] if text not in said[0]
     ]

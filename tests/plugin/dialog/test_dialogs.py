@@ -75,6 +75,16 @@ def test_nothing_is_cut_off_at_the_side(qgis, open_dialog, name, size):
     assert [area.horizontalScrollBar().maximum() for area in areas] == [0] * len(areas)
 
 
+def test_the_help_of_a_small_dialog_needs_no_horizontal_scroll_bar(qgis, open_dialog):
+    dialog = open_dialog("extractrails")
+    dialog.resize(640, 420)
+    browser = dialog.findChild(QTextBrowser, "textShortHelp")
+    for share in (0.5, 0.25):
+        dialog.findChild(QSplitter).setSizes([round(part * dialog.width()) for part in (1 - share, share)])
+        qgis.processEvents()
+        assert browser.horizontalScrollBar().maximum() == 0, browser.width()
+
+
 def test_arrow_steps_of_fields_suit_the_range(open_dialog):
     wrappers = open_dialog("extractrails").mainWidget().wrappers
     for name, largest in {"TOLERANCE_XY": 0.1, "TOLERANCE_Z": 0.1, "CENTERLINE_TOLERANCE": 0.1, "MAX_GAP": 1}.items():

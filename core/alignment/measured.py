@@ -1,0 +1,151 @@
+"""Measured tracks: what a fit is given, and the points of it that count."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..polyline import is_closed, length_along, runs
+from ..progress import Progress, counted
+from .intrinsic import groups, lateral_signal
+from .noise import strays
+
+LEAST_TRACK_M, LEAST_POINTS = 50.0, 20
+"""Least length of a track, metres, and least number of its points: the shortest curve that has a radius."""
+
+TURNS_BACK_RAD = np.pi / 3.0
+"""Largest bend of a line at a vertex: a track that turns back has a stray vertex, or runs through a switch twice."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """A measured track.
+
+    Attributes
+    ----------
+    track_id : int
+    xyz : (n, 3) array
+        Vertices of the centerline, local metres.
+    cant : (k, 2) array
+        Plan distance from the first vertex, increasing, and cant there, left rail minus right rail; metres. Empty if it
+        is unknown.
+    is_bridged : (n,) bool array
+        Whether the line bridges a gap at the vertex; such vertices do not count.
+    """
+
+    track_id: int
+    xyz: np.ndarray
+    cant: np.ndarray
+    is_bridged: np.ndarray
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Points of a track, or of a part of it: its vertices, those averaged that are closer than a metre.
+
+    Attributes
+    ----------
+    xyz : (n, 3) array
+    along : (n,) array
+        Plan distance from the first vertex of the track along the line.
+    share : (n,) array
+        Number of vertices in each point that do not bridge a gap.
+    is_stray : (n, 2) bool array
+        Whether a point lies off its neighbours, so that it does not count: in plan, in height.
+    """
+
+    xyz: np.ndarray
+    along: np.ndarray
+    share: np.ndarray
+    is_stray: np.ndarray
+
+    @property
+    def in_plan(self) -> np.ndarray:
+        """How much each point counts in plan, (n,)."""
+        return np.where(self.is_stray[:, 0], 0.0, self.share)
+
+    @property
+    def in_height(self) -> np.ndarray:
+        """How much each point counts in height, (n,)."""
+        return np.where(self.is_stray.any(axis=1), 0.0, self.share)
+
+    def without_stray_ends(self) -> Measured:
+        """Return the points from the first to the last one that does not lie off in plan."""
+        kept = np.flatnonzero(~self.is_stray[:, 0])
+        return self._part(int(kept[0]), int(kept[-1]))
+
+    def _part(self, first: int, last: int) -> Measured:
+        part = slice(first, last + 1)
+        return Measured(self.xyz[part], self.along[part], self.share[part], self.is_stray[part])
+
+    def between_strays(self) -> list[Measured]:
+        """Return the parts between the points that lie off in plan and are long enough for a fit, the longest first."""
+        parts = [self._part(first, last) for first, last in runs(~self.is_stray[:, 0])]
+        fit = [
+            one
+            for one in parts
+            if np.count_nonzero(one.share) >= LEAST_POINTS and one.along[-1] - one.along[0] >= LEAST_TRACK_M
+        ]
+        return sorted(fit, key=lambda one: one.along[0] - one.along[-1])
+
+
+def measured_of(track: Track, limit_m: float, progress: Progress) -> Measured:
+    """Return the points of a track; warn of those that lie off their neighbours by more than a limit.
+
+    Raises
+    ------
+    ParameterError
+        The line cannot have an alignment.
+    """
+    _check(track)
+    made = _points(track)
+    across, up = lateral_signal(made.xyz[:, :2])[1], made.xyz[:, 2]
+    off = np.column_stack([strays(made.along, values, limit_m) for values in (across, up)])
+    places = made.along[off.any(axis=1)]
+    if len(places):
+        progress.warning(
+            f"{counted(len(places), 'point')} of track {track.track_id}, the first {places[0]:.0f} m from its start, "
+            f"{'lies' if len(places) == 1 else 'lie'} more than {1000 * limit_m:.0f} mm off the neighbours and "
+            f"{'does' if len(places) == 1 else 'do'} not count: look at the line there."
+        )
+    return replace(made, is_stray=off)
+
+
+def _check(track: Track) -> None:
+    """Refuse lines that cannot have an alignment."""
+    name, xy = f"The line of track {track.track_id}", track.xyz[:, :2]
+    if np.isnan(track.xyz[:, 2]).any():
+        raise ParameterError(f"{name} has no heights: give a 3D line, such as a centerline of Extract rails.")
+    if is_closed(xy):
+        raise ParameterError(f"{name} ends where it begins: cut the ring into two lines.")
+    length = length_along(xy)[-1]
+    if length < LEAST_TRACK_M or len(xy) < LEAST_POINTS:
+        remedy = "leave it out, or join it with the track that continues it"
+        if length >= LEAST_TRACK_M:
+            remedy = "give a line that was measured point by point, such as a centerline of Extract rails"
+        raise ParameterError(
+            f"{name} has {counted(len(xy), 'vertex', 'vertices')} over {length:.0f} m, but a fit needs at least "
+            f"{LEAST_POINTS} over {LEAST_TRACK_M:.0f} m: {remedy}."
+        )
+
+
+def _points(track: Track) -> Measured:
+    """Return the points of a track."""
+    starts, counts = groups(track.xyz[:, :2])
+    along = length_along(track.xyz[:, :2])
+    sums = np.add.reduceat(np.column_stack([track.xyz, along, ~track.is_bridged]), starts)
+    made = Measured(sums[:, :3] / counts[:, None], sums[:, 3] / counts, sums[:, 4], np.zeros((len(starts), 2), bool))
+    step = np.diff(made.xyz[:, :2], axis=0)
+    turn = np.abs(np.angle(np.exp(1j * np.diff(np.arctan2(step[:, 1], step[:, 0])))))
+    if turn.max(initial=0.0) > TURNS_BACK_RAD:
+        raise ParameterError(
+            f"The line of track {track.track_id} turns back {made.along[int(turn.argmax()) + 1]:.0f} m from its start: "
+            "remove the stray vertices there, or cut the line."
+        )
+    if np.count_nonzero(made.share) < LEAST_POINTS:
+        raise ParameterError(
+            f"Track {track.track_id} has fewer than {LEAST_POINTS} points outside of bridged gaps: leave it out."
+        )
+    return made
