@@ -1,19 +1,32 @@
 """Prints how well tracks are fitted in simulated airborne clouds: seen, right, standard errors, switches, and speed.
 
-Usage: python benchmarks/airborne.py [--seeds 3] [--rows ROW ...]
+With --search: how well guides are proposed for clouds without any, and how many metres of them are false.
+
+Usage: python benchmarks/airborne.py [--seeds 3] [--first 1] [--search] [--rows ROW ...]
 """
 
 from __future__ import annotations
 
 import argparse
+import tempfile
 import time
+from pathlib import Path
 
 import numpy as np
 from rail_extract.core.airborne.axis import axis_of_guide
 from rail_extract.core.airborne.fitting import SEEN, fit_tracks
+from rail_extract.core.airborne.proposals import propose_guides
+from rail_extract.core.clouds.points import ask
+from rail_extract.core.parameters import AirborneParameters
+from rail_extract.core.polyline import resample
+from rail_extract.core.tasks import InTurn
 from rail_extract.laboratory.airborne.designs import SPACING_M, Design, canted_curve, curved_line, drawn_together, yard
 from rail_extract.laboratory.airborne.flight import Flight, fly
+from rail_extract.laboratory.airborne.ground import STEP_M
+from rail_extract.laboratory.airborne.landscapes import countryside, railway
+from rail_extract.laboratory.airborne.write import ORIGIN, write_airborne
 from rail_extract.laboratory.ruler.airborne import Stationwise, compare_stations
+from scipy.spatial import cKDTree
 
 REACH_M, RAIL_HEIGHT_M = 3.0, 0.17
 
@@ -26,6 +39,18 @@ FLIGHTS = {
     "yard, 50 cm, 10 per m2": (yard, 10, 0.5),
 }
 """Design, points per square metre and footprint of each row."""
+
+SEARCHES = {
+    "railway beside roads and fields, 25 cm, 10 per m2": (railway, 10, 0.25),
+    "railway beside roads and fields, 25 cm, 5 per m2": (railway, 5, 0.25),
+    "railway beside roads and fields, 50 cm, 10 per m2": (railway, 10, 0.5),
+    "roads and fields only, 25 cm, 10 per m2": (countryside, 10, 0.25),
+    "roads and fields only, 50 cm, 10 per m2": (countryside, 10, 0.5),
+}
+"""The same for searches without a guide."""
+
+ON_TRACK_M = 0.5
+"""Distance from a track within which a proposed guide is right."""
 
 APART_M = ((3.5, np.inf), (1.6, 3.5), (0.5, 1.6), (0.0, 0.5))
 """Distances from the next track by which the stations of yards are listed."""
@@ -51,16 +76,65 @@ def measured(design: Design, density: float, footprint_m: float, seed: int) -> t
     return Stationwise.joined(rows), sum(axis.t[-1] for axis in axes) / 1000, seconds
 
 
+def searched(design: Design, density: float, footprint_m: float, seed: int) -> tuple[float, float, float, float, float]:
+    """Return the length of tracks with a proposed guide, that of all, of false guides, the area in km2, and seconds."""
+    cloud = fly(design.world, design.where, design.width_m, Flight(density, footprint_m), seed)
+    with tempfile.TemporaryDirectory() as folder:
+        write_airborne(cloud, Path(folder) / "cloud.las")
+        request = ask(Path(folder) / "cloud.las", (1, 2))
+        parameters = AirborneParameters(1.435, SPACING_M - 1.435, footprint_m=footprint_m)
+        start = time.process_time()
+        found = propose_guides(request, parameters, Path(folder) / "points", InTurn())
+        seconds = time.process_time() - start
+    guides = [resample(found.frame.to_crs(one.xyz)[:, :2] - ORIGIN[:2], 1.0)[0] for one in found.guides]
+    visible = [
+        design.truth(number)[~design.is_hidden(number, np.arange(len(design.truth(number))) * STEP_M), :2]
+        for number in range(len(design.tracks))
+    ]
+    right_m = sum(STEP_M * _near(one, guides).sum() for one in visible)
+    all_tracks = [design.truth(number)[:, :2] for number in range(len(design.tracks))]
+    false_m = float(sum((~_near(one, all_tracks)).sum() for one in guides))
+    area_km2 = len(cloud.xyz) / density / 1e6
+    return right_m, STEP_M * sum(map(len, visible)), false_m, area_km2, seconds
+
+
+def _near(places: np.ndarray, lines: list[np.ndarray]) -> np.ndarray:
+    """Return which places, (n, 2), lie on lines, (n,) bool."""
+    if not lines:
+        return np.zeros(len(places), dtype=bool)
+    return cKDTree(np.concatenate(lines)).query(places)[0] < ON_TRACK_M
+
+
+def print_searches(rows: list[str], seeds: range) -> None:
+    """Print how well guides are proposed."""
+    print("| scene | tracks | found | false | false per km2 | s per km2 |")
+    print("|---|---|---|---|---|---|")
+    for name in rows:
+        make, density, footprint_m = SEARCHES[name]
+        runs = np.array([searched(make(seed), density, footprint_m, seed) for seed in seeds])
+        right_m, all_m, false_m, area_km2, seconds = runs.sum(axis=0)
+        share = f"{100 * right_m / all_m:.0f} %" if all_m else ""
+        print(
+            f"| {name} | {all_m:.0f} m | {share} | {false_m:.0f} m | {false_m / area_km2:.0f} m "
+            f"| {seconds / area_km2:.0f} |",
+            flush=True,
+        )
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=3, help="designs of each row (default: 3)")
     parser.add_argument("--first", type=int, default=1, help="seed of the first (default: 1)")
-    parser.add_argument("--rows", nargs="*", choices=FLIGHTS, default=list(FLIGHTS), help="rows (default: all)")
+    parser.add_argument("--rows", nargs="*", choices=[*FLIGHTS, *SEARCHES], help="rows (default: all)")
+    parser.add_argument("--search", action="store_true", help="search without guides instead")
     args = parser.parse_args()
+    if args.search:
+        print_searches(args.rows or list(SEARCHES), range(args.first, args.first + args.seeds))
+        return
     print("| scene | stations | seen | within 10 cm | across, rms | height, sd | 95 % interval | s per km |")
     print("|---|---|---|---|---|---|---|---|")
-    for name in args.rows:
+    for name in args.rows or list(FLIGHTS):
         make, density, footprint_m = FLIGHTS[name]
         runs = [measured(make(seed), density, footprint_m, seed) for seed in range(args.first, args.first + args.seeds)]
         found = Stationwise.joined([one for one, _, _ in runs])

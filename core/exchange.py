@@ -41,6 +41,7 @@ DRAWN = {
     "rails": "RAILS",
     "centerlines": "TRACK",
     "airborne": "TRACK",
+    "proposed": "GUIDES",
     "stations": "STATIONS",
     "quality": "STATIONS",
     "findings": "FINDINGS",

@@ -205,6 +205,14 @@ AIRBORNE_FIELDS = (
     Field("gauge_mm", float, "gauge that was looked for: that of the guide, or of the run, millimetres", 1),
     Field("name", str, "name of the guide"),
     Field("ref", str, "reference of the guide, such as the number of the line"),
+    Field(
+        "hint", int, "1 where the cloud has too few points for its footprint, so that the line is only a hint; else 0"
+    ),
+)
+PROPOSED_FIELDS = (
+    Field("guide_id", int, "number of the proposal, the longest first"),
+    Field("score", float, "share of its stations at which two rails on a bed are seen, per cent", 0),
+    LENGTH,
 )
 AIRBORNE_STATION_FIELDS = (
     Field("track_id", int, "number of the line; empty where there is none"),

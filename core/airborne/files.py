@@ -9,23 +9,19 @@ from pathlib import Path
 import numpy as np
 
 from ..clouds.points import Request, strips_of
-from ..clouds.readers import read_classes
-from ..disk import writing
-from ..errors import CloudError, NoRailPointsError, ParameterError
+from ..errors import NoRailPointsError, ParameterError
 from ..frame import LocalFrame
 from ..parameters import AirborneParameters
 from ..progress import SILENT, Progress
-from ..tasks import READ_S, Context, Runner, Task
+from ..standards import STANDARDS
+from ..tasks import Context, Runner, Task
 from .axis import Axis, axis_of_guide
-from .beside import WIDE_M
-from .fitting import EMPTY, Fitted, Stations, fit_tracks
+from .fitting import EMPTY, SEEN, Fitted, Stations, fit_tracks
 from .refinement import STATION_M
-from .ridges import HALF_M, Shape
-from .squares import Key, Piece, areas_along, cells_around, in_cells, pieces_by_square
+from .remarks import FLIGHT, are_hints, on_density, on_gauges, on_shapes, refuse_mobile
+from .spooling import density_of, points_of, spool
+from .squares import Key, Piece, pieces_by_square
 from .survey import AirborneTrack, Guide, Survey, joined_others, lines_of, track_of
-
-POINT = np.dtype([("xyz", "<f8", 3), ("mark", "<u4")])
-"""A point on disk: metres from the zero of the coordinate system, and its mark, see `passes.marks_of`."""
 
 FIT_S = 2e-5
 """Run time of the fit per point, in seconds."""
@@ -33,20 +29,9 @@ FIT_S = 2e-5
 MIN_LENGTH_M = 30.0
 """Shorter guides have too few sections for a curve."""
 
-MOBILE_DENSITY = 500.0
-"""Points per square metre above which single railheads show, and Extract Rails is better: airborne clouds have up to
-100, surveys from drones up to 400."""
-
-SPARSE_DENSITY, WIDE_FOOTPRINT_M = 5.0, 0.4
-"""Below this density, a footprint this wide hides the rails in too many sections."""
-
-FLIGHT = (
-    "The standard errors are those of the fit. They leave out the error of the flight itself against its datum, often "
-    "3 to 10 cm: compare with control points."
-)
-
-WIDE_RIDGES = 1.6
-"""Ridges this much wider than the footprint makes them are warned of."""
+OTHER_GAUGE_M, LEAST_SHOWN = 0.1, 0.5
+"""Gauges this far from that of a guide are tried where no track is seen, and the share of the stations on which one
+must show."""
 
 
 def survey_files(
@@ -83,21 +68,48 @@ def survey_files(
         No guide lies in the cloud, or one is too short.
     """
     _check_degrees(request, guides)
-    axes = [_axis(guide, request) for guide in guides]
+    guides, axes, short = _axes(guides, request)
     _check_inside(request, axes, parameters.reach_m)
     squares = pieces_by_square(axes)
     reading, fitting = progress.divide((1.0, 2.0))
     progress.status("Reading the points along the guides")
-    counts = _spool(request, squares, parameters.reach_m, folder, runner, reading)
+    counts = spool(request, squares, parameters.reach_m, folder, runner, reading)
     if not counts:
         raise NoRailPointsError(
             f"The cloud has no points of class {', '.join(map(str, request.class_codes))} along the guides: set the "
             "classes, and check the coordinate system of the guides."
         )
-    density = _density(folder, axes, counts)
-    warnings = _judge_density(density, parameters, progress)
+    density = float(np.median(np.concatenate([density_of(points_of(folder, key)["xyz"][:, :2]) for key in counts])))
+    refuse_mobile(density)
+    progress.info(f"The cloud has {density:.1f} points per square metre along the guides.")
     progress.status("Fitting the tracks")
     spacings_m = [parameters.spacing_of(guide.gauge_m) for guide in guides]
+    fitted = _fit(folder, squares, counts, spacings_m, parameters, runner, fitting)
+    frame = _frame(request.zero, axes)
+    tracks = [
+        _joined(guide, axis, parts, spacing_m, parameters.rail_height_m, request.zero, frame)
+        for guide, axis, parts, spacing_m in zip(guides, axes, fitted, spacings_m)
+    ]
+    numbered, lines = lines_of(tracks, 1000 * parameters.gauge_m, are_hints(density, parameters))
+    found = [[one for _, one in parts] for parts in fitted]
+    warnings = [*short, *on_density(density, parameters), *on_gauges(guides, found, parameters)]
+    warnings += on_shapes([one for parts in found for one in parts], parameters, spacings_m)
+    for warning in warnings:
+        progress.warning(warning)
+    progress.info(FLIGHT)
+    return Survey(numbered, lines, frame, density, tuple(warnings))
+
+
+def _fit(
+    folder: Path,
+    squares: Mapping[Key, tuple[Piece, ...]],
+    counts: Mapping[Key, int],
+    spacings_m: Sequence[float],
+    parameters: AirborneParameters,
+    runner: Runner,
+    progress: Progress,
+) -> list[list[tuple[Piece, Fitted]]]:
+    """Fit all squares that have points, and return what was found along each guide, piece by piece."""
     tasks: dict[Key, Task] = {
         key: Task(
             f"The square {key}", fit_square, (folder, key, pieces, spacings_m, parameters), weight=FIT_S * counts[key]
@@ -105,22 +117,12 @@ def survey_files(
         for key, pieces in squares.items()
         if key in counts
     }
-    found: dict[Key, list[Fitted]] = dict(runner.run(tasks, fitting))
-    fitted: list[list[tuple[Piece, Fitted]]] = [[] for _ in guides]
-    for key, results in found.items():
-        for piece, one in zip(squares[key], results):
+    found: dict[Key, list[Fitted]] = dict(runner.run(tasks, progress))
+    fitted: list[list[tuple[Piece, Fitted]]] = [[] for _ in spacings_m]
+    for key in tasks:
+        for piece, one in zip(squares[key], found[key]):
             fitted[piece.number].append((piece, one))
-    frame = _frame(request.zero, axes)
-    tracks = [
-        _joined(guide, axis, parts, spacing_m, parameters.rail_height_m, request.zero, frame)
-        for guide, axis, parts, spacing_m in zip(guides, axes, fitted, spacings_m)
-    ]
-    numbered, lines = lines_of(tracks, 1000 * parameters.gauge_m)
-    warnings += _judge_shapes([one for parts in fitted for _, one in parts], parameters, spacings_m)
-    for warning in warnings:
-        progress.warning(warning)
-    progress.info(FLIGHT)
-    return Survey(numbered, lines, frame, density, tuple(warnings))
+    return fitted
 
 
 def _check_degrees(request: Request, guides: Sequence[Guide]) -> None:
@@ -132,16 +134,29 @@ def _check_degrees(request: Request, guides: Sequence[Guide]) -> None:
         )
 
 
-def _axis(guide: Guide, request: Request) -> Axis:
-    """Return the axis of a guide in metres."""
-    xy = request.zero.to_local(np.column_stack([guide.xy[:, :2], np.zeros(len(guide.xy))]))[:, :2]
-    xy = xy[np.append(True, np.hypot(*np.diff(xy, axis=0).T) > 0)]
-    length_m = float(np.hypot(*np.diff(xy, axis=0).T).sum())
-    if length_m < MIN_LENGTH_M:
+def _axes(guides: Sequence[Guide], request: Request) -> tuple[list[Guide], list[Axis], list[str]]:
+    """Return the guides that are long enough, their axes in metres, and a sentence on those that are not."""
+    kept: list[tuple[Guide, Axis]] = []
+    short: list[tuple[Guide, float]] = []
+    for guide in guides:
+        xy = request.zero.to_local(np.column_stack([guide.xy[:, :2], np.zeros(len(guide.xy))]))[:, :2]
+        xy = xy[np.append(True, np.hypot(*np.diff(xy, axis=0).T) > 0)]
+        length_m = float(np.hypot(*np.diff(xy, axis=0).T).sum())
+        if length_m < MIN_LENGTH_M:
+            short.append((guide, length_m))
+        else:
+            kept.append((guide, axis_of_guide(xy)))
+    if not kept:
+        guide, length_m = short[0]
         raise ParameterError(
             f"Guide {guide.guide_id} is {length_m:.1f} m long: give guides of {MIN_LENGTH_M:g} m or more."
         )
-    return axis_of_guide(xy)
+    left_out = [
+        f"Guide {guide.guide_id} is left out: it is {length_m:.1f} m long, too short alone. Join it to the line "
+        "that it continues."
+        for guide, length_m in short
+    ]
+    return [guide for guide, _ in kept], [axis for _, axis in kept], left_out
 
 
 def _check_inside(request: Request, axes: Sequence[Axis], reach_m: float) -> None:
@@ -166,79 +181,6 @@ def _check_inside(request: Request, axes: Sequence[Axis], reach_m: float) -> Non
     )
 
 
-def _spool(
-    request: Request,
-    squares: Mapping[Key, tuple[Piece, ...]],
-    reach_m: float,
-    folder: Path,
-    runner: Runner,
-    progress: Progress,
-) -> dict[Key, int]:
-    """Sort the points around the guides into squares on disk, and return the number in each."""
-    wide_m = reach_m + WIDE_M + HALF_M
-    areas = areas_along(squares, wide_m) / request.zero.horizontal_unit_m
-    around = {key: cells_around([piece.axis for piece in pieces], wide_m) for key, pieces in squares.items()}
-    with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-    tasks = {}
-    for number, header in enumerate(request.headers):
-        low, high = np.array(header.extent[:2]), np.array(header.extent[2:])
-        touched = ~((areas[:, :2] > high) | (areas[:, 2:] < low)).any(axis=1)  # an extent of NaN may be anywhere
-        if touched.any():
-            arguments = (request, number, areas[touched], around, folder)
-            tasks[number] = Task(header.path.name, spool_file, arguments, weight=READ_S * (header.point_count + 1))
-    counts: dict[Key, int] = {}
-    for _, one in runner.run(tasks, progress):
-        for key, count in one.items():
-            counts[key] = counts.get(key, 0) + count
-    return counts
-
-
-def spool_file(
-    request: Request, number: int, areas: np.ndarray, around: Mapping[Key, np.ndarray], folder: Path, context: Context
-) -> dict[Key, int]:
-    """Sort the points of a file into squares, and return the number in each.
-
-    Parameters
-    ----------
-    request : Request
-    number : int
-        Of the file.
-    areas : (k, 4) array
-        Rectangles in which points are needed, units of the CRS.
-    around : mapping of Key to (m,) array
-        Cells whose points each square needs.
-    folder : Path
-    context : Context
-    """
-    header = request.headers[number]
-    counts: dict[Key, int] = {}
-    chunks = read_classes(header.path, request.class_codes, context.progress, areas, request.leave_out)
-    for xyz, _, marks, _ in chunks:
-        kept = request.holds(xyz)
-        local, marks = request.zero.to_local(xyz[kept]), marks[kept]
-        for key, cells in around.items():
-            inside = in_cells(local[:, :2], cells)
-            if not inside.any():
-                continue
-            points = np.empty(int(inside.sum()), POINT)
-            points["xyz"], points["mark"] = local[inside], marks[inside]
-            counts[key] = counts.get(key, 0) + len(points)
-            with writing(folder), _file(folder, key, number).open("ab") as file:
-                file.write(points.tobytes())
-    return counts
-
-
-def _file(folder: Path, key: Key, number: int) -> Path:
-    return folder / f"{key[0]}_{key[1]}_{number}"
-
-
-def _points_of(folder: Path, key: Key) -> np.ndarray:
-    """Return the points of a square, (n,) `POINT`."""
-    files = sorted(folder.glob(f"{key[0]}_{key[1]}_*"))
-    return np.concatenate([np.fromfile(file, POINT) for file in files])
-
-
 def fit_square(
     folder: Path,
     key: Key,
@@ -247,15 +189,42 @@ def fit_square(
     parameters: AirborneParameters,
     context: Context,
 ) -> list[Fitted]:
-    """Fit the pieces of guides in a square; their stations outside of it are dropped."""
-    points = _points_of(folder, key)
+    """Fit the pieces of guides in a square; their stations outside of it are dropped. A task."""
+    points = points_of(folder, key)
     origin = np.floor(points["xyz"].mean(axis=0))
     axes = [Axis(piece.axis.xy - origin[:2], piece.axis.t) for piece in pieces]
     own = [spacings_m[piece.number] for piece in pieces]
     local = points["xyz"] - origin
     strips = strips_of(points["xyz"], points["mark"])
-    found = fit_tracks(local, strips, axes, own, parameters.reach_m, parameters.footprint_m, context.progress)
+    rest = (parameters.reach_m, parameters.footprint_m, context.progress)
+    found = fit_tracks(local, strips, axes, own, *rest)
+    for number, (axis, spacing_m) in enumerate(zip(axes, own)):
+        if not (found[number].stations.reason == SEEN).any():
+            shown_m = _shown_otherwise(local, strips, axis, spacing_m, parameters, context.progress)
+            found[number] = replace(found[number], shown_m=shown_m)
     return [_moved(one, origin, piece) for one, piece in zip(found, pieces)]
+
+
+def _shown_otherwise(
+    local: np.ndarray,
+    strips: np.ndarray,
+    axis: Axis,
+    spacing_m: float,
+    parameters: AirborneParameters,
+    progress: Progress,
+) -> float:
+    """Return the distance of rails at another gauge that show along a guide whose own do not, else NaN."""
+    best, shown_m = LEAST_SHOWN, np.nan
+    for gauge_m in sorted({one.gauge_m for one in STANDARDS.values()}):
+        tried_m = parameters.spacing_of(gauge_m)
+        if abs(tried_m - spacing_m) < OTHER_GAUGE_M:
+            continue
+        progress.check()
+        (one,) = fit_tracks(local, strips, [axis], [tried_m], parameters.reach_m, parameters.footprint_m)
+        share = float((one.stations.reason == SEEN).mean())
+        if share > best:
+            best, shown_m = share, one.shown_m if np.isfinite(one.shown_m) else tried_m
+    return shown_m
 
 
 def _moved(fitted: Fitted, origin: np.ndarray, piece: Piece) -> Fitted:
@@ -302,49 +271,3 @@ def _frame(zero: LocalFrame, axes: Sequence[Axis]) -> LocalFrame:
     """Return the frame of the results, with its origin among the guides."""
     middle = np.append(np.round(np.concatenate([axis.xy for axis in axes]).mean(axis=0)), 0.0)
     return zero.with_origin(middle)
-
-
-def _density(folder: Path, axes: Sequence[Axis], counts: Mapping[Key, int]) -> float:
-    """Return the points per square metre along the guides: the median over places that have points."""
-    found = []
-    for key in counts:
-        xy = _points_of(folder, key)["xyz"][:, :2]
-        cells = np.floor(xy / PLACE_M).astype(np.int64)
-        _, number = np.unique(cells, axis=0, return_counts=True)
-        found.append(number[number > 0])
-    return float(np.median(np.concatenate(found))) / PLACE_M**2
-
-
-PLACE_M = 2.0
-"""Side of the squares in which the density is counted."""
-
-
-def _judge_density(density: float, parameters: AirborneParameters, progress: Progress) -> list[str]:
-    """Refuse a cloud of mobile lidar, and warn of one that is too sparse for its footprint."""
-    if density > MOBILE_DENSITY:
-        raise CloudError(
-            f"The cloud has {density:.0f} points per square metre along the guides, as mobile lidar has: use Extract "
-            "Rails, which finds the single railheads and is more accurate there."
-        )
-    progress.info(f"The cloud has {density:.1f} points per square metre along the guides.")
-    if density < SPARSE_DENSITY and parameters.footprint_m > WIDE_FOOTPRINT_M:
-        return [
-            f"The cloud has {density:.1f} points per square metre, too few for a footprint of "
-            f"{parameters.footprint_m:g} m: take the lines as hints."
-        ]
-    return []
-
-
-def _judge_shapes(found: Sequence[Fitted], parameters: AirborneParameters, spacings_m: Sequence[float]) -> list[str]:
-    """Warn of ridges that do not fit the footprint."""
-    shapes = [one.shape for one in found if one.shape is not None and (one.stations.reason == 0).any()]
-    if not shapes:
-        return []
-    width_m = float(np.median([shape.width_m for shape in shapes]))
-    expected_m = Shape.expected(spacings_m[0], parameters.footprint_m).width_m
-    if width_m < WIDE_RIDGES * expected_m:
-        return []
-    return [
-        f"The rails show as ridges with a standard deviation of {1000 * width_m:.0f} mm, wider than a footprint of "
-        f"{parameters.footprint_m:g} m makes them: set the footprint of the scanner."
-    ]

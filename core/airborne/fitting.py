@@ -15,7 +15,7 @@ from .beside import LENGTH_M, WIDE_M, Beside, look_beside
 from .corridor import gather
 from .course import Course, Evidence, evidence
 from .joint import certainty, courses
-from .refinement import STATION_M, Refined, refine, strips_apart
+from .refinement import STATION_M, Refined, refine, strip_error
 from .ridges import HALF_M, Shape
 
 LONG = 7
@@ -26,6 +26,9 @@ LONG_GAIN, FLAT = 0.2, 0.5
 
 OWN_GAIN, OWN_SHARE = 4.0, 0.2
 """A section of its own shows a track with this gain, or with this share of what is expected there."""
+
+WIDEST_M = 0.215
+"""Ridges this wide are the halves of a road's crown: no survey has the footprint of 0.7 m that would blur rails so."""
 
 RIVAL_SHARE = 1.1
 """Share of a line's score over 50 m that no place so close that it excludes the line may have."""
@@ -43,11 +46,9 @@ SWITCH_M, TOE_M, TOE_FACTOR = 3.0, 0.5, 2.0
 """Two results this close are those of a switch; this close, both pull each other, and the standard error grows by this
 factor."""
 
-FOOTPRINT_SHARE = 0.04
-"""Standard error across by the ballast beside the rails, as a share of the footprint."""
-
-STRIP_SHARE = 0.5
-"""Share of half the distance between strips by which the fit, which lies between them, may be off their middle."""
+SHARED, FOOTPRINT_SHARE = 1.4, 0.025
+"""Neighbouring sections share errors, by sleepers and by waves of the ballast, which the curve takes as independent:
+its standard error is this much too small. What ballast beside the rails adds, as a share of the footprint."""
 
 BED_SIGMA_M = 0.03
 """Standard deviation of the rails' height above the bed, which depends on the fill of the ballast."""
@@ -58,8 +59,8 @@ ASIDE_M = 0.15
 FEW_POINTS = 8
 """Points on the bed of a section up to which it shows nothing."""
 
-MAX_SIGMA_M = 0.04
-"""Standard error above which a station is not seen: 2.5 times as much is the 10 cm within which it is to be right."""
+MAX_SIGMA_M = 0.05
+"""Standard error above which a station is not seen: of those below, 95 % lie within 10 cm."""
 
 LEAST_EXPECTED = 3.5
 """Gain that rails must be expected to have in a section of 10 m: below it, density and footprint hide them."""
@@ -126,15 +127,15 @@ class Fitted:
     stations : Stations
     shape : Shape or None
         Ridges as they were measured; None where no track was found.
-    spacing_m : float
-        Distance of the rails that fits best.
+    shown_m : float
+        Distance of the rails that the points show where it is clearly not the expected one, else NaN.
     others : (k, 2) array
         Chainages and distances to the left of places that look like tracks and have no guide.
     """
 
     stations: Stations
     shape: Shape | None
-    spacing_m: float
+    shown_m: float
     others: np.ndarray
 
 
@@ -207,7 +208,7 @@ def _judged(axes: Sequence[Axis], lines: dict[int, _Line], footprint_m: float) -
         distance, apart = _others(number, axes, places)
         toe = np.where(distance < TOE_M, TOE_FACTOR, 1.0)
         blur = FOOTPRINT_SHARE * footprint_m
-        sigma = toe * np.sqrt(refined.sigma**2 + blur**2 + (STRIP_SHARE * strips_apart(refined)) ** 2)
+        sigma = toe * np.sqrt((SHARED * refined.sigma) ** 2 + blur**2 + strip_error(refined) ** 2)
         reason = _reasons(line)
         reason[(reason == SEEN) & (sigma > toe * MAX_SIGMA_M)] = SPARSE
         reason[(reason == SEEN) & (distance < TWIN_M) & (apart > GUIDES_APART_M)] = TWIN
@@ -222,7 +223,7 @@ def _judged(axes: Sequence[Axis], lines: dict[int, _Line], footprint_m: float) -
             reason,
             distance < SWITCH_M,
         )
-        judged.append(Fitted(stations, refined.shape, refined.spacing_m, _unclaimed(number, lines, places)))
+        judged.append(Fitted(stations, refined.shape, refined.shown_m, _unclaimed(number, lines, places)))
     return judged
 
 
@@ -244,7 +245,7 @@ def _reasons(line: _Line) -> np.ndarray:
     gain, flaw, most = (_long(found.gain, np.max), _long(found.flaw, np.min), _long(found.most, np.max))
     enough = found.both > np.minimum(OWN_GAIN, OWN_SHARE * found.most)
     enough &= (gain > LONG_GAIN * most) & (np.abs(refined.sections.offset) < REACH_M)
-    flat = flaw < FLAT
+    flat = (flaw < FLAT) & (refined.shape.width_m < WIDEST_M)
     if line.beside is not None:
         long = np.minimum((np.arange(count) * STATION_M / LENGTH_M).astype(np.int64), len(line.beside.own) - 1)
         flat &= line.beside.rival[long] < RIVAL_SHARE * np.maximum(line.beside.own[long], 0.0)

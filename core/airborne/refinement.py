@@ -26,8 +26,12 @@ BIN_M, PROFILE_BIN_M = 0.025, 0.02
 """Width of the bins across in the fit of a section, and in the profile of a whole line."""
 
 WIDTHS_M = np.arange(0.04, 0.24, 0.01)
-SPACINGS_M = np.arange(-0.06, 0.061, 0.02)
-"""Widths of a ridge that are tried, and deviations of the rails' distance."""
+SPACINGS_M = np.arange(-0.12, 0.121, 0.02)
+"""Widths of a ridge that are tried, and deviations of the rails' distance, up to those between neighbouring gauges."""
+
+OTHER_GAIN, OTHER_SHARE, OTHER_M = 40.0, 0.1, 0.045
+"""Log-likelihood of another distance of the rails above that of the expected one, also as a share of its own, and the
+deviation, from which it is said: ballast piled at the rails shifts the ridges by up to 20 mm."""
 
 PROFILE_ROUGH_M, FREE = 0.004, 3.0
 """Roughness of a profile, and the spread of the ridge's height while it is measured."""
@@ -62,6 +66,10 @@ ENOUGH_GAIN, GAIN_SHARE, MOST_EXPECTED = 6.0, 0.3, 60.0
 
 FEW_POINTS = 8
 """Points on a section's bed up to which it shows nothing."""
+
+SHIFT_LENGTH_M, STRIP_SHIFT_M, MIXED_SECTIONS = 50.0, 0.1, 7
+"""Length of the sections in which strips are fitted alone, standard deviation of the shift between two strips, and the
+sections over which a curve mixes them."""
 
 EDGE_M = 0.01
 """A middle this close to the end of the search lies beyond it."""
@@ -111,8 +119,8 @@ class Refined:
         Distance of the section's own middle from the curve, metres.
     shape : Shape
         Ridges as they were measured.
-    spacing_m : float
-        Distance of the rails that fits best; a check only.
+    shown_m : float
+        Distance of the rails that the points show where it is clearly not the expected one, else NaN.
     corridor : Corridor
     """
 
@@ -125,7 +133,7 @@ class Refined:
     sections: Sections
     beside: np.ndarray
     shape: Shape
-    spacing_m: float
+    shown_m: float
     corridor: Corridor
 
 
@@ -172,7 +180,7 @@ class _Round:
     beside: np.ndarray
     sections: Sections
     shape: Shape
-    spacing_m: float
+    shown_m: float
     corridor: Corridor
 
 
@@ -181,13 +189,13 @@ def _round(points: Points, line: Axis, shape: Shape, shows: np.ndarray | None, r
     corridor = gather(points, line, HALF_M + MARGIN_M)
     if corridor is None:
         return None
-    measured, spacing_m = measure(corridor, shape, shows)
+    measured, shown_m = measure(corridor, shape, shows)
     sections = fit_sections(corridor, measured, reach_m)
     if not sections.shows.any():
         return None
     t = corridor.start_m + (np.arange(len(sections.shows)) + 0.5) * STATION_M
     xy, sigma, beside = _curve(line, t, sections)
-    return _Round(t, xy, sigma, beside, sections, measured, spacing_m, corridor)
+    return _Round(t, xy, sigma, beside, sections, measured, shown_m, corridor)
 
 
 def _with_heights(last: _Round, axis: Axis) -> Refined:
@@ -206,7 +214,7 @@ def _with_heights(last: _Round, axis: Axis) -> Refined:
         sections,
         last.beside,
         last.shape,
-        last.spacing_m,
+        last.shown_m,
         last.corridor,
     )
 
@@ -227,7 +235,7 @@ def _axis_through(xy: np.ndarray, t: np.ndarray, guide: Axis) -> Axis:
 
 
 def measure(corridor: Corridor, shape: Shape, shows: np.ndarray | None) -> tuple[Shape, float]:
-    """Return the ridges that the profile of a whole line shows, and the distance of the rails that fits best."""
+    """Return the ridges that the profile of a whole line shows, and the distance of the rails if it is another one."""
     near = np.abs(corridor.across) < HALF_M
     if shows is not None and shows.any():
         section = ((corridor.t - corridor.start_m) / STATION_M).astype(np.int64)
@@ -241,12 +249,20 @@ def measure(corridor: Corridor, shape: Shape, shows: np.ndarray | None) -> tuple
     fits = [fit(count, mean, u, one) for one in tried]
     best = int(np.argmax([one.both[0] for one in fits]))
     height_m = float(np.clip(fits[best].height[0], LOWEST * shape.height_m, HIGHEST * shape.height_m))
-    spacings = [replace(tried[best], spacing_m=shape.spacing_m + float(more)) for more in SPACINGS_M]
-    spacing_m = spacings[int(np.argmax([fit(count, mean, u, one).both[0] for one in spacings]))].spacing_m
     residual = height - mean[0][np.clip(np.floor((across + HALF_M) / PROFILE_BIN_M).astype(np.int64), 0, bins - 1)]
     noise_m = 1.4826 * float(np.median(np.abs(residual - np.median(residual)))) if len(residual) else shape.noise_m
     found = Shape(shape.spacing_m, tried[best].width_m, height_m, max(noise_m, 0.01), SECTION_ROUGH_M, SECTION_SPREAD)
-    return found, spacing_m
+    return found, _other_spacing(count, mean, u, tried[best])
+
+
+def _other_spacing(count: np.ndarray, mean: np.ndarray, u: np.ndarray, shape: Shape) -> float:
+    """Return the distance of the rails that a profile shows where it is clearly not the expected one, else NaN."""
+    gains = [
+        float(fit(count, mean, u, replace(shape, spacing_m=shape.spacing_m + more)).both[0]) for more in SPACINGS_M
+    ]
+    best, expected = int(np.argmax(gains)), gains[len(gains) // 2]
+    clearly = gains[best] - expected > max(OTHER_GAIN, OTHER_SHARE * gains[best])
+    return float(shape.spacing_m + SPACINGS_M[best]) if clearly and abs(SPACINGS_M[best]) > OTHER_M else np.nan
 
 
 def fit_sections(corridor: Corridor, shape: Shape, reach_m: float, length_m: float = STATION_M) -> Sections:
@@ -279,9 +295,9 @@ LITTLE_SHARP = 1.0
 
 def _shows(found: Fit, points: np.ndarray) -> np.ndarray:
     """Return which sections show two rails, together with those next to them."""
-    together, expected = (np.convolve(one, np.ones(3), "same") for one in (found.gain, found.most))
+    together, expected = (np.convolve(one, np.ones(3))[1:-1] for one in (found.both, found.most))
     enough = together > np.maximum(ENOUGH_GAIN, GAIN_SHARE * np.minimum(expected, MOST_EXPECTED))
-    return enough & (found.gain > 0) & (points > FEW_POINTS)
+    return enough & (found.both > 0) & (points > FEW_POINTS)
 
 
 def _curve(line: Axis, t: np.ndarray, sections: Sections) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -314,18 +330,35 @@ def _bent(
     return float(loss / free**2), (curve.values, sigma, beside)
 
 
-def strips_apart(refined: Refined, length_m: float = 50.0) -> float:
-    """Return half the distance across between strips, beyond what their own errors explain, metres."""
+def strip_error(refined: Refined) -> np.ndarray:
+    """Return the standard error across by the distance between the two main strips, (n,) metres.
+
+    Where both have as many points, the curve lies in their middle; where one is alone, it is off by half the distance.
+    """
     strips, counts = np.unique(refined.corridor.strip, return_counts=True)
     main: Sequence[int] = strips[np.argsort(-counts)][:2].tolist()
+    error = np.zeros(len(refined.t))
     if len(main) < 2:
-        return 0.0
+        return error
+    section = np.clip(((refined.corridor.t - refined.corridor.start_m) / STATION_M).astype(np.int64), 0, len(error) - 1)
     one, other = (
-        fit_sections(refined.corridor.kept(refined.corridor.strip == strip), refined.shape, REACHES_M[-1], length_m)
-        for strip in main
+        np.bincount(section[refined.corridor.strip == strip], minlength=len(error)).astype(float) for strip in main
     )
+    long = np.ones(min(MIXED_SECTIONS, len(error)))
+    mixed = np.convolve(one - other, long, "same") / np.maximum(np.convolve(one + other, long, "same"), 1.0)
+    _, normal = refined.axis.at(refined.t)
+    return np.abs(mixed * (normal @ _strip_shift(refined, main))) / 2
+
+
+def _strip_shift(refined: Refined, strips: Sequence[int]) -> np.ndarray:
+    """Return how far one strip is shifted in plan against another, (2,) metres, as far as it shows across the track."""
+    corridor, fits = refined.corridor, []
+    for strip in strips:
+        fits.append(fit_sections(corridor.kept(corridor.strip == strip), refined.shape, REACHES_M[-1], SHIFT_LENGTH_M))
+    one, other = fits
+    middles = corridor.start_m + (np.arange(len(one.offset)) + 0.5) * SHIFT_LENGTH_M
+    _, normal = refined.axis.at(np.minimum(middles, refined.axis.t[-1]))
     good = (one.found.gain > ENOUGH_GAIN) & (other.found.gain > ENOUGH_GAIN)
-    if good.sum() < 2:
-        return 0.0
-    apart = (one.offset - other.offset)[good] ** 2 - (one.sigma**2 + other.sigma**2)[good]
-    return float(np.sqrt(max(apart.mean(), 0.0))) / 2
+    weight = np.where(good, 1 / (one.sigma**2 + other.sigma**2), 0.0)
+    matrix = (normal * weight[:, None]).T @ normal + np.eye(2) / STRIP_SHIFT_M**2
+    return np.linalg.solve(matrix, normal.T @ (weight * (one.offset - other.offset)))

@@ -164,6 +164,7 @@ class AirborneLine:
     gauge_mm: float
     name: str
     ref: str
+    hint: int
 
 
 @dataclass(frozen=True)
@@ -260,9 +261,18 @@ def _shape_of(xyz: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def lines_of(
-    tracks: Sequence[AirborneTrack], gauge_mm: float
+    tracks: Sequence[AirborneTrack], gauge_mm: float, hints: bool = False
 ) -> tuple[tuple[AirborneTrack, ...], tuple[AirborneLine, ...]]:
-    """Draw the lines of tracks where they are seen, and number the stations by them."""
+    """Draw the lines of tracks where they are seen, and number the stations by them.
+
+    Parameters
+    ----------
+    tracks : sequence of AirborneTrack
+    gauge_mm : float
+        That of the run, for guides that state none.
+    hints : bool
+        Whether the cloud is too sparse for more.
+    """
     numbered: list[AirborneTrack] = []
     lines: list[AirborneLine] = []
     for track in tracks:
@@ -283,6 +293,7 @@ def lines_of(
                     1000 * track.guide.gauge_m if track.guide.gauge_m else gauge_mm,
                     track.name,
                     track.ref,
+                    int(hints),
                 )
             )
         numbered.append(replace(track, track_id=ids))

@@ -8,11 +8,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ..airborne.files import survey_files
+from ..airborne.proposals import Proposals, propose_guides
 from ..airborne.survey import Guide, Survey
 from ..clouds.points import Request, ask
 from ..disk import Destination, writing
 from ..errors import ParameterError
-from ..fields import AIRBORNE_FIELDS, FINDING_FIELDS
+from ..fields import AIRBORNE_FIELDS, FINDING_FIELDS, PROPOSED_FIELDS
 from ..parameters import AIRBORNE_CLASSES, AirborneParameters
 from ..progress import Estimating
 from ..report.airborne import airborne_findings, airborne_page, airborne_summary
@@ -32,7 +33,13 @@ from .options import (
     shapes_module,
 )
 
-SUFFIXES = {"centerlines": LAYERS, "stations": LAYERS, "findings": LAYERS, "report": (".html", ".htm")}
+SUFFIXES = {
+    "centerlines": LAYERS,
+    "stations": LAYERS,
+    "findings": LAYERS,
+    "proposed": LAYERS,
+    "report": (".html", ".htm"),
+}
 """File name suffixes of each output."""
 
 LENGTHS = {
@@ -46,14 +53,18 @@ LENGTHS = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument("tiles", nargs="+", type=Path, metavar="TILE", help=TILES_HELP)
-    text = "lines along the tracks, one for each, such as OpenStreetMap has them (GeoPackage, GeoJSON)"
-    parser.add_argument("--guide", type=Path, required=True, metavar="FILE", help=text)
+    text = (
+        "lines along the tracks, one for each, such as OpenStreetMap has them (GeoPackage, GeoJSON); without it, the "
+        "cloud is searched and --proposed written"
+    )
+    parser.add_argument("--guide", type=Path, metavar="FILE", help=text)
     output = parser.add_argument_group("outputs", "Existing files are replaced. GeoPackages may be the same file.")
-    output.add_argument("--centerlines", type=Path, required=True, help="GeoPackage (or .dxf, .csv) for the lines")
+    output.add_argument("--centerlines", type=Path, help="GeoPackage (or .dxf, .csv) for the lines")
     output.add_argument(
         "--stations", type=Path, help="GeoPackage for a point every 10 m, with what is not seen and why"
     )
     output.add_argument("--findings", type=Path, help="GeoPackage for the places to look at")
+    output.add_argument("--proposed", type=Path, help="GeoPackage for guides where there are none: lines to correct")
     output.add_argument("--report", type=Path, help="HTML file for the report")
     add_cloud_arguments(parser)
     classes = ",".join(map(str, AIRBORNE_CLASSES))
@@ -76,17 +87,44 @@ def run(args: argparse.Namespace) -> None:
     standard = resolve(args.standard, args.gauge, args.head_width)
     parameters = parameters_of(args, standard)
     progress = Estimating(Console())
+    _check_outputs(args)
     given = {name: getattr(args, name) for name in SUFFIXES if getattr(args, name) is not None}
     outputs = {name: destination_of(name, path, SUFFIXES[name]) for name, path in given.items()}
     codes = numbers_in(args.classes, "--classes", int)
     request = limited(ask(args.tiles, codes, args.crs, extent_of(args.extent), progress), args)
-    parent = outputs["centerlines"].file.parent
+    parent = next(iter(outputs.values())).file.parent
     with writing(parent), scratch_folder(parent) as folder, runner_of(args) as runner:
-        guides = _guides(args.guide, request)
-        survey = survey_files(request, guides, parameters, folder / "points", runner, progress)
+        if args.guide is None:
+            found = propose_guides(request, parameters, folder / "points", runner, progress)
+        else:
+            guides = _guides(args.guide, request)
+            survey = survey_files(request, guides, parameters, folder / "points", runner, progress)
+    if args.guide is None:
+        _write_proposed(found, outputs["proposed"])
+        print(found.summary)
+        return
     _write(survey, outputs, args, standard)
     for sentence in airborne_summary(survey):
         print(sentence)
+
+
+def _check_outputs(args: argparse.Namespace) -> None:
+    """Check that the outputs are those of a fit along guides, or of a search for guides."""
+    wanted = "proposed" if args.guide is None else "centerlines"
+    if getattr(args, wanted) is None:
+        ending = "to have guides proposed, or --guide to fit tracks" if args.guide is None else "for the lines"
+        raise ParameterError(f"Give --{wanted} {ending}.")
+    for name in SUFFIXES:
+        if (name == "proposed") == (args.guide is not None) and getattr(args, name) is not None:
+            raise ParameterError(
+                f"--{name} is written {'with' if args.guide is None else 'without'} --guide only: leave it out."
+            )
+
+
+def _write_proposed(found: Proposals, destination: Destination) -> None:
+    """Write the proposed guides."""
+    module = shapes_module("--proposed", "geopackage")
+    module.write_layers([module.lines_layer("proposed", destination, PROPOSED_FIELDS, found.guides)], found.frame)
 
 
 def parameters_of(args: argparse.Namespace, standard: RailStandard) -> AirborneParameters:

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..airborne.files import FLIGHT
 from ..airborne.refinement import STATION_M
+from ..airborne.remarks import FLIGHT
 from ..airborne.survey import AirborneTrack, Survey
 from .listing import OFF_RAIL_MM, Finding
 from .markup import metres, table, tag, text

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsProcessingContext
 
+from ...core.errors import ParameterError
 from ...core.parameters import AirborneParameters
 from ...core.progress import Estimating, Progress
 from ...core.standards import SEARCHED_CLASSES, RailStandard
@@ -16,7 +17,7 @@ from ..dialog.parameter_values import ParameterValues, class_numbers
 from ..dialog.passwords import masked
 from ..reading.clouds import CloudSource, points_folder, request_points
 from ..writing.destinations import is_wanted
-from ..writing.layers import AIRBORNE, FINDINGS, figures_of, write_airborne_stations, write_lines
+from ..writing.layers import AIRBORNE, FINDINGS, PROPOSED, figures_of, write_airborne_stations, write_lines
 from ..writing.reports import write_shown
 from ..writing.run import properties_of
 from ..writing.whole_files import write_each
@@ -25,6 +26,8 @@ from .toolbox_groups import RAW_CLOUDS
 
 if TYPE_CHECKING:
     from ...core.airborne.survey import Guide, Survey
+    from ...core.clouds.points import Request
+    from ...core.tasks import Runner
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,8 @@ class AirborneCenterlines(RailAlgorithm):
         "whether the track is seen there and, if not, why: under trains and bridges, on crossings, on slab track, "
         "or where the guide fits two tracks. sigma_mm is the standard error of the fit; it leaves out the error of the "
         "flight against its datum, often 3 to 10 cm.\n\n"
+        "Without a guide, the whole cloud is searched, which takes minutes per square kilometre, and only PROPOSED is "
+        "written: correct it in the map and run again with it as GUIDE.\n\n"
         "The height is that of the bed between the rails plus RAIL_HEIGHT. For clouds of mobile lidar use Extract "
         "Rails, which finds each railhead."
     )
@@ -75,6 +80,7 @@ class AirborneCenterlines(RailAlgorithm):
             outputs.airborne_centerlines(),
             outputs.airborne_stations(),
             outputs.findings(),
+            outputs.proposed_guides(),
         ):
             self.addParameter(definition)
         self._add_report(outputs.report())
@@ -87,19 +93,58 @@ class AirborneCenterlines(RailAlgorithm):
         standard, cloud, classes = values.standard(), values.cloud("INPUT"), values.text("CLASSES").strip()
         codes = class_numbers(classes, "CLASSES") if classes else SEARCHED_CLASSES
         command = masked(self.asPythonCommand(parameters, context))
-        return Job(cloud, codes, standard, values.airborne(standard), values.tracks_meant(cloud), command)
+        guides = values.tracks_meant(cloud)
+        if not guides and not is_wanted(parameters.get("PROPOSED"), context):
+            raise ParameterError("GUIDE is empty: choose lines along the tracks, or PROPOSED to have some proposed.")
+        return Job(cloud, codes, standard, values.airborne(standard), guides, command)
 
     def compute(
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
-        """Fit the tracks, then write the outputs."""
-        from ...core.airborne.files import survey_files
-        from ...core.report.airborne import airborne_findings, airborne_summary
-
+        """Fit the tracks, or propose guides where there are none, then write the outputs."""
         progress = Estimating(progress)
         values = ParameterValues(self, parameters, context)
         request = request_points(job.cloud, job.class_codes, values.extent, progress)
-        with points_folder() as folder, values.runner() as runner:
+        work = self._fit if job.guides else self._propose
+        with values.runner() as runner:
+            return work(job, request, runner, parameters, context, progress)
+
+    def _propose(
+        self,
+        job: Job,
+        request: Request,
+        runner: Runner,
+        parameters: dict[str, Any],
+        context: QgsProcessingContext,
+        progress: Progress,
+    ) -> dict[str, Any]:
+        """Search the cloud and write the proposed guides."""
+        from ...core.airborne.proposals import propose_guides
+
+        with points_folder() as folder:
+            found = propose_guides(request, job.parameters, folder / "points", runner, progress)
+        progress.check()
+        self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, found.frame)
+        progress.info(found.summary)
+        rest = (parameters, context)
+        writers = {"PROPOSED": lambda: write_lines(self, "PROPOSED", PROPOSED, found.guides, found.frame, *rest)}
+        written = write_each(writers, parameters, context)
+        return {**written, "PROPOSED_LENGTH": found.length_m, "DENSITY": round(found.density, 1)}
+
+    def _fit(
+        self,
+        job: Job,
+        request: Request,
+        runner: Runner,
+        parameters: dict[str, Any],
+        context: QgsProcessingContext,
+        progress: Progress,
+    ) -> dict[str, Any]:
+        """Fit the tracks along the guides and write what was found."""
+        from ...core.airborne.files import survey_files
+        from ...core.report.airborne import airborne_findings, airborne_summary
+
+        with points_folder() as folder:
             survey = survey_files(request, job.guides, job.parameters, folder / "points", runner, progress)
         progress.check()
         found = airborne_findings(survey) if is_wanted(parameters.get("FINDINGS"), context) else ()

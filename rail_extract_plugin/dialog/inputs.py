@@ -98,10 +98,11 @@ def tracks_meant() -> QgsProcessingParameterDefinition:
     """Define the lines that say which tracks are meant."""
     line = QgsProcessing.SourceType.TypeVectorLine
     return helped(
-        QgsProcessingParameterFeatureSource("GUIDE", tr("Guide"), [line]),
+        QgsProcessingParameterFeatureSource("GUIDE", tr("Guide"), [line], optional=True),
         tr(
             "One line for each track of the railway, such as railway=rail of OpenStreetMap, up to 3 m off. Give every "
-            "track of a line its guide: they are fitted together. The fields name, ref and gauge are used."
+            "track of a line its guide: they are fitted together. The fields name, ref and gauge are used. "
+            "Leave empty to search the whole cloud and have guides proposed."
         ),
     )
 

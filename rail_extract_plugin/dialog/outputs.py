@@ -73,6 +73,18 @@ def airborne_stations() -> QgsProcessingParameterDefinition:
     )
 
 
+def proposed_guides() -> QgsProcessingParameterDefinition:
+    """Define the layer of guides for a cloud without any."""
+    line = QgsProcessing.SourceType.TypeVectorLine
+    return helped(
+        _layer("PROPOSED", tr("Proposed guides"), line, optional=True),
+        tr(
+            "Only where GUIDE is empty: lines along which tracks seem to lie, with a score. Delete or move what is "
+            "wrong, add what is missing, and run again with this layer as GUIDE."
+        ),
+    )
+
+
 def airborne_figures() -> Numbers:
     """Define the figures about tracks seen in an airborne cloud."""
     return (
@@ -80,6 +92,7 @@ def airborne_figures() -> Numbers:
         QgsProcessingOutputNumber("GUIDE_LENGTH", tr("Length of the guides [m]")),
         QgsProcessingOutputNumber("SEEN_LENGTH", tr("Length on which tracks are seen [m]")),
         QgsProcessingOutputNumber("DENSITY", tr("Points per square metre along the guides")),
+        QgsProcessingOutputNumber("PROPOSED_LENGTH", tr("Length of the proposed guides [m]")),
     )
 
 

@@ -190,7 +190,7 @@ class ParameterValues:
         return read_guide(self._line_source("GUIDE"), system(checked_crs(cloud)), self._context)
 
     def tracks_meant(self, cloud: CloudSource) -> tuple[Guide, ...]:
-        """Read the lines of GUIDE with what the layer states of them.
+        """Read the lines of GUIDE with what the layer states of them; none if it is empty.
 
         Raises
         ------
@@ -199,6 +199,8 @@ class ParameterValues:
         """
         from ..reading.line_layers import read_tracks_meant
 
+        if not self.filled("GUIDE"):
+            return ()
         return read_tracks_meant(self._line_source("GUIDE"), system(checked_crs(cloud)), self._context)
 
     def airborne(self, standard: RailStandard) -> AirborneParameters:

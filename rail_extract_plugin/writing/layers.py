@@ -39,6 +39,7 @@ from ...core.fields import (
     FINDING_FIELDS,
     KM_FIELDS,
     LENGTH,
+    PROPOSED_FIELDS,
     QUALITY_FIELDS,
     RAIL_FIELDS,
     SIGMA,
@@ -57,6 +58,7 @@ from .whole_files import write_whole
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.airborne.proposals import ProposedGuide
     from ...core.airborne.survey import AirborneLine, AirborneTrack
     from ...core.alignment.deviations import Deviations
     from ...core.alignment.elements import Alignment
@@ -69,7 +71,7 @@ if TYPE_CHECKING:
     from ...core.raster_file import RasterHeader
     from ...core.report import Finding
 
-    Line = Union[RailLine, Centerline, Finding, AirborneLine]
+    Line = Union[RailLine, Centerline, Finding, AirborneLine, ProposedGuide]
 
 KINDS = {int: INTEGER, float: REAL, str: TEXT}
 
@@ -85,6 +87,7 @@ class LayerKind:
 RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELDS, "centerlines")
 QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
 STOPS = LayerKind(STOP_FIELDS, "stops")
+PROPOSED = LayerKind(PROPOSED_FIELDS, "proposed")
 AIRBORNE, STATIONS = LayerKind(AIRBORNE_FIELDS, "airborne"), LayerKind(AIRBORNE_STATION_FIELDS, "stations")
 DIFFERENCES = LayerKind(DIFFERENCE_FIELDS, "differences")
 ELEMENTS, AXES = LayerKind(ELEMENT_FIELDS, "elements"), LayerKind(AXIS_FIELDS, "axes")

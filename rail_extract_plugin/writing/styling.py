@@ -32,7 +32,7 @@ NO_PROPERTIES: Mapping[str, str] = {}
 
 TOP_TO_BOTTOM = (
     *("stops", "findings", "differences", "deviations", "elements", "axes", "centerlines", "airborne", "rails"),
-    *("stations", "quality", "raster"),
+    *("proposed", "stations", "quality", "raster"),
 )
 """Order of the layers of a run, by style: what is to be looked at first, then the lines, and what they rest on."""
 
@@ -45,6 +45,8 @@ class _Styler(QgsProcessingLayerPostProcessorInterface):
     def postProcessLayer(
         self, layer: QgsMapLayer, context: QgsProcessingContext, feedback: QgsProcessingFeedback
     ) -> None:
+        # If a run replaces the file of a layer in the project, it gets this layer, which still reads the old file.
+        layer.reload()
         if not self._has_system:
             # QGIS marks such a layer and asks for its system; it can't place the one that stands for an unknown one.
             layer.setCrs(QgsCoordinateReferenceSystem())

@@ -62,6 +62,7 @@
     <alias field="gauge_mm" index="6" name="Gauge looked for [mm]"/>
     <alias field="name" index="7" name="Name"/>
     <alias field="ref" index="8" name="Reference"/>
+    <alias field="hint" index="9" name="Only a hint"/>
   </aliases>
   <attributetableconfig>
     <columns>
@@ -74,6 +75,7 @@
       <column type="field" name="gauge_mm" width="210" hidden="0"/>
       <column type="field" name="name" width="160" hidden="0"/>
       <column type="field" name="ref" width="110" hidden="0"/>
+      <column type="field" name="hint" width="150" hidden="0"/>
     </columns>
   </attributetableconfig>
   <mapTip>&lt;b&gt;[% &quot;ref&quot; %] [% &quot;name&quot; %]&lt;/b&gt;&lt;br&gt;Length: [% format_number(&quot;length_m&quot;, 1) %] m&lt;br&gt;Seen: [% format_number(&quot;seen_m&quot;, 0) %] m&lt;br&gt;Standard error: [% format_number(&quot;sigma_mm&quot;, 0) %] mm</mapTip>

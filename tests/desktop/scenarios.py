@@ -406,6 +406,8 @@ def again(driver: Driver) -> Iterator:
     _follow(log, "Review the findings")
     yield 0.5
     driver.keep("dock is visible", dock.isVisible())
+    driver.keep("first finding", dock.reason.text())
+    driver.picture("right_review")
     yield from _save_all(driver, log)
     yield from close(dialog)
 

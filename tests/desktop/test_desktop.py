@@ -161,6 +161,7 @@ def test_a_wrong_gauge_is_corrected_by_a_link(run_scenario):
     (opened,) = session["opened"]
     assert opened.endswith("report.html")
     assert session["dock is visible"]
+    assert session["first finding"] == "A rail has no points"  # not that of the first run, whose file is the same
     assert session["saved layers"] == ["found", "Track centerlines", "Rails"]
     assert session["saved sources"] == ["all of it.gpkg"]
 

@@ -31,7 +31,26 @@ def guided(*texts, kind="LineString", crs="EPSG:32643", density=10, class_code=2
 
 
 FAULTS = [
+    Fault(
+        "neither a guide nor a layer for proposals",
+        lambda bench: {"INPUT": cloud(bench)},
+        REFUSED,
+        "GUIDE is empty: choose lines along the tracks, or PROPOSED to have some proposed.",
+    ),
+    Fault(
+        "mobile lidar without a guide",
+        lambda bench: {"INPUT": cloud(bench, density=800), "PROPOSED": "TEMPORARY_OUTPUT"},
+        REFUSED,
+        "The cloud has 800 points per square metre, as mobile lidar has: use Extract Rails, which finds the single "
+        "railheads and is more accurate there.",
+    ),
     Fault("guide without lines", guided(), REFUSED, "GUIDE has no lines: give a line layer."),
+    Fault(
+        "polygons as guide",
+        guided("POLYGON((500000 3000004, 500060 3000004, 500060 3000006, 500000 3000004))", kind="Polygon"),
+        REFUSED,
+        "GUIDE has the geometry type Polygon: give a line layer.",
+    ),
     Fault(
         "guide outside of the cloud",
         guided("LINESTRING(510000 3000005, 510060 3000005)"),
@@ -61,8 +80,8 @@ FAULTS = [
         "mobile lidar as airborne cloud",
         guided(ALONG, density=800),
         REFUSED,
-        "The cloud has 799 points per square metre along the guides, as mobile lidar has: use Extract Rails, which "
-        "finds the single railheads and is more accurate there.",
+        "The cloud has 799 points per square metre, as mobile lidar has: use Extract Rails, which finds the single "
+        "railheads and is more accurate there.",
     ),
     Fault(
         "airborne cloud in Extract Rails",

@@ -1,6 +1,7 @@
 """Every widget and dialog of ours is made, painted and used with PyQt6."""
 
 import sys
+from configparser import ConfigParser
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -247,6 +248,13 @@ def test_the_windows_come_and_go(application):
     assert not windows.dock.isVisible()
     windows.remove()
     assert entries == []
+
+
+def test_the_metadata_admit_qgis_4():
+    metadata = ConfigParser(interpolation=None)
+    metadata.read(Path(__file__).resolve().parents[2] / "metadata.txt", encoding="utf-8")
+    facts = metadata["general"]
+    assert (facts["qgisMinimumVersion"], facts["qgisMaximumVersion"], facts["supportsQt6"]) == ("3.22", "4.99", "True")
 
 
 def test_all_modules_with_widgets_are_imported_here():

@@ -6,7 +6,8 @@ import laspy
 import numpy as np
 import pytest
 from rail_extract.core.airborne import squares
-from rail_extract.core.airborne.files import FLIGHT, survey_files
+from rail_extract.core.airborne.files import survey_files
+from rail_extract.core.airborne.remarks import FLIGHT
 from rail_extract.core.airborne.survey import Guide
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.errors import CloudError, NoRailPointsError, ParameterError
@@ -73,10 +74,35 @@ def test_tiles_and_squares_give_the_lines_of_one_file(flown, whole, tmp_path, mo
         assert np.abs(moved[seen, :2]).max() < 0.02
 
 
-def test_the_gauge_of_a_guide_counts(flown, tmp_path):
+def test_a_gauge_that_the_points_contradict_is_said(flown, tmp_path):
     write_airborne(flown.cloud, tmp_path / "cloud.laz")
-    narrow = [replace(one, gauge_m=1.0) for one in guides(flown)]
-    assert not survey(tmp_path / "cloud.laz", narrow, tmp_path).lines
+    first, second = guides(flown)
+    found = survey(tmp_path / "cloud.laz", [replace(first, gauge_m=1.0), second], tmp_path)
+    assert {line.guide_id for line in found.lines} == {2}
+    assert found.warnings == (
+        "Along guide 1, rails with a gauge of about 1435 mm show, not 1000 mm as its field gauge states: correct it.",
+    )
+
+
+def test_a_similar_gauge_of_the_run_is_said_once_and_the_track_is_seen(flown, tmp_path):
+    write_airborne(flown.cloud, tmp_path / "cloud.laz")
+    found = survey(tmp_path / "cloud.laz", guides(flown), tmp_path, replace(PARAMETERS, gauge_m=1.52))
+    assert found.seen_m > 0.9 * found.guides_m
+    assert found.warnings == (
+        "Along guides 1 and 2, rails with a gauge of about 1435 mm show, not 1520 mm as the rail standard states: "
+        "choose another.",
+    )
+
+
+def test_a_short_guide_is_left_out_if_others_are_long(flown, tmp_path):
+    write_airborne(flown.cloud, tmp_path / "cloud.laz")
+    first, second = guides(flown)
+    short = Guide(3, np.array([second.xy[0], second.xy[0] + [9.0, 0.0]]))
+    found = survey(tmp_path / "cloud.laz", [first, second, short], tmp_path)
+    assert [line.guide_id for line in found.lines] == [1, 2]
+    assert found.warnings == (
+        "Guide 3 is left out: it is 9.0 m long, too short alone. Join it to the line that it continues.",
+    )
 
 
 def test_a_guide_outside_of_the_cloud_is_refused(flown, tmp_path):
@@ -105,6 +131,8 @@ def test_a_sparse_cloud_with_a_wide_footprint_is_a_hint(flown, tmp_path):
     write_airborne(few, tmp_path / "cloud.laz")
     found = survey(tmp_path / "cloud.laz", guides(flown), tmp_path, replace(PARAMETERS, footprint_m=0.5))
     assert "take the lines as hints" in found.warnings[0]
+    assert found.lines
+    assert all(line.hint for line in found.lines)
 
 
 def test_points_far_from_the_guides_are_not_kept(flown, tmp_path):

@@ -7,7 +7,8 @@ from rail_extract.core.airborne.fitting import EMPTY, HIDDEN, MISLED, SEEN, TWIN
 from rail_extract.laboratory.airborne.designs import SPACING_M, box
 from rail_extract.laboratory.airborne.flight import Flight, fly
 from rail_extract.laboratory.airborne.ground import Axis, Band, World
-from rail_extract.laboratory.ruler.airborne import compare_stations
+from rail_extract.laboratory.ruler.airborne import Stationwise, compare_stations
+from scipy.spatial import cKDTree
 
 
 def fitted(xyz, strip, guides, reach_m=3.0, footprint_m=0.25):
@@ -48,6 +49,39 @@ def test_cant_and_height_are_those_of_the_bed(flown, found):
         cant_m = flown.design.tracks[number].cant_m[middle]
         assert SPACING_M * one.stations.tilt[nearest] == pytest.approx(cant_m, abs=0.025)
         assert one.stations.bed[nearest] == pytest.approx(truth[middle, 2] - 0.19, abs=0.05)
+
+
+def test_a_section_that_one_strip_covers_alone_may_be_off_by_half_their_distance(flown):
+    truth = flown.design.truth(0)
+    nearest = cKDTree(truth[:, :2]).query(flown.cloud.xyz[:, :2])[1]
+    left = flown.design.tracks[0].curve.left_normal[nearest]
+    xyz, other = flown.cloud.xyz.copy(), flown.cloud.strip == 1
+    xyz[other, :2] += 0.08 * left[other]
+    kept = ~other | (nearest < len(truth) / 2)
+    stations = fitted(xyz[kept], flown.cloud.strip[kept], flown.guides[:1])[0].stations
+    both, alone = stations.t < 80, (stations.t > 180) & (stations.t < 240)
+    assert np.median(stations.sigma[both]) < 0.02
+    assert np.median(stations.sigma[alone]) == pytest.approx(0.05, abs=0.02)
+
+
+def test_little_of_a_sparse_cloud_with_a_wide_footprint_is_lost(flown):
+    cloud = fly(flown.design.world, flown.design.where, 9.0, Flight(5.0, 0.5, plants=0.03), seed=5)
+    found = fitted(cloud.xyz, cloud.strip, flown.guides, footprint_m=0.5)
+    rows = [
+        compare_stations(
+            np.column_stack([one.stations.xy, one.stations.bed]),
+            one.stations.reason == SEEN,
+            one.stations.sigma,
+            one.stations.switch,
+            flown.design.truth(number),
+        )
+        for number, one in enumerate(found)
+    ]
+    share, right, rms_mm, _, within = Stationwise.joined(rows).shares()
+    assert share > 0.8
+    assert right == 1.0
+    assert rms_mm < 45
+    assert within > 0.9
 
 
 def test_the_distance_of_a_track_without_a_guide_is_stated(flown):
@@ -113,6 +147,14 @@ def test_no_line_where_there_is_no_track(thing):
     cloud = fly(World([], [ground, band], seed=4), flat.xyz[::4, :2], 7.0, Flight(10.0, 0.25), seed=1)
     guide = np.column_stack([along[::160], 0.3 * np.sin(along[::160])])
     assert not (fitted(cloud.xyz, cloud.strip, [guide])[0].stations.reason == SEEN).any()
+
+
+@pytest.mark.parametrize("length_m", [30, 60, 90])
+def test_short_guides_are_fitted_too(flown, length_m):
+    truth = flown.design.truth(0)[200 : 200 + 4 * length_m + 1 : 40, :2]
+    stations = fitted(flown.cloud.xyz, flown.cloud.strip, [truth])[0].stations
+    assert len(stations.t) == length_m / 10
+    assert (stations.reason == SEEN).mean() > 0.6
 
 
 def test_no_points_give_no_track():

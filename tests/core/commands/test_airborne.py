@@ -48,6 +48,36 @@ def test_all_outputs_are_written(flown, tmp_path, capsys):
     assert stations["seen"].sum() >= 14
 
 
+def test_proposed_guides_lead_to_lines_on_two_workers(flown, tmp_path, capsys):
+    options = ["airborne", str(flown / "air.laz"), "--footprint", "0.25", "--workers", "2"]
+    assert main([*options, "--proposed", str(tmp_path / "proposed.gpkg")]) == 0
+    assert "Proposed 1 guide" in capsys.readouterr().out
+    guide = ["--guide", str(tmp_path / "proposed.gpkg"), "--centerlines", str(tmp_path / "out.gpkg")]
+    assert main([*options, *guide]) == 0
+    _, _, shapes, columns = pyogrio.raw.read(tmp_path / "out.gpkg", layer="centerlines", columns=["seen_m"])
+    assert len(shapes) == 1
+    assert columns[0][0] >= 120
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--centerlines", "out.gpkg"], "Give --proposed to have guides proposed, or --guide to fit tracks."),
+        (["--proposed", "p.gpkg", "--report", "r.html"], "--report is written with --guide only: leave it out."),
+        (["--guide", "g.gpkg"], "Give --centerlines for the lines."),
+        (
+            ["--guide", "g.gpkg", "--centerlines", "o.gpkg", "--proposed", "p.gpkg"],
+            "--proposed is written without --guide",
+        ),
+    ],
+)
+def test_outputs_of_the_other_mode_are_refused(flown, tmp_path, capsys, monkeypatch, words, message):
+    monkeypatch.chdir(tmp_path)
+    assert main(["airborne", str(flown / "air.laz"), *words]) == 1
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
 def test_polygons_as_guide_are_refused(flown, tmp_path, capsys):
     guide = json.loads((flown / "guide.geojson").read_text())
     ring = guide["features"][0]["geometry"]["coordinates"]

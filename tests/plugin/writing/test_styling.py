@@ -19,6 +19,7 @@ from qgis.core import (
     QgsReadWriteContext,
     QgsRectangle,
     QgsRenderContext,
+    QgsVectorFileWriter,
     QgsVectorLayer,
 )
 from qgis.PyQt.QtCore import QSize
@@ -33,6 +34,7 @@ from rail_extract.core.fields import (
     DIFFERENCE_FIELDS,
     ELEMENT_FIELDS,
     FINDING_FIELDS,
+    PROPOSED_FIELDS,
     QUALITY_FIELDS,
     RAIL_FIELDS,
     STATION_FIELDS,
@@ -57,6 +59,7 @@ KINDS = {
     "axes": ("LineStringZM", AXIS_FIELDS),
     "deviations": ("PointZ", DEVIATION_FIELDS),
     "airborne": ("LineStringZ", AIRBORNE_FIELDS),
+    "proposed": ("LineStringZ", PROPOSED_FIELDS),
     "stations": ("PointZ", AIRBORNE_STATION_FIELDS),
 }
 
@@ -287,6 +290,7 @@ def test_layers_can_be_drawn(styled, style):
         "axes": (LINE, {"track_id": 1}),
         "deviations": ("POINT Z (500050 3000000 1)", {"track_id": 1, "slew_mm": 12.0}),
         "airborne": (LINE, {"track_id": 1}),
+        "proposed": (LINE, {"guide_id": 1, "score": 90.0}),
         "stations": ("POINT Z (500050 3000000 1)", {"track_id": 1, "seen": 1}),
     }
     layer = styled(style, [rows[style]])
@@ -302,7 +306,7 @@ def test_layers_can_be_drawn(styled, style):
     image = job.renderedImage()
     seen = {image.pixelColor(x, y).name() for x in range(60, 200) for y in range(100, 200)}
     colours = {"rails": "#1565c0", "centerlines": "#e64a19", "quality": "#f28e2b", "findings": "#84b397"}
-    colours.update(airborne="#e64a19", stations="#2e7d4f")
+    colours.update(airborne="#e64a19", proposed="#8e24aa", stations="#2e7d4f")
     colours.update(stops="#e64a19", elements="#1565c0", axes="#8e5bb5", deviations="#b2182b", differences="#b2182b")
     assert colours[style] in seen
 
@@ -353,6 +357,27 @@ def test_layers_of_a_run_are_in_order_however_they_are_loaded(context, new_feedb
     order = [style for style in ("findings", "centerlines", "rails", "quality") if style in loaded]
     assert [node.name() for node in root.findLayers()] == [*order, "other"]
     assert len(project.mapLayers()) == len(loaded) + 1
+
+
+def test_a_layer_whose_file_was_replaced_shows_the_new_one(context, new_feedback, tmp_path):
+    def write(path, reason):
+        layer = QgsVectorLayer("LineStringZ?crs=EPSG:32643&field=reason:string", "findings", "memory")
+        feature = QgsFeature(layer.fields())
+        feature["reason"] = reason
+        layer.dataProvider().addFeature(feature)
+        options = QgsVectorFileWriter.SaveVectorOptions()
+        QgsVectorFileWriter.writeAsVectorFormatV3(layer, str(path), context.transformContext(), options)
+
+    shown, new = tmp_path / "findings.gpkg", tmp_path / "new.gpkg"
+    write(shown, "old")
+    layer = QgsProject.instance().addMapLayer(QgsVectorLayer(str(shown), "findings", "ogr"))
+    assert [one["reason"] for one in layer.getFeatures()] == ["old"]
+    write(new, "new")
+    new.replace(shown)
+    context.addLayerToLoadOnCompletion(layer.id(), QgsProcessingContext.LayerDetails("", QgsProject.instance(), ""))
+    style_on_load(layer.id(), "findings", context)
+    context.layerToLoadOnCompletionDetails(layer.id()).postProcessor().postProcessLayer(layer, context, new_feedback())
+    assert [one["reason"] for one in layer.getFeatures()] == ["new"]
 
 
 @pytest.mark.parametrize("style", KINDS)

@@ -1,0 +1,260 @@
+"""Guides for a cloud without any: it is searched square by square, finds are chained, and fits along them decide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..clouds.points import Request
+from ..disk import writing
+from ..errors import NoRailPointsError
+from ..frame import LocalFrame
+from ..parameters import AirborneParameters
+from ..polyline import left_normals, length_along, resample, runs
+from ..progress import SILENT, Progress, counted
+from ..squares.grid import Key, points_by_square
+from ..tasks import READ_S, Context, Runner, Task, in_listed_order
+from .chaining import MIN_LENGTH_M, chains
+from .files import survey_files
+from .remarks import refuse_mobile
+from .ridges import Shape
+from .search import TILE_M, Finds, search
+from .spooling import density_of
+from .survey import AirborneTrack, Guide, Survey
+
+SIDE_M = 200.0
+"""Side of the squares that are searched: with 40 points per square metre, the points of one take 30 MB."""
+
+SEARCH_S = 3e-5
+"""Run time of the search per point, in seconds."""
+
+REACH_M = 1.0
+"""Distance from a chain within which its track is fitted: finds are 0.3 m off at most, and arcs between them 0.5 m."""
+
+APART_M = 0.6
+"""Proposals closer than this are the same track."""
+
+STEP_M = 20.0
+"""Distance between the vertices of a proposal: few to move by hand, and enough for any curve."""
+
+LEAST_SCORE = 60.0
+"""Proposals with a smaller score are left out: on little more than half of their stations, two rails are seen."""
+
+
+@dataclass(frozen=True)
+class ProposedGuide:
+    """A line along which a track seems to lie; fields as in `fields.PROPOSED_FIELDS`.
+
+    Attributes
+    ----------
+    xyz : (n, 3) array
+        Local metres.
+    """
+
+    xyz: np.ndarray
+    guide_id: int
+    score: float
+    length_m: float
+
+
+@dataclass(frozen=True)
+class Proposals:
+    """What the search has found.
+
+    Attributes
+    ----------
+    guides : tuple of ProposedGuide
+    frame : LocalFrame
+    density : float
+        Points per square metre.
+    """
+
+    guides: tuple[ProposedGuide, ...]
+    frame: LocalFrame
+    density: float
+
+    @property
+    def length_m(self) -> float:
+        """Length of all."""
+        return sum(one.length_m for one in self.guides)
+
+    @property
+    def summary(self) -> str:
+        """What was found and what to do next, in a sentence for a log."""
+        if not self.guides:
+            return "No track was found in the cloud: draw guides, or take them from OpenStreetMap."
+        return (
+            f"Proposed {counted(len(self.guides), 'guide')}, {self.length_m:,.0f} m in all: delete or move what is "
+            "wrong, add what is missing, and run again with them as the guide."
+        )
+
+
+def propose_guides(
+    request: Request, parameters: AirborneParameters, folder: Path, runner: Runner, progress: Progress = SILENT
+) -> Proposals:
+    """Search a cloud for tracks.
+
+    Parameters
+    ----------
+    request : Request
+        Files, classes and extent.
+    parameters : AirborneParameters
+    folder : Path
+        Existing folder for the points, 12 bytes each and a quarter more near borders; the caller removes it.
+    runner : Runner
+        Executes one task per file and one per square.
+    progress : Progress
+
+    Raises
+    ------
+    CloudError
+        A file is damaged, or the cloud is one of mobile lidar.
+    DiskError
+        The disk is full.
+    NoRailPointsError
+        The cloud has no points of these classes.
+    """
+    reading, searching, fitting = progress.divide((1.0, 4.0, 1.0))
+    progress.status("Reading the points")
+    counts = _sorted(request, folder, runner, reading)
+    progress.status("Searching for tracks")
+    finds, density = _found(counts, parameters, folder, runner, searching)
+    refuse_mobile(density)
+    lines = list(chains(finds))
+    if not lines:
+        return Proposals((), request.zero, density)
+    flat = [np.column_stack([line, np.zeros(len(line))]) for line in lines]
+    guides = [Guide(number, request.zero.to_crs(line)[:, :2]) for number, line in enumerate(flat, start=1)]
+    near, shares = replace(parameters, reach_m=REACH_M), fitting.split(2)
+    survey = survey_files(request, guides, near, folder / "first", runner, shares[0])
+    guides = list(_with_neighbours(survey))
+    if guides:
+        survey = survey_files(request, guides, near, folder / "second", runner, shares[1])
+    return Proposals(tuple(_distinct(survey)), survey.frame, density)
+
+
+def _with_neighbours(survey: Survey) -> Iterator[Guide]:
+    """Yield guides along the lines that were seen, and along the tracks beside them that have no guide yet."""
+    tracks = {track.guide_id: track for track in survey.tracks}
+    known: list[np.ndarray] = []
+    beside = []
+    for line in sorted(survey.lines, key=lambda one: -one.seen_m):
+        xy = resample(line.xyz[:, :2], STEP_M)[0]
+        if _is_new(xy, known):
+            known.append(line.xyz[:, :2])
+            beside += [xy + one.left_m * left_normals(xy) for one in tracks[line.guide_id].others]
+    lines = [resample(line, STEP_M)[0] for line in known]
+    for xy in beside:
+        if _is_new(xy, known):
+            known.append(resample(xy, 1.0)[0])
+            lines.append(xy)
+    for number, xy in enumerate(lines, start=1):
+        yield Guide(number, survey.frame.to_crs(np.column_stack([xy, np.zeros(len(xy))]))[:, :2])
+
+
+def _is_new(xy: np.ndarray, known: list[np.ndarray]) -> bool:
+    """Return whether most of a line lies apart from others."""
+    if not known:
+        return True
+    return bool(np.median(cKDTree(np.concatenate(known)).query(xy)[0]) > APART_M)
+
+
+def _sorted(request: Request, folder: Path, runner: Runner, progress: Progress) -> dict[Key, int]:
+    """Sort the points of all files into squares on disk, and return the number of points in each."""
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    tasks = {
+        number: Task(header.path.name, sort_file, (request, number, folder), weight=READ_S * (header.point_count + 1))
+        for number, header in enumerate(request.headers)
+    }
+    counts: dict[Key, int] = {}
+    for _, one in runner.run(tasks, progress):
+        for key, count in one.items():
+            counts[key] = counts.get(key, 0) + count
+    if not counts:
+        raise NoRailPointsError(
+            f"The {request.where} has no points of class {', '.join(map(str, request.class_codes))}: set the classes."
+        )
+    return counts
+
+
+def sort_file(request: Request, number: int, folder: Path, context: Context) -> dict[Key, int]:
+    """Sort the points of a file into squares and their surroundings, and return the number in each; a task."""
+    counts: dict[Key, int] = {}
+    for xyz, _, _, _ in request.read(request.headers[number], context.progress):
+        local = request.zero.to_local(xyz)
+        for key, chosen in points_by_square(local, SIDE_M, TILE_M).items():
+            counts[key] = counts.get(key, 0) + len(chosen)
+            corner = [*(np.array(key) * SIDE_M), 0.0]
+            with writing(folder), _file(folder, key, number).open("ab") as file:
+                file.write((local[chosen] - corner).astype("<f4").tobytes())
+    return counts
+
+
+def _file(folder: Path, key: Key, number: int) -> Path:
+    return folder / f"{key[0]}_{key[1]}_{number}"
+
+
+def _found(
+    counts: Mapping[Key, int], parameters: AirborneParameters, folder: Path, runner: Runner, progress: Progress
+) -> tuple[Finds, float]:
+    """Search all squares, and return their finds and the median density."""
+    shape = Shape.expected(parameters.spacing_of(), parameters.footprint_m)
+    tasks = {
+        key: Task(f"The square {key}", search_square, (folder, key, shape), weight=SEARCH_S * counts[key])
+        for key in sorted(counts)
+    }
+    rows, densities = [], []
+    for found, density in in_listed_order(tasks, runner.run(tasks, progress)):
+        rows += found
+        densities.append(density)
+    return Finds.joined(rows), float(np.median(densities))
+
+
+def search_square(
+    folder: Path, key: Key, shape: Shape, context: Context
+) -> tuple[list[tuple[float, float, float, float]], float]:
+    """Search a square, and return its finds and its points per square metre; a task."""
+    files = sorted(folder.glob(f"{key[0]}_{key[1]}_*"))
+    local = np.concatenate([np.fromfile(file, "<f4").reshape(-1, 3) for file in files]).astype(np.float64)
+    for file in files:
+        file.unlink()
+    corner = np.array(key) * SIDE_M
+    found = search(local, np.zeros(2), SIDE_M, shape, context.progress)
+    moved = [(x + corner[0], y + corner[1], direction, score) for x, y, direction, score in found]
+    return moved, float(np.median(density_of(local[:, :2])))
+
+
+def _distinct(survey: Survey) -> Iterator[ProposedGuide]:
+    """Yield the lines that were seen, the longest first, each track once."""
+    tracks = {track.guide_id: track for track in survey.tracks}
+    known: list[np.ndarray] = []
+    number = 0
+    for line in sorted(survey.lines, key=lambda one: -one.seen_m):
+        away = np.ones(len(line.xyz), dtype=bool)
+        if known:
+            away = cKDTree(np.concatenate(known)).query(line.xyz[:, :2])[0] > APART_M
+        for first, last in runs(away):
+            part = line.xyz[first : last + 1]
+            if length_along(part[:, :2])[-1] < MIN_LENGTH_M:
+                continue
+            score = _score(tracks[line.guide_id], part[:, :2])
+            if score >= LEAST_SCORE:
+                number += 1
+                yield _proposed(part, number, score)
+        known.append(line.xyz[:, :2])
+
+
+def _score(track: AirborneTrack, part: np.ndarray) -> float:
+    """Return the share of the stations along a part of a line on which the track is seen, per cent."""
+    near = cKDTree(part).query(track.xyz[:, :2])[0] < STEP_M / 2
+    return 100 * float(track.seen[near].mean())
+
+
+def _proposed(part: np.ndarray, number: int, score: float) -> ProposedGuide:
+    xyz = resample(part, STEP_M)[0]
+    return ProposedGuide(xyz, number, score, float(length_along(xyz[:, :2])[-1]))
