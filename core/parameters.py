@@ -55,8 +55,10 @@ class Parameters:
         See `frpdf.engine`.
     model : str
         Name of a model, see `frpdf.models`.
-    smoothing_xy_m, smoothing_z_m : float
-        Sigma of PAEK in plan and in height.
+    smoothing_xy_m : float
+        Sigma of PAEK in plan.
+    smoothing_z_m : float or None
+        Sigma of PAEK in height; None smooths heights by a spline, as much as the points show.
     tolerance_xy_m, tolerance_z_m : float
         A point gives height if it is at most this far from the line in plan and this far below the top surface.
     crown_radius_m : float
@@ -94,7 +96,7 @@ class Parameters:
     device: str = "AUTO"
     model: str = "AUTO"
     smoothing_xy_m: float = 0.8
-    smoothing_z_m: float = 3.0
+    smoothing_z_m: float | None = None
     tolerance_xy_m: float = 0.10
     tolerance_z_m: float = 0.03
     crown_radius_m: float = 20.0

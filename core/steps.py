@@ -25,6 +25,7 @@ from .heads.roads import onto_heads
 from .heads.smoothing_check import warn_if_out_of_reach
 from .heads.strips import rows_of, strips_along
 from .lines.bridges import FIT_M
+from .lines.network import LineNetwork
 from .lines.network_smoothing import smooth_network
 from .lines.thinning import thin
 from .lines.turning import MAX_TURN_DEG, parts_without_turns
@@ -81,7 +82,7 @@ def overlap_tiles(parameters: Parameters) -> int:
     its bridge is fitted to on either side, and three sigma of the smoothing in height. However long the gaps, only the
     neighbours are included.
     """
-    reach_m = HALO_M + max(2 * (parameters.max_gap_m + 2 * FIT_M), 3 * parameters.smoothing_z_m)
+    reach_m = HALO_M + max(2 * (parameters.max_gap_m + 2 * FIT_M), 3 * (parameters.smoothing_z_m or 0.0))
     return min(math.ceil(max(reach_m, OVERLAP_M) / _tile_side(parameters)), parameters.square_tiles)
 
 
@@ -283,7 +284,16 @@ def _all_vertices(
 
     See `strips.rows_of`.
     """
-    vectorizing, smoothing, refining, elevating = progress.divide((VECTORIZE, SMOOTH, REFINE, ELEVATE))
+    drawing, measuring = progress.divide((VECTORIZE + SMOOTH, REFINE + ELEVATE))
+    network = draw_lines(raster, points, parameters, drawing)
+    return measure_lines(network, points, class_code, parameters, raster.cell_m, measuring)
+
+
+def draw_lines(
+    raster: RailRaster, points: RailPoints | None, parameters: Parameters, progress: Progress = SILENT
+) -> LineNetwork:
+    """Draw the smoothed lines that a cleaned raster shows; points, if given, judge its branches."""
+    vectorizing, smoothing = progress.divide((VECTORIZE, SMOOTH))
     network = vectorize(
         raster,
         parameters.head_width_m,
@@ -293,7 +303,31 @@ def _all_vertices(
         vectorizing,
         None if points is None else rasterize(points.xyz, raster.cell_m),
     )
-    network = smooth_network(network, parameters.smoothing_xy_m, smoothing)
+    return smooth_network(network, parameters.smoothing_xy_m, smoothing)
+
+
+def measure_lines(
+    network: LineNetwork,
+    points: RailPoints | None,
+    class_code: int,
+    parameters: Parameters,
+    cell_m: float,
+    progress: Progress = SILENT,
+) -> tuple[tuple[RailLine, ...], np.ndarray]:
+    """Move drawn lines onto their heads and measure them; see `_all_vertices`.
+
+    Parameters
+    ----------
+    network : LineNetwork
+        From `draw_lines`.
+    points : RailPoints or None
+    class_code : int
+    parameters : Parameters
+    cell_m : float
+        Cell size of the raster from which the lines were drawn.
+    progress : Progress
+    """
+    refining, elevating = progress.divide((REFINE, ELEVATE))
     elevation = ElevationParameters(
         head_width_m=parameters.head_width_m,
         tolerance_xy_m=parameters.tolerance_xy_m,
@@ -301,7 +335,7 @@ def _all_vertices(
         crown_radius_m=parameters.crown_radius_m,
         smoothing_xy_m=parameters.smoothing_xy_m,
         smoothing_z_m=parameters.smoothing_z_m,
-        cell_m=raster.cell_m,
+        cell_m=cell_m,
         min_length_m=parameters.min_length_m,
         align=parameters.strips == ALIGNED,
     )

@@ -116,7 +116,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     method.add_argument("--model", choices=NAMES, default=Parameters.model, help=text)
     for field in _number_fields():
         unit = "degrees" if field.name.endswith("_deg") else "metres"
-        text = f"{_option(field.name)[2:].replace('-', '_').upper()} in {unit} (default: {field.default:g})"
+        default = "as the points require" if field.default is None else f"{field.default:g}"
+        text = f"{_option(field.name)[2:].replace('-', '_').upper()} in {unit} (default: {default})"
         method.add_argument(_option(field.name), type=float, default=field.default, metavar="N", help=text)
     text = f"how strips, the passes of a scanner, are used (default: {Parameters.strips})"
     method.add_argument("--strips", choices=STRIPS, default=Parameters.strips, help=text)
@@ -184,7 +185,7 @@ def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameter
     gauges = gauges_of(args, standard, args.centerline_tolerance)
     numbers = {field.name: getattr(args, _option(field.name)[2:].replace("-", "_")) for field in _number_fields()}
     for name, value in {**numbers, "iterations": args.iterations, "step": args.step, "workers": args.workers}.items():
-        if not (math.isfinite(value) and value >= 0) or (name in POSITIVE and value == 0):
+        if value is not None and not (math.isfinite(value) and value >= 0) or (name in POSITIVE and value == 0):
             raise ParameterError(
                 f"The option {_option(name)} can't be {getattr(args, name, value)}: give a larger number."
             )

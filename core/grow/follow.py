@@ -9,8 +9,8 @@ from typing import Optional
 import numpy as np
 
 from ..progress import SILENT, Progress
-from .blunt import cut
 from .course import LEAST_RADIUS_M, Ahead, lead
+from .on_heads import cut
 from .points import Points
 from .profile import BED_M, HIGH_M, MIN_POINTS, Head, Section
 from .settings import GrowSettings

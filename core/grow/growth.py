@@ -9,9 +9,9 @@ import numpy as np
 
 from ..polyline import length_along, project, runs
 from ..progress import SILENT, Progress
-from .blunt import OnHeads
 from .course import smoothed
 from .follow import Reason, Window, follow, turned
+from .on_heads import OnHeads
 from .points import Points
 from .settings import DENSE, Beam, GrowSettings
 from .start import Start, find_start

@@ -11,6 +11,11 @@ THIN_PER_M2 = 400.0
 """Points per square metre around a seed below which its rail is thin; as in `classify`."""
 
 
+HEAD_LEVEL_M = 0.20
+"""Difference in height between windows on heads that the classification has found: it only has to tell the rail from
+one on a bridge. Noise moves a window by up to 0.15 m."""
+
+
 @dataclass(frozen=True)
 class Beam:
     """Tolerances across and in height, metres.
@@ -37,7 +42,7 @@ class Beam:
         Largest distance of the windows of a rail from their course, root mean square. Measured: up to 8 mm on dense
         rails and 15 mm on thin ones; undergrowth and rubble 12 to 63 mm.
     classified : bool
-        Whether heads are looked for where the classification finds some; see `blunt`.
+        Whether heads are looked for where the classification finds some; see `on_heads`.
     """
 
     blur_m: float
@@ -51,6 +56,10 @@ class Beam:
     fit_m: float
     steady_m: float
     classified: bool = False
+
+    def on_heads(self) -> Beam:
+        """Return the tolerances for points that the classification has found on heads."""
+        return replace(self, level_m=HEAD_LEVEL_M, classified=True)
 
 
 DENSE = Beam(
@@ -81,14 +90,7 @@ THIN = Beam(
 )
 """For scanners in the air: a beam of 4 to 9 cm blends the head and the ballast."""
 
-BLUNT = replace(
-    THIN,
-    level_m=0.20,
-    below_m=classify.BLUNT.below_m,
-    above_m=classify.BLUNT.above_m,
-    steady_m=0.035,
-    classified=True,
-)
+BLUNT = replace(THIN, below_m=classify.BLUNT.below_m, above_m=classify.BLUNT.above_m, steady_m=0.035)
 """For clouds that blur a head to a round ridge."""
 
 

@@ -10,8 +10,8 @@ from ..classify.bed import Coarse, find_bed
 from ..classify.settings import Settings
 from ..classify.square import classify_square
 from ..classify.tops import TOP_M
-from .blunt import OnHeads, cut
 from .course import Ahead
+from .on_heads import OnHeads, cut
 from .points import Points
 from .profile import GROOVE_M, HIGH_M, MIN_CONTRAST, Head
 from .settings import BLUNT, DENSE, THIN, THIN_PER_M2, Beam, GrowSettings
@@ -99,8 +99,8 @@ def window_m(per_m: float, settings: GrowSettings) -> float:
 def find_start(points: Points, seed: np.ndarray, settings: GrowSettings, heads: OnHeads | None = None) -> Start | None:
     """Find the rail at a seed, (2,); None if there is none within the search distance.
 
-    The points that the classification takes for rails are looked at first, then all. In a cloud that blurs heads, only
-    those on heads by the classification count.
+    The points that the classification takes for rails are looked at first, then all. In thin clouds, windows show less
+    than the classification of whole squares, and in clouds that blur heads nothing: these rails are followed on it.
     """
     near = _near(points, seed, settings)
     if not len(near):
@@ -110,10 +110,13 @@ def find_start(points: Points, seed: np.ndarray, settings: GrowSettings, heads: 
     beam = THIN if per_m2 < THIN_PER_M2 else DENSE
     reach_m = float(np.clip(REACH_POINTS_PER_M / per_m2, *REACH_M))
     rail, is_blunt = _classified(patch, seed, settings)
-    if is_blunt:
+    if is_blunt or beam is THIN:
         heads = heads or OnHeads(points, settings)
-        near = _near(heads, seed, settings)
-        return _found(heads, near, near, seed, reach_m, BLUNT, settings)
+        near_heads = _near(heads, seed, settings)
+        found = (BLUNT if is_blunt else THIN).on_heads()
+        start = _found(heads, near_heads, near_heads, seed, reach_m, found, settings)
+        if start is not None or is_blunt:
+            return start
     sure = _found(points, near, patch[rail], seed, reach_m, beam, settings)
     if sure is not None:
         return sure

@@ -33,6 +33,9 @@ LEANING_M = 0.008
 """Standard deviation of the mean of the points about the crest: labels lean to the side on which the bed is higher.
 Where noise hides the crest, the mean says more."""
 
+SMOOTHING_M = 3.0
+"""Sigma of PAEK in height: a spline would follow the errors that neighbouring points of such a cloud share."""
+
 STIFF_PLAN, STIFF_PROFILE = (201, 3), (301, 2)
 """Stations of a stiff curve, and its degree: 50 m of a clothoid in plan, 75 m of a parabola in height. Errors of dense
 matching are alike over 5 to 20 m. What is longer than this is taken for the shape of the track."""

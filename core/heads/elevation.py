@@ -18,14 +18,15 @@ from ..parameters import Parameters
 from ..polyline import Feet, interpolate, length_along, project, resample, starts_at_its_end
 from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
-from .blunt import Ridge, wander
+from .blunt import SMOOTHING_M, Ridge, wander
 from .edges import Widths, search_distance, stations_along, widest
 from .flank import find_flank
-from .level import AXIS_SHARE, blended_fall, rough_level
+from .level import crown_fall, rough_level
 from .neighbours import free_edges
 from .own_level import on_own_level
+from .smoother import KNOT_M
 from .strips import StripOffsets, aligned, measure_strips
-from .top import MIN_POINTS, Profile, find_top
+from .top import MIN_POINTS, Top, find_top, smoothed
 from .uncertainty import height_error, measure_support, on_one_face
 
 MIN_GAP_M, MAX_CHANCE_GAP_M = 0.5, 0.9
@@ -59,8 +60,10 @@ class ElevationParameters:
         Maximum depth of a point below the top surface.
     crown_radius_m : float
         Radius of the disc that rolls along the top.
-    smoothing_xy_m, smoothing_z_m : float
-        Sigma of PAEK in plan and in height.
+    smoothing_xy_m : float
+        Sigma of PAEK in plan.
+    smoothing_z_m : float or None
+        See `Parameters`.
     cell_m : float
         Cell size of the raster from which the line was drawn.
     min_length_m : float
@@ -74,7 +77,7 @@ class ElevationParameters:
     tolerance_z_m: float = Parameters.tolerance_z_m
     crown_radius_m: float = Parameters.crown_radius_m
     smoothing_xy_m: float = Parameters.smoothing_xy_m
-    smoothing_z_m: float = Parameters.smoothing_z_m
+    smoothing_z_m: float | None = Parameters.smoothing_z_m
     cell_m: float = 0.04
     min_length_m: float = Parameters.min_length_m
     align: bool = False
@@ -180,23 +183,23 @@ def _measured(
     flank = find_flank(feet.t, feet.across, z, parameters.head_width_m)
     ridge = None if flank else Ridge.find(feet.t, feet.across, z, along[-1], parameters.head_width_m)
     if flank is None:
-        level_z = z + blended_fall(feet.t, feet.across, z, parameters.head_width_m)
-        found = find_top(
+        level_z = z + crown_fall(feet.t, feet.across, z, parameters.head_width_m)
+        top = find_top(
             feet.t[head],
             feet.across[head],
             level_z[head],
             parameters.head_width_m,
             parameters.crown_radius_m,
             parameters.tolerance_z_m,
-            parameters.smoothing_z_m,
+            parameters.smoothing_z_m or (SMOOTHING_M if ridge else None),
         )
-        if found is None:
+        if top is None:
             return None
-        profile, top = found
     else:
-        level_z, (head, top) = z, np.ones((2, len(z)), dtype=bool)
-        profile = Profile.through(feet.t, rough_level(feet.t, z) + flank.top_m, parameters.smoothing_z_m)
-    supporting = feet[head][top]
+        head = np.ones(len(z), dtype=bool)
+        course = smoothed(feet.t, z + flank.top_m - np.mean(z - rough_level(feet.t, z)), parameters.smoothing_z_m)
+        top = Top(course, head, np.zeros(len(z)))
+    supporting = feet[head][top.points]
     start, end = _supported(supporting.t, along[-1], free_ends)
     stations = np.concatenate([[start], along[(along > start) & (along < end)], [end]])
     gaps = find_gaps(supporting.t, start, end)
@@ -218,19 +221,15 @@ def _measured(
             marked=strips is not None,
         )
     if flank is not None:
-        support = on_one_face(support, feet.t, flank.sigma_m)
-    axial = np.abs(supporting.across) <= AXIS_SHARE * parameters.head_width_m
-    axial |= axial.sum() < MIN_POINTS
-    t = supporting.t[axial]
-    residual_m = level_z[head][top][axial] - profile.at(t)
-    by_chance_m = height_error(t, residual_m, support.t, parameters.smoothing_z_m)
+        support = on_one_face(support, feet.t, flank)
+    error_m = height_error(supporting.t, top.course.sigma(support.t), top.slope[top.points], support)
     if ridge is not None:
-        by_chance_m = np.hypot(by_chance_m, wander(profile.at(support.t)))
-    support = replace(support, sigmaz_m=np.hypot(by_chance_m, np.nan_to_num(support.heights_m)))
+        error_m = np.hypot(error_m, wander(top.course.at(support.t)))
+    support = replace(support, sigmaz_m=np.hypot(error_m, np.nan_to_num(support.heights_m)))
     if strips is not None:
         support = strips.added_to(support, parameters.align)
     support = support.between(start, end)
-    xyz = np.column_stack([interpolate(line, along, stations), profile.at(stations)])
+    xyz = np.column_stack([interpolate(line, along, stations), top.course.at(stations)])
     figures = (len(supporting.t), 1000 * resid, 1000 * support.rms_m, bridged)
     return RailLine(xyz, 0, 0, *figures, gaps - start, support, sigmaz_mm=1000 * support.rmsz_m)
 
@@ -239,7 +238,7 @@ def measure_again(
     rails: Sequence[RailLine],
     points: RailPoints,
     head_width_m: Widths,
-    smoothing_z_m: float,
+    smoothing_z_m: float | None,
     progress: Progress = SILENT,
     align: bool = False,
 ) -> list[RailLine]:
@@ -251,8 +250,8 @@ def measure_again(
     points : RailPoints
     head_width_m : float or (n,) array
         Width of the heads, of all rails or of each.
-    smoothing_z_m : float
-        Sigma of PAEK for the heights.
+    smoothing_z_m : float or None
+        See `Parameters`.
     progress : Progress
     align : bool
         See `ElevationParameters`.
@@ -262,7 +261,8 @@ def measure_again(
     list of RailLine
         In the order given. A rail without points keeps its heights and is a gap from end to end.
     """
-    plans = [resample(rail.xyz[:, :2], smoothing_z_m / STATIONS_PER_SIGMA)[0] for rail in rails]
+    step_m = KNOT_M if smoothing_z_m is None else smoothing_z_m / STATIONS_PER_SIGMA
+    plans = [resample(rail.xyz[:, :2], step_m)[0] for rail in rails]
     feet = project(plans, points.xyz[:, :2], search_distance(widest(head_width_m)), progress.span(0.0, 0.7))
     # Lines from a file are only known to be on their heads, so the head width takes the place of the cell size.
     of_rails = [

@@ -29,6 +29,9 @@ FLANK_SIGMA_M = 0.0012
 """Standard error of the axis from one face: half of what head widths differ by, and a millimetre because the slope
 across of the head is not seen."""
 
+FLANK_TOP_SIGMA_M = 0.0012
+"""Standard error of the top from one face: where the face ends below depends on the rail and on the view."""
+
 
 @dataclass(frozen=True)
 class Flank:

@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 
+from .outline import CROWN_RADIUS_M
+
 LEVEL_BIN_M = 0.5
 """Length of the bins: a handful of points on the sparsest rail, and at most 2 cm of height at 4 % gradient."""
 
@@ -118,10 +120,11 @@ def is_blended(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: f
     return False
 
 
-def blended_fall(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> np.ndarray:
-    """Return how far beams that blend the head and the ballast lower points, (n,) metres; zeros for narrow beams.
+def crown_fall(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> np.ndarray:
+    """Return how far points are lower than the axis of their head because they are beside it, (n,) metres.
 
-    The share of the ballast in a beam grows with the distance from the axis: up to the rims the fall is a parabola.
+    Narrow beams show the crown. Where beams blend the head and the ballast, the share of the ballast grows with the
+    distance from the axis: up to the rims the fall is a parabola, which is fitted.
 
     Parameters
     ----------
@@ -129,10 +132,10 @@ def blended_fall(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m:
         Chainage (increasing), offset to the left and height of points near the line, metres.
     head_width_m : float
     """
-    if not is_blended(t, across, z, head_width_m):
-        return np.zeros(len(t))
     rim_m = RIM_HEADS[0] * head_width_m
     near, square = np.abs(across) <= rim_m, np.minimum(np.abs(across), rim_m) ** 2
+    if not is_blended(t, across, z, head_width_m):
+        return square / (2 * CROWN_RADIUS_M)
     above, x = z[near] - rough_level(t[near], z[near]), square[near]
     used, bend = np.ones(len(above), dtype=bool), 0.0
     for _ in range(SLOPE_ROUNDS):

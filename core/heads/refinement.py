@@ -28,7 +28,7 @@ from .own_level import on_own_level
 from .roads import hidden_edges
 from .sections import outline_middles, with_outline
 from .strips import aligned, measure_strips
-from .top import Profile
+from .top import smoothed
 
 MIN_SEEN_SHARE = 0.25
 """Minimum share of a line's stations with visible edges; otherwise the line stays as it is."""
@@ -193,7 +193,7 @@ def _moved_onto(line: np.ndarray, feet: Feet) -> np.ndarray:
 
 def _moved_off(line: np.ndarray, feet: Feet, flank: Flank, smoothing_m: float) -> np.ndarray:
     """Move a line along one face of its head onto the axis."""
-    along_face = Profile.through(feet.t, feet.across, smoothing_m).at(length_along(line))
+    along_face = smoothed(feet.t, feet.across, smoothing_m).at(length_along(line))
     shift = along_face + flank.left_m - np.median(feet.across)
     return line + shift[:, None] * left_normals(line)
 

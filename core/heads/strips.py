@@ -299,7 +299,7 @@ class _Shown:
         if found is None:
             return None
         across = np.bincount(number[known], middle[known], minlength=steps) / np.maximum(windows, 1)
-        up = found[0].at((np.arange(steps) + 0.5) * STEP_M)
+        up = found.course.at((np.arange(steps) + 0.5) * STEP_M)
         return cls(np.where(seen, across, np.nan), np.where(seen, up, np.nan), points)
 
 

@@ -6,12 +6,15 @@ See docs/method.md section 6.4.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Union
 
 import numpy as np
 
+from ..lines.paek import VARIANCE_FACTOR
 from ..lines.smoothing import smooth_profile
 from .envelope import extremal_boundary
 from .level import AXIS_SHARE, cross_slope, robust_sigma, rough_level
+from .smoother import Spline, smooth
 
 MIN_POINTS = 10
 """A line with fewer points is not a rail: 1 m of the sparsest rail has more."""
@@ -37,7 +40,7 @@ BAND_ROUNDS = 3
 """Rounds of smoothing and selection; a fourth moves the top by less than 0.1 mm."""
 
 PROFILE_BIN_M = 0.25
-"""Bins along the line in which points are averaged: a twelfth of the smoothing's sigma."""
+"""Bins along the line in which points are averaged: half the distance between the knots of the spline."""
 
 TAIL_M = 1.0
 """Length over which a profile is extrapolated with the slope at its end; beyond it is level."""
@@ -45,27 +48,11 @@ TAIL_M = 1.0
 
 @dataclass(frozen=True)
 class Profile:
-    """A smoothed height profile: heights `z` at chainages `t`, (n,) each, metres."""
+    """A height profile smoothed by PAEK: heights `z` and standard errors at chainages `t`, (n,) each, metres."""
 
     t: np.ndarray
     z: np.ndarray
-
-    @classmethod
-    def through(cls, t: np.ndarray, z: np.ndarray, sigma_m: float) -> Profile:
-        """Smooth the heights of points.
-
-        Points of a bin are averaged, so that no single point marks the edge of a gap.
-
-        Parameters
-        ----------
-        t, z : (n,) arrays
-            Chainage and height, metres.
-        sigma_m : float
-            Sigma of PAEK.
-        """
-        _, number, count = np.unique(np.floor(t / PROFILE_BIN_M), return_inverse=True, return_counts=True)
-        t, z = np.bincount(number, t) / count, np.bincount(number, z) / count
-        return cls(t, smooth_profile(t, z, sigma_m, t))
+    error_m: np.ndarray
 
     def at(self, stations: np.ndarray) -> np.ndarray:
         """Return the heights at chainages, (m,), which may be beyond the ends."""
@@ -77,6 +64,58 @@ class Profile:
         inner_start, inner_end = np.interp([self.t[0] + TAIL_M, self.t[-1] - TAIL_M], self.t, self.z)
         return height + (self.z[0] - inner_start) / TAIL_M * before + (self.z[-1] - inner_end) / TAIL_M * after
 
+    def sigma(self, stations: np.ndarray) -> np.ndarray:
+        """Return the standard errors at chainages, (m,)."""
+        return np.interp(stations, self.t, self.error_m)
+
+
+Course = Union[Profile, Spline]
+"""Heights along a line, and their standard errors by chance."""
+
+
+@dataclass(frozen=True)
+class Top:
+    """The top of a head.
+
+    Attributes
+    ----------
+    course : Profile or Spline
+        Its height on the axis.
+    points : (n,) bool array
+        Points on it.
+    slope : (n,) array
+        Rise per metre to the left, at each point.
+    """
+
+    course: Course
+    points: np.ndarray
+    slope: np.ndarray
+
+
+def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None) -> Course:
+    """Smooth the heights of points.
+
+    Points of a bin are averaged, so that no single point marks the edge of a gap.
+
+    Parameters
+    ----------
+    t, z : (n,) arrays
+        Chainage (increasing) and height, metres.
+    smoothing_m : float or None
+        Sigma of PAEK; None smooths by a spline as much as the points show.
+    """
+    rough = rough_level(t, z)
+    noise_m = robust_sigma(z - rough)
+    _, number, count = np.unique(np.floor(t / PROFILE_BIN_M), return_inverse=True, return_counts=True)
+    middle, height = np.bincount(number, t) / count, np.bincount(number, z) / count
+    if smoothing_m is None:
+        return smooth(middle, height, count / noise_m**2, middle[0] - TAIL_M, middle[-1] + TAIL_M)
+    reach_m = 0.5 * smoothing_m / VARIANCE_FACTOR
+    averaged = np.diff(np.searchsorted(t, [middle - reach_m, middle + reach_m]), axis=0)[0]
+    return Profile(
+        middle, smooth_profile(middle, height, smoothing_m, middle), noise_m / np.sqrt(np.maximum(averaged, 1))
+    )
+
 
 def find_top(
     t: np.ndarray,
@@ -85,8 +124,8 @@ def find_top(
     head_width_m: float,
     crown_radius_m: float,
     tolerance_m: float,
-    smoothing_m: float,
-) -> tuple[Profile, np.ndarray] | None:
+    smoothing_m: float | None,
+) -> Top | None:
     """Find the height of the top on the head's axis and the points on it; None if too few points agree.
 
     The slope across is removed first. The disc then separates the top from the side faces, but it rests on the highest
@@ -102,26 +141,21 @@ def find_top(
         Radius of the disc.
     tolerance_m : float
         Maximum depth of a point below the top.
-    smoothing_m : float
-        Sigma of PAEK along the line.
-
-    Returns
-    -------
-    profile : Profile
-    top : (n,) bool array
-        Points on the top.
+    smoothing_m : float or None
+        See `smoothed`.
     """
-    flat = z - cross_slope(t, across, z - rough_level(t, z), head_width_m) * across
+    slope = cross_slope(t, across, z - rough_level(t, z), head_width_m)
+    flat = z - slope * across
     top, noise = _under_disc(t, flat, crown_radius_m, tolerance_m)
     central = np.abs(across) <= AXIS_SHARE * head_width_m
     band = min(tolerance_m, max(MIN_BAND_M, BAND_SIGMAS * noise))
     for _ in range(BAND_ROUNDS):
         chosen = top & central if (top & central).sum() >= MIN_POINTS else top
-        profile = Profile.through(t[chosen], flat[chosen], smoothing_m)
-        top = np.abs(flat - profile.at(t)) <= band
+        course = smoothed(t[chosen], flat[chosen], smoothing_m)
+        top = np.abs(flat - course.at(t)) <= band
         if top.sum() < MIN_POINTS:
             return None
-    return profile, top
+    return Top(course, top, slope)
 
 
 def _under_disc(t: np.ndarray, z: np.ndarray, crown_radius_m: float, tolerance_m: float) -> tuple[np.ndarray, float]:

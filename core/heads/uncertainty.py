@@ -19,7 +19,8 @@ from ..lines.smoothing import smooth_profile
 from ..polyline import distance_to
 from ..rails import Support
 from .edges import BLUR_BINS, HALF_HEAD_BINS, STATION_STEP_M, VIEW_STATIONS, CrossSections, histograms
-from .level import on_top, robust_sigma
+from .flank import FLANK_TOP_SIGMA_M, Flank
+from .level import on_top
 from .roads import MIN_WIDER_M, bands, hidden_edges
 from .sections import Middles, outline_middles, with_outline
 
@@ -27,9 +28,8 @@ UNSURE_CURVATURE = 0.007
 """Standard error, 1/m, of the curvature of a bridge across a gap, which follows from the lines on either side. On the
 scene `gaps`, with gaps of 1.5 to 4.5 m in a curve of 250 m with transitions, errors in the middle are 1.6 to 20 mm."""
 
-TOP_SIGMA_M = 0.0003
-"""Standard error of the height that does not depend on the points: the crown falls off next to the axis, and waves of
-the rail are smoothed."""
+TOP_SIGMA_M = 0.0002
+"""Standard error of the height that does not depend on the points: worn crowns are flatter than new ones."""
 
 UNSURE_GRADIENT_CHANGE = 1e-4
 """The same as `UNSURE_CURVATURE` for the height, 1/m: vertical curves have radii of 2 to 20 km, settled track has waves
@@ -151,29 +151,29 @@ def _combined(middles: Middles, smoothing_m: float) -> np.ndarray:
     return np.hypot(_averaged(middles.information, smoothing_m), middles.in_window)
 
 
-def on_one_face(support: Support, t: np.ndarray, sigma_m: float) -> Support:
-    """Replace the support of a line whose points, at chainages `t` (n,), are on one face; its axis has `sigma_m`."""
+def on_one_face(support: Support, t: np.ndarray, flank: Flank) -> Support:
+    """Replace the support of a line whose points, at chainages `t` (n,), are on one face."""
     places = np.minimum((t / STATION_STEP_M).astype(int), len(support.t) - 1)
     points = np.bincount(places, minlength=len(support.t))
-    return replace(support, points=points, sigma_m=np.hypot(sigma_m, bridge_error(t, support.t)))
+    sigma_m = np.hypot(flank.sigma_m, bridge_error(t, support.t))
+    return replace(support, points=points, sigma_m=sigma_m, sigmaz_m=np.full(len(points), FLANK_TOP_SIGMA_M))
 
 
-def height_error(t: np.ndarray, residual_m: np.ndarray, stations: np.ndarray, smoothing_m: float) -> np.ndarray:
-    """Estimate the standard error of a line's height at stations along it, (s,) metres.
+def height_error(t: np.ndarray, by_chance_m: np.ndarray, slope: np.ndarray, support: Support) -> np.ndarray:
+    """Estimate the standard error of a line's height at its stations, (s,) metres.
 
     Parameters
     ----------
-    t, residual_m : (n,) arrays
-        Chainage (increasing) of the points on the axis of the head, and their heights above the line.
-    stations : (s,) array
-        Equidistant chainages, see `edges.stations_along`.
-    smoothing_m : float
-        Sigma of PAEK that smoothed the heights.
+    t, slope : (n,) arrays
+        Chainage (increasing) of the points on the head, and the slope of its top across, by which an error across is
+        one of height.
+    by_chance_m : (s,) array
+        Standard error of the smoothed heights of the points.
+    support : Support
     """
-    points = np.bincount(np.minimum((t / STATION_STEP_M).astype(int), len(stations) - 1), minlength=len(stations))
-    sampling = robust_sigma(residual_m) / np.sqrt(np.maximum(_averaged(points, smoothing_m), 1.0))
-    bridge = bridge_error(t, stations) * (UNSURE_GRADIENT_CHANGE / UNSURE_CURVATURE)
-    return np.sqrt(sampling**2 + TOP_SIGMA_M**2 + bridge**2)
+    bridge = bridge_error(t, support.t) * (UNSURE_GRADIENT_CHANGE / UNSURE_CURVATURE)
+    leaning = np.interp(support.t, t, slope) * support.sigma_m
+    return np.sqrt(by_chance_m**2 + TOP_SIGMA_M**2 + bridge**2 + leaning**2)
 
 
 def _either_end(counts: np.ndarray, head_width_m: float) -> np.ndarray:

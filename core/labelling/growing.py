@@ -18,8 +18,8 @@ from ..clouds.points import Request
 from ..clouds.readers import read_points
 from ..disk import writing
 from ..errors import OffCloudError, OffRailError
-from ..grow.blunt import OnHeads
 from ..grow.growth import Growth, Stop, grow, on_rails
+from ..grow.on_heads import OnHeads
 from ..grow.points import Buckets
 from ..grow.settings import GrowSettings
 from ..grow.start import PATCH_M

@@ -29,6 +29,23 @@ PROFILE_SAMPLES = 24
 
 
 @dataclass(frozen=True)
+class Profile:
+    """Shape of a railhead, by default that of a new rail.
+
+    Attributes
+    ----------
+    crown_radius_m, corner_radius_m : float
+        Radii of the running surface and of both corners.
+    """
+
+    crown_radius_m: float = CROWN_RADIUS_M
+    corner_radius_m: float = CORNER_RADIUS_M
+
+
+NEW = Profile()
+
+
+@dataclass(frozen=True)
 class Scanner:
     """A scanner on a train; the defaults are those of a good one.
 
@@ -60,12 +77,13 @@ class Scanner:
     top_share: float = 1.0
 
 
-def head_outline(head_width_m: float) -> tuple[np.ndarray, np.ndarray]:
+def head_outline(head_width_m: float, profile: Profile = NEW) -> tuple[np.ndarray, np.ndarray]:
     """Return the outline of a railhead in its own frame, from the bottom of the left face to that of the right one.
 
     Parameters
     ----------
     head_width_m : float
+    profile : Profile
 
     Returns
     -------
@@ -74,25 +92,25 @@ def head_outline(head_width_m: float) -> tuple[np.ndarray, np.ndarray]:
     turn : (m,) array
         Angle between the normal of the surface and the axis, radians, positive to the left.
     """
-    half = head_width_m / 2
-    reach = CROWN_RADIUS_M - CORNER_RADIUS_M
-    drop = np.sqrt(reach**2 - (half - CORNER_RADIUS_M) ** 2)
-    shoulder = np.arctan2(half - CORNER_RADIUS_M, drop)
+    half, crown_m, corner_m = head_width_m / 2, profile.crown_radius_m, profile.corner_radius_m
+    reach = crown_m - corner_m
+    drop = np.sqrt(reach**2 - (half - corner_m) ** 2)
+    shoulder = np.arctan2(half - corner_m, drop)
     crown = np.linspace(0, shoulder, PROFILE_SAMPLES // 2, endpoint=False)
     corner = np.linspace(shoulder, np.pi / 2, PROFILE_SAMPLES // 2)
-    corner_height = drop - CROWN_RADIUS_M
+    corner_height = drop - crown_m
     face = np.linspace(corner_height, -FACE_DEPTH_M, PROFILE_SAMPLES // 2)[1:]
     u = np.concatenate(
         [
-            CROWN_RADIUS_M * np.sin(crown),
-            half - CORNER_RADIUS_M + CORNER_RADIUS_M * np.sin(corner),
+            crown_m * np.sin(crown),
+            half - corner_m + corner_m * np.sin(corner),
             np.full(len(face), half),
         ]
     )
     v = np.concatenate(
         [
-            CROWN_RADIUS_M * (np.cos(crown) - 1),
-            corner_height + CORNER_RADIUS_M * np.cos(corner),
+            crown_m * (np.cos(crown) - 1),
+            corner_height + corner_m * np.cos(corner),
             face,
         ]
     )
@@ -109,6 +127,7 @@ def scan(
     scanner: Scanner,
     rng: np.random.RandomState,
     missing: tuple[tuple[float, float], ...] = (),
+    shape: Profile = NEW,
 ) -> np.ndarray:
     """Scan one railhead from a passing train.
 
@@ -125,6 +144,7 @@ def scan(
     rng : RandomState
     missing : tuple of (start, end)
         Sections without points, metres along the head.
+    shape : Profile
 
     Returns
     -------
@@ -135,8 +155,8 @@ def scan(
     ray = source - head.top[stations]
     across = np.sum(ray * head.across[stations], axis=1)
     above = np.sum(ray * head.axis[stations], axis=1)
-    profile, position = _hits(head_width_m, across, above, scanner.ray_step_rad, rng)
-    outline, turn = head_outline(head_width_m)
+    outline, turn = head_outline(head_width_m, shape)
+    profile, position = _hits(outline, across, above, scanner.ray_step_rad, rng)
     samples = np.arange(len(outline))
     kept = rng.random_sample(len(profile)) < _chance(
         np.hypot(across, above)[profile], np.interp(position, samples, turn), scanner
@@ -173,9 +193,9 @@ def _scanner_positions(top: np.ndarray, path: np.ndarray, scanner: Scanner) -> n
 
 
 def _hits(
-    head_width_m: float, across: np.ndarray, above: np.ndarray, ray_step_rad: float, rng: np.random.RandomState
+    outline: np.ndarray, across: np.ndarray, above: np.ndarray, ray_step_rad: float, rng: np.random.RandomState
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find where the rays from scanner positions, (`across`, `above`) in the frame of the head, hit the outline.
+    """Find where the rays from scanner positions, (`across`, `above`) in the frame of the head, hit its outline.
 
     Returns
     -------
@@ -184,7 +204,6 @@ def _hits(
     position : (n,) array
         Position along `head_outline`, in samples.
     """
-    outline, _ = head_outline(head_width_m)
     # Seen from outside, the angle along a convex outline increases only where the surface faces the scanner.
     angle = np.arctan2(across[:, None] - outline[:, 0], above[:, None] - outline[:, 1])
     rows = np.arange(len(across))

@@ -15,7 +15,7 @@ from ...core.frame import LocalFrame
 from ...core.standards import RailStandard
 from . import clutter
 from .frogs import frog_guards, laid_together
-from .scanner import Scanner, scan
+from .scanner import NEW, Profile, Scanner, scan
 from .tracks import Track
 
 UNCLASSIFIED, GROUND, RAIL = 1, 2, 10
@@ -107,6 +107,8 @@ class Plan:
     frame : LocalFrame
     other_gauges_m : tuple of float
         See `Scene`.
+    shape : Profile
+        Shape of the heads.
     """
 
     tracks: Sequence[Track]
@@ -117,6 +119,7 @@ class Plan:
     clutter: Clutter = Clutter()
     frame: LocalFrame = LocalFrame(np.zeros(3))
     other_gauges_m: tuple[float, ...] = ()
+    shape: Profile = NEW
 
 
 def build(name: str, plan: Plan, rng: np.random.RandomState) -> Scene:
@@ -155,13 +158,13 @@ def _scanned(plan: Plan, rng: np.random.RandomState) -> list[np.ndarray]:
     path = plan.tracks[plan.ridden].centerline
     head_width_m = plan.standard.head_width_m
     running = [
-        scan(track.railhead(side), head_width_m, path, plan.scanner, rng, plan.gaps.get((number, side), ()))
+        scan(track.railhead(side), head_width_m, path, plan.scanner, rng, plan.gaps.get((number, side), ()), plan.shape)
         for number, track in enumerate(plan.tracks)
         for side in track.sides
     ]
     running = laid_together(plan.tracks, running, head_width_m)
     guards = frog_guards(plan.tracks, head_width_m)
-    return running + [scan(guard, head_width_m, path, plan.scanner, rng) for guard in guards]
+    return running + [scan(guard, head_width_m, path, plan.scanner, rng, shape=plan.shape) for guard in guards]
 
 
 def _clutter(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,8 +14,8 @@ UP = np.array([0.0, 0.0, 1.0])
 TRUTH_SAGITTA_M = 2e-5
 """Greatest distance between a true line and the curve: negligible compared with a millimetre."""
 
-MAX_CHORD_M = 0.5
-"""Distance between the vertices of true lines on straight track."""
+MAX_CHORD_M, ROUGH_CHORD_M = 0.5, 0.1
+"""Distance between the vertices of true lines on straight track, and where rails are not as smooth as designed."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,8 @@ class Track:
         Inward inclination of the heads: 1/20 in most countries, 1/40 in some.
     sides : tuple of int
         Rails of the track, +1 left and -1 right; a third rail is a track with one.
+    wear : mapping of int to (n, 2) array
+        How far the top of a rail, by its side, is to the left of its design and above it, at the samples.
     """
 
     curve: Curve
@@ -63,6 +66,7 @@ class Track:
     left_m: float = 0.0
     inclination: float = 1 / 20
     sides: tuple[int, ...] = (1, -1)
+    wear: Mapping[int, np.ndarray] = field(default_factory=dict)
 
     @property
     def centerline(self) -> np.ndarray:
@@ -75,6 +79,8 @@ class Track:
         left = np.column_stack([self.curve.left_normal, np.zeros(len(self.curve.xy))])
         tilt = np.broadcast_to(np.arcsin(np.asarray(self.cant_m) / self.spacing_m), len(left))
         top = self.centerline + side * 0.5 * self.spacing_m * _turned(left, tilt)
+        if side in self.wear:
+            top = top + self.wear[side][:, :1] * left + self.wear[side][:, 1:] * UP
         lean = tilt + side * np.arctan(self.inclination)
         across = _turned(left, lean)
         axis = _turned(left, lean + np.pi / 2)
@@ -87,7 +93,7 @@ class Track:
     def thinned(self, line: np.ndarray) -> np.ndarray:
         """Return as many vertices of a line as the curvature requires; its (n, 3) vertices are at the samples."""
         sharpest = max(float(np.abs(self.curve.curvature).max()), 1e-9)
-        chord_m = min(np.sqrt(8 * TRUTH_SAGITTA_M / sharpest), MAX_CHORD_M)
+        chord_m = min(np.sqrt(8 * TRUTH_SAGITTA_M / sharpest), ROUGH_CHORD_M if self.wear else MAX_CHORD_M)
         stride = max(int(chord_m / self.curve.step_m), 1)
         last = len(self.curve.xy) - 1
         return line[np.unique(np.append(np.arange(0, last, stride), last))]
@@ -98,7 +104,8 @@ class Track:
         first = max(int(round(start_m / self.curve.step_m)), 0)
         curve = self.curve.piece(start_m, end_m)
         part = slice(first, first + len(curve.xy))
-        return replace(self, curve=curve, height_m=height[part], cant_m=cant[part])
+        wear = {side: own[part] for side, own in self.wear.items()}
+        return replace(self, curve=curve, height_m=height[part], cant_m=cant[part], wear=wear)
 
 
 def _turned(left: np.ndarray, angle: np.ndarray) -> np.ndarray:

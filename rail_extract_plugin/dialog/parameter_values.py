@@ -403,7 +403,11 @@ class ParameterValues:
 
     def settings(self, standard: RailStandard, other_gauges: tuple[Gauge, ...] = ()) -> Parameters:
         """Return the algorithm's parameters for the core, with the core's defaults for all others."""
-        given: dict[str, Any] = {field: self.number(name) for name, field in NUMBERS.items() if self._has(name)}
+        given: dict[str, Any] = {}
+        for name, field in NUMBERS.items():
+            if self._has(name):
+                optional = getattr(Parameters, field) is None
+                given[field] = self.optional_number(name) if optional else self.number(name)
         given.update({field: self.choice(name) for name, field in CHOICES.items() if self._has(name)})
         if self._has("ITERATIONS"):
             given["passes"] = int(self.number("ITERATIONS"))

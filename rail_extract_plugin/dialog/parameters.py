@@ -277,8 +277,11 @@ def lines() -> Definitions:
     return (
         smoothing_xy(),
         advanced(
-            number("SMOOTHING_Z", tr("Smoothing in height [m]"), Parameters.smoothing_z_m, 0.05, MAX_SMOOTHING_M),
-            tr("Standard deviation of the smoothing: dips shorter than a few times this length are flattened."),
+            number("SMOOTHING_Z", tr("Smoothing in height [m]"), minimum=0.05, maximum=MAX_SMOOTHING_M, optional=True),
+            tr(
+                "If empty, heights are smoothed as much as the points require. Otherwise the standard deviation of the "
+                "smoothing of the paper: dips shorter than a few times this length are flattened."
+            ),
         ),
         advanced(
             number("TOLERANCE_XY", tr("Tolerance in plan [m]"), Parameters.tolerance_xy_m, 0.005, MAX_TOLERANCE_M),

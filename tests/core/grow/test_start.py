@@ -35,7 +35,7 @@ def test_a_sharp_curve_is_found():
 def test_a_thin_cloud_is_known_as_such():
     track = strip(16.0, per_m2=150, noise_m=0.01)
     start = find_start(Buckets(track.xyz), track.at(8.0, SPACING_M / 2), growing())
-    assert start.beam is THIN
+    assert start.beam == THIN.on_heads()
     assert start.xyz[:, 1] == pytest.approx(SPACING_M / 2, abs=0.03)
 
 

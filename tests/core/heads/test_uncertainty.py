@@ -4,8 +4,10 @@ from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.edges import VIEW_STATIONS, station_count
 from rail_extract.core.heads.elevation import ElevationParameters, elevate
+from rail_extract.core.heads.flank import FLANK_TOP_SIGMA_M, Flank
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.heads.sections import PROFILE_SIGMA_M
+from rail_extract.core.heads.top import smoothed
 from rail_extract.core.heads.uncertainty import (
     TOP_SIGMA_M,
     UNSURE_CURVATURE,
@@ -168,11 +170,18 @@ def test_the_height_is_known_by_its_points_and_unsure_where_none_are():
     t = np.sort(random.uniform(0, 60, 6000))
     t = t[(t < 20) | (t > 40)]
     stations = np.arange(0.125, 60, 0.25)
-    few, many = (height_error(part, random.normal(0, 0.004, len(part)), stations, 3.0) for part in (t[::10], t))
+    whole = Support(stations, np.zeros(len(stations), int), np.full(len(stations), 0.002))
+    found = []
+    for part in (t[::10], t):
+        by_chance_m = smoothed(part, random.normal(0, 0.004, len(part)), 3.0).sigma(stations)
+        found.append(height_error(part, by_chance_m, np.zeros(len(part)), whole))
+        leaning = height_error(part, by_chance_m, np.full(len(part), 0.1), whole)
+        assert leaning == pytest.approx(np.hypot(found[-1], 0.0002))
+    few, many = found
     seen = (stations > 5) & (stations < 15)
     assert few[seen] == pytest.approx(np.hypot(0.004 / np.sqrt(10 * 3 / 0.33375), TOP_SIGMA_M), rel=0.35)
     assert many[seen].max() < few[seen].min()
-    assert many[len(stations) // 2] == pytest.approx(np.hypot(0.004, UNSURE_GRADIENT_CHANGE * 10 * 10 / 2), rel=0.05)
+    assert many[len(stations) // 2] == pytest.approx(UNSURE_GRADIENT_CHANGE * 10 * 10 / 2, rel=0.05)
 
 
 @pytest.mark.parametrize("apart_m", [0.010, 0.015, 0.025])
@@ -240,10 +249,11 @@ def test_lines_err_where_there_are_no_points_by_an_unknown_curvature():
 
 def test_a_line_on_one_face_has_the_points_of_its_face_and_its_doubt():
     before = Support(np.arange(0.125, 1.5, 0.25), np.full(6, 9), np.full(6, 1.0))
-    found = on_one_face(before, np.array([0.1, 0.2, 0.3, 1.49, 1.6]), 0.004)
+    found = on_one_face(before, np.array([0.1, 0.2, 0.3, 1.49, 1.6]), Flank(0.0, 0.0, 0.004))
     assert found.points.tolist() == [2, 1, 0, 0, 0, 2]
     expected = np.hypot(0.004, bridge_error(np.array([0.1, 0.2, 0.3, 1.49, 1.6]), before.t))
     np.testing.assert_allclose(found.sigma_m, expected)
+    np.testing.assert_allclose(found.heights_m, FLANK_TOP_SIGMA_M)
 
 
 def test_a_head_that_every_point_of_a_window_shows_does_not_wander():

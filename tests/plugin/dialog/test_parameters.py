@@ -25,7 +25,7 @@ PARAMETERS = [
     ("ENGINE", "enum", "AUTO"),
     ("DEVICE", "enum", "AUTO"),
     ("SMOOTHING_XY", "number", 0.8),
-    ("SMOOTHING_Z", "number", 3.0),
+    ("SMOOTHING_Z", "number", None),
     ("TOLERANCE_XY", "number", 0.10),
     ("TOLERANCE_Z", "number", 0.03),
     ("CROWN_RADIUS", "number", 20.0),
@@ -75,7 +75,7 @@ OUTPUTS = {
 RESULTS = {"RAILS", "CENTERLINES", "QUALITY", "FINDINGS", "CLEANED", "REPORT"}
 ESSENTIAL = {"INPUT", "RAIL_CLASSES", "CLASSIFY", "STANDARD", "RAILS", "REPORT"}
 OPTIONAL = {"WEIGHTS", "SEEDS", "GAUGE", "HEAD_WIDTH", "EXTENT", "MASK", "CRS", "LEAVE_OUT", "OTHER_GAUGES"} | RESULTS
-OPTIONAL |= {"AXIS", "START_KM", "POSTS", "POST_FIELD", "JUMPS"}
+OPTIONAL |= {"SMOOTHING_Z", "AXIS", "START_KM", "POSTS", "POST_FIELD", "JUMPS"}
 
 
 CORE_DEFAULTS = {name: getattr(Parameters, field) for name, field in {**NUMBERS, **CHOICES}.items()}

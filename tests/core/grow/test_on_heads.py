@@ -1,11 +1,11 @@
-"""Rails in clouds that blur heads: followed where the classification finds them."""
+"""Rails in clouds that are thin or blur heads: followed where the classification finds them."""
 
 import numpy as np
 import pytest
-from rail_extract.core.grow import blunt
-from rail_extract.core.grow.blunt import OfHeads, OnHeads
+from rail_extract.core.grow import on_heads as module
 from rail_extract.core.grow.follow import Reason
 from rail_extract.core.grow.growth import grow, on_rails
+from rail_extract.core.grow.on_heads import OfHeads, OnHeads
 from rail_extract.core.grow.points import Buckets
 from rail_extract.core.grow.settings import BLUNT, GrowSettings
 from rail_extract.core.parameters import GrowParameters
@@ -62,8 +62,8 @@ def test_where_two_heads_touch_the_course_decides_between_them(place):
 
 
 def test_a_rail_is_followed_through_the_cloud_and_no_square_is_classified_twice(scene, near, monkeypatch):
-    calls, real = [], blunt.classify_square
-    monkeypatch.setattr(blunt, "classify_square", lambda xyz, own: calls.append(len(xyz)) or real(xyz, own))
+    calls, real = [], module.classify_square
+    monkeypatch.setattr(module, "classify_square", lambda xyz, own: calls.append(len(xyz)) or real(xyz, own))
     points, own = Buckets(near), GrowSettings(scene.standard.gauge_m, scene.standard.head_width_m)
     heads = OnHeads(points, own)
     for rail in scene.rails[:2]:

@@ -1,7 +1,8 @@
-"""Rails in a cloud that blurs heads to round ridges.
+"""Rails followed on what the classification finds, where windows alone show too little.
 
-No window of such a cloud shows the edges of a head. There the classification, which finds heads over tens of metres,
-takes the place of the windows' own judgement: a head is where it has found one, and the one of the seed is followed.
+A window of a thin cloud holds a dozen points of a head, and one of a cloud that blurs heads to round ridges shows no
+edges. There the classification, which looks at tens of metres, takes the place of the windows' own judgement: a head is
+where it has found one, and the one of the seed is followed.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from ..classify.settings import BLUNT as BLUNT_TOLERANCES
 from ..classify.settings import MARGIN_M, Settings
 from ..classify.square import classify_square
 from .points import Buckets, Points
-from .profile import MIN_POINTS, Head, Section
+from .profile import CROWN_SHARE, MIN_POINTS, Head, Section
 from .settings import Beam, GrowSettings
 
 GAP_M = 0.10
@@ -72,8 +73,10 @@ class OfHeads(Section):
         middle = float(across.mean())
         spare_m = max((across[-1] - across[0]) / 2 - TOUCHING * half_m, 0.0)
         place_m = float(np.clip(around_m, middle - spare_m, middle + spare_m))
-        on = np.abs(across - place_m) <= self._settings.head_width_m / 2
-        top_m = float(np.median(self.height_m[group][on])) if on.any() else 0.0
+        off_m = np.abs(across - place_m)
+        on = off_m <= self._settings.head_width_m / 2
+        crown = self.height_m[group][off_m <= CROWN_SHARE * self._settings.head_width_m / 2]
+        top_m = float(np.median(crown)) if len(crown) else 0.0
         return Head(place_m, top_m, (True, True), int(on.sum()), False, -self._settings.parameters.min_height_m)
 
 
