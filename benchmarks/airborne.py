@@ -43,9 +43,7 @@ FLIGHTS = {
 SEARCHES = {
     "railway beside roads and fields, 25 cm, 10 per m2": (railway, 10, 0.25),
     "railway beside roads and fields, 25 cm, 5 per m2": (railway, 5, 0.25),
-    "railway beside roads and fields, 50 cm, 10 per m2": (railway, 10, 0.5),
     "roads and fields only, 25 cm, 10 per m2": (countryside, 10, 0.25),
-    "roads and fields only, 50 cm, 10 per m2": (countryside, 10, 0.5),
 }
 """The same for searches without a guide."""
 

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..clouds.points import Request
 from ..disk import writing
-from ..errors import NoRailPointsError
+from ..errors import NoRailPointsError, ParameterError
 from ..frame import LocalFrame
 from ..parameters import AirborneParameters
 from ..polyline import left_normals, length_along, resample, runs
@@ -20,7 +20,7 @@ from ..squares.grid import Key, points_by_square
 from ..tasks import READ_S, Context, Runner, Task, in_listed_order
 from .chaining import MIN_LENGTH_M, chains
 from .files import survey_files
-from .remarks import refuse_mobile
+from .remarks import WIDE_FOOTPRINT_M, refuse_mobile
 from .ridges import Shape
 from .search import TILE_M, Finds, search
 from .spooling import density_of
@@ -117,7 +117,14 @@ def propose_guides(
         The disk is full.
     NoRailPointsError
         The cloud has no points of these classes.
+    ParameterError
+        The footprint is too wide.
     """
+    if parameters.footprint_m > WIDE_FOOTPRINT_M:
+        raise ParameterError(
+            f"With a footprint of {parameters.footprint_m:g} m, tracks can't be told from roads: draw guides, or take "
+            f"them from OpenStreetMap. The search takes up to {WIDE_FOOTPRINT_M:g} m."
+        )
     reading, searching, fitting = progress.divide((1.0, 4.0, 1.0))
     progress.status("Reading the points")
     counts = _sorted(request, folder, runner, reading)

@@ -1,8 +1,7 @@
 """Smooth what is measured along a line: a cubic spline whose bending is as probable as the measurements show.
 
-A rail bends little, and the change of its curvature from place to place is small and without direction. So the third
-derivative of the spline is noise of an unknown strength, with rare large values at welds, switches and the ends of
-arcs: Student's distribution. The strength is that under which the measurements are most probable (the evidence, by
+A rail bends little, up as often as down. So the second derivative of the spline is noise of an unknown strength, with
+rare large values at welds and in switches: Student's distribution. The strength is that under which the measurements are most probable (the evidence, by
 Laplace's approximation); standard errors follow from the inverse of the information matrix. Everything is banded, so
 that time grows with the length of the line. See docs/method.md section 6.4.
 """
@@ -29,7 +28,7 @@ LEAST_SHARE = 1e-3
 """Probability, relative to that of the best, below which a strength does not count."""
 
 FREEDOM = 3.0
-"""Degrees of freedom of Student's distribution of the third derivative: one weld in twenty metres stands out."""
+"""Degrees of freedom of Student's distribution of the second derivative: one weld in twenty metres stands out."""
 
 ROUNDS = 4
 """Rounds in which large values lose weight; a fifth changes the evidence by less than 0.1."""
@@ -132,7 +131,7 @@ class _Fit:
 
 
 def _fit(data: np.ndarray, score: np.ndarray, scale: float) -> _Fit:
-    """Find the most probable coefficients if third differences have the scale `scale`, by reweighting."""
+    """Find the most probable coefficients if second differences have the scale `scale`, by reweighting."""
     count = len(score)
     weight = np.ones(count - len(DIFFERENCE) + 1)
     for _ in range(ROUNDS):
@@ -146,7 +145,7 @@ def _fit(data: np.ndarray, score: np.ndarray, scale: float) -> _Fit:
 
 
 def _bending(weight: np.ndarray, count: int) -> np.ndarray:
-    """Return the information of the prior, (4, count), given that of each third difference."""
+    """Return the information of the prior, (4, count), given that of each second difference."""
     band = np.zeros((BAND, count))
     for one in range(len(DIFFERENCE)):
         for apart in range(len(DIFFERENCE) - one):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rail_extract.core.airborne.proposals import propose_guides
 from rail_extract.core.clouds.points import ask
-from rail_extract.core.errors import CloudError, NoRailPointsError
+from rail_extract.core.errors import CloudError, NoRailPointsError, ParameterError
 from rail_extract.core.parameters import AirborneParameters
 from rail_extract.core.progress import SILENT
 from rail_extract.core.tasks import InTurn
@@ -18,9 +18,9 @@ from scipy.spatial import cKDTree
 PARAMETERS = AirborneParameters(1.435, 0.072, footprint_m=0.25)
 
 
-def proposed(cloud, folder, codes=(1, 2)):
+def proposed(cloud, folder, codes=(1, 2), parameters=PARAMETERS):
     write_airborne(cloud, folder / "cloud.las")
-    return propose_guides(ask(folder / "cloud.las", codes), PARAMETERS, folder / "points", InTurn(), SILENT)
+    return propose_guides(ask(folder / "cloud.las", codes), parameters, folder / "points", InTurn(), SILENT)
 
 
 def test_guides_lie_on_both_tracks_and_have_few_vertices(flown, tmp_path):
@@ -51,3 +51,9 @@ def test_other_classes_and_mobile_clouds_are_refused(flown, tmp_path):
     xyz = np.random.RandomState(1).uniform(0, 1, (72_000, 3)) * [12.0, 10.0, 0.05] + [0, 0, 100.0]
     with pytest.raises(CloudError, match="use Extract Rails"):
         proposed(AirborneCloud(xyz, np.zeros(len(xyz), int)), tmp_path)
+
+
+def test_a_wide_footprint_is_refused_before_anything_is_read(flown, tmp_path):
+    with pytest.raises(ParameterError, match="With a footprint of 0.5 m, tracks can't be told from roads: draw guides"):
+        proposed(flown.cloud, tmp_path, parameters=replace(PARAMETERS, footprint_m=0.5))
+    assert not (tmp_path / "points").exists()
