@@ -1,9 +1,10 @@
 """Smooth what is measured along a line: a cubic spline whose bending is as probable as the measurements show.
 
 A rail bends little, up as often as down. So the second derivative of the spline is noise of an unknown strength, with
-rare large values at welds and in switches: Student's distribution. The strength is that under which the measurements are most probable (the evidence, by
-Laplace's approximation); standard errors follow from the inverse of the information matrix. Everything is banded, so
-that time grows with the length of the line. See docs/method.md section 6.4.
+rare large values at welds and in switches: Student's distribution. The strength is that under which the measurements
+are most probable (the evidence, by Laplace's approximation); standard errors follow from the inverse of the
+information matrix. Everything is banded, so that time grows with the length of the line. See docs/method.md section
+6.4.
 """
 
 from __future__ import annotations
