@@ -2,8 +2,8 @@
 
 Run `python benchmarks/learned.py labelled FOLDER` to write the labelled tiles of the published training, train with
 `python -m rail_extract train-classifier FOLDER --weights rails.npz --card rails.html --epochs 6`, and then run
-`python benchmarks/learned.py compare rails.npz [SCENE ...]`. The training has seen one scanner on a train, and scenes
-of the kinds in `LEARNED` with other seeds.
+`python benchmarks/learned.py compare rails.npz [SCENE ...]`. The tiles are scenes of the kinds in `LEARNED`, `IMAGES`
+and `AIR`, and places without rails, with other seeds than those of the comparison.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ EMPTY = ("forest", "street", "car park", "quarry")
 
 IMAGES = ("photo straight", "photo curve", "photo curve blunt", "photo turnout", "photo station")
 EMPTY_IMAGES = ("photo street", "photo quarry", "photo motorway", "photo kerbs", "photo farmland")
-"""Surveys by images, with rails and without, for a training that sees them as well."""
+"""Surveys by images that the training has seen, with rails and without."""
 
 APART_M, COLUMNS = 200.0, 6
 """Distance between the labelled tiles, and tiles in a row."""
@@ -61,14 +61,14 @@ SCENES = {**RAW_SCENES, **OTHERS, **BESIDE}
 
 COMPARED = {
     "seen in training, other seed": ("double", "station", "turnout 1:9", "yard", "viaduct", "far track"),
-    "surveys by images": IMAGES,
+    "surveys by images, other seed": IMAGES,
+    "from the air, other seed": tuple(AIR),
     "other track": ("narrow", "dual gauge", "crossing", "tram"),
     "other noise or spacing": tuple(OTHERS),
-    "other scanner, from the air": tuple(AIR),
     "other scanner, on a road": tuple(BESIDE),
     "no rails": (
         *("car park", "street from the air", "quarry"),
-        *("photo street", "photo motorway", "photo building site", "photo farmland"),
+        *("photo street", "photo motorway", "photo kerbs", "photo building site", "photo farmland"),
     ),
 }
 """Scenes of the published comparison, by what the training has not seen of them."""
@@ -80,18 +80,17 @@ def main() -> None:
     parser.add_argument("task", choices=("labelled", "compare"))
     parser.add_argument("path", type=Path, help="folder for the tiles, or weights")
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help="to compare; default: those published")
-    parser.add_argument("--images", action="store_true", help="label surveys by images as well")
     arguments = parser.parse_args()
     if arguments.task == "labelled":
-        write_labelled(arguments.path, arguments.images)
+        write_labelled(arguments.path)
     else:
         compare(arguments.path, arguments.scenes)
 
 
-def write_labelled(folder: Path, images: bool) -> None:
+def write_labelled(folder: Path) -> None:
     """Write the scenes of the training as tiles beside each other, with their rail points classified."""
     folder.mkdir(parents=True, exist_ok=True)
-    rails, empty = (LEARNED + IMAGES, EMPTY + EMPTY_IMAGES) if images else (LEARNED, EMPTY)
+    rails, empty = (*LEARNED, *IMAGES, *AIR), EMPTY + EMPTY_IMAGES
     jobs = [(name, seed) for seed in SEEDS for name in rails] + [(name, seed) for seed in EMPTY_SEEDS for name in empty]
     for number, (name, seed) in enumerate(jobs):
         raw = RAW_SCENES[name](seed)
