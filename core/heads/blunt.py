@@ -40,6 +40,13 @@ STIFF_PLAN, STIFF_PROFILE = (201, 3), (301, 2)
 """Stations of a stiff curve, and its degree: 50 m of a clothoid in plan, 75 m of a parabola in height. Errors of dense
 matching are alike over 5 to 20 m. What is longer than this is taken for the shape of the track."""
 
+CENTRE_WEIGHT = 2.25
+"""Weight of a station in its own stiff curve, times the stations of the curve, for both degrees."""
+
+MOST_FOLLOWED = 0.75
+"""Largest share of the variance that a stiff curve is taken to follow: where errors are correlated over its length, it
+shows nothing of them."""
+
 
 @dataclass(frozen=True)
 class Ridge:
@@ -142,11 +149,25 @@ def blunt_share(lines: Sequence[np.ndarray], xyz: np.ndarray, head_width_m: floa
 def wander(line: np.ndarray) -> float:
     """Return the standard deviation of a line about a stiff curve: of heights, (s,), or across a plan, (s, 2), metres.
 
-    The median over the line counts, so that the abrupt curvature of a turnout does not.
+    The median over the line counts, so that the abrupt curvature of a turnout does not. The curve follows errors that
+    are correlated over a part of its length; what it takes of them is added.
     """
     stations, degree = STIFF_PROFILE if line.ndim == 1 else STIFF_PLAN
     size = min(stations, len(line) - 1 + len(line) % 2)
     if size <= degree + 1:
         return 0.0
     off = line - savgol_filter(line, size, degree, axis=0)
-    return robust_sigma(off if line.ndim == 1 else np.einsum("ij,ij->i", off, left_normals(line)))
+    off = off if line.ndim == 1 else np.einsum("ij,ij->i", off, left_normals(line))
+    followed = CENTRE_WEIGHT * _correlated_stations(off) / size
+    return robust_sigma(off / np.sqrt(1 - min(followed, MOST_FOLLOWED)))
+
+
+def _correlated_stations(off: np.ndarray) -> float:
+    """Return the number of neighbouring stations that share one error: the sum of the correlations of errors, (s,)."""
+    size = len(off)
+    spectrum = np.abs(np.fft.rfft(off - off.mean(), 2 * size)) ** 2
+    shared = np.fft.irfft(spectrum)[:size]
+    if shared[0] <= 0:
+        return 1.0
+    ends = np.flatnonzero(shared <= 0)
+    return float(2 * shared[: ends[0] if len(ends) else size].sum() / shared[0] - 1)
