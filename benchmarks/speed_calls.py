@@ -122,7 +122,7 @@ def main() -> None:
         sys.exit('QGIS_PROCESS is not set: run `eval "$(make -s env)"` to time whole calls.')
     unknown = set(arguments.calls) - set(CALLS)
     if unknown:
-        sys.exit(f"There is no call {', '.join(sorted(unknown))}: choose of {', '.join(CALLS)}.")
+        sys.exit(f"There is no call {', '.join(sorted(unknown))}: choose from {', '.join(CALLS)}.")
     chosen = [call for name, call in CALLS.items() if name in (arguments.calls or CALLS) and find_spec(call.needs)]
     print(f"{processor()}, {len(os.sched_getaffinity(0))} cores; seconds (processor seconds)\n", flush=True)
     for line in header(arguments.busy):

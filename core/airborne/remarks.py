@@ -50,7 +50,7 @@ def refuse_mobile(density: float) -> None:
 
 
 def are_hints(density: float, parameters: AirborneParameters) -> bool:
-    """Return whether lines in a cloud with this many points per square metre are no more than hints."""
+    """Return whether lines in a cloud with this many points per square metre are only hints."""
     return density < SPARSE_DENSITY and parameters.footprint_m > WIDE_FOOTPRINT_M
 
 

@@ -85,7 +85,7 @@ class Noise:
         Returns
         -------
         (b, n) array or None
-            Metres; None if there is no misalignment.
+            Metres; None without misalignment.
         """
         if not self.shared_m:
             return None

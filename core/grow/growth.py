@@ -106,7 +106,7 @@ def grow(
     Returns
     -------
     Growth or None
-        None if there is no rail.
+        None if the seed is not on a rail.
     """
     start = find_start(points, seed, settings, heads)
     if start is None:
