@@ -10,13 +10,15 @@ from rail_extract.core.airborne.files import survey_files
 from rail_extract.core.airborne.remarks import FLIGHT
 from rail_extract.core.airborne.survey import Guide
 from rail_extract.core.clouds.points import ask
+from rail_extract.core.clouds.vpc import CatalogueTile, catalogue_text
 from rail_extract.core.errors import CloudError, NoRailPointsError, ParameterError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import AirborneParameters
 from rail_extract.core.progress import Progress
 from rail_extract.core.tasks import InTurn
 from rail_extract.laboratory.airborne.flight import AirborneCloud
-from rail_extract.laboratory.airborne.write import ORIGIN, write_airborne
+from rail_extract.laboratory.airborne.write import ORIGIN, las_of, write_airborne
+from rail_extract.laboratory.scenes.copc import write_copc
 
 FOOT_M = 1200 / 3937
 """Length of the US survey foot."""
@@ -96,6 +98,25 @@ def test_tiles_and_squares_give_the_lines_of_one_file(flown, whole, tmp_path, mo
         assert seen.mean() > 0.9
         moved = found.frame.to_crs(one.xyz) - whole[0].frame.to_crs(other.xyz)
         assert np.abs(moved[seen, :2]).max() < 0.02
+
+
+@pytest.mark.parametrize("form", ["tiles", "catalogue", "octree"])
+def test_every_form_of_a_cloud_gives_the_same_stations(flown, whole, tmp_path, form):
+    if form == "octree":
+        low = flown.cloud.xyz.min(axis=0) + ORIGIN - 1.0
+        write_copc(las_of(flown.cloud), tmp_path / "cloud.copc.laz", low, 300.0, 4)
+    else:
+        upper = flown.cloud.xyz[:, 1] > np.median(flown.cloud.xyz[:, 1])
+        for name, part in (("a", upper), ("b", ~upper)):
+            write_airborne(AirborneCloud(flown.cloud.xyz[part], flown.cloud.strip[part]), tmp_path / f"{name}.laz")
+    if form == "catalogue":
+        tiles = [CatalogueTile(f"{name}.laz", 1, (0.0, 0.0, 1.0, 1.0)) for name in "ab"]
+        (tmp_path / "all.vpc").write_text(catalogue_text(tiles, None), encoding="utf-8")
+    found = survey(tmp_path / "all.vpc" if form == "catalogue" else tmp_path, guides(flown), tmp_path)
+    for one, other in zip(found.tracks, whole[0].tracks):
+        assert one.reason == other.reason
+        for name in ("xyz", "sigma_mm", "bed_m", "cant_mm", "radius_m"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
 
 
 def test_a_gauge_that_the_points_contradict_is_said(flown, tmp_path):
