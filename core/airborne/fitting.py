@@ -255,12 +255,25 @@ def _reasons(line: _Line) -> np.ndarray:
         (UNSURE, (line.sure[half] < SURE) | (line.course.margin[half] < MARGIN)),
         (ASIDE, np.abs(refined.beside) > ASIDE_M),
         (MISLED, ~flat),
-        (HIDDEN, ~enough),
+        (HIDDEN, ~enough | _off_level(refined)),
         (SPARSE, most < LEAST_EXPECTED),
         (EMPTY, refined.sections.points <= FEW_POINTS),
     ):
         reason[holds] = code
     return reason
+
+
+JUMP_M = 1.0
+"""Change of the bed's height over a station, beyond the gradient of the line, that no track makes: a train stands there,
+a bridge crosses, or the ground shows through an open one."""
+
+
+def _off_level(refined: Refined) -> np.ndarray:
+    """Return which stations lie on another level than most of the line, (n,) bool."""
+    step = np.diff(refined.sections.found.level + refined.corridor.level_at(refined.t), prepend=np.nan)
+    step = np.nan_to_num(step - np.nanmedian(step)) if len(step) > 1 else np.zeros(len(step))
+    level = np.cumsum(np.where(np.abs(step) > JUMP_M, step, 0.0))
+    return np.abs(level - np.median(level)) > JUMP_M
 
 
 VERTEX_M = 0.1
