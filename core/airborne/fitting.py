@@ -46,7 +46,7 @@ SWITCH_M, TOE_M, TOE_FACTOR = 3.0, 0.5, 2.0
 """Two results this close are those of a switch; this close, both pull each other, and the standard error grows by this
 factor."""
 
-SHARED, FOOTPRINT_SHARE = 1.4, 0.025
+SHARED, FOOTPRINT_SHARE = 1.2, 0.025
 """Neighbouring sections share errors, by sleepers and by waves of the ballast, which the curve takes as independent:
 its standard error is this much too small. What ballast beside the rails adds, as a share of the footprint."""
 
@@ -62,7 +62,7 @@ FEW_POINTS = 8
 MAX_SIGMA_M = 0.05
 """Standard error above which a station is not seen: of those below, 95 % lie within 10 cm."""
 
-LEAST_EXPECTED = 3.5
+LEAST_EXPECTED = 2.5
 """Gain that rails must be expected to have in a section of 10 m: below it, density and footprint hide them."""
 
 TURNED_M = 0.15
