@@ -345,7 +345,7 @@ def _square_tasks(
 
 def _clean(source: PointSource, square: Square, parameters: Parameters, context: Context) -> RailRaster:
     """Clean the raster of a square; a task."""
-    return clean_square(source, square, parameters, context.once(engine_for, parameters), context.progress)
+    return clean_square(source, square, parameters, context.network(engine_for, parameters), context.progress)
 
 
 def _draw(source: PointSource, square: Square, parameters: Parameters, context: Context) -> SquareRails:
