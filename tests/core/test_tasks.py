@@ -119,5 +119,6 @@ def test_the_start_of_a_network_is_said_once():
 
     listener = Listener()
     tasks = {key: Task("", clean, (key,)) for key in ("aa", "bbb")}
-    assert dict(InTurn().run({**tasks, "again": Task("", clean, ("bbb",))}, listener)) == {"aa": 2, "bbb": 3, "again": 3}
+    tasks["again"] = Task("", clean, ("bbb",))
+    assert dict(InTurn().run(tasks, listener)) == {"aa": 2, "bbb": 3, "again": 3}
     assert listener.texts == 2 * ["Starting the network", "The network has started"]
