@@ -210,7 +210,7 @@ def ablate(task: tuple[str, Sequence[str]]) -> dict[str, list[Difference]]:
 
 @contextmanager
 def _watched(switches: Sequence[Switch], effective: set[str]) -> Iterator[None]:
-    """Note the switches whose replacements return anything else than the rules do, and all that are no functions."""
+    """Note the switches whose replacements return anything else than the rules do, and all constants."""
     with ExitStack() as stack:
         for switch in switches:
             for module, attribute, value in switch.off:

@@ -342,4 +342,4 @@ ADVERSARIAL: dict[str, Callable[..., Scene]] = {
     "hidden_heads": partial(standing_train, "hidden_heads", seed=43, head_share=0.0),
     "grooved": grooved,
 }
-"""By name; every scene is seeded, and `seed` draws it anew."""
+"""By name; every scene is seeded, and another `seed` changes the noise."""

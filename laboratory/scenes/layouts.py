@@ -68,4 +68,4 @@ LAYOUTS: dict[str, Callable[..., Scene]] = {
     "loop": loop,
     "parked_train": parked_train,
 }
-"""By name; every scene is seeded, and `seed` draws it anew."""
+"""By name; every scene is seeded, and another `seed` changes the noise."""
