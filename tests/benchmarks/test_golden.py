@@ -18,11 +18,11 @@ def test_scene_gives_its_published_figures(place):
     )
 
 
-def test_table_has_every_scene_once_and_with_every_variant():
+def test_table_has_scenes_and_variants_that_exist_and_all_of_the_quick_part():
     figures = Golden(TABLE).figures
-    assert list(figures) == [variant.name for variant in VARIANTS]
-    assert list(figures[PLAIN.name]) == list(PLACES)
-    assert set(QUICK) <= set(PLACES)
+    assert set(figures) <= {variant.name for variant in VARIANTS}
+    assert all(set(scenes) <= set(PLACES) for scenes in figures.values())
+    assert set(QUICK) <= set(figures[PLAIN.name])
 
 
 def test_figures_that_moved_appeared_or_vanished_differ(tmp_path):
