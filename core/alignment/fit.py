@@ -183,17 +183,18 @@ def _fit_in_plan(
     """Return the fitted elements in plan."""
     s, y = lateral_signal(measured.xyz[:, :2])
     signal = Signal(s, y, measured.in_plan, PLAN)
-    held = NOTHING
+    held, poses = NOTHING, None
     if fixed is None:
         jumps = settings.transitions == JUMPS
         chain, used = find_structure(signal, settings.tolerance_m, settings.min_length_m, jumps, progress)
     else:
         given = given_of(fixed, float(s[-1]))
-        chain, held, used = given.chain, given.held, noise_of(signal, settings.tolerance_m, progress)[0]
+        chain, held, poses = given.chain, given.held, given.poses
+        used = noise_of(signal, settings.tolerance_m, progress)[0]
     used_m = used.effective_m(signal.step_m)
     points = Points(measured.xyz[:, :2], s, measured.in_plan / used_m**2)
     try:
-        fit = fit_plan(chain, points, held, progress)
+        fit = fit_plan(chain, points, held, progress, poses)
     except (FitError, RuntimeError, np.linalg.LinAlgError) as error:
         raise _lost(track_id) from error
     if not np.isfinite(fit.across).all():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,10 +28,13 @@ class Given:
     ----------
     chain : Chain
     held : Held
+    poses : (e, 3) array
+        Place and direction at the start of each element.
     """
 
     chain: Chain
     held: Held
+    poses: np.ndarray
 
 
 def given_of(fixed: Alignment, length_m: float) -> Given:
@@ -60,7 +63,15 @@ def given_of(fixed: Alignment, length_m: float) -> Given:
     numbers = np.flatnonzero(chain.extents[1] > chain.extents[0])
     held = {int(number): one.k_from for number, one in zip(numbers, arcs) if _has_edited_radius(one)}
     starts = {number + 1: joint for number, joint in enumerate(joints) if _is_edited(plan[number + 1])}
-    return Given(chain, Held(held, starts))
+    poses = [_pose(fixed, one, start) for one, start in zip(plan, bounds)]
+    return Given(chain, Held(held, starts), np.array(poses))
+
+
+def _pose(fixed: Alignment, one: PlanElement, start: float) -> tuple[float, float, float]:
+    """Return place and direction of an element that is continued to a start."""
+    alone, s = replace(fixed, plan=(one,)), np.array([start])
+    (x, y), heading = alone.places(s)[0], alone.headings(s)[0]
+    return float(x), float(y), float(heading)
 
 
 def _joint(before: PlanElement, after: PlanElement) -> float:

@@ -47,6 +47,9 @@ SHARE = 0.4
 HEADING_CHORD_M = 5.0
 """Half of the chord that gives the first direction of an element, metres."""
 
+NEAR_M = 1.0
+"""A given place of an element's start is a first value if it is nearer to the line than this, metres."""
+
 RIDGE = 1e-9
 """Added to the diagonal of the scaled normal matrix, so that an element without points stays where it is."""
 
@@ -79,7 +82,7 @@ class Held:
     bends : mapping of int to float
         Curvature of parts of the chain by their number, 1/m.
     starts : mapping of int to float
-        Where elements start, by their number, metres.
+        Where elements start, by their number, metres; one past the last stands for the end.
     lengths : mapping of int to float
         Lengths of elements, by their number, metres.
     """
@@ -164,7 +167,13 @@ class _Solver:
         return (self.factor.solve(right)[: len(self.scale)] * self.scale[:, None]).T
 
 
-def fit_plan(chain: Chain, points: Points, held: Held = NOTHING, progress: Progress = SILENT) -> PlanFit:
+def fit_plan(
+    chain: Chain,
+    points: Points,
+    held: Held = NOTHING,
+    progress: Progress = SILENT,
+    poses: Optional[np.ndarray] = None,
+) -> PlanFit:
     """Fit the elements of a chain to points.
 
     Parameters
@@ -174,13 +183,15 @@ def fit_plan(chain: Chain, points: Points, held: Held = NOTHING, progress: Progr
     points : Points
     held : Held
     progress : Progress
+    poses : (e, 3) array, optional
+        First values of places and directions at the starts of the elements; else they are those of the line.
     """
     number = np.where(chain.curved, np.cumsum(chain.curved) - 1, -1)
     bends = chain.bends.copy()
     bends[list(held.bends)] = list(held.bends.values())
     chain = replace(chain, bends=bends)
     numbers = Held({int(number[part]): bend for part, bend in held.bends.items()}, held.starts)
-    now = _Look.at(_first_state(chain, points), points, points.s, numbers)
+    now = _Look.at(_first_state(chain, points, poses), points, points.s, numbers)
     ridge = RIDGE
     for _ in range(ROUNDS):
         progress.check()
@@ -222,8 +233,10 @@ class _Look:
 
     @classmethod
     def at(cls, state: _State, points: Points, feet: np.ndarray, held: Held) -> _Look:
-        constraints, gaps = _with_held(*_constraints(state), state, held)
-        return cls(state, *_seen(state, points, feet), constraints, gaps, points.weight)
+        seen = _seen(state, points, feet)
+        to_the_end = replace(held, starts={**held.starts, len(state.length): float(seen[0][-1])})
+        constraints, gaps = _with_held(*_constraints(state), state, to_the_end)
+        return cls(state, *seen, constraints, gaps, points.weight)
 
     @property
     def weighted(self) -> sparse.csr_matrix:
@@ -278,8 +291,8 @@ def _is_sane(state: _State) -> bool:
     return bool(np.isfinite(state.pose).all() and (np.abs(state.ends).max(axis=1) * state.length).max() < MOST_TURN_RAD)
 
 
-def _first_state(chain: Chain, points: Points) -> _State:
-    """Return poses from the points, and curvatures and lengths from the chain."""
+def _first_state(chain: Chain, points: Points, poses: Optional[np.ndarray]) -> _State:
+    """Return poses from the points or as they are given, and curvatures and lengths from the chain."""
     number = np.where(chain.curved, np.cumsum(chain.curved) - 1, -1)
     starts, ends = chain.extents
     rows = []
@@ -289,14 +302,25 @@ def _first_state(chain: Chain, points: Points) -> _State:
         if i < len(chain.p) and chain.q[i] > chain.p[i]:
             rows.append((chain.p[i], chain.q[i], number[i], number[i + 1]))
     start, end, *nodes = np.array(rows).T
-    place = np.column_stack([np.interp(start, points.s, axis) for axis in points.xy.T])
-    behind, ahead = start - HEADING_CHORD_M, start + HEADING_CHORD_M
-    chord = np.column_stack(
-        [np.interp(ahead, points.s, axis) - np.interp(behind, points.s, axis) for axis in points.xy.T]
+    pose = _poses_on(points, start)
+    if poses is not None:
+        near = np.hypot(*(poses - pose)[:, :2].T) < NEAR_M
+        pose[near] = poses[near]
+    state = _State(pose, chain.bends[np.array(chain.curved)], end - start, np.array(nodes).T.astype(int))
+    turns = np.cumsum(0.5 * state.ends.sum(axis=1) * state.length)[:-1]
+    expected = pose[0, 2] + np.append(0.0, turns)
+    pose[:, 2] += 2.0 * np.pi * np.round((expected - pose[:, 2]) / (2.0 * np.pi))
+    return state
+
+
+def _poses_on(points: Points, s: np.ndarray) -> np.ndarray:
+    """Return places and directions of the line, (e, 3)."""
+    place, behind, ahead = (
+        np.column_stack([np.interp(at, points.s, axis) for axis in points.xy.T])
+        for at in (s, s - HEADING_CHORD_M, s + HEADING_CHORD_M)
     )
-    heading = np.arctan2(chord[:, 1], chord[:, 0])
-    pose = np.column_stack([place, np.unwrap(heading)])
-    return _State(pose, chain.bends[np.array(chain.curved)], end - start, np.array(nodes).T.astype(int))
+    chord = ahead - behind
+    return np.column_stack([place, np.arctan2(chord[:, 1], chord[:, 0])])
 
 
 def _seen(state: _State, points: Points, feet: np.ndarray) -> tuple[np.ndarray, np.ndarray, sparse.csr_matrix]:
@@ -379,11 +403,10 @@ def _constraints(state: _State) -> tuple[sparse.csr_matrix, np.ndarray]:
         columns += [numbers.ravel()[keep.ravel()], 3 * (e + 1) + axis]
         values += [by[:, :, axis].ravel()[keep.ravel()], np.full(len(e), -1.0)]
     cos, sin = np.cos(state.pose[0, 2]), np.sin(state.pose[0, 2])
-    last = 3 * count + bends + count - 1
-    rows.append(np.array([3 * len(e), 3 * len(e), 3 * len(e) + 1]))
-    columns.append(np.array([0, 1, last]))
-    values.append(np.array([cos, sin, 1.0]))
-    gaps = np.concatenate([(end - state.pose[1:]).ravel(), [0.0, 0.0]])
+    rows.append(np.array([3 * len(e), 3 * len(e)]))
+    columns.append(np.array([0, 1]))
+    values.append(np.array([cos, sin]))
+    gaps = np.append((end - state.pose[1:]).ravel(), 0.0)
     shape = (len(gaps), 4 * count + bends)
     flat = (np.concatenate(rows), np.concatenate(columns))
     return sparse.coo_matrix((np.concatenate(values), flat), shape=shape).tocsr(), gaps
