@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any, Optional
 
 import numpy as np
 
 from ..errors import ParameterError
+from ..frame import LocalFrame
 from .chain import Chain, Span, assembled
-from .elements import Alignment, Element, PlanElement
-from .plane_fit import Held
+from .elements import Alignment, Element, Figures, PlanElement
+from .plane_fit import NOTHING, Held
 from .signals import Signal
 
 EDITED_R, EDITED_M = 1e-6, 0.0005
@@ -28,13 +30,13 @@ class Given:
     ----------
     chain : Chain
     held : Held
-    poses : (e, 3) array
-        Place and direction at the start of each element.
+    poses : (e, 3) array, optional
+        Place and direction at the start of each element; else they are those of the line.
     """
 
     chain: Chain
-    held: Held
-    poses: np.ndarray
+    held: Held = NOTHING
+    poses: Optional[np.ndarray] = None
 
 
 def given_of(fixed: Alignment, length_m: float) -> Given:
@@ -65,6 +67,27 @@ def given_of(fixed: Alignment, length_m: float) -> Given:
     starts = {number + 1: joint for number, joint in enumerate(joints) if _is_edited(plan[number + 1])}
     poses = [_pose(fixed, one, start) for one, start in zip(plan, bounds)]
     return Given(chain, Held(held, starts), np.array(poses))
+
+
+def without(elements: Sequence[PlanElement], number: int, length_m: float) -> Given:
+    """Return the structure of fitted elements of which one is closed by its neighbours.
+
+    Parameters
+    ----------
+    elements : sequence of PlanElement
+    number : int
+        Of the one that goes.
+    length_m : float
+        Length of the measured line.
+    """
+    rest = [noted(one) for at, one in enumerate(elements) if at != number]
+    return given_of(Alignment(None, LocalFrame(np.zeros(3)), tuple(rest)), length_m)
+
+
+def noted(one: PlanElement, **figures: Any) -> PlanElement:
+    """Return a fitted element with its figures, which note radius and start so that an edit shows."""
+    radius = 1.0 / one.k_from if one.type == "arc" else None
+    return replace(one, figures=Figures(r_fit_m=radius, s_fit_m=one.s_from, **figures))
 
 
 def _pose(fixed: Alignment, one: PlanElement, start: float) -> tuple[float, float, float]:

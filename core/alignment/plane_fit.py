@@ -26,14 +26,16 @@ has failed, metres."""
 CLOSING_ROUNDS = 8
 """Largest number of steps that only close gaps."""
 
-LEAST_CHANGE = 1e-3
-"""Change of chi-square at which the fit ends."""
+LEAST_CHANGE, MOST_RISE = 1e-3, 0.1
+"""Change of chi-square at which the fit ends, and the rise that a step may cause: to close the last gaps costs some."""
 
-RISE_SHARE, MOST_RISE = 0.01, 10.0
-"""Rise of chi-square, as a share and beyond it, that a step may cause while it closes the gaps."""
+GAP_SIGMA_M = 0.001
+"""Standard deviation at which gaps count beside the points where a step is judged, metres or radians: a step may be as
+long as the gaps stay small that its curvature opens."""
 
-STIFF, STIFFER, STIFFEST = 1e-5, 30.0, 100.0
-"""Damping after a failed step, its growth after another one, and where the fit ends, as shares of the diagonal."""
+STIFF, STIFFER, LOOSER, STIFFEST = 1e-6, 10.0, 0.3, 100.0
+"""Damping after a failed step, its growth after another one, its fall after a good one, and where the fit ends, as
+shares of the diagonal."""
 
 MOST_TURN_RAD = 20.0
 """Largest turn of an element: three circles."""
@@ -192,27 +194,8 @@ def fit_plan(
     chain = replace(chain, bends=bends)
     numbers = Held({int(number[part]): bend for part, bend in held.bends.items()}, held.starts)
     now = _Look.at(_first_state(chain, points, poses), points, points.s, numbers)
-    ridge = RIDGE
-    for _ in range(ROUNDS):
-        progress.check()
-        change = now.change(ridge)
-        short = [one for one in now.shrinking(change, LEAST_M) if one not in numbers.lengths]
-        if short:
-            numbers = replace(numbers, lengths={**numbers.lengths, **dict.fromkeys(short, LEAST_M)})
-            now = _Look.at(now.state, points, now.feet, numbers)
-            continue
-        after, moved = now.stepped(points, numbers, change)
-        if after is None or not after.is_better(now):
-            ridge = max(ridge * STIFFER, STIFF)
-            if ridge > STIFFEST:
-                break
-            continue
-        fallen = now.chi_square - after.chi_square
-        now, ridge = after, max(ridge / STIFFER, RIDGE)
-        if now.gap_m < CLOSED_M and (moved < CLOSED_M or abs(fallen) < LEAST_CHANGE):
-            break
-    now = _closed(now, points, numbers)
-    return PlanFit(_elements(now.state), now.across, now.feet, now.state.nodes, now.jacobian, now.solver(RIDGE))
+    last = _closed(_settled(now, points, progress), points)
+    return PlanFit(_elements(last.state), last.across, last.feet, last.state.nodes, last.jacobian, last.solver(RIDGE))
 
 
 class FitError(Exception):
@@ -230,13 +213,14 @@ class _Look:
     constraints: sparse.csr_matrix
     gaps: np.ndarray
     weight: np.ndarray
+    held: Held
 
     @classmethod
     def at(cls, state: _State, points: Points, feet: np.ndarray, held: Held) -> _Look:
         seen = _seen(state, points, feet)
         to_the_end = replace(held, starts={**held.starts, len(state.length): float(seen[0][-1])})
         constraints, gaps = _with_held(*_constraints(state), state, to_the_end)
-        return cls(state, *seen, constraints, gaps, points.weight)
+        return cls(state, *seen, constraints, gaps, points.weight, held)
 
     @property
     def weighted(self) -> sparse.csr_matrix:
@@ -247,6 +231,11 @@ class _Look:
         return float(self.weight @ self.across**2)
 
     @property
+    def misfit(self) -> float:
+        """Chi-square of points and gaps."""
+        return self.chi_square + float(np.sum((self.gaps / GAP_SIGMA_M) ** 2))
+
+    @property
     def gap_m(self) -> float:
         """Largest gap between elements, metres or radians."""
         return float(np.abs(self.gaps).max(initial=0.0))
@@ -254,32 +243,61 @@ class _Look:
     def solver(self, ridge: float) -> _Solver:
         return _Solver(self.jacobian.T @ self.weighted, self.constraints, ridge)
 
-    def change(self, ridge: float) -> np.ndarray:
+    def change(self, solver: _Solver) -> np.ndarray:
         """Return the change of the unknowns in a step."""
-        return self.solver(ridge).step(-(self.weighted.T @ self.across), -self.gaps)
+        return solver.step(-(self.weighted.T @ self.across), -self.gaps)
 
     def shrinking(self, change: np.ndarray, least_m: float) -> list[int]:
-        """Return the numbers of the elements that a change would make shorter than the least length."""
-        after = self.state.length + change[-len(self.state.length) :]
-        return np.flatnonzero(after < least_m).tolist()
+        """Return the numbers of the elements that a step makes shorter than the least length."""
+        return np.flatnonzero(_taken(self.state, change)[0].length < least_m).tolist()
 
-    def stepped(self, points: Points, held: Held, change: np.ndarray) -> tuple[Optional[_Look], float]:
-        """Return the look after a change, None if it makes no sense, and the largest shift."""
+    def stepped(self, points: Points, solver: _Solver, change: np.ndarray) -> tuple[Optional[_Look], float]:
+        """Return the look after a change, None if it makes no sense, and the largest shift.
+
+        Where the change does more harm than good, the gaps are closed that its curvature has opened.
+        """
         state, moved = _taken(self.state, change)
-        return (_Look.at(state, points, self.feet, held) if _is_sane(state) else None), moved
+        if not _is_sane(state):
+            return None, moved
+        after = _Look.at(state, points, self.feet, self.held)
+        if after.misfit > self.misfit:
+            state, _ = _taken(state, solver.step(np.zeros(len(change)), -after.gaps))
+            after = _Look.at(state, points, after.feet, self.held) if _is_sane(state) else after
+        return after, moved
 
-    def is_better(self, before: _Look) -> bool:
-        """Return whether gaps were closed without the fit being lost."""
-        closes = before.gap_m > CLOSED_M and self.gap_m < 0.5 * before.gap_m
-        return closes or self.chi_square <= before.chi_square * (1.0 + RISE_SHARE) + MOST_RISE
+
+def _settled(now: _Look, points: Points, progress: Progress) -> _Look:
+    """Return the look from which no step leads to a better one."""
+    ridge = RIDGE
+    for _ in range(ROUNDS):
+        progress.check()
+        solver = now.solver(ridge)
+        change = now.change(solver)
+        short = [one for one in now.shrinking(change, LEAST_M) if one not in now.held.lengths]
+        if short:
+            held = replace(now.held, lengths={**now.held.lengths, **dict.fromkeys(short, LEAST_M)})
+            now = _Look.at(now.state, points, now.feet, held)
+            continue
+        after, moved = now.stepped(points, solver, change)
+        if after is None or after.misfit > now.misfit + MOST_RISE:
+            ridge = max(ridge * STIFFER, STIFF)
+            if ridge > STIFFEST:
+                break
+            continue
+        fallen = now.chi_square - after.chi_square
+        now, ridge = after, max(ridge * LOOSER, RIDGE)
+        if now.gap_m < CLOSED_M and (moved < CLOSED_M or abs(fallen) < LEAST_CHANGE):
+            break
+    return now
 
 
-def _closed(look: _Look, points: Points, held: Held) -> _Look:
+def _closed(look: _Look, points: Points) -> _Look:
     """Return a look in which elements meet, moved no more than that needs."""
     for _ in range(CLOSING_ROUNDS):
         if look.gap_m < CLOSED_M:
             return look
-        after, _ = look.stepped(points, held, look.change(STIFFEST))
+        solver = look.solver(STIFFEST)
+        after, _ = look.stepped(points, solver, look.change(solver))
         look = after if after is not None else look
     if look.gap_m > OPEN_M:
         raise FitError
