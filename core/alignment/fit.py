@@ -163,10 +163,11 @@ def _followed(
         except _LostError as error:
             lost = lost or error
             continue
-        if lost is not None:
+        if len(part.along) < len(measured.along):
+            why = "No chain of elements follows the whole line" if lost else "Points do not count at an end of the line"
             progress.warning(
-                f"No chain of elements follows the line of track {track_id} as a whole. Only the elements from "
-                f"{part.along[0]:.0f} to {part.along[-1]:.0f} m are given."
+                f"{why} of track {track_id}: only the elements from {part.along[0]:.0f} to {part.along[-1]:.0f} m are "
+                "given."
             )
         return part, plan
     raise lost or _lost(track_id)

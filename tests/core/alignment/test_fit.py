@@ -209,21 +209,21 @@ def test_the_part_that_holds_is_given_and_the_rest_is_said():
     assert 375 < found.alignment.s_to < 410
     assert [one.type for one in found.alignment.plan[:4]] == ["line", "clothoid", "arc", "clothoid"]
     assert "do not count" in progress.warnings[0]
-    assert "Only the elements from" in progress.warnings[1]
+    assert "only the elements from 0 to 398 m are given" in progress.warnings[1]
     assert max(one.figures.dev_rms_mm for one in found.alignment.plan) < 15
 
 
 def test_a_bad_start_does_not_bend_the_elements():
     progress = Recording(Progress())
     found = fit(with_errors(0, 50, 0.08), progress=progress)
-    assert "49 points" in progress.warnings[0]
+    assert "only the elements from 51 to 520 m are given" in progress.warnings[1]
     assert [one.type for one in found.alignment.plan] == ["line", "clothoid", "arc", "clothoid", "line"]
+    assert 45 < found.alignment.s_from < 60
     np.testing.assert_allclose(np.diff([one.s_from for one in found.alignment.plan[1:]]), [60, 150, 50], atol=1.0)
     np.testing.assert_allclose(
         [one.figures.s_fit_m for one in found.alignment.plan], [one.s_from for one in found.alignment.plan]
     )
-    assert np.abs(found.deviations.slew_mm[:50]).max() > 100
-    assert np.abs(found.deviations.slew_mm[52:]).max() < 10
+    assert found.deviations.s[0] == np.ceil(found.alignment.s_from)
 
 
 def test_a_stray_vertex_does_not_count_and_is_named():
