@@ -16,7 +16,6 @@ from .attaching import attach_branches
 from .branches import free_third_rails, resolve_branches
 from .closing import close
 from .crossings import resolve_crossings
-from .guards import drop_guards
 from .joining import join_gaps
 from .junctions import clean_junctions, run_through, weld_pairs
 from .pixels import chamfer_distance, parity_fix, pixel_set
@@ -83,11 +82,10 @@ def vectorize(
     network, slips = open_slips(clean_junctions(traced, head_width_m), seen)
     network = straighten_blots(network, places, widths_m, head_width_m, progress.span(0.6, 0.8))
     network = cut_kinks(network, progress.span(0.8, 0.85))
-    network = join_gaps(network, max_gap_m, gap_angle_deg, seen, at_nodes=False, progress=progress)
     network = resolve_branches(free_third_rails(add_curves(resolve_crossings(network), slips)))
     network = join_gaps(run_through(network), max_gap_m, gap_angle_deg, seen, progress=progress)
     network = attach_branches(network, seen, max_gap_m, progress.span(0.9, 1.0))
-    network = choose_routes(_drop_short(drop_guards(network), min_length_m))
+    network = choose_routes(_drop_short(network, min_length_m))
     return _settle_ends(network)
 
 
