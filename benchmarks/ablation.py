@@ -89,45 +89,31 @@ def _rule(name: str, value: Any, *also: tuple[str, str, Any]) -> Switch:
     return Switch(name, ((module, attribute, value), *also))
 
 
-def _joined_at_nodes_only(network: Any, *arguments: Any, **named: Any) -> Any:
-    from rail_extract.core.vectorize.joining import join_gaps
-
-    return network if named.get("at_nodes") is False else join_gaps(network, *arguments, **named)
-
-
 SWITCHES = (
     _rule("vectorize.open_slips", lambda network, seen: (network, [])),
     _rule("vectorize.straighten_blots", first),
     _rule("vectorize.cut_kinks", first),
-    _rule("vectorize.drop_guards", first),
     _rule("vectorize.attach_branches", first),
-    _rule("vectorize.attaching._straightened", lambda network, touch, tip: (network, touch.vertex)),
     _rule("vectorize.free_third_rails", first),
     _rule("vectorize.resolve_branches", first),
     _rule("vectorize.choose_routes", first),
     _rule("vectorize.resolve_crossings", first),
-    _rule("vectorize.crossings._cut_off", nothing),
-    _rule("vectorize.join_gaps", _joined_at_nodes_only),
     _rule("vectorize.joining.HOOKS_M", ((0.0, 0.0),)),
     _rule("vectorize._settle_ends", first),
     _rule("vectorize.close", first),
     _rule("vectorize.junctions.drop_bubbles", first),
     _rule("vectorize.junctions.drop_rungs", first),
-    _rule("vectorize.junctions.contract_links", first),
     _rule("vectorize.junctions.drop_spurs", first),
     _rule("vectorize.repairs.BEND", np.inf),
     _rule("vectorize.repairs.SWERVE_M", np.inf),
-    _rule("steps.rasterize", lambda *_: None),
     _rule("steps.parts_without_turns", lambda line, *_: [(0.0, float(length_along(line)[-1]))]),
     _rule("lines.network_smoothing._continuations", lambda *_: {}),
     _rule("tracks.pairing._without_ghosts", list),
     _rule("tracks.pairing._without_rivals", lambda matches, misfits_m: list(matches)),
-    _rule("tracks.pairing._on_one_level", lambda *_: True),
     _rule("tracks.chaining._facing", lambda *_: np.empty((0, 2), dtype=int)),
     _rule("tracks.chaining.MAX_HIDDEN_M", 0.0),
     _rule("tracks.centerlines.fork_centerlines", lambda lines, *_: list(lines)),
     _rule("tracks.forking.BENT_M", np.inf),
-    _rule("tracks.centerlines.started_abreast", lambda rails: list(rails)),
     _rule("tracks.centerlines.at_gauge", lambda left, right, *_: (left, right)),
     _rule("tracks.centerlines._smoothed", first),
     _rule("tracks.parallels._is_crowded", none_of),

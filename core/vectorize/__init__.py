@@ -39,7 +39,6 @@ def vectorize(
     gap_angle_deg: float = Parameters.gap_angle_deg,
     min_length_m: float = Parameters.min_length_m,
     progress: Progress = SILENT,
-    raw: RailRaster | None = None,
 ) -> LineNetwork:
     """Turn rail cells into lines: one per rail, straight through junctions and across gaps (docs/method.md section 4).
 
@@ -54,9 +53,6 @@ def vectorize(
     min_length_m : float
         Shorter lines are dropped unless they connect two junctions.
     progress : Progress
-    raw : RailRaster, optional
-        Cells of all points, including those that the cleaning dropped because they are few. Only length without any
-        point counts towards `max_gap_m`.
 
     Returns
     -------
@@ -78,7 +74,7 @@ def vectorize(
     progress.set_fraction(0.6)
     progress.check()
     places, widths_m = closed.to_local(pixels.cells / 2), raster.cell_m * distance / 2
-    seen = cKDTree(places if raw is None else np.concatenate([places, raw.to_local(raw.cells())]))
+    seen = cKDTree(places)
     network, slips = open_slips(clean_junctions(traced, head_width_m), seen)
     network = straighten_blots(network, places, widths_m, head_width_m, progress.span(0.6, 0.8))
     network = cut_kinks(network, progress.span(0.8, 0.85))

@@ -27,7 +27,7 @@ MIN_PIECE_M = 0.25
 """Shorter pieces have no direction and are not joined."""
 
 UNSEEN_M = 0.10
-"""A place this far from all cells has no points of its rail, nor of a rail that is merged with it."""
+"""A place this far from all cells shows neither its rail nor one that is merged with it."""
 
 
 def join_gaps(
@@ -50,7 +50,7 @@ def join_gaps(
         Ends at most this far apart are joined if each points at the other within this angle.
     seen : cKDTree, optional
         Places of rail cells. Ends up to `MAX_MERGED_M` apart are joined too if at most `max_gap_m` of the curve is away
-        from all cells: where rails merge or points are few, lines end without a gap.
+        from all cells: where rails merge, lines end without a gap.
     progress : Progress
         Only asked for a cancel, because the number of rounds is unknown.
     """
