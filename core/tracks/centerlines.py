@@ -22,7 +22,7 @@ from .pairing import MIN_SECTION_M, pair_rails
 from .parallels import most_common_spacing
 from .provisional import PROVISIONAL_STEP_M, provisional_centerline
 from .rails_ahead import runs_on
-from .rings import closed_centerline, extended_ring
+from .rings import closed_centerline, extended_ring, started_abreast
 
 STATIONS_AT_ONCE = 8192
 """Stations processed at once, 2 km of track: lets the user cancel several times per second."""
@@ -101,7 +101,7 @@ def build_centerlines(
 def _in_order(rails: Sequence[RailLine]) -> list[RailLine]:
     """Sort rails by place and turn them to start in the west: tracks must not depend on the order of the rails."""
     turned = [rail.reversed() if starts_at_its_end(rail.xyz) else rail for rail in rails]
-    return sorted(turned, key=lambda rail: (*rail.xyz[0, :2], *rail.xyz[-1, :2], rail.length_m))
+    return started_abreast(sorted(turned, key=lambda rail: (*rail.xyz[0, :2], *rail.xyz[-1, :2], rail.length_m)))
 
 
 def _refuse_other_spacing(rails: Sequence[RailLine], gauge_m: float, head_width_m: float, tolerance_m: float) -> None:

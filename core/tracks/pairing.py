@@ -39,6 +39,9 @@ FINE_STEP_M = 0.025
 MIN_BREAK_M = 5.0
 """Distance between stations along a rail from which a new section begins: about the length of the longest gap."""
 
+MAX_LEVEL_M = 0.4
+"""Maximum height difference of the rails of a track: cant makes at most 0.2 m, a bridge several metres."""
+
 WANDER_STATIONS = 11
 """Stations, 5 m of them, over which the distance of two rails is compared with a steady change: gauge widening and cant
 transitions are steady over this length."""
@@ -207,7 +210,7 @@ def _match(rails: Sequence[RailLine], section: Parallels, spacing: float, tolera
         for found in match_polylines(curve_a.at(s_a), curve_b.at(s_b), tolerance_m):
             t_a, t_b = curve_a.t_at(s_a[found.first]), curve_b.t_at(s_b[found.second])
             match = _Match(a, b, t_a, t_b, side_a, side_b, found.penalty / found.length)
-            if match.length_m >= MIN_SECTION_M:
+            if match.length_m >= MIN_SECTION_M and _on_one_level(rails[a].xyz, t_a, rails[b].xyz, t_b):
                 yield match
 
 
@@ -217,6 +220,13 @@ def _is_nearest(match: _Match, section: Parallels, spacing: float, others_m: Seq
     inside = (section.t_a >= first) & (section.t_a <= last)
     apart_m = np.abs(section.left_m[inside]).mean()
     return all(abs(apart_m - spacing) <= abs(apart_m - other) for other in others_m)
+
+
+def _on_one_level(a: np.ndarray, t_a: np.ndarray, b: np.ndarray, t_b: np.ndarray) -> bool:
+    """Return whether two rails, (n, 3) and (m, 3), are on one level at chainages; unknown heights count as equal."""
+    z_a, z_b = (np.interp(t, length_along(line[:, :2]), line[:, 2]) for line, t in ((a, t_a), (b, t_b)))
+    apart = np.abs(z_a - z_b)[np.isfinite(z_a - z_b)]
+    return not len(apart) or bool(np.median(apart) <= MAX_LEVEL_M)
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,44 @@
-"""Closed centerlines, such as that of a turning loop.
+"""Closed rails, such as those of a turning loop: the rails of a track must start abreast to be paired all around.
 
 See docs/method.md section 8.8.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from ..polyline import MIN_RING_M, length_along
+from ..lines.uniting import united
+from ..polyline import MIN_RING_M, is_closed, length_along, resample
+from ..rails import RailLine
+
+START_STEP_M = 0.05
+"""Spacing of the places where a closed rail may start: the rails of a track then start abreast to within half of it."""
 
 MAX_SEAM_M = 0.5
 """Maximum distance between the ends of a ring's centerline, which may overlap or leave a gap: matches end a little
 early."""
+
+
+def started_abreast(rails: Sequence[RailLine]) -> list[RailLine]:
+    """Move the start of closed rails to the place nearest to the start of the first one.
+
+    The rails of a track then start on a common normal, wherever they started before.
+    """
+    place = next((rail.xyz[0, :2] for rail in rails if is_closed(rail.xyz)), None)
+    if place is None:
+        return list(rails)
+    return [_started_near(rail, place) if is_closed(rail.xyz) else rail for rail in rails]
+
+
+def _started_near(rail: RailLine, place: np.ndarray) -> RailLine:
+    """Move the start of a closed rail to the place nearest to a given one, (2,)."""
+    stations, t = resample(rail.xyz[:, :2], START_STEP_M)
+    start = t[np.argmin(np.linalg.norm(stations - place, axis=1))]
+    if start in (0.0, t[-1]):
+        return rail
+    return united([rail.between(start, t[-1]), rail.between(0.0, start)])
 
 
 def closed_centerline(xyz: np.ndarray) -> np.ndarray:

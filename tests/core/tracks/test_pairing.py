@@ -12,6 +12,7 @@ from rail_extract.core.tracks.pairing import (
     _Match,
     _misfit_m,
     _OffsetCurve,
+    _on_one_level,
     _sections,
     _wander,
     _without_rivals,
@@ -288,6 +289,14 @@ def test_a_match_is_left_to_a_nearer_gauge():
     section = stations(np.arange(0, 30.0), np.where((np.arange(30) >= 10) & (np.arange(30) <= 20), -1.50, 9.0))
     assert _is_nearest(match, section, 1.52, [1.47]) and _is_nearest(match, section, 1.53, [1.06, 1.47])
     assert not _is_nearest(match, section, 1.54, [1.06, 1.47]) and _is_nearest(match, section, 1.8, [])
+
+
+@pytest.mark.parametrize(("apart_m", "is_one"), [(0.39, True), (0.41, False), (-0.41, False)])
+def test_rails_on_one_level_are_less_than_40_cm_apart(apart_m, is_one):
+    a = np.array([[0.0, 0.0, 0.0], [50.0, 0.0, 1.0]])
+    b = np.array([[50.0, 1.5, 1.0 + apart_m], [0.0, 1.5, apart_m]])
+    t = np.linspace(5, 45, 20)
+    assert _on_one_level(a, t, b, 50 - t) == is_one
 
 
 def test_the_misfit_of_a_partner_is_its_distance_from_gauge_and_thrice_its_wander():

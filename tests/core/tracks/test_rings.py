@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from rail_extract.core.polyline import length_along
-from rail_extract.core.tracks.rings import MAX_SEAM_M, closed_centerline, extended_ring
+from rail_extract.core.rails import RailLine
+from rail_extract.core.tracks.rings import MAX_SEAM_M, closed_centerline, extended_ring, started_abreast
 
 RADIUS_M = 30.0
 
@@ -14,6 +15,15 @@ def ring(start=0.0, radius_m=RADIUS_M, turns=1.0, count=400):
     if turns == 1.0:
         xyz[-1] = xyz[0]
     return xyz
+
+
+def test_closed_rails_start_abreast():
+    lines = [RailLine(xyz, 1, 10, 10, 1.0, 1.0, 0.0) for xyz in (ring(), ring(2.0, RADIUS_M + 1.5), ring()[:200])]
+    first, second, open_line = started_abreast(lines)
+    assert np.hypot(*(first.xyz[0] - second.xyz[0])[:2]) == pytest.approx(1.5, abs=0.002)
+    assert second.length_m == pytest.approx(lines[1].length_m, abs=0.001)
+    assert np.array_equal(second.xyz[0], second.xyz[-1])
+    assert open_line is lines[2]
 
 
 @pytest.mark.parametrize("turns", [1.001, 1.0, 0.999])
