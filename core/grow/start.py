@@ -140,7 +140,7 @@ def _near(points: Points, seed: np.ndarray, settings: GrowSettings) -> np.ndarra
 
 
 def _classified(patch: np.ndarray, seed: np.ndarray, settings: GrowSettings) -> tuple[np.ndarray, bool]:
-    """Return the points of a patch, (k, 3), that lie on rails by the classification, and whether the heads are blunt."""
+    """Return the points of a patch, (k, 3), that the classification finds on rails, and whether heads are blunt."""
     own = Settings((settings.gauge_m,), settings.head_width_m)
     corner = np.append(seed - own.side_m / 2, 0.0)
     found = classify_square(patch - corner, own)
