@@ -121,7 +121,7 @@ class _Span(_Relay):
         super().set_fraction(self._start + (self._end - self._start) * fraction)
 
     def span(self, start: float, end: float) -> Progress:
-        """Return the progress of a step of this one, as a part of its parent: a step of a step is no deeper."""
+        """Return the progress of a step of this one as a part of its parent, so that steps of steps do not pile up."""
         length = self._end - self._start
         return _Span(self._listener, self._start + length * start, self._start + length * end)
 
