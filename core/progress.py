@@ -120,6 +120,11 @@ class _Span(_Relay):
     def set_fraction(self, fraction: float) -> None:
         super().set_fraction(self._start + (self._end - self._start) * fraction)
 
+    def span(self, start: float, end: float) -> Progress:
+        """Return the progress of a step of this one as a part of its parent, so that steps of steps do not pile up."""
+        length = self._end - self._start
+        return _Span(self._listener, self._start + length * start, self._start + length * end)
+
 
 class Recording(_Relay):
     """Passes everything on, and keeps the warnings, each once."""

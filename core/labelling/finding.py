@@ -268,7 +268,7 @@ def _append(
     with writing(folder.parent):
         for key, numbers in points_by_square(places, side_m, MARGIN_M).items():
             with _file(folder, key).open("ab") as file:
-                file.write(points[numbers].tobytes())
+                file.write(points[numbers].data)
 
 
 def _search_task(key: Key, sorted_files: Sequence[SortedFile], zero: LocalFrame, settings: Settings) -> Task:

@@ -82,3 +82,9 @@ def test_spans_relay_everything():
     listener.is_cancelled = lambda: True
     with pytest.raises(Cancelled):
         span.check()
+
+
+def test_a_step_of_a_step_covers_its_part_of_the_whole():
+    listener = Listener()
+    listener.span(0.2, 0.6).span(0.5, 1.0).span(0.0, 0.5).set_fraction(1.0)
+    assert listener.fractions == [pytest.approx(0.5)]
