@@ -264,8 +264,8 @@ def _reasons(line: _Line) -> np.ndarray:
 
 
 JUMP_M = 1.0
-"""Change of the bed's height over a station, beyond the gradient of the line, that no track makes: a train stands there,
-a bridge crosses, or the ground shows through an open one."""
+"""Change of the bed's height over a station, beyond the gradient of the line, that no track makes: a train stands
+there, a bridge crosses above, or the ground shows through an open one."""
 
 
 def _off_level(refined: Refined) -> np.ndarray:

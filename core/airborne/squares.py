@@ -97,9 +97,7 @@ def numbers_of(cells: np.ndarray) -> np.ndarray:
 def areas_along(pieces: Sequence[Piece], reach_m: float) -> np.ndarray:
     """Return rectangles that hold all places within reach of the pieces, (k, 4) metres."""
     parts = [
-        part
-        for piece in pieces
-        for part in np.array_split(piece.axis.xy, max(int(len(piece.axis.xy) / AREA_M), 1))
+        part for piece in pieces for part in np.array_split(piece.axis.xy, max(int(len(piece.axis.xy) / AREA_M), 1))
     ]
     low, high = (np.array([reduce(part, axis=0) for part in parts]) for reduce in (np.min, np.max))
     return np.column_stack([low - reach_m, high + reach_m])
