@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> None:
     for name in ("tolerance", "min_length"):
         if not 0 < getattr(args, name) < np.inf:
             raise ParameterError(f"--{name.replace('_', '-')} must be a positive number.")
-    features, layers = (shapes_module("LINES", name) for name in ("features", "geopackage"))
+    features, layers = (shapes_module("LINES", name) for name in ("features", "alignment_layers"))
     outputs = {
         name: destination_of(name, getattr(args, name), suffixes)
         for name, suffixes in SUFFIXES.items()
@@ -62,10 +62,10 @@ def run(args: argparse.Namespace) -> None:
     tracks, frame = features.read_tracks(args.lines, args.quality, args.rails)
     fixed = {} if args.fixed is None else {one.track_id: one for one in features.read_elements(args.fixed, "--fixed")}
     fits = fit_tracks(tracks, frame, settings, fixed, Estimating(Console()))
-    made = [layers.elements_layer(outputs["elements"], [fit.alignment for fit in fits])]
+    made = [layers.elements_layer([fit.alignment for fit in fits])]
     if "deviations" in outputs:
-        made.append(layers.deviations_layer(outputs["deviations"], [fit.deviations for fit in fits]))
-    layers.write_files(made, frame)
+        made.append(layers.deviations_layer([fit.deviations for fit in fits]))
+    layers.write_all(made, outputs, frame)
     if "report" in outputs:
         courses = [(fit.alignment, fit.deviations) for fit in fits]
         facts = {**stated(frame.crs_wkt), "Command": args.command_line}

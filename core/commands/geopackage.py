@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pyogrio
 import shapely
 
 from ..airborne.survey import AirborneTrack
-from ..alignment.deviations import Deviations
-from ..alignment.elements import Alignment
-from ..alignment.equations import measured
-from ..alignment.table import rows
-from ..comparison.tracks import TrackComparison
 from ..disk import Destination
 from ..exchange import DRAWN, Shape, write_shapes
 from ..fields import (
     AIRBORNE_STATION_FIELDS,
-    AXIS_FIELDS,
-    DEVIATION_FIELDS,
-    DIFFERENCE_FIELDS,
-    ELEMENT_FIELDS,
+    CENTERLINE_FIELDS,
+    FINDING_FIELDS,
+    KM_FIELDS,
     QUALITY_FIELDS,
+    RAIL_FIELDS,
     STATION_FIELDS,
     STOP_FIELDS,
     UNKNOWN_IN_METRES,
@@ -36,11 +31,8 @@ from ..fields import (
 from ..frame import LocalFrame
 from ..geopackage import tables_in
 from ..grow.growth import Stop
-from ..rails import Centerline, RailLine, TrackGeometry
-from ..report import Finding
-
-if TYPE_CHECKING:
-    from .features import Features
+from ..rails import Centerline, RailLine, RailNetwork, TrackGeometry
+from ..report import Finding, list_findings
 
 LINE_M, LINE_ZM = 2002, 3002
 """Codes of lines with M values in well-known binary."""
@@ -55,8 +47,6 @@ class Layer:
     Attributes
     ----------
     name : str
-    destination : Destination
-        GeoPackage of the layer.
     fields : sequence of Field
     columns : sequence of sequence
         Values of each field, one per feature.
@@ -67,16 +57,51 @@ class Layer:
     """
 
     name: str
-    destination: Destination
     fields: Sequence[Field]
     columns: Sequence[Sequence[Any]]
     geometry_type: str
     xyz: Sequence[np.ndarray]
 
+    def shapes(self, frame: LocalFrame) -> list:
+        """Return the geometries in the coordinates of the cloud, given the local frame of the layer."""
+        make = shapely.points if self.geometry_type.startswith("Point") else shapely.linestrings
+        own = slice(3 if "Z" in self.geometry_type else 2)
+        return [make(frame.to_crs(xyz[..., :3])[..., own]) for xyz in self.xyz]
+
+    def written_columns(self) -> list[list[Any]]:
+        """Return the columns with the values as they are written; None where one is unknown."""
+        return [[field.value(value) for value in values] for field, values in zip(self.fields, self.columns)]
+
+
+def network_layers(network: RailNetwork, names: Collection[str], gauges_m: Sequence[float]) -> list[Layer]:
+    """Make layers of an extraction.
+
+    Parameters
+    ----------
+    network : RailNetwork
+        With the geometry of its tracks, if "quality" or "findings" is among the names.
+    names : collection of str
+        Of "rails", "centerlines", "quality" and "findings".
+    gauges_m : sequence of float
+        Gauges of the extraction.
+    """
+    makers: dict[str, Callable[[], Layer]] = {
+        "rails": lambda: lines_layer("rails", RAIL_FIELDS, network.rails),
+        "centerlines": lambda: lines_layer("centerlines", CENTERLINE_FIELDS, network.centerlines),
+        "quality": lambda: stations_layer("quality", network.geometry),
+        "findings": lambda: findings_layer(list_findings(network, gauges_m)),
+    }
+    return [make() for name, make in makers.items() if name in names]
+
+
+def findings_layer(found: Sequence[Finding]) -> Layer:
+    """Make a layer of findings: with an axis, also with their kilometres."""
+    located = any(finding.km_text is not None for finding in found)
+    return lines_layer("findings", (*FINDING_FIELDS, *KM_FIELDS) if located else FINDING_FIELDS, found)
+
 
 def lines_layer(
     name: str,
-    destination: Destination,
     fields: Sequence[Field],
     lines: Sequence[RailLine] | Sequence[Centerline] | Sequence[Finding],
 ) -> Layer:
@@ -85,21 +110,19 @@ def lines_layer(
     Parameters
     ----------
     name : str
-    destination : Destination
     fields : sequence of Field
     lines : sequence of RailLine, Centerline or Finding
     """
     columns = [[getattr(line, field.name) for line in lines] for field in fields]
-    return Layer(name, destination, fields, columns, "LineString Z", [line.xyz for line in lines])
+    return Layer(name, fields, columns, "LineString Z", [line.xyz for line in lines])
 
 
-def stations_layer(name: str, destination: Destination, tracks: Sequence[TrackGeometry]) -> Layer:
+def stations_layer(name: str, tracks: Sequence[TrackGeometry]) -> Layer:
     """Make a layer of the stations of tracks, with the fields of QUALITY.
 
     Parameters
     ----------
     name : str
-    destination : Destination
     tracks : sequence of TrackGeometry
     """
     columns = [
@@ -112,16 +135,16 @@ def stations_layer(name: str, destination: Destination, tracks: Sequence[TrackGe
         columns += [
             [value for track in tracks for value in getattr(track.kilometres, field.name)] for field in STATION_FIELDS
         ]
-    return Layer(name, destination, fields, columns, "Point Z", [place for track in tracks for place in track.xyz])
+    return Layer(name, fields, columns, "Point Z", [place for track in tracks for place in track.xyz])
 
 
-def stops_layer(destination: Destination, stops: Sequence[Stop]) -> Layer:
+def stops_layer(stops: Sequence[Stop]) -> Layer:
     """Make a layer of the places where rails were not followed further."""
     columns: list[Sequence[Any]] = [range(1, len(stops) + 1), [stop.reason.value for stop in stops]]
-    return Layer("stops", destination, STOP_FIELDS, columns, "Point Z", [stop.xyz for stop in stops])
+    return Layer("stops", STOP_FIELDS, columns, "Point Z", [stop.xyz for stop in stops])
 
 
-def airborne_stations_layer(destination: Destination, tracks: Sequence[AirborneTrack]) -> Layer:
+def airborne_stations_layer(tracks: Sequence[AirborneTrack]) -> Layer:
     """Make a layer of the stations along guides."""
     columns: list[Sequence[Any]] = [
         [value for track in tracks for value in np.broadcast_to(getattr(track, field.name), len(track.xyz))]
@@ -129,106 +152,26 @@ def airborne_stations_layer(destination: Destination, tracks: Sequence[AirborneT
     ]
     columns[0] = [int(number) or None for number in columns[0]]
     places = [place for track in tracks for place in track.xyz]
-    return Layer("stations", destination, AIRBORNE_STATION_FIELDS, columns, "Point Z", places)
+    return Layer("stations", AIRBORNE_STATION_FIELDS, columns, "Point Z", places)
 
 
-def elements_layer(destination: Destination, alignments: Sequence[Alignment]) -> Layer:
-    """Make a layer of the element tables of alignments, each element with its curve."""
-    table = [row for alignment in alignments for row in rows(alignment)]
-    columns = [[row[field.name] for row in table] for field in ELEMENT_FIELDS]
-    curves = [alignment.drawn(one.s_from, one.s_to) for alignment in alignments for one in alignment.elements]
-    return Layer("elements", destination, ELEMENT_FIELDS, columns, _type("LineString", curves), curves)
+def by_file(layers: Sequence[Layer], destinations: Mapping[str, Destination]) -> list[tuple[list[Layer], Destination]]:
+    """Group layers by the file that each goes into, given the destinations by name of the layer; for `write_layers`."""
+    groups: dict[Path, tuple[list[Layer], Destination]] = {}
+    for layer in layers:
+        destination = destinations[layer.name]
+        groups.setdefault(destination.file, ([], destination))[0].append(layer)
+    return list(groups.values())
 
 
-def axes_layer(destination: Destination, alignments: Sequence[Alignment]) -> Layer:
-    """Make a layer of alignments as lines with kilometres as M values."""
-    lines = [measured(alignment) for alignment in alignments]
-    columns: list[Sequence[Any]] = [
-        [one.track_id for one in alignments],
-        [one.name for one in alignments],
-        [one.s_to - one.s_from for one in alignments],
-        [line[0, 3] for line in lines],
-        [line[-1, 3] for line in lines],
-    ]
-    return Layer("axis", destination, AXIS_FIELDS, columns, _type("LineString", lines) + "M", lines)
-
-
-def deviations_layer(destination: Destination, found: Sequence[Deviations]) -> Layer:
-    """Make a layer of the deviations of tracks, as points on their designs."""
-    columns: list[Sequence[Any]] = [[one.track_id for one in found for _ in one.s]]
-    columns += [[value for one in found for value in getattr(one, field.name)] for field in DEVIATION_FIELDS[1:]]
-    places = [place for one in found for place in one.xyz]
-    return Layer("deviations", destination, DEVIATION_FIELDS, columns, _type("Point", places), places)
-
-
-def differences_layer(destination: Destination, found: TrackComparison) -> Layer:
-    """Make a layer of the stations of a comparison."""
-    stations = [(line, at) for line in found.lines for at in range(len(line.state)) if line.state[at]]
-    columns: list[Sequence[Any]] = [[line.line_id for line, _ in stations]]
-    columns += [[getattr(line, field.name)[at] for line, at in stations] for field in DIFFERENCE_FIELDS[1:]]
-    places = [line.xyz[at] for line, at in stations]
-    return Layer("differences", destination, DIFFERENCE_FIELDS, columns, _type("Point", places), places)
-
-
-def _type(kind: str, places: Sequence[np.ndarray]) -> str:
-    """Return the type of a geometry: without heights if none is known."""
-    known = any(np.isfinite(np.atleast_2d(one)[:, 2]).any() for one in places)
-    return f"{kind} Z" if known else f"{kind} "
-
-
-def write_files(layers: Sequence[Layer], frame: LocalFrame) -> None:
-    """Write layers into the GeoPackages of their destinations; see `write_layers`."""
-    for file in dict.fromkeys(layer.destination.file for layer in layers):
-        write_layers([layer for layer in layers if layer.destination.file == file], frame)
-
-
-def write_copy(
-    destination: Destination, source: Features, fields: Sequence[Field], columns: Sequence[Sequence[Any]]
-) -> None:
-    """Write the features of another layer with further fields into a GeoPackage.
-
-    Parameters
-    ----------
-    destination : Destination
-    source : Features
-    fields : sequence of Field
-    columns : sequence of sequence
-        Values of each further field, one per feature.
-    """
-    further = [_column(field, values) for field, values in zip(fields, columns)]
-    kept = {name: values for name, values in source.columns.items() if name not in {field.name for field in fields}}
-    kinds = {shape.geom_type for shape in source.shapes if shape is not None}
-    with destination.replacing() as new, _as_os_error():
-        pyogrio.raw.write(
-            str(new),
-            layer="stations",
-            driver="GPKG",
-            geometry=np.array([shapely.to_wkb(shape, output_dimension=4) for shape in source.shapes], dtype=object),
-            geometry_type=kinds.pop() if len(kinds) == 1 else "Unknown",
-            field_data=[*kept.values(), *(column for column, _ in further)],
-            field_mask=[*(None for _ in kept), *(empty for _, empty in further)],
-            fields=[*kept, *(field.name for field in fields)],
-            crs=source.crs_wkt or UNKNOWN_IN_METRES,
-            nan_as_null=True,
-        )
-
-
-@contextmanager
-def _as_os_error() -> Iterator[None]:
-    """Turn what GDAL raises into an `OSError`, which a destination explains."""
-    try:
-        yield
-    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, RuntimeError) as error:
-        raise OSError(str(error)) from error
-
-
-def write_layers(layers: Sequence[Layer], frame: LocalFrame) -> None:
+def write_layers(layers: Sequence[Layer], destination: Destination, frame: LocalFrame) -> None:
     """Write layers into one GeoPackage, whose other layers stay, or one layer into a DXF or CSV file.
 
     Parameters
     ----------
     layers : sequence of Layer
-        All with the same destination.
+        Only the first of them goes into a DXF or CSV file.
+    destination : Destination
     frame : LocalFrame
         Local frame of the layers.
 
@@ -238,34 +181,33 @@ def write_layers(layers: Sequence[Layer], frame: LocalFrame) -> None:
         See `Destination.replacing`.
     """
     names = {layer.name for layer in layers}
-    destination = layers[0].destination
     if destination.file.suffix.lower() != ".gpkg":
-        _write_for_others(layers[0], frame)
+        _write_for_others(layers[0], destination, frame)
         return
     with destination.replacing(edit=bool(tables_in(destination.file) - names)) as new:
         for layer in layers:
             _write_layer(layer, frame, new)
 
 
-def _write_for_others(layer: Layer, frame: LocalFrame) -> None:
+def _write_for_others(layer: Layer, destination: Destination, frame: LocalFrame) -> None:
     """Write a layer for other programs, by the suffix of its file."""
-    columns = [[field.value(value) for value in values] for field, values in zip(layer.fields, layer.columns)]
-    shapes = [Shape(np.atleast_2d(frame.to_crs(xyz)), values) for xyz, values in zip(layer.xyz, zip(*columns))]
+    rows = zip(*layer.written_columns())
+    shapes = [Shape(np.atleast_2d(frame.to_crs(xyz)), values) for xyz, values in zip(layer.xyz, rows)]
     is_line = layer.geometry_type != "Point Z"
-    with layer.destination.replacing() as new:
+    with destination.replacing() as new:
         write_shapes(new, shapes, layer.fields, frame, DRAWN[layer.name], is_line)
 
 
 def _write_layer(layer: Layer, frame: LocalFrame, file: Path) -> None:
     """Write a layer, in place of the one of this name that the file has."""
-    columns = [_column(field, values) for field, values in zip(layer.fields, layer.columns)]
-    with _as_os_error():
+    columns = [column_of(field, values) for field, values in zip(layer.fields, layer.written_columns())]
+    with as_os_error():
         pyogrio.raw.write(
             str(file),
             layer=layer.name,
             driver="GPKG",
             geometry=_geometry(layer, frame),
-            geometry_type="Unknown" if layer.geometry_type.endswith("M") else layer.geometry_type.strip(),
+            geometry_type="Unknown" if layer.geometry_type.endswith("M") else layer.geometry_type,
             field_data=[column for column, _ in columns],
             field_mask=[empty for _, empty in columns],
             fields=[field.name for field in layer.fields],
@@ -274,16 +216,28 @@ def _write_layer(layer: Layer, frame: LocalFrame, file: Path) -> None:
         )
 
 
+@contextmanager
+def as_os_error() -> Iterator[None]:
+    """Turn what GDAL raises into an `OSError`, which a destination explains."""
+    try:
+        yield
+    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, RuntimeError) as error:
+        raise OSError(str(error)) from error
+
+
 def _geometry(layer: Layer, frame: LocalFrame) -> np.ndarray:
     """Geometries in the coordinates of the cloud as well-known binary, (n,)."""
-    make = shapely.points if layer.geometry_type.startswith("Point") else shapely.linestrings
-    own = slice(3 if "Z" in layer.geometry_type else 2)
-    places = [frame.to_crs(xyz[..., :3])[..., own] for xyz in layer.xyz]
+    shapes = layer.shapes(frame)
     if layer.geometry_type.endswith("M"):
-        made = [measured_line(np.column_stack([place, xyz[:, 3]])) for place, xyz in zip(places, layer.xyz)]
+        pairs = zip(shapes, layer.xyz)
+        made = [measured_line(np.column_stack([_vertices(shape), xyz[:, 3]])) for shape, xyz in pairs]
     else:
-        made = [shapely.to_wkb(make(place), output_dimension=3) for place in places]
+        made = [shapely.to_wkb(shape, output_dimension=3) for shape in shapes]
     return np.array(made, dtype=object)
+
+
+def _vertices(shape: shapely.Geometry) -> np.ndarray:
+    return shapely.get_coordinates(shape, include_z=shapely.has_z(shape))
 
 
 def measured_line(vertices: np.ndarray) -> bytes:
@@ -298,9 +252,8 @@ def measured_line(vertices: np.ndarray) -> bytes:
     return struct.pack("<BII", 1, {3: LINE_M, 4: LINE_ZM}[size], count) + vertices.astype("<f8").tobytes()
 
 
-def _column(field: Field, values: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Values of a field as they are written, and where there are none, (n,) each."""
-    written = [field.value(value) for value in values]
+def column_of(field: Field, written: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Values of a field, given as they are written, and where there are none, (n,) each."""
     empty = np.array([value is None for value in written], dtype=bool)
     filler = 0 if field.kind is int else None
     return np.array([filler if value is None else value for value in written], dtype=KINDS[field.kind]), empty

@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> None:
         raise ParameterError("Give --elements, --axis, --deviations or --report for what is wanted of the file.")
     if args.tracks is None and {"deviations", "report"} & set(outputs):
         raise ParameterError("--deviations and --report compare measured tracks with the alignments: give --tracks.")
-    features, layers = (shapes_module("import-alignment", name) for name in ("features", "geopackage"))
+    features, layers = (shapes_module("import-alignment", name) for name in ("features", "alignment_layers"))
     progress = Estimating(Console())
     found = args.tracks and features.read_survey(args.tracks, "--tracks", None)
     system = stated_system(args.file) or args.crs or (found[1].crs_wkt if found else None)
@@ -70,11 +70,11 @@ def run(args: argparse.Namespace) -> None:
         lines, _ = features.read_survey(args.tracks, "--tracks", frame)
         courses = compared_with(alignments, [(line.number, line.xyz) for line in lines], progress)
     makers = {
-        "elements": lambda to: layers.elements_layer(to, alignments),
-        "axis": lambda to: layers.axes_layer(to, alignments),
-        "deviations": lambda to: layers.deviations_layer(to, [one for _, one in courses]),
+        "elements": lambda: layers.elements_layer(alignments),
+        "axis": lambda: layers.axes_layer(alignments),
+        "deviations": lambda: layers.deviations_layer([one for _, one in courses]),
     }
-    layers.write_files([make(outputs[name]) for name, make in makers.items() if name in outputs], frame)
+    layers.write_all([make() for name, make in makers.items() if name in outputs], outputs, frame)
     if "report" in outputs:
         facts = {**stated(wkt), "LandXML file": args.file.name, "Command": args.command_line}
         outputs["report"].write_text(build_alignment_page(courses, args.tracks, facts, False))

@@ -25,7 +25,7 @@ def run(args: argparse.Namespace) -> None:
     RailExtractError
         A file can't be read, the axis states no kilometres, or the output can't be written.
     """
-    features, layers = (shapes_module("stations", name) for name in ("features", "geopackage"))
+    features, layers = (shapes_module("stations", name) for name in ("features", "alignment_layers"))
     output = destination_of("output", args.output, (".gpkg",))
     places = features.read_features(args.input, "INPUT")
     axes, plane = axes_of(args, places.crs_wkt)
