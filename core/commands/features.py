@@ -177,7 +177,7 @@ def read_elements(file: str, option: str, crs: Optional[str] = None) -> list[Ali
     Raises
     ------
     CrsError, ParameterError, RailExtractError
-        It is no element table, an element is wrong, or it is in degrees.
+        It is not an element table, an element is wrong, or it is in degrees.
     """
     found = read_features(file, option)
     check_table(found.columns, option)
