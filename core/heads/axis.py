@@ -18,7 +18,7 @@ from .edges import STATION_STEP_M, VIEW_STATIONS, find_middles, histograms, stat
 from .flank import FLANK_TOP_SIGMA_M, Flank, find_flank
 from .level import on_top, robust_sigma
 from .roads import MIN_WIDER_M, bands, hidden_edges
-from .sections import Middles, outline_middles, with_outline
+from .sections import PROFILE_SIGMA_M, Middles, outline_middles, with_outline
 from .smoother import AMPLITUDES, STILL, Spline, smooth
 
 UNSHOWN_M = 0.3
@@ -200,7 +200,7 @@ def _of_head(
         points,
         np.select(which, [outline.offset, with_outline(found.offset_m, outline), mean_m]),
         np.select(which, [outline.information, found.information, by_mean]),
-        np.select(which, [outline.common, found.view_m, unsure_m]),
+        np.select(which, [outline.common, np.hypot(found.view_m, PROFILE_SIGMA_M), unsure_m]),
         outline.blur,
         outline.blur_up,
     )

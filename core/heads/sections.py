@@ -87,7 +87,7 @@ BEYOND_RING, MAX_BEYOND = (0.53, 0.60), 0.2
 """Distances from the axis at which a flat head has no points, as shares of its width, and their most density there
 compared with that between the corners and the axis: passes 15 mm apart have half of it there."""
 
-PROFILE_SIGMA_M = 0.0004
+PROFILE_SIGMA_M = 0.0003
 """Standard error of the middle that comes from the outline itself: real heads chain more radii, and are worn."""
 
 

@@ -10,6 +10,7 @@ grows with the length of the line. See docs/method.md section 6.4.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -31,14 +32,14 @@ AMPLITUDES = 10.0 ** np.arange(-5.0, -2.4, 0.5)
 STILL = AMPLITUDES[:1]
 """The same where the errors of a cloud look like waves."""
 
-USUAL_AMPLITUDE_M, AMPLITUDE_DECADES = 3e-4, 0.5
+USUAL_AMPLITUDE_M, AMPLITUDE_DECADES = 4e-4, 0.4
 """Standard deviation of the waves that rails in service have, and that of its logarithm in decades: few points that
 show no waves do not tell that there are none."""
 
 WAVE_M = 8.0
 """Length from which waves are not longer: what bends over more is the design."""
 
-LEAST_SHARE = 1e-3
+LEAST_SHARE = 1e-2
 """Probability, relative to that of the best, below which strengths do not count."""
 
 FREEDOM = 3.0
@@ -66,14 +67,20 @@ class Spline:
     start_m, step_m : float
         First knot, and distance between knots.
     coefficients : (n,) array
-    covariance : (4, n) array
-        Covariances of each coefficient with itself and the next three.
+    likely : list
+        For each likely strength of the prior: its probability, the Cholesky factor of the information about both
+        splines, and by how much its coefficients differ from the mean.
     """
 
     start_m: float
     step_m: float
     coefficients: np.ndarray
-    covariance: np.ndarray
+    likely: list[tuple[float, np.ndarray, np.ndarray]]
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """Covariances of each coefficient with itself and the next three, (4, n)."""
+        return np.sum([part * (_covariance(factor) + _products(off)) for part, factor, off in self.likely], axis=0)
 
     def at(self, t: np.ndarray) -> np.ndarray:
         """Return the values at chainages `t`, (m,); beyond the ends, those at the ends."""
@@ -136,8 +143,7 @@ def smooth(
     share = np.exp(evidence - evidence.max())
     likely = [(one, part) for one, part in zip(fits, share / share.sum()) if part > LEAST_SHARE * share.max()]
     mean = sum(part * one.coefficients for one, part in likely)
-    covariance = sum(part * (_covariance(one.factor) + _products(one.coefficients - mean)) for one, part in likely)
-    return Spline(start_m, step_m, trend + mean, covariance)
+    return Spline(start_m, step_m, trend + mean, [(part, one.factor, one.coefficients - mean) for one, part in likely])
 
 
 def _trend(t: np.ndarray, values: np.ndarray, information: np.ndarray, places: np.ndarray) -> np.ndarray:
