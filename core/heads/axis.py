@@ -16,13 +16,17 @@ from ..rails import Support
 from .blunt import WINDOW, Ridge, wander
 from .edges import STATION_STEP_M, VIEW_STATIONS, find_middles, histograms, stations_along
 from .flank import FLANK_TOP_SIGMA_M, Flank, find_flank
-from .level import on_top, robust_sigma
+from .level import MIN_ON_HEAD, on_top, robust_sigma
 from .roads import MIN_WIDER_M, bands, hidden_edges
 from .sections import PROFILE_SIGMA_M, Middles, outline_middles, with_outline
 from .smoother import AMPLITUDES, STILL, Spline, smooth
 
 UNSHOWN_M = 0.3
 """Standard error of a metre of line that no point shows: raster lines follow what covers a head, a decimetre off."""
+
+NARROW_SHARE, NARROW_PERCENTILES = 0.25, (5.0, 95.0)
+"""Width of a band of points, in head widths and between these percentiles, in which no edges are looked for: points
+that were drawn or computed on the axis, not scanned, all have one offset."""
 
 CELL_M = 0.04
 """Cell size of the raster of standard gauge."""
@@ -110,11 +114,14 @@ class Axis:
         """
         along = length_along(line)
         flank = find_flank(t, across, z, head_width_m)
-        ridge = None if flank else Ridge.find(t, across, z, along[-1], head_width_m)
+        is_band = flank is not None or _is_narrow(across, head_width_m)
+        ridge = None if is_band else Ridge.find(t, across, z, along[-1], head_width_m)
         if ridge is not None:
             shown = _of_ridge(line, t, ridge)
         elif flank is not None:
-            shown = _of_face(t, across, along[-1], flank)
+            shown = _of_band(t, across, along[-1], flank.left_m, flank.sigma_m)
+        elif is_band:
+            shown = _of_band(t, across, along[-1], np.median(across), unseen_m)
         else:
             shown = _of_head(t, across, z, along[-1], head_width_m, free, unseen_m, by_outline)
         known = shown.information > 0
@@ -160,13 +167,21 @@ def _of_ridge(line: np.ndarray, t: np.ndarray, ridge: Ridge) -> Shown:
     return Shown(ridge.t, _counted(t, len(ridge.t)), ridge.offset_m, information, nothing, nothing, nothing)
 
 
-def _of_face(t: np.ndarray, across: np.ndarray, length_m: float, flank: Flank) -> Shown:
-    """Return what points on one face of a head show."""
+def _is_narrow(across: np.ndarray, head_width_m: float) -> bool:
+    """Return whether all points near a line, by their offsets from it, form a band in which no edges can be seen."""
+    if len(across) < MIN_ON_HEAD:
+        return False
+    low, high = np.percentile(across, NARROW_PERCENTILES)
+    return bool(high - low < NARROW_SHARE * head_width_m)
+
+
+def _of_band(t: np.ndarray, across: np.ndarray, length_m: float, left_m: float, sigma_m: float) -> Shown:
+    """Return what points show that are all on one face, or on the axis; the axis is at `left_m` on average."""
     stations = stations_along(length_m)
     points, mean_m = _means(t, across, len(stations))
     noise_m, nothing = robust_sigma(across - np.interp(t, stations[points > 0], mean_m[points > 0])), 0.0 * mean_m
-    offset_m = mean_m + flank.left_m - np.median(across)
-    return Shown(stations, points, offset_m, points / noise_m**2, nothing + flank.sigma_m, nothing, nothing)
+    offset_m = mean_m + left_m - np.median(across)
+    return Shown(stations, points, offset_m, points / noise_m**2, nothing + sigma_m, nothing, nothing)
 
 
 def _of_head(
