@@ -31,7 +31,7 @@ SURE_HEADS = (APART_HEADS, 0.7, 0.7)
 where the raster separates the two, then where most of the head is free. Closer than that, the line is still biased
 towards the start assumed before, which moves the start half a metre forward."""
 
-ALIGNED_ROUNDS = 4
+ALIGNED_ROUNDS = 2
 """Further rounds in which strips are aligned: a step of 30 mm where strips meet has been drawn as a bend 2 m long, of
 which a round removes half."""
 

@@ -83,6 +83,9 @@ FLAT_RING, FLAT_DROP_M = (0.40, 0.47), 0.0012
 """Distances from the axis, as shares of the head's width, between which corners are; and by how much less they lie
 below the middle of a head that is flat to its edges. Those of the outline are 2.5 to 5 mm below it."""
 
+SHARP_NOISE_M = 0.003
+"""Noise in height from which the outline tells the axis of a head without corners as well as its edges do."""
+
 BEYOND_RING, MAX_BEYOND = (0.53, 0.60), 0.2
 """Distances from the axis at which a flat head has no points, as shares of its width, and their most density there
 compared with that between the corners and the axis: passes 15 mm apart have half of it there."""
@@ -162,7 +165,8 @@ def outline_middles(
         pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
         offset = np.where(seen[part], offset - pull, np.nan)
         is_crowned = _is_crowned(left[here], up[here], head_width_m)
-        if is_crowned or not _is_flat(left[here] - section.place[0], up[here], head_width_m):
+        is_sharp = np.exp(section.place[5]) < SHARP_NOISE_M
+        if is_crowned or not (is_sharp and _is_flat(left[here] - section.place[0], up[here], head_width_m)):
             middles.offset[part] = offset
         middles.common[part] = np.hypot(np.hypot(scores.common_m, PROFILE_SIGMA_M), PULL_DOUBT * pull)
         on_crown = np.abs(left[here] - section.place[0]) < FLAT_SHARE * head_width_m
