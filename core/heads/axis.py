@@ -24,6 +24,10 @@ from .smoother import AMPLITUDES, STILL, Spline, smooth
 UNSHOWN_M = 0.3
 """Standard error of a metre of line that no point shows: raster lines follow what covers a head, a decimetre off."""
 
+SHOWN_SHARE = 0.25
+"""Points on the head at a station, by their median, from which it shows the head: with fewer, something covers it, and
+the edges that are seen are those of dirt next to it."""
+
 NARROW_SHARE, NARROW_PERCENTILES = 0.25, (5.0, 95.0)
 """Width of a band of points, in head widths and between these percentiles, in which no edges are looked for: points
 that were drawn or computed on the axis, not scanned, all have one offset."""
@@ -202,7 +206,7 @@ def _of_head(
     head = top & (np.abs(across) <= 0.5 * head_width_m)
     on_head, mean_m = _means(t[head], across[head], len(stations))
     found = find_middles(counts, wide_counts, points, free, head_width_m, noise_m)
-    seen = np.isfinite(found.offset_m)
+    seen = np.isfinite(found.offset_m) & _is_shown(on_head)
     outline = Middles.unknown(len(stations))
     if by_outline:
         outline = outline_middles(t, across, z, length_m, head_width_m, seen & free.all(axis=0))
@@ -219,6 +223,12 @@ def _of_head(
         outline.blur,
         outline.blur_up,
     )
+
+
+def _is_shown(points: np.ndarray) -> np.ndarray:
+    """Return at which stations the head is shown, (s,) bool, by the number of points on it."""
+    usual = np.median(points[points > 0]) if points.any() else 0.0
+    return points >= SHOWN_SHARE * usual
 
 
 def _either_end(counts: np.ndarray, head_width_m: float) -> np.ndarray:

@@ -36,7 +36,7 @@ BIN_M = 0.002
 BESIDE_M, ABOVE_M, BELOW_M = 0.024, 0.016, 0.046
 """Reach of the bins beyond the edges, above the top and below it: three standard deviations of strong noise."""
 
-MIN_STRAY_SHARE = 0.002
+MIN_STRAY_SHARE = 0.02
 """Smallest share of points that are on no part of the outline: it limits how far a single one can pull."""
 
 START_NOISE_M, MIN_NOISE_M = 0.005, 0.001

@@ -240,7 +240,8 @@ def _fit(data: np.ndarray, score: np.ndarray, prior: _Prior) -> _Fit:
         right[::2] -= np.convolve(weights[0] / prior.scales[0] ** 2 * prior.bends, DESIGN)
         factor = cholesky_banded(both + prior.information(weights, count), lower=True, check_finite=False)
         found = cho_solve_banded((factor, True), right, check_finite=False)
-        weights = tuple((FREEDOM + 1) / (FREEDOM + off**2) for off in prior.off(found))
+        design, waves = prior.off(found)
+        weights = (FREEDOM + 1) / (FREEDOM + design**2), (FREEDOM + 1) / (FREEDOM + waves**2)
     coefficients = found[::2] + found[1::2]
     explained = score @ coefficients - 0.5 * coefficients @ _times(data, coefficients)
     evidence = explained + prior.log_probability(found) - np.log(factor[0]).sum()
