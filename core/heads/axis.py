@@ -19,10 +19,13 @@ from .flank import FLANK_TOP_SIGMA_M, Flank, find_flank
 from .level import MIN_ON_HEAD, on_top, robust_sigma
 from .roads import MIN_WIDER_M, bands, hidden_edges
 from .sections import PROFILE_SIGMA_M, Middles, outline_middles, with_outline
-from .smoother import AMPLITUDES, STILL, Spline, smooth
+from .smoother import AMPLITUDES, STILL, Spline, bridge_error, smooth
 
 UNSHOWN_M = 0.3
 """Standard error of a metre of line that no point shows: raster lines follow what covers a head, a decimetre off."""
+
+UNSEEN_TURN = 1e-4
+"""Change of the curvature per metre that a rail may have where no point shows it, 1/m²: that of a transition."""
 
 SHOWN_SHARE = 0.25
 """Points on the head at a station, by their median, from which it shows the head: with fewer, something covers it, and
@@ -143,8 +146,9 @@ class Axis:
         """
         t = self.shown.t
         by_chance = self.course.sigma(t) ** 2
+        bridge_m = np.minimum(bridge_error(t[self.shown.information > 0], t, UNSEEN_TURN), UNSHOWN_M)
         remainder = np.maximum(self.course.at(t) ** 2 - by_chance, 0.0)
-        support = Support(t, self.shown.points, np.sqrt(by_chance + remainder + self.shown.common_m**2))
+        support = Support(t, self.shown.points, np.sqrt(by_chance + remainder + self.shown.common_m**2 + bridge_m**2))
         if self.flank is not None:
             return replace(support, sigmaz_m=np.full(len(t), FLANK_TOP_SIGMA_M))
         return support if marked else _with_blur(support, self.shown.blur_m, self.shown.blur_up_m)

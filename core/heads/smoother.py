@@ -51,6 +51,9 @@ ROUNDS = 3
 RIDGE = 1e-6
 """Information, relative to the mean of the measurements, that is always there, so that few of them are enough."""
 
+ROUNDING = 1e-14
+"""Information, relative to the largest of the prior, by which rounding cannot make the matrix indefinite."""
+
 DESIGN, WAVES = np.array([-1.0, 3.0, -3.0, 1.0]), np.array([1.0, -2.0, 1.0])
 """Differences of neighbouring coefficients that are noise."""
 
@@ -146,6 +149,28 @@ def smooth(
     return Spline(start_m, step_m, trend + mean, [(part, one.factor, one.coefficients - mean) for one, part in likely])
 
 
+def bridge_error(t: np.ndarray, stations: np.ndarray, turn: float) -> np.ndarray:
+    """Return how far a course may be off where nothing is measured, (s,) metres: there, a curve may begin unseen.
+
+    A third derivative that is wrong by k moves a course by k a b (a + b) / 12 at distances a and b from what is
+    measured, and by k a³ / 6 beyond the last of it.
+
+    Parameters
+    ----------
+    t : (n,) array
+        Chainages at which something is measured, increasing.
+    stations : (s,) array
+    turn : float
+        Third derivative, 1/m².
+    """
+    after = np.searchsorted(t, stations)
+    sides = np.array([stations - np.append(-np.inf, t)[after], np.append(t, np.inf)[after] - stations])
+    near_m, far_m = sides.min(axis=0), sides.max(axis=0)
+    inside = np.isfinite(far_m)
+    far_m = np.where(inside, far_m, 0.0)
+    return np.where(inside, turn * near_m * far_m * (near_m + far_m) / 12, turn * near_m**3 / 6)
+
+
 def _trend(t: np.ndarray, values: np.ndarray, information: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Return the straight line through measurements at `places`, (n,), so that `RIDGE` pulls towards it."""
     middle, level = (np.average(one, weights=information) for one in (t, values))
@@ -238,7 +263,9 @@ def _fit(data: np.ndarray, score: np.ndarray, prior: _Prior) -> _Fit:
     for _ in range(ROUNDS):
         right = np.repeat(score, 2)
         right[::2] -= np.convolve(weights[0] / prior.scales[0] ** 2 * prior.bends, DESIGN)
-        factor = cholesky_banded(both + prior.information(weights, count), lower=True, check_finite=False)
+        band = both + prior.information(weights, count)
+        band[0] += ROUNDING * band[0].max()
+        factor = cholesky_banded(band, lower=True, check_finite=False)
         found = cho_solve_banded((factor, True), right, check_finite=False)
         design, waves = prior.off(found)
         weights = (FREEDOM + 1) / (FREEDOM + design**2), (FREEDOM + 1) / (FREEDOM + waves**2)

@@ -12,6 +12,7 @@ from rail_extract.core.heads.smoother import (
     _differences,
     _of_both,
     _Prior,
+    bridge_error,
     smooth,
 )
 from scipy.linalg import cholesky_banded
@@ -135,3 +136,10 @@ def test_a_line_that_bends_is_straightened_but_not_one_in_a_curve():
         found = smooth(known, values, np.full(len(known), 0.0005**-2), 0.0, 60.0, line)
         left = found.at(places) + 0.004 * np.sin(2 * np.pi * places / 1.7)
         assert np.sqrt(np.mean(left**2)) < 0.0012
+
+
+def test_a_course_may_turn_where_nothing_is_measured():
+    """Cubics that are 0 at both ends of a gap of 10 m, and beyond the last value."""
+    found = bridge_error(np.array([0.0, 10.0]), np.array([-3.0, 0.0, 5.0, 8.0, 10.0, 12.0]), 1e-4)
+    expected = [27 / 6, 0.0, 5 * 5 * 10 / 12, 2 * 8 * 10 / 12, 0.0, 8 / 6]
+    np.testing.assert_allclose(found, 1e-4 * np.array(expected), atol=1e-12)
