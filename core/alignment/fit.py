@@ -33,7 +33,8 @@ SQUEEZED = 0.5
 """Share of the least length below which an element that the fit shortens at an end of the line is left out."""
 
 UNSURE, MANY = 1.0 / 3.0, 0.25
-"""An arc is near the noise if its standard error exceeds this share of its radius; so many of all arcs are reported."""
+"""An arc is near the noise if its standard error exceeds this share of its radius; more than this share of all arcs is
+reported."""
 
 LEAST_CANT_POINTS = 20
 """With fewer places of known cant, it has no elements."""
