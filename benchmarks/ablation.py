@@ -1,7 +1,8 @@
 """Switch rules off, one at a time, and print which figures of the golden table need each.
 
-Run `python benchmarks/ablation.py [RULE ...] [--scenes SCENE ...]`. A rule may be a part of a name, as `tracks.`. In a
-scene in which a rule returns what its replacement returns whenever it is called, it has no effect and is not run again.
+Run `python benchmarks/ablation.py [RULE ...] [--scenes SCENE ...] [--variant 'seed 1']`. A rule may be a part of a
+name, as `tracks.`. In a scene in which a rule returns what its replacement returns, whenever it is called, it has no
+effect and is not run again.
 """
 
 from __future__ import annotations
@@ -27,7 +28,16 @@ from rail_extract.core import pipeline
 from rail_extract.core.classify import settings
 from rail_extract.core.classify.flush import NO_LINES, Flush
 from rail_extract.core.polyline import length_along
-from rail_extract.laboratory.ruler.golden import PLACES, Difference, Golden, build_scene, differences, figures_of
+from rail_extract.laboratory.ruler.golden import (
+    PLACES,
+    PLAIN,
+    VARIANTS,
+    Difference,
+    Golden,
+    build_scene,
+    differences,
+    figures_of,
+)
 
 SHOWN = 3
 """Differences printed for each rule: the largest, by their tolerances."""
@@ -79,35 +89,23 @@ def _rule(name: str, value: Any, *also: tuple[str, str, Any]) -> Switch:
     return Switch(name, ((module, attribute, value), *also))
 
 
-def _joined_at_nodes_only(network: Any, *arguments: Any, **named: Any) -> Any:
-    from rail_extract.core.vectorize.joining import join_gaps
-
-    return network if named.get("at_nodes") is False else join_gaps(network, *arguments, **named)
-
-
 SWITCHES = (
     _rule("vectorize.open_slips", lambda network, seen: (network, [])),
     _rule("vectorize.straighten_blots", first),
     _rule("vectorize.cut_kinks", first),
-    _rule("vectorize.drop_guards", first),
     _rule("vectorize.attach_branches", first),
-    _rule("vectorize.attaching._straightened", lambda network, touch, tip: (network, touch.vertex)),
     _rule("vectorize.free_third_rails", first),
     _rule("vectorize.resolve_branches", first),
     _rule("vectorize.choose_routes", first),
     _rule("vectorize.resolve_crossings", first),
-    _rule("vectorize.crossings._cut_off", nothing),
-    _rule("vectorize.join_gaps", _joined_at_nodes_only),
     _rule("vectorize.joining.HOOKS_M", ((0.0, 0.0),)),
     _rule("vectorize._settle_ends", first),
     _rule("vectorize.close", first),
     _rule("vectorize.junctions.drop_bubbles", first),
     _rule("vectorize.junctions.drop_rungs", first),
-    _rule("vectorize.junctions.contract_links", first),
     _rule("vectorize.junctions.drop_spurs", first),
     _rule("vectorize.repairs.BEND", np.inf),
     _rule("vectorize.repairs.SWERVE_M", np.inf),
-    _rule("steps.rasterize", lambda *_: None),
     _rule("steps.parts_without_turns", lambda line, *_: [(0.0, float(length_along(line)[-1]))]),
     _rule("lines.network_smoothing._continuations", lambda *_: {}),
     _rule("tracks.pairing._without_ghosts", list),
@@ -145,6 +143,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("rules", nargs="*", help="parts of the names of rules; default: all")
     parser.add_argument("--scenes", nargs="+", choices=PLACES, metavar="SCENE", default=PLACES)
+    parser.add_argument("--variant", choices=[one.name for one in VARIANTS], default=PLAIN.name, help="model or seed")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (default: one per core)")
     arguments = parser.parse_args()
     chosen = [
@@ -155,8 +154,8 @@ def main() -> None:
     acts: dict[str, int] = defaultdict(int)
     needs: dict[str, list[Difference]] = defaultdict(list)
     with ProcessPoolExecutor(arguments.workers, multiprocessing.get_context("spawn")) as pool:
-        tasks = [(place, chosen) for place in arguments.scenes]
-        for (place, _), found in zip(tasks, pool.map(ablate, tasks)):
+        tasks = [(place, chosen, arguments.variant) for place in arguments.scenes]
+        for (place, *_), found in zip(tasks, pool.map(ablate, tasks)):
             print(place, file=sys.stderr, flush=True)
             for name, moved in found.items():
                 acts[name] += 1
@@ -178,7 +177,7 @@ def _largest(moved: Sequence[Difference]) -> str:
     return (shown or "none") + (f"; {more} more scenes" if more > 0 else "")
 
 
-def ablate(task: tuple[str, Sequence[str]]) -> dict[str, list[Difference]]:
+def ablate(task: tuple[str, Sequence[str], str]) -> dict[str, list[Difference]]:
     """Run a scene with all rules, and without each of those that have an effect in it.
 
     Returns
@@ -186,21 +185,22 @@ def ablate(task: tuple[str, Sequence[str]]) -> dict[str, list[Difference]]:
     dict of str to list of Difference
         By name of the rules that have an effect; the list has the figures that moved.
     """
-    place, names = task
-    scene = build_scene(place)
+    place, names, name = task
+    variant = next(one for one in VARIANTS if one.name == name)
+    scene = build_scene(place, variant.seed_shift)
     chosen = [switch for switch in SWITCHES if switch.name in names]
     effective: set[str] = set()
     tolerances = Golden(TABLE).tolerances
     with patch.object(pipeline, "clean_square", _remembering(pipeline.clean_square)):
         with _watched(chosen, effective):
-            before = figures_of(place, scene)
+            before = figures_of(place, scene, variant.model)
         found = {}
         for switch in (switch for switch in chosen if switch.name in effective):
             with ExitStack() as stack:
                 for module, attribute, value in switch.off:
                     stack.enter_context(patch.object(_module(module), attribute, value))
                 try:
-                    now = figures_of(place, scene)
+                    now = figures_of(place, scene, variant.model)
                 except Exception as error:  # noqa: BLE001 - whatever happens without a rule is its effect
                     print(f"{place} without {switch.name}: {error}", file=sys.stderr)
                     now = {}

@@ -30,7 +30,7 @@ HOLDS = 3.0
 """A fit does not hold where the line is off by more than this many tolerances, as a root mean square."""
 
 SQUEEZED = 0.5
-"""Share of the least length below which an element that the fit shortens is left out."""
+"""Share of the least length below which an element that the fit shortens at an end of the line is left out."""
 
 LEAST_CANT_POINTS = 20
 """With fewer places of known cant, it has no elements."""
@@ -211,14 +211,10 @@ def _fit_in_plan(
 
 
 def _squeezed(elements: Sequence[PlanElement], settings: FitParameters) -> Optional[int]:
-    """Return the number of an element that the points squeeze between its neighbours, which can do without it."""
-    for number, one in enumerate(elements):
-        near = elements[max(number - 1, 0) : number + 2]
-        between_lines = len(near) == 3 and near[0].type == near[2].type == "line"
-        is_needed = one.type == "clothoid" and len(near) == 3 and settings.transitions != JUMPS
-        if one.length_m < SQUEEZED * settings.min_length_m and len(near) > 1 and not between_lines | is_needed:
-            return number
-    return None
+    """Return the number of an element at an end of the line that the points squeeze out; None if there is none."""
+    least_m = SQUEEZED * settings.min_length_m
+    ends = {0, len(elements) - 1} if len(elements) > 1 else set()
+    return next((number for number in ends if elements[number].length_m < least_m), None)
 
 
 def _lost(track_id: int) -> _LostError:

@@ -41,7 +41,7 @@ PLACES = (*DRAWN, *(RAW + name for name in RAW_SCENES))
 
 QUICK = (
     *("straight", "tram", "turnout_7", "turnout_26", "crossover", "dual_gauge", "noisy", "sparse"),
-    *("ballast", "platform", "gaps", "thin_points", "strips_meet", "double_slip", "three_way", "side_30"),
+    *("ballast", "platform", "gaps", "thin_points", "strips_meet", "double_slip", "three_way_apart", "side_30"),
     *("crossing", "standing_train", "grooved", "near_tracks", "flyover", "parked_train"),
     *("raw turnout 1:9", "raw metro", "raw crossing", "raw air 80", "raw photo curve", "raw car park"),
 )

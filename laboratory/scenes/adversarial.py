@@ -331,6 +331,7 @@ ADVERSARIAL: dict[str, Callable[..., Scene]] = {
     "unmarked_passes": strips.unmarked,
     "double_slip": switches.double_slip,
     "three_way": switches.three_way,
+    "three_way_apart": partial(switches.three_way, apart_m=1.5, name="three_way_apart"),
     "unmarked_meet": partial(strips.meeting, with_ids=False),
     "side_17": partial(from_the_side, "side_17", seed=36, angle_deg=17.0),
     "side_30": partial(from_the_side, "side_30", seed=37, angle_deg=30.0, face_share=0.5),
