@@ -165,10 +165,11 @@ def bridge_error(t: np.ndarray, stations: np.ndarray, turn: float) -> np.ndarray
     """
     after = np.searchsorted(t, stations)
     sides = np.array([stations - np.append(-np.inf, t)[after], np.append(t, np.inf)[after] - stations])
-    near_m, far_m = sides.min(axis=0), sides.max(axis=0)
-    inside = np.isfinite(far_m)
-    far_m = np.where(inside, far_m, 0.0)
-    return np.where(inside, turn * near_m * far_m * (near_m + far_m) / 12, turn * near_m**3 / 6)
+    is_near, is_inside = np.isfinite(sides).any(axis=0), np.isfinite(sides).all(axis=0)
+    near_m = np.where(is_near, sides.min(axis=0), 0.0)
+    far_m = np.where(is_inside, sides.max(axis=0), 0.0)
+    off = np.where(is_inside, near_m * far_m * (near_m + far_m) / 12, near_m**3 / 6)
+    return np.where(is_near, turn * off, np.inf)
 
 
 def _trend(t: np.ndarray, values: np.ndarray, information: np.ndarray, places: np.ndarray) -> np.ndarray:
