@@ -26,8 +26,8 @@ from ..writing.whole_files import write_each
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
+    from ...core.alignment.placed_axes import PlacedAxes
     from ...core.rails import TrackGeometry
-    from ..reading.axes import PlacedAxes
 
 READING, MEASURING = 0.3, 0.9
 """Fractions of the progress bar at which lines and cloud are read, and at which the rails are measured."""

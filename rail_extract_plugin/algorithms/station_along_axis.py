@@ -24,7 +24,7 @@ from .base import RAIL_WORDS, RailAlgorithm
 from .toolbox_groups import ALIGNMENT
 
 if TYPE_CHECKING:
-    from ..reading.axes import PlacedAxes
+    from ...core.alignment.placed_axes import PlacedAxes
 
 LOCATING = 0.9
 """Fraction of the progress bar at which the kilometres are known."""
