@@ -170,7 +170,7 @@ def _check_place(job: Job, frame: LocalFrame, progress: Progress) -> None:
     from ...core.clouds.crs import lies_in_area, name_of, parse_crs
 
     if job.crs_wkt is None:
-        progress.warning(f"{job.path.name} states no coordinate system: choose CRS to see its tracks in their place.")
+        progress.warning(f"{job.path.name} has no coordinate system: choose CRS to see its tracks in their place.")
         return
     crs, (x, y, _) = parse_crs(job.crs_wkt), frame.origin
     if lies_in_area(crs, (x, y)):

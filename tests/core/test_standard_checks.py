@@ -85,7 +85,7 @@ def test_passes_side_by_side_without_a_mark_are_said():
         source = MemorySource(replace(scene.rail_points(), strips=strips), 500.0)
         assert head_widths(source, ((1.435, 0.072),), heard).differ == bool(count)
         assert len(heard.said) == count
-        assert all("passes of the scanner lie apart" in text for text in heard.said)
+        assert all("passes of the scanner are not aligned" in text for text in heard.said)
 
 
 def test_noise_and_faces_do_not_widen_heads_and_a_single_face_is_no_head():
