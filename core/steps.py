@@ -267,9 +267,9 @@ def warn_of_strips(rails: Sequence[RailLine], parameters: Parameters, progress: 
     if STATION_STEP_M * np.sum(count == 1) >= MIN_STRIPS_APART_M:
         progress.warning(
             f"On {STATION_STEP_M * np.sum(count == 1):.0f} m of rail the heads look blurred or too wide, as if passes "
-            f"of the scanner were up to {_largest(spread_m[count == 1])} apart. The points have no source id or GPS time, "
-            "so the passes cannot be separated: sigma_mm and sigmaz_mm contain half of it. Export the cloud with them, or "
-            "pass by pass."
+            f"of the scanner were up to {_largest(spread_m[count == 1])} apart. The points have no source id or GPS "
+            "time, so the passes cannot be separated: sigma_mm and sigmaz_mm contain half of it. Export the cloud with "
+            "them, or pass by pass."
         )
 
 
