@@ -99,6 +99,7 @@ classification-pictures: .venv/installed  ## draw the steps of the classificatio
 
 .PHONY: screenshots
 screenshots: plugin  ## take pictures of the dialogs and of the sample's result, docs/pictures
+	@command -v chromium > /dev/null || { $(INSTALL) chromium; }
 	@. ./$(ENVIRONMENT) && $(PYTHON) tools/screenshots.py
 
 .PHONY: clean

@@ -331,7 +331,6 @@ def measure_lines(
         tolerance_xy_m=parameters.tolerance_xy_m,
         tolerance_z_m=parameters.tolerance_z_m,
         crown_radius_m=parameters.crown_radius_m,
-        smoothing_xy_m=parameters.smoothing_xy_m,
         smoothing_z_m=parameters.smoothing_z_m,
         cell_m=cell_m,
         min_length_m=parameters.min_length_m,
@@ -343,7 +342,7 @@ def measure_lines(
     heads = widths_by_gauge(drawn, parameters.gauges, parameters.centerline_tolerance_m)
     spacings_m = [sum(gauge) for gauge in parameters.gauges]
     network = replace(network, lines=onto_heads(network.lines, points, heads, spacings_m))
-    network = refine(network, points, heads, parameters.smoothing_xy_m, refining, elevation.align)
+    network = refine(network, points, heads, parameters.smoothing_xy_m, refining, elevation.align, cell_m)
     strips = strips_along(network.lines, points, heads)
     return elevate(network, points, elevation, elevating, strips, heads), rows_of(network.lines, strips)
 

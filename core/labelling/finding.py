@@ -292,7 +292,7 @@ def search_square(xyz: np.ndarray, settings: Settings, context: Context) -> Clas
     """Find the points on railheads in a square by the method of the settings; see `classify_square`."""
     if settings.weights is None:
         return classify_square(xyz, settings)
-    classifier = context.once(Classifier.of, settings.weights)
+    classifier = context.network(Classifier.of, settings.weights)
     return label_square(xyz, settings, classifier, context.progress)
 
 
