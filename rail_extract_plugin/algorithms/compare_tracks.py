@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from qgis.core import QgsProcessingContext, QgsProcessingFeatureSource
 
 from ...core.errors import ParameterError
+from ...core.fields import DIFFERENCE_FIELDS
 from ...core.progress import Progress
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
@@ -61,6 +62,7 @@ class CompareTracks(RailAlgorithm):
     )
     PICTURE = "comparison.svg"
     GUIDE = "comparison"
+    FIELDS = DIFFERENCE_FIELDS
     PAGES = ("comparison", "reference")
     HELP = "\n\n".join(
         (

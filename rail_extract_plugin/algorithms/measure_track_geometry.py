@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsProcessingContext
 
+from ...core.fields import QUALITY_FIELDS
 from ...core.parameters import Parameters
 from ...core.progress import Progress, Recording
 from ...core.standards import CUSTOM, Gauge, RailStandard, resolve
@@ -59,6 +60,7 @@ class MeasureTrackGeometry(RailAlgorithm):
     NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
     SUMMARY = "Measures gauge, cant, twist, radius and gradient along tracks, and their support by points."
     PICTURE = "gauge.svg"
+    FIELDS = QUALITY_FIELDS
     PAGES = ("parameters", "reference")
     HELP = "\n\n".join(
         (
