@@ -40,6 +40,17 @@ test-desktop: plugin  ## test the real QGIS application on a virtual display
 	@command -v xvfb-run > /dev/null || { $(INSTALL) xvfb xauth; }
 	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest tests/desktop
 
+.PHONY: golden golden-all
+golden: .venv/installed  ## run every scene, and write its figures to benchmarks/golden.json
+	@PYTHONPATH=$(AS_PACKAGE) $(PYTHON) benchmarks/golden.py --write
+
+golden-all: .venv/installed  ## compare every scene with its figures, with the base model and three seeds, too; WRITE=--write writes
+	@PYTHONPATH=$(AS_PACKAGE) $(PYTHON) benchmarks/golden.py --all $(WRITE)
+
+.PHONY: ablation
+ablation: .venv/installed  ## switch rules off one at a time, and print which golden figures need each; RULES=tracks. chooses
+	@PYTHONPATH=$(AS_PACKAGE) $(PYTHON) benchmarks/ablation.py $(RULES)
+
 .PHONY: fuzz
 fuzz: plugin  ## read damaged files of every kind for MINUTES=5, from SEED=0; `tools/fuzz.py KIND:SEED` repeats one
 	@. ./$(ENVIRONMENT) && $(PYTHON) tools/fuzz.py --minutes $(or $(MINUTES),5) --seed $(or $(SEED),0)
@@ -88,6 +99,7 @@ classification-pictures: .venv/installed  ## draw the steps of the classificatio
 
 .PHONY: screenshots
 screenshots: plugin  ## take pictures of the dialogs and of the sample's result, docs/pictures
+	@command -v chromium > /dev/null || { $(INSTALL) chromium; }
 	@. ./$(ENVIRONMENT) && $(PYTHON) tools/screenshots.py
 
 .PHONY: clean

@@ -1,4 +1,33 @@
-"""Rail Extract: survey-grade 3D rails and track centerlines from classified lidar points."""
+"""Rail Extract: survey-grade 3D rails and track centerlines from classified lidar points.
+
+>>> from pathlib import Path
+>>> import rail_extract as rx
+>>> network = rx.extract(Path(rx.__file__).parent / "resources" / "sample" / "sample.laz", standard="IN_75R_1000")
+>>> len(network.centerlines)
+3
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from .core import VERSION as __version__  # noqa: N811 - the name that packages give it
+
+if TYPE_CHECKING:
+    from .core.front import Network, classify, extract
+
+__all__ = ["Network", "__version__", "classify", "extract"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is asked for: QGIS imports this package before numpy may be installed."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from .core import front
+
+    return getattr(front, name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])
 
 
 def classFactory(iface):  # noqa: N802 - the name QGIS calls

@@ -2,7 +2,8 @@
 
 Run `python benchmarks/classification.py [--seed N] [--lines] [SCENE ...]`. Thresholds were chosen on seeds 1 to 9; the
 published tables are those of the default seed. `--large 50` classifies tiles of 50 million points in all with the
-command `classify`, by one process and by two; compare rows of the same run only.
+command `classify`, by one process and by two; `--stages 4` prints the processor time of each stage of it. Compare rows
+of the same run only.
 """
 
 from __future__ import annotations
@@ -19,12 +20,16 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
+from rail_extract.__main__ import main as main_of_commands
+from rail_extract.core.classify import square
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.frpdf.models import NAMES
+from rail_extract.core.labelling import files, finding
 from rail_extract.core.parameters import Parameters
 from rail_extract.laboratory.ruler.classification import Score, hectares, lines_from, score
 from rail_extract.laboratory.ruler.lines import Match
 from rail_extract.laboratory.scenes.raw_catalogue import AIR, RAW_SCENES
+from stopwatch import Stopwatch
 
 SEED = 2026
 
@@ -43,9 +48,13 @@ def main() -> None:
     parser.add_argument("--lines", action="store_true", help="extract lines from the labelled points as well")
     parser.add_argument("--model", choices=NAMES, default=Parameters.model, help="weights that draw the lines")
     parser.add_argument("--large", type=float, metavar="MIO", help="million points of a large cloud to measure instead")
+    parser.add_argument("--stages", type=float, metavar="MIO", help="million points whose stages to measure instead")
     arguments = parser.parse_args()
     if arguments.large:
         measure_large(arguments.large, arguments.seed)
+        return
+    if arguments.stages:
+        measure_stages(arguments.stages, arguments.seed)
         return
     print(HEADER)
     print(
@@ -84,6 +93,61 @@ def measure_large(millions: float, seed: int) -> None:
                 flush=True,
             )
             shutil.rmtree(new.with_suffix(""))
+
+
+STAGES = (
+    (finding, "read_points", "reading and decompressing"),
+    (finding, "_sort_file", "sorting into squares on disk"),
+    (finding, "read_square", "reading the squares"),
+    (finding, "search_square", "joining the steps of the search"),
+    (square, "find_bed", "1 bed"),
+    (square.Coarse, "around", "1 bed"),
+    (square.Coarse, "offsets", "1 bed"),
+    (square.Bed, "heights", "1 bed"),
+    (square.Grid, "around", "2 tops"),
+    (square, "tops_of", "2 tops"),
+    (square.Candidates, "find", "2 tops"),
+    (square, "find_lines", "3 lines"),
+    (square, "centred", "3 lines"),
+    (square, "stands_free", "4 sides"),
+    (square, "_paired", "5 partner"),
+    (square, "runs_inside", "5 partner"),
+    (square, "links", "6 pieces"),
+    (square, "_certain", "6 pieces"),
+    (square, "lower_than_beside", "6 pieces"),
+    (square, "_long", "6 pieces"),
+    (square, "_completed", "7 labels"),
+    (square, "whole_heads", "7 labels"),
+    (square, "label", "7 labels"),
+    (square, "_narrow", "7 labels"),
+    (square.Near, "find", "7 labels"),
+    (square.Near, "on", "7 labels"),
+    (square.Ridges, "measure", "blunt heads"),
+    (square, "_blunt_heads", "blunt heads"),
+    (square, "flush_rails", "8 flush rails"),
+    (square, "_figures", "figures"),
+    (files, "rewrite", "reading again, compressing and writing"),
+)
+"""Functions and the stages of docs/classification.md that they belong to."""
+
+
+def measure_stages(millions: float, seed: int) -> None:
+    """Write a large cloud, classify it in this process, and print the processor time of each stage."""
+    watch = Stopwatch()
+    for owner, function, stage in STAGES:
+        watch.time(owner, function, stage)
+    with tempfile.TemporaryDirectory() as folder:
+        raw = Path(folder) / "raw"
+        raw.mkdir()
+        count = _write_tiles(raw, millions, seed)
+        with watch.stage("all else"):
+            main_of_commands(["classify", str(raw), "--output", str(Path(folder) / "new.vpc"), "--workers", "1"])
+    del watch.spent_s[""]
+    names = list(dict.fromkeys([*(stage for *_, stage in STAGES), "all else"]))
+    print("| stage | CPU s per million points |\n|---|---|")
+    for name in names:
+        print(f"| {name} | {watch.spent_s[name] / count * 1e6:.3f} |")
+    print(f"| sum | {sum(watch.spent_s.values()) / count * 1e6:.3f} |")
 
 
 def _write_tiles(folder: Path, millions: float, seed: int) -> int:

@@ -4,6 +4,7 @@ All computations run in float64 metres from a local origin (`frame.LocalFrame`).
 
 Public, with names and meanings kept between versions:
 
+- `front`: what `import rail_extract` gives, from files to tables, files and a report;
 - `pipeline.extract_rails` and `parameters.Parameters`: the extraction and its settings;
 - `clouds.points.read_rail_points`: the points of the rail classes of LAS, LAZ, COPC and .vpc files;
 - `rails`: the lines that come out, with their figures;

@@ -221,7 +221,7 @@ AIRBORNE_STATION_FIELDS = (
     Field("seen", int, "1 where the track is seen, else 0"),
     Field("sigma_mm", float, "standard error across, without the flight's own error, millimetres", 1),
     Field("sigmaz_mm", float, "standard error of the height, likewise, millimetres", 1),
-    Field("bed_m", float, "height of the bed between the rails, in the unit of the cloud", 3),
+    Field("bed_m", float, "height of the bed between the rails, metres", 3),
     Field("cant_mm", float, "cant: left minus right, seen along the guide, millimetres", 0),
     Field("radius_m", float, "radius in plan over 80 m, positive in left-hand curves, empty above 10 km, metres", 0),
     Field("grade_pm", float, "gradient over 80 m, per mille; positive uphill", 2),

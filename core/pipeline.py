@@ -170,10 +170,10 @@ def extract_files(
                 source, figures = spool_grown(request, seeds, own, side_m, scratch, reading)
             network = _walk([source], parameters, runner, rest)
         return replace(network, warnings=recording.warnings, search=figures)
-    warn_of_gauge(request, parameters, progress)
+    is_warned = warn_of_gauge(request, parameters, progress)
     count = sum(header.point_count for header in request.headers)
     progress.info(f"Reading {counted(len(request.headers), 'file')} with {counted(count, 'point')}.")
-    network = _walk(_sorted_points(request, side_m, folder, runner, reading), parameters, runner, rest)
+    network = _walk(_sorted_points(request, side_m, folder, runner, reading), parameters, runner, rest, is_warned)
     return replace(network, warnings=recording.warnings)
 
 
@@ -206,8 +206,17 @@ def _sort_file(request: Request, header: CloudHeader, side_m: float, folder: Pat
         ) from error
 
 
-def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner, progress: Progress) -> RailNetwork:
-    """Extract rails, centerlines and track geometry from points that are sorted into squares."""
+def _walk(
+    sources: Sequence[PointSource],
+    parameters: Parameters,
+    runner: Runner,
+    progress: Progress,
+    is_warned: bool = False,
+) -> RailNetwork:
+    """Extract rails, centerlines and track geometry from points that are sorted into squares.
+
+    If the user `is_warned` of another gauge, the rails do not lead to the same question again.
+    """
     progress = Recording(progress)
     drawing, pairing, measuring = progress.divide((DRAWING, PAIRING, MEASURING))
     rails: list[RailLine] = []
@@ -235,7 +244,8 @@ def _walk(sources: Sequence[PointSource], parameters: Parameters, runner: Runner
     try:
         centerlines = tracks_of(rails, parameters, pairing)
     except NoTrackError as error:
-        runner.failures.append(str(error))
+        told = f"No track of {1000 * parameters.gauge_m:.0f} mm gauge found."
+        runner.failures.append(told if is_warned else str(error))
     progress.info(f"Paired: {_lengths(centerlines, 'track')}.")
     rails = with_tracks(rails, centerlines, progress)
     warn_of_split_classes(rails, parameters, progress)
@@ -345,7 +355,7 @@ def _square_tasks(
 
 def _clean(source: PointSource, square: Square, parameters: Parameters, context: Context) -> RailRaster:
     """Clean the raster of a square; a task."""
-    return clean_square(source, square, parameters, context.once(engine_for, parameters), context.progress)
+    return clean_square(source, square, parameters, context.network(engine_for, parameters), context.progress)
 
 
 def _draw(source: PointSource, square: Square, parameters: Parameters, context: Context) -> SquareRails:

@@ -120,6 +120,11 @@ class _Span(_Relay):
     def set_fraction(self, fraction: float) -> None:
         super().set_fraction(self._start + (self._end - self._start) * fraction)
 
+    def span(self, start: float, end: float) -> Progress:
+        """Return the progress of a step of this one as a part of its parent, so that steps of steps do not pile up."""
+        length = self._end - self._start
+        return _Span(self._listener, self._start + length * start, self._start + length * end)
+
 
 class Recording(_Relay):
     """Passes everything on, and keeps the warnings, each once."""
@@ -142,6 +147,8 @@ class Recording(_Relay):
 class Estimating(_Relay):
     """Passes everything on, and reports the remaining time, estimated from the second half of the elapsed time.
 
+    A status begins an activity with a speed of its own: the time before it, such as that of an import, does not count.
+
     Parameters
     ----------
     listener : Progress
@@ -154,11 +161,17 @@ class Estimating(_Relay):
         super().__init__(listener)
         self._clock = clock
         self._marks = [(clock(), 0.0)]
-        self._reported = -math.inf
+        self._fraction, self._reported = 0.0, -math.inf
+
+    def status(self, text: str) -> None:
+        """Pass the activity on, and measure its speed from here."""
+        super().status(text)
+        self._marks = [(self._clock(), self._fraction)]
 
     def set_fraction(self, fraction: float) -> None:
         """Pass the fraction on, and every few seconds report the remaining time as status."""
         super().set_fraction(fraction)
+        self._fraction = fraction
         now, start = self._clock(), self._marks[0][0]
         if now - self._reported < REPORT_EVERY_S or now - start < REPORT_EVERY_S:
             return
@@ -170,7 +183,7 @@ class Estimating(_Relay):
             left_s = (1.0 - fraction) * (now - before[0]) / (fraction - before[1])
             if left_s < LEAST_LEFT_S:
                 return
-            self.status(f"{100 * fraction:.0f} % done, about {_rounded(left_s)} left")
+            super().status(f"{100 * fraction:.0f} % done, about {_rounded(left_s)} left")
 
 
 def _rounded(seconds: float) -> str:

@@ -133,7 +133,7 @@ def _detected(spacings: Spacings, progress: Progress) -> RailStandard:
     return standard
 
 
-def warn_of_gauge(request: Request, parameters: Parameters, progress: Progress) -> None:
+def warn_of_gauge(request: Request, parameters: Parameters, progress: Progress) -> bool:
     """Warn the user at once if the first points show another gauge: the run takes minutes until no track is found.
 
     Parameters
@@ -141,30 +141,36 @@ def warn_of_gauge(request: Request, parameters: Parameters, progress: Progress) 
     request : Request
     parameters : Parameters
     progress : Progress
+
+    Returns
+    -------
+    bool
+        Whether the user has been warned.
     """
     try:
         sample = request.sample()
     except CloudError:
-        return  # reported when the points are sorted
+        return False  # reported when the points are sorted
     spacings = measure_spacings(sample)
     measured = spacings.most_common()
     spacings_m, tolerance_m = [sum(one) for one in parameters.gauges], parameters.centerline_tolerance_m
     if any(spacings.include(one, tolerance_m) for one in spacings_m):
-        return
+        return False
     for factor, stated, real in zip(FEET, ("metres", "feet"), ("feet", "metres")):
         if _is_off_by(factor, sample, spacings_m, parameters):
             progress.warning(
                 f"Rails are {1 / factor:.3g} times as far apart as the gauge: the coordinates are said to be {stated}, "
                 f"are these {real}? Assign a coordinate system that says so."
             )
-            return
+            return True
     if measured is None:
-        return
+        return False
     expected = 1000 * (parameters.gauge_m + parameters.head_width_m)
     progress.warning(f"Rails are {_in_words(*measured)}; {expected:.0f} mm apart are expected{_question(*measured)}")
     standard = closest_standard(*measured)
     if standard is not None:
         progress.propose(standard.name)
+    return True
 
 
 def _is_off_by(factor: float, xyz: np.ndarray, spacings_m: Sequence[float], parameters: Parameters) -> bool:
@@ -181,7 +187,8 @@ def head_widths(
     """Measure how wide heads look, and warn the user if another width is stated.
 
     The spread of the points decides; where it is a little more than stated, which noise and side faces do as well, the
-    outline of the heads does.
+    outline of the heads does. Another standard is asked about at a stated gauge only: elsewhere, it is asked about
+    already because of the gauge.
 
     Parameters
     ----------
@@ -231,6 +238,8 @@ def head_widths(
                 "other is at gauge, the line follows that one. Check the classification elsewhere."
             )
         elif fits or widths.seen_m < stated_m:
+            if not any(abs(measured[0] - seen_m - gauge_m) <= SAME_GAUGE_M for gauge_m, _ in gauges):
+                return widths
             progress.warning(f"{seen}{_question(*measured)} Every gauge is off by the difference.")
         else:
             progress.warning(

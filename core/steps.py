@@ -285,14 +285,12 @@ def _all_vertices(
     See `strips.rows_of`.
     """
     drawing, measuring = progress.divide((VECTORIZE + SMOOTH, REFINE + ELEVATE))
-    network = draw_lines(raster, points, parameters, drawing)
+    network = draw_lines(raster, parameters, drawing)
     return measure_lines(network, points, class_code, parameters, raster.cell_m, measuring)
 
 
-def draw_lines(
-    raster: RailRaster, points: RailPoints | None, parameters: Parameters, progress: Progress = SILENT
-) -> LineNetwork:
-    """Draw the smoothed lines that a cleaned raster shows; points, if given, judge its branches."""
+def draw_lines(raster: RailRaster, parameters: Parameters, progress: Progress = SILENT) -> LineNetwork:
+    """Draw the smoothed lines that a cleaned raster shows."""
     vectorizing, smoothing = progress.divide((VECTORIZE, SMOOTH))
     network = vectorize(
         raster,
@@ -301,7 +299,6 @@ def draw_lines(
         parameters.gap_angle_deg,
         parameters.min_length_m,
         vectorizing,
-        None if points is None else rasterize(points.xyz, raster.cell_m),
     )
     return smooth_network(network, parameters.smoothing_xy_m, smoothing)
 

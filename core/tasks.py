@@ -26,6 +26,10 @@ class Once:
     def __init__(self) -> None:
         self._kept: dict[tuple, Any] = {}
 
+    def keeps(self, function: Callable[..., Any], *arguments: Hashable) -> bool:
+        """Return whether ``function(*arguments)`` is there already."""
+        return (function, arguments) in self._kept
+
     def __call__(self, function: Callable[..., Any], *arguments: Hashable) -> Any:
         """Return ``function(*arguments)``, computed only if the call before this one was different."""
         key = (function, arguments)
@@ -49,6 +53,17 @@ class Context:
     results: Mapping[Any, Any]
     once: Once
     progress: Progress
+
+    def network(self, function: Callable[..., Any], *arguments: Hashable) -> Any:
+        """Return ``once(function, *arguments)``; the progress names the start of a network as an activity of its own.
+
+        The import of its library takes seconds in which nothing of the task is done.
+        """
+        if not self.once.keeps(function, *arguments):
+            self.progress.status("Starting the network")
+            self.once(function, *arguments)
+            self.progress.status("The network has started")
+        return self.once(function, *arguments)
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ class Welcome(QObject):
         if missing:
             self._push(_what_is_missing(missing), tr("Install packages…"), open_installation)
         else:
-            text = tr("The plugin is ready; the sample shows what it does.")
+            text = tr("Ready: the sample shows what the plugin does.")
             self._push(text, tr("Open the sample…"), self._open_sample)
 
     def remove(self) -> None:

@@ -87,6 +87,12 @@ REVIEW_SIZE = (380, 640)
 REPORT_TOP, PLOTS_TOP = 1300, 2320
 """Height of the picture of the report's top, and of the report above the plots of the first track, in pixels."""
 
+QUIETLY = (
+    *("--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--no-first-run", "--disable-sync"),
+    *("--disable-quic", "--disable-background-networking", "--disable-component-update"),
+)
+"""Options with which Chromium draws a page without a screen and asks for nothing else."""
+
 SPLITTER, BUTTONS = 27, 400
 """Width of a dialog to the right of its fields without the help, and height below them, in pixels."""
 
@@ -309,10 +315,9 @@ def _report(page: Path, picture: Path) -> None:
     if chromium is None:
         print(f"chromium is not installed: {picture.name} is not updated (apt-get install chromium).")
         return
-    size = ",".join(map(str, REPORT_SIZE))
-    options = ("--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", f"--window-size={size}")
-    command = [chromium, *options, f"--user-data-dir={page.parent / 'chromium'}", f"--screenshot={picture}"]
-    subprocess.run([*command, page.as_uri()], check=True, capture_output=True)
+    options = (f"--window-size={','.join(map(str, REPORT_SIZE))}", f"--user-data-dir={page.parent / 'chromium'}")
+    command = [chromium, *QUIETLY, *options, f"--screenshot={picture}", page.as_uri()]
+    subprocess.run(command, check=True, capture_output=True)
     shutil.copy(picture, FOLDER / "report_track.png")
     _crop(picture, bottom=REPORT_SIZE[1] - REPORT_TOP)
     _crop(FOLDER / "report_track.png", top=PLOTS_TOP)

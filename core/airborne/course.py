@@ -32,6 +32,7 @@ APART_M = 0.5
 """Distance beyond which another place is a different answer."""
 
 IMPOSSIBLE = -1e9
+"""Score of a place where no course runs: below every sum of scores."""
 
 
 @dataclass(frozen=True)

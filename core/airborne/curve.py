@@ -17,6 +17,7 @@ BLOCK = 400
 """Places whose standard errors are computed at once."""
 
 LITTLE = 1e-12
+"""Added to the diagonal, so that a matrix without any data can be solved."""
 
 
 @dataclass(frozen=True)

@@ -102,7 +102,7 @@ class AirborneTrack:
     sigma_mm, sigmaz_mm : (n,) arrays
         Standard errors across and of the height, without the flight's own error.
     bed_m : (n,) array
-        Height of the bed, in the vertical unit of the cloud.
+        Height of the bed above the zero of the cloud's heights.
     cant_mm : (n,) array
         Left minus right, seen along the guide.
     radius_m, grade_pm : (n,) arrays
@@ -212,7 +212,7 @@ def track_of(
     z = stations.bed + rail_height_m
     xyz = np.column_stack([stations.xy, z])
     radius_m, grade_pm = _shape_of(xyz, seen)
-    down = frame.to_crs(np.column_stack([stations.xy, stations.bed]))[:, 2]
+    bed_m = stations.bed + frame.origin[2] * frame.vertical_unit_m
     return AirborneTrack(
         guide,
         np.zeros(len(seen), dtype=np.int64),
@@ -221,7 +221,7 @@ def track_of(
         seen.astype(np.int64),
         1000 * stations.sigma,
         1000 * np.hypot(stations.sigma_bed, BED_SIGMA_M),
-        np.where(seen, down, np.nan),
+        np.where(seen, bed_m, np.nan),
         np.where(seen, 1000 * spacing_m * stations.tilt, np.nan),
         radius_m,
         grade_pm,

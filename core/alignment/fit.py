@@ -15,19 +15,22 @@ from ..polyline import length_along, runs
 from ..progress import SILENT, Progress
 from .chain import Chain
 from .deviations import Deviations, deviations_of
-from .elements import Alignment, Element, Figures, PlanElement
-from .given import chain_of, given_of
+from .elements import Alignment, Element, PlanElement
+from .given import Given, chain_of, given_of, noted, without
 from .intrinsic import lateral_signal
 from .layouts import cants, heights, snapped
 from .measured import LEAST_POINTS, Measured, Track, measured_of
 from .noise import Noise, strays
-from .plane_fit import NOTHING, FitError, PlanFit, Points, fit_plan
+from .plane_fit import FitError, PlanFit, Points, fit_plan
 from .rounding import off_element, with_round_radii
 from .signals import CANT, HEIGHT, PLAN, Kind, Signal, find_structure, noise_of, refitted
 from .uncertainty import chain_errors, plan_errors, remaining
 
 HOLDS = 3.0
 """A fit does not hold where the line is off by more than this many tolerances, as a root mean square."""
+
+SQUEEZED = 0.5
+"""Share of the least length below which an element that the fit shortens is left out."""
 
 LEAST_CANT_POINTS = 20
 """With fewer places of known cant, it has no elements."""
@@ -160,10 +163,11 @@ def _followed(
         except _LostError as error:
             lost = lost or error
             continue
-        if lost is not None:
+        if len(part.along) < len(measured.along):
+            why = "No chain of elements follows the whole line" if lost else "Points do not count at an end of the line"
             progress.warning(
-                f"No chain of elements follows the line of track {track_id} as a whole. Only the elements from "
-                f"{part.along[0]:.0f} to {part.along[-1]:.0f} m are given."
+                f"{why} of track {track_id}: only the elements from {part.along[0]:.0f} to {part.along[-1]:.0f} m are "
+                "given."
             )
         return part, plan
     raise lost or _lost(track_id)
@@ -183,22 +187,38 @@ def _fit_in_plan(
     """Return the fitted elements in plan."""
     s, y = lateral_signal(measured.xyz[:, :2])
     signal = Signal(s, y, measured.in_plan, PLAN)
-    held = NOTHING
     if fixed is None:
         jumps = settings.transitions == JUMPS
         chain, used = find_structure(signal, settings.tolerance_m, settings.min_length_m, jumps, progress)
+        given = Given(chain)
     else:
-        given = given_of(fixed, float(s[-1]))
-        chain, held, used = given.chain, given.held, noise_of(signal, settings.tolerance_m, progress)[0]
+        given, used = given_of(fixed, float(s[-1])), noise_of(signal, settings.tolerance_m, progress)[0]
     used_m = used.effective_m(signal.step_m)
     points = Points(measured.xyz[:, :2], s, measured.in_plan / used_m**2)
     try:
-        fit = fit_plan(chain, points, held, progress)
+        fit = fit_plan(given.chain, points, given.held, progress, given.poses)
+        while fixed is None:
+            number = _squeezed(fit.elements, settings)
+            if number is None:
+                break
+            given = without(fit.elements, number, float(s[-1]))
+            fit = fit_plan(given.chain, points, given.held, progress, given.poses)
     except (FitError, RuntimeError, np.linalg.LinAlgError) as error:
         raise _lost(track_id) from error
     if not np.isfinite(fit.across).all():
         raise _lost(track_id)
-    return _Plan(chain, fit, points, used_m, remaining(fit, points, settings.tolerance_m))
+    return _Plan(given.chain, fit, points, used_m, remaining(fit, points, settings.tolerance_m))
+
+
+def _squeezed(elements: Sequence[PlanElement], settings: FitParameters) -> Optional[int]:
+    """Return the number of an element that the points squeeze between its neighbours, which can do without it."""
+    for number, one in enumerate(elements):
+        near = elements[max(number - 1, 0) : number + 2]
+        between_lines = len(near) == 3 and near[0].type == near[2].type == "line"
+        is_needed = one.type == "clothoid" and len(near) == 3 and settings.transitions != JUMPS
+        if one.length_m < SQUEEZED * settings.min_length_m and len(near) > 1 and not between_lines | is_needed:
+            return number
+    return None
 
 
 def _lost(track_id: int) -> _LostError:
@@ -214,18 +234,17 @@ def _stated(plan: _Plan) -> tuple[PlanElement, ...]:
     for number, one in enumerate(plan.fit.elements):
         rms, largest = off_element(plan.fit, plan.points, number)
         before = plan.fit.elements[number - 1] if number else None
-        bend_error = errors.bend[number]
-        figures = Figures(
-            joint=None if before is None else "G2" if before.k_to == one.k_from else "G1",
-            dev_rms_mm=rms,
-            dev_max_mm=largest,
-            sigma_r_m=float(bend_error / one.k_from**2) if one.type == "arc" else None,
-            sigma_len_m=float(errors.length[number]),
-            sigma_s_m=float(errors.s[number]),
-            r_fit_m=1.0 / one.k_from if one.type == "arc" else None,
-            s_fit_m=one.s_from,
+        made.append(
+            noted(
+                one,
+                joint=None if before is None else "G2" if before.k_to == one.k_from else "G1",
+                dev_rms_mm=rms,
+                dev_max_mm=largest,
+                sigma_r_m=float(errors.bend[number] / one.k_from**2) if one.type == "arc" else None,
+                sigma_len_m=float(errors.length[number]),
+                sigma_s_m=float(errors.s[number]),
+            )
         )
-        made.append(replace(one, figures=figures))
     return tuple(made)
 
 

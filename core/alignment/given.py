@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any, Optional
 
 import numpy as np
 
 from ..errors import ParameterError
+from ..frame import LocalFrame
 from .chain import Chain, Span, assembled
-from .elements import Alignment, Element, PlanElement
-from .plane_fit import Held
+from .elements import Alignment, Element, Figures, PlanElement
+from .plane_fit import NOTHING, Held
 from .signals import Signal
 
 EDITED_R, EDITED_M = 1e-6, 0.0005
@@ -28,10 +30,13 @@ class Given:
     ----------
     chain : Chain
     held : Held
+    poses : (e, 3) array, optional
+        Place and direction at the start of each element; else they are those of the line.
     """
 
     chain: Chain
-    held: Held
+    held: Held = NOTHING
+    poses: Optional[np.ndarray] = None
 
 
 def given_of(fixed: Alignment, length_m: float) -> Given:
@@ -60,7 +65,36 @@ def given_of(fixed: Alignment, length_m: float) -> Given:
     numbers = np.flatnonzero(chain.extents[1] > chain.extents[0])
     held = {int(number): one.k_from for number, one in zip(numbers, arcs) if _has_edited_radius(one)}
     starts = {number + 1: joint for number, joint in enumerate(joints) if _is_edited(plan[number + 1])}
-    return Given(chain, Held(held, starts))
+    poses = [_pose(fixed, one, start) for one, start in zip(plan, bounds)]
+    return Given(chain, Held(held, starts), np.array(poses))
+
+
+def without(elements: Sequence[PlanElement], number: int, length_m: float) -> Given:
+    """Return the structure of fitted elements of which one is closed by its neighbours.
+
+    Parameters
+    ----------
+    elements : sequence of PlanElement
+    number : int
+        Of the one that goes.
+    length_m : float
+        Length of the measured line.
+    """
+    rest = [noted(one) for at, one in enumerate(elements) if at != number]
+    return given_of(Alignment(None, LocalFrame(np.zeros(3)), tuple(rest)), length_m)
+
+
+def noted(one: PlanElement, **figures: Any) -> PlanElement:
+    """Return a fitted element with its figures, which note radius and start so that an edit shows."""
+    radius = 1.0 / one.k_from if one.type == "arc" else None
+    return replace(one, figures=Figures(r_fit_m=radius, s_fit_m=one.s_from, **figures))
+
+
+def _pose(fixed: Alignment, one: PlanElement, start: float) -> tuple[float, float, float]:
+    """Return place and direction of an element that is continued to a start."""
+    alone, s = replace(fixed, plan=(one,)), np.array([start])
+    (x, y), heading = alone.places(s)[0], alone.headings(s)[0]
+    return float(x), float(y), float(heading)
 
 
 def _joint(before: PlanElement, after: PlanElement) -> float:

@@ -39,6 +39,7 @@ MIN_BREAK = 1e-6
 hundredth of it."""
 
 MM = 1000.0
+"""Millimetres per metre."""
 
 
 def write_landxml(path: Path, alignments: Sequence[Alignment], delivery: Delivery, circles: bool = True) -> None:

@@ -36,6 +36,7 @@ rounded to millimetres."""
 TURNS = {"ccw": 1.0, "cw": -1.0}
 
 MM = 1000.0
+"""Millimetres per metre."""
 
 
 @dataclass(frozen=True)

@@ -130,11 +130,13 @@ def independent_m(s: np.ndarray, y: np.ndarray) -> float:
 def strays(s: np.ndarray, y: np.ndarray, limit_m: float) -> np.ndarray:
     """Return which points lie farther off their neighbours than a limit and chance explain, (n,) bool."""
     found = np.zeros(len(s), dtype=bool)
-    if len(s) >= 2 * SIZES[0]:
-        found[2:-2] = np.abs(off_neighbours(s, y)) > max(limit_m, STRAY * independent_m(s, y))
+    if len(s) < 2 * SIZES[0]:
+        return found
+    found[2:-2] = np.abs(off_neighbours(s, y)) > max(limit_m, STRAY * independent_m(s, y))
     which = np.flatnonzero(found)
     for first, last in zip(which, which[1:]):
         found[first:last] = found[first:last] | (last - first <= TOGETHER)
+    found[:2], found[-2:] = found[2], found[-3]  # which have too few neighbours of their own
     return found
 
 

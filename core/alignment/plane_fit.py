@@ -26,14 +26,16 @@ has failed, metres."""
 CLOSING_ROUNDS = 8
 """Largest number of steps that only close gaps."""
 
-LEAST_CHANGE = 1e-3
-"""Change of chi-square at which the fit ends."""
+LEAST_CHANGE, MOST_RISE = 1e-3, 0.1
+"""Change of chi-square at which the fit ends, and the rise that a step may cause: to close the last gaps costs some."""
 
-RISE_SHARE, MOST_RISE = 0.01, 10.0
-"""Rise of chi-square, as a share and beyond it, that a step may cause while it closes the gaps."""
+GAP_SIGMA_M = 0.001
+"""Standard deviation at which gaps count beside the points where a step is judged, metres or radians: a step may be as
+long as the gaps stay small that its curvature opens."""
 
-STIFF, STIFFER, STIFFEST = 1e-5, 30.0, 100.0
-"""Damping after a failed step, its growth after another one, and where the fit ends, as shares of the diagonal."""
+STIFF, STIFFER, LOOSER, STIFFEST = 1e-6, 10.0, 0.3, 100.0
+"""Damping after a failed step, its growth after another one, its fall after a good one, and where the fit ends, as
+shares of the diagonal."""
 
 MOST_TURN_RAD = 20.0
 """Largest turn of an element: three circles."""
@@ -46,6 +48,9 @@ SHARE = 0.4
 
 HEADING_CHORD_M = 5.0
 """Half of the chord that gives the first direction of an element, metres."""
+
+NEAR_M = 1.0
+"""A given place of an element's start is a first value if it is nearer to the line than this, metres."""
 
 RIDGE = 1e-9
 """Added to the diagonal of the scaled normal matrix, so that an element without points stays where it is."""
@@ -79,7 +84,7 @@ class Held:
     bends : mapping of int to float
         Curvature of parts of the chain by their number, 1/m.
     starts : mapping of int to float
-        Where elements start, by their number, metres.
+        Where elements start, by their number, metres; one past the last stands for the end.
     lengths : mapping of int to float
         Lengths of elements, by their number, metres.
     """
@@ -164,7 +169,13 @@ class _Solver:
         return (self.factor.solve(right)[: len(self.scale)] * self.scale[:, None]).T
 
 
-def fit_plan(chain: Chain, points: Points, held: Held = NOTHING, progress: Progress = SILENT) -> PlanFit:
+def fit_plan(
+    chain: Chain,
+    points: Points,
+    held: Held = NOTHING,
+    progress: Progress = SILENT,
+    poses: Optional[np.ndarray] = None,
+) -> PlanFit:
     """Fit the elements of a chain to points.
 
     Parameters
@@ -174,34 +185,17 @@ def fit_plan(chain: Chain, points: Points, held: Held = NOTHING, progress: Progr
     points : Points
     held : Held
     progress : Progress
+    poses : (e, 3) array, optional
+        First values of places and directions at the starts of the elements; else they are those of the line.
     """
     number = np.where(chain.curved, np.cumsum(chain.curved) - 1, -1)
     bends = chain.bends.copy()
     bends[list(held.bends)] = list(held.bends.values())
     chain = replace(chain, bends=bends)
     numbers = Held({int(number[part]): bend for part, bend in held.bends.items()}, held.starts)
-    now = _Look.at(_first_state(chain, points), points, points.s, numbers)
-    ridge = RIDGE
-    for _ in range(ROUNDS):
-        progress.check()
-        change = now.change(ridge)
-        short = [one for one in now.shrinking(change, LEAST_M) if one not in numbers.lengths]
-        if short:
-            numbers = replace(numbers, lengths={**numbers.lengths, **dict.fromkeys(short, LEAST_M)})
-            now = _Look.at(now.state, points, now.feet, numbers)
-            continue
-        after, moved = now.stepped(points, numbers, change)
-        if after is None or not after.is_better(now):
-            ridge = max(ridge * STIFFER, STIFF)
-            if ridge > STIFFEST:
-                break
-            continue
-        fallen = now.chi_square - after.chi_square
-        now, ridge = after, max(ridge / STIFFER, RIDGE)
-        if now.gap_m < CLOSED_M and (moved < CLOSED_M or abs(fallen) < LEAST_CHANGE):
-            break
-    now = _closed(now, points, numbers)
-    return PlanFit(_elements(now.state), now.across, now.feet, now.state.nodes, now.jacobian, now.solver(RIDGE))
+    now = _Look.at(_first_state(chain, points, poses), points, points.s, numbers)
+    last = _closed(_settled(now, points, progress), points)
+    return PlanFit(_elements(last.state), last.across, last.feet, last.state.nodes, last.jacobian, last.solver(RIDGE))
 
 
 class FitError(Exception):
@@ -219,11 +213,14 @@ class _Look:
     constraints: sparse.csr_matrix
     gaps: np.ndarray
     weight: np.ndarray
+    held: Held
 
     @classmethod
     def at(cls, state: _State, points: Points, feet: np.ndarray, held: Held) -> _Look:
-        constraints, gaps = _with_held(*_constraints(state), state, held)
-        return cls(state, *_seen(state, points, feet), constraints, gaps, points.weight)
+        seen = _seen(state, points, feet)
+        to_the_end = replace(held, starts={**held.starts, len(state.length): float(seen[0][-1])})
+        constraints, gaps = _with_held(*_constraints(state), state, to_the_end)
+        return cls(state, *seen, constraints, gaps, points.weight, held)
 
     @property
     def weighted(self) -> sparse.csr_matrix:
@@ -234,6 +231,11 @@ class _Look:
         return float(self.weight @ self.across**2)
 
     @property
+    def misfit(self) -> float:
+        """Chi-square of points and gaps."""
+        return self.chi_square + float(np.sum((self.gaps / GAP_SIGMA_M) ** 2))
+
+    @property
     def gap_m(self) -> float:
         """Largest gap between elements, metres or radians."""
         return float(np.abs(self.gaps).max(initial=0.0))
@@ -241,32 +243,61 @@ class _Look:
     def solver(self, ridge: float) -> _Solver:
         return _Solver(self.jacobian.T @ self.weighted, self.constraints, ridge)
 
-    def change(self, ridge: float) -> np.ndarray:
+    def change(self, solver: _Solver) -> np.ndarray:
         """Return the change of the unknowns in a step."""
-        return self.solver(ridge).step(-(self.weighted.T @ self.across), -self.gaps)
+        return solver.step(-(self.weighted.T @ self.across), -self.gaps)
 
     def shrinking(self, change: np.ndarray, least_m: float) -> list[int]:
-        """Return the numbers of the elements that a change would make shorter than the least length."""
-        after = self.state.length + change[-len(self.state.length) :]
-        return np.flatnonzero(after < least_m).tolist()
+        """Return the numbers of the elements that a step makes shorter than the least length."""
+        return np.flatnonzero(_taken(self.state, change)[0].length < least_m).tolist()
 
-    def stepped(self, points: Points, held: Held, change: np.ndarray) -> tuple[Optional[_Look], float]:
-        """Return the look after a change, None if it makes no sense, and the largest shift."""
+    def stepped(self, points: Points, solver: _Solver, change: np.ndarray) -> tuple[Optional[_Look], float]:
+        """Return the look after a change, None if it makes no sense, and the largest shift.
+
+        Where the change does more harm than good, the gaps are closed that its curvature has opened.
+        """
         state, moved = _taken(self.state, change)
-        return (_Look.at(state, points, self.feet, held) if _is_sane(state) else None), moved
+        if not _is_sane(state):
+            return None, moved
+        after = _Look.at(state, points, self.feet, self.held)
+        if after.misfit > self.misfit:
+            state, _ = _taken(state, solver.step(np.zeros(len(change)), -after.gaps))
+            after = _Look.at(state, points, after.feet, self.held) if _is_sane(state) else after
+        return after, moved
 
-    def is_better(self, before: _Look) -> bool:
-        """Return whether gaps were closed without the fit being lost."""
-        closes = before.gap_m > CLOSED_M and self.gap_m < 0.5 * before.gap_m
-        return closes or self.chi_square <= before.chi_square * (1.0 + RISE_SHARE) + MOST_RISE
+
+def _settled(now: _Look, points: Points, progress: Progress) -> _Look:
+    """Return the look from which no step leads to a better one."""
+    ridge = RIDGE
+    for _ in range(ROUNDS):
+        progress.check()
+        solver = now.solver(ridge)
+        change = now.change(solver)
+        short = [one for one in now.shrinking(change, LEAST_M) if one not in now.held.lengths]
+        if short:
+            held = replace(now.held, lengths={**now.held.lengths, **dict.fromkeys(short, LEAST_M)})
+            now = _Look.at(now.state, points, now.feet, held)
+            continue
+        after, moved = now.stepped(points, solver, change)
+        if after is None or after.misfit > now.misfit + MOST_RISE:
+            ridge = max(ridge * STIFFER, STIFF)
+            if ridge > STIFFEST:
+                break
+            continue
+        fallen = now.chi_square - after.chi_square
+        now, ridge = after, max(ridge * LOOSER, RIDGE)
+        if now.gap_m < CLOSED_M and (moved < CLOSED_M or abs(fallen) < LEAST_CHANGE):
+            break
+    return now
 
 
-def _closed(look: _Look, points: Points, held: Held) -> _Look:
+def _closed(look: _Look, points: Points) -> _Look:
     """Return a look in which elements meet, moved no more than that needs."""
     for _ in range(CLOSING_ROUNDS):
         if look.gap_m < CLOSED_M:
             return look
-        after, _ = look.stepped(points, held, look.change(STIFFEST))
+        solver = look.solver(STIFFEST)
+        after, _ = look.stepped(points, solver, look.change(solver))
         look = after if after is not None else look
     if look.gap_m > OPEN_M:
         raise FitError
@@ -278,8 +309,8 @@ def _is_sane(state: _State) -> bool:
     return bool(np.isfinite(state.pose).all() and (np.abs(state.ends).max(axis=1) * state.length).max() < MOST_TURN_RAD)
 
 
-def _first_state(chain: Chain, points: Points) -> _State:
-    """Return poses from the points, and curvatures and lengths from the chain."""
+def _first_state(chain: Chain, points: Points, poses: Optional[np.ndarray]) -> _State:
+    """Return poses from the points or as they are given, and curvatures and lengths from the chain."""
     number = np.where(chain.curved, np.cumsum(chain.curved) - 1, -1)
     starts, ends = chain.extents
     rows = []
@@ -289,14 +320,25 @@ def _first_state(chain: Chain, points: Points) -> _State:
         if i < len(chain.p) and chain.q[i] > chain.p[i]:
             rows.append((chain.p[i], chain.q[i], number[i], number[i + 1]))
     start, end, *nodes = np.array(rows).T
-    place = np.column_stack([np.interp(start, points.s, axis) for axis in points.xy.T])
-    behind, ahead = start - HEADING_CHORD_M, start + HEADING_CHORD_M
-    chord = np.column_stack(
-        [np.interp(ahead, points.s, axis) - np.interp(behind, points.s, axis) for axis in points.xy.T]
+    pose = _poses_on(points, start)
+    if poses is not None:
+        near = np.hypot(*(poses - pose)[:, :2].T) < NEAR_M
+        pose[near] = poses[near]
+    state = _State(pose, chain.bends[np.array(chain.curved)], end - start, np.array(nodes).T.astype(int))
+    turns = np.cumsum(0.5 * state.ends.sum(axis=1) * state.length)[:-1]
+    expected = pose[0, 2] + np.append(0.0, turns)
+    pose[:, 2] += 2.0 * np.pi * np.round((expected - pose[:, 2]) / (2.0 * np.pi))
+    return state
+
+
+def _poses_on(points: Points, s: np.ndarray) -> np.ndarray:
+    """Return places and directions of the line, (e, 3)."""
+    place, behind, ahead = (
+        np.column_stack([np.interp(at, points.s, axis) for axis in points.xy.T])
+        for at in (s, s - HEADING_CHORD_M, s + HEADING_CHORD_M)
     )
-    heading = np.arctan2(chord[:, 1], chord[:, 0])
-    pose = np.column_stack([place, np.unwrap(heading)])
-    return _State(pose, chain.bends[np.array(chain.curved)], end - start, np.array(nodes).T.astype(int))
+    chord = ahead - behind
+    return np.column_stack([place, np.arctan2(chord[:, 1], chord[:, 0])])
 
 
 def _seen(state: _State, points: Points, feet: np.ndarray) -> tuple[np.ndarray, np.ndarray, sparse.csr_matrix]:
@@ -379,11 +421,10 @@ def _constraints(state: _State) -> tuple[sparse.csr_matrix, np.ndarray]:
         columns += [numbers.ravel()[keep.ravel()], 3 * (e + 1) + axis]
         values += [by[:, :, axis].ravel()[keep.ravel()], np.full(len(e), -1.0)]
     cos, sin = np.cos(state.pose[0, 2]), np.sin(state.pose[0, 2])
-    last = 3 * count + bends + count - 1
-    rows.append(np.array([3 * len(e), 3 * len(e), 3 * len(e) + 1]))
-    columns.append(np.array([0, 1, last]))
-    values.append(np.array([cos, sin, 1.0]))
-    gaps = np.concatenate([(end - state.pose[1:]).ravel(), [0.0, 0.0]])
+    rows.append(np.array([3 * len(e), 3 * len(e)]))
+    columns.append(np.array([0, 1]))
+    values.append(np.array([cos, sin]))
+    gaps = np.append((end - state.pose[1:]).ravel(), 0.0)
     shape = (len(gaps), 4 * count + bends)
     flat = (np.concatenate(rows), np.concatenate(columns))
     return sparse.coo_matrix((np.concatenate(values), flat), shape=shape).tocsr(), gaps

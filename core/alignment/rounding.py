@@ -41,6 +41,7 @@ def with_round_radii(
     parts = np.flatnonzero(chain.extents[1] > chain.extents[0])
     of_part = [number for number, one in enumerate(elements) if one.type != "clothoid"]
     before = _chi_square(fit, points)
+    poses = np.array([(one.x, one.y, one.heading) for one in fit.elements])
     for sigmas in SIGMAS:
         proposed = [round_radius(one, sigmas) for one in elements]
         radii = [(int(part), proposed[one]) for part, one in zip(parts, of_part)]
@@ -48,7 +49,7 @@ def with_round_radii(
         if not held:
             break
         try:
-            rounded = fit_plan(chain, points, Held(held), progress)
+            rounded = fit_plan(chain, points, Held(held), progress, poses)
         except FitError:
             continue
         if _chi_square(rounded, points) - before <= MOST_RISE * len(held):

@@ -16,11 +16,8 @@ from .structure import Blocks, Rules, from_pieces, searched
 NOISE_ROUNDS, SETTLED = 8, 1.15
 """Largest number of partitions for the noise, and the growth of the noise below which it is known."""
 
-FEW_POINTS = 25
-"""Mean number of points in a piece below which a partition may follow the misalignment and hide it."""
-
 LIKELY = 2.0
-"""Standard errors by which the first partitions have to show misalignment: to miss it is worse than to see some where
+"""Standard errors by which the last partition has to show misalignment: to miss it is worse than to see some where
 there is none, because the search then bends a track with it."""
 
 FLOOR_M = 0.00005
@@ -87,7 +84,8 @@ def noise_of(signal: Signal, tolerance_m: float, progress: Progress = SILENT) ->
     """Return the noise of a signal, and the partition for it.
 
     The finer a partition is, the less is left as noise. From the errors of single points upwards, the noise is raised
-    until a partition leaves no more than it was made for.
+    until a partition leaves no more than it was made for. Misalignment raises it at every step; where there is none,
+    the first partition remains.
 
     Parameters
     ----------
@@ -99,16 +97,21 @@ def noise_of(signal: Signal, tolerance_m: float, progress: Progress = SILENT) ->
     used = signal.share > 0
     s, y = signal.s[used], signal.y[used]
     noise = Noise(max(independent_m(s, y), FLOOR_M))
+    tried = []
     for share in progress.split(NOISE_ROUNDS):
         sigma, fine = noise.effective_m(signal.step_m), signal.blocks(noise).fine
         of_block = sigma * math.sqrt(len(fine.s) / len(s))
         pieces = partition(fine.s, fine.y, of_block, signal.kind.degrees, (s[0], s[-1]), share)
-        is_coarse = len(s) > FEW_POINTS * len(pieces)
-        found = estimated(_residuals(pieces, s, y), signal.step_m, FLOOR_M, LIKELY if is_coarse else 0.0)
+        rests = _residuals(pieces, s, y)
+        found = estimated(rests, signal.step_m, FLOOR_M)
         noise = Noise(found.white_m, min(found.shared_m, tolerance_m), found.length_m)
+        tried.append((rests, pieces))
         if noise.effective_m(signal.step_m) < SETTLED * sigma:
             break
-    return noise, pieces
+    if estimated(rests, signal.step_m, FLOOR_M, LIKELY).shared_m:
+        return noise, pieces
+    rests, pieces = tried[0]
+    return estimated(rests, signal.step_m, FLOOR_M, np.inf), pieces
 
 
 def _residuals(pieces: list[Piece], s: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, int]]:

@@ -92,7 +92,9 @@ class Coarse:
 
     def offsets(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Distance of each point from the middle of its cell, to the east and to the north."""
-        row, column = np.divmod(self.cell, np.int32(self.shape[1]))
+        width = np.int32(self.shape[1])
+        row = self.cell // width  # faster than divmod, which is not vectorized
+        column = self.cell - row * width
         dx = x - COARSE_M * (column + (self.column + 0.5))
         dy = y - COARSE_M * (row + (self.row + 0.5))
         return dx.astype(np.float32), dy.astype(np.float32)

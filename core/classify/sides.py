@@ -33,15 +33,16 @@ def stands_free(tops: Tops, band: Band, marks: np.ndarray, lines: Lines) -> np.n
     along = np.linspace(-0.5, 0.5, ALONG) * lines.reach_m
     free = np.ones(len(lines.axis), dtype=bool)
     depth_m = band.depth_m(lines.height)
-    z = tops.z.ravel()
+    z, high_cells = tops.z.ravel(), tops.high.ravel()
+    own, ahead_m, left_m = z[marks], lines.along, lines.across
     for side in (1, -1):
         distances = np.zeros(len(free), dtype=np.int64)
         for left in ACROSS_M:
             seen, high = np.zeros(len(free), dtype=np.int64), np.zeros(len(free), dtype=np.int64)
             for ahead in along:
-                cell, inside = tops.grid.cells(lines.axis + ahead * lines.along + side * left * lines.across)
-                rise = z[cell] - z[marks]
-                wall = inside & tops.high.ravel()[cell]
+                cell, inside = tops.grid.cells(lines.axis + ahead * ahead_m + side * left * left_m)
+                rise = z[cell] - own
+                wall = inside & high_cells[cell]
                 seen += wall | (inside & (np.abs(rise) < HIGH_M))
                 high += wall | (inside & (rise >= -depth_m) & (rise < HIGH_M))
             distances += 2 * high > seen

@@ -175,11 +175,11 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> Classified:
     near = np.flatnonzero(height <= HIGH_M)
     if not len(near):
         return nothing
-    height = height[near]
+    height, xy = height[near], xyz[near, :2]
     grid, cell = Grid.around(x[near], y[near], settings.cell_m)
     tops = tops_of(grid, cell, height, z[near])
-    standing = _standing(Shown(xyz[near, :2], cell, height, bed, tops), settings)
-    flush = flush_rails(coarse, near, xyz[near, :2], height, grid, cell, settings)
+    standing = _standing(Shown(xy, cell, height, bed, tops), settings)
+    flush = flush_rails(coarse, near, xy, height, grid, cell, settings)
     rail = nothing.rail
     found = near[np.union1d(standing.points, flush.points)]
     rail[found[settings.own(xyz[found])]] = True
@@ -382,7 +382,7 @@ def _narrow(
     sharp = width_m < settings.head_width_m + tolerances.sharp_m
     wide = partnered.any() and sharp[piece[partnered]].mean() < tolerances.sharp_share
     blur_m = 0.0
-    if wide or alone.any():
+    if wide or (alone.any() and not partnered.any()):  # where rails with a partner are sharp, the cloud is
         ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
         alone &= not ridges.are_blunt(settings.head_width_m)
         blur_m = ridges.blur_m if wide and ridges.are_blunt(settings.head_width_m) else 0.0

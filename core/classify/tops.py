@@ -28,6 +28,7 @@ EMPTY = np.int16(-32768)
 """Top of a cell without points."""
 
 MILLIMETRES, TENTHS_OF_MM = 1000, 10_000
+"""Per metre; heights of cells are whole millimetres, and sums of places whole tenths."""
 
 
 @dataclass(frozen=True)

@@ -82,13 +82,13 @@ def read_classes(
     for chunk, codes, marks, valid, whole in _chunks(path, progress, extent, leave_out):
         keep = np.flatnonzero(wanted[codes] & valid)
         counted = codes[valid] if whole else codes[keep]
-        yield _coordinates(chunk, keep), codes[keep], marks[keep], np.bincount(counted, minlength=256)
+        yield coordinates(chunk, keep), codes[keep], marks[keep], np.bincount(counted, minlength=256)
 
 
 def read_points(path: Path, progress: Progress = SILENT, leave_out: Sequence[str] = ()) -> Iterator[Points]:
     """Read all points chunk by chunk; see `readers.read_points`."""
     for chunk, codes, marks, valid, _ in _chunks(path, progress, None, leave_out):
-        yield _coordinates(chunk, slice(None)), codes, marks, valid
+        yield coordinates(chunk, slice(None)), codes, marks, valid
 
 
 def _chunks(
@@ -149,7 +149,7 @@ def read_blocks(
     return laz.read_chunks(path, header, laz.read_chunk_table(path, header) if chunks is None else chunks, fields, most)
 
 
-def _coordinates(chunk: laspy.ScaleAwarePointRecord, keep: np.ndarray | slice) -> np.ndarray:
+def coordinates(chunk: laspy.ScaleAwarePointRecord, keep: np.ndarray | slice) -> np.ndarray:
     """Return the coordinates of some points of a chunk, (n, 3) in units of the CRS."""
     raw = np.column_stack([chunk.X[keep], chunk.Y[keep], chunk.Z[keep]])
     return raw * chunk.scales + chunk.offsets

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import struct
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
@@ -12,13 +13,16 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..progress import SILENT, Progress
-from .las import laspy, read_blocks
+from .las import coordinates, laspy, read_blocks
 from .laz import lazrs
 from .readers import explained
 
-Change = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
-"""Called with the coordinates (n, 3) and classes (n,) of the next points of a file; returns their new classes (n,) and
-which points to write (n,) bool."""
+Places = Callable[[np.ndarray], np.ndarray]
+"""Called with the numbers of some points, (k,) int; returns their coordinates (k, 3)."""
+
+Change = Callable[[np.ndarray, Places], tuple[np.ndarray, np.ndarray]]
+"""Called with the classes (n,) of the next points of a file, and what returns their coordinates; returns their new
+classes (n,) and which points to write (n,) bool."""
 
 LAST_OLD_FORMAT, LAST_OLD_CLASS = 5, 31
 """Point formats 0 to 5 have five bits for the class."""
@@ -93,8 +97,7 @@ def rewrite(path: Path, new: Path, change: Change, progress: Progress = SILENT) 
             with laspy.open(new, "w", header=header, do_compress=compress, encoding_errors=AS_IT_IS) as writer:
                 for chunk in _chunks(path, reader, progress):
                     before = np.array(chunk.classification)
-                    xyz = np.column_stack([chunk.X, chunk.Y, chunk.Z]) * header.scales + header.offsets
-                    codes, keep = change(xyz, before)
+                    codes, keep = change(before, partial(coordinates, chunk))
                     other = codes != before
                     chunk.classification[other] = codes[other]
                     writer.write_points(chunk if keep.all() else chunk[keep])

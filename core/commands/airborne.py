@@ -124,7 +124,7 @@ def _check_outputs(args: argparse.Namespace) -> None:
 def _write_proposed(found: Proposals, destination: Destination) -> None:
     """Write the proposed guides."""
     module = shapes_module("--proposed", "geopackage")
-    module.write_layers([module.lines_layer("proposed", destination, PROPOSED_FIELDS, found.guides)], found.frame)
+    module.write_layers([module.lines_layer("proposed", PROPOSED_FIELDS, found.guides)], destination, found.frame)
 
 
 def parameters_of(args: argparse.Namespace, standard: RailStandard) -> AirborneParameters:
@@ -152,14 +152,14 @@ def _write(
 ) -> None:
     """Write the outputs that were asked for; layers of the same file together."""
     module = shapes_module("--centerlines", "geopackage")
-    layers = [module.lines_layer("centerlines", outputs["centerlines"], AIRBORNE_FIELDS, survey.lines)]
+    layers = [module.lines_layer("centerlines", AIRBORNE_FIELDS, survey.lines)]
     if "stations" in outputs:
-        layers.append(module.airborne_stations_layer(outputs["stations"], survey.tracks))
+        layers.append(module.airborne_stations_layer(survey.tracks))
     if "findings" in outputs:
         found = airborne_findings(survey)
-        layers.append(module.lines_layer("findings", outputs["findings"], FINDING_FIELDS, found))
-    for file in dict.fromkeys(layer.destination.file for layer in layers):
-        module.write_layers([layer for layer in layers if layer.destination.file == file], survey.frame)
+        layers.append(module.lines_layer("findings", FINDING_FIELDS, found))
+    for same, file in module.by_file(layers, outputs):
+        module.write_layers(same, file, survey.frame)
     if "report" in outputs:
         facts = {"Rail": standard.label, "Command": args.command_line}
         outputs["report"].write_text(airborne_page(survey, args.tiles[0].name, facts))

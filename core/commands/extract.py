@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import Field as ParameterField
 from dataclasses import fields, replace
 from functools import partial
@@ -15,7 +16,6 @@ from pathlib import Path
 from ..clouds.points import ask
 from ..disk import Destination
 from ..errors import ParameterError, RailExtractError
-from ..fields import CENTERLINE_FIELDS, FINDING_FIELDS, RAIL_FIELDS
 from ..frpdf import DEVICES, ENGINES, MAX_PASSES
 from ..frpdf.models import NAMES, choose
 from ..learned.model import weights_for
@@ -24,9 +24,11 @@ from ..pipeline import extract_files
 from ..progress import Estimating, Progress
 from ..rails import RailNetwork
 from ..raster_file import header_for, on_one_grid
-from ..report import Origin, list_findings, summary
+from ..report import Origin, summary
 from ..scratch import scratch_folder
 from ..standards import SEARCHED_CLASSES, RailStandard, resolve
+from ..tasks import Runner
+from ..workers.runner import workers
 from .options import (
     LAYERS,
     TILES_HELP,
@@ -41,8 +43,12 @@ from .options import (
     shapes_module,
 )
 
-NEEDS = {name: name for name in ("distributed", "cryptography", "pyogrio", "shapely", "rasterio")}
-"""Modules and packages of the extra "cluster"; rasterio is needed for `--cleaned` only."""
+LAYER_PACKAGES, RASTER_PACKAGES, CLUSTER_PACKAGES = (
+    ("pyogrio", "shapely"),
+    ("rasterio",),
+    ("distributed", "cryptography"),
+)
+"""Modules of the extra "cluster", which have the names of their packages: for layers, for `--cleaned`, and for Dask."""
 
 LAST_PORT = 65_535
 """Largest number of a port; 0 stands for any that is free."""
@@ -154,11 +160,12 @@ def run(args: argparse.Namespace) -> int:
     RailExtractError
         A parameter is wrong, nothing could be extracted, or an output could not be written.
     """
-    missing = [
-        package
-        for module, package in NEEDS.items()
-        if find_spec(module) is None and (module != "rasterio" or args.cleaned)
+    needed = [
+        *LAYER_PACKAGES,
+        *(RASTER_PACKAGES if args.cleaned else ()),
+        *(CLUSTER_PACKAGES if _on_dask(args) else ()),
     ]
+    missing = [package for package in needed if find_spec(package) is None]
     if missing:
         raise RailExtractError(f"Packages are missing ({', '.join(missing)}): in a clone, run pip install .[cluster].")
     standard = resolve(args.standard, args.gauge, args.head_width)
@@ -236,9 +243,6 @@ def _run_in(
     outputs: Mapping[str, Destination],
 ) -> int:
     """Extract with a folder for finished results, then write."""
-    from ..cluster.runner import DaskRunner
-    from ..cluster.workers import Certificates, connect
-
     codes, extent = numbers_in(args.rail_classes, "--rail-classes", int), extent_of(args.extent)
     if args.classify and args.seeds is not None:
         raise ParameterError("--classify finds all rails, and --seeds those that are pointed at: give one of them.")
@@ -246,10 +250,7 @@ def _run_in(
     codes = SEARCHED_CLASSES if raw else codes
     weights = _weights(args)
     progress = Estimating(Console())
-    files = _certificate_files(args, progress)
-    certificates = Certificates(*files) if files else None
-    with connect(args.scheduler, args.workers or None, certificates, args.dashboard) as client:
-        runner = DaskRunner(client, folder)
+    with _runner(args, folder, progress) as runner:
         request = ask(args.tiles, codes, args.crs, extent, progress, unreadable=runner.failures)
         request = limited(request, args)
         request = replace(request, merged=args.merge_classes and not raw)
@@ -263,6 +264,27 @@ def _run_in(
     for failure in network.failures:
         print(failure, file=sys.stderr)
     return INCOMPLETE if network.failures else 0
+
+
+def _on_dask(args: argparse.Namespace) -> bool:
+    """Return whether an option asks for what only Dask can do: a cluster, and what its local workers keep and show."""
+    return bool(args.scheduler or args.workers or args.work is not None or args.dashboard is not None)
+
+
+@contextmanager
+def _runner(args: argparse.Namespace, folder: Path, progress: Progress) -> Iterator[Runner]:
+    """Provide the runner: Dask if it is asked for, else processes of this computer."""
+    files = _certificate_files(args, progress)
+    if not _on_dask(args):
+        with workers(DEFAULT_WORKERS) as runner:
+            yield runner
+        return
+    from ..cluster.runner import DaskRunner
+    from ..cluster.workers import Certificates, connect
+
+    certificates = Certificates(*files) if files else None
+    with connect(args.scheduler, args.workers or None, certificates, args.dashboard) as client:
+        yield DaskRunner(client, folder)
 
 
 def _weights(args: argparse.Namespace) -> Path | None:
@@ -320,20 +342,12 @@ def _write(
     RailExtractError
         An output could not be written.
     """
-    from .geopackage import lines_layer, stations_layer, write_layers
+    from .geopackage import by_file, network_layers, write_layers
 
-    layers = [lines_layer("rails", outputs["rails"], RAIL_FIELDS, network.rails)]
-    if "centerlines" in outputs:
-        layers.append(lines_layer("centerlines", outputs["centerlines"], CENTERLINE_FIELDS, network.centerlines))
-    if "quality" in outputs:
-        layers.append(stations_layer("quality", outputs["quality"], network.geometry))
-    if "findings" in outputs:
-        found = list_findings(network, parameters.gauges_m)
-        layers.append(lines_layer("findings", outputs["findings"], FINDING_FIELDS, found))
-    of_files = {
-        layer.destination.file: [one for one in layers if one.destination is layer.destination] for layer in layers
-    }
-    writers: list[Callable[[], None]] = [partial(write_layers, same, network.frame) for same in of_files.values()]
+    layers = network_layers(network, outputs, parameters.gauges_m)
+    writers: list[Callable[[], None]] = [
+        partial(write_layers, same, file, network.frame) for same, file in by_file(layers, outputs)
+    ]
     if "report" in outputs:
         origin = Origin(tuple(args.tiles), standard, parameters.gauges[1:], args.command_line, parameters)
         writers.append(lambda: outputs["report"].write_text(origin.report(network)))

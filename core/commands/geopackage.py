@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,21 @@ import shapely
 from ..airborne.survey import AirborneTrack
 from ..disk import Destination
 from ..exchange import DRAWN, Shape, write_shapes
-from ..fields import AIRBORNE_STATION_FIELDS, QUALITY_FIELDS, STOP_FIELDS, UNKNOWN_IN_METRES, Field
+from ..fields import (
+    AIRBORNE_STATION_FIELDS,
+    CENTERLINE_FIELDS,
+    FINDING_FIELDS,
+    QUALITY_FIELDS,
+    RAIL_FIELDS,
+    STOP_FIELDS,
+    UNKNOWN_IN_METRES,
+    Field,
+)
 from ..frame import LocalFrame
 from ..geopackage import tables_in
 from ..grow.growth import Stop
-from ..rails import Centerline, RailLine, TrackGeometry
-from ..report import Finding
+from ..rails import Centerline, RailLine, RailNetwork, TrackGeometry
+from ..report import Finding, list_findings
 
 KINDS = {int: np.int32, float: float, str: object}
 
@@ -31,8 +40,6 @@ class Layer:
     Attributes
     ----------
     name : str
-    destination : Destination
-        GeoPackage of the layer.
     fields : sequence of Field
     columns : sequence of sequence
         Values of each field, one per feature.
@@ -43,16 +50,44 @@ class Layer:
     """
 
     name: str
-    destination: Destination
     fields: Sequence[Field]
     columns: Sequence[Sequence[Any]]
     geometry_type: str
     xyz: Sequence[np.ndarray]
 
+    def shapes(self, frame: LocalFrame) -> list:
+        """Return the geometries in the coordinates of the cloud, given the local frame of the layer."""
+        make = shapely.points if self.geometry_type == "Point Z" else shapely.linestrings
+        return [make(frame.to_crs(xyz)) for xyz in self.xyz]
+
+    def written_columns(self) -> list[list[Any]]:
+        """Return the columns with the values as they are written; None where one is unknown."""
+        return [[field.value(value) for value in values] for field, values in zip(self.fields, self.columns)]
+
+
+def network_layers(network: RailNetwork, names: Collection[str], gauges_m: Sequence[float]) -> list[Layer]:
+    """Make layers of an extraction.
+
+    Parameters
+    ----------
+    network : RailNetwork
+        With the geometry of its tracks, if "quality" or "findings" is among the names.
+    names : collection of str
+        Of "rails", "centerlines", "quality" and "findings".
+    gauges_m : sequence of float
+        Gauges of the extraction.
+    """
+    makers: dict[str, Callable[[], Layer]] = {
+        "rails": lambda: lines_layer("rails", RAIL_FIELDS, network.rails),
+        "centerlines": lambda: lines_layer("centerlines", CENTERLINE_FIELDS, network.centerlines),
+        "quality": lambda: stations_layer("quality", network.geometry),
+        "findings": lambda: lines_layer("findings", FINDING_FIELDS, list_findings(network, gauges_m)),
+    }
+    return [make() for name, make in makers.items() if name in names]
+
 
 def lines_layer(
     name: str,
-    destination: Destination,
     fields: Sequence[Field],
     lines: Sequence[RailLine] | Sequence[Centerline] | Sequence[Finding],
 ) -> Layer:
@@ -61,39 +96,35 @@ def lines_layer(
     Parameters
     ----------
     name : str
-    destination : Destination
     fields : sequence of Field
     lines : sequence of RailLine, Centerline or Finding
     """
     columns = [[getattr(line, field.name) for line in lines] for field in fields]
-    return Layer(name, destination, fields, columns, "LineString Z", [line.xyz for line in lines])
+    return Layer(name, fields, columns, "LineString Z", [line.xyz for line in lines])
 
 
-def stations_layer(name: str, destination: Destination, tracks: Sequence[TrackGeometry]) -> Layer:
+def stations_layer(name: str, tracks: Sequence[TrackGeometry]) -> Layer:
     """Make a layer of the stations of tracks, with the fields of QUALITY.
 
     Parameters
     ----------
     name : str
-    destination : Destination
     tracks : sequence of TrackGeometry
     """
     columns = [
         [value for track in tracks for value in np.broadcast_to(getattr(track, field.name), len(track.xyz))]
         for field in QUALITY_FIELDS
     ]
-    return Layer(
-        name, destination, QUALITY_FIELDS, columns, "Point Z", [place for track in tracks for place in track.xyz]
-    )
+    return Layer(name, QUALITY_FIELDS, columns, "Point Z", [place for track in tracks for place in track.xyz])
 
 
-def stops_layer(destination: Destination, stops: Sequence[Stop]) -> Layer:
+def stops_layer(stops: Sequence[Stop]) -> Layer:
     """Make a layer of the places where rails were not followed further."""
     columns: list[Sequence[Any]] = [range(1, len(stops) + 1), [stop.reason.value for stop in stops]]
-    return Layer("stops", destination, STOP_FIELDS, columns, "Point Z", [stop.xyz for stop in stops])
+    return Layer("stops", STOP_FIELDS, columns, "Point Z", [stop.xyz for stop in stops])
 
 
-def airborne_stations_layer(destination: Destination, tracks: Sequence[AirborneTrack]) -> Layer:
+def airborne_stations_layer(tracks: Sequence[AirborneTrack]) -> Layer:
     """Make a layer of the stations along guides."""
     columns: list[Sequence[Any]] = [
         [value for track in tracks for value in np.broadcast_to(getattr(track, field.name), len(track.xyz))]
@@ -101,16 +132,26 @@ def airborne_stations_layer(destination: Destination, tracks: Sequence[AirborneT
     ]
     columns[0] = [int(number) or None for number in columns[0]]
     places = [place for track in tracks for place in track.xyz]
-    return Layer("stations", destination, AIRBORNE_STATION_FIELDS, columns, "Point Z", places)
+    return Layer("stations", AIRBORNE_STATION_FIELDS, columns, "Point Z", places)
 
 
-def write_layers(layers: Sequence[Layer], frame: LocalFrame) -> None:
+def by_file(layers: Sequence[Layer], destinations: Mapping[str, Destination]) -> list[tuple[list[Layer], Destination]]:
+    """Group layers by the file that each goes into, given the destinations by name of the layer; for `write_layers`."""
+    groups: dict[Path, tuple[list[Layer], Destination]] = {}
+    for layer in layers:
+        destination = destinations[layer.name]
+        groups.setdefault(destination.file, ([], destination))[0].append(layer)
+    return list(groups.values())
+
+
+def write_layers(layers: Sequence[Layer], destination: Destination, frame: LocalFrame) -> None:
     """Write layers into one GeoPackage, whose other layers stay, or one layer into a DXF or CSV file.
 
     Parameters
     ----------
     layers : sequence of Layer
-        All with the same destination.
+        Only the first of them goes into a DXF or CSV file.
+    destination : Destination
     frame : LocalFrame
         Local frame of the layers.
 
@@ -120,27 +161,26 @@ def write_layers(layers: Sequence[Layer], frame: LocalFrame) -> None:
         See `Destination.replacing`.
     """
     names = {layer.name for layer in layers}
-    destination = layers[0].destination
     if destination.file.suffix.lower() != ".gpkg":
-        _write_for_others(layers[0], frame)
+        _write_for_others(layers[0], destination, frame)
         return
     with destination.replacing(edit=bool(tables_in(destination.file) - names)) as new:
         for layer in layers:
             _write_layer(layer, frame, new)
 
 
-def _write_for_others(layer: Layer, frame: LocalFrame) -> None:
+def _write_for_others(layer: Layer, destination: Destination, frame: LocalFrame) -> None:
     """Write a layer for other programs, by the suffix of its file."""
-    columns = [[field.value(value) for value in values] for field, values in zip(layer.fields, layer.columns)]
-    shapes = [Shape(np.atleast_2d(frame.to_crs(xyz)), values) for xyz, values in zip(layer.xyz, zip(*columns))]
+    rows = zip(*layer.written_columns())
+    shapes = [Shape(np.atleast_2d(frame.to_crs(xyz)), values) for xyz, values in zip(layer.xyz, rows)]
     is_line = layer.geometry_type != "Point Z"
-    with layer.destination.replacing() as new:
+    with destination.replacing() as new:
         write_shapes(new, shapes, layer.fields, frame, DRAWN[layer.name], is_line)
 
 
 def _write_layer(layer: Layer, frame: LocalFrame, file: Path) -> None:
     """Write a layer, in place of the one of this name that the file has."""
-    columns = [_column(field, values) for field, values in zip(layer.fields, layer.columns)]
+    columns = [_column(field, values) for field, values in zip(layer.fields, layer.written_columns())]
     try:
         pyogrio.raw.write(
             str(file),
@@ -160,14 +200,11 @@ def _write_layer(layer: Layer, frame: LocalFrame, file: Path) -> None:
 
 def _geometry(layer: Layer, frame: LocalFrame) -> np.ndarray:
     """Geometries in the coordinates of the cloud as well-known binary, (n,)."""
-    make = shapely.points if layer.geometry_type == "Point Z" else shapely.linestrings
-    shapes = [make(frame.to_crs(xyz)) for xyz in layer.xyz]
-    return np.array([shapely.to_wkb(shape, output_dimension=3) for shape in shapes], dtype=object)
+    return np.array([shapely.to_wkb(shape, output_dimension=3) for shape in layer.shapes(frame)], dtype=object)
 
 
-def _column(field: Field, values: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Values of a field as they are written, and where there are none, (n,) each."""
-    written = [field.value(value) for value in values]
+def _column(field: Field, written: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Values of a field, given as they are written, and where there are none, (n,) each."""
     empty = np.array([value is None for value in written], dtype=bool)
     filler = 0 if field.kind is int else None
     return np.array([filler if value is None else value for value in written], dtype=KINDS[field.kind]), empty

@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> None:
     with writing(parent), scratch_folder(parent) as folder:
         result = grow_files(request, seeds, settings, choice, planned, folder, InTurn(), progress)
     if layers is not None:
-        layers.write_layers([layers.stops_layer(stops, result.stops)], request.zero)
+        layers.write_layers([layers.stops_layer(result.stops)], stops, request.zero)
     print_figures(result.figures, result.point_count)
 
 

@@ -8,7 +8,7 @@ Off the corridor the value is what the layer makes of an empty raster.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Callable
 
@@ -92,8 +92,7 @@ class LayeredEngine(ABC):
         empty = np.array([0.0, 0.0 if number else START], dtype=np.float32)[:, None, None]
         outside = self._load(np.repeat(empty * 2 - 1, side**2, axis=0))
         windows = np.array([piece.window for piece in pieces]) // side
-        reaches = {step.reach for step in steps} - {0}
-        near = {reach: [list(overlaps(windows, one, reach)) for one in range(len(windows))] for reach in reaches}
+        near = {reach: overlaps(windows, reach) for reach in {step.reach for step in steps} - {0}}
         for step, share in zip(steps, progress.split(len(steps))):
             held, outside = self._advance(step, held, outside, near.get(step.reach), share)
         return [from_blocks(self._probabilities(logits), side) for logits in held]
@@ -172,30 +171,27 @@ Overlap = tuple[int, tuple[slice, slice], tuple[slice, slice]]
 """Number of a piece; rows and columns of some of its cells within another piece extended by a reach, and within it."""
 
 
-def overlaps(windows: np.ndarray, number: int, reach: int) -> Iterator[Overlap]:
-    """Find the cells of all pieces that are at most `reach` cells away from a piece.
+def overlaps(windows: np.ndarray, reach: int) -> list[list[Overlap]]:
+    """Find, for each piece, the cells of all pieces that are at most `reach` cells away from it, its own among them.
 
     Parameters
     ----------
     windows : (n, 4) int array
         Row, column, height and width of each piece.
-    number : int
-        Of the piece in question.
     reach : int
-
-    Yields
-    ------
-    Overlap
-        For each piece near it, the piece itself among them.
     """
     corners, ends = windows[:, :2], windows[:, :2] + windows[:, 2:]
-    corner, end = corners[number] - reach, ends[number] + reach
-    first, last = np.maximum(corners, corner), np.minimum(ends, end)
-    for other in np.flatnonzero((first < last).all(axis=1)):
-        target = _slices(first[other] - corner, last[other] - corner)
-        yield int(other), target, _slices(first[other] - corners[other], last[other] - corners[other])
+    first = np.maximum(corners, corners[:, None] - reach)
+    last = np.minimum(ends, ends[:, None] + reach)
+    found: list[list[Overlap]] = [[] for _ in windows]
+    pairs = np.argwhere((first < last).all(axis=2))
+    places = np.stack([first, last])[:, pairs[:, 0], pairs[:, 1]]
+    around, within = places - corners[pairs[:, 0]] + reach, places - corners[pairs[:, 1]]
+    columns = (pairs, *around, *within)
+    for (one, other), top, end, other_top, other_end in zip(*(column.tolist() for column in columns)):
+        found[one].append((other, _slices(top, end), _slices(other_top, other_end)))
+    return found
 
 
-def _slices(first: np.ndarray, last: np.ndarray) -> tuple[slice, slice]:
-    (top, left), (bottom, right) = first.tolist(), last.tolist()
-    return slice(top, bottom), slice(left, right)
+def _slices(first: Sequence[int], last: Sequence[int]) -> tuple[slice, slice]:
+    return slice(first[0], last[0]), slice(first[1], last[1])

@@ -36,22 +36,30 @@ class OnHeads:
     def __init__(self, points: Points, settings: GrowSettings) -> None:
         self._points = points
         self._settings = Settings((settings.gauge_m,), settings.head_width_m)
-        self._squares: dict[tuple[int, int], Buckets] = {}
+        self._squares: dict[tuple[int, int], tuple[Buckets, bool]] = {}
 
     def around(self, xy: np.ndarray, reach_m: float) -> np.ndarray:
         """See `Points`."""
-        low, high = (np.floor((xy + step) / self._settings.side_m).astype(int).tolist() for step in (-reach_m, reach_m))
-        keys = [(c, r) for c in range(low[0], high[0] + 1) for r in range(low[1], high[1] + 1)]
-        return np.concatenate([self._square(key).around(xy, reach_m) for key in keys])
+        return np.concatenate([found.around(xy, reach_m) for found, _ in self._near(xy, reach_m)])
 
-    def _square(self, key: tuple[int, int]) -> Buckets:
-        """Return the points on heads of the square in this column and row."""
+    def are_blunt(self, xy: np.ndarray, reach_m: float) -> bool:
+        """Return whether heads are blunt in a square within `reach_m` of a place, (2,)."""
+        return any(blunt for _, blunt in self._near(xy, reach_m))
+
+    def _near(self, xy: np.ndarray, reach_m: float) -> list[tuple[Buckets, bool]]:
+        """Return the squares within `reach_m` of a place, (2,)."""
+        low, high = (np.floor((xy + step) / self._settings.side_m).astype(int).tolist() for step in (-reach_m, reach_m))
+        return [self._square((c, r)) for c in range(low[0], high[0] + 1) for r in range(low[1], high[1] + 1)]
+
+    def _square(self, key: tuple[int, int]) -> tuple[Buckets, bool]:
+        """Return the points on heads of the square in this column and row, and whether the heads are blunt."""
         if key not in self._squares:
             side_m = self._settings.side_m
             corner = np.append(np.multiply(key, side_m), 0.0)
             points = self._points.around(corner[:2] + side_m / 2, side_m / 2 + MARGIN_M) - corner
             points = points[((points[:, :2] >= -MARGIN_M) & (points[:, :2] < side_m + MARGIN_M)).all(axis=1)]
-            self._squares[key] = Buckets(points[classify_square(points, self._settings).rail] + corner)
+            found = classify_square(points, self._settings)
+            self._squares[key] = Buckets(points[found.rail] + corner), found.figures.blunt_m > 0
         return self._squares[key]
 
 

@@ -23,6 +23,10 @@ PATCH_M, PATCH_POINTS = (6.0, 20.0), 500_000
 """Reach of the points around a seed that are classified, within limits, and their number: rails without a partner are
 known from 5 m on, and the blur of a cloud from tens of metres of ridges."""
 
+SQUARES_PER_M2 = 500.0
+"""Points per square metre below which the squares around a seed are classified instead, a million points each: where
+the rail is followed on what the classification finds, they are needed anyway."""
+
 REACH_POINTS_PER_M, REACH_M = 120.0, (1.0, 2.0)
 """Reach of the line through a seed: this divided by the points per square metre, within limits; as in `classify`."""
 
@@ -106,21 +110,25 @@ def find_start(points: Points, seed: np.ndarray, settings: GrowSettings, heads: 
     if not len(near):
         return None
     per_m2 = _density(near, seed)
-    patch = points.around(seed, float(np.clip(np.sqrt(PATCH_POINTS / per_m2) / 2, *PATCH_M)))
+    patch_m = float(np.clip(np.sqrt(PATCH_POINTS / per_m2) / 2, *PATCH_M))
     beam = THIN if per_m2 < THIN_PER_M2 else DENSE
     reach_m = float(np.clip(REACH_POINTS_PER_M / per_m2, *REACH_M))
-    rail, is_blunt = _classified(patch, seed, settings)
+    heads = heads or OnHeads(points, settings)
+    if per_m2 < SQUARES_PER_M2:
+        rail, is_blunt = _near(heads, seed, settings), heads.are_blunt(seed, REACH_M[1])
+    else:
+        rail, is_blunt = _classified(points.around(seed, patch_m), seed, settings)
     if is_blunt or beam is THIN:
-        heads = heads or OnHeads(points, settings)
         near_heads = _near(heads, seed, settings)
         found = (BLUNT if is_blunt else THIN).on_heads()
         start = _found(heads, near_heads, near_heads, seed, reach_m, found, settings)
         if start is not None or is_blunt:
             return start
-    sure = _found(points, near, patch[rail], seed, reach_m, beam, settings)
+    sure = _found(points, near, rail, seed, reach_m, beam, settings)
     if sure is not None:
         return sure
-    start = _found(points, near, _standing(patch, settings), seed, reach_m, beam, settings)
+    standing = _standing(points.around(seed, patch_m), settings)
+    start = _found(points, near, standing, seed, reach_m, beam, settings)
     return start if start is not None and start.free >= MIN_COVER else None
 
 
@@ -132,11 +140,11 @@ def _near(points: Points, seed: np.ndarray, settings: GrowSettings) -> np.ndarra
 
 
 def _classified(patch: np.ndarray, seed: np.ndarray, settings: GrowSettings) -> tuple[np.ndarray, bool]:
-    """Return which points, (n, 3), lie on rails by the classification, (n,) bool, and whether the heads are blunt."""
+    """Return the points of a patch, (k, 3), that the classification finds on rails, and whether heads are blunt."""
     own = Settings((settings.gauge_m,), settings.head_width_m)
     corner = np.append(seed - own.side_m / 2, 0.0)
     found = classify_square(patch - corner, own)
-    return found.rail, found.figures.blunt_m > 0
+    return patch[found.rail], found.figures.blunt_m > 0
 
 
 def _standing(patch: np.ndarray, settings: GrowSettings) -> np.ndarray:

@@ -7,6 +7,9 @@ from math import sqrt
 
 import numpy as np
 
+MANY_COVERED = 0.05
+"""Share of the discs that a round has to leave out, so that another one is faster than looking at each."""
+
 
 @dataclass(frozen=True)
 class Boundary:
@@ -69,12 +72,13 @@ def extremal_boundary(x: np.ndarray, y: np.ndarray, radius: float) -> Boundary:
         In units of x and y.
     """
     order = np.lexsort((-y, x))
+    x, y = x[order], y[order]
+    highest = np.diff(x, prepend=-np.inf) > 0
+    x, y = _outer(x[highest], y[highest], radius)
     stack_x: list[float] = []
     stack_y: list[float] = []
     starts: list[float] = []
-    for x_new, y_new in zip(x[order].tolist(), y[order].tolist()):
-        if stack_x and x_new == stack_x[-1]:
-            continue
+    for x_new, y_new in zip(x.tolist(), y.tolist()):
         start = x_new - radius
         while stack_x:
             start = _handover(stack_x[-1], stack_y[-1], x_new, y_new, radius)
@@ -87,6 +91,25 @@ def extremal_boundary(x: np.ndarray, y: np.ndarray, radius: float) -> Boundary:
         stack_y.append(y_new)
         starts.append(start)
     return Boundary(np.array(stack_x), np.array(stack_y), np.array(starts), radius)
+
+
+def _outer(x: np.ndarray, y: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Leave out discs that their two neighbours cover, while that leaves out many; `x` is increasing.
+
+    All at once is right: the highest disc at a place is not covered, so it stays.
+    """
+    left_out = len(x)
+    while left_out > MANY_COVERED * len(x) and len(x) > 2:
+        dx, dy = np.diff(x), np.diff(y)
+        squared = dx * dx + dy * dy
+        with np.errstate(invalid="ignore"):
+            start = 0.5 * (x[:-1] + x[1:]) - dy * np.sqrt(radius * radius / squared - 0.25)
+        meet = (dx < 2 * radius) & (squared < 2 * radius * dx)
+        kept = np.ones(len(x), dtype=bool)
+        kept[1:-1] = ~(meet[:-1] & meet[1:] & (start[1:] <= start[:-1]))
+        left_out = len(x) - int(kept.sum())
+        x, y = x[kept], y[kept]
+    return x, y
 
 
 def _handover(x_left: float, y_left: float, x_right: float, y_right: float, radius: float) -> float:

@@ -81,9 +81,30 @@ def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
     """
     number = np.floor((t - t[0]) / LEVEL_BIN_M).astype(int)
     first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
-    middle = first + np.diff(np.append(first, len(t))) // 2
-    middle_t, middle_z = t[middle], z[np.lexsort((z, number))][middle]
-    return np.interp(t, middle_t, _median_filtered(middle_t, middle_z))
+    count = np.diff(np.append(first, len(t)))
+    middle_t = t[first + count // 2]
+    return np.interp(t, middle_t, _median_filtered(middle_t, medians(z, first, count)))
+
+
+def medians(values: np.ndarray, first: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """Return the median of each group of successive values, (k,); of an even number, the upper one of the middle two.
+
+    Sorting short rows is several times as fast as sorting all values by their group.
+
+    Parameters
+    ----------
+    values : (n,) array
+    first, count : (k,) int arrays
+        First value and number of values of each group, at least one; the groups follow each other without gaps.
+    """
+    found = np.empty(len(count))
+    order = np.argsort(count, kind="stable")
+    for groups in np.split(order, np.flatnonzero(np.diff(np.log2(count[order]).astype(int))) + 1):
+        filled = np.full((len(groups), count[groups[-1]]), np.inf)
+        own = np.arange(filled.shape[1]) < count[groups, None]
+        filled[own] = values[(first[groups, None] + np.arange(filled.shape[1]))[own]]
+        found[groups] = np.sort(filled, axis=1)[np.arange(len(groups)), count[groups] // 2]
+    return found
 
 
 def _median_filtered(t: np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_opening, median_filter
 
-from .level import LEVEL_BIN_M, MIN_ON_HEAD, is_blended, robust_sigma
+from .level import LEVEL_BIN_M, MIN_ON_HEAD, is_blended, medians, robust_sigma
 
 WINDOW_M = 0.02
 """Height in which the points on top of a head are: noise of 5 mm, and 100 mm of cant."""
@@ -119,11 +119,10 @@ def on_own_level(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m:
 def _gradient(t: np.ndarray, z: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Sum up the gradient of points, (n,), and return it at chainages `at`: steps do not count."""
     number = (t / LEVEL_BIN_M).astype(int)
-    bins, first, number, count = np.unique(number, return_index=True, return_inverse=True, return_counts=True)
+    bins, first, count = np.unique(number, return_index=True, return_counts=True)
     if len(bins) < 2:
         return np.zeros(len(at))
-    middle = first + count // 2
-    place, height = t[middle], z[np.lexsort((z, number))][middle]
+    place, height = t[first + count // 2], medians(z, first, count)
     slope = median_filter(np.diff(height) / np.diff(bins), SLOPE_BINS, mode="reflect") / LEVEL_BIN_M
     place = np.concatenate([[place[0] - 1.0], place, [place[-1] + 1.0]])
     slope = np.concatenate([slope[:1], slope, slope[-1:]])
@@ -174,16 +173,16 @@ def _sagitta(bins: np.ndarray, known: np.ndarray) -> np.ndarray:
 def _pieces(levels: _Levels, step_m: float) -> list[np.ndarray]:
     """Link levels of successive bins that do not step: bins and heights, (k, 2), of each piece."""
     pieces: list[list[tuple[int, float]]] = []
-    open_pieces: list[int] = []
+    ends: dict[int, tuple[int, float]] = {}
     for here, up in zip(levels.bin.tolist(), levels.height.tolist()):
-        open_pieces = [one for one in open_pieces if here - pieces[one][-1][0] <= SKIPPED_BINS]
-        steps = [(abs(_last(pieces[one]) - up), one) for one in open_pieces if pieces[one][-1][0] < here]
+        ends = {one: end for one, end in ends.items() if here - end[0] <= SKIPPED_BINS}
+        steps = [(abs(height - up), one) for one, (last, height) in ends.items() if last < here]
         step, nearest = min(steps, default=(np.inf, -1))
-        if step <= step_m:
-            pieces[nearest].append((here, up))
-        else:
-            open_pieces.append(len(pieces))
-            pieces.append([(here, up)])
+        if step > step_m:
+            nearest = len(pieces)
+            pieces.append([])
+        pieces[nearest].append((here, up))
+        ends[nearest] = here, _last(pieces[nearest])
     return [np.array(piece) for piece in pieces if len(piece) >= MIN_BINS]
 
 

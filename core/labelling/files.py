@@ -12,7 +12,7 @@ import numpy as np
 from ..classify.settings import Settings
 from ..clouds.points import Request
 from ..clouds.readers import CATALOGUES, READERS, list_files
-from ..clouds.rewriting import check_class, rewrite
+from ..clouds.rewriting import Places, check_class, rewrite
 from ..clouds.vpc import CatalogueTile, catalogue_text
 from ..disk import NEW, Destination, alone_in, identity, replace_folder, writing
 from ..errors import DiskError, ParameterError, RailExtractError
@@ -271,13 +271,13 @@ class _Writer:
         """Write one file; returns how many points it has."""
         numbers, done = self._labels.of(place), 0
 
-        def change(xyz: np.ndarray, codes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        def change(codes: np.ndarray, places: Places) -> tuple[np.ndarray, np.ndarray]:
             nonlocal done
             rail = np.zeros(len(codes), dtype=bool)
             first, last = np.searchsorted(numbers, (done, done + len(codes)))
             rail[numbers[first:last] - done] = True
             done += len(codes)
-            return self._classes(xyz, codes, rail), rail | (not self._choice.only_rails)
+            return self._classes(codes, places, rail), rail | (not self._choice.only_rails)
 
         return rewrite(self._request.headers[place].path, new, change, progress)
 
@@ -306,11 +306,12 @@ class _Writer:
                 catalogue.write_text(catalogue_text(tiles, self._request.zero.crs_wkt), encoding="utf-8")
                 _move_tiles(output, scratch)
 
-    def _classes(self, xyz: np.ndarray, codes: np.ndarray, rail: np.ndarray) -> np.ndarray:
+    def _classes(self, codes: np.ndarray, places: Places, rail: np.ndarray) -> np.ndarray:
         """Return the new classes of points, (n,)."""
         choice, changed = self._choice, codes.copy()
         if choice.reset:
-            changed[(codes == choice.class_code) & self._request.holds(xyz)] = UNCLASSIFIED
+            were = np.flatnonzero(codes == choice.class_code)
+            changed[were[self._request.holds(places(were))]] = UNCLASSIFIED
         changed[rail] = choice.class_code
         return changed
 

@@ -268,7 +268,7 @@ def _append(
     with writing(folder.parent):
         for key, numbers in points_by_square(places, side_m, MARGIN_M).items():
             with _file(folder, key).open("ab") as file:
-                file.write(points[numbers].tobytes())
+                file.write(points[numbers].data)
 
 
 def _search_task(key: Key, sorted_files: Sequence[SortedFile], zero: LocalFrame, settings: Settings) -> Task:
@@ -292,7 +292,7 @@ def search_square(xyz: np.ndarray, settings: Settings, context: Context) -> Clas
     """Find the points on railheads in a square by the method of the settings; see `classify_square`."""
     if settings.weights is None:
         return classify_square(xyz, settings)
-    classifier = context.once(Classifier.of, settings.weights)
+    classifier = context.network(Classifier.of, settings.weights)
     return label_square(xyz, settings, classifier, context.progress)
 
 

@@ -18,6 +18,7 @@ RATIO = 4
 """Points of a layer for each one of the next layer."""
 
 LAYERS = 4
+"""Levels of the pyramid, each coarser than the one below it."""
 
 
 @dataclass(frozen=True)

@@ -72,20 +72,6 @@ class LineNetwork:
         """
         return bool(self._passing(number, first, last).any())
 
-    def with_piece(self, number: int, first: int, last: int, vertices: np.ndarray) -> LineNetwork:
-        """Redraw a line between two of its vertices; passes between them are dropped, all others stay in place.
-
-        Parameters
-        ----------
-        number : int
-            Line to edit.
-        first, last : int
-            Vertices on either side of the new ones; both stay.
-        vertices : (n, 2) array
-            New vertices in the direction of the line.
-        """
-        return self._spliced(number, first + 1, last, vertices)
-
     def with_end(self, end: int, vertices: np.ndarray, replaced: int, at: tuple[int, int] | None = None) -> LineNetwork:
         """Give a line a new end with a node of its own; passes at replaced vertices are dropped, others stay in place.
 

@@ -156,5 +156,11 @@ def _shifted(moments: np.ndarray, powers: Sequence[np.ndarray], decay: np.ndarra
     """
     shifted = np.empty_like(moments)
     for order in range(len(moments)):
-        shifted[order] = sum(comb(order, lower) * powers[order - lower] * moments[lower] for lower in range(order + 1))
-    return shifted * decay
+        total = shifted[order]
+        np.multiply(powers[order], moments[0], out=total)
+        for lower in range(1, order):
+            total += comb(order, lower) * powers[order - lower] * moments[lower]
+        if order:
+            total += moments[order]
+    shifted *= decay
+    return shifted

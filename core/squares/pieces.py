@@ -23,6 +23,7 @@ MIN_MATCH_M = 1.0
 """Lines that are close together over a shorter length only cross or diverge."""
 
 HOLE_STATIONS = 3
+"""Near a corner of squares, two of them may show a rail this far apart before a third notices, stations."""
 HOLE_M = HOLE_STATIONS * CUT_STEP_M
 """Longest hole that can remain near a corner between the parts of a rail that two squares show; a longer one is filled
 by a third square."""

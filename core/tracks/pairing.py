@@ -59,6 +59,7 @@ MAX_LOST_SHARE = 0.5
 """Share of a match that may be lost to better partners on the other side of its rails; see `_without_rivals`."""
 
 LEFT, RIGHT = 1, -1
+"""Sides of a rail."""
 
 
 @dataclass(frozen=True)

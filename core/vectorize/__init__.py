@@ -16,7 +16,6 @@ from .attaching import attach_branches
 from .branches import free_third_rails, resolve_branches
 from .closing import close
 from .crossings import resolve_crossings
-from .guards import drop_guards
 from .joining import join_gaps
 from .junctions import clean_junctions, run_through, weld_pairs
 from .pixels import chamfer_distance, parity_fix, pixel_set
@@ -40,7 +39,6 @@ def vectorize(
     gap_angle_deg: float = Parameters.gap_angle_deg,
     min_length_m: float = Parameters.min_length_m,
     progress: Progress = SILENT,
-    raw: RailRaster | None = None,
 ) -> LineNetwork:
     """Turn rail cells into lines: one per rail, straight through junctions and across gaps (docs/method.md section 4).
 
@@ -55,9 +53,6 @@ def vectorize(
     min_length_m : float
         Shorter lines are dropped unless they connect two junctions.
     progress : Progress
-    raw : RailRaster, optional
-        Cells of all points, including those that the cleaning dropped because they are few. Only length without any
-        point counts towards `max_gap_m`.
 
     Returns
     -------
@@ -79,15 +74,14 @@ def vectorize(
     progress.set_fraction(0.6)
     progress.check()
     places, widths_m = closed.to_local(pixels.cells / 2), raster.cell_m * distance / 2
-    seen = cKDTree(places if raw is None else np.concatenate([places, raw.to_local(raw.cells())]))
+    seen = cKDTree(places)
     network, slips = open_slips(clean_junctions(traced, head_width_m), seen)
     network = straighten_blots(network, places, widths_m, head_width_m, progress.span(0.6, 0.8))
     network = cut_kinks(network, progress.span(0.8, 0.85))
-    network = join_gaps(network, max_gap_m, gap_angle_deg, seen, at_nodes=False, progress=progress)
     network = resolve_branches(free_third_rails(add_curves(resolve_crossings(network), slips)))
     network = join_gaps(run_through(network), max_gap_m, gap_angle_deg, seen, progress=progress)
     network = attach_branches(network, seen, max_gap_m, progress.span(0.9, 1.0))
-    network = choose_routes(_drop_short(drop_guards(network), min_length_m))
+    network = choose_routes(_drop_short(network, min_length_m))
     return _settle_ends(network)
 
 

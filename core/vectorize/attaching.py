@@ -9,13 +9,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..lines.bridges import FIT_M, MISFIT_M, Bridge, bridge, curvature
-from ..lines.ends import STEP_M, even_points, tip_and_direction
+from ..lines.ends import even_points, tip_and_direction
 from ..lines.network import LineNetwork
 from ..lines.parting import ARC, PartingLaw
 from ..polyline import length_along
 from ..progress import SILENT, Progress
 from .branches import MAX_BACK_M, STEADY_M, max_curvature
-from .crossings import SKIP_M
 from .joining import unseen_m
 from .junctions import DIRECTION_M
 
@@ -27,10 +26,6 @@ MIN_AHEAD_M = 4.0
 
 MIN_POINTS = 10
 """Fewer even points, on a metre of line, have no measurable curvature."""
-
-PULLED_M = 0.03
-"""A stock rail's line this far from the curve through both its sides is the mean of both rails; half a cell of this may
-be stairs."""
 
 
 @dataclass(frozen=True)
@@ -120,34 +115,6 @@ def _touching(from_end: np.ndarray, number: int, line: np.ndarray) -> Iterator[_
 
 
 def _attached(network: LineNetwork, end: int, touch: _Touch) -> LineNetwork:
-    """Extend one end to where it touches its stock rail, whose own line is straightened there."""
-    network, vertex = _straightened(network, touch, network.from_end(end)[0])
+    """Extend one end to where it touches its stock rail."""
     network = network.cut_back({end: touch.curve.cuts_m[0]})
-    return network.with_end(end, touch.curve.points[::-1], 0, at=(touch.stock, vertex))
-
-
-def _straightened(network: LineNetwork, touch: _Touch, tip: np.ndarray) -> tuple[LineNetwork, int]:
-    """Redraw a stock rail that is pulled aside, from where the branch touches it to where both are seen apart.
-
-    Returns the network and the new number of the vertex in which the branch touches.
-    """
-    line, vertex = network.lines[touch.stock], touch.vertex
-    abeam = int(np.hypot(*(line - tip).T).argmin())
-    sense = 1 if abeam > vertex else -1
-    before, onward = line[vertex::-sense], line[vertex::sense]
-    t = length_along(onward)
-    far = int(np.searchsorted(t, t[abs(abeam - vertex)] + SKIP_M))
-    if far == len(onward) or min(length_along(before)[-1], t[-1] - t[far]) < DIRECTION_M:
-        return network, vertex
-    curve = bridge(before, onward[far:])
-    if curve is None or curve.cuts_m[0] > STEP_M or not len(curve.points):
-        return network, vertex
-    far += int(np.searchsorted(t[far:] - t[far], curve.cuts_m[1]))
-    if far >= len(onward) or cKDTree(curve.points).query(onward[1:far])[0].max(initial=0) < PULLED_M:
-        return network, vertex
-    first, last = sorted([vertex, vertex + sense * far])
-    if network.meets(touch.stock, first + 1, last):
-        return network, vertex
-    redrawn = network.with_piece(touch.stock, first, last, curve.points[::sense])
-    moved = vertex if sense > 0 else vertex + len(redrawn.lines[touch.stock]) - len(line)
-    return redrawn, moved
+    return network.with_end(end, touch.curve.points[::-1], 0, at=(touch.stock, touch.vertex))

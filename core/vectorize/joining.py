@@ -27,7 +27,7 @@ MIN_PIECE_M = 0.25
 """Shorter pieces have no direction and are not joined."""
 
 UNSEEN_M = 0.10
-"""A place this far from all cells has no points of its rail, nor of a rail that is merged with it."""
+"""A place this far from all cells shows neither its rail nor one that is merged with it."""
 
 
 def join_gaps(
@@ -35,12 +35,12 @@ def join_gaps(
     max_gap_m: float,
     gap_angle_deg: float,
     seen: cKDTree | None = None,
-    at_nodes: bool = True,
     progress: Progress = SILENT,
 ) -> LineNetwork:
     """Join ends that face each other across a gap.
 
-    At least one of the two ends is free. Joining goes in rounds: each joins the pairs of ends that are each other's
+    At least one of the two ends is free; the other may be in a node, as at a frog that was mistaken for a branching.
+    Joining goes in rounds: each joins the pairs of ends that are each other's
     cheapest partner, because the direction of a joined line is known better.
 
     Parameters
@@ -50,14 +50,12 @@ def join_gaps(
         Ends at most this far apart are joined if each points at the other within this angle.
     seen : cKDTree, optional
         Places of rail cells. Ends up to `MAX_MERGED_M` apart are joined too if at most `max_gap_m` of the curve is away
-        from all cells: where rails merge or points are few, lines end without a gap.
-    at_nodes : bool
-        Whether one of the ends may be in a node, as at a frog that was mistaken for a branching.
+        from all cells: where rails merge, lines end without a gap.
     progress : Progress
         Only asked for a cancel, because the number of rounds is unknown.
     """
     while True:
-        joins = _possible_joins(network, max_gap_m, gap_angle_deg, seen, at_nodes, progress)
+        joins = _possible_joins(network, max_gap_m, gap_angle_deg, seen, progress)
         best: dict[int, tuple[int, int]] = {}
         for ends in sorted(joins, key=lambda ends: (joins[ends].cost, ends), reverse=True):
             best[ends[0]] = best[ends[1]] = ends
@@ -76,12 +74,11 @@ def _possible_joins(
     max_gap_m: float,
     gap_angle_deg: float,
     seen: cKDTree | None,
-    at_nodes: bool,
     progress: Progress,
 ) -> dict[tuple[int, int], Bridge]:
     """Find every pair of ends that could be joined."""
     degrees = network.degrees()[network.ends.ravel()]
-    ends = np.flatnonzero(degrees != 2) if at_nodes else np.flatnonzero(degrees == 1)
+    ends = np.flatnonzero(degrees != 2)
     ends = ends[network.lengths()[ends // 2] >= MIN_PIECE_M]
     if len(ends) < 2:
         return {}

@@ -1,4 +1,4 @@
-"""Repair what the raster does to junctions: drop spurs, merge clusters into one node, straighten rails through nodes.
+"""Repair what the raster does to junctions: drop spurs, bubbles and rungs, straighten rails through nodes.
 
 See docs/method.md section 4.6.
 """
@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..lines.ends import even_points, tip_and_direction
@@ -40,9 +38,8 @@ DIRECTION_M = 2.5
 
 
 def clean_junctions(network: LineNetwork, head_width_m: float) -> LineNetwork:
-    """Drop spurs, small loops and rungs between rails, contract short links, and join lines at nodes of degree 2."""
-    network = contract_links(weld_pairs(network), head_width_m)
-    network = weld_pairs(drop_bubbles(network, RUNG_HEADS * head_width_m))
+    """Drop spurs, small loops and rungs between rails, and join lines at nodes of degree 2."""
+    network = weld_pairs(drop_bubbles(weld_pairs(network), RUNG_HEADS * head_width_m))
     network = weld_pairs(drop_rungs(network, RUNG_HEADS * head_width_m))
     return drop_spurs(network, SPUR_M)
 
@@ -79,24 +76,6 @@ def drop_spurs(network: LineNetwork, length_m: float) -> LineNetwork:
         keep = np.ones(len(network.lines), dtype=bool)
         keep[rows[first]] = False
         network = weld_pairs(network.select(keep))
-
-
-def contract_links(network: LineNetwork, length_m: float) -> LineNetwork:
-    """Merge junctions that a line shorter than `length_m` connects into one node, at their mean."""
-    short = (network.degrees()[network.ends] > 2).all(axis=1) & (network.lengths() < length_m)
-    if not short.any():
-        return network
-    count = len(network.nodes)
-    links = coo_matrix((np.ones(np.count_nonzero(short)), network.ends[short].T), shape=(count, count))
-    clusters, cluster = connected_components(links, directed=False)
-    members = np.bincount(cluster, minlength=clusters)
-    nodes = np.column_stack([np.bincount(cluster, axis, minlength=clusters) / members for axis in network.nodes.T])
-    ends = cluster[network.ends]
-    lines = tuple(
-        np.concatenate([nodes[start : start + 1], line[1:-1], nodes[end : end + 1]])
-        for line, (start, end) in zip(network.lines, ends)
-    )
-    return LineNetwork(lines, nodes, ends).select(~short)
 
 
 def drop_bubbles(network: LineNetwork, apart_m: float) -> LineNetwork:

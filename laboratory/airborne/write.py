@@ -10,24 +10,37 @@ import numpy as np
 
 from ...core.clouds.crs import parse_crs
 from ...core.clouds.las import laspy
+from ...core.frame import LocalFrame
 from ..scenes.write import MADE, SCALE_M
 from .flight import AirborneCloud
 
 CRS, ORIGIN = "EPSG:25832", np.array([500_400.0, 5_500_400.0, 0.0])
 """Coordinate system of the files, and where the zero of a design lies in it."""
 
+FRAME = LocalFrame(ORIGIN, crs_wkt=CRS)
+
 GROUND = 2
 """Class of the points."""
 
 
-def write_airborne(cloud: AirborneCloud, path: Path, class_code: int = GROUND) -> None:
-    """Write a cloud as LAS 1.4, compressed if the name ends in .laz, with a source id for each strip."""
+def write_airborne(cloud: AirborneCloud, path: Path, class_code: int = GROUND, frame: LocalFrame = FRAME) -> None:
+    """Write a cloud as LAS 1.4, compressed if the name ends in .laz, with a source id for each strip.
+
+    Parameters
+    ----------
+    cloud : AirborneCloud
+    path : Path
+    class_code : int
+        Of all points.
+    frame : LocalFrame
+        Where the zero of the cloud lies, with the coordinate system.
+    """
     header = laspy.LasHeader(version="1.4", point_format=6)
-    header.scales, header.offsets = np.full(3, SCALE_M), ORIGIN
+    header.scales, header.offsets = np.full(3, SCALE_M), frame.origin
     header.creation_date, header.generating_software = MADE, "Rail Extract scenes"
-    header.add_crs(parse_crs(CRS))
+    header.add_crs(parse_crs(str(frame.crs_wkt)))
     points = laspy.LasData(header)
-    points.x, points.y, points.z = (cloud.xyz + ORIGIN).T
+    points.x, points.y, points.z = frame.to_crs(cloud.xyz).T
     points.classification = np.full(len(cloud.xyz), class_code, np.uint8)
     points.point_source_id = cloud.strip + 1
     points.write(path)

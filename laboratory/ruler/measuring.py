@@ -90,7 +90,7 @@ def measure(scene: Scene, model: str = Parameters.model) -> Result:
         [network.frame.to_local(scene.frame.to_crs(line)) for line in lines]
         for lines in (scene.rails, scene.centerlines)
     )
-    sigma_m = _local_sigma(network.rails, rails)
+    sigma_m = local_sigma(network.rails, rails)
     start = time.perf_counter()
     script = match(script_lines(scene.rail_points(), standard.gauge_m, standard.head_width_m), scene.rails)
     return Result(
@@ -117,7 +117,7 @@ def _through_a_file(scene: Scene) -> tuple[RailPoints, ...]:
         return read_rail_points([path], [RAIL])
 
 
-def _local_sigma(rails: Sequence[RailLine], found: Match) -> np.ndarray:
+def local_sigma(rails: Sequence[RailLine], found: Match) -> np.ndarray:
     """Interpolate the standard error of our rails at each place that was compared, (n,) metres."""
     sigma_m = np.empty(len(found.line))
     for number, rail in enumerate(rails):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -310,14 +311,14 @@ def grooved(seed: int = 42, road_m: float = 0.07, noise_m: float = 0.004) -> Sce
     return with_points(scene, [strip(rng, track, side * outside_m, 0.0, road_m, 250, noise_m) for side in (1, -1)])
 
 
-ADVERSARIAL: dict[str, Callable[[], Scene]] = {
-    "trough": lambda: beside("trough", 1, [lids], 80.0),
-    "ballast": lambda: beside("ballast", 2, [ballast]),
-    "platform": lambda: beside("platform", 3, [along(-1.65, 0.55, 0.08)]),
-    "fence": lambda: beside("fence", 4, [along(3.0, 1.2, 0.05)]),
-    "contact_wire": lambda: beside("contact_wire", 5, [contact_wire]),
-    "conductor": lambda: beside("conductor", 6, [along(1.16, 0.08, 0.07)]),
-    "rack": lambda: beside("rack", 7, [rack]),
+ADVERSARIAL: dict[str, Callable[..., Scene]] = {
+    "trough": partial(beside, "trough", seed=1, extras=[lids], length_m=80.0),
+    "ballast": partial(beside, "ballast", seed=2, extras=[ballast]),
+    "platform": partial(beside, "platform", seed=3, extras=[along(-1.65, 0.55, 0.08)]),
+    "fence": partial(beside, "fence", seed=4, extras=[along(3.0, 1.2, 0.05)]),
+    "contact_wire": partial(beside, "contact_wire", seed=5, extras=[contact_wire]),
+    "conductor": partial(beside, "conductor", seed=6, extras=[along(1.16, 0.08, 0.07)]),
+    "rack": partial(beside, "rack", seed=7, extras=[rack]),
     "widened": widened,
     "narrow_heads": narrow_heads,
     "hole": hole,
@@ -330,15 +331,16 @@ ADVERSARIAL: dict[str, Callable[[], Scene]] = {
     "unmarked_passes": strips.unmarked,
     "double_slip": switches.double_slip,
     "three_way": switches.three_way,
-    "unmarked_meet": lambda: strips.meeting(with_ids=False),
-    "side_17": lambda: from_the_side("side_17", 36, 17.0),
-    "side_30": lambda: from_the_side("side_30", 37, 30.0, face_share=0.5),
-    "side_45": lambda: from_the_side("side_45", 38, 45.0),
-    "one_face": lambda: from_the_side("one_face", 44, 20.0, noise_m=0.004, top_share=0.0),
+    "three_way_apart": partial(switches.three_way, apart_m=1.5, name="three_way_apart"),
+    "unmarked_meet": partial(strips.meeting, with_ids=False),
+    "side_17": partial(from_the_side, "side_17", seed=36, angle_deg=17.0),
+    "side_30": partial(from_the_side, "side_30", seed=37, angle_deg=30.0, face_share=0.5),
+    "side_45": partial(from_the_side, "side_45", seed=38, angle_deg=45.0),
+    "one_face": partial(from_the_side, "one_face", seed=44, angle_deg=20.0, noise_m=0.004, top_share=0.0),
     "all_faces": all_faces,
     "crossing": crossing,
     "standing_train": standing_train,
-    "hidden_heads": lambda: standing_train("hidden_heads", 43, head_share=0.0),
+    "hidden_heads": partial(standing_train, "hidden_heads", seed=43, head_share=0.0),
     "grooved": grooved,
 }
-"""By name; every scene is seeded."""
+"""By name; every scene is seeded, and another `seed` changes the noise."""

@@ -104,13 +104,13 @@ def double_slip(seed: int = 23, number: float = 9.0, radius_m: float = 190.0, he
     return _build("double_slip", [*tracks, *slips], rng, gaps=0)
 
 
-def three_way(seed: int = 24, apart_m: float = 0.0, heading: float = -0.5) -> Scene:
+def three_way(seed: int = 24, apart_m: float = 0.0, heading: float = -0.5, name: str = "three_way") -> Scene:
     """Build a straight track that two branches 190-1:9 leave, one to either side, the second one `apart_m` later."""
     rng = np.random.RandomState(seed)
     form = next(candidate for candidate in FORMS if candidate.name == "190-1:9")
     main = trace([Element(2 * FREE_M + form.arc_m + apart_m)], heading=heading)
     sides = [branch(main, FREE_M + back_m, form, hand, FREE_M) for hand, back_m in ((1, 0.0), (-1, apart_m))]
-    return _build("three_way", [main, *sides], rng, gaps=0)
+    return _build(name, [main, *sides], rng, gaps=0)
 
 
 def _turned_back(ladder: Curve, arc_m: float, end_m: float, curvature: float, main: Curve) -> Curve:

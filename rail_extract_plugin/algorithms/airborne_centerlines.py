@@ -53,19 +53,14 @@ class AirborneCenterlines(RailAlgorithm):
     SUMMARY = "Fits the centerlines of tracks in airborne lidar, along lines that say which tracks are meant."
     PICTURE = "gauge.svg"
     GUIDE = "airborne"
+    PAGES = ("airborne", "parameters")
     HELP = (
-        "For the clouds of national surveys, with 5 to 100 points per square metre, which show no single railheads. "
-        "Choose the cloud and a guide: a line for each track of the railway, up to 3 m off, such as railway=rail of "
-        "OpenStreetMap. The guide decides which track is meant, the points where it lies. Give every track of a line "
-        "its guide: they are fitted together, and one alone may be taken for its neighbour.\n\n"
-        "A line is drawn where the track is seen; it ends where it is not seen for more than 30 m. Each station states "
-        "whether the track is seen there and, if not, why: under trains and bridges, on crossings, on slab track, "
-        "or where the guide fits two tracks. sigma_mm is the standard error of the fit; it leaves out the error of the "
-        "flight against its datum, often 3 to 10 cm.\n\n"
-        "Without a guide, the whole cloud is searched, which takes minutes per square kilometre, and only PROPOSED is "
-        "written: correct it in the map and run again with it as GUIDE.\n\n"
-        "The height is that of the bed between the rails plus RAIL_HEIGHT. For clouds of mobile lidar use Extract "
-        "Rails, which finds each railhead."
+        "For the clouds of national surveys, with 5 to 100 points per square metre, which show no single railheads; "
+        "for mobile lidar, use Extract Rails.\n\n"
+        "A line ends where the track is not seen for more than 30 m; the stations state why. The standard error "
+        "leaves out that of the flight against its datum, often 3 to 10 cm.\n\n"
+        "Without a guide, the whole cloud is searched, in minutes per square kilometre. Correct the guides that are "
+        "proposed, and run again with them."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
@@ -78,9 +73,9 @@ class AirborneCenterlines(RailAlgorithm):
             *groups.area(),
             groups.workers(),
             outputs.airborne_centerlines(),
-            outputs.airborne_stations(),
-            outputs.findings(),
-            outputs.proposed_guides(),
+            outputs.further(outputs.airborne_stations()),
+            outputs.further(outputs.findings()),
+            outputs.further(outputs.proposed_guides()),
         ):
             self.addParameter(definition)
         self._add_report(outputs.report())

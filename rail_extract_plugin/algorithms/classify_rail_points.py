@@ -47,15 +47,14 @@ class ClassifyRailPoints(RailAlgorithm):
     NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
     SUMMARY = "Finds the points on railheads in a lidar cloud that nobody has classified, and writes a classified copy."
     HELP = (
-        "Choose the point cloud and the rail standard, then run. Rails are found by their shape: no classes of the "
-        "ground, no trajectory and no training are needed. A classifier that you have trained can be used instead. "
-        "Classes of low and high noise (7 and 18) and withheld points are left out of the search.\n\n"
+        "Rails are found by their shape: no classes of the ground, no trajectory and no training are needed. A "
+        "classifier that you have trained can be used instead. Noise and withheld points are left "
+        "out of the search.\n\n"
         "The copy has the same points in the same order with the same attributes; only classes differ. Where the "
         "input is a folder or a virtual point cloud, a folder of the same tiles is written, with a virtual point "
         "cloud (.vpc) of the same name next to it.\n\n"
         "The log states how many metres of rail were found with and without a partner. Below 10 cells with points "
-        "per metre of rail, lines are less accurate and may have gaps. The page about the classification "
-        "describes the method and its limits; it was tested on simulated clouds only."
+        "per metre of rail, lines are less accurate and may have gaps. The method was tested on simulated clouds only."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:

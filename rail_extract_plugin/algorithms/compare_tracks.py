@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from qgis.core import QgsProcessingContext, QgsProcessingFeatureSource
 
 from ...core.errors import ParameterError
-from ...core.fields import DIFFERENCE_FIELDS
 from ...core.progress import Progress
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
@@ -63,14 +62,14 @@ class CompareTracks(RailAlgorithm):
     )
     PICTURE = "comparison.svg"
     GUIDE = "comparison"
+    PAGES = ("comparison", "reference")
     HELP = "\n\n".join(
         (
             "The reference is the earlier survey, the design, or a control measurement. Its lines are rails or "
             "centerlines; the same kind of lines is compared with it. Between rails, gauge and cant are compared as "
             "well; for centerlines, give the rails of both surveys.",
-            "\n".join(f"{field.name}: {field.meaning}." for field in DIFFERENCE_FIELDS),
-            "Standard errors come from the fields sigma_mm and sigmaz_mm of the lines, else from the two fields below. "
-            "Where neither states one, the scatter of the differences stands for it, and the run says so.",
+            "Standard errors come from the fields sigma_mm and sigmaz_mm of the lines, else from the advanced "
+            "parameters. Where neither states one, the scatter of the differences stands for it, and the run says so.",
             "A constant shift between the surveys, as from two positions of a base station, is estimated so that it "
             "is the same for most of the length, and stated apart.",
         )

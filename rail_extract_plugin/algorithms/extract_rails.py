@@ -15,7 +15,6 @@ from ...core.progress import Estimating, Progress
 from ...core.standards import DEFAULT, SEARCHED_CLASSES, Gauge, RailStandard
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
-from ..dialog.definitions import advanced
 from ..dialog.parameter_values import ParameterValues
 from ..dialog.passwords import masked
 from ..i18n import tr
@@ -110,7 +109,7 @@ class ExtractRails(RailAlgorithm):
         for extra in (quality, cleaned):
             extra.setCreateByDefault(False)
         for destination in (centerlines, quality, findings, cleaned):
-            self.addParameter(advanced(destination, destination.help()))
+            self.addParameter(outputs.further(destination))
         self._add_report(outputs.report())
         figures = (*outputs.rail_figures(), *outputs.centerline_figures(), *outputs.quality_figures())
         for output in (*figures, outputs.engine()):

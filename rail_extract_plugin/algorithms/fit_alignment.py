@@ -46,6 +46,7 @@ class FitAlignment(RailAlgorithm):
     SUMMARY = "Finds the straights, clothoids and arcs, grades and cant ramps that tracks were built to."
     PICTURE = "alignment.svg"
     GUIDE = "alignment"
+    PAGES = ("alignment", "reference")
     HELP = "\n\n".join(
         (
             "Takes centerlines of Extract Rails or any other 3D lines of tracks. Number, type and ends of the elements "
@@ -61,7 +62,8 @@ class FitAlignment(RailAlgorithm):
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
         """Declare the parameters and outputs in the order of the interface."""
         layers = (inputs.tracks_to_fit(), *inputs.cant_of_tracks())
-        for definition in (*layers, *groups.alignment(), inputs.fixed(), outputs.elements(), outputs.deviations()):
+        deviations = outputs.further(outputs.deviations())
+        for definition in (*layers, *groups.alignment(), inputs.fixed(), outputs.elements(), deviations):
             self.addParameter(definition)
         report = outputs.alignment_report()
         report.setCreateByDefault(False)

@@ -47,14 +47,13 @@ class GrowRailPoints(RailAlgorithm):
     NEEDS = ClassifyRailPoints.NEEDS
     SUMMARY = "Follows rails in a lidar cloud from places that you point at, and classifies their points in a copy."
     HELP = (
-        "Choose the point cloud, raw or classified, and the rail standard, and give places on railheads: a layer of "
-        "points or lines, or a point on the map. Each rail is followed to both sides along its head, over crossings "
-        "and through switches, up to the longest run. The log states where each rail stops, and why.\n\n"
+        "Each rail is followed to both sides along its head, over crossings and through switches, up to the longest "
+        "run. The log states where each rail stops, and why.\n\n"
         "The copy has the same points in the same order with the same attributes; points on these rails get the class "
         "of rail points. Where the input is a folder or a virtual point cloud, a folder of the same tiles is written, "
-        "with a virtual point cloud (.vpc) of the same name next to it.\n\n"
-        "The toolbar button Grow Rails lets you click rails on the map and shows at once what grows. "
-        "The page about growing describes the method and its limits; it was tested on simulated clouds only."
+        "with a virtual point cloud (.vpc) next to it.\n\n"
+        "The toolbar button Grow Rails lets you click rails on the map and shows at once what grows. The method was "
+        "tested on simulated clouds only."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
@@ -68,7 +67,7 @@ class GrowRailPoints(RailAlgorithm):
             groups.leave_out(),
             *groups.content(),
             outputs.classified(),
-            outputs.stops(),
+            outputs.further(outputs.stops()),
         ):
             self.addParameter(definition)
         for output in outputs.classified_figures():

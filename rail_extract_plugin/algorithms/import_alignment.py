@@ -68,7 +68,7 @@ class ImportAlignment(RailAlgorithm):
         for needs_tracks in (deviations, report):
             needs_tracks.setCreateByDefault(False)
         tracks = inputs.tracks_beside_design()
-        for definition in (*inputs.landxml(), tracks, outputs.elements(), outputs.axes(), deviations):
+        for definition in (*inputs.landxml(), tracks, outputs.elements(), outputs.axes(), outputs.further(deviations)):
             self.addParameter(definition)
         self._add_report(report)
         for output in outputs.alignment_figures():

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsProcessingContext
 
-from ...core.fields import QUALITY_FIELDS, STATION_FIELDS
 from ...core.parameters import Parameters
 from ...core.progress import Progress, Recording
 from ...core.standards import CUSTOM, Gauge, RailStandard, resolve
@@ -60,19 +59,17 @@ class MeasureTrackGeometry(RailAlgorithm):
     NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
     SUMMARY = "Measures gauge, cant, twist, radius and gradient along tracks, and their support by points."
     PICTURE = "gauge.svg"
+    PAGES = ("parameters", "reference")
     HELP = "\n\n".join(
         (
             "Takes the lines of Extract Rails, or lines drawn by hand, and returns points along each centerline.",
-            "\n".join(f"{field.name}: {field.meaning}." for field in QUALITY_FIELDS),
             "With a point cloud, heights are measured again and smoothed over 1 m only, and sigma_mm, points and "
             "bridged apply to each station. Without one, the heights are those of the rails, each rail's sigma_mm and "
             "points are taken as uniform along it, and bridged is 1 where a rail is missing or its field gaps names "
             "the place.",
             "The findings and the report compare the gauge with that of the standard, with Gauge and with Other "
             "gauges, whichever is nearest.",
-            "With an axis, points, findings and report have kilometres as well: "
-            + "; ".join(f"{field.name}: {field.meaning}" for field in STATION_FIELDS)
-            + ".",
+            "With an axis, points, findings and report have kilometres as well.",
         )
     )
 
@@ -83,7 +80,7 @@ class MeasureTrackGeometry(RailAlgorithm):
         axis = inputs.axis(optional=True)
         findings = outputs.findings()
         findings.setCreateByDefault(False)
-        for definition in (*layers, *settings, *axis, outputs.quality(), findings):
+        for definition in (*layers, *settings, *axis, outputs.quality(), outputs.further(findings)):
             self.addParameter(definition)
         self._add_report(outputs.report())
         for output in outputs.quality_figures():

@@ -14,7 +14,6 @@ from qgis.core import (
 )
 
 from ...core.errors import RailExtractError
-from ...core.fields import EXTENT_FIELDS, STATION_FIELDS
 from ...core.progress import Progress
 from ..dialog import inputs, outputs
 from ..dialog.parameter_values import ParameterValues
@@ -50,12 +49,13 @@ class StationAlongAxis(RailAlgorithm):
     SUMMARY = "Gives the features of any layer their kilometre along the axis of the railway, with offset and side."
     PICTURE = "stationing.svg"
     GUIDE = "stationing"
+    PAGES = ("stationing", "reference")
     HELP = "\n\n".join(
         (
             "The axis is the line that carries the kilometres, often that of one track or the middle between two. Its "
             "kilometres come from posts, from the kilometre at its start, or from its M values, in this order.",
-            "\n".join(f"{field.name}: {field.meaning}." for field in (*STATION_FIELDS, *EXTENT_FIELDS)),
-            "Lines and polygons also get km_from and km_to. The kilometre comes from the axis at right angles, never "
+            "The copy has the fields km, km_text, offset_m (positive to the left), side and further ones; lines and "
+            "polygons also get km_from and km_to. The kilometre comes from the axis at right angles, never "
             "from the length of a parallel track. Where numbers are missing or twice, piece tells the sections apart.",
         )
     )

@@ -46,13 +46,12 @@ class TrainRailClassifier(RailAlgorithm):
         "Choose clouds with labelled rail points, the classes of these points and a file for the weights, then run. "
         "All other points are examples of what is not on rails: the clouds must contain them. A training takes minutes "
         "on a GPU and hours on a CPU.\n\n"
-        "Classify rail points and Extract rails use the weights if a trained classifier is what finds rail points "
-        "there. "
+        "Classify rail points and Extract rails use the weights if a trained classifier finds rail points there. "
         "A classifier knows the scanner that it learned from; for other scanners, geometry is often better. A fifth "
         "of the places is kept back, and "
         "the card states how well the classifier labels them.\n\n"
-        "A run that is cancelled keeps what it has learned in a folder next to the weights. The same run continues "
-        "there."
+        "A cancelled run keeps what it has learned in a folder next to the weights. The same run continues "
+        "it."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:

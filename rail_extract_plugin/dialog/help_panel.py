@@ -19,6 +19,11 @@ ADVANCED = QgsProcessingParameterDefinition.Flag.FlagAdvanced
 
 PAGES = {
     "parameters": tr("All parameters, with pictures"),
+    "reference": tr("All fields of the results"),
+    "airborne": tr("Tracks in airborne clouds"),
+    "stationing": tr("Kilometres along an axis"),
+    "alignment": tr("How elements are fitted"),
+    "comparison": tr("How surveys are compared"),
     "tutorial": tr("Tutorial"),
     "limits": tr("Limits"),
     "troubleshooting": tr("If something is wrong"),

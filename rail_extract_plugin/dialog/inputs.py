@@ -82,10 +82,10 @@ def airborne_cloud() -> Definitions:
             CloudParameter("INPUT", tr("Airborne point cloud (layer, file or folder)")),
             tr(
                 "A loaded point cloud layer, or the path of a LAS, LAZ or COPC file, of a folder of such files, or of "
-                "a virtual point cloud (.vpc). Only the points along the guides are used."
+                "a virtual point cloud (.vpc)."
             ),
         ),
-        helped(
+        advanced(
             QgsProcessingParameterString(
                 "CLASSES", tr("Classes"), defaultValue=",".join(map(str, AIRBORNE_CLASSES)), optional=True
             ),
@@ -101,8 +101,7 @@ def tracks_meant() -> QgsProcessingParameterDefinition:
         QgsProcessingParameterFeatureSource("GUIDE", tr("Guide"), [line], optional=True),
         tr(
             "One line for each track of the railway, such as railway=rail of OpenStreetMap, up to 3 m off. Give every "
-            "track of a line its guide: they are fitted together. The fields name, ref and gauge are used. "
-            "Leave empty to search the whole cloud and have guides proposed."
+            "track its guide: they are fitted together. Leave empty to have guides proposed."
         ),
     )
 
@@ -235,7 +234,7 @@ def landxml() -> Definitions:
             QgsProcessingParameterFile("INPUT", tr("LandXML file"), behaviour, fileFilter=kinds),
             tr("LandXML 1.0 to 1.2 in metres, with alignments of lines, arcs and clothoids."),
         ),
-        helped(
+        advanced(
             QgsProcessingParameterCrs("CRS", tr("CRS of a file without one"), optional=True),
             tr("Projected coordinate system in metres for a file that does not state one; other files keep their own."),
         ),
@@ -262,11 +261,11 @@ def surveys() -> Definitions:
             QgsProcessingParameterFeatureSource("INPUT", tr("Lines to compare"), [line]),
             tr("The same kind of lines of the later survey, in the same coordinate system."),
         ),
-        helped(
+        advanced(
             QgsProcessingParameterFeatureSource("REFERENCE_RAILS", tr("Rails of the reference"), [line], optional=True),
             rails,
         ),
-        helped(
+        advanced(
             QgsProcessingParameterFeatureSource("RAILS", tr("Rails to compare"), [line], optional=True),
             rails,
         ),
@@ -283,7 +282,7 @@ def places() -> QgsProcessingParameterDefinition:
 
 
 def axis(optional: bool) -> Definitions:
-    """Define the axis and what states its kilometres; where it is optional, all of it is advanced."""
+    """Define the axis and what states its kilometres: the line, its start and posts in sight unless it is optional."""
     show = advanced if optional else helped
     line, point = QgsProcessing.SourceType.TypeVectorLine, QgsProcessing.SourceType.TypeVectorPoint
     posts = QgsProcessingParameterFeatureSource("POSTS", tr("Kilometre posts"), [point], optional=True)
@@ -305,7 +304,7 @@ def axis(optional: bool) -> Definitions:
             number("START_KM", tr("Start of the axis [km]"), minimum=-UNBOUNDED, optional=True, decimals=6),
             tr("Kilometre at the first vertex of the axis, for an axis that is a single line. It overrides M values."),
         ),
-        show(
+        advanced(
             choice("DIRECTION", tr("Kilometres along the axis"), DIRECTIONS, INCREASING),
             tr("Whether kilometres increase or decrease from the start of the axis; used with its start kilometre."),
         ),
@@ -316,15 +315,17 @@ def axis(optional: bool) -> Definitions:
                 "between them. They override the start and M values."
             ),
         ),
-        show(field, tr("Numbers, or texts such as 12.3+45. Empty means the first of km, kilometre, km_text, station.")),
-        show(
+        advanced(
+            field, tr("Numbers, or texts such as 12.3+45. Empty means the first of km, kilometre, km_text, station.")
+        ),
+        advanced(
             jumps,
             tr(
                 "Table with the fields km_back, the kilometre before each jump, and km_ahead, the one behind it, in "
                 "the order of increasing kilometres."
             ),
         ),
-        show(
+        advanced(
             choice("FORMAT", tr("Kilometres as text"), tuple(NOTATIONS), HECTOMETRES),
             tr(
                 "HECTOMETRES writes 12.3+45.67, KILOMETRES 12+345.67, GERMAN 12,3 + 46, and MILES 7 mi 1181.39 yd, in "
@@ -354,7 +355,7 @@ def cant_of_tracks() -> Definitions:
                 "sections without rail points do not count."
             ),
         ),
-        helped(
+        advanced(
             QgsProcessingParameterFeatureSource("RAILS", tr("Rails"), [line], optional=True),
             tr("3D lines of both rails, for the cant where there is no track geometry."),
         ),

@@ -13,7 +13,7 @@ from qgis.core import (
 )
 
 from ..i18n import tr
-from .definitions import helped
+from .definitions import advanced, helped
 
 Numbers = tuple[QgsProcessingOutputNumber, ...]
 
@@ -59,6 +59,11 @@ def airborne_centerlines() -> QgsProcessingParameterDefinition:
         _layer("CENTERLINES", tr("Track centerlines"), line, optional=True),
         tr("Lines in the middle of the tracks at the top of the rails, where they are seen, with standard errors."),
     )
+
+
+def further(definition: QgsProcessingParameterDefinition) -> QgsProcessingParameterDefinition:
+    """Show an output in the section of further results, not in sight."""
+    return advanced(definition, definition.help())
 
 
 def airborne_stations() -> QgsProcessingParameterDefinition:

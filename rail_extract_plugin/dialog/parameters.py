@@ -105,7 +105,7 @@ def rail(detect: bool = False) -> Definitions:
 def airborne() -> Definitions:
     """Define how tracks are looked for in an airborne cloud."""
     return (
-        helped(
+        advanced(
             number("REACH", tr("Reach [m]"), AirborneParameters.reach_m, 0.5, MAX_GUIDE_REACH_M),
             tr("Largest distance of a track from its guide."),
         ),
@@ -113,10 +113,10 @@ def airborne() -> Definitions:
             number("FOOTPRINT", tr("Footprint [m]"), AirborneParameters.footprint_m, 0.01, MAX_FOOTPRINT_M),
             tr(
                 "Diameter of the laser beam on the ground: flying height times divergence, such as 1000 m times 0.25 "
-                "mrad. Where it is not known, 0.3 m suits most flights; a warning says if the rails look wider."
+                "mrad. If it is not known, 0.3 m suits most flights; a warning says if the rails look wider."
             ),
         ),
-        helped(
+        advanced(
             number("RAIL_HEIGHT", tr("Rails above the bed [m]"), AirborneParameters.rail_height_m, 0.0, MAX_RAIL_M),
             tr("Top of the rails above the bed between them, which the points show. It depends on the ballast."),
         ),
@@ -449,11 +449,11 @@ def content() -> Definitions:
     """Define the class of rail points, and whether the others are written as well."""
     contents = [tr("Whole cloud"), tr("Rail points only")]
     return (
-        helped(
+        advanced(
             number("RAIL_CLASS", tr("Class of rail points"), RAIL_CLASS, maximum=LAST_CLASS, whole=True),
             tr("The class that points on rails get. In point formats 0 to 5, classes end at 31."),
         ),
-        helped(
+        advanced(
             QgsProcessingParameterEnum("CONTENT", tr("Content of the output"), contents, defaultValue=0),
             tr("The whole cloud (0), or only the points on rails (1)."),
         ),
@@ -493,7 +493,7 @@ def growth() -> Definitions:
         number("MAX_OUTLIERS", tr("Most windows without the rail"), defaults.max_outliers, maximum=1000, whole=True),
         tr("A rail that is not seen in more windows in a row than this is not followed further."),
     )
-    both = helped(
+    both = advanced(
         QgsProcessingParameterBoolean("BOTH", tr("Follow both rails of the track"), defaultValue=defaults.both),
         tr("The other rail of the track, at the gauge, is followed as well. Otherwise only the one with the seed."),
     )
@@ -514,7 +514,7 @@ def comparison() -> Definitions:
         ("INPUT_SIGMA", tr("Standard error, lines [mm]")),
     )
     return (
-        *(helped(number(name, label, optional=True, decimals=MM_DECIMALS), sigma) for name, label in errors),
+        *(advanced(number(name, label, optional=True, decimals=MM_DECIMALS), sigma) for name, label in errors),
         helped(
             shift,
             tr("moved is judged without the shift that most of the length shares. Switch it off for a design."),
@@ -572,12 +572,12 @@ def alignment() -> Definitions:
                 "design by its length; more is followed by elements."
             ),
         ),
-        helped(length, tr("Shorter elements are not sought.")),
-        helped(
+        advanced(length, tr("Shorter elements are not sought.")),
+        advanced(
             choice("TRANSITIONS", tr("Between two radii"), TRANSITIONS, default.transitions),
             tr("Jumps of the curvature, as in turnouts and sidings, or clothoids only."),
         ),
-        helped(
+        advanced(
             QgsProcessingParameterBoolean("ROUND", tr("Propose round radii"), defaultValue=default.rounded),
             tr("States the roundest radius that the track allows, beside the fitted one."),
         ),

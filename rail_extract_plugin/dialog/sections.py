@@ -5,17 +5,21 @@ from __future__ import annotations
 from ..i18n import tr
 
 SECTIONS = {
-    tr("Cloud"): ("MERGE_CLASSES", "EXTENT", "MASK", "CRS", "LEAVE_OUT"),
+    tr("Cloud"): ("MERGE_CLASSES", "CLASSES", "EXTENT", "MASK", "CRS", "LEAVE_OUT"),
     tr("Raw clouds"): (
         *("METHOD", "WEIGHTS", "SEEDS", "SEED", "GUIDE", "GUIDE_DISTANCE", "ONLY_GUIDED", "KEEP_SINGLE", "RAIL_CLASS"),
-        *("CONTENT", "RESET", "START", "SEARCH", "THICKNESS", "WINDOW", "MIN_HEIGHT", "MAX_OUTLIERS", "MAX_LENGTH"),
+        *("CONTENT", "RESET", "START", "BOTH", "SEARCH", "THICKNESS", "WINDOW", "MIN_HEIGHT", "MAX_OUTLIERS"),
+        "MAX_LENGTH",
     ),
     tr("Network"): ("MODEL", "ITERATIONS", "ENGINE", "DEVICE"),
     tr("Lines"): (
         *("SMOOTHING_XY", "SMOOTHING_Z", "TOLERANCE_XY", "TOLERANCE_Z", "CROWN_RADIUS", "MAX_GAP", "GAP_ANGLE"),
         *("SIMPLIFY_XY", "SIMPLIFY_Z", "MIN_LENGTH", "STRIPS"),
     ),
-    tr("Tracks"): ("GAUGE", "HEAD_WIDTH", "OTHER_GAUGES", "CENTERLINE_TOLERANCE", "STEP"),
+    tr("Tracks"): (
+        *("GAUGE", "HEAD_WIDTH", "OTHER_GAUGES", "CENTERLINE_TOLERANCE", "RAIL_HEIGHT", "REFERENCE_RAILS", "RAILS"),
+        *("REFERENCE_SIGMA", "INPUT_SIGMA", "REACH", "STEP", "TRANSITIONS", "ROUND", "FIXED"),
+    ),
     tr("Axis"): ("AXIS", "START_KM", "POSTS", "POST_FIELD", "JUMPS", "DIRECTION", "FORMAT"),
     tr("Computer"): ("WORKERS",),
     tr("Files of alignments"): ("VERTICAL_CURVES", "EAST_FIRST"),

@@ -36,6 +36,7 @@ from ...core.fields import (
     DEVIATION_FIELDS,
     DIFFERENCE_FIELDS,
     ELEMENT_FIELDS,
+    EXTENT_FIELDS,
     FINDING_FIELDS,
     KM_FIELDS,
     LENGTH,
@@ -86,14 +87,24 @@ class LayerKind:
 
 RAILS, CENTERLINES = LayerKind(RAIL_FIELDS, "rails"), LayerKind(CENTERLINE_FIELDS, "centerlines")
 QUALITY, FINDINGS = LayerKind(QUALITY_FIELDS, "quality"), LayerKind(FINDING_FIELDS, "findings")
+LOCATED_QUALITY = LayerKind((*QUALITY_FIELDS, *STATION_FIELDS), "quality")
+LOCATED_FINDINGS = LayerKind((*FINDING_FIELDS, *KM_FIELDS), "findings")
+"""With an axis."""
+
 STOPS = LayerKind(STOP_FIELDS, "stops")
 PROPOSED = LayerKind(PROPOSED_FIELDS, "proposed")
 AIRBORNE, STATIONS = LayerKind(AIRBORNE_FIELDS, "airborne"), LayerKind(AIRBORNE_STATION_FIELDS, "stations")
 DIFFERENCES = LayerKind(DIFFERENCE_FIELDS, "differences")
 ELEMENTS, AXES = LayerKind(ELEMENT_FIELDS, "elements"), LayerKind(AXIS_FIELDS, "axes")
 DEVIATIONS = LayerKind(DEVIATION_FIELDS, "deviations")
-PLACES = "places"
-"""What copies of layers of any kind are called in drawings; they have no style."""
+PLACES = LayerKind((*STATION_FIELDS, *EXTENT_FIELDS), "places")
+"""The fields that copies of layers of any kind get in addition; their style only names these."""
+
+LAYERS = (
+    *(RAILS, CENTERLINES, QUALITY, LOCATED_QUALITY, FINDINGS, LOCATED_FINDINGS, STOPS, PROPOSED, AIRBORNE, STATIONS),
+    *(DIFFERENCES, ELEMENTS, AXES, DEVIATIONS, PLACES),
+)
+"""Every kind of layer that a run can write."""
 
 
 def fields(columns: Sequence[Field]) -> QgsFields:
@@ -133,14 +144,12 @@ def stations(tracks: Sequence[TrackGeometry], frame: LocalFrame) -> Iterator[Qgs
 
 def quality_of(tracks: Sequence[TrackGeometry]) -> LayerKind:
     """Return the fields of the stations of tracks: with an axis, also their places along it."""
-    located = any(track.kilometres is not None for track in tracks)
-    return LayerKind((*QUALITY_FIELDS, *STATION_FIELDS), QUALITY.style) if located else QUALITY
+    return LOCATED_QUALITY if any(track.kilometres is not None for track in tracks) else QUALITY
 
 
 def findings_of(found: Sequence[Finding]) -> LayerKind:
     """Return the fields of findings: with an axis, also their kilometres."""
-    located = any(finding.km_text is not None for finding in found)
-    return LayerKind((*FINDING_FIELDS, *KM_FIELDS), FINDINGS.style) if located else FINDINGS
+    return LOCATED_FINDINGS if any(finding.km_text is not None for finding in found) else FINDINGS
 
 
 def copies(originals: Sequence[QgsFeature], columns: QgsFields, rows: Sequence[Sequence[Any]]) -> Iterator[QgsFeature]:
@@ -517,12 +526,16 @@ def write_copy(
 
         if QgsWkbTypes.geometryType(shape) == QgsWkbTypes.GeometryType.PolygonGeometry:
             raise RailExtractError(f"{name} can't be {destination.path.name} for polygons: choose a GeoPackage.")
-        kind = LayerKind(tuple(Field(one.name(), float if one.isNumeric() else str, "") for one in columns), PLACES)
+        written = tuple(Field(one.name(), float if one.isNumeric() else str, "") for one in columns)
         unit_m = units(parse_crs(wkt))[0] if wkt and not crs.isGeographic() else 1.0
         frame = LocalFrame(np.zeros(3), unit_m, crs_wkt=wkt)
+        kind = LayerKind(written, PLACES.style)
         return _exchange(algorithm, name, kind, shape, made, frame, parameters, context)
     layer_id = _layer(algorithm, name, columns, shape, made, crs, lost_part(wkt), parameters, context)
-    return {name: layer_id} if layer_id else {}
+    if not layer_id:
+        return {}
+    _style(algorithm, name, layer_id, PLACES.style, context)
+    return {name: layer_id}
 
 
 def _layer(

@@ -32,7 +32,7 @@ NO_PROPERTIES: Mapping[str, str] = {}
 
 TOP_TO_BOTTOM = (
     *("stops", "findings", "differences", "deviations", "elements", "axes", "centerlines", "airborne", "rails"),
-    *("proposed", "stations", "quality", "raster"),
+    *("proposed", "stations", "quality", "places", "raster"),
 )
 """Order of the layers of a run, by style: what is to be looked at first, then the lines, and what they rest on."""
 
@@ -57,15 +57,17 @@ class _Styler(QgsProcessingLayerPostProcessorInterface):
             layer.setCustomProperty(name, value)
         if layer.name() == self._title:
             layer.setName(run_name(layer, self._title))
-        if not compat.GROUPS_LAYERS:
-            _put_in_order(layer)
+        _put_in_order(layer)
         layer.triggerRepaint()
         if self._style == FINDINGS:
             notices.findings_loaded.emit(layer.id())
 
 
 def _put_in_order(layer: QgsMapLayer) -> None:
-    """Sort the layers of a run that are next to the one that has just been loaded."""
+    """Sort the layers of a run that are next to the one that has just been loaded.
+
+    QGIS sorts new layers only, and puts them above one of an earlier run whose file is written again.
+    """
     node = QgsProject.instance().layerTreeRoot().findLayer(layer.id())
     if node is None:
         return
@@ -106,7 +108,7 @@ def style_on_load(
 ) -> None:
     """Apply a style if QGIS loads the layer after the run.
 
-    All layers of a run go into one group if QGIS supports groups for results, in the order of `TOP_TO_BOTTOM`.
+    The layers of a run are in the order of `TOP_TO_BOTTOM`, and in one group if QGIS supports groups for results.
 
     Parameters
     ----------
@@ -126,4 +128,3 @@ def style_on_load(
         details.setPostProcessor(_styler(style, title, properties, has_system))
         if compat.GROUPS_LAYERS:
             details.groupName = tr("Rail Extract")
-            details.layerSortKey = -TOP_TO_BOTTOM.index(style)

@@ -90,6 +90,8 @@
     <alias field="sigmaz_mm" index="11" name="Standard error of the height there [mm]"/>
     <alias field="points" index="12" name="Points"/>
     <alias field="review" index="13" name="Review"/>
+    <alias field="km" index="14" name="Kilometre there"/>
+    <alias field="km_text" index="15" name="Kilometre there as text"/>
   </aliases>
   <attributetableconfig>
     <columns>
@@ -107,6 +109,8 @@
       <column type="field" name="sigmaz_mm" width="360" hidden="0"/>
       <column type="field" name="points" width="80" hidden="0"/>
       <column type="field" name="review" width="80" hidden="0"/>
+      <column type="field" name="km" width="160" hidden="0"/>
+      <column type="field" name="km_text" width="230" hidden="0"/>
     </columns>
   </attributetableconfig>
   <mapTip>&lt;b&gt;[% &quot;finding&quot; %]: [% &quot;reason&quot; %]&lt;/b&gt;&lt;br&gt;[% if(&quot;rail_id&quot; IS NULL, &#x27;Track &#x27; || &quot;track_id&quot;, &#x27;Rail &#x27; || &quot;rail_id&quot;) %], [% coalesce(format_number(&quot;from_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %] to [% coalesce(format_number(&quot;to_m&quot;, 1) || &#x27; m&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Review: [% if(coalesce(&quot;review&quot;, &#x27;&#x27;) = &#x27;&#x27;, &#x27;open&#x27;, &quot;review&quot;) %]</mapTip>

@@ -41,7 +41,7 @@
     <alias field="seen" index="3" name="Seen"/>
     <alias field="sigma_mm" index="4" name="Standard error [mm]"/>
     <alias field="sigmaz_mm" index="5" name="Standard error of the height [mm]"/>
-    <alias field="bed_m" index="6" name="Height of the bed"/>
+    <alias field="bed_m" index="6" name="Height of the bed [m]"/>
     <alias field="cant_mm" index="7" name="Cant [mm]"/>
     <alias field="radius_m" index="8" name="Radius [m]"/>
     <alias field="grade_pm" index="9" name="Gradient [‰]"/>

@@ -9,6 +9,7 @@ import pytest
 import rail_extract.core
 
 MODULES = [
+    "rail_extract",
     "rail_extract.core",
     *(module.name for module in pkgutil.walk_packages(rail_extract.core.__path__, "rail_extract.core.")),
 ]
@@ -27,3 +28,4 @@ def test_examples_give_what_they_show(name):
 
 def test_the_front_door_has_an_example():
     assert has_examples("rail_extract.core")
+    assert has_examples("rail_extract.core.front")

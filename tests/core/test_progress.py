@@ -52,6 +52,18 @@ def test_the_estimate_follows_the_second_half_of_the_elapsed_time():
     assert run(fast + slow)[-1] == "70 % done, about 10 minutes left"
 
 
+def test_the_time_before_an_activity_does_not_count_in_its_speed():
+    listener, clock = Listener(), Clock()
+    progress = Estimating(listener, clock)
+    progress.set_fraction(0.2)
+    clock.now = 60.0  # an import
+    progress.status("The network has started")
+    for second in range(61, 70):
+        clock.now = second
+        progress.set_fraction(0.2 + (second - 60) / 100)
+    assert listener.texts == ["The network has started", "25 % done, about 80 seconds left"]
+
+
 def test_estimates_start_late_and_have_an_interval():
     assert run([(0.1 * step, step / 100) for step in range(1, 40)]) == []
     assert len(run([(0.1 * step, step / 1000) for step in range(1, 1000)])) <= 20
@@ -70,3 +82,9 @@ def test_spans_relay_everything():
     listener.is_cancelled = lambda: True
     with pytest.raises(Cancelled):
         span.check()
+
+
+def test_a_step_of_a_step_covers_its_part_of_the_whole():
+    listener = Listener()
+    listener.span(0.2, 0.6).span(0.5, 1.0).span(0.0, 0.5).set_fraction(1.0)
+    assert listener.fractions == [pytest.approx(0.5)]

@@ -78,6 +78,14 @@ def test_heads_of_another_width_than_stated_are_said(width_m, count):
     assert all(said in one for one in heard.said)
 
 
+def test_heads_of_another_standard_are_not_said_where_the_gauge_is_another_one():
+    points = RailPoints(heads_of(LINE, SEEN_SHARE * 0.062, gauge_m=1.0), LocalFrame(np.zeros(3)), 10)
+    for gauge_m, count in ((1.0, 1), (1.435, 0)):
+        heard = Warnings()
+        assert head_widths(MemorySource(points, 500.0), ((gauge_m, 0.072),), heard).differ
+        assert len(heard.said) == count
+
+
 def test_passes_side_by_side_without_a_mark_are_said():
     scene = two_passes(apart_m=0.016)
     for strips, count in ((None, 1), (scene.rail_points().strips, 0)):

@@ -15,7 +15,10 @@ keys = st.sets(st.tuples(st.integers(-3, 3), st.integers(-3, 3)), min_size=1)
 
 class Listener(Progress):
     def __init__(self, cancel_at=2.0):
-        self.fractions, self.cancel_at = [], cancel_at
+        self.fractions, self.texts, self.cancel_at = [], [], cancel_at
+
+    def status(self, text):
+        self.texts.append(text)
 
     def set_fraction(self, fraction):
         self.fractions.append(fraction)
@@ -108,3 +111,14 @@ def test_an_engine_is_set_up_once_and_again_for_other_parameters():
     once = Once()
     assert [once(make, name) for name in ("a", "a", "b", "b", "a")] == ["A", "A", "B", "B", "A"]
     assert made == ["a", "b", "a"]
+
+
+def test_the_start_of_a_network_is_said_once():
+    def clean(key, context):
+        return context.network(len, key)
+
+    listener = Listener()
+    tasks = {key: Task("", clean, (key,)) for key in ("aa", "bbb")}
+    tasks["again"] = Task("", clean, ("bbb",))
+    assert dict(InTurn().run(tasks, listener)) == {"aa": 2, "bbb": 3, "again": 3}
+    assert listener.texts == 2 * ["Starting the network", "The network has started"]

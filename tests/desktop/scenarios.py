@@ -417,7 +417,7 @@ def _follow(log: QTextEdit, text: str) -> None:
     log.moveCursor(QTextCursor.MoveOperation.End)
     found = log.document().find(text, log.textCursor(), QTextDocument.FindFlag.FindBackward)
     log.setTextCursor(found)
-    found.setPosition(found.selectionStart() + 3)
+    found.setPosition(found.selectionStart() + 1)
     QTest.mouseClick(log.viewport(), Qt.MouseButton.LeftButton, pos=log.cursorRect(found).center())
 
 
@@ -552,10 +552,16 @@ def review(driver: Driver) -> Iterator:
     yield 1.0
     driver.picture("review_rejected")
     yield from _review_by_keys(driver, dock)
-    layer = QgsProject.instance().mapLayersByName("findings")[0]
+    layer = _findings()
     driver.keep("order", [node.name() for node in QgsProject.instance().layerTreeRoot().findLayers()])
     yield from _open_table(driver, layer)
     yield from _show_in_3d(driver, menu)
+
+
+def _findings() -> QgsVectorLayer:
+    """Return the layer of findings, whatever QGIS calls it."""
+    layers = QgsProject.instance().mapLayers().values()
+    return next(one for one in layers if one.customProperty("rail_extract/style") == "findings")
 
 
 def _place_dock(driver: Driver, dock: QDockWidget) -> None:
@@ -581,7 +587,7 @@ def _review_by_keys(driver: Driver, dock: QDockWidget) -> Iterator:
         press(key)
         at.append(dock.count.text())
     driver.keep("by keys", [int(text.split()[0]) for text in at])
-    layer = QgsProject.instance().mapLayersByName("findings")[0]
+    layer = _findings()
     layer.startEditing()
     dock.go(2)
     before = dock.count.text()

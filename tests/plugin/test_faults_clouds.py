@@ -124,8 +124,7 @@ POINTS = [
         of(lambda points: points + np.where(points[:, 1:2] > 3_000_000, [0, 0.1, 0], 0)),
         WARNED,
         "Rails are 160… mm apart, with heads 7… mm wide; 1507 mm apart are expected: is it Russia R65, 1520 mm "
-        "(unconfirmed width) (RU_R65_1520)? No track of 1435 mm gauge found: rails are 160… mm apart, is "
-        "the gauge 1520 mm?",
+        "(unconfirmed width) (RU_R65_1520)? No track of 1435 mm gauge found.",
     ),
     Fault(
         "stray point 1000 km away", of(lambda points: np.append(points, points[:1] + [1e6, 0, 0], axis=0)), gives=TRACK

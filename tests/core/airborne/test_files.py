@@ -11,11 +11,15 @@ from rail_extract.core.airborne.remarks import FLIGHT
 from rail_extract.core.airborne.survey import Guide
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.errors import CloudError, NoRailPointsError, ParameterError
+from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import AirborneParameters
 from rail_extract.core.progress import Progress
 from rail_extract.core.tasks import InTurn
 from rail_extract.laboratory.airborne.flight import AirborneCloud
 from rail_extract.laboratory.airborne.write import ORIGIN, write_airborne
+
+FOOT_M = 1200 / 3937
+"""Length of the US survey foot."""
 
 PARAMETERS = AirborneParameters(1.435, 0.072, footprint_m=0.25)
 
@@ -58,6 +62,26 @@ def test_the_lines_lie_on_the_tracks(flown, whole):
         places = found.frame.to_crs(line.xyz)[:, :2] - ORIGIN[:2]
         off = np.hypot(*(places[:, None] - truth[None, ::2, :2]).transpose(2, 0, 1)).min(axis=1)
         assert np.median(off[10:-10]) < 0.15  # samples of the truth are 0.5 m apart
+
+
+def test_figures_are_metres_in_a_cloud_in_feet(flown, whole, tmp_path):
+    feet = LocalFrame(np.array([984_250.0, 196_850.0, 500.0]), FOOT_M, FOOT_M, "EPSG:2263+6360")
+    write_airborne(flown.cloud, tmp_path / "feet.laz", frame=feet)
+    flat = [np.column_stack([one, np.zeros(len(one))]) for one in flown.guides]
+    given = [Guide(number, feet.to_crs(one)[:, :2]) for number, one in enumerate(flat, start=1)]
+    found = survey(tmp_path / "feet.laz", given, tmp_path)
+    assert found.density == pytest.approx(whole[0].density, rel=0.05)
+    for one, other in zip(found.tracks, whole[0].tracks):
+        seen = (one.seen & other.seen).astype(bool)
+        assert seen.mean() > 0.9
+        assert np.array_equal(one.s_m, other.s_m)
+        assert one.bed_m[seen] - 500 * FOOT_M == pytest.approx(other.bed_m[seen], abs=0.03)
+        assert one.radius_m[seen] == pytest.approx(other.radius_m[seen], rel=0.3, nan_ok=True)
+        assert one.cant_mm[seen] == pytest.approx(other.cant_mm[seen], abs=15)
+        assert one.sigma_mm[seen] == pytest.approx(other.sigma_mm[seen], rel=0.5)
+    for line, other in zip(found.lines, whole[0].lines):
+        assert line.length_m == pytest.approx(other.length_m, abs=0.05)
+        assert (line.seen_m, line.gauge_mm) == (other.seen_m, other.gauge_mm)
 
 
 def test_tiles_and_squares_give_the_lines_of_one_file(flown, whole, tmp_path, monkeypatch):

@@ -163,6 +163,30 @@ def test_an_edited_radius_and_start_are_held_and_the_rest_follows():
     )
 
 
+@pytest.mark.parametrize("seed", [3, 4])
+def test_misalignment_of_a_short_track_is_not_taken_for_design_and_its_table_refits(seed):
+    random = np.random.default_rng([77, seed])
+    one = random_design(random, FAMILIES["branch line"], 24)
+    measured = replace(track(one), xyz=surveyed(one, random, 0.001, 0.003, 15.0))
+    found = fit(measured)
+    met = compared(one, found.alignment)
+    assert met.found >= 0.85 * met.true
+    assert met.fitted <= 1.05 * met.true
+    assert len(found.alignment.vertical) <= len(one.vertical)
+    again = fit(measured, corrected(found, lambda table: None)).alignment
+    assert [x.type for x in again.elements] == [x.type for x in found.alignment.elements]
+    for x, y in zip(again.plan, found.alignment.plan):
+        assert x.s_from == pytest.approx(y.s_from, abs=0.02)
+        assert x.k_from == pytest.approx(y.k_from, abs=1e-6)
+
+
+def test_an_arc_may_turn_round():
+    spiral = design([(80.0, 0, 0), (60.0, 0, 1 / 150), (800.0, 1 / 150, 1 / 150), (60.0, 1 / 150, 0), (80.0, 0, 0)])
+    found = fit(track(spiral)).alignment
+    assert [one.type for one in found.plan] == ["line", "clothoid", "arc", "clothoid", "line"]
+    assert found.plan[2].k_from == pytest.approx(1 / 150, rel=1e-4)
+
+
 def test_an_element_that_was_removed_stays_away():
     shapes = [(120.0, 0, 0), (15.0, 0, 1 / 400), (150.0, 1 / 400, 1 / 400), (50.0, 1 / 400, 0), (140.0, 0, 0)]
     measured = track(design(shapes), white_m=0.0005)
@@ -185,14 +209,14 @@ def test_the_part_that_holds_is_given_and_the_rest_is_said():
     assert 375 < found.alignment.s_to < 410
     assert [one.type for one in found.alignment.plan[:4]] == ["line", "clothoid", "arc", "clothoid"]
     assert "do not count" in progress.warnings[0]
-    assert "Only the elements from" in progress.warnings[1]
+    assert "only the elements from 0 to 398 m are given" in progress.warnings[1]
     assert max(one.figures.dev_rms_mm for one in found.alignment.plan) < 15
 
 
-def test_elements_after_a_bad_start_have_their_distance_from_the_first_vertex():
+def test_a_bad_start_does_not_bend_the_elements():
     progress = Recording(Progress())
     found = fit(with_errors(0, 50, 0.08), progress=progress)
-    assert "Only the elements from 51 to 520 m are given" in progress.warnings[1]
+    assert "only the elements from 51 to 520 m are given" in progress.warnings[1]
     assert [one.type for one in found.alignment.plan] == ["line", "clothoid", "arc", "clothoid", "line"]
     assert 45 < found.alignment.s_from < 60
     np.testing.assert_allclose(np.diff([one.s_from for one in found.alignment.plan[1:]]), [60, 150, 50], atol=1.0)

@@ -21,7 +21,7 @@ def test_a_version_that_is_not_written_becomes_one_that_has_the_point_format(
     data = bytearray(old.read_bytes())
     data[MINOR_VERSION_AT] = minor
     old.write_bytes(data)
-    assert rewrite(old, copy, lambda xyz, codes: (np.full(len(codes), 10, np.uint8), codes == codes)) == 100
+    assert rewrite(old, copy, lambda codes, places: (np.full(len(codes), 10, np.uint8), codes == codes)) == 100
     written = laspy.read(copy)
     assert str(written.header.version) == new
     np.testing.assert_allclose(written.xyz, cloud.xyz, rtol=0, atol=1e-9)

@@ -57,7 +57,7 @@ def test_the_cells_of_each_neighbour_are_found_at_their_position():
     pieces = quarters(60, 50, 25, 31)
     parts = cut(field, pieces)
     around = np.full((pieces[0].height + 14, pieces[0].width + 14), -1)
-    for other, target, source in overlaps(np.array([piece.window for piece in pieces]), 0, 7):
+    for other, target, source in overlaps(np.array([piece.window for piece in pieces]), 7)[0]:
         around[target] = parts[other][source]
     np.testing.assert_array_equal(around[7:, 7:], field[:32, :38])
     assert (around[:7] == -1).all() and (around[:, :7] == -1).all()

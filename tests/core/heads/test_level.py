@@ -9,6 +9,7 @@ from rail_extract.core.heads.level import (
     crown_fall,
     in_head_frame,
     is_blended,
+    medians,
     on_top,
     robust_sigma,
     rough_level,
@@ -150,3 +151,12 @@ def test_what_is_known_of_a_head_does_not_depend_on_its_height_and_gradient():
     up, own_up = (in_head_frame(t, across, one, WIDTH)[1] for one in (z + risen_m, z))
     inner = (t > 0.5) & (t < 19.5)  # the level of the first and last half bin is that of their middle
     np.testing.assert_allclose(up[inner], own_up[inner], atol=0.003)
+
+
+def test_the_median_of_each_group_is_that_of_its_values():
+    random = np.random.default_rng(5)
+    count = np.concatenate([[1, 2, 3, 400], random.integers(1, 90, 50)])
+    first = np.cumsum(count) - count
+    values = random.normal(size=count.sum())
+    expected = [np.sort(values[start : start + size])[size // 2] for start, size in zip(first, count)]
+    np.testing.assert_array_equal(medians(values, first, count), expected)

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.polyline import length_along
 from rail_extract.core.vectorize.junctions import (
-    contract_links,
     drop_bubbles,
     drop_rungs,
     drop_spurs,
@@ -44,17 +43,6 @@ def test_through_lines_pass_the_node_and_the_steeper_line_ends_there():
     assert len(network.lines) == 3
     assert network.passes.shape == (1, 3)
     assert sorted(network.lengths())[-1] == pytest.approx(20, abs=0.01)
-
-
-def test_junctions_close_to_each_other_become_one():
-    left, right = star((-10.0, 0.0), (-10.0, 1.0)), star((10.0, 0.0), (10.0, 1.0))
-    link = np.array([[0.0, 0.0], [0.05, 0.0]])
-    lines = (*left.lines, *(line + [0.05, 0] for line in right.lines), link)
-    nodes = np.concatenate([left.nodes, right.nodes + [0.05, 0]])
-    network = contract_links(LineNetwork(lines, nodes, np.array([[0, 1], [0, 2], [3, 4], [3, 5], [0, 3]])), 0.0762)
-    check_invariants(network)
-    assert sorted(network.degrees()) == [1, 1, 1, 1, 4]
-    np.testing.assert_allclose(network.nodes[network.degrees() == 4], [[0.025, 0]])
 
 
 def test_a_rung_between_two_rails_is_dropped():

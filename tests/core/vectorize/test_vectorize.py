@@ -8,7 +8,7 @@ from rail_extract.core.errors import Cancelled
 from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.polyline import length_along
 from rail_extract.core.progress import Progress
-from rail_extract.core.raster import RailRaster, rasterize
+from rail_extract.core.raster import RailRaster
 from rail_extract.core.vectorize import vectorize
 from rail_extract.laboratory.curves import Element, trace
 from rail_extract.laboratory.rasters.turnouts import FORMS, branch
@@ -297,17 +297,3 @@ def test_a_weed_on_the_side_of_a_rail_is_not_a_branch():
     rail = straight(20, 0.3)
     weed = rail.mean(axis=0) + np.outer([0.0, 0.8], [0.0, 1.0])
     assert len(vectorize(draw([rail, weed]), HEAD_M, min_length_m=0.3).lines) == 1
-
-
-def test_a_part_that_the_cleaning_dropped_is_not_a_gap_where_there_are_points():
-    rng = np.random.default_rng(5)
-    xy = np.column_stack([rng.uniform(0, 60, 9000), rng.uniform(-HEAD_M / 2, HEAD_M / 2, 9000)])
-    lost = (xy[:, 0] > 25) & (xy[:, 0] < 34)
-    cleaned, sparse = rasterize(xy[~lost], 0.04), xy[lost][::30]
-    assert len(vectorize(cleaned, HEAD_M).lines) == 2
-    assert (
-        len(vectorize(cleaned, HEAD_M, raw=rasterize(np.concatenate([xy[~lost], sparse + [0.0, 0.5]]), 0.04)).lines)
-        == 2
-    )
-    (line,) = vectorize(cleaned, HEAD_M, raw=rasterize(np.concatenate([xy[~lost], sparse]), 0.04)).lines
-    assert np.abs(line[:, 1]).max() < 0.05

@@ -11,6 +11,7 @@ from qgis.PyQt.QtWidgets import QGroupBox, QLabel, QScrollArea, QSplitter, QText
 from rail_extract.rail_extract_plugin.dialog import guide
 from rail_extract.rail_extract_plugin.dialog.choices import WORDS
 from rail_extract.rail_extract_plugin.dialog.help_panel import ADVANCED
+from rail_extract.rail_extract_plugin.dialog.sections import OTHERS, section_of
 from rail_extract.rail_extract_plugin.dialog.wording import for_user, with_labels
 
 NAMES = (
@@ -104,13 +105,28 @@ def test_panel_explains_the_algorithm_and_the_fields_in_sight(open_dialog, name)
             assert f"{definition.description()}\u2028{text}" in "\n".join(shown).replace("\n", "\u2028")
 
 
-def test_main_dialog_has_few_fields_in_sight_and_a_short_help(open_dialog):
+@pytest.mark.parametrize("name", NAMES)
+def test_dialogs_have_few_fields_in_sight_and_a_short_help(open_dialog, name):
+    dialog = open_dialog(name)
+    definitions = dialog.algorithm().parameterDefinitions()
+    assert len([one.name() for one in definitions if not one.flags() & ADVANCED]) <= 6
+    assert len(dialog.findChild(QTextBrowser, "textShortHelp").toPlainText().split()) <= 300
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_advanced_field_has_a_section(make, name):
+    algorithm = make(name)  # which owns its parameters
+    definitions = algorithm.parameterDefinitions()
+    fields = [one.name() for one in definitions if one.flags() & ADVANCED and not one.isDestination()]
+    assert [field for field in fields if section_of(field) == OTHERS] == []
+
+
+def test_main_dialog_shows_what_the_main_job_needs(open_dialog):
     dialog = open_dialog("extractrails")
     definitions = dialog.algorithm().parameterDefinitions()
     in_sight = [one.name() for one in definitions if not one.flags() & ADVANCED]
     assert in_sight == ["INPUT", "RAIL_CLASSES", "CLASSIFY", "STANDARD", "RAILS", "REPORT"]
     panel = dialog.findChild(QTextBrowser, "textShortHelp")
-    assert len(panel.toPlainText().split()) <= 300
     assert len(re.findall('<a href="(?:.*?)limits.md"', panel.toHtml())) == 1
 
 

@@ -1,0 +1,275 @@
+"""Switch rules off, one at a time, and print which figures of the golden table need each.
+
+Run `python benchmarks/ablation.py [RULE ...] [--scenes SCENE ...] [--variant 'seed 1']`. A rule may be a part of a
+name, as `tracks.`. In a scene in which a rule returns what its replacement returns, whenever it is called, it has no
+effect and is not run again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import multiprocessing
+import os
+import sys
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, is_dataclass, replace
+from functools import wraps
+from types import GeneratorType
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+from golden import TABLE
+from rail_extract.core import pipeline
+from rail_extract.core.classify import settings
+from rail_extract.core.classify.flush import NO_LINES, Flush
+from rail_extract.core.polyline import length_along
+from rail_extract.laboratory.ruler.golden import (
+    PLACES,
+    PLAIN,
+    VARIANTS,
+    Difference,
+    Golden,
+    build_scene,
+    differences,
+    figures_of,
+)
+
+SHOWN = 3
+"""Differences printed for each rule: the largest, by their tolerances."""
+
+
+@dataclass(frozen=True)
+class Switch:
+    """A rule and what stands in for it when it is off.
+
+    Attributes
+    ----------
+    name : str
+        Module and rule.
+    off : tuple of (str, str, object)
+        Module below `rail_extract.core`, name in it, and its value when the rule is off.
+    """
+
+    name: str
+    off: tuple[tuple[str, str, Any], ...]
+
+
+def first(value: Any, *_: Any, **__: Any) -> Any:
+    """Return the first argument as it is."""
+    return value
+
+
+def nothing(*_: Any) -> list:
+    """Return no result."""
+    return []
+
+
+def never(*_: Any) -> bool:
+    """Return False."""
+    return False
+
+
+def none_of(values: Any, *_: Any) -> np.ndarray:
+    """Choose none of the values."""
+    return np.zeros(len(getattr(values, "axis", values)), dtype=bool)
+
+
+def all_of(values: Any, *_: Any) -> np.ndarray:
+    """Choose all of the values."""
+    return np.ones(len(getattr(values, "axis", values)), dtype=bool)
+
+
+def _rule(name: str, value: Any, *also: tuple[str, str, Any]) -> Switch:
+    module, attribute = name.rsplit(".", 1)
+    return Switch(name, ((module, attribute, value), *also))
+
+
+SWITCHES = (
+    _rule("vectorize.open_slips", lambda network, seen: (network, [])),
+    _rule("vectorize.straighten_blots", first),
+    _rule("vectorize.cut_kinks", first),
+    _rule("vectorize.attach_branches", first),
+    _rule("vectorize.free_third_rails", first),
+    _rule("vectorize.resolve_branches", first),
+    _rule("vectorize.choose_routes", first),
+    _rule("vectorize.resolve_crossings", first),
+    _rule("vectorize.joining.HOOKS_M", ((0.0, 0.0),)),
+    _rule("vectorize._settle_ends", first),
+    _rule("vectorize.close", first),
+    _rule("vectorize.junctions.drop_bubbles", first),
+    _rule("vectorize.junctions.drop_rungs", first),
+    _rule("vectorize.junctions.drop_spurs", first),
+    _rule("vectorize.repairs.BEND", np.inf),
+    _rule("vectorize.repairs.SWERVE_M", np.inf),
+    _rule("steps.parts_without_turns", lambda line, *_: [(0.0, float(length_along(line)[-1]))]),
+    _rule("lines.network_smoothing._continuations", lambda *_: {}),
+    _rule("tracks.pairing._without_ghosts", list),
+    _rule("tracks.pairing._without_rivals", lambda matches, misfits_m: list(matches)),
+    _rule("tracks.pairing._on_one_level", lambda *_: True),
+    _rule("tracks.chaining._facing", lambda *_: np.empty((0, 2), dtype=int)),
+    _rule("tracks.chaining.MAX_HIDDEN_M", 0.0),
+    _rule("tracks.centerlines.fork_centerlines", lambda lines, *_: list(lines)),
+    _rule("tracks.forking.BENT_M", np.inf),
+    _rule("tracks.centerlines.started_abreast", lambda rails: list(rails)),
+    _rule("tracks.centerlines.at_gauge", lambda left, right, *_: (left, right)),
+    _rule("tracks.centerlines._smoothed", first),
+    _rule("tracks.parallels._is_crowded", none_of),
+    _rule("tracks.lone._off_level_m", lambda *_: 0.0),
+    _rule("pipeline.steps_of", nothing),
+    _rule("classify.square.stands_free", lambda tops, band, marks, lines: all_of(lines)),
+    _rule("classify.square.runs_inside", none_of),
+    _rule("classify.square.lower_than_beside", none_of),
+    _rule("classify.square.centred", first),
+    _rule("classify.square._completed", lambda found, kept, *_: np.sort(kept.cell)),
+    _rule("classify.square._certain", lambda lines, paired, pairs: all_of(paired)),
+    _rule("classify.pieces.continuing", lambda lines, chosen: chosen),
+    _rule("classify.labels._highest_around", lambda image, cells, reach: np.full(len(cells), -(10**6))),
+    _rule("classify.labels.UNDER_MEAN_M", 10.0),
+    _rule("classify.square.flush_rails", lambda *_: Flush(np.empty(0, dtype=np.int64), NO_LINES, NO_LINES)),
+    _rule("classify.square.SINGLE_SLOPE", np.inf),
+    _rule("classify.square.SINGLE_HEIGHT_M", 0.0),
+    _rule("classify.square.LEAST_SINGLE_WIDTH", 0.0),
+    _rule("classify.square.DENSE", replace(settings.DENSE, width_rounds=1)),
+)
+
+
+def main() -> None:
+    """Print a row for each rule."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("rules", nargs="*", help="parts of the names of rules; default: all")
+    parser.add_argument("--scenes", nargs="+", choices=PLACES, metavar="SCENE", default=PLACES)
+    parser.add_argument("--variant", choices=[one.name for one in VARIANTS], default=PLAIN.name, help="model or seed")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (default: one per core)")
+    arguments = parser.parse_args()
+    chosen = [
+        switch.name
+        for switch in SWITCHES
+        if any(part in switch.name for part in arguments.rules) or not arguments.rules
+    ]
+    acts: dict[str, int] = defaultdict(int)
+    needs: dict[str, list[Difference]] = defaultdict(list)
+    with ProcessPoolExecutor(arguments.workers, multiprocessing.get_context("spawn")) as pool:
+        tasks = [(place, chosen, arguments.variant) for place in arguments.scenes]
+        for (place, *_), found in zip(tasks, pool.map(ablate, tasks)):
+            print(place, file=sys.stderr, flush=True)
+            for name, moved in found.items():
+                acts[name] += 1
+                needs[name] += moved
+                print(f"    {name}", *moved, sep="\n        ", file=sys.stderr, flush=True)
+    print("| rule | acts in | figures that move without it |\n|---|---|---|")
+    for name in chosen:
+        print(f"| `{name}` | {acts[name]} of {len(tasks)} scenes | {_largest(needs[name])} |")
+
+
+def _largest(moved: Sequence[Difference]) -> str:
+    """Write the largest differences, and the number of scenes."""
+    tolerances = Golden(TABLE).tolerances
+    ordered = sorted(
+        moved, key=lambda one: -abs(np.nan_to_num(one.now - one.before, nan=1e6)) / (tolerances[one.figure] or 0.01)
+    )
+    shown = "; ".join(f"{one.scene}: {one.figure} {one.before:.4g} → {one.now:.4g}" for one in ordered[:SHOWN])
+    more = len({one.scene for one in moved}) - len({one.scene for one in ordered[:SHOWN]})
+    return (shown or "none") + (f"; {more} more scenes" if more > 0 else "")
+
+
+def ablate(task: tuple[str, Sequence[str], str]) -> dict[str, list[Difference]]:
+    """Run a scene with all rules, and without each of those that have an effect in it.
+
+    Returns
+    -------
+    dict of str to list of Difference
+        By name of the rules that have an effect; the list has the figures that moved.
+    """
+    place, names, name = task
+    variant = next(one for one in VARIANTS if one.name == name)
+    scene = build_scene(place, variant.seed_shift)
+    chosen = [switch for switch in SWITCHES if switch.name in names]
+    effective: set[str] = set()
+    tolerances = Golden(TABLE).tolerances
+    with patch.object(pipeline, "clean_square", _remembering(pipeline.clean_square)):
+        with _watched(chosen, effective):
+            before = figures_of(place, scene, variant.model)
+        found = {}
+        for switch in (switch for switch in chosen if switch.name in effective):
+            with ExitStack() as stack:
+                for module, attribute, value in switch.off:
+                    stack.enter_context(patch.object(_module(module), attribute, value))
+                try:
+                    now = figures_of(place, scene, variant.model)
+                except Exception as error:  # noqa: BLE001 - whatever happens without a rule is its effect
+                    print(f"{place} without {switch.name}: {error}", file=sys.stderr)
+                    now = {}
+            found[switch.name] = differences(place, before, now, tolerances)
+    return found
+
+
+@contextmanager
+def _watched(switches: Sequence[Switch], effective: set[str]) -> Iterator[None]:
+    """Note the switches whose replacements return anything else than the rules do, and all constants."""
+    with ExitStack() as stack:
+        for switch in switches:
+            for module, attribute, value in switch.off:
+                original = getattr(_module(module), attribute)
+                if not callable(original):
+                    effective.add(switch.name)
+                else:
+                    watching = _watching(original, value, switch.name, effective)
+                    stack.enter_context(patch.object(_module(module), attribute, watching))
+        yield
+
+
+def _watching(rule: Callable, instead: Callable, name: str, effective: set[str]) -> Callable:
+    """Wrap a rule, so that its name is noted when its replacement returns something else."""
+
+    @wraps(rule)
+    def wrapped(*arguments: Any, **named: Any) -> Any:
+        result = rule(*arguments, **named)
+        if isinstance(result, GeneratorType):
+            result = list(result)
+        if name not in effective and not same(result, instead(*arguments, **named)):
+            effective.add(name)
+        return result
+
+    return wrapped
+
+
+def _remembering(function: Callable) -> Callable:
+    """Wrap the cleaning of a square, so that each square is cleaned once."""
+    results: dict[tuple, Any] = {}
+
+    @wraps(function)
+    def wrapped(source: Any, square: Any, *others: Any) -> Any:
+        key = (source.class_code, square.key)
+        if key not in results:
+            results[key] = function(source, square, *others)
+        return results[key]
+
+    return wrapped
+
+
+def same(one: Any, other: Any) -> bool:
+    """Return whether two results are equal, part by part."""
+    if one is other:
+        return True
+    if isinstance(one, np.ndarray):
+        return np.shape(one) == np.shape(other) and bool(np.array_equal(one, other, equal_nan=one.dtype.kind == "f"))
+    if is_dataclass(one):
+        return type(one) is type(other) and same(vars(one), vars(other))
+    if isinstance(one, (list, tuple)):
+        return len(one) == len(other) and all(map(same, one, other))
+    if isinstance(one, dict):
+        return set(one) == set(other) and all(same(value, other[key]) for key, value in one.items())
+    return type(one) is type(other) and bool(one == other)
+
+
+def _module(name: str) -> Any:
+    return importlib.import_module(f"rail_extract.core.{name}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,52 @@
+"""The golden table: scenes run as the published figures say, and the comparison finds what moved."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rail_extract.laboratory.ruler.golden import PLACES, PLAIN, QUICK, VARIANTS, Golden, build_scene, figures_of
+
+TABLE = Path(__file__).resolve().parents[2] / "benchmarks" / "golden.json"
+
+
+@pytest.mark.parametrize("place", QUICK)
+def test_scene_gives_its_published_figures(place):
+    differences = Golden(TABLE).differences(PLAIN, place, figures_of(place, build_scene(place)))
+    assert not differences, "\n".join(
+        ["", f"{'scene':<24}{'figure':<16}{'before':>10}    now", *map(str, differences), "Meant so? `make golden`"]
+    )
+
+
+def test_table_has_scenes_and_variants_that_exist_and_all_of_the_quick_part():
+    figures = Golden(TABLE).figures
+    assert set(figures) <= {variant.name for variant in VARIANTS}
+    assert all(set(scenes) <= set(PLACES) for scenes in figures.values())
+    assert set(QUICK) <= set(figures[PLAIN.name])
+
+
+def test_figures_that_moved_appeared_or_vanished_differ(tmp_path):
+    path = tmp_path / "golden.json"
+    path.write_text(json.dumps({"tolerances": {"across mm": 0.2, "tracks": 0, "fork m": 1}, "figures": {}}), "utf-8")
+    golden = Golden(path)
+    golden.put(PLAIN, "straight", {"across mm": 1.0, "tracks": 2, "fork m": np.nan})
+    golden.save()
+    again = Golden(path)
+    same = {"across mm": 1.19, "tracks": 2}
+    assert again.differences(PLAIN, "straight", same) == []
+    moved = again.differences(PLAIN, "straight", {"across mm": 1.25, "tracks": np.nan, "fork m": 0.1})
+    assert [difference.figure for difference in moved] == ["across mm", "tracks", "fork m"]
+    assert str(moved[0]).split() == ["straight", "across", "mm", "1.00", "->", "1.25"]
+
+
+def test_a_figure_without_tolerance_is_refused(tmp_path):
+    path = tmp_path / "golden.json"
+    path.write_text('{"tolerances": {}, "figures": {}}', "utf-8")
+    with pytest.raises(ValueError, match="State a tolerance for tracks"):
+        Golden(path).put(PLAIN, "straight", {"tracks": 2})
+
+
+def test_another_seed_draws_the_same_place_anew():
+    own, other = build_scene("turnout_7"), build_scene("turnout_7", 100)
+    assert np.array_equal(own.rails[0], other.rails[0])
+    assert own.xyz.shape != other.xyz.shape or np.abs(own.xyz - other.xyz).max() > 0.001

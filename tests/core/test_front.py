@@ -1,0 +1,116 @@
+"""The front door: one call from a file to lines, and lines as tables, files and a report."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rail_extract as rx
+from rail_extract.core.clouds.points import read_rail_points
+from rail_extract.core.errors import ParameterError
+from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
+from rail_extract.core.front import LAYERS
+from rail_extract.core.parameters import Parameters
+from rail_extract.core.pipeline import extract_rails
+from rail_extract.core.standards import STANDARDS
+
+SAMPLE = Path(rx.__file__).parent / "resources" / "sample" / "sample.laz"
+STANDARD = STANDARDS["IN_75R_1000"]
+
+
+@pytest.fixture(scope="module")
+def network():
+    return rx.extract(SAMPLE, standard="IN_75R_1000", passes=1, engine="OPENCV")
+
+
+def test_lines_are_those_of_the_walk(network):
+    parameters = Parameters(STANDARD.gauge_m, STANDARD.head_width_m, passes=1, engine="OPENCV", quality_step_m=1.0)
+    expected = extract_rails(read_rail_points(SAMPLE, [10]), parameters)
+    assert len(network.rails) == len(expected.rails) == 6
+    for one, other in zip(network.rails, expected.rails):
+        np.testing.assert_array_equal(one.xyz, other.xyz)
+    assert [track.gauge_mm for track in network.centerlines] == [track.gauge_mm for track in expected.centerlines]
+
+
+def test_importing_the_package_imports_no_numpy():
+    code = "import sys, rail_extract; assert rail_extract.__version__ and 'numpy' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_public_names_are_listed_and_others_are_not_there():
+    assert set(rx.__all__) <= set(dir(rx))
+    assert rx.__version__.count(".") == 2
+    with pytest.raises(AttributeError, match="no attribute 'extrakt'"):
+        rx.extrakt  # noqa: B018 - looked up only
+
+
+def test_a_geopackage_gets_all_layers(network, tmp_path):
+    pyogrio = pytest.importorskip("pyogrio")
+    network.save(tmp_path / "out.gpkg")
+    assert [name for name, _ in pyogrio.list_layers(tmp_path / "out.gpkg")] == list(LAYERS)
+    for name, fields in (("rails", RAIL_FIELDS), ("centerlines", CENTERLINE_FIELDS), ("quality", QUALITY_FIELDS)):
+        info = pyogrio.read_info(tmp_path / "out.gpkg", layer=name)
+        assert list(info["fields"]) == [field.name for field in fields]
+    assert pyogrio.read_info(tmp_path / "out.gpkg", layer="rails")["features"] == len(network.rails)
+
+
+def test_other_files_get_one_layer(network, tmp_path):
+    pytest.importorskip("pyogrio")
+    network.save(tmp_path / "rails.csv")
+    network.save(str(tmp_path / "tracks.csv"), "centerlines")
+    assert len((tmp_path / "rails.csv").read_text().splitlines()) == 1 + len(network.rails)
+    assert len((tmp_path / "tracks.csv").read_text().splitlines()) == 1 + len(network.centerlines)
+
+
+def test_a_table_has_fields_geometry_and_coordinate_system(network):
+    pytest.importorskip("geopandas")
+    table = network.to_geodataframe("rails")
+    assert list(table.columns) == [*(field.name for field in RAIL_FIELDS), "geometry"]
+    assert table["rail_id"].tolist() == [rail.rail_id for rail in network.rails]
+    assert table["length_m"].tolist() == pytest.approx([rail.length_m for rail in network.rails], abs=0.001)
+    assert table.crs.to_epsg() == 32643
+    place = table.geometry[0].coords[0]
+    np.testing.assert_allclose(place, network.frame.to_crs(network.rails[0].xyz[:1])[0], atol=1e-6)
+
+
+def test_the_report_names_file_and_call(network, tmp_path):
+    network.report(tmp_path / "out.html")
+    page = (tmp_path / "out.html").read_text(encoding="utf-8")
+    assert "sample.laz" in page
+    assert "rail_extract.extract(" in page
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda network: network.save("out.shp"), "out.shp can't be written: let the name end in .gpkg or .dxf"),
+        (lambda network: network.save("out.gpkg", "tracks"), "There is no layer 'tracks': choose one of rails"),
+        (lambda network: rx.extract(SAMPLE, gap_m=3.0), "There is no parameter 'gap_m': choose from"),
+        (lambda network: rx.extract(SAMPLE, standard="UIC60"), "The rail standard 'UIC60' is unknown"),
+    ],
+)
+def test_a_wrong_argument_is_refused_with_a_remedy(network, call, said):
+    with pytest.raises(ParameterError) as refused:
+        call(network)
+    assert said in str(refused.value)
+
+
+def test_raw_points_are_classified_into_a_copy_from_which_rails_come(tmp_path):
+    laspy = pytest.importorskip("laspy")
+    from rail_extract.laboratory.scenes.raw_catalogue import RAW_SCENES
+
+    scene = RAW_SCENES["narrow"](7)
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.scales = [0.001] * 3
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = scene.xyz.T
+    cloud.write(tmp_path / "raw.laz")
+    figures = rx.classify(tmp_path / "raw.laz", tmp_path / "new.laz", standard="EN_49E1_1000")
+    assert figures.paired_m == pytest.approx(100, abs=6)
+    labelled = laspy.read(tmp_path / "new.laz").classification
+    assert np.count_nonzero(np.asarray(labelled) == 10) == figures.points
+    found = rx.extract(tmp_path / "new.laz", standard="EN_49E1_1000", passes=1, engine="OPENCV")
+    direct = rx.extract(tmp_path / "raw.laz", standard="EN_49E1_1000", raw=True, passes=1, engine="OPENCV")
+    assert len(found.rails) == len(direct.rails) == 2
+    assert direct.search.points == figures.points
