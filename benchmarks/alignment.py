@@ -1,8 +1,9 @@
 """Print how well fitted alignments meet the random designs that tracks were made from.
 
 Run `python benchmarks/alignment.py [--designs N]`. Every row has N chains of 100 elements, with a point every metre.
-The first rows have white noise only, the next ones misalignment that neighbours share as well, the last one is 20 km in
-one piece.
+The first rows have white noise only, the next ones misalignment that neighbours share as well, then there are 8 short
+tracks of 24 elements, and the last row is 20 km in one piece. With `--given`, the rows with white noise are fitted with
+the types of the true elements: what the points allow, if no element is missed.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 from rail_extract.core.alignment.elements import Alignment
 from rail_extract.core.alignment.fit import fit_track
+from rail_extract.core.alignment.given import noted
 from rail_extract.core.alignment.measured import Track
 from rail_extract.core.parameters import FitParameters
 from rail_extract.laboratory.designs import FAMILIES, Family, random_design, surveyed
@@ -33,19 +35,30 @@ WHITE_M = 0.002
 
 LONG_KM = 20.0
 
+SHORT, TRACKS = 24, 8
+"""Elements of a short track, and number of these tracks."""
+
 
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--designs", type=int, default=2, help="number of chains in each row")
-    count = parser.parse_args().designs
+    parser.add_argument("--given", action="store_true", help="give the fit the types of the true elements")
+    args = parser.parse_args()
+    count = args.designs
     print(HEAD)
     for name, family in FAMILIES.items():
-        print(row(name, [family] * count, WHITE_M, (0.0, 15.0)))
+        print(row(name, [family] * count, WHITE_M, (0.0, 15.0), given=args.given), flush=True)
+    if args.given:
+        return
     for shared, length in MISALIGNMENTS:
         for name in ("main line", "branch line"):
             title = f"{name}, {1000 * shared:.0f} mm over {length:.0f} m"
-            print(row(title, [FAMILIES[name]] * count, 0.5 * WHITE_M, (shared, length)))
+            print(row(title, [FAMILIES[name]] * count, 0.5 * WHITE_M, (shared, length)), flush=True)
+    shared, length = MISALIGNMENTS[1]
+    title = f"short, {1000 * shared:.0f} mm over {length:.0f} m"
+    tracks = [FAMILIES["branch line"]] * TRACKS
+    print(row(title, tracks, 0.5 * WHITE_M, (shared, length), elements=SHORT), flush=True)
     print(row(f"main line, {LONG_KM:.0f} km", [FAMILIES["main line"]], WHITE_M, (0.0, 15.0), 1000.0 * LONG_KM))
 
 
@@ -58,7 +71,13 @@ HEAD = (
 
 
 def row(
-    title: str, families: list[Family], white_m: float, shared: tuple[float, float], length_m: float | None = None
+    title: str,
+    families: list[Family],
+    white_m: float,
+    shared: tuple[float, float],
+    length_m: float | None = None,
+    elements: int = 100,
+    given: bool = False,
 ) -> str:
     """Fit designs, and return a row of the table.
 
@@ -71,19 +90,24 @@ def row(
     shared : (float, float)
         Standard deviation and correlation length of the misalignment, metres.
     length_m : float, optional
-        Length to which the design is cut; else it has 100 elements.
+        Length to which the design is cut; else it has `elements`.
+    elements : int
+    given : bool
+        Whether the fit is given the types of the true elements.
     """
     met, seconds, kilometres = [], 0.0, 0.0
     for number, family in enumerate(families):
         random = np.random.default_rng([SEED, number])
-        design = random_design(random, family, 100 if length_m is None else 300)
+        design = random_design(random, family, elements if length_m is None else 300)
         if length_m is not None:
             design = shortened(design, length_m)
         line = surveyed(design, random, white_m, *shared)
         s = np.arange(len(line), dtype=float)
         cant = np.column_stack([s, design.cants(s) + CANT_NOISE_M * random.standard_normal(len(s))])
         start = time.process_time()
-        fit = fit_track(Track(1, line, cant, np.zeros(len(line), dtype=bool)), design.frame, FitParameters())
+        track = Track(1, line, cant, np.zeros(len(line), dtype=bool))
+        fixed = replace(design, plan=tuple(map(noted, design.plan))) if given else None
+        fit = fit_track(track, design.frame, FitParameters(), fixed)
         seconds += time.process_time() - start
         kilometres += design.s_to / 1000.0
         met.append(compared(design, fit.alignment))

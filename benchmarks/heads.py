@@ -138,7 +138,7 @@ def drawn_once(scene: Scene, parameters: Parameters, folder: Path) -> LineNetwor
         source = MemorySource(points, side_m)
         (square,) = lay_out([source], source)
         raster = clean_square(source, square, parameters, engine_for(parameters))
-        network = draw_lines(raster, points, parameters)
+        network = draw_lines(raster, parameters)
         lines = {f"line{number}": line for number, line in enumerate(network.lines)}
         np.savez(path, nodes=network.nodes, ends=network.ends, passes=network.passes, **lines)
     with np.load(path) as kept:

@@ -3,8 +3,9 @@
 `python benchmarks/scaling.py` measures a synthetic double track of 1 km and of 10 km, each in a separate process, and
 one worker against two on the longer one, with one thread each. `--km 0.6` is faster; half a kilometre cannot be
 divided. `--memory 500` measures 500 km alone, to see what grows with length: network and drawing are left out, and each
-square has the true lines, so only reading and joining are measured. `--cores 2` measures 2 km alone, with one process
-and with two, as QGIS starts them, and prints what more would gain. Compare rows of the same run only.
+square has the true lines, so only reading and joining are measured. `--cores 2` measures 2 km alone, with one process,
+with two, as QGIS starts them, and with two threads, and prints what more processes would gain. Compare rows of the same
+run only.
 """
 
 from __future__ import annotations
@@ -16,7 +17,11 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rail_extract.core import pipeline
@@ -26,12 +31,14 @@ from rail_extract.core.cluster.runner import DaskRunner
 from rail_extract.core.cluster.workers import connect
 from rail_extract.core.kernels import blas, one_thread
 from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
+from rail_extract.core.progress import SILENT, Progress
 from rail_extract.core.rails import RailLine, Support
 from rail_extract.core.squares.grid import HALO_M, Square
 from rail_extract.core.squares.pieces import SquareRails, trim
 from rail_extract.core.squares.spool import SpooledPoints, spool
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.steps import engine_for, square_side
+from rail_extract.core.tasks import Context, Name, Once, Results, Runner, Task, turns
 from rail_extract.core.workers import runner as processes
 from rail_extract.laboratory.curves import Element, trace
 from rail_extract.laboratory.scenes.plain import spacing
@@ -135,23 +142,64 @@ def compare_workers(tiles: Path, folder: Path) -> None:
 
 
 def compare_processes(tiles: Path) -> None:
-    """Run one process, then two, and print what more would gain: work that is not shared takes as long as with one."""
+    """Run one process, two, and two threads, and print what more processes would gain.
+
+    Work that is not shared takes as long as with one.
+    """
     engine_for(parameters())  # loads the packages, which happens only once
-    spent = {count: processor_seconds(tiles, count) for count in (1, 2)}
-    for count, (wall_s, own_s, others_s) in spent.items():
-        print(f"{count} process(es): {wall_s:.1f} s; {own_s:.1f} processor seconds here, {others_s:.1f} in workers")
-    _, alone_s, _ = spent[1]
-    _, serial_s, shared_s = spent[2]
+    runners = {
+        "1 process": lambda: processes.workers(1),
+        "2 processes": lambda: processes.workers(2),
+        "2 threads": lambda: nullcontext(Threads(2)),
+    }
+    spent = {name: processor_seconds(tiles, runner()) for name, runner in runners.items()}
+    for name, (wall_s, own_s, others_s) in spent.items():
+        print(f"{name}: {wall_s:.1f} s; {own_s:.1f} processor seconds here, {others_s:.1f} in workers")
+    _, alone_s, _ = spent["1 process"]
+    _, serial_s, shared_s = spent["2 processes"]
     print(f"Not shared: {100 * serial_s / alone_s:.1f} %; sharing costs {shared_s + serial_s - alone_s:.1f} s")
     for count in PROCESSES:
         print(f"  {count} cores: {alone_s / (serial_s + shared_s / count):.1f} times as fast, by processor time")
 
 
-def processor_seconds(tiles: Path, count: int) -> tuple[float, float, float]:
-    """Extract with a number of processes; return seconds, and processor seconds of this process and of the others."""
+class Threads:
+    """A runner on threads of this process, to compare with processes: Python runs one of them at a time.
+
+    Parameters
+    ----------
+    count : int
+        Number of threads.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.failures: list[str] = []
+        self._idle = [Once() for _ in range(count)]
+
+    def run(self, tasks: Mapping[Name, Task], progress: Progress = SILENT) -> Iterator[tuple[Name, Any]]:
+        """Execute tasks; see `tasks.Runner.run`."""
+        results, waiting, finished = Results(tasks), turns(tasks), set()
+        running: dict[Future, tuple[Name, Once]] = {}
+        with ThreadPoolExecutor(len(self._idle)) as pool:
+            while waiting or running:
+                for name in [name for name in waiting if finished.issuperset(tasks[name].inputs)][: len(self._idle)]:
+                    waiting.remove(name)
+                    task, once = tasks[name], self._idle.pop()
+                    context = Context(results.take(task), once, SILENT)
+                    running[pool.submit(task.function, *task.arguments, context)] = name, once
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    name, once = running.pop(future)
+                    self._idle.append(once)
+                    finished.add(name)
+                    results.keep(name, future.result())
+                    if tasks[name].returned:
+                        yield name, future.result()
+
+
+def processor_seconds(tiles: Path, runners: AbstractContextManager[Runner]) -> tuple[float, float, float]:
+    """Extract with a runner; return seconds, and processor seconds of this process and of the others."""
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     own = time.process_time()
-    with tempfile.TemporaryDirectory() as work, one_thread(*blas()), processes.workers(count) as runner:
+    with tempfile.TemporaryDirectory() as work, one_thread(*blas()), runners as runner:
         extract_files(ask([tiles], [RAIL]), Path(work), parameters(), runner)
     after, own = resource.getrusage(resource.RUSAGE_CHILDREN), time.process_time() - own
     others = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime

@@ -2,8 +2,9 @@
 
 Run `eval "$(make -s env)"`, then `python benchmarks/speed_calls.py [CALL ...]`. Each figure is the wall time of a call
 and, in brackets, the processor time of all its processes; the shortest of the runs counts. The busy programs sort
-arrays. Wall times hold for a computer without other load only; processor times hold on a shared one, too. This command
-writes the table of speed in the README.
+arrays. Wall times hold for a computer without other load only; processor times hold on a shared one, too, except that
+cores that share a part of the processor slow each other. This command writes the table of speed in the README.
+`--clouds FOLDER --prepare` makes the clouds beforehand.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -117,6 +118,9 @@ def main() -> None:
     parser.add_argument("calls", nargs="*", metavar="CALL", help=f"of {', '.join(CALLS)} (default all)")
     parser.add_argument("--runs", type=int, default=3, help="runs of each call, of which the shortest counts (3)")
     parser.add_argument("--busy", type=int, default=2, help="most busy programs beside a call (2)")
+    text = "folder for the clouds, which stay there for the next time (default: a temporary one)"
+    parser.add_argument("--clouds", type=Path, metavar="FOLDER", help=text)
+    parser.add_argument("--prepare", action="store_true", help="make the clouds only, for a run with the same --clouds")
     arguments = parser.parse_args()
     if "QGIS_PROCESS" not in os.environ:
         sys.exit('QGIS_PROCESS is not set: run `eval "$(make -s env)"` to time whole calls.')
@@ -124,13 +128,26 @@ def main() -> None:
     if unknown:
         sys.exit(f"There is no call {', '.join(sorted(unknown))}: choose from {', '.join(CALLS)}.")
     chosen = [call for name, call in CALLS.items() if name in (arguments.calls or CALLS) and find_spec(call.needs)]
+    if arguments.prepare:
+        if arguments.clouds is None:
+            parser.error("--prepare needs --clouds")
+        make_clouds(arguments.clouds, chosen)
+        return
     print(f"{processor()}, {len(os.sched_getaffinity(0))} cores; seconds (processor seconds)\n", flush=True)
     for line in header(arguments.busy):
         print(line)
-    with tempfile.TemporaryDirectory() as folder:
+    with nullcontext(arguments.clouds.resolve()) if arguments.clouds else tempfile.TemporaryDirectory() as folder:
+        make_clouds(Path(folder), chosen)
         for call in chosen:
             words = call.words(Path(folder))
             print(row(call.name, measured(call.algorithm, words, arguments.runs, arguments.busy)), flush=True)
+
+
+def make_clouds(folder: Path, calls: Sequence[Call]) -> None:
+    """Make the clouds of calls that are not there yet."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for call in calls:
+        call.words(folder)
 
 
 def measured(algorithm: str, words: list[str], runs: int, most_busy: int) -> list[Spent]:

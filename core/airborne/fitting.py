@@ -46,7 +46,7 @@ SWITCH_M, TOE_M, TOE_FACTOR = 3.0, 0.5, 2.0
 """Two results this close are those of a switch; this close, both pull each other, and the standard error grows by this
 factor."""
 
-SHARED, FOOTPRINT_SHARE = 1.4, 0.025
+SHARED, FOOTPRINT_SHARE = 1.2, 0.025
 """Neighbouring sections share errors, by sleepers and by waves of the ballast, which the curve takes as independent:
 its standard error is this much too small. What ballast beside the rails adds, as a share of the footprint."""
 
@@ -62,7 +62,7 @@ FEW_POINTS = 8
 MAX_SIGMA_M = 0.05
 """Standard error above which a station is not seen: of those below, 95 % lie within 10 cm."""
 
-LEAST_EXPECTED = 3.5
+LEAST_EXPECTED = 2.5
 """Gain that rails must be expected to have in a section of 10 m: below it, density and footprint hide them."""
 
 TURNED_M = 0.15
@@ -255,12 +255,25 @@ def _reasons(line: _Line) -> np.ndarray:
         (UNSURE, (line.sure[half] < SURE) | (line.course.margin[half] < MARGIN)),
         (ASIDE, np.abs(refined.beside) > ASIDE_M),
         (MISLED, ~flat),
-        (HIDDEN, ~enough),
+        (HIDDEN, ~enough | _off_level(refined)),
         (SPARSE, most < LEAST_EXPECTED),
         (EMPTY, refined.sections.points <= FEW_POINTS),
     ):
         reason[holds] = code
     return reason
+
+
+JUMP_M = 1.0
+"""Change of the bed's height over a station, beyond the gradient of the line, that no track makes: a train stands
+there, a bridge crosses above, or the ground shows through an open one."""
+
+
+def _off_level(refined: Refined) -> np.ndarray:
+    """Return which stations lie on another level than most of the line, (n,) bool."""
+    step = np.diff(refined.sections.found.level + refined.corridor.level_at(refined.t), prepend=np.nan)
+    step = np.nan_to_num(step - np.nanmedian(step)) if len(step) > 1 else np.zeros(len(step))
+    level = np.cumsum(np.where(np.abs(step) > JUMP_M, step, 0.0))
+    return np.abs(level - np.median(level)) > JUMP_M
 
 
 VERTEX_M = 0.1

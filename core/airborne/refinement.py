@@ -10,7 +10,7 @@ import numpy as np
 from .axis import STEP_M as VERTEX_M
 from .axis import Axis, Points
 from .corridor import Corridor, gather
-from .curve import OUTLIER, ROBUST_PASSES, smooth
+from .curve import smooth
 from .ridges import HALF_M, Fit, Shape, binned, fit, windows
 
 STATION_M = 10.0
@@ -48,15 +48,22 @@ PARABOLA = 4
 LEAST_SIGMA_M = 0.004
 """Standard error of a section below which the scanner itself is not good enough."""
 
-TURNS_M, SLOPE_M = (0.01, 0.025, 0.06, 0.2), 0.017
-"""Standard deviations of the third differences of a track in plan over 10 m, of which one is chosen, and of the second
-ones of its height: a curve of 300 m radius whose transition is 60 m long has 0.056 m, the toe of a switch 0.3 m."""
+STRAIGHT_M, STRAIGHT_SECTIONS, TURN_SECTIONS = 0.004, 2, 5
+"""Standard deviation of the third differences of a track in plan over 10 m where its curvature does not change, the
+number of sections for which this counts beside what is measured, and the sections over which it is measured: a
+transition is rarely shorter than 50 m."""
 
-LOOSER = 1.5
-"""A curve that turns more must predict better by this factor than one that turns less."""
+FIRST_TURN_M, SLOPE_M = 0.03, 0.017
+"""Standard deviations with which the search for them begins, and of the second differences of the height: a curve of
+300 m radius whose transition is 60 m long has third differences of 0.056 m, the toe of a switch 0.3 m."""
+
+CURVE_PASSES, OUTLIER, TRUSTED = 12, 3.0, 0.2
+"""Weightings of the curve, after which it hardly moves, the residual, in standard errors, at which a section has lost
+3/4 of its weight, and the weight above which it states how good the standard errors are."""
 
 COURSE_TURN_M, COURSE_M = 0.03, 0.12
-"""The same for the first curve, through the courses of 5 m, and the standard error of their places."""
+"""Standard deviation of the third differences of the first curve, through the courses of 5 m, and the standard error of
+their places."""
 
 HOLD_M = 0.3
 """Standard error of the place of a section that is not seen: it stays where the last curve passed."""
@@ -303,31 +310,33 @@ def _shows(found: Fit, points: np.ndarray) -> np.ndarray:
 def _curve(line: Axis, t: np.ndarray, sections: Sections) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the curve through the middles, its standard error, and how far the middles lie beside it.
 
-    How much a track turns is chosen by generalised cross-validation: a straight allows less than a switch.
+    Straights and arcs are long, and transitions lie between them: how much the curvature changes is measured along the
+    track (expectation maximisation of the variance of the third differences), so that a straight stays stiff beside a
+    transition and a switch.
     """
-    tried = [_bent(line, t, sections, turn_m) for turn_m in TURNS_M]
-    return min(enumerate(tried), key=lambda one: LOOSER ** one[0] * one[1][0])[1][1]
-
-
-def _bent(
-    line: Axis, t: np.ndarray, sections: Sections, turn_m: float
-) -> tuple[float, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Return how badly a curve with this spread of third differences predicts, and the curve as `_curve` does."""
     place, normal = line.at(t)
     shows = sections.shows
     target = place + np.where(shows, sections.offset, 0.0)[:, None] * normal
     weight, robust = np.where(shows, sections.sigma**-2, HOLD_M**-2), np.ones(len(t))
-    for _ in range(ROBUST_PASSES):
+    turn_m = np.full(max(len(t) - 3, 0), FIRST_TURN_M)
+    for _ in range(CURVE_PASSES):
         curve = smooth(target, weight * robust, turn_m, 3)
         beside = ((target - curve.values) * normal).sum(axis=1)
         squares = (beside / sections.sigma / OUTLIER) ** 2
         robust = np.where(shows, 1 / (1 + squares) ** 2, 1.0)
-    loss = (OUTLIER**2 * squares / (1 + squares))[shows].sum()
-    free = max(shows.sum() - (curve.variance * weight * robust)[shows].sum(), 1.0)
-    good = shows & (robust > 0.2)
+        turn_m = _turns(curve.bend)
+    good = shows & (robust > TRUSTED)
     spread = np.sqrt(np.mean((beside / sections.sigma)[good] ** 2)) if good.sum() > 5 else 1.0
-    sigma = np.sqrt(curve.variance) * np.clip(spread, 0.5, 3.0)
-    return float(loss / free**2), (curve.values, sigma, beside)
+    return curve.values, np.sqrt(curve.variance) * np.clip(spread, 0.5, 3.0), beside
+
+
+def _turns(bend: np.ndarray) -> np.ndarray:
+    """Return the standard deviations of third differences, (n,), from their expected squares."""
+    if not len(bend):
+        return bend
+    kernel = np.ones(TURN_SECTIONS)
+    total, count = (np.convolve(one, kernel)[TURN_SECTIONS // 2 :][: len(bend)] for one in (bend, np.ones(len(bend))))
+    return np.sqrt((STRAIGHT_SECTIONS * STRAIGHT_M**2 + total) / (STRAIGHT_SECTIONS + count))
 
 
 def strip_error(refined: Refined) -> np.ndarray:

@@ -14,8 +14,8 @@ from .ridges import Shape
 from .survey import Guide
 
 MOBILE_DENSITY = 500.0
-"""Points per square metre above which single railheads show, and Extract Rails is better: airborne clouds have up to
-100, surveys from drones up to 400."""
+"""Points per square metre above which single railheads show, and Extract Rails is better: clouds from aeroplanes have
+up to 100, lidar from drones up to 400."""
 
 SPARSE_DENSITY, WIDE_FOOTPRINT_M = 5.0, 0.4
 """Below this density, a footprint this wide hides the rails in too many sections."""
@@ -44,8 +44,8 @@ def refuse_mobile(density: float) -> None:
     """
     if density > MOBILE_DENSITY:
         raise CloudError(
-            f"The cloud has {density:.0f} points per square metre, as mobile lidar has: use Extract Rails, which finds "
-            "the single railheads and is more accurate there."
+            f"The cloud has {density:.0f} points per square metre, as mobile lidar and dense drone surveys have: use "
+            "Extract Rails, which finds the single railheads and is more accurate there."
         )
 
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from ..clouds.points import Request
-from ..clouds.readers import read_classes
+from ..clouds.readers import Extent, read_classes
 from ..disk import writing
 from ..progress import Progress
 from ..tasks import READ_S, Context, Runner, Task
 from .beside import WIDE_M
 from .ridges import HALF_M
-from .squares import Key, Piece, areas_along, cells_around, in_cells
+from .squares import Key, Piece, areas_along, cells_around, in_cells, numbers_of
 
 POINT = np.dtype([("xyz", "<f8", 3), ("mark", "<u4")])
 """A point on disk: metres from the zero of the coordinate system, and its mark, see `passes.marks_of`."""
@@ -45,22 +46,27 @@ def spool(
     progress : Progress
     """
     wide_m = reach_m + WIDE_M + HALF_M
-    areas = areas_along(squares, wide_m) / request.zero.horizontal_unit_m
+    areas = {key: areas_along(pieces, wide_m) / request.zero.horizontal_unit_m for key, pieces in squares.items()}
     around = {key: cells_around([piece.axis for piece in pieces], wide_m) for key, pieces in squares.items()}
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     tasks = {}
     for number, header in enumerate(request.headers):
-        low, high = np.array(header.extent[:2]), np.array(header.extent[2:])
-        touched = ~((areas[:, :2] > high) | (areas[:, 2:] < low)).any(axis=1)  # an extent of NaN may be anywhere
-        if touched.any():
-            arguments = (request, number, areas[touched], around, folder)
-            tasks[number] = Task(header.path.name, spool_file, arguments, weight=READ_S * (header.point_count + 1))
-    counts: dict[Key, int] = {}
+        touched = {key: some for key, all_areas in areas.items() if len(some := _touched(all_areas, header.extent))}
+        if touched:
+            arguments = (request, number, np.concatenate([*touched.values()]), {key: around[key] for key in touched})
+            weight = READ_S * (header.point_count + 1)
+            tasks[number] = Task(header.path.name, spool_file, (*arguments, folder), weight=weight)
+    counts: Counter[Key] = Counter()
     for _, one in runner.run(tasks, progress):
-        for key, count in one.items():
-            counts[key] = counts.get(key, 0) + count
-    return counts
+        counts.update(one)
+    return dict(counts)
+
+
+def _touched(areas: np.ndarray, extent: Extent) -> np.ndarray:
+    """Return the rectangles, (k, 4), that touch an extent; one of NaN may be anywhere."""
+    low, high = np.array(extent[:2]), np.array(extent[2:])
+    return areas[~((areas[:, :2] > high) | (areas[:, 2:] < low)).any(axis=1)]
 
 
 def spool_file(
@@ -81,21 +87,21 @@ def spool_file(
     context : Context
     """
     header = request.headers[number]
-    counts: dict[Key, int] = {}
+    counts: Counter[Key] = Counter()
+    anywhere = np.unique(np.concatenate([*around.values()]))
     chunks = read_classes(header.path, request.class_codes, context.progress, areas, request.leave_out)
     for xyz, _, marks, _ in chunks:
-        kept = request.holds(xyz)
-        local, marks = request.zero.to_local(xyz[kept]), marks[kept]
+        local = request.zero.to_local(xyz)
+        kept = in_cells(local[:, :2], anywhere) & request.holds(xyz)
+        points = np.empty(int(kept.sum()), POINT)
+        points["xyz"], points["mark"] = local[kept], marks[kept]
         for key, cells in around.items():
-            inside = in_cells(local[:, :2], cells)
-            if not inside.any():
-                continue
-            points = np.empty(int(inside.sum()), POINT)
-            points["xyz"], points["mark"] = local[inside], marks[inside]
-            counts[key] = counts.get(key, 0) + len(points)
-            with writing(folder), _file(folder, key, number).open("ab") as file:
-                file.write(points.tobytes())
-    return counts
+            own = points[in_cells(points["xyz"][:, :2], cells)]
+            if len(own):
+                counts[key] += len(own)
+                with writing(folder), _file(folder, key, number).open("ab") as file:
+                    file.write(own.tobytes())
+    return dict(counts)
 
 
 def _file(folder: Path, key: Key, number: int) -> Path:
@@ -110,5 +116,5 @@ def points_of(folder: Path, key: Key) -> np.ndarray:
 
 def density_of(xy: np.ndarray) -> np.ndarray:
     """Return the number of places, (n, 2), in each square of `PLACE_M` that has one, per square metre."""
-    _, number = np.unique(np.floor(xy / PLACE_M).astype(np.int64), axis=0, return_counts=True)
+    _, number = np.unique(numbers_of(np.floor(xy / PLACE_M).astype(np.int64)), return_counts=True)
     return number / PLACE_M**2

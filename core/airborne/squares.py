@@ -6,7 +6,7 @@ fitted together, with as much of them around it as their curves depend on.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,27 +79,25 @@ def cells_around(axes: Sequence[Axis], reach_m: float) -> np.ndarray:
     steps = np.arange(-int(np.ceil(reach_m / CELL_M)), int(np.ceil(reach_m / CELL_M)) + 1)
     around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     cells = np.unique(np.concatenate([np.floor(axis.xy / CELL_M).astype(np.int64) for axis in axes]), axis=0)
-    return np.unique(_numbers((cells[:, None] + around).reshape(-1, 2)))
+    return np.unique(numbers_of((cells[:, None] + around).reshape(-1, 2)))
 
 
 def in_cells(xy: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Return which places, (n, 2), lie in cells, given by their numbers, (n,) bool."""
-    number = _numbers(np.floor(xy / CELL_M).astype(np.int64))
+    number = numbers_of(np.floor(xy / CELL_M).astype(np.int64))
     at = np.minimum(np.searchsorted(cells, number), len(cells) - 1)
     return cells[at] == number
 
 
-def _numbers(cells: np.ndarray) -> np.ndarray:
+def numbers_of(cells: np.ndarray) -> np.ndarray:
+    """Return a number for each cell, given by its column and row, (n, 2)."""
     return cells[:, 0] * ROW + cells[:, 1]
 
 
-def areas_along(squares: Mapping[Key, Sequence[Piece]], reach_m: float) -> np.ndarray:
+def areas_along(pieces: Sequence[Piece], reach_m: float) -> np.ndarray:
     """Return rectangles that hold all places within reach of the pieces, (k, 4) metres."""
     parts = [
-        part
-        for pieces in squares.values()
-        for piece in pieces
-        for part in np.array_split(piece.axis.xy, max(int(len(piece.axis.xy) / AREA_M), 1))
+        part for piece in pieces for part in np.array_split(piece.axis.xy, max(int(len(piece.axis.xy) / AREA_M), 1))
     ]
     low, high = (np.array([reduce(part, axis=0) for part in parts]) for reduce in (np.min, np.max))
     return np.column_stack([low - reach_m, high + reach_m])

@@ -8,6 +8,9 @@ from typing import Optional
 
 import numpy as np
 
+from ..errors import RailExtractError
+from ..polyline import length_along
+from ..progress import Progress
 from .elements import Alignment
 from .equations import SAME_PLACE_M
 
@@ -57,6 +60,39 @@ def _distance_m(alignment: Alignment, xy: np.ndarray) -> float:
     foot = alignment.foot(xy)
     inside = foot.past_m == 0
     return float(np.median(np.abs(foot.across_m[inside]))) if np.count_nonzero(inside) > 1 else np.inf
+
+
+def compared_with(
+    alignments: Sequence[Alignment], tracks: Sequence[tuple[Optional[int], np.ndarray]], progress: Progress
+) -> list[tuple[Alignment, Deviations]]:
+    """Return the deviations of each track, with the alignment beside it.
+
+    Parameters
+    ----------
+    alignments : sequence of Alignment
+    tracks : sequence of (int, (n, 3) array)
+        Numbers and vertices, local metres of the alignments.
+    progress : Progress
+        Warned of tracks that lie along no alignment.
+
+    Raises
+    ------
+    RailExtractError
+        None lies along an alignment.
+    """
+    found, lost = [], []
+    for track_id, xyz in tracks:
+        alignment = beside(alignments, xyz[:, :2])
+        if alignment is None:
+            lost.append(str(track_id))
+            continue
+        along = length_along(xyz[:, :2])
+        found.append((alignment, deviations_of(alignment, track_id, xyz, along, np.zeros((0, 2)))))
+    if not found:
+        raise RailExtractError("None of TRACKS lies along an alignment of INPUT: check the coordinate system of both.")
+    if lost:
+        progress.warning(f"Tracks {', '.join(lost)} do not lie along an alignment: they are left out.")
+    return found
 
 
 def deviations_of(

@@ -30,7 +30,11 @@ HOLDS = 3.0
 """A fit does not hold where the line is off by more than this many tolerances, as a root mean square."""
 
 SQUEEZED = 0.5
-"""Share of the least length below which an element that the fit shortens is left out."""
+"""Share of the least length below which an element that the fit shortens at an end of the line is left out."""
+
+UNSURE, MANY = 1.0 / 3.0, 0.25
+"""An arc is near the noise if its standard error exceeds this share of its radius; more than this share of all arcs is
+reported."""
 
 LEAST_CANT_POINTS = 20
 """With fewer places of known cant, it has no elements."""
@@ -84,6 +88,7 @@ def fit_track(
     in_plan, in_height, of_cant = progress.divide([4.0, 1.0, 1.0])
     measured, plan = _followed(track.track_id, measured, settings, fixed, in_plan)
     elements = _stated(plan)
+    _warn_of_noise(track.track_id, elements, progress)
     if settings.rounded and fixed is None:
         elements = with_round_radii(plan.chain, plan.points, plan.fit, elements, in_plan)
     elements, feet = _shifted(elements, float(measured.along[0])), plan.fit.s + measured.along[0]
@@ -211,14 +216,10 @@ def _fit_in_plan(
 
 
 def _squeezed(elements: Sequence[PlanElement], settings: FitParameters) -> Optional[int]:
-    """Return the number of an element that the points squeeze between its neighbours, which can do without it."""
-    for number, one in enumerate(elements):
-        near = elements[max(number - 1, 0) : number + 2]
-        between_lines = len(near) == 3 and near[0].type == near[2].type == "line"
-        is_needed = one.type == "clothoid" and len(near) == 3 and settings.transitions != JUMPS
-        if one.length_m < SQUEEZED * settings.min_length_m and len(near) > 1 and not between_lines | is_needed:
-            return number
-    return None
+    """Return the number of an element at an end of the line that the points squeeze out; None if there is none."""
+    least_m = SQUEEZED * settings.min_length_m
+    ends = {0, len(elements) - 1} if len(elements) > 1 else set()
+    return next((number for number in ends if elements[number].length_m < least_m), None)
 
 
 def _lost(track_id: int) -> _LostError:
@@ -246,6 +247,17 @@ def _stated(plan: _Plan) -> tuple[PlanElement, ...]:
             )
         )
     return tuple(made)
+
+
+def _warn_of_noise(track_id: int, elements: Sequence[PlanElement], progress: Progress) -> None:
+    """Say if many arcs can hardly be told from straights."""
+    arcs = [one for one in elements if one.type == "arc" and one.figures.sigma_r_m is not None]
+    unsure = [one for one in arcs if (one.figures.sigma_r_m or 0.0) * abs(one.k_from) > UNSURE]
+    if len(unsure) > max(1.0, MANY * len(arcs)):
+        progress.warning(
+            f"{len(unsure)} of {len(arcs)} arcs of track {track_id} are near the noise (sigma_r_m is more than a third "
+            "of the radius): misalignment may have been taken for design. Raise TOLERANCE, or fit a longer line."
+        )
 
 
 def _holding(

@@ -41,6 +41,25 @@ class Track:
     is_bridged: np.ndarray
 
 
+def with_stations(track_id: int, xyz: np.ndarray, stations: np.ndarray) -> Track:
+    """Return a track with the cant of its stations, and what these say of bridged gaps.
+
+    Parameters
+    ----------
+    track_id : int
+    xyz : (n, 3) array
+        Vertices, local metres.
+    stations : (k, 3) array
+        Chainage, cant in metres, NaN where it is unknown, and 1 in a bridged gap; in order.
+    """
+    known = np.isfinite(stations[:, 1]) & (stations[:, 2] == 0)
+    bridged = np.zeros(len(xyz), dtype=bool)
+    if len(stations):
+        at = np.clip(np.searchsorted(stations[:, 0], length_along(xyz[:, :2])), 0, len(stations) - 1)
+        bridged = stations[at, 2] != 0
+    return Track(track_id, xyz, stations[known][:, :2], bridged)
+
+
 @dataclass(frozen=True)
 class Measured:
     """Points of a track, or of a part of it: its vertices, those averaged that are closer than a metre.

@@ -16,6 +16,10 @@ from .structure import Blocks, Rules, from_pieces, searched
 NOISE_ROUNDS, SETTLED = 8, 1.15
 """Largest number of partitions for the noise, and the growth of the noise below which it is known."""
 
+SHORT_M, RAISED = 10.0, 2.0
+"""Mean length of a piece, metres, below which a partition follows the noise, because no track is built of such
+elements, and the factor by which the noise is then raised."""
+
 LIKELY = 2.0
 """Standard errors by which the last partition has to show misalignment: to miss it is worse than to see some where
 there is none, because the search then bends a track with it."""
@@ -97,17 +101,20 @@ def noise_of(signal: Signal, tolerance_m: float, progress: Progress = SILENT) ->
     used = signal.share > 0
     s, y = signal.s[used], signal.y[used]
     noise = Noise(max(independent_m(s, y), FLOOR_M))
-    tried = []
+    sigma, tried = noise.effective_m(signal.step_m), []
     for share in progress.split(NOISE_ROUNDS):
-        sigma, fine = noise.effective_m(signal.step_m), signal.blocks(noise).fine
+        fine = signal.blocks(noise).fine
         of_block = sigma * math.sqrt(len(fine.s) / len(s))
         pieces = partition(fine.s, fine.y, of_block, signal.kind.degrees, (s[0], s[-1]), share)
         rests = _residuals(pieces, s, y)
         found = estimated(rests, signal.step_m, FLOOR_M)
         noise = Noise(found.white_m, min(found.shared_m, tolerance_m), found.length_m)
         tried.append((rests, pieces))
-        if noise.effective_m(signal.step_m) < SETTLED * sigma:
+        is_short = s[-1] - s[0] < SHORT_M * len(pieces)
+        left = noise.effective_m(signal.step_m)
+        if left < SETTLED * sigma and not is_short:
             break
+        sigma = max(left, RAISED * sigma) if is_short else left
     if estimated(rests, signal.step_m, FLOOR_M, LIKELY).shared_m:
         return noise, pieces
     rests, pieces = tried[0]

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import fields
 from itertools import groupby
 from typing import Any, Optional
 
 import numpy as np
 
-from ..errors import ParameterError
+from ..errors import ParameterError, RailExtractError
 from ..fields import ELEMENT_FIELDS
-from ..frame import LocalFrame
+from ..frame import ORIGIN_STEP, LocalFrame
 from .elements import Alignment, CantElement, Element, Figures, PlanElement, VerticalElement
 
 Row = Mapping[str, Any]
@@ -21,6 +21,53 @@ GON = 200.0 / math.pi
 """Gon in a radian."""
 
 LAYOUTS = (PlanElement.layout, VerticalElement.layout, CantElement.layout)
+
+
+KEY_FIELDS = ("layout", "s_from", "s_to")
+"""Fields by which an element table is recognized."""
+
+
+def check_table(names: Collection[str], source: str) -> None:
+    """Check that a table with these fields is an element table; `source` names it in the message.
+
+    Raises
+    ------
+    RailExtractError
+        It is another one.
+    """
+    if not set(KEY_FIELDS) <= set(names):
+        raise RailExtractError(
+            f"{source} is not an element table, because it lacks the fields {', '.join(KEY_FIELDS)}: give the output "
+            "ELEMENTS of Fit alignment or Import alignment."
+        )
+
+
+def frame_of(table: Iterable[Row], system: tuple[Optional[str], float, float], source: str) -> LocalFrame:
+    """Return the local frame of an element table.
+
+    Parameters
+    ----------
+    table : iterable of mappings
+    system : (str or None, float, float)
+        Coordinate system as WKT, and its units in plan and in height, metres.
+    source : str
+        Name of the table, for the message.
+
+    Raises
+    ------
+    RailExtractError
+        No element has a place.
+    """
+    starts = [(row["x"], row["y"]) for row in table if _is_number(row.get("x")) and _is_number(row.get("y"))]
+    if not starts:
+        raise RailExtractError(f"{source} has no element in plan with x and y: give a table with layout H.")
+    crs_wkt, horizontal_unit_m, vertical_unit_m = system
+    origin = np.append(np.round(np.median(starts, axis=0) / ORIGIN_STEP) * ORIGIN_STEP, 0.0)
+    return LocalFrame(origin, horizontal_unit_m, vertical_unit_m, crs_wkt)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and math.isfinite(value)
 
 
 def rows(alignment: Alignment) -> list[dict[str, Any]]:
@@ -175,8 +222,8 @@ def _figures(row: Row) -> Figures:
 
 def _needed(row: Row, name: str) -> float:
     """Return a number that a row must have."""
-    value = row.get(name)
-    if isinstance(value, (int, float)) and math.isfinite(value):
+    value: Any = row.get(name)
+    if _is_number(value):
         return float(value)
     raise ParameterError(f"{_where(row)} has no value in the field {name}: fill it, or remove the row.")
 

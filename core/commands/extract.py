@@ -33,8 +33,10 @@ from .options import (
     LAYERS,
     TILES_HELP,
     Console,
+    add_axis_arguments,
     add_cloud_arguments,
     add_method_arguments,
+    axes_of,
     destination_of,
     extent_of,
     gauges_of,
@@ -114,6 +116,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "take all rail classes for one, for tracks whose rails are of different classes"
     cloud.add_argument("--merge-classes", action="store_true", help=text)
     add_cloud_arguments(cloud)
+    kilometres = parser.add_argument_group("kilometres", "Fields of --quality and --findings, and in the report.")
+    kilometres.add_argument("--axis", metavar="FILE", help="line layer that carries the kilometres")
+    add_axis_arguments(kilometres)
     method = parser.add_argument_group("method", "See docs/parameters.md.")
     method.add_argument("--iterations", type=int, default=Parameters.passes, help="passes of the network (default: 2)")
     method.add_argument("--engine", choices=ENGINES, default=Parameters.engine, help="what runs the network")
@@ -168,6 +173,8 @@ def run(args: argparse.Namespace) -> int:
     missing = [package for package in needed if find_spec(package) is None]
     if missing:
         raise RailExtractError(f"Packages are missing ({', '.join(missing)}): in a clone, run pip install .[cluster].")
+    if args.axis and not (args.quality or args.findings or args.report):
+        raise ParameterError("--axis gives --quality, --findings and --report kilometres: name at least one of these.")
     standard = resolve(args.standard, args.gauge, args.head_width)
     parameters = parameters_of(args, standard)
     outputs = _outputs(args)
@@ -255,7 +262,10 @@ def _run_in(
         request = limited(request, args)
         request = replace(request, merged=args.merge_classes and not raw)
         seeds = shapes_module("--seeds").read_seeds(args.seeds, request.zero.crs_wkt) if args.seeds else ()
+        axes = axes_of(args, None, request.zero.crs_wkt)[0] if args.axis else None
         network = extract_files(request, folder.resolve(), parameters, runner, progress, args.classify, weights, seeds)
+    if axes is not None:
+        network = replace(network, geometry=axes.along(network.geometry, network.frame, progress))
     _write(network, args, standard, parameters, extent, outputs)
     print(f"{len(network.rails)} rails, {sum(rail.length_m for rail in network.rails) / 1000:.3f} km")
     print(f"{len(network.centerlines)} centerlines, {sum(one.length_m for one in network.centerlines) / 1000:.3f} km")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+import struct
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,8 +20,10 @@ from ..fields import (
     AIRBORNE_STATION_FIELDS,
     CENTERLINE_FIELDS,
     FINDING_FIELDS,
+    KM_FIELDS,
     QUALITY_FIELDS,
     RAIL_FIELDS,
+    STATION_FIELDS,
     STOP_FIELDS,
     UNKNOWN_IN_METRES,
     Field,
@@ -29,6 +33,9 @@ from ..geopackage import tables_in
 from ..grow.growth import Stop
 from ..rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from ..report import Finding, list_findings
+
+LINE_M, LINE_ZM = 2002, 3002
+"""Codes of lines with M values in well-known binary."""
 
 KINDS = {int: np.int32, float: float, str: object}
 
@@ -44,7 +51,7 @@ class Layer:
     columns : sequence of sequence
         Values of each field, one per feature.
     geometry_type : str
-        "LineString Z" or "Point Z".
+        "LineString Z" or "Point Z"; without Z, heights are left out, and with M, lines have a fourth column.
     xyz : sequence of (n, 3) or (3,) array
         Vertices of each line, or place of each point, in local metres.
     """
@@ -57,8 +64,9 @@ class Layer:
 
     def shapes(self, frame: LocalFrame) -> list:
         """Return the geometries in the coordinates of the cloud, given the local frame of the layer."""
-        make = shapely.points if self.geometry_type == "Point Z" else shapely.linestrings
-        return [make(frame.to_crs(xyz)) for xyz in self.xyz]
+        make = shapely.points if self.geometry_type.startswith("Point") else shapely.linestrings
+        own = slice(3 if "Z" in self.geometry_type else 2)
+        return [make(frame.to_crs(xyz[..., :3])[..., own]) for xyz in self.xyz]
 
     def written_columns(self) -> list[list[Any]]:
         """Return the columns with the values as they are written; None where one is unknown."""
@@ -81,9 +89,15 @@ def network_layers(network: RailNetwork, names: Collection[str], gauges_m: Seque
         "rails": lambda: lines_layer("rails", RAIL_FIELDS, network.rails),
         "centerlines": lambda: lines_layer("centerlines", CENTERLINE_FIELDS, network.centerlines),
         "quality": lambda: stations_layer("quality", network.geometry),
-        "findings": lambda: lines_layer("findings", FINDING_FIELDS, list_findings(network, gauges_m)),
+        "findings": lambda: findings_layer(list_findings(network, gauges_m)),
     }
     return [make() for name, make in makers.items() if name in names]
+
+
+def findings_layer(found: Sequence[Finding]) -> Layer:
+    """Make a layer of findings: with an axis, also with their kilometres."""
+    located = any(finding.km_text is not None for finding in found)
+    return lines_layer("findings", (*FINDING_FIELDS, *KM_FIELDS) if located else FINDING_FIELDS, found)
 
 
 def lines_layer(
@@ -115,7 +129,13 @@ def stations_layer(name: str, tracks: Sequence[TrackGeometry]) -> Layer:
         [value for track in tracks for value in np.broadcast_to(getattr(track, field.name), len(track.xyz))]
         for field in QUALITY_FIELDS
     ]
-    return Layer(name, QUALITY_FIELDS, columns, "Point Z", [place for track in tracks for place in track.xyz])
+    fields: tuple[Field, ...] = QUALITY_FIELDS
+    if any(track.kilometres is not None for track in tracks):
+        fields = (*QUALITY_FIELDS, *STATION_FIELDS)
+        columns += [
+            [value for track in tracks for value in getattr(track.kilometres, field.name)] for field in STATION_FIELDS
+        ]
+    return Layer(name, fields, columns, "Point Z", [place for track in tracks for place in track.xyz])
 
 
 def stops_layer(stops: Sequence[Stop]) -> Layer:
@@ -180,30 +200,59 @@ def _write_for_others(layer: Layer, destination: Destination, frame: LocalFrame)
 
 def _write_layer(layer: Layer, frame: LocalFrame, file: Path) -> None:
     """Write a layer, in place of the one of this name that the file has."""
-    columns = [_column(field, values) for field, values in zip(layer.fields, layer.written_columns())]
-    try:
+    columns = [column_of(field, values) for field, values in zip(layer.fields, layer.written_columns())]
+    with as_os_error():
         pyogrio.raw.write(
             str(file),
             layer=layer.name,
             driver="GPKG",
             geometry=_geometry(layer, frame),
-            geometry_type=layer.geometry_type,
+            geometry_type="Unknown" if layer.geometry_type.endswith("M") else layer.geometry_type,
             field_data=[column for column, _ in columns],
             field_mask=[empty for _, empty in columns],
             fields=[field.name for field in layer.fields],
             crs=frame.crs_wkt or UNKNOWN_IN_METRES,
             nan_as_null=True,
         )
+
+
+@contextmanager
+def as_os_error() -> Iterator[None]:
+    """Turn what GDAL raises into an `OSError`, which a destination explains."""
+    try:
+        yield
     except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, RuntimeError) as error:
         raise OSError(str(error)) from error
 
 
 def _geometry(layer: Layer, frame: LocalFrame) -> np.ndarray:
     """Geometries in the coordinates of the cloud as well-known binary, (n,)."""
-    return np.array([shapely.to_wkb(shape, output_dimension=3) for shape in layer.shapes(frame)], dtype=object)
+    shapes = layer.shapes(frame)
+    if layer.geometry_type.endswith("M"):
+        pairs = zip(shapes, layer.xyz)
+        made = [measured_line(np.column_stack([_vertices(shape), xyz[:, 3]])) for shape, xyz in pairs]
+    else:
+        made = [shapely.to_wkb(shape, output_dimension=3) for shape in shapes]
+    return np.array(made, dtype=object)
 
 
-def _column(field: Field, written: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
+def _vertices(shape: shapely.Geometry) -> np.ndarray:
+    return shapely.get_coordinates(shape, include_z=shapely.has_z(shape))
+
+
+def measured_line(vertices: np.ndarray) -> bytes:
+    """Return a line with M values as well-known binary, which shapely does not write.
+
+    Parameters
+    ----------
+    vertices : (n, 3) or (n, 4) array
+        x, y, perhaps z, and M.
+    """
+    count, size = vertices.shape
+    return struct.pack("<BII", 1, {3: LINE_M, 4: LINE_ZM}[size], count) + vertices.astype("<f8").tobytes()
+
+
+def column_of(field: Field, written: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
     """Values of a field, given as they are written, and where there are none, (n,) each."""
     empty = np.array([value is None for value in written], dtype=bool)
     filler = 0 if field.kind is int else None

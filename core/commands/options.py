@@ -12,6 +12,9 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
+from ..alignment.km_text import HECTOMETRES, NOTATIONS
+from ..alignment.placed_axes import PlacedAxes
+from ..alignment.stations import Start
 from ..clouds.points import Request
 from ..disk import Destination, writing
 from ..errors import ParameterError
@@ -57,6 +60,43 @@ def add_method_arguments(parser: argparse._ActionsContainer) -> None:
     parser.add_argument("--method", choices=METHODS, default=GEOMETRY, help=text)
     text = f"file that train-classifier has written, for --method {LEARNED} (default: those shipped)"
     parser.add_argument("--weights", type=Path, metavar="FILE", help=text)
+
+
+def add_axis_arguments(parser: argparse._ActionsContainer) -> None:
+    """Declare what states the kilometres of an axis, in a parser or in a group."""
+    text = "kilometre at the first vertex of the axis; overrides M values"
+    parser.add_argument("--start-km", type=float, metavar="KM", help=text)
+    parser.add_argument("--decreasing", action="store_true", help="kilometres decrease from the start of the axis")
+    text = "points of kilometre or hectometre posts; they override the start and M values"
+    parser.add_argument("--posts", metavar="FILE", help=text)
+    text = "field of the posts with the kilometre (default: the first of km, kilometre, km_text, station)"
+    parser.add_argument("--post-field", metavar="NAME", help=text)
+    text = "table of gaps and overlaps with the fields km_back and km_ahead"
+    parser.add_argument("--jumps", metavar="FILE", help=text)
+    text = f"how km_text writes kilometres (default: {HECTOMETRES})"
+    parser.add_argument("--format", choices=tuple(NOTATIONS), default=HECTOMETRES, help=text)
+
+
+def axes_of(args: argparse.Namespace, places: str | None, plane: str | None = None) -> tuple[PlacedAxes, str | None]:
+    """Return the axes that the options state, and the coordinate system of their plane.
+
+    Parameters
+    ----------
+    args : Namespace
+    places : str or None
+        Coordinate system of what is to be located.
+    plane : str, optional
+        Coordinate system of the plane; else it is that of the axis, or of the places if the axis is in degrees.
+
+    Raises
+    ------
+    RailExtractError
+        They state no kilometres, or contradict each other.
+    """
+    start = None if args.start_km is None else Start(args.start_km, args.decreasing)
+    return shapes_module("--axis", "features").read_axes(
+        args.axis, start, args.posts, args.post_field, args.jumps, args.format, (plane, places)
+    )
 
 
 LAYERS = (".gpkg", ".dxf", ".csv")

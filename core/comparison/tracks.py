@@ -195,6 +195,18 @@ class TrackComparison:
         return every[np.isfinite(every)]
 
 
+def doubts_of(found: TrackComparison) -> list[str]:
+    """Return what the user is warned of: nothing in common, or standard errors that no survey states."""
+    if not found.values("across_mm").size:
+        return ["The two surveys have no line in common: check that they are of the same place, and REACH."]
+    if not np.isfinite(found.estimated_m):
+        return []
+    return [
+        "A survey states no standard error: the scatter of the differences stands for it, "
+        f"{1000 * found.estimated_m:.1f} mm across. Fill in REFERENCE_SIGMA and INPUT_SIGMA if it is known."
+    ]
+
+
 def compare_surveys(
     reference: Survey, other: Survey, settings: ComparisonParameters, progress: Progress = SILENT
 ) -> TrackComparison:

@@ -14,10 +14,8 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import savgol_filter
 
 from ..polyline import left_normals, project
-from ..rails import Support
 from .edges import STATION_STEP_M, search_distance, station_count, stations_along
 from .level import OFF_TOP_SIGMAS, SLOPE_ROUNDS, is_blended, robust_sigma, rough_level
-from .uncertainty import bridge_error
 
 REACH_HEADS = 1.0
 """Distance from the line, in head widths, within which the ridge is a parabola: a Gaussian of 7 cm is, to a tenth."""
@@ -56,17 +54,20 @@ class Ridge:
     ----------
     t : (s,) array
         Equidistant chainages, see `edges.stations_along`.
-    offset_m, by_chance_m : (s,) arrays
-        Offset of the crest to the left of the line, and its standard error by the noise of single points; NaN where no
-        points are near.
-    bend : float
-        Curvature of the parabola, 1/m.
+    offset_m, information : (s,) arrays
+        Offset of the crest to the left of the line that the points next to a station alone show, and the inverse of its
+        variance by the noise of single points, 1/m²; 0 where no points are near.
     """
 
     t: np.ndarray
     offset_m: np.ndarray
-    by_chance_m: np.ndarray
-    bend: float
+    information: np.ndarray
+
+    @property
+    def course_m(self) -> np.ndarray:
+        """Offset of the crest in windows of `WINDOW` stations, (s,)."""
+        shown = uniform_filter1d([self.information * self.offset_m, self.information], WINDOW, axis=1, mode="nearest")
+        return shown[0] / np.maximum(shown[1], 1e-9)
 
     @classmethod
     def find(
@@ -93,43 +94,31 @@ class Ridge:
             bend = max(-2 * float(np.polynomial.polynomial.polyfit(x[used], up[used], 2)[2]), MIN_BEND)
             flat = up + 0.5 * bend * x**2
             noise_m = robust_sigma(flat[used])
-            level, slope, spread = _slopes(
-                row[used], rows, x[used], flat[used], bend, (noise_m / bend / LEANING_M) ** 2
-            )
+            level, slope, crest, information = _crests(row[used], rows, x[used], flat[used], bend, noise_m)
             used = np.abs(flat - level[row] - slope[row] * x) <= OFF_TOP_SIGMAS * noise_m
-        return cls(stations_along(length_m), slope / bend, noise_m / (bend * np.sqrt(spread)), bend)
-
-    def support(self, t: np.ndarray, line: np.ndarray, unseen_m: float) -> Support:
-        """Return how well points support a finished line, without its errors of height.
-
-        Parameters
-        ----------
-        t : (n,) array
-            Chainages of the points on the head, increasing.
-        line : (s, 2) array
-            Places of the stations.
-        unseen_m : float
-            Standard deviation of the line where no points are near.
-        """
-        points = np.bincount(np.minimum((t / STATION_STEP_M).astype(int), len(self.t) - 1), minlength=len(self.t))
-        sigma_m = np.where(np.isfinite(self.by_chance_m), np.hypot(self.by_chance_m, wander(line)), unseen_m)
-        return Support(self.t, points, np.hypot(sigma_m, bridge_error(t, self.t)))
+        return cls(stations_along(length_m), crest, information)
 
 
-def _slopes(
-    row: np.ndarray, rows: int, x: np.ndarray, flat: np.ndarray, bend: float, prior_m2: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fit level and slope across to the points of each window, (rows,) each; NaN in windows without points.
+def _crests(
+    row: np.ndarray, rows: int, x: np.ndarray, flat: np.ndarray, bend: float, noise_m: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Fit level and slope across to the points of each window, and the crest to those of each station, (rows,) each.
 
-    The third array is the information about the slope: the sum of the squares of the offsets about their mean, m², and
-    that of the prior, by which the crest is at the mean of the points.
+    The fourth array is the information about the crest, 1/m²: from the offsets of the points about their mean, and from
+    the prior of the window, by which the crest is at this mean.
     """
     sums = np.array([np.bincount(row, one, rows) for one in (np.ones_like(x), x, flat, x * x, x * flat)])
     count, sx, sy, xx, xy = uniform_filter1d(sums, WINDOW, axis=1, mode="constant") * WINDOW
-    count = np.where(count > 0.5, count, np.nan)
-    spread = xx - sx**2 / count + prior_m2
-    slope = (xy - sx * sy / count + prior_m2 * bend * sx / count) / spread
-    return (sy - slope * sx) / count, slope, spread
+    count = np.where(count > 0.5, count, np.inf)
+    mean, level = sx / count, sy / count
+    prior_m2 = (noise_m / bend / LEANING_M) ** 2
+    slope = (xy - mean * sy + prior_m2 * bend * mean) / (xx - mean * sx + prior_m2)
+    points, sx, sy, xx, xy = sums
+    own_prior = prior_m2 / WINDOW * (count < np.inf)
+    spread = xx - 2 * mean * sx + points * mean**2 + own_prior
+    product = xy - mean * sy - level * sx + points * mean * level + own_prior * bend * mean
+    crest = product / (bend * np.maximum(spread, 1e-12))
+    return level - slope * mean, slope, crest, spread * (bend / noise_m) ** 2
 
 
 def blunt_share(lines: Sequence[np.ndarray], xyz: np.ndarray, head_width_m: float) -> float:

@@ -60,6 +60,10 @@ SURE_SIGMAS = 2.0
 HALF_RANGE_BINS = HALF_HEAD_BINS + MAX_SHIFT_BINS + 2 + BLURRED_BINS + RIM_BINS
 """Bins on either side of a line that these steps need."""
 
+ALONE_SIGMA_M = 0.0012
+"""Standard error of the middle that comes from a single edge: how much of its corner is seen depends on the view. Seen
+from above a track, the left and the right corner differ by 1.7 mm."""
+
 EDGE_ROUNDS = 2
 """The first round finds out how the scanner sees the head, the second uses the edges that count."""
 
@@ -136,6 +140,74 @@ def middles(counts: np.ndarray, wide_counts: np.ndarray, free: np.ndarray) -> np
         See `neighbours.free_edges`.
     """
     return CrossSections.of(wide_counts).find_edges(free).middles_in(counts, wide_counts)
+
+
+@dataclass(frozen=True)
+class EdgeMiddles:
+    """The middle between the edges of a head at s stations, NaN where no edges are visible.
+
+    Attributes
+    ----------
+    offset_m : (s,) array
+        Metres to the left of the line.
+    information : (s,) array
+        Inverse of its variance that the points next to a station alone contribute, 1/m².
+    view_m : (s,) array
+        Standard error that more points would not reduce: how much of the corners is seen is not known.
+    """
+
+    offset_m: np.ndarray
+    information: np.ndarray
+    view_m: np.ndarray
+
+
+def find_middles(
+    counts: np.ndarray,
+    wide_counts: np.ndarray,
+    points: np.ndarray,
+    free: np.ndarray,
+    head_width_m: float,
+    noise_m: float,
+) -> EdgeMiddles:
+    """Find the middle between the edges at each station.
+
+    Parameters
+    ----------
+    counts, wide_counts : (s, 2 HALF_RANGE_BINS) arrays
+        See `histograms`.
+    points : (s,) array
+        Points on top that are nearest to the stations.
+    free : (2, s) bool array
+        See `neighbours.free_edges`.
+    head_width_m : float
+    noise_m : float
+    """
+    sections, bin_m = CrossSections.of(wide_counts), head_width_m / (2 * HALF_HEAD_BINS)
+    edges = sections.find_edges(free)
+    density = edges.density * (points / np.maximum(wide_counts.sum(axis=1), 1)) / bin_m
+    view = (sections.middles(edges) - sections.middles(edges.equally_weighted(free))) * bin_m / np.sqrt(3)
+    view_m = np.hypot(view, np.where(free.sum(axis=0) == 1, ALONE_SIGMA_M, 0.0))
+    information = _information(density, edges.weight, noise_m, BLUR_BINS * bin_m)
+    return EdgeMiddles(edges.middles_in(counts, wide_counts) * bin_m, information, view_m)
+
+
+def _information(density: np.ndarray, weight: np.ndarray, noise_m: float, blur_m: float) -> np.ndarray:
+    """Return the inverse of the variance of the middle between both edges that is due to chance, (s,) 1/m².
+
+    An edge is where the blurred density falls to half. There the density has, like any count, the variance density /
+    (4 √π blur), and it falls by density / (√2π spread) per metre; the spread of the edge comes from blur and noise.
+
+    Parameters
+    ----------
+    density : (2, s) array
+        Points per metre across, just inside the edges.
+    weight : (2, s) array
+        Weights of the edges.
+    noise_m, blur_m : float
+    """
+    spread_m = np.hypot(blur_m, noise_m)
+    variance = np.sqrt(np.pi) * spread_m**2 / (2 * blur_m * np.maximum(density, 1e-9))
+    return np.sum(weight, axis=0) ** 2 / np.maximum(np.sum(weight**2 * variance, axis=0), 1e-12)
 
 
 @dataclass(frozen=True)

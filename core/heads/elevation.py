@@ -18,16 +18,15 @@ from ..parameters import Parameters
 from ..polyline import Feet, interpolate, length_along, project, resample, starts_at_its_end
 from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
-from .blunt import SMOOTHING_M, Ridge, wander
+from .axis import CELL_M, Axis, unseen_m
+from .blunt import SMOOTHING_M, wander
 from .edges import Widths, search_distance, stations_along, widest
-from .flank import find_flank
 from .level import crown_fall, rough_level
 from .neighbours import free_edges
 from .own_level import on_own_level
 from .smoother import KNOT_M
 from .strips import StripOffsets, aligned, measure_strips
 from .top import MIN_POINTS, Top, find_top, smoothed
-from .uncertainty import height_error, measure_support, on_one_face
 
 MIN_GAP_M, MAX_CHANCE_GAP_M = 0.5, 0.9
 """Length without points from which a line counts as bridged: five profiles of the fastest train's scanner. Where points
@@ -60,8 +59,6 @@ class ElevationParameters:
         Maximum depth of a point below the top surface.
     crown_radius_m : float
         Radius of the disc that rolls along the top.
-    smoothing_xy_m : float
-        Sigma of PAEK in plan.
     smoothing_z_m : float or None
         See `Parameters`.
     cell_m : float
@@ -76,16 +73,10 @@ class ElevationParameters:
     tolerance_xy_m: float = Parameters.tolerance_xy_m
     tolerance_z_m: float = Parameters.tolerance_z_m
     crown_radius_m: float = Parameters.crown_radius_m
-    smoothing_xy_m: float = Parameters.smoothing_xy_m
     smoothing_z_m: float | None = Parameters.smoothing_z_m
-    cell_m: float = 0.04
+    cell_m: float = CELL_M
     min_length_m: float = Parameters.min_length_m
     align: bool = False
-
-    @property
-    def unseen_m(self) -> float:
-        """Standard deviation of a line where no points show its head: it may be anywhere in its cell."""
-        return self.cell_m / np.sqrt(12)
 
 
 def elevate(
@@ -175,14 +166,13 @@ def _measured(
     if parameters.align:
         feet, z = aligned(strips, feet, z, points)
     own = on_own_level(feet.t, feet.across, z, parameters.head_width_m)
-    near, feet, z = feet.t, feet[own], z[own]
+    feet, z = feet[own], z[own]
     head = np.abs(feet.across) <= min(0.5 * parameters.head_width_m, parameters.tolerance_xy_m)
     if head.sum() < MIN_POINTS:
         return None
     along = length_along(line)
-    flank = find_flank(feet.t, feet.across, z, parameters.head_width_m)
-    ridge = None if flank else Ridge.find(feet.t, feet.across, z, along[-1], parameters.head_width_m)
-    if flank is None:
+    axis = Axis.of(line, feet.t, feet.across, z, parameters.head_width_m, edges, unseen_m(parameters.cell_m))
+    if axis.flank is None:
         level_z = z + crown_fall(feet.t, feet.across, z, parameters.head_width_m)
         top = find_top(
             feet.t[head],
@@ -191,39 +181,23 @@ def _measured(
             parameters.head_width_m,
             parameters.crown_radius_m,
             parameters.tolerance_z_m,
-            parameters.smoothing_z_m or (SMOOTHING_M if ridge else None),
+            parameters.smoothing_z_m or (SMOOTHING_M if axis.ridge else None),
         )
         if top is None:
             return None
     else:
         head = np.ones(len(z), dtype=bool)
-        course = smoothed(feet.t, z + flank.top_m - np.mean(z - rough_level(feet.t, z)), parameters.smoothing_z_m)
-        top = Top(course, head, np.zeros(len(z)))
+        above_m = axis.flank.top_m - np.mean(z - rough_level(feet.t, z))
+        top = Top(smoothed(feet.t, z + above_m, parameters.smoothing_z_m), head, np.zeros(len(z)))
     supporting = feet[head][top.points]
     start, end = _supported(supporting.t, along[-1], free_ends)
     stations = np.concatenate([[start], along[(along > start) & (along < end)], [end]])
     gaps = find_gaps(supporting.t, start, end)
     bridged = float(np.sum(gaps[:, 1] - gaps[:, 0]))
     resid = float(np.sqrt(np.mean(supporting.across**2)))
-    if ridge is not None:
-        support = ridge.support(supporting.t, interpolate(line, along, ridge.t), parameters.unseen_m)
-    else:
-        support = measure_support(
-            feet.t,
-            feet.across,
-            z,
-            along[-1],
-            parameters.head_width_m,
-            parameters.smoothing_xy_m,
-            unseen_m=parameters.unseen_m,
-            free=edges,
-            near=near,
-            marked=strips is not None,
-        )
-    if flank is not None:
-        support = on_one_face(support, feet.t, flank)
-    error_m = height_error(supporting.t, top.course.sigma(support.t), top.slope[top.points], support)
-    if ridge is not None:
+    support = axis.support(strips is not None)
+    error_m = top.height_error(supporting.t, support)
+    if axis.ridge is not None:
         error_m = np.hypot(error_m, wander(top.course.at(support.t)))
     support = replace(support, sigmaz_m=np.hypot(error_m, np.nan_to_num(support.heights_m)))
     if strips is not None:
@@ -296,7 +270,7 @@ def _unsupported(rail: RailLine, parameters: ElevationParameters) -> RailLine:
     """Mark a rail as supported nowhere."""
     length_m = float(length_along(rail.xyz[:, :2])[-1])
     t = stations_along(length_m)
-    support = Support(t, np.zeros(len(t), dtype=int), np.full(len(t), parameters.unseen_m))
+    support = Support(t, np.zeros(len(t), dtype=int), np.full(len(t), unseen_m(parameters.cell_m)))
     return replace(rail, gaps=np.array([[0.0, length_m]]), support=support)
 
 

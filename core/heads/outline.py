@@ -80,7 +80,7 @@ SHARE_RIDGE = 0.02
 """Weight of the shares of the last round in the next, relative to that of the points: views next to each other look
 alike."""
 
-SHARE_DOUBT = 2e-4
+SHARE_DOUBT = 2e-5
 """The same where the error of a section is estimated: nothing is known of the shares before."""
 
 

@@ -172,23 +172,22 @@ def _sagitta(bins: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 def _pieces(levels: _Levels, step_m: float) -> list[np.ndarray]:
     """Link levels of successive bins that do not step: bins and heights, (k, 2), of each piece."""
-    pieces: list[list[tuple[int, float]]] = []
+    pieces: list[tuple[list[int], list[float]]] = []
     ends: dict[int, tuple[int, float]] = {}
     for here, up in zip(levels.bin.tolist(), levels.height.tolist()):
         ends = {one: end for one, end in ends.items() if here - end[0] <= SKIPPED_BINS}
-        steps = [(abs(height - up), one) for one, (last, height) in ends.items() if last < here]
+        steps = [(abs(height - up), one) for one, (end, height) in ends.items() if end < here]
         step, nearest = min(steps, default=(np.inf, -1))
         if step > step_m:
             nearest = len(pieces)
-            pieces.append([])
-        pieces[nearest].append((here, up))
-        ends[nearest] = here, _last(pieces[nearest])
-    return [np.array(piece) for piece in pieces if len(piece) >= MIN_BINS]
-
-
-def _last(piece: list[tuple[int, float]]) -> float:
-    """Return the height of the end of a piece: its median, so that a level cannot step by halves."""
-    return sorted(height for _, height in piece[-MIN_BINS:])[len(piece[-MIN_BINS:]) // 2]
+            pieces.append(([], []))
+        bins, heights = pieces[nearest]
+        bins.append(here)
+        heights.append(up)
+        # The median, so that a level cannot step by halves.
+        last = sorted(heights[-MIN_BINS:])
+        ends[nearest] = here, last[len(last) // 2]
+    return [np.column_stack(piece) for piece in pieces if len(piece[0]) >= MIN_BINS]
 
 
 def _chain(pieces: list[np.ndarray], step_m: float) -> np.ndarray:

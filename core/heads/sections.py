@@ -13,7 +13,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..polyline import length_along, project
-from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, WINDOWS, search_distance, station_count
+from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, search_distance, station_count
 from .level import in_head_frame
 from .outline import CROWN_RADIUS_M, MIN_NOISE_M, Grid, Outline, Scores, Section, fit_section, log_likelihood
 
@@ -39,8 +39,8 @@ MAX_STRAY_SHARE = 0.3
 MAX_SECTION_SHIFT_M = 0.02
 """Largest offset of a section: further off, the other edge of the head is outside the bins."""
 
-MAX_SIGMA_M = 0.006
-"""Standard error of the middle in a window from which it counts as not visible."""
+COURSE_STATIONS = 33
+"""Stations, 8.25 m, in whose windows the course of a line about its head is found."""
 
 WRONG_WIDTH_M, MAX_WRONG_WIDTH_M = 0.004, 0.015
 """Error of the width from which another outline is fitted: standards differ by a millimetre; and from which the points
@@ -83,11 +83,14 @@ FLAT_RING, FLAT_DROP_M = (0.40, 0.47), 0.0012
 """Distances from the axis, as shares of the head's width, between which corners are; and by how much less they lie
 below the middle of a head that is flat to its edges. Those of the outline are 2.5 to 5 mm below it."""
 
+SHARP_NOISE_M = 0.003
+"""Noise in height from which the outline tells the axis of a head without corners as well as its edges do."""
+
 BEYOND_RING, MAX_BEYOND = (0.53, 0.60), 0.2
 """Distances from the axis at which a flat head has no points, as shares of its width, and their most density there
 compared with that between the corners and the axis: passes 15 mm apart have half of it there."""
 
-PROFILE_SIGMA_M = 0.0004
+PROFILE_SIGMA_M = 0.0003
 """Standard error of the middle that comes from the outline itself: real heads chain more radii, and are worn."""
 
 
@@ -99,8 +102,8 @@ class Middles:
     ----------
     offset : (s,) array
         Metres to the left of the line.
-    information, in_window : (s,) arrays
-        Inverse variance of it, 1/m², that the points next to a station alone contribute, and those of its window.
+    information : (s,) array
+        Inverse of its variance, 1/m², that the points next to a station alone contribute.
     common : (s,) array
         Standard error that all stations of a section share, metres.
     blur, blur_up : (s,) arrays
@@ -110,7 +113,6 @@ class Middles:
 
     offset: np.ndarray
     information: np.ndarray
-    in_window: np.ndarray
     common: np.ndarray
     blur: np.ndarray
     blur_up: np.ndarray
@@ -119,7 +121,7 @@ class Middles:
     def unknown(cls, count: int) -> Middles:
         """Return those of stations of which nothing is known."""
         nothing = np.full(count, np.nan)
-        return cls(nothing, np.zeros(count), np.zeros(count), nothing.copy(), np.zeros(count), np.zeros(count))
+        return cls(nothing, np.zeros(count), nothing.copy(), np.zeros(count), np.zeros(count))
 
 
 def outline_middles(
@@ -157,13 +159,14 @@ def outline_middles(
             continue
         scores = Scores.of(counts, section, head.outline, grid)
         part = slice(first, last)
-        offset, middles.information[part], middles.in_window[part] = _in_windows(
+        offset, middles.information[part], course = _by_station(
             section.place[0], scores.by_bin[bins[here]], station[here] - first, last - first
         )
         pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
         offset = np.where(seen[part], offset - pull, np.nan)
         is_crowned = _is_crowned(left[here], up[here], head_width_m)
-        if is_crowned or not _is_flat(left[here] - section.place[0], up[here], head_width_m):
+        is_sharp = np.exp(section.place[5]) < SHARP_NOISE_M
+        if is_crowned or not (is_sharp and _is_flat(left[here] - section.place[0], up[here], head_width_m)):
             middles.offset[part] = offset
         middles.common[part] = np.hypot(np.hypot(scores.common_m, PROFILE_SIGMA_M), PULL_DOUBT * pull)
         on_crown = np.abs(left[here] - section.place[0]) < FLAT_SHARE * head_width_m
@@ -171,7 +174,7 @@ def outline_middles(
         middles.blur[part] = _blur(
             section,
             width_m - head_width_m,
-            offset,
+            course,
             apart_m,
             is_crowned,
         )
@@ -338,25 +341,24 @@ def _share(station: np.ndarray, is_left: np.ndarray) -> float:
     return float(np.median(on_left[count > 0] / count[count > 0]))
 
 
-def _in_windows(
+def _by_station(
     offset_m: float, score: np.ndarray, station: np.ndarray, count: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find the middles at the stations of a section from the scores of its points.
 
     Returns
     -------
-    offset, information, in_window : (count,) arrays
+    offset, information : (count,) arrays
         See `Middles`.
+    course : (count,) array
+        The middles in windows of `COURSE_STATIONS`, which show how the line wanders about the head.
     """
-    sums = np.array([np.bincount(station, weights, minlength=count) for weights in (None, score, score**2)], float)
-    chosen = WINDOWS[-1] * uniform_filter1d(sums, WINDOWS[-1], axis=1, mode="constant")
-    for size in WINDOWS[-2::-1]:
-        window = size * uniform_filter1d(sums, size, axis=1, mode="constant")
-        enough = window[0] >= ENOUGH_POINTS
-        chosen[:, enough] = window[:, enough]
-    _, gradient, known = chosen
-    offset = offset_m + gradient / np.maximum(known, 1e-9)
-    return np.where(known > MAX_SIGMA_M**-2, offset, np.nan), sums[2], known
+    gradient, known = np.array([np.bincount(station, weights, minlength=count) for weights in (score, score**2)])
+    offset, course = (
+        offset_m + sums[0] / np.maximum(sums[1], 1e-9)
+        for sums in ((gradient, known), uniform_filter1d([gradient, known], COURSE_STATIONS, axis=1, mode="constant"))
+    )
+    return np.where(known > 0, offset, np.nan), known, course
 
 
 def with_outline(by_edges: np.ndarray, by_outline: Middles) -> np.ndarray:

@@ -1,47 +1,64 @@
-"""Smooth what is measured along a line: a cubic spline whose bending is as probable as the measurements show.
+"""Smooth what is measured along a line: a cubic spline that bends as the measurements show, and no more.
 
-A rail bends little, up as often as down. So the second derivative of the spline is noise of an unknown strength, with
-rare large values at welds and in switches: Student's distribution. The strength is that under which the measurements
-are most probable (the evidence, by Laplace's approximation); standard errors follow from the inverse of the
-information matrix. Everything is banded, so that time grows with the length of the line. See docs/method.md section
-6.4.
+A rail follows its design, whose curvature changes little and seldom, and has waves of some metres about it. So the
+course is the sum of two splines: the third derivative of the one and the second of the other are noise, with rare large
+values where curves begin and at welds: Student's distribution. How strong both are, the evidence tells (by Laplace's
+approximation); standard errors follow from the inverse of the information matrix. Everything is banded, so that time
+grows with the length of the line. See docs/method.md section 6.4.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
+
+from ..polyline import interpolate, left_normals, length_along
 
 KNOT_M = 0.5
 """Distance between the knots: a spline of this step follows waves of 2 m."""
 
-STRENGTHS = 10.0 ** np.arange(-5.0, -1.9, 0.25)
-"""Strengths of the second derivative that are tried, metres to the power of -1/2: from a vertical curve of 20 km to
-waves of 2 mm that are 3 m long."""
+DESIGNS = 10.0 ** np.array([-6.0, -5.0, -4.0])
+"""Strengths of the third derivative of the design that are tried, metres to the power of -3/2. A transition from
+straight track to an arc of 300 m in 33 m has a third derivative of 1e-4 per m²."""
 
-USUAL_STRENGTH, STRENGTH_DECADES = 2e-3, 0.3
-"""Strength that rails in service have, with waves of 1 mm that are 6 m long, and its standard deviation in decades: few
-points that show no waves do not tell that there are none."""
+AMPLITUDES = 10.0 ** np.arange(-4.5, -2.4, 0.5)
+"""Standard deviations of the waves that are tried, metres."""
 
-LEAST_SHARE = 1e-3
-"""Probability, relative to that of the best, below which a strength does not count."""
+STILL = AMPLITUDES[:1]
+"""The same where the errors of a cloud look like waves."""
+
+USUAL_AMPLITUDE_M, AMPLITUDE_DECADES = 4e-4, 0.4
+"""Standard deviation of the waves that rails in service have, and that of its logarithm in decades: few points that
+show no waves do not tell that there are none."""
+
+WAVE_M = 8.0
+"""Length from which waves are not longer: what bends over more is the design."""
+
+LEAST_SHARE = 1e-2
+"""Probability, relative to that of the best, below which strengths do not count."""
 
 FREEDOM = 3.0
-"""Degrees of freedom of Student's distribution of the second derivative: one weld in twenty metres stands out."""
+"""Degrees of freedom of Student's distribution: one weld in twenty metres stands out."""
 
-ROUNDS = 4
-"""Rounds in which large values lose weight; a fifth changes the evidence by less than 0.1."""
+ROUNDS = 3
+"""Rounds in which large values lose weight; a fourth changes no error by more than 0.01 mm."""
 
 RIDGE = 1e-6
 """Information, relative to the mean of the measurements, that is always there, so that few of them are enough."""
 
-DIFFERENCE = np.array([1.0, -2.0, 1.0])
-"""Second difference of neighbouring coefficients."""
+ROUNDING = 1e-14
+"""Information, relative to the largest of the prior, by which rounding cannot make the matrix indefinite."""
+
+DESIGN, WAVES = np.array([-1.0, 3.0, -3.0, 1.0]), np.array([1.0, -2.0, 1.0])
+"""Differences of neighbouring coefficients that are noise."""
 
 BAND = 4
-"""Diagonals of all matrices, on one side: a place is in the reach of four coefficients."""
+"""Diagonals of the matrices of one spline, on one side: a place is in the reach of four coefficients."""
 
 
 @dataclass(frozen=True)
@@ -53,14 +70,20 @@ class Spline:
     start_m, step_m : float
         First knot, and distance between knots.
     coefficients : (n,) array
-    covariance : (4, n) array
-        Covariances of each coefficient with itself and the next three.
+    likely : list
+        For each likely strength of the prior: its probability, the Cholesky factor of the information about both
+        splines, and by how much its coefficients differ from the mean.
     """
 
     start_m: float
     step_m: float
     coefficients: np.ndarray
-    covariance: np.ndarray
+    likely: list[tuple[float, np.ndarray, np.ndarray]]
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """Covariances of each coefficient with itself and the next three, (4, n)."""
+        return np.sum([part * (_covariance(factor) + _products(off)) for part, factor, off in self.likely], axis=0)
 
     def at(self, t: np.ndarray) -> np.ndarray:
         """Return the values at chainages `t`, (m,); beyond the ends, those at the ends."""
@@ -81,7 +104,15 @@ class Spline:
         return _basis(t, self.start_m, self.step_m, len(self.coefficients))
 
 
-def smooth(t: np.ndarray, values: np.ndarray, information: np.ndarray, start_m: float, end_m: float) -> Spline:
+def smooth(
+    t: np.ndarray,
+    values: np.ndarray,
+    information: np.ndarray,
+    start_m: float,
+    end_m: float,
+    line: np.ndarray | None = None,
+    amplitudes: np.ndarray = AMPLITUDES,
+) -> Spline:
     """Fit a spline to measurements.
 
     Parameters
@@ -92,6 +123,10 @@ def smooth(t: np.ndarray, values: np.ndarray, information: np.ndarray, start_m: 
         Inverse of the variance of each value.
     start_m, end_m : float
         Section of the line that the spline covers.
+    line : (k, 2) array, optional
+        Line in plan to whose left the values are measured: the design is that of the line and the values together.
+    amplitudes : (n,) array
+        Standard deviations of the waves that are tried.
     """
     pieces = max(int(np.ceil((end_m - start_m) / KNOT_M)), 1)
     step_m, count = max(end_m - start_m, 1e-3) / pieces, pieces + BAND - 1
@@ -105,13 +140,36 @@ def smooth(t: np.ndarray, values: np.ndarray, information: np.ndarray, start_m: 
         for apart in range(BAND - one):
             data[apart] += np.bincount(first + one, information * basis[one] * basis[one + apart], count)
     data[0] += RIDGE * data[0].mean()
-    fits = [_fit(data, score, strength * step_m**1.5) for strength in STRENGTHS]
-    evidence = [one.evidence for one in fits] - 0.5 * (np.log10(STRENGTHS / USUAL_STRENGTH) / STRENGTH_DECADES) ** 2
-    share = np.exp(evidence - np.max(evidence))
+    bends = np.zeros(pieces) if line is None else _third_differences(line, start_m, step_m, pieces)
+    fits = [_fit(data, score, _Prior(*strengths, step_m, bends)) for strengths in product(DESIGNS, amplitudes)]
+    evidence = np.array([one.evidence for one in fits])
+    share = np.exp(evidence - evidence.max())
     likely = [(one, part) for one, part in zip(fits, share / share.sum()) if part > LEAST_SHARE * share.max()]
     mean = sum(part * one.coefficients for one, part in likely)
-    covariance = sum(part * (_covariance(one.factor) + _products(one.coefficients - mean)) for one, part in likely)
-    return Spline(start_m, step_m, trend + mean, covariance)
+    return Spline(start_m, step_m, trend + mean, [(part, one.factor, one.coefficients - mean) for one, part in likely])
+
+
+def bridge_error(t: np.ndarray, stations: np.ndarray, turn: float) -> np.ndarray:
+    """Return how far a course may be off where nothing is measured, (s,) metres: there, a curve may begin unseen.
+
+    A third derivative that is wrong by k moves a course by k a b (a + b) / 12 at distances a and b from what is
+    measured, and by k a³ / 6 beyond the last of it.
+
+    Parameters
+    ----------
+    t : (n,) array
+        Chainages at which something is measured, increasing.
+    stations : (s,) array
+    turn : float
+        Third derivative, 1/m².
+    """
+    after = np.searchsorted(t, stations)
+    sides = np.array([stations - np.append(-np.inf, t)[after], np.append(t, np.inf)[after] - stations])
+    is_near, is_inside = np.isfinite(sides).any(axis=0), np.isfinite(sides).all(axis=0)
+    near_m = np.where(is_near, sides.min(axis=0), 0.0)
+    far_m = np.where(is_inside, sides.max(axis=0), 0.0)
+    off = np.where(is_inside, near_m * far_m * (near_m + far_m) / 12, near_m**3 / 6)
+    return np.where(is_near, turn * off, np.inf)
 
 
 def _trend(t: np.ndarray, values: np.ndarray, information: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -122,36 +180,114 @@ def _trend(t: np.ndarray, values: np.ndarray, information: np.ndarray, places: n
     return level + rise * (places - middle)
 
 
+def _third_differences(line: np.ndarray, start_m: float, step_m: float, pieces: int) -> np.ndarray:
+    """Return the third differences, to its left, of the coefficients of a line in plan, (k, 2), for each piece."""
+    along, knots = length_along(line), start_m + step_m * np.arange(pieces + 1)
+    curve = CubicSpline(knots, interpolate(line, along, knots), bc_type="natural")
+    normals = interpolate(left_normals(line), along, 0.5 * (knots[1:] + knots[:-1]))
+    return 6 * step_m**3 * np.einsum("ij,ij->i", curve.c[0], normals)
+
+
+@dataclass(frozen=True)
+class _Prior:
+    """What is expected of the coefficients of design and waves, which take turns in one array.
+
+    Attributes
+    ----------
+    design, amplitude_m : float
+        See `DESIGNS` and `AMPLITUDES`.
+    step_m : float
+        Distance between the knots.
+    bends : (p,) array
+        Third differences that the line has without the spline.
+    """
+
+    design: float
+    amplitude_m: float
+    step_m: float
+    bends: np.ndarray
+
+    @property
+    def scales(self) -> tuple[float, float]:
+        """Scales of the differences of design and waves."""
+        return self.design * self.step_m**2.5, np.sqrt(self.step_m**3 / self._stiffness)
+
+    @property
+    def hold(self) -> float:
+        """Information by which waves return to zero over `WAVE_M`."""
+        return self._stiffness * (2 * np.pi / WAVE_M) ** 4 * self.step_m
+
+    @property
+    def _stiffness(self) -> float:
+        """Inverse of the spectral density of the second derivative of waves that have the amplitude."""
+        return 1 / (2 * np.sqrt(2) * self.amplitude_m**2 * (2 * np.pi / WAVE_M) ** 3)
+
+    def off(self, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the differences of design and waves in their scales."""
+        design, waves = self.scales
+        return (_differences(found[::2], DESIGN) + self.bends) / design, _differences(found[1::2], WAVES) / waves
+
+    def information(self, weights: tuple[np.ndarray, np.ndarray], count: int) -> np.ndarray:
+        """Return the information, (8, 2 count), given the weights of the differences."""
+        band = np.zeros((2 * BAND, 2 * count))
+        for number, (scale, weight, difference) in enumerate(zip(self.scales, weights, (DESIGN, WAVES))):
+            for one in range(len(difference)):
+                for apart in range(len(difference) - one):
+                    own = weight / scale**2 * difference[one] * difference[one + apart]
+                    band[2 * apart, number::2][one : one + len(own)] += own
+        band[0, 1::2] += self.hold
+        return band
+
+    def log_probability(self, found: np.ndarray) -> float:
+        """Return the logarithm of the probability density of coefficients, and of the amplitude."""
+        off = np.concatenate(self.off(found))
+        usual = np.log10(self.amplitude_m / USUAL_AMPLITUDE_M) / AMPLITUDE_DECADES
+        scales = len(self.bends) * np.log(self.scales[0]) + len(found) // 2 * np.log(self.amplitude_m)
+        student = 0.5 * (FREEDOM + 1) * np.log1p(off**2 / FREEDOM).sum()
+        return float(-student - 0.5 * self.hold * found[1::2] @ found[1::2] - scales - 0.5 * usual**2)
+
+
 @dataclass(frozen=True)
 class _Fit:
-    """Coefficients under one strength of the prior, the Cholesky factor of their information, and the evidence."""
+    """Coefficients under one prior, the Cholesky factor of the information about both splines, and the evidence."""
 
     coefficients: np.ndarray
     factor: np.ndarray
     evidence: float
 
 
-def _fit(data: np.ndarray, score: np.ndarray, scale: float) -> _Fit:
-    """Find the most probable coefficients if second differences have the scale `scale`, by reweighting."""
+def _fit(data: np.ndarray, score: np.ndarray, prior: _Prior) -> _Fit:
+    """Find the most probable coefficients by reweighting."""
     count = len(score)
-    weight = np.ones(count - len(DIFFERENCE) + 1)
+    both = _of_both(data)
+    weights = np.ones(len(prior.bends)), np.ones(count - len(WAVES) + 1)
     for _ in range(ROUNDS):
-        factor = cholesky_banded(data + _bending(weight / scale**2, count), lower=True)
-        coefficients = cho_solve_banded((factor, True), score)
-        off = np.convolve(coefficients, DIFFERENCE[::-1], mode="valid") / scale
-        weight = (FREEDOM + 1) / (FREEDOM + off**2)
+        right = np.repeat(score, 2)
+        right[::2] -= np.convolve(weights[0] / prior.scales[0] ** 2 * prior.bends, DESIGN)
+        band = both + prior.information(weights, count)
+        band[0] += ROUNDING * band[0].max()
+        factor = cholesky_banded(band, lower=True, check_finite=False)
+        found = cho_solve_banded((factor, True), right, check_finite=False)
+        design, waves = prior.off(found)
+        weights = (FREEDOM + 1) / (FREEDOM + design**2), (FREEDOM + 1) / (FREEDOM + waves**2)
+    coefficients = found[::2] + found[1::2]
     explained = score @ coefficients - 0.5 * coefficients @ _times(data, coefficients)
-    prior = -0.5 * (FREEDOM + 1) * np.log1p(off**2 / FREEDOM).sum() - len(off) * np.log(scale)
-    return _Fit(coefficients, factor, explained + prior - np.log(factor[0]).sum())
+    evidence = explained + prior.log_probability(found) - np.log(factor[0]).sum()
+    return _Fit(coefficients, factor, evidence)
 
 
-def _bending(weight: np.ndarray, count: int) -> np.ndarray:
-    """Return the information of the prior, (4, count), given that of each second difference."""
-    band = np.zeros((BAND, count))
-    for one in range(len(DIFFERENCE)):
-        for apart in range(len(DIFFERENCE) - one):
-            band[apart, one : one + len(weight)] += weight * DIFFERENCE[one] * DIFFERENCE[one + apart]
-    return band
+def _of_both(data: np.ndarray) -> np.ndarray:
+    """Return the information about the coefficients of both splines, (8, 2 n), given that about their sum, (4, n)."""
+    both = np.zeros((2 * BAND, 2 * data.shape[1]))
+    for apart in range(BAND):
+        both[2 * apart, ::2] = both[2 * apart, 1::2] = both[2 * apart + 1, ::2] = data[apart]
+        if apart:
+            both[2 * apart - 1, 1::2] = data[apart]
+    return both
+
+
+def _differences(coefficients: np.ndarray, difference: np.ndarray) -> np.ndarray:
+    return np.convolve(coefficients, difference[::-1], mode="valid")
 
 
 def _times(band: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -169,23 +305,24 @@ def _products(vector: np.ndarray) -> np.ndarray:
 
 
 def _covariance(factor: np.ndarray) -> np.ndarray:
-    """Return the band of the inverse of a matrix from its Cholesky factor, from the end to the start (Takahashi)."""
-    count = factor.shape[1]
-    inverse = np.zeros((count + BAND - 1, BAND))
-    below = factor[1:] / factor[0]
+    """Return the band, (4, n), of the covariance of the sum of both splines.
+
+    The band of the inverse follows from the Cholesky factor, from the end to the start (Takahashi).
+    """
+    size, count = factor.shape
+    below, own = (factor[1:] / factor[0]).T, 1 / factor[0] ** 2
+    inverse = np.zeros((count, size))
+    after = np.zeros((size - 1, size - 1))  # covariances of the next coefficients with each other
     for number in range(count - 1, -1, -1):
-        column, after = below[:, number], inverse[number + 1 : number + BAND]
-        # Covariances of the next three coefficients with each other.
-        block = np.array(
-            [
-                [after[0, 0], after[0, 1], after[0, 2]],
-                [after[0, 1], after[1, 0], after[1, 1]],
-                [after[0, 2], after[1, 1], after[2, 0]],
-            ]
-        )
-        inverse[number, 1:] = -block @ column
-        inverse[number, 0] = 1 / factor[0, number] ** 2 - column @ inverse[number, 1:]
-    return inverse[:count].T
+        row = inverse[number]
+        row[1:] = -after @ below[number]
+        row[0] = own[number] - below[number] @ row[1:]
+        after[1:, 1:] = after[:-1, :-1].copy()
+        after[0] = after[:, 0] = row[:-1]
+    covariance = inverse[::2, ::2].T + inverse[1::2, ::2].T + inverse[::2, 1::2].T
+    covariance[1:] += inverse[1::2, 1:-1:2].T
+    covariance[0] += inverse[::2, 1]
+    return covariance
 
 
 def _basis(t: np.ndarray, start_m: float, step_m: float, count: int) -> tuple[np.ndarray, np.ndarray]:

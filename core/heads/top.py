@@ -12,9 +12,10 @@ import numpy as np
 
 from ..lines.paek import VARIANCE_FACTOR
 from ..lines.smoothing import smooth_profile
+from ..rails import Support
 from .envelope import extremal_boundary
 from .level import AXIS_SHARE, cross_slope, robust_sigma, rough_level
-from .smoother import Spline, smooth
+from .smoother import Spline, bridge_error, smooth
 
 MIN_POINTS = 10
 """A line with fewer points is not a rail: 1 m of the sparsest rail has more."""
@@ -38,6 +39,13 @@ BAND_SIGMAS = 3.0
 
 BAND_ROUNDS = 3
 """Rounds of smoothing and selection; a fourth moves the top by less than 0.1 mm."""
+
+TOP_SIGMA_M = 0.0002
+"""Standard error of the height that does not depend on the points: worn crowns are flatter than new ones."""
+
+UNSEEN_TURN = 1e-5
+"""Change of the vertical curvature per metre that a rail may have where no point shows it, 1/m²: settled track has
+waves of 10 mm that are 60 m long."""
 
 PROFILE_BIN_M = 0.25
 """Bins along the line in which points are averaged: half the distance between the knots of the spline."""
@@ -90,6 +98,20 @@ class Top:
     course: Course
     points: np.ndarray
     slope: np.ndarray
+
+    def height_error(self, t: np.ndarray, support: Support) -> np.ndarray:
+        """Return the standard error of the height at the stations of a support, (s,) metres.
+
+        Parameters
+        ----------
+        t : (n,) array
+            Chainages of the points on the top, increasing.
+        support : Support
+            Its error across is one of height where the top is not level.
+        """
+        leaning = np.interp(support.t, t, self.slope[self.points]) * support.sigma_m
+        bridge = bridge_error(t, support.t, UNSEEN_TURN)
+        return np.sqrt(self.course.sigma(support.t) ** 2 + TOP_SIGMA_M**2 + leaning**2 + bridge**2)
 
 
 def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None) -> Course:

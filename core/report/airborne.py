@@ -10,6 +10,7 @@ import numpy as np
 from ..airborne.refinement import STATION_M
 from ..airborne.remarks import FLIGHT
 from ..airborne.survey import AirborneTrack, Survey
+from ..progress import counted
 from .listing import OFF_RAIL_MM, Finding
 from .markup import metres, table, tag, text
 from .style import STYLE
@@ -66,8 +67,8 @@ def airborne_summary(survey: Survey) -> list[str]:
     """Return the verdict and what it rests on, in sentences for a log."""
     return [
         _verdict(survey)[1],
-        f"{metres(survey.seen_m)} of {metres(survey.guides_m)} along {len(survey.tracks)} guides are seen, "
-        f"in {len(survey.lines)} lines.",
+        f"{metres(survey.seen_m)} of {metres(survey.guides_m)} along {counted(len(survey.tracks), 'guide')} are seen, "
+        f"in {counted(len(survey.lines), 'line')}.",
     ]
 
 

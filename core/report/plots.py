@@ -12,7 +12,7 @@ from ..tracks.geometry import TWIST_BASE_M
 from .findings import DOUBTS, GAUGE_OFF_MM, TrackFindings
 from .markup import tag, text
 
-WIDTH, LEFT, RIGHT = 1040.0, 76.0, 24.0
+WIDTH, LEFT, RIGHT = 1040.0, 92.0, 24.0
 """Width of a picture in its units, and its margins for labels."""
 
 PANEL, SPACE, AXIS = 92.0, 26.0, 38.0

@@ -23,13 +23,12 @@ GROUND = 2
 """Class of the points."""
 
 
-def write_airborne(cloud: AirborneCloud, path: Path, class_code: int = GROUND, frame: LocalFrame = FRAME) -> None:
-    """Write a cloud as LAS 1.4, compressed if the name ends in .laz, with a source id for each strip.
+def las_of(cloud: AirborneCloud, class_code: int = GROUND, frame: LocalFrame = FRAME) -> laspy.LasData:
+    """Return a cloud as LAS 1.4, with a source id for each strip.
 
     Parameters
     ----------
     cloud : AirborneCloud
-    path : Path
     class_code : int
         Of all points.
     frame : LocalFrame
@@ -43,7 +42,12 @@ def write_airborne(cloud: AirborneCloud, path: Path, class_code: int = GROUND, f
     points.x, points.y, points.z = frame.to_crs(cloud.xyz).T
     points.classification = np.full(len(cloud.xyz), class_code, np.uint8)
     points.point_source_id = cloud.strip + 1
-    points.write(path)
+    return points
+
+
+def write_airborne(cloud: AirborneCloud, path: Path, class_code: int = GROUND, frame: LocalFrame = FRAME) -> None:
+    """Write a cloud, compressed if the name ends in .laz; see `las_of`."""
+    las_of(cloud, class_code, frame).write(path)
 
 
 def write_guides(guides: Sequence[np.ndarray], path: Path, **stated: Sequence[str]) -> None:

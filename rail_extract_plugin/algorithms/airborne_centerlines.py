@@ -25,9 +25,8 @@ from .base import CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 from .toolbox_groups import RAW_CLOUDS
 
 if TYPE_CHECKING:
+    from ...core.airborne.proposals import Proposals
     from ...core.airborne.survey import Guide, Survey
-    from ...core.clouds.points import Request
-    from ...core.tasks import Runner
 
 
 @dataclass(frozen=True)
@@ -97,56 +96,50 @@ class AirborneCenterlines(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Fit the tracks, or propose guides where there are none, then write the outputs."""
+        from ...core.airborne.files import survey_files
+        from ...core.airborne.proposals import propose_guides
+
         progress = Estimating(progress)
         values = ParameterValues(self, parameters, context)
         request = request_points(job.cloud, job.class_codes, values.extent, progress)
-        work = self._fit if job.guides else self._propose
-        with values.runner() as runner:
-            return work(job, request, runner, parameters, context, progress)
+        with values.runner() as runner, points_folder() as folder:
+            rest = (job.parameters, folder / "points", runner, progress)
+            found: Any = survey_files(request, job.guides, *rest) if job.guides else propose_guides(request, *rest)
+        progress.check()
+        self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, found.frame)
+        write = self._write_survey if job.guides else self._write_proposals
+        return write(found, job, parameters, context, progress)
 
-    def _propose(
+    def _write_proposals(
         self,
+        found: Proposals,
         job: Job,
-        request: Request,
-        runner: Runner,
         parameters: dict[str, Any],
         context: QgsProcessingContext,
         progress: Progress,
     ) -> dict[str, Any]:
-        """Search the cloud and write the proposed guides."""
-        from ...core.airborne.proposals import propose_guides
-
-        with points_folder() as folder:
-            found = propose_guides(request, job.parameters, folder / "points", runner, progress)
-        progress.check()
-        self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, found.frame)
+        """Write the proposed guides."""
         progress.info(found.summary)
         rest = (parameters, context)
         writers = {"PROPOSED": lambda: write_lines(self, "PROPOSED", PROPOSED, found.guides, found.frame, *rest)}
         written = write_each(writers, parameters, context)
         return {**written, "PROPOSED_LENGTH": found.length_m, "DENSITY": round(found.density, 1)}
 
-    def _fit(
+    def _write_survey(
         self,
+        survey: Survey,
         job: Job,
-        request: Request,
-        runner: Runner,
         parameters: dict[str, Any],
         context: QgsProcessingContext,
         progress: Progress,
     ) -> dict[str, Any]:
-        """Fit the tracks along the guides and write what was found."""
-        from ...core.airborne.files import survey_files
+        """Write what was found along the guides."""
         from ...core.report.airborne import airborne_findings, airborne_summary
 
-        with points_folder() as folder:
-            survey = survey_files(request, job.guides, job.parameters, folder / "points", runner, progress)
-        progress.check()
-        found = airborne_findings(survey) if is_wanted(parameters.get("FINDINGS"), context) else ()
-        frame, rest = survey.frame, (parameters, context)
-        self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, frame)
         for sentence in airborne_summary(survey):
             progress.info(sentence)
+        found = airborne_findings(survey) if is_wanted(parameters.get("FINDINGS"), context) else ()
+        frame, rest = survey.frame, (parameters, context)
         writers = {
             "CENTERLINES": lambda: write_lines(self, "CENTERLINES", AIRBORNE, survey.lines, frame, *rest),
             "STATIONS": lambda: write_airborne_stations(self, "STATIONS", survey.tracks, frame, *rest),

@@ -19,6 +19,7 @@ from qgis.PyQt.QtGui import QIcon
 from qgis.PyQt.QtWidgets import QWidget
 
 from ...core.disk import Destination
+from ...core.fields import Field
 from ...core.kernels import blas, one_thread
 from ...core.progress import Progress
 from ..dialog.checks import check_values, explain_invalid
@@ -72,6 +73,8 @@ class RailAlgorithm(QgsProcessingAlgorithm):
     TAGS: tuple[str, ...] = ()
     SUMMARY = ""
     HELP = ""
+    FIELDS: tuple[Field, ...] = ()
+    """Fields of the main result, for the help on the command line; windows link to the reference."""
     PICTURE = ""
     """File in the folder of pictures, shown in the help panel of the dialog."""
     GUIDE = "parameters"
@@ -251,7 +254,7 @@ class RailAlgorithm(QgsProcessingAlgorithm):
         """Return the text of the help panel; a command line prints no HTML, and the summary and parameters itself."""
         summary, text = tr(self.SUMMARY), tr(self.HELP)
         if QgsApplication.platform() == COMMAND_LINE:
-            return text
+            return "\n\n".join((text, *(f"{field.name}: {field.meaning}." for field in self.FIELDS)))
         picture = PICTURES / self.PICTURE if self.PICTURE else None
         return help_panel(summary, picture, text, self.parameterDefinitions(), self.PAGES)
 

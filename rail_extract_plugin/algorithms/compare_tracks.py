@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from qgis.core import QgsProcessingContext, QgsProcessingFeatureSource
 
 from ...core.errors import ParameterError
+from ...core.fields import DIFFERENCE_FIELDS
 from ...core.progress import Progress
 from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
@@ -62,6 +62,7 @@ class CompareTracks(RailAlgorithm):
     )
     PICTURE = "comparison.svg"
     GUIDE = "comparison"
+    FIELDS = DIFFERENCE_FIELDS
     PAGES = ("comparison", "reference")
     HELP = "\n\n".join(
         (
@@ -99,7 +100,7 @@ class CompareTracks(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Compare the lines, then write points and report."""
-        from ...core.comparison.tracks import compare_surveys
+        from ...core.comparison.tracks import compare_surveys, doubts_of
         from ...core.parameters import ComparisonParameters
         from ...core.report.comparison import describe_shift, verdict_on
         from ..reading.surveys import read_surveys
@@ -113,15 +114,8 @@ class CompareTracks(RailAlgorithm):
         progress.check()
         for sentence in (verdict_on(found), describe_shift(found)):
             progress.info(sentence)
-        if not found.values("across_mm").size:
-            progress.warning(
-                "The two surveys have no line in common: check that they are of the same place, and REACH."
-            )
-        elif math.isfinite(found.estimated_m):
-            progress.warning(
-                "A survey states no standard error: the scatter of the differences stands for it, "
-                f"{1000 * found.estimated_m:.1f} mm across. Fill in REFERENCE_SIGMA and INPUT_SIGMA if it is known."
-            )
+        for sentence in doubts_of(found):
+            progress.warning(sentence)
         rest = (parameters, context)
         source = " against ".join(job.sources[name].sourceName() for name in ("INPUT", "REFERENCE"))
         facts = {"Date": f"{datetime.now():%Y-%m-%d %H:%M}", "Command": job.command}

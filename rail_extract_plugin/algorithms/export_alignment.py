@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from qgis.core import QgsCoordinateReferenceSystem, QgsProcessingContext, QgsProcessingFeatureSource
 
 from ...core import VERSION
 from ...core.disk import Destination
-from ...core.errors import CrsError, ParameterError
 from ...core.progress import Progress
 from ...core.standards import RailStandard
 from ..dialog import inputs, outputs
@@ -20,13 +18,6 @@ from ..dialog.parameter_values import ParameterValues
 from ..systems import prepare_system
 from .base import ALIGNMENT_WORDS, RAIL_WORDS, RailAlgorithm
 from .toolbox_groups import ALIGNMENT
-
-if TYPE_CHECKING:
-    from ...core.alignment.delivery import Delivery
-    from ...core.alignment.elements import Alignment
-
-FORMATS = {".xml": "LandXML", ".landxml": "LandXML", ".ifc": "IFC", ".dxf": "DXF"}
-"""Format of a file by the ending of its name."""
 
 READING = 0.5
 """Fraction of the progress bar at which the table is read."""
@@ -73,6 +64,7 @@ class ExportAlignment(RailAlgorithm):
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read and check the parameters, in the main thread."""
+        from ...core.design_files import check_format
         from ..reading.line_layers import wkt_of
 
         values = ParameterValues(self, parameters, context)
@@ -80,8 +72,7 @@ class ExportAlignment(RailAlgorithm):
         crs = source.sourceCrs() if source.sourceCrs().isValid() else values.projected_crs()
         prepare_system(wkt_of(crs) or None)
         path = Path(self.parameterAsFileOutput(parameters, "OUTPUT", context))
-        if path.suffix.lower() not in FORMATS:
-            raise ParameterError(f"OUTPUT can't be {path.name}: let it end in .xml for LandXML, in .ifc or in .dxf.")
+        check_format(path)
         circles = values.choice("VERTICAL_CURVES") == groups.VERTICAL_CURVES[0]
         return Job(source, crs, values.standard(), path, circles)
 
@@ -89,45 +80,13 @@ class ExportAlignment(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Read the table, check it and write the file."""
-        from ...core.alignment.delivery import check_joined
+        from ...core.design_files import check_designs, write_designs
         from ..reading.element_tables import read_elements
 
-        alignments, frame = read_elements(job.source, job.crs, progress.span(0, READING))
-        if (frame.horizontal_unit_m, frame.vertical_unit_m) != (1.0, 1.0):
-            raise CrsError(
-                "INPUT is in feet, and files for design software are written in metres: fit the lines in a coordinate "
-                "system in metres."
-            )
-        for alignment in progress.span(READING, 1).follow(alignments):
-            check_joined(alignment)
-            if alignment.cant and not alignment.vertical:
-                progress.warning(f"Track {alignment.track_id} has cant but no profile: IFC files leave the cant out.")
+        alignments, _ = read_elements(job.source, job.crs, progress.span(0, READING))
+        check_designs(alignments, progress.span(READING, 1))
         destination = self.destinations.get("OUTPUT") or Destination.at(job.path)
         with destination.replacing() as new:
-            _write(new, alignments, job, _delivery(job, frame.crs_wkt))
+            write_designs(new, alignments, job.standard, job.circles, VERSION)
         count = sum(len(alignment.elements) for alignment in alignments)
         return {"OUTPUT": str(job.path), "ALIGNMENT_COUNT": len(alignments), "ELEMENT_COUNT": count}
-
-
-def _write(path: Path, alignments: Sequence[Alignment], job: Job, delivery: Delivery) -> None:
-    """Write the file in the format that its name states."""
-    from ...core.alignment.ifc import write_ifc
-    from ...core.alignment.landxml import write_landxml
-    from ...core.exchange import write_alignments
-
-    kind = FORMATS[path.suffix.lower()]
-    if kind == "LandXML":
-        write_landxml(path, alignments, delivery, job.circles)
-    elif kind == "IFC":
-        write_ifc(path, alignments, delivery)
-    else:
-        write_alignments(path, alignments)
-
-
-def _delivery(job: Job, crs_wkt: str | None) -> Delivery:
-    """Return what the file states besides the alignments."""
-    from ...core.alignment.delivery import Delivery
-    from ...core.clouds.crs import codes_and_names, parse_crs
-
-    epsg, system, heights = codes_and_names(parse_crs(crs_wkt)) if crs_wkt else (None, "", "")
-    return Delivery(job.standard.gauge_m, job.standard.head_width_m, epsg, system, heights, VERSION)

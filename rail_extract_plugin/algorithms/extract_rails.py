@@ -39,9 +39,9 @@ from .base import CLOUD_WORDS, RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...core.alignment.placed_axes import PlacedAxes
     from ...core.clouds.points import Request
     from ...core.rails import RailNetwork
-    from ..reading.axes import PlacedAxes
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsProcessingContext, QgsProcessingFeatureSource
 
-from ...core.errors import AlignmentFileError, CrsError, ParameterError, RailExtractError
+from ...core.errors import CrsError, ParameterError
 from ...core.progress import Progress
 from ..dialog import inputs, outputs
 from ..dialog.parameter_values import ParameterValues
@@ -101,11 +101,12 @@ class ImportAlignment(RailAlgorithm):
     ) -> dict[str, Any]:
         """Read the file and write the layers."""
         from ...core.alignment.landxml_reading import read_landxml
+        from ...core.design_files import check_place
 
         read = read_landxml(job.path, job.east_first, progress.span(0, READING))
         frame = replace(read[0].frame, crs_wkt=job.crs_wkt)
         alignments = tuple(replace(one, frame=frame) for one in read)
-        _check_place(job, frame, progress)
+        check_place(job.path.name, frame, job.east_first, progress)
         courses = _compared(job.tracks, alignments, frame, progress.span(READING, 1)) if job.tracks is not None else []
         rest = (parameters, context)
         facts = {"LandXML file": job.path.name, "Command": job.command}
@@ -128,56 +129,12 @@ def _name(job: Job) -> str:
 def _compared(
     source: QgsProcessingFeatureSource, alignments: Sequence[Alignment], frame: LocalFrame, progress: Progress
 ) -> list[tuple[Alignment, Deviations]]:
-    """Return the deviations of each track with the alignment beside it.
-
-    Raises
-    ------
-    RailExtractError
-        No track lies along an alignment.
-    """
-    import numpy as np
-
-    from ...core.alignment.deviations import beside, deviations_of
-    from ...core.polyline import length_along
+    """Return the deviations of each track with the alignment beside it."""
+    from ...core.alignment.deviations import compared_with
     from ..reading.area_points import check_same_plane
     from ..reading.line_layers import read_centerlines
 
     lines, theirs = read_centerlines(source, progress, "TRACKS")
     check_same_plane("TRACKS", theirs.crs_wkt, "INPUT", frame)
-    shift, found, lost = theirs.shift_to(frame), [], []
-    for line in lines:
-        xyz = line.xyz + shift
-        alignment = beside(alignments, xyz[:, :2])
-        if alignment is None:
-            lost.append(str(line.track_id))
-            continue
-        along = length_along(xyz[:, :2])
-        found.append((alignment, deviations_of(alignment, line.track_id, xyz, along, np.zeros((0, 2)))))
-    if not found:
-        raise RailExtractError("None of TRACKS lies along an alignment of INPUT: check the coordinate system of both.")
-    if lost:
-        progress.warning(f"Tracks {', '.join(lost)} do not lie along an alignment: they are left out.")
-    return found
-
-
-def _check_place(job: Job, frame: LocalFrame, progress: Progress) -> None:
-    """Refuse easting and northing that are exchanged, as the area of the coordinate system shows; warn of other places.
-
-    Raises
-    ------
-    AlignmentFileError
-    """
-    from ...core.clouds.crs import lies_in_area, name_of, parse_crs
-
-    if job.crs_wkt is None:
-        progress.warning(f"{job.path.name} states no coordinate system: choose CRS to see its tracks in their place.")
-        return
-    crs, (x, y, _) = parse_crs(job.crs_wkt), frame.origin
-    if lies_in_area(crs, (x, y)):
-        return
-    if lies_in_area(crs, (y, x)):
-        first, remedy = ("northing", "leave EAST_FIRST off") if job.east_first else ("easting", "set EAST_FIRST")
-        raise AlignmentFileError(
-            f"{job.path.name} lies in the area of {name_of(crs)} if its points are written {first} first: {remedy}."
-        )
-    progress.warning(f"{job.path.name} lies outside the area of {name_of(crs)}: check its coordinate system.")
+    shift = theirs.shift_to(frame)
+    return compared_with(alignments, [(line.track_id, line.xyz + shift) for line in lines], progress)

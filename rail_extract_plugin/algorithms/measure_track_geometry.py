@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsProcessingContext
 
+from ...core.fields import QUALITY_FIELDS
 from ...core.parameters import Parameters
 from ...core.progress import Progress, Recording
 from ...core.standards import CUSTOM, Gauge, RailStandard, resolve
@@ -25,8 +26,8 @@ from ..writing.whole_files import write_each
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 
 if TYPE_CHECKING:
+    from ...core.alignment.placed_axes import PlacedAxes
     from ...core.rails import TrackGeometry
-    from ..reading.axes import PlacedAxes
 
 READING, MEASURING = 0.3, 0.9
 """Fractions of the progress bar at which lines and cloud are read, and at which the rails are measured."""
@@ -59,6 +60,7 @@ class MeasureTrackGeometry(RailAlgorithm):
     NEEDS = (("numpy",), ("scipy",), ("laspy",), ("lazrs",), ("pyproj",))
     SUMMARY = "Measures gauge, cant, twist, radius and gradient along tracks, and their support by points."
     PICTURE = "gauge.svg"
+    FIELDS = QUALITY_FIELDS
     PAGES = ("parameters", "reference")
     HELP = "\n\n".join(
         (

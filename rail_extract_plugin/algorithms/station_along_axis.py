@@ -14,6 +14,7 @@ from qgis.core import (
 )
 
 from ...core.errors import RailExtractError
+from ...core.fields import EXTENT_FIELDS, STATION_FIELDS
 from ...core.progress import Progress
 from ..dialog import inputs, outputs
 from ..dialog.parameter_values import ParameterValues
@@ -23,7 +24,7 @@ from .base import RAIL_WORDS, RailAlgorithm
 from .toolbox_groups import ALIGNMENT
 
 if TYPE_CHECKING:
-    from ..reading.axes import PlacedAxes
+    from ...core.alignment.placed_axes import PlacedAxes
 
 LOCATING = 0.9
 """Fraction of the progress bar at which the kilometres are known."""
@@ -49,6 +50,7 @@ class StationAlongAxis(RailAlgorithm):
     SUMMARY = "Gives the features of any layer their kilometre along the axis of the railway, with offset and side."
     PICTURE = "stationing.svg"
     GUIDE = "stationing"
+    FIELDS = (*STATION_FIELDS, *EXTENT_FIELDS)
     PAGES = ("stationing", "reference")
     HELP = "\n\n".join(
         (

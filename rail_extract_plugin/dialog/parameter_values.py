@@ -39,10 +39,10 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ...core.airborne.survey import Guide
+    from ...core.alignment.placed_axes import PlacedAxes
     from ...core.clouds.mask import Mask
     from ...core.raster_file import RasterHeader
     from ...core.tasks import Runner
-    from ..reading.axes import PlacedAxes
 
 INCREASING, DECREASING = DIRECTIONS = ("INCREASING", "DECREASING")
 """Whether kilometres increase from the first vertex of an axis."""

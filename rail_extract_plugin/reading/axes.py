@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from qgis.core import (
@@ -19,25 +18,12 @@ from qgis.core import (
     QgsWkbTypes,
 )
 
-from ...core.alignment.axis import locate
-from ...core.alignment.km_text import read_km
+from ...core.alignment.placed_axes import AHEAD, BACK, NAME_FIELDS, PlacedAxes, check_jumps, km_of, post_field
 from ...core.alignment.stationing import Jump
 from ...core.alignment.stations import Axes, AxisLine, Post, Start, make_axes
 from ...core.clouds.crs import parse_crs, units
 from ...core.errors import CrsError, RailExtractError
-from ...core.frame import LocalFrame
-from ...core.progress import SILENT, Progress
-from ...core.rails import Kilometres, TrackGeometry
 from .line_layers import CHORD_TOLERANCE_M, GEOMETRY_AS_IT_IS, transform, value_of, wkt_of
-
-NAME_FIELDS = ("axis", "name", "ref")
-"""Fields of an axis layer that name an axis, the first one that exists."""
-
-KM_FIELDS = ("km", "kilometre", "kilometer", "km_text", "station")
-"""Fields of a post layer with the kilometre, the first one that exists, if none is chosen."""
-
-BACK, AHEAD = "km_back", "km_ahead"
-"""Fields of the table of jumps."""
 
 
 @dataclass(frozen=True)
@@ -49,54 +35,6 @@ class AxisSources:
     posts: QgsProcessingFeatureSource | None
     post_field: str
     jumps: QgsProcessingFeatureSource | None
-
-
-@dataclass(frozen=True)
-class PlacedAxes:
-    """Axes in the plane of a coordinate system.
-
-    Attributes
-    ----------
-    axes : Axes
-        In metres from the zero of the coordinate system.
-    unit_m : float
-        Length of the unit of its coordinates.
-    notation : str
-        One of `km_text.NOTATIONS`.
-    """
-
-    axes: Axes
-    unit_m: float
-    notation: str
-
-    def locate(self, xy: np.ndarray, progress: Progress = SILENT) -> Kilometres:
-        """Find the kilometres of places, (n, 2) in coordinates of the system, and say what is in doubt."""
-        for notice in self.axes.notices:
-            progress.warning(notice)
-        found = self.kilometres(xy, progress)
-        beyond, ambiguous = int(np.isnan(found.km).sum()), sum(map(bool, found.ambiguous))
-        if beyond:
-            progress.warning(f"{beyond} of {len(xy)} places are beyond the ends of AXIS: their kilometres are empty.")
-        if ambiguous:
-            progress.warning(
-                f"{ambiguous} of {len(xy)} places are nearly as close to another place of AXIS: check the kilometres "
-                "of those whose field ambiguous is 1."
-            )
-        return found
-
-    def along(
-        self, tracks: Sequence[TrackGeometry], frame: LocalFrame, progress: Progress = SILENT
-    ) -> tuple[TrackGeometry, ...]:
-        """Return measured tracks with the kilometres of their stations, and say what is in doubt."""
-        places = [frame.to_crs(track.xyz)[:, :2] for track in tracks]
-        found = self.locate(np.concatenate([np.empty((0, 2)), *places]), progress)
-        ends = np.cumsum([len(one) for one in places], dtype=int)
-        own = (found.part(end - len(one), end) for one, end in zip(places, ends))
-        return tuple(replace(track, kilometres=kilometres) for track, kilometres in zip(tracks, own))
-
-    def kilometres(self, xy: np.ndarray, progress: Progress = SILENT) -> Kilometres:
-        """Find the same, without a word."""
-        return locate(self.axes.axes, xy * self.unit_m, self.notation, progress)
 
 
 def read_axes(
@@ -204,11 +142,7 @@ def _posts(
     context: QgsProcessingContext,
 ) -> list[Post]:
     """Read the posts."""
-    name = field or next((one for one in KM_FIELDS if source.fields().lookupField(one) >= 0), "")
-    if not name:
-        raise RailExtractError(
-            f"POSTS has no field {', '.join(KM_FIELDS)}: choose the field with the kilometre in POST_FIELD."
-        )
+    name = field or post_field(source.fields().names())
     found = []
     for feature, shape in shapes_in(source, crs, context, "POSTS"):
         if QgsWkbTypes.geometryType(shape.wkbType()) != QgsWkbTypes.GeometryType.PointGeometry or shape.isEmpty():
@@ -222,29 +156,11 @@ def _posts(
 
 def _jumps(source: QgsProcessingFeatureSource) -> list[Jump]:
     """Read the table of jumps."""
-    for name in (BACK, AHEAD):
-        if source.fields().lookupField(name) < 0:
-            raise RailExtractError(
-                f"JUMPS has no field {name}: give a table with {BACK}, the kilometre before each jump, and {AHEAD}, "
-                "the one behind it."
-            )
+    check_jumps(source.fields().names())
     rows = source.getFeatures(QgsFeatureRequest(), GEOMETRY_AS_IT_IS)
     return [Jump(_km(feature, BACK, "JUMPS"), _km(feature, AHEAD, "JUMPS")) for feature in rows]
 
 
 def _km(feature: QgsFeature, field: str, name: str) -> float:
-    """Return the kilometre in a field, a number or a text such as 12.3+45.
-
-    Raises
-    ------
-    RailExtractError
-        It is something else.
-    """
-    value = value_of(feature, field)
-    km = read_km(value) if isinstance(value, str) else value
-    if isinstance(km, (int, float)) and math.isfinite(km):
-        return float(km)
-    raise RailExtractError(
-        f"{name} has a row (feature {feature.id()}) whose field {field} is {value!r} and no kilometre: correct it, or "
-        "delete the row."
-    )
+    """Return the kilometre in a field; see `km_of`."""
+    return km_of(value_of(feature, field), field, name, feature.id())

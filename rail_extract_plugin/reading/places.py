@@ -15,10 +15,11 @@ from qgis.core import (
     QgsWkbTypes,
 )
 
+from ...core.alignment.placed_axes import PlacedAxes
 from ...core.fields import EXTENT_FIELDS, STATION_FIELDS, Field
 from ...core.progress import Progress
 from ...core.rails import Kilometres
-from .axes import PlacedAxes, shapes_in
+from .axes import shapes_in
 
 NOWHERE = np.full(2, np.nan)
 """Place of a feature without geometry."""

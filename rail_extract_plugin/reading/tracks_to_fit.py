@@ -10,12 +10,10 @@ from qgis.core import NULL, QgsFeatureRequest, QgsProcessingFeatureSource
 
 from ...core.alignment.cant_of_rails import cant_of_rails
 from ...core.alignment.elements import Alignment
-from ...core.alignment.measured import Track
+from ...core.alignment.measured import Track, with_stations
 from ...core.errors import RailExtractError
 from ...core.frame import LocalFrame
-from ...core.polyline import length_along
 from ...core.progress import Progress
-from ...core.rails import Centerline
 from ..systems import system
 from .area_points import check_same_plane
 from .element_tables import read_elements
@@ -44,7 +42,7 @@ def read_tracks(
         if not any(line.track_id in stations for line in lines):
             raise RailExtractError("QUALITY has no stations of the tracks in INPUT: give the track geometry of INPUT.")
         none = np.zeros((0, 3))
-        return [_with_stations(line, stations.get(line.track_id, none)) for line in lines], frame
+        return [with_stations(line.track_id, line.xyz, stations.get(line.track_id, none)) for line in lines], frame
     shapes = _rails(rails, frame, progress) if rails is not None else []
     return [
         Track(line.track_id, line.xyz, cant_of_rails(line.xyz, shapes), np.zeros(len(line.xyz), dtype=bool))
@@ -61,16 +59,6 @@ def _stations(source: QgsProcessingFeatureSource) -> dict[int, np.ndarray]:
             cant = np.nan if row["cant_mm"] is None else float(row["cant_mm"]) / 1000.0
             found.setdefault(int(row["track_id"]), []).append((float(row["chainage_m"]), cant, row["bridged"] or 0))
     return {number: np.array(sorted(rows)) for number, rows in found.items()}
-
-
-def _with_stations(line: Centerline, stations: np.ndarray) -> Track:
-    """Return a track with the cant of its stations, and what these say of bridged gaps."""
-    known = np.isfinite(stations[:, 1]) & (stations[:, 2] == 0)
-    bridged = np.zeros(len(line.xyz), dtype=bool)
-    if len(stations):
-        at = np.clip(np.searchsorted(stations[:, 0], length_along(line.xyz[:, :2])), 0, len(stations) - 1)
-        bridged = stations[at, 2] != 0
-    return Track(line.track_id, line.xyz, stations[known][:, :2], bridged)
 
 
 def _rails(source: QgsProcessingFeatureSource, frame: LocalFrame, progress: Progress) -> list[np.ndarray]:

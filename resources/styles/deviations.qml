@@ -94,6 +94,6 @@
     </columns>
   </attributetableconfig>
   <mapTip>&lt;b&gt;Track [% &quot;track_id&quot; %], [% format_number(&quot;s&quot;, 0) %] m&lt;/b&gt;&lt;br&gt;Slew: [% format_number(&quot;slew_mm&quot;, 1) || &#x27; mm&#x27; %]&lt;br&gt;Lift: [% coalesce(format_number(&quot;lift_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]&lt;br&gt;Cant, measured minus design: [% coalesce(format_number(&quot;cant_diff_mm&quot;, 1) || &#x27; mm&#x27;, &#x27;unknown&#x27;) %]</mapTip>
-  <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Centroid" type="IndividualFeatures" respectLayerSymbol="1"/>
+  <elevation zoffset="0" zscale="1" clamping="Absolute" binding="Vertex" type="IndividualFeatures" respectLayerSymbol="1"/>
   <layerGeometryType>0</layerGeometryType>
 </qgis>

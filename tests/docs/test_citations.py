@@ -1,6 +1,5 @@
-"""The account of the method: every section that is cited exists, and every constant and file that it names."""
+"""The account of the method: every section that is cited exists, and every file that it names."""
 
-import ast
 import re
 import subprocess
 from functools import lru_cache
@@ -17,8 +16,6 @@ ABSENT = [f"{name}.md" for name in ("ALGORITHMS", "DESIGN", "INTERFACE", "HOUSE"
 NUMBERS = r"((?:\d+(?:\.\d+)?(?:,? (?:and|to) |, )?)+)"
 CITATION = re.compile(r"docs/method\.md\s+sections?\s+" + NUMBERS)
 OWN_REFERENCE = re.compile(r"(?<!Chang, )\b[Ss]ections? " + NUMBERS)
-CONSTANT_ROW = re.compile(r"^\| `(\w+)\.([A-Z_]\w*)` \| ([^|]*) \|", re.MULTILINE)
-NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?")
 
 
 @lru_cache(maxsize=1)
@@ -39,43 +36,6 @@ def sections(text):
 
 def cited(pattern, text):
     return [number for group in pattern.findall(text) for number in re.findall(r"\d+(?:\.\d+)?", group)]
-
-
-def constants(source):
-    """Names and values of the constants of a module; None for a value that is computed."""
-    found = {}
-    for node in ast.parse(source).body:
-        if isinstance(node, ast.Assign):
-            target, value = node.targets[0], node.value
-            both = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
-            for name, one in zip(target.elts, value.elts) if both else [(target, value)]:
-                found[ast.unparse(name)] = literal(one)
-    return found
-
-
-def literal(node):
-    try:
-        return ast.literal_eval(node)
-    except ValueError:
-        return None
-
-
-def flat(value):
-    if isinstance(value, (tuple, list)):
-        return [number for one in value for number in flat(one)]
-    return [float(value)]
-
-
-@lru_cache(maxsize=1)
-def modules():
-    """Constants of every module of the product and the laboratory, in lists by the module's name."""
-    found = {}
-    for name, text in tracked().items():
-        if name.startswith(("core/", "laboratory/")) and name.endswith(".py"):
-            path = Path(name)
-            stem = path.parent.name if path.stem == "__init__" else path.stem
-            found.setdefault(stem, []).append(constants(text))
-    return found
 
 
 def test_every_section_that_is_cited_exists():
@@ -99,18 +59,6 @@ def test_sections_are_numbered_in_order():
 @pytest.mark.parametrize("paper", ABSENT)
 def test_no_file_cites_what_is_not_in_the_repository(paper):
     assert [name for name, text in tracked().items() if paper in text] == []
-
-
-def test_constants_have_the_values_that_the_method_states():
-    rows = CONSTANT_ROW.findall(tracked()[METHOD])
-    assert len(rows) > 50
-    wrong = []
-    for module, constant, stated in rows:
-        values = [one[constant] for one in modules().get(module, []) if constant in one]
-        numbers = [float(number) for number in NUMBER.findall(stated)]
-        if not values or all(value is not None and flat(value) != numbers for value in values):
-            wrong.append((f"{module}.{constant}", stated, values))
-    assert wrong == []
 
 
 def test_files_that_the_method_names_exist():

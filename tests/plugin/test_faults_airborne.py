@@ -41,8 +41,8 @@ FAULTS = [
         "mobile lidar without a guide",
         lambda bench: {"INPUT": cloud(bench, density=800), "PROPOSED": "TEMPORARY_OUTPUT"},
         REFUSED,
-        "The cloud has 800 points per square metre, as mobile lidar has: use Extract Rails, which finds the single "
-        "railheads and is more accurate there.",
+        "The cloud has 800 points per square metre, as mobile lidar and dense drone surveys have: use Extract Rails, "
+        "which finds the single railheads and is more accurate there.",
     ),
     Fault("guide without lines", guided(), REFUSED, "GUIDE has no lines: give a line layer."),
     Fault(
@@ -80,8 +80,8 @@ FAULTS = [
         "mobile lidar as airborne cloud",
         guided(ALONG, density=800),
         REFUSED,
-        "The cloud has 799 points per square metre, as mobile lidar has: use Extract Rails, which finds the single "
-        "railheads and is more accurate there.",
+        "The cloud has 799 points per square metre, as mobile lidar and dense drone surveys have: use Extract Rails, "
+        "which finds the single railheads and is more accurate there.",
     ),
     Fault(
         "airborne cloud in Extract Rails",

@@ -10,13 +10,15 @@ from rail_extract.core.airborne.files import survey_files
 from rail_extract.core.airborne.remarks import FLIGHT
 from rail_extract.core.airborne.survey import Guide
 from rail_extract.core.clouds.points import ask
+from rail_extract.core.clouds.vpc import CatalogueTile, catalogue_text
 from rail_extract.core.errors import CloudError, NoRailPointsError, ParameterError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import AirborneParameters
 from rail_extract.core.progress import Progress
 from rail_extract.core.tasks import InTurn
 from rail_extract.laboratory.airborne.flight import AirborneCloud
-from rail_extract.laboratory.airborne.write import ORIGIN, write_airborne
+from rail_extract.laboratory.airborne.write import ORIGIN, las_of, write_airborne
+from rail_extract.laboratory.scenes.copc import write_copc
 
 FOOT_M = 1200 / 3937
 """Length of the US survey foot."""
@@ -73,10 +75,11 @@ def test_figures_are_metres_in_a_cloud_in_feet(flown, whole, tmp_path):
     assert found.density == pytest.approx(whole[0].density, rel=0.05)
     for one, other in zip(found.tracks, whole[0].tracks):
         seen = (one.seen & other.seen).astype(bool)
-        assert seen.mean() > 0.9
+        known = np.isfinite(one.radius_m) & np.isfinite(other.radius_m)
+        assert min(seen.mean(), known.mean()) > 0.8
         assert np.array_equal(one.s_m, other.s_m)
         assert one.bed_m[seen] - 500 * FOOT_M == pytest.approx(other.bed_m[seen], abs=0.03)
-        assert one.radius_m[seen] == pytest.approx(other.radius_m[seen], rel=0.3, nan_ok=True)
+        assert 1 / one.radius_m[known] == pytest.approx(1 / other.radius_m[known], abs=2e-4)
         assert one.cant_mm[seen] == pytest.approx(other.cant_mm[seen], abs=15)
         assert one.sigma_mm[seen] == pytest.approx(other.sigma_mm[seen], rel=0.5)
     for line, other in zip(found.lines, whole[0].lines):
@@ -96,6 +99,25 @@ def test_tiles_and_squares_give_the_lines_of_one_file(flown, whole, tmp_path, mo
         assert seen.mean() > 0.9
         moved = found.frame.to_crs(one.xyz) - whole[0].frame.to_crs(other.xyz)
         assert np.abs(moved[seen, :2]).max() < 0.02
+
+
+@pytest.mark.parametrize("form", ["tiles", "catalogue", "octree"])
+def test_every_form_of_a_cloud_gives_the_same_stations(flown, whole, tmp_path, form):
+    if form == "octree":
+        low = flown.cloud.xyz.min(axis=0) + ORIGIN - 1.0
+        write_copc(las_of(flown.cloud), tmp_path / "cloud.copc.laz", low, 300.0, 4)
+    else:
+        upper = flown.cloud.xyz[:, 1] > np.median(flown.cloud.xyz[:, 1])
+        for name, part in (("a", upper), ("b", ~upper)):
+            write_airborne(AirborneCloud(flown.cloud.xyz[part], flown.cloud.strip[part]), tmp_path / f"{name}.laz")
+    if form == "catalogue":
+        tiles = [CatalogueTile(f"{name}.laz", 1, (0.0, 0.0, 1.0, 1.0)) for name in "ab"]
+        (tmp_path / "all.vpc").write_text(catalogue_text(tiles, None), encoding="utf-8")
+    found = survey(tmp_path / "all.vpc" if form == "catalogue" else tmp_path, guides(flown), tmp_path)
+    for one, other in zip(found.tracks, whole[0].tracks):
+        assert one.reason == other.reason
+        for name in ("xyz", "sigma_mm", "bed_m", "cant_mm", "radius_m"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
 
 
 def test_a_gauge_that_the_points_contradict_is_said(flown, tmp_path):

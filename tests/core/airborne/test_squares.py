@@ -34,7 +34,8 @@ def test_each_station_belongs_to_one_square_that_holds_it():
 
 def test_cells_and_areas_hold_what_is_within_reach():
     place, normal = AXIS.at(np.linspace(0, AXIS.t[-1], 400))
-    cells, areas = cells_around([AXIS], 10.0), areas_along(pieces_by_square([AXIS]), 10.0)
+    pieces = [piece for some in pieces_by_square([AXIS]).values() for piece in some]
+    cells, areas = cells_around([AXIS], 10.0), areas_along(pieces, 10.0)
     for left in (-9.9, 0.0, 9.9):
         xy = place + left * normal
         assert in_cells(xy, cells).all()

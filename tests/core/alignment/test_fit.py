@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
 from rail_extract.core.alignment.fit import fit_track, fit_tracks
+from rail_extract.core.alignment.given import noted
 from rail_extract.core.alignment.measured import Track
 from rail_extract.core.alignment.rounding import round_radius
 from rail_extract.core.alignment.table import alignments, rows
@@ -178,6 +179,17 @@ def test_misalignment_of_a_short_track_is_not_taken_for_design_and_its_table_ref
     for x, y in zip(again.plan, found.alignment.plan):
         assert x.s_from == pytest.approx(y.s_from, abs=0.02)
         assert x.k_from == pytest.approx(y.k_from, abs=1e-6)
+
+
+def test_arcs_near_the_noise_are_said():
+    shapes = [(60.0, 0, 0), *((60.0, sign / 2e5, sign / 2e5) for sign in (1, -1, 1, -1)), (60.0, 0, 0)]
+    progress, measured = Recording(Progress()), track(design(shapes), white_m=0.003)
+    types = replace(design(shapes), plan=tuple(map(noted, design(shapes).plan)))
+    fit(measured, types, progress)
+    assert any("of 4 arcs of track 1 are near the noise" in warning for warning in progress.warnings)
+    progress = Recording(Progress())
+    fit(track(design(), seed=2), None, progress)
+    assert not progress.warnings
 
 
 def test_an_arc_may_turn_round():

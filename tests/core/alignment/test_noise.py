@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.alignment.noise import Noise, estimated, independent_m, shared_covariance
-from rail_extract.core.alignment.signals import PLAN, Signal, noise_of
+from rail_extract.core.alignment.signals import CANT, PLAN, Signal, find_structure, noise_of
 
 S = np.arange(0.0, 1200.0)
 
@@ -54,3 +54,13 @@ def test_the_covariance_of_points_is_that_of_their_distance():
     near = lag < 20
     np.testing.assert_allclose(made[near], noise.covariance(lag)[near])
     assert not made[~near].any()
+
+
+def test_errors_that_only_neighbours_share_do_not_make_elements():
+    s, random = np.arange(280.0), np.random.default_rng(3)
+    kernel = np.exp(-2.0 * (np.arange(-12, 13) / 4.0) ** 2)
+    shared = np.convolve(random.standard_normal(len(s) + 24), kernel, mode="valid") / np.sqrt(np.sum(kernel**2))
+    cant = np.interp(s, [20.0, 110.0, 170.0, 260.0], [0.0, 0.110, 0.110, 0.0]) + 0.0005 * shared
+    chain, found = find_structure(Signal(s, cant, np.ones(len(s)), CANT), 0.005, 5.0, True)
+    np.testing.assert_allclose(chain.p, [20, 110, 170, 260], atol=2.5)
+    assert found.shared_m == pytest.approx(0.0005, rel=0.5)

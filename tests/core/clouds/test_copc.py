@@ -1,66 +1,29 @@
 """COPC files: only chunks that an extent touches are read, and the points are those of a full read."""
 
 import struct
-from unittest import mock
 
 import laspy
-import lazrs
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from laspy._compression import lazrsbackend
 from rail_extract.core.clouds import copc, las, laz
 from rail_extract.core.clouds.points import read_rail_points
 from rail_extract.core.errors import NoRailPointsError
+from rail_extract.laboratory.scenes.copc import write_copc
 
 RAIL, HALF_M, LOW = 10, 32.0, np.array([578000.0, 2494000.0, 500.0])
 LEVELS = 4
 
 
-def nodes_of(xyz):
-    """Node of each point, (n, 4): a random level, and the place there."""
-    level = np.random.RandomState(2).randint(0, LEVELS, len(xyz))
-    return np.column_stack([level, np.floor((xyz - LOW) / (2 * HALF_M / 2.0**level)[:, None])]).astype(int)
-
-
-def write_copc(path, count=4000):
-    """Write a cloud with an octree; return its points in the order of the file."""
+def write_cloud(path, count=4000):
+    """Write a cloud with an octree; return the position of its page and the number of its entries."""
     header = laspy.LasHeader(version="1.4", point_format=6)
     header.scales, header.offsets = [0.001] * 3, LOW
-    header.vlrs.append(laspy.VLR("copc", 1, "copc info", bytes(160)))
     cloud = laspy.LasData(header)
     cloud.xyz = LOW + np.random.RandomState(1).uniform(0, 2 * HALF_M, (count, 3))
     cloud.classification = np.random.RandomState(3).choice([2, RAIL], count)
-    nodes, index = np.unique(nodes_of(cloud.xyz), axis=0, return_inverse=True)
-    cloud.points = cloud.points[np.argsort(index.ravel(), kind="stable")]
-    counts = np.bincount(index.ravel())
-    cloud.evlrs = laspy.vlrs.vlrlist.VLRList([laspy.VLR("copc", 1000, "hierarchy", bytes(32 * len(nodes)))])
-
-    class Writer(lazrsbackend.LazrsPointWriter):
-        def __init__(self, dest, point_format, parallel):
-            super().__init__(dest, point_format, parallel=False)
-            self.vlr = lazrs.LazVlr.new_for_compression(point_format.id, point_format.num_extra_bytes, True)
-
-        def write_points(self, points):
-            for end, size in zip(np.cumsum(counts), counts):
-                super().write_points(points[end - size : end])
-                self.compressor.finish_current_chunk()
-
-    with mock.patch.object(lazrsbackend, "LazrsPointWriter", Writer):
-        cloud.write(path)
-    with laspy.open(path) as reader:
-        root_at, table = reader.header.start_of_first_evlr + 60, laz.read_chunk_table(path, reader.header)
-    entries = b"".join(
-        struct.pack("<4iQ2i", *node, one.at, one.size, one.points) for node, one in zip(nodes.tolist(), table)
-    )
-    info = struct.pack("<5d2Q2d", *(LOW + HALF_M), HALF_M, 1.0, root_at, len(entries), 0.0, 1.0)
-    data = bytearray(path.read_bytes())
-    place = data.index(b"copc\0") - 2 + 54
-    data[place : place + len(info)] = info
-    data[root_at : root_at + len(entries)] = entries
-    path.write_bytes(data)
-    return root_at, len(nodes)
+    return write_copc(cloud, path, LOW, 2 * HALF_M, LEVELS)
 
 
 def read(path, extent=None, codes=(RAIL,)):
@@ -77,7 +40,7 @@ def inside(xyz, extent):
 @pytest.fixture(scope="module")
 def cloud(tmp_path_factory):
     path = tmp_path_factory.mktemp("copc") / "a.copc.laz"
-    return path, *write_copc(path)
+    return path, *write_cloud(path)
 
 
 @settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])

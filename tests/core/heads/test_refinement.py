@@ -3,7 +3,7 @@ import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.level import is_blended
-from rail_extract.core.heads.refinement import _covered, _redrawn, refine
+from rail_extract.core.heads.refinement import refine
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.polyline import project
@@ -228,24 +228,6 @@ def test_free_ends_follow_the_rail_although_the_raster_curls(radius):
     refined = refine(network_of(line), cloud(points), WIDTH).lines[0]
     off = refined[:, 1] - np.interp(refined[:, 0], *true.T)
     assert np.abs(off[-8:]).max() < 0.006
-
-
-def test_a_redrawn_section_does_not_overshoot_what_strays_behind_it():
-    """Other rails draw the line aside for another metre: the curve leaves that out, and the line must not turn back."""
-    x = np.arange(0, 24, 0.1)
-    aside = 0.05 * np.exp(-(((x - 14.5) / 0.4) ** 2))
-    line = np.column_stack([x, aside])
-    redrawn = _redrawn(line, x, [(10.0, 14.2)])
-    assert (np.diff(redrawn[:, 0]) > 0).all()
-    assert np.abs(redrawn[:, 1]).max() < 0.021
-    assert len(redrawn) == len(line)
-
-
-def test_a_covered_section_is_redrawn_and_a_gap_is_not():
-    t = np.concatenate([np.arange(0, 10, 0.1), np.arange(25, 40, 0.1), np.arange(50, 60, 0.1)])
-    np.testing.assert_allclose(_covered(t, np.arange(10.5, 24.5, 0.05)), [(9.9 - 2.0, 25.0 + 2.0)])
-    assert _covered(t, np.array([12.0, 20.0])) == []
-    assert _covered(t, np.empty(0)) == []
 
 
 def test_dirt_next_to_covered_rails_does_not_draw_the_line():

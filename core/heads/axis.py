@@ -1,0 +1,258 @@
+"""The axis of a head along its line: what points show of it at each station, smoothed, and its standard error.
+
+A line is moved onto this axis, and once it is there, the same measurement states how well points support it. See
+docs/method.md sections 6.2 and 6.6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from ..polyline import interpolate, left_normals, length_along
+from ..rails import Support
+from .blunt import WINDOW, Ridge, wander
+from .edges import STATION_STEP_M, VIEW_STATIONS, find_middles, histograms, stations_along
+from .flank import FLANK_TOP_SIGMA_M, Flank, find_flank
+from .level import MIN_ON_HEAD, on_top, robust_sigma
+from .roads import MIN_WIDER_M, bands, hidden_edges
+from .sections import PROFILE_SIGMA_M, Middles, outline_middles, with_outline
+from .smoother import AMPLITUDES, STILL, Spline, bridge_error, smooth
+
+UNSHOWN_M = 0.3
+"""Standard error of a metre of line that no point shows: raster lines follow what covers a head, a decimetre off."""
+
+UNSEEN_TURN = 1e-4
+"""Change of the curvature per metre that a rail may have where no point shows it, 1/m²: that of a transition."""
+
+SHOWN_SHARE = 0.25
+"""Points on the head at a station, by their median, from which it shows the head: with fewer, something covers it, and
+the edges that are seen are those of dirt next to it."""
+
+NARROW_SHARE, NARROW_PERCENTILES = 0.25, (5.0, 95.0)
+"""Width of a band of points, in head widths and between these percentiles, in which no edges are looked for: points
+that were drawn or computed on the axis, not scanned, all have one offset."""
+
+CELL_M = 0.04
+"""Cell size of the raster of standard gauge."""
+
+
+def unseen_m(cell_m: float) -> float:
+    """Return the standard deviation of a line where points show no edge of its head: it may be anywhere in its cell."""
+    return cell_m / float(np.sqrt(12))
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What points show of a head at each station of its line, (s,) each.
+
+    Attributes
+    ----------
+    t : float
+        Chainage, see `edges.stations_along`.
+    points : int
+        Points on top that are nearest to the station.
+    offset_m, information : float
+        Offset of the axis to the left of the line, and the inverse of its variance by chance, 1/m²; 0 where these
+        points show nothing.
+    common_m : float
+        Standard error that more points would not reduce.
+    blur_m, blur_up_m : float
+        See `sections.Middles`.
+    """
+
+    t: np.ndarray
+    points: np.ndarray
+    offset_m: np.ndarray
+    information: np.ndarray
+    common_m: np.ndarray
+    blur_m: np.ndarray
+    blur_up_m: np.ndarray
+
+
+@dataclass(frozen=True)
+class Axis:
+    """The axis of a head along its line.
+
+    Attributes
+    ----------
+    course : Spline
+        Its offset to the left of the line, and the standard error of this offset by chance.
+    shown : Shown
+    flank : Flank or None
+        The head, where its points show one face alone.
+    ridge : Ridge or None
+        The crest, where the head is blunt.
+    """
+
+    course: Spline
+    shown: Shown
+    flank: Flank | None = None
+    ridge: Ridge | None = None
+
+    @classmethod
+    def of(
+        cls,
+        line: np.ndarray,
+        t: np.ndarray,
+        across: np.ndarray,
+        z: np.ndarray,
+        head_width_m: float,
+        free: np.ndarray,
+        unseen_m: float,
+        by_outline: bool = True,
+    ) -> Axis:
+        """Measure the axis.
+
+        Parameters
+        ----------
+        line : (k, 2) array
+        t, across, z : (n,) arrays
+            Chainage (increasing), offset to the left and height of points near the line at its own level, metres.
+        head_width_m : float
+        free : (2, s) bool array
+            Where the right and the left edge are free of other heads; see `neighbours.free_edges`.
+        unseen_m : float
+            Standard deviation of the line where points show no edges of the head.
+        by_outline : bool
+            Whether the line is close enough to its head to compare the points with the outline.
+        """
+        along = length_along(line)
+        flank = find_flank(t, across, z, head_width_m)
+        is_band = flank is not None or _is_narrow(across, head_width_m)
+        ridge = None if is_band else Ridge.find(t, across, z, along[-1], head_width_m)
+        if ridge is not None:
+            shown = _of_ridge(line, t, ridge)
+        elif flank is not None:
+            shown = _of_band(t, across, along[-1], flank.left_m, flank.sigma_m)
+        elif is_band:
+            shown = _of_band(t, across, along[-1], np.median(across), unseen_m)
+        else:
+            shown = _of_head(t, across, z, along[-1], head_width_m, free, unseen_m, by_outline)
+        known = shown.information > 0
+        information = np.where(known, shown.information, STATION_STEP_M / UNSHOWN_M**2)
+        offset_m, bent = np.where(known, shown.offset_m, 0.0), line if known.any() else None
+        amplitudes = STILL if ridge else AMPLITUDES
+        course = smooth(shown.t, offset_m, information, 0.0, along[-1], bent, amplitudes)
+        common_m = np.interp(shown.t, shown.t[known], shown.common_m[known]) if known.any() else shown.common_m
+        return cls(course, replace(shown, common_m=common_m), flank, ridge)
+
+    def support(self, marked: bool) -> Support:
+        """Return how well points support the line as it is.
+
+        Its error of height is only what passes of the scanner, which are not `marked` in the points, differ by.
+        """
+        t = self.shown.t
+        by_chance = self.course.sigma(t) ** 2
+        bridge_m = np.minimum(bridge_error(t[self.shown.information > 0], t, UNSEEN_TURN), UNSHOWN_M)
+        remainder = np.maximum(self.course.at(t) ** 2 - by_chance, 0.0)
+        support = Support(t, self.shown.points, np.sqrt(by_chance + remainder + self.shown.common_m**2 + bridge_m**2))
+        if self.flank is not None:
+            return replace(support, sigmaz_m=np.full(len(t), FLANK_TOP_SIGMA_M))
+        return support if marked else _with_blur(support, self.shown.blur_m, self.shown.blur_up_m)
+
+
+def _counted(t: np.ndarray, count: int, values: np.ndarray | None = None) -> np.ndarray:
+    """Count points, or sum up their values, by the nearest of `count` stations."""
+    return np.bincount(np.minimum((t / STATION_STEP_M).astype(int), count - 1), values, minlength=count)
+
+
+def _means(t: np.ndarray, across: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the number of points at each station, and the mean of their offsets; 0 without points."""
+    points = _counted(t, count)
+    return points, _counted(t, count, across) / np.maximum(points, 1)
+
+
+def _of_ridge(line: np.ndarray, t: np.ndarray, ridge: Ridge) -> Shown:
+    """Return what points show of a blunt head: its crest, with errors that the stations of a window share."""
+    nothing = np.zeros(len(ridge.t))
+    along = length_along(line)
+    places, normals = (interpolate(values, along, ridge.t) for values in (line, left_normals(line)))
+    shared_m = wander(places + ridge.course_m[:, None] * normals)
+    information = ridge.information / (1 + ridge.information * WINDOW * shared_m**2)
+    return Shown(ridge.t, _counted(t, len(ridge.t)), ridge.offset_m, information, nothing, nothing, nothing)
+
+
+def _is_narrow(across: np.ndarray, head_width_m: float) -> bool:
+    """Return whether all points near a line, by their offsets from it, form a band in which no edges can be seen."""
+    if len(across) < MIN_ON_HEAD:
+        return False
+    low, high = np.percentile(across, NARROW_PERCENTILES)
+    return bool(high - low < NARROW_SHARE * head_width_m)
+
+
+def _of_band(t: np.ndarray, across: np.ndarray, length_m: float, left_m: float, sigma_m: float) -> Shown:
+    """Return what points show that are all on one face, or on the axis; the axis is at `left_m` on average."""
+    stations = stations_along(length_m)
+    points, mean_m = _means(t, across, len(stations))
+    noise_m, nothing = robust_sigma(across - np.interp(t, stations[points > 0], mean_m[points > 0])), 0.0 * mean_m
+    offset_m = mean_m + left_m - np.median(across)
+    return Shown(stations, points, offset_m, points / noise_m**2, nothing + sigma_m, nothing, nothing)
+
+
+def _of_head(
+    t: np.ndarray,
+    across: np.ndarray,
+    z: np.ndarray,
+    length_m: float,
+    head_width_m: float,
+    free: np.ndarray,
+    unseen_m: float,
+    by_outline: bool,
+) -> Shown:
+    """Return what points show of a head: its outline, else its edges, else the mean of the points on top."""
+    top, noise_m = on_top(t, across, z, head_width_m)
+    stations, counts, wide_counts = histograms(t[top], across[top], length_m, head_width_m)
+    free = free & ~hidden_edges(t[top], across[top], length_m, head_width_m, free)
+    points = _counted(t[top], len(stations))
+    head = top & (np.abs(across) <= 0.5 * head_width_m)
+    on_head, mean_m = _means(t[head], across[head], len(stations))
+    found = find_middles(counts, wide_counts, points, free, head_width_m, noise_m)
+    seen = np.isfinite(found.offset_m) & _is_shown(on_head)
+    outline = Middles.unknown(len(stations))
+    if by_outline:
+        outline = outline_middles(t, across, z, length_m, head_width_m, seen & free.all(axis=0))
+    outlined = np.isfinite(outline.offset)
+    which = [outlined, seen, on_head > 0]
+    unsure_m = np.hypot(unseen_m, _either_end(wide_counts, head_width_m))
+    by_mean = np.full(len(stations), STATION_STEP_M / unseen_m**2)
+    return Shown(
+        stations,
+        points,
+        np.select(which, [outline.offset, with_outline(found.offset_m, outline), mean_m]),
+        np.select(which, [outline.information, found.information, by_mean]),
+        np.select(which, [outline.common, np.hypot(found.view_m, PROFILE_SIGMA_M), unsure_m]),
+        outline.blur,
+        outline.blur_up,
+    )
+
+
+def _is_shown(points: np.ndarray) -> np.ndarray:
+    """Return at which stations the head is shown, (s,) bool, by the number of points on it."""
+    usual = np.median(points[points > 0]) if points.any() else 0.0
+    return points >= SHOWN_SHARE * usual
+
+
+def _either_end(counts: np.ndarray, head_width_m: float) -> np.ndarray:
+    """Estimate by how much the middle of a band of points that is wider than a head may be off the head, (s,) metres.
+
+    Road next to a grooved rail is as high as its head, which may be at either end of the band.
+    """
+    right_m, left_m = bands(counts, head_width_m)
+    wider_m = left_m - right_m - head_width_m
+    return np.where(wider_m > MIN_WIDER_M, 0.5 * wider_m, 0.0)
+
+
+def _with_blur(support: Support, blur_m: np.ndarray, blur_up_m: np.ndarray) -> Support:
+    """Add what blurs the head across and in height, (s,) metres, as of passes of the scanner apart by twice that.
+
+    Next to it, where one of the passes may go on alone, the line is as much in doubt.
+    """
+    largest_m = np.maximum(blur_m, blur_up_m)
+    if not largest_m.any():
+        return support
+    across_m, up_m = (maximum_filter1d(one, 2 * VIEW_STATIONS + 1) for one in (blur_m, blur_up_m))
+    strips = np.column_stack([np.ones(len(blur_m)), np.where(largest_m > 0, 2 * largest_m, np.nan), across_m])
+    return replace(support, sigma_m=np.hypot(support.sigma_m, across_m), strips=strips, sigmaz_m=up_m)

@@ -1,0 +1,159 @@
+"""The commands `fit`, `export-alignment`, `import-alignment`, `compare` and `stations`, one after another."""
+
+import json
+
+import numpy as np
+import pytest
+from rail_extract.__main__ import main
+from rail_extract.core.alignment.elements import Alignment, VerticalElement, chained
+from rail_extract.core.frame import LocalFrame
+from rail_extract.laboratory.designs import surveyed
+
+pyogrio, shapely = pytest.importorskip("pyogrio"), pytest.importorskip("shapely")
+
+SHAPES = [(120.0, 0, 0), (60.0, 0, 1 / 400), (150.0, 1 / 400, 1 / 400), (50.0, 1 / 400, 0), (140.0, 0, 0)]
+CORNER = np.array([578_200.0, 5_804_300.0, 0.0])
+
+
+def table(path, layer):
+    meta, ids, shapes, columns = pyogrio.raw.read(path, layer=layer, return_fids=True)
+    return dict(zip(meta["fields"].tolist(), columns)), shapely.from_wkb(shapes)
+
+
+def written(path, layer, lines, **columns):
+    """Write 3D lines in EPSG:25832."""
+    pyogrio.raw.write(
+        str(path), layer=layer, driver="GPKG", geometry_type="LineString Z", crs="EPSG:25832",
+        geometry=np.array([shapely.to_wkb(shapely.linestrings(line), output_dimension=3) for line in lines], object),
+        field_data=[np.array(values) for values in columns.values()], fields=list(columns),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a measured track, its elements as `fit` writes them, and these as LandXML."""
+    place = tmp_path_factory.mktemp("alignment")
+    vertical = (VerticalElement(0, 200, 50, 0.01, 0.01), VerticalElement(200, 80, 52, 0.01, -0.01))
+    vertical = (*vertical, VerticalElement(280, 240, 52, -0.01, -0.01))
+    design = Alignment(4, LocalFrame(CORNER), chained((100.0, 200.0), 0.3, SHAPES), vertical)
+    line = surveyed(design, np.random.default_rng(2), 0.001) + CORNER
+    written(place / "tracks.gpkg", "centerlines", [line], track_id=[4])
+    written(place / "moved.gpkg", "centerlines", [line + [0, 0, 0.010]], track_id=[4])
+    assert main(["fit", str(place / "tracks.gpkg"), "--elements", str(place / "out.gpkg"),
+                 "--deviations", str(place / "out.gpkg"), "--report", str(place / "fit.html")]) == 0  # fmt: skip
+    file = str(place / "design.xml")
+    assert main(["export-alignment", f"{place / 'out.gpkg'}|layername=elements", file]) == 0
+    return place
+
+
+def test_fit_writes_elements_deviations_and_a_report(folder):
+    rows, shapes = table(folder / "out.gpkg", "elements")
+    plan = rows["layout"] == "H"
+    assert rows["type"][plan].tolist() == ["line", "clothoid", "arc", "clothoid", "line"]
+    np.testing.assert_allclose(rows["s_from"][plan], [0, 120, 180, 330, 380], atol=0.5)
+    assert rows["r1_m"][plan][2] == pytest.approx(400, abs=0.3)
+    assert set(rows["track_id"]) == {4}
+    first = shapely.get_coordinates(shapes[0], include_z=True)[0]
+    np.testing.assert_allclose(first, [*CORNER[:2] + [100, 200], 50], atol=0.01)
+    away, _ = table(folder / "out.gpkg", "deviations")
+    assert len(away["s"]) == 521
+    assert np.std(away["slew_mm"]) == pytest.approx(1.0, abs=0.15)
+    assert "<svg" in (folder / "fit.html").read_text()
+
+
+def test_a_fit_with_its_own_table_gives_the_same_elements(folder):
+    out = folder / "again.gpkg"
+    fixed = f"{folder / 'out.gpkg'}|layername=elements"
+    assert main(["fit", str(folder / "tracks.gpkg"), "--fixed", fixed, "--elements", str(out)]) == 0
+    rows, again = table(folder / "out.gpkg", "elements")[0], table(out, "elements")[0]
+    assert again["type"].tolist() == rows["type"].tolist()
+    np.testing.assert_allclose(again["s_from"], rows["s_from"], atol=0.01)
+
+
+def test_a_design_is_read_again_and_compared_with_the_track(folder):
+    out = folder / "design.gpkg"
+    values = ["--tracks", str(folder / "moved.gpkg"), "--elements", str(out), "--axis", str(out)]
+    values += ["--deviations", str(out), "--report", str(folder / "off.html")]
+    assert main(["import-alignment", str(folder / "design.xml"), *values]) == 0
+    rows, read = table(folder / "out.gpkg", "elements")[0], table(out, "elements")[0]
+    plan = rows["layout"] == "H"
+    np.testing.assert_allclose(read["s_from"][read["layout"] == "H"], rows["s_from"][plan], atol=1e-3)
+    away, _ = table(out, "deviations")
+    assert np.mean(away["lift_mm"]) == pytest.approx(10, abs=0.3)
+    assert np.mean(away["slew_mm"]) == pytest.approx(0, abs=0.3)
+    assert "<svg" in (folder / "off.html").read_text()
+
+
+def test_surveys_are_compared(folder, capsys):
+    out = folder / "differences.gpkg"
+    values = [str(folder / "tracks.gpkg"), str(folder / "moved.gpkg"), "--reference-sigma", "0", "--input-sigma", "1"]
+    values += ["--count-shift", "--output", str(out), "--report", str(folder / "differences.html")]
+    assert main(["compare", *values]) == 0
+    rows, _ = table(out, "differences")
+    np.testing.assert_allclose(rows["height_mm"], 10, atol=0.1)
+    np.testing.assert_allclose(rows["across_mm"], 0, atol=0.1)
+    assert rows["moved"].all()
+    assert "+10.0 mm up" in capsys.readouterr().out
+    assert (folder / "differences.html").stat().st_size > 5000
+
+
+def points(path, places):
+    features = [
+        {"type": "Feature", "properties": {"name": str(number)}, "geometry": {"type": "Point", "coordinates": place}}
+        for number, place in enumerate(places)
+    ]
+    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}
+    path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": features}))
+
+
+@pytest.mark.parametrize("decreasing", [False, True])
+def test_places_have_their_kilometre_along_an_axis(tmp_path, decreasing):
+    written(tmp_path / "axis.gpkg", "axis", [CORNER + [[0, 0, 0], [1000, 0, 0]]], name=["main"])
+    points(tmp_path / "places.json", [(CORNER[:2] + [250, 3]).tolist(), (CORNER[:2] + [900, -4]).tolist()])
+    out = tmp_path / "out.gpkg"
+    values = [str(tmp_path / "places.json"), str(tmp_path / "axis.gpkg"), str(out), "--start-km", "12.0"]
+    assert main(["stations", *values, *(["--decreasing"] if decreasing else [])]) == 0
+    rows, shapes = table(out, "stations")
+    np.testing.assert_allclose(rows["km"], [11.75, 11.1] if decreasing else [12.25, 12.9], atol=1e-6)
+    np.testing.assert_allclose(rows["offset_m"], [-3, 4] if decreasing else [3, -4], atol=1e-3)
+    assert rows["name"].tolist() == ["0", "1"]
+    np.testing.assert_allclose(shapely.get_coordinates(shapes)[0], CORNER[:2] + [250, 3])
+
+
+def test_an_axis_may_state_kilometres_as_m_values(tmp_path):
+    place = tmp_path / "km.gpkg"
+    measured_line = pytest.importorskip("rail_extract.core.commands.geopackage").measured_line
+    line = measured_line(np.array([[*CORNER, 3.0], [*CORNER + [1000, 0, 0], 4.0]]))
+    pyogrio.raw.write(str(place), layer="axis", driver="GPKG", geometry_type="Unknown", crs="EPSG:25832",
+                      geometry=np.array([line], object),
+                      field_data=[np.array(["main"])], fields=["name"])  # fmt: skip
+    points(tmp_path / "places.json", [(CORNER[:2] + [250, 3]).tolist()])
+    out = tmp_path / "out.gpkg"
+    assert main(["stations", str(tmp_path / "places.json"), str(place), str(out), "--format", "KILOMETRES"]) == 0
+    rows, _ = table(out, "stations")
+    assert rows["km"][0] == pytest.approx(3.25)
+    assert rows["km_text"][0] == "3+250.00"
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        (["fit", "nothing.gpkg", "--elements", "out.gpkg"], "can't be read as a vector file"),
+        (["fit", "{tracks}", "--elements", "out.gpkg", "--tolerance", "0"], "--tolerance must be a positive number"),
+        (["fit", "{tracks}", "--elements", "out.gpkg", "--fixed", "{tracks}"], "--fixed is not an element table"),
+        (["export-alignment", "{tracks}", "out.xml"], "ELEMENTS is not an element table"),
+        (["export-alignment", "{elements}", "out.txt"], "let it end in .xml"),
+        (["import-alignment", "{tracks}", "--elements", "out.gpkg"], "GeoPackage"),
+        (["import-alignment", "{xml}"], "Give --elements"),
+        (["import-alignment", "{xml}", "--deviations", "out.gpkg"], "give --tracks"),
+        (["compare", "{tracks}", "{tracks}", "--rails", "{tracks}"], "give --rails and --reference-rails"),
+        (["stations", "{tracks}", "{tracks}", "out.gpkg"], "AXIS has no M values"),
+        (["stations", "{tracks}", "{tracks}", "out.gpkg", "--posts", "{tracks}"], "POSTS has no field"),
+    ],
+)
+def test_bad_input_is_one_sentence(folder, tmp_path, monkeypatch, capsys, values, words):
+    monkeypatch.chdir(tmp_path)
+    known = {"tracks": folder / "tracks.gpkg", "xml": folder / "design.xml", "elements": folder / "out.gpkg"}
+    assert main([value.format(**known) for value in values]) == 1
+    said = capsys.readouterr().err.strip().splitlines()
+    assert words in said[-1]
