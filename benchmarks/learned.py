@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,21 +18,8 @@ from rail_extract.core.frame import LocalFrame
 from rail_extract.core.standards import RAIL_CLASS
 from rail_extract.laboratory.ruler.classification import Score, score, truth
 from rail_extract.laboratory.scenes.raw import RawScene
-from rail_extract.laboratory.scenes.raw_catalogue import (
-    AIR,
-    BLUNT,
-    RAW_SCENES,
-    SURVEYED,
-    TRAIN,
-    Scanning,
-    double_track,
-    turnout,
-    wide_place,
-)
-from rail_extract.laboratory.scenes.raw_photogrammetry import Photogrammetry
-from rail_extract.laboratory.scenes.raw_places import farmland, kerbed_car_park, motorway
+from rail_extract.laboratory.scenes.raw_catalogue import AIR, RAW_SCENES, TRAIN, double_track, turnout
 from rail_extract.laboratory.scenes.raw_scanner import RawScanner
-from rail_extract.laboratory.scenes.raw_world import Bedding
 from rail_extract.laboratory.scenes.scene import Scene
 from rail_extract.laboratory.scenes.write import write_cloud
 
@@ -52,32 +38,6 @@ EMPTY = ("forest", "street", "car park", "quarry")
 IMAGES = ("photo straight", "photo curve", "photo curve blunt", "photo turnout", "photo station")
 EMPTY_IMAGES = ("photo street", "photo quarry", "photo motorway", "photo kerbs", "photo farmland")
 """Surveys by images that the training has seen, with rails and without."""
-
-ROUGH = Photogrammetry(
-    blur_m=0.085,
-    blur_varies=0.4,
-    widening_m=0.03,
-    drift_m=0.008,
-    wave_m=0.015,
-    noise_m=0.013,
-    stray_share=0.01,
-)
-SMOOTH = replace(ROUGH, point_step_m=0.055, blur_m=0.11, blur_varies=0.25, widening_m=0.045, noise_m=0.006)
-"""Images that show ridges two to three times as wide as heads: rough ones, and those that matching has smoothed."""
-
-BLUNTER = {"blunt": BLUNT, "rough": ROUGH, "smooth": SMOOTH}
-
-BURIED = Bedding(fill_m=-0.05)
-"""Ballast to 13 cm below the tops of the rails."""
-
-BLUNTED: dict[str, Callable[[int, Scanning], RawScene]] = {
-    **{name: lambda seed, camera, scene=scene: scene(seed, scanner=camera) for name, scene in SURVEYED.items()},
-    "buried": lambda seed, camera: double_track(seed, camera, None, "buried", 1 / 900, 0.06, BURIED),
-    "motorway": lambda seed, camera: wide_place("motorway", seed, camera, motorway),
-    "kerbs": lambda seed, camera: wide_place("kerbs", seed, camera, kerbed_car_park),
-    "farmland": lambda seed, camera: wide_place("farmland", seed, camera, farmland),
-}
-"""Places that the training has seen by the images of `BLUNTER`, too."""
 
 APART_M, COLUMNS = 200.0, 6
 """Distance between the labelled tiles, and tiles in a row."""
@@ -130,24 +90,16 @@ def main() -> None:
 def write_labelled(folder: Path) -> None:
     """Write the scenes of the training as tiles beside each other, with their rail points classified."""
     folder.mkdir(parents=True, exist_ok=True)
-    for number, (name, make) in enumerate(labelled().items()):
-        raw = make()
+    rails, empty = (*LEARNED, *IMAGES, *AIR), EMPTY + EMPTY_IMAGES
+    jobs = [(name, seed) for seed in SEEDS for name in rails] + [(name, seed) for seed in EMPTY_SEEDS for name in empty]
+    for number, (name, seed) in enumerate(jobs):
+        raw = RAW_SCENES[name](seed)
         head, _ = truth(raw, np.zeros(len(raw.xyz), dtype=bool), False)
         row, column = divmod(number, COLUMNS)
         origin = np.array([500_000 + APART_M * column, 5_000_000 + APART_M * row, 100.0])
         labels = np.where(head, RAIL_CLASS, 1).astype(np.uint8)
         scene = Scene(name, raw.xyz, labels, (), (), raw.standard, LocalFrame(origin))
-        write_cloud(scene, folder / f"{name.replace(' ', '_').replace(':', '-')}.laz")
-
-
-def labelled() -> dict[str, Callable[[], RawScene]]:
-    """Return the scenes of the training by the names of their tiles."""
-    seeded = [(name, seed) for seed in SEEDS for name in (*LEARNED, *IMAGES, *AIR)]
-    seeded += [(name, seed) for seed in EMPTY_SEEDS for name in EMPTY + EMPTY_IMAGES]
-    scenes = {f"{name} {seed}": partial(RAW_SCENES[name], seed) for name, seed in seeded}
-    for kind, camera in BLUNTER.items():
-        scenes.update({f"{kind} {name} {SEEDS[0]}": partial(make, SEEDS[0], camera) for name, make in BLUNTED.items()})
-    return scenes
+        write_cloud(scene, folder / f"{name.replace(' ', '_').replace(':', '-')}_{seed}.laz")
 
 
 def compare(weights: Path, names: list[str]) -> None:

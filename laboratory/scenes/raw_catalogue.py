@@ -84,7 +84,6 @@ def double_track(
     name: str = "double",
     curvature: float = 1 / 700,
     cant_m: float = 0.09,
-    bedding: Bedding = BALLAST,
 ) -> RawScene:
     """Double track in a curve with cant, masts and wires, a trough, plants beside the bed."""
     curve = line(60.0, curvature, 0.35)
@@ -96,7 +95,7 @@ def double_track(
         thing(plants, 60, (-9.0, -4.5)),
     ]
     scanners = [scanner] if second is None else [scanner, second]
-    return scan_world(name, parallel(curve, (0.0, 4.2), cant_m), STANDARD, scanners, things, seed, bedding)
+    return scan_world(name, parallel(curve, (0.0, 4.2), cant_m), STANDARD, scanners, things, seed)
 
 
 def masts_at(left_m: float) -> Thing:
