@@ -104,7 +104,7 @@ def check_place(name: str, frame: LocalFrame, east_first: bool, progress: Progre
     AlignmentFileError
     """
     if frame.crs_wkt is None:
-        progress.warning(f"{name} states no coordinate system: choose CRS to see its tracks in their place.")
+        progress.warning(f"{name} has no coordinate system: choose CRS to see its tracks in their place.")
         return
     crs, (x, y, _) = parse_crs(frame.crs_wkt), frame.origin
     if lies_in_area(crs, (x, y)):

@@ -382,7 +382,6 @@ class HeadWidths:
 
     seen_m: float
     stated_m: float
-    blunt: bool = False
 
     @property
     def differ(self) -> bool:

@@ -215,7 +215,7 @@ def head_widths(
             "as matched images and wide beams do. Lines follow the crests, and sigma_mm and sigmaz_mm state how far "
             "these wander: gauge and cant cannot be better, and the width of the heads is not measured."
         )
-        return HeadWidths(float("nan"), stated_m, blunt=True)
+        return HeadWidths(float("nan"), stated_m)
     if measured is None:
         return HeadWidths(float("nan"), stated_m)
     seen_m = measured[1]
@@ -229,13 +229,13 @@ def head_widths(
         fits = standard is not None and abs(standard.head_width_m - widths.seen_m) <= HEAD_OFF_M
         if 1000 * widths.seen_m < HEAD_WIDTH_RANGE_MM[0]:
             progress.warning(
-                f"Points show a band {1000 * widths.seen_m:.0f} mm wide rather than heads of {1000 * stated_m:.0f} mm, "
-                "as where the scanner sees one face of each. The lines are on the axes if that width is right."
+                f"The points cover only {1000 * widths.seen_m:.0f} mm of each head of {1000 * stated_m:.0f} mm; the "
+                "scanner probably saw one side only. The lines are on the axes if that width is right."
             )
         elif widths.seen_m > stated_m + MIN_WIDER_M:
             progress.warning(
-                f"{seen}: road or dirt next to them is classified as rail. Where it hides one edge of a head and the "
-                "other is at gauge, the line follows that one. Check the classification elsewhere."
+                f"{seen}: road or dirt next to them is classified as rail. Where it covers one edge of a head, the "
+                "line is set from the other edge if that is at gauge. Check the classification elsewhere."
             )
         elif fits or widths.seen_m < stated_m:
             if not any(abs(measured[0] - seen_m - gauge_m) <= SAME_GAUGE_M for gauge_m, _ in gauges):
@@ -243,8 +243,8 @@ def head_widths(
             progress.warning(f"{seen}{_question(*measured)} Every gauge is off by the difference.")
         else:
             progress.warning(
-                f"{seen}, and no standard has such heads: passes of the scanner lie apart, or the points are noisy. "
-                "Passes can be compared and aligned (STRIPS) if the points have source ids or GPS times."
+                f"{seen}, and no standard has such heads: passes of the scanner are not aligned, or the points are "
+                "noisy. Passes can be compared and aligned (STRIPS) if the points have source ids or GPS times."
             )
     return widths
 

@@ -236,8 +236,8 @@ def warn_of_steps(steps: Sequence[tuple[Centerline, Steps]], progress: Progress)
         words = [f"{1000 * abs(step_m):.0f} mm at {at_m:.0f} m of track {track}" for track, at_m, step_m in largest]
         more = f" and {len(found) - MAX_LISTED} more" if len(found) > MAX_LISTED else ""
         progress.warning(
-            f"Tracks step to the side, as none does: {', '.join(words)}{more}. "
-            "Passes of the scanner that meet there lie apart."
+            f"Sideways jumps in tracks: {', '.join(words)}{more}. Real track has none; probably two passes of the "
+            "scanner that are not aligned meet there."
         )
 
 
@@ -261,20 +261,21 @@ def warn_of_strips(rails: Sequence[RailLine], parameters: Parameters, progress: 
             else "correct the positions of the scanner, or set STRIPS to ALIGNED"
         )
         progress.warning(
-            f"Strips are up to {_largest(spread_m[count > 1])}, on {STATION_STEP_M * np.sum(count > 1):.0f} m of rail "
-            f"where they meet: {remedy}."
+            f"Where strips overlap ({STATION_STEP_M * np.sum(count > 1):.0f} m of rail), they differ by up to "
+            f"{_largest(spread_m[count > 1])}: {remedy}."
         )
     if STATION_STEP_M * np.sum(count == 1) >= MIN_STRIPS_APART_M:
         progress.warning(
-            f"Heads are blurred or too wide on {STATION_STEP_M * np.sum(count == 1):.0f} m of rail, as by passes of "
-            f"the scanner up to {_largest(spread_m[count == 1])}, whose points state neither source id nor GPS time: "
-            "sigma_mm and sigmaz_mm contain half of it. Export the cloud with them, or pass by pass."
+            f"On {STATION_STEP_M * np.sum(count == 1):.0f} m of rail the heads look blurred or too wide, as if passes "
+            f"of the scanner were up to {_largest(spread_m[count == 1])} apart. The points have no source id or GPS "
+            "time, so the passes cannot be separated: sigma_mm and sigmaz_mm contain half of it. Export the cloud with "
+            "them, or pass by pass."
         )
 
 
 def _largest(spread_m: np.ndarray) -> str:
-    """State the largest of the distances between strips."""
-    return f"{1000 * np.percentile(spread_m, LARGEST_PERCENT):.0f} mm apart"
+    """Write the largest of the distances between strips."""
+    return f"{1000 * np.percentile(spread_m, LARGEST_PERCENT):.0f} mm"
 
 
 def _all_vertices(
@@ -366,11 +367,11 @@ def _without_turns(lines: Sequence[Line], parameters: Parameters, progress: Prog
         turned += [] if whole else [line]
     if turned:
         what = "rail" if isinstance(turned[0], RailLine) else "centerline"
-        count = f"1 {what} turned" if len(turned) == 1 else f"{len(turned)} {what}s turned"
+        count, was = (f"1 {what} bends", "it was") if len(turned) == 1 else (f"{len(turned)} {what}s bend", "they were")
         before_m, after_m = (sum(line.length_m for line in some) for some in (lines, kept))
         progress.warning(
-            f"{count} by more than {MAX_TURN_DEG:g}° within a metre, as no rail does: split there, and "
-            f"{before_m - after_m:.1f} m left out."
+            f"{count} by more than {MAX_TURN_DEG:g}° within a metre, which rails cannot; {was} split there and "
+            f"{before_m - after_m:.1f} m dropped."
         )
     return kept
 
@@ -459,8 +460,8 @@ def warn_of_split_classes(rails: Sequence[RailLine], parameters: Parameters, pro
     split = sorted({code for group in at_gauge | _in_line(rails) if len(group) > 1 for code in group})
     if split:
         progress.warning(
-            f"Rails of the classes {', '.join(map(str, split))} lie at gauge from each other or continue each other, "
-            "but each class is paired by itself. If they are of the same tracks, set MERGE_CLASSES."
+            f"Rails of the classes {', '.join(map(str, split))} form tracks or continue each other, but classes are "
+            "paired separately. If they are of the same tracks, set MERGE_CLASSES."
         )
 
 

@@ -334,8 +334,7 @@ def _shared_system(headers: Sequence[CloudHeader], given: str | None, progress: 
     crs = common_crs([(header.path.name, parsed.get(text)) for header, text in zip(headers, texts)])
     if crs is None:
         progress.warning(
-            "The cloud states no coordinate system: its coordinates are taken as metres. If it has one, choose it as "
-            "CRS."
+            "The cloud has no coordinate system: its coordinates are taken as metres. If it has one, choose it as CRS."
         )
         return LocalFrame(np.zeros(3))
     name = headers[0].path.name

@@ -169,7 +169,7 @@ def grow_all(
             f"{parameters.min_height_m:g} m above the bed, and check the rail standard and the unit of the coordinates."
         )
     if missed:
-        progress.warning(f"{missed} of {len(places)} seeds lie on no rail: move them onto railheads.")
+        progress.warning(f"{missed} of {len(places)} seeds are not on a rail: move them onto railheads.")
     return squares, growths
 
 

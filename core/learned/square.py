@@ -11,7 +11,7 @@ from ..classify.bed import COARSE_M, Coarse
 from ..classify.figures import shares_of_length
 from ..classify.flush import flush_rails
 from ..classify.settings import Settings
-from ..classify.square import REACH_M, REACH_POINTS_PER_M, Classified, beside_guide
+from ..classify.square import REACH_M, REACH_POINTS_PER_M, Classified, beside_guide, classify_square
 from ..classify.tops import HIGH_M, Grid
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
@@ -52,12 +52,28 @@ def label_square(
     rail[flush] = True
     if blocks:
         probability = _spread(thinned, classifier.probabilities(thinned, blocks, progress))
+        blunt = _blunt(xyz, settings)
+        probability[blunt.rail[thinned.band]] = 1.0
         found = np.flatnonzero((probability >= POSSIBLE) & settings.own(xyz[thinned.band]))
         point, sure = thinned.band[found], probability[found] >= PROBABILITY
         kept, standing = rails_of(xyz[point], sure, settings, _reach_m(thinned.coarse, point[sure]))
         rail[point[kept]] = True
-        figures += standing
+        figures += replace(standing, blunt_m=blunt.figures.blunt_m, blur_m2=blunt.figures.blur_m2)
     return Classified(rail, replace(figures, points=int(rail.sum()), squares=int(rail.any())))
+
+
+def _blunt(xyz: np.ndarray, settings: Settings) -> Classified:
+    """Find rails by geometry if their heads are blunted: the network sees too little of those that are low and wide.
+
+    Returns
+    -------
+    Classified
+        Nothing if heads are sharp.
+    """
+    found = classify_square(xyz, settings)
+    if found.figures.blunt_m:
+        return found
+    return Classified(np.zeros(len(xyz), dtype=bool), SearchFigures())
 
 
 def _flush(xyz: np.ndarray, thinned: Thinned, settings: Settings) -> tuple[np.ndarray, SearchFigures]:

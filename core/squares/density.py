@@ -1,4 +1,4 @@
-"""Checks of how densely points lie, before any raster is made: what is too thin to be a rail costs no time.
+"""Squares with too few points for rails are skipped before rasters are made.
 
 Coordinates in another unit than the one that the file states, and points far from any rail, would take hours: the
 raster follows the points wherever they are. See docs/method.md section 7.1.

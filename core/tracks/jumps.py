@@ -1,4 +1,4 @@
-"""Steps of a track to the side, which no track has: passes of a scanner that lie apart meet there.
+"""Sideways jumps in tracks: passes of a scanner that are not aligned meet there.
 
 See docs/method.md section 6.7.
 """
@@ -31,11 +31,11 @@ MIN_STEP_M = 0.008
 """Smallest step: waves of 1 mm that are 5 m long look like 4 mm."""
 
 BEND_M2 = 1.9
-"""Largest step, metres, that an abrupt change of the curvature looks like, per 1/m by which the arms then differ."""
+"""A sudden change of curvature can look like a step of up to this many metres per 1/m of change."""
 
 STEP_SIGMAS, STEP_GAIN = 5.0, 2.75
-"""Standard errors from which a step is not chance, and the standard error of a step in those of the line that shows it,
-whose errors are alike over a metre."""
+"""Standard errors from which a step is not chance, and the standard error of a step relative to that of its line, whose
+errors are correlated over about a metre."""
 
 
 Steps = list[tuple[float, float]]

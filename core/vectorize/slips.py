@@ -60,8 +60,8 @@ and shortest length on which a slip curve is that far from both: 8 m for 190 m a
 rails and check rails at frogs look like is that far from both for less than 5 m."""
 
 SPACINGS_M = (0.6, 1.8)
-"""Distances between the axes of the rails of a track: gauges of 600 to 1676 mm. The left rails of two tracks cross that
-far beside their right rails."""
+"""Distances between the axes of the rails of a track: gauges of 600 to 1676 mm. At a crossing, left rails cross each
+other this far from where the right rails cross."""
 
 BESIDE_M = (1.07, 1.507)
 """How far to either side the other two rails may cross: metre and standard gauge. `NEAR_M` covers the others."""

@@ -91,7 +91,7 @@ def test_a_class_without_track_is_a_warning_if_another_class_has_one():
     assert said.startswith("Class 11: No track of 1435 mm gauge found")
 
 
-SPLIT = "Rails of the classes 10, 11 lie at gauge from each other or continue each other"
+SPLIT = "Rails of the classes 10, 11 form tracks or continue each other"
 
 
 def split_between_classes(by_rail):

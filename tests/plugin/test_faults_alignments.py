@@ -159,7 +159,7 @@ IMPORTED = [
         "a file without a coordinate system",
         of_file(landxml(head=METRIC)),
         WARNED,
-        "design.xml states no coordinate system: choose CRS to see its tracks in their place.",
+        "design.xml has no coordinate system: choose CRS to see its tracks in their place.",
     ),
     Fault(
         "a coordinate system that does not fit",

@@ -243,13 +243,13 @@ SYSTEMS = [
         "no coordinate system",
         in_system(None, 1, HERE),
         WARNED,
-        "The cloud states no coordinate system: its coordinates are taken as metres. If it has one, choose it as CRS.",
+        "The cloud has no coordinate system: its coordinates are taken as metres. If it has one, choose it as CRS.",
     ),
     Fault(
         "unreadable coordinate system",
         with_broken_system,
         WARNED,
-        "The cloud states no coordinate system: its coordinates are taken as metres. If it has one, choose it as CRS.",
+        "The cloud has no coordinate system: its coordinates are taken as metres. If it has one, choose it as CRS.",
     ),
     Fault(
         "coordinates in degrees",

@@ -87,7 +87,7 @@ FAULTS = [
         "one seed on a rail and one beside",
         seeds(ON_RAIL, BESIDE),
         WARNED,
-        "1 of 2 seeds lie on no rail: move them onto railheads.",
+        "1 of 2 seeds are not on a rail: move them onto railheads.",
     ),
     Fault(
         "seed on a lone rail",

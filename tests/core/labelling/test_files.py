@@ -214,7 +214,7 @@ def test_ground_has_no_rail(tmp_path):
     assert (laspy.read(result.file).classification == 2).all()
     assert progress.warnings[0] == "new.copc.laz is written as new.laz: COPC files can't be written."
     assert [one.split(":")[0] for one in progress.warnings[1:]] == [
-        "The cloud states no coordinate system",
+        "The cloud has no coordinate system",
         "No rail was found",
     ]
 

@@ -104,7 +104,7 @@ def test_two_seeds_on_one_track_count_its_length_once(tmp_path):
     seeds = [SEED, CORNER[:2] + TRACK.at(8.0, SPACING_M / 2), CORNER[:2] + TRACK.at(6.0, 0.0)]
     result, progress = grow(tmp_path, [source], tmp_path / "new.las", seeds)
     assert result.figures.paired_m == pytest.approx(47.0, abs=2.5)
-    assert "1 of 3 seeds lie on no rail: move them onto railheads." in progress.warnings
+    assert "1 of 3 seeds are not on a rail: move them onto railheads." in progress.warnings
     assert len(result.stops) == 2
 
 

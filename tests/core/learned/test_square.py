@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.classify.settings import Settings
+from rail_extract.core.classify.settings import MARGIN_M, Settings
 from rail_extract.core.classify.square import classify_square
 from rail_extract.core.learned.square import label_square
+from rail_extract.laboratory.scenes.raw_catalogue import RAW_SCENES
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, turned, with_track
 
 GAUGE, WIDTH = 1.435, 0.072
@@ -42,6 +43,19 @@ def test_points_from_half_on_are_labelled(value, share):
     assert found.rail[on].mean() == pytest.approx(share, abs=0.02)
     assert not found.rail[~on].any()
     assert found.figures.paired_m == pytest.approx(share * 18, abs=2)
+
+
+def test_blunted_rails_are_found_whatever_the_network_says():
+    scene = RAW_SCENES["photo curve blunt"](2)
+    settings = Settings((scene.standard.gauge_m,), scene.standard.head_width_m)
+    corner = scene.rails[0][len(scene.rails[0]) // 2] - [20.0, 20.0, 0.0]
+    xyz = scene.xyz - corner
+    xyz = xyz[((xyz[:, :2] > -MARGIN_M) & (xyz[:, :2] < settings.side_m + MARGIN_M)).all(axis=1)]
+    found, expected = label_square(xyz, settings, Answer(0.0)), classify_square(xyz, settings)
+    assert expected.rail.sum() > 3000
+    assert found.rail[expected.rail].mean() > 0.95
+    assert not found.rail[~expected.rail].any()
+    assert found.figures.blunt_m == expected.figures.blunt_m > 100
 
 
 def test_no_points_give_no_rails():

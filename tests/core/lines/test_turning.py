@@ -98,7 +98,7 @@ def test_rails_with_a_corner_are_split_and_said(gaps):
     assert (one.sigma_mm, other.sigma_mm) == (pytest.approx(1.0), pytest.approx(4.0))
     assert one.points + other.points == pytest.approx(1200, rel=0.05)
     (warning,) = heard.warnings
-    assert warning.startswith("1 rail turned by more than 10° within a metre")
+    assert warning.startswith("1 rail bends by more than 10° within a metre")
 
 
 def damaged(layout, seed):

@@ -334,8 +334,8 @@ def test_a_track_that_ends_on_another_one_has_no_hole():
 
 
 def test_warnings_of_the_run_are_listed():
-    whole = replace(network(track()), warnings=("1 rail turned by more than 10° within a metre.",))
-    assert "<li>1 rail turned by more than 10° within a metre.</li>" in build_page(whole, (1.435,), "cloud.laz")
+    whole = replace(network(track()), warnings=("1 rail bends by more than 10° within a metre.",))
+    assert "<li>1 rail bends by more than 10° within a metre.</li>" in build_page(whole, (1.435,), "cloud.laz")
 
 
 def test_findings_are_in_the_order_of_possible_error_times_length():

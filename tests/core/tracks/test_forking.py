@@ -1,17 +1,8 @@
 import numpy as np
 import pytest
 from rail_extract.core.lines.thinning import thin
-from rail_extract.core.rails import Centerline, RailLine
+from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.centerlines import build_centerlines
-from rail_extract.core.tracks.forking import (
-    MAX_APART_M,
-    _angle,
-    _extended,
-    _near_ends,
-    _seen_from,
-    _with_bridged,
-    _with_vertex,
-)
 from rail_extract.laboratory.curves import Element, trace
 from rail_extract.laboratory.rasters.turnouts import FORMS, branch
 from rail_extract.laboratory.ruler.lines import compare_lines
@@ -147,78 +138,3 @@ def test_a_track_that_continues_another_at_a_distance_does_not_fork():
     rails = [rail for curve in (first, second) for rail in Track(curve, GAUGE + WIDTH).rails()]
     found = build_centerlines(rails_of(*rails), GAUGE, WIDTH)
     assert sum(line.length_m for line in found) == pytest.approx(60.0, abs=0.5)
-
-
-@pytest.mark.parametrize(("first_m", "is_near"), [(MAX_APART_M - 0.005, True), (MAX_APART_M + 0.005, False)])
-def test_a_branch_is_only_extended_if_its_very_end_is_near_the_track(first_m, is_near):
-    """A branch on an arc of 300 m, whose second vertex is further away than the limit in both cases."""
-    x = np.arange(0.0, 60.0, 0.5)
-    through = np.column_stack([x - 20, np.zeros((len(x), 2))])
-    way = x + np.sqrt(600 * first_m)
-    branch = np.column_stack([x, way**2 / 600, np.zeros(len(x))])
-    longer = _extended(branch, through)
-    assert (longer is not None) == is_near
-    if is_near:
-        assert longer[0] == pytest.approx([-np.sqrt(600 * first_m), 0, 0], abs=0.05)
-
-
-@pytest.mark.parametrize(("bend", "touch"), [(0.001, -5.0), (-0.001, -np.inf)])
-def test_a_straight_switch_has_a_heel_behind_which_the_branch_bends_outward(bend, touch):
-    s = np.arange(0.0, 30.0, 0.5)
-    off = 0.02 * (s + 5) + bend * np.maximum(s - 8, 0) ** 2
-    law, misfit_m = _angle(s, off, 8.0)
-    assert law.touch == pytest.approx(touch)
-    assert misfit_m.max() < 1e-9
-
-
-@pytest.mark.parametrize(("at_m", "is_extended"), [(None, True), (2.0, True), (11.0, False)])
-def test_a_branch_that_leaves_its_arc_late_is_not_extended(at_m, is_extended):
-    """An arc of 300 m that lies off by 5 cm for 2 m; it is followed as far as 0.8 m from the track."""
-    x = np.arange(0.0, 60.0, 0.5)
-    through = np.column_stack([x - 20, np.zeros((len(x), 2))])
-    branch = np.column_stack([x, (x + 8) ** 2 / 600, np.zeros(len(x))])
-    if at_m is not None:
-        branch[(x >= at_m) & (x < at_m + 2), 1] += 0.05
-    assert (_extended(branch, through) is not None) == is_extended
-
-
-@pytest.mark.parametrize(("at_m", "first_m", "last_m"), [(0.0, 0, 149), (250.2, 101, 400), (499.0, 350, 500)])
-def test_a_line_is_seen_to_150_m_from_a_place(at_m, first_m, last_m):
-    line = np.column_stack([np.arange(0, 501.0), np.zeros((501, 2))])
-    seen = _seen_from(np.array([at_m, -1.0, 0.0]), line)
-    assert line[seen][[0, -1], 0].tolist() == [first_m, last_m]
-    returning = np.concatenate([line, line[::-1] + [0, 5.0, 0]])
-    assert _seen_from(np.array([0.0, -1.0, 0.0]), returning) == slice(0, 150)
-    assert _seen_from(line[3], line[:5]) == slice(0, 5)
-
-
-@pytest.mark.parametrize(("off_m", "count"), [(0.0018, 5), (0.0022, 6)])
-def test_a_vertex_within_two_millimetres_moves_to_the_place_of_the_fork(off_m, count):
-    line = np.column_stack([np.arange(5.0), np.zeros(5), np.arange(5.0)])
-    place = np.array([2.0 + off_m, 0.0, 7.0])
-    forked = _with_vertex(line, place)
-    assert len(forked) == count and line[2].tolist() == [2.0, 0.0, 2.0]
-    np.testing.assert_array_equal(forked[count - 3], place)
-    np.testing.assert_array_equal(
-        np.delete(forked, count - 3, axis=0), np.delete(line, 2, axis=0) if count == 5 else line
-    )
-
-
-def centerline(*places):
-    return Centerline(np.column_stack([places, np.zeros(len(places))]), 1, 10, (1,), (2,), 1435.0, 1.0, 0.0, 0.0, 0.5)
-
-
-def test_ends_are_near_the_line_whose_stations_are_nearest():
-    through, other = centerline((0.0, 0.0), (50.0, 0.0)), centerline((0.0, -0.5), (50.0, -0.5))
-    branch = centerline((20.2, 0.25), (40.0, 5.0))
-    assert list(_near_ends([through, branch])) == [(1, 0, 0)]
-    turned = centerline((40.0, 5.0), (20.2, 0.25))
-    assert (1, -1, 0) in list(_near_ends([through, turned, other]))
-    assert list(_near_ends([through, centerline((20.2, 0.82), (40.0, 5.0))])) == []
-    assert list(_near_ends([through])) == []
-
-
-def test_an_extension_is_bridged_and_a_shorter_branch_is_not():
-    branch = centerline((10.0, 0.0), (30.0, 0.0))
-    assert _with_bridged(branch, np.array([[4.0, 0, 0], [30.0, 0, 0]])).bridged_m == pytest.approx(branch.bridged_m + 6)
-    assert _with_bridged(branch, np.array([[14.0, 0, 0], [30.0, 0, 0]])).bridged_m == branch.bridged_m

@@ -6,12 +6,6 @@ import numpy as np
 import pytest
 from rail_extract.core.rails import Centerline, RailLine, Support
 from rail_extract.core.tracks.jumps import (
-    ARM_M,
-    BEND_M2,
-    STATION_M,
-    _peaks,
-    _steps_along,
-    _weights,
     doubting_steps,
     find_steps,
     steps_of,
@@ -102,44 +96,6 @@ def test_an_abrupt_arc_is_no_step_of_two_rails():
     curve = trace([Element(40.0), Element(30.0, 1 / 60, 1 / 60)], heading=2.0)
     rails = [rail(number, beside(curve, left_m).xy) for number, left_m in ((1, 0.75), (2, -0.75))]
     assert find_steps(track(curve.xy, (1,), (2,)), rails) == []
-
-
-def test_the_largest_of_the_steps_that_share_an_arm_counts():
-    t = np.arange(0.0, 60.0, 0.5)
-    across = np.zeros(len(t))
-    for place, size in ((10.0, 0.02), (10.0 + 2 * ARM_M, -0.01), (40.0, -0.03), (40.5, 0.025)):
-        across[t == place] = size
-    assert _peaks(t, across) == [(10.0, 0.02), (40.0, -0.03)]
-    across[t == 10.5 + 2 * ARM_M] = -0.01
-    assert _peaks(t, across) == [(10.0, 0.02), (10.5 + 2 * ARM_M, -0.01), (40.0, -0.03)]
-    assert _peaks(t, 0 * across) == _peaks(t[:0], across[:0]) == []
-
-
-def test_steps_and_changes_of_curvature_are_told_from_cubics():
-    steps, bends = _weights()
-    t = (np.arange(len(steps)) - len(steps) // 2) * STATION_M
-    assert t[-1] == pytest.approx(5.0)
-    cubic = 0.3 + 0.01 * t - 0.002 * t**2 + 0.0004 * t**3
-    assert steps @ cubic == pytest.approx(0.0, abs=1e-9)
-    assert steps @ (t > 0) == pytest.approx(1.0)
-    assert bends @ (0.3 + 0.01 * t - 0.002 * t**2) == pytest.approx(0.0, abs=1e-9)
-    assert bends @ np.where(t > 0, t**2 / 600, 0.0) == pytest.approx(1 / 300)
-    inside = np.abs(t) < 0.99
-    assert not steps[inside].any() and not bends[inside].any()
-
-
-def test_what_a_step_may_be_comes_from_bends_and_from_the_error_of_the_line():
-    x = np.arange(0.0, 40.01, 0.05)
-    line = np.column_stack([x, np.where(x > 20, (x - 20) ** 2 / 200, 0.0)])
-    t = np.arange(0.125, 40, 0.25)
-    strips = np.column_stack([np.ones((len(t), 2)), np.full(len(t), 0.003)])
-    support = Support(t, np.full(len(t), 9), np.full(len(t), 0.005), strips)
-    places, across, bend, chance = _steps_along(line, support)
-    assert places[[0, -1], 0] == pytest.approx([5.0, 35.0], abs=0.3)
-    np.testing.assert_allclose(chance, 0.004, rtol=1e-6)
-    at = np.argmin(np.abs(places[:, 0] - 20))
-    assert bend[at] == pytest.approx(BEND_M2 / 100, rel=0.05) and bend[:5].max() < 1e-6
-    assert len(_steps_along(line[:190])[0]) == 0 and not _steps_along(line)[3].any()
 
 
 @pytest.mark.parametrize(("spread_m", "expected_m"), [(np.nan, 0.03), (0.02, 0.03), (0.05, 0.05)])

@@ -4,22 +4,10 @@ import numpy as np
 import pytest
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.pairing import (
-    WANDER_STATIONS,
-    _abreast,
-    _free_runs,
-    _inside,
-    _is_nearest,
-    _Match,
-    _misfit_m,
-    _OffsetCurve,
-    _on_one_level,
-    _sections,
-    _wander,
-    _without_rivals,
     find_candidates,
     pair_rails,
 )
-from rail_extract.core.tracks.parallels import Parallels, find_parallels
+from rail_extract.core.tracks.parallels import find_parallels
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 
 GAUGE, WIDTH = 1.435, 0.072
@@ -193,121 +181,3 @@ def test_a_rail_whose_other_partner_is_as_good_keeps_both():
     """Where three rails are at the gauge, nothing shows which two are a track."""
     widths = beside(CURVED, SPACING, 0.0, -SPACING - 0.005)
     assert len(pair_rails(rails_of(*widths), GAUGE, WIDTH)) == 2
-
-
-def offset_curve(*places):
-    xy = np.array(places, dtype=float)
-    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
-    return _OffsetCurve(xy, s, s + 100)
-
-
-def test_stations_are_abreast_where_curves_are_within_the_tolerance():
-    x = np.arange(0, 20.01, 0.25)
-    line = offset_curve(*np.column_stack([x, np.zeros(len(x))]))
-    bulging = offset_curve((0, 0.01), (7, 0.01), (8, 0.5), (11, 0.5), (12, 0.01), (20, 0.01))
-    (before, at_before), (after, at_after) = _abreast(line, bulging, 0.05)
-    assert before[[0, -1]] == pytest.approx([0.0, 7.05], abs=0.1)
-    assert after[[0, -1]] == pytest.approx([11.95, 20.0], abs=0.1)
-    assert at_before[[0, -1]] == pytest.approx([0.0, 7.05], abs=0.1)
-    length_m = bulging.s[-1]
-    assert at_after[[0, -1]] == pytest.approx([length_m - 8.05, length_m], abs=0.1)
-
-
-def test_a_steady_change_is_no_wander_and_a_wave_is_one():
-    steps = np.arange(40.0)
-    assert _wander(0.3 * steps) == pytest.approx(0.0, abs=1e-12)
-    assert _wander(0.01 * (-1) ** steps) == pytest.approx(0.01, rel=0.02)
-    assert _wander(np.where(steps == 20, 1.0, 0.0)) == pytest.approx(0.0, abs=1e-12)  # most windows are steady
-    assert _wander(np.array([0.0, 5.0])) == 0.0
-    assert _wander(np.array([0.0, 3.0, 0.0])) == pytest.approx(np.sqrt(2.0))
-    assert WANDER_STATIONS == 11
-
-
-def test_a_single_station_out_of_tolerance_divides_a_section():
-    x = np.arange(0, 20.01, 0.5)
-    line = offset_curve(*np.column_stack([x, np.zeros(len(x))]))
-    pointed = offset_curve((0, 0), (9.95, 0), (10, 0.0685), (10.05, 0), (20, 0))
-    (before, _), (after, _) = _abreast(line, pointed, 0.05)
-    assert [*before[[0, -1]], *after[[0, -1]]] == pytest.approx([0.0, 9.975, 10.025, 20.0])
-
-
-@pytest.mark.parametrize(("lost_m", "left_m"), [(10.0, [10.0]), (11.0, [])])
-def test_a_match_stays_if_half_of_it_or_less_is_lost_to_a_better_partner(lost_m, left_m):
-    t = np.arange(0, 20) + 0.5
-    worse = _Match(0, 1, t, t, 1, -1, 0.0)
-    claimed = np.array([-1.0, lost_m + 0.6])
-    better = _Match(0, 2, claimed, claimed, -1, 1, 0.0)
-    kept = _without_rivals([worse, better], [0.05, 0.01])
-    assert [match.length_m + 1 for match in kept if match.b == 1] == left_m
-    assert [match.length_m for match in kept if match.b == 2] == [lost_m + 1.6]
-
-
-@pytest.mark.parametrize(
-    ("worse_m", "better_m", "is_kept"),
-    [(0.029, 0.02, True), (0.031, 0.02, False), (0.059, 0.04, True), (0.061, 0.04, False), (0.0105, 0.001, True)],
-)
-def test_a_partner_is_clearly_worse_by_half_and_by_a_centimetre(worse_m, better_m, is_kept):
-    t = np.arange(0, 20) + 0.5
-    worse, better = _Match(0, 1, t, t, 1, -1, 0.0), _Match(0, 2, t, t, -1, 1, 0.0)
-    kept = _without_rivals([worse, better], [worse_m, better_m])
-    assert [match.b for match in kept] == ([1, 2] if is_kept else [2])
-
-
-def test_two_matches_may_share_half_a_metre():
-    inside = _inside(np.array([10.4, 10.6, 15.0, 19.4, 19.6, 31.0]), [(10.0, 20.0), (30.0, 32.0)])
-    assert inside.tolist() == [False, True, True, True, False, True]
-
-
-def test_what_is_free_of_a_match_is_three_metres_long():
-    t = np.arange(0, 20.0)
-    match = _Match(0, 1, t, 100 - t, 1, -1, 0.25)
-    taken = np.isin(t, [3, 8, 9])
-    parts = list(_free_runs(match, taken))
-    assert [part.t_a[[0, -1]].tolist() for part in parts] == [[4, 7], [10, 19]]
-    assert [part.t_b[[0, -1]].tolist() for part in parts] == [[96, 93], [90, 81]]
-    assert {part.mean_penalty for part in parts} == {0.25}
-
-
-def stations(t_a, left_m=1.5):
-    count = len(t_a)
-    numbers = np.zeros(count, dtype=int)
-    left_m = np.broadcast_to(left_m, count)
-    return Parallels(numbers, numbers + 1, np.array(t_a), np.array(t_a), left_m, np.ones(count, dtype=bool))
-
-
-def test_stations_are_divided_at_gaps_of_five_metres_and_after_a_kilometre():
-    t_a = np.concatenate([np.arange(100.0, 1350.0, 0.5), np.arange(1354.0, 1500.0, 0.5), [1505.0, 1505.5]])
-    assert [part.t_a[[0, -1]].tolist() for part in _sections(stations(t_a))] == [
-        [100.0, 1099.5],
-        [1100.0, 1499.5],
-        [1505.0, 1505.5],
-    ]
-
-
-def test_a_match_is_left_to_a_nearer_gauge():
-    match = _Match(0, 1, np.array([20.0, 10.0]), np.array([0.0, 10.0]), 1, -1, 0.0)
-    section = stations(np.arange(0, 30.0), np.where((np.arange(30) >= 10) & (np.arange(30) <= 20), -1.50, 9.0))
-    assert _is_nearest(match, section, 1.52, [1.47]) and _is_nearest(match, section, 1.53, [1.06, 1.47])
-    assert not _is_nearest(match, section, 1.54, [1.06, 1.47]) and _is_nearest(match, section, 1.8, [])
-
-
-@pytest.mark.parametrize(("apart_m", "is_one"), [(0.39, True), (0.41, False), (-0.41, False)])
-def test_rails_on_one_level_are_less_than_40_cm_apart(apart_m, is_one):
-    a = np.array([[0.0, 0.0, 0.0], [50.0, 0.0, 1.0]])
-    b = np.array([[50.0, 1.5, 1.0 + apart_m], [0.0, 1.5, apart_m]])
-    t = np.linspace(5, 45, 20)
-    assert _on_one_level(a, t, b, 50 - t) == is_one
-
-
-def test_the_misfit_of_a_partner_is_its_distance_from_gauge_and_thrice_its_wander():
-    x = np.arange(0, 60.25, 0.5)
-    wave = 0.01 * np.resize([1, 1, -1, -1], len(x))
-    own = rail(np.column_stack([x, 0 * x]), 1)
-    match = _Match(0, 1, np.array([5.0, 55.0]), np.array([5.0, 55.0]), -1, 1, 0.0)
-    off_m, wander_m = _misfit_m([own, rail(np.column_stack([x, 0 * x - SPACING - 0.02]), 2)], match, SPACING)
-    assert (off_m, wander_m) == pytest.approx((0.02, 0.0), abs=1e-9)
-    off_m, wander_m = _misfit_m([own, rail(np.column_stack([x, 0 * x - SPACING]), 2, z=wave)], match, SPACING)
-    assert (off_m, wander_m) == pytest.approx((0.0, 3 * 0.01), rel=0.1)
-    tilted = rail(np.column_stack([x, -SPACING - 0.0004 * x]), 2, z=0.002 * x)
-    off_m, wander_m = _misfit_m([own, tilted], match, SPACING)
-    assert off_m == pytest.approx(0.0004 * np.sqrt(30**2 + 50**2 / 12), rel=0.02) and wander_m < 1e-4

@@ -193,7 +193,7 @@ def test_rails_of_two_classes_make_a_track_when_merged(run, new_feedback, write_
     feedback = new_feedback()
     apart, merged = run(values, feedback), run({**values, "MERGE_CLASSES": True})
     assert (apart.results["CENTERLINE_COUNT"], merged.results["CENTERLINE_COUNT"]) == (0, 1)
-    assert any("Rails of the classes 10, 11 lie at gauge" in text for text in feedback.warnings)
+    assert any("Rails of the classes 10, 11 form tracks" in text for text in feedback.warnings)
     assert {items["class_code"] for _, items in read_features(tmp_path / "rails.gpkg")} == {11}
 
 
@@ -287,8 +287,8 @@ def test_strips_are_stated_and_aligned(run, write_cloud, track, tmp_path, new_fe
         feedback, report = new_feedback(), tmp_path / f"{how}.html"
         outcome = run({"INPUT": cloud, "ITERATIONS": 1, "STRIPS": how, "REPORT": report, **paths}, feedback)
         assert outcome.ok, outcome.error
-        warning = next(text for text in feedback.warnings if "Strips are up to" in text)
-        assert "mm apart" in warning and ("set STRIPS to ALIGNED" in warning) == (how == "AS_THEY_ARE")
+        warning = next(text for text in feedback.warnings if "Where strips overlap" in text)
+        assert "differ by up to" in warning and ("set STRIPS to ALIGNED" in warning) == (how == "AS_THEY_ARE")
         layer, stations = lines_of(paths["QUALITY"])
         assert layer.fields().indexFromName("strips") >= 0
         assert {station["strips"] for station in stations} == {2}
