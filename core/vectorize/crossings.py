@@ -8,9 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..lines.bridges import Bridge, bridge
-from ..lines.ends import cut_back
+from ..lines.ends import cut_back, even_points
 from ..lines.network import LineNetwork
 from .junctions import ends_by_node
 from .steadiness import unsteadiness
@@ -36,8 +37,9 @@ _PAIRINGS = (((0, 2), (1, 3)), ((0, 3), (1, 2)), ((0, 1), (2, 3)))
 def resolve_crossings(network: LineNetwork) -> LineNetwork:
     """Draw two rails through every part that two crossing rails share, each a smooth curve between its own free parts.
 
-    A crossing is a node of four lines, or a short line between two nodes of three. It is resolved if its four legs form
-    two pairs that rails could follow. The rails then cross without a node.
+    A crossing is a node of four lines; or a short line between two nodes of three; or a node of three whose fourth leg
+    ends freely before it, because a flangeway of the frog cuts it off. It is resolved if its four legs form two pairs
+    that rails could follow. The rails then cross without a node.
 
     Parameters
     ----------
@@ -81,12 +83,37 @@ def _crossings(network: LineNetwork) -> Iterator[tuple[list[int], dict[int, floa
         (lines, {end: SKIP_M for node in nodes for end in at_node[node] if end // 2 not in lines})
         for lines, nodes in places
     ]
+    crossings += [([], legs) for legs in _cut_off(network)]
     for lines, legs in crossings:
         long = all(
             lengths[end // 2] > 3 * SKIP_M and lengths[end // 2] > skip_m + SKIP_M for end, skip_m in legs.items()
         )
         if len({end // 2 for end in legs}) == 4 and long:
             yield lines, legs
+
+
+def _cut_off(network: LineNetwork) -> list[dict[int, float]]:
+    """List the crossings to which a flangeway leaves only three legs, with every free end that may be the fourth.
+
+    The leg towards the free end is shared up to that end. Nearer free ends come first.
+    """
+    degrees, at_node = network.degrees(), dict(ends_by_node(network))
+    free, forks = np.flatnonzero(degrees == 1), np.flatnonzero(degrees == 3)
+    if not len(free) or not len(forks):
+        return []
+    near = cKDTree(network.nodes[forks]).sparse_distance_matrix(
+        cKDTree(network.nodes[free]), MAX_MERGED_M, output_type="coo_matrix"
+    )
+    found = []
+    for fork, tip in np.column_stack([near.row, near.col])[np.argsort(near.data, kind="stable")].tolist():
+        legs, across = at_node[int(forks[fork])], network.nodes[free[tip]] - network.nodes[forks[fork]]
+        reach_m = float(np.hypot(*across))
+        ways = [
+            even_points(network.from_end(end), max(reach_m, SKIP_M))[-1] - network.nodes[forks[fork]] for end in legs
+        ]
+        stem = legs[int(np.argmax([way @ across for way in ways]))]
+        found.append({**dict.fromkeys(legs, SKIP_M), stem: reach_m + SKIP_M, at_node[int(free[tip])][0]: SKIP_M})
+    return found
 
 
 def _best_pairing(network: LineNetwork, legs: Mapping[int, float]) -> dict[tuple[int, int], Bridge]:

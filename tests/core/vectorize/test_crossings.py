@@ -1,4 +1,4 @@
-"""Rails that cross at flat frogs."""
+"""Rails that cross, at flat frogs and where a flangeway cuts one leg off."""
 
 import numpy as np
 import pytest
@@ -30,6 +30,41 @@ def test_two_rails_cross_at_a_flat_frog_and_do_not_exchange(number, heading):
         x, y = turned @ line.T
         assert np.abs(np.abs(y) - np.abs(x) * np.tan(half)).max() < 0.06
         assert y[np.argmin(x)] * y[np.argmax(x)] < 0
+
+
+@pytest.mark.parametrize("missing_m", [1.0, 3.0])
+def test_rails_cross_at_a_frog_whose_flangeway_cuts_one_leg_off(missing_m):
+    slope = np.arctan(1 / 9)
+    way, other = np.array([1.0, 0.0]), np.array([np.cos(slope), np.sin(slope)])
+    near, t = np.arange(0, 25, 0.1)[:, None], np.arange(missing_m, 25, 0.1)[:, None]
+    fork = np.zeros((1, 2))
+    shared = np.concatenate([fork, (missing_m / 2 + 0.1) * (way + other)[None] / 2, (t[1:] + 0.3) * other])
+    lines = (np.concatenate([fork, -near[5:] * way]), np.concatenate([fork, -near[5:] * other]), shared, t * way)
+    nodes = np.concatenate([fork, *(line[-1:] for line in lines), lines[3][:1]])
+    network = resolve_crossings(LineNetwork(lines, nodes, np.array([[0, 1], [0, 2], [0, 3], [5, 4]])))
+    assert len(network.lines) == 2
+    for line in network.lines:
+        off = [np.abs(line @ [-along[1], along[0]]).max() for along in (way, other)]
+        assert min(off) < 0.02
+
+
+def test_a_leg_belongs_to_one_crossing_only():
+    """A rail that a flangeway cuts off and a gap interrupts has two free ends that could be the fourth leg."""
+    slope = np.arctan(1 / 9)
+    way, other = np.array([1.0, 0.0]), np.array([np.cos(slope), np.sin(slope)])
+    fork = np.zeros((1, 2))
+    arms = [np.concatenate([fork, -np.arange(0.5, 25, 0.1)[:, None] * along]) for along in (way, other)]
+    shared = np.concatenate([fork, 0.6 * (way + other)[None] / 2, np.arange(1.4, 25, 0.1)[:, None] * other])
+    near, far = (np.arange(start, end, 0.1)[:, None] * way for start, end in ((1.0, 8.0), (9.0, 25.0)))
+    lines = (*arms, shared, near, far)
+    nodes = np.concatenate([fork, *(line[-1:] for line in lines[:3]), near[[0, -1]], far[[0, -1]]])
+    ends = np.array([[0, 1], [0, 2], [0, 3], [4, 5], [6, 7]])
+    network = resolve_crossings(LineNetwork(lines, nodes, ends))
+    spans = sorted(
+        (round(line[:, 0].min(), 1), round(line[:, 0].max(), 1)) for line in network.lines if line[-1, 1] == 0
+    )
+    assert len(network.lines) == 3
+    assert spans == [(-24.9, 7.9), (9.0, 24.9)]
 
 
 def test_a_loop_through_a_node_is_not_two_legs_of_a_crossing():
