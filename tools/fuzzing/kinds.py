@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from .mutators import mutate, mutate_text
 
 RAIL = 10
@@ -150,6 +152,12 @@ def _read_stored(path: Path) -> None:
         raise RailExtractError(" ".join(str(error).split())) from error
 
 
+def _keep_all(codes: np.ndarray, places: Callable[[np.ndarray], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Look at the places of all points and keep their classes."""
+    places(np.arange(len(codes)))
+    return codes, np.ones(len(codes), dtype=bool)
+
+
 def _copy_cloud(path: Path) -> None:
     """Read a raw cloud and write a classified copy, which must have the same points."""
     import laspy
@@ -157,7 +165,7 @@ def _copy_cloud(path: Path) -> None:
 
     _read_cloud(path)
     copy = path.with_name(f"copy{path.suffix}")
-    written = rewrite(path, copy, lambda xyz, codes: (codes, codes == codes))
+    written = rewrite(path, copy, _keep_all)
     with laspy.open(copy, read_evlrs=False) as reader:
         there = sum(len(chunk) for chunk in reader.chunk_iterator(1000))
     if written != there:
