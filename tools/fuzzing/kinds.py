@@ -74,7 +74,6 @@ class Kind:
 
 def _read_cloud(path: Path) -> None:
     """Read rail points; those that are read must be numbers."""
-    import numpy as np
     from rail_extract.core.clouds.points import read_rail_points
 
     for points in read_rail_points(path, [RAIL]):
@@ -125,7 +124,6 @@ def _spooled(cloud: Path, folder: Path) -> Sequence:
 
 def _make_stored(folder: Path) -> list[Path]:
     """Store the raster and the rails of a square."""
-    import numpy as np
     from rail_extract.core.cluster.store import save
     from rail_extract.core.frame import LocalFrame
     from rail_extract.core.rails import RailLine
