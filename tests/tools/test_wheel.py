@@ -62,7 +62,7 @@ def test_the_command_is_installed(installed, tmp_path):
     done = subprocess.run(
         command, check=True, cwd=tmp_path, env=_environment(installed), capture_output=True, text=True
     )
-    assert "extract rails and track centerlines" in done.stdout.decode()
+    assert "extract rails and track centerlines" in done.stdout
     assert "synthetic" not in done.stdout.decode()  # the laboratory is not installed
 
 
