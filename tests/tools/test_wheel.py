@@ -63,7 +63,7 @@ def test_the_command_is_installed(installed, tmp_path):
         command, check=True, cwd=tmp_path, env=_environment(installed), capture_output=True, text=True
     )
     assert "extract rails and track centerlines" in done.stdout
-    assert "synthetic" not in done.stdout.decode()  # the laboratory is not installed
+    assert "synthetic" not in done.stdout  # the laboratory is not installed
 
 
 def _environment(folder):
