@@ -1,7 +1,7 @@
 """Run every scene and compare its figures with `golden.json`, or write them there.
 
-Run `python benchmarks/golden.py [SCENE ...] [--all] [--write]`. `--all` adds the base model and three other seeds. Scenes with
-PyTorch are run where it is installed.
+Run `python benchmarks/golden.py [SCENE ...] [--all] [--write]`. `--all` adds the base model and three other seeds.
+Scenes with PyTorch are run where it is installed.
 """
 
 from __future__ import annotations
