@@ -91,7 +91,6 @@ def _rule(name: str, value: Any, *also: tuple[str, str, Any]) -> Switch:
 
 SWITCHES = (
     _rule("vectorize.open_slips", lambda network, seen: (network, [])),
-    _rule("vectorize.straighten_blots", first),
     _rule("vectorize.cut_kinks", first),
     _rule("vectorize.attach_branches", first),
     _rule("vectorize.free_third_rails", first),
@@ -107,10 +106,7 @@ SWITCHES = (
     _rule("vectorize.junctions.drop_bubbles", first),
     _rule("vectorize.junctions.drop_rungs", first),
     _rule("vectorize.junctions.drop_spurs", first),
-    _rule("vectorize.repairs.BEND", np.inf),
-    _rule("vectorize.repairs.SWERVE_M", np.inf),
     _rule("steps.parts_without_turns", lambda line, *_: [(0.0, float(length_along(line)[-1]))]),
-    _rule("lines.network_smoothing._continuations", lambda *_: {}),
     _rule("tracks.pairing._without_ghosts", list),
     _rule("tracks.pairing._without_rivals", lambda matches, misfits_m: list(matches)),
     _rule("tracks.pairing._on_one_level", lambda *_: True),

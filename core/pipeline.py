@@ -46,8 +46,8 @@ from .steps import (
 from .tasks import READ_S, Context, InTurn, Runner, Task
 from .tracks.geometry import measure_track_geometry
 from .tracks.jumps import doubting_steps, steps_of
+from .tracks.parallels import widths_by_gauge
 from .tracks.strip_courses import strip_courses
-from .tracks.widths_by_gauge import widths_by_gauge
 
 READING, DRAWING, PAIRING, MEASURING = 0.2, 0.72, 0.04, 0.04
 """Run times of the steps relative to each other, for the progress: sorting files, squares, tracks, track geometry."""

@@ -23,7 +23,7 @@ from .rails import HEAD_OFF_M, HeadWidths, RailLine
 from .squares.density import fullest_square
 from .squares.grid import PointSource
 from .standards import HEAD_WIDTH_RANGE_MM, SAME_GAUGE_M, STANDARDS, Gauge, RailStandard, closest_standard
-from .tracks.widths_by_gauge import width_at
+from .tracks.parallels import width_at
 
 SAMPLE_M = 50.0
 """Half the side of the area whose points show the width of the heads."""

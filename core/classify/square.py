@@ -9,15 +9,22 @@ import numpy as np
 from ..frame import ORIGIN_STEP
 from ..rails import SearchFigures
 from .bed import COARSE_M, Bed, Coarse, find_bed
-from .figures import shares_of_length
 from .flush import Flush, flush_rails
 from .labels import Near, label, whole_heads
 from .lines import Lines, Marks, centred, find_lines
 from .partner import runs_inside, stations_with_partner
-from .pieces import continuing, links, long_enough, lower_than_beside, pieces_of, with_partner
+from .pieces import (
+    continuing,
+    links,
+    long_enough,
+    lower_than_beside,
+    pieces_of,
+    shares_of_length,
+    stands_free,
+    with_partner,
+)
 from .ridges import Ridges, cells_beside, on_crests
 from .settings import BLUNT, DENSE, HEADS, MARGIN_M, THIN, Settings, Tolerances
-from .sides import stands_free
 from .tops import HIGH_M, MILLIMETRES, Band, Grid, Tops, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
 
 THIN_PER_M2 = 400.0

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..classify.bed import COARSE_M, Coarse
-from ..classify.figures import shares_of_length
 from ..classify.flush import flush_rails
+from ..classify.pieces import shares_of_length
 from ..classify.settings import Settings
 from ..classify.square import REACH_M, REACH_POINTS_PER_M, Classified, beside_guide, classify_square
 from ..classify.tops import HIGH_M, Grid
