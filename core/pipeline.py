@@ -46,6 +46,7 @@ from .steps import (
 from .tasks import READ_S, Context, InTurn, Runner, Task
 from .tracks.geometry import measure_track_geometry
 from .tracks.jumps import doubting_steps, steps_of
+from .tracks.scatter import doubting_scatter, gauge_scatter
 from .tracks.strip_courses import strip_courses
 from .tracks.widths_by_gauge import widths_by_gauge
 
@@ -254,7 +255,9 @@ def _walk(
     warn_of_steps(stepping, progress)
     rails = doubting_steps(rails, stepping)
     heads = head_widths(sources[0], parameters.gauges, progress, rails) if rails else None
-    geometry = _measure_tracks(centerlines, rails, sources, parameters, runner, measuring)
+    beyond_m = gauge_scatter(rails, centerlines) if heads and heads.blunt else {}
+    rails = doubting_scatter(rails, beyond_m)
+    geometry = _measure_tracks(centerlines, rails, beyond_m, sources, parameters, runner, measuring)
     if geometry:
         count = sum(len(track.chainage_m) for track in geometry)
         progress.info(f"Measured: {counted(count, 'station')}, one every {parameters.quality_step_m:g} m.")
@@ -372,18 +375,20 @@ def _describe_engine(parameters: Parameters, context: Context) -> str:
 def _measure_tracks(
     centerlines: Sequence[Centerline],
     rails: Sequence[RailLine],
+    beyond_m: Mapping[int, float],
     sources: Sequence[PointSource],
     parameters: Parameters,
     runner: Runner,
     progress: Progress,
 ) -> list[TrackGeometry]:
-    """Measure the geometry of all tracks, class by class, if it is asked for."""
+    """Measure the geometry of all tracks, class by class, if it is asked for; see `gauge_scatter` for `beyond_m`."""
     if parameters.quality_step_m is None:
         return []
     remeasuring, stations = progress.divide((REMEASURE, STATIONS))
     align = parameters.strips == ALIGNED
     heads_m = widths_by_gauge(rails, parameters.gauges, parameters.centerline_tolerance_m)
     measured = measure_rails(rails, sources, heads_m, runner, remeasuring, align)
+    measured = doubting_scatter(measured, beyond_m)
     geometry: list[TrackGeometry] = []
     for source, share in zip(sources, stations.split(len(sources))):
         geometry += measure_track_geometry(

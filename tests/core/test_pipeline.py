@@ -241,6 +241,22 @@ def test_a_ring_stays_closed(monkeypatch, tiles):
         assert largest_step(line.xyz) < 0.05
 
 
+def test_errors_of_blunt_rails_explain_what_their_gauge_scatters(monkeypatch):
+    """Ridges that wander against each other by 8 mm over 50 m, which a curve along a single rail follows."""
+    monkeypatch.setattr(steps, "clean", lambda raster, *_: raster)
+    rng = np.random.RandomState(5)
+    t, left = rng.uniform(0, 100, 40_000), rng.uniform(-0.056, 0.056, 40_000)
+    side = rng.choice([-1, 1], len(t))
+    across = side * (0.5 * (1.435 + WIDTH) + 0.004 * np.sin(2 * np.pi * t / 50)) + left
+    xyz = np.column_stack([t, across, rng.normal(0, 0.01, len(t)) - 5 * left**2])
+    points = RailPoints(xyz, LocalFrame(np.zeros(3)), 10)
+    found = extract_rails([points], Parameters(1.435, WIDTH, quality_step_m=1.0))
+    (track,) = found.centerlines
+    assert 3 < track.gaugesd_mm < 8 / np.sqrt(2)
+    assert np.hypot(*(rail.sigma_mm for rail in found.rails)) == pytest.approx(track.gaugesd_mm, rel=0.1)
+    assert np.median(found.geometry[0].sigma_mm) == pytest.approx(track.gaugesd_mm / 2, rel=0.15)
+
+
 def _by_length(lines):
     return sorted(lines, key=lambda line: line.length_m)
 
