@@ -170,6 +170,9 @@ def extract_files(
                 own = GrowSettings(parameters.gauge_m, parameters.head_width_m)
                 source, figures = spool_grown(request, seeds, own, side_m, scratch, reading)
             network = _walk([source], parameters, runner, rest)
+        if classify and network.heads is not None and network.heads.blunt:
+            # Only its partner tells a blunt rail from other ridges, and the user has been told so.
+            network = replace(network, rails=tuple(rail for rail in network.rails if rail.track_ids))
         return replace(network, warnings=recording.warnings, search=figures)
     is_warned = warn_of_gauge(request, parameters, progress)
     count = sum(header.point_count for header in request.headers)
