@@ -368,11 +368,12 @@ HEAD_OFF_M = 0.005
 class HeadWidths:
     """Width of the railheads as the points show it, NaN if they do not, and as it is stated, metres.
 
-    Blunt heads show no width: they are round ridges, which beams or images have blurred.
+    Heads that are `blunt` show no width: they are round ridges, which beams or images have blurred.
     """
 
     seen_m: float
     stated_m: float
+    blunt: bool = False
 
     @property
     def differ(self) -> bool:

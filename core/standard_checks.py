@@ -215,7 +215,7 @@ def head_widths(
             "as matched images and wide beams do. Lines follow the crests, and sigma_mm and sigmaz_mm state how far "
             "these wander: gauge and cant cannot be better, and the width of the heads is not measured."
         )
-        return HeadWidths(float("nan"), stated_m)
+        return HeadWidths(float("nan"), stated_m, blunt=True)
     if measured is None:
         return HeadWidths(float("nan"), stated_m)
     seen_m = measured[1]
