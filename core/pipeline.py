@@ -46,8 +46,9 @@ from .steps import (
 from .tasks import READ_S, Context, InTurn, Runner, Task
 from .tracks.geometry import measure_track_geometry
 from .tracks.jumps import doubting_steps, steps_of
+from .tracks.parallels import widths_by_gauge
+from .tracks.scatter import doubting_scatter, gauge_scatter
 from .tracks.strip_courses import strip_courses
-from .tracks.widths_by_gauge import widths_by_gauge
 
 READING, DRAWING, PAIRING, MEASURING = 0.2, 0.72, 0.04, 0.04
 """Run times of the steps relative to each other, for the progress: sorting files, squares, tracks, track geometry."""
@@ -169,6 +170,9 @@ def extract_files(
                 own = GrowSettings(parameters.gauge_m, parameters.head_width_m)
                 source, figures = spool_grown(request, seeds, own, side_m, scratch, reading)
             network = _walk([source], parameters, runner, rest)
+        if classify and network.heads is not None and network.heads.blunt:
+            # Only its partner tells a blunt rail from other ridges, and the user has been told so.
+            network = replace(network, rails=tuple(rail for rail in network.rails if rail.track_ids))
         return replace(network, warnings=recording.warnings, search=figures)
     is_warned = warn_of_gauge(request, parameters, progress)
     count = sum(header.point_count for header in request.headers)
@@ -254,7 +258,9 @@ def _walk(
     warn_of_steps(stepping, progress)
     rails = doubting_steps(rails, stepping)
     heads = head_widths(sources[0], parameters.gauges, progress, rails) if rails else None
-    geometry = _measure_tracks(centerlines, rails, sources, parameters, runner, measuring)
+    beyond_m = gauge_scatter(rails, centerlines) if heads and heads.blunt else {}
+    rails = doubting_scatter(rails, beyond_m)
+    geometry = _measure_tracks(centerlines, rails, beyond_m, sources, parameters, runner, measuring)
     if geometry:
         count = sum(len(track.chainage_m) for track in geometry)
         progress.info(f"Measured: {counted(count, 'station')}, one every {parameters.quality_step_m:g} m.")
@@ -372,18 +378,20 @@ def _describe_engine(parameters: Parameters, context: Context) -> str:
 def _measure_tracks(
     centerlines: Sequence[Centerline],
     rails: Sequence[RailLine],
+    beyond_m: Mapping[int, float],
     sources: Sequence[PointSource],
     parameters: Parameters,
     runner: Runner,
     progress: Progress,
 ) -> list[TrackGeometry]:
-    """Measure the geometry of all tracks, class by class, if it is asked for."""
+    """Measure the geometry of all tracks, class by class, if it is asked for; see `gauge_scatter` for `beyond_m`."""
     if parameters.quality_step_m is None:
         return []
     remeasuring, stations = progress.divide((REMEASURE, STATIONS))
     align = parameters.strips == ALIGNED
     heads_m = widths_by_gauge(rails, parameters.gauges, parameters.centerline_tolerance_m)
     measured = measure_rails(rails, sources, heads_m, runner, remeasuring, align)
+    measured = doubting_scatter(measured, beyond_m)
     geometry: list[TrackGeometry] = []
     for source, share in zip(sources, stations.split(len(sources))):
         geometry += measure_track_geometry(

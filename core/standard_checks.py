@@ -23,7 +23,7 @@ from .rails import HEAD_OFF_M, HeadWidths, RailLine
 from .squares.density import fullest_square
 from .squares.grid import PointSource
 from .standards import HEAD_WIDTH_RANGE_MM, SAME_GAUGE_M, STANDARDS, Gauge, RailStandard, closest_standard
-from .tracks.widths_by_gauge import width_at
+from .tracks.parallels import width_at
 
 SAMPLE_M = 50.0
 """Half the side of the area whose points show the width of the heads."""
@@ -215,7 +215,7 @@ def head_widths(
             "as matched images and wide beams do. Lines follow the crests, and sigma_mm and sigmaz_mm state how far "
             "these wander: gauge and cant cannot be better, and the width of the heads is not measured."
         )
-        return HeadWidths(float("nan"), stated_m)
+        return HeadWidths(float("nan"), stated_m, blunt=True)
     if measured is None:
         return HeadWidths(float("nan"), stated_m)
     seen_m = measured[1]

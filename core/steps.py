@@ -41,7 +41,7 @@ from .standards import distinct_gauges
 from .tracks.centerlines import CenterlineParameters, build_centerlines
 from .tracks.jumps import Steps
 from .tracks.lone import assign_tracks
-from .tracks.widths_by_gauge import widths_by_gauge
+from .tracks.parallels import widths_by_gauge
 from .vectorize import vectorize
 
 MIN_STRIPS_APART_M = 5.0

@@ -61,7 +61,7 @@ class Doubt:
 
 UNSUPPORTED = Doubt("unsupported", "a rail has no points")
 OFF_GAUGE = Doubt("offgauge", f"gauge off by more than {GAUGE_OFF_MM:g} mm")
-UNSURE = Doubt("unsure", f"standard error above {UNSURE_MM:g} mm")
+UNSURE = Doubt("unsure", f"standard error above {UNSURE_MM:g} mm across or in height")
 DOUBTS = (UNSUPPORTED, OFF_GAUGE, UNSURE)
 """In order of severity; a place counts under the first that applies."""
 

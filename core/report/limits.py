@@ -82,7 +82,7 @@ QUANTITIES = (
     Quantity("gauge", "Gauge, off nominal", GAUGE_OFF_MM),
     Quantity("cant", "Cant"),
     Quantity("twist", f"Twist over {TWIST_BASE_M:g} m"),
-    Quantity("sigma", "Standard error", UNSURE_MM),
+    Quantity("sigma", "Standard error, across or in height", UNSURE_MM),
 )
 
 

@@ -16,8 +16,7 @@ from ..lines.parting import ARC, PartingLaw
 from ..polyline import length_along
 from .crossings import MISFIT_M as KNOWN_MISFIT_M
 from .crossings import SKIP_M
-from .junctions import DEFLECTION_DEG, DIRECTION_M, deflections, ends_by_node
-from .steadiness import unsteadiness
+from .junctions import DEFLECTION_DEG, DIRECTION_M, deflections, ends_by_node, unsteadiness
 
 MAX_BACK_M = 40.0
 """Largest length by which a branch is extended back: on a radius of 2500 m, as at 1:26.5, two rails are 0.2 m apart
@@ -34,6 +33,13 @@ SHARPER = 2.0
 UNSURE_CURVATURE = 16 * STAIRS_M / STEADY_M**2
 """A branch begins on the arc on which it continues: the fitted curvature may be `SHARPER` times the visible one, plus
 what stairs at both ends of the visible part may hide. At a frog, where rails cross, it is larger."""
+
+ROUTE_M = 40.0
+"""Length on either side over which curvatures are compared. At 1:26.5, the flattest turnout in use, the branch is then
+off a constant curvature by 18 mm, several times the uncertainty from stairs; over 30 m, by 10 mm."""
+
+MIN_LENGTH_M = 8.0
+"""Shorter parts between nodes have no measurable curvature."""
 
 
 def resolve_branches(network: LineNetwork) -> LineNetwork:
@@ -148,3 +154,18 @@ def _drawn(trunk: np.ndarray, rail: np.ndarray) -> np.ndarray | None:
 def max_curvature(seen: float) -> float:
     """Return the largest relative curvature, 1/m, with which rails part whose visible relative curvature is `seen`."""
     return SHARPER * abs(seen) + UNSURE_CURVATURE
+
+
+def choose_routes(network: LineNetwork) -> LineNetwork:
+    """Let the rail whose curvature changes least pass through each node in which one rail leaves another."""
+    pieces, partner = network.parted()
+    lengths = pieces.lengths()
+    for _, stem, legs in branchings(pieces):
+        if min(lengths[end // 2] for end in (stem, *legs)) < MIN_LENGTH_M:
+            continue
+        scores = [unsteadiness(pieces.from_end(stem), pieces.from_end(leg), ROUTE_M) for leg in legs]
+        steady = legs[scores.index(min(scores))]
+        for end in (stem, *legs):
+            partner.pop(end, None)
+        partner[stem], partner[steady] = steady, stem
+    return pieces.weld(partner)
