@@ -121,10 +121,10 @@ def _alignment(track_id: Optional[int], table: list[Row], frame: LocalFrame) -> 
 def _check_order(table: Sequence[Row]) -> None:
     """Check that elements which follow each other along the track are numbered in this order."""
     for before, after in zip(table, table[1:]):
-        numbers = before.get("no"), after.get("no")
-        if all(map(_is_number, numbers)) and numbers[0] > numbers[1]:
+        first, second = (float(row["no"]) if _is_number(row.get("no")) else math.nan for row in (before, after))
+        if first > second:
             raise ParameterError(
-                f"{_where(before)} starts at s_from = {float(before['s_from']):g} m, before element {numbers[1]:g} at "
+                f"{_where(before)} starts at s_from = {float(before['s_from']):g} m, before element {second:g} at "
                 f"{float(after['s_from']):g} m: correct s_from, or number the elements in order along the track."
             )
 
