@@ -15,6 +15,10 @@ from .noise import strays
 LEAST_TRACK_M, LEAST_POINTS = 50.0, 20
 """Least length of a track, metres, and least number of its points: the shortest curve that has a radius."""
 
+BESIDE_M = 1.0
+"""A point is on a part of the line that ends nearer than this before it, metres: the noise of the line makes it a few
+centimetres longer than its design on a kilometre."""
+
 TURNS_BACK_RAD = np.pi / 3.0
 """Largest bend of a line at a vertex: a track that turns back has a stray vertex, or runs through a switch twice."""
 
@@ -98,6 +102,11 @@ class Measured:
     def _part(self, first: int, last: int) -> Measured:
         part = slice(first, last + 1)
         return Measured(self.xyz[part], self.along[part], self.share[part], self.is_stray[part])
+
+    def between(self, first_m: float, last_m: float) -> Measured:
+        """Return the points between two distances along the line, with those next to them."""
+        inside = np.flatnonzero((self.along > first_m - BESIDE_M) & (self.along < last_m + BESIDE_M))
+        return self._part(int(inside[0]), int(inside[-1])) if len(inside) else self
 
     def between_strays(self) -> list[Measured]:
         """Return the parts between the points that lie off in plan and are long enough for a fit, the longest first."""
