@@ -64,10 +64,6 @@ def extract_rails(
     parameters : Parameters
     progress : Progress
 
-    Returns
-    -------
-    RailNetwork
-
     Raises
     ------
     NoRailPointsError
@@ -128,10 +124,6 @@ def extract_files(
     seeds : sequence of (k, 2) array
         Places on railheads, k = 1, or lines along them, in units of the CRS, if only the rails that grow from these
         are to be extracted; the request is for the same classes.
-
-    Returns
-    -------
-    RailNetwork
 
     Raises
     ------

@@ -86,14 +86,6 @@ def clean_square(
     """Rasterize the points of a square, clean the raster with the network, and keep the tiles inside the square.
 
     The network also sees cells that are drawn along thin rails (docs/method.md section 2.4).
-
-    Parameters
-    ----------
-    source : PointSource
-    square : Square
-    parameters : Parameters
-    engine : Engine
-    progress : Progress
     """
     cell_m = cell_size(parameters.gauge_m, parameters.head_width_m)
     margin_m = max_passes(parameters.passes) * MARGIN * cell_m
@@ -288,12 +280,6 @@ def tracks_of(rails: Sequence[RailLine], parameters: Parameters, progress: Progr
     """Pair the rails of each class at every gauge, and draw, simplify and number the centerlines.
 
     Takes the rails as the user gets them, so that rails from a file give the same tracks.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    parameters : Parameters
-    progress : Progress
 
     Raises
     ------
