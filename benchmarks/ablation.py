@@ -16,7 +16,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, is_dataclass
 from functools import wraps
 from types import GeneratorType
 from typing import Any
@@ -25,7 +25,6 @@ from unittest.mock import patch
 import numpy as np
 from golden import TABLE
 from rail_extract.core import pipeline
-from rail_extract.core.classify import settings
 from rail_extract.core.classify.flush import NO_LINES, Flush
 from rail_extract.core.polyline import length_along
 from rail_extract.laboratory.ruler.golden import (
@@ -130,18 +129,12 @@ SWITCHES = (
     _rule("classify.square.centred", first),
     _rule("classify.square._completed", lambda found, kept, *_: np.sort(kept.cell)),
     _rule("classify.square._certain", lambda lines, paired, pairs: all_of(paired)),
-    _rule(
-        "classify.pieces.continuing",
-        lambda lines, chosen: chosen,
-        ("classify.square", "continuing", lambda lines, chosen: chosen),
-    ),
     _rule("classify.labels._highest_around", lambda image, cells, reach: np.full(len(cells), -(10**6))),
     _rule("classify.labels.UNDER_MEAN_M", 10.0),
     _rule("classify.square.flush_rails", lambda *_: Flush(np.empty(0, dtype=np.int64), NO_LINES, NO_LINES)),
     _rule("classify.square.SINGLE_SLOPE", np.inf),
     _rule("classify.square.SINGLE_HEIGHT_M", 0.0),
     _rule("classify.square.LEAST_SINGLE_WIDTH", 0.0),
-    _rule("classify.square.DENSE", replace(settings.DENSE, width_rounds=1)),
     _rule("classify.square.LEAST_BLUNT_HEIGHT_M", 0.0),
     _rule("classify.partner._majority", first),
     _rule("classify.labels.MIN_AXES", 1),

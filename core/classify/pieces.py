@@ -115,22 +115,13 @@ def long_enough(
     piece = pieces_of(len(pair), links(lines.of(pair), max(HIDDEN_M, lines.reach_m)))
     long = np.zeros(len(paired), dtype=bool)
     long[pair] = _reaches(lines.axis[pair], piece, least_m, open_ended[pair])
-    return kept | continuing(lines, long)
+    return kept | long
 
 
 def with_partner(pairs: np.ndarray, paired: np.ndarray) -> np.ndarray:
     """Return which cells belong to pieces that have a partner, (n,) bool; see `long_enough`."""
     piece = pieces_of(len(paired), pairs)
     return (np.bincount(piece, paired) > LEAST_PAIRED * np.bincount(piece))[piece]
-
-
-def continuing(lines: Lines, chosen: np.ndarray) -> np.ndarray:
-    """Return which cells are chosen, or continue such a cell with gaps of at most `HIDDEN_M`, (n,) bool.
-
-    Under a parked train, the other rail may be hidden.
-    """
-    piece = pieces_of(len(chosen), links(lines, max(HIDDEN_M, lines.reach_m)))
-    return (np.bincount(piece, chosen) > 0)[piece]
 
 
 def _reaches(xy: np.ndarray, piece: np.ndarray, least_m: float, open_ended: np.ndarray) -> np.ndarray:
