@@ -31,6 +31,9 @@ CLOSED_M = 0.01
 MIN_RING_M = 10.0
 """Shortest closed rail: no track turns round in less."""
 
+SAME_PLACE_M = 1e-9
+"""Vertices closer than this along a line are the same."""
+
 NORTH_TANGENT = np.tan(np.radians(1.0))
 """Lines within one degree of north start at their southern end, all others at their western end."""
 
@@ -104,6 +107,17 @@ def interpolate(values: np.ndarray, along: np.ndarray, t: np.ndarray) -> np.ndar
     (m, d) array
     """
     return np.column_stack([np.interp(t, along, column) for column in values.T])
+
+
+def part(vertices: np.ndarray, start: float, end: float) -> np.ndarray:
+    """Return the part of a polyline, (n, d), between two plan chainages, with vertices at both, (m, d).
+
+    >>> part(np.array([[0.0, 0.0], [4.0, 0.0], [9.0, 0.0]]), 3.0, 5.0)[:, 0].tolist()
+    [3.0, 4.0, 5.0]
+    """
+    along = length_along(vertices[:, :2])
+    inner = along[(along > start + SAME_PLACE_M) & (along < end - SAME_PLACE_M)]
+    return interpolate(vertices, along, np.concatenate([[start], inner, [end]]))
 
 
 def unit_tangents(vertices: np.ndarray) -> np.ndarray:

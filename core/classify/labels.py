@@ -32,10 +32,6 @@ show its direction: the axis before the wheel continues to it, and over some of 
 WIDEST_M = 0.075
 """Distance from the axis within which points count towards the width of a top: short of a guard rail."""
 
-WIDTH_SPREADS = 1.9
-"""Standard deviations beyond which points no longer count towards the width of a top: a bar's points lie within 1.73 of
-them. A guard rail that leads some axes astray adds a quarter of the density on either side."""
-
 
 def whole_heads(tops: Tops, kept: np.ndarray, tolerances: Tolerances) -> np.ndarray:
     """Spread kept cells over the other cells of their blocks of 2 x 2, and drop feet and fastenings.
@@ -151,26 +147,18 @@ class Near:
         on = (np.abs(self.across) <= half_m) & fits
         return np.bincount(self.place[on], minlength=self.count) >= MIN_AXES
 
-    def widths(self, piece: np.ndarray, rounds: int) -> np.ndarray:
+    def widths(self, piece: np.ndarray) -> np.ndarray:
         """Width of the top of each piece: that of a bar whose points scatter across as much, (pieces,) metres.
 
-        Parameters
-        ----------
-        piece : (cells,) int array
-            Piece of each cell.
-        rounds : int
-            See `Tolerances.width_rounds`.
+        `piece` has the piece of each cell, (cells,).
         """
-        # Whole numbers add up to the same sum in any order of the points.
-        across = np.round(self.across * TENTHS_OF_MM)
-        number, count = piece[self.cell], int(piece.max()) + 1
         inside = np.abs(self.across) < WIDEST_M
-        for _ in range(rounds):
-            left, own = across[inside], number[inside]
-            points = np.maximum(np.bincount(own, minlength=count), 1)
-            mean = np.bincount(own, left, count) / points
-            spread = np.sqrt(np.maximum(np.bincount(own, left**2, count) / points - mean**2, 0))
-            inside = inside & (np.abs(across - mean[number]) <= WIDTH_SPREADS * spread[number])
+        # Whole numbers add up to the same sum in any order of the points.
+        across, number = np.round(self.across[inside] * TENTHS_OF_MM), piece[self.cell[inside]]
+        count = int(piece.max()) + 1
+        points = np.maximum(np.bincount(number, minlength=count), 1)
+        mean = np.bincount(number, across, count) / points
+        spread = np.sqrt(np.maximum(np.bincount(number, across**2, count) / points - mean**2, 0))
         return np.sqrt(12) * spread / TENTHS_OF_MM
 
 

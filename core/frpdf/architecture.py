@@ -87,6 +87,6 @@ BASE = Architecture(channels=24, kernel_radius=3, dilations=(1, 3, 7, 15, 31, 63
 """The network of Gribov and Chang, section 5: receptive radius 753 cells, 292,680 products per cell."""
 
 FAST = Architecture(channels=64, kernel_radius=1, dilations=(1, 2, 4, 8, 16, 32, 8, 4, 2), block=4)
-"""The fast model: receptive radius 324 cells, 33,472 products per cell (docs/method.md section 3.11)."""
+"""The fast model: receptive radius 324 cells, 33,472 products per cell (docs/method.md section 3.6)."""
 
 ARCHITECTURES = (BASE, FAST)
