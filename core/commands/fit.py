@@ -11,6 +11,7 @@ import numpy as np
 from .. import VERSION
 from ..alignment.fit import fit_tracks
 from ..errors import ParameterError
+from ..layers import deviations_layer, elements_layer
 from ..parameters import TRANSITIONS, FitParameters
 from ..progress import Estimating
 from ..report import build_alignment_page
@@ -52,7 +53,7 @@ def run(args: argparse.Namespace) -> None:
     for name in ("tolerance", "min_length"):
         if not 0 < getattr(args, name) < np.inf:
             raise ParameterError(f"--{name.replace('_', '-')} must be a positive number.")
-    features, layers = (shapes_module("LINES", name) for name in ("features", "alignment_layers"))
+    features, geopackage = (shapes_module("LINES", name) for name in ("features", "geopackage"))
     outputs = {
         name: destination_of(name, getattr(args, name), suffixes)
         for name, suffixes in SUFFIXES.items()
@@ -62,10 +63,10 @@ def run(args: argparse.Namespace) -> None:
     tracks, frame = features.read_tracks(args.lines, args.quality, args.rails)
     fixed = {} if args.fixed is None else {one.track_id: one for one in features.read_elements(args.fixed, "--fixed")}
     fits = fit_tracks(tracks, frame, settings, fixed, Estimating(Console()))
-    made = [layers.elements_layer([fit.alignment for fit in fits])]
+    made = [elements_layer([fit.alignment for fit in fits])]
     if "deviations" in outputs:
-        made.append(layers.deviations_layer([fit.deviations for fit in fits]))
-    layers.write_all(made, outputs, frame)
+        made.append(deviations_layer([fit.deviations for fit in fits]))
+    geopackage.write_all(made, outputs, frame)
     if "report" in outputs:
         courses = [(fit.alignment, fit.deviations) for fit in fits]
         facts = {**stated(frame.crs_wkt), "Command": args.command_line}

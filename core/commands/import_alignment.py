@@ -11,6 +11,7 @@ from ..alignment.landxml_reading import read_landxml, stated_system
 from ..clouds.crs import parse_crs, units
 from ..design_files import check_place
 from ..errors import CrsError, ParameterError
+from ..layers import axes_layer, deviations_layer, elements_layer
 from ..progress import Estimating
 from ..report import build_alignment_page
 from .fit import stated
@@ -51,7 +52,7 @@ def run(args: argparse.Namespace) -> None:
         raise ParameterError("Give --elements, --axis, --deviations or --report for what is wanted of the file.")
     if args.tracks is None and {"deviations", "report"} & set(outputs):
         raise ParameterError("--deviations and --report compare measured tracks with the alignments: give --tracks.")
-    features, layers = (shapes_module("import-alignment", name) for name in ("features", "alignment_layers"))
+    features, geopackage = (shapes_module("import-alignment", name) for name in ("features", "geopackage"))
     progress = Estimating(Console())
     found = args.tracks and features.read_survey(args.tracks, "--tracks", None)
     system = stated_system(args.file) or args.crs or (found[1].crs_wkt if found else None)
@@ -70,11 +71,11 @@ def run(args: argparse.Namespace) -> None:
         lines, _ = features.read_survey(args.tracks, "--tracks", frame)
         courses = compared_with(alignments, [(line.number, line.xyz) for line in lines], progress)
     makers = {
-        "elements": lambda: layers.elements_layer(alignments),
-        "axis": lambda: layers.axes_layer(alignments),
-        "deviations": lambda: layers.deviations_layer([one for _, one in courses]),
+        "elements": lambda: elements_layer(alignments),
+        "axis": lambda: axes_layer(alignments),
+        "deviations": lambda: deviations_layer([one for _, one in courses]),
     }
-    layers.write_all([make() for name, make in makers.items() if name in outputs], outputs, frame)
+    geopackage.write_all([make() for name, make in makers.items() if name in outputs], outputs, frame)
     if "report" in outputs:
         facts = {**stated(wkt), "LandXML file": args.file.name, "Command": args.command_line}
         outputs["report"].write_text(build_alignment_page(courses, args.tracks, facts, False))
