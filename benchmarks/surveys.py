@@ -10,9 +10,9 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
+from rail_extract.core.comparison.agreement import HEADER, agreement
 from rail_extract.core.labelling.cloud import classify_cloud
 from rail_extract.core.rails import RailNetwork
-from rail_extract.laboratory.ruler.agreement import HEADER, agreement
 from rail_extract.laboratory.ruler.classification import draw, settings_of
 from rail_extract.laboratory.ruler.lines import match
 from rail_extract.laboratory.scenes.raw import RawScene

@@ -12,6 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from .checks.lines import warn_of_rails, warn_of_split_classes, with_tracks
+from .checks.standard import head_widths, warn_of_gauge
+from .checks.strips import doubting_jumps, strip_courses, warn_of_strips
 from .classify.settings import Settings
 from .clouds.las import CloudHeader
 from .clouds.points import RailPoints, Request
@@ -29,26 +32,11 @@ from .squares.grid import Key, MemorySource, PointSource, Square, around, assemb
 from .squares.pieces import SquareRails, rows_in_frame
 from .squares.remeasuring import measure_rails
 from .squares.spool import SpooledFile, SpooledPoints, gather, spool_file
-from .standard_checks import head_widths, warn_of_gauge
-from .steps import (
-    clean_square,
-    engine_for,
-    rails_of_square,
-    square_side,
-    tracks_of,
-    warn_of_rails,
-    warn_of_split_classes,
-    warn_of_steps,
-    warn_of_strips,
-    whole_rails,
-    with_tracks,
-)
+from .steps import clean_square, engine_for, rails_of_square, square_side, tracks_of, whole_rails
 from .tasks import READ_S, Context, InTurn, Runner, Task
 from .tracks.geometry import measure_track_geometry
-from .tracks.jumps import doubting_steps, steps_of
 from .tracks.parallels import widths_by_gauge
 from .tracks.scatter import doubting_scatter, gauge_scatter
-from .tracks.strip_courses import strip_courses
 
 READING, DRAWING, PAIRING, MEASURING = 0.2, 0.72, 0.04, 0.04
 """Run times of the steps relative to each other, for the progress: sorting files, squares, tracks, track geometry."""
@@ -254,9 +242,7 @@ def _walk(
     rails = with_tracks(rails, centerlines, progress)
     warn_of_split_classes(rails, parameters, progress)
     warn_of_strips(rails, parameters, progress)
-    stepping = steps_of(centerlines, rails)
-    warn_of_steps(stepping, progress)
-    rails = doubting_steps(rails, stepping)
+    rails = doubting_jumps(rails, centerlines, progress)
     heads = head_widths(sources[0], parameters.gauges, progress, rails) if rails else None
     beyond_m = gauge_scatter(rails, centerlines) if heads and heads.blunt else {}
     rails = doubting_scatter(rails, beyond_m)

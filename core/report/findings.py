@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks.strips import find_jumps
 from ..polyline import interpolate, length_along, project
 from ..rails import STRIP_OFF_M, Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry, cell_borders
-from ..tracks.jumps import find_steps
 
 GAUGE_OFF_MM = 10.0
 """Plain track is not left in service with a larger deviation from its gauge. Curves of less than 200 m radius are
@@ -221,7 +221,7 @@ def examine(network: RailNetwork, gauges_m: Sequence[float]) -> Findings:
     """
     geometry = {track.track_id: track for track in network.geometry}
     tracks = tuple(
-        _examine_track(line, geometry[line.track_id], gauges_m, find_steps(line, network.rails))
+        _examine_track(line, geometry[line.track_id], gauges_m, find_jumps(line, network.rails))
         for line in network.centerlines
     )
     heads = network.heads

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rail_extract.core import pipeline, steps
+from rail_extract.core.checks.lines import warn_of_split_classes
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.errors import Cancelled, NoTrackError, ParameterError
 from rail_extract.core.frame import LocalFrame
@@ -15,7 +16,7 @@ from rail_extract.core.rails import RailLine, SearchFigures
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.squares.grid import MemorySource
 from rail_extract.core.standards import STANDARDS, RailStandard
-from rail_extract.core.steps import lines_of, overlap_tiles, tracks_of, warn_of_split_classes
+from rail_extract.core.steps import lines_of, overlap_tiles, tracks_of
 from rail_extract.core.tasks import InTurn
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.plain import straight

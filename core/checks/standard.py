@@ -9,21 +9,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .classify.settings import Settings
-from .classify.square import classify_square
-from .clouds.points import Request
-from .errors import CloudError, ParameterError
-from .heads.blunt import blunt_share
-from .heads.gauge_estimate import Spacings, measure_spacings
-from .heads.roads import MIN_WIDER_M
-from .heads.sections import likelier_width
-from .parameters import Parameters
-from .progress import SILENT, Progress
-from .rails import HEAD_OFF_M, HeadWidths, RailLine
-from .squares.density import fullest_square
-from .squares.grid import PointSource
-from .standards import HEAD_WIDTH_RANGE_MM, SAME_GAUGE_M, STANDARDS, Gauge, RailStandard, closest_standard
-from .tracks.parallels import width_at
+from ..classify.settings import Settings
+from ..classify.square import classify_square
+from ..clouds.points import Request
+from ..errors import CloudError, ParameterError
+from ..heads.blunt import blunt_share
+from ..heads.gauge_estimate import Spacings, measure_spacings
+from ..heads.roads import MIN_WIDER_M
+from ..heads.sections import likelier_width
+from ..parameters import Parameters
+from ..progress import SILENT, Progress
+from ..rails import HEAD_OFF_M, HeadWidths, RailLine
+from ..squares.density import fullest_square
+from ..squares.grid import PointSource
+from ..standards import HEAD_WIDTH_RANGE_MM, SAME_GAUGE_M, STANDARDS, Gauge, RailStandard, closest_standard
+from ..tracks.parallels import width_at
 
 SAMPLE_M = 50.0
 """Half the side of the area whose points show the width of the heads."""
