@@ -16,7 +16,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, is_dataclass
 from functools import wraps
 from types import GeneratorType
 from typing import Any
@@ -25,7 +25,6 @@ from unittest.mock import patch
 import numpy as np
 from golden import TABLE
 from rail_extract.core import pipeline
-from rail_extract.core.classify import settings
 from rail_extract.core.classify.flush import NO_LINES, Flush
 from rail_extract.core.polyline import length_along
 from rail_extract.laboratory.ruler.golden import (
@@ -118,11 +117,9 @@ SWITCHES = (
     _rule("tracks.centerlines.at_gauge", lambda left, right, *_: (left, right)),
     _rule("tracks.centerlines._smoothed", first),
     _rule("tracks.centerlines.is_closed", never),
-    _rule("tracks.centerlines._spans", lambda rails, spans: list(zip(rails, spans))),
     _rule("tracks.pairing.FINE_STEP_M", 0.5),
     _rule("tracks.pairing._is_nearest", lambda *_: True),
     _rule("tracks.pairing.WANDER_WEIGHT", 0.0),
-    _rule("tracks.pairing.MAX_LOST_SHARE", 1.0),
     _rule("tracks.parallels._is_crowded", none_of),
     _rule("checks.lines._off_level_m", lambda *_: 0.0),
     _rule("checks.strips.find_jumps", nothing),
@@ -132,14 +129,12 @@ SWITCHES = (
     _rule("classify.square.centred", first),
     _rule("classify.square._completed", lambda found, kept, *_: np.sort(kept.cell)),
     _rule("classify.square._certain", lambda lines, paired, pairs: all_of(paired)),
-    _rule("classify.pieces.continuing", lambda lines, chosen: chosen),
     _rule("classify.labels._highest_around", lambda image, cells, reach: np.full(len(cells), -(10**6))),
     _rule("classify.labels.UNDER_MEAN_M", 10.0),
     _rule("classify.square.flush_rails", lambda *_: Flush(np.empty(0, dtype=np.int64), NO_LINES, NO_LINES)),
     _rule("classify.square.SINGLE_SLOPE", np.inf),
     _rule("classify.square.SINGLE_HEIGHT_M", 0.0),
     _rule("classify.square.LEAST_SINGLE_WIDTH", 0.0),
-    _rule("classify.square.DENSE", replace(settings.DENSE, width_rounds=1)),
     _rule("classify.square.LEAST_BLUNT_HEIGHT_M", 0.0),
     _rule("classify.partner._majority", first),
     _rule("classify.labels.MIN_AXES", 1),

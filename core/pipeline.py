@@ -64,10 +64,6 @@ def extract_rails(
     parameters : Parameters
     progress : Progress
 
-    Returns
-    -------
-    RailNetwork
-
     Raises
     ------
     NoRailPointsError
@@ -129,16 +125,12 @@ def extract_files(
         Places on railheads, k = 1, or lines along them, in units of the CRS, if only the rails that grow from these
         are to be extracted; the request is for the same classes.
 
-    Returns
-    -------
-    RailNetwork
-
     Raises
     ------
     CloudError
         A file is damaged; if the runner tolerates that, all of them are.
     NoRailPointsError
-        No point of the requested classes lies in the files and the extent.
+        No point of the requested classes is in the files and the extent.
     DiskError
         The disk is full.
     ModelError, Cancelled

@@ -86,14 +86,6 @@ def clean_square(
     """Rasterize the points of a square, clean the raster with the network, and keep the tiles inside the square.
 
     The network also sees cells that are drawn along thin rails (docs/method.md section 2.4).
-
-    Parameters
-    ----------
-    source : PointSource
-    square : Square
-    parameters : Parameters
-    engine : Engine
-    progress : Progress
     """
     cell_m = cell_size(parameters.gauge_m, parameters.head_width_m)
     margin_m = max_passes(parameters.passes) * MARGIN * cell_m
@@ -144,7 +136,7 @@ def whole_rails(
     first_id: int = 1,
     progress: Progress = SILENT,
 ) -> list[RailLine]:
-    """Join the rails of all squares, drop the short ones, cut turns that no rail has, simplify and number them.
+    """Join the rails of all squares, drop the short ones, cut turns too sharp for a rail, simplify and number them.
 
     Parameters
     ----------
@@ -256,7 +248,7 @@ def measure_lines(
 
 
 def _finished(rails: Sequence[RailLine], parameters: Parameters, first_id: int, progress: Progress) -> list[RailLine]:
-    """Cut turns that no rail has, simplify rails and number them from `first_id`."""
+    """Cut turns too sharp for a rail, simplify rails and number them from `first_id`."""
     thinned = thin(_without_turns(rails, parameters, progress), parameters.simplify_xy_m, parameters.simplify_z_m)
     return [replace(rail, rail_id=number) for number, rail in enumerate(thinned, start=first_id)]
 
@@ -265,7 +257,7 @@ Line = TypeVar("Line", RailLine, Centerline)
 
 
 def _without_turns(lines: Sequence[Line], parameters: Parameters, progress: Progress) -> list[Line]:
-    """Split lines where they turn as no rail can, and warn the user."""
+    """Split lines where they turn too sharply for rails, and warn the user."""
     kept: list[Line] = []
     turned: list[Line] = []
     for line in lines:
@@ -288,12 +280,6 @@ def tracks_of(rails: Sequence[RailLine], parameters: Parameters, progress: Progr
     """Pair the rails of each class at every gauge, and draw, simplify and number the centerlines.
 
     Takes the rails as the user gets them, so that rails from a file give the same tracks.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    parameters : Parameters
-    progress : Progress
 
     Raises
     ------

@@ -136,12 +136,6 @@ def _detected(spacings: Spacings, progress: Progress) -> RailStandard:
 def warn_of_gauge(request: Request, parameters: Parameters, progress: Progress) -> bool:
     """Warn the user at once if the first points show another gauge: the run takes minutes until no track is found.
 
-    Parameters
-    ----------
-    request : Request
-    parameters : Parameters
-    progress : Progress
-
     Returns
     -------
     bool

@@ -199,7 +199,7 @@ def _weights() -> tuple[np.ndarray, np.ndarray]:
 
 
 def strip_courses(centerlines: Sequence[Centerline], rows: np.ndarray) -> tuple[StripCourse, ...]:
-    """Describe how strips lie along tracks.
+    """Describe the offsets of strips along tracks.
 
     Parameters
     ----------
@@ -234,14 +234,7 @@ def _courses(centerline: Centerline, t: np.ndarray, rows: np.ndarray) -> Iterato
 
 
 def warn_of_strips(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> None:
-    """Warn the user if strips, the passes of a scanner, differ.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    parameters : Parameters
-    progress : Progress
-    """
+    """Warn the user if strips, the passes of a scanner, differ."""
     shown = np.concatenate(
         [rail.support.every_strip[:, :2] for rail in rails if rail.support is not None] or [np.empty((0, 2))]
     )

@@ -46,7 +46,7 @@ a cable trough, or of the shoulder of the ballast takes all."""
 
 
 def links(lines: Lines, within_m: float | None = None) -> np.ndarray:
-    """Pairs of cells that lie on each other's axis, at most `within_m` apart or within reach, (m, 2) int."""
+    """Pairs of cells that are on each other's axis, at most `within_m` apart or within reach, (m, 2) int."""
     if len(lines.axis) < 2:
         return np.empty((0, 2), dtype=np.int64)
     pairs = cKDTree(lines.axis).query_pairs(within_m or lines.reach_m, output_type="ndarray")
@@ -115,22 +115,13 @@ def long_enough(
     piece = pieces_of(len(pair), links(lines.of(pair), max(HIDDEN_M, lines.reach_m)))
     long = np.zeros(len(paired), dtype=bool)
     long[pair] = _reaches(lines.axis[pair], piece, least_m, open_ended[pair])
-    return kept | continuing(lines, long)
+    return kept | long
 
 
 def with_partner(pairs: np.ndarray, paired: np.ndarray) -> np.ndarray:
     """Return which cells belong to pieces that have a partner, (n,) bool; see `long_enough`."""
     piece = pieces_of(len(paired), pairs)
     return (np.bincount(piece, paired) > LEAST_PAIRED * np.bincount(piece))[piece]
-
-
-def continuing(lines: Lines, chosen: np.ndarray) -> np.ndarray:
-    """Return which cells are chosen, or continue such a cell with gaps of at most `HIDDEN_M`, (n,) bool.
-
-    Under a parked train, the other rail may be hidden.
-    """
-    piece = pieces_of(len(chosen), links(lines, max(HIDDEN_M, lines.reach_m)))
-    return (np.bincount(piece, chosen) > 0)[piece]
 
 
 def _reaches(xy: np.ndarray, piece: np.ndarray, least_m: float, open_ended: np.ndarray) -> np.ndarray:

@@ -14,7 +14,6 @@ from .labels import Near, label, whole_heads
 from .lines import Lines, Marks, centred, find_lines
 from .partner import runs_inside, stations_with_partner
 from .pieces import (
-    continuing,
     links,
     long_enough,
     lower_than_beside,
@@ -412,9 +411,9 @@ def _narrow(
     if not len(kept.cell):
         return np.zeros(0, dtype=bool), 0.0
     piece = pieces_of(len(kept.cell), kept.pairs)
-    width_m = beside.widths(piece, tolerances.width_rounds)
+    width_m = beside.widths(piece)
     narrow = width_m < settings.head_width_m + tolerances.wider_m
-    alone = _stands_alone(kept, piece, beside, shown.bed, settings, tolerances)
+    alone = _stands_alone(kept, piece, width_m, shown.bed, settings, tolerances)
     partnered = with_partner(kept.pairs, kept.paired)
     sharp = width_m < settings.head_width_m + tolerances.sharp_m
     wide = partnered.any() and sharp[piece[partnered]].mean() < tolerances.sharp_share
@@ -423,18 +422,17 @@ def _narrow(
         ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
         alone &= not ridges.are_blunt(settings.head_width_m)
         blur_m = ridges.blur_m if wide and ridges.are_blunt(settings.head_width_m) else 0.0
-    return np.where(continuing(kept.lines, partnered), narrow[piece], alone[piece]), blur_m
+    return np.where(partnered, narrow[piece], alone[piece]), blur_m
 
 
 def _stands_alone(
-    kept: Kept, piece: np.ndarray, beside: Near, bed: Bed, settings: Settings, tolerances: Tolerances
+    kept: Kept, piece: np.ndarray, width_m: np.ndarray, bed: Bed, settings: Settings, tolerances: Tolerances
 ) -> np.ndarray:
-    """Return which pieces may be rails without a partner, (pieces,) bool.
+    """Return which pieces, of (pieces,) widths, may be rails without a partner, (pieces,) bool.
 
     They are as narrow as a head, stand as high as a rail does that is not buried in ballast, and their bed is not
     steeper than a track's.
     """
-    width_m = beside.widths(piece, 1)
     narrow = width_m < settings.head_width_m + tolerances.wider_single_m
     narrow &= width_m > LEAST_SINGLE_WIDTH * settings.head_width_m
     high = _mean(kept.lines.height, piece) >= SINGLE_HEIGHT_M

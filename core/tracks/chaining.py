@@ -118,10 +118,6 @@ def chain_pairs(
         Maximum length without any rail.
     tolerance_m : float
         Tolerance of the gauge.
-
-    Returns
-    -------
-    tuple of Chain
     """
     if not pairs:
         return ()
@@ -297,12 +293,6 @@ def rails_ahead(rails: Sequence[RailLine], pair: RailPair, end: int) -> tuple[Ra
     """Return the left and the right rail of a section, seen from its start (`end` 0) or its end (1).
 
     Left and right refer to the direction of the section.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    pair : RailPair
-    end : int
     """
     return RailAhead.of(rails[pair.left], pair.left_span, end), RailAhead.of(rails[pair.right], pair.right_span, end)
 

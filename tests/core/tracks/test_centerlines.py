@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from rail_extract.core.errors import NoTrackError
 from rail_extract.core.polyline import length_along
-from rail_extract.core.progress import SILENT
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.centerlines import (
     MAX_SEAM_M,
     CenterlineParameters,
-    _smoothed,
     build_centerlines,
     closed_centerline,
     extended_ring,
@@ -269,17 +267,6 @@ def test_cant_keeps_its_sign_on_a_centerline_that_is_turned_around(sign):
     assert line.cantmax_mm == pytest.approx(sign * 80, abs=0.5)
     assert line.cant_mm == pytest.approx(sign * 50, abs=0.5)
     assert (line.left_ids, line.right_ids) == ((1, 2), (3, 4))
-
-
-def test_a_smoothed_ring_closes_with_even_steps():
-    angle = np.linspace(0, 2 * np.pi, 300)
-    ring = np.column_stack([20 * np.cos(angle), 20 * np.sin(angle), np.full(300, 7.0)])
-    ring[-1] = ring[0]
-    smooth = _smoothed(ring, 1.0, SILENT)
-    assert np.array_equal(smooth[0], smooth[-1])
-    steps = np.hypot(*np.diff(smooth[:, :2], axis=0).T)
-    assert steps == pytest.approx(np.median(steps), rel=0.01)
-    assert np.abs(np.hypot(*smooth[:, :2].T) - 20).max() < 0.002
 
 
 def test_rails_that_are_nowhere_opposite_each_other_are_no_track():

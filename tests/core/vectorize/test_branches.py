@@ -7,7 +7,7 @@ from rail_extract.core.lines.ends import even_points
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.vectorize import vectorize
-from rail_extract.core.vectorize.branches import DIRECTION_M, _trunk, choose_routes, free_third_rails, resolve_branches
+from rail_extract.core.vectorize.branches import choose_routes, free_third_rails, resolve_branches
 from rail_extract.core.vectorize.junctions import (
     run_through,
     unsteadiness,
@@ -57,19 +57,6 @@ def test_of_three_rails_that_part_within_metres_the_straight_one_goes_on():
     assert len(freed.lines) == 3 and (freed.degrees() == 1).all()
     through = max(freed.lines, key=len)
     assert np.abs(through[:, 1]).max() < 0.02 and np.ptp(through[:, 0]) > 49
-
-
-@pytest.mark.parametrize("left_m", [40.0, DIRECTION_M + 0.5, DIRECTION_M - 0.5])
-def test_a_stem_is_cut_back_to_where_its_legs_part_if_enough_of_it_remains(left_m):
-    """Legs that part on an arc of 300 m and are 0.3 m apart where the stem ends."""
-    t, back_m = np.arange(0, 20, 0.1), np.sqrt(2 * 300 * 0.3)
-    rails = [np.column_stack([t, np.zeros(len(t))]), np.column_stack([t, (t + back_m) ** 2 / 600])]
-    apart_m = back_m - np.sqrt(2 * 300 * MISFIT_M)
-    trunk = _trunk(-along_x(0, apart_m + left_m), rails)
-    assert (len(trunk) > 0) == (left_m > DIRECTION_M)
-    if len(trunk):
-        assert np.ptp(trunk[:, 0]) == pytest.approx(left_m, abs=0.3)
-        assert trunk[0, 0] == pytest.approx(-apart_m, abs=0.3)
 
 
 def stairs(line):
