@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..airborne.refinement import STATION_M
+from ..airborne.sections import STATION_M
 from ..airborne.remarks import FLIGHT
 from ..airborne.survey import AirborneTrack, Survey
 from ..progress import counted
