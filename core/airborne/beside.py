@@ -19,8 +19,9 @@ STEP_M = 0.05
 WIDE_M = 5.6
 """Distance from the line up to which places are compared: tracks of one line are rarely farther apart."""
 
-SAME_M, APART_M, TRACKS_APART_M = 0.2, 0.4, 2.8
-"""Places this close are the same, those this far apart are others, and two tracks are at least this far apart."""
+SAME_M, APART_M, REPEATED_M, TRACKS_APART_M = 0.2, 0.4, 1.1, 2.8
+"""Places this close are the same, those this far apart are others, those less far apart than a gauge have no rail of
+the line, and two tracks are at least this far apart."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +57,17 @@ class Beside:
     @property
     def rival(self) -> np.ndarray:
         """Best score of a place that excludes the line, because two tracks are never so close, (n,)."""
+        return self._best(APART_M, TRACKS_APART_M)
+
+    @property
+    def repeated(self) -> np.ndarray:
+        """Best score of a place that the line's own rails can't make, as the furrows of a field do, (n,)."""
+        return self._best(APART_M, REPEATED_M)
+
+    def _best(self, low_m: float, high_m: float) -> np.ndarray:
+        """Return the best score of places between two distances, (n,)."""
         apart = np.abs(self.across)
-        return self.score[:, (apart > APART_M) & (apart < TRACKS_APART_M)].max(axis=1)
+        return self.score[:, (apart > low_m) & (apart < high_m)].max(axis=1)
 
 
 def look_beside(corridor: Corridor, shape: Shape, sections: int) -> Beside:

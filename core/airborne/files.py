@@ -17,9 +17,9 @@ from ..standards import STANDARDS
 from ..tasks import Context, Task
 from .axis import Axis, axis_of_guide
 from .fitting import EMPTY, SEEN, Fitted, Stations, fit_tracks
-from .sections import STATION_M
 from .remarks import FLIGHT, are_hints, on_density, on_gauges, on_shapes, refuse_mobile
 from .run import Run
+from .sections import STATION_M
 from .spooling import density_of, points_of, spool
 from .squares import Key, Piece, pieces_by_square
 from .survey import AirborneTrack, Guide, Survey, joined_others, lines_of, track_of

@@ -32,6 +32,9 @@ WIDEST_M = 0.215
 RIVAL_SHARE = 1.1
 """Share of a line's score over 70 m that no place so close that it excludes the line may have."""
 
+REPEATED_SHARE = 0.6
+"""The same for places closer than a gauge, where no switch is: the furrows of a field repeat."""
+
 SURE = 0.9
 """Least likelihood that the guide means this track and not another one."""
 
@@ -215,7 +218,7 @@ def _judged(axes: Sequence[Axis], lines: dict[int, _Line], footprint_m: float) -
         toe = np.where(distance < TOE_M, TOE_FACTOR, 1.0)
         blur = FOOTPRINT_SHARE * footprint_m
         sigma = toe * np.sqrt((SHARED * refined.curve.sigma) ** 2 + blur**2 + strip_error(refined) ** 2)
-        reason = _reasons(line)
+        reason = _reasons(line, distance < SWITCH_M)
         reason[(reason == SEEN) & (sigma > toe * MAX_SIGMA_M)] = SPARSE
         reason[(reason == SEEN) & (distance < TWIN_M) & (apart > GUIDES_APART_M)] = TWIN
         stations = Stations(
@@ -244,13 +247,13 @@ def _nothing(axis: Axis) -> Fitted:
     return Fitted(stations, None, np.nan, np.empty((0, 2)))
 
 
-def _reasons(line: _Line) -> np.ndarray:
-    """Return why the stations of a line are not seen, by what shows along it."""
+def _reasons(line: _Line, switch: np.ndarray) -> np.ndarray:
+    """Return why the stations of a line are not seen, by what shows along it; at a `switch`, (n,), it shows twice."""
     refined, sections = line.refined, line.refined.seen.sections
     most = sections.found.most
-    own = (sections.found.both > np.minimum(OWN_GAIN, most - CHANCE * np.sqrt(2 * most)))
+    own = sections.found.both > np.minimum(OWN_GAIN, most - CHANCE * np.sqrt(2 * most))
     own &= np.abs(sections.offset) < REACH_M
-    shown, flat = _over_70_m(line.beside) if line.beside is not None else (own, own)
+    shown, flat = _over_70_m(line.beside, switch) if line.beside is not None else (own, own)
     flat &= refined.seen.shape.width_m < WIDEST_M
     half = np.minimum(np.arange(len(own)) * 2, len(line.sure) - 1)
     reason = np.full(len(own), SEEN)
@@ -265,7 +268,7 @@ def _reasons(line: _Line) -> np.ndarray:
     return reason
 
 
-def _over_70_m(beside: Beside) -> tuple[np.ndarray, np.ndarray]:
+def _over_70_m(beside: Beside, switch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return where two rails show, and where they lie on a flat bed that no other place excludes, (n,) bool each.
 
     Of the 70 m before, around and behind a station, the best count: beside a train, those on its other side.
@@ -277,7 +280,8 @@ def _over_70_m(beside: Beside) -> tuple[np.ndarray, np.ndarray]:
     around = np.clip(around, 0, len(gain) - 1)
     best = np.take_along_axis(around, score[around].argmax(axis=0)[None], axis=0)[0]
     flat = (score > least) & (beside.rival < RIVAL_SHARE * score)
-    return (gain > least)[best], flat[best]
+    alone = beside.repeated < REPEATED_SHARE * score
+    return (gain > least)[best], flat[best] & (alone[best] | switch)
 
 
 JUMP_M = 1.0

@@ -72,6 +72,11 @@ class Seen:
     shown_m: float
     sections: Sections
 
+    @property
+    def t(self) -> np.ndarray:
+        """Chainage of the middle of each section along the guide, (n,)."""
+        return self.sections.stations_on(self.axis)
+
 
 @dataclass(frozen=True)
 class Refined:
@@ -97,26 +102,28 @@ class Refined:
     @property
     def t(self) -> np.ndarray:
         """Chainage of the middle of each section along the guide, (n,)."""
-        return self.seen.sections.stations_on(self.seen.axis)
+        return self.seen.t
 
 
 def refine(tracks: Sequence[Traced]) -> list[Refined | None]:
     """Fit the curves of parallel tracks; None for those of which no section shows a track."""
     lines = {number: _first(track) for number, track in enumerate(tracks)}
-    seen: dict[int, Seen] = {}
-    drawn: dict[int, Curve] = {}
+    found: dict[int, tuple[Seen, Curve, Axis]] = {}
     for reach_m in REACHES_M:
-        looked = {number: _look(tracks[number], line, seen.get(number), reach_m) for number, line in lines.items()}
-        seen = {number: one for number, one in looked.items() if one is not None}
+        seen: dict[int, Seen] = {}
+        for number, line in lines.items():
+            last = found[number][0] if found else None
+            one = _look(tracks[number], line, last, reach_m)
+            if one is not None:
+                seen[number] = one
         if not seen:
-            break
-        sections = [one.sections for one in seen.values()]
-        drawn = dict(zip(seen, draw_together([one.axis for one in seen.values()], sections)))
-        lines = {number: _axis_through(drawn[number].xy, one.sections.stations_on(one.axis), tracks[number].guide) for number, one in seen.items()}
-    return [
-        _with_heights(seen[number], drawn[number], lines[number]) if number in seen else None
-        for number in range(len(tracks))
-    ]
+            return [None] * len(tracks)
+        curves = draw_together([one.axis for one in seen.values()], [one.sections for one in seen.values()])
+        lines = {
+            number: _axis_through(curve.xy, seen[number].t, tracks[number].guide) for number, curve in zip(seen, curves)
+        }
+        found = {number: (seen[number], curve, lines[number]) for number, curve in zip(seen, curves)}
+    return [_with_heights(*found[number]) if number in found else None for number in range(len(tracks))]
 
 
 def _first(track: Traced) -> Axis:
@@ -141,7 +148,7 @@ def _look(track: Traced, line: Axis, last: Seen | None, reach_m: float) -> Seen 
 def _with_heights(seen: Seen, curve: Curve, line: Axis) -> Refined:
     """Smooth the heights of the bed as well."""
     sections = seen.sections
-    level = sections.found.level + seen.corridor.level_at(sections.stations_on(seen.axis))
+    level = sections.found.level + seen.corridor.level_at(seen.t)
     noise = np.maximum(seen.shape.noise_m / np.sqrt(np.maximum(sections.points, 1)), LEAST_SIGMA_M)
     weight = np.where(sections.shows, noise**-2, 0.0)
     heights = smooth(level[:, None], weight, differences(len(level), 2), SLOPE_M)

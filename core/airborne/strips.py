@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .refinement import REACHES_M, Refined
+from .refinement import REACHES_M, Refined, Seen
 from .sections import ENOUGH_GAIN, STATION_M, fit_sections
 
 SHIFT_LENGTH_M, STRIP_SHIFT_M, MIXED_SECTIONS = 50.0, 0.1, 7
@@ -19,29 +19,30 @@ def strip_error(refined: Refined) -> np.ndarray:
 
     Where both have as many points, the curve lies in their middle; where one is alone, it is off by half the distance.
     """
-    strips, counts = np.unique(refined.seen.corridor.strip, return_counts=True)
+    seen, error = refined.seen, np.zeros(len(refined.t))
+    strips, counts = np.unique(seen.corridor.strip, return_counts=True)
     main: Sequence[int] = strips[np.argsort(-counts)][:2].tolist()
-    error = np.zeros(len(refined.t))
     if len(main) < 2:
         return error
-    section = np.clip(((refined.seen.corridor.t - refined.seen.corridor.start_m) / STATION_M).astype(np.int64), 0, len(error) - 1)
+    section = ((seen.corridor.t - seen.corridor.start_m) / STATION_M).astype(np.int64)
+    section = np.clip(section, 0, len(error) - 1)
     one, other = (
-        np.bincount(section[refined.seen.corridor.strip == strip], minlength=len(error)).astype(float) for strip in main
+        np.bincount(section[seen.corridor.strip == strip], minlength=len(error)).astype(float) for strip in main
     )
     long = np.ones(min(MIXED_SECTIONS, len(error)))
     mixed = np.convolve(one - other, long, "same") / np.maximum(np.convolve(one + other, long, "same"), 1.0)
-    _, normal = refined.seen.axis.at(refined.t)
-    return np.abs(mixed * (normal @ _strip_shift(refined, main))) / 2
+    _, normal = seen.axis.at(refined.t)
+    return np.abs(mixed * (normal @ _strip_shift(seen, main))) / 2
 
 
-def _strip_shift(refined: Refined, strips: Sequence[int]) -> np.ndarray:
+def _strip_shift(seen: Seen, strips: Sequence[int]) -> np.ndarray:
     """Return how far one strip is shifted in plan against another, (2,) metres, as far as it shows across the track."""
-    corridor, fits = refined.seen.corridor, []
+    corridor, fits = seen.corridor, []
     for strip in strips:
-        fits.append(fit_sections(corridor.kept(corridor.strip == strip), refined.seen.shape, REACHES_M[-1], SHIFT_LENGTH_M))
+        fits.append(fit_sections(corridor.kept(corridor.strip == strip), seen.shape, REACHES_M[-1], SHIFT_LENGTH_M))
     one, other = fits
     middles = corridor.start_m + (np.arange(len(one.offset)) + 0.5) * SHIFT_LENGTH_M
-    _, normal = refined.seen.axis.at(np.minimum(middles, refined.seen.axis.t[-1]))
+    _, normal = seen.axis.at(np.minimum(middles, seen.axis.t[-1]))
     good = (one.found.gain > ENOUGH_GAIN) & (other.found.gain > ENOUGH_GAIN)
     weight = np.where(good, 1 / (one.sigma**2 + other.sigma**2), 0.0)
     matrix = (normal * weight[:, None]).T @ normal + np.eye(2) / STRIP_SHIFT_M**2

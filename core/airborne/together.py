@@ -92,9 +92,7 @@ def draw_together(lines: Sequence[Axis], found: Sequence[Sections]) -> list[Curv
         turn_m = stiff.measured(curve.bend)
     error, good = np.sqrt(curve.variance), shows & (robust > TRUSTED)
     parts = np.split(np.arange(len(target)), np.cumsum([len(t) for t in stations])[:-1])
-    return [
-        Curve(curve.values[at], error[at] * _spread((beside / sigma)[at][good[at]]), beside[at]) for at in parts
-    ]
+    return [Curve(curve.values[at], error[at] * _spread((beside / sigma)[at][good[at]]), beside[at]) for at in parts]
 
 
 def _spread(residual: np.ndarray) -> float:

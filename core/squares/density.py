@@ -51,7 +51,8 @@ MAX_SAMPLE = 50_000
 """Most points of a square of which this share is computed: it is exact to 1 % then."""
 
 AIRBORNE_SPACING_M, AIRBORNE_PER_METRE = 1.0, 12.0
-"""Distance of points on rails below which a thin class may be that of an airborne cloud, and points per metre of rail below which rails that were drawn are those of one: 40 points per square metre give nine."""
+"""Distance of points on rails below which a thin class may be that of an airborne cloud, and points per metre of rail
+below which rails that were drawn are those of one: 40 points per square metre give nine."""
 
 _ROW = 1 << 32
 """Distance between the numbers of two rows of cells."""

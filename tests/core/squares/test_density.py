@@ -144,7 +144,7 @@ def test_rails_of_an_airborne_cloud_give_a_warning(per_metre, said):
 
 
 def test_points_as_thin_as_those_of_an_airborne_cloud_are_refused_with_its_algorithm():
-    with pytest.raises(CloudError, match=r"too far for rails: .* For an airborne cloud, use Track Centerlines from Air"):
+    with pytest.raises(CloudError, match=r"too far for rails: .* For an airborne cloud, use Track Centerlines"):
         plausible([source(rail(per_metre=2, length_m=400.0))])
 
 
