@@ -123,7 +123,7 @@ def test_a_train_and_a_hole_are_not_seen(flown):
     assert (stations.reason[(stations.t < 45) | ((stations.t > 145) & (stations.t < 170))] == SEEN).all()
 
 
-@pytest.mark.parametrize("thing", ["road with kerbs", "hedge", "ditch", "bank", "field"])
+@pytest.mark.parametrize("thing", ["road with kerbs", "hedge", "ditch", "bank", "field", "furrows"])
 def test_no_line_where_there_is_no_track(thing):
     along = np.arange(0.0, 160.0, 0.25)
     flat = Axis(np.column_stack([along, 0 * along, 0 * along + 50]), 0 * along, 0 * along)
@@ -141,6 +141,7 @@ def test_no_line_where_there_is_no_track(thing):
         "ditch": [[-1.5, 0.0], [-0.4, -0.6], [0.4, -0.6], [1.5, 0.0]],
         "bank": [[-3.0, 0.0], [-1.2, 0.9], [1.2, 0.9], [3.0, 0.0]],
         "field": [[-1.0, 0.0], [1.0, 0.0]],
+        "furrows": [[0.375 * number, 0.18 * (number % 2)] for number in range(-18, 19)],
     }
     band = Band(flat, np.array(profiles[thing]), covers=thing != "ditch")
     ground = Band(flat, np.array([[-15.0, 0.0], [15.0, 0.0]]), covers=False)
