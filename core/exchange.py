@@ -37,23 +37,6 @@ APPLICATION = "RAIL_EXTRACT"
 MAX_TEXT = 255
 """Longest text of extended data."""
 
-DRAWN = {
-    "rails": "RAILS",
-    "centerlines": "TRACK",
-    "airborne": "TRACK",
-    "proposed": "GUIDES",
-    "stations": "STATIONS",
-    "quality": "STATIONS",
-    "findings": "FINDINGS",
-    "stops": "STOPS",
-    "places": "PLACES",
-    "differences": "DIFFERENCES",
-    "elements": "ELEMENTS",
-    "deviations": "DEVIATIONS",
-    "axes": "ALIGNMENT",
-}
-"""First word of the layers in a drawing, by output."""
-
 COLOURS = {"RAILS": 5, "TRACK": 1, "STATIONS": 3, "ALIGNMENT": 1, "PLAN": 7, "PROFILE": 3, "CANT": 5}
 """Colour of a layer by the first word of its name: blue, red, green; black on paper for elements in plan."""
 
@@ -162,11 +145,6 @@ def write_alignments(path: Path, alignments: Sequence[Alignment]) -> None:
     """Write alignments as a DXF file: a 3D polyline for each, and a point with a text where an element begins.
 
     The curve of track 7 is on the layer ALIGNMENT_7, the elements are on PLAN_7, PROFILE_7 and CANT_7.
-
-    Parameters
-    ----------
-    path : Path
-    alignments : sequence of Alignment
 
     Raises
     ------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -14,8 +13,9 @@ from ..airborne.survey import Guide, Survey
 from ..clouds.points import Request, ask
 from ..disk import Destination, writing
 from ..errors import ParameterError
-from ..fields import AIRBORNE_FIELDS, FINDING_FIELDS, PROPOSED_FIELDS
+from ..layers import airborne_stations_layer, findings_layer, lines_layer
 from ..parameters import AIRBORNE_CLASSES, AirborneParameters
+from ..products import AIRBORNE, PROPOSED
 from ..progress import Estimating
 from ..report.airborne import airborne_findings, airborne_page, airborne_summary
 from ..scratch import scratch_folder
@@ -25,6 +25,7 @@ from .options import (
     TILES_HELP,
     Console,
     add_cloud_arguments,
+    add_length,
     add_workers_argument,
     destination_of,
     extent_of,
@@ -71,9 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     classes = ",".join(map(str, AIRBORNE_CLASSES))
     parser.add_argument("--classes", default=classes, help=f"classes of the points to use (default: {classes})")
     for name, text in LENGTHS.items():
-        value = getattr(AirborneParameters, f"{name}_m")
-        option = f"--{name.replace('_', '-')}"
-        parser.add_argument(option, type=float, default=value, metavar="M", help=f"{text} (default: {value:g})")
+        add_length(parser, f"--{name.replace('_', '-')}", getattr(AirborneParameters, f"{name}_m"), text)
     add_workers_argument(parser)
 
 
@@ -125,21 +124,12 @@ def _check_outputs(args: argparse.Namespace) -> None:
 def _write_proposed(found: Proposals, destination: Destination) -> None:
     """Write the proposed guides."""
     module = shapes_module("--proposed", "geopackage")
-    module.write_layers([module.lines_layer("proposed", PROPOSED_FIELDS, found.guides)], destination, found.frame)
+    module.write_layers([lines_layer(PROPOSED, found.guides)], destination, found.frame)
 
 
 def parameters_of(args: argparse.Namespace, standard: RailStandard) -> AirborneParameters:
-    """Return the parameters that the options state.
-
-    Raises
-    ------
-    ParameterError
-        A length is not positive.
-    """
+    """Return the parameters that the options state."""
     lengths = {f"{name}_m": getattr(args, name) for name in LENGTHS}
-    for name in LENGTHS:
-        if not 0 < getattr(args, name) < math.inf:
-            raise ParameterError(f"--{name.replace('_', '-')} must be a positive number.")
     return AirborneParameters(standard.gauge_m, standard.head_width_m, **lengths)
 
 
@@ -153,14 +143,12 @@ def _write(
 ) -> None:
     """Write the outputs that were asked for; layers of the same file together."""
     module = shapes_module("--centerlines", "geopackage")
-    layers = [module.lines_layer("centerlines", AIRBORNE_FIELDS, survey.lines)]
+    layers = [lines_layer(AIRBORNE, survey.lines)]
     if "stations" in outputs:
-        layers.append(module.airborne_stations_layer(survey.tracks))
+        layers.append(airborne_stations_layer(survey.tracks))
     if "findings" in outputs:
-        found = airborne_findings(survey)
-        layers.append(module.lines_layer("findings", FINDING_FIELDS, found))
-    for same, file in module.by_file(layers, outputs):
-        module.write_layers(same, file, survey.frame)
+        layers.append(findings_layer(airborne_findings(survey)))
+    module.write_all(layers, outputs, survey.frame)
     if "report" in outputs:
         facts = {"Rail": standard.label, "Command": args.command_line}
         outputs["report"].write_text(airborne_page(survey, args.tiles[0].name, facts))

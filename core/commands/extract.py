@@ -93,7 +93,7 @@ POSITIVE = (
     "centerline_tolerance_m",
     "step",
 )
-"""Parameters that can't be 0: nothing is smoothed over no length, and no point lies within no distance."""
+"""Parameters that can't be 0: nothing is smoothed over no length, and no point is within no distance."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -352,7 +352,8 @@ def _write(
     RailExtractError
         An output could not be written.
     """
-    from .geopackage import by_file, network_layers, write_layers
+    from ..layers import network_layers
+    from .geopackage import by_file, write_layers
 
     layers = network_layers(network, outputs, parameters.gauges_m)
     writers: list[Callable[[], None]] = [
