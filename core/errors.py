@@ -43,11 +43,11 @@ class MissingError(ParameterError):
 
 
 class OffRailError(RailExtractError):
-    """No seed lies on a rail."""
+    """No seed is on a rail."""
 
 
 class OffCloudError(ParameterError):
-    """No seed lies in the cloud."""
+    """No seed is in the cloud."""
 
 
 class RasterError(RailExtractError):

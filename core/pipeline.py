@@ -130,7 +130,7 @@ def extract_files(
     CloudError
         A file is damaged; if the runner tolerates that, all of them are.
     NoRailPointsError
-        No point of the requested classes lies in the files and the extent.
+        No point of the requested classes is in the files and the extent.
     DiskError
         The disk is full.
     ModelError, Cancelled

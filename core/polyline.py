@@ -246,7 +246,7 @@ class _Stations:
     def _foot(self, xy: np.ndarray, segment: np.ndarray) -> np.ndarray:
         """Return t and across of each point's foot on one segment, (2, k); inf where there is none.
 
-        A foot may lie up to 1 % of the segment's length past its ends, so that no point outside a bend is lost.
+        A foot may be up to 1 % of the segment's length past its ends, so that no point outside a bend is lost.
         """
         start, end = np.maximum(segment, 0), np.minimum(segment + 1, len(self.t) - 1)
         a, b = self.tree.data[start], self.tree.data[end]

@@ -162,8 +162,6 @@ SAME_M = 0.002
 STANDARDS = _standards()
 """All standards by name, except CUSTOM."""
 
-UNCONFIRMED_PROFILES = tuple(profile for profile, _, _, sources, _ in _PROFILES if not sources)
-
 
 def resolve(name: str, gauge_mm: float | None = None, head_width_mm: float | None = None) -> RailStandard:
     """Look up a standard; a gauge or a head width, if given, overrides that of the standard.

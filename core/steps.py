@@ -136,7 +136,7 @@ def whole_rails(
     first_id: int = 1,
     progress: Progress = SILENT,
 ) -> list[RailLine]:
-    """Join the rails of all squares, drop the short ones, cut turns that no rail has, simplify and number them.
+    """Join the rails of all squares, drop the short ones, cut turns too sharp for a rail, simplify and number them.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ def measure_lines(
 
 
 def _finished(rails: Sequence[RailLine], parameters: Parameters, first_id: int, progress: Progress) -> list[RailLine]:
-    """Cut turns that no rail has, simplify rails and number them from `first_id`."""
+    """Cut turns too sharp for a rail, simplify rails and number them from `first_id`."""
     thinned = thin(_without_turns(rails, parameters, progress), parameters.simplify_xy_m, parameters.simplify_z_m)
     return [replace(rail, rail_id=number) for number, rail in enumerate(thinned, start=first_id)]
 
@@ -257,7 +257,7 @@ Line = TypeVar("Line", RailLine, Centerline)
 
 
 def _without_turns(lines: Sequence[Line], parameters: Parameters, progress: Progress) -> list[Line]:
-    """Split lines where they turn as no rail can, and warn the user."""
+    """Split lines where they turn too sharply for rails, and warn the user."""
     kept: list[Line] = []
     turned: list[Line] = []
     for line in lines:

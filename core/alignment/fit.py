@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Optional
@@ -131,8 +132,11 @@ def fit_tracks(
         raise ParameterError("FIXED has no elements of the tracks in INPUT: give the table of these tracks.")
     shares = progress.divide([float(length_along(track.xyz[:, :2])[-1]) + 1.0 for track in tracks])
     fits: list[Fit] = []
-    refusals: list[ParameterError] = []
+    lines = Counter(track.track_id for track in tracks)
+    refusals = [_in_pieces(number, count) for number, count in lines.items() if count > 1]
     for track, share in zip(tracks, shares):
+        if lines[track.track_id] > 1:
+            continue
         progress.status(f"Fitting track {track.track_id}")
         try:
             fits.append(fit_track(track, frame, settings, fixed.get(track.track_id), share))
@@ -143,6 +147,13 @@ def fit_tracks(
     for refusal in refusals:
         progress.warning(str(refusal))
     return fits
+
+
+def _in_pieces(track_id: int, count: int) -> ParameterError:
+    """Return the refusal of a track of several lines: `s` in its table would begin in each of them."""
+    return ParameterError(
+        f"Track {track_id} has {count} lines, but its elements follow one: join them, or give each its own track_id."
+    )
 
 
 @dataclass(frozen=True)

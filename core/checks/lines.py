@@ -117,7 +117,7 @@ def warn_of_rails(rails: Sequence[RailLine], class_code: int, parameters: Parame
     progress : Progress
     """
     if not rails:
-        progress.warning(f"Class {class_code} shows no rail: check the rail classes, the standard and MIN_LENGTH.")
+        progress.warning(f"Class {class_code} has no rails: check the rail classes, the standard and MIN_LENGTH.")
     warn_if_out_of_reach(rails, parameters.head_width_m, parameters.smoothing_xy_m, progress)
 
 

@@ -199,7 +199,7 @@ def _weights() -> tuple[np.ndarray, np.ndarray]:
 
 
 def strip_courses(centerlines: Sequence[Centerline], rows: np.ndarray) -> tuple[StripCourse, ...]:
-    """Describe how strips lie along tracks.
+    """Describe the offsets of strips along tracks.
 
     Parameters
     ----------

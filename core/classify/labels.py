@@ -22,11 +22,11 @@ UNDER_MEAN_M = 0.02
 """Tops this far below the mean are left out of it: a wide beam at the side of a head blends it with the ballast."""
 
 NEAREST, MIN_AXES = 6, 2
-"""Axes that are looked at for a place, and how many of them it must lie on: where two heads part there are some of
+"""Axes that are looked at for a place, and how many of them it must be on: where two heads part there are some of
 each, and single axes are led astray by a guard rail."""
 
 BEYOND_M = HIDDEN_M + 0.3
-"""Distance to an axis up to which a place may lie on it. Behind a wheel at the end of a cloud, the rail is too short to
+"""Distance to an axis up to which a place may be on it. Behind a wheel at the end of a cloud, the rail is too short to
 show its direction: the axis before the wheel continues to it, and over some of its cells."""
 
 WIDEST_M = 0.075
@@ -122,7 +122,7 @@ class Near:
     place, cell : (m,) int arrays
         Pairs; the nearest cell of each place comes first.
     across : (m,) array
-        How far the place lies across from the axis of the cell, metres.
+        How far the place is across from the axis of the cell, metres.
     """
 
     count: int
@@ -143,7 +143,7 @@ class Near:
         return cls(len(xy), place, cell, across)
 
     def on(self, half_m: float, fits: np.ndarray) -> np.ndarray:
-        """Return which places lie within `half_m` of `MIN_AXES` axes that fit, (m,) bool; (count,) bool."""
+        """Return which places are within `half_m` of `MIN_AXES` axes that fit, (m,) bool; (count,) bool."""
         on = (np.abs(self.across) <= half_m) & fits
         return np.bincount(self.place[on], minlength=self.count) >= MIN_AXES
 

@@ -46,7 +46,7 @@ a cable trough, or of the shoulder of the ballast takes all."""
 
 
 def links(lines: Lines, within_m: float | None = None) -> np.ndarray:
-    """Pairs of cells that lie on each other's axis, at most `within_m` apart or within reach, (m, 2) int."""
+    """Pairs of cells that are on each other's axis, at most `within_m` apart or within reach, (m, 2) int."""
     if len(lines.axis) < 2:
         return np.empty((0, 2), dtype=np.int64)
     pairs = cKDTree(lines.axis).query_pairs(within_m or lines.reach_m, output_type="ndarray")

@@ -158,5 +158,5 @@ class Settings:
         return replace(self, guide=self.guide.around(np.multiply(key, self.side_m), self.side_m))
 
     def own(self, xy: np.ndarray) -> np.ndarray:
-        """Return which of (n, 2) or (n, 3) places, in metres from a square's corner, lie in the square, (n,) bool."""
+        """Return which of (n, 2) or (n, 3) places, in metres from a square's corner, are in the square, (n,) bool."""
         return np.all((xy[:, :2] >= 0) & (xy[:, :2] < self.side_m), axis=1)

@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rails", metavar="FILE", help="rails of these tracks, with the cant")
     parser.add_argument("--fixed", metavar="FILE", help="corrected element table: what was changed is held")
     default = FitParameters()
-    text = "how far the track may lie off its design"
+    text = "how far the track may be off its design"
     add_length(parser, "--tolerance", 1000 * default.tolerance_m, text, "MM")
     add_length(parser, "--min-length", default.min_length_m, "least length of an element")
     text = f"whether the curvature may jump (default: {default.transitions})"

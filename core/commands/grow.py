@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> None:
     Raises
     ------
     RailExtractError
-        A parameter is wrong, a file can't be read, no seed lies on a rail, or the output can't be written.
+        A parameter is wrong, a file can't be read, no seed is on a rail, or the output can't be written.
     """
     check_rail_class(args)
     standard = resolve(args.standard, args.gauge, args.head_width)

@@ -100,9 +100,9 @@ def grow_files(
     DiskError
         The disk is full, or another program has changed an output.
     ParameterError
-        No seed lies in the cloud.
+        No seed is in the cloud.
     RailExtractError
-        No seed lies on a rail.
+        No seed is on a rail.
     """
     growing, rewriting = progress.divide((7.0, 3.0))
     labels = Labels(request, folder)
@@ -163,7 +163,7 @@ def grow_all(
     parameters = settings.parameters
     if not growths:
         raise OffRailError(
-            f"No seed lies on a rail: put seeds within {parameters.search_m:g} m of railheads that stand "
+            f"No seed is on a rail: put seeds within {parameters.search_m:g} m of railheads that stand "
             f"{parameters.min_height_m:g} m above the bed, and check the rail standard and the unit of the coordinates."
         )
     if missed:
@@ -200,7 +200,7 @@ class Squares:
     Raises
     ------
     ParameterError
-        No seed lies in the cloud.
+        No seed is in the cloud.
     """
 
     def __init__(self, request: Request, places: np.ndarray, settings: GrowSettings, folder: Path) -> None:
@@ -216,7 +216,7 @@ class Squares:
         self._kept: OrderedDict[Key, Buckets] = OrderedDict()
 
     def _inside(self, places: np.ndarray) -> None:
-        """Refuse seeds of which none lies in the cloud; headers may state an extent that is not a number."""
+        """Refuse seeds of which none is in the cloud; headers may state an extent that is not a number."""
         extents = np.array([header.extent for header in self._request.headers], dtype=float)
         if not np.isfinite(extents).all():
             return
@@ -224,7 +224,7 @@ class Squares:
         corners = self._request.zero.to_local(corners)[:, :2].reshape(-1, 2, 2)
         inside = (places[:, None] >= corners[:, 0] - PATCH_M[0]) & (places[:, None] <= corners[:, 1] + PATCH_M[0])
         if not inside.all(axis=2).any():
-            raise OffCloudError("No seed lies in the cloud: check the place and the coordinate system of the seeds.")
+            raise OffCloudError("No seed is in the cloud: check the place and the coordinate system of the seeds.")
 
     def fill(self, progress: Progress) -> None:
         """Read the points of the cloud that are within reach."""
@@ -327,7 +327,7 @@ def _report(
     single = sum(len(growth.rails) == 1 for growth in growths)
     if settings.parameters.both and single:
         progress.warning(
-            f"{single} of {len(growths)} followed rails have no other rail at the gauge: check that their seeds lie on "
+            f"{single} of {len(growths)} followed rails have no other rail at the gauge: check that their seeds are on "
             "rails, and the rail standard."
         )
     progress.info(

@@ -65,7 +65,7 @@ class Square:
         return cls(key, replace(frame, origin=corner), side_m)
 
     def holds(self, xyz: np.ndarray, margin_m: float = 0.0) -> np.ndarray:
-        """Return which places lie in the square or at most `margin_m` outside, (n,) bool.
+        """Return which places are in the square or at most `margin_m` outside, (n,) bool.
 
         Parameters
         ----------
@@ -135,7 +135,7 @@ class MemorySource:
 
 
 def unique_keys(xyz_m: np.ndarray, side_m: float) -> tuple[list[Key], np.ndarray]:
-    """Find the squares in which points lie.
+    """Find the squares in which points are.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def lay_out(sources: Sequence[PointSource], source: PointSource) -> list[Square]
 
 
 def own_tiles(raster: RailRaster, square: Square) -> RailRaster:
-    """Keep the tiles of a raster that lie in the square."""
+    """Keep the tiles of a raster that are in the square."""
     if square.is_whole_plane:
         return raster
     count = tiles_along(square.side_m, raster.cell_m)

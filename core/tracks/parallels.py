@@ -39,7 +39,7 @@ CROWD_M, CROWD = 1.0, 75
 ten heads of rails fit next to each other. Each pair of lines would be compared."""
 
 CROWDED = (
-    "More than 25 lines lie within 1 m of each other on {:.0f} m of their length, which is not paired: remove copies "
+    "More than 25 lines are within 1 m of each other on {:.0f} m of their length, which is not paired: remove copies "
     "of lines."
 )
 
@@ -120,7 +120,7 @@ def find_parallels(rails: Sequence[RailLine], reach_m: float = MAX_SPACING_M, pr
 
 
 def _is_crowded(stations: np.ndarray) -> np.ndarray:
-    """Return which stations lie in a square with more stations than rails can have, (n,) bool."""
+    """Return which stations are in a square with more stations than rails can have, (n,) bool."""
     squares = np.floor(stations / CROWD_M) @ [1.0, 2.0**26]  # a number for each square
     _, square, counts = np.unique(squares, return_inverse=True, return_counts=True)
     return (counts > CROWD)[square]

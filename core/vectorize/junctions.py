@@ -32,6 +32,9 @@ part on a radius of 2500 m have separate heads after 23 m, and after 33 m they a
 DEFLECTION_DEG = 15.0
 """A rail turns by less where it passes through a node; the steepest turnouts in use leave at about 14 degrees."""
 
+TURNED_BACK_DEG = 90.0
+"""Two lines that meet more sharply are not one rail, but the legs of a switch whose stem is missing."""
+
 DIRECTION_M = 2.5
 """Length over which directions at a node are compared: longer than the merged part of a 1:9 frog."""
 
@@ -53,12 +56,16 @@ def clean_junctions(network: LineNetwork, head_width_m: float) -> LineNetwork:
 
 
 def weld_pairs(network: LineNetwork) -> LineNetwork:
-    """Join lines at nodes in which exactly two different lines end and none passes."""
+    """Join lines at nodes in which exactly two different lines end and none passes; separate them if they turn back."""
     plain = network.degrees() == 2
     plain[network.passes[:, 0]] = False
     partner: dict[int, int] = {}
     for one, other in (pair for node, pair in ends_by_node(network) if plain[node]):
-        if one // 2 != other // 2:
+        if one // 2 == other // 2:
+            continue
+        if deflections(network, [one, other])[0, 1] > TURNED_BACK_DEG:
+            network = network.with_end(other, network.from_end(other)[:1], 1)
+        else:
             partner[one], partner[other] = other, one
     return network.weld(partner) if partner else network
 

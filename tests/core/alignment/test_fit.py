@@ -335,6 +335,17 @@ def test_a_track_that_cannot_be_fitted_does_not_stop_the_others():
     assert "track 7" in progress.warnings[0]
 
 
+def test_a_track_of_two_lines_is_refused_and_the_others_are_fitted():
+    progress, line = Recording(Progress()), track(design())
+    fits = fit_tracks(
+        [line, replace(line, track_id=7), replace(line, track_id=7)], FRAME, FitParameters(), {}, progress
+    )
+    assert [one.alignment.track_id for one in fits] == [1]
+    assert list(progress.warnings) == [
+        "Track 7 has 2 lines, but its elements follow one: join them, or give each its own track_id."
+    ]
+
+
 def test_a_table_of_other_tracks_is_refused():
     with pytest.raises(ParameterError, match="FIXED has no elements"):
         fit_tracks([track(design())], FRAME, FitParameters(), {9: design()})

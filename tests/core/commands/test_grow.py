@@ -96,7 +96,7 @@ def test_rails_grow_and_are_extracted_in_one_call(tmp_path):
         (["--seed", "5"], '--seed "5" should be two numbers: x,y.'),
         (["--seed", "nan,5"], '--seed "nan,5" should be two numbers: x,y.'),
         (["--seed", "1e300,5"], '--seed "1e300,5" should be two numbers: x,y.'),
-        (["--seed", "1,2"], "No seed lies in the cloud"),
+        (["--seed", "1,2"], "No seed is in the cloud"),
         (["--seed", f"{X},{Y}", "--max-outliers", "-1"], "--max-outliers must be 0 or more, not -1."),
         (["--seed", f"{X},{Y}", "--stops", "a.shp"], "The option --stops writes .gpkg files: give a.shp this suffix."),
         (["--seed", f"{X},{Y}", "--rail-class", "300"], "--rail-class must be a number from 0 to 255, not 300."),

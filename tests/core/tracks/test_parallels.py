@@ -58,7 +58,7 @@ def test_a_crowd_of_lines_is_left_out_with_a_warning():
     parallels = find_parallels(rails_of(*track, *copies), progress=heard)
     assert set(zip(parallels.a, parallels.b)) == {(0, 1)}
     assert heard.warnings == (
-        "More than 25 lines lie within 1 m of each other on 820 m of their length, which is not paired: remove copies "
+        "More than 25 lines are within 1 m of each other on 820 m of their length, which is not paired: remove copies "
         "of lines.",
     )
     assert not len(find_parallels(rails_of(*copies)).a)

@@ -86,6 +86,13 @@ def test_welding_restores_a_line_cut_into_pieces(order, turned, closed):
     np.testing.assert_allclose(length_along(line)[-1], length_along(whole)[-1])
 
 
+def test_the_legs_of_a_switch_that_lost_its_stem_are_not_one_rail():
+    lines = tuple(np.array([[0.0, 0.0], [10.0, y]]) for y in (0.5, -0.5))
+    network = weld_pairs(LineNetwork(lines, np.array([[0.0, 0], [10, 0.5], [10, -0.5]]), np.array([[0, 1], [0, 2]])))
+    assert len(network.lines) == 2
+    assert (network.degrees() == 1).all()
+
+
 @pytest.mark.parametrize(("length", "apart", "left"), [(0.5, 0.3, 4), (3.0, 0.15, 4), (3.0, 0.3, 5), (12.0, 0.15, 5)])
 def test_a_slit_between_rails_that_part_is_not_a_loop_of_two_rails(length, apart, left):
     nodes = np.array([(0, 0), (10, 0), (10 + length, 0), (40, 0), (40, 1)], dtype=float)
