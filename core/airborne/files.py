@@ -73,6 +73,7 @@ def survey_files(
     squares = pieces_by_square(axes)
     reading, fitting = progress.divide((1.0, 2.0))
     progress.status("Reading the points along the guides")
+    progress.reading()
     counts = spool(request, squares, parameters.reach_m, folder, runner, reading)
     if not counts:
         raise NoRailPointsError(

@@ -127,6 +127,7 @@ def propose_guides(
         )
     reading, searching, fitting = progress.divide((1.0, 4.0, 1.0))
     progress.status("Reading the points")
+    progress.reading()
     counts = _sorted(request, folder, runner, reading)
     progress.status("Searching for tracks")
     finds, density = _found(counts, parameters, folder, runner, searching)

@@ -518,6 +518,7 @@ def assert_refused(outcome, message, outputs):
     assert not any(path.exists() for path in outputs.values())
 
 
+@pytest.mark.skipif(not blas(), reason="This numpy has a BLAS that knows one thread only.")
 @pytest.mark.parametrize("ends", ["well", "badly"])
 def test_libraries_have_one_thread_during_a_run_and_as_many_as_before_afterwards(run, scene, new_feedback, ends):
     seen, feedback, before = set(), new_feedback(1 if ends == "badly" else None), [one.get() for one in blas()]
