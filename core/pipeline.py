@@ -29,7 +29,7 @@ from .squares.grid import Key, MemorySource, PointSource, Square, around, assemb
 from .squares.pieces import SquareRails, rows_in_frame
 from .squares.remeasuring import measure_rails
 from .squares.spool import SpooledFile, SpooledPoints, gather, spool_file
-from .standard_checks import head_widths, warn_of_gauge
+from .standard_checks import head_widths, warn_of_gauge, warn_of_spacing
 from .steps import (
     clean_square,
     engine_for,
@@ -249,7 +249,8 @@ def _walk(
         centerlines = tracks_of(rails, parameters, pairing)
     except NoTrackError as error:
         told = f"No track of {1000 * parameters.gauge_m:.0f} mm gauge found."
-        runner.failures.append(told if is_warned else str(error))
+        is_asked = is_warned or warn_of_spacing(sources[0], parameters, progress)
+        runner.failures.append(told if is_asked else str(error))
     progress.info(f"Paired: {_lengths(centerlines, 'track')}.")
     rails = with_tracks(rails, centerlines, progress)
     warn_of_split_classes(rails, parameters, progress)

@@ -255,7 +255,7 @@ class Request:
             return NoRailPointsError(
                 f"All points of the cloud are marked as {flags}: export the valid points without this mark."
             )
-        found = ", ".join(f"{code} ({census[code]})" for code in np.flatnonzero(census))
+        found = ", ".join(f"{code} ({census[code]:,})" for code in np.flatnonzero(census))
         airborne = f" For an airborne cloud, use {AIRBORNE}." if self.is_airborne else ""
         return UnclassifiedError(
             f"The cloud has no points of class {wanted}; its classes, with the number of points, are {found}: set the "

@@ -290,7 +290,7 @@ def test_a_3d_view_opens_on_the_lines(run_scenario):
 
 def test_a_clicked_rail_grows_and_is_classified(run_scenario):
     session = run_scenario("growing")
-    assert session["said beside"].startswith("No railhead within 25 cm of the click that stands ")
+    assert session["said beside"].startswith("No railhead within 25 cm of the click: zoom in")
     assert session["said"].startswith("Followed 1")
     assert session["left after undo"] == session["left after the dialog"] == 1
     assert session["standard"] == "IN_75R_1000"

@@ -158,7 +158,7 @@ FAULTS = [
         "class without points",
         with_(RAIL_CLASSES="11"),
         REFUSED,
-        "The cloud has no points of class 11; its classes, with the number of points, are 10 (3600): set the rail "
+        "The cloud has no points of class 11; its classes, with the number of points, are 10 (3,600): set the rail "
         "classes or, if nobody has classified the cloud, CLASSIFY.",
     ),
     Fault(

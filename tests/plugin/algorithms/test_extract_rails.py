@@ -413,7 +413,7 @@ def test_damaged_file(run, outputs, write_cloud, track, damage, message, suffix)
     [
         ({"RAIL_CLASSES": "ten"}, "RAIL_CLASSES"),
         ({"RAIL_CLASSES": "300"}, "from 0 to 255"),
-        ({"RAIL_CLASSES": "11"}, "its classes, with the number of points, are 10 (7200)"),
+        ({"RAIL_CLASSES": "11"}, "its classes, with the number of points, are 10 (7,200)"),
         ({"STANDARD": "CUSTOM"}, "CUSTOM needs both"),
         ({"STANDARD": "EN_99"}, "STANDARD"),
         ({"GAUGE": 300}, "A gauge of 300 mm is not possible"),
