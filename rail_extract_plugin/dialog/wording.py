@@ -37,7 +37,7 @@ def with_labels(sentence: str, definitions: Definitions, about: str = "") -> str
     sentence : str
     definitions : sequence of QgsProcessingParameterDefinition
     about : str
-        Parameter that the sentence is about. An id is a choice of this one, or of the one that was named last; without
+        Parameter that the sentence is about. An id is a choice of the one that was named last, or of this one; without
         either it is a word as any other, such as CPU.
     """
     labels = {definition.name(): definition.description() for definition in definitions}
@@ -48,7 +48,7 @@ def with_labels(sentence: str, definitions: Definitions, about: str = "") -> str
         if found[0] in labels:
             named = found[0]
             return f'"{labels[named]}"'
-        words = WORDS.get(named, {}).get(found[0])
-        return f'"{words}"' if words else found[0]
+        words = [WORDS[one][found[0]] for one in (named, about) if found[0] in WORDS.get(one, {})]
+        return f'"{words[0]}"' if words else found[0]
 
     return re.sub(NAME, in_words, sentence)
