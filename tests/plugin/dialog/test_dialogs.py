@@ -220,8 +220,9 @@ def test_messages_in_dialogs_use_labels(make):
     algorithm = make("extractrails")
     definitions = algorithm.parameterDefinitions()
     said = "STANDARD CUSTOM needs both: fill in GAUGE and HEAD_WIDTH, not MAX_GAPS or OUTPUT/CRS.gpkg."
-    words = {"CUSTOM": WORDS["STANDARD"]["CUSTOM"], "GAUGE": "Gauge [mm]", "HEAD_WIDTH": "Railhead width [mm]"}
-    shown = re.sub(r"\b(CUSTOM|GAUGE|HEAD_WIDTH)\b", lambda found: f'"{words[found[0]]}"', said)
+    labels = {"STANDARD": "Rail standard", "GAUGE": "Gauge [mm]", "HEAD_WIDTH": "Railhead width [mm]"}
+    words = {"CUSTOM": WORDS["STANDARD"]["CUSTOM"], **labels}
+    shown = re.sub(r"\b(STANDARD|CUSTOM|GAUGE|HEAD_WIDTH)\b", lambda found: f'"{words[found[0]]}"', said)
     assert with_labels(said, definitions) == shown
     assert for_user(said, definitions) == said  # no QGIS with windows runs here
 
