@@ -99,16 +99,17 @@ class SectionView(QWidget):
 
     def _panels(self, picture: Picture) -> Iterator[Panel]:
         """Yield the whole section, and the nearest rail on either side; only one where none is on the other side."""
-        whole, left, right = _boxes(float(self.width()), float(self.height()))
+        whole, one, other = _boxes(float(self.width()), float(self.height()))
         yield Panel(whole, 0.0, 0.0, 2 * REACH_M, WHOLE_HEIGHT_M, tr("left") + " – " + tr("right"))
         is_left = picture.rails[:, 0] < 0
-        heads = [(left, tr("left rail"), is_left), (right, tr("right rail"), ~is_left)]
+        least = HEADS * picture.head_width_m, HEADS_HIGH * picture.head_width_m
+        heads = [(one, tr("left rail"), is_left), (other, tr("right rail"), ~is_left)]
         if is_left.all() or not is_left.any():
-            heads = [(left.united(right), tr("rail"), np.ones_like(is_left))] if len(is_left) else []
+            heads = [(one.united(other), tr("rail"), np.ones_like(is_left))] if len(is_left) else []
         for box, title, side in heads:
             mine = picture.rails[side]
-            place = mine[np.argmin(np.abs(mine[:, 0]))].tolist()
-            yield Panel(box, *place, HEADS * picture.head_width_m, HEADS_HIGH * picture.head_width_m, title)
+            right, up = mine[np.argmin(np.abs(mine[:, 0]))]
+            yield Panel(box, float(right), float(up), *least, title)
 
 
 def _boxes(width: float, height: float) -> tuple[QRectF, QRectF, QRectF]:
