@@ -90,10 +90,6 @@ BEYOND_RING, MAX_BEYOND = (0.53, 0.60), 0.2
 """Distances from the axis at which a flat head has no points, as shares of its width, and their most density there
 compared with that between the corners and the axis: passes 15 mm apart have half of it there."""
 
-PROFILE_SIGMA_M = 0.0003
-"""Standard error of the middle that comes from the outline itself: real heads chain more radii, and are worn."""
-
-
 @dataclass(frozen=True)
 class Middles:
     """Middle of the head at s stations, NaN where the sections do not show it.
@@ -137,7 +133,7 @@ def outline_middles(
         Length of the line.
     head_width_m : float
     seen : (s,) bool array
-        Where the head stands alone and its edges are visible.
+        Where the head stands alone.
     """
     count = station_count(length_m)
     middles = Middles.unknown(count)
@@ -148,7 +144,7 @@ def outline_middles(
     used = (bins >= 0) & seen[station]
     left, up, station, bins = left[used], up[used], station[used], bins[used]
     section: Section | None = None
-    for first, last in _borders(count):
+    for first, last in _borders(station, count):
         here = slice(*np.searchsorted(station, [first, last]))
         counts = np.bincount(bins[here], minlength=grid.size).astype(float)
         if counts.sum() < MIN_SECTION_POINTS:
@@ -168,7 +164,7 @@ def outline_middles(
         is_sharp = np.exp(section.place[5]) < SHARP_NOISE_M
         if is_crowned or not (is_sharp and _is_flat(left[here] - section.place[0], up[here], head_width_m)):
             middles.offset[part] = offset
-        middles.common[part] = np.hypot(np.hypot(scores.common_m, PROFILE_SIGMA_M), PULL_DOUBT * pull)
+        middles.common[part] = np.hypot(scores.common_m, PULL_DOUBT * pull)
         on_crown = np.abs(left[here] - section.place[0]) < FLAT_SHARE * head_width_m
         middles.blur_up[part] = apart_m = _half_apart(_above_crown(left[here], up[here], section.place)[on_crown])
         middles.blur[part] = _blur(
@@ -297,19 +293,25 @@ def likelier_width(lines: Sequence[np.ndarray], xyz: np.ndarray, widths_m: Seque
     for number, line in enumerate(lines):
         own = feet.of(number)
         bins = grid.number(*in_head_frame(own.t, own.across, xyz[own.point, 2], widths_m[0]))
-        for first, last in _borders(station_count(float(length_along(line)[-1]))):
-            here = bins[slice(*np.searchsorted(own.t, [first * STATION_STEP_M, last * STATION_STEP_M]))]
-            counts = np.bincount(here[here >= 0], minlength=grid.size).astype(float)
+        station = own.t[bins >= 0] / STATION_STEP_M
+        for first, last in _borders(station, station_count(float(length_along(line)[-1]))):
+            here = bins[bins >= 0][slice(*np.searchsorted(station, [first, last]))]
+            counts = np.bincount(here, minlength=grid.size).astype(float)
             if counts.sum() >= MIN_SECTION_POINTS:
                 fits = [fit_section(counts, outline, grid) for outline in outlines]
                 likelihood += [log_likelihood(counts, fit, one, grid) for fit, one in zip(fits, outlines)]
     return widths_m[int(np.argmax(likelihood))]
 
 
-def _borders(count: int) -> list[tuple[int, int]]:
-    """Divide stations into sections of about VIEW_STATIONS."""
-    borders = np.linspace(0, count, max(int(round(count / VIEW_STATIONS)), 1) + 1).astype(int)
-    return list(zip(borders[:-1].tolist(), borders[1:].tolist()))
+def _borders(station: np.ndarray, count: int) -> list[tuple[int, int]]:
+    """Divide stations into sections of about VIEW_STATIONS, longer ones where points, at `station`, are few."""
+    ends = np.linspace(0, count, max(int(round(count / VIEW_STATIONS)), 1) + 1).astype(int)
+    borders, before = [0], np.searchsorted(station, ends)
+    for end, points in zip(ends[1:].tolist(), before[1:].tolist()):
+        if points - np.searchsorted(station, borders[-1]) >= MIN_SECTION_POINTS:
+            borders.append(end)
+    borders[max(len(borders) - 1, 1) :] = [count]
+    return list(zip(borders[:-1], borders[1:]))
 
 
 def _pull(station: np.ndarray, is_left: np.ndarray, count: int) -> np.ndarray:
