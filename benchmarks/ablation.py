@@ -16,7 +16,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, is_dataclass
 from functools import wraps
 from types import GeneratorType
 from typing import Any
@@ -25,7 +25,6 @@ from unittest.mock import patch
 import numpy as np
 from golden import TABLE
 from rail_extract.core import pipeline
-from rail_extract.core.classify import settings
 from rail_extract.core.classify.flush import NO_LINES, Flush
 from rail_extract.core.polyline import length_along
 from rail_extract.laboratory.ruler.golden import (
@@ -91,7 +90,6 @@ def _rule(name: str, value: Any, *also: tuple[str, str, Any]) -> Switch:
 
 SWITCHES = (
     _rule("vectorize.open_slips", lambda network, seen: (network, [])),
-    _rule("vectorize.straighten_blots", first),
     _rule("vectorize.cut_kinks", first),
     _rule("vectorize.attach_branches", first),
     _rule("vectorize.free_third_rails", first),
@@ -100,14 +98,14 @@ SWITCHES = (
     _rule("vectorize.resolve_crossings", first),
     _rule("vectorize.joining.HOOKS_M", ((0.0, 0.0),)),
     _rule("vectorize._settle_ends", first),
+    _rule("vectorize.slips._paired", lambda found: list(found)),
+    _rule("lines.bridges._astray", lambda *_: 0),
+    _rule("steps.drawn", lambda *_: np.empty((0, 2))),
     _rule("vectorize.close", first),
     _rule("vectorize.junctions.drop_bubbles", first),
     _rule("vectorize.junctions.drop_rungs", first),
     _rule("vectorize.junctions.drop_spurs", first),
-    _rule("vectorize.repairs.BEND", np.inf),
-    _rule("vectorize.repairs.SWERVE_M", np.inf),
     _rule("steps.parts_without_turns", lambda line, *_: [(0.0, float(length_along(line)[-1]))]),
-    _rule("lines.network_smoothing._continuations", lambda *_: {}),
     _rule("tracks.pairing._without_ghosts", list),
     _rule("tracks.pairing._without_rivals", lambda matches, misfits_m: list(matches)),
     _rule("tracks.pairing._on_one_level", lambda *_: True),
@@ -118,23 +116,30 @@ SWITCHES = (
     _rule("tracks.centerlines.started_abreast", lambda rails: list(rails)),
     _rule("tracks.centerlines.at_gauge", lambda left, right, *_: (left, right)),
     _rule("tracks.centerlines._smoothed", first),
+    _rule("tracks.centerlines.is_closed", never),
+    _rule("tracks.pairing.FINE_STEP_M", 0.5),
+    _rule("tracks.pairing._is_nearest", lambda *_: True),
+    _rule("tracks.pairing.WANDER_WEIGHT", 0.0),
     _rule("tracks.parallels._is_crowded", none_of),
-    _rule("tracks.lone._off_level_m", lambda *_: 0.0),
-    _rule("pipeline.steps_of", nothing),
+    _rule("checks.lines._off_level_m", lambda *_: 0.0),
+    _rule("checks.strips.find_jumps", nothing),
     _rule("classify.square.stands_free", lambda tops, band, marks, lines: all_of(lines)),
     _rule("classify.square.runs_inside", none_of),
     _rule("classify.square.lower_than_beside", none_of),
     _rule("classify.square.centred", first),
     _rule("classify.square._completed", lambda found, kept, *_: np.sort(kept.cell)),
     _rule("classify.square._certain", lambda lines, paired, pairs: all_of(paired)),
-    _rule("classify.pieces.continuing", lambda lines, chosen: chosen),
     _rule("classify.labels._highest_around", lambda image, cells, reach: np.full(len(cells), -(10**6))),
     _rule("classify.labels.UNDER_MEAN_M", 10.0),
     _rule("classify.square.flush_rails", lambda *_: Flush(np.empty(0, dtype=np.int64), NO_LINES, NO_LINES)),
     _rule("classify.square.SINGLE_SLOPE", np.inf),
     _rule("classify.square.SINGLE_HEIGHT_M", 0.0),
     _rule("classify.square.LEAST_SINGLE_WIDTH", 0.0),
-    _rule("classify.square.DENSE", replace(settings.DENSE, width_rounds=1)),
+    _rule("classify.square.LEAST_BLUNT_HEIGHT_M", 0.0),
+    _rule("classify.partner._majority", first),
+    _rule("classify.labels.MIN_AXES", 1),
+    _rule("classify.flush.CROWD", 10**6),
+    _rule("classify.tops._around", first),
 )
 
 
@@ -193,14 +198,14 @@ def ablate(task: tuple[str, Sequence[str], str]) -> dict[str, list[Difference]]:
     tolerances = Golden(TABLE).tolerances
     with patch.object(pipeline, "clean_square", _remembering(pipeline.clean_square)):
         with _watched(chosen, effective):
-            before = figures_of(place, scene, variant.model)
+            before = figures_of(place, scene, variant)
         found = {}
         for switch in (switch for switch in chosen if switch.name in effective):
             with ExitStack() as stack:
                 for module, attribute, value in switch.off:
                     stack.enter_context(patch.object(_module(module), attribute, value))
                 try:
-                    now = figures_of(place, scene, variant.model)
+                    now = figures_of(place, scene, variant)
                 except Exception as error:  # noqa: BLE001 - whatever happens without a rule is its effect
                     print(f"{place} without {switch.name}: {error}", file=sys.stderr)
                     now = {}

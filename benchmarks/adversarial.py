@@ -14,7 +14,7 @@ from rail_extract.core.pipeline import extract_rails
 from rail_extract.core.rails import RailNetwork
 from rail_extract.core.report.findings import examine
 from rail_extract.core.report.verdict import verdict
-from rail_extract.laboratory.ruler.golden import build_scene, line_figures, parameters_of
+from rail_extract.laboratory.ruler.golden import Variant, build_scene, line_figures, parameters_of
 from rail_extract.laboratory.scenes.adversarial import ADVERSARIAL
 from rail_extract.laboratory.scenes.scene import Scene
 
@@ -35,7 +35,7 @@ def main() -> None:
     print(*HEADINGS, sep="\n")
     for name in arguments.scenes or ADVERSARIAL:
         scene = build_scene(name)
-        network = extract_rails([scene.rail_points()], parameters_of(scene, arguments.model))
+        network = extract_rails([scene.rail_points()], parameters_of(scene, Variant("", model=arguments.model)))
         print(row(scene, network), flush=True)
         print(name, file=sys.stderr, flush=True)
 

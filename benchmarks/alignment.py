@@ -3,7 +3,8 @@
 Run `python benchmarks/alignment.py [--designs N]`. Every row has N chains of 100 elements, with a point every metre.
 The first rows have white noise only, the next ones misalignment that neighbours share as well, then there are 8 short
 tracks of 24 elements, and the last row is 20 km in one piece. With `--given`, the rows with white noise are fitted with
-the types of the true elements: what the points allow, if no element is missed.
+the types of the true elements: what the points allow, if no element is missed. With `--bound`, the least errors are
+computed that any such fit can have.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import argparse
 import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from rail_extract.core.alignment.elements import Alignment
@@ -19,7 +21,7 @@ from rail_extract.core.alignment.given import noted
 from rail_extract.core.alignment.measured import Track
 from rail_extract.core.parameters import FitParameters
 from rail_extract.laboratory.designs import FAMILIES, Family, random_design, surveyed
-from rail_extract.laboratory.ruler.alignments import Met, compared, together
+from rail_extract.laboratory.ruler.alignments import Met, bound_of, compared, quantiles, together
 
 SEED = 33_2026
 """Different from the seeds of the other benchmarks."""
@@ -43,9 +45,22 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--designs", type=int, default=2, help="number of chains in each row")
+    parser.add_argument(
+        "--seed", type=int, default=SEED, help="of the random designs and errors (default: %(default)s)"
+    )
     parser.add_argument("--given", action="store_true", help="give the fit the types of the true elements")
+    parser.add_argument("--bound", action="store_true", help="print the least errors of white noise instead")
     args = parser.parse_args()
+    if args.bound:
+        print_bounds(args.seed, args.designs)
+    else:
+        print_rows(args)
+
+
+def print_rows(args: argparse.Namespace) -> None:
+    """Fit the designs, and print the rows."""
     count = args.designs
+    row = partial(row_of, args.seed)
     print(HEAD)
     for name, family in FAMILIES.items():
         print(row(name, [family] * count, WHITE_M, (0.0, 15.0), given=args.given), flush=True)
@@ -70,7 +85,22 @@ HEAD = (
 )
 
 
-def row(
+def print_bounds(seed: int, count: int) -> None:
+    """Print median and 90 % of the least errors of radii and tangent points with white noise."""
+    print(f"{'':<20}{'radius %':>9}{'90 %':>7}{'tangent point m':>18}{'90 %':>7}")
+    for name, family in FAMILIES.items():
+        bounds = []
+        for number in range(count):
+            random = np.random.default_rng([seed, number])
+            design = random_design(random, family, 100)
+            bounds.append(bound_of(design, surveyed(design, random, 0.0), WHITE_M))
+        radius = quantiles(np.concatenate([one.radius for one in bounds]), (0.5, 0.9))
+        ends = quantiles(np.concatenate([one.ends_m for one in bounds]), (0.5, 0.9))
+        print(f"{name:<20}{100 * radius[0]:>9.3f}{100 * radius[1]:>7.2f}{ends[0]:>18.3f}{ends[1]:>7.2f}", flush=True)
+
+
+def row_of(
+    seed: int,
     title: str,
     families: list[Family],
     white_m: float,
@@ -83,6 +113,7 @@ def row(
 
     Parameters
     ----------
+    seed : int
     title : str
     families : list of Family
         One for each design.
@@ -97,7 +128,7 @@ def row(
     """
     met, seconds, kilometres = [], 0.0, 0.0
     for number, family in enumerate(families):
-        random = np.random.default_rng([SEED, number])
+        random = np.random.default_rng([seed, number])
         design = random_design(random, family, elements if length_m is None else 300)
         if length_m is not None:
             design = shortened(design, length_m)

@@ -1,6 +1,7 @@
 """Run every scene and compare its figures with `golden.json`, or write them there.
 
 Run `python benchmarks/golden.py [SCENE ...] [--all] [--write]`. `--all` adds the base model and three other seeds.
+Scenes with PyTorch are run where it is installed.
 """
 
 from __future__ import annotations
@@ -10,11 +11,13 @@ import multiprocessing
 import os
 import sys
 from concurrent.futures import ProcessPoolExecutor
+from importlib.util import find_spec
 from pathlib import Path
 
 from rail_extract.laboratory.ruler.golden import (
     PLACES,
     PLAIN,
+    TORCH,
     VARIANTS,
     Figures,
     Golden,
@@ -39,9 +42,9 @@ def main() -> None:
     golden = Golden(TABLE)
     keys = [
         (variant, place)
-        for variant in (VARIANTS if arguments.all else (PLAIN,))
-        for place in arguments.scenes or PLACES
-        if not (variant.model != PLAIN.model and place.startswith("raw "))
+        for variant in (VARIANTS if arguments.all else (PLAIN, TORCH))
+        for place in variant.places
+        if place in (arguments.scenes or PLACES) and (variant.engine != TORCH.engine or find_spec("torch"))
     ]
     different = 0
     with ProcessPoolExecutor(arguments.workers, multiprocessing.get_context("spawn")) as pool:
@@ -60,7 +63,7 @@ def main() -> None:
 def _run(key: Key) -> Figures:
     """Run one scene; a task of a worker."""
     variant, place = key
-    return figures_of(place, build_scene(place, variant.seed_shift), variant.model)
+    return figures_of(place, build_scene(place, variant.seed_shift), variant)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Files for design software as the last step of a run: which format, what a file states, and where its tracks lie."""
+"""Files for design software as the last step of a run: which format, what a file states, and where its tracks are."""
 
 from __future__ import annotations
 
@@ -112,6 +112,6 @@ def check_place(name: str, frame: LocalFrame, east_first: bool, progress: Progre
     if lies_in_area(crs, (y, x)):
         first, remedy = ("northing", "leave EAST_FIRST off") if east_first else ("easting", "set EAST_FIRST")
         raise AlignmentFileError(
-            f"{name} lies in the area of {name_of(crs)} if its points are written {first} first: {remedy}."
+            f"{name} is in the area of {name_of(crs)} if its points are written {first} first: {remedy}."
         )
-    progress.warning(f"{name} lies outside the area of {name_of(crs)}: check its coordinate system.")
+    progress.warning(f"{name} is outside the area of {name_of(crs)}: check its coordinate system.")

@@ -31,12 +31,23 @@ class ParameterError(RailExtractError):
     """A parameter is out of range or contradicts another."""
 
 
+class MissingError(ParameterError):
+    """A layer has no feature of the kind that a parameter needs.
+
+    >>> str(MissingError("AXIS", "line"))
+    'AXIS has no lines: give a line layer.'
+    """
+
+    def __init__(self, name: str, kind: str) -> None:
+        super().__init__(f"{name} has no {kind}s: give a {kind} layer.")
+
+
 class OffRailError(RailExtractError):
-    """No seed lies on a rail."""
+    """No seed is on a rail."""
 
 
 class OffCloudError(ParameterError):
-    """No seed lies in the cloud."""
+    """No seed is in the cloud."""
 
 
 class RasterError(RailExtractError):

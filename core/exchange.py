@@ -163,11 +163,6 @@ def write_alignments(path: Path, alignments: Sequence[Alignment]) -> None:
 
     The curve of track 7 is on the layer ALIGNMENT_7, the elements are on PLAN_7, PROFILE_7 and CANT_7.
 
-    Parameters
-    ----------
-    path : Path
-    alignments : sequence of Alignment
-
     Raises
     ------
     OSError

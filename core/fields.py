@@ -265,7 +265,7 @@ ELEMENT_FIELDS = (
     Field("joint", str, "how the element begins: G2 if curvature, gradient or cant continue, G1 if they jump"),
     Field("r_round_m", float, "proposed round radius, metres; empty if none fits the measured track", 3),
     Field("dev_rms_round_mm", float, "dev_rms_mm with the round radii, millimetres", 2),
-    Field("r_fit_m", float, "radius of an arc as fitted; the next fit holds r1_m where you change it", 4),
+    Field("r_fit_m", float, "radius of an arc or a parabola as fitted; the next fit holds r1_m where you change it", 4),
     Field("s_fit_m", float, "s_from as fitted; the next fit holds s_from where you change it", 4),
 )
 """The element table: `alignment.table` writes and reads its rows. A shapefile cuts its long names."""

@@ -156,10 +156,6 @@ def extract(
     **parameters
         Fields of `Parameters`, such as `max_gap_m=8.0`.
 
-    Returns
-    -------
-    Network
-
     Raises
     ------
     RailExtractError

@@ -10,6 +10,7 @@ while a run needs it, and restored by the last of the runs that overlap.
 from __future__ import annotations
 
 import ctypes
+import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -34,6 +35,22 @@ ENVIRONMENT = {
 """Variables of a worker process. The first keep it on one core: there are as many workers as cores. The last are the
 bytes of freed memory that glibc keeps, and the largest array that it takes from them: otherwise each array returns to
 the system, which clears the memory before it lends it again, at a tenth of the run time."""
+
+
+MOST_THREADS = 4
+"""Threads of a process that compute at a time: each keeps arrays of some 100 MB, and the network, which they share, is
+half of the time that a short track takes."""
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def threads() -> int:
+    """Return the number of threads on which this process computes: OMP_NUM_THREADS limits it, as in workers."""
+    limit = os.environ.get("OMP_NUM_THREADS", "")
+    return min(cores(), MOST_THREADS, int(limit) if limit.isdigit() and int(limit) else MOST_THREADS)
 
 
 @dataclass(frozen=True)

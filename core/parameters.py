@@ -28,7 +28,7 @@ METHODS = (GEOMETRY, LEARNED)
 
 JUMPS, CLOTHOIDS = "JUMPS", "CLOTHOIDS"
 TRANSITIONS = (JUMPS, CLOTHOIDS)
-"""Whether the curvature may jump, as in turnouts and sidings, or a clothoid lies between any two radii."""
+"""Whether the curvature may jump, as in turnouts and sidings, or a clothoid is between any two radii."""
 
 AIRBORNE_CLASSES = (1, 2)
 """Classes of an airborne cloud in which tracks are looked for: unclassified and ground."""
@@ -171,7 +171,7 @@ class FitParameters:
     Attributes
     ----------
     tolerance_m : float
-        How far the track may lie off its design: the largest standard deviation of misalignment that is told from
+        How far the track may be off its design: the largest standard deviation of misalignment that is told from
         design.
     min_length_m : float
         Least length of an element.

@@ -12,6 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from .checks.lines import warn_of_rails, warn_of_split_classes, with_tracks
+from .checks.standard import head_widths, warn_of_gauge
+from .checks.strips import doubting_jumps, strip_courses, warn_of_strips
 from .classify.settings import Settings
 from .clouds.las import CloudHeader
 from .clouds.points import RailPoints, Request
@@ -29,25 +32,11 @@ from .squares.grid import Key, MemorySource, PointSource, Square, around, assemb
 from .squares.pieces import SquareRails, rows_in_frame
 from .squares.remeasuring import measure_rails
 from .squares.spool import SpooledFile, SpooledPoints, gather, spool_file
-from .standard_checks import head_widths, warn_of_gauge
-from .steps import (
-    clean_square,
-    engine_for,
-    rails_of_square,
-    square_side,
-    tracks_of,
-    warn_of_rails,
-    warn_of_split_classes,
-    warn_of_steps,
-    warn_of_strips,
-    whole_rails,
-    with_tracks,
-)
+from .steps import clean_square, engine_for, rails_of_square, square_side, tracks_of, whole_rails
 from .tasks import READ_S, Context, InTurn, Runner, Task
 from .tracks.geometry import measure_track_geometry
-from .tracks.jumps import doubting_steps, steps_of
-from .tracks.strip_courses import strip_courses
-from .tracks.widths_by_gauge import widths_by_gauge
+from .tracks.parallels import widths_by_gauge
+from .tracks.scatter import doubting_scatter, gauge_scatter
 
 READING, DRAWING, PAIRING, MEASURING = 0.2, 0.72, 0.04, 0.04
 """Run times of the steps relative to each other, for the progress: sorting files, squares, tracks, track geometry."""
@@ -74,10 +63,6 @@ def extract_rails(
         From `points.read_rail_points` or `spool.spool`: one per class, all in one frame.
     parameters : Parameters
     progress : Progress
-
-    Returns
-    -------
-    RailNetwork
 
     Raises
     ------
@@ -140,16 +125,12 @@ def extract_files(
         Places on railheads, k = 1, or lines along them, in units of the CRS, if only the rails that grow from these
         are to be extracted; the request is for the same classes.
 
-    Returns
-    -------
-    RailNetwork
-
     Raises
     ------
     CloudError
         A file is damaged; if the runner tolerates that, all of them are.
     NoRailPointsError
-        No point of the requested classes lies in the files and the extent.
+        No point of the requested classes is in the files and the extent.
     DiskError
         The disk is full.
     ModelError, Cancelled
@@ -169,6 +150,9 @@ def extract_files(
                 own = GrowSettings(parameters.gauge_m, parameters.head_width_m)
                 source, figures = spool_grown(request, seeds, own, side_m, scratch, reading)
             network = _walk([source], parameters, runner, rest)
+        if classify and network.heads is not None and network.heads.blunt:
+            # Only its partner tells a blunt rail from other ridges, and the user has been told so.
+            network = replace(network, rails=tuple(rail for rail in network.rails if rail.track_ids))
         return replace(network, warnings=recording.warnings, search=figures)
     is_warned = warn_of_gauge(request, parameters, progress)
     count = sum(header.point_count for header in request.headers)
@@ -250,11 +234,11 @@ def _walk(
     rails = with_tracks(rails, centerlines, progress)
     warn_of_split_classes(rails, parameters, progress)
     warn_of_strips(rails, parameters, progress)
-    stepping = steps_of(centerlines, rails)
-    warn_of_steps(stepping, progress)
-    rails = doubting_steps(rails, stepping)
+    rails = doubting_jumps(rails, centerlines, progress)
     heads = head_widths(sources[0], parameters.gauges, progress, rails) if rails else None
-    geometry = _measure_tracks(centerlines, rails, sources, parameters, runner, measuring)
+    beyond_m = gauge_scatter(rails, centerlines) if heads and heads.blunt else {}
+    rails = doubting_scatter(rails, beyond_m)
+    geometry = _measure_tracks(centerlines, rails, beyond_m, sources, parameters, runner, measuring)
     if geometry:
         count = sum(len(track.chainage_m) for track in geometry)
         progress.info(f"Measured: {counted(count, 'station')}, one every {parameters.quality_step_m:g} m.")
@@ -372,18 +356,20 @@ def _describe_engine(parameters: Parameters, context: Context) -> str:
 def _measure_tracks(
     centerlines: Sequence[Centerline],
     rails: Sequence[RailLine],
+    beyond_m: Mapping[int, float],
     sources: Sequence[PointSource],
     parameters: Parameters,
     runner: Runner,
     progress: Progress,
 ) -> list[TrackGeometry]:
-    """Measure the geometry of all tracks, class by class, if it is asked for."""
+    """Measure the geometry of all tracks, class by class, if it is asked for; see `gauge_scatter` for `beyond_m`."""
     if parameters.quality_step_m is None:
         return []
     remeasuring, stations = progress.divide((REMEASURE, STATIONS))
     align = parameters.strips == ALIGNED
     heads_m = widths_by_gauge(rails, parameters.gauges, parameters.centerline_tolerance_m)
     measured = measure_rails(rails, sources, heads_m, runner, remeasuring, align)
+    measured = doubting_scatter(measured, beyond_m)
     geometry: list[TrackGeometry] = []
     for source, share in zip(sources, stations.split(len(sources))):
         geometry += measure_track_geometry(

@@ -31,6 +31,9 @@ CLOSED_M = 0.01
 MIN_RING_M = 10.0
 """Shortest closed rail: no track turns round in less."""
 
+SAME_PLACE_M = 1e-9
+"""Vertices closer than this along a line are the same."""
+
 NORTH_TANGENT = np.tan(np.radians(1.0))
 """Lines within one degree of north start at their southern end, all others at their western end."""
 
@@ -104,6 +107,17 @@ def interpolate(values: np.ndarray, along: np.ndarray, t: np.ndarray) -> np.ndar
     (m, d) array
     """
     return np.column_stack([np.interp(t, along, column) for column in values.T])
+
+
+def part(vertices: np.ndarray, start: float, end: float) -> np.ndarray:
+    """Return the part of a polyline, (n, d), between two plan chainages, with vertices at both, (m, d).
+
+    >>> part(np.array([[0.0, 0.0], [4.0, 0.0], [9.0, 0.0]]), 3.0, 5.0)[:, 0].tolist()
+    [3.0, 4.0, 5.0]
+    """
+    along = length_along(vertices[:, :2])
+    inner = along[(along > start + SAME_PLACE_M) & (along < end - SAME_PLACE_M)]
+    return interpolate(vertices, along, np.concatenate([[start], inner, [end]]))
 
 
 def unit_tangents(vertices: np.ndarray) -> np.ndarray:
@@ -232,7 +246,7 @@ class _Stations:
     def _foot(self, xy: np.ndarray, segment: np.ndarray) -> np.ndarray:
         """Return t and across of each point's foot on one segment, (2, k); inf where there is none.
 
-        A foot may lie up to 1 % of the segment's length past its ends, so that no point outside a bend is lost.
+        A foot may be up to 1 % of the segment's length past its ends, so that no point outside a bend is lost.
         """
         start, end = np.maximum(segment, 0), np.minimum(segment + 1, len(self.t) - 1)
         a, b = self.tree.data[start], self.tree.data[end]

@@ -7,11 +7,8 @@ from dataclasses import astuple, dataclass, field, replace
 import numpy as np
 
 from .frame import LocalFrame
-from .polyline import length_along
+from .polyline import length_along, part
 from .raster import RailRaster
-
-SAME_PLACE_M = 1e-9
-"""Vertices closer than this along a line are the same."""
 
 NO_GAPS = np.empty((0, 2))
 
@@ -151,21 +148,18 @@ class RailLine:
 
     def between(self, start: float, end: float) -> RailLine:
         """Return the part between two plan chainages, with the share of the points that its stations count."""
-        along = length_along(self.xyz[:, :2])
-        if start <= 0.0 and end >= along[-1]:
+        length_m = float(length_along(self.xyz[:, :2])[-1])
+        if start <= 0.0 and end >= length_m:
             return self
-        start, end = max(start, 0.0), min(end, float(along[-1]))
-        inner = (along > start + SAME_PLACE_M) & (along < end - SAME_PLACE_M)
-        t = np.concatenate([[start], along[inner], [end]])
-        xyz = np.column_stack([np.interp(t, along, column) for column in self.xyz.T])
+        start, end = max(start, 0.0), min(end, length_m)
         gaps = np.clip(self.gaps, start, end)
         gaps = gaps[gaps[:, 1] > gaps[:, 0]] - start
-        support, share = None, (end - start) / along[-1]
+        support, share = None, (end - start) / length_m
         if self.support is not None:
             last = np.inf if end >= self.support.t[-1] else end
             support = self.support.select((self.support.t >= start) & (self.support.t < last), start)
             share = support.points.sum() / max(self.support.points.sum(), 1)
-        return replace(self, xyz=xyz, points=self.points * share, gaps=gaps, support=support)
+        return replace(self, xyz=part(self.xyz, start, end), points=self.points * share, gaps=gaps, support=support)
 
     def part(self, start: float, end: float) -> RailLine:
         """Return the part between two plan chainages as a rail of its own, with its own figures."""
@@ -219,11 +213,8 @@ class Centerline:
 
     def part(self, start: float, end: float) -> Centerline:
         """Return the part between two plan chainages, with the means of the whole line."""
-        along = length_along(self.xyz[:, :2])
-        inner = along[(along > start + SAME_PLACE_M) & (along < end - SAME_PLACE_M)]
-        t = np.concatenate([[start], inner, [end]])
-        xyz = np.column_stack([np.interp(t, along, column) for column in self.xyz.T])
-        return replace(self, xyz=xyz, bridged_m=self.bridged_m * (end - start) / along[-1])
+        share = (end - start) / length_along(self.xyz[:, :2])[-1]
+        return replace(self, xyz=part(self.xyz, start, end), bridged_m=self.bridged_m * share)
 
 
 def cell_borders(chainage: np.ndarray) -> np.ndarray:
@@ -377,11 +368,12 @@ HEAD_OFF_M = 0.005
 class HeadWidths:
     """Width of the railheads as the points show it, NaN if they do not, and as it is stated, metres.
 
-    Blunt heads show no width: they are round ridges, which beams or images have blurred.
+    Heads that are `blunt` show no width: they are round ridges, which beams or images have blurred.
     """
 
     seen_m: float
     stated_m: float
+    blunt: bool = False
 
     @property
     def differ(self) -> bool:

@@ -20,7 +20,7 @@ CENTRE_SPACING_CELLS = 37.78
 """Cells between the two railhead centres: 1511.2 mm (132RE) in cells of 40 mm, the example of Gribov and Chang."""
 
 BORDER_CELLS = 1e-6
-"""A point this close to a cell border belongs to the next cell: files store millimetres, so points lie on borders, and
+"""A point this close to a cell border belongs to the next cell: files store millimetres, so points are on borders, and
 the rounding of the last bit must not decide on the cell."""
 
 POINTS_AT_ONCE = 1_000_000

@@ -49,7 +49,7 @@ class RasterHeader:
         Name of the weights that fit these rails.
     extent : tuple of float or None
         Smallest x, smallest y, largest x, largest y of the extent to which the points were restricted, in units of the
-        coordinate system. Lines end there and ignore what lies beyond.
+        coordinate system. Lines end there and ignore what is beyond.
     """
 
     class_codes: tuple[int, ...]

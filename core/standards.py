@@ -1,10 +1,7 @@
 """Rail standards: gauge and railhead width by name.
 
-Head widths come from tables of rail sections: Wirth Rail (American rails), "Rail section properties" (AREMA 2015,
-EN 13674-1, AS 1085, JIS), AGICO (Australian rails), IIT Kanpur (Indian rails), cranerailclips (EN rails) and
-chinarailfastener (Chinese rails); IN_75R_1000 is the example of Gribov and Chang. The tables differ by 1 to 3 mm,
-because they measure at different places on the head. Widths that no table confirms are marked. See docs/method.md
-section 10.
+Head widths come from tables of rail sections, which differ by 1 to 3 mm because they measure at different places on the
+head. See docs/method.md section 10.
 """
 
 from __future__ import annotations
@@ -52,6 +49,8 @@ class RailStandard:
     gauge_m, head_width_m : float
     region : str
         Where the profile is laid; empty for CUSTOM.
+    sources : str
+        Letters of `SOURCES` that confirm the width of the head; empty if none does.
     """
 
     name: str
@@ -59,6 +58,7 @@ class RailStandard:
     gauge_m: float
     head_width_m: float
     region: str = ""
+    sources: str = ""
 
     @property
     def profile(self) -> str:
@@ -73,45 +73,56 @@ class RailStandard:
 
 UNCONFIRMED = " (unconfirmed width)"
 
-# profile, name to show to users, head width in mm, whether a table confirms the width, gauges in mm
+SOURCES = {
+    "W": "Wirth Rail, American rails",
+    "P": "Rail section properties (AREMA 2015, EN 13674-1, AS 1085, JIS)",
+    "X": "cranerailclips, EN rails",
+    "A": "AGICO, Australian rails",
+    "K": "IIT Kanpur, Indian rails",
+    "C": "chinarailfastener and railroad-fastener, Chinese rails",
+    "G": "the example of Gribov and Chang",
+}
+"""Tables of rail sections that confirm head widths, by their letter."""
+
+# profile, name to show to users, head width in mm, letters of the tables that confirm it, gauges in mm
 _PROFILES = (
-    ("US_90ARAA", "US 90 ARA-A", 65.09, True, (1435,)),
-    ("US_100ARAA", "US 100 ARA-A", 69.85, True, (1435,)),
-    ("US_100RE", "US 100RE", 68.26, True, (1435,)),
-    ("US_115RE", "US 115RE", 69.06, True, (1435,)),
-    ("US_119RE", "US 119RE", 67.47, True, (1435,)),
-    ("US_132RE", "US 132RE", 76.20, True, (1435,)),
-    ("US_133RE", "US 133RE", 76.20, True, (1435,)),
-    ("US_136RE", "US 136RE", 74.61, True, (1435,)),
-    ("US_141RE", "US 141RE", 77.79, True, (1435,)),
-    ("EN_45E1", "EN 45E1 (BS 90A)", 66.6, True, (1435,)),
-    ("EN_46E2", "EN 46E2 (U33)", 62.0, True, (1435,)),
-    ("EN_49E1", "EN 49E1 (S49)", 67.0, True, (1435, 1000)),
-    ("EN_50E2", "EN 50E2", 72.0, True, (1435,)),
-    ("EN_50E4", "EN 50E4", 70.0, True, (1435,)),
-    ("EN_50E6", "EN 50E6 (U50)", 65.0, True, (1435,)),
-    ("EN_54E1", "EN 54E1 (UIC 54)", 70.0, True, (1435, 1600, 1668, 1000)),
-    ("EN_60E1", "EN 60E1 (UIC 60)", 72.0, True, (1435, 1668)),
-    ("BS_113A", "BS 113A (56E1)", 69.85, False, (1435,)),
-    ("GB_50", "GB 50 kg/m", 70.0, True, (1435,)),
-    ("GB_60", "GB 60 kg/m", 73.0, False, (1435,)),
-    ("GB_75", "GB 75 kg/m", 75.0, True, (1435,)),
-    ("AS_60", "AS 60 kg/m", 70.0, True, (1435, 1067, 1600)),
-    ("AS_68", "AS 68 kg/m", 74.6, True, (1435,)),
-    ("JIS_60", "JIS 60 kg", 65.0, True, (1435, 1067)),
-    ("JIS_40N", "JIS 40N", 64.0, True, (1067,)),
-    ("JIS_37A", "JIS 37A", 62.71, True, (1067,)),
-    ("AS_41", "AS 41 kg/m", 63.5, True, (1067,)),
-    ("IN_52KG", "India 52 kg", 67.0, True, (1676,)),
-    ("IN_60KG", "India 60 kg", 72.0, True, (1676,)),
-    ("IN_90R", "India 90R", 66.7, True, (1676, 1000)),
-    ("IN_75R", "India 75R", 61.91, True, (1000,)),
-    ("IN_60R", "India 60R", 57.15, False, (1000,)),
-    ("RU_R50", "Russia R50", 72.0, False, (1520,)),
-    ("RU_R65", "Russia R65", 75.0, False, (1520,)),
-    ("S33", "S33", 58.0, False, (1000,)),
-    ("S41", "S41", 67.0, False, (1000,)),
-    ("EN_46E1", "EN 46E1 (SBB I)", 65.0, False, (1000,)),
+    ("US_90ARAA", "US 90 ARA-A", 65.09, "W", (1435,)),
+    ("US_100ARAA", "US 100 ARA-A", 69.85, "W", (1435,)),
+    ("US_100RE", "US 100RE", 68.26, "W", (1435,)),
+    ("US_115RE", "US 115RE", 69.06, "W, P", (1435,)),  # Esri's tool: 66.675
+    ("US_119RE", "US 119RE", 67.47, "W", (1435,)),
+    ("US_132RE", "US 132RE", 76.20, "W, G", (1435,)),
+    ("US_133RE", "US 133RE", 76.20, "W", (1435,)),
+    ("US_136RE", "US 136RE", 74.61, "W, P", (1435,)),
+    ("US_141RE", "US 141RE", 77.79, "W, P", (1435,)),
+    ("EN_45E1", "EN 45E1 (BS 90A)", 66.6, "X", (1435,)),
+    ("EN_46E2", "EN 46E2 (U33)", 62.0, "X", (1435,)),
+    ("EN_49E1", "EN 49E1 (S49)", 67.0, "X", (1435, 1000)),
+    ("EN_50E2", "EN 50E2", 72.0, "X", (1435,)),
+    ("EN_50E4", "EN 50E4", 70.0, "X", (1435,)),
+    ("EN_50E6", "EN 50E6 (U50)", 65.0, "X", (1435,)),
+    ("EN_54E1", "EN 54E1 (UIC 54)", 70.0, "P, X", (1435, 1600, 1668, 1000)),
+    ("EN_60E1", "EN 60E1 (UIC 60)", 72.0, "P", (1435, 1668)),  # 74.3 at the widest point in K and C
+    ("BS_113A", "BS 113A (56E1)", 69.85, "", (1435,)),
+    ("GB_50", "GB 50 kg/m", 70.0, "C", (1435,)),
+    ("GB_60", "GB 60 kg/m", 73.0, "", (1435,)),
+    ("GB_75", "GB 75 kg/m", 75.0, "C", (1435,)),
+    ("AS_60", "AS 60 kg/m", 70.0, "P, A", (1435, 1067, 1600)),
+    ("AS_68", "AS 68 kg/m", 74.6, "P", (1435,)),  # 73 in A
+    ("JIS_60", "JIS 60 kg", 65.0, "P", (1435, 1067)),
+    ("JIS_40N", "JIS 40N", 64.0, "P", (1067,)),
+    ("JIS_37A", "JIS 37A", 62.71, "P", (1067,)),
+    ("AS_41", "AS 41 kg/m", 63.5, "A", (1067,)),
+    ("IN_52KG", "India 52 kg", 67.0, "K", (1676,)),
+    ("IN_60KG", "India 60 kg", 72.0, "P", (1676,)),  # 74.3 at the widest point in K
+    ("IN_90R", "India 90R", 66.7, "K", (1676, 1000)),
+    ("IN_75R", "India 75R", 61.91, "G", (1000,)),
+    ("IN_60R", "India 60R", 57.15, "", (1000,)),
+    ("RU_R50", "Russia R50", 72.0, "", (1520,)),  # a trader: 70
+    ("RU_R65", "Russia R65", 75.0, "", (1520,)),  # about 73 at the top
+    ("S33", "S33", 58.0, "", (1000,)),
+    ("S41", "S41", 67.0, "", (1000,)),
+    ("EN_46E1", "EN 46E1 (SBB I)", 65.0, "", (1000,)),
 )
 
 
@@ -132,12 +143,12 @@ _REGIONS = {
 
 def _standards() -> dict[str, RailStandard]:
     table = {}
-    for profile, label, head_width_mm, confirmed, gauges_mm in _PROFILES:
+    for profile, label, head_width_mm, sources, gauges_mm in _PROFILES:
         for gauge_mm in gauges_mm:
             name = f"{profile}_{gauge_mm}"
-            text = f"{label}, {gauge_mm} mm" + ("" if confirmed else UNCONFIRMED)
+            text = f"{label}, {gauge_mm} mm" + ("" if sources else UNCONFIRMED)
             region = _REGIONS[profile.split("_")[0]]
-            table[name] = RailStandard(name, text, gauge_mm / 1000, head_width_mm / 1000, region)
+            table[name] = RailStandard(name, text, gauge_mm / 1000, head_width_mm / 1000, region, sources)
     return table
 
 
@@ -150,8 +161,6 @@ SAME_M = 0.002
 
 STANDARDS = _standards()
 """All standards by name, except CUSTOM."""
-
-UNCONFIRMED_PROFILES = tuple(profile for profile, _, _, confirmed, _ in _PROFILES if not confirmed)
 
 
 def resolve(name: str, gauge_mm: float | None = None, head_width_mm: float | None = None) -> RailStandard:

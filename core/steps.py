@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from .classify.thin import SURROUNDINGS_M, drawn
 from .clouds.points import RailPoints
@@ -18,11 +17,9 @@ from .frpdf.cleanup import MARGIN, clean, max_passes
 from .frpdf.engine import Engine, make_engine
 from .frpdf.models import choose
 from .frpdf.weights import load_arrays
-from .heads.edges import STATION_STEP_M
 from .heads.elevation import ElevationParameters, elevate, flat_rail, flat_rails, numbered
 from .heads.refinement import refine
 from .heads.roads import onto_heads
-from .heads.smoothing_check import warn_if_out_of_reach
 from .heads.strips import rows_of, strips_along
 from .lines.bridges import FIT_M
 from .lines.network import LineNetwork
@@ -32,32 +29,18 @@ from .lines.turning import MAX_TURN_DEG, parts_without_turns
 from .parameters import ALIGNED, Parameters
 from .polyline import length_along
 from .progress import SILENT, Progress
-from .rails import STRIP_OFF_M, Centerline, RailLine
+from .rails import Centerline, RailLine
 from .raster import TILE, RailRaster, cell_size, rasterize
 from .squares.grid import HALO_M, OVERLAP_M, Key, PointSource, Square, mosaic, own_tiles
 from .squares.pieces import SquareRails, trim
 from .squares.seams import join
 from .standards import distinct_gauges
 from .tracks.centerlines import CenterlineParameters, build_centerlines
-from .tracks.jumps import Steps
-from .tracks.lone import assign_tracks
-from .tracks.widths_by_gauge import widths_by_gauge
+from .tracks.parallels import widths_by_gauge
 from .vectorize import vectorize
-
-MIN_STRIPS_APART_M = 5.0
-"""Length of rail on which strips are apart from which the user is warned; they are compared over twice this length."""
-
-MAX_LISTED = 3
-"""Steps that a warning lists."""
-
-LARGEST_PERCENT = 95.0
-"""Percentile of the distances that is stated as the largest: switches and crossings make some of them wrong."""
 
 VECTORIZE, SMOOTH, REFINE, ELEVATE = 0.45, 0.05, 0.25, 0.25
 """Relative run times of the steps from a raster to lines, for the progress."""
-
-SAME_RAIL_M = 0.5
-"""Ends of rails that are closer together belong to one rail: no two rails of any gauge end so close to each other."""
 
 
 def square_side(parameters: Parameters) -> float:
@@ -103,14 +86,6 @@ def clean_square(
     """Rasterize the points of a square, clean the raster with the network, and keep the tiles inside the square.
 
     The network also sees cells that are drawn along thin rails (docs/method.md section 2.4).
-
-    Parameters
-    ----------
-    source : PointSource
-    square : Square
-    parameters : Parameters
-    engine : Engine
-    progress : Progress
     """
     cell_m = cell_size(parameters.gauge_m, parameters.head_width_m)
     margin_m = max_passes(parameters.passes) * MARGIN * cell_m
@@ -161,7 +136,7 @@ def whole_rails(
     first_id: int = 1,
     progress: Progress = SILENT,
 ) -> list[RailLine]:
-    """Join the rails of all squares, drop the short ones, cut turns that no rail has, simplify and number them.
+    """Join the rails of all squares, drop the short ones, cut turns too sharp for a rail, simplify and number them.
 
     Parameters
     ----------
@@ -200,82 +175,7 @@ def lines_of(
         `rail_id` of the first rail.
     """
     drawn, _ = _all_vertices(raster, class_code, points, parameters, progress)
-    rails = _finished(drawn, parameters, first_id, progress)
-    warn_of_rails(rails, class_code, parameters, progress)
-    return rails
-
-
-def warn_of_rails(rails: Sequence[RailLine], class_code: int, parameters: Parameters, progress: Progress) -> None:
-    """Warn the user if a class has no rails, or if `smoothing_xy_m` moves lines off their rails.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-        Rails of the class.
-    class_code : int
-    parameters : Parameters
-    progress : Progress
-    """
-    if not rails:
-        progress.warning(f"Class {class_code} shows no rail: check the rail classes, the standard and MIN_LENGTH.")
-    warn_if_out_of_reach(rails, parameters.head_width_m, parameters.smoothing_xy_m, progress)
-
-
-def warn_of_steps(steps: Sequence[tuple[Centerline, Steps]], progress: Progress) -> None:
-    """Warn the user of tracks that step to the side.
-
-    Parameters
-    ----------
-    steps : sequence of Centerline and Steps
-        From `jumps.steps_of`.
-    progress : Progress
-    """
-    found = [(line.track_id, *step) for line, own in steps for step in own]
-    if found:
-        largest = sorted(found, key=lambda one: -abs(one[2]))[:MAX_LISTED]
-        words = [f"{1000 * abs(step_m):.0f} mm at {at_m:.0f} m of track {track}" for track, at_m, step_m in largest]
-        more = f" and {len(found) - MAX_LISTED} more" if len(found) > MAX_LISTED else ""
-        progress.warning(
-            f"Sideways jumps in tracks: {', '.join(words)}{more}. Real track has none; probably two passes of the "
-            "scanner that are not aligned meet there."
-        )
-
-
-def warn_of_strips(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> None:
-    """Warn the user if strips, the passes of a scanner, differ.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    parameters : Parameters
-    progress : Progress
-    """
-    shown = np.concatenate(
-        [rail.support.every_strip[:, :2] for rail in rails if rail.support is not None] or [np.empty((0, 2))]
-    )
-    count, spread_m = shown[np.nan_to_num(shown[:, 1]) >= STRIP_OFF_M].T
-    if STATION_STEP_M * np.sum(count > 1) >= MIN_STRIPS_APART_M:
-        remedy = (
-            "they are aligned to their mean, and sigma_mm states what remains in doubt"
-            if parameters.strips == ALIGNED
-            else "correct the positions of the scanner, or set STRIPS to ALIGNED"
-        )
-        progress.warning(
-            f"Where strips overlap ({STATION_STEP_M * np.sum(count > 1):.0f} m of rail), they differ by up to "
-            f"{_largest(spread_m[count > 1])}: {remedy}."
-        )
-    if STATION_STEP_M * np.sum(count == 1) >= MIN_STRIPS_APART_M:
-        progress.warning(
-            f"On {STATION_STEP_M * np.sum(count == 1):.0f} m of rail the heads look blurred or too wide, as if passes "
-            f"of the scanner were up to {_largest(spread_m[count == 1])} apart. The points have no source id or GPS "
-            "time, so the passes cannot be separated: sigma_mm and sigmaz_mm contain half of it. Export the cloud with "
-            "them, or pass by pass."
-        )
-
-
-def _largest(spread_m: np.ndarray) -> str:
-    """Write the largest of the distances between strips."""
-    return f"{1000 * np.percentile(spread_m, LARGEST_PERCENT):.0f} mm"
+    return _finished(drawn, parameters, first_id, progress)
 
 
 def _all_vertices(
@@ -348,7 +248,7 @@ def measure_lines(
 
 
 def _finished(rails: Sequence[RailLine], parameters: Parameters, first_id: int, progress: Progress) -> list[RailLine]:
-    """Cut turns that no rail has, simplify rails and number them from `first_id`."""
+    """Cut turns too sharp for a rail, simplify rails and number them from `first_id`."""
     thinned = thin(_without_turns(rails, parameters, progress), parameters.simplify_xy_m, parameters.simplify_z_m)
     return [replace(rail, rail_id=number) for number, rail in enumerate(thinned, start=first_id)]
 
@@ -357,7 +257,7 @@ Line = TypeVar("Line", RailLine, Centerline)
 
 
 def _without_turns(lines: Sequence[Line], parameters: Parameters, progress: Progress) -> list[Line]:
-    """Split lines where they turn as no rail can, and warn the user."""
+    """Split lines where they turn too sharply for rails, and warn the user."""
     kept: list[Line] = []
     turned: list[Line] = []
     for line in lines:
@@ -381,12 +281,6 @@ def tracks_of(rails: Sequence[RailLine], parameters: Parameters, progress: Progr
 
     Takes the rails as the user gets them, so that rails from a file give the same tracks.
 
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    parameters : Parameters
-    progress : Progress
-
     Raises
     ------
     NoTrackError
@@ -398,7 +292,7 @@ def tracks_of(rails: Sequence[RailLine], parameters: Parameters, progress: Progr
     errors: dict[int, NoTrackError] = {}
     for code, share in zip(codes, progress.split(len(codes))):
         try:
-            centerlines += _tracks_of_class([rail for rail in rails if rail.class_code == code], parameters, share)
+            centerlines += tracks_of_class([rail for rail in rails if rail.class_code == code], parameters, share)
         except NoTrackError as error:
             errors[code] = error
     if errors and not centerlines:
@@ -408,71 +302,7 @@ def tracks_of(rails: Sequence[RailLine], parameters: Parameters, progress: Progr
     return [replace(line, track_id=number) for number, line in enumerate(centerlines, start=1)]
 
 
-def with_tracks(
-    rails: Sequence[RailLine], centerlines: Sequence[Centerline], progress: Progress = SILENT
-) -> list[RailLine]:
-    """State the tracks of each rail, and leave out lone lines that are too high or too low to be rails.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    centerlines : sequence of Centerline
-        All tracks of these rails.
-    progress : Progress
-        Receives a warning if lines are left out.
-
-    Returns
-    -------
-    list of RailLine
-        With their numbers as before.
-    """
-    kept, left_out = assign_tracks(rails, centerlines)
-    if left_out:
-        length_m = sum(line.length_m for line, _ in left_out)
-        lines = "1 line" if len(left_out) == 1 else f"{len(left_out)} lines"
-        heights = ", ".join(f"{height:+.1f} m" for height in sorted({round(above_m, 1) for _, above_m in left_out}))
-        progress.warning(
-            f"{lines} ({length_m:.0f} m) left out: too high or too low for a rail, compared with the tracks alongside "
-            f"({heights}). Check the classification there."
-        )
-    return kept
-
-
-def warn_of_split_classes(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> None:
-    """Warn the user if rails of different classes seem to be the rails of one track, or parts of one rail.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-        With their tracks.
-    parameters : Parameters
-    progress : Progress
-    """
-    codes = {rail.rail_id: rail.class_code for rail in rails}
-    if len(set(codes.values())) < 2:
-        return
-    lone = [replace(rail, class_code=0) for rail in rails if not rail.track_ids]
-    try:
-        tracks = _tracks_of_class(lone, parameters, SILENT)
-    except NoTrackError:
-        tracks = ()
-    at_gauge = {tuple({codes[one] for one in (*track.left_ids, *track.right_ids)}) for track in tracks}
-    split = sorted({code for group in at_gauge | _in_line(rails) if len(group) > 1 for code in group})
-    if split:
-        progress.warning(
-            f"Rails of the classes {', '.join(map(str, split))} form tracks or continue each other, but classes are "
-            "paired separately. If they are of the same tracks, set MERGE_CLASSES."
-        )
-
-
-def _in_line(rails: Sequence[RailLine]) -> set[tuple[int, ...]]:
-    """Return the pairs of classes of which one has a rail that begins where a rail of the other ends."""
-    ends = np.concatenate([rail.xyz[[0, -1], :2] for rail in rails])
-    codes = [rail.class_code for rail in rails for _ in range(2)]
-    return {(codes[a], codes[b]) for a, b in cKDTree(ends).query_pairs(SAME_RAIL_M) if codes[a] != codes[b]}
-
-
-def _tracks_of_class(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> tuple[Centerline, ...]:
+def tracks_of_class(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> tuple[Centerline, ...]:
     """Pair the rails of one class; see `tracks_of`."""
     settings = CenterlineParameters(
         tolerance_m=parameters.centerline_tolerance_m,

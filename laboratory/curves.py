@@ -116,7 +116,7 @@ def trace(
 
 
 def transition_curve(straight_m: float, clothoid_m: float, arc_m: float, curvature: float) -> list[Element]:
-    """Return the elements of the classical railway curve (docs/method.md section 11.2).
+    """Return the elements of the classical railway curve (docs/synthetic.md).
 
     Parameters
     ----------

@@ -32,8 +32,8 @@ from rail_extract.core.classify.tops import (  # noqa: E402
     Tops,
     tops_of,
 )
-from rail_extract.core.labelling.cloud import classify_cloud  # noqa: E402
 from rail_extract.laboratory.rasters.turnouts import FORMS, branch  # noqa: E402
+from rail_extract.laboratory.ruler.whole_clouds import classify_cloud  # noqa: E402
 from rail_extract.laboratory.scenes.plain import spacing  # noqa: E402
 from rail_extract.laboratory.scenes.raw import RawScene, scan_world  # noqa: E402
 from rail_extract.laboratory.scenes.raw_catalogue import STANDARD, TRAIN, line, masts_at, thing, tram  # noqa: E402

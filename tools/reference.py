@@ -36,7 +36,7 @@ from rail_extract.core.fields import (  # noqa: E402
     STOP_FIELDS,
     Field,
 )
-from rail_extract.core.standards import CUSTOM, STANDARDS, UNCONFIRMED  # noqa: E402
+from rail_extract.core.standards import CUSTOM, SOURCES, STANDARDS  # noqa: E402
 from rail_extract.rail_extract_plugin.algorithms import ALGORITHMS  # noqa: E402
 from rail_extract.rail_extract_plugin.dialog.definitions import UNBOUNDED  # noqa: E402
 
@@ -77,9 +77,10 @@ def page(provider: QgsProcessingProvider) -> str:
     parts += ["\n## Fields\n"]
     for title, fields in LAYERS.items():
         parts += [f"\n### {title}\n", *_table(("field", "type", "meaning"), map(_field, fields))]
-    parts += ["\n## Rail standards\n", *_table(("STANDARD", "rail", "gauge", "railhead"), _standards())]
+    parts += ["\n## Rail standards\n", *_table(("STANDARD", "rail", "gauge", "railhead", "source"), _standards())]
     parts += [
-        f"\n`{CUSTOM}` takes GAUGE and HEAD_WIDTH. A width marked * is not confirmed by a table of rail sections.\n"
+        f"\n`{CUSTOM}` takes GAUGE and HEAD_WIDTH. No table of rail sections confirms a width without a source.\n\n",
+        *_table(("source", "table"), SOURCES.items()),
     ]
     return "".join(parts)
 
@@ -128,13 +129,13 @@ def _field(field: Field) -> tuple[str, str, str]:
 
 def _standards() -> Iterator[tuple[str, ...]]:
     for standard in STANDARDS.values():
-        sure = "*" if standard.label.endswith(UNCONFIRMED) else ""
         rail = standard.label.rpartition(",")[0]
         yield (
             f"`{standard.name}`",
             rail,
             f"{1000 * standard.gauge_m:g} mm",
-            f"{1000 * standard.head_width_m:g} mm{sure}",
+            f"{1000 * standard.head_width_m:g} mm",
+            standard.sources,
         )
 
 

@@ -11,8 +11,9 @@ where G is the second integral of a ramp from 0 to 1. With `order` 1, slope s is
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Optional
 
 import numpy as np
@@ -121,6 +122,28 @@ class Chain:
 
 
 @dataclass(frozen=True)
+class Held:
+    """What is held in a fit.
+
+    Attributes
+    ----------
+    bends : mapping of int to float
+        Bend of parts of the chain by their number, 1/m.
+    starts : mapping of int to float
+        Where elements start, by their number, metres; one past the last stands for the end.
+    lengths : mapping of int to float
+        Lengths of elements, by their number, metres.
+    """
+
+    bends: Mapping[int, float] = field(default_factory=dict)
+    starts: Mapping[int, float] = field(default_factory=dict)
+    lengths: Mapping[int, float] = field(default_factory=dict)
+
+
+NOTHING = Held()
+
+
+@dataclass(frozen=True)
 class Span:
     """A part of a chain that is to be assembled, or a ramp between two parts.
 
@@ -209,7 +232,57 @@ def columns(chain: Chain, samples: Samples) -> tuple[np.ndarray, np.ndarray]:
     return base[:, :-1], by
 
 
-def fitted(chain: Chain, samples: Samples, least_m: float, steps: int) -> tuple[Chain, float]:
+@dataclass(frozen=True)
+class Unknowns:
+    """What a fit of a chain finds.
+
+    Attributes
+    ----------
+    free : (order + m,) bool array
+        Whether the values at the start and the bends are found.
+    bends : (m,) array
+        Bends that are not: 0, or as they are held, 1/m.
+    knots : (2 m - 2,) int array
+        Number of the unknown of each knot but the ends; -1 where it is fixed or held.
+    """
+
+    free: np.ndarray
+    bends: np.ndarray
+    knots: np.ndarray
+
+    @classmethod
+    def of(cls, chain: Chain, held: Held = NOTHING) -> Unknowns:
+        """Return the unknowns of a chain whose elements are its parts, if something is held."""
+        bends, knots = np.zeros(len(chain.bends)), chain.unknown
+        free = np.array((True,) * chain.order + chain.curved)
+        for part, bend in held.bends.items():
+            bends[part], free[chain.order + part] = bend, False
+        for start in held.starts:
+            knots[2 * start - 2 : 2 * start] = -1
+        moving = knots >= 0
+        knots[moving] = np.unique(knots[moving], return_inverse=True)[1]
+        return cls(free, bends, knots)
+
+    @cached_property
+    def chosen(self) -> np.ndarray:
+        """Which knots each unknown moves, (2 m - 2, u)."""
+        return (self.knots[:, None] == np.arange(self.knots.max(initial=-1) + 1)).astype(float)
+
+    def with_solution(self, chain: Chain, solution: np.ndarray) -> Chain:
+        """Return a chain with the bends that were found."""
+        values = np.zeros(len(self.free))
+        values[self.free] = solution
+        return replace(chain, bends=values[chain.order :] + self.bends)
+
+    def matrix(self, chain: Chain, samples: Samples) -> np.ndarray:
+        """Return the whitened derivatives by values and bends, then by knots, and what they explain as last column."""
+        base, by = columns(chain, samples)
+        by_knots = (by * np.repeat(np.diff(chain.bends), 2)) @ self.chosen
+        rest = samples.y - base[:, chain.order :] @ self.bends
+        return samples.whitened(np.concatenate([base[:, self.free], by_knots, rest[:, None]], axis=1))
+
+
+def fitted(chain: Chain, samples: Samples, least_m: float, steps: int, held: Held = NOTHING) -> tuple[Chain, float]:
     """Fit bends and joints by Gauss-Newton steps; return the best chain and its weighted sum of squared residuals.
 
     A chain that has as many parameters as there are samples, or more, stays as it is; its sum is infinite.
@@ -222,34 +295,31 @@ def fitted(chain: Chain, samples: Samples, least_m: float, steps: int) -> tuple[
         Least length of a part or a ramp, metres.
     steps : int
         Largest number of steps.
+    held : Held
+        Bends and starts of parts that stay as they are.
     """
     best, best_rss = chain, np.inf
     if len(samples.s) <= chain.size:
         return best, best_rss
-    free, unknown = np.array((True,) * chain.order + chain.curved), chain.unknown
-    chosen = (unknown[:, None] == np.arange(unknown.max(initial=-1) + 1)).astype(float)
+    unknowns = Unknowns.of(chain, held)
+    linear = int(unknowns.free.sum())
     for step in range(steps + 1):
-        base, by = columns(chain, samples)
-        by_knots = (by * np.repeat(np.diff(chain.bends), 2)) @ chosen
-        matrix = samples.whitened(np.concatenate([base[:, free], by_knots, samples.y[:, None]], axis=1))
+        matrix = unknowns.matrix(chain, samples)
         factor = np.triu(dgeqrf(matrix)[0][: matrix.shape[1]])
-        linear = matrix.shape[1] - by_knots.shape[1] - 1
         rest = factor[linear:, -1]
-        rss, values = float(rest @ rest), np.zeros(len(free))
-        values[free] = _solved(factor[:linear, :linear], factor[:linear, -1])
-        was_flat = not chain.bends.any()
-        chain = replace(chain, bends=values[chain.order :])
+        rss, was_flat = float(rest @ rest), not chain.bends.any()
+        chain = unknowns.with_solution(chain, _solved(factor[:linear, :linear], factor[:linear, -1]))
         gain = best_rss - rss
         if gain > 0:
             best, best_rss = chain, rss
-        if step == steps or not len(chosen) or (gain < LEAST_GAIN and step > 1):
+        if step == steps or not len(unknowns.knots) or (gain < LEAST_GAIN and step > 1):
             break
         if was_flat:
             continue
         lower = factor[linear:-1, linear:-1]
         normal = lower.T @ lower + np.eye(len(lower)) / LONGEST_SHIFT_M**2
         shift = np.linalg.solve(normal, lower.T @ rest[:-1])
-        chain = _moved(chain, unknown, shift, least_m)
+        chain = _moved(chain, unknowns.knots, shift, least_m)
     return best, best_rss
 
 

@@ -13,6 +13,7 @@ from ..polyline import length_along
 from ..progress import Progress
 from .elements import Alignment
 from .equations import SAME_PLACE_M
+from .measured import Track
 
 BESIDE_M = 2.0
 """Largest median distance of a track from its alignment, metres: that of its neighbour is at least 3.4 m away."""
@@ -63,15 +64,15 @@ def _distance_m(alignment: Alignment, xy: np.ndarray) -> float:
 
 
 def compared_with(
-    alignments: Sequence[Alignment], tracks: Sequence[tuple[Optional[int], np.ndarray]], progress: Progress
+    alignments: Sequence[Alignment], tracks: Sequence[Track], progress: Progress
 ) -> list[tuple[Alignment, Deviations]]:
     """Return the deviations of each track, with the alignment beside it.
 
     Parameters
     ----------
     alignments : sequence of Alignment
-    tracks : sequence of (int, (n, 3) array)
-        Numbers and vertices, local metres of the alignments.
+    tracks : sequence of Track
+        In the frame of the alignments.
     progress : Progress
         Warned of tracks that lie along no alignment.
 
@@ -81,13 +82,13 @@ def compared_with(
         None lies along an alignment.
     """
     found, lost = [], []
-    for track_id, xyz in tracks:
-        alignment = beside(alignments, xyz[:, :2])
+    for track in tracks:
+        alignment = beside(alignments, track.xyz[:, :2])
         if alignment is None:
-            lost.append(str(track_id))
+            lost.append(str(track.track_id))
             continue
-        along = length_along(xyz[:, :2])
-        found.append((alignment, deviations_of(alignment, track_id, xyz, along, np.zeros((0, 2)))))
+        along = length_along(track.xyz[:, :2])
+        found.append((alignment, deviations_of(alignment, track.track_id, track.xyz, along, track.cant)))
     if not found:
         raise RailExtractError("None of TRACKS lies along an alignment of INPUT: check the coordinate system of both.")
     if lost:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Optional
@@ -16,9 +17,9 @@ from ..progress import SILENT, Progress
 from .chain import Chain
 from .deviations import Deviations, deviations_of
 from .elements import Alignment, Element, PlanElement
-from .given import Given, chain_of, given_of, noted, without
+from .given import Given, given_along, given_of, noted, without
 from .intrinsic import lateral_signal
-from .layouts import cants, heights, snapped
+from .layouts import cants, heights, on_clothoids
 from .measured import LEAST_POINTS, Measured, Track, measured_of
 from .noise import Noise, strays
 from .plane_fit import FitError, PlanFit, Points, fit_plan
@@ -35,6 +36,10 @@ SQUEEZED = 0.5
 UNSURE, MANY = 1.0 / 3.0, 0.25
 """An arc is near the noise if its standard error exceeds this share of its radius; more than this share of all arcs is
 reported."""
+
+AT_END_M = 0.01
+"""The foot of a point at an end of the design may lie this far beyond it, metres: the fit moves the end by micrometres,
+and the point counts in any case."""
 
 LEAST_CANT_POINTS = 20
 """With fewer places of known cant, it has no elements."""
@@ -127,8 +132,11 @@ def fit_tracks(
         raise ParameterError("FIXED has no elements of the tracks in INPUT: give the table of these tracks.")
     shares = progress.divide([float(length_along(track.xyz[:, :2])[-1]) + 1.0 for track in tracks])
     fits: list[Fit] = []
-    refusals: list[ParameterError] = []
+    lines = Counter(track.track_id for track in tracks)
+    refusals = [_in_pieces(number, count) for number, count in lines.items() if count > 1]
     for track, share in zip(tracks, shares):
+        if lines[track.track_id] > 1:
+            continue
         progress.status(f"Fitting track {track.track_id}")
         try:
             fits.append(fit_track(track, frame, settings, fixed.get(track.track_id), share))
@@ -139,6 +147,13 @@ def fit_tracks(
     for refusal in refusals:
         progress.warning(str(refusal))
     return fits
+
+
+def _in_pieces(track_id: int, count: int) -> ParameterError:
+    """Return the refusal of a track of several lines: `s` in its table would begin in each of them."""
+    return ParameterError(
+        f"Track {track_id} has {count} lines, but its elements follow one: join them, or give each its own track_id."
+    )
 
 
 @dataclass(frozen=True)
@@ -160,7 +175,10 @@ def _followed(
     track_id: int, measured: Measured, settings: FitParameters, fixed: Optional[Alignment], progress: Progress
 ) -> tuple[Measured, _Plan]:
     """Return the fit in plan, of the line or of the longest part between strays that elements follow, and that part."""
-    parts = [measured] if fixed else [measured.without_stray_ends(), *measured.between_strays()]
+    if fixed:
+        parts = [measured.between(fixed.s_from, fixed.s_to)]
+    else:
+        parts = [measured.without_stray_ends(), *measured.between_strays()]
     lost: Optional[_LostError] = None
     for part in parts:
         try:
@@ -197,7 +215,8 @@ def _fit_in_plan(
         chain, used = find_structure(signal, settings.tolerance_m, settings.min_length_m, jumps, progress)
         given = Given(chain)
     else:
-        given, used = given_of(fixed, float(s[-1])), noise_of(signal, settings.tolerance_m, progress)[0]
+        given = given_of(fixed, float(measured.along[0]), float(s[-1]))
+        used = noise_of(signal, settings.tolerance_m, progress)[0]
     used_m = used.effective_m(signal.step_m)
     points = Points(measured.xyz[:, :2], s, measured.in_plan / used_m**2)
     try:
@@ -309,9 +328,10 @@ def _with_heights(
     """Return an alignment with grades and parabolas."""
     signal = _signal(alignment, feet, measured.xyz[:, 2], measured.in_height, HEIGHT)
     shape = fixed.vertical if fixed else ()
-    chain, used = _chain(signal, [one.type == "parabola" for one in shape], shape, settings, progress)
+    given, used = _structure(alignment.track_id, signal, shape, settings, progress)
+    chain = refitted(given.chain, signal, used, settings.min_length_m, given.held)
     chain = replace(chain, start=alignment.s_from, end=alignment.s_to)
-    errors = chain_errors(chain, signal, used)
+    errors = chain_errors(chain, signal, used, given.held)
     return replace(alignment, vertical=heights(chain, signal, used, errors))
 
 
@@ -331,27 +351,24 @@ def _with_cants(
     if len(signal.s) < LEAST_CANT_POINTS:
         return alignment
     shape = fixed.cant if fixed else ()
-    chain, used = _chain(signal, [one.type == "ramp" for one in shape], shape, settings, progress)
-    errors = chain_errors(chain, signal, used)
-    chain, moved = snapped(chain, alignment.plan, signal, used, errors)
-    sure = np.concatenate([[False], moved])
-    return replace(alignment, cant=cants(chain, signal, used, replace(errors, s=np.where(sure, np.nan, errors.s))))
+    given, used = _structure(alignment.track_id, signal, shape, settings, progress)
+    chain, errors = on_clothoids(given, alignment.plan, signal, used, settings.min_length_m)
+    return replace(alignment, cant=cants(chain, signal, used, errors))
 
 
 def _signal(alignment: Alignment, s: np.ndarray, values: np.ndarray, share: np.ndarray, kind: Kind) -> Signal:
     """Return values along the design, where their points count."""
-    used = (s >= alignment.s_from) & (s <= alignment.s_to) & (share > 0)
-    order = np.argsort(s[used], kind="stable")
-    return Signal(s[used][order], values[used][order], share[used][order], kind)
+    inside = np.clip(s, alignment.s_from, alignment.s_to)
+    used = (np.abs(s - inside) < AT_END_M) & (share > 0)
+    order = np.argsort(inside[used], kind="stable")
+    return Signal(inside[used][order], values[used][order], share[used][order], kind)
 
 
-def _chain(
-    signal: Signal, curved: Sequence[bool], shape: Sequence[Element], settings: FitParameters, progress: Progress
-) -> tuple[Chain, Noise]:
-    """Return the chain of a signal, and its noise."""
-    least_m, tolerance_m = settings.min_length_m, settings.tolerance_m
+def _structure(
+    track_id: Optional[int], signal: Signal, shape: Sequence[Element], settings: FitParameters, progress: Progress
+) -> tuple[Given, Noise]:
+    """Return the structure of a signal, found or given, and its noise."""
     if shape:
-        chain, used = chain_of(shape, curved, signal), noise_of(signal, tolerance_m)[0]
-    else:
-        chain, used = find_structure(signal, tolerance_m, least_m, True, progress)
-    return refitted(chain, signal, used, least_m), used
+        return given_along(track_id, shape, signal), noise_of(signal, settings.tolerance_m)[0]
+    chain, used = find_structure(signal, settings.tolerance_m, settings.min_length_m, True, progress)
+    return Given(chain), used

@@ -1,4 +1,4 @@
-"""A corrected element table as the structure of a fit: types are held, and the radii and ends that were edited."""
+"""A corrected element table as the structure of a fit: types are held, and the radii and starts that were edited."""
 
 from __future__ import annotations
 
@@ -10,28 +10,30 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..frame import LocalFrame
-from .chain import Chain, Span, assembled
-from .elements import Alignment, Element, Figures, PlanElement
-from .plane_fit import NOTHING, Held
+from .chain import NOTHING, Chain, Held, Span, assembled
+from .elements import Alignment, Element, Figures, PlanElement, VerticalElement
 from .signals import Signal
 
 EDITED_R, EDITED_M = 1e-6, 0.0005
-"""A radius (as a share) and an end (metres) were edited if they differ by more from what the fit has noted."""
+"""A radius (as a share) and a start (metres) were edited if they differ by more from what the fit has noted."""
 
 TOUCHING_M = 0.01
 """Elements whose ends differ by less touch, metres."""
 
+BENT = ("arc", "parabola", "ramp")
+"""Types whose bend is constant and not 0."""
+
 
 @dataclass(frozen=True)
 class Given:
-    """The structure in plan that a table states.
+    """The structure that a table states.
 
     Attributes
     ----------
     chain : Chain
     held : Held
     poses : (e, 3) array, optional
-        Place and direction at the start of each element; else they are those of the line.
+        Place and direction at the start of each element in plan; else they are those of the line.
     """
 
     chain: Chain
@@ -39,34 +41,55 @@ class Given:
     poses: Optional[np.ndarray] = None
 
 
-def given_of(fixed: Alignment, length_m: float) -> Given:
+def given_of(fixed: Alignment, first_m: float, length_m: float) -> Given:
     """Return the structure of the elements in plan.
 
     Parameters
     ----------
     fixed : Alignment
+    first_m : float
+        Where on the measured line the part begins that is fitted.
     length_m : float
-        Length of the measured line; the table's first and last element are continued to its ends.
+        Length of that part; the table's first and last element are continued to its ends.
     """
-    plan = list(fixed.plan)
-    joints = [_joint(before, after) for before, after in zip(plan[:-1], plan[1:])]
-    if plan[0].s_to <= 0.0 or (joints and joints[-1] >= length_m):
+    plan = [_moved(one, -first_m) for one in fixed.plan]
+    bounds = _bounds(fixed.track_id, plan, 0.0, length_m)
+    if plan[0].s_to <= 0.0 or (len(plan) > 1 and bounds[-2] >= length_m):
         raise ParameterError(
-            f"The elements of track {fixed.track_id} in FIXED end at {plan[-1].s_to:.0f} m, but its line is "
-            f"{length_m:.0f} m long: give the table of this line."
+            f"The elements of track {fixed.track_id} in FIXED end at {fixed.s_to:.0f} m, but its line is "
+            f"{first_m + length_m:.0f} m long: give the table of this line."
         )
-    bounds = [0.0, *joints, length_m]
     spans = [
         Span(start, end, one.type == "clothoid", one.type == "arc", one.k_to, one.k_from)
         for one, start, end in zip(plan, bounds[:-1], bounds[1:])
     ]
     chain = assembled(spans, 2)
-    arcs = [one for one in plan if one.type != "clothoid"]
+    parts = [one for one in plan if one.type != "clothoid"]
     numbers = np.flatnonzero(chain.extents[1] > chain.extents[0])
-    held = {int(number): one.k_from for number, one in zip(numbers, arcs) if _has_edited_radius(one)}
-    starts = {number + 1: joint for number, joint in enumerate(joints) if _is_edited(plan[number + 1])}
-    poses = [_pose(fixed, one, start) for one, start in zip(plan, bounds)]
-    return Given(chain, Held(held, starts), np.array(poses))
+    bends = {int(number): one.k_from for number, one in zip(numbers, parts) if _has_edited_radius(one)}
+    poses = [_pose(fixed, one, start + first_m) for one, start in zip(fixed.plan, bounds)]
+    return Given(chain, Held(bends, _edited_starts(plan, bounds)), np.array(poses))
+
+
+def given_along(track_id: Optional[int], shape: Sequence[Element], signal: Signal) -> Given:
+    """Return the structure of the elements in height or of cant.
+
+    Parameters
+    ----------
+    track_id : int or None
+    shape : sequence of VerticalElement or of CantElement
+    signal : Signal
+        Elements beyond its ends are left out.
+    """
+    first, last = float(signal.s[0]), float(signal.s[-1])
+    covering = max(sum(one.s_from <= first for one in shape) - 1, 0)
+    known = [one for number, one in enumerate(shape) if number == covering or first < one.s_from < last]
+    bounds = _bounds(track_id, known, first, last)
+    spans = [
+        Span(start, end, False, one.type in BENT, _bend(one)) for one, start, end in zip(known, bounds[:-1], bounds[1:])
+    ]
+    bends = {number: _bend(one) for number, one in enumerate(known) if _has_edited_radius(one)}
+    return Given(assembled(spans, signal.kind.order), Held(bends, _edited_starts(known, bounds)))
 
 
 def without(elements: Sequence[PlanElement], number: int, length_m: float) -> Given:
@@ -81,13 +104,19 @@ def without(elements: Sequence[PlanElement], number: int, length_m: float) -> Gi
         Length of the measured line.
     """
     rest = [noted(one) for at, one in enumerate(elements) if at != number]
-    return given_of(Alignment(None, LocalFrame(np.zeros(3)), tuple(rest)), length_m)
+    return given_of(Alignment(None, LocalFrame(np.zeros(3)), tuple(rest)), 0.0, length_m)
 
 
 def noted(one: PlanElement, **figures: Any) -> PlanElement:
     """Return a fitted element with its figures, which note radius and start so that an edit shows."""
     radius = 1.0 / one.k_from if one.type == "arc" else None
     return replace(one, figures=Figures(r_fit_m=radius, s_fit_m=one.s_from, **figures))
+
+
+def _moved(one: PlanElement, by_m: float) -> PlanElement:
+    """Return an element that starts farther along the line."""
+    noted_m = None if one.figures.s_fit_m is None else one.figures.s_fit_m + by_m
+    return replace(one, s_from=one.s_from + by_m, figures=replace(one.figures, s_fit_m=noted_m))
 
 
 def _pose(fixed: Alignment, one: PlanElement, start: float) -> tuple[float, float, float]:
@@ -97,30 +126,44 @@ def _pose(fixed: Alignment, one: PlanElement, start: float) -> tuple[float, floa
     return float(x), float(y), float(heading)
 
 
-def _joint(before: PlanElement, after: PlanElement) -> float:
+def _bounds(track_id: Optional[int], elements: Sequence[Element], first: float, last: float) -> list[float]:
+    """Return where elements start, and the end of the last one; the outer ones reach to `first` and `last`."""
+    bounds = [first, *(_joint(before, after) for before, after in zip(elements[:-1], elements[1:])), last]
+    wrong = next((at for at in range(1, len(bounds) - 1) if bounds[at] <= bounds[at - 1]), None)
+    if wrong is not None:
+        raise ParameterError(
+            f"In FIXED, the element {wrong + 1} in layout {elements[wrong].layout} of track {track_id} does not start "
+            f"after the one before it: correct its s_from of {elements[wrong].s_from:.4f} m."
+        )
+    return bounds
+
+
+def _joint(before: Element, after: Element) -> float:
     """Return where two elements meet: midway if the row between them is missing."""
     if abs(before.s_to - after.s_from) < TOUCHING_M or _is_edited(after):
         return after.s_from
     return 0.5 * (before.s_to + after.s_from)
 
 
-def _is_edited(one: PlanElement) -> bool:
+def _edited_starts(elements: Sequence[Element], bounds: Sequence[float]) -> dict[int, float]:
+    """Return the starts that were edited, by the number of their element."""
+    return {number: bounds[number] for number, one in enumerate(elements) if number and _is_edited(one)}
+
+
+def _is_edited(one: Element) -> bool:
     """Return whether the start of an element was edited."""
     return one.figures.s_fit_m is not None and abs(one.s_from - one.figures.s_fit_m) > EDITED_M
 
 
-def _has_edited_radius(one: PlanElement) -> bool:
-    """Return whether the radius of an arc was edited, or stands in a table that no fit made."""
-    if one.type != "arc":
+def _has_edited_radius(one: Element) -> bool:
+    """Return whether the radius of an arc or a parabola was edited, or stands in a table that no fit made."""
+    if one.type not in ("arc", "parabola"):
         return False
-    return one.figures.r_fit_m is None or abs(one.figures.r_fit_m * one.k_from - 1.0) > EDITED_R
+    return one.figures.r_fit_m is None or abs(one.figures.r_fit_m * _bend(one) - 1.0) > EDITED_R
 
 
-def chain_of(shape: Sequence[Element], curved: Sequence[bool], signal: Signal) -> Chain:
-    """Return the chain of elements in height or of cant, with first values from their ends."""
-    first, last = float(signal.s[0]), float(signal.s[-1])
-    inside = [number for number, one in enumerate(shape) if number and first < one.s_from < last]
-    starts = [first, *(shape[number].s_from for number in inside)]
-    flags = [curved[max(inside[0] - 1, 0)] if inside else curved[0], *(curved[number] for number in inside)]
-    spans = [Span(start, end, False, flag) for start, end, flag in zip(starts, [*starts[1:], last], flags)]
-    return assembled(spans, signal.kind.order)
+def _bend(one: Element) -> float:
+    """Return the bend of an element that has a constant one, 1/m."""
+    if isinstance(one, PlanElement):
+        return one.k_from
+    return one.curvature if isinstance(one, VerticalElement) else (one.cant_to_m - one.cant_from_m) / one.length_m

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +16,13 @@ from .noise import strays
 
 LEAST_TRACK_M, LEAST_POINTS = 50.0, 20
 """Least length of a track, metres, and least number of its points: the shortest curve that has a radius."""
+
+BESIDE_M = 1.0
+"""A point is on a part of the line that ends nearer than this before it, metres: the noise of the line makes it a few
+centimetres longer than its design on a kilometre."""
+
+STATION_NEEDS = ("track_id", "chainage_m", "cant_mm")
+"""Fields of the track geometry that state the cant."""
 
 TURNS_BACK_RAD = np.pi / 3.0
 """Largest bend of a line at a vertex: a track that turns back has a stray vertex, or runs through a switch twice."""
@@ -60,6 +69,67 @@ def with_stations(track_id: int, xyz: np.ndarray, stations: np.ndarray) -> Track
     return Track(track_id, xyz, stations[known][:, :2], bridged)
 
 
+def moved(track: Track, shift: np.ndarray) -> Track:
+    """Return a track in another frame, to which a shift, (3,) metres, leads."""
+    return replace(track, xyz=track.xyz + shift)
+
+
+def stations_by_track(rows: Iterable[Mapping[str, Any]], fields: Collection[str], name: str) -> dict[int, np.ndarray]:
+    """Return chainage, cant and whether a gap is bridged of the stations of each track, (n, 3); NaN without cant.
+
+    Parameters
+    ----------
+    rows : iterable of mappings
+        Of the track geometry; None where a field is empty.
+    fields : collection of str
+        That it has.
+    name : str
+        Of its parameter, for the message.
+
+    Raises
+    ------
+    ParameterError
+        A field is missing.
+    """
+    lacking = next((one for one in STATION_NEEDS if one not in fields), None)
+    if lacking:
+        raise ParameterError(
+            f"{name} has no field {lacking}: give the track geometry of Extract rails or Measure track geometry."
+        )
+    found: dict[int, list[tuple[float, float, float]]] = {}
+    for row in rows:
+        if row["track_id"] is not None and row["chainage_m"] is not None:
+            cant = np.nan if row["cant_mm"] is None else float(row["cant_mm"]) / 1000.0
+            station = float(row["chainage_m"]), cant, float(row.get("bridged") or 0)
+            found.setdefault(int(row["track_id"]), []).append(station)
+    return {number: np.array(sorted(stations)) for number, stations in found.items()}
+
+
+def with_cant(
+    lines: Sequence[tuple[int, np.ndarray]], stations: Mapping[int, np.ndarray], quality: str, tracks: str
+) -> list[Track]:
+    """Return tracks with the cant of their stations.
+
+    Parameters
+    ----------
+    lines : sequence of (int, (n, 3) array)
+        Number and vertices of each track.
+    stations : mapping
+        By track, as `stations_by_track` returns them.
+    quality, tracks : str
+        Names of the parameters, for the message.
+
+    Raises
+    ------
+    ParameterError
+        No track has stations.
+    """
+    if not any(number in stations for number, _ in lines):
+        raise ParameterError(f"{quality} has no stations of the tracks in {tracks}: give their track geometry.")
+    none = np.zeros((0, 3))
+    return [with_stations(number, xyz, stations.get(number, none)) for number, xyz in lines]
+
+
 @dataclass(frozen=True)
 class Measured:
     """Points of a track, or of a part of it: its vertices, those averaged that are closer than a metre.
@@ -98,6 +168,11 @@ class Measured:
     def _part(self, first: int, last: int) -> Measured:
         part = slice(first, last + 1)
         return Measured(self.xyz[part], self.along[part], self.share[part], self.is_stray[part])
+
+    def between(self, first_m: float, last_m: float) -> Measured:
+        """Return the points between two distances along the line, with those next to them."""
+        inside = np.flatnonzero((self.along > first_m - BESIDE_M) & (self.along < last_m + BESIDE_M))
+        return self._part(int(inside[0]), int(inside[-1])) if len(inside) else self
 
     def between_strays(self) -> list[Measured]:
         """Return the parts between the points that lie off in plan and are long enough for a fit, the longest first."""

@@ -183,7 +183,7 @@ def _hang_together(products: np.ndarray, variance: float, count: float, sure: fl
     """Return whether products of residuals at lags, (LAGS,), are more than those of independent errors would be."""
     sums = np.cumsum(products[1:])
     error = variance * np.sqrt(count * np.arange(1, LAGS))
-    return bool((sums > sure * error).any())
+    return bool((sums / sure > error).any())
 
 
 def _usual(pieces: list[tuple[np.ndarray, float]]) -> list[tuple[np.ndarray, float]]:

@@ -90,6 +90,13 @@ def post_field(names: Collection[str]) -> str:
     return found
 
 
+AXIS_IN_DEGREES = (
+    "AXIS and INPUT are in degrees, where lengths can't be measured: reproject AXIS, for example to the UTM zone of "
+    "the place."
+)
+"""Message where no plane is known."""
+
+
 def check_jumps(names: Collection[str]) -> None:
     """Check that a table of jumps has its fields.
 

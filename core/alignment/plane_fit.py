@@ -6,8 +6,8 @@ end of an element the start of the next one. The curvature of a clothoid's end i
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Optional
 
 import numpy as np
@@ -15,7 +15,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from ..progress import SILENT, Progress
-from .chain import Chain
+from .chain import NOTHING, Chain, Held
 from .curves import PANEL_RAD, UNIT_NODES, UNIT_WEIGHTS, displaced, turned
 from .elements import PlanElement
 
@@ -26,8 +26,12 @@ has failed, metres."""
 CLOSING_ROUNDS = 8
 """Largest number of steps that only close gaps."""
 
-LEAST_CHANGE, MOST_RISE = 1e-3, 0.1
-"""Change of chi-square at which the fit ends, and the rise that a step may cause: to close the last gaps costs some."""
+STILL_M = 0.0001
+"""The fit ends when no place or length changes by more, metres: chi-square hardly shows how long a weak element is, and
+a fit that goes on from the table of this one must find the same."""
+
+MOST_RISE = 0.1
+"""Rise of chi-square that a step may cause: to close the last gaps costs some."""
 
 GAP_SIGMA_M = 0.001
 """Standard deviation at which gaps count beside the points where a step is judged, metres or radians: a step may be as
@@ -73,28 +77,6 @@ class Points:
     xy: np.ndarray
     s: np.ndarray
     weight: np.ndarray
-
-
-@dataclass(frozen=True)
-class Held:
-    """What is held in the fit.
-
-    Attributes
-    ----------
-    bends : mapping of int to float
-        Curvature of parts of the chain by their number, 1/m.
-    starts : mapping of int to float
-        Where elements start, by their number, metres; one past the last stands for the end.
-    lengths : mapping of int to float
-        Lengths of elements, by their number, metres.
-    """
-
-    bends: Mapping[int, float] = field(default_factory=dict)
-    starts: Mapping[int, float] = field(default_factory=dict)
-    lengths: Mapping[int, float] = field(default_factory=dict)
-
-
-NOTHING = Held()
 
 
 @dataclass(frozen=True)
@@ -284,9 +266,8 @@ def _settled(now: _Look, points: Points, progress: Progress) -> _Look:
             if ridge > STIFFEST:
                 break
             continue
-        fallen = now.chi_square - after.chi_square
         now, ridge = after, max(ridge * LOOSER, RIDGE)
-        if now.gap_m < CLOSED_M and (moved < CLOSED_M or abs(fallen) < LEAST_CHANGE):
+        if now.gap_m < CLOSED_M and moved < STILL_M:
             break
     return now
 

@@ -9,9 +9,9 @@ from typing import Optional
 import numpy as np
 
 from ..progress import SILENT, Progress
-from .chain import Chain
+from .chain import Chain, Held
 from .elements import PlanElement
-from .plane_fit import FitError, Held, PlanFit, Points, fit_plan
+from .plane_fit import FitError, PlanFit, Points, fit_plan
 
 STEPS_M = (1000.0, 500.0, 100.0, 50.0, 25.0, 10.0, 5.0, 1.0)
 """Steps of round radii, the roundest first, metres."""

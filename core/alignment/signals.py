@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..progress import SILENT, Progress
-from .chain import Chain, fitted, start_of
+from .chain import NOTHING, Chain, Held, fitted, start_of
 from .noise import Noise, estimated, independent_m
 from .partition import Piece, partition
 from .structure import Blocks, Rules, from_pieces, searched
@@ -30,8 +30,12 @@ FLOOR_M = 0.00005
 LEAST_PRICE = 8.0
 """Least cost of a parameter in units of chi-square: with it, noise alone bends a line in one of a hundred cases."""
 
-FINAL_STEPS = 12
-"""Gauss-Newton steps of the last fit of a chain as a whole."""
+FINAL_STEPS, FINAL_ROUNDS = 12, 20
+"""Gauss-Newton steps of a last fit of a chain as a whole, and how often it is repeated at most."""
+
+STILL_M = 0.0005
+"""The last fit ends when no joint moves farther, metres: chi-square hardly shows where a weak joint lies, and a fit
+that goes on from the table of this one must find it in the same place."""
 
 
 @dataclass(frozen=True)
@@ -159,9 +163,14 @@ def find_structure(
     return searched(chain, signal.blocks(noise), rules, second), noise
 
 
-def refitted(chain: Chain, signal: Signal, noise: Noise, least_m: float) -> Chain:
-    """Return a chain that is fitted as a whole."""
-    return fitted(chain, signal.blocks(noise).near(chain), least_m, FINAL_STEPS)[0]
+def refitted(chain: Chain, signal: Signal, noise: Noise, least_m: float, held: Held = NOTHING) -> Chain:
+    """Return a chain that is fitted as a whole, until its joints rest."""
+    blocks = signal.blocks(noise)
+    for _ in range(FINAL_ROUNDS):
+        before, chain = chain, fitted(chain, blocks.near(chain), least_m, FINAL_STEPS, held)[0]
+        if np.abs(chain.knots - before.knots).max() < STILL_M:
+            break
+    return chain
 
 
 def started(chain: Chain, signal: Signal, noise: Noise) -> np.ndarray:

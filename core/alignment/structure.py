@@ -60,7 +60,8 @@ class Blocks:
         """Average a signal whose points count as `share`, (n,), of one; those with 0 are left out."""
         used = share > 0
         s, y, weight = s[used], y[used], share[used] / noise.white_m**2
-        number = ((s - s[0]) // FINE_M).astype(int)
+        half_step = 0.5 * (s[-1] - s[0]) / max(len(s) - 1, 1)  # else micrometres decide about points between two blocks
+        number = ((s - s[0] + half_step) // FINE_M).astype(int)
         return cls(_averaged(s, y, weight, number), _averaged(s, y, weight, number // COARSE), float(s[0]), noise)
 
     def near(self, chain: Chain) -> Samples:

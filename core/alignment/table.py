@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import fields
 from itertools import groupby
-from typing import Any, Optional
+from typing import Any, Optional, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from ..frame import ORIGIN_STEP, LocalFrame
 from .elements import Alignment, CantElement, Element, Figures, PlanElement, VerticalElement
 
 Row = Mapping[str, Any]
+
+Bent = TypeVar("Bent", VerticalElement, CantElement)
 
 GON = 200.0 / math.pi
 """Gon in a radian."""
@@ -101,6 +103,8 @@ def _alignment(track_id: Optional[int], table: list[Row], frame: LocalFrame) -> 
     """Return the alignment of one track."""
     table = sorted(table, key=lambda row: (LAYOUTS.index(row["layout"]), float(_needed(row, "s_from"))))
     by_layout = {layout: list(members) for layout, members in groupby(table, key=lambda row: row["layout"])}
+    for members in by_layout.values():
+        _check_order(members)
     if "H" not in by_layout:
         raise ParameterError(
             f"The element table has no row with layout H for track {track_id}: give it the elements in plan, too."
@@ -112,6 +116,17 @@ def _alignment(track_id: Optional[int], table: list[Row], frame: LocalFrame) -> 
         tuple(_vertical_element(row, frame) for row in by_layout.get("V", ())),
         tuple(_cant_element(row) for row in by_layout.get("C", ())),
     )
+
+
+def _check_order(table: Sequence[Row]) -> None:
+    """Check that elements which follow each other along the track are numbered in this order."""
+    for before, after in zip(table, table[1:]):
+        first, second = (float(row["no"]) if _is_number(row.get("no")) else math.nan for row in (before, after))
+        if first > second:
+            raise ParameterError(
+                f"{_where(before)} starts at s_from = {float(before['s_from']):g} m, before element {second:g} at "
+                f"{float(after['s_from']):g} m: correct s_from, or number the elements in order along the track."
+            )
 
 
 def _row(alignment: Alignment, number: int, element: Element) -> dict[str, Any]:
@@ -180,16 +195,41 @@ def _plan_element(row: Row, frame: LocalFrame) -> PlanElement:
 
 
 def _vertical_element(row: Row, frame: LocalFrame) -> VerticalElement:
-    """Return the element of a row in height."""
+    """Return the element of a row in height; the radius of a parabola counts where a fit has noted its own."""
+    s_from, length_m = _extent(row)
     z = float(frame.to_local(np.array([0.0, 0.0, _needed(row, "z")]))[2])
-    grade_from, grade_to = (_needed(row, name) / 1000.0 for name in ("grade1_pm", "grade2_pm"))
-    return VerticalElement(*_extent(row), z, grade_from, grade_to, _figures(row))
+    grade_from, grade_to = _ends(row, ("grade", "parabola"), "grade1_pm", "grade2_pm")
+    radius = _edited_radius(row)
+    if row.get("type") == "parabola" and radius is not None and (grade_from == grade_to or _is_fitted(row)):
+        grade_to = grade_from + length_m * _bend(row, radius)
+    return _checked(row, VerticalElement(s_from, length_m, z, grade_from, grade_to, _figures(row)), "fill r1_m")
 
 
 def _cant_element(row: Row) -> CantElement:
     """Return the element of a row of cant."""
-    cant_from_m, cant_to_m = (_needed(row, name) / 1000.0 for name in ("cant1_mm", "cant2_mm"))
-    return CantElement(*_extent(row), cant_from_m, cant_to_m, _figures(row))
+    cant_from_m, cant_to_m = _ends(row, ("constant", "ramp"), "cant1_mm", "cant2_mm")
+    return _checked(row, CantElement(*_extent(row), cant_from_m, cant_to_m, _figures(row)), "change cant2_mm")
+
+
+def _ends(row: Row, types: tuple[str, str], *names: str) -> tuple[float, float]:
+    """Return gradients or cants at both ends, as shares or metres; the first of the types has equal ones."""
+    start, end = (_needed(row, name) / 1000.0 for name in names)
+    return start, start if row.get("type") == types[0] else end
+
+
+def _checked(row: Row, made: Bent, remedy: str) -> Bent:
+    """Check that an element is of the type that its row states, if it states one."""
+    if row.get("type") not in (None, made.type):
+        raise ParameterError(
+            f"{_where(row)} has the type {row.get('type')!r}, but its values are those of a {made.type}: {remedy}, or "
+            f"write {made.type}."
+        )
+    return made
+
+
+def _is_fitted(row: Row) -> bool:
+    """Return whether a fit has noted the radius of the row."""
+    return row.get("r_fit_m") is not None
 
 
 def _extent(row: Row) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from .chain import Chain, columns
+from .chain import NOTHING, Chain, Held, Unknowns
 from .noise import Noise, estimated, shared_covariance
 from .plane_fit import PlanFit, Points
 from .signals import FLOOR_M, Signal
@@ -84,7 +84,7 @@ def plan_errors(fit: PlanFit, points: Points, used_m: float, noise: Noise) -> Er
     return Errors(np.where(nodes[:, 0] == nodes[:, 1], known, np.nan), length, s)
 
 
-def chain_errors(chain: Chain, signal: Signal, noise: Noise) -> Errors:
+def chain_errors(chain: Chain, signal: Signal, noise: Noise, held: Held = NOTHING) -> Errors:
     """Return standard errors of the parts of a chain whose joints are jumps.
 
     Parameters
@@ -92,20 +92,18 @@ def chain_errors(chain: Chain, signal: Signal, noise: Noise) -> Errors:
     chain : Chain
     signal : Signal
     noise : Noise
+    held : Held
+        Bends and starts that were not fitted.
     """
-    samples = signal.blocks(noise).near(chain)
-    base, by = columns(chain, samples)
-    unknown = chain.unknown[1::2]
-    free = np.array((True,) * chain.order + chain.curved)
-    by_knots = (by[:, 0::2] + by[:, 1::2]) * np.diff(chain.bends)
-    jacobian = np.concatenate([base[:, free], by_knots[:, unknown >= 0]], axis=1)
-    weighted = samples.whitened(jacobian)
+    unknowns = Unknowns.of(chain, held)
+    weighted = unknowns.matrix(chain, signal.blocks(noise).near(chain))[:, :-1]
+    linear, joints = int(unknowns.free.sum()), unknowns.knots[1::2] >= 0
     scale = np.linalg.norm(weighted, axis=0)
     scale[scale == 0] = 1.0
     half = np.linalg.pinv(np.linalg.qr(weighted / scale, mode="r"), rcond=SINGULAR) / scale[:, None]
     bends, starts = np.zeros((len(chain.bends), len(half))), np.zeros((len(chain.bends) + 1, len(half)))
-    bends[np.array(chain.curved)] = half[chain.order : int(free.sum())]
-    starts[1:-1][unknown >= 0] = half[int(free.sum()) :]
+    bends[unknowns.free[chain.order :]] = half[chain.order : linear]
+    starts[1:-1][joints] = half[linear:]
     return Errors(*(np.linalg.norm(one, axis=1) for one in (bends, np.diff(starts, axis=0), starts[:-1])))
 
 

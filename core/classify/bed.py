@@ -49,7 +49,7 @@ UNDER_M = 0.20
 """A point this far below a level still belongs to it: its bed may be rough, or the level an object on it."""
 
 BORDER = 1e-6
-"""A point this close below the border of a coarse cell, in cells, lies beyond it: rounding must not choose the cell."""
+"""A point this close below the border of a coarse cell, in cells, is beyond it: rounding must not choose the cell."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Coarse:
         return cls(first_column, first_row, shape, cell, np.bincount(cell, minlength=shape[0] * shape[1]))
 
     def cells(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Coarse cells of places, (k, 2): their numbers, and whether they lie in the grid, (k,) each; 0 outside."""
+        """Coarse cells of places, (k, 2): their numbers, and whether they are in the grid, (k,) each; 0 outside."""
         column, row = (np.floor(values / COARSE_M).astype(np.int64) for values in xy.T)
         row, column = row - self.row, column - self.column
         inside = (row >= 0) & (row < self.shape[0]) & (column >= 0) & (column < self.shape[1])
@@ -197,7 +197,7 @@ def _counted(cell: np.ndarray, bins: np.ndarray, count: int, cells: int) -> tupl
 
 
 MAX_DENSE = 16_000_000
-"""Bins that are counted in an array, 128 MB; where stray points lie kilometres above the ground they are sorted."""
+"""Bins that are counted in an array, 128 MB; where stray points are kilometres above the ground they are sorted."""
 
 
 def _quantiles(coarse: Coarse, begin: np.ndarray, z: np.ndarray) -> np.ndarray:

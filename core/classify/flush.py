@@ -24,7 +24,7 @@ MIN_PER_M2 = 800.0
 holds a row of them. Between points that are further apart, a groove and a wave of the pavement look alike."""
 
 MIN_SHARE, LEVEL_M, NEAR_BED_M = 0.65, 0.008, 0.03
-"""A coarse cell is paved if this share of its points lies this close to their mean height; the mean is that of the
+"""A coarse cell is paved if this share of its points is this close to their mean height; the mean is that of the
 points near the bed. Ballast scatters by 12 mm and more."""
 
 CAVITY_M = (0.012, 0.19)
@@ -37,7 +37,7 @@ REACH_M, STRIP_M, MIN_COVER, MIN_PURE = 1.0, 0.05, 0.5, 0.3
 """See `lines`; stricter than for rails, because nothing else confirms a groove."""
 
 INSIDE_M, SPACING_M = 0.052, 0.05
-"""Distance of the two grooves below the gauge, and its tolerance: grooves are 35 to 80 mm wide and lie inside."""
+"""Distance of the two grooves below the gauge, and its tolerance: grooves are 35 to 80 mm wide and are inside."""
 
 MIN_STATIONS = 3
 """Stations with a partner of five."""
@@ -61,7 +61,7 @@ left."""
 
 SEARCH_BINS = 6
 """Distance from the middle of the cavities within which the gap is looked for: where only one wall is seen, the middle
-lies on it."""
+is on it."""
 
 HEAD_LEVEL_M = 0.012
 """Largest difference in height between a head and the pavement."""
@@ -257,7 +257,7 @@ def _outer_edges(counts: np.ndarray) -> np.ndarray:
 
 
 def _on_heads(heads: Heads, xy: np.ndarray, below_m: np.ndarray, head_width_m: float) -> np.ndarray:
-    """Return which points lie on a head: on its level top, or on the face beside the groove, (k,) bool."""
+    """Return which points are on a head: on its level top, or on the face beside the groove, (k,) bool."""
     if not len(heads.inward) or not len(xy):
         return np.zeros(len(xy), dtype=bool)
     distance, cell = cKDTree(heads.lines.axis).query(xy, distance_upper_bound=REACH_M / 2)

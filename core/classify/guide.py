@@ -18,7 +18,7 @@ STEP_M = 0.25
 """Distance between the places of a guide: distances of 4 m from it are 2 mm too long at most."""
 
 CONTEXT_M = 3.0
-"""Points this far beyond the distance are searched as well: the other rail of a track, and what lies beside it."""
+"""Points this far beyond the distance are searched as well: the other rail of a track, and what is beside it."""
 
 MIDDLE_M = 0.5
 """Distance from the middle of a track within which a guide runs along this track."""

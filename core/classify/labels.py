@@ -22,19 +22,15 @@ UNDER_MEAN_M = 0.02
 """Tops this far below the mean are left out of it: a wide beam at the side of a head blends it with the ballast."""
 
 NEAREST, MIN_AXES = 6, 2
-"""Axes that are looked at for a place, and how many of them it must lie on: where two heads part there are some of
+"""Axes that are looked at for a place, and how many of them it must be on: where two heads part there are some of
 each, and single axes are led astray by a guard rail."""
 
 BEYOND_M = HIDDEN_M + 0.3
-"""Distance to an axis up to which a place may lie on it. Behind a wheel at the end of a cloud, the rail is too short to
+"""Distance to an axis up to which a place may be on it. Behind a wheel at the end of a cloud, the rail is too short to
 show its direction: the axis before the wheel continues to it, and over some of its cells."""
 
 WIDEST_M = 0.075
 """Distance from the axis within which points count towards the width of a top: short of a guard rail."""
-
-WIDTH_SPREADS = 1.9
-"""Standard deviations beyond which points no longer count towards the width of a top: a bar's points lie within 1.73 of
-them. A guard rail that leads some axes astray adds a quarter of the density on either side."""
 
 
 def whole_heads(tops: Tops, kept: np.ndarray, tolerances: Tolerances) -> np.ndarray:
@@ -126,7 +122,7 @@ class Near:
     place, cell : (m,) int arrays
         Pairs; the nearest cell of each place comes first.
     across : (m,) array
-        How far the place lies across from the axis of the cell, metres.
+        How far the place is across from the axis of the cell, metres.
     """
 
     count: int
@@ -147,30 +143,22 @@ class Near:
         return cls(len(xy), place, cell, across)
 
     def on(self, half_m: float, fits: np.ndarray) -> np.ndarray:
-        """Return which places lie within `half_m` of `MIN_AXES` axes that fit, (m,) bool; (count,) bool."""
+        """Return which places are within `half_m` of `MIN_AXES` axes that fit, (m,) bool; (count,) bool."""
         on = (np.abs(self.across) <= half_m) & fits
         return np.bincount(self.place[on], minlength=self.count) >= MIN_AXES
 
-    def widths(self, piece: np.ndarray, rounds: int) -> np.ndarray:
+    def widths(self, piece: np.ndarray) -> np.ndarray:
         """Width of the top of each piece: that of a bar whose points scatter across as much, (pieces,) metres.
 
-        Parameters
-        ----------
-        piece : (cells,) int array
-            Piece of each cell.
-        rounds : int
-            See `Tolerances.width_rounds`.
+        `piece` has the piece of each cell, (cells,).
         """
-        # Whole numbers add up to the same sum in any order of the points.
-        across = np.round(self.across * TENTHS_OF_MM)
-        number, count = piece[self.cell], int(piece.max()) + 1
         inside = np.abs(self.across) < WIDEST_M
-        for _ in range(rounds):
-            left, own = across[inside], number[inside]
-            points = np.maximum(np.bincount(own, minlength=count), 1)
-            mean = np.bincount(own, left, count) / points
-            spread = np.sqrt(np.maximum(np.bincount(own, left**2, count) / points - mean**2, 0))
-            inside = inside & (np.abs(across - mean[number]) <= WIDTH_SPREADS * spread[number])
+        # Whole numbers add up to the same sum in any order of the points.
+        across, number = np.round(self.across[inside] * TENTHS_OF_MM), piece[self.cell[inside]]
+        count = int(piece.max()) + 1
+        points = np.maximum(np.bincount(number, minlength=count), 1)
+        mean = np.bincount(number, across, count) / points
+        spread = np.sqrt(np.maximum(np.bincount(number, across**2, count) / points - mean**2, 0))
         return np.sqrt(12) * spread / TENTHS_OF_MM
 
 

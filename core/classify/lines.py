@@ -1,4 +1,4 @@
-"""Direction, axis and continuity of the line that each cell lies on, from the cells around it.
+"""Direction, axis and continuity of the line that each cell is on, from the cells around it.
 
 No trajectory, seed or drawn line is needed: each cell votes with the directions to its neighbours of the same height.
 """
@@ -28,7 +28,7 @@ FIRST_FIT_M, FIT_ROUNDS = 0.075, 2
 those in the strip, which must not reach a guard rail."""
 
 FIT_SLOPE, FIT_NEAR_M = 0.25, 0.04
-"""They also lie within this slope of the line, from a cell's width on."""
+"""They are also within this slope of the line, from a cell's width on."""
 
 RIDGE_M2 = 0.01
 """Keeps the direction where neighbours are few and near."""
@@ -40,7 +40,7 @@ BESIDE_M = 0.10
 """Neighbours further across than this are beside the line."""
 
 MAX_NEIGHBOURS = 400
-"""A cell with more neighbours within reach lies in an area, not on a line: a line of cells has 25 to 50 at 1 m reach,
+"""A cell with more neighbours within reach is in an area, not on a line: a line of cells has 25 to 50 at 1 m reach,
 and with 0.2 of them on the line (see `MIN_PURE`) at most 250."""
 
 CENTRE_M, CENTRE_ROUNDS = 0.5, 3
@@ -177,7 +177,7 @@ def _neighbours(
 
 
 def _main_direction(count: int, number: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """Direction in which most neighbours lie, (count,) radians from 0 to pi."""
+    """Direction in which most neighbours are, (count,) radians from 0 to pi."""
     distance = np.hypot(*step.T)
     angle = np.arctan2(step[:, 1], step[:, 0]) % np.pi
     bins = np.minimum((angle * (BINS / np.pi)).astype(np.int64), BINS - 1)
@@ -191,7 +191,7 @@ def _main_direction(count: int, number: np.ndarray, step: np.ndarray) -> np.ndar
 def _fitted(theta: np.ndarray, number: np.ndarray, step: np.ndarray, strip_m: float) -> tuple[np.ndarray, np.ndarray]:
     """Fit a straight line to the neighbours near each line: its direction and its distance to the left, (count,) each.
 
-    The cell itself counts as well. Near the end of a rail, all neighbours lie on one side: a line that had to pass
+    The cell itself counts as well. Near the end of a rail, all neighbours are on one side: a line that had to pass
     through the cell, which may be at the edge of the head, would be turned.
     """
     count = len(theta)
@@ -232,7 +232,7 @@ def _measured(
 
 
 def centred(lines: Lines, cells: Marks, half_m: float, along_m: float) -> Lines:
-    """Move the axes to the middle of all cells of their heads: those that were thinned lie to one side or the other.
+    """Move the axes to the middle of all cells of their heads: those that were thinned are to one side or the other.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ CANDIDATES = 6
 """Lines that are looked at for one station: other rails may be near at turnouts."""
 
 INSIDE_M = (0.02, 0.05)
-"""What runs inside a track lies this far beyond a head's width from the rail, and within the gauge by as much."""
+"""What runs inside a track is this far beyond a head's width from the rail, and within the gauge by as much."""
 
 PARALLEL_RAD = 0.07
 """Angle to the rail within which a line runs along it; the branch of a turnout leaves at 1:9 to 1:14."""

@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .lines import Lines
+from .tops import HIGH_M, Band, Tops
 
 ALIGNED_M = 0.03
 """Two cells continue each other if the axis of each passes the other one this close."""
@@ -30,9 +31,22 @@ LEAST_SINGLE_M = 5.0
 """Shortest piece without a partner: FRPDF is trained to remove shorter lone lines; a longer one may be the visible rail
 of a hidden pair."""
 
+GAP_M = 1.0
+"""Longest gap between two cells of a rail that counts towards its length."""
+
+ACROSS_M = (0.09, 0.13, 0.17, 0.21, 0.25, 0.29)
+"""Distances from the axis at which the surroundings are looked at: from beyond the head to the next 0.2 m."""
+
+ALONG = 9
+"""Places along the line, over half its reach to either side."""
+
+MAX_HIGH = 4
+"""Of these distances, as many may be as high as the line on one side. A guard rail takes three; the edge of a kerb, of
+a cable trough, or of the shoulder of the ballast takes all."""
+
 
 def links(lines: Lines, within_m: float | None = None) -> np.ndarray:
-    """Pairs of cells that lie on each other's axis, at most `within_m` apart or within reach, (m, 2) int."""
+    """Pairs of cells that are on each other's axis, at most `within_m` apart or within reach, (m, 2) int."""
     if len(lines.axis) < 2:
         return np.empty((0, 2), dtype=np.int64)
     pairs = cKDTree(lines.axis).query_pairs(within_m or lines.reach_m, output_type="ndarray")
@@ -101,7 +115,7 @@ def long_enough(
     piece = pieces_of(len(pair), links(lines.of(pair), max(HIDDEN_M, lines.reach_m)))
     long = np.zeros(len(paired), dtype=bool)
     long[pair] = _reaches(lines.axis[pair], piece, least_m, open_ended[pair])
-    return kept | continuing(lines, long)
+    return kept | long
 
 
 def with_partner(pairs: np.ndarray, paired: np.ndarray) -> np.ndarray:
@@ -110,15 +124,64 @@ def with_partner(pairs: np.ndarray, paired: np.ndarray) -> np.ndarray:
     return (np.bincount(piece, paired) > LEAST_PAIRED * np.bincount(piece))[piece]
 
 
-def continuing(lines: Lines, chosen: np.ndarray) -> np.ndarray:
-    """Return which cells are chosen, or continue such a cell with gaps of at most `HIDDEN_M`, (n,) bool.
-
-    Under a parked train, the other rail may be hidden.
-    """
-    piece = pieces_of(len(chosen), links(lines, max(HIDDEN_M, lines.reach_m)))
-    return (np.bincount(piece, chosen) > 0)[piece]
-
-
 def _reaches(xy: np.ndarray, piece: np.ndarray, least_m: float, open_ended: np.ndarray) -> np.ndarray:
     """Return which cells belong to pieces of at least this length, or to open-ended ones, (n,) bool."""
     return ((lengths(xy, piece) >= least_m) | (np.bincount(piece, open_ended) > 0))[piece]
+
+
+def shares_of_length(lines: Lines, half_m: float) -> np.ndarray:
+    """Length of rail that each cell stands for, (n,) metres: half the way to the next cell ahead and behind.
+
+    Parameters
+    ----------
+    lines : Lines
+    half_m : float
+        Distance across within which two cells are on one line.
+    """
+    count = len(lines.axis)
+    if count < 2:
+        return np.zeros(count)
+    pairs = cKDTree(lines.axis).query_pairs(np.hypot(GAP_M, half_m), output_type="ndarray")
+    own, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+    step = lines.axis[other] - lines.axis[own]
+    along = np.einsum("ij,ij->i", step, lines.along[own])
+    beside = np.abs(np.einsum("ij,ij->i", step, lines.across[own])) < half_m
+    share_m = np.zeros(count)
+    for ahead in (True, False):
+        mine = beside & ((along > 0) == ahead)
+        gap_m = np.full(count, GAP_M)
+        np.minimum.at(gap_m, own[mine], np.abs(along[mine]))
+        share_m += np.where(gap_m < GAP_M, gap_m / 2, 0.0)
+    return share_m
+
+
+def stands_free(tops: Tops, band: Band, marks: np.ndarray, lines: Lines) -> np.ndarray:
+    """Return which lines have lower ground, or nothing seen, on each side, (n,) bool.
+
+    Parameters
+    ----------
+    tops : Tops
+    band : Band
+    marks : (n,) int array
+        Cells.
+    lines : Lines
+        The line of each cell.
+    """
+    along = np.linspace(-0.5, 0.5, ALONG) * lines.reach_m
+    free = np.ones(len(lines.axis), dtype=bool)
+    depth_m = band.depth_m(lines.height)
+    z, high_cells = tops.z.ravel(), tops.high.ravel()
+    own, ahead_m, left_m = z[marks], lines.along, lines.across
+    for side in (1, -1):
+        distances = np.zeros(len(free), dtype=np.int64)
+        for left in ACROSS_M:
+            seen, high = np.zeros(len(free), dtype=np.int64), np.zeros(len(free), dtype=np.int64)
+            for ahead in along:
+                cell, inside = tops.grid.cells(lines.axis + ahead * ahead_m + side * left * left_m)
+                rise = z[cell] - own
+                wall = inside & high_cells[cell]
+                seen += wall | (inside & (np.abs(rise) < HIGH_M))
+                high += wall | (inside & (rise >= -depth_m) & (rise < HIGH_M))
+            distances += 2 * high > seen
+        free &= distances <= MAX_HIGH
+    return free

@@ -51,9 +51,6 @@ class Tolerances:
         Width beyond that of a head up to which a top is not blurred, and the share of such cells, among those with a
         partner, below which the blur of the square is measured. Wide beams blend heads with the ballast, and `THIN`
         allows for that; in a dense square, one wide top is enough.
-    width_rounds : int
-        Rounds in which this width is measured where there is a partner. From the second on, points that do not fit a
-        bar are left out: those of a guard rail, where beams are narrow enough to show it apart.
     """
 
     along_m: float
@@ -69,7 +66,6 @@ class Tolerances:
     wider_single_m: float
     sharp_m: float
     sharp_share: float
-    width_rounds: int
 
 
 HEADS = Band(low_m=LOW_M, depth_share=1.0, slab_m=0.025)
@@ -91,7 +87,6 @@ DENSE = Tolerances(
     wider_single_m=0.012,
     sharp_m=0.012,
     sharp_share=1.0,
-    width_rounds=5,
 )
 """For scanners on vehicles: beams of a few millimetres, range noise up to 5 mm."""
 
@@ -109,7 +104,6 @@ THIN = Tolerances(
     wider_single_m=0.04,
     sharp_m=0.05,
     sharp_share=0.5,
-    width_rounds=1,
 )
 """For scanners in the air: a beam of 4 to 9 cm blends the head and the ballast."""
 
@@ -164,5 +158,5 @@ class Settings:
         return replace(self, guide=self.guide.around(np.multiply(key, self.side_m), self.side_m))
 
     def own(self, xy: np.ndarray) -> np.ndarray:
-        """Return which of (n, 2) or (n, 3) places, in metres from a square's corner, lie in the square, (n,) bool."""
+        """Return which of (n, 2) or (n, 3) places, in metres from a square's corner, are in the square, (n,) bool."""
         return np.all((xy[:, :2] >= 0) & (xy[:, :2] < self.side_m), axis=1)

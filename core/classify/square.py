@@ -9,15 +9,21 @@ import numpy as np
 from ..frame import ORIGIN_STEP
 from ..rails import SearchFigures
 from .bed import COARSE_M, Bed, Coarse, find_bed
-from .figures import shares_of_length
 from .flush import Flush, flush_rails
 from .labels import Near, label, whole_heads
 from .lines import Lines, Marks, centred, find_lines
 from .partner import runs_inside, stations_with_partner
-from .pieces import continuing, links, long_enough, lower_than_beside, pieces_of, with_partner
+from .pieces import (
+    links,
+    long_enough,
+    lower_than_beside,
+    pieces_of,
+    shares_of_length,
+    stands_free,
+    with_partner,
+)
 from .ridges import Ridges, cells_beside, on_crests
 from .settings import BLUNT, DENSE, HEADS, MARGIN_M, THIN, Settings, Tolerances
-from .sides import stands_free
 from .tops import HIGH_M, MILLIMETRES, Band, Grid, Tops, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
 
 THIN_PER_M2 = 400.0
@@ -153,7 +159,20 @@ class Classified:
     figures: SearchFigures
 
 
-def classify_square(xyz: np.ndarray, settings: Settings) -> Classified:
+@dataclass(frozen=True)
+class ByShape(Classified):
+    """The answer of geometry for one square.
+
+    Attributes
+    ----------
+    flush : Classified
+        What of it is in pavements; its figures leave out points and squares.
+    """
+
+    flush: Classified
+
+
+def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
     """Find the points on railheads in a square.
 
     Parameters
@@ -163,7 +182,8 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> Classified:
         The corner lies at a multiple of `Settings.side_m` from the zero of the coordinate system.
     settings : Settings
     """
-    nothing = Classified(np.zeros(len(xyz), dtype=bool), SearchFigures())
+    rail = np.zeros(len(xyz), dtype=bool)
+    nothing = ByShape(rail, SearchFigures(), Classified(rail, SearchFigures()))
     if not len(xyz):
         return nothing
     x, y = (np.ascontiguousarray(values) for values in xyz.T[:2])
@@ -179,11 +199,23 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> Classified:
     grid, cell = Grid.around(x[near], y[near], settings.cell_m)
     tops = tops_of(grid, cell, height, z[near])
     standing = _standing(Shown(xy, cell, height, bed, tops), settings)
-    flush = flush_rails(coarse, near, xy, height, grid, cell, settings)
-    rail = nothing.rail
-    found = near[np.union1d(standing.points, flush.points)]
-    rail[found[settings.own(xyz[found])]] = True
-    return Classified(rail, _figures(rail, standing, flush, grid, cell[rail[near]], settings))
+    paved = flush_rails(coarse, near, xy, height, grid, cell, settings)
+    in_pavement = rail.copy()
+    in_pavement[near[paved.points]] = True
+    rail[near[standing.points]] = True
+    own = settings.own(xyz)
+    rail, in_pavement = (rail | in_pavement) & own, in_pavement & own
+    flush = Classified(in_pavement, _flush_figures(paved, cell[in_pavement[near]], settings))
+    figures = _standing_figures(standing, settings) + flush.figures
+    there = bool(rail.any())
+    figures = replace(
+        figures,
+        points=int(rail.sum()),
+        cells=len(np.unique(cell[rail[near]])),
+        squares=int(there),
+        thin=int(there and standing.thin),
+    )
+    return ByShape(rail, figures, flush)
 
 
 @dataclass(frozen=True)
@@ -254,28 +286,32 @@ def _blunt_heads(shown: Shown, reach_m: float, settings: Settings) -> tuple[Kept
     return kept, label(shown.tops, cells, shown.cell, shown.height, BLUNT)
 
 
-def _figures(
-    rail: np.ndarray, standing: Standing, flush: Flush, grid: Grid, cell: np.ndarray, settings: Settings
-) -> SearchFigures:
-    """Sum up what was found in the square without its margin; `cell` are those of the rail points."""
+def _standing_figures(standing: Standing, settings: Settings) -> SearchFigures:
+    """Sum up the lengths of rails that stand out of their bed, in the square without its margin."""
     kept = standing.kept
     share_m = np.where(settings.own(kept.lines.axis), shares_of_length(kept.lines, settings.head_width_m), 0.0)
-    flush_m = shares_of_length(flush.lines, settings.head_width_m)[settings.own(flush.lines.axis)]
-    near_m = beside_guide(standing.rails.lines, settings) + beside_guide(flush.rails, settings)
-    there = bool(rail.any())
+    along_m, across_m = beside_guide(standing.rails.lines, settings)
     blunt_m = float(share_m.sum()) if standing.blur_m else 0.0
     return SearchFigures(
-        points=int(rail.sum()),
-        paired_m=float(share_m[kept.paired].sum() + flush_m.sum()),
+        paired_m=float(share_m[kept.paired].sum()),
         single_m=float(share_m[~kept.paired].sum()),
-        cells=len(np.unique(cell)),
-        squares=int(there),
-        thin=int(there and standing.thin),
-        paved=int(len(flush_m) > 0),
-        along_m=float(near_m[0]),
-        across_m=float(near_m[1]),
+        along_m=float(along_m),
+        across_m=float(across_m),
         blunt_m=blunt_m,
         blur_m2=blunt_m * standing.blur_m,
+    )
+
+
+def _flush_figures(flush: Flush, cell: np.ndarray, settings: Settings) -> SearchFigures:
+    """Sum up rails in pavements, in the square without its margin; `cell` are those of their points."""
+    share_m = shares_of_length(flush.lines, settings.head_width_m)[settings.own(flush.lines.axis)]
+    along_m, across_m = beside_guide(flush.rails, settings)
+    return SearchFigures(
+        paired_m=float(share_m.sum()),
+        cells=len(np.unique(cell)),
+        paved=int(len(share_m) > 0),
+        along_m=float(along_m),
+        across_m=float(across_m),
     )
 
 
@@ -375,9 +411,9 @@ def _narrow(
     if not len(kept.cell):
         return np.zeros(0, dtype=bool), 0.0
     piece = pieces_of(len(kept.cell), kept.pairs)
-    width_m = beside.widths(piece, tolerances.width_rounds)
+    width_m = beside.widths(piece)
     narrow = width_m < settings.head_width_m + tolerances.wider_m
-    alone = _stands_alone(kept, piece, beside, shown.bed, settings, tolerances)
+    alone = _stands_alone(kept, piece, width_m, shown.bed, settings, tolerances)
     partnered = with_partner(kept.pairs, kept.paired)
     sharp = width_m < settings.head_width_m + tolerances.sharp_m
     wide = partnered.any() and sharp[piece[partnered]].mean() < tolerances.sharp_share
@@ -386,18 +422,17 @@ def _narrow(
         ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
         alone &= not ridges.are_blunt(settings.head_width_m)
         blur_m = ridges.blur_m if wide and ridges.are_blunt(settings.head_width_m) else 0.0
-    return np.where(continuing(kept.lines, partnered), narrow[piece], alone[piece]), blur_m
+    return np.where(partnered, narrow[piece], alone[piece]), blur_m
 
 
 def _stands_alone(
-    kept: Kept, piece: np.ndarray, beside: Near, bed: Bed, settings: Settings, tolerances: Tolerances
+    kept: Kept, piece: np.ndarray, width_m: np.ndarray, bed: Bed, settings: Settings, tolerances: Tolerances
 ) -> np.ndarray:
-    """Return which pieces may be rails without a partner, (pieces,) bool.
+    """Return which pieces, of (pieces,) widths, may be rails without a partner, (pieces,) bool.
 
     They are as narrow as a head, stand as high as a rail does that is not buried in ballast, and their bed is not
     steeper than a track's.
     """
-    width_m = beside.widths(piece, 1)
     narrow = width_m < settings.head_width_m + tolerances.wider_single_m
     narrow &= width_m > LEAST_SINGLE_WIDTH * settings.head_width_m
     high = _mean(kept.lines.height, piece) >= SINGLE_HEIGHT_M

@@ -1,4 +1,4 @@
-"""Cells for rails that are too thin for FRPDF: drawn along the lines on which the cells of a rail lie.
+"""Cells for rails that are too thin for FRPDF: drawn along the lines on which the cells of a rail are.
 
 They show the network where the rail runs and carry no measurement: as points they would cost accuracy. They depend on
 the cells within `SURROUNDINGS_M` only, and there are none where rails are dense (docs/method.md section 2.4).
@@ -83,7 +83,7 @@ def drawn(xyz: np.ndarray, spacings_m: Sequence[float], cell_m: float) -> np.nda
 
 
 def _good_lines(cells: Marks, wanted: np.ndarray) -> tuple[np.ndarray, Lines]:
-    """Find the lines of some cells, (k,) int, that lie on one: those cells, (m,), and their lines."""
+    """Find the lines of some cells, (k,) int, that are on one: those cells, (m,), and their lines."""
     lines = find_lines(cells, REACH_M, ALONG_M, STRIP_M, wanted)
     good = np.flatnonzero((lines.cover >= MIN_COVER) & (lines.pure >= MIN_PURE))
     return good, lines.of(good)

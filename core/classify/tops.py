@@ -87,14 +87,14 @@ class Grid:
         return np.column_stack([column + (self.column + 0.5), -(row + (self.row + 0.5))]) * self.cell_m
 
     def cells(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Cells of places, (k, 2): their numbers, and whether they lie in the window, (k,) each; 0 outside."""
+        """Cells of places, (k, 2): their numbers, and whether they are in the window, (k,) each; 0 outside."""
         row = np.floor(-xy[:, 1] / self.cell_m + BORDER_CELLS).astype(np.int64) - self.row
         column = np.floor(xy[:, 0] / self.cell_m + BORDER_CELLS).astype(np.int64) - self.column
         inside = (row >= 0) & (row < self.shape[0]) & (column >= 0) & (column < self.shape[1])
         return np.where(inside, row * self.shape[1] + column, 0), inside
 
     def blocks(self, cell: np.ndarray) -> np.ndarray:
-        """Find the blocks of 2 x 2 cells of the raster that the cells lie in, (k,) int64 numbers."""
+        """Find the blocks of 2 x 2 cells of the raster that the cells are in, (k,) int64 numbers."""
         row, column = np.divmod(cell, self.shape[1])
         return ((row + self.row) // 2 - self.row // 2) * (self.shape[1] + 2) + (column + self.column) // 2
 

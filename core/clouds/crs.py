@@ -46,7 +46,7 @@ BASELINE_M = 100.0
 compared with the rounding of degrees."""
 
 AREA_DEG = 2.0
-"""How far outside of the area of its system a railway may lie, degrees: grids are used beyond their borders."""
+"""How far outside of the area of its system a railway may be, degrees: grids are used beyond their borders."""
 
 WGS_84 = "EPSG:4326"
 
@@ -196,7 +196,7 @@ def codes_and_names(crs: pyproj.CRS) -> tuple[int | None, str, str]:
 
 
 def lies_in_area(crs: pyproj.CRS, xy: tuple[float, float]) -> bool:
-    """Return whether a place, in units of a projected system, lies in or near the area for which it is made.
+    """Return whether a place, in units of a projected system, is in or near the area for which it is made.
 
     It does also where the area is unknown.
 

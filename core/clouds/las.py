@@ -151,8 +151,10 @@ def read_blocks(
 
 def coordinates(chunk: laspy.ScaleAwarePointRecord, keep: np.ndarray | slice) -> np.ndarray:
     """Return the coordinates of some points of a chunk, (n, 3) in units of the CRS."""
-    raw = np.column_stack([chunk.X[keep], chunk.Y[keep], chunk.Z[keep]])
-    return raw * chunk.scales + chunk.offsets
+    axes = (chunk.X, chunk.Y, chunk.Z)
+    return np.column_stack(
+        [raw[keep] * scale + offset for raw, scale, offset in zip(axes, chunk.scales, chunk.offsets)]
+    )
 
 
 def shows_scanner(path: Path) -> bool:

@@ -169,7 +169,7 @@ class Request:
             yield xyz[inside], found[inside], marks[inside], census
 
     def holds(self, xyz: np.ndarray) -> np.ndarray:
-        """Return which places, (n, 3) in units of the CRS, lie in the extent and the mask, (n,) bool."""
+        """Return which places, (n, 3) in units of the CRS, are in the extent and the mask, (n,) bool."""
         inside = np.ones(len(xyz), dtype=bool) if self.extent is None else _inside(xyz, self.extent)
         if self.mask is not None:
             inside[inside] = self.mask.holds(xyz[inside])

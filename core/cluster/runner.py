@@ -134,10 +134,6 @@ def execute(task: Task, inputs: Mapping[Hashable, Any], folder: str, expected_ve
     expected_version : str
         Version of the code and the weights that asks for the task; see `store.version`.
 
-    Returns
-    -------
-    Answer
-
     Raises
     ------
     DiskError

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -24,6 +23,7 @@ from .options import (
     TILES_HELP,
     Console,
     add_cloud_arguments,
+    add_length,
     add_workers_argument,
     destination_of,
     extent_of,
@@ -70,9 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     classes = ",".join(map(str, AIRBORNE_CLASSES))
     parser.add_argument("--classes", default=classes, help=f"classes of the points to use (default: {classes})")
     for name, text in LENGTHS.items():
-        value = getattr(AirborneParameters, f"{name}_m")
-        option = f"--{name.replace('_', '-')}"
-        parser.add_argument(option, type=float, default=value, metavar="M", help=f"{text} (default: {value:g})")
+        add_length(parser, f"--{name.replace('_', '-')}", getattr(AirborneParameters, f"{name}_m"), text)
     add_workers_argument(parser)
 
 
@@ -128,17 +126,8 @@ def _write_proposed(found: Proposals, destination: Destination) -> None:
 
 
 def parameters_of(args: argparse.Namespace, standard: RailStandard) -> AirborneParameters:
-    """Return the parameters that the options state.
-
-    Raises
-    ------
-    ParameterError
-        A length is not positive.
-    """
+    """Return the parameters that the options state."""
     lengths = {f"{name}_m": getattr(args, name) for name in LENGTHS}
-    for name in LENGTHS:
-        if not 0 < getattr(args, name) < math.inf:
-            raise ParameterError(f"--{name.replace('_', '-')} must be a positive number.")
     return AirborneParameters(standard.gauge_m, standard.head_width_m, **lengths)
 
 

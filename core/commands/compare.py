@@ -13,7 +13,7 @@ from ..errors import ParameterError
 from ..parameters import ComparisonParameters
 from ..progress import Estimating
 from ..report.comparison import build_comparison, describe_shift, verdict_on
-from .options import Console, destination_of, shapes_module
+from .options import Console, add_length, destination_of, shapes_module
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,10 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         text = "standard error of lines that state none; 0 for a design"
         parser.add_argument(f"--{name}-sigma", type=float, metavar="MM", help=text)
     default = ComparisonParameters()
-    text = f"largest distance at which two lines are the same (default: {default.reach_m:g})"
-    parser.add_argument("--reach", type=float, default=default.reach_m, metavar="M", help=text)
-    text = f"distance between stations (default: {default.step_m:g})"
-    parser.add_argument("--step", type=float, default=default.step_m, metavar="M", help=text)
+    add_length(parser, "--reach", default.reach_m, "largest distance at which two lines are the same")
+    add_length(parser, "--step", default.step_m, "distance between stations")
     text = "a constant shift between the surveys counts as a movement, as it should against a design"
     parser.add_argument("--count-shift", action="store_true", help=text)
     output = parser.add_argument_group("outputs", "Existing files are replaced.")
@@ -47,9 +45,6 @@ def run(args: argparse.Namespace) -> None:
     RailExtractError
         A parameter is wrong, a file can't be read, or an output can't be written.
     """
-    for name in ("reach", "step"):
-        if not 0 < getattr(args, name) < math.inf:
-            raise ParameterError(f"--{name} must be a positive number.")
     if (args.rails is None) != (args.reference_rails is None):
         raise ParameterError(
             "Gauge and cant are compared between the rails of both: give --rails and --reference-rails."

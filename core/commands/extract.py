@@ -93,7 +93,7 @@ POSITIVE = (
     "centerline_tolerance_m",
     "step",
 )
-"""Parameters that can't be 0: nothing is smoothed over no length, and no point lies within no distance."""
+"""Parameters that can't be 0: nothing is smoothed over no length, and no point is within no distance."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -15,14 +15,14 @@ import shapely
 
 from ..alignment.cant_of_rails import cant_of_rails
 from ..alignment.elements import Alignment
-from ..alignment.measured import Track, with_stations
-from ..alignment.placed_axes import NAME_FIELDS, PlacedAxes, check_jumps, km_of, post_field
+from ..alignment.measured import Track, stations_by_track, with_cant
+from ..alignment.placed_axes import AXIS_IN_DEGREES, NAME_FIELDS, PlacedAxes, check_jumps, km_of, post_field
 from ..alignment.stationing import Jump
 from ..alignment.stations import Axes, AxisLine, Post, Start, make_axes
 from ..alignment.table import alignments, check_table, frame_of
 from ..clouds.crs import import_pyproj, is_geographic, name_of, parse_crs, same_plane, units
 from ..comparison.tracks import SurveyedLine
-from ..errors import CrsError, ParameterError
+from ..errors import CrsError, MissingError, ParameterError
 from ..fields import EXTENT_FIELDS, STATION_FIELDS, Field
 from ..frame import ORIGIN_STEP, LocalFrame
 from ..geopackage import geometries_in
@@ -97,7 +97,7 @@ class Features:
             if part.geom_type == "LineString" and part.length > 0
         ]
         if not found:
-            raise ParameterError(f"{self.option} has no lines: give a line layer.")
+            raise MissingError(self.option, "line")
         crs_wkt, horizontal_unit_m, vertical_unit_m = self.system
         middle = np.median(np.concatenate([xyz for _, _, xyz in found]), axis=0)
         origin = np.round(np.nan_to_num(middle) / ORIGIN_STEP) * ORIGIN_STEP
@@ -149,22 +149,22 @@ def _with_measures(features: Features, file: str) -> Features:
     return replace(features, shapes=shapely.from_wkb([stored.get(int(number)) for number in features.ids]))
 
 
-def read_tracks(lines: str, quality: Optional[str], rails: Optional[str]) -> tuple[list[Track], LocalFrame]:
-    """Read centerlines with their cant: from the track geometry, else from the rails.
+def read_tracks(
+    lines: str, quality: Optional[str], rails: Optional[str], option: str = "LINES"
+) -> tuple[list[Track], LocalFrame]:
+    """Read centerlines with their cant: from the track geometry, else from the rails; `option` names the lines.
 
     Raises
     ------
     CrsError, ParameterError
         A file has no lines, lacks a field, or states the cant of other tracks.
     """
-    found, frame = read_features(lines, "LINES").lines()
+    found, frame = read_features(lines, option).lines()
     tracks = [(_whole(row.get("track_id"), feature), xyz) for feature, row, xyz in found]
     if quality is not None:
-        stations = _stations(read_features(quality, "--quality"))
-        if not any(number in stations for number, _ in tracks):
-            raise ParameterError("--quality has no stations of the tracks in LINES: give their track geometry.")
-        none = np.zeros((0, 3))
-        return [with_stations(number, xyz, stations.get(number, none)) for number, xyz in tracks], frame
+        features = read_features(quality, "--quality")
+        stations = stations_by_track(features.rows(), features.columns, "--quality")
+        return with_cant(tracks, stations, "--quality", option), frame
     shapes = [] if rails is None else [xyz for _, _, xyz in _lines_in(read_features(rails, "--rails"), frame)]
     return [
         Track(number, xyz, cant_of_rails(xyz, shapes), np.zeros(len(xyz), dtype=bool)) for number, xyz in tracks
@@ -261,14 +261,11 @@ def read_axes(
     stated_systems = [one for one in (plane, features.crs_wkt, places) if one]
     crs_wkt = next((one for one in stated_systems if not is_geographic(parse_crs(one))), None)
     if crs_wkt is None and stated_systems:
-        raise CrsError(
-            "AXIS and INPUT are in degrees, where lengths can't be measured: reproject AXIS, for example to the UTM "
-            "zone of the place."
-        )
+        raise CrsError(AXIS_IN_DEGREES)
     unit_m = units(parse_crs(crs_wkt))[0] if crs_wkt else 1.0
     lines = list(_axis_lines(features, crs_wkt, unit_m))
     if not lines:
-        raise ParameterError("AXIS has no lines: give a line layer.")
+        raise MissingError("AXIS", "line")
     stated = [] if posts is None else _posts(read_features(posts, "POSTS"), field, crs_wkt, unit_m)
     made = make_axes(lines, start, stated, [] if jumps is None else _jumps(read_features(jumps, "JUMPS")))
     return PlacedAxes(Axes(made.axes, made.notices), unit_m, notation), crs_wkt
@@ -356,7 +353,7 @@ def _posts(features: Features, field: Optional[str], crs_wkt: Optional[str], uni
         for xy in shapely.get_coordinates(part)
     ]
     if not found:
-        raise ParameterError("POSTS has no points: give a point layer.")
+        raise MissingError("POSTS", "point")
     return found
 
 
@@ -369,19 +366,6 @@ def _jumps(features: Features) -> list[Jump]:
     ]
 
 
-def _stations(features: Features) -> dict[int, np.ndarray]:
-    """Return chainage, cant and whether a gap is bridged of the stations of each track, (n, 3); NaN without cant."""
-    for name in ("track_id", "chainage_m", "cant_mm"):
-        if name not in features.columns:
-            raise ParameterError(f"{features.option} has no field {name}: give the track geometry of extract.")
-    found: dict[int, list[tuple[float, float, float]]] = {}
-    for row in features.rows():
-        if row["track_id"] is not None and row["chainage_m"] is not None:
-            values = float(row["chainage_m"]), _number(row["cant_mm"]) / 1000.0, float(row.get("bridged") or 0)
-            found.setdefault(int(row["track_id"]), []).append(values)
-    return {number: np.array(sorted(rows)) for number, rows in found.items()}
-
-
 def _lines_in(features: Features, frame: LocalFrame) -> list[tuple[int, dict[str, Any], np.ndarray]]:
     """Return the lines in a frame.
 
@@ -391,14 +375,25 @@ def _lines_in(features: Features, frame: LocalFrame) -> list[tuple[int, dict[str
         Their coordinate system is another one.
     """
     found, own = features.lines()
+    shift = shift_between(features.option, own, frame)
+    return [(feature, row, xyz + shift) for feature, row, xyz in found]
+
+
+def shift_between(option: str, own: LocalFrame, frame: LocalFrame) -> np.ndarray:
+    """Return what moves places, (3,) metres, of the lines that an option names into another frame.
+
+    Raises
+    ------
+    CrsError
+        Their coordinate system is another one.
+    """
     if own.crs_wkt and frame.crs_wkt and not same_plane(own.crs_wkt, frame.crs_wkt, tuple(frame.origin[:2])):
         names = (name_of(parse_crs(wkt)) for wkt in (own.crs_wkt, frame.crs_wkt))
         raise CrsError(
-            f"{features.option} is in {next(names)} but the other lines in {next(names)}: give both in the same "
-            "coordinate system."
+            f"{option} is in {next(names)} but the other lines in {next(names)}: give both in the same coordinate "
+            "system."
         )
-    shift = own.shift_to(frame)
-    return [(feature, row, xyz + shift) for feature, row, xyz in found]
+    return own.shift_to(frame)
 
 
 def _vertices(line: shapely.LineString) -> np.ndarray:

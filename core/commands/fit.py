@@ -6,16 +6,13 @@ import argparse
 from datetime import datetime
 from pathlib import Path
 
-import numpy as np
-
 from .. import VERSION
 from ..alignment.fit import fit_tracks
-from ..errors import ParameterError
 from ..parameters import TRANSITIONS, FitParameters
 from ..progress import Estimating
 from ..report import build_alignment_page
 from ..report.origin import title_of
-from .options import Console, destination_of, shapes_module
+from .options import Console, add_length, destination_of, shapes_module
 
 SUFFIXES = {"elements": (".gpkg",), "deviations": (".gpkg",), "report": (".html", ".htm")}
 """File name suffixes of each output."""
@@ -28,10 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rails", metavar="FILE", help="rails of these tracks, with the cant")
     parser.add_argument("--fixed", metavar="FILE", help="corrected element table: what was changed is held")
     default = FitParameters()
-    text = f"how far the track may lie off its design (default: {1000 * default.tolerance_m:g})"
-    parser.add_argument("--tolerance", type=float, default=1000 * default.tolerance_m, metavar="MM", help=text)
-    text = f"least length of an element (default: {default.min_length_m:g})"
-    parser.add_argument("--min-length", type=float, default=default.min_length_m, metavar="M", help=text)
+    text = "how far the track may be off its design"
+    add_length(parser, "--tolerance", 1000 * default.tolerance_m, text, "MM")
+    add_length(parser, "--min-length", default.min_length_m, "least length of an element")
     text = f"whether the curvature may jump (default: {default.transitions})"
     parser.add_argument("--transitions", choices=TRANSITIONS, default=default.transitions, help=text)
     parser.add_argument("--no-round", action="store_true", help="do not propose round radii")
@@ -49,9 +45,6 @@ def run(args: argparse.Namespace) -> None:
     RailExtractError
         A parameter is wrong, a file can't be read, no track can be fitted, or an output can't be written.
     """
-    for name in ("tolerance", "min_length"):
-        if not 0 < getattr(args, name) < np.inf:
-            raise ParameterError(f"--{name.replace('_', '-')} must be a positive number.")
     features, layers = (shapes_module("LINES", name) for name in ("features", "alignment_layers"))
     outputs = {
         name: destination_of(name, getattr(args, name), suffixes)

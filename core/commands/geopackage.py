@@ -105,26 +105,13 @@ def lines_layer(
     fields: Sequence[Field],
     lines: Sequence[RailLine] | Sequence[Centerline] | Sequence[Finding],
 ) -> Layer:
-    """Make a layer of lines.
-
-    Parameters
-    ----------
-    name : str
-    fields : sequence of Field
-    lines : sequence of RailLine, Centerline or Finding
-    """
+    """Make a layer of lines."""
     columns = [[getattr(line, field.name) for line in lines] for field in fields]
     return Layer(name, fields, columns, "LineString Z", [line.xyz for line in lines])
 
 
 def stations_layer(name: str, tracks: Sequence[TrackGeometry]) -> Layer:
-    """Make a layer of the stations of tracks, with the fields of QUALITY.
-
-    Parameters
-    ----------
-    name : str
-    tracks : sequence of TrackGeometry
-    """
+    """Make a layer of the stations of tracks, with the fields of QUALITY."""
     columns = [
         [value for track in tracks for value in np.broadcast_to(getattr(track, field.name), len(track.xyz))]
         for field in QUALITY_FIELDS

@@ -20,7 +20,7 @@ from ..scratch import scratch_folder
 from ..standards import DEFAULT, SEARCHED_CLASSES, resolve
 from ..tasks import InTurn
 from .copies import add_label_arguments, add_tiles_arguments, check_rail_class, planned_output, print_figures
-from .options import Console, destination_of, shapes_module
+from .options import Console, add_length, destination_of, shapes_module
 
 LENGTHS = {
     "search": "largest distance of a seed from its rail, and of the rail from its course",
@@ -48,9 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "do not follow the other rail of the track"
     parser.add_argument("--single", action="store_true", help=text)
     for name, text in LENGTHS.items():
-        value = getattr(GrowParameters, f"{name}_m")
-        option = f"--{name.replace('_', '-')}"
-        parser.add_argument(option, type=float, default=value, metavar="M", help=f"{text} (default: {value:g})")
+        add_length(parser, f"--{name.replace('_', '-')}", getattr(GrowParameters, f"{name}_m"), text)
     most = GrowParameters.max_outliers
     text = f"windows in a row in which the rail may not be seen (default: {most})"
     parser.add_argument("--max-outliers", type=int, default=most, metavar="N", help=text)
@@ -65,7 +63,7 @@ def run(args: argparse.Namespace) -> None:
     Raises
     ------
     RailExtractError
-        A parameter is wrong, a file can't be read, no seed lies on a rail, or the output can't be written.
+        A parameter is wrong, a file can't be read, no seed is on a rail, or the output can't be written.
     """
     check_rail_class(args)
     standard = resolve(args.standard, args.gauge, args.head_width)
@@ -91,12 +89,9 @@ def _parameters(args: argparse.Namespace) -> GrowParameters:
     Raises
     ------
     ParameterError
-        A length is not positive.
+        A number is negative.
     """
     lengths = {f"{name}_m": getattr(args, name) for name in LENGTHS}
-    for name in LENGTHS:
-        if not 0 < getattr(args, name) < np.inf:
-            raise ParameterError(f"--{name.replace('_', '-')} must be a positive number.")
     if args.max_outliers < 0:
         raise ParameterError(f"--max-outliers must be 0 or more, not {args.max_outliers}.")
     return GrowParameters(both=not args.single, max_outliers=args.max_outliers, **lengths)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..alignment.deviations import compared_with
 from ..alignment.landxml_reading import read_landxml, stated_system
+from ..alignment.measured import moved
 from ..clouds.crs import parse_crs, units
 from ..design_files import check_place
 from ..errors import CrsError, ParameterError
@@ -27,10 +28,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--east-first", action="store_true", help="the points of the file have the easting first")
     text = "measured centerlines: how far they lie off the alignments beside them"
     parser.add_argument("--tracks", metavar="LINES", help=text)
+    parser.add_argument("--quality", metavar="FILE", help="track geometry of TRACKS, with the cant")
+    parser.add_argument("--rails", metavar="FILE", help="rails of TRACKS, with the cant")
     output = parser.add_argument_group("outputs", "Existing files are replaced. GeoPackages may be the same file.")
     output.add_argument("--elements", type=Path, metavar="FILE", help="GeoPackage for the element table")
     output.add_argument("--axis", type=Path, metavar="FILE", help="GeoPackage for axes with kilometres as M values")
-    output.add_argument("--deviations", type=Path, metavar="FILE", help="GeoPackage for slews and lifts of TRACKS")
+    output.add_argument("--deviations", type=Path, metavar="FILE", help="GeoPackage for slews, lifts, cant of TRACKS")
     output.add_argument("--report", type=Path, metavar="FILE", help="HTML file for the diagrams of TRACKS")
 
 
@@ -49,12 +52,12 @@ def run(args: argparse.Namespace) -> None:
     }
     if not outputs:
         raise ParameterError("Give --elements, --axis, --deviations or --report for what is wanted of the file.")
-    if args.tracks is None and {"deviations", "report"} & set(outputs):
+    if args.tracks is None and (args.quality or args.rails or {"deviations", "report"} & set(outputs)):
         raise ParameterError("--deviations and --report compare measured tracks with the alignments: give --tracks.")
     features, layers = (shapes_module("import-alignment", name) for name in ("features", "alignment_layers"))
     progress = Estimating(Console())
-    found = args.tracks and features.read_survey(args.tracks, "--tracks", None)
-    system = stated_system(args.file) or args.crs or (found[1].crs_wkt if found else None)
+    tracks, own = features.read_tracks(args.tracks, args.quality, args.rails, "--tracks") if args.tracks else ([], None)
+    system = stated_system(args.file) or args.crs or (own and own.crs_wkt)
     wkt = parse_crs(system).to_wkt() if system else None
     if wkt and units(parse_crs(wkt))[0] != 1.0:
         raise CrsError(
@@ -67,8 +70,8 @@ def run(args: argparse.Namespace) -> None:
     check_place(args.file.name, frame, args.east_first, progress)
     courses = []
     if args.tracks:
-        lines, _ = features.read_survey(args.tracks, "--tracks", frame)
-        courses = compared_with(alignments, [(line.number, line.xyz) for line in lines], progress)
+        shift = features.shift_between("--tracks", own, frame)
+        courses = compared_with(alignments, [moved(one, shift) for one in tracks], progress)
     makers = {
         "elements": lambda: layers.elements_layer(alignments),
         "axis": lambda: layers.axes_layer(alignments),

@@ -1,4 +1,4 @@
-"""Lines cut into short pieces, and the nearest place on any of them."""
+"""Lines cut into short pieces: the nearest place on any of them, and gauge and cant between two of them."""
 
 from __future__ import annotations
 
@@ -16,6 +16,9 @@ STEP_M = 0.05
 
 CANDIDATES = 4
 """Number of nearest pieces to search: near a place there may be two pieces of a line and a second line."""
+
+ASTRAY_M = 0.10
+"""Distance from its expected place, relative to the track, at which a line is not the rail of the track."""
 
 
 @dataclass(frozen=True)
@@ -100,3 +103,28 @@ def nearest(places: np.ndarray, pieces: Pieces) -> tuple[np.ndarray, np.ndarray]
     distance = np.linalg.norm(feet[..., :2] - places[:, None, :2], axis=2)
     rows, best = np.arange(len(places)), np.argmin(distance, axis=1)
     return feet[rows, best], candidates[rows, best]
+
+
+def spacing_and_cant(left: np.ndarray, right: np.ndarray, pieces: Pieces) -> np.ndarray:
+    """Measure the distance in space of the two rails of a track, and the height of the left one above the right one.
+
+    Parameters
+    ----------
+    left, right : (n, 2) array
+        Where the two rails are expected, metres.
+    pieces : Pieces
+        Of all rails.
+
+    Returns
+    -------
+    (n, 2) array
+        Metres; NaN where a rail is missing.
+    """
+    sides = []
+    for place in (left, right):
+        feet, _ = nearest(np.column_stack([place, np.zeros(len(place))]), pieces)
+        astray = ~(np.linalg.norm(feet[:, :2] - place, axis=1) <= ASTRAY_M)
+        sides.append(np.where(astray[:, None], np.nan, feet))
+    step = sides[0] - sides[1]
+    plan = np.hypot(step[:, 0], step[:, 1])
+    return np.column_stack([np.hypot(plan, np.nan_to_num(step[:, 2])), step[:, 2]])

@@ -15,8 +15,7 @@ from ..polyline import interpolate, left_normals, length_along, runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine, cell_borders
 from ..tracks.parallels import most_common_spacing
-from .crossing import spacing_and_cant
-from .pieces import Pieces, cut, nearest
+from .pieces import Pieces, cut, nearest, spacing_and_cant
 from .shift import Shift, find_shift
 
 BOTH, MISSING, EXTRA = "both", "missing", "extra"
@@ -202,7 +201,7 @@ def doubts_of(found: TrackComparison) -> list[str]:
     if not np.isfinite(found.estimated_m):
         return []
     return [
-        "A survey states no standard error: the scatter of the differences stands for it, "
+        "A survey has no standard errors: the scatter of the differences is used instead, "
         f"{1000 * found.estimated_m:.1f} mm across. Fill in REFERENCE_SIGMA and INPUT_SIGMA if it is known."
     ]
 

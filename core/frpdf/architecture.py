@@ -74,19 +74,11 @@ class Architecture:
         """Distance in cells of the farthest cell that can influence a cell in one pass, measured between blocks."""
         return self.block * self.kernel_radius * (4 + sum(self.dilations))
 
-    @property
-    def products_per_cell(self) -> float:
-        """Multiplications for one cell in one pass."""
-        kernel = self.channels * (2 * self.kernel_radius + 1) ** 2
-        stacked = kernel * (self.channels_in + 3 * self.channels)
-        combined = len(self.dilations) * self.channels * (kernel + 2 * self.channels)
-        return (stacked + combined + self.channels * self.channels_out) / self.block**2
-
 
 BASE = Architecture(channels=24, kernel_radius=3, dilations=(1, 3, 7, 15, 31, 63, 127))
 """The network of Gribov and Chang, section 5: receptive radius 753 cells, 292,680 products per cell."""
 
 FAST = Architecture(channels=64, kernel_radius=1, dilations=(1, 2, 4, 8, 16, 32, 8, 4, 2), block=4)
-"""The fast model: receptive radius 324 cells, 33,472 products per cell (docs/method.md section 3.11)."""
+"""The fast model: receptive radius 324 cells, 33,472 products per cell (docs/method.md section 3.6)."""
 
 ARCHITECTURES = (BASE, FAST)

@@ -2,20 +2,23 @@
 
 Each layer is computed on all pieces before the next layer starts, and reads the surroundings of a piece from its
 neighbours. So nothing is computed twice, and nothing along the track is cut off, however far a dilated kernel reaches.
-Off the corridor the value is what the layer makes of an empty raster.
+Off the corridor the value is what the layer makes of an empty raster. Threads share the pieces of a layer.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Callable
 
 import numpy as np
 
 from ..errors import DeviceExhaustedError
-from ..kernels import Library, one_thread
+from ..kernels import Library, one_thread, threads
 from ..progress import Progress
 from . import START, STATISTICS
 from .corridor import Piece
@@ -93,8 +96,9 @@ class LayeredEngine(ABC):
         outside = self._load(np.repeat(empty * 2 - 1, side**2, axis=0))
         windows = np.array([piece.window for piece in pieces]) // side
         near = {reach: overlaps(windows, reach) for reach in {step.reach for step in steps} - {0}}
-        for step, share in zip(steps, progress.split(len(steps))):
-            held, outside = self._advance(step, held, outside, near.get(step.reach), share)
+        with self._threads() as on_each:
+            for step, share in zip(steps, progress.split(len(steps))):
+                held, outside = self._advance(step, held, outside, near.get(step.reach), on_each, share)
         return [from_blocks(self._probabilities(logits), side) for logits in held]
 
     def retreat(self) -> str:
@@ -113,12 +117,31 @@ class LayeredEngine(ABC):
         """Return whether an error says that there is not enough memory; libraries have their own ways to say so."""
         return isinstance(error, MemoryError)
 
+    @contextmanager
+    def _threads(self) -> Iterator[Callable]:
+        """Provide a function like `map`, on as many threads as compute at a time; in this one if that is one."""
+        count = self._thread_count()
+        if count == 1:
+            yield map
+            return
+        # The number of threads of a library may belong to the thread that sets it.
+        with ThreadPoolExecutor(count, initializer=self.library.set, initargs=(1,)) as pool:
+            try:
+                yield pool.map
+            finally:
+                pool.shutdown(cancel_futures=True)
+
+    def _thread_count(self) -> int:
+        """Return how many threads compute at a time."""
+        return threads()
+
     def _advance(
         self,
         step: Step,
         held: Sequence[Array],
         outside: Array,
         near: Sequence[Sequence[Overlap]] | None,
+        on_each: Callable,
         progress: Progress,
     ) -> tuple[list[Array], Array]:
         """Run a layer on all pieces, and on an empty raster.
@@ -132,14 +155,21 @@ class LayeredEngine(ABC):
             Its input on an empty raster.
         near : sequence of sequence of Overlap, optional
             What surrounds each piece; None for a layer without reach.
+        on_each : callable
+            See `_threads`.
         progress : Progress
         """
-        results = []
-        for number, own in progress.follow(list(enumerate(held))):
-            around = own if near is None else self._surrounded(own, held, outside, near[number], step.reach)
-            results.append(step.run(around, own))
+        run = partial(self._run, step, held, outside, near)
+        results = list(progress.follow(on_each(run, range(len(held))), len(held)))
         side = 2 * step.reach + 1
         return results, step.run(self._filled(outside, side, side), outside)
+
+    def _run(
+        self, step: Step, held: Sequence[Array], outside: Array, near: Sequence[Sequence[Overlap]] | None, number: int
+    ) -> Array:
+        """Run a layer on one piece."""
+        own = held[number]
+        return step.run(own if near is None else self._surrounded(own, held, outside, near[number], step.reach), own)
 
     def _surrounded(
         self, own: Array, held: Sequence[Array], outside: Array, near: Sequence[Overlap], reach: int
@@ -160,7 +190,10 @@ class LayeredEngine(ABC):
 
     @abstractmethod
     def _filled(self, outside: Array, height: int, width: int) -> Array:
-        """Return an array to write into that is full of `outside`, (channels, 1, 1); the next call may reuse it."""
+        """Return an array to write into that is full of `outside`, (channels, 1, 1).
+
+        The next call in the same thread may reuse it.
+        """
 
     @abstractmethod
     def _probabilities(self, logits: Array) -> np.ndarray:

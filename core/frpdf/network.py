@@ -45,10 +45,6 @@ class PassBatchNorm2d(nn.BatchNorm2d):
         x : (batch, channels, height, width) tensor
         mean, variance : (channels,) tensor
             Running statistics.
-
-        Returns
-        -------
-        Tensor of the same shape as `x`
         """
         return nn.functional.batch_norm(
             x, mean, variance, self.weight, self.bias, self.training, self.momentum, self.eps
@@ -143,10 +139,6 @@ class Recurrent(nn.Module):
             `START` in the first pass; in later passes `feedback` of the logits of the pass before.
         number : int
             Number of the pass, from 0; it selects the batch statistics.
-
-        Returns
-        -------
-        Tensor of the same shape
         """
         for module in self.modules():
             if isinstance(module, PassBatchNorm2d):

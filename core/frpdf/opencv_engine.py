@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from threading import local
 
 import cv2
 import numpy as np
@@ -21,13 +22,13 @@ class OpenCvEngine(LayeredEngine):
     def __init__(self, arrays: dict[str, np.ndarray]) -> None:
         folded = fold(arrays)
         self.block = block_side(folded[0])
-        self._passes = [[_step(layer) for layer in layers] for layers in folded]
-        self._scratch = np.empty(0, dtype=np.float32)
+        self._passes = [[Step(layer.reach, _Net(layer).run) for layer in layers] for layers in folded]
+        self._scratch = _Scratch()
         self.description = f"OpenCV {cv2.__version__}, CPU, float32"
 
     def retreat(self) -> str:
         """Compute fewer cells at once; see `Engine.retreat`."""
-        self._scratch = self._scratch[:0].copy()
+        self._scratch = _Scratch()
         return super().retreat()
 
     def _means_no_memory(self, error: Exception) -> bool:
@@ -43,9 +44,9 @@ class OpenCvEngine(LayeredEngine):
     def _filled(self, outside: np.ndarray, height: int, width: int) -> np.ndarray:
         # New memory costs more than writing into it: the system clears every page first.
         size = len(outside) * height * width
-        if size > len(self._scratch):
-            self._scratch = np.empty(size, dtype=np.float32)
-        around = self._scratch[:size].reshape(-1, height, width)
+        if size > len(self._scratch.array):
+            self._scratch.array = np.empty(size, dtype=np.float32)
+        around = self._scratch.array[:size].reshape(-1, height, width)
         around[:] = outside
         return around
 
@@ -53,13 +54,23 @@ class OpenCvEngine(LayeredEngine):
         return 1 / (1 + np.exp(-logits))
 
 
-def _step(layer: FoldedLayer) -> Step:
-    net = cv2.dnn.readNetFromONNX(np.frombuffer(layer_to_onnx(layer), np.uint8))
+class _Scratch(local):
+    """Memory of each thread."""
 
-    def run(around: np.ndarray, own: np.ndarray) -> np.ndarray:
-        net.setInput(around[None], "around")
-        if layer.reduction:
-            net.setInput(own[None], "own")
-        return net.forward()[0]
+    def __init__(self) -> None:
+        self.array = np.empty(0, dtype=np.float32)
 
-    return Step(layer.reach, run)
+
+class _Net(local):
+    """A layer, loaded by each thread: OpenCV's networks cannot be shared between threads."""
+
+    def __init__(self, layer: FoldedLayer) -> None:
+        self._net = cv2.dnn.readNetFromONNX(np.frombuffer(layer_to_onnx(layer), np.uint8))
+        self._takes_own = layer.reduction is not None
+
+    def run(self, around: np.ndarray, own: np.ndarray) -> np.ndarray:
+        """Run the layer; see `layered.Step`."""
+        self._net.setInput(around[None], "around")
+        if self._takes_own:
+            self._net.setInput(own[None], "own")
+        return self._net.forward()[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from threading import local
 
 import numpy as np
 import torch
@@ -11,8 +12,6 @@ from torch.nn.functional import conv2d
 
 from ..errors import ModelError
 from ..kernels import pytorch
-from ..progress import Progress
-from .corridor import Piece
 from .folding import Convolution, FoldedLayer, block_side, fold
 from .layered import LayeredEngine, Step
 
@@ -59,28 +58,16 @@ class TorchEngine(LayeredEngine):
         self._device = device
         self._dtype = torch.float32 if self._exact else _fast_type(device)
         self._passes = [[_step(layer, device, self._dtype) for layer in layers] for layers in self._folded]
-        self._scratch = torch.empty(0, dtype=self._dtype, device=device)
+        self._scratch = _Scratch()
 
     @property
     def description(self) -> str:
         """Library, device and number type."""
         return f"PyTorch {torch.__version__}, {self._device.upper()}, {str(self._dtype).split('.')[-1]}"
 
-    def sweep(
-        self,
-        seen: Sequence[np.ndarray],
-        known: Sequence[np.ndarray],
-        number: int,
-        pieces: Sequence[Piece],
-        progress: Progress,
-    ) -> list[np.ndarray]:
-        """Run one pass over pieces; see `Engine.sweep`."""
-        with torch.inference_mode():
-            return super().sweep(seen, known, number, pieces, progress)
-
     def retreat(self) -> str:
         """Compute fewer cells at once, and at last change to the CPU; see `Engine.retreat`."""
-        self._scratch = self._scratch[:0].clone()
+        self._scratch = _Scratch()
         if self._device == "cuda":
             torch.cuda.empty_cache()
         try:
@@ -101,6 +88,9 @@ class TorchEngine(LayeredEngine):
         words = isinstance(error, RuntimeError) and any(word in str(error) for word in NO_MEMORY)
         return words or isinstance(error, torch.cuda.OutOfMemoryError) or super()._means_no_memory(error)
 
+    def _thread_count(self) -> int:
+        return 1 if self._device == "cuda" else super()._thread_count()
+
     def _steps(self, number: int) -> Sequence[Step]:
         return self._passes[number]
 
@@ -110,13 +100,20 @@ class TorchEngine(LayeredEngine):
     def _filled(self, outside: Tensor, height: int, width: int) -> Tensor:
         # New memory costs more than writing into it: the system clears every page first.
         size = len(outside) * height * width
-        if size > len(self._scratch):
-            self._scratch = torch.empty(size, dtype=self._dtype, device=self._device)
-        around = self._scratch[:size].view(height, width, len(outside)).permute(2, 0, 1)
+        if size > len(self._scratch.tensor):
+            self._scratch.tensor = torch.empty(size, dtype=self._dtype, device=self._device)
+        around = self._scratch.tensor[:size].view(height, width, len(outside)).permute(2, 0, 1)
         return around.copy_(outside.expand_as(around))
 
     def _probabilities(self, logits: Tensor) -> np.ndarray:
         return torch.sigmoid(logits.float()).cpu().numpy()
+
+
+class _Scratch(local):
+    """Memory of each thread."""
+
+    def __init__(self) -> None:
+        self.tensor = torch.empty(0)
 
 
 def _step(layer: FoldedLayer, device: str, dtype: torch.dtype) -> Step:

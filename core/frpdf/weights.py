@@ -24,10 +24,6 @@ DTYPES = (np.float16, np.float32)
 def load_arrays(path: Path) -> dict[str, np.ndarray]:
     """Read weights; only plain arrays are accepted, and no more memory is used than for weights.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     dict of str to float32 array

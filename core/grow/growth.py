@@ -39,7 +39,7 @@ class Rail:
     xyz : (k, 3) array
         Its axis on the top of the head, a place for each window from the first one in which it was seen to the last.
     seen, flush : (k,) bool arrays
-        Windows in which it was seen, and in which it lies in a pavement.
+        Windows in which it was seen, and in which it is in a pavement.
     beam : Beam
     """
 

@@ -31,13 +31,13 @@ BED_QUANTILE = 0.2
 """Quantile of the heights that is taken as the bed, as in `classify.bed`."""
 
 BED_DEPTH_M = 1.0
-"""Points further below the top are not of the bed: what lies under a bridge."""
+"""Points further below the top are not of the bed: what is under a bridge."""
 
 GROOVE_M = 0.16
 """A groove ends within this distance of the head's side."""
 
 LEVEL_M, LEVEL_SHARE, NEAR_TOP_M = 0.008, 0.55, 0.02
-"""Beside a head lies a pavement if this share of the points there is this close to their median height, and the median
+"""Beside a head is a pavement if this share of the points there is this close to their median height, and the median
 this close to the top; see `classify.flush`. Ballast scatters by 12 mm and more."""
 
 MIN_PAVEMENT_POINTS = 20

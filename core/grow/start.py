@@ -1,4 +1,4 @@
-"""From a seed to the rail under it: its direction, its height, and on which side the other rail of the track lies."""
+"""From a seed to the rail under it: its direction, its height, and on which side the other rail of the track is."""
 
 from __future__ import annotations
 
@@ -73,9 +73,9 @@ class Start:
     per_m : float
         Points on the head per metre.
     flush : bool
-        Whether the head lies in a pavement.
+        Whether the head is in a pavement.
     side : int
-        1 if the other rail of the track lies to the left, -1 to the right, 0 if none was found.
+        1 if the other rail of the track is to the left, -1 to the right, 0 if none was found.
     level_m : float
         Height of the other rail above this one.
     free : float
@@ -298,7 +298,7 @@ def _aligned(ahead: Ahead, stations: np.ndarray, heads: list[Head]) -> Ahead:
 
 
 def _other_rail(points: Points, ahead: Ahead, reach_m: float, beam: Beam, settings: GrowSettings) -> tuple[int, float]:
-    """Find the other rail of the track; returns its side and how much higher it lies, 0 and 0 without any."""
+    """Find the other rail of the track; returns its side and how much higher it is, 0 and 0 without any."""
     found = []
     for side in (1, -1):
         beside = ahead.beside(side * settings.spacing_m, 0.0)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
-from scipy.signal import savgol_filter
 
 from ..polyline import left_normals, project
 from .edges import STATION_STEP_M, search_distance, station_count, stations_along
@@ -145,6 +144,8 @@ def wander(line: np.ndarray) -> float:
     size = min(stations, len(line) - 1 + len(line) % 2)
     if size <= degree + 1:
         return 0.0
+    from scipy.signal import savgol_filter  # takes as long to import as numpy, scipy.spatial and laspy together
+
     off = line - savgol_filter(line, size, degree, axis=0)
     off = off if line.ndim == 1 else np.einsum("ij,ij->i", off, left_normals(line))
     followed = CENTRE_WEIGHT * _correlated_stations(off) / size

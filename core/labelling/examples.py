@@ -83,6 +83,6 @@ def _check(census: np.ndarray, index: np.ndarray, rail_classes: Sequence[int]) -
         )
     if not index["rail"].any():
         raise NoRailPointsError(
-            f"No point of class {named} is 0.055 to 0.4 m above the bed, where railheads lie: check the labels and the "
+            f"No point of class {named} is 0.055 to 0.4 m above the bed, where railheads are: check the labels and the "
             "unit of the coordinates."
         )

@@ -6,7 +6,7 @@ The files are read once; memory holds one square and its margin (docs/classifica
 from __future__ import annotations
 
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -237,38 +237,44 @@ def _sort_file(
     with writing(mine.parent):
         mine.mkdir()
     counts: dict[Key, int] = {}
-    wanted = np.zeros(LAST_CLASS + 1, dtype=bool)
-    wanted[list(request.class_codes)] = True
-    for xyz, codes, marks, valid in read_points(header.path, context.progress, request.leave_out):
-        kept = np.flatnonzero(valid & wanted[codes] & request.holds(xyz))
+    for points in read_searched(request, header.path, first, context.progress, with_class):
+        places = request.zero.to_local(points["xyz"])
         if settings.guide is not None:
-            kept = kept[settings.guide.holds(request.zero.to_local(xyz[kept])[:, :2])]
-        points = np.empty(len(kept), POINT)
-        points["xyz"] = xyz[kept]
-        points["number"] = kept + first
-        points["mark"] = (codes if with_class else marks)[kept]
-        first += len(xyz)
-        _append(points, request.zero, settings.side_m, mine, counts, header.path.name)
+            held = settings.guide.holds(places[:, :2])
+            points, places = points[held], places[held]
+        keys, square = unique_keys(places, settings.side_m)
+        if len(keys) > MANY_SQUARES and len(points) < FEW_IN_SQUARE * len(keys):
+            raise CloudError(
+                f"The points of {header.path.name} are too far apart for rails: if the coordinates are in centimetres "
+                "or millimetres, assign a coordinate system that says so."
+            )
+        for key, count in zip(keys, np.bincount(square).tolist()):
+            counts[key] = counts.get(key, 0) + count
+        append(points, points_by_square(places, settings.side_m, MARGIN_M), mine)
     return SortedFile(str(mine), counts)
 
 
-def _append(
-    points: np.ndarray, zero: LocalFrame, side_m: float, folder: Path, counts: dict[Key, int], name: str
-) -> None:
-    """Append points to the files of the squares that need them, and count them in their own squares."""
-    places = zero.to_local(points["xyz"])
-    keys, square = unique_keys(places, side_m)
-    if len(keys) > MANY_SQUARES and len(points) < FEW_IN_SQUARE * len(keys):
-        raise CloudError(
-            f"The points of {name} are too far apart for rails: if the coordinates are in centimetres or millimetres, "
-            "assign a coordinate system that says so."
-        )
-    for key, count in zip(keys, np.bincount(square).tolist()):
-        counts[key] = counts.get(key, 0) + count
+def read_searched(
+    request: Request, path: Path, first: int, progress: Progress, with_class: bool = False
+) -> Iterator[np.ndarray]:
+    """Yield the points of a file that are to be searched, (n,) arrays of POINT; `first` is the number of its first."""
+    wanted = np.zeros(LAST_CLASS + 1, dtype=bool)
+    wanted[list(request.class_codes)] = True
+    for xyz, codes, marks, valid in read_points(path, progress, request.leave_out):
+        kept = np.flatnonzero(valid & wanted[codes] & request.holds(xyz))
+        points = np.empty(len(kept), POINT)
+        points["xyz"], points["number"] = xyz[kept], kept + first
+        points["mark"] = (codes if with_class else marks)[kept]
+        first += len(xyz)
+        yield points
+
+
+def append(points: np.ndarray, squares: Mapping[Key, np.ndarray], folder: Path) -> None:
+    """Append points, (n,) of POINT, to the files of their squares, given the numbers of those of each square."""
     with writing(folder.parent):
-        for key, numbers in points_by_square(places, side_m, MARGIN_M).items():
-            with _file(folder, key).open("ab") as file:
-                file.write(points[numbers].data)
+        for key, numbers in squares.items():
+            with file_of(folder, key).open("ab") as file:
+                file.write(points.take(numbers).data)  # which is four times as fast as an index
 
 
 def _search_task(key: Key, sorted_files: Sequence[SortedFile], zero: LocalFrame, settings: Settings) -> Task:
@@ -298,13 +304,15 @@ def search_square(xyz: np.ndarray, settings: Settings, context: Context) -> Clas
 
 def files_of(key: Key, sorted_files: Sequence[SortedFile]) -> list[Path]:
     """List the files that may hold points of a square."""
-    return [_file(Path(one.folder), key) for one in sorted_files]
+    return [file_of(Path(one.folder), key) for one in sorted_files]
 
 
 def read_square(files: Sequence[str | Path]) -> np.ndarray:
     """Read the points of a square and of its margin, (n,) array of POINT."""
-    return np.concatenate([np.fromfile(file, POINT) for file in files if Path(file).exists()])
+    parts = [np.fromfile(file, np.uint8) for file in files if Path(file).exists()]
+    return np.concatenate(parts).view(POINT)  # joining bytes takes a fifth of the time that joining fields does
 
 
-def _file(folder: Path, key: Key) -> Path:
+def file_of(folder: Path, key: Key) -> Path:
+    """Return the file of a square."""
     return folder / f"{key[0]}_{key[1]}"

@@ -15,7 +15,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..clouds.points import Request
-from ..clouds.readers import read_points
 from ..disk import writing
 from ..errors import OffCloudError, OffRailError
 from ..grow.growth import Growth, Stop, grow, on_rails
@@ -28,10 +27,9 @@ from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from ..raster import BORDER_CELLS, cell_size
 from ..squares.grid import Key, points_by_square
-from ..standards import LAST_CLASS
 from ..tasks import Runner
 from .files import Choice, Labels, Output, write_labelled
-from .finding import POINT
+from .finding import POINT, append, file_of, read_searched
 
 SIDE_M = 10.0
 """Side of the squares on disk: four of them hold what a window needs, and 0.5 million points of a dense cloud each."""
@@ -102,9 +100,9 @@ def grow_files(
     DiskError
         The disk is full, or another program has changed an output.
     ParameterError
-        No seed lies in the cloud.
+        No seed is in the cloud.
     RailExtractError
-        No seed lies on a rail.
+        No seed is on a rail.
     """
     growing, rewriting = progress.divide((7.0, 3.0))
     labels = Labels(request, folder)
@@ -165,7 +163,7 @@ def grow_all(
     parameters = settings.parameters
     if not growths:
         raise OffRailError(
-            f"No seed lies on a rail: put seeds within {parameters.search_m:g} m of railheads that stand "
+            f"No seed is on a rail: put seeds within {parameters.search_m:g} m of railheads that stand "
             f"{parameters.min_height_m:g} m above the bed, and check the rail standard and the unit of the coordinates."
         )
     if missed:
@@ -202,7 +200,7 @@ class Squares:
     Raises
     ------
     ParameterError
-        No seed lies in the cloud.
+        No seed is in the cloud.
     """
 
     def __init__(self, request: Request, places: np.ndarray, settings: GrowSettings, folder: Path) -> None:
@@ -218,7 +216,7 @@ class Squares:
         self._kept: OrderedDict[Key, Buckets] = OrderedDict()
 
     def _inside(self, places: np.ndarray) -> None:
-        """Refuse seeds of which none lies in the cloud; headers may state an extent that is not a number."""
+        """Refuse seeds of which none is in the cloud; headers may state an extent that is not a number."""
         extents = np.array([header.extent for header in self._request.headers], dtype=float)
         if not np.isfinite(extents).all():
             return
@@ -226,7 +224,7 @@ class Squares:
         corners = self._request.zero.to_local(corners)[:, :2].reshape(-1, 2, 2)
         inside = (places[:, None] >= corners[:, 0] - PATCH_M[0]) & (places[:, None] <= corners[:, 1] + PATCH_M[0])
         if not inside.all(axis=2).any():
-            raise OffCloudError("No seed lies in the cloud: check the place and the coordinate system of the seeds.")
+            raise OffCloudError("No seed is in the cloud: check the place and the coordinate system of the seeds.")
 
     def fill(self, progress: Progress) -> None:
         """Read the points of the cloud that are within reach."""
@@ -245,29 +243,20 @@ class Squares:
 
     def _sort(self, path: Path, first: int, progress: Progress) -> None:
         """Append the points of a file to the files of their squares."""
-        wanted = np.zeros(LAST_CLASS + 1, dtype=bool)
-        wanted[list(self._request.class_codes)] = True
-        for xyz, codes, marks, valid in read_points(path, progress, self._request.leave_out):
-            kept = np.flatnonzero(valid & wanted[codes] & self._request.holds(xyz))
-            places = self._request.zero.to_local(xyz[kept])
-            near = ((places[:, :2] >= self._low) & (places[:, :2] <= self._high)).all(axis=1)
-            kept, places = kept[near], places[near]
-            points = np.empty(len(kept), POINT)
-            points["xyz"], points["number"], points["mark"] = places, kept + first, marks[kept]
-            first += len(xyz)
-            with writing(self._folder.parent):
-                for key, number in points_by_square(places, SIDE_M).items() if len(places) else ():
-                    if key in self._wanted:
-                        with self._file(key).open("ab") as file:
-                            file.write(points[number].tobytes())
+        for points in read_searched(self._request, path, first, progress):
+            points["xyz"] = self._request.zero.to_local(points["xyz"])
+            places = points["xyz"][:, :2]
+            points = points[((places >= self._low) & (places <= self._high)).all(axis=1)]
+            squares = points_by_square(points["xyz"], SIDE_M) if len(points) else {}
+            append(points, {key: number for key, number in squares.items() if key in self._wanted}, self._folder)
 
     def keys(self) -> list[Key]:
         """List the squares with points."""
-        return sorted(key for key in self._wanted if self._file(key).exists())
+        return sorted(key for key in self._wanted if file_of(self._folder, key).exists())
 
     def read(self, key: Key) -> np.ndarray:
         """Return the points of a square, (n,) `finding.POINT` in metres."""
-        file = self._file(key)
+        file = file_of(self._folder, key)
         return np.fromfile(file, POINT) if file.exists() else np.empty(0, POINT)
 
     def around(self, xy: np.ndarray, reach_m: float) -> np.ndarray:
@@ -284,9 +273,6 @@ class Squares:
                 self._kept.popitem(last=False)
         self._kept.move_to_end(key)
         return self._kept[key]
-
-    def _file(self, key: Key) -> Path:
-        return self._folder / f"{key[0]}_{key[1]}"
 
 
 def _on_rails(xyz: np.ndarray, growths: Sequence[Growth], settings: GrowSettings) -> np.ndarray:
@@ -341,7 +327,7 @@ def _report(
     single = sum(len(growth.rails) == 1 for growth in growths)
     if settings.parameters.both and single:
         progress.warning(
-            f"{single} of {len(growths)} followed rails have no other rail at the gauge: check that their seeds lie on "
+            f"{single} of {len(growths)} followed rails have no other rail at the gauge: check that their seeds are on "
             "rails, and the rail standard."
         )
     progress.info(

@@ -56,8 +56,6 @@ class Thinned:
         The thinned point of their cube, for each.
     coarse : Coarse
         The cells in which the bed was found.
-    height : (k,) float32 array
-        Height above the bed of each point of the square.
     """
 
     number: np.ndarray
@@ -67,7 +65,6 @@ class Thinned:
     band_place: np.ndarray
     stands_for: np.ndarray
     coarse: Coarse
-    height: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -108,7 +105,7 @@ def thin(xyz: np.ndarray) -> Thinned:
     band, context = np.flatnonzero(railhigh), np.flatnonzero(~railhigh)
     chosen, stands_for = _one_of_each(place[band], RAIL_VOXEL_M)
     kept = np.concatenate([band[chosen], context[_one_of_each(place[context], CONTEXT_VOXEL_M)[0]]])
-    return Thinned(used[kept], place[kept], railhigh[kept], used[band], place[band, :3], stands_for, coarse, height)
+    return Thinned(used[kept], place[kept], railhigh[kept], used[band], place[band, :3], stands_for, coarse)
 
 
 def _one_of_each(place: np.ndarray, side_m: float) -> tuple[np.ndarray, np.ndarray]:

@@ -8,11 +8,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..classify.figures import shares_of_length
 from ..classify.labels import Near
 from ..classify.lines import Lines, Marks, find_lines
 from ..classify.partner import stations_with_partner
-from ..classify.pieces import links, long_enough
+from ..classify.pieces import links, long_enough, shares_of_length
 from ..classify.settings import DENSE, THIN, Settings
 from ..classify.square import beside_guide
 from ..classify.tops import Grid

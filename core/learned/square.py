@@ -8,13 +8,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..classify.bed import COARSE_M, Coarse
-from ..classify.figures import shares_of_length
-from ..classify.flush import flush_rails
 from ..classify.settings import Settings
-from ..classify.square import REACH_M, REACH_POINTS_PER_M, Classified, beside_guide, classify_square
-from ..classify.tops import HIGH_M, Grid
+from ..classify.square import REACH_M, REACH_POINTS_PER_M, Classified, classify_square
 from ..progress import SILENT, Progress
-from ..rails import SearchFigures
 from .blocks import RAIL_VOXEL_M, Thinned, cut, thin
 from .model import Classifier
 from .rails import rails_of
@@ -35,6 +31,9 @@ def label_square(
 ) -> Classified:
     """Find the points on railheads in a square.
 
+    Rails in pavements are found by their shape, because the network does not see their grooves, and so are, beside what
+    the network finds, blunted heads, of which it sees too little where they are low and wide.
+
     Parameters
     ----------
     xyz : (n, 3) array
@@ -43,54 +42,22 @@ def label_square(
     classifier : Classifier
     progress : Progress
     """
-    rail = np.zeros(len(xyz), dtype=bool)
+    by_shape = classify_square(xyz, settings)
+    rail, figures = by_shape.flush.rail.copy(), by_shape.flush.figures
     if not len(xyz):
-        return Classified(rail, SearchFigures())
+        return Classified(rail, figures)
     thinned = thin(xyz)
     blocks = cut(thinned, settings.side_m)
-    flush, figures = _flush(xyz, thinned, settings)
-    rail[flush] = True
     if blocks:
         probability = _spread(thinned, classifier.probabilities(thinned, blocks, progress))
-        blunt = _blunt(xyz, settings)
-        probability[blunt.rail[thinned.band]] = 1.0
+        if by_shape.figures.blunt_m:
+            probability[by_shape.rail[thinned.band]] = 1.0
         found = np.flatnonzero((probability >= POSSIBLE) & settings.own(xyz[thinned.band]))
         point, sure = thinned.band[found], probability[found] >= PROBABILITY
         kept, standing = rails_of(xyz[point], sure, settings, _reach_m(thinned.coarse, point[sure]))
         rail[point[kept]] = True
-        figures += replace(standing, blunt_m=blunt.figures.blunt_m, blur_m2=blunt.figures.blur_m2)
+        figures += replace(standing, blunt_m=by_shape.figures.blunt_m, blur_m2=by_shape.figures.blur_m2)
     return Classified(rail, replace(figures, points=int(rail.sum()), squares=int(rail.any())))
-
-
-def _blunt(xyz: np.ndarray, settings: Settings) -> Classified:
-    """Find rails by geometry if their heads are blunted: the network sees too little of those that are low and wide.
-
-    Returns
-    -------
-    Classified
-        Nothing if heads are sharp.
-    """
-    found = classify_square(xyz, settings)
-    if found.figures.blunt_m:
-        return found
-    return Classified(np.zeros(len(xyz), dtype=bool), SearchFigures())
-
-
-def _flush(xyz: np.ndarray, thinned: Thinned, settings: Settings) -> tuple[np.ndarray, SearchFigures]:
-    """Find the points of rails in pavements, (k,) int numbers, by their grooves, which the network does not see."""
-    near = np.flatnonzero(thinned.height <= HIGH_M)
-    if not len(near):
-        return near, SearchFigures()
-    grid, cell = Grid.around(xyz[near, 0], xyz[near, 1], settings.cell_m)
-    found = flush_rails(thinned.coarse, near, xyz[near, :2], thinned.height[near], grid, cell, settings)
-    own = found.points[settings.own(xyz[near[found.points]])]
-    length_m = shares_of_length(found.lines, settings.head_width_m)[settings.own(found.lines.axis)].sum()
-    along_m, across_m = beside_guide(found.rails, settings)
-    cells = len(np.unique(cell[own]))
-    figures = SearchFigures(
-        paired_m=float(length_m), cells=cells, paved=int(length_m > 0), along_m=float(along_m), across_m=float(across_m)
-    )
-    return near[own], figures
 
 
 def _reach_m(coarse: Coarse, point: np.ndarray) -> float:

@@ -103,13 +103,6 @@ def bridge(
     return Bridge(gap * (1 + misfit / MISFIT_M + bend), cuts_m, points)
 
 
-def curvature(points: np.ndarray) -> float:
-    """Measure the curvature in the middle of (n, 2) points in order, 1/m, positive for a curve to the left."""
-    half = len(points) // 2
-    origin, axes = _frame(points[: half + 1], points[half:])
-    return float(_fit((points - origin) @ axes.T)[2])
-
-
 def _astray(off_m: np.ndarray) -> int:
     """Count the points from the end inward up to the last one off the curve; at most half, as the rest supports it."""
     half = len(off_m) // 2

@@ -53,11 +53,6 @@ class PartingLaw:
         """Way at which the axes touch; -inf if they do not part."""
         return self.way_at(0.0)
 
-    @property
-    def curvature(self) -> float:
-        """Relative curvature k of two rails that part on an arc, 1/m: their distance is k way² / 2."""
-        return 2 * self.slope**2
-
     def __call__(self, way: np.ndarray) -> np.ndarray:
         """Return the distances at (n,) places along the way, metres."""
         return np.maximum(self.slope * way + self.root, 0.0) ** self.power

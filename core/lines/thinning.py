@@ -30,10 +30,6 @@ def thin(lines: Sequence[Line], tolerance_xy_m: float, tolerance_z_m: float) -> 
     lines : sequence of RailLine or Centerline
     tolerance_xy_m, tolerance_z_m : float
         Largest distance of a dropped vertex from the result, in plan and in height.
-
-    Returns
-    -------
-    tuple of RailLine or Centerline
     """
     ends = np.unique([_as_complex(line.xyz[[0, -1]]) for line in lines])
     return tuple(replace(line, xyz=_thinned(line.xyz, ends, tolerance_xy_m, tolerance_z_m)) for line in lines)

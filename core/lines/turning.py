@@ -1,4 +1,4 @@
-"""The last check of every line: none turns as no rail can (docs/method.md section 5.8)."""
+"""The last check of every line: none turns too sharply for a rail (docs/method.md section 5.8)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ the line has turned back onto itself."""
 
 
 def parts_without_turns(line: np.ndarray, min_length_m: float, smoothing_m: float) -> list[tuple[float, float]]:
-    """Return the parts of a line, (n, 2), between the places where it turns as no rail can.
+    """Return the parts of a line, (n, 2), between the places where it turns too sharply for a rail.
 
     Parameters
     ----------

@@ -90,7 +90,7 @@ def _verdict(found: TrackComparison, counts_shift: bool) -> str:
     ]
     if np.isfinite(found.estimated_m):
         reasons.append(
-            "A survey states no standard error: the scatter of the differences stands for it "
+            "A survey has no standard errors: the scatter of the differences is used instead "
             f"({1000 * found.estimated_m:.1f} mm across)."
         )
     for state, words in ((MISSING, "of the reference is missing in the later survey"), (EXTRA, "is new in it")):

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks.strips import find_jumps
 from ..polyline import interpolate, length_along, project
 from ..rails import STRIP_OFF_M, Centerline, HeadWidths, RailLine, RailNetwork, TrackGeometry, cell_borders
-from ..tracks.jumps import find_steps
 
 GAUGE_OFF_MM = 10.0
 """Plain track is not left in service with a larger deviation from its gauge. Curves of less than 200 m radius are
@@ -61,7 +61,7 @@ class Doubt:
 
 UNSUPPORTED = Doubt("unsupported", "a rail has no points")
 OFF_GAUGE = Doubt("offgauge", f"gauge off by more than {GAUGE_OFF_MM:g} mm")
-UNSURE = Doubt("unsure", f"standard error above {UNSURE_MM:g} mm")
+UNSURE = Doubt("unsure", f"standard error above {UNSURE_MM:g} mm across or in height")
 DOUBTS = (UNSUPPORTED, OFF_GAUGE, UNSURE)
 """In order of severity; a place counts under the first that applies."""
 
@@ -221,7 +221,7 @@ def examine(network: RailNetwork, gauges_m: Sequence[float]) -> Findings:
     """
     geometry = {track.track_id: track for track in network.geometry}
     tracks = tuple(
-        _examine_track(line, geometry[line.track_id], gauges_m, find_steps(line, network.rails))
+        _examine_track(line, geometry[line.track_id], gauges_m, find_jumps(line, network.rails))
         for line in network.centerlines
     )
     heads = network.heads

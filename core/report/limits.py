@@ -82,17 +82,12 @@ QUANTITIES = (
     Quantity("gauge", "Gauge, off nominal", GAUGE_OFF_MM),
     Quantity("cant", "Cant"),
     Quantity("twist", f"Twist over {TWIST_BASE_M:g} m"),
-    Quantity("sigma", "Standard error", UNSURE_MM),
+    Quantity("sigma", "Standard error, across or in height", UNSURE_MM),
 )
 
 
 def limits_table(tracks: Sequence[TrackFindings]) -> str:
-    """Return inputs for the limits and the table of what is beyond them, with the script that counts again.
-
-    Parameters
-    ----------
-    tracks : sequence of TrackFindings
-    """
+    """Return inputs for the limits and the table of what is beyond them, with the script that counts again."""
     headings = ("Track", "Quantity", "Largest", "at", "Beyond the limit", "of the length")
     head = tag("tr", *(tag("th", text(heading)) for heading in headings))
     rows = [_row(quantity, track) for quantity in QUANTITIES for track in tracks]

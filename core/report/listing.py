@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from ..checks.strips import ARM_M
 from ..polyline import length_along
 from ..rails import RailLine, RailNetwork, TrackGeometry
-from ..tracks.jumps import ARM_M
 from .findings import DOUBTS, OFF_GAUGE, UNSUPPORTED, Findings, Hole, Place, TrackFindings, examine
 
 OFF_RAIL_MM = 70.0

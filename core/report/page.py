@@ -146,7 +146,7 @@ def _tiles(network: RailNetwork, findings: Findings) -> str:
         (str(len(findings.tracks)), "tracks"),
         (metres(findings.length_m), "of track"),
         (str(len(network.rails)), f"rails, {metres(sum(rail.length_m for rail in network.rails))}"),
-        (f"{np.median(known):.1f} mm" if len(known) else "unknown", "standard error, median"),
+        (f"{np.median(known):.1f} mm" if len(known) else "unknown", "standard error across, median"),
         (f"{100 * (1 - findings.share):.1f} %", "of it without doubt"),
         (f"{_density(findings):.0f}", "points per metre of track, median"),
     ]
@@ -178,7 +178,17 @@ def _findings(findings: Findings) -> str:
     found = listed(findings)
     if not found:
         return ""
-    headings = ["Finding", "Where", "Chainage", "In doubt", "Worst at", "Gauge", "Standard error", "Why"]
+    headings = [
+        "Finding",
+        "Where",
+        "Chainage",
+        "In doubt",
+        "Worst at",
+        "Gauge",
+        "Standard error across",
+        "in height",
+        "Why",
+    ]
     rows: list[tuple[object, ...]] = list(map(_finding, found))
     if any(finding.km_text for finding in found):
         headings.append("Kilometre of the worst place")
@@ -198,6 +208,7 @@ def _finding(finding: Finding) -> tuple[object, ...]:
         _figure(finding.worst_m, "m"),
         _figure(finding.gauge_mm, "mm"),
         _figure(finding.sigma_mm, "mm"),
+        _figure(finding.sigmaz_mm, "mm"),
         finding.reason,
     )
 
@@ -216,8 +227,8 @@ def _tracks(findings: Findings) -> str:
         "Twist",
         "Tightest radius",
         "Gradient",
-        "Standard error",
-        "of the height",
+        "Standard error across",
+        "in height",
         "No points",
     ]
     rows: list[tuple[str, ...]] = [_row(track) for track in findings.tracks]

@@ -24,7 +24,7 @@ def verdict(findings: Findings) -> tuple[str, str]:
     if share > MANY >= max(share - unsure, silent):
         # Points at gauge whose cloud resolves no more: nothing is wrong that a setting could mend.
         return "fair", (
-            f"Less accurate than a track survey accepts: the standard error is above {UNSURE_MM:g} mm on "
-            f"{100 * unsure:.0f} % of the length."
+            f"Less accurate than a track survey accepts: the standard error is above {UNSURE_MM:g} mm across "
+            f"or in height on {100 * unsure:.0f} % of the length."
         )
     return next((kind, words) for limit, kind, words in VERDICTS if share <= limit)

@@ -57,11 +57,6 @@ _ROW = 1 << 32
 def plausible(sources: Sequence[PointSource], progress: Progress = SILENT) -> list[PointSource]:
     """Return the classes whose points can be those of rails, and warn the user about the others.
 
-    Parameters
-    ----------
-    sources : sequence of PointSource
-    progress : Progress
-
     Raises
     ------
     CloudError

@@ -65,7 +65,7 @@ class Square:
         return cls(key, replace(frame, origin=corner), side_m)
 
     def holds(self, xyz: np.ndarray, margin_m: float = 0.0) -> np.ndarray:
-        """Return which places lie in the square or at most `margin_m` outside, (n,) bool.
+        """Return which places are in the square or at most `margin_m` outside, (n,) bool.
 
         Parameters
         ----------
@@ -135,7 +135,7 @@ class MemorySource:
 
 
 def unique_keys(xyz_m: np.ndarray, side_m: float) -> tuple[list[Key], np.ndarray]:
-    """Find the squares in which points lie.
+    """Find the squares in which points are.
 
     Parameters
     ----------
@@ -198,12 +198,13 @@ def points_by_square(xyz_m: np.ndarray, side_m: float, margin_m: float = 0.0) ->
 
 def _with_margin(xy_m: np.ndarray, side_m: float, margin_m: float) -> tuple[np.ndarray, np.ndarray]:
     """Repeat places near the borders of squares, moved into each square that they belong to, and their numbers."""
+    xy_m = np.ascontiguousarray(xy_m.T)
     crosses = np.floor((xy_m - margin_m) / side_m) != np.floor((xy_m + margin_m) / side_m)
-    moved, number = [xy_m - margin_m], [np.arange(len(xy_m))]
-    for chosen, sense in ((crosses[:, 0], (1, -1)), (crosses[:, 1], (-1, 1)), (crosses.all(axis=1), (1, 1))):
+    moved, number = [xy_m - margin_m], [np.arange(xy_m.shape[1])]
+    for chosen, sense in ((crosses[0], (1, -1)), (crosses[1], (-1, 1)), (crosses.all(axis=0), (1, 1))):
         number.append(np.flatnonzero(chosen))
-        moved.append(xy_m[number[-1]] + np.multiply(sense, margin_m))
-    return np.concatenate(moved), np.concatenate(number)
+        moved.append(xy_m[:, number[-1]] + np.multiply(sense, margin_m)[:, None])
+    return np.concatenate(moved, axis=1).T, np.concatenate(number)
 
 
 def around(key: Key) -> list[Key]:
@@ -219,7 +220,7 @@ def lay_out(sources: Sequence[PointSource], source: PointSource) -> list[Square]
 
 
 def own_tiles(raster: RailRaster, square: Square) -> RailRaster:
-    """Keep the tiles of a raster that lie in the square."""
+    """Keep the tiles of a raster that are in the square."""
     if square.is_whole_plane:
         return raster
     count = tiles_along(square.side_m, raster.cell_m)

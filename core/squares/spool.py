@@ -92,7 +92,7 @@ class SpooledPoints:
 
 
 def _read(file: str, square: Square, margin_m: float) -> np.ndarray:
-    """Read the points of a file that lie in a square or at most `margin_m` outside, (n, 3), in the frame of the square.
+    """Read the points of a file that are in a square or at most `margin_m` outside, (n, 3), in the frame of the square.
 
     A single place may hold most of a cloud, so that each copy of its points counts.
     """
@@ -125,7 +125,7 @@ def spool(request: Request, side_m: float, folder: Path, progress: Progress = SI
     DiskError
         The disk is full.
     NoRailPointsError
-        No point of the requested classes lies within the extent.
+        No point of the requested classes is within the extent.
     """
     shares = request.shares(progress)
     found = [spool_file(request, header, side_m, folder, share) for header, share in zip(request.headers, shares)]

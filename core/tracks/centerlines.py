@@ -10,8 +10,9 @@ import numpy as np
 from ..errors import NoTrackError
 from ..lines.paek import REACH_SIGMAS
 from ..lines.smoothing import STATIONS_PER_SIGMA, smooth_line
+from ..lines.uniting import united
 from ..parameters import Parameters
-from ..polyline import is_closed, left_normals, length_along, resample, starts_at_its_end
+from ..polyline import MIN_RING_M, is_closed, left_normals, length_along, resample, starts_at_its_end
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
 from ..standards import STANDARDS
@@ -21,14 +22,19 @@ from .midline import MAX_OFFSET_M, Meeting, Side, at_gauge, bridged_steps, midwa
 from .pairing import MIN_SECTION_M, pair_rails
 from .parallels import most_common_spacing
 from .provisional import PROVISIONAL_STEP_M, provisional_centerline
-from .rails_ahead import runs_on
-from .rings import closed_centerline, extended_ring, started_abreast
 
 STATIONS_AT_ONCE = 8192
 """Stations processed at once, 2 km of track: lets the user cancel several times per second."""
 
 SAME_GAUGE_M = 0.04
 """Gauges in use differ by more than this, so a measured spacing this close to one of them suggests it."""
+
+START_STEP_M = 0.05
+"""Spacing of the places where a closed rail may start: the rails of a track then start abreast to within half of it."""
+
+MAX_SEAM_M = 0.5
+"""Maximum distance between the ends of a ring's centerline, which may overlap or leave a gap: matches end a little
+early."""
 
 
 @dataclass(frozen=True)
@@ -172,8 +178,8 @@ def _meetings(
     reach_m = single_rail_limit(parameters.max_gap_m)
     # The stations are half a gauge from one rail, so the other is off by the whole deviation of the gauge.
     max_offset_m = max(MAX_OFFSET_M, parameters.tolerance_m)
-    lefts = _spans([pair.left for pair in chain.pairs], [pair.left_span for pair in chain.pairs])
-    rights = _spans([pair.right for pair in chain.pairs], [pair.right_span for pair in chain.pairs])
+    lefts = [(pair.left, pair.left_span) for pair in chain.pairs]
+    rights = [(pair.right, pair.right_span) for pair in chain.pairs]
     to_left, to_right = progress.split(2)
     left = _met(Side.of(rails, lefts, reach_m), stations, normals, half_m, max_offset_m, to_left)
     right = _met(Side.of(rails, rights, reach_m), stations, -normals, half_m, max_offset_m, to_right)
@@ -183,17 +189,6 @@ def _meetings(
 def _ids(rails: Sequence[RailLine], numbers: Iterable[int]) -> tuple[int, ...]:
     """Return the ids of rails without repetition, in order of first occurrence."""
     return tuple(dict.fromkeys(rails[number].rail_id for number in numbers))
-
-
-def _spans(rails: Sequence[int], spans: Sequence[tuple[float, float]]) -> list[tuple[int, tuple[float, float]]]:
-    """List a track's rails on one side and their sections, merging sections between which the rail continues."""
-    merged = [(rails[0], spans[0])]
-    for rail, span in zip(rails[1:], spans[1:]):
-        if rail == merged[-1][0] and runs_on(merged[-1][1], span):
-            merged[-1] = (rail, (merged[-1][1][0], span[1]))
-        else:
-            merged.append((rail, span))
-    return merged
 
 
 def _met(
@@ -223,3 +218,43 @@ def _smoothed(xyz: np.ndarray, smoothing_m: float, progress: Progress) -> np.nda
         plan.append(smooth_line(near, smoothing_m, stations=part - along[first], ends="free"))
     smooth = np.column_stack([np.concatenate(plan), stations[:, 2]])
     return np.concatenate([smooth[:-1], smooth[:1]]) if closed else smooth
+
+
+def started_abreast(rails: Sequence[RailLine]) -> list[RailLine]:
+    """Move the start of closed rails to the place nearest to the start of the first one.
+
+    The rails of a track then start on a common normal, wherever they started before.
+    """
+    place = next((rail.xyz[0, :2] for rail in rails if is_closed(rail.xyz)), None)
+    if place is None:
+        return list(rails)
+    return [_started_near(rail, place) if is_closed(rail.xyz) else rail for rail in rails]
+
+
+def _started_near(rail: RailLine, place: np.ndarray) -> RailLine:
+    """Move the start of a closed rail to the place nearest to a given one, (2,)."""
+    stations, t = resample(rail.xyz[:, :2], START_STEP_M)
+    start = t[np.argmin(np.linalg.norm(stations - place, axis=1))]
+    if start in (0.0, t[-1]):
+        return rail
+    return united([rail.between(start, t[-1]), rail.between(0.0, start)])
+
+
+def closed_centerline(xyz: np.ndarray) -> np.ndarray:
+    """Close a centerline, (n, d), drawn along closed rails if its ends are close together."""
+    away = np.linalg.norm(xyz[:, :2] - xyz[0, :2], axis=1)
+    along = length_along(xyz[:, :2])
+    if away[-1] > MAX_SEAM_M or along[-1] <= MIN_RING_M:
+        return xyz
+    ahead = (xyz[:, :2] - xyz[0, :2]) @ (xyz[1, :2] - xyz[0, :2])
+    past = (along > along[-1] - 2 * MAX_SEAM_M) & (away <= 2 * MAX_SEAM_M) & (ahead >= 0)
+    return np.concatenate([xyz[~past], xyz[:1]])
+
+
+def extended_ring(xyz: np.ndarray, margin_m: float) -> tuple[np.ndarray, float]:
+    """Extend a closed line, (n, d), at both ends by at least `margin_m`; returns it and the length before its start."""
+    along = length_along(xyz[:, :2])
+    margin_m = min(margin_m, along[-1])
+    first, last = np.searchsorted(along, [along[-1] - margin_m, margin_m])
+    first, last = max(first - 1, 0), min(last + 1, len(xyz))
+    return np.concatenate([xyz[first:-1], xyz, xyz[1:last]]), float(along[-1] - along[first])

@@ -77,10 +77,6 @@ def match_polylines(first: np.ndarray, second: np.ndarray, tolerance: float) -> 
         segment may be too far from any vertex.
     tolerance : float
         Maximum distance between a vertex and a segment, exclusive, in the unit of the vertices.
-
-    Returns
-    -------
-    list of Match
     """
     edges = lattice_edges(first, second, tolerance)
     if not len(edges.first):

@@ -16,8 +16,7 @@ from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine, TrackGeometry, cell_borders
 from ..standards import Gauge
 from .midline import Meeting, Side, bridged_steps
-from .parallels import most_common_spacing
-from .widths_by_gauge import width_at
+from .parallels import most_common_spacing, width_at
 
 MEETING_STEP_M = 0.25
 """Spacing of the stations at which both rails are met."""

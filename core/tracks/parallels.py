@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from ..polyline import left_normals, resample, unit_tangents
 from ..progress import SILENT, Progress
 from ..rails import RailLine
+from ..standards import Gauge
 
 SAMPLE_STEP_M = 0.5
 """Spacing of the stations: six on the shortest section, and a railway curve is within 2 mm of the chords."""
@@ -38,7 +39,7 @@ CROWD_M, CROWD = 1.0, 75
 ten heads of rails fit next to each other. Each pair of lines would be compared."""
 
 CROWDED = (
-    "More than 25 lines lie within 1 m of each other on {:.0f} m of their length, which is not paired: remove copies "
+    "More than 25 lines are within 1 m of each other on {:.0f} m of their length, which is not paired: remove copies "
     "of lines."
 )
 
@@ -119,7 +120,7 @@ def find_parallels(rails: Sequence[RailLine], reach_m: float = MAX_SPACING_M, pr
 
 
 def _is_crowded(stations: np.ndarray) -> np.ndarray:
-    """Return which stations lie in a square with more stations than rails can have, (n,) bool."""
+    """Return which stations are in a square with more stations than rails can have, (n,) bool."""
     squares = np.floor(stations / CROWD_M) @ [1.0, 2.0**26]  # a number for each square
     _, square, counts = np.unique(squares, return_inverse=True, return_counts=True)
     return (counts > CROWD)[square]
@@ -158,3 +159,38 @@ def most_common_spacing(rails: Sequence[RailLine], min_length_m: float) -> float
         return None
     middle = (np.argmax(counts) + 0.5) * SPACING_BIN_M
     return float(np.median(spacing[np.abs(spacing - middle) <= 2 * SPACING_BIN_M]))
+
+
+def width_at(spacing_m: float, gauges: Sequence[Gauge]) -> float:
+    """Return the width of the railheads of a track whose rails are at a distance, that of the nearest gauge, metres.
+
+    Examples
+    --------
+    >>> width_at(1.061, [(1.435, 0.072), (1.0, 0.066)])
+    0.066
+    """
+    return min(gauges, key=lambda one: abs(sum(one) - spacing_m))[1]
+
+
+def widths_by_gauge(rails: Sequence[RailLine], gauges: Sequence[Gauge], tolerance_m: float) -> np.ndarray:
+    """Return the width of the head of each rail, (n,) metres: that of the gauge at which it runs for the most part.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+    gauges : sequence of Gauge
+        The first one decides where a rail has no partner, or is common to tracks of two gauges over the same length.
+    tolerance_m : float
+        Largest deviation of a track from its gauge.
+    """
+    widths_m = np.array([width_m for _, width_m in gauges])
+    if not len(rails) or np.all(widths_m == widths_m[0]):
+        return np.full(len(rails), widths_m[0])
+    found = find_parallels(rails, max(map(sum, gauges)) + tolerance_m)
+    off_m = np.abs(np.abs(found.left_m)[:, None] - np.array([sum(one) for one in gauges]))
+    at_gauge = off_m.min(axis=1) <= tolerance_m
+    nearest = off_m.argmin(axis=1)[at_gauge]
+    stations = np.zeros((len(rails), len(gauges)))
+    for sides in (found.a, found.b):
+        np.add.at(stations, (sides[at_gauge], nearest), 1)
+    return widths_m[stations.argmax(axis=1)]

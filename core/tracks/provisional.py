@@ -10,9 +10,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..rails import RailLine
-from .chaining import Chain
+from .chaining import Chain, RailAhead, rails_ahead, runs_on
 from .pairing import RailPair
-from .rails_ahead import RailAhead, rails_ahead, runs_on
 
 PROVISIONAL_STEP_M = 0.25
 """Spacing of the vertices: in a tram curve of 25 m the chords deviate by 0.3 mm."""

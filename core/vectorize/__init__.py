@@ -13,14 +13,11 @@ from ..parameters import Parameters
 from ..progress import SILENT, Progress
 from ..raster import RailRaster
 from .attaching import attach_branches
-from .branches import free_third_rails, resolve_branches
-from .closing import close
+from .branches import choose_routes, free_third_rails, resolve_branches
 from .crossings import resolve_crossings
 from .joining import join_gaps
-from .junctions import clean_junctions, run_through, weld_pairs
-from .pixels import chamfer_distance, parity_fix, pixel_set
-from .repairs import cut_kinks, straighten_blots
-from .routes import choose_routes
+from .junctions import clean_junctions, cut_kinks, run_through, weld_pairs
+from .pixels import chamfer_distance, close, parity_fix, pixel_set
 from .slips import add_curves, open_slips
 from .tracing import trace
 from .veinerization import prune, veinerize
@@ -73,11 +70,9 @@ def vectorize(
     traced = trace(closed, pixels, edges, tips)
     progress.set_fraction(0.6)
     progress.check()
-    places, widths_m = closed.to_local(pixels.cells / 2), raster.cell_m * distance / 2
-    seen = cKDTree(places)
+    seen = cKDTree(closed.to_local(pixels.cells / 2))
     network, slips = open_slips(clean_junctions(traced, head_width_m), seen)
-    network = straighten_blots(network, places, widths_m, head_width_m, progress.span(0.6, 0.8))
-    network = cut_kinks(network, progress.span(0.8, 0.85))
+    network = cut_kinks(network, progress.span(0.6, 0.85))
     network = resolve_branches(free_third_rails(add_curves(resolve_crossings(network), slips)))
     network = join_gaps(run_through(network), max_gap_m, gap_angle_deg, seen, progress=progress)
     network = attach_branches(network, seen, max_gap_m, progress.span(0.9, 1.0))

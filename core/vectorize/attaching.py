@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..lines.bridges import FIT_M, MISFIT_M, Bridge, bridge, curvature
+from ..lines.bridges import FIT_M, MISFIT_M, Bridge, bridge
 from ..lines.ends import even_points, tip_and_direction
 from ..lines.network import LineNetwork
 from ..lines.parting import ARC, PartingLaw
 from ..polyline import length_along
 from ..progress import SILENT, Progress
-from .branches import MAX_BACK_M, STEADY_M, max_curvature
+from .branches import MAX_BACK_M, STEADY_M
 from .joining import unseen_m
 from .junctions import DIRECTION_M
 
@@ -98,8 +98,7 @@ def _touching(from_end: np.ndarray, number: int, line: np.ndarray) -> Iterator[_
         return
     law = PartingLaw.fitted(-own_x, np.abs(stock_y - own_y), ARC)
     touch_m = -law.way_at(MISFIT_M)
-    seen_curvature = curvature(own) - curvature(np.column_stack([own_x, stock_y]) @ axes)
-    if law.curvature > max_curvature(seen_curvature) or not 0 < touch_m < min(MAX_BACK_M, x[-1]):
+    if not 0 < touch_m < min(MAX_BACK_M, x[-1]):
         return
     along = int(np.abs(x - touch_m).argmin())
     onward = line[(first + along if sense > 0 else last - along) :: sense]

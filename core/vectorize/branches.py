@@ -9,15 +9,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..lines.bridges import MISFIT_M, STAIRS_M, bridge, curvature
+from ..lines.bridges import MISFIT_M, bridge
 from ..lines.ends import STEP_M, cut_back, even_points, turned
 from ..lines.network import LineNetwork
 from ..lines.parting import ARC, PartingLaw
 from ..polyline import length_along
 from .crossings import MISFIT_M as KNOWN_MISFIT_M
 from .crossings import SKIP_M
-from .junctions import DEFLECTION_DEG, DIRECTION_M, deflections, ends_by_node
-from .steadiness import unsteadiness
+from .junctions import DEFLECTION_DEG, DIRECTION_M, deflections, ends_by_node, unsteadiness
 
 MAX_BACK_M = 40.0
 """Largest length by which a branch is extended back: on a radius of 2500 m, as at 1:26.5, two rails are 0.2 m apart
@@ -30,10 +29,12 @@ MERGED_M, MIN_LEG_M = 8.0, 8.0
 """Length of the stem of three rails in which they are merged, and shortest leg that shows which of them goes on: rails
 that part on 190 m have separate heads after 7.5 m."""
 
-SHARPER = 2.0
-UNSURE_CURVATURE = 16 * STAIRS_M / STEADY_M**2
-"""A branch begins on the arc on which it continues: the fitted curvature may be `SHARPER` times the visible one, plus
-what stairs at both ends of the visible part may hide. At a frog, where rails cross, it is larger."""
+ROUTE_M = 40.0
+"""Length on either side over which curvatures are compared. At 1:26.5, the flattest turnout in use, the branch is then
+off a constant curvature by 18 mm, several times the uncertainty from stairs; over 30 m, by 10 mm."""
+
+MIN_LENGTH_M = 8.0
+"""Shorter parts between nodes have no measurable curvature."""
 
 
 def resolve_branches(network: LineNetwork) -> LineNetwork:
@@ -131,7 +132,7 @@ def _trunk(stem: np.ndarray, rails: list[np.ndarray]) -> np.ndarray:
     law = PartingLaw.fitted(SKIP_M + STEP_M * np.arange(count), apart_m, ARC)
     back_m = -law.way_at(MISFIT_M)
     too_short = length_along(stem)[-1] < back_m + DIRECTION_M
-    if too_short or not 0 < back_m < MAX_BACK_M or law.curvature > max_curvature(curvature(one) - curvature(other)):
+    if too_short or not 0 < back_m < MAX_BACK_M:
         return stem[:0]
     return cut_back(stem, back_m)
 
@@ -145,6 +146,16 @@ def _drawn(trunk: np.ndarray, rail: np.ndarray) -> np.ndarray | None:
     return np.concatenate([trunk[:1], curve.points, cut_back(free, curve.cuts_m[1])])
 
 
-def max_curvature(seen: float) -> float:
-    """Return the largest relative curvature, 1/m, with which rails part whose visible relative curvature is `seen`."""
-    return SHARPER * abs(seen) + UNSURE_CURVATURE
+def choose_routes(network: LineNetwork) -> LineNetwork:
+    """Let the rail whose curvature changes least pass through each node in which one rail leaves another."""
+    pieces, partner = network.parted()
+    lengths = pieces.lengths()
+    for _, stem, legs in branchings(pieces):
+        if min(lengths[end // 2] for end in (stem, *legs)) < MIN_LENGTH_M:
+            continue
+        scores = [unsteadiness(pieces.from_end(stem), pieces.from_end(leg), ROUTE_M) for leg in legs]
+        steady = legs[scores.index(min(scores))]
+        for end in (stem, *legs):
+            partner.pop(end, None)
+        partner[stem], partner[steady] = steady, stem
+    return pieces.weld(partner)

@@ -13,8 +13,7 @@ from scipy.spatial import cKDTree
 from ..lines.bridges import Bridge, bridge
 from ..lines.ends import cut_back, even_points
 from ..lines.network import LineNetwork
-from .junctions import ends_by_node
-from .steadiness import unsteadiness
+from .junctions import ends_by_node, unsteadiness
 
 MAX_MERGED_M = 14.0
 """Largest length that two crossing rails share. Heads of 76 mm in cells of 40 mm share 9 m at 1:26.5, and wing rails

@@ -1,6 +1,6 @@
-"""Repair what the raster does to junctions: drop spurs, bubbles and rungs, straighten rails through nodes.
+"""Repair what the raster does to junctions: drop spurs, bubbles, rungs and kinks, and run rails through nodes.
 
-See docs/method.md section 4.6.
+See docs/method.md sections 4.6 and 4.7.
 """
 
 from __future__ import annotations
@@ -10,8 +10,10 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..lines.ends import even_points, tip_and_direction
+from ..lines.ends import STEP_M, even_points, tip_and_direction
 from ..lines.network import LineNetwork
+from ..polyline import length_along, part
+from ..progress import SILENT, Progress
 
 SPUR_M = 1.0
 """A shorter branch with a free end is a weed on the side of the rail; a longer one may continue beyond a gap."""
@@ -35,6 +37,15 @@ TURNED_BACK_DEG = 90.0
 
 DIRECTION_M = 2.5
 """Length over which directions at a node are compared: longer than the merged part of a 1:9 frog."""
+
+COARSE_M = 1.0
+"""Spacing of the points that are compared: directions between closer ones show the stairs."""
+
+TOGETHER_M = 1.0
+"""Kinks closer to each other than this are one."""
+
+KINK_DEG, KINK_M = 25.0, 0.5
+"""No rail turns by this angle between two parts of this length; the stairs of a raster turn by 6 degrees."""
 
 
 def clean_junctions(network: LineNetwork, head_width_m: float) -> LineNetwork:
@@ -149,3 +160,78 @@ def ends_by_node(network: LineNetwork) -> Iterable[tuple[int, list[int]]]:
     order = np.argsort(flat, kind="stable")
     nodes, first = np.unique(flat[order], return_index=True)
     return zip(nodes.tolist(), (group.tolist() for group in np.split(order, first[1:])))
+
+
+def unsteadiness(one: np.ndarray, other: np.ndarray, length_m: float) -> float:
+    """Measure how far two lines are off one curve of constant curvature through both, metres rms.
+
+    Headings are summed along the way, which unrolls tight curves as well.
+
+    Parameters
+    ----------
+    one, other : (n, 2) arrays
+        Both lines, from the ends that face each other inward.
+    length_m : float
+        Length of each that counts.
+    """
+    coarse = int(round(COARSE_M / STEP_M))
+    points = np.concatenate([even_points(one, length_m)[::coarse][::-1], even_points(other, length_m)[::coarse]])
+    if len(points) < 4:
+        return 0.0
+    way = np.diff(points, axis=0)
+    way = way[np.abs(way).max(axis=1) > 0]
+    length = np.hypot(*way.T)
+    heading = np.unwrap(np.arctan2(way[:, 1], way[:, 0]))
+    along = np.concatenate([[0.0], np.cumsum(length)])
+    aside = np.concatenate([[0.0], np.cumsum(length * (heading - heading.mean()))])
+    along = along / along[-1]
+    return float(np.sqrt(np.mean((aside - np.polyval(np.polyfit(along, aside, 2), along)) ** 2)))
+
+
+def cut_kinks(network: LineNetwork, progress: Progress = SILENT) -> LineNetwork:
+    """Cut lines where they turn too sharply for a rail, and drop the bent part; the new ends are free.
+
+    Parameters
+    ----------
+    network : LineNetwork
+        Lines without passes.
+    progress : Progress
+    """
+    lines: list[np.ndarray] = []
+    ends: list[list[int]] = []
+    nodes = list(network.nodes)
+    for line, own in progress.follow(zip(network.lines, network.ends.tolist()), len(network.lines)):
+        for piece in _without_kinks(line):
+            lines.append(piece)
+            ends.append([])
+            for node, was, now in zip(own, line[[0, -1]], piece[[0, -1]]):
+                ends[-1].append(node if (was == now).all() else len(nodes))
+                nodes += [] if (was == now).all() else [now]
+    whole = LineNetwork(tuple(lines), np.array(nodes).reshape(-1, 2), np.array(ends, dtype=int).reshape(-1, 2))
+    return weld_pairs(whole.tidy())
+
+
+def _without_kinks(line: np.ndarray) -> list[np.ndarray]:
+    """Cut a line into the pieces between its kinks."""
+    points, length_m = even_points(line), float(length_along(line)[-1])
+    bent = np.linspace(0.0, length_m, len(points))[_turns(points, KINK_M) > np.radians(KINK_DEG)]
+    if not len(bent):
+        return [line]
+    kinks = np.split(bent, np.flatnonzero(np.diff(bent) > TOGETHER_M) + 1)
+    pieces, t = [], 0.0
+    for start, end in [*((one[0] - KINK_M, one[-1] + KINK_M) for one in kinks), (length_m, np.inf)]:
+        if start - t > STEP_M:
+            pieces.append(part(line, t, min(start, length_m)))
+        t = end
+    return pieces
+
+
+def _turns(points: np.ndarray, length_m: float) -> np.ndarray:
+    """Measure the angle between the parts of a length before and behind each even point of a line, radians, (n,)."""
+    reach = int(round(length_m / STEP_M))
+    turn = np.zeros(len(points))
+    if len(points) > 2 * reach:
+        back, ahead = points[reach:-reach] - points[: -2 * reach], points[2 * reach :] - points[reach:-reach]
+        cross = back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0]
+        turn[reach:-reach] = np.abs(np.arctan2(cross, (back * ahead).sum(axis=1)))
+    return turn

@@ -328,7 +328,7 @@ def _continue(tips: np.ndarray, outward: np.ndarray) -> bool:
 
 
 def _as_crossing(network: LineNetwork, slip: Slip) -> LineNetwork:
-    """Remove what lies inside a slip, and let its four legs meet in one node."""
+    """Remove what is inside a slip, and let its four legs meet in one node."""
     hub = len(network.nodes)
     lines: list[np.ndarray] = []
     ends: list[tuple[int, int]] = []

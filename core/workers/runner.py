@@ -12,6 +12,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from ..errors import RailExtractError
+from ..kernels import cores
 from ..progress import SILENT, Progress, counted
 from ..tasks import InTurn, Name, Results, Runner, Task, turns
 from .process import ENDED, Interpreter, Messages, Worker
@@ -35,11 +36,6 @@ def worker_count(wanted: int) -> int:
     """Return the number of workers that is asked for; for 0, one per core, as far as their memory allows."""
     budget_bytes = max(BUDGET_BYTES, BUDGET_SHARE * memory_bytes())
     return wanted or max(1, min(cores(), int(budget_bytes / WORKER_BYTES)))
-
-
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def memory_bytes() -> int:

@@ -1,4 +1,4 @@
-"""Combinations of clothoids that join oriented points, from a table computed once (docs/method.md section 11.3).
+"""Combinations of clothoids that join oriented points, from a table computed once (docs/synthetic.md).
 
 A combination has three elements: the curvature rises from zero, changes linearly, and falls back to zero, so that the
 curvature of a chain of combinations is continuous. With the chord as unit of length, the deflections at both ends and

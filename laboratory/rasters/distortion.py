@@ -1,7 +1,7 @@
 """Pairs of rasters of a layout: as a scanner shows it at a severity from 0 to 1, and as it is.
 
-Gribov and Chang, section 4.3, name the kinds of distortion; docs/method.md section 3.7 has the principles, and
-docs/synthetic.md states the effect of each severity. A label follows the shift of its rail at wavelengths above
+Gribov and Chang, section 4.3, name the kinds of distortion; docs/synthetic.md has the principles, and the effect of
+each severity. A label follows the shift of its rail at wavelengths above
 `LABEL_WAVELENGTH_M`: the network is to smooth noise, not to straighten track.
 """
 

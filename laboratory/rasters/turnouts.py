@@ -1,4 +1,4 @@
-"""Turnouts and crossovers: the forms that railways build, and their rails (docs/method.md section 11.4)."""
+"""Turnouts and crossovers: the forms that railways build, and their rails (docs/synthetic.md)."""
 
 from __future__ import annotations
 

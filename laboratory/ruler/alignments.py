@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Optional, TypeVar
 
 import numpy as np
+from scipy.special import erf
 
 from ...core.alignment.elements import Alignment, Element, PlanElement, VerticalElement
+from ...core.alignment.given import given_of, noted
+from ...core.alignment.noise import Noise
+from ...core.alignment.plane_fit import Points, fit_plan
+from ...core.alignment.uncertainty import plan_errors
+from ...core.polyline import length_along
+
+SIZES, TINY = 100_000, 1e-9
+"""Number of sizes of an error that are tried, and least standard deviation, metres."""
 
 Some = TypeVar("Some", bound=Element)
 
@@ -56,6 +65,51 @@ class Met:
     ramps_true: int
     ramps_found: int
     ramp_ends_m: np.ndarray
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Least standard errors that any fit can have which is given the types of the elements (Cramér and Rao).
+
+    Attributes
+    ----------
+    radius : (n,) array
+        Of the radii of arcs, as shares.
+    ends_m : (k,) array
+        Of the ends of elements, in the order of `Met.ends_m` if all are found, metres.
+    """
+
+    radius: np.ndarray
+    ends_m: np.ndarray
+
+
+def bound_of(design: Alignment, line: np.ndarray, white_m: float) -> Bound:
+    """Return the least standard errors for a design: the inverse of the information at the true elements.
+
+    Parameters
+    ----------
+    design : Alignment
+    line : (n, 3) array
+        Vertices on the design without errors, local metres.
+    white_m : float
+        Standard deviation of independent errors across, metres.
+    """
+    s = length_along(line[:, :2])
+    given = given_of(replace(design, plan=tuple(map(noted, design.plan))), 0.0, float(s[-1]))
+    points = Points(line[:, :2], s, np.full(len(s), 1.0 / white_m**2))
+    fit = fit_plan(given.chain, points, given.held, poses=given.poses)
+    errors = plan_errors(fit, points, white_m, Noise(white_m))
+    arcs = np.array([one.type == "arc" for one in fit.elements])
+    bends = np.array([one.k_from for one in fit.elements])
+    ends_m = np.column_stack([errors.s, np.append(errors.s[1:], 0.0)]).ravel()
+    return Bound(errors.bend[arcs] / np.abs(bends[arcs]), ends_m)
+
+
+def quantiles(sigmas: np.ndarray, shares: Sequence[float]) -> np.ndarray:
+    """Return quantiles of the size of normal errors with standard deviations, (n,), all of them taken together."""
+    sizes = np.linspace(0.0, 5.0 * sigmas.max(), SIZES)
+    below = np.array([np.mean(erf(size / (np.maximum(sigmas, TINY) * np.sqrt(2.0)))) for size in sizes])
+    return np.interp(shares, below, sizes)
 
 
 def compared(design: Alignment, fit: Alignment) -> Met:

@@ -12,13 +12,13 @@ import numpy as np
 from ...core.classify.settings import Settings
 from ...core.clouds.points import RailPoints
 from ...core.comparison.pieces import cut, nearest
-from ...core.labelling.cloud import classify_cloud
 from ...core.parameters import Parameters
 from ...core.pipeline import extract_rails
 from ...core.rails import RailNetwork, SearchFigures
 from ..scenes.raw import RawScene
 from ..scenes.scene import RAIL
 from .lines import Match, match
+from .whole_clouds import classify_cloud
 
 FACE_M = 0.035
 """Depth of the side faces that count as head, as in the classified scenes."""

@@ -47,9 +47,6 @@ QUICK = (
 )
 """Scenes that a test runs: at least one for each kind of place."""
 
-MODEL, ENGINE = "fast", "OPENCV"
-"""Weights, and the engine that every installation has; others round differently."""
-
 FORK_REACH_M = 5.0
 """A branch whose line begins further from where it truly begins counts as this far off."""
 
@@ -70,17 +67,27 @@ class Variant:
         One of `frpdf.models.NAMES`.
     seed_shift : int
         Added to the seed of every scene; even, because odd seeds look from the other side in some.
+    engine : str
+        One of `frpdf.engine`. Every installation has OpenCV.
+    places : tuple of str
+        Scenes that are run so.
     """
 
     name: str
-    model: str = MODEL
+    model: str = "fast"
     seed_shift: int = 0
+    engine: str = "OPENCV"
+    places: tuple[str, ...] = PLACES
 
 
 PLAIN = Variant("as published")
+TORCH = Variant("PyTorch", engine="TORCH", places=("throat",))
+"""Engines round differently, and the cells of this scene differ by enough to draw other lines."""
+
 VARIANTS = (
     PLAIN,
-    Variant("base model", model="base"),
+    TORCH,
+    Variant("base model", model="base", places=tuple(DRAWN)),
     *(Variant(f"seed {1 + number}", seed_shift=100 * (1 + number)) for number in range(3)),
 )
 
@@ -107,7 +114,7 @@ def build_scene(place: str, seed_shift: int = 0) -> Scene | RawScene:
     return make(seed=inspect.signature(make).parameters["seed"].default + seed_shift)
 
 
-def parameters_of(scene: Scene, model: str = MODEL) -> Parameters:
+def parameters_of(scene: Scene, variant: Variant = PLAIN) -> Parameters:
     """Return the parameters with which the scenes of the table are extracted."""
     standard = scene.standard
     return Parameters(
@@ -115,16 +122,16 @@ def parameters_of(scene: Scene, model: str = MODEL) -> Parameters:
         standard.head_width_m,
         other_gauges_m=scene.other_gauges_m,
         quality_step_m=QUALITY_STEP_M,
-        model=model,
-        engine=ENGINE,
+        model=variant.model,
+        engine=variant.engine,
     )
 
 
-def figures_of(place: str, scene: Scene | RawScene, model: str = MODEL) -> Figures:
+def figures_of(place: str, scene: Scene | RawScene, variant: Variant = PLAIN) -> Figures:
     """Run one scene of `PLACES` and measure what comes out."""
     if isinstance(scene, RawScene):
         return _raw_figures(scene, wide=place[len(RAW) :] in AIR)
-    return line_figures(scene, extract_rails([scene.rail_points()], parameters_of(scene, model)))
+    return line_figures(scene, extract_rails([scene.rail_points()], parameters_of(scene, variant)))
 
 
 def line_figures(scene: Scene, network: RailNetwork) -> Figures:

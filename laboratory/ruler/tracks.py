@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.comparison.crossing import ASTRAY_M, spacing_and_cant
-from ...core.comparison.pieces import cut
+from ...core.comparison.pieces import ASTRAY_M, cut, spacing_and_cant
 from ...core.polyline import interpolate, left_normals, length_along, project
 from ...core.rails import Centerline, RailLine, TrackGeometry
 

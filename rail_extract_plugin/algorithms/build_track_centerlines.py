@@ -79,7 +79,8 @@ class BuildTrackCenterlines(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Pair the rails of each class, then write the centerlines."""
-        from ...core.steps import tracks_of, with_tracks
+        from ...core.checks.lines import with_tracks
+        from ...core.steps import tracks_of
         from ..reading.line_layers import read_rails
 
         values = ParameterValues(self, parameters, context)

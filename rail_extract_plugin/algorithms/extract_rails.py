@@ -154,7 +154,7 @@ class ExtractRails(RailAlgorithm):
 
     def _detected(self, job: Job, request: Request, values: ParameterValues, progress: Progress) -> Job:
         """Return the job with the rail standard that fits the points."""
-        from ...core.standard_checks import detect_in_raw, detect_standard
+        from ...core.checks.standard import detect_in_raw, detect_standard
 
         progress.status(tr("Measuring gauge and railheads"))
         detect = detect_in_raw if values.flag("CLASSIFY") else detect_standard

@@ -39,6 +39,8 @@ class Job:
     crs_wkt: str | None
     east_first: bool
     tracks: QgsProcessingFeatureSource | None
+    quality: QgsProcessingFeatureSource | None
+    rails: QgsProcessingFeatureSource | None
     command: str
 
 
@@ -59,7 +61,7 @@ class ImportAlignment(RailAlgorithm):
         "The element table is that of Fit Alignment: it can be edited and exported. The axes have kilometres as M "
         "values: Station Along Axis takes them.\n\n"
         "With measured tracks that lie along the alignments, the run states how far they lie off them: slews, lifts, "
-        "and a report with a diagram of each track."
+        "with track geometry or rails the cant, and a report with a diagram of each track."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:
@@ -67,8 +69,8 @@ class ImportAlignment(RailAlgorithm):
         deviations, report = outputs.deviations(), outputs.alignment_report()
         for needs_tracks in (deviations, report):
             needs_tracks.setCreateByDefault(False)
-        tracks = inputs.tracks_beside_design()
-        for definition in (*inputs.landxml(), tracks, outputs.elements(), outputs.axes(), outputs.further(deviations)):
+        tracks = (inputs.tracks_beside_design(), *inputs.cant_beside_design())
+        for definition in (*inputs.landxml(), *tracks, outputs.elements(), outputs.axes(), outputs.further(deviations)):
             self.addParameter(definition)
         self._add_report(report)
         for output in outputs.alignment_figures():
@@ -83,6 +85,10 @@ class ImportAlignment(RailAlgorithm):
         values = ParameterValues(self, parameters, context)
         path, crs = Path(self.parameterAsFile(parameters, "INPUT", context)), values.projected_crs()
         tracks = values.lines("TRACKS") if values.filled("TRACKS") else None
+        quality = values.table("QUALITY") if values.filled("QUALITY") else None
+        rails = values.lines("RAILS") if values.filled("RAILS") else None
+        if tracks is None and (quality or rails):
+            raise ParameterError("QUALITY and RAILS state the cant of measured tracks: choose TRACKS.")
         if tracks is None and any(is_wanted(parameters.get(name), context) for name in ("DEVIATIONS", "REPORT")):
             raise ParameterError("DEVIATIONS and REPORT compare measured tracks with the alignments: choose TRACKS.")
         stated = stated_system(path)
@@ -94,7 +100,8 @@ class ImportAlignment(RailAlgorithm):
                 "CRS, or correct the file."
             )
         prepare_system(wkt)
-        return Job(path, wkt, values.flag("EAST_FIRST"), tracks, masked(self.asPythonCommand(parameters, context)))
+        command = masked(self.asPythonCommand(parameters, context))
+        return Job(path, wkt, values.flag("EAST_FIRST"), tracks, quality, rails, command)
 
     def compute(
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
@@ -107,7 +114,7 @@ class ImportAlignment(RailAlgorithm):
         frame = replace(read[0].frame, crs_wkt=job.crs_wkt)
         alignments = tuple(replace(one, frame=frame) for one in read)
         check_place(job.path.name, frame, job.east_first, progress)
-        courses = _compared(job.tracks, alignments, frame, progress.span(READING, 1)) if job.tracks is not None else []
+        courses = _compared(job, alignments, frame, progress.span(READING, 1))
         rest = (parameters, context)
         facts = {"LandXML file": job.path.name, "Command": job.command}
         writers = {
@@ -127,14 +134,17 @@ def _name(job: Job) -> str:
 
 
 def _compared(
-    source: QgsProcessingFeatureSource, alignments: Sequence[Alignment], frame: LocalFrame, progress: Progress
+    job: Job, alignments: Sequence[Alignment], frame: LocalFrame, progress: Progress
 ) -> list[tuple[Alignment, Deviations]]:
-    """Return the deviations of each track with the alignment beside it."""
+    """Return the deviations of each track with the alignment beside it; none without tracks."""
     from ...core.alignment.deviations import compared_with
+    from ...core.alignment.measured import moved
     from ..reading.area_points import check_same_plane
-    from ..reading.line_layers import read_centerlines
+    from ..reading.tracks_to_fit import read_tracks
 
-    lines, theirs = read_centerlines(source, progress, "TRACKS")
+    if job.tracks is None:
+        return []
+    tracks, theirs = read_tracks(job.tracks, job.quality, job.rails, progress, "TRACKS")
     check_same_plane("TRACKS", theirs.crs_wkt, "INPUT", frame)
     shift = theirs.shift_to(frame)
-    return compared_with(alignments, [(line.track_id, line.xyz + shift) for line in lines], progress)
+    return compared_with(alignments, [moved(one, shift) for one in tracks], progress)

@@ -114,7 +114,7 @@ class MeasureTrackGeometry(RailAlgorithm):
         from ...core.report import Origin, list_findings, summary
         from ...core.squares.remeasuring import measure_rails
         from ...core.tracks.geometry import measure_track_geometry
-        from ...core.tracks.widths_by_gauge import widths_by_gauge
+        from ...core.tracks.parallels import widths_by_gauge
         from ..reading.track_inputs import check_gauges, read_inputs, with_measured_gauge
 
         values, progress = ParameterValues(self, parameters, context), Recording(progress)

@@ -80,6 +80,7 @@ class VectorizeRails(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Vectorize each class, then write the lines."""
+        from ...core.checks.lines import warn_of_rails
         from ...core.steps import lines_of
         from ..reading.area_points import Area, read_points_in
         from ..reading.geotiff import read_rasters
@@ -98,7 +99,9 @@ class VectorizeRails(RailAlgorithm):
         rails: list[RailLine] = []
         shares = progress.span(READING, 1).split(len(rasters))
         for raster, code, share in zip(rasters, job.header.class_codes, shares):
-            rails += lines_of(raster, code, clouds.get(code), settings, share, first_id=len(rails) + 1)
+            found = lines_of(raster, code, clouds.get(code), settings, share, first_id=len(rails) + 1)
+            warn_of_rails(found, code, settings, progress)
+            rails += found
         progress.check()
         written = write_lines(self, "OUTPUT", RAILS, rails, frame, parameters, context)
         return {**written, **figures_of(rails, "RAIL")}

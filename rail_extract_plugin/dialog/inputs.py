@@ -225,6 +225,21 @@ def tracks_beside_design() -> QgsProcessingParameterDefinition:
     )
 
 
+def cant_beside_design() -> Definitions:
+    """Define the layers from which the cant of measured tracks is known, where it is compared with a design."""
+    line, point = QgsProcessing.SourceType.TypeVectorLine, QgsProcessing.SourceType.TypeVectorPoint
+    return (
+        advanced(
+            QgsProcessingParameterFeatureSource("QUALITY", tr("Track geometry"), [point], optional=True),
+            tr("Points of Extract Rails or Measure Track Geometry for these tracks, with the cant."),
+        ),
+        advanced(
+            QgsProcessingParameterFeatureSource("RAILS", tr("Rails"), [line], optional=True),
+            tr("3D lines of both rails, for the cant where there is no track geometry."),
+        ),
+    )
+
+
 def landxml() -> Definitions:
     """Define the parameters for a LandXML file."""
     behaviour = QgsProcessingParameterFile.Behavior.File

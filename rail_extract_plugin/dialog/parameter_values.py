@@ -287,10 +287,10 @@ class ParameterValues:
         RailExtractError
             The layer has no polygons, or they can't be transformed.
         """
-        from ..reading.line_layers import read_mask
-
         if not self.filled("MASK"):
             return None
+        from ..reading.line_layers import read_mask
+
         source = self._algorithm.parameterAsSource(self._parameters, "MASK", self._context)
         if source is None:
             raise RailExtractError("MASK is not a readable layer: give a polygon layer.")

@@ -568,7 +568,7 @@ def alignment() -> Definitions:
         helped(
             tolerance,
             tr(
-                "How far the track may lie off its design. Misalignment up to this standard deviation is told from "
+                "How far the track may be off its design. Misalignment up to this standard deviation is told from "
                 "design by its length; more is followed by elements."
             ),
         ),

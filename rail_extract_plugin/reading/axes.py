@@ -18,11 +18,20 @@ from qgis.core import (
     QgsWkbTypes,
 )
 
-from ...core.alignment.placed_axes import AHEAD, BACK, NAME_FIELDS, PlacedAxes, check_jumps, km_of, post_field
+from ...core.alignment.placed_axes import (
+    AHEAD,
+    AXIS_IN_DEGREES,
+    BACK,
+    NAME_FIELDS,
+    PlacedAxes,
+    check_jumps,
+    km_of,
+    post_field,
+)
 from ...core.alignment.stationing import Jump
 from ...core.alignment.stations import Axes, AxisLine, Post, Start, make_axes
 from ...core.clouds.crs import parse_crs, units
-from ...core.errors import CrsError, RailExtractError
+from ...core.errors import CrsError, MissingError, RailExtractError
 from .line_layers import CHORD_TOLERANCE_M, GEOMETRY_AS_IT_IS, transform, value_of, wkt_of
 
 
@@ -61,7 +70,7 @@ def read_axes(
     unit_m = units(parse_crs(wkt_of(crs)))[0] if crs.isValid() else 1.0
     lines = list(_lines(sources.axis, crs, unit_m, context))
     if not lines:
-        raise RailExtractError("AXIS has no lines: give a line layer.")
+        raise MissingError("AXIS", "line")
     posts = [] if sources.posts is None else _posts(sources.posts, sources.post_field, crs, unit_m, context)
     jumps = [] if sources.jumps is None else _jumps(sources.jumps)
     made = make_axes(lines, sources.start, posts, jumps)
@@ -83,10 +92,7 @@ def plane_of(axis: QgsCoordinateReferenceSystem, places: QgsCoordinateReferenceS
         if crs.isValid() and not crs.isGeographic():
             return crs
     if axis.isGeographic() or places.isGeographic():
-        raise CrsError(
-            "AXIS and INPUT are in degrees, where lengths can't be measured: reproject AXIS, for example to the UTM "
-            "zone of the place."
-        )
+        raise CrsError(AXIS_IN_DEGREES)
     return axis
 
 
@@ -150,7 +156,7 @@ def _posts(
         km = _km(feature, name, "POSTS")
         found += [Post(np.array([one.x(), one.y()]) * unit_m, km) for one in shape.vertices()]
     if not found:
-        raise RailExtractError("POSTS has no points: give a point layer.")
+        raise MissingError("POSTS", "point")
     return found
 
 

@@ -29,7 +29,7 @@ from ...core.airborne.survey import Guide, gauge_of
 from ...core.clouds.crs import MAX_COORDINATE, parse_crs, units, warn_of_scale
 from ...core.clouds.mask import Mask
 from ...core.comparison.tracks import SurveyedLine
-from ...core.errors import CrsError, RailExtractError
+from ...core.errors import CrsError, MissingError, RailExtractError
 from ...core.fields import CENTERLINE_FIELDS, RAIL_FIELDS, Field
 from ...core.frame import ORIGIN_STEP, LocalFrame
 from ...core.polyline import length_along
@@ -143,7 +143,7 @@ def read_guide(
     shapes = _transformed(source, crs, context, "GUIDE")
     lines = tuple(vertices[:, :2] for shape in shapes for vertices in _parts(shape, CHORD_TOLERANCE_M))
     if not lines:
-        raise RailExtractError("GUIDE has no lines: give a line layer.")
+        raise MissingError("GUIDE", "line")
     return lines
 
 
@@ -170,7 +170,7 @@ def read_tracks_meant(
         for vertices in _parts(shape, CHORD_TOLERANCE_M)
     )
     if not guides:
-        raise RailExtractError("GUIDE has no lines: give a line layer.")
+        raise MissingError("GUIDE", "line")
     return guides
 
 
@@ -295,7 +295,7 @@ def _read(
         for vertices in _parts(feature.geometry(), CHORD_TOLERANCE_M / horizontal_unit_m)
     ]
     if not found:
-        raise RailExtractError(f"{name} has no lines: give a line layer.")
+        raise MissingError(name, "line")
     lost = next((feature.id() for feature, vertices in found if _is_impossible(vertices)), None)
     if lost is not None:
         raise RailExtractError(

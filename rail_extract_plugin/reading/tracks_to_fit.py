@@ -10,8 +10,7 @@ from qgis.core import NULL, QgsFeatureRequest, QgsProcessingFeatureSource
 
 from ...core.alignment.cant_of_rails import cant_of_rails
 from ...core.alignment.elements import Alignment
-from ...core.alignment.measured import Track, with_stations
-from ...core.errors import RailExtractError
+from ...core.alignment.measured import STATION_NEEDS, Track, stations_by_track, with_cant
 from ...core.frame import LocalFrame
 from ...core.progress import Progress
 from ..systems import system
@@ -19,53 +18,44 @@ from .area_points import check_same_plane
 from .element_tables import read_elements
 from .line_layers import GEOMETRY_AS_IT_IS, read_centerlines, read_rails
 
-QUALITY_NEEDS = ("track_id", "chainage_m", "cant_mm")
-"""Fields of the track geometry that state the cant."""
-
 
 def read_tracks(
     source: QgsProcessingFeatureSource,
     quality: QgsProcessingFeatureSource | None,
     rails: QgsProcessingFeatureSource | None,
     progress: Progress,
+    name: str = "INPUT",
 ) -> tuple[list[Track], LocalFrame]:
     """Read centerlines with their cant: from the track geometry, else from the rails.
+
+    Parameters
+    ----------
+    source, quality, rails : QgsProcessingFeatureSource
+    progress : Progress
+    name : str
+        Name of the parameter of the centerlines, for messages.
 
     Raises
     ------
     RailExtractError
         A layer has no lines, lacks a field, or states the cant of other tracks.
     """
-    lines, frame = read_centerlines(source, progress)
+    lines, frame = read_centerlines(source, progress, name)
     if quality is not None:
-        stations = _stations(quality)
-        if not any(line.track_id in stations for line in lines):
-            raise RailExtractError("QUALITY has no stations of the tracks in INPUT: give the track geometry of INPUT.")
-        none = np.zeros((0, 3))
-        return [with_stations(line.track_id, line.xyz, stations.get(line.track_id, none)) for line in lines], frame
-    shapes = _rails(rails, frame, progress) if rails is not None else []
+        stations = stations_by_track(_rows(quality, (*STATION_NEEDS, "bridged")), quality.fields().names(), "QUALITY")
+        return with_cant([(line.track_id, line.xyz) for line in lines], stations, "QUALITY", name), frame
+    shapes = _rails(rails, frame, progress, name) if rails is not None else []
     return [
         Track(line.track_id, line.xyz, cant_of_rails(line.xyz, shapes), np.zeros(len(line.xyz), dtype=bool))
         for line in lines
     ], frame
 
 
-def _stations(source: QgsProcessingFeatureSource) -> dict[int, np.ndarray]:
-    """Return chainage, cant and whether a gap is bridged of the stations of each track, (n, 3); NaN without cant."""
-    _check_fields(source, QUALITY_NEEDS, "QUALITY", "the track geometry of Extract rails or Measure track geometry")
-    found: dict[int, list[tuple[float, float, float]]] = {}
-    for row in _rows(source, (*QUALITY_NEEDS, "bridged")):
-        if row["track_id"] is not None and row["chainage_m"] is not None:
-            cant = np.nan if row["cant_mm"] is None else float(row["cant_mm"]) / 1000.0
-            found.setdefault(int(row["track_id"]), []).append((float(row["chainage_m"]), cant, row["bridged"] or 0))
-    return {number: np.array(sorted(rows)) for number, rows in found.items()}
-
-
-def _rails(source: QgsProcessingFeatureSource, frame: LocalFrame, progress: Progress) -> list[np.ndarray]:
+def _rails(source: QgsProcessingFeatureSource, frame: LocalFrame, progress: Progress, name: str) -> list[np.ndarray]:
     """Return the lines of rails in the frame of the tracks."""
     rails, theirs = read_rails(source, progress, "RAILS")
-    check_same_plane("RAILS", theirs.crs_wkt, "INPUT", frame)
-    check_same_plane("INPUT", frame.crs_wkt, "RAILS", theirs)
+    check_same_plane("RAILS", theirs.crs_wkt, name, frame)
+    check_same_plane(name, frame.crs_wkt, "RAILS", theirs)
     return [rail.xyz + theirs.shift_to(frame) for rail in rails]
 
 
@@ -79,13 +69,6 @@ def read_fixed(source: QgsProcessingFeatureSource, frame: LocalFrame) -> dict[in
     """
     crs = source.sourceCrs() if source.sourceCrs().isValid() else system(frame.crs_wkt or "")
     return {one.track_id: one for one in read_elements(source, crs, name="FIXED")[0]}
-
-
-def _check_fields(source: QgsProcessingFeatureSource, names: Sequence[str], layer: str, remedy: str) -> None:
-    """Refuse a layer that lacks a field."""
-    lacking = next((name for name in names if source.fields().lookupField(name) < 0), None)
-    if lacking:
-        raise RailExtractError(f"{layer} has no field {lacking}: give {remedy}.")
 
 
 def _rows(source: QgsProcessingFeatureSource, names: Sequence[str]) -> list[dict[str, Any]]:

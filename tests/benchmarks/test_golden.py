@@ -5,14 +5,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rail_extract.laboratory.ruler.golden import PLACES, PLAIN, QUICK, VARIANTS, Golden, build_scene, figures_of
+from rail_extract.laboratory.ruler.golden import PLAIN, QUICK, TORCH, VARIANTS, Golden, build_scene, figures_of
 
 TABLE = Path(__file__).resolve().parents[2] / "benchmarks" / "golden.json"
 
 
-@pytest.mark.parametrize("place", QUICK)
-def test_scene_gives_its_published_figures(place):
-    differences = Golden(TABLE).differences(PLAIN, place, figures_of(place, build_scene(place)))
+@pytest.mark.parametrize(
+    ("variant", "place"), [*((PLAIN, place) for place in QUICK), *((TORCH, place) for place in TORCH.places)]
+)
+def test_scene_gives_its_published_figures(variant, place):
+    if variant is TORCH:
+        pytest.importorskip("torch", reason="PyTorch draws other lines than OpenCV; it is not installed here")
+    differences = Golden(TABLE).differences(variant, place, figures_of(place, build_scene(place), variant))
     assert not differences, "\n".join(
         ["", f"{'scene':<24}{'figure':<16}{'before':>10}    now", *map(str, differences), "Meant so? `make golden`"]
     )
@@ -21,8 +25,8 @@ def test_scene_gives_its_published_figures(place):
 def test_table_has_scenes_and_variants_that_exist_and_all_of_the_quick_part():
     figures = Golden(TABLE).figures
     assert set(figures) <= {variant.name for variant in VARIANTS}
-    assert all(set(scenes) <= set(PLACES) for scenes in figures.values())
-    assert set(QUICK) <= set(figures[PLAIN.name])
+    assert all(set(scenes) <= set(variant.places) for variant in VARIANTS for scenes in [figures.get(variant.name, {})])
+    assert set(QUICK) <= set(figures[PLAIN.name]) and set(TORCH.places) == set(figures[TORCH.name])
 
 
 def test_figures_that_moved_appeared_or_vanished_differ(tmp_path):

@@ -10,8 +10,8 @@ from pathlib import Path
 import laspy
 import numpy as np
 import pytest
+from rail_extract.core.checks.standard import detect_standard
 from rail_extract.core.clouds.points import ask
-from rail_extract.core.standard_checks import detect_standard
 from rail_extract.core.standards import STANDARDS
 from rail_extract.laboratory.scenes.raw import scan_world
 from rail_extract.laboratory.scenes.raw_catalogue import line, masts_at, parallel

@@ -10,7 +10,7 @@ from rail_extract.core.frpdf.cleanup import clean
 from rail_extract.core.frpdf.engine import make_engine
 from rail_extract.core.frpdf.models import MODELS
 from rail_extract.core.frpdf.weights import load_arrays
-from rail_extract.core.kernels import Library, _beside, _openblas, blas, one_thread, opencv
+from rail_extract.core.kernels import ENVIRONMENT, Library, _beside, _openblas, blas, cores, one_thread, opencv, threads
 from rail_extract.core.progress import Progress
 from rail_extract.core.raster import rasterize
 
@@ -48,8 +48,8 @@ def on_two_threads():
         return libraries
 
     yield give
-    for library, threads in before:
-        library.set(threads)
+    for library, count in before:
+        library.set(count)
 
 
 def test_the_blas_of_numpy_and_scipy_has_one_thread_for_the_length_of_a_run(on_two_threads):
@@ -119,3 +119,15 @@ def test_a_command_runs_on_one_thread(on_two_threads):
 def test_opencv_is_set_to_the_number_that_it_tells(on_two_threads):
     (library,) = on_two_threads(opencv())
     assert library.get() == 2
+
+
+@pytest.mark.parametrize(("limit", "most"), [("1", 1), ("2", 2), ("all", 64), ("0", 64)])
+def test_a_process_computes_on_the_threads_that_its_environment_allows(monkeypatch, limit, most):
+    monkeypatch.setenv("OMP_NUM_THREADS", limit)
+    assert 1 <= threads() <= min(cores(), most)
+
+
+def test_a_worker_process_computes_on_one_thread(monkeypatch):
+    for name, value in ENVIRONMENT.items():
+        monkeypatch.setenv(name, value)
+    assert threads() == 1

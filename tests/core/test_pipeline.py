@@ -5,16 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rail_extract.core import pipeline, steps
+from rail_extract.core.checks.lines import warn_of_split_classes
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.errors import Cancelled, NoTrackError, ParameterError
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.pipeline import Parameters, extract_rails
+from rail_extract.core.pipeline import Parameters, extract_files, extract_rails
 from rail_extract.core.polyline import length_along, project
 from rail_extract.core.progress import Progress
-from rail_extract.core.rails import RailLine
+from rail_extract.core.rails import RailLine, SearchFigures
 from rail_extract.core.raster import cell_size, rasterize
+from rail_extract.core.squares.grid import MemorySource
 from rail_extract.core.standards import STANDARDS, RailStandard
-from rail_extract.core.steps import lines_of, overlap_tiles, tracks_of, warn_of_split_classes
+from rail_extract.core.steps import lines_of, overlap_tiles, tracks_of
+from rail_extract.core.tasks import InTurn
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.plain import straight
 from rail_extract.laboratory.scenes.scanner import Scanner
@@ -239,6 +242,42 @@ def test_a_ring_stays_closed(monkeypatch, tiles):
         off = np.hypot(*(line.xyz[:, :2] - [3.0, -2.0]).T) - expected / (2 * np.pi)
         assert np.sqrt(np.mean(off**2)) < 2e-3
         assert largest_step(line.xyz) < 0.05
+
+
+def ridges(rng, *lefts, wander_m=0.0):
+    """Points on ridges without edges that wander against each other, at distances to the left of a line of 100 m."""
+    t, left = rng.uniform(0, 100, 20_000 * len(lefts)), rng.uniform(-0.056, 0.056, 20_000 * len(lefts))
+    place = rng.choice(lefts, len(t))
+    across = place + np.sign(place) * wander_m * np.sin(2 * np.pi * t / 50) + left
+    return np.column_stack([t, across, rng.normal(0, 0.01, len(t)) - 5 * left**2])
+
+
+@pytest.mark.parametrize("classify", [True, False])
+def test_a_blunt_ridge_without_a_partner_is_a_rail_only_if_someone_says_so(monkeypatch, tmp_path, classify):
+    monkeypatch.setattr(steps, "clean", lambda raster, *_: raster)
+    half = 0.5 * (1.435 + WIDTH)
+    xyz = ridges(np.random.RandomState(6), half, -half, 6.0)
+    source = MemorySource(RailPoints(xyz, LocalFrame(np.zeros(3)), 10), 500.0)
+    found = lambda *_: (source, SearchFigures(blunt_m=300.0))  # noqa: E731
+    monkeypatch.setattr(pipeline, "spool_found", found)
+    monkeypatch.setattr(pipeline, "spool_grown", found)
+    seeds = () if classify else (xyz[:1, :2],)
+    network = extract_files(None, tmp_path, Parameters(1.435, WIDTH), InTurn(), classify=classify, seeds=seeds)
+    assert len(network.rails) == (2 if classify else 3)
+    assert len(network.centerlines) == 1
+
+
+def test_errors_of_blunt_rails_explain_what_their_gauge_scatters(monkeypatch):
+    """Ridges that wander against each other by 8 mm over 50 m, which a curve along a single rail follows."""
+    monkeypatch.setattr(steps, "clean", lambda raster, *_: raster)
+    half = 0.5 * (1.435 + WIDTH)
+    xyz = ridges(np.random.RandomState(5), half, -half, wander_m=0.004)
+    points = RailPoints(xyz, LocalFrame(np.zeros(3)), 10)
+    found = extract_rails([points], Parameters(1.435, WIDTH, quality_step_m=1.0))
+    (track,) = found.centerlines
+    assert 3 < track.gaugesd_mm < 8 / np.sqrt(2)
+    assert np.hypot(*(rail.sigma_mm for rail in found.rails)) == pytest.approx(track.gaugesd_mm, rel=0.1)
+    assert np.median(found.geometry[0].sigma_mm) == pytest.approx(track.gaugesd_mm / 2, rel=0.15)
 
 
 def _by_length(lines):

@@ -323,7 +323,11 @@ def test_lines_from_files_are_judged(run_scenario):
     assert opened.endswith(".html")
     dataset = ogr.Open(str(session.folder / "found.gpkg"))
     reasons = {feature["reason"] for feature in dataset.GetLayer(0)}
-    assert reasons <= {"a rail has no points", "gauge off by more than 10 mm", "standard error above 5 mm"}
+    assert reasons <= {
+        "a rail has no points",
+        "gauge off by more than 10 mm",
+        "standard error above 5 mm across or in height",
+    }
 
 
 def test_kilometres_and_differences_from_their_dialogs(run_scenario):

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
 from rail_extract.core.frame import LocalFrame
+from rail_extract.laboratory.designs import FAMILIES, random_design, surveyed
 
 EAST, NORTH = 500_000.0, 3_000_000.0
 SHAPES = [(150.0, 0, 0), (60.0, 0, -1 / 500), (150.0, -1 / 500, -1 / 500), (60.0, -1 / 500, 0), (100.0, 0, 0)]
 FITTED = "layout, type, s_from, s_to, r1_m, r2_m, sigma_r_m, x, cant2_mm, r_round_m"
+PLACES = "s_from, x, y, z, cant1_mm"
 
 
 @pytest.fixture(scope="module")
@@ -25,6 +27,12 @@ def survey(tmp_path_factory):
     s = np.arange(0.0, 521.0)
     line = design.xyz(s) + [EAST, NORTH, 0] + 0.001 * random.standard_normal((len(s), 3))
     mm = 1000 * design.cants(s) + 0.4 * random.standard_normal(len(s))
+    write_survey(folder, line, s, mm)
+    return folder
+
+
+def write_survey(folder, line, s, mm):
+    """Write a line, and stations with its cant."""
     stations = [
         ({"track_id": 0, "chainage_m": t, "cant_mm": value}, place) for t, value, place in zip(s, mm, line.tolist())
     ]
@@ -37,13 +45,31 @@ def survey(tmp_path_factory):
             for kind, values, places in shapes
         ]
         (folder / name).write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": features}))
-    return folder
 
 
 def table(path):
     with sqlite3.connect(path) as database:
         rows = list(database.execute(f"SELECT {FITTED} FROM {path.stem} ORDER BY fid"))
     return {layout: [row[1:] for row in rows if row[0] == layout] for layout in "HVC"}
+
+
+def rows_of(path):
+    """Rows of an element table without their geometries."""
+    with sqlite3.connect(path) as database:
+        found = database.execute(f"SELECT * FROM {path.stem} ORDER BY fid")
+        names = [column[0] for column in found.description]
+        return [{name: value for name, value in zip(names, row) if name != "geom"} for row in found]
+
+
+def as_csv(source, path, radii):
+    """Write an element table as a person edits it in a spreadsheet: with other radii in some rows."""
+    table = rows_of(source)
+    for at, radius in radii.items():
+        table[at].update(r1_m=radius(table[at]))
+    lines = [",".join("" if value is None else str(value) for value in row.values()) for row in table]
+    path.write_text("\n".join([",".join(table[0]), *lines]) + "\n")
+    types = {"layout": "String", "type": "String", "rot": "String", "joint": "String"}
+    path.with_suffix(".csvt").write_text(",".join(types.get(name, "Real") for name in table[0]))
 
 
 def test_elements_and_deviations_and_a_corrected_table(qgis_process, survey):
@@ -70,16 +96,8 @@ def test_elements_and_deviations_and_a_corrected_table(qgis_process, survey):
         away = np.array(list(database.execute("SELECT s, slew_mm, lift_mm, cant_diff_mm FROM deviations")), dtype=float)
     assert away[:, 0].tolist() == list(range(len(away)))
     np.testing.assert_allclose(np.nanstd(away[:, 1:], axis=0), [1.0, 1.0, 0.4], atol=0.2)
-    with sqlite3.connect(outputs["ELEMENTS"]) as database:
-        rows = list(database.execute("SELECT * FROM elements"))
-        names = [column[0] for column in database.execute("SELECT * FROM elements").description]
     edited = survey / "edited.csv"
-    kept = [at for at, name in enumerate(names) if name != "geom"]
-    lines = [",".join("" if row[at] is None else str(row[at]) for at in kept) for row in rows]
-    lines[2] = lines[2].replace(str(arc[3]), "-498.0", 2)
-    edited.write_text("\n".join([",".join(names[at] for at in kept), *lines]) + "\n")
-    types = {"layout": "String", "type": "String", "rot": "String", "joint": "String"}
-    edited.with_suffix(".csvt").write_text(",".join(types.get(names[at], "Real") for at in kept))
+    as_csv(outputs["ELEMENTS"], edited, {2: lambda row: -498.0})
     again = qgis_process(
         {**given, "FIXED": edited, "ELEMENTS": survey / "held.gpkg"}, algorithm="railextract:fitalignment"
     )
@@ -87,3 +105,39 @@ def test_elements_and_deviations_and_a_corrected_table(qgis_process, survey):
     held = table(survey / "held.gpkg")["H"]
     assert held[2][3] == held[2][4] == pytest.approx(-498.0, abs=1e-4)
     assert [row[0] for row in held] == [row[0] for row in found["H"]]
+
+
+def places(path):
+    """Types, and where the elements begin."""
+    with sqlite3.connect(path) as database:
+        rows = list(database.execute(f"SELECT layout, type, {PLACES} FROM {path.stem} ORDER BY fid"))
+    return [row[:2] for row in rows], np.array([row[2:] for row in rows], dtype=float)
+
+
+def test_a_table_given_back_keeps_heights_and_cants_and_what_was_edited(qgis_process, tmp_path):
+    random = np.random.default_rng([77, 24])
+    design = random_design(random, FAMILIES["main line"], 14)
+    line = surveyed(design, random, 0.001, 0.003, 15.0) + [EAST, NORTH, 0]
+    s = np.arange(len(line), dtype=float)
+    write_survey(tmp_path, line, s, 1000 * design.cants(s) + 0.4 * random.standard_normal(len(s)))
+    given = {"INPUT": tmp_path / "line.geojson", "QUALITY": tmp_path / "quality.geojson"}
+
+    def fitted(name, **fixed):
+        run = qgis_process({**given, **fixed, "ELEMENTS": tmp_path / name}, algorithm="railextract:fitalignment")
+        assert run.returncode == 0, run.stdout + run.stderr
+        return tmp_path / name
+
+    types, free = places(fitted("free.gpkg"))
+    again = places(fitted("again.gpkg", FIXED=tmp_path / "free.gpkg"))
+    assert again[0] == types
+    np.testing.assert_allclose(again[1][:, 0], free[:, 0], atol=0.02)
+    np.testing.assert_allclose(again[1][:, 1:3], free[:, 1:3], atol=0.02)
+    np.testing.assert_allclose(again[1][:, 3], free[:, 3], atol=0.002)
+    np.testing.assert_allclose(again[1][:, 4], free[:, 4], atol=0.5)
+    edited = [types.index(kind) for kind in (("H", "arc"), ("V", "parabola"))]
+    as_csv(tmp_path / "free.gpkg", tmp_path / "edited.csv", {at: lambda row: row["r1_m"] * 1.001 for at in edited})
+    held = fitted("held.gpkg", FIXED=tmp_path / "edited.csv")
+    assert places(held)[0] == types
+    before, after = ([row["r1_m"] for row in rows_of(path)] for path in (tmp_path / "free.gpkg", held))
+    for at in edited:
+        assert after[at] == pytest.approx(1.001 * before[at], rel=1e-6)

@@ -90,6 +90,6 @@ def test_a_seed_off_the_rails_is_one_sentence(qgis_process, folder, raw, tmp_pat
     parameters = {"INPUT": raw[0], "SEED": f"{x},{y}", "CRS": "EPSG:32643", "OUTPUT": tmp_path / "o.laz"}
     run = qgis_process(parameters, algorithm="railextract:growrailpoints")
     assert run.returncode == 1
-    assert "No seed lies on a rail: put seeds within 0.25 m of railheads" in run.stdout + run.stderr
+    assert "No seed is on a rail: put seeds within 0.25 m of railheads" in run.stdout + run.stderr
     assert "Traceback" not in run.stdout + run.stderr
     assert not list(tmp_path.iterdir())

@@ -76,7 +76,7 @@ IMPORTED = [
         "the same without a curve",
         of_file(swapped(landxml(LINE))),
         REFUSED,
-        "design.xml lies in the area of ETRS89 / UTM zone 32N if its points are written easting first: set EAST_FIRST.",
+        "design.xml is in the area of ETRS89 / UTM zone 32N if its points are written easting first: set EAST_FIRST.",
     ),
     Fault(
         "the same with EAST_FIRST",
@@ -165,7 +165,7 @@ IMPORTED = [
         "a coordinate system that does not fit",
         of_file(landxml(head=METRIC), CRS="EPSG:31467"),
         WARNED,
-        "design.xml lies outside the area of DHDN / 3-degree Gauss-Kruger zone 3: check its coordinate system.",
+        "design.xml is outside the area of DHDN / 3-degree Gauss-Kruger zone 3: check its coordinate system.",
     ),
     Fault(
         "a coordinate system in feet",

@@ -75,7 +75,7 @@ FAULTS = [
         "surveys without standard errors",
         given(REFERENCE_SIGMA=None, INPUT_SIGMA=None),
         WARNED,
-        "A survey states no standard error: the scatter of the differences stands for it, 1.0 mm across. Fill in "
+        "A survey has no standard errors: the scatter of the differences is used instead, 1.0 mm across. Fill in "
         "REFERENCE_SIGMA and INPUT_SIGMA if it is known.",
     ),
     Fault(

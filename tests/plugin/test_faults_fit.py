@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from faults import REFUSED, WARNED, Fault
+from faults import FINE, REFUSED, WARNED, Fault
 from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
 
 TITLE = "Design elements"
@@ -28,6 +28,24 @@ def ring():
 def stray():
     """A straight line with a vertex 30 cm beside it."""
     return [(500_000.0 + x, 3_000_000.0 + 0.3 * (x == 100)) for x in range(200)]
+
+
+def in_two_parts():
+    """A track of two straight lines in one feature."""
+    made = QgsVectorLayer("MultiLineStringZ?crs=EPSG:32643", "tracks", "memory")
+    feature = QgsFeature()
+    parts = [
+        "(" + ", ".join(f"{x} {3_000_000} 50" for x in range(first, first + 100)) + ")" for first in (500_000, 500_150)
+    ]
+    feature.setGeometry(QgsGeometry.fromWkt(f"MultiLineString Z({', '.join(parts)})"))
+    assert made.dataProvider().addFeature(feature)
+    return made
+
+
+def branch():
+    """The arc of a switch, up to the point where it leaves the main track."""
+    angle = np.arange(0, 0.5, 1 / 300)
+    return line(shape=np.column_stack([500_000 + 300 * np.sin(angle), 3_000_300 - 300 * np.cos(angle)]))
 
 
 def given(make=line, **parameters):
@@ -71,6 +89,18 @@ FAULTS = [
         given(lambda: line(shape=ring())),
         REFUSED,
         "The line of track 1 ends where it begins: cut the ring into two lines.",
+    ),
+    Fault(
+        "two lines of one track",
+        given(in_two_parts),
+        REFUSED,
+        "Track 1 has 2 lines, but its elements follow one: join them, or give each its own track_id.",
+    ),
+    Fault(
+        "branch that ends in a switch",
+        given(branch),
+        FINE,
+        gives={"ELEMENT_COUNT": 2},
     ),
     Fault(
         "line that turns back",

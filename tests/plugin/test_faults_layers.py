@@ -287,7 +287,7 @@ RASTERS = [
         of_raster(cells=np.ones((1, 1, 1), np.uint8)),
         WARNED,
         "Without POINTS, the rails have no heights and are only as accurate as the raster. "
-        "Class 10 shows no rail: check the rail classes, the standard and MIN_LENGTH.",
+        "Class 10 has no rails: check the rail classes, the standard and MIN_LENGTH.",
         {"RAIL_COUNT": 0},
     ),
     Fault(
@@ -462,7 +462,7 @@ LINES = [
         "2,000 copies of a line",
         lines(*[LEFT] * 2000),
         WARNED,
-        "1999 of 2000 lines are duplicates: their results appear twice. More than 25 lines lie within 1 m of each "
+        "1999 of 2000 lines are duplicates: their results appear twice. More than 25 lines are within 1 m of each "
         "other on … m of their length, which is not paired: remove copies of lines. No two rails run parallel: there "
         "are rails but no track centerlines.",
         {"CENTERLINE_COUNT": 0},

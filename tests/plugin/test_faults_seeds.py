@@ -14,10 +14,10 @@ CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
 ON_RAIL = f"POINT(500006 {3_000_000 + SPACING_M / 2})"
 BESIDE = "POINT(500006 3000000)"
 NO_RAIL = (
-    "No seed lies on a rail: put seeds within 0.25 m of railheads that stand 0.05 m above the bed, and check the rail "
+    "No seed is on a rail: put seeds within 0.25 m of railheads that stand 0.05 m above the bed, and check the rail "
     "standard and the unit of the coordinates."
 )
-NO_SEED = "No seed lies in the cloud: check the place and the coordinate system of the seeds."
+NO_SEED = "No seed is in the cloud: check the place and the coordinate system of the seeds."
 
 
 def cloud(bench, change=lambda xyz: xyz):
@@ -93,7 +93,7 @@ FAULTS = [
         "seed on a lone rail",
         lone,
         WARNED,
-        "1 of 1 followed rails have no other rail at the gauge: check that their seeds lie on rails, and the rail "
+        "1 of 1 followed rails have no other rail at the gauge: check that their seeds are on rails, and the rail "
         "standard.",
     ),
     Fault("seed on the map", lambda bench: {"INPUT": cloud(bench), "SEED": f"500006,{3e6 + SPACING_M / 2}"}, FINE),

@@ -64,7 +64,7 @@ FAULTS = [
         "training with labels on the ground",
         labelled(lambda xyz, codes: (xyz * [1, 1, 0.05], codes)),
         REFUSED,
-        "No point of class 10 is 0.055 to 0.4 m above the bed, where railheads lie: check the labels and the unit of "
+        "No point of class 10 is 0.055 to 0.4 m above the bed, where railheads are: check the labels and the unit of "
         "the coordinates.",
     ),
     Fault(

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rail_extract.core.alignment.deviations import beside, deviations_of
+from rail_extract.core.alignment.deviations import beside, compared_with, deviations_of
 from rail_extract.core.alignment.elements import Alignment, VerticalElement, chained
+from rail_extract.core.alignment.measured import Track
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.polyline import length_along
+from rail_extract.core.progress import SILENT
 
 
 def moved(design, s, slew, lift):
@@ -64,3 +66,12 @@ def test_a_line_belongs_to_the_design_along_which_it_lies(random_design):
     assert beside([first, second], moved(second, s, np.full(len(s), 3.5), 0)[:, :2]) is None
     before = first.places(np.array([-50.0, -10.0]))
     assert beside([first], before) is None
+
+
+def test_the_cant_of_a_track_is_compared_with_the_alignment_beside_it(random_design):
+    design, s = random_design(3), np.arange(5.0, 150.0)
+    cant = np.column_stack([s - 5.0, design.cants(s) - 0.003])
+    track = Track(8, design.xyz(s), cant, np.zeros(len(s), dtype=bool))
+    ((beside, found),) = compared_with([design], [track], SILENT)
+    assert beside is design and found.track_id == 8
+    np.testing.assert_allclose(found.cant_diff_mm, -3.0, atol=0.05)

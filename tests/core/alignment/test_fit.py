@@ -11,6 +11,7 @@ from rail_extract.core.alignment.measured import Track
 from rail_extract.core.alignment.rounding import round_radius
 from rail_extract.core.alignment.table import alignments, rows
 from rail_extract.core.errors import ParameterError
+from rail_extract.core.fields import ELEMENT_FIELDS
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.parameters import FitParameters
 from rail_extract.core.progress import Progress, Recording
@@ -158,14 +159,71 @@ def test_an_edited_radius_and_start_are_held_and_the_rest_follows():
     assert held.alignment.plan[3].s_from == pytest.approx(330.3, abs=1e-4)
     assert [one.type for one in held.alignment.elements] == [one.type for one in free.alignment.elements]
     assert held.rms_mm > free.rms_mm
-    same = fit(measured, corrected(free, lambda table: None))
-    np.testing.assert_allclose(
-        [one.s_from for one in same.alignment.plan], [one.s_from for one in free.alignment.plan], atol=0.01
+
+
+def test_edited_radii_and_starts_in_height_and_of_ramps_are_held():
+    measured = track(design(), seed=2, cant=True)
+    found = fit(measured)
+    free = found.alignment
+    parabola, ramp = (
+        next(at for at, one in enumerate(free.elements) if one.type == kind) for kind in ("parabola", "ramp")
     )
+
+    def edit(table):
+        table[parabola].update(r1_m=-3950.0, s_from=200.5)
+        table[ramp].update(s_from=119.0)
+
+    held = fit(measured, corrected(found, edit)).alignment
+    assert [one.type for one in held.elements] == [one.type for one in free.elements]
+    assert 1 / held.elements[parabola].curvature == pytest.approx(-3950.0, rel=1e-6)
+    assert held.elements[parabola].s_from == pytest.approx(200.5, abs=1e-6)
+    assert held.elements[parabola].figures.sigma_r_m == held.elements[parabola].figures.sigma_s_m == 0.0
+    assert held.elements[ramp].s_from == pytest.approx(119.0, abs=1e-6)
+    assert held.elements[parabola + 1].s_from == pytest.approx(free.elements[parabola + 1].s_from, abs=3.0)
+    s = np.arange(10.0, 510.0)
+    np.testing.assert_allclose(held.heights(s), free.heights(s), atol=0.005)
+    np.testing.assert_allclose(held.cants(s), free.cants(s), atol=0.003)
+
+
+@pytest.mark.parametrize(("family", "seed"), [("branch line", 5), ("main line", 22), ("main line", 24)])
+def test_a_table_without_changes_gives_back_its_alignment(family, seed):
+    random = np.random.default_rng([77, seed])
+    one = random_design(random, FAMILIES[family], 14)
+    line = surveyed(one, random, 0.001, 0.003, 15.0)
+    measured = replace(track(one, cant=True), xyz=line)
+    free = fit(measured).alignment
+    table = [{field.name: field.value(row[field.name]) for field in ELEMENT_FIELDS} for row in rows(free)]
+    again = fit(measured, alignments(table, FRAME)[0]).alignment
+    assert [x.type for x in again.elements] == [x.type for x in free.elements]
+    s = np.arange(free.s_from, free.s_to)
+    np.testing.assert_allclose(again.places(s), free.places(s), atol=0.001)
+    np.testing.assert_allclose(again.heights(s), free.heights(s), atol=0.001)
+    np.testing.assert_allclose(again.cants(s), free.cants(s), atol=0.0005)
+    for x, y in zip((*free.plan, *free.vertical), (*again.plan, *again.vertical)):
+        assert y.s_from == pytest.approx(x.s_from, abs=0.01)
+
+
+def test_the_table_of_a_part_is_that_of_the_part():
+    measured = with_errors(0, 50, 0.08)
+    free = fit(measured).alignment
+    again = fit(measured, alignments(rows(free), FRAME)[0]).alignment
+    assert free.s_from > 45
+    assert [x.type for x in again.elements] == [x.type for x in free.elements]
+    np.testing.assert_allclose([x.s_from for x in again.plan], [x.s_from for x in free.plan], atol=0.005)
+
+
+def test_two_elements_with_one_start_are_refused():
+    found = fit(track(design(), seed=2))
+
+    def edit(table):
+        table[2].update(s_from=table[1]["s_from"])
+
+    with pytest.raises(ParameterError, match="element 3 in layout H of track 1 does not start after the one before"):
+        fit(track(design(), seed=2), corrected(found, edit))
 
 
 @pytest.mark.parametrize("seed", [3, 4])
-def test_misalignment_of_a_short_track_is_not_taken_for_design_and_its_table_refits(seed):
+def test_misalignment_of_a_short_track_is_not_taken_for_design(seed):
     random = np.random.default_rng([77, seed])
     one = random_design(random, FAMILIES["branch line"], 24)
     measured = replace(track(one), xyz=surveyed(one, random, 0.001, 0.003, 15.0))
@@ -174,11 +232,6 @@ def test_misalignment_of_a_short_track_is_not_taken_for_design_and_its_table_ref
     assert met.found >= 0.85 * met.true
     assert met.fitted <= 1.05 * met.true
     assert len(found.alignment.vertical) <= len(one.vertical)
-    again = fit(measured, corrected(found, lambda table: None)).alignment
-    assert [x.type for x in again.elements] == [x.type for x in found.alignment.elements]
-    for x, y in zip(again.plan, found.alignment.plan):
-        assert x.s_from == pytest.approx(y.s_from, abs=0.02)
-        assert x.k_from == pytest.approx(y.k_from, abs=1e-6)
 
 
 def test_arcs_near_the_noise_are_said():
@@ -280,6 +333,17 @@ def test_a_track_that_cannot_be_fitted_does_not_stop_the_others():
     fits = fit_tracks([short, track(design())], FRAME, FitParameters(), {}, progress)
     assert [one.alignment.track_id for one in fits] == [1]
     assert "track 7" in progress.warnings[0]
+
+
+def test_a_track_of_two_lines_is_refused_and_the_others_are_fitted():
+    progress, line = Recording(Progress()), track(design())
+    fits = fit_tracks(
+        [line, replace(line, track_id=7), replace(line, track_id=7)], FRAME, FitParameters(), {}, progress
+    )
+    assert [one.alignment.track_id for one in fits] == [1]
+    assert list(progress.warnings) == [
+        "Track 7 has 2 lines, but its elements follow one: join them, or give each its own track_id."
+    ]
 
 
 def test_a_table_of_other_tracks_is_refused():

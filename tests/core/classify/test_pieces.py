@@ -56,14 +56,3 @@ def test_a_wheel_does_not_divide_a_rail(gap_m, paired, kept):
     found = long_enough(lines, links(lines), np.full(len(behind), bool(paired)), none, keep_single=True)
     assert found[~behind].all()
     assert (found[behind] == kept).all()
-
-
-@pytest.mark.parametrize(("gap_m", "kept"), [(1.1, True), (1.5, False)])
-def test_a_short_part_without_a_partner_that_continues_a_rail_with_one_is_kept(gap_m, kept):
-    lines = lines_of((7.4 + gap_m, 0.0))
-    x = lines.axis[:, 0]
-    lines = lines.of((x < 6.0) | (x > 6.0 + gap_m))
-    behind, none = lines.axis[:, 0] > 6.0, np.zeros(len(lines.axis), dtype=bool)
-    found = long_enough(lines, links(lines), ~behind, none, keep_single=False)
-    assert found[~behind].all()
-    assert (found[behind] == kept).all()

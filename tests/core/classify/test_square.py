@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rail_extract.core.classify.settings import Settings
 from rail_extract.core.classify.square import classify_square
-from rail_extract.core.labelling.cloud import classify_cloud
+from rail_extract.laboratory.ruler.whole_clouds import classify_cloud
 from rail_extract.laboratory.scenes.raw_catalogue import RAW_SCENES
 from rail_extract.laboratory.scenes.raw_shapes import MIDDLE, TOP_M, flat, rough, turned, with_bar, with_track
 from scipy.spatial import cKDTree

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.classify.figures import shares_of_length
 from rail_extract.core.classify.lines import Marks, find_lines
+from rail_extract.core.classify.pieces import shares_of_length
 from rail_extract.core.classify.thin import SURROUNDINGS_M, drawn
 from rail_extract.core.rails import SearchFigures
 

@@ -139,7 +139,6 @@ def test_an_axis_may_state_kilometres_as_m_values(tmp_path):
     ("values", "words"),
     [
         (["fit", "nothing.gpkg", "--elements", "out.gpkg"], "can't be read as a vector file"),
-        (["fit", "{tracks}", "--elements", "out.gpkg", "--tolerance", "0"], "--tolerance must be a positive number"),
         (["fit", "{tracks}", "--elements", "out.gpkg", "--fixed", "{tracks}"], "--fixed is not an element table"),
         (["export-alignment", "{tracks}", "out.xml"], "ELEMENTS is not an element table"),
         (["export-alignment", "{elements}", "out.txt"], "let it end in .xml"),

@@ -9,8 +9,8 @@ from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_bar, wit
 
 torch = pytest.importorskip("torch")
 
-from rail_extract.core.labelling.cloud import classify_cloud  # noqa: E402
 from rail_extract.core.learned import training  # noqa: E402
+from rail_extract.laboratory.ruler.whole_clouds import classify_cloud  # noqa: E402
 
 SIDE_M = Settings((1.435,), 0.072).side_m
 CORNER = np.array([round(500_000 / SIDE_M) * SIDE_M, round(5_000_000 / SIDE_M) * SIDE_M, 100.0])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.errors import Cancelled
+from rail_extract.core.frpdf import layered
 from rail_extract.core.frpdf.corridor import Piece
 from rail_extract.core.frpdf.engine import make_engine
 from rail_extract.core.frpdf.layered import overlaps
@@ -77,3 +78,28 @@ def test_a_cancel_is_noticed_between_pieces(arrays, name):
     with pytest.raises(Cancelled):
         engine_of(name, arrays).sweep(parts, parts, 1, pieces, listener)
     assert listener.calls == 4
+
+
+@pytest.mark.parametrize("name", ["TORCH", "OPENCV"])
+def test_threads_that_share_the_pieces_change_no_bit(arrays, name, monkeypatch):
+    raster = noise(96, 96)
+    pieces = [Piece(row, column, 24, 24) for row in range(0, 96, 24) for column in range(0, 96, 24)]
+    engine, parts, found = engine_of(name, arrays), cut(raster, pieces), []
+    for count in (1, 3):
+        monkeypatch.setattr(layered, "threads", lambda count=count: count)
+        found.append(np.array(engine.sweep(parts, parts, 1, pieces, SILENT)))
+    np.testing.assert_array_equal(*found)
+
+
+def test_an_error_in_a_thread_ends_the_pass(arrays, monkeypatch):
+    class BrokenLayerError(Exception):
+        pass
+
+    def fails(*_):
+        raise BrokenLayerError
+
+    monkeypatch.setattr(layered, "threads", lambda: 3)
+    engine, pieces = engine_of("OPENCV", arrays), quarters(40, 40, 20, 20)
+    monkeypatch.setattr(engine, "_steps", lambda number: [layered.Step(0, fails)])
+    with pytest.raises(BrokenLayerError):
+        engine.sweep(*[cut(noise(40, 40), pieces)] * 2, 1, pieces, SILENT)

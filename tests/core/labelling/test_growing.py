@@ -128,8 +128,8 @@ def test_only_rails_are_written_on_request(tmp_path):
 
 def test_seeds_elsewhere_are_refused(tmp_path):
     source = save(tmp_path / "raw.las", TRACK.xyz)
-    with pytest.raises(ParameterError, match="No seed lies in the cloud"):
+    with pytest.raises(ParameterError, match="No seed is in the cloud"):
         grow(tmp_path, [source], tmp_path / "new.las", [[12.0, 50.0]])
-    with pytest.raises(RailExtractError, match=r"No seed lies on a rail: put seeds within 0\.25 m"):
+    with pytest.raises(RailExtractError, match=r"No seed is on a rail: put seeds within 0\.25 m"):
         grow(tmp_path, [source], tmp_path / "new.las", [CORNER[:2] + TRACK.at(12.0, 0.0)])
     assert not (tmp_path / "new.las").exists()

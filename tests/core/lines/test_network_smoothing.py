@@ -1,10 +1,8 @@
 """Smoothed networks: lines that met still meet."""
 
 import numpy as np
-import pytest
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.lines.network_smoothing import NETWORK_STATIONS_PER_SIGMA, bend_through, smooth_network
-from rail_extract.core.lines.smoothing import smooth_line
 from rail_extract.core.polyline import length_along
 
 SIGMA = 0.8
@@ -49,14 +47,6 @@ def test_a_branch_does_not_bend_the_line_it_leaves():
     t = length_along(expected)
     np.testing.assert_allclose(through[:, 1], np.interp(through[:, 0], expected[:, 0], expected[:, 1]), atol=2e-5)
     assert np.diff(t).max() <= SIGMA / NETWORK_STATIONS_PER_SIGMA + 1e-9
-
-
-def test_lines_cut_at_a_node_are_smoothed_as_one():
-    line = wavy(np.arange(0, 40, 0.1), np.zeros(400), 3)
-    whole = smooth_line(line, SIGMA, length_along(line)[[150, 200, 250]])
-    cut = LineNetwork((line[:201], line[200:][::-1]), line[[0, 200, -1]], np.array([[0, 1], [2, 1]]))
-    smoothed = smooth_network(cut, SIGMA)
-    np.testing.assert_allclose(smoothed.nodes[1], whole[1], atol=1e-9)
 
 
 def test_a_loop_in_a_network_is_smoothed_across_its_seam():
@@ -113,16 +103,3 @@ def test_bending_a_line_equals_one_dense_system():
     expected = line + fading(t[:, None] - t[places]) @ weights
     bend_through(line, t, places, targets)
     np.testing.assert_allclose(line, expected, atol=1e-9)
-
-
-@pytest.mark.parametrize("turned", [(False, False), (False, True), (True, False), (True, True)])
-def test_free_ends_of_lines_that_run_on_are_smoothed_as_those_of_one_line(turned):
-    line = wavy(np.arange(0, 20, 0.1), np.zeros(200), 3)
-    ends = np.array([[0, 1], [1, 2]])
-    lines = tuple(one[::-1] if turn else one for one, turn in zip((line[:101], line[100:]), turned))
-    ends = np.array([pair[::-1] if turn else pair for pair, turn in zip(ends, turned)])
-    smoothed = smooth_network(LineNetwork(lines, line[[0, 100, -1]], ends), SIGMA)
-    (expected,) = smooth_network(LineNetwork((line,), line[[0, -1]], np.array([[0, 1]])), SIGMA).lines
-    for own, turn in zip(smoothed.lines, turned):
-        own = own[::-1] if turn else own
-        np.testing.assert_allclose(own[:, 1], np.interp(own[:, 0], *expected.T), atol=5e-5)

@@ -1,4 +1,4 @@
-"""Lines that turn as no rail can are split there."""
+"""Lines that turn too sharply for rails are split there."""
 
 import numpy as np
 import pytest

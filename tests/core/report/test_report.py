@@ -142,7 +142,7 @@ def test_tracks_that_are_only_inaccurate_are_not_called_poor(bridged, words):
     sigma[:80] = 7.0
     html = page(track(sigma_mm=sigma, bridged=at(101, *range(bridged))))
     assert headline(html).startswith(words)
-    assert ("above 5 mm on 80 % of the length" in headline(html)) == (bridged == 0)
+    assert ("above 5 mm across or in height on 80 % of the length" in headline(html)) == (bridged == 0)
 
 
 def test_each_track_is_judged_by_its_own_gauge():
@@ -158,7 +158,8 @@ def test_every_place_is_listed_the_most_harmful_first():
     sigma[950], bridged = 30.0, at(1001, 950)
     html = page(track(length_m=1000.0, sigma_mm=sigma, bridged=bridged))
     rows = elements(html, "tbody")[0].findall("tr")
-    assert [row.findall("td")[7].text for row in rows] == ["a rail has no points"] + 40 * ["standard error above 5 mm"]
+    unsure = "standard error above 5 mm across or in height"
+    assert [row.findall("td")[8].text for row in rows] == ["a rail has no points"] + 40 * [unsure]
     assert [cell.text for cell in rows[0].findall("td")][:7] == [
         *("1", "track 1", "949.5 to 950.5 m", "1.0 m", "950.0 m", "1435.0 mm", "30.0 mm")
     ]

@@ -10,14 +10,11 @@ from rail_extract.core.rails import RailLine
 from rail_extract.core.squares.density import (
     MIN_IN_WINDOW,
     WINDOW_M,
-    _company,
-    _holds_only_strays,
-    _parts_near,
     occupied_squares,
     plausible,
     warn_of_unexplained,
 )
-from rail_extract.core.squares.grid import MemorySource, Square, lay_out
+from rail_extract.core.squares.grid import MemorySource, lay_out
 
 SIDE_M = 500.0
 RNG = np.random.default_rng(4)
@@ -132,31 +129,3 @@ def test_points_far_from_all_rails_give_a_warning(others, said, length_m):
     listener = Listener()
     warn_of_unexplained(one, [straight(7.1, length_m)], listener)
     assert [text[5:9] for text in listener.warnings] == [said] * bool(said)
-
-
-def test_a_line_is_cut_to_the_segments_whose_boxes_are_near_a_square():
-    square = Square.on_grid((0, 0), 100.0, LocalFrame(np.zeros(3)))
-    x = np.arange(-95.0, 200.0, 10.0)
-    there_and_back = np.column_stack([np.append(x, x[::-1]), np.repeat([1.0, -2.0], len(x))])
-    (near,) = _parts_near(there_and_back, square, 1.0)
-    assert (near[0].tolist(), near[-1].tolist(), len(near)) == ([-5.0, 1.0], [105.0, 1.0], 12)
-    both = _parts_near(there_and_back, square, 2.0)
-    assert [part[0].tolist() for part in both] == [[-5.0, 1.0], [105.0, -2.0]]
-    whole = Square((0, 0), LocalFrame(np.zeros(3)), np.inf)
-    assert _parts_near(there_and_back, whole, 1.0)[0] is there_and_back
-
-
-def test_company_is_counted_in_a_cell_and_the_rings_around():
-    xyz = np.array([[0.5, 0.5, 0], [0.6, 0.5, 9], [1.5, 0.5, 0], [2.5, 1.5, 0], [-0.5, -1.5, 0]])
-    for rings, wanted in enumerate(([2, 2, 1, 1, 1], [3, 3, 4, 2, 1], [5, 5, 5, 4, 4])):
-        number, company = _company(xyz, 1.0, rings)
-        assert company[number].tolist() == wanted
-
-
-@pytest.mark.parametrize("apart_m", [0.1, 1.5, 2.5])
-def test_strays_have_company_one_window_away_but_not_two(apart_m):
-    """Two groups, each half as many as company takes, in windows next to each other or with one between."""
-    group = np.full((MIN_IN_WINDOW // 2 + 1, 3), 0.01)
-    points = source(group, group + [apart_m * WINDOW_M, 0, 0])
-    (square,) = lay_out([points], points)
-    assert _holds_only_strays(points, square) == (apart_m > 2)

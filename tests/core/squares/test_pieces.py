@@ -6,11 +6,6 @@ from rail_extract.core.frame import LocalFrame
 from rail_extract.core.rails import RailLine
 from rail_extract.core.squares.grid import HALO_M, Square, unique_keys
 from rail_extract.core.squares.pieces import (
-    CUT_STEP_M,
-    HOLE_STATIONS,
-    MIN_MATCH_M,
-    _without_holes,
-    _without_short_matches,
     blended,
     extended,
     parts_near,
@@ -64,33 +59,6 @@ def test_no_points_lie_in_no_square():
 
 def marks(text):
     return np.array([letter == "x" for letter in text])
-
-
-@pytest.mark.parametrize(
-    ("seen", "filled"),
-    [
-        ("xx..xx", "xxxxxx"),
-        ("..xxx", "..xxx"),
-        ("xxx..", "xxx.."),
-        ("x" + "." * (HOLE_STATIONS - 1) + "x", "x" * (HOLE_STATIONS + 1)),
-        ("x" + "." * HOLE_STATIONS + "x", "x" + "." * HOLE_STATIONS + "x"),
-    ],
-)
-def test_only_short_holes_between_marked_stations_are_filled(seen, filled):
-    t = CUT_STEP_M * np.arange(len(seen))
-    assert _without_holes(marks(seen), t).tolist() == marks(filled).tolist()
-
-
-def test_short_matches_count_only_where_they_cover_most_of_the_line():
-    count = int(np.ceil(MIN_MATCH_M / CUT_STEP_M))
-    long, short = "x" * (count + 1), "x" * count
-    seen = marks(f"{long}...{short}....")
-    assert (
-        _without_short_matches(seen, CUT_STEP_M * np.arange(len(seen))).tolist()
-        == marks(f"{long}{'.' * (count + 7)}").tolist()
-    )
-    assert _without_short_matches(marks("xxx.."), 0.125 * np.arange(5)).tolist() == marks("xxx..").tolist()
-    assert not _without_short_matches(marks("xx..."), 0.125 * np.arange(5)).any()
 
 
 def test_the_weight_of_a_blend_has_no_bend_at_its_ends():

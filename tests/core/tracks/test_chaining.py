@@ -11,8 +11,6 @@ from rail_extract.core.polyline import length_along
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.centerlines import build_centerlines
-from rail_extract.core.tracks.chaining import _Ends, _facing, _rail_links
-from rail_extract.core.tracks.pairing import RailPair
 from rail_extract.laboratory.curves import Curve, Element, trace
 from rail_extract.laboratory.rasters.turnouts import FORMS, branch
 from rail_extract.laboratory.ruler.lines import compare_lines
@@ -243,29 +241,3 @@ def test_drawing_a_long_track_can_be_cancelled():
     with pytest.raises(Cancelled):
         build(*laid.rails(), progress=progress)
     assert progress.fraction < 0.75
-
-
-@pytest.mark.parametrize(("gap_m", "count"), [(-1.2, 0), (-0.8, 1), (4.0, 1), (6.0, 0)])
-def test_a_rail_links_sections_that_it_continues_over_a_gap_or_a_small_overlap(gap_m, count):
-    pairs = [RailPair(0, 1, (0.0, 50.0), (0.0, 50.0)), RailPair(0, 2, (50 + gap_m, 90.0), (40.0, 0.0))]
-    links = list(_rail_links(pairs, 5.0))
-    assert len(links) == count
-    for link in links:
-        assert (link.first, link.second, link.rail) == (1, 2, 0)
-        assert link.length_m == pytest.approx(gap_m)
-
-
-def test_a_track_may_go_on_half_a_gauge_beside_the_rail_that_goes_on():
-    """The left rail goes on for 6 m at the start, the right one for 4 m at the end."""
-    left = np.array([[-6.0, SPACING / 2, 0], [50.0, SPACING / 2, 0]])
-    right = np.array([[54.0, -SPACING / 2, 0], [0.0, -SPACING / 2, 0]])
-    ends = _Ends.of(rails_of(left, right), [RailPair(0, 1, (6.0, 56.0), (4.0, 54.0)[::-1])], 5.0, set())
-    assert ends.owner.tolist() == [0, 1, 0, 1]
-    assert ends.xy == pytest.approx(np.array([[0, 0], [50, 0], [-5, 0], [54, 0]]))
-    assert ends.outward == pytest.approx(np.array([[-1, 0], [1, 0], [-1, 0], [1, 0]]))
-
-
-@pytest.mark.parametrize(("aside_m", "faces"), [(0.02, True), (0.7, True), (0.8, False)])
-def test_ends_face_each_other_within_ten_degrees_of_the_gap(aside_m, faces):
-    ends = _Ends(np.array([1, 2]), np.array([[0, 0], [4.0, aside_m]]), np.array([[1.0, 0], [-1, 0]]))
-    assert len(_facing(ends, LONGEST_GAP_M, 0.05)) == faces

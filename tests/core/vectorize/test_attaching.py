@@ -35,10 +35,3 @@ def test_a_branch_is_extended_tangentially_to_its_stock_rail(radius, sense):
     seen_from_m = 10 + np.sqrt(2 * radius * MISFIT_M)
     assert network.nodes[node][0] == pytest.approx(seen_from_m, abs=0.2)
     assert cKDTree(np.concatenate([stock, arc])).query(network.lines[1])[0].max() < 0.06
-
-
-def test_a_rail_that_ends_at_a_frog_does_not_branch_off_there():
-    straight = trace([Element(20)], (30.0, 0.15), np.arctan(1 / 9)).xy[::5]
-    stock = along_x(0, 60)
-    network = attach_branches(loose(stock, straight), cKDTree(np.concatenate([stock, straight])), 5.0)
-    assert (network.degrees() == 1).all()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.lines.network import LineNetwork
-from rail_extract.core.vectorize.crossings import _crossings, resolve_crossings
+from rail_extract.core.vectorize.crossings import resolve_crossings
 
 
 def stairs(line):
@@ -65,13 +65,3 @@ def test_a_leg_belongs_to_one_crossing_only():
     )
     assert len(network.lines) == 3
     assert spans == [(-24.9, 7.9), (9.0, 24.9)]
-
-
-def test_a_loop_through_a_node_is_not_two_legs_of_a_crossing():
-    turn = np.linspace(0, 2 * np.pi, 300)[:, None]
-    loop = 6.0 * np.concatenate([1 - np.cos(turn), np.sin(turn)], axis=1)
-    arms = [np.arange(0, 20, 0.1)[:, None] * way for way in ([-1.0, 0.1], [-1.0, -0.1])]
-    nodes = np.concatenate([loop[:1], *(arm[-1:] for arm in arms)])
-    network = LineNetwork((loop, *arms), nodes, np.array([[0, 0], [0, 1], [0, 2]]))
-    assert not list(_crossings(network))
-    assert resolve_crossings(network) is network

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from rail_extract.core.raster import RailRaster
-from rail_extract.core.vectorize.pixels import RING, chamfer_distance, parity_fix, pixel_set
+from rail_extract.core.vectorize.pixels import chamfer_distance, parity_fix, pixel_set
 from rail_extract.core.vectorize.tracing import chains, trace
-from rail_extract.core.vectorize.veinerization import _BY_DISTANCE, _groups_of, _steepest, prune, veinerize
+from rail_extract.core.vectorize.veinerization import prune, veinerize
 from scipy import ndimage
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -128,23 +128,3 @@ def test_a_noisy_bar_has_no_side_branches():
     image[5] = random.random(600) < 0.15
     network = skeleton(np.argwhere(image))
     assert sorted(network.degrees()) == [1, 1]
-
-
-@pytest.mark.parametrize(("depth", "chosen"), [((0, 3, 4), 1), ((0, 3, 5), 2)])
-def test_a_diagonal_step_must_gain_half_as_much_again(depth, chosen):
-    """An edge neighbour that is 3 deeper, against a diagonal one; the step to it is longer."""
-    depth = np.array(depth)
-    neighbours = np.array([[1, 2, 0, 0, 0, 0, 0, 0]])
-    found = _steepest(np.array([0]), np.array([0b11], np.uint8), neighbours, depth, depth * _BY_DISTANCE)
-    assert found.tolist() == [chosen]
-
-
-@pytest.mark.parametrize("flags", range(256))
-def test_neighbours_form_groups_that_touch(flags):
-    image = np.zeros((3, 3), dtype=bool)
-    places = [(1 + row, 1 + column) for row, column in RING]
-    for bit, place in enumerate(places):
-        image[place] = flags >> bit & 1
-    labels, count = ndimage.label(image, np.ones((3, 3)))
-    expected = [sum(1 << bit for bit, place in enumerate(places) if labels[place] == one + 1) for one in range(count)]
-    assert sorted(_groups_of(flags)) == sorted(expected)

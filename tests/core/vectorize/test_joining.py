@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.lines.network import LineNetwork
-from rail_extract.core.vectorize.joining import _View, join_gaps, unseen_m
+from rail_extract.core.vectorize.joining import join_gaps, unseen_m
 from rail_extract.core.vectorize.junctions import (
     run_through,
 )
@@ -85,16 +85,6 @@ def test_a_curve_is_unseen_where_cells_are_more_than_ten_centimetres_away():
     seen = cKDTree(np.concatenate([along_x(0, 5, 0.09), along_x(5, 10, 0.11), along_x(10, 15, -0.09)]))
     assert unseen_m(along_x(0, 15), seen) == pytest.approx(5.0, abs=0.11)
     assert unseen_m(np.empty((0, 2)), seen) == 0.0
-
-
-@pytest.mark.parametrize(
-    ("place", "does"),
-    [((5, 0.89), 1), ((5, -0.89), 1), ((5, 0.92), 0), ((5, -0.92), 0), ((-5, 0), 0)],
-)
-def test_an_end_faces_what_lies_ahead_within_an_angle_and_half_a_cell(place, does):
-    view = _View(np.array([[2.0, 3.0]]), np.array([[0.0, 1.0]]))
-    ahead, left = place
-    assert view.faces(np.array([[2.0 - left, 3.0 + ahead]]), 10.0).tolist() == [bool(does)]
 
 
 @pytest.mark.parametrize(("gap_m", "count"), [(4.8, 1), (5.2, 2)])

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.polyline import length_along
 from rail_extract.core.vectorize.junctions import (
+    cut_kinks,
     drop_bubbles,
     drop_rungs,
     drop_spurs,
@@ -28,6 +29,18 @@ def star(*tips):
     lines = tuple(np.outer(np.linspace(0, 1, max(int(np.hypot(*tip)), 1) + 1), tip) for tip in tips)
     nodes = np.array([(0.0, 0.0), *tips])
     return LineNetwork(lines, nodes, np.column_stack([np.zeros(len(tips), int), np.arange(1, len(tips) + 1)]))
+
+
+def loose(*lines):
+    """Lines whose ends are all free."""
+    lines = tuple(np.asarray(line, dtype=float) for line in lines)
+    nodes = np.concatenate([line[[0, -1]] for line in lines])
+    return LineNetwork(lines, nodes, np.arange(2 * len(lines)).reshape(-1, 2))
+
+
+def along_x(start, end, y=0.0):
+    x = np.arange(start, end, 0.1)
+    return np.column_stack([x, np.full(len(x), y)])
 
 
 def test_spurs_are_dropped_one_at_a_time_so_that_a_rail_keeps_its_end():
@@ -88,3 +101,21 @@ def test_a_slit_between_rails_that_part_is_not_a_loop_of_two_rails(length, apart
     lines = (nodes[[0, 1]], nodes[[1, 2]], slit, nodes[[2, 3]], nodes[[2, 4]])
     network = LineNetwork(lines, nodes, np.array([[0, 1], [1, 2], [1, 2], [2, 3], [2, 4]]))
     assert len(drop_bubbles(network, 0.2).lines) == left
+
+
+def test_a_line_that_turns_back_is_cut_in_two():
+    line = np.concatenate([along_x(0, 10), along_x(0, 10, 0.3)[::-1]])
+    network = cut_kinks(loose(line))
+    assert len(network.lines) == 2
+    assert (network.degrees() == 1).all()
+    assert network.lengths() == pytest.approx([9.3, 9.3], abs=0.3)
+
+
+@pytest.mark.parametrize(("turn_deg", "count"), [(22, 1), (29, 2)])
+def test_lines_are_cut_where_they_turn_by_25_degrees_and_half_a_metre_on_either_side_is_dropped(turn_deg, count):
+    before, ways = along_x(0, 10.05), np.arange(0.1, 10, 0.1)
+    turn = np.radians(turn_deg)
+    line = np.concatenate([before, before[-1] + ways[:, None] * [np.cos(turn), np.sin(turn)]])
+    lengths = cut_kinks(loose(line)).lengths()
+    assert len(lengths) == count
+    assert lengths.sum() == pytest.approx(19.9 if count == 1 else 18.9, abs=0.25)

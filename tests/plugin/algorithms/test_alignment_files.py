@@ -130,6 +130,30 @@ def test_tracks_are_compared_with_the_design_beside_them(exported, run_step, con
     assert "<b>15.0 mm</b><span>slew, RMS" in page and "Track 5</h2>" in page and "is a proposal" not in page
 
 
+def test_the_cant_of_tracks_is_compared_with_that_of_the_design(exported, run_step, context):
+    _, path = exported("a.xml")
+    tracks = QgsVectorLayer("LineStringZ?crs=EPSG:25832&field=track_id:integer", "survey", "memory")
+    columns = "&field=track_id:integer&field=chainage_m:double&field=cant_mm:double"
+    stations = QgsVectorLayer(f"Point?crs=EPSG:25832{columns}", "stations", "memory")
+    s = np.arange(20.0, 340.0, 2.0)
+    line = QgsFeature(tracks.fields())
+    line.setGeometry(QgsGeometry(QgsLineString(*FRAME.to_crs(design().xyz(s)).T.tolist())))
+    line["track_id"] = 3
+    tracks.dataProvider().addFeature(line)
+    for at, cant in zip(s, design().cants(s)):
+        station = QgsFeature(stations.fields())
+        station.setAttributes([3, float(at - s[0]), float(1000 * cant + 4)])
+        stations.dataProvider().addFeature(station)
+    outputs = {"ELEMENTS": None, "AXIS": None, "DEVIATIONS": "memory:"}
+    outcome = run_step("importalignment", {"INPUT": path, "TRACKS": tracks, "QUALITY": stations, **outputs})
+    assert outcome.ok, outcome.error
+    found = QgsProcessingUtils.mapLayerFromString(outcome.results["DEVIATIONS"], context).getFeatures()
+    off = [one["cant_diff_mm"] for one in found if 25 < one["s"] < 335]
+    assert off == pytest.approx([4.0] * len(off), abs=0.1) and len(off) == 309
+    alone = run_step("importalignment", {"INPUT": path, "QUALITY": stations, "ELEMENTS": "memory:"})
+    assert "QUALITY and RAILS state the cant of measured tracks: choose TRACKS." in alone.error
+
+
 def test_gdal_reads_the_dxf(exported):
     outcome, path = exported("a.dxf")
     assert outcome.ok, outcome.error

@@ -106,7 +106,7 @@ def test_a_design_without_standard_errors(compare):
     _, values, feedback = compare(design, survey)
     assert set(values["moved"]) == {0}
     assert feedback.warnings == [
-        "A survey states no standard error: the scatter of the differences stands for it, 1.0 mm across. Fill in "
+        "A survey has no standard errors: the scatter of the differences is used instead, 1.0 mm across. Fill in "
         "REFERENCE_SIGMA and INPUT_SIGMA if it is known."
     ]
 

@@ -1,4 +1,7 @@
-"""Rails of no track: which they are, and which of them cannot be rails (docs/method.md section 8.10)."""
+"""Lines that do not look like rails: lone ones beside tracks, those of split classes, and none at all.
+
+See docs/method.md section 8.10.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,13 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..errors import NoTrackError
+from ..heads.smoothing_check import warn_if_out_of_reach
+from ..parameters import Parameters
 from ..polyline import resample, unit_tangents
+from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
+from ..steps import tracks_of_class
 
 STEP_M = 1.0
 """Spacing of the places at which a lone line is compared with the tracks next to it."""
@@ -30,6 +38,9 @@ BANK = 1 / 1.5
 MIN_OFF_SHARE, MIN_COMPARED_SHARE = 0.5, 0.5
 """Share of the compared places of a line that must be too high or too low, and share of the line that must be next to a
 track, for the line to be left out."""
+
+SAME_RAIL_M = 0.5
+"""Ends of rails that are closer together belong to one rail: no two rails of any gauge end so close to each other."""
 
 
 def assign_tracks(
@@ -92,3 +103,83 @@ def _near(line: np.ndarray, places: np.ndarray) -> bool:
     """Return whether the extents of two lines are within reach of each other."""
     low, high = line[:, :2].min(axis=0) - REACH_M, line[:, :2].max(axis=0) + REACH_M
     return bool((places[:, :2].min(axis=0) < high).all() and (places[:, :2].max(axis=0) > low).all())
+
+
+def warn_of_rails(rails: Sequence[RailLine], class_code: int, parameters: Parameters, progress: Progress) -> None:
+    """Warn the user if a class has no rails, or if `smoothing_xy_m` moves lines off their rails.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+        Rails of the class.
+    class_code : int
+    parameters : Parameters
+    progress : Progress
+    """
+    if not rails:
+        progress.warning(f"Class {class_code} has no rails: check the rail classes, the standard and MIN_LENGTH.")
+    warn_if_out_of_reach(rails, parameters.head_width_m, parameters.smoothing_xy_m, progress)
+
+
+def with_tracks(
+    rails: Sequence[RailLine], centerlines: Sequence[Centerline], progress: Progress = SILENT
+) -> list[RailLine]:
+    """State the tracks of each rail, and leave out lone lines that are too high or too low to be rails.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+    centerlines : sequence of Centerline
+        All tracks of these rails.
+    progress : Progress
+        Receives a warning if lines are left out.
+
+    Returns
+    -------
+    list of RailLine
+        With their numbers as before.
+    """
+    kept, left_out = assign_tracks(rails, centerlines)
+    if left_out:
+        length_m = sum(line.length_m for line, _ in left_out)
+        lines = "1 line" if len(left_out) == 1 else f"{len(left_out)} lines"
+        heights = ", ".join(f"{height:+.1f} m" for height in sorted({round(above_m, 1) for _, above_m in left_out}))
+        progress.warning(
+            f"{lines} ({length_m:.0f} m) left out: too high or too low for a rail, compared with the tracks alongside "
+            f"({heights}). Check the classification there."
+        )
+    return kept
+
+
+def warn_of_split_classes(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> None:
+    """Warn the user if rails of different classes seem to be the rails of one track, or parts of one rail.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+        With their tracks.
+    parameters : Parameters
+    progress : Progress
+    """
+    codes = {rail.rail_id: rail.class_code for rail in rails}
+    if len(set(codes.values())) < 2:
+        return
+    lone = [replace(rail, class_code=0) for rail in rails if not rail.track_ids]
+    try:
+        tracks = tracks_of_class(lone, parameters, SILENT)
+    except NoTrackError:
+        tracks = ()
+    at_gauge = {tuple({codes[one] for one in (*track.left_ids, *track.right_ids)}) for track in tracks}
+    split = sorted({code for group in at_gauge | _in_line(rails) if len(group) > 1 for code in group})
+    if split:
+        progress.warning(
+            f"Rails of the classes {', '.join(map(str, split))} form tracks or continue each other, but classes are "
+            "paired separately. If they are of the same tracks, set MERGE_CLASSES."
+        )
+
+
+def _in_line(rails: Sequence[RailLine]) -> set[tuple[int, ...]]:
+    """Return the pairs of classes of which one has a rail that begins where a rail of the other ends."""
+    ends = np.concatenate([rail.xyz[[0, -1], :2] for rail in rails])
+    codes = [rail.class_code for rail in rails for _ in range(2)]
+    return {(codes[a], codes[b]) for a, b in cKDTree(ends).query_pairs(SAME_RAIL_M) if codes[a] != codes[b]}

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..classify.settings import MARGIN_M, Settings
-from ..classify.square import Classified
-from ..progress import SILENT, Progress
-from ..rails import SearchFigures
-from ..squares.grid import points_by_square, unique_keys
-from ..tasks import Context, Once
-from .finding import search_square
+from ...core.classify.settings import MARGIN_M, Settings
+from ...core.classify.square import Classified
+from ...core.labelling.finding import search_square
+from ...core.progress import SILENT, Progress
+from ...core.rails import SearchFigures
+from ...core.squares.grid import points_by_square, unique_keys
+from ...core.tasks import Context, Once
 
 
 def classify_cloud(xyz: np.ndarray, settings: Settings, progress: Progress = SILENT) -> Classified:

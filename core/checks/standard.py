@@ -9,21 +9,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .classify.settings import Settings
-from .classify.square import classify_square
-from .clouds.points import Request
-from .errors import CloudError, ParameterError
-from .heads.blunt import blunt_share
-from .heads.gauge_estimate import Spacings, measure_spacings
-from .heads.roads import MIN_WIDER_M
-from .heads.sections import likelier_width
-from .parameters import Parameters
-from .progress import SILENT, Progress
-from .rails import HEAD_OFF_M, HeadWidths, RailLine
-from .squares.density import fullest_square
-from .squares.grid import PointSource
-from .standards import HEAD_WIDTH_RANGE_MM, SAME_GAUGE_M, STANDARDS, Gauge, RailStandard, closest_standard
-from .tracks.widths_by_gauge import width_at
+from ..classify.settings import Settings
+from ..classify.square import classify_square
+from ..clouds.points import Request
+from ..errors import CloudError, ParameterError
+from ..heads.blunt import blunt_share
+from ..heads.gauge_estimate import Spacings, measure_spacings
+from ..heads.roads import MIN_WIDER_M
+from ..heads.sections import likelier_width
+from ..parameters import Parameters
+from ..progress import SILENT, Progress
+from ..rails import HEAD_OFF_M, HeadWidths, RailLine
+from ..squares.density import fullest_square
+from ..squares.grid import PointSource
+from ..standards import HEAD_WIDTH_RANGE_MM, SAME_GAUGE_M, STANDARDS, Gauge, RailStandard, closest_standard
+from ..tracks.parallels import width_at
 
 SAMPLE_M = 50.0
 """Half the side of the area whose points show the width of the heads."""
@@ -136,12 +136,6 @@ def _detected(spacings: Spacings, progress: Progress) -> RailStandard:
 def warn_of_gauge(request: Request, parameters: Parameters, progress: Progress) -> bool:
     """Warn the user at once if the first points show another gauge: the run takes minutes until no track is found.
 
-    Parameters
-    ----------
-    request : Request
-    parameters : Parameters
-    progress : Progress
-
     Returns
     -------
     bool
@@ -215,7 +209,7 @@ def head_widths(
             "as matched images and wide beams do. Lines follow the crests, and sigma_mm and sigmaz_mm state how far "
             "these wander: gauge and cant cannot be better, and the width of the heads is not measured."
         )
-        return HeadWidths(float("nan"), stated_m)
+        return HeadWidths(float("nan"), stated_m, blunt=True)
     if measured is None:
         return HeadWidths(float("nan"), stated_m)
     seen_m = measured[1]

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rail_extract.core.checks.lines import assign_tracks, with_tracks
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import Centerline, RailLine
-from rail_extract.core.steps import with_tracks
-from rail_extract.core.tracks.lone import assign_tracks
 from rail_extract.laboratory.curves import Element, trace
 
 CURVE = trace([Element(60.0, 1 / 400, 1 / 400)], heading=0.4)

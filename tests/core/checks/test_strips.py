@@ -4,13 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core.rails import Centerline, RailLine, Support
-from rail_extract.core.tracks.jumps import (
-    doubting_steps,
-    find_steps,
-    steps_of,
+from rail_extract.core.checks.strips import (
+    doubting_jumps,
+    find_jumps,
+    strip_courses,
 )
+from rail_extract.core.rails import Centerline, RailLine, Support
 from rail_extract.laboratory.curves import Element, trace, transition_curve
+
+LENGTH_M = 20.0
+NORTH, EAST = np.array([0.0, 1.0]), np.array([1.0, 0.0])
 
 
 def stepped(curve, at_m, step_m):
@@ -37,7 +40,7 @@ def beside(curve, left_m):
 @pytest.mark.parametrize("radius_m", [300.0, 3000.0])
 def test_a_step_is_found_with_its_size(step_m, radius_m):
     curve = trace([Element(80.0, 1 / radius_m, 1 / radius_m)], heading=0.7)
-    ((at_m, found_m),) = find_steps(track(stepped(curve, 33.0, step_m)), ())
+    ((at_m, found_m),) = find_jumps(track(stepped(curve, 33.0, step_m)), ())
     assert at_m == pytest.approx(33.0, abs=0.3)
     assert found_m == pytest.approx(step_m, rel=0.06)
 
@@ -54,15 +57,15 @@ def test_what_tracks_do_is_no_step(elements):
     rng = np.random.RandomState(0)
     curve = trace(elements, heading=2.0)
     wave = 0.001 * np.sin(curve.chainage * 2 * np.pi / rng.uniform(4, 20))
-    assert find_steps(track(curve.xy + wave[:, None] * curve.left_normal), ()) == []
-    assert find_steps(track(curve.xy[:20]), ()) == []
+    assert find_jumps(track(curve.xy + wave[:, None] * curve.left_normal), ()) == []
+    assert find_jumps(track(curve.xy[:20]), ()) == []
 
 
 def test_half_of_a_step_is_in_doubt_on_either_side():
     curve = trace([Element(80.0, 1 / 800, 1 / 800)], heading=0.3)
     middle, left, right = (stepped(beside(curve, left_m), 33.0, 0.03) for left_m in (0.0, 0.75, -0.75))
     rails = [rail(1, left), rail(2, right[::-1]), rail(3, left)]
-    *doubted, kept = doubting_steps(rails, steps_of([track(middle, (1,), (2,))], rails))
+    *doubted, kept = doubting_jumps(rails, [track(middle, (1,), (2,))])
     for one in doubted:
         assert np.allclose(one.support.sigma_m, np.hypot(0.001, 0.015), rtol=0.06)
         assert np.allclose(one.support.strips[:, 1], 0.03, rtol=0.06)
@@ -76,8 +79,8 @@ def test_a_track_does_not_step_where_one_of_its_rails_does_not(other_m):
     rails = [rail(1, stepped(beside(curve, 0.75), 33.0, 0.04)), rail(2, stepped(beside(curve, -0.75), 33.0, other_m))]
     middle = stepped(curve, 33.0, 0.02)
     one = track(middle, (1,), (2,))
-    assert find_steps(track(middle), ()) and not find_steps(one, rails)
-    assert doubting_steps(rails, steps_of([one], rails)) == rails
+    assert find_jumps(track(middle), ()) and not find_jumps(one, rails)
+    assert doubting_jumps(rails, [one]) == rails
 
 
 @pytest.mark.parametrize(("sigma_m", "steps"), [(0.001, 1), (0.006, 0)])
@@ -86,16 +89,16 @@ def test_both_rails_show_a_step_that_the_centerline_hides_unless_it_is_chance(si
     rails = [rail(number, stepped(beside(curve, left_m), 40.0, 0.012)) for number, left_m in ((1, 0.75), (2, -0.75))]
     rails = [replace(one, support=replace(one.support, sigma_m=0 * one.support.sigma_m + sigma_m)) for one in rails]
     smooth = track(curve.xy, (1,), (2,))
-    found = find_steps(smooth, rails)
+    found = find_jumps(smooth, rails)
     assert len(found) == steps
     assert all(at_m == pytest.approx(40, abs=0.5) and size_m == pytest.approx(0.012, rel=0.1) for at_m, size_m in found)
-    assert find_steps(smooth, doubting_steps(rails, steps_of([smooth], rails))) == found
+    assert find_jumps(smooth, doubting_jumps(rails, [smooth])) == found
 
 
 def test_an_abrupt_arc_is_no_step_of_two_rails():
     curve = trace([Element(40.0), Element(30.0, 1 / 60, 1 / 60)], heading=2.0)
     rails = [rail(number, beside(curve, left_m).xy) for number, left_m in ((1, 0.75), (2, -0.75))]
-    assert find_steps(track(curve.xy, (1,), (2,)), rails) == []
+    assert find_jumps(track(curve.xy, (1,), (2,)), rails) == []
 
 
 @pytest.mark.parametrize(("spread_m", "expected_m"), [(np.nan, 0.03), (0.02, 0.03), (0.05, 0.05)])
@@ -105,5 +108,45 @@ def test_the_spread_of_strips_is_at_least_the_step(spread_m, expected_m):
     rails = [rail(1, left), rail(2, right)]
     strips = np.tile([2.0, spread_m, 0.004], (320, 1))
     rails = [replace(one, support=replace(one.support, strips=strips)) for one in rails]
-    for one in doubting_steps(rails, steps_of([track(middle, (1,), (2,))], rails)):
+    for one in doubting_jumps(rails, [track(middle, (1,), (2,))]):
         assert np.allclose(one.support.strips, [2.0, expected_m, np.hypot(0.004, 0.015)], rtol=0.06)
+
+
+def centerline(start, way, track_id):
+    xy = np.array([start, np.add(start, LENGTH_M * way)])
+    return Centerline(np.column_stack([xy, np.zeros(2)]), track_id, 10, (1,), (2,), 1435.0, 1.0, 0.0, 0.0, 0.0)
+
+
+def rows(start, way, strip, left_m, up_m, aside_m):
+    """Stations every half metre on a rail beside a track, at which a strip is off by this."""
+    left = np.array([-way[1], way[0]])
+    places = np.add(start, np.arange(0.25, LENGTH_M, 0.5)[:, None] * way + aside_m * left)
+    count = len(places)
+    values = [np.full(count, strip), *np.tile(left_m * left, (count, 1)).T, np.full(count, up_m), np.full(count, 9)]
+    return np.column_stack([places, *values])
+
+
+def test_each_strip_of_each_track_has_its_offsets_along_it():
+    lines = [centerline((0, 0), NORTH, 4), centerline((30, 5), -EAST, 7)]
+    found = strip_courses(
+        lines,
+        np.concatenate(
+            [
+                rows((0, 0), NORTH, 1, 0.010, -0.004, 0.7),
+                rows((0, 0), NORTH, 1, 0.020, -0.006, -0.7),  # the other rail
+                rows((0, 0), NORTH, 2, -0.015, 0.005, 0.7),
+                rows((30, 5), -EAST, 2, 0.008, 0.001, 0.7),
+                rows((100, 0), NORTH, 3, 1.0, 1.0, 0.0),  # no track
+                rows((0, 0), NORTH, 3, 1.0, 1.0, 1.2),  # another rail
+            ]
+        ),
+    )
+    assert [(one.track_id, one.strip) for one in found] == [(4, 1), (4, 2), (7, 2)]
+    for one, across_mm, up_mm in zip(found, (15, -15, 8), (-5, 5, 1)):
+        assert one.chainage_m == pytest.approx(np.arange(0.5, LENGTH_M))
+        assert one.across_mm == pytest.approx(across_mm)
+        assert one.up_mm == pytest.approx(up_mm)
+
+
+def test_no_strips_have_no_courses():
+    assert strip_courses([centerline((0, 0), NORTH, 1)], np.empty((0, 7))) == ()

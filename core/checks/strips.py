@@ -1,18 +1,21 @@
-"""Sideways jumps in tracks: passes of a scanner that are not aligned meet there.
+"""Strips, the passes of a scanner, that are not aligned: their offsets along tracks, and the jumps where they meet.
 
 See docs/method.md section 6.7.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from ..heads.edges import STATION_STEP_M
+from ..parameters import ALIGNED, Parameters
 from ..polyline import interpolate, left_normals, length_along, project
-from ..rails import Centerline, RailLine, Support
+from ..progress import SILENT, Progress
+from ..rails import STRIP_OFF_M, Centerline, RailLine, StripCourse, Support
 
 STATION_M = 0.25
 """Spacing of the stations at which a track is looked at."""
@@ -37,18 +40,24 @@ STEP_SIGMAS, STEP_GAIN = 5.0, 2.75
 """Standard errors from which a step is not chance, and the standard error of a step relative to that of its line, whose
 errors are correlated over about a metre."""
 
+REACH_M = 1.0
+"""Distance from a centerline within which its rails are: half of the widest gauge and a head."""
 
-Steps = list[tuple[float, float]]
-"""Chainage of each step of a track, and its size to the left in metres."""
+STEP_M = 1.0
+"""Length over which the offsets on both rails are averaged."""
+
+MIN_STRIPS_APART_M = 5.0
+"""Length of rail on which strips are apart from which the user is warned; they are compared over twice this length."""
+
+MAX_LISTED = 3
+"""Steps that a warning lists."""
+
+LARGEST_PERCENT = 95.0
+"""Percentile of the distances that is stated as the largest: switches and crossings make some of them wrong."""
 
 
-def steps_of(centerlines: Sequence[Centerline], rails: Sequence[RailLine]) -> list[tuple[Centerline, Steps]]:
-    """Return each track with its steps; see `find_steps`."""
-    return [(line, find_steps(line, rails)) for line in centerlines]
-
-
-def find_steps(track: Centerline, rails: Sequence[RailLine]) -> Steps:
-    """Find the steps of a track: places where a rail on either side steps the same way.
+def find_jumps(track: Centerline, rails: Sequence[RailLine]) -> list[tuple[float, float]]:
+    """Find the jumps of a track: places where a rail on either side steps the same way.
 
     At switches one of the rails may be off for some metres, as no pass of a scanner puts it.
 
@@ -101,25 +110,36 @@ def _peaks(t: np.ndarray, across: np.ndarray) -> list[tuple[float, float]]:
     return sorted(found)
 
 
-def doubting_steps(rails: Sequence[RailLine], steps: Sequence[tuple[Centerline, Steps]]) -> list[RailLine]:
-    """Add half of the steps of tracks to the standard errors of their rails: on either side, one pass may be right.
+def doubting_jumps(
+    rails: Sequence[RailLine], centerlines: Sequence[Centerline], progress: Progress = SILENT
+) -> list[RailLine]:
+    """Warn the user of jumps, and add half of each to the standard errors of both rails: either pass may be right.
 
     Parameters
     ----------
     rails : sequence of RailLine
         With their tracks.
-    steps : sequence of Centerline and Steps
-        All tracks of these rails, from `steps_of`.
+    centerlines : sequence of Centerline
+        All tracks of these rails.
+    progress : Progress
     """
+    found = [(line, at_m, jump_m) for line in centerlines for at_m, jump_m in find_jumps(line, rails)]
+    if found:
+        largest = sorted(found, key=lambda one: -abs(one[2]))[:MAX_LISTED]
+        words = [f"{1000 * abs(by_m):.0f} mm at {at_m:.0f} m of track {line.track_id}" for line, at_m, by_m in largest]
+        more = f" and {len(found) - MAX_LISTED} more" if len(found) > MAX_LISTED else ""
+        progress.warning(
+            f"Sideways jumps in tracks: {', '.join(words)}{more}. Real track has none; probably two passes of the "
+            "scanner that are not aligned meet there."
+        )
     doubted = []
     for rail in rails:
-        found = [
-            (interpolate(line.xyz[:, :2], length_along(line.xyz[:, :2]), np.array([at_m]))[0], abs(step_m))
-            for line, own in steps
+        own = [
+            (interpolate(line.xyz[:, :2], length_along(line.xyz[:, :2]), np.array([at_m]))[0], abs(jump_m))
+            for line, at_m, jump_m in found
             if rail.rail_id in (*line.left_ids, *line.right_ids)
-            for at_m, step_m in own
         ]
-        doubted.append(_doubting(rail, found) if found else rail)
+        doubted.append(_doubting(rail, own) if own else rail)
     return doubted
 
 
@@ -176,3 +196,68 @@ def _weights() -> tuple[np.ndarray, np.ndarray]:
         arm = used & (side * t > 0)
         bends[arm] = side * np.linalg.pinv(np.stack([t**0, t, t**2 / 2], axis=1)[arm])[-1]
     return steps, bends
+
+
+def strip_courses(centerlines: Sequence[Centerline], rows: np.ndarray) -> tuple[StripCourse, ...]:
+    """Describe the offsets of strips along tracks.
+
+    Parameters
+    ----------
+    centerlines : sequence of Centerline
+    rows : (k, 7) array
+        See `heads.strips.rows_of`, in the frame of the centerlines.
+
+    Returns
+    -------
+    tuple of StripCourse
+        By track and strip.
+    """
+    lines = [one.xyz[:, :2] for one in centerlines]
+    feet = project(lines, rows[:, :2], REACH_M)
+    return tuple(
+        course
+        for number, one in enumerate(centerlines)
+        for course in _courses(one, feet.of(number).t, rows[feet.of(number).point])
+    )
+
+
+def _courses(centerline: Centerline, t: np.ndarray, rows: np.ndarray) -> Iterator[StripCourse]:
+    """Average the offsets of each strip along one track."""
+    line = centerline.xyz[:, :2]
+    normals = interpolate(left_normals(line), length_along(line), t)
+    across = np.einsum("ij,ij->i", rows[:, 3:5], normals)
+    for strip in np.unique(rows[:, 2]):
+        mine = rows[:, 2] == strip
+        step, number, count = np.unique(np.floor(t[mine] / STEP_M), return_inverse=True, return_counts=True)
+        means = [1000 * np.bincount(number, values[mine]) / count for values in (across, rows[:, 5])]
+        yield StripCourse(centerline.track_id, int(strip), (step + 0.5) * STEP_M, *means)
+
+
+def warn_of_strips(rails: Sequence[RailLine], parameters: Parameters, progress: Progress) -> None:
+    """Warn the user if strips, the passes of a scanner, differ."""
+    shown = np.concatenate(
+        [rail.support.every_strip[:, :2] for rail in rails if rail.support is not None] or [np.empty((0, 2))]
+    )
+    count, spread_m = shown[np.nan_to_num(shown[:, 1]) >= STRIP_OFF_M].T
+    if STATION_STEP_M * np.sum(count > 1) >= MIN_STRIPS_APART_M:
+        remedy = (
+            "they are aligned to their mean, and sigma_mm states what remains in doubt"
+            if parameters.strips == ALIGNED
+            else "correct the positions of the scanner, or set STRIPS to ALIGNED"
+        )
+        progress.warning(
+            f"Where strips overlap ({STATION_STEP_M * np.sum(count > 1):.0f} m of rail), they differ by up to "
+            f"{_largest(spread_m[count > 1])}: {remedy}."
+        )
+    if STATION_STEP_M * np.sum(count == 1) >= MIN_STRIPS_APART_M:
+        progress.warning(
+            f"On {STATION_STEP_M * np.sum(count == 1):.0f} m of rail the heads look blurred or too wide, as if passes "
+            f"of the scanner were up to {_largest(spread_m[count == 1])} apart. The points have no source id or GPS "
+            "time, so the passes cannot be separated: sigma_mm and sigmaz_mm contain half of it. Export the cloud with "
+            "them, or pass by pass."
+        )
+
+
+def _largest(spread_m: np.ndarray) -> str:
+    """Write the largest of the distances between strips."""
+    return f"{1000 * np.percentile(spread_m, LARGEST_PERCENT):.0f} mm"

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rail_extract.core.checks.standard import head_widths, warn_of_gauge
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.gauge_estimate import SEEN_SHARE
@@ -11,7 +12,6 @@ from rail_extract.core.parameters import Parameters
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
 from rail_extract.core.squares.grid import MemorySource
-from rail_extract.core.standard_checks import head_widths, warn_of_gauge
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.adversarial import from_the_side
 from rail_extract.laboratory.scenes.strips import two_passes
