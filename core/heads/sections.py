@@ -94,6 +94,7 @@ BEYOND_RING, MAX_BEYOND = (0.53, 0.60), 0.2
 """Distances from the axis at which a flat head has no points, as shares of its width, and their most density there
 compared with that between the corners and the axis: passes 15 mm apart have half of it there."""
 
+
 @dataclass(frozen=True)
 class Middles:
     """Middle of the head at s stations, NaN where the sections do not show it.
