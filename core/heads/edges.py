@@ -252,7 +252,7 @@ class CrossSections:
 
     def find_edges(self, free: np.ndarray) -> Edges:
         """Find the edges among those that are `free`, (2, s) bool."""
-        edges = Edges(np.ones(free.shape), free, free.any(axis=0), np.zeros(free.shape[1]))
+        edges = Edges(np.ones(free.shape), free, free[0] | free[1], np.zeros(free.shape[1]))
         for _ in range(EDGE_ROUNDS):
             edges = self._edges_of(self.middles(edges), free)
         return replace(edges, inset=self._inset(edges, free))
