@@ -125,7 +125,8 @@ STAGES = (
     (square.Ridges, "measure", "blunt heads"),
     (square, "_blunt_heads", "blunt heads"),
     (square, "flush_rails", "8 flush rails"),
-    (square, "_figures", "figures"),
+    (square, "_standing_figures", "figures"),
+    (square, "_flush_figures", "figures"),
     (files, "rewrite", "reading again, compressing and writing"),
 )
 """Functions and the stages of docs/classification.md that they belong to."""

@@ -37,23 +37,6 @@ APPLICATION = "RAIL_EXTRACT"
 MAX_TEXT = 255
 """Longest text of extended data."""
 
-DRAWN = {
-    "rails": "RAILS",
-    "centerlines": "TRACK",
-    "airborne": "TRACK",
-    "proposed": "GUIDES",
-    "stations": "STATIONS",
-    "quality": "STATIONS",
-    "findings": "FINDINGS",
-    "stops": "STOPS",
-    "places": "PLACES",
-    "differences": "DIFFERENCES",
-    "elements": "ELEMENTS",
-    "deviations": "DEVIATIONS",
-    "axes": "ALIGNMENT",
-}
-"""First word of the layers in a drawing, by output."""
-
 COLOURS = {"RAILS": 5, "TRACK": 1, "STATIONS": 3, "ALIGNMENT": 1, "PLAN": 7, "PROFILE": 3, "CANT": 5}
 """Colour of a layer by the first word of its name: blue, red, green; black on paper for elements in plan."""
 

@@ -38,7 +38,7 @@ class Field:
         if known is None:
             return None
         if self.kind is str:
-            return known if isinstance(known, str) else ",".join(map(_word, known))
+            return str(known) if isinstance(known, str) else ",".join(map(_word, known))
         if self.kind is int:
             return int(known)
         # Adding zero turns -0.0, which rounding may leave, into 0.0.

@@ -31,7 +31,7 @@ from .workers.runner import workers as workers_of
 if TYPE_CHECKING:
     import geopandas
 
-    from .commands.geopackage import Layer
+    from .layers import Layer
 
 LAYERS = ("rails", "centerlines", "quality", "findings")
 """Layers of a result; `quality` holds the stations of the track geometry."""
@@ -71,8 +71,10 @@ class Network(RailNetwork):
         """
         geopandas = _package("geopandas")
         (written,) = self._layers([layer])
-        columns = dict(zip((one.name for one in written.fields), written.written_columns()))
-        return geopandas.GeoDataFrame(columns, geometry=written.shapes(self.frame), crs=self.frame.crs_wkt or None)
+        from .commands.geopackage import shapes_of
+
+        columns = dict(zip((one.name for one in written.product.fields), written.written_columns()))
+        return geopandas.GeoDataFrame(columns, geometry=shapes_of(written, self.frame), crs=self.frame.crs_wkt or None)
 
     def save(self, path: str | Path, layer: str | None = None) -> None:
         """Write the layers into a GeoPackage, whose other layers stay, or one layer into a DXF or CSV file.
@@ -117,7 +119,7 @@ class Network(RailNetwork):
             raise ParameterError(f"There is no layer {unknown.pop()!r}: choose one of {', '.join(LAYERS)}.")
         for package in ("pyogrio", "shapely"):
             _package(package)
-        from .commands.geopackage import network_layers
+        from .layers import network_layers
 
         return network_layers(self, names, self.origin.gauges_m)
 

@@ -32,6 +32,8 @@ from rail_extract.core.clouds.readers import list_files
 from rail_extract.core.disk import Destination, identity
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.labelling.files import Choice, Labels, Output, write_labelled
+from rail_extract.core.layers import lines_layer
+from rail_extract.core.products import RAILS
 from rail_extract.core.progress import SILENT
 from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import rasterize
@@ -41,7 +43,8 @@ from rail_extract.core.standards import SEARCHED_CLASSES, resolve
 from rail_extract.core.tasks import InTurn
 from rail_extract.rail_extract_plugin.algorithms.frpdf_cleanup import FrpdfCleanup
 from rail_extract.rail_extract_plugin.algorithms.vectorize_rails import VectorizeRails
-from rail_extract.rail_extract_plugin.writing.layers import RAILS, write_lines, write_raster
+from rail_extract.rail_extract_plugin.writing.layers import write_layer as write_output
+from rail_extract.rail_extract_plugin.writing.layers import write_raster
 
 MAX_S = 0.3
 """Longest time from the first complete version to the kill."""
@@ -62,8 +65,8 @@ LEFT_OVER = re.compile(rf"{re.escape(PREFIX)}\w+")
 def write_layer(destination: Destination, version: int) -> None:
     """Write rails whose number and place are the version."""
     xyz = np.array([[version, 0.0, version], [version, 10.0, version]], dtype=float)
-    rails = [RailLine(xyz, version, 10, version, 1.0, 1.0, 0.0) for _ in range(COUNT)]
-    _write(VectorizeRails(), destination, lambda *rest: write_lines(rest[0], "OUTPUT", RAILS, rails, FRAME, *rest[1:]))
+    made = lines_layer(RAILS, [RailLine(xyz, version, 10, version, 1.0, 1.0, 0.0) for _ in range(COUNT)])
+    _write(VectorizeRails(), destination, lambda *rest: write_output(rest[0], "OUTPUT", made, FRAME, *rest[1:]))
 
 
 def read_layer(path: Path) -> set[int]:

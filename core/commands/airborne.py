@@ -12,8 +12,9 @@ from ..airborne.survey import Guide, Survey
 from ..clouds.points import Request, ask
 from ..disk import Destination, writing
 from ..errors import ParameterError
-from ..fields import AIRBORNE_FIELDS, FINDING_FIELDS, PROPOSED_FIELDS
+from ..layers import airborne_stations_layer, findings_layer, lines_layer
 from ..parameters import AIRBORNE_CLASSES, AirborneParameters
+from ..products import AIRBORNE, PROPOSED
 from ..progress import Estimating
 from ..report.airborne import airborne_findings, airborne_page, airborne_summary
 from ..scratch import scratch_folder
@@ -122,7 +123,7 @@ def _check_outputs(args: argparse.Namespace) -> None:
 def _write_proposed(found: Proposals, destination: Destination) -> None:
     """Write the proposed guides."""
     module = shapes_module("--proposed", "geopackage")
-    module.write_layers([module.lines_layer("proposed", PROPOSED_FIELDS, found.guides)], destination, found.frame)
+    module.write_layers([lines_layer(PROPOSED, found.guides)], destination, found.frame)
 
 
 def parameters_of(args: argparse.Namespace, standard: RailStandard) -> AirborneParameters:
@@ -141,14 +142,12 @@ def _write(
 ) -> None:
     """Write the outputs that were asked for; layers of the same file together."""
     module = shapes_module("--centerlines", "geopackage")
-    layers = [module.lines_layer("centerlines", AIRBORNE_FIELDS, survey.lines)]
+    layers = [lines_layer(AIRBORNE, survey.lines)]
     if "stations" in outputs:
-        layers.append(module.airborne_stations_layer(survey.tracks))
+        layers.append(airborne_stations_layer(survey.tracks))
     if "findings" in outputs:
-        found = airborne_findings(survey)
-        layers.append(module.lines_layer("findings", FINDING_FIELDS, found))
-    for same, file in module.by_file(layers, outputs):
-        module.write_layers(same, file, survey.frame)
+        layers.append(findings_layer(airborne_findings(survey)))
+    module.write_all(layers, outputs, survey.frame)
     if "report" in outputs:
         facts = {"Rail": standard.label, "Command": args.command_line}
         outputs["report"].write_text(airborne_page(survey, args.tiles[0].name, facts))

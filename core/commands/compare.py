@@ -10,6 +10,7 @@ from pathlib import Path
 
 from ..comparison.tracks import Survey, compare_surveys, doubts_of
 from ..errors import ParameterError
+from ..layers import differences_layer
 from ..parameters import ComparisonParameters
 from ..progress import Estimating
 from ..report.comparison import build_comparison, describe_shift, verdict_on
@@ -51,7 +52,7 @@ def run(args: argparse.Namespace) -> None:
         )
     output = None if args.output is None else destination_of("output", args.output, (".gpkg",))
     report = None if args.report is None else destination_of("report", args.report, (".html", ".htm"))
-    features, layers = (shapes_module("compare", name) for name in ("features", "alignment_layers"))
+    features, geopackage = (shapes_module("compare", name) for name in ("features", "geopackage"))
     lines, frame = features.read_survey(args.reference, "REFERENCE", None)
     earlier = Survey(lines, sigma_m=_metres(args.reference_sigma))
     later = Survey(features.read_survey(args.input, "INPUT", frame)[0], sigma_m=_metres(args.input_sigma))
@@ -64,7 +65,7 @@ def run(args: argparse.Namespace) -> None:
     for sentence in doubts_of(found):
         progress.warning(sentence)
     if output is not None:
-        layers.write_all([layers.differences_layer(found)], {"differences": output}, frame)
+        geopackage.write_all([differences_layer(found)], {"differences": output}, frame)
     if report is not None:
         facts = {"Date": f"{datetime.now():%Y-%m-%d %H:%M}", "Command": args.command_line}
         report.write_text(build_comparison(found, args.count_shift, f"{args.input} against {args.reference}", facts))

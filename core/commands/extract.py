@@ -352,7 +352,8 @@ def _write(
     RailExtractError
         An output could not be written.
     """
-    from .geopackage import by_file, network_layers, write_layers
+    from ..layers import network_layers
+    from .geopackage import by_file, write_layers
 
     layers = network_layers(network, outputs, parameters.gauges_m)
     writers: list[Callable[[], None]] = [

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from .. import VERSION
 from ..alignment.fit import fit_tracks
+from ..layers import deviations_layer, elements_layer
 from ..parameters import TRANSITIONS, FitParameters
 from ..progress import Estimating
 from ..report import build_alignment_page
@@ -45,7 +46,7 @@ def run(args: argparse.Namespace) -> None:
     RailExtractError
         A parameter is wrong, a file can't be read, no track can be fitted, or an output can't be written.
     """
-    features, layers = (shapes_module("LINES", name) for name in ("features", "alignment_layers"))
+    features, geopackage = (shapes_module("LINES", name) for name in ("features", "geopackage"))
     outputs = {
         name: destination_of(name, getattr(args, name), suffixes)
         for name, suffixes in SUFFIXES.items()
@@ -55,10 +56,10 @@ def run(args: argparse.Namespace) -> None:
     tracks, frame = features.read_tracks(args.lines, args.quality, args.rails)
     fixed = {} if args.fixed is None else {one.track_id: one for one in features.read_elements(args.fixed, "--fixed")}
     fits = fit_tracks(tracks, frame, settings, fixed, Estimating(Console()))
-    made = [layers.elements_layer([fit.alignment for fit in fits])]
+    made = [elements_layer([fit.alignment for fit in fits])]
     if "deviations" in outputs:
-        made.append(layers.deviations_layer([fit.deviations for fit in fits]))
-    layers.write_all(made, outputs, frame)
+        made.append(deviations_layer([fit.deviations for fit in fits]))
+    geopackage.write_all(made, outputs, frame)
     if "report" in outputs:
         courses = [(fit.alignment, fit.deviations) for fit in fits]
         facts = {**stated(frame.crs_wkt), "Command": args.command_line}

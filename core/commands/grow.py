@@ -14,6 +14,7 @@ from ..errors import ParameterError
 from ..grow.settings import GrowSettings
 from ..labelling.files import Choice
 from ..labelling.growing import grow_files
+from ..layers import stops_layer
 from ..parameters import GrowParameters
 from ..progress import Estimating
 from ..scratch import scratch_folder
@@ -71,15 +72,15 @@ def run(args: argparse.Namespace) -> None:
     progress = Estimating(Console())
     planned = planned_output(args, progress)
     stops = None if args.stops is None else destination_of("stops", args.stops)
-    layers = None if stops is None else shapes_module("--stops", "geopackage")
+    geopackage = None if stops is None else shapes_module("--stops", "geopackage")
     request = ask(args.tiles, SEARCHED_CLASSES, args.crs, None, progress)
     choice = Choice(args.rail_class, args.rails_only, reset=False)
     seeds = _seeds(args, request.zero.crs_wkt)
     parent = planned.file.parent
     with writing(parent), scratch_folder(parent) as folder:
         result = grow_files(request, seeds, settings, choice, planned, folder, InTurn(), progress)
-    if layers is not None:
-        layers.write_layers([layers.stops_layer(result.stops)], stops, request.zero)
+    if geopackage is not None:
+        geopackage.write_layers([stops_layer(result.stops)], stops, request.zero)
     print_figures(result.figures, result.point_count)
 
 

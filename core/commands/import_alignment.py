@@ -12,6 +12,7 @@ from ..alignment.measured import moved
 from ..clouds.crs import parse_crs, units
 from ..design_files import check_place
 from ..errors import CrsError, ParameterError
+from ..layers import axes_layer, deviations_layer, elements_layer
 from ..progress import Estimating
 from ..report import build_alignment_page
 from .fit import stated
@@ -54,7 +55,7 @@ def run(args: argparse.Namespace) -> None:
         raise ParameterError("Give --elements, --axis, --deviations or --report for what is wanted of the file.")
     if args.tracks is None and (args.quality or args.rails or {"deviations", "report"} & set(outputs)):
         raise ParameterError("--deviations and --report compare measured tracks with the alignments: give --tracks.")
-    features, layers = (shapes_module("import-alignment", name) for name in ("features", "alignment_layers"))
+    features, geopackage = (shapes_module("import-alignment", name) for name in ("features", "geopackage"))
     progress = Estimating(Console())
     tracks, own = features.read_tracks(args.tracks, args.quality, args.rails, "--tracks") if args.tracks else ([], None)
     system = stated_system(args.file) or args.crs or (own and own.crs_wkt)
@@ -73,11 +74,11 @@ def run(args: argparse.Namespace) -> None:
         shift = features.shift_between("--tracks", own, frame)
         courses = compared_with(alignments, [moved(one, shift) for one in tracks], progress)
     makers = {
-        "elements": lambda: layers.elements_layer(alignments),
-        "axis": lambda: layers.axes_layer(alignments),
-        "deviations": lambda: layers.deviations_layer([one for _, one in courses]),
+        "elements": lambda: elements_layer(alignments),
+        "axis": lambda: axes_layer(alignments),
+        "deviations": lambda: deviations_layer([one for _, one in courses]),
     }
-    layers.write_all([make() for name, make in makers.items() if name in outputs], outputs, frame)
+    geopackage.write_all([make() for name, make in makers.items() if name in outputs], outputs, frame)
     if "report" in outputs:
         facts = {**stated(wkt), "LandXML file": args.file.name, "Command": args.command_line}
         outputs["report"].write_text(build_alignment_page(courses, args.tracks, facts, False))

@@ -25,10 +25,10 @@ def run(args: argparse.Namespace) -> None:
     RailExtractError
         A file can't be read, the axis states no kilometres, or the output can't be written.
     """
-    features, layers = (shapes_module("stations", name) for name in ("features", "alignment_layers"))
+    features, geopackage = (shapes_module("stations", name) for name in ("features", "geopackage"))
     output = destination_of("output", args.output, (".gpkg",))
     places = features.read_features(args.input, "INPUT")
     axes, plane = axes_of(args, places.crs_wkt)
     located = features.located(places, axes, plane, Estimating(Console()))
-    layers.write_copy(output, places, located.fields, located.columns)
+    geopackage.write_copy(output, places, located.fields, located.columns)
     print(f"{located.known} of {len(places.ids)} features have a kilometre")

@@ -1,6 +1,6 @@
 """FRPDF, the network that cleans rail rasters: its architecture, weights, engines and passes.
 
-The constants here are those of Gribov and Chang, section 5 (docs/method.md section 3.2).
+The constants here are those of Gribov and Chang, section 5 (docs/method.md section 3).
 """
 
 from ..parameters import Parameters

@@ -1,4 +1,4 @@
-"""The architecture of FRPDF: the stages of one pass, in order (docs/method.md section 3.1).
+"""The architecture of FRPDF: the stages of one pass, in order (docs/network.md).
 
 Only `Architecture.stages` states this order. `network` builds the modules to be trained from it and `folding` collects
 the weights of each stage; the engines and the ONNX files follow the list of layers that `folding` returns.
@@ -79,6 +79,6 @@ BASE = Architecture(channels=24, kernel_radius=3, dilations=(1, 3, 7, 15, 31, 63
 """The network of Gribov and Chang, section 5: receptive radius 753 cells, 292,680 products per cell."""
 
 FAST = Architecture(channels=64, kernel_radius=1, dilations=(1, 2, 4, 8, 16, 32, 8, 4, 2), block=4)
-"""The fast model: receptive radius 324 cells, 33,472 products per cell (docs/method.md section 3.6)."""
+"""The fast model: receptive radius 324 cells, 33,472 products per cell (docs/network.md)."""
 
 ARCHITECTURES = (BASE, FAST)

@@ -1,4 +1,4 @@
-"""One pass of the network, layer by layer over the pieces of a corridor (docs/method.md section 3.4).
+"""One pass of the network, layer by layer over the pieces of a corridor (docs/network.md).
 
 Each layer is computed on all pieces before the next layer starts, and reads the surroundings of a piece from its
 neighbours. So nothing is computed twice, and nothing along the track is cut off, however far a dilated kernel reaches.

@@ -1,4 +1,4 @@
-"""FRPDF as it is trained, with the class names of the paper (docs/method.md section 3.1).
+"""FRPDF as it is trained, with the class names of the paper (docs/network.md).
 
 Every layer keeps the resolution of the raster, or that of its blocks; context comes from dilation alone.
 """
@@ -19,7 +19,7 @@ class PassBatchNorm2d(nn.BatchNorm2d):
     """Batch norm with running statistics for each kind of pass; scale and shift are shared by all passes.
 
     The state is constant in the first pass and binary in all later ones, so activations differ between them, and one
-    set of running statistics fits neither (docs/method.md section 3.2).
+    set of running statistics fits neither (docs/method.md section 3).
     """
 
     momentum: float

@@ -1,4 +1,4 @@
-"""Smooth lines and height profiles by PAEK; what it keeps and loses: docs/method.md sections 5.3 to 5.5."""
+"""Smooth lines and height profiles by PAEK; what it keeps and loses: docs/method.md sections 5.3 and 5.4."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Rail points on disk, sorted into squares in one pass over the files, so that memory does not grow with the cloud.
 
-See docs/method.md section 7.2.
+See docs/method.md section 7.1.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from ..polyline import MIN_RING_M, is_closed, left_normals, length_along, resamp
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
 from ..standards import STANDARDS
-from .chaining import Chain, chain_pairs, single_rail_limit
+from .chaining import Chain, chain_pairs, runs_on, single_rail_limit
 from .forking import fork_centerlines
 from .midline import MAX_OFFSET_M, Meeting, Side, at_gauge, bridged_steps, midway
 from .pairing import MIN_SECTION_M, pair_rails
@@ -178,8 +178,8 @@ def _meetings(
     reach_m = single_rail_limit(parameters.max_gap_m)
     # The stations are half a gauge from one rail, so the other is off by the whole deviation of the gauge.
     max_offset_m = max(MAX_OFFSET_M, parameters.tolerance_m)
-    lefts = [(pair.left, pair.left_span) for pair in chain.pairs]
-    rights = [(pair.right, pair.right_span) for pair in chain.pairs]
+    lefts = _spans([pair.left for pair in chain.pairs], [pair.left_span for pair in chain.pairs])
+    rights = _spans([pair.right for pair in chain.pairs], [pair.right_span for pair in chain.pairs])
     to_left, to_right = progress.split(2)
     left = _met(Side.of(rails, lefts, reach_m), stations, normals, half_m, max_offset_m, to_left)
     right = _met(Side.of(rails, rights, reach_m), stations, -normals, half_m, max_offset_m, to_right)
@@ -189,6 +189,17 @@ def _meetings(
 def _ids(rails: Sequence[RailLine], numbers: Iterable[int]) -> tuple[int, ...]:
     """Return the ids of rails without repetition, in order of first occurrence."""
     return tuple(dict.fromkeys(rails[number].rail_id for number in numbers))
+
+
+def _spans(rails: Sequence[int], spans: Sequence[tuple[float, float]]) -> list[tuple[int, tuple[float, float]]]:
+    """List a track's rails on one side and their sections, merging sections between which the rail continues."""
+    merged = [(rails[0], spans[0])]
+    for rail, span in zip(rails[1:], spans[1:]):
+        if rail == merged[-1][0] and runs_on(merged[-1][1], span):
+            merged[-1] = (rail, (merged[-1][1][0], span[1]))
+        else:
+            merged.append((rail, span))
+    return merged
 
 
 def _met(

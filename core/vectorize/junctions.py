@@ -1,6 +1,6 @@
 """Repair what the raster does to junctions: drop spurs, bubbles, rungs and kinks, and run rails through nodes.
 
-See docs/method.md sections 4.6 and 4.7.
+See docs/method.md section 4.6.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Train FRPDF, or a network to compare it with, on synthetic pairs: seeded, logged and resumable, on the CPU or CUDA.
 
 Loss on every pass, no gradient through the feedback, shared weights, batch statistics per pass; see
-docs/training.md.
+docs/network.md.
 """
 
 from __future__ import annotations

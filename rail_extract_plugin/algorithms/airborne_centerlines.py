@@ -9,6 +9,7 @@ from qgis.core import QgsProcessingContext
 
 from ...core.errors import ParameterError
 from ...core.parameters import AirborneParameters
+from ...core.products import AIRBORNE, PROPOSED
 from ...core.progress import Estimating, Progress
 from ...core.standards import SEARCHED_CLASSES, RailStandard
 from ..dialog import inputs, outputs
@@ -17,7 +18,7 @@ from ..dialog.parameter_values import ParameterValues, class_numbers
 from ..dialog.passwords import masked
 from ..reading.clouds import CloudSource, points_folder, request_points
 from ..writing.destinations import is_wanted
-from ..writing.layers import AIRBORNE, FINDINGS, PROPOSED, figures_of, write_airborne_stations, write_lines
+from ..writing.layers import figures_of, write_layer
 from ..writing.reports import write_shown
 from ..writing.run import properties_of
 from ..writing.whole_files import write_each
@@ -119,10 +120,11 @@ class AirborneCenterlines(RailAlgorithm):
         progress: Progress,
     ) -> dict[str, Any]:
         """Write the proposed guides."""
+        from ...core.layers import lines_layer
+
         progress.info(found.summary)
-        rest = (parameters, context)
-        writers = {"PROPOSED": lambda: write_lines(self, "PROPOSED", PROPOSED, found.guides, found.frame, *rest)}
-        written = write_each(writers, parameters, context)
+        guides = lines_layer(PROPOSED, found.guides)
+        written = write_layer(self, "PROPOSED", guides, found.frame, parameters, context)
         return {**written, "PROPOSED_LENGTH": found.length_m, "DENSITY": round(found.density, 1)}
 
     def _write_survey(
@@ -134,6 +136,7 @@ class AirborneCenterlines(RailAlgorithm):
         progress: Progress,
     ) -> dict[str, Any]:
         """Write what was found along the guides."""
+        from ...core.layers import airborne_stations_layer, findings_layer, lines_layer
         from ...core.report.airborne import airborne_findings, airborne_summary
 
         for sentence in airborne_summary(survey):
@@ -141,9 +144,9 @@ class AirborneCenterlines(RailAlgorithm):
         found = airborne_findings(survey) if is_wanted(parameters.get("FINDINGS"), context) else ()
         frame, rest = survey.frame, (parameters, context)
         writers = {
-            "CENTERLINES": lambda: write_lines(self, "CENTERLINES", AIRBORNE, survey.lines, frame, *rest),
-            "STATIONS": lambda: write_airborne_stations(self, "STATIONS", survey.tracks, frame, *rest),
-            "FINDINGS": lambda: write_lines(self, "FINDINGS", FINDINGS, found, frame, *rest),
+            "CENTERLINES": lambda: write_layer(self, "CENTERLINES", lines_layer(AIRBORNE, survey.lines), frame, *rest),
+            "STATIONS": lambda: write_layer(self, "STATIONS", airborne_stations_layer(survey.tracks), frame, *rest),
+            "FINDINGS": lambda: write_layer(self, "FINDINGS", findings_layer(found), frame, *rest),
             "REPORT": lambda: write_shown(self, "REPORT", lambda: _page(job, survey), *rest),
         }
         written = write_each(writers, parameters, context)

@@ -13,7 +13,7 @@ from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
 from ..writing.destinations import is_wanted
-from ..writing.layers import CENTERLINES, RAILS, figures_of, write_lines
+from ..writing.layers import figures_of, write_layer
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
 from .toolbox_groups import STEPS
 
@@ -80,6 +80,8 @@ class BuildTrackCenterlines(RailAlgorithm):
     ) -> dict[str, Any]:
         """Pair the rails of each class, then write the centerlines."""
         from ...core.checks.lines import with_tracks
+        from ...core.layers import lines_layer
+        from ...core.products import CENTERLINES, RAILS
         from ...core.steps import tracks_of
         from ..reading.line_layers import read_rails
 
@@ -89,8 +91,8 @@ class BuildTrackCenterlines(RailAlgorithm):
         tracks = tracks_of(rails, settings, progress.span(READING, 1))
         progress.check()
         rest = (frame, parameters, context)
-        written = write_lines(self, "OUTPUT", CENTERLINES, tracks, *rest)
+        written = write_layer(self, "OUTPUT", lines_layer(CENTERLINES, tracks), *rest)
         if is_wanted(parameters.get("RAILS"), context):
             paired = with_tracks(rails, tracks, progress)
-            written.update(write_lines(self, "RAILS", RAILS, paired, *rest))
+            written.update(write_layer(self, "RAILS", lines_layer(RAILS, paired), *rest))
         return {**written, **figures_of(tracks, "CENTERLINE")}

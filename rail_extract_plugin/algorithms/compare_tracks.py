@@ -15,7 +15,7 @@ from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
 from ..dialog.passwords import masked
-from ..writing.layers import write_differences
+from ..writing.layers import write_layer
 from ..writing.reports import write_comparison
 from ..writing.whole_files import write_each
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
@@ -101,6 +101,7 @@ class CompareTracks(RailAlgorithm):
     ) -> dict[str, Any]:
         """Compare the lines, then write points and report."""
         from ...core.comparison.tracks import compare_surveys, doubts_of
+        from ...core.layers import differences_layer
         from ...core.parameters import ComparisonParameters
         from ...core.report.comparison import describe_shift, verdict_on
         from ..reading.surveys import read_surveys
@@ -120,7 +121,7 @@ class CompareTracks(RailAlgorithm):
         source = " against ".join(job.sources[name].sourceName() for name in ("INPUT", "REFERENCE"))
         facts = {"Date": f"{datetime.now():%Y-%m-%d %H:%M}", "Command": job.command}
         writers = {
-            "OUTPUT": lambda: write_differences(self, "OUTPUT", found, surveys.frame, *rest),
+            "OUTPUT": lambda: write_layer(self, "OUTPUT", differences_layer(found), surveys.frame, *rest),
             "REPORT": lambda: write_comparison(self, "REPORT", found, not ignored, source, facts, *rest),
         }
         return {**write_each(writers, *rest), **_figures(found)}

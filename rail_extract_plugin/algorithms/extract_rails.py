@@ -11,6 +11,7 @@ from qgis.core import QgsProcessingContext
 from ...core.errors import ParameterError
 from ...core.frpdf.models import choose as choose_model
 from ...core.parameters import LEARNED
+from ...core.products import CENTERLINES, RAILS
 from ...core.progress import Estimating, Progress
 from ...core.standards import DEFAULT, SEARCHED_CLASSES, Gauge, RailStandard
 from ..dialog import inputs, outputs
@@ -21,16 +22,7 @@ from ..i18n import tr
 from ..reading.clouds import CloudSource, checked_crs, points_folder, request_points
 from ..systems import system
 from ..writing.destinations import is_wanted
-from ..writing.layers import (
-    CENTERLINES,
-    RAILS,
-    figures_of,
-    figures_of_stations,
-    findings_of,
-    write_lines,
-    write_raster,
-    write_stations,
-)
+from ..writing.layers import figures_of, figures_of_stations, write_layer, write_raster
 from ..writing.reports import write_report
 from ..writing.run import properties_of
 from ..writing.whole_files import write_each
@@ -166,6 +158,7 @@ class ExtractRails(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Extract the rails and tracks, then write the outputs."""
+        from ...core.layers import findings_layer, lines_layer, quality_layer
         from ...core.pipeline import extract_files
         from ...core.report import Origin, list_findings, summary
 
@@ -193,14 +186,14 @@ class ExtractRails(RailAlgorithm):
             progress.warning(failure)
         origin = Origin(job.cloud.paths, job.standard, job.other_gauges, job.command, settings)
         found = list_findings(network, origin.gauges_m) if findings else ()
-        frame, rest = network.frame, (parameters, context)
+        frame, tracks, rest = network.frame, network.centerlines, (parameters, context)
         self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, frame)
         writers = {
             "CLEANED": lambda: self._write_cleaned(job, network, *rest),
-            "RAILS": lambda: write_lines(self, "RAILS", RAILS, network.rails, frame, *rest),
-            "CENTERLINES": lambda: write_lines(self, "CENTERLINES", CENTERLINES, network.centerlines, frame, *rest),
-            "QUALITY": lambda: write_stations(self, "QUALITY", network.geometry, frame, *rest),
-            "FINDINGS": lambda: write_lines(self, "FINDINGS", findings_of(found), found, frame, *rest),
+            "RAILS": lambda: write_layer(self, "RAILS", lines_layer(RAILS, network.rails), frame, *rest),
+            "CENTERLINES": lambda: write_layer(self, "CENTERLINES", lines_layer(CENTERLINES, tracks), frame, *rest),
+            "QUALITY": lambda: write_layer(self, "QUALITY", quality_layer(network.geometry), frame, *rest),
+            "FINDINGS": lambda: write_layer(self, "FINDINGS", findings_layer(found), frame, *rest),
             "REPORT": lambda: write_report(self, "REPORT", network, origin, *rest),
         }
         for sentence in summary(network, origin.gauges_m):

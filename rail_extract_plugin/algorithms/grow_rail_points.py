@@ -15,7 +15,7 @@ from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource, points_folder, request_points
-from ..writing.layers import write_stops
+from ..writing.layers import write_layer
 from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
 from .classify_rail_points import ClassifyRailPoints, classified_results
 from .toolbox_groups import RAW_CLOUDS
@@ -92,6 +92,7 @@ class GrowRailPoints(RailAlgorithm):
         from ...core.grow.settings import GrowSettings
         from ...core.labelling.files import Choice, plan_output
         from ...core.labelling.growing import grow_files
+        from ...core.layers import stops_layer
         from ...core.tasks import InTurn
 
         progress = Estimating(progress)
@@ -102,4 +103,4 @@ class GrowRailPoints(RailAlgorithm):
         with points_folder() as folder:
             grown = grow_files(request, job.seeds, settings, choice, output, folder, InTurn(), progress)
         results = classified_results(grown.file, grown.point_count, grown.figures)
-        return {**results, **write_stops(self, "STOPS", grown.stops, request.zero, parameters, context)}
+        return {**results, **write_layer(self, "STOPS", stops_layer(grown.stops), request.zero, parameters, context)}

@@ -19,7 +19,7 @@ from ..dialog.parameter_values import ParameterValues
 from ..dialog.passwords import masked
 from ..reading.clouds import CloudSource, points_folder
 from ..writing.destinations import is_wanted
-from ..writing.layers import figures_of_stations, findings_of, write_lines, write_stations
+from ..writing.layers import figures_of_stations, write_layer
 from ..writing.reports import write_report
 from ..writing.run import properties_of
 from ..writing.whole_files import write_each
@@ -110,6 +110,7 @@ class MeasureTrackGeometry(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Measure each track, then write the points."""
+        from ...core.layers import findings_layer, quality_layer
         from ...core.rails import RailNetwork
         from ...core.report import Origin, list_findings, summary
         from ...core.squares.remeasuring import measure_rails
@@ -143,8 +144,8 @@ class MeasureTrackGeometry(RailAlgorithm):
         for sentence in summary(network, origin.gauges_m):
             progress.info(sentence)
         writers = {
-            "OUTPUT": lambda: write_stations(self, "OUTPUT", measured, frame, *rest),
-            "FINDINGS": lambda: write_lines(self, "FINDINGS", findings_of(found), found, frame, *rest),
+            "OUTPUT": lambda: write_layer(self, "OUTPUT", quality_layer(measured), frame, *rest),
+            "FINDINGS": lambda: write_layer(self, "FINDINGS", findings_layer(found), frame, *rest),
             "REPORT": lambda: write_report(self, "REPORT", network, origin, *rest),
         }
         return {**write_each(writers, *rest), **figures_of_stations(measured)}

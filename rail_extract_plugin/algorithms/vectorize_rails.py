@@ -14,7 +14,7 @@ from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
 from ..reading.clouds import CloudSource
-from ..writing.layers import RAILS, figures_of, write_lines
+from ..writing.layers import figures_of, write_layer
 from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
 from .toolbox_groups import STEPS
 
@@ -81,6 +81,8 @@ class VectorizeRails(RailAlgorithm):
     ) -> dict[str, Any]:
         """Vectorize each class, then write the lines."""
         from ...core.checks.lines import warn_of_rails
+        from ...core.layers import lines_layer
+        from ...core.products import RAILS
         from ...core.steps import lines_of
         from ..reading.area_points import Area, read_points_in
         from ..reading.geotiff import read_rasters
@@ -103,5 +105,5 @@ class VectorizeRails(RailAlgorithm):
             warn_of_rails(found, code, settings, progress)
             rails += found
         progress.check()
-        written = write_lines(self, "OUTPUT", RAILS, rails, frame, parameters, context)
+        written = write_layer(self, "OUTPUT", lines_layer(RAILS, rails), frame, parameters, context)
         return {**written, **figures_of(rails, "RAIL")}

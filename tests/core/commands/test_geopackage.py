@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,12 +10,14 @@ import pytest
 pyogrio = pytest.importorskip("pyogrio")
 shapely = pytest.importorskip("shapely")
 
-from rail_extract.core.commands.geopackage import lines_layer, stations_layer, write_layers  # noqa: E402
+from rail_extract.core.commands.geopackage import write_layers  # noqa: E402
 from rail_extract.core.disk import Destination  # noqa: E402
 from rail_extract.core.errors import DiskError  # noqa: E402
 from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS  # noqa: E402
 from rail_extract.core.frame import LocalFrame  # noqa: E402
 from rail_extract.core.geopackage import tables_in  # noqa: E402
+from rail_extract.core.layers import lines_layer, quality_layer  # noqa: E402
+from rail_extract.core.products import CENTERLINES, RAILS  # noqa: E402
 from rail_extract.core.rails import Centerline, RailLine, TrackGeometry  # noqa: E402
 
 FRAME = LocalFrame(np.array([500.0, 7100.0, 30.0]), 0.5, 0.25, "EPSG:2227")
@@ -43,9 +46,9 @@ def test_a_file_holds_lines_and_points_with_their_fields(tmp_path):
     path = tmp_path / "all.gpkg"
     destination = Destination.at(path)
     layers = [
-        lines_layer("rails", RAIL_FIELDS, [RAIL]),
-        lines_layer("centerlines", CENTERLINE_FIELDS, [TRACK]),
-        stations_layer("quality", [STATIONS]),
+        lines_layer(RAILS, [RAIL]),
+        lines_layer(CENTERLINES, [TRACK]),
+        quality_layer([STATIONS]),
     ]
     write_layers(layers, destination, FRAME)
     found = {name: pyogrio.raw.read(path, layer=name) for name, _ in pyogrio.list_layers(path)}
@@ -71,7 +74,7 @@ def test_a_file_holds_lines_and_points_with_their_fields(tmp_path):
 def test_layers_without_features_keep_their_fields(tmp_path):
     path = tmp_path / "empty.gpkg"
     destination = Destination.at(path)
-    write_layers([lines_layer("rails", RAIL_FIELDS, []), stations_layer("quality", [])], destination, FRAME)
+    write_layers([lines_layer(RAILS, []), quality_layer([])], destination, FRAME)
     assert [pyogrio.read_info(path, layer=name)["features"] for name in ("rails", "quality")] == [0, 0]
     assert list(pyogrio.read_info(path, layer="quality")["fields"]) == [field.name for field in QUALITY_FIELDS]
 
@@ -82,7 +85,7 @@ def test_a_file_in_use_is_left_alone_and_the_new_one_is_next_to_it(tmp_path):
     destination = Destination.at(out)
     (tmp_path / "out.gpkg-wal").write_text("pending")
     with pytest.raises(DiskError, match=r"The new file is .*out_new\.gpkg"):
-        write_layers([lines_layer("rails", RAIL_FIELDS, [])], destination, FRAME)
+        write_layers([lines_layer(RAILS, [])], destination, FRAME)
     assert out.read_text() == "theirs"
     assert pyogrio.read_info(tmp_path / "out_new.gpkg")["features"] == 0
 
@@ -90,12 +93,12 @@ def test_a_file_in_use_is_left_alone_and_the_new_one_is_next_to_it(tmp_path):
 def test_the_other_tables_of_a_file_stay(tmp_path):
     path = tmp_path / "all.gpkg"
     destination = Destination.at(path)
-    write_layers([lines_layer("signals", RAIL_FIELDS, [RAIL] * 3)], destination, FRAME)
-    write_layers([lines_layer("rails", RAIL_FIELDS, [RAIL] * 2)], destination, FRAME)
+    write_layers([lines_layer(replace(RAILS, style="signals"), [RAIL] * 3)], destination, FRAME)
+    write_layers([lines_layer(RAILS, [RAIL] * 2)], destination, FRAME)
     before = path.read_bytes()
     layers = [
-        lines_layer("rails", RAIL_FIELDS, [RAIL]),
-        stations_layer("quality", [STATIONS]),
+        lines_layer(RAILS, [RAIL]),
+        quality_layer([STATIONS]),
     ]
     write_layers(layers, destination, FRAME)
     assert path.read_bytes() != before
@@ -109,16 +112,17 @@ FULL_DISK = """
 import resource, sys
 from pathlib import Path
 import numpy as np
-from rail_extract.core.commands.geopackage import lines_layer, write_layers
+from rail_extract.core.commands.geopackage import write_layers
 from rail_extract.core.disk import Destination
 from rail_extract.core.errors import DiskError
-from rail_extract.core.fields import RAIL_FIELDS
 from rail_extract.core.frame import LocalFrame
+from rail_extract.core.layers import lines_layer
+from rail_extract.core.products import RAILS
 from rail_extract.core.rails import RailLine
 resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
 rails = [RailLine(np.random.rand(20_000, 3), 1, 10, 5, 1.0, 1.0, 0.0)]
 try:
-    write_layers([lines_layer("rails", RAIL_FIELDS, rails)], Destination.at(Path(sys.argv[1])), LocalFrame(np.zeros(3)))
+    write_layers([lines_layer(RAILS, rails)], Destination.at(Path(sys.argv[1])), LocalFrame(np.zeros(3)))
 except DiskError as error:
     print(error)
 """
@@ -138,7 +142,7 @@ def test_layers_for_other_programs_are_those_of_their_suffix(tmp_path):
     frame = LocalFrame(np.array([1000.0, 2000.0, 0.0]), crs_wkt="EPSG:32643")
     rail = RailLine(np.array([[0.0, 0.0, 5.0], [3.0, 4.0, 5.5]]), 1, 10, 9, 1.0, 0.5, 0.0)
     for name in ("rails.dxf", "rails.csv", "rails_points.csv"):
-        write_layers([lines_layer("rails", RAIL_FIELDS, [rail])], Destination.at(tmp_path / name), frame)
+        write_layers([lines_layer(RAILS, [rail])], Destination.at(tmp_path / name), frame)
     assert "RAILS_10" in (tmp_path / "rails.dxf").read_text(encoding="ascii")
     assert (
         "LINESTRING Z (1000.0000 2000.0000 5.0000,1003.0000 2004.0000 5.5000)" in (tmp_path / "rails.csv").read_text()

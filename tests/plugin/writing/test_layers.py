@@ -13,6 +13,8 @@ from qgis.core import (
 from rail_extract.core.errors import RailExtractError
 from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
 from rail_extract.core.frame import LocalFrame
+from rail_extract.core.layers import lines_layer
+from rail_extract.core.products import CENTERLINES, RAILS
 from rail_extract.core.rails import Centerline, RailLine
 from rail_extract.rail_extract_plugin.writing.destinations import destinations
 from rail_extract.rail_extract_plugin.writing.layers import add_features, features, fields, output_crs
@@ -35,7 +37,7 @@ def test_rail_becomes_a_feature_in_the_units_of_the_cloud(qgis):
         track_ids=(2, 5),
         sigmaz_mm=0.456,
     )
-    (feature,) = features([rail], RAIL_FIELDS, FEET)
+    (feature,) = features(lines_layer(RAILS, [rail]), FEET)
     vertices = [(point.x(), point.y(), point.z()) for point in feature.geometry().vertices()]
     assert np.allclose(vertices, [(1000, 2000, 10), (1010, 2000, 11)])
     assert feature.attributes() == [3, 10, 3.063, 812, 4.5, 0.7, 1.5, "2,5", "0.25-1.00,2.00-2.75", 0.46]
@@ -43,7 +45,7 @@ def test_rail_becomes_a_feature_in_the_units_of_the_cloud(qgis):
 
 def test_centerline_becomes_a_feature(qgis):
     line = Centerline(XYZ, 1, 10, (1, 4), (2,), 1435.2, float("nan"), -20.0, -41.0, 0.5)
-    (feature,) = features([line], CENTERLINE_FIELDS, FEET)
+    (feature,) = features(lines_layer(CENTERLINES, [line]), FEET)
     attributes = dict(zip((column.name for column in CENTERLINE_FIELDS), feature.attributes()))
     assert (attributes["left_ids"], attributes["right_ids"]) == ("1,4", "2")
     assert attributes["cantmax_mm"] == -41.0
@@ -78,7 +80,7 @@ def test_numbers_have_the_decimals_of_their_fields(tmp_path, context, suffix):
     path = str(tmp_path / f"lines{suffix}")
     shape, crs = QgsWkbTypes.Type.LineStringZ, output_crs(None)
     sink, layer_id = QgsProcessingUtils.createFeatureSink(path, context, fields(CENTERLINE_FIELDS), shape, crs)
-    add_features(sink, features([line], CENTERLINE_FIELDS, FEET))
+    add_features(sink, features(lines_layer(CENTERLINES, [line]), FEET))
     del sink
     layer = QgsVectorLayer(layer_id, "lines", "ogr")
     (feature,) = layer.getFeatures()

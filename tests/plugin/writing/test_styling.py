@@ -27,10 +27,11 @@ from qgis.PyQt.QtGui import QColor
 from qgis.PyQt.QtXml import QDomDocument
 from rail_extract.core import fields as core_fields
 from rail_extract.core.frame import LocalFrame
+from rail_extract.core.products import PRODUCTS
 from rail_extract.rail_extract_plugin import compat
 from rail_extract.rail_extract_plugin.paths import STYLES
 from rail_extract.rail_extract_plugin.reading.clouds import CloudSource
-from rail_extract.rail_extract_plugin.writing.layers import LAYERS, fields
+from rail_extract.rail_extract_plugin.writing.layers import fields
 from rail_extract.rail_extract_plugin.writing.run import properties_of
 from rail_extract.rail_extract_plugin.writing.styling import style_on_load
 
@@ -40,7 +41,7 @@ SHAPES = {
     "axes": "LineStringZM",
 }
 DRAWN = [style for style in SHAPES if style != "places"]
-COLUMNS = {kind.style: kind.columns for kind in reversed(LAYERS)}
+COLUMNS = {product.style: product.fields for product in reversed(PRODUCTS)}
 
 
 @pytest.fixture
@@ -131,14 +132,14 @@ def test_elements_are_coloured_by_type_and_drawn_once(styled):
 
 def test_all_declared_fields_are_in_a_layer():
     declared = {one for fields in vars(core_fields).values() if isinstance(fields, tuple) for one in fields}
-    assert {field for kind in LAYERS for field in kind.columns} == declared
+    assert {field for product in PRODUCTS for field in product.fields} == declared
     assert len(declared) > 100
 
 
-@pytest.mark.parametrize("kind", LAYERS, ids=lambda kind: f"{kind.style}{len(kind.columns)}")
+@pytest.mark.parametrize("kind", PRODUCTS, ids=lambda kind: f"{kind.style}{len(kind.fields)}")
 def test_fields_have_names_in_words_with_units(styled, kind):
-    layer = styled(kind.style, columns=kind.columns)
-    for field in kind.columns:
+    layer = styled(kind.style, columns=kind.fields)
+    for field in kind.fields:
         alias = layer.attributeAlias(layer.fields().lookupField(field.name))
         assert alias and alias != field.name
         for ending, unit in (("_mm", "[mm]"), ("_m", "[m]"), ("_pm", "[‰]")):
