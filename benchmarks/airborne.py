@@ -16,6 +16,7 @@ import numpy as np
 from rail_extract.core.airborne.axis import axis_of_guide
 from rail_extract.core.airborne.fitting import SEEN, fit_tracks
 from rail_extract.core.airborne.proposals import propose_guides
+from rail_extract.core.airborne.run import Run
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.parameters import AirborneParameters
 from rail_extract.core.polyline import resample
@@ -82,7 +83,7 @@ def searched(design: Design, density: float, footprint_m: float, seed: int) -> t
         request = ask(Path(folder) / "cloud.las", (1, 2))
         parameters = AirborneParameters(1.435, SPACING_M - 1.435, footprint_m=footprint_m)
         start = time.process_time()
-        found = propose_guides(request, parameters, Path(folder) / "points", InTurn())
+        found = propose_guides(Run(request, parameters, Path(folder) / "points", InTurn()))
         seconds = time.process_time() - start
     guides = [resample(found.frame.to_crs(one.xyz)[:, :2] - ORIGIN[:2], 1.0)[0] for one in found.guides]
     visible = [

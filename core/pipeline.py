@@ -27,7 +27,7 @@ from .progress import SILENT, Progress, Recording, counted
 from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
 from .raster import RailRaster
 from .scratch import scratch_folder
-from .squares.density import occupied_squares, plausible, warn_of_unexplained
+from .squares.density import occupied_squares, plausible, warn_of_airborne, warn_of_unexplained
 from .squares.grid import Key, MemorySource, PointSource, Square, around, assembled
 from .squares.pieces import SquareRails, rows_in_frame
 from .squares.remeasuring import measure_rails
@@ -219,6 +219,7 @@ def _walk(
         warn_of_rails(found, source.class_code, parameters, progress)
         if found:
             warn_of_unexplained(source, found, progress)
+            warn_of_airborne(source, found, progress)
         rails += found
         if rasters:
             cleaned[source.class_code] = assembled(rasters, squares, source.frame)

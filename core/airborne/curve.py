@@ -1,17 +1,11 @@
-"""Smooth curves through fitted places: penalised least squares with the standard error that remains."""
+"""Smooth curves through fitted places: penalised least squares with the covariance that remains."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solveh_banded
-
-SPREAD = 60
-"""Places beyond which a place has no effect on a smooth curve, in steps of the standard error's computation."""
-
-BLOCK = 400
-"""Places whose standard errors are computed at once."""
+from scipy.sparse import csr_matrix, diags
 
 LITTLE = 1e-12
 """Added to the diagonal, so that a matrix without any data can be solved."""
@@ -19,23 +13,34 @@ LITTLE = 1e-12
 
 @dataclass(frozen=True)
 class Smooth:
-    """A smooth curve at equal steps.
+    """A smooth curve.
 
     Attributes
     ----------
     values : (n, d) array
-    variance : (n,) array
+    covariance : (n, n) array
         That of the curve, if each place has the variance 1 / weight.
-    bend : (n - order,) array
-        Expected square of the differences that are penalised: that of the curve's, and their variance.
+    rows : (k, n) matrix
+        The differences that are penalised.
     """
 
     values: np.ndarray
-    variance: np.ndarray
-    bend: np.ndarray
+    covariance: np.ndarray
+    rows: csr_matrix
+
+    @property
+    def variance(self) -> np.ndarray:
+        """Variance of each place, (n,)."""
+        return np.diag(self.covariance)
+
+    @property
+    def bend(self) -> np.ndarray:
+        """Expected square of each penalised difference, (k,): that of the curve's, and its variance."""
+        spread = self.rows.multiply(self.rows @ self.covariance).sum(axis=1)
+        return ((self.rows @ self.values) ** 2).sum(axis=1) + np.asarray(spread).ravel()
 
 
-def smooth(values: np.ndarray, weight: np.ndarray, sigma: float | np.ndarray, order: int) -> Smooth:
+def smooth(values: np.ndarray, weight: np.ndarray, rows: csr_matrix, sigma: float | np.ndarray) -> Smooth:
     """Return the curve that balances places and smoothness.
 
     Parameters
@@ -44,61 +49,21 @@ def smooth(values: np.ndarray, weight: np.ndarray, sigma: float | np.ndarray, or
         Places; those with a weight of 0 may hold any number.
     weight : (n,) array
         1 / variance of each.
-    sigma : float or (n - order,) array
-        Standard deviation of the differences of this order.
-    order : int
+    rows : (k, n) matrix
+        Differences that are small, such as those of `differences`.
+    sigma : float or (k,) array
+        Their standard deviation.
     """
-    band = _bands(weight, 1 / np.square(sigma), order)
-    found = solveh_banded(band, weight[:, None] * values)
-    inverse = _inverse_bands(band)
-    squares = (np.diff(found, order, axis=0) ** 2).sum(axis=-1)
-    return Smooth(found, inverse[0], squares + _variance_of_differences(inverse, order))
+    stiffness = np.broadcast_to(1 / np.square(sigma), rows.shape[0])
+    matrix = (rows.T @ diags(stiffness) @ rows).toarray()
+    matrix[np.diag_indices(len(matrix))] += weight + LITTLE
+    covariance = np.linalg.inv(matrix)
+    return Smooth(covariance @ (weight[:, None] * values), covariance, rows)
 
 
-def _bands(weight: np.ndarray, stiffness: float | np.ndarray, order: int) -> np.ndarray:
-    """Return the upper bands of the normal equations, (order + 1, n)."""
-    count = len(weight)
-    difference = _weights(order)
-    band = np.zeros((order + 1, count))
-    for one in range(order + 1):
-        for other in range(one, order + 1):
-            band[order - (other - one), other : max(count - order, 0) + other] += (
-                stiffness * difference[one] * difference[other]
-            )
-    band[order] += weight + LITTLE
-    return band
-
-
-def _weights(order: int) -> np.ndarray:
-    """Return the weights with which places make a difference, (order + 1,)."""
-    return np.diff(np.eye(order + 1), order, axis=0)[0]
-
-
-def _inverse_bands(band: np.ndarray) -> np.ndarray:
-    """Return the diagonal of the inverse of a banded matrix and those beside it, (order + 1, n), block by block."""
-    order, count = len(band) - 1, band.shape[1]
-    found = np.empty(band.shape)
-    for first in range(0, count, BLOCK):
-        low, high = max(first - SPREAD, 0), min(first + BLOCK + SPREAD, count)
-        part = band[:, low:high].copy()
-        for row in range(order):
-            part[row, : order - row] = 0.0
-        wanted = np.arange(first, min(first + BLOCK, count))
-        unit = np.zeros((high - low, len(wanted)))
-        unit[wanted - low, np.arange(len(wanted))] = 1.0
-        solved = solveh_banded(part, unit)
-        for beside in range(order + 1):
-            row = np.minimum(wanted - low + beside, high - low - 1)
-            found[beside, wanted] = solved[row, np.arange(len(wanted))]
-    return found
-
-
-def _variance_of_differences(inverse: np.ndarray, order: int) -> np.ndarray:
-    """Return the variance of differences, (n - order,), from the diagonals of the inverse, (order + 1, n)."""
-    difference, count = _weights(order), inverse.shape[1]
-    total = np.zeros(max(count - order, 0))
-    for one in range(order + 1):
-        for other in range(order + 1):
-            first = min(one, other)
-            total += difference[one] * difference[other] * inverse[abs(one - other), first : count - order + first]
-    return total
+def differences(count: int, order: int) -> csr_matrix:
+    """Return the differences of some order between places at equal steps, (count - order, count)."""
+    if count <= order:
+        return csr_matrix((0, count))
+    weights = np.diff(np.eye(order + 1), order, axis=0)[0]
+    return diags(weights, range(order + 1), shape=(count - order, count), format="csr")

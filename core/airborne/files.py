@@ -12,13 +12,14 @@ from ..clouds.points import Request, strips_of
 from ..errors import NoRailPointsError, ParameterError
 from ..frame import LocalFrame
 from ..parameters import AirborneParameters
-from ..progress import SILENT, Progress
+from ..progress import Progress
 from ..standards import STANDARDS
-from ..tasks import Context, Runner, Task
+from ..tasks import Context, Task
 from .axis import Axis, axis_of_guide
 from .fitting import EMPTY, SEEN, Fitted, Stations, fit_tracks
-from .refinement import STATION_M
 from .remarks import FLIGHT, are_hints, on_density, on_gauges, on_shapes, refuse_mobile
+from .run import Run
+from .sections import STATION_M
 from .spooling import density_of, points_of, spool
 from .squares import Key, Piece, pieces_by_square
 from .survey import AirborneTrack, Guide, Survey, joined_others, lines_of, track_of
@@ -34,27 +35,8 @@ OTHER_GAUGE_M, LEAST_SHOWN = 0.1, 0.5
 must show."""
 
 
-def survey_files(
-    request: Request,
-    guides: Sequence[Guide],
-    parameters: AirborneParameters,
-    folder: Path,
-    runner: Runner,
-    progress: Progress = SILENT,
-) -> Survey:
+def survey_files(run: Run, guides: Sequence[Guide]) -> Survey:
     """Find the track of each guide in a cloud.
-
-    Parameters
-    ----------
-    request : Request
-        Files, classes and extent.
-    guides : sequence of Guide
-    parameters : AirborneParameters
-    folder : Path
-        Existing folder for the points around the guides, 28 bytes each; the caller removes it.
-    runner : Runner
-        Executes one task per file and one per square.
-    progress : Progress
 
     Raises
     ------
@@ -67,24 +49,26 @@ def survey_files(
     ParameterError
         No guide lies in the cloud, or one is too short.
     """
+    request, parameters, progress = run.request, run.parameters, run.progress
     _check_degrees(request, guides)
     guides, axes, short = _axes(guides, request)
     _check_inside(request, axes, parameters.reach_m)
     squares = pieces_by_square(axes)
     reading, fitting = progress.divide((1.0, 2.0))
     progress.status("Reading the points along the guides")
-    counts = spool(request, squares, parameters.reach_m, folder, runner, reading)
+    counts = spool(replace(run, progress=reading), squares)
     if not counts:
         raise NoRailPointsError(
             f"The cloud has no points of class {', '.join(map(str, request.class_codes))} along the guides: set the "
             "classes, and check the coordinate system of the guides."
         )
-    density = float(np.median(np.concatenate([density_of(points_of(folder, key)["xyz"][:, :2]) for key in counts])))
+    densities = [density_of(points_of(run.folder, key)["xyz"][:, :2]) for key in counts]
+    density = float(np.median(np.concatenate(densities)))
     refuse_mobile(density)
     progress.info(f"The cloud has {density:.1f} points per square metre along the guides.")
     progress.status("Fitting the tracks")
     spacings_m = [parameters.spacing_of(guide.gauge_m) for guide in guides]
-    fitted = _fit(folder, squares, counts, spacings_m, parameters, runner, fitting)
+    fitted = _fit(replace(run, progress=fitting), squares, counts, spacings_m)
     frame = _frame(request.zero, axes)
     tracks = [
         _joined(guide, axis, parts, spacing_m, parameters.rail_height_m, request.zero, frame)
@@ -101,23 +85,20 @@ def survey_files(
 
 
 def _fit(
-    folder: Path,
-    squares: Mapping[Key, tuple[Piece, ...]],
-    counts: Mapping[Key, int],
-    spacings_m: Sequence[float],
-    parameters: AirborneParameters,
-    runner: Runner,
-    progress: Progress,
+    run: Run, squares: Mapping[Key, tuple[Piece, ...]], counts: Mapping[Key, int], spacings_m: Sequence[float]
 ) -> list[list[tuple[Piece, Fitted]]]:
     """Fit all squares that have points, and return what was found along each guide, piece by piece."""
     tasks: dict[Key, Task] = {
         key: Task(
-            f"The square {key}", fit_square, (folder, key, pieces, spacings_m, parameters), weight=FIT_S * counts[key]
+            f"The square {key}",
+            fit_square,
+            (run.folder, key, pieces, spacings_m, run.parameters),
+            weight=FIT_S * counts[key],
         )
         for key, pieces in squares.items()
         if key in counts
     }
-    found: dict[Key, list[Fitted]] = dict(runner.run(tasks, progress))
+    found: dict[Key, list[Fitted]] = dict(run.runner.run(tasks, run.progress))
     fitted: list[list[tuple[Piece, Fitted]]] = [[] for _ in spacings_m]
     for key in tasks:
         for piece, one in zip(squares[key], found[key]):

@@ -2,36 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
 from scipy.spatial import cKDTree
 
 from ..progress import SILENT, Progress
 from .axis import Axis, Points
-from .beside import LENGTH_M, WIDE_M, Beside, look_beside
+from .beside import LONG, WIDE_M, Beside, look_beside
 from .corridor import gather
 from .course import Course, Evidence, evidence
-from .joint import certainty, courses
-from .refinement import STATION_M, Refined, refine, strip_error
+from .joint import certainty, courses, groups
+from .refinement import Refined, Traced, refine
 from .ridges import HALF_M, Shape
+from .sections import STATION_M
+from .strips import strip_error
 
-LONG = 7
-"""Sections over which a place must look like a track: one section may be hidden, or mislead."""
+LONG_GAIN, LONG_SHARE = 7.0, 0.25
+"""Gain that two rails must have over 70 m, and the share of the expected gain: roads, hedges and ditches stay below."""
 
-LONG_GAIN, FLAT = 0.2, 0.5
-"""Share of the expected gain that the checked gain has over them, and the largest flaw of a flat bed."""
-
-OWN_GAIN, OWN_SHARE = 4.0, 0.2
-"""A section of its own shows a track with this gain, or with this share of what is expected there."""
+OWN_GAIN, CHANCE = 4.0, 1.5
+"""A section of its own shows a track with this gain, or with one that misses what is expected there by no more than as
+many standard deviations of it: noise gives the expected gain E a standard deviation of the root of 2 E."""
 
 WIDEST_M = 0.215
 """Ridges this wide are the halves of a road's crown: no survey has the footprint of 0.7 m that would blur rails so."""
 
 RIVAL_SHARE = 1.1
-"""Share of a line's score over 50 m that no place so close that it excludes the line may have."""
+"""Share of a line's score over 70 m that no place so close that it excludes the line may have."""
+
+REPEATED_SHARE = 0.6
+"""The same for places closer than a gauge, where no switch is: the furrows of a field repeat."""
 
 SURE = 0.9
 """Least likelihood that the guide means this track and not another one."""
@@ -46,24 +48,22 @@ SWITCH_M, TOE_M, TOE_FACTOR = 3.0, 0.5, 2.0
 """Two results this close are those of a switch; this close, both pull each other, and the standard error grows by this
 factor."""
 
-SHARED, FOOTPRINT_SHARE = 1.2, 0.025
+SHARED, FOOTPRINT_SHARE = 1.2, 0.015
 """Neighbouring sections share errors, by sleepers and by waves of the ballast, which the curve takes as independent:
 its standard error is this much too small. What ballast beside the rails adds, as a share of the footprint."""
 
 BED_SIGMA_M = 0.03
 """Standard deviation of the rails' height above the bed, which depends on the fill of the ballast."""
 
-ASIDE_M = 0.15
-"""A section whose own rails lie farther from the curve than this does not support it."""
+ASIDE_M, ASIDE_SIGMAS = 0.15, 3.0
+"""A section whose own rails lie farther from the curve than this, and by more of its own standard errors, does not
+support it."""
 
 FEW_POINTS = 8
 """Points on the bed of a section up to which it shows nothing."""
 
 MAX_SIGMA_M = 0.05
 """Standard error above which a station is not seen: of those below, 95 % lie within 10 cm."""
-
-LEAST_EXPECTED = 2.5
-"""Gain that rails must be expected to have in a section of 10 m: below it, density and footprint hide them."""
 
 TURNED_M = 0.15
 """What a section of 5 m reaches farther to the side where the guide's direction is off most."""
@@ -178,13 +178,15 @@ def fit_tracks(
     numbers = [number for number, _ in found]
     own, scores = courses([axes[number] for number in numbers], [one for _, one in found])
     lines: dict[int, _Line] = {}
-    for (number, one), course, score in fitting.follow(list(zip(found, own, scores)), len(found)):
-        refined = refine(near[number], axes[number], course.across, shapes[number])
-        if refined is not None:
-            wide = gather(near[number], refined.axis, WIDE_M + HALF_M)
-            beside = look_beside(wide, refined.shape) if wide is not None else None
-            sure = certainty(course, score, one.across)
-            lines[number] = _Line(refined, course, sure, beside)
+    together = groups([axes[number] for number in numbers])
+    for group in fitting.follow(together):
+        tracks = [
+            Traced(near[numbers[one]], axes[numbers[one]], own[one].across, shapes[numbers[one]]) for one in group
+        ]
+        for one, refined in zip(group, refine(tracks)):
+            if refined is not None:
+                sure = certainty(own[one], scores[one], found[one][1].across)
+                lines[numbers[one]] = _Line.seen(near[numbers[one]], refined, own[one], sure)
     return _judged(axes, lines, footprint_m)
 
 
@@ -195,10 +197,17 @@ class _Line:
     sure: np.ndarray
     beside: Beside | None
 
+    @classmethod
+    def seen(cls, points: Points, refined: Refined, course: Course, sure: np.ndarray) -> _Line:
+        """Look beside a line that was fitted."""
+        wide = gather(points, refined.line, WIDE_M + HALF_M)
+        beside = None if wide is None else look_beside(wide, refined.seen.shape, len(refined.t))
+        return cls(refined, course, sure, beside)
+
 
 def _judged(axes: Sequence[Axis], lines: dict[int, _Line], footprint_m: float) -> list[Fitted]:
     """Judge every station of every line, also by the other lines."""
-    places = {number: line.refined.xy for number, line in lines.items()}
+    places = {number: line.refined.curve.xy for number, line in lines.items()}
     judged = []
     for number, axis in enumerate(axes):
         if number not in lines:
@@ -208,22 +217,22 @@ def _judged(axes: Sequence[Axis], lines: dict[int, _Line], footprint_m: float) -
         distance, apart = _others(number, axes, places)
         toe = np.where(distance < TOE_M, TOE_FACTOR, 1.0)
         blur = FOOTPRINT_SHARE * footprint_m
-        sigma = toe * np.sqrt((SHARED * refined.sigma) ** 2 + blur**2 + strip_error(refined) ** 2)
-        reason = _reasons(line)
+        sigma = toe * np.sqrt((SHARED * refined.curve.sigma) ** 2 + blur**2 + strip_error(refined) ** 2)
+        reason = _reasons(line, distance < SWITCH_M)
         reason[(reason == SEEN) & (sigma > toe * MAX_SIGMA_M)] = SPARSE
         reason[(reason == SEEN) & (distance < TWIN_M) & (apart > GUIDES_APART_M)] = TWIN
         stations = Stations(
             refined.t,
-            refined.xy,
+            refined.curve.xy,
             refined.bed,
-            refined.sections.found.tilt,
+            refined.seen.sections.found.tilt,
             sigma,
             refined.sigma_bed,
             line.course.margin[np.minimum(np.arange(len(reason)) * 2, len(line.course.margin) - 1)],
             reason,
             distance < SWITCH_M,
         )
-        judged.append(Fitted(stations, refined.shape, refined.shown_m, _unclaimed(number, lines, places)))
+        judged.append(Fitted(stations, refined.seen.shape, refined.seen.shown_m, _unclaimed(number, lines, places)))
     return judged
 
 
@@ -238,29 +247,41 @@ def _nothing(axis: Axis) -> Fitted:
     return Fitted(stations, None, np.nan, np.empty((0, 2)))
 
 
-def _reasons(line: _Line) -> np.ndarray:
-    """Return why the stations of a line are not seen, by what shows along it."""
-    refined, found = line.refined, line.refined.sections.found
-    count = len(refined.t)
-    gain, flaw, most = (_long(found.gain, np.max), _long(found.flaw, np.min), _long(found.most, np.max))
-    enough = found.both > np.minimum(OWN_GAIN, OWN_SHARE * found.most)
-    enough &= (gain > LONG_GAIN * most) & (np.abs(refined.sections.offset) < REACH_M)
-    flat = (flaw < FLAT) & (refined.shape.width_m < WIDEST_M)
-    if line.beside is not None:
-        long = np.minimum((np.arange(count) * STATION_M / LENGTH_M).astype(np.int64), len(line.beside.own) - 1)
-        flat &= line.beside.rival[long] < RIVAL_SHARE * np.maximum(line.beside.own[long], 0.0)
-    half = np.minimum(np.arange(count) * 2, len(line.sure) - 1)
-    reason = np.full(count, SEEN)
+def _reasons(line: _Line, switch: np.ndarray) -> np.ndarray:
+    """Return why the stations of a line are not seen, by what shows along it; at a `switch`, (n,), it shows twice."""
+    refined, sections = line.refined, line.refined.seen.sections
+    most = sections.found.most
+    own = sections.found.both > np.minimum(OWN_GAIN, most - CHANCE * np.sqrt(2 * most))
+    own &= np.abs(sections.offset) < REACH_M
+    shown, flat = _over_70_m(line.beside, switch) if line.beside is not None else (own, own)
+    flat &= refined.seen.shape.width_m < WIDEST_M
+    half = np.minimum(np.arange(len(own)) * 2, len(line.sure) - 1)
+    reason = np.full(len(own), SEEN)
     for code, holds in (
         (UNSURE, (line.sure[half] < SURE) | (line.course.margin[half] < MARGIN)),
-        (ASIDE, np.abs(refined.beside) > ASIDE_M),
+        (ASIDE, np.abs(refined.curve.beside) > np.maximum(ASIDE_M, ASIDE_SIGMAS * sections.sigma)),
         (MISLED, ~flat),
-        (HIDDEN, ~enough | _off_level(refined)),
-        (SPARSE, most < LEAST_EXPECTED),
-        (EMPTY, refined.sections.points <= FEW_POINTS),
+        (HIDDEN, ~own | ~shown | _off_level(refined)),
+        (EMPTY, sections.points <= FEW_POINTS),
     ):
         reason[holds] = code
     return reason
+
+
+def _over_70_m(beside: Beside, switch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return where two rails show, and where they lie on a flat bed that no other place excludes, (n,) bool each.
+
+    Of the 70 m before, around and behind a station, the best count: beside a train, those on its other side.
+    """
+    gain, flaw, most = beside.on
+    least = np.maximum(LONG_GAIN, LONG_SHARE * most)
+    score = gain - flaw
+    around = np.arange(len(gain)) + np.array([[-(LONG // 2)], [0], [LONG // 2]])
+    around = np.clip(around, 0, len(gain) - 1)
+    best = np.take_along_axis(around, score[around].argmax(axis=0)[None], axis=0)[0]
+    flat = (score > least) & (beside.rival < RIVAL_SHARE * score)
+    alone = beside.repeated < REPEATED_SHARE * score
+    return (gain > least)[best], flat[best] & (alone[best] | switch)
 
 
 JUMP_M = 1.0
@@ -270,7 +291,7 @@ there, a bridge crosses above, or the ground shows through an open one."""
 
 def _off_level(refined: Refined) -> np.ndarray:
     """Return which stations lie on another level than most of the line, (n,) bool."""
-    step = np.diff(refined.sections.found.level + refined.corridor.level_at(refined.t), prepend=np.nan)
+    step = np.diff(refined.seen.sections.found.level + refined.seen.corridor.level_at(refined.t), prepend=np.nan)
     step = np.nan_to_num(step - np.nanmedian(step)) if len(step) > 1 else np.zeros(len(step))
     level = np.cumsum(np.where(np.abs(step) > JUMP_M, step, 0.0))
     return np.abs(level - np.median(level)) > JUMP_M
@@ -278,12 +299,6 @@ def _off_level(refined: Refined) -> np.ndarray:
 
 VERTEX_M = 0.1
 """Distance between the vertices of a line from which distances are measured."""
-
-
-def _long(values: np.ndarray, best: Callable[..., np.ndarray]) -> np.ndarray:
-    """Return the best median over `LONG` sections of which each is one: beside a train, those on its other side."""
-    shifts = (-(LONG // 2), 0, LONG // 2)
-    return best([median_filter(values, LONG, mode="nearest", origin=shift) for shift in shifts], axis=0)
 
 
 REACH_M = 0.24
@@ -313,7 +328,7 @@ def _dense(xy: np.ndarray) -> np.ndarray:
 
 
 OTHER_SHARE, OTHER_GAIN, CLAIMED_M = 0.5, 10.0, 1.2
-"""A place beside a track looks like another one with this share of its score and this gain over 50 m; it has a guide if
+"""A place beside a track looks like another one with this share of its score and this gain over 70 m; it has a guide if
 a line passes this close."""
 
 
@@ -323,13 +338,14 @@ def _unclaimed(number: int, lines: dict[int, _Line], places: dict[int, np.ndarra
     if line.beside is None:
         return np.empty((0, 2))
     known = cKDTree(np.concatenate([_dense(xy) for xy in places.values()]))
+    gain, flaw, _ = line.beside.on
     found = []
-    for section, (score, own) in enumerate(zip(line.beside.score, line.beside.own)):
-        t = float(line.refined.axis.t[0]) + (section + 0.5) * LENGTH_M
+    for section in range(min(LONG // 2, len(gain) - 1), len(gain), LONG):
+        t, own, score = float(line.refined.t[section]), gain[section] - flaw[section], line.beside.score[section]
         for side in (-1, 1):
             there = np.where(side * line.beside.across > GUIDES_APART_M, score, -np.inf)
             best = int(there.argmax())
-            place, normal = line.refined.axis.at(np.array([t]))
+            place, normal = line.refined.line.at(np.array([t]))
             free = known.query(place + line.beside.across[best] * normal)[0][0] > CLAIMED_M
             if own > OTHER_GAIN and there[best] > max(OTHER_GAIN, OTHER_SHARE * own) and free:
                 found.append((t, float(line.beside.across[best])))

@@ -22,6 +22,9 @@ OWN_M = 0.5
 OWN_LENGTH_M, SMOOTHED_SECTIONS = 50.0, 7
 """Length over which this error is a new one, and the sections over which the joint course is averaged."""
 
+MOST_TOGETHER = 8
+"""Tracks whose curves are drawn together: the run time grows with the third power of their number."""
+
 LEAST = -6.0
 """Score of places outside of the neighbour's reach."""
 
@@ -47,6 +50,19 @@ def courses(axes: Sequence[Axis], found: Sequence[Evidence]) -> tuple[list[Cours
     return joined, together
 
 
+def groups(axes: Sequence[Axis]) -> list[list[int]]:
+    """Return the numbers of the guides whose curves are drawn together: parallel ones, `MOST_TOGETHER` at most."""
+    found: list[list[int]] = []
+    for number, axis in enumerate(axes):
+        for group in found:
+            if len(group) < MOST_TOGETHER and any(parallel(axis.xy, axis.normal, axes[one])[0].any() for one in group):
+                group.append(number)
+                break
+        else:
+            found.append([number])
+    return found
+
+
 def _support(number: int, axes: Sequence[Axis], found: Sequence[Evidence]) -> np.ndarray:
     """Return what the neighbours of a guide say about places beside it, (sections, c)."""
     own, sections = axes[number], len(found[number].score)
@@ -55,16 +71,31 @@ def _support(number: int, axes: Sequence[Axis], found: Sequence[Evidence]) -> np
     for other, evidence in enumerate(found):
         if other == number:
             continue
-        distance, nearest = cKDTree(axes[other].xy).query(place, distance_upper_bound=FAR_M)
-        near = np.isfinite(distance)
-        nearest = np.where(near, nearest, 0)
-        cosine = (normal * axes[other].normal[nearest]).sum(axis=1)
-        near &= (np.abs(cosine) > PARALLEL) & (distance > NEAR_M)
-        section = ((axes[other].t[nearest] - axes[other].t[0]) / SECTION_M).astype(np.int64)
+        near, t, opposite = parallel(place, normal, axes[other])
+        section = ((t - axes[other].t[0]) / SECTION_M).astype(np.int64)
         score = evidence.best[np.clip(section, 0, len(evidence.score) - 1)]
-        score = np.where((cosine < 0)[:, None], score[:, ::-1], score)
+        score = np.where(opposite[:, None], score[:, ::-1], score)
         support += np.where(near[:, None], _blurred(score), 0.0)
     return support
+
+
+def parallel(place: np.ndarray, normal: np.ndarray, other: Axis) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return beside which places, (n, 2), with unit vectors to the left, (n, 2), another line is parallel.
+
+    Returns
+    -------
+    parallel : (n,) bool array
+    t : (n,) array
+        Chainage of the other line there.
+    opposite : (n,) bool array
+        Whether it runs the other way.
+    """
+    distance, nearest = cKDTree(other.xy).query(place, distance_upper_bound=FAR_M)
+    near = np.isfinite(distance)
+    nearest = np.where(near, nearest, 0)
+    cosine = (normal * other.normal[nearest]).sum(axis=1)
+    near &= (np.abs(cosine) > PARALLEL) & (distance > NEAR_M)
+    return near, other.t[nearest], cosine < 0
 
 
 def _blurred(score: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,15 +14,15 @@ from ..clouds.points import Request
 from ..disk import writing
 from ..errors import NoRailPointsError, ParameterError
 from ..frame import LocalFrame
-from ..parameters import AirborneParameters
 from ..polyline import left_normals, length_along, resample, runs
-from ..progress import SILENT, Progress, counted
+from ..progress import counted
 from ..squares.grid import Key, points_by_square
-from ..tasks import READ_S, Context, Runner, Task, in_listed_order
+from ..tasks import READ_S, Context, Task, in_listed_order
 from .chaining import MIN_LENGTH_M, chains
 from .files import survey_files
 from .remarks import WIDE_FOOTPRINT_M, refuse_mobile
 from .ridges import Shape
+from .run import Run
 from .search import TILE_M, Finds, search
 from .spooling import density_of
 from .survey import AirborneTrack, Guide, Survey
@@ -93,21 +94,8 @@ class Proposals:
         )
 
 
-def propose_guides(
-    request: Request, parameters: AirborneParameters, folder: Path, runner: Runner, progress: Progress = SILENT
-) -> Proposals:
+def propose_guides(run: Run) -> Proposals:
     """Search a cloud for tracks.
-
-    Parameters
-    ----------
-    request : Request
-        Files, classes and extent.
-    parameters : AirborneParameters
-    folder : Path
-        Existing folder for the points, 12 bytes each and a quarter more near borders; the caller removes it.
-    runner : Runner
-        Executes one task per file and one per square.
-    progress : Progress
 
     Raises
     ------
@@ -120,27 +108,27 @@ def propose_guides(
     ParameterError
         The footprint is too wide.
     """
-    if parameters.footprint_m > WIDE_FOOTPRINT_M:
+    zero, footprint_m = run.request.zero, run.parameters.footprint_m
+    if footprint_m > WIDE_FOOTPRINT_M:
         raise ParameterError(
-            f"With a footprint of {parameters.footprint_m:g} m, tracks can't be told from roads: draw guides, or take "
+            f"With a footprint of {footprint_m:g} m, tracks can't be told from roads: draw guides, or take "
             f"them from OpenStreetMap. The search takes up to {WIDE_FOOTPRINT_M:g} m."
         )
-    reading, searching, fitting = progress.divide((1.0, 4.0, 1.0))
-    progress.status("Reading the points")
-    counts = _sorted(request, folder, runner, reading)
-    progress.status("Searching for tracks")
-    finds, density = _found(counts, parameters, folder, runner, searching)
+    reading, searching, *fitting = run.progress.divide((2.0, 8.0, 1.0, 1.0))
+    run.progress.status("Reading the points")
+    counts = _sorted(replace(run, progress=reading))
+    run.progress.status("Searching for tracks")
+    finds, density = _found(replace(run, progress=searching), counts)
     refuse_mobile(density)
-    lines = list(chains(finds))
-    if not lines:
-        return Proposals((), request.zero, density)
-    flat = [np.column_stack([line, np.zeros(len(line))]) for line in lines]
-    guides = [Guide(number, request.zero.to_crs(line)[:, :2]) for number, line in enumerate(flat, start=1)]
-    near, shares = replace(parameters, reach_m=REACH_M), fitting.split(2)
-    survey = survey_files(request, guides, near, folder / "first", runner, shares[0])
+    flat = [np.column_stack([line, np.zeros(len(line))]) for line in chains(finds)]
+    if not flat:
+        return Proposals((), zero, density)
+    near = replace(run, parameters=replace(run.parameters, reach_m=REACH_M))
+    guides = [Guide(number, zero.to_crs(line)[:, :2]) for number, line in enumerate(flat, start=1)]
+    survey = survey_files(replace(near, folder=run.folder / "first", progress=fitting[0]), guides)
     guides = list(_with_neighbours(survey))
     if guides:
-        survey = survey_files(request, guides, near, folder / "second", runner, shares[1])
+        survey = survey_files(replace(near, folder=run.folder / "second", progress=fitting[1]), guides)
     return Proposals(tuple(_distinct(survey)), survey.frame, density)
 
 
@@ -170,23 +158,23 @@ def _is_new(xy: np.ndarray, known: list[np.ndarray]) -> bool:
     return bool(np.median(cKDTree(np.concatenate(known)).query(xy)[0]) > APART_M)
 
 
-def _sorted(request: Request, folder: Path, runner: Runner, progress: Progress) -> dict[Key, int]:
+def _sorted(run: Run) -> dict[Key, int]:
     """Sort the points of all files into squares on disk, and return the number of points in each."""
+    request, folder = run.request, run.folder
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     tasks = {
         number: Task(header.path.name, sort_file, (request, number, folder), weight=READ_S * (header.point_count + 1))
         for number, header in enumerate(request.headers)
     }
-    counts: dict[Key, int] = {}
-    for _, one in runner.run(tasks, progress):
-        for key, count in one.items():
-            counts[key] = counts.get(key, 0) + count
+    counts: Counter[Key] = Counter()
+    for _, one in run.runner.run(tasks, run.progress):
+        counts.update(one)
     if not counts:
         raise NoRailPointsError(
             f"The {request.where} has no points of class {', '.join(map(str, request.class_codes))}: set the classes."
         )
-    return counts
+    return dict(counts)
 
 
 def sort_file(request: Request, number: int, folder: Path, context: Context) -> dict[Key, int]:
@@ -206,17 +194,15 @@ def _file(folder: Path, key: Key, number: int) -> Path:
     return folder / f"{key[0]}_{key[1]}_{number}"
 
 
-def _found(
-    counts: Mapping[Key, int], parameters: AirborneParameters, folder: Path, runner: Runner, progress: Progress
-) -> tuple[Finds, float]:
+def _found(run: Run, counts: Mapping[Key, int]) -> tuple[Finds, float]:
     """Search all squares, and return their finds and the median density."""
-    shape = Shape.expected(parameters.spacing_of(), parameters.footprint_m)
+    shape = Shape.expected(run.parameters.spacing_of(), run.parameters.footprint_m)
     tasks = {
-        key: Task(f"The square {key}", search_square, (folder, key, shape), weight=SEARCH_S * counts[key])
+        key: Task(f"The square {key}", search_square, (run.folder, key, shape), weight=SEARCH_S * counts[key])
         for key in sorted(counts)
     }
     rows, densities = [], []
-    for found, density in in_listed_order(tasks, runner.run(tasks, progress)):
+    for found, density in in_listed_order(tasks, run.runner.run(tasks, run.progress)):
         rows += found
         densities.append(density)
     return Finds.joined(rows), float(np.median(densities))

@@ -11,10 +11,10 @@ import numpy as np
 from ..clouds.points import Request
 from ..clouds.readers import Extent, read_classes
 from ..disk import writing
-from ..progress import Progress
-from ..tasks import READ_S, Context, Runner, Task
+from ..tasks import READ_S, Context, Task
 from .beside import WIDE_M
 from .ridges import HALF_M
+from .run import Run
 from .squares import Key, Piece, areas_along, cells_around, in_cells, numbers_of
 
 POINT = np.dtype([("xyz", "<f8", 3), ("mark", "<u4")])
@@ -24,28 +24,10 @@ PLACE_M = 2.0
 """Side of the squares in which the density is counted."""
 
 
-def spool(
-    request: Request,
-    squares: Mapping[Key, tuple[Piece, ...]],
-    reach_m: float,
-    folder: Path,
-    runner: Runner,
-    progress: Progress,
-) -> dict[Key, int]:
-    """Sort the points around the guides into squares on disk, and return the number in each.
-
-    Parameters
-    ----------
-    request : Request
-    squares : mapping of Key to tuple of Piece
-    reach_m : float
-        Largest distance of a track from its guide.
-    folder : Path
-    runner : Runner
-        Executes one task per file.
-    progress : Progress
-    """
-    wide_m = reach_m + WIDE_M + HALF_M
+def spool(run: Run, squares: Mapping[Key, tuple[Piece, ...]]) -> dict[Key, int]:
+    """Sort the points around the guides into squares on disk, and return the number in each."""
+    request, folder = run.request, run.folder
+    wide_m = run.parameters.reach_m + WIDE_M + HALF_M
     areas = {key: areas_along(pieces, wide_m) / request.zero.horizontal_unit_m for key, pieces in squares.items()}
     around = {key: cells_around([piece.axis for piece in pieces], wide_m) for key, pieces in squares.items()}
     with writing(folder):
@@ -58,7 +40,7 @@ def spool(
             weight = READ_S * (header.point_count + 1)
             tasks[number] = Task(header.path.name, spool_file, (*arguments, folder), weight=weight)
     counts: Counter[Key] = Counter()
-    for _, one in runner.run(tasks, progress):
+    for _, one in run.runner.run(tasks, run.progress):
         counts.update(one)
     return dict(counts)
 

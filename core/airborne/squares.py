@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .axis import Axis
-from .refinement import STATION_M
+from .sections import STATION_M
 
 SIDE_M = 1000.0
 """Side of the squares: with 40 points per square metre and four tracks, one needs 0.3 GB."""

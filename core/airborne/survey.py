@@ -12,7 +12,7 @@ from ..frame import LocalFrame
 from ..polyline import length_along
 from ..standards import GAUGE_RANGE_MM
 from .fitting import BED_SIGMA_M, REASONS, SEEN, Stations
-from .refinement import STATION_M
+from .sections import STATION_M
 
 MAX_UNSEEN_M, LEAST_STATIONS = 30.0, 3
 """A line ends where its track is not seen for longer, and is none with fewer stations that are."""

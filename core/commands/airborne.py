@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..airborne.files import survey_files
 from ..airborne.proposals import Proposals, propose_guides
+from ..airborne.run import Run
 from ..airborne.survey import Guide, Survey
 from ..clouds.points import Request, ask
 from ..disk import Destination, writing
@@ -93,11 +94,11 @@ def run(args: argparse.Namespace) -> None:
     request = limited(ask(args.tiles, codes, args.crs, extent_of(args.extent), progress), args)
     parent = next(iter(outputs.values())).file.parent
     with writing(parent), scratch_folder(parent) as folder, runner_of(args) as runner:
+        job = Run(request, parameters, folder / "points", runner, progress)
         if args.guide is None:
-            found = propose_guides(request, parameters, folder / "points", runner, progress)
+            found = propose_guides(job)
         else:
-            guides = _guides(args.guide, request)
-            survey = survey_files(request, guides, parameters, folder / "points", runner, progress)
+            survey = survey_files(job, _guides(args.guide, request))
     if args.guide is None:
         _write_proposed(found, outputs["proposed"])
         print(found.summary)

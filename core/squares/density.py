@@ -11,9 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..clouds.points import RailPoints
+from ..clouds.points import AIRBORNE, RailPoints
 from ..errors import CloudError
-from ..polyline import project, runs
+from ..polyline import length_along, project, runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine
 from .grid import PointSource, Square, around, lay_out
@@ -49,6 +49,10 @@ points that gives no warning. In clouds with weeds and stones it is nine of ten.
 
 MAX_SAMPLE = 50_000
 """Most points of a square of which this share is computed: it is exact to 1 % then."""
+
+AIRBORNE_SPACING_M, AIRBORNE_PER_METRE = 1.0, 12.0
+"""Distance of points on rails below which a thin class may be that of an airborne cloud, and points per metre of rail
+below which rails that were drawn are those of one: 40 points per square metre give nine."""
 
 _ROW = 1 << 32
 """Distance between the numbers of two rows of cells."""
@@ -110,6 +114,17 @@ def warn_of_unexplained(source: PointSource, rails: Sequence[RailLine], progress
         )
 
 
+def warn_of_airborne(source: PointSource, rails: Sequence[RailLine], progress: Progress = SILENT) -> None:
+    """Warn the user if rails were drawn from as few points as airborne clouds have on them; parameters as above."""
+    length_m = sum(float(length_along(rail.xyz[:, :2])[-1]) for rail in rails)
+    per_metre = sum(source.counts.values()) / length_m
+    if per_metre < AIRBORNE_PER_METRE:
+        progress.warning(
+            f"The rails have {per_metre:.1f} points per metre, as in airborne clouds, which show no single railheads: "
+            f"use {AIRBORNE}, which is more accurate there."
+        )
+
+
 def fullest_square(source: PointSource) -> RailPoints:
     """Return the points of the square of a class that has the most."""
     return source.near(_fullest(source)[0], 0.0)
@@ -148,9 +163,11 @@ def _why_thin(source: PointSource) -> str | None:
         return None
     places = np.concatenate([(xyz + square.frame.shift_to(source.frame))[:, :2] for square, xyz in parts])
     spacing_m = float(np.median(cKDTree(places).query(places, 2)[0][:, 1]))
+    airborne = f" For an airborne cloud, use {AIRBORNE}." if spacing_m < AIRBORNE_SPACING_M else ""
     return (
         f"The points of class {source.class_code} are {spacing_m:.2g} m apart over {source.span_m:.0f} m, too far for "
         "rails: if the coordinates are in centimetres or millimetres, assign a coordinate system that says so."
+        f"{airborne}"
     )
 
 

@@ -99,13 +99,14 @@ class AirborneCenterlines(RailAlgorithm):
         """Fit the tracks, or propose guides where there are none, then write the outputs."""
         from ...core.airborne.files import survey_files
         from ...core.airborne.proposals import propose_guides
+        from ...core.airborne.run import Run
 
         progress = Estimating(progress)
         values = ParameterValues(self, parameters, context)
         request = request_points(job.cloud, job.class_codes, values.extent, progress)
         with values.runner() as runner, points_folder() as folder:
-            rest = (job.parameters, folder / "points", runner, progress)
-            found: Any = survey_files(request, job.guides, *rest) if job.guides else propose_guides(request, *rest)
+            run = Run(request, job.parameters, folder / "points", runner, progress)
+            found: Any = survey_files(run, job.guides) if job.guides else propose_guides(run)
         progress.check()
         self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, found.frame)
         write = self._write_survey if job.guides else self._write_proposals

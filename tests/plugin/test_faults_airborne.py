@@ -93,6 +93,15 @@ FAULTS = [
         run="extractrails",
     ),
     Fault(
+        "airborne cloud with classified rails in Extract Rails",
+        lambda bench: {"INPUT": cloud(bench, density=2, width_m=30.0, class_code=10)},
+        REFUSED,
+        "The points of class 10 are … m apart over … m, too far for rails: if the coordinates are in centimetres or "
+        "millimetres, assign a coordinate system that says so. For an airborne cloud, use Track Centerlines from "
+        "Airborne Lidar.",
+        run="extractrails",
+    ),
+    Fault(
         "raw airborne cloud in Extract Rails",
         lambda bench: {"INPUT": cloud(bench, width_m=30.0), "CLASSIFY": True},
         REFUSED,

@@ -8,6 +8,7 @@ import pytest
 from rail_extract.core.airborne import squares
 from rail_extract.core.airborne.files import survey_files
 from rail_extract.core.airborne.remarks import FLIGHT
+from rail_extract.core.airborne.run import Run
 from rail_extract.core.airborne.survey import Guide
 from rail_extract.core.clouds.points import ask
 from rail_extract.core.clouds.vpc import CatalogueTile, catalogue_text
@@ -42,7 +43,7 @@ def guides(flown, move=(0.0, 0.0)):
 
 
 def survey(paths, given, folder, parameters=PARAMETERS, codes=(1, 2), progress=None):
-    return survey_files(ask(paths, codes), given, parameters, folder / "points", InTurn(), progress or Log())
+    return survey_files(Run(ask(paths, codes), parameters, folder / "points", InTurn(), progress or Log()), given)
 
 
 @pytest.fixture(scope="module")

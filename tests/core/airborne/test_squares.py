@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.airborne.axis import axis_of_guide
-from rail_extract.core.airborne.refinement import STATION_M
+from rail_extract.core.airborne.sections import STATION_M
 from rail_extract.core.airborne.squares import (
     MARGIN_M,
     SIDE_M,

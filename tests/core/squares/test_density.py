@@ -12,6 +12,7 @@ from rail_extract.core.squares.density import (
     WINDOW_M,
     occupied_squares,
     plausible,
+    warn_of_airborne,
     warn_of_unexplained,
 )
 from rail_extract.core.squares.grid import MemorySource, lay_out
@@ -129,3 +130,16 @@ def test_points_far_from_all_rails_give_a_warning(others, said, length_m):
     listener = Listener()
     warn_of_unexplained(one, [straight(7.1, length_m)], listener)
     assert [text[5:9] for text in listener.warnings] == [said] * bool(said)
+
+
+@pytest.mark.parametrize(("per_metre", "said"), [(3, "have 3.0 points per metre"), (9, "have 9.0 points"), (20, "")])
+def test_rails_of_an_airborne_cloud_give_a_warning(per_metre, said):
+    listener = Listener()
+    warn_of_airborne(source(rail(per_metre=per_metre)), [straight(7.0)], listener)
+    assert len(listener.warnings) == bool(said)
+    assert all(said in text and "use Track Centerlines from Airborne Lidar" in text for text in listener.warnings)
+
+
+def test_points_as_thin_as_those_of_an_airborne_cloud_are_refused_with_its_algorithm():
+    with pytest.raises(CloudError, match=r"too far for rails: .* For an airborne cloud, use Track Centerlines"):
+        plausible([source(rail(per_metre=2, length_m=400.0))])
