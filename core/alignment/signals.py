@@ -24,6 +24,9 @@ LIKELY = 2.0
 """Standard errors by which the last partition has to show misalignment: to miss it is worse than to see some where
 there is none, because the search then bends a track with it."""
 
+SMOOTHED_M = 12.0
+"""Distance over which the errors of a smoothed line hang together, metres: about that of the rails of Extract rails."""
+
 FLOOR_M = 0.00005
 """Least standard deviation of a point, metres: below it, coordinates are rounded."""
 
@@ -50,14 +53,23 @@ class Kind:
         Of the polynomials in the first partition.
     ramps : bool
         Whether the bend may change linearly.
+    least_m : float
+        Least standard deviation of the errors, metres.
     """
 
     order: int
     degrees: tuple[int, ...]
     ramps: bool
+    least_m: float = 0.0
 
 
-PLAN, HEIGHT, CANT = Kind(2, (1, 2, 3), True), Kind(2, (1, 2), False), Kind(1, (0, 1), False)
+LEAST_ERROR_M = 0.0005
+"""Least standard deviation of a line across and in height, metres: no survey of a track is better. Where single points
+scatter by less, the line was smoothed, and what their errors lack is shared by neighbours: the bends of a smooth error
+would be taken for elements."""
+
+PLAN, HEIGHT = Kind(2, (1, 2, 3), True, LEAST_ERROR_M), Kind(2, (1, 2), False, LEAST_ERROR_M)
+CANT = Kind(1, (0, 1), False)
 
 
 @dataclass(frozen=True)
@@ -120,9 +132,18 @@ def noise_of(signal: Signal, tolerance_m: float, progress: Progress = SILENT) ->
             break
         sigma = max(left, RAISED * sigma) if is_short else left
     if estimated(rests, signal.step_m, FLOOR_M, LIKELY).shared_m:
-        return noise, pieces
+        return _at_least(noise, signal.kind.least_m), pieces
     rests, pieces = tried[0]
-    return estimated(rests, signal.step_m, FLOOR_M, np.inf), pieces
+    return _at_least(estimated(rests, signal.step_m, FLOOR_M, np.inf), signal.kind.least_m), pieces
+
+
+def _at_least(noise: Noise, least_m: float) -> Noise:
+    """Return a noise whose standard deviation is at least `least_m`; neighbours share what is added."""
+    lack = least_m**2 - noise.white_m**2 - noise.shared_m**2
+    if lack <= 0.0:
+        return noise
+    length_m = SMOOTHED_M if lack > noise.shared_m**2 else noise.length_m
+    return Noise(noise.white_m, math.sqrt(noise.shared_m**2 + lack), length_m)
 
 
 def _residuals(pieces: list[Piece], s: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, int]]:

@@ -94,6 +94,17 @@ def test_the_reversed_track_gives_the_mirrored_elements():
     np.testing.assert_allclose([x.k_from for x in one.plan], [-x.k_to for x in other.plan[::-1]], atol=2e-7)
 
 
+@pytest.mark.parametrize("seed", [0, 3])
+def test_errors_of_a_smoothed_line_are_not_taken_for_elements(seed):
+    shapes = [(20.0, 0, 0), (90.0, 0, -1 / 1200), (60.0, -1 / 1200, -1 / 1200), (90.0, -1 / 1200, 0), (20.0, 0, 0)]
+    one = replace(design(shapes), vertical=(VerticalElement(0, 280, 50, 0.001, 0.001),))
+    smooth = surveyed(one, np.random.default_rng(seed), 0.00003, 0.0006, 12.0)[::3]
+    found = fit(Track(1, smooth, NONE, np.zeros(len(smooth), dtype=bool))).alignment
+    assert [x.type for x in found.plan] == ["line", "clothoid", "arc", "clothoid", "line"]
+    assert 1 / found.plan[2].k_from == pytest.approx(-1200, rel=0.005)
+    assert len(found.vertical) == 1
+
+
 def test_a_straight_stays_one_element():
     straight = Alignment(1, FRAME, chained((0.0, 0.0), 1.0, [(400.0, 0, 0)]), (VerticalElement(0, 400, 0, 0, 0),))
     counts = [len(fit(track(straight, seed, white_m=0.004)).alignment.plan) for seed in range(10)]
