@@ -102,8 +102,8 @@ class Parameters:
     crown_radius_m: float = 20.0
     max_gap_m: float = 5.0
     gap_angle_deg: float = 10.0
-    simplify_xy_m: float = 0.002
-    simplify_z_m: float = 0.002
+    simplify_xy_m: float = 0.001
+    simplify_z_m: float = 0.0005
     min_length_m: float = 1.0
     other_gauges_m: tuple[float, ...] = ()
     other_heads_m: tuple[float, ...] = ()

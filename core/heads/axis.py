@@ -14,11 +14,11 @@ from scipy.ndimage import maximum_filter1d
 from ..polyline import interpolate, left_normals, length_along
 from ..rails import Support
 from .blunt import WINDOW, Ridge, wander
-from .edges import STATION_STEP_M, VIEW_STATIONS, find_middles, histograms, stations_along
+from .edges import EDGE_SIGMA_M, STATION_STEP_M, find_middles, histograms, stations_along
 from .flank import FLANK_TOP_SIGMA_M, Flank, find_flank
 from .level import MIN_ON_HEAD, on_top, robust_sigma
 from .roads import MIN_WIDER_M, bands, hidden_edges
-from .sections import PROFILE_SIGMA_M, Middles, outline_middles, with_outline
+from .sections import SECTION_STATIONS, Middles, outline_middles, with_outline
 from .smoother import AMPLITUDES, STILL, Spline, bridge_error, smooth
 
 UNSHOWN_M = 0.3
@@ -58,7 +58,7 @@ class Shown:
         Offset of the axis to the left of the line, and the inverse of its variance by chance, 1/m²; 0 where these
         points show nothing.
     common_m : float
-        Standard error that more points would not reduce.
+        Standard error that more points would not reduce; along an `Axis`, what its course follows of it.
     blur_m, blur_up_m : float
         See `sections.Middles`.
     """
@@ -136,7 +136,7 @@ class Axis:
         offset_m, bent = np.where(known, shown.offset_m, 0.0), line if known.any() else None
         amplitudes = STILL if ridge else AMPLITUDES
         course = smooth(shown.t, offset_m, information, 0.0, along[-1], bent, amplitudes)
-        common_m = np.interp(shown.t, shown.t[known], shown.common_m[known]) if known.any() else shown.common_m
+        common_m = course.followed(shown.t, np.where(known, shown.common_m, 0.0), information)
         return cls(course, replace(shown, common_m=common_m), flank, ridge)
 
     def support(self, marked: bool) -> Support:
@@ -210,20 +210,22 @@ def _of_head(
     head = top & (np.abs(across) <= 0.5 * head_width_m)
     on_head, mean_m = _means(t[head], across[head], len(stations))
     found = find_middles(counts, wide_counts, points, free, head_width_m, noise_m)
-    seen = np.isfinite(found.offset_m) & _is_shown(on_head)
+    shown, either_end_m = _is_shown(on_head), _either_end(wide_counts, head_width_m)
+    by_edges = np.isfinite(found.offset_m)
+    seen, one_head = by_edges & shown, (by_edges | (either_end_m == 0)) & free.all(axis=0)
     outline = Middles.unknown(len(stations))
     if by_outline:
-        outline = outline_middles(t, across, z, length_m, head_width_m, seen & free.all(axis=0))
+        outline = outline_middles(t, across, z, length_m, head_width_m, shown & one_head)
     outlined = np.isfinite(outline.offset)
     which = [outlined, seen, on_head > 0]
-    unsure_m = np.hypot(unseen_m, _either_end(wide_counts, head_width_m))
+    unsure_m = np.hypot(unseen_m, either_end_m)
     by_mean = np.full(len(stations), STATION_STEP_M / unseen_m**2)
     return Shown(
         stations,
         points,
         np.select(which, [outline.offset, with_outline(found.offset_m, outline), mean_m]),
         np.select(which, [outline.information, found.information, by_mean]),
-        np.select(which, [outline.common, np.hypot(found.view_m, PROFILE_SIGMA_M), unsure_m]),
+        np.select(which, [outline.common, np.full(len(stations), EDGE_SIGMA_M), unsure_m]),
         outline.blur,
         outline.blur_up,
     )
@@ -253,6 +255,6 @@ def _with_blur(support: Support, blur_m: np.ndarray, blur_up_m: np.ndarray) -> S
     largest_m = np.maximum(blur_m, blur_up_m)
     if not largest_m.any():
         return support
-    across_m, up_m = (maximum_filter1d(one, 2 * VIEW_STATIONS + 1) for one in (blur_m, blur_up_m))
+    across_m, up_m = (maximum_filter1d(one, 2 * SECTION_STATIONS + 1) for one in (blur_m, blur_up_m))
     strips = np.column_stack([np.ones(len(blur_m)), np.where(largest_m > 0, 2 * largest_m, np.nan), across_m])
     return replace(support, sigma_m=np.hypot(support.sigma_m, across_m), strips=strips, sigmaz_m=up_m)

@@ -21,7 +21,7 @@ from ..rails import RailLine, Support
 from .axis import CELL_M, Axis, unseen_m
 from .blunt import SMOOTHING_M, wander
 from .edges import Widths, search_distance, stations_along, widest
-from .level import crown_fall, rough_level
+from .level import fit_crown, rough_level
 from .neighbours import free_edges
 from .own_level import on_own_level
 from .smoother import KNOT_M
@@ -173,7 +173,8 @@ def _measured(
     along = length_along(line)
     axis = Axis.of(line, feet.t, feet.across, z, parameters.head_width_m, edges, unseen_m(parameters.cell_m))
     if axis.flank is None:
-        level_z = z + crown_fall(feet.t, feet.across, z, parameters.head_width_m)
+        crown = fit_crown(feet.t, feet.across, z, parameters.head_width_m)
+        level_z = z + crown.fall(feet.across)
         top = find_top(
             feet.t[head],
             feet.across[head],
@@ -185,6 +186,7 @@ def _measured(
         )
         if top is None:
             return None
+        top = replace(top, crown_m=crown.error(parameters.head_width_m))
     else:
         head = np.ones(len(z), dtype=bool)
         above_m = axis.flank.top_m - np.mean(z - rough_level(feet.t, z))

@@ -5,6 +5,8 @@ See docs/method.md section 6.1.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 
@@ -62,8 +64,36 @@ CROWN_HEADS, RIM_HEADS, SHOULDER_HEADS = 0.2, (0.3, 0.5), (0.55, 0.75)
 """Parts of the head width on either side of the axis: the crown, the rims, and what is beyond a head that is not
 blurred."""
 
+LEAST_INFORMATION = 1e-6
+"""Information about level, slope and fall of a crown that is always there, so that few points are enough."""
+
 SHOULDER_SHARE = 0.2
 """Points per width on either shoulder, as a share of those on the crown, from which a blurred head goes on there."""
+
+
+@dataclass(frozen=True)
+class Crown:
+    """How the top of a head falls beside its axis: in proportion to the square of the distance, up to the rims.
+
+    Attributes
+    ----------
+    bend, sigma : float
+        Fall per square of the distance, and its standard error, 1/m.
+    rim_m : float
+        Distance from the axis up to which the top falls.
+    """
+
+    bend: float
+    sigma: float
+    rim_m: float
+
+    def fall(self, across: np.ndarray) -> np.ndarray:
+        """Return how far points are lower than the axis of their head because they are beside it, (n,) metres."""
+        return self.bend * np.minimum(np.abs(across), self.rim_m) ** 2
+
+    def error(self, head_width_m: float) -> float:
+        """Return the standard error of the height on the axis, metres, from points up to `AXIS_SHARE` beside it."""
+        return self.sigma * (AXIS_SHARE * head_width_m) ** 2 / 3
 
 
 def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -141,11 +171,11 @@ def is_blended(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: f
     return False
 
 
-def crown_fall(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> np.ndarray:
-    """Return how far points are lower than the axis of their head because they are beside it, (n,) metres.
+def fit_crown(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> Crown:
+    """Fit a parabola to the crown of a head.
 
-    Narrow beams show the crown. Where beams blend the head and the ballast, the share of the ballast grows with the
-    distance from the axis: up to the rims the fall is a parabola, which is fitted.
+    New crowns have a radius, and worn ones are flatter. Where beams blend the head and the ballast, the share of the
+    ballast grows with the distance from the axis, and the fall may be of any size.
 
     Parameters
     ----------
@@ -153,17 +183,21 @@ def crown_fall(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: f
         Chainage (increasing), offset to the left and height of points near the line, metres.
     head_width_m : float
     """
-    rim_m = RIM_HEADS[0] * head_width_m
-    near, square = np.abs(across) <= rim_m, np.minimum(np.abs(across), rim_m) ** 2
-    if not is_blended(t, across, z, head_width_m):
-        return square / (2 * CROWN_RADIUS_M)
-    above, x = z[near] - rough_level(t[near], z[near]), square[near]
-    used, bend = np.ones(len(above), dtype=bool), 0.0
+    usual, rim_m = 0.5 / CROWN_RADIUS_M, RIM_HEADS[0] * head_width_m
+    near = np.abs(across) <= rim_m
+    if not near.any():
+        return Crown(usual, usual, rim_m)
+    expected = np.array([0.0, 0.0, 0.0 if is_blended(t, across, z, head_width_m) else usual**-2])
+    above, powers = z[near] - rough_level(t[near], z[near]), np.vander(across[near], 3, increasing=True)
+    used, off = np.ones(len(above), dtype=bool), above
     for _ in range(SLOPE_ROUNDS):
-        bend, level = np.polynomial.polynomial.polyfit(x[used], above[used], 1)[::-1]
-        off = above - level - bend * x
+        noise_m = robust_sigma(off[used])
+        information = powers[used].T @ powers[used] / noise_m**2 + np.diag(expected + LEAST_INFORMATION)
+        covariance = np.linalg.inv(information)
+        found = covariance @ (powers[used].T @ above[used] / noise_m**2 - expected * usual)
+        off = above - powers @ found
         used = np.abs(off) <= OFF_TOP_SIGMAS * robust_sigma(off)
-    return max(-bend, 0.0) * square
+    return Crown(max(-found[2], 0.0), float(np.sqrt(covariance[2, 2])), rim_m)
 
 
 def robust_sigma(values: np.ndarray) -> float:

@@ -13,9 +13,12 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..polyline import length_along, project
-from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, search_distance, station_count
+from .edges import ENOUGH_POINTS, STATION_STEP_M, search_distance, station_count
 from .level import in_head_frame
 from .outline import CROWN_RADIUS_M, MIN_NOISE_M, Grid, Outline, Scores, Section, fit_section, log_likelihood
+
+SECTION_STATIONS = 161
+"""Stations of a section, 40 m: a scanner on a train keeps its view over this length."""
 
 MIN_SECTION_POINTS = 250
 """Points that a section needs for its parts to be told apart."""
@@ -24,8 +27,9 @@ PULL_M, PULL_DOUBT = 0.028, 0.3
 """Distance by which the middles at the ends of a section are pulled, per change of the share of points on the left from
 one half to the other, and how well that is known: 22 to 36 mm, on branches seen from above first and at 40° then."""
 
-MIN_HALF_POINTS = 250
-"""Points in half a section that show its view: their share is known to 0.03, which pulls by a millimetre."""
+CHANGE_SIGMAS, MEDIAN_SIGMA = 1.0, 1.25
+"""Standard errors of a change of this share up to which chance explains it, and standard error of a median, relative to
+that of a mean."""
 
 MAX_CHANGE = 0.2
 """Change of this share from which it is not the view that changes: half of the head is in the shadow of something."""
@@ -90,9 +94,6 @@ BEYOND_RING, MAX_BEYOND = (0.53, 0.60), 0.2
 """Distances from the axis at which a flat head has no points, as shares of its width, and their most density there
 compared with that between the corners and the axis: passes 15 mm apart have half of it there."""
 
-PROFILE_SIGMA_M = 0.0003
-"""Standard error of the middle that comes from the outline itself: real heads chain more radii, and are worn."""
-
 
 @dataclass(frozen=True)
 class Middles:
@@ -137,7 +138,7 @@ def outline_middles(
         Length of the line.
     head_width_m : float
     seen : (s,) bool array
-        Where the head stands alone and its edges are visible.
+        Where the head stands alone.
     """
     count = station_count(length_m)
     middles = Middles.unknown(count)
@@ -148,7 +149,7 @@ def outline_middles(
     used = (bins >= 0) & seen[station]
     left, up, station, bins = left[used], up[used], station[used], bins[used]
     section: Section | None = None
-    for first, last in _borders(count):
+    for first, last in _borders(station, count):
         here = slice(*np.searchsorted(station, [first, last]))
         counts = np.bincount(bins[here], minlength=grid.size).astype(float)
         if counts.sum() < MIN_SECTION_POINTS:
@@ -162,22 +163,15 @@ def outline_middles(
         offset, middles.information[part], course = _by_station(
             section.place[0], scores.by_bin[bins[here]], station[here] - first, last - first
         )
-        pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
-        offset = np.where(seen[part], offset - pull, np.nan)
         is_crowned = _is_crowned(left[here], up[here], head_width_m)
+        pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
         is_sharp = np.exp(section.place[5]) < SHARP_NOISE_M
         if is_crowned or not (is_sharp and _is_flat(left[here] - section.place[0], up[here], head_width_m)):
-            middles.offset[part] = offset
-        middles.common[part] = np.hypot(np.hypot(scores.common_m, PROFILE_SIGMA_M), PULL_DOUBT * pull)
+            middles.offset[part] = np.where(seen[part], offset - pull, np.nan)
+        middles.common[part] = np.hypot(scores.common_m, PULL_DOUBT * pull)
         on_crown = np.abs(left[here] - section.place[0]) < FLAT_SHARE * head_width_m
         middles.blur_up[part] = apart_m = _half_apart(_above_crown(left[here], up[here], section.place)[on_crown])
-        middles.blur[part] = _blur(
-            section,
-            width_m - head_width_m,
-            course,
-            apart_m,
-            is_crowned,
-        )
+        middles.blur[part] = _blur(section, width_m - head_width_m, course, apart_m, is_crowned)
     return middles
 
 
@@ -297,19 +291,25 @@ def likelier_width(lines: Sequence[np.ndarray], xyz: np.ndarray, widths_m: Seque
     for number, line in enumerate(lines):
         own = feet.of(number)
         bins = grid.number(*in_head_frame(own.t, own.across, xyz[own.point, 2], widths_m[0]))
-        for first, last in _borders(station_count(float(length_along(line)[-1]))):
-            here = bins[slice(*np.searchsorted(own.t, [first * STATION_STEP_M, last * STATION_STEP_M]))]
-            counts = np.bincount(here[here >= 0], minlength=grid.size).astype(float)
+        station = own.t[bins >= 0] / STATION_STEP_M
+        for first, last in _borders(station, station_count(float(length_along(line)[-1]))):
+            here = bins[bins >= 0][slice(*np.searchsorted(station, [first, last]))]
+            counts = np.bincount(here, minlength=grid.size).astype(float)
             if counts.sum() >= MIN_SECTION_POINTS:
                 fits = [fit_section(counts, outline, grid) for outline in outlines]
                 likelihood += [log_likelihood(counts, fit, one, grid) for fit, one in zip(fits, outlines)]
     return widths_m[int(np.argmax(likelihood))]
 
 
-def _borders(count: int) -> list[tuple[int, int]]:
-    """Divide stations into sections of about VIEW_STATIONS."""
-    borders = np.linspace(0, count, max(int(round(count / VIEW_STATIONS)), 1) + 1).astype(int)
-    return list(zip(borders[:-1].tolist(), borders[1:].tolist()))
+def _borders(station: np.ndarray, count: int) -> list[tuple[int, int]]:
+    """Divide stations into sections of about SECTION_STATIONS, longer ones where points, at `station`, are few."""
+    ends = np.linspace(0, count, max(int(round(count / SECTION_STATIONS)), 1) + 1).astype(int)
+    borders, before = [0], np.searchsorted(station, ends)
+    for end, points in zip(ends[1:].tolist(), before[1:].tolist()):
+        if points - np.searchsorted(station, borders[-1]) >= MIN_SECTION_POINTS:
+            borders.append(end)
+    borders[max(len(borders) - 1, 1) :] = [count]
+    return list(zip(borders[:-1], borders[1:]))
 
 
 def _pull(station: np.ndarray, is_left: np.ndarray, count: int) -> np.ndarray:
@@ -326,12 +326,13 @@ def _pull(station: np.ndarray, is_left: np.ndarray, count: int) -> np.ndarray:
         Number of stations.
     """
     half = int(np.searchsorted(station, count // 2))
-    if min(half, len(station) - half) < MIN_HALF_POINTS:
+    if not 0 < half < len(station):
         return np.zeros(count)
     change = _share(station[half:], is_left[half:]) - _share(station[:half], is_left[:half])
-    if abs(change) > MAX_CHANGE:
+    chance = CHANGE_SIGMAS * MEDIAN_SIGMA * np.sqrt(0.25 / half + 0.25 / (len(station) - half))
+    if not chance < abs(change) <= MAX_CHANGE:
         return np.zeros(count)
-    return PULL_M * change * np.linspace(-1.0, 1.0, count)
+    return PULL_M * change * (1 - (chance / change) ** 2) * np.linspace(-1.0, 1.0, count)
 
 
 def _share(station: np.ndarray, is_left: np.ndarray) -> float:

@@ -40,9 +40,6 @@ BAND_SIGMAS = 3.0
 BAND_ROUNDS = 3
 """Rounds of smoothing and selection; a fourth moves the top by less than 0.1 mm."""
 
-TOP_SIGMA_M = 0.0002
-"""Standard error of the height that does not depend on the points: worn crowns are flatter than new ones."""
-
 UNSEEN_TURN = 1e-5
 """Change of the vertical curvature per metre that a rail may have where no point shows it, 1/m²: settled track has
 waves of 10 mm that are 60 m long."""
@@ -93,11 +90,14 @@ class Top:
         Points on it.
     slope : (n,) array
         Rise per metre to the left, at each point.
+    crown_m : float
+        Standard error of the height on the axis that all points share.
     """
 
     course: Course
     points: np.ndarray
     slope: np.ndarray
+    crown_m: float = 0.0
 
     def height_error(self, t: np.ndarray, support: Support) -> np.ndarray:
         """Return the standard error of the height at the stations of a support, (s,) metres.
@@ -111,7 +111,7 @@ class Top:
         """
         leaning = np.interp(support.t, t, self.slope[self.points]) * support.sigma_m
         bridge = bridge_error(t, support.t, UNSEEN_TURN)
-        return np.sqrt(self.course.sigma(support.t) ** 2 + TOP_SIGMA_M**2 + leaning**2 + bridge**2)
+        return np.sqrt(self.course.sigma(support.t) ** 2 + self.crown_m**2 + leaning**2 + bridge**2)
 
 
 def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None) -> Course:

@@ -1,6 +1,6 @@
 """Thin finished lines, the last step in making them (docs/method.md section 5.7).
 
-All chords between vertices of a curve are inside it, on average by 1 mm at a tolerance of 2 mm. The remaining vertices
+All chords between vertices of a curve are inside it, on average by half the tolerance. The remaining vertices
 are therefore moved so that the thinned line fits the whole one best.
 """
 

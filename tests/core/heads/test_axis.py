@@ -3,11 +3,11 @@ import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.axis import UNSHOWN_M, Axis, _with_blur
-from rail_extract.core.heads.edges import ALONE_SIGMA_M, VIEW_STATIONS, _information, station_count
+from rail_extract.core.heads.edges import EDGE_SIGMA_M, _information, station_count
 from rail_extract.core.heads.elevation import ElevationParameters, elevate
 from rail_extract.core.heads.flank import FLANK_SIGMA_M, FLANK_TOP_SIGMA_M
 from rail_extract.core.heads.refinement import refine
-from rail_extract.core.heads.sections import PROFILE_SIGMA_M
+from rail_extract.core.heads.sections import SECTION_STATIONS
 from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.polyline import interpolate, length_along, project
 from rail_extract.core.rails import Support
@@ -67,7 +67,7 @@ def test_errors_of_lines_are_as_large_as_stated(left_m, noise_m):
 
 
 def test_points_reduce_sigma():
-    few, many = (np.sqrt(support(*head(60, density)).rms_m ** 2 - PROFILE_SIGMA_M**2) for density in (100, 400))
+    few, many = (support(*head(60, density)).rms_m for density in (100, 400))
     assert 0.4 * few < many < 0.9 * few  # with more points, less of the rail shares one error
 
 
@@ -87,7 +87,7 @@ def test_sigma_grows_into_a_gap():
     t, across, z = head(60, 150)
     there = np.abs(t - 30) > 5
     sides, middle = axis(t[there], across[there], z[there]).course.sigma(np.array([23.0, 30.0]))
-    assert middle > 1.25 * sides
+    assert middle > 1.1 * sides
 
 
 def test_a_line_off_its_rail_has_a_large_sigma():
@@ -148,16 +148,16 @@ def test_a_middle_from_a_single_edge_errs_by_its_corner(side, seen_m):
     free = np.ones((2, station_count(12.0)), dtype=bool)
     free[side] = False
     alone = support(t, across + seen_m, z, 12.0, free)
-    assert np.median(alone.sigma_m) == pytest.approx(ALONE_SIGMA_M, abs=0.0001)
+    assert np.median(alone.sigma_m) == pytest.approx(EDGE_SIGMA_M, abs=0.0001)
 
 
 def test_blur_is_in_doubt_as_far_as_one_pass_may_go_on_alone():
-    count = 3 * VIEW_STATIONS
+    count = 3 * SECTION_STATIONS
     plain = Support(np.arange(count) * 0.25, np.full(count, 9), np.full(count, 0.003))
     blur, blur_up = np.zeros(count), np.zeros(count)
     blur[-1], blur_up[-1] = 0.004, 0.006
     found = _with_blur(plain, blur, blur_up)
-    near = np.arange(count) >= count - 1 - VIEW_STATIONS
+    near = np.arange(count) >= count - 1 - SECTION_STATIONS
     np.testing.assert_allclose(found.sigma_m, np.where(near, 0.005, 0.003))
     np.testing.assert_allclose(found.sigmaz_m, np.where(near, 0.006, 0.0))
     assert found.strips[-1].tolist() == [1.0, 0.012, 0.004] and np.isnan(found.strips[:-1, 1]).all()
@@ -166,9 +166,9 @@ def test_blur_is_in_doubt_as_far_as_one_pass_may_go_on_alone():
 
 def test_edges_err_by_chance_as_counts_do():
     """Of 1000 points per metre across, blurred by 3 and 4 mm; two edges err less by the root of 2."""
-    density, weight = np.full((2, 2), 1000.0), np.array([[1.0, 0.5], [0.0, 0.5]])
+    density, free = np.full((2, 2), 1000.0), np.array([[True, True], [False, True]])
     one_m = np.sqrt(np.sqrt(np.pi) * 0.005**2 / (2 * 0.003 * 1000))
-    np.testing.assert_allclose(_information(density, weight, 0.004, 0.003) ** -0.5, [one_m, one_m / np.sqrt(2)])
+    np.testing.assert_allclose(_information(density, free, 0.004, 0.003) ** -0.5, [one_m, one_m / np.sqrt(2)])
 
 
 @pytest.mark.parametrize("offset_m", [-0.012, 0.0, 0.009])
@@ -176,7 +176,7 @@ def test_points_that_all_have_one_offset_are_the_axis_but_in_doubt_by_a_cell(off
     t = np.sort(np.random.default_rng(1).uniform(0, 60, 3000))
     found = axis(t, np.full(len(t), offset_m), np.zeros(len(t)))
     np.testing.assert_allclose(found.course.at(np.arange(1.0, 60)), offset_m, atol=0.0005)
-    assert (found.support(marked=False).sigma_m >= UNSEEN).all()
+    assert (found.support(marked=False).sigma_m > 0.999 * UNSEEN).all()
 
 
 def test_a_line_without_points_stays_and_is_in_doubt():
@@ -197,7 +197,7 @@ def test_a_line_on_one_face_is_half_a_head_off_and_has_the_doubt_of_one_face(sid
     across = side * np.where(down < 0.014, 0.013 * np.sin(turn) - 0.013, 0.0)
     found = axis(t, across + random.normal(0, 0.002, len(t)), -down + random.normal(0, 0.002, len(t)))
     np.testing.assert_allclose(found.course.at(np.arange(2.0, 59)), -side * WIDTH / 2, atol=0.002)
-    np.testing.assert_allclose(found.shown.common_m, FLANK_SIGMA_M)
+    np.testing.assert_allclose(found.shown.common_m, FLANK_SIGMA_M, rtol=0.001)
     np.testing.assert_allclose(found.support(marked=False).heights_m, FLANK_TOP_SIGMA_M)
 
 

@@ -6,7 +6,6 @@ import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.elevation import ElevationParameters, elevate, find_gaps, flat_rails
-from rail_extract.core.heads.sections import PROFILE_SIGMA_M
 from rail_extract.core.lines.network import LineNetwork
 
 WIDTH = 0.072
@@ -191,7 +190,7 @@ def test_figures_of_support():
     assert rail.points == pytest.approx(10000, rel=0.15)
     assert rail.resid_mm == pytest.approx(1000 * WIDTH / np.sqrt(12), rel=0.05)
     (denser,) = elevate(network_of(straight_line(100)), cloud(head(100, 400, low_share=0.0)), PARAMETERS)
-    few_mm, many_mm = (np.sqrt(one.sigma_mm**2 - 1e6 * PROFILE_SIGMA_M**2) for one in (rail, denser))
+    few_mm, many_mm = rail.sigma_mm, denser.sigma_mm
     assert 0.4 * few_mm < many_mm < 0.9 * few_mm  # with more points, less of the rail shares one error
 
 
