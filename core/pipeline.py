@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from .checks.lines import warn_of_rails, warn_of_split_classes, with_tracks
-from .checks.standard import head_widths, warn_of_gauge
+from .checks.standard import head_widths, warn_of_gauge, warn_of_spacing
 from .checks.strips import doubting_jumps, strip_courses, warn_of_strips
 from .classify.settings import Settings
 from .clouds.las import CloudHeader
@@ -40,6 +40,9 @@ from .tracks.scatter import doubting_scatter, gauge_scatter
 
 READING, DRAWING, PAIRING, MEASURING = 0.2, 0.72, 0.04, 0.04
 """Run times of the steps relative to each other, for the progress: sorting files, squares, tracks, track geometry."""
+
+FINDING = 4.0
+"""Run time, relative to these, of finding the rail points of a raw cloud, which has 10 to 100 times as many points."""
 
 CLEAN_S, DRAW_S = 1.5e-5, 2.5e-5
 """Run times per point, in seconds, of the two tasks of a square: cleaning its raster with the network, and drawing its
@@ -140,7 +143,8 @@ def extract_files(
     """
     side_m = square_side(parameters)
     progress = recording = Recording(progress)
-    reading, rest = progress.divide((READING, DRAWING + PAIRING + MEASURING))
+    first = FINDING if classify or len(seeds) else READING
+    reading, rest = progress.divide((first, DRAWING + PAIRING + MEASURING))
     if classify or len(seeds):
         with scratch_folder(folder) as scratch:
             if classify:
@@ -155,8 +159,7 @@ def extract_files(
             network = replace(network, rails=tuple(rail for rail in network.rails if rail.track_ids))
         return replace(network, warnings=recording.warnings, search=figures)
     is_warned = warn_of_gauge(request, parameters, progress)
-    count = sum(header.point_count for header in request.headers)
-    progress.info(f"Reading {counted(len(request.headers), 'file')} with {counted(count, 'point')}.")
+    request.announce(progress)
     network = _walk(_sorted_points(request, side_m, folder, runner, reading), parameters, runner, rest, is_warned)
     return replace(network, warnings=recording.warnings)
 
@@ -207,6 +210,7 @@ def _walk(
     strips: list[np.ndarray] = []
     cleaned: dict[int, RailRaster] = {}
     any_square = False
+    progress.status("Drawing the rails")
     sources = plausible(sources, progress)
     for source, share in zip(sources, drawing.split(len(sources))):
         squares = {square.key: square for square in occupied_squares(sources, source)}
@@ -230,7 +234,8 @@ def _walk(
         centerlines = tracks_of(rails, parameters, pairing)
     except NoTrackError as error:
         told = f"No track of {1000 * parameters.gauge_m:.0f} mm gauge found."
-        runner.failures.append(told if is_warned else str(error))
+        is_asked = is_warned or warn_of_spacing(sources[0], parameters, progress)
+        runner.failures.append(told if is_asked else str(error))
     progress.info(f"Paired: {_lengths(centerlines, 'track')}.")
     rails = with_tracks(rails, centerlines, progress)
     warn_of_split_classes(rails, parameters, progress)

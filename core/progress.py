@@ -32,6 +32,9 @@ class Progress:
     def status(self, text: str) -> None:
         """Report the current activity, to be shown until the next status."""
 
+    def reading(self) -> None:
+        """Report that files are read until the next status: the speed of this says nothing about that of the rest."""
+
     def info(self, text: str) -> None:
         """Report a message for the log."""
 
@@ -97,6 +100,9 @@ class _Relay(Progress):
     def status(self, text: str) -> None:
         self._listener.status(text)
 
+    def reading(self) -> None:
+        self._listener.reading()
+
     def info(self, text: str) -> None:
         self._listener.info(text)
 
@@ -148,6 +154,7 @@ class Estimating(_Relay):
     """Passes everything on, and reports the remaining time, estimated from the second half of the elapsed time.
 
     A status begins an activity with a speed of its own: the time before it, such as that of an import, does not count.
+    While files are read, nothing is estimated.
 
     Parameters
     ----------
@@ -161,19 +168,25 @@ class Estimating(_Relay):
         super().__init__(listener)
         self._clock = clock
         self._marks = [(clock(), 0.0)]
+        self._is_reading = False
         self._fraction, self._reported = 0.0, -math.inf
 
     def status(self, text: str) -> None:
         """Pass the activity on, and measure its speed from here."""
         super().status(text)
-        self._marks = [(self._clock(), self._fraction)]
+        self._marks, self._is_reading = [(self._clock(), self._fraction)], False
+
+    def reading(self) -> None:
+        """Estimate nothing until the next status."""
+        super().reading()
+        self._is_reading = True
 
     def set_fraction(self, fraction: float) -> None:
         """Pass the fraction on, and every few seconds report the remaining time as status."""
         super().set_fraction(fraction)
         self._fraction = fraction
         now, start = self._clock(), self._marks[0][0]
-        if now - self._reported < REPORT_EVERY_S or now - start < REPORT_EVERY_S:
+        if self._is_reading or now - self._reported < REPORT_EVERY_S or now - start < REPORT_EVERY_S:
             return
         self._reported = now
         self._marks.append((now, fraction))

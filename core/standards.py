@@ -195,7 +195,7 @@ def resolve(name: str, gauge_mm: float | None = None, head_width_mm: float | Non
     if name == CUSTOM:
         if gauge_mm is None or head_width_mm is None:
             raise ParameterError(
-                "The standard CUSTOM needs both the gauge and the railhead width, in millimetres: fill in GAUGE and "
+                "STANDARD CUSTOM needs both the gauge and the railhead width, in millimetres: fill in GAUGE and "
                 "HEAD_WIDTH."
             )
         return _custom(gauge_mm / 1000, head_width_mm / 1000)

@@ -21,7 +21,7 @@ class _Notices(QObject):
     """Id of a layer of findings in the project."""
 
     sample_wanted = pyqtSignal()
-    """From a link in a log."""
+    """From a link in a log, or the menu."""
 
     packages_installed = pyqtSignal()
     """After a run after which no Python package is missing that it was to install."""

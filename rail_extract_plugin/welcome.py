@@ -37,6 +37,7 @@ class Welcome(QObject):
         self._bar, self._open_sample = bar, open_sample
         self._item: QgsMessageBarItem | None = None
         notices.packages_installed.connect(self.show)
+        notices.sample_wanted.connect(self._close)
         self.show()
 
     def show(self) -> None:
@@ -56,6 +57,7 @@ class Welcome(QObject):
     def remove(self) -> None:
         """Take the message away."""
         notices.packages_installed.disconnect(self.show)
+        notices.sample_wanted.disconnect(self._close)
         self._close()
 
     def _push(self, text: str, label: str, do: Callable[[], None]) -> None:

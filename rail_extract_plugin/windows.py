@@ -80,7 +80,7 @@ class Windows(QObject):
         if compat.OPENS_3D_VIEWS:
             self._entries.append(self._entry(NAME, lambda: show_in_3d(iface)))
         self._entries += [
-            self._entry(self._actions[0].name, self._actions[0].execute),
+            self._entry(self._actions[0].name, notices.sample_wanted.emit),
             self._entry(tr("Install Packages…"), open_installation),
             self._entry(tr("Help"), lambda: QDesktopServices.openUrl(QUrl(guide("tutorial")))),
         ]

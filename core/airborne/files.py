@@ -56,6 +56,7 @@ def survey_files(run: Run, guides: Sequence[Guide]) -> Survey:
     squares = pieces_by_square(axes)
     reading, fitting = progress.divide((1.0, 2.0))
     progress.status("Reading the points along the guides")
+    progress.reading()
     counts = spool(replace(run, progress=reading), squares)
     if not counts:
         raise NoRailPointsError(

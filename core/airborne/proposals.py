@@ -116,6 +116,7 @@ def propose_guides(run: Run) -> Proposals:
         )
     reading, searching, *fitting = run.progress.divide((2.0, 8.0, 1.0, 1.0))
     run.progress.status("Reading the points")
+    run.progress.reading()
     counts = _sorted(replace(run, progress=reading))
     run.progress.status("Searching for tracks")
     finds, density = _found(replace(run, progress=searching), counts)

@@ -145,13 +145,23 @@ def warn_of_gauge(request: Request, parameters: Parameters, progress: Progress) 
         sample = request.sample()
     except CloudError:
         return False  # reported when the points are sorted
-    spacings = measure_spacings(sample)
+    return _warn_of_spacing(sample, parameters, progress)
+
+
+def warn_of_spacing(source: PointSource, parameters: Parameters, progress: Progress) -> bool:
+    """Warn the user of another gauge as `warn_of_gauge` does, by the points of one class, as found in a raw cloud."""
+    return _warn_of_spacing(_middle(fullest_square(source).xyz), parameters, progress)
+
+
+def _warn_of_spacing(xyz: np.ndarray, parameters: Parameters, progress: Progress) -> bool:
+    """Warn the user if rail points, (n, 3) in metres, show another gauge; return whether they do."""
+    spacings = measure_spacings(xyz)
     measured = spacings.most_common()
     spacings_m, tolerance_m = [sum(one) for one in parameters.gauges], parameters.centerline_tolerance_m
     if any(spacings.include(one, tolerance_m) for one in spacings_m):
         return False
     for factor, stated, real in zip(FEET, ("metres", "feet"), ("feet", "metres")):
-        if _is_off_by(factor, sample, spacings_m, parameters):
+        if _is_off_by(factor, xyz, spacings_m, parameters):
             progress.warning(
                 f"Rails are {1 / factor:.3g} times as far apart as the gauge: the coordinates are said to be {stated}, "
                 f"are these {real}? Assign a coordinate system that says so."
@@ -199,8 +209,7 @@ def head_widths(
         strips, counts = np.unique(points.strips, return_counts=True)
         points = points.kept(points.strips == strips[np.argmax(counts)])
     xyz = points.xyz
-    place = xyz[np.argmin(np.abs(xyz[:, :2] - np.median(xyz[:, :2], axis=0)).max(axis=1)), :2]
-    measured = measure_spacings(xyz[np.abs(xyz[:, :2] - place).max(axis=1) <= SAMPLE_M]).most_common()
+    measured = measure_spacings(_middle(xyz)).most_common()
     lines = [rail.xyz[:, :2] - points.frame.shift_to(source.frame)[:2] for rail in rails]
     stated_m = gauges[0][1] if measured is None else width_at(measured[0], gauges)
     if blunt_share(lines, xyz, stated_m) > MOST:
@@ -241,6 +250,12 @@ def head_widths(
                 "noisy. Passes can be compared and aligned (STRIPS) if the points have source ids or GPS times."
             )
     return widths
+
+
+def _middle(xyz: np.ndarray) -> np.ndarray:
+    """Return the points around the middle one."""
+    place = xyz[np.argmin(np.abs(xyz[:, :2] - np.median(xyz[:, :2], axis=0)).max(axis=1)), :2]
+    return xyz[np.abs(xyz[:, :2] - place).max(axis=1) <= SAMPLE_M]
 
 
 def _question(spacing_m: float, head_width_m: float) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import CloudError, CrsError, EmptyCloudError, NoRailPointsError, ParameterError, UnclassifiedError
 from ..frame import ORIGIN_STEP, LocalFrame
-from ..progress import SILENT, Progress
+from ..progress import SILENT, Progress, counted
 from ..standards import LAST_CLASS
 from .crs import common_crs, is_geographic, name_of, parse_crs, units, utm_zone, warn_of_scale
 from .mask import Mask
@@ -180,6 +180,12 @@ class Request:
         """What limits the points, in a word."""
         return "mask" if self.mask is not None else "cloud" if self.extent is None else "extent"
 
+    def announce(self, progress: Progress) -> None:
+        """Say that the files are read now."""
+        count = sum(header.point_count for header in self.headers)
+        progress.info(f"Reading {counted(len(self.headers), 'file')} with {counted(count, 'point')}.")
+        progress.reading()
+
     def _areas(self) -> list[Extent]:
         """List the rectangles outside of which no point is requested."""
         return [area for area in (self.extent, None if self.mask is None else self.mask.extent) if area is not None]
@@ -249,7 +255,7 @@ class Request:
             return NoRailPointsError(
                 f"All points of the cloud are marked as {flags}: export the valid points without this mark."
             )
-        found = ", ".join(f"{code} ({census[code]})" for code in np.flatnonzero(census))
+        found = ", ".join(f"{code} ({census[code]:,})" for code in np.flatnonzero(census))
         airborne = f" For an airborne cloud, use {AIRBORNE}." if self.is_airborne else ""
         return UnclassifiedError(
             f"The cloud has no points of class {wanted}; its classes, with the number of points, are {found}: set the "

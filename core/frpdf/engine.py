@@ -117,7 +117,7 @@ def choose_engine(engine: str, device: str) -> str:
         engine = "TORCH" if find_spec("torch") else "OPENCV"
     module, package = _PACKAGES[engine]
     if not find_spec(module):
-        raise ModelError(f"The engine {engine} needs the package {package}: install it, or set ENGINE to AUTO.")
+        raise ModelError(f"ENGINE {engine} needs the package {package}: install it, or set ENGINE to AUTO.")
     if engine == "OPENCV" and device == "CUDA":
-        raise ModelError("The engine OPENCV runs on the CPU only: set DEVICE to AUTO, or ENGINE to TORCH.")
+        raise ModelError("ENGINE OPENCV runs on the CPU only: set DEVICE to AUTO, or ENGINE to TORCH.")
     return engine

@@ -44,7 +44,7 @@ class TorchEngine(LayeredEngine):
         """
         has_cuda = torch.cuda.is_available()
         if device == "CUDA" and not has_cuda:
-            raise ModelError("There is no CUDA device that PyTorch can use: choose AUTO or CPU.")
+            raise ModelError("There is no CUDA device that PyTorch can use: set DEVICE to AUTO or CPU.")
         self._folded = fold(arrays)
         self.block = block_side(self._folded[0])
         self._exact = exact

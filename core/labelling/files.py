@@ -200,6 +200,7 @@ def write_labelled(
     request: Request, choice: Choice, labels: Labels, output: Output, runner: Runner, progress: Progress
 ) -> None:
     """Write the files of a cloud with the classes that follow from the labels; see `classify_files`."""
+    progress.status("Writing the classes")
     writer = _Writer(request, choice, labels)
     if output.names:
         writer.write_tiles(output, runner, progress)

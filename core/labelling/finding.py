@@ -95,11 +95,13 @@ def find_rail_points(
     DiskError
         The disk is full.
     """
-    reading, searching = progress.divide((1.0, 1.0))
+    reading, searching = progress.divide((1.0, 3.0))
+    request.announce(progress)
     sorted_files = sort_files(request, settings, folder, runner, reading)
     keys = sorted({key for one in sorted_files for key in one.counts})
     if not keys:
         raise _nothing_to_search(request, settings.guide)
+    progress.status("Searching for rails")
     tasks = {key: _search_task(key, sorted_files, request.zero, settings) for key in keys}
     for found in in_listed_order(tasks, runner.run(tasks, searching)):
         if found.figures != SearchFigures():

@@ -152,7 +152,9 @@ def grow_all(
     local = [request.zero.to_local(np.column_stack([seed[:, :2], np.zeros(len(seed))]))[:, :2] for seed in seeds]
     places = [resample(seed, LINE_STEP_M)[0] if len(seed) > 1 else seed for seed in local]
     squares = Squares(request, np.concatenate(places), settings, folder / "squares")
+    request.announce(progress)
     squares.fill(reading)
+    progress.status("Following the rails")
     growths: list[Growth] = []
     missed = 0
     heads = OnHeads(squares, settings)

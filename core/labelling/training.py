@@ -106,6 +106,7 @@ def train_classifier(
     with writing(folder.parent):
         examples = _examples(request, settings, plan, folder, reading)
         reading.set_fraction(1.0)
+        progress.status("Training")
         trained = train(examples, TrainingSettings(plan.epochs, plan.seed, plan.start), folder, plan.device, learning)
     with weights.replacing() as new:
         save(new, trained.network)
@@ -133,6 +134,7 @@ def _examples(request: Request, settings: Settings, plan: Plan, folder: Path, pr
         examples.mkdir(parents=True, exist_ok=True)
         source.write_bytes(identity.encode())
         progress.status("Cutting the cloud into blocks")
+        progress.reading()
         found = write_examples(request, plan.rail_classes, settings, examples, progress)
         found.validation(plan.seed)
         return found

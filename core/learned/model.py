@@ -181,7 +181,7 @@ def device_of(device: str) -> str:
     import torch
 
     if device == "CUDA" and not torch.cuda.is_available():
-        raise ModelError("There is no CUDA device that PyTorch can use: choose AUTO or CPU.")
+        raise ModelError("There is no CUDA device that PyTorch can use: set DEVICE to AUTO or CPU.")
     return "cuda" if device != "CPU" and torch.cuda.is_available() else "cpu"
 
 

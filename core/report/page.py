@@ -26,10 +26,10 @@ from .style import STYLE
 from .verdict import verdict
 
 ADVICE = (
-    "Rail classes: choose the class that the rails of this cloud have, or CLASSIFY if they have none.",
-    "Rail standard: with DETECT, gauge and railhead width are measured in the points.",
+    "Rail classes: choose the class of the rails; in a raw cloud, which has none, have the rail points found.",
+    "Rail standard: have it detected, and gauge and railhead width are measured in the points.",
     "Density: points must be at most a few centimetres apart along the head; in clouds from aircraft they seldom are.",
-    "Extent and shortest line: the extent must contain rails that are longer than MIN_LENGTH.",
+    "Extent and shortest line: the extent must contain rails that are longer than the shortest line.",
 )
 """What to try if no track was found."""
 

@@ -117,9 +117,9 @@ class ExtractRails(RailAlgorithm):
         if classify and grow:
             raise ParameterError("CLASSIFY finds all rails, and SEEDS those that are pointed at: choose one of them.")
         if grow and values.detects():
-            raise ParameterError("DETECT measures classified points, which SEEDS do not need: choose STANDARD.")
+            raise ParameterError("STANDARD DETECT measures classified points, which SEEDS do not need: choose another.")
         if values.choice("METHOD") == LEARNED and not classify:
-            raise ParameterError("LEARNED is for raw clouds: set CLASSIFY, or choose GEOMETRY for METHOD.")
+            raise ParameterError("METHOD LEARNED is for raw clouds: set CLASSIFY, or set METHOD to GEOMETRY.")
         weights = values.weights()
         standard = values.standard(DEFAULT if values.detects() else None)
         choose_model(standard.gauge_m, standard.head_width_m, values.choice("MODEL"))

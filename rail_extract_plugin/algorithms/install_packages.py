@@ -48,7 +48,7 @@ class InstallPackages(RailAlgorithm):
         "QGIS itself is not changed, administrator rights are not needed, and packages that are already installed are "
         "skipped. An internet connection is required.\n\n"
         "PyTorch is optional: the network runs faster with it than with OpenCV, and can use a GPU. The download is "
-        "about 200 MB for the CPU build and several GB for CUDA."
+        "about 200 MB for the processor and several GB for an Nvidia GPU."
     )
 
     def initAlgorithm(self, config: dict[str, Any] | None = None) -> None:

@@ -48,7 +48,7 @@ def help_panel(summary: str, picture: Path | None, text: str, definitions: Defin
         Pages of the guide to link to, of `PAGES`.
     """
     image = [f'<img src="{picture.as_uri()}">'] if picture else []
-    prose = [escape(line, quote=False) for line in text.split("\n") if line]
+    prose = [escape(with_labels(line, definitions), quote=False) for line in text.split("\n") if line]
     common = [one for one in definitions if not one.flags() & ADVANCED]
     fields = [
         *_section(tr("Parameters"), [one for one in common if not one.isDestination()], definitions),

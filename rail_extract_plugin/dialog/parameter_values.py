@@ -392,7 +392,7 @@ class ParameterValues:
         """Read HEAD_WIDTH, or the value of STANDARD."""
         head_width_mm = self.optional_number("HEAD_WIDTH")
         if head_width_mm is None and self.choice("STANDARD") == CUSTOM:
-            raise ParameterError("The standard CUSTOM needs the railhead width, in millimetres: fill in HEAD_WIDTH.")
+            raise ParameterError("STANDARD CUSTOM needs the railhead width, in millimetres: fill in HEAD_WIDTH.")
         return resolve(DEFAULT if head_width_mm else self.choice("STANDARD"), None, head_width_mm).head_width_m
 
     def other_gauges(self, standard: RailStandard) -> tuple[Gauge, ...]:

@@ -374,8 +374,8 @@ def method() -> Definitions:
                 "WEIGHTS", tr("Weights of the classifier"), optional=True, fileFilter=tr("Weights (*.npz)")
             ),
             tr(
-                "The file that Train Rail Classifier has written, for LEARNED. Leave empty to use the weights that "
-                "were trained on simulated clouds."
+                "The file that Train Rail Classifier has written, used if METHOD is LEARNED. Leave empty to use the "
+                "weights that were trained on simulated clouds."
             ),
         ),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from qgis.core import QgsApplication, QgsProcessingParameterDefinition, QgsProcessingParameterEnum
+from qgis.core import QgsApplication, QgsProcessingParameterDefinition
 
 from .choices import WORDS
 from .passwords import masked
@@ -37,11 +37,10 @@ def with_labels(sentence: str, definitions: Definitions, about: str = "") -> str
     sentence : str
     definitions : sequence of QgsProcessingParameterDefinition
     about : str
-        Parameter that the sentence is about; an id that several parameters have is a choice of this one, or of the one
-        that was named last.
+        Parameter that the sentence is about. An id is a choice of the one that was named last, or of this one; without
+        either it is a word as any other, such as CPU.
     """
     labels = {definition.name(): definition.description() for definition in definitions}
-    lists = [one.name() for one in definitions if isinstance(one, QgsProcessingParameterEnum) and one.name() in WORDS]
     named = about
 
     def in_words(found: re.Match[str]) -> str:
@@ -49,7 +48,7 @@ def with_labels(sentence: str, definitions: Definitions, about: str = "") -> str
         if found[0] in labels:
             named = found[0]
             return f'"{labels[named]}"'
-        words = [WORDS[one][found[0]] for one in (named, *lists) if found[0] in WORDS.get(one, {})]
+        words = [WORDS[one][found[0]] for one in (named, about) if found[0] in WORDS.get(one, {})]
         return f'"{words[0]}"' if words else found[0]
 
     return re.sub(NAME, in_words, sentence)

@@ -102,8 +102,6 @@ class GrowTask(QgsTask):
 
 def _missed() -> str:
     """Say to someone who clicked that there is no rail."""
-    search_cm, height_cm = 100 * GrowParameters.search_m, 100 * GrowParameters.min_height_m
     return tr(
-        "No railhead within {:.0f} cm of the click that stands {:.0f} cm above the bed: zoom in and click on a head. "
-        "If you did, choose the rail standard of this track in the toolbar."
-    ).format(search_cm, height_cm)
+        "No railhead within {:.0f} cm of the click: zoom in and click on one, or choose another rail standard."
+    ).format(100 * GrowParameters.search_m)

@@ -98,16 +98,18 @@ class SectionView(QWidget):
         painter.end()
 
     def _panels(self, picture: Picture) -> Iterator[Panel]:
-        """Yield the whole section, and the nearest rail on either side."""
-        whole, *heads = _boxes(float(self.width()), float(self.height()))
+        """Yield the whole section, and the nearest rail on either side; only one where none is on the other side."""
+        whole, one, other = _boxes(float(self.width()), float(self.height()))
         yield Panel(whole, 0.0, 0.0, 2 * REACH_M, WHOLE_HEIGHT_M, tr("left") + " – " + tr("right"))
-        sides = picture.rails[:, 0] < 0, picture.rails[:, 0] >= 0
+        is_left = picture.rails[:, 0] < 0
         least = HEADS * picture.head_width_m, HEADS_HIGH * picture.head_width_m
-        for box, title, side in zip(heads, (tr("left rail"), tr("right rail")), sides):
+        heads = [(one, tr("left rail"), is_left), (other, tr("right rail"), ~is_left)]
+        if is_left.all() or not is_left.any():
+            heads = [(one.united(other), tr("rail"), np.ones_like(is_left))] if len(is_left) else []
+        for box, title, side in heads:
             mine = picture.rails[side]
-            if len(mine):
-                right, up = mine[np.argmin(np.abs(mine[:, 0]))]
-                yield Panel(box, float(right), float(up), *least, title)
+            right, up = mine[np.argmin(np.abs(mine[:, 0]))]
+            yield Panel(box, float(right), float(up), *least, title)
 
 
 def _boxes(width: float, height: float) -> tuple[QRectF, QRectF, QRectF]:

@@ -64,6 +64,19 @@ def test_the_time_before_an_activity_does_not_count_in_its_speed():
     assert listener.texts == ["The network has started", "25 % done, about 80 seconds left"]
 
 
+def test_nothing_is_estimated_while_files_are_read():
+    listener, clock = Listener(), Clock()
+    progress = Estimating(listener, clock)
+    progress.span(0.0, 0.1).reading()
+    for clock.now in range(1, 30):
+        progress.set_fraction(0.1 * clock.now / 29)
+    progress.status("Searching for rails")
+    assert listener.texts == ["Searching for rails"]
+    for clock.now in range(30, 41):
+        progress.set_fraction(0.1 + (clock.now - 29) / 100)
+    assert listener.texts[1:] == ["15 % done, about 80 seconds left", "20 % done, about 80 seconds left"]
+
+
 def test_estimates_start_late_and_have_an_interval():
     assert run([(0.1 * step, step / 100) for step in range(1, 40)]) == []
     assert len(run([(0.1 * step, step / 1000) for step in range(1, 1000)])) <= 20

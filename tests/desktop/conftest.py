@@ -103,10 +103,14 @@ def run_scenario(tmp_path_factory, raw_cloud, airborne_cloud):
     def run(scenario: str) -> Session:
         folder = tmp_path_factory.mktemp(scenario)
         begin = folder / "begin.py"
+        # QGIS calls layers of files by the files, unless they are in its folder for temporary ones.
+        temporary = folder / "temporary"
+        temporary.mkdir()
         begin.write_text(BEGIN.format(here=str(HERE), scenario=scenario, folder=str(folder)), encoding="utf-8")
         environment = {
             **os.environ,
             "QT_QPA_PLATFORM": "xcb",
+            "TMPDIR": str(temporary),
             "RAIL_EXTRACT_SAMPLE": str(ROOT / "resources" / "sample" / "sample.laz"),
             "RAIL_EXTRACT_RAW": str(raw_cloud),
             "RAIL_EXTRACT_AIRBORNE": str(airborne_cloud),

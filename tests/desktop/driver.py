@@ -49,6 +49,7 @@ class Driver:
         self._wait: Callable[[], Any] = lambda: True
         self._deadline = time.monotonic() + PATIENCE_S
         sys.excepthook = self._note_exception
+        iface.mainWindow().setGeometry(QApplication.primaryScreen().geometry())  # as there is no window manager
         self._timer = QTimer()
         self._timer.timeout.connect(self._advance)
         self._timer.start(INTERVAL_MS)

@@ -18,6 +18,7 @@ from qgis.core import (
     QgsGeometry,
     QgsPointCloudLayer,
     QgsPointXY,
+    QgsProcessingParameterEnum,
     QgsProject,
     QgsRectangle,
     QgsVectorFileWriter,
@@ -63,8 +64,8 @@ PART = {
 }
 """Parameters for 20 m of the sample's three tracks, for runs of a second or two."""
 
-ON_RAIL = QgsPointXY(578250.91, 2494323.23)
-"""A place on a rail of the sample, from which a click may be 0.1 m off."""
+ON_RAIL, BESIDE = QgsPointXY(578250.91, 2494323.23), QgsPointXY(578250.91, 2494323.78)
+"""A place on a rail of the sample, from which a click may be 0.1 m off, and one half a gauge away."""
 
 POOL_S = 35.0
 """Time after which Qt has ended the thread of a run: 30 s without work, and some more."""
@@ -97,6 +98,7 @@ def dialogs(driver: Driver) -> Iterator:
             group.setProperty("collapsed", False)
         yield 0.3
         driver.picture(f"dialog_{name}")
+        driver.keep("ids", {**driver.results.get("ids", {}), name: _ids_shown(dialog)})
         dialog.buttonBox().button(QDialogButtonBox.StandardButton.Help).click()
         yield from close(dialog)
         dialog = yield from open_batch(name)
@@ -109,6 +111,17 @@ def dialogs(driver: Driver) -> Iterator:
     driver.keep("check", (yield from press_run(dialog)))
     driver.picture("check")
     yield from close(dialog)
+
+
+def _ids_shown(dialog: QWidget) -> list[str]:
+    """Return the names of parameters and choices that a dialog shows instead of words, in its lists and its help."""
+    definitions = dialog.algorithm().parameterDefinitions()
+    lists = [one.options() for one in definitions if isinstance(one, QgsProcessingParameterEnum)]
+    ids = {*(one.name() for one in definitions), *(option for options in lists for option in options)}
+    combos = dialog.mainWidget().findChildren(QComboBox)
+    shown = [combo.itemText(row) for combo in combos for row in range(combo.count())]
+    texts = " ".join([*shown, dialog.findChild(QTextBrowser, "textShortHelp").toPlainText()])
+    return sorted(set(re.findall("[A-Z][A-Z_]{3,}", texts)) & ids)
 
 
 def _select_clouds(driver: Driver) -> Iterator:
@@ -636,22 +649,25 @@ def _show_in_3d(driver: Driver, menu: QMenu) -> Iterator:
 
 
 def growing(driver: Driver) -> Iterator:
-    """Click a rail of the sample on the map, see it grow, click another one, undo it, and classify the first."""
+    """Click beside a rail in a file, click a rail of a layer twice, undo one of them, and classify the other."""
     yield from install(ARCHIVE)
-    layer, canvas = QgsPointCloudLayer(SAMPLE, "sample", "pdal"), iface.mapCanvas()  # invalid in a QGIS without PDAL
-    layer.setCrs(QgsCoordinateReferenceSystem("EPSG:32643"))
-    QgsProject.instance().setCrs(layer.crs())
-    iface.setActiveLayer(QgsProject.instance().addMapLayer(layer))
+    system, canvas = QgsCoordinateReferenceSystem("EPSG:32643"), iface.mapCanvas()
+    QgsProject.instance().setCrs(system)
     menu = next(one for one in iface.pluginMenu().actions() if one.text() == "Rail Extract").menu()
     next(one for one in menu.actions() if one.text() == "Grow Rails").trigger()
     tool = plugins["rail_extract"].windows.growing
     tool.standards.setCurrentIndex(tool.standards.findData(PART["STANDARD"]))
-    click = partial(QTest.mouseClick, canvas.viewport(), Qt.MouseButton.LeftButton)
+    yield from _click(BESIDE)
+    chooser = yield lambda: window("QFileDialog")
+    yield from _answer(chooser, SAMPLE)
+    yield lambda: tool.message and not tool.is_growing
+    driver.keep("said beside", tool.message)
+    driver.picture("grow_missed")
+    layer = QgsPointCloudLayer(SAMPLE, "sample", "pdal")  # invalid in a QGIS without PDAL
+    layer.setCrs(system)
+    iface.setActiveLayer(QgsProject.instance().addMapLayer(layer))
     for _ in range(2):
-        canvas.setExtent(QgsRectangle.fromCenterAndSize(ON_RAIL, 20, 20))
-        yield 1.0
-        pixel = canvas.getCoordinateTransform().transform(ON_RAIL)
-        click(pos=QPoint(round(pixel.x()), round(pixel.y())))
+        yield from _click(ON_RAIL)
         yield lambda: not tool.is_growing
     driver.keep("said", tool.message)
     canvas.setExtent(QgsRectangle.fromCenterAndSize(ON_RAIL, 200, 200))
@@ -660,6 +676,9 @@ def growing(driver: Driver) -> Iterator:
     driver.picture("grown")
     tool.undo_action.trigger()
     driver.keep("left after undo", len(tool.seeds))
+    later(tool.accept_action.trigger)
+    yield from close((yield lambda: window("AlgorithmDialog")))
+    driver.keep("left after the dialog", len(tool.seeds))
     later(tool.accept_action.trigger)
     dialog = yield lambda: window("AlgorithmDialog")
     values = dialog.mainWidget().createProcessingParameters()
@@ -671,6 +690,17 @@ def growing(driver: Driver) -> Iterator:
     driver.keep("results", dialog.results())
     yield from close(dialog)
     driver.picture("grown_classified")
+
+
+def _click(place: QgsPointXY) -> Iterator:
+    """Click a place of the map, of which 20 m are shown."""
+    canvas = iface.mapCanvas()
+    canvas.setExtent(QgsRectangle.fromCenterAndSize(place, 20, 20))
+    yield 1.0
+    pixel = canvas.getCoordinateTransform().transform(place)
+    pos = QPoint(round(pixel.x()), round(pixel.y()))
+    later(partial(QTest.mouseClick, canvas.viewport(), Qt.MouseButton.LeftButton, pos=pos))
+    yield 0.5
 
 
 def deliveries(driver: Driver) -> Iterator:

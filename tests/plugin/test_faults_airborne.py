@@ -87,7 +87,7 @@ FAULTS = [
         "airborne cloud in Extract Rails",
         lambda bench: {"INPUT": cloud(bench, width_m=30.0)},
         REFUSED,
-        "The cloud has no points of class 10; its classes, with the number of points, are 2 (18000): set the rail "
+        "The cloud has no points of class 10; its classes, with the number of points, are 2 (18,000): set the rail "
         "classes or, if nobody has classified the cloud, CLASSIFY. For an airborne cloud, use Track Centerlines from "
         "Airborne Lidar.",
         run="extractrails",

@@ -321,7 +321,7 @@ FAULTS = [
         "missing package of the chosen engine",
         without_engine,
         REFUSED,
-        "The engine TORCH needs the package torch: install it, or set ENGINE to AUTO.",
+        "ENGINE TORCH needs the package torch: install it, or set ENGINE to AUTO.",
     ),
     Fault(
         "missing weights",
@@ -448,7 +448,7 @@ FAULTS = [
         "output with a name that no file can have",
         lambda bench: {**cloud(bench), "REPORT": f"{bench.folder}/a\0b.html"},
         REFUSED,
-        "The output … can't be written (embedded null byte): choose another place.",
+        "The output … can't be written (…): choose another place.",
     ),
     Fault(
         "layer in a folder with a colon",

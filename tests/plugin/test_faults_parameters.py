@@ -107,15 +107,13 @@ FAULTS = [
         "CUSTOM without gauge and railhead width",
         with_(STANDARD="CUSTOM"),
         REFUSED,
-        "The standard CUSTOM needs both the gauge and the railhead width, in millimetres: fill in GAUGE and "
-        "HEAD_WIDTH.",
+        "STANDARD CUSTOM needs both the gauge and the railhead width, in millimetres: fill in GAUGE and HEAD_WIDTH.",
     ),
     Fault(
         "CUSTOM without railhead width",
         with_(STANDARD="CUSTOM", GAUGE=1435),
         REFUSED,
-        "The standard CUSTOM needs both the gauge and the railhead width, in millimetres: fill in GAUGE and "
-        "HEAD_WIDTH.",
+        "STANDARD CUSTOM needs both the gauge and the railhead width, in millimetres: fill in GAUGE and HEAD_WIDTH.",
     ),
     Fault(
         "unknown standard",
@@ -160,7 +158,7 @@ FAULTS = [
         "class without points",
         with_(RAIL_CLASSES="11"),
         REFUSED,
-        "The cloud has no points of class 11; its classes, with the number of points, are 10 (3600): set the rail "
+        "The cloud has no points of class 11; its classes, with the number of points, are 10 (3,600): set the rail "
         "classes or, if nobody has classified the cloud, CLASSIFY.",
     ),
     Fault(
@@ -248,7 +246,7 @@ FAULTS = [
         "OPENCV on a GPU",
         with_(ENGINE="OPENCV", DEVICE="CUDA"),
         REFUSED,
-        "The engine OPENCV runs on the CPU only: set DEVICE to AUTO, or ENGINE to TORCH.",
+        "ENGINE OPENCV runs on the CPU only: set DEVICE to AUTO, or ENGINE to TORCH.",
     ),
     Fault(
         "no cloud",

@@ -133,7 +133,7 @@ FAULTS = [
         "rail standard to be detected from seeds",
         seeds(ON_RAIL, STANDARD="DETECT"),
         REFUSED,
-        "DETECT measures classified points, which SEEDS do not need: choose STANDARD.",
+        "STANDARD DETECT measures classified points, which SEEDS do not need: choose another.",
         run="extractrails",
     ),
     *(

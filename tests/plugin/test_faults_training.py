@@ -125,7 +125,7 @@ FAULTS = [
         "extraction with METHOD LEARNED from a classified cloud",
         labelled(METHOD="LEARNED"),
         REFUSED,
-        "LEARNED is for raw clouds: set CLASSIFY, or choose GEOMETRY for METHOD.",
+        "METHOD LEARNED is for raw clouds: set CLASSIFY, or set METHOD to GEOMETRY.",
         run="extractrails",
     ),
 ]

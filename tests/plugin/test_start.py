@@ -20,10 +20,13 @@ application.initQgis()
 sys.path.append(str(Path(application.pkgDataPath()) / "python" / "plugins"))
 from processing.core.Processing import Processing
 Processing.initialize()
+
+heavy = ("numpy", "scipy", "laspy", "lazrs", "pyproj", "torch", "cv2")
+of_qgis = [name for name in heavy if name in sys.modules]  # newer QGIS imports numpy itself
 from rail_extract import classFactory
 
 def loaded():
-    return [name for name in ("numpy", "scipy", "laspy", "lazrs", "pyproj", "torch", "cv2") if name in sys.modules]
+    return [name for name in heavy if name in sys.modules and name not in of_qgis]
 
 plugin = classFactory(None)
 plugin.initProcessing()

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rail_extract.core.checks.standard import head_widths, warn_of_gauge
+from rail_extract.core.checks.standard import head_widths, warn_of_gauge, warn_of_spacing
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.gauge_estimate import SEEN_SHARE
@@ -23,10 +23,13 @@ CURVE = trace(transition_curve(15, 20, 15, 1 / 300), heading=-0.6)
 
 class Warnings(Progress):
     def __init__(self):
-        self.said = []
+        self.said, self.proposed = [], []
 
     def warning(self, text):
         self.said.append(text)
+
+    def propose(self, standard):
+        self.proposed.append(standard)
 
 
 class Sampled:
@@ -64,6 +67,14 @@ def test_coordinates_in_the_right_unit_are_no_warning():
     heard = Warnings()
     warn_of_gauge(Sampled(heads_of(CURVE, WIDTH)), Parameters(1.435, WIDTH), heard)
     assert heard.said == []
+
+
+@pytest.mark.parametrize(("gauge_m", "proposed"), [(1.435, []), (1.52, ["RU_R65_1520"])])
+def test_found_points_of_another_gauge_lead_to_their_standard(gauge_m, proposed):
+    heard, points = Warnings(), RailPoints(heads_of(LINE, 0.075, gauge_m), LocalFrame(np.zeros(3)), 10)
+    assert warn_of_spacing(MemorySource(points, 500.0), Parameters(1.435, WIDTH), heard) == bool(proposed)
+    assert heard.proposed == proposed
+    assert [f"Rails are {1000 * gauge_m + 75:.0f} mm apart" in text for text in heard.said] == [True] * len(proposed)
 
 
 @pytest.mark.parametrize(("width_m", "count"), [(0.062, 1), (0.068, 0), (0.072, 0), (0.076, 0), (0.084, 1)])

@@ -59,7 +59,7 @@ def test_a_trained_classifier_labels_points_and_gives_rails(labelled, run_step, 
     assert done.ok, done.error
     assert done.results["RAIL_COUNT"] >= 1
     done = run({**learned, "RAILS": tmp_path / "rails.gpkg"})
-    assert done.error == "LEARNED is for raw clouds: set CLASSIFY, or choose GEOMETRY for METHOD."
+    assert done.error == "METHOD LEARNED is for raw clouds: set CLASSIFY, or set METHOD to GEOMETRY."
 
 
 def test_a_cancelled_training_keeps_its_checkpoint_and_continues(labelled, run_step, tmp_path, new_feedback):

@@ -219,9 +219,10 @@ def test_dialog_refuses_contradictions(open_dialog, context, write_cloud, track,
 def test_messages_in_dialogs_use_labels(make):
     algorithm = make("extractrails")
     definitions = algorithm.parameterDefinitions()
-    said = "The standard CUSTOM needs both: fill in GAUGE and HEAD_WIDTH, not MAX_GAPS or OUTPUT/CRS.gpkg."
-    words = {"CUSTOM": WORDS["STANDARD"]["CUSTOM"], "GAUGE": "Gauge [mm]", "HEAD_WIDTH": "Railhead width [mm]"}
-    shown = re.sub(r"\b(CUSTOM|GAUGE|HEAD_WIDTH)\b", lambda found: f'"{words[found[0]]}"', said)
+    said = "STANDARD CUSTOM needs both: fill in GAUGE and HEAD_WIDTH, not MAX_GAPS or OUTPUT/CRS.gpkg."
+    labels = {"STANDARD": "Rail standard", "GAUGE": "Gauge [mm]", "HEAD_WIDTH": "Railhead width [mm]"}
+    words = {"CUSTOM": WORDS["STANDARD"]["CUSTOM"], **labels}
+    shown = re.sub(r"\b(STANDARD|CUSTOM|GAUGE|HEAD_WIDTH)\b", lambda found: f'"{words[found[0]]}"', said)
     assert with_labels(said, definitions) == shown
     assert for_user(said, definitions) == said  # no QGIS with windows runs here
 
@@ -235,6 +236,12 @@ def test_an_id_of_several_choices_has_the_words_of_the_parameter_named_before(ma
         'to "GPU if there is one", or "Engine of the network" to "The faster one".'
     )
     assert with_labels("AUTO is best.", definitions, "MODEL") == '"Automatic" is best.'
+
+
+def test_a_word_is_no_choice_unless_its_parameter_is_named(make):
+    algorithm = make("extractrails")  # which owns its parameters
+    said = "Network fast, OpenCV 4.13, CPU, float32."
+    assert with_labels(said, algorithm.parameterDefinitions()) == said
 
 
 @pytest.mark.parametrize("name", NAMES)

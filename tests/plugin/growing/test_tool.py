@@ -91,7 +91,7 @@ def test_a_click_beside_the_rails_is_taken_back_with_a_reason(qgis, canvas, laye
     growing.click(place(6.0, 0.0))
     wait(qgis, growing)
     assert growing.seeds == []
-    assert growing.message.startswith("No railhead within 25 cm of the click that stands 5 cm above the bed")
+    assert growing.message.startswith("No railhead within 25 cm of the click: zoom in and click on one, or")
     assert not growing.undo_action.isEnabled()
 
 

@@ -281,6 +281,17 @@ def test_a_rail_that_was_not_found_is_outlined_opposite_to_the_other(load, dock,
     assert picture.missing.tolist() == [False, True]
 
 
+def test_a_rail_of_no_track_is_neither_left_nor_right(load, dock, cloud):
+    _, properties = cloud
+    rail = f"LINESTRING Z (500000 {3_000_000 + 1.507 / 2} 100, 500012 {3_000_000 + 1.507 / 2} 100)"
+    load("Rails", RAIL_FIELDS, [(rail, {"rail_id": 1})], properties)
+    load("Findings", FINDING_FIELDS, [(rail, {**ROWS[0][1], "track_id": None, "rail_id": 1})], properties)
+    shown = dock()
+    picture = shown._sections.picture(shown._found[0])
+    np.testing.assert_allclose(picture.rails, [[0, 0]], atol=1e-6)
+    assert [panel.title for panel in shown.view._panels(picture)][1:] == ["rail"]
+
+
 def test_without_the_cloud_gauge_and_cant_place_the_rails(load, dock, cloud):
     path, properties = cloud
     path.unlink()
