@@ -141,3 +141,15 @@ def test_a_table_given_back_keeps_heights_and_cants_and_what_was_edited(qgis_pro
     before, after = ([row["r1_m"] for row in rows_of(path)] for path in (tmp_path / "free.gpkg", held))
     for at in edited:
         assert after[at] == pytest.approx(1.001 * before[at], rel=1e-6)
+
+
+def test_lines_of_an_extraction_have_the_elements_of_the_scene(extracted, qgis_process, tmp_path):
+    """The errors of extracted lines are smooth, and must not be taken for elements."""
+    given = {"INPUT": extracted.centerlines, "ELEMENTS": tmp_path / "elements.gpkg"}
+    run = qgis_process(given, "--json", algorithm="railextract:fitalignment")
+    assert run.returncode == 0, run.stdout + run.stderr
+    plan = [row for row in rows_of(tmp_path / "elements.gpkg") if row["layout"] == "H"]
+    assert [row["type"] for row in plan] == 3 * ["line", "clothoid", "arc"]
+    np.testing.assert_allclose([row["s_to"] for row in plan[::3]], 40, atol=1)
+    np.testing.assert_allclose([row["length_m"] for row in plan[1::3]], 40, atol=2)
+    np.testing.assert_allclose([row["r1_m"] for row in plan[2::3]], 1500, atol=25)
