@@ -27,7 +27,7 @@ demo: plugin  ## extract the sample's rails through qgis_process; lines and map 
 	@. ./$(ENVIRONMENT) && $(PYTHON) tools/demo.py
 
 .PHONY: check
-check: lint  ## lint, types, import rules and the tests that need neither QGIS nor PyTorch; two minutes
+check: lint  ## lint, types, import rules and the tests that need neither QGIS nor PyTorch; a few minutes
 	@PYTHONPATH=$(AS_PACKAGE) $(CHECK) -m pytest -n auto tests/core tests/docs tests/tools tests/qt6
 
 .PHONY: test
