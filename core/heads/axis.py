@@ -14,11 +14,11 @@ from scipy.ndimage import maximum_filter1d
 from ..polyline import interpolate, left_normals, length_along
 from ..rails import Support
 from .blunt import WINDOW, Ridge, wander
-from .edges import EDGE_SIGMA_M, STATION_STEP_M, find_middles, histograms, stations_along
+from .edges import STATION_STEP_M, VIEW_STATIONS, find_middles, histograms, stations_along
 from .flank import FLANK_TOP_SIGMA_M, Flank, find_flank
 from .level import MIN_ON_HEAD, on_top, robust_sigma
 from .roads import MIN_WIDER_M, bands, hidden_edges
-from .sections import SECTION_STATIONS, Middles, outline_middles, with_outline
+from .sections import Middles, outline_middles, with_outline
 from .smoother import AMPLITUDES, STILL, Spline, bridge_error, smooth
 
 UNSHOWN_M = 0.3
@@ -225,7 +225,7 @@ def _of_head(
         points,
         np.select(which, [outline.offset, with_outline(found.offset_m, outline), mean_m]),
         np.select(which, [outline.information, found.information, by_mean]),
-        np.select(which, [outline.common, np.full(len(stations), EDGE_SIGMA_M), unsure_m]),
+        np.select(which, [outline.common, found.view_m, unsure_m]),
         outline.blur,
         outline.blur_up,
     )
@@ -255,6 +255,6 @@ def _with_blur(support: Support, blur_m: np.ndarray, blur_up_m: np.ndarray) -> S
     largest_m = np.maximum(blur_m, blur_up_m)
     if not largest_m.any():
         return support
-    across_m, up_m = (maximum_filter1d(one, 2 * SECTION_STATIONS + 1) for one in (blur_m, blur_up_m))
+    across_m, up_m = (maximum_filter1d(one, 2 * VIEW_STATIONS + 1) for one in (blur_m, blur_up_m))
     strips = np.column_stack([np.ones(len(blur_m)), np.where(largest_m > 0, 2 * largest_m, np.nan), across_m])
     return replace(support, sigma_m=np.hypot(support.sigma_m, across_m), strips=strips, sigmaz_m=up_m)

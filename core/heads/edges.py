@@ -42,19 +42,30 @@ MIN_RIM_POINTS = 6
 MIN_RIM_SHARE = 0.5
 """Minimum density just inside an edge relative to that on the crown: a shadow on the head has edges of its own."""
 
+EVEN_EXCESS, ASKEW_EXCESS = 0.05, 0.3
+"""Relative excess of the density at one edge over that at the other from which the weight of the other decreases, and
+from which it is zero: a scanner abreast of the rail sees both corners alike, one at 45 degrees half of the far one."""
+
 INSET_BINS = 1.6
 """How far inside the edge of a head the round corner ends what is level with its top, where no part of the line shows
 both edges: 3 mm, less where noise of 8 mm also takes points deeper on the corner for points on top."""
 
+VIEW_STATIONS = 161
+"""Stations, 40 m, over which the excess is averaged: a scanner on a train keeps its view, and 60 points give the excess
+to 20 % only."""
+
+SURE_SIGMAS = 2.0
+"""Standard deviations by which a local excess must exceed chance to count without its neighbours."""
+
 HALF_RANGE_BINS = HALF_HEAD_BINS + MAX_SHIFT_BINS + 2 + BLURRED_BINS + RIM_BINS
 """Bins on either side of a line that these steps need."""
 
-EDGE_SIGMA_M = 0.0012
-"""Standard error of the middle between edges that more points would not reduce: how much of the corners is seen depends
-on the view. Seen from above a track, the left and the right corner differ by 1.7 mm."""
+ALONE_SIGMA_M = 0.0012
+"""Standard error of the middle that comes from a single edge: how much of its corner is seen depends on the view. Seen
+from above a track, the left and the right corner differ by 1.7 mm."""
 
 EDGE_ROUNDS = 2
-"""The first round finds the head, the second knows how dense its points are."""
+"""The first round finds out how the scanner sees the head, the second uses the edges that count."""
 
 
 Widths = Union[float, np.ndarray]
@@ -141,10 +152,13 @@ class EdgeMiddles:
         Metres to the left of the line.
     information : (s,) array
         Inverse of its variance that the points next to a station alone contribute, 1/m².
+    view_m : (s,) array
+        Standard error that more points would not reduce: how much of the corners is seen is not known.
     """
 
     offset_m: np.ndarray
     information: np.ndarray
+    view_m: np.ndarray
 
 
 def find_middles(
@@ -171,12 +185,14 @@ def find_middles(
     sections, bin_m = CrossSections.of(wide_counts), head_width_m / (2 * HALF_HEAD_BINS)
     edges = sections.find_edges(free)
     density = edges.density * (points / np.maximum(wide_counts.sum(axis=1), 1)) / bin_m
-    information = _information(density, free, noise_m, BLUR_BINS * bin_m)
-    return EdgeMiddles(edges.middles_in(counts, wide_counts) * bin_m, information)
+    view = (sections.middles(edges) - sections.middles(edges.equally_weighted(free))) * bin_m / np.sqrt(3)
+    view_m = np.hypot(view, np.where(free.sum(axis=0) == 1, ALONE_SIGMA_M, 0.0))
+    information = _information(density, edges.weight, noise_m, BLUR_BINS * bin_m)
+    return EdgeMiddles(edges.middles_in(counts, wide_counts) * bin_m, information, view_m)
 
 
-def _information(density: np.ndarray, free: np.ndarray, noise_m: float, blur_m: float) -> np.ndarray:
-    """Return the inverse of the variance of the middle between free edges that is due to chance, (s,) 1/m².
+def _information(density: np.ndarray, weight: np.ndarray, noise_m: float, blur_m: float) -> np.ndarray:
+    """Return the inverse of the variance of the middle between both edges that is due to chance, (s,) 1/m².
 
     An edge is where the blurred density falls to half. There the density has, like any count, the variance density /
     (4 √π blur), and it falls by density / (√2π spread) per metre; the spread of the edge comes from blur and noise.
@@ -185,13 +201,13 @@ def _information(density: np.ndarray, free: np.ndarray, noise_m: float, blur_m: 
     ----------
     density : (2, s) array
         Points per metre across, just inside the edges.
-    free : (2, s) bool array
-        See `neighbours.free_edges`.
+    weight : (2, s) array
+        Weights of the edges.
     noise_m, blur_m : float
     """
     spread_m = np.hypot(blur_m, noise_m)
     variance = np.sqrt(np.pi) * spread_m**2 / (2 * blur_m * np.maximum(density, 1e-9))
-    return np.sum(free, axis=0) ** 2 / np.maximum(np.sum(free * variance, axis=0), 1e-12)
+    return np.sum(weight, axis=0) ** 2 / np.maximum(np.sum(weight**2 * variance, axis=0), 1e-12)
 
 
 @dataclass(frozen=True)
@@ -202,18 +218,27 @@ class Edges:
     ----------
     density : (2, s) array
         Points per bin just inside the edge.
-    free : (2, s) bool array
-        See `neighbours.free_edges`.
+    weight : (2, s) array
+        0 to 1: the edge that faces the scanner counts fully, while the corner of the other is hardly visible.
     seen : (s,) bool array
-        Whether the free edges are visible.
+        Whether the edges that count are visible.
     inset : (s,) array
         Correction of a middle found from one edge alone, in bins to the left: the round corner hides part of the head.
     """
 
     density: np.ndarray
-    free: np.ndarray
+    weight: np.ndarray
     seen: np.ndarray
     inset: np.ndarray
+
+    @classmethod
+    def initial(cls, free: np.ndarray) -> Edges:
+        """Return equal weights for all edges that are `free`, (2, s) bool: those of the first round."""
+        return cls(np.ones(free.shape), free.astype(float), free[0] | free[1], np.zeros(free.shape[1]))
+
+    def equally_weighted(self, free: np.ndarray) -> Edges:
+        """Give both edges full weight where both are free, however well they are visible."""
+        return replace(self, weight=np.where(free.all(axis=0), 1.0, self.weight))
 
     def middles_in(self, counts: np.ndarray, wide_counts: np.ndarray) -> np.ndarray:
         """Find the middle in narrower windows than the edges were found in, (s,); NaN where no edges are visible."""
@@ -241,9 +266,9 @@ class CrossSections:
         """
         shifts = np.arange(-MAX_SHIFT_BINS - 1, MAX_SHIFT_BINS + 2)
         held = np.zeros((len(self.sums), len(shifts)))
-        for side, density, is_free in zip((-1, 1), edges.density, edges.free):
+        for side, density, weight in zip((-1, 1), edges.density, edges.weight):
             within = self.sums[:, HALF_RANGE_BINS + shifts + side * HALF_HEAD_BINS] / np.maximum(density, 1e-6)[:, None]
-            held += side * is_free[:, None] * (within - shifts / 2)
+            held += side * weight[:, None] * (within - shifts / 2)
         rows = np.arange(len(held))
         top = np.clip(np.argmax(held, axis=1), 1, len(shifts) - 2)
         before, at, after = (held[rows, top + step] for step in (-1, 0, 1))
@@ -251,8 +276,8 @@ class CrossSections:
         return shifts[top] + np.clip(0.5 * (after - before) / bend, -1, 1)
 
     def find_edges(self, free: np.ndarray) -> Edges:
-        """Find the edges among those that are `free`, (2, s) bool."""
-        edges = Edges(np.ones(free.shape), free, free[0] | free[1], np.zeros(free.shape[1]))
+        """Find the edges and their weights among those that are `free`, (2, s) bool."""
+        edges = Edges.initial(free)
         for _ in range(EDGE_ROUNDS):
             edges = self._edges_of(self.middles(edges), free)
         return replace(edges, inset=self._inset(edges, free))
@@ -263,7 +288,7 @@ class CrossSections:
         inset = np.zeros(len(whole))
         middle = self.middles(edges)
         for side, outward in enumerate((-1, 1)):
-            alone = replace(edges, free=np.eye(2)[side][:, None] * np.ones(len(whole)))
+            alone = replace(edges, weight=np.eye(2)[side][:, None] * np.ones(len(whole)))
             seen = (middle - self.middles(alone))[whole]
             inset[free[side] & ~free[1 - side]] = np.median(seen) if len(seen) else outward * INSET_BINS
         return inset
@@ -274,15 +299,32 @@ class CrossSections:
         inside = np.array([self._density(centre + side * (HALF_HEAD_BINS - BLURRED_BINS), -side) for side in (-1, 1)])
         beyond = np.array([self._density(centre + side * (HALF_HEAD_BINS + BLURRED_BINS), side) for side in (-1, 1)])
         crown = self._density(centre - RIM_BINS // 2, 1)
+        both = free.all(axis=0)
+        shadow = _sure_excess(inside * RIM_BINS)
+        view = _excess(uniform_filter1d(inside * both, VIEW_STATIONS, axis=1, mode="nearest"))
+        excess = np.where(shadow.max(axis=0) > ASKEW_EXCESS, shadow, view)
+        weight = 1 - np.clip((excess - EVEN_EXCESS) / (ASKEW_EXCESS - EVEN_EXCESS), 0, 1)
+        weight = np.where(both, weight, free)  # a single free edge has nothing to be compared with
         clear = (
             (inside >= MIN_RIM_SHARE * crown)
             & (beyond <= MAX_OUTSIDE_SHARE * inside)
             & (inside * RIM_BINS >= MIN_RIM_POINTS)
         )
-        return Edges(inside, free, np.all(clear | ~free, axis=0) & free.any(axis=0), np.zeros(len(centre)))
+        return Edges(inside, weight, np.all(clear | (weight == 0), axis=0) & free.any(axis=0), np.zeros(len(centre)))
 
     def _density(self, start: np.ndarray, direction: int) -> np.ndarray:
         """Return the points per bin on the RIM_BINS bins from `start`, (s,), to the left (1) or to the right (-1)."""
         rows = np.arange(len(start))
         start = start + HALF_RANGE_BINS
         return np.abs(self.sums[rows, start + direction * RIM_BINS] - self.sums[rows, start]) / RIM_BINS
+
+
+def _excess(density: np.ndarray) -> np.ndarray:
+    """Return the relative excess of density at the other edge, (2, s)."""
+    return density[::-1] / np.maximum(density, 1e-6) - 1
+
+
+def _sure_excess(points: np.ndarray) -> np.ndarray:
+    """Return the relative excess, beyond chance, of the points just inside the edges, (2, s): that of local shadows."""
+    chance = SURE_SIGMAS * np.sqrt(points[0] + points[1])
+    return (points[::-1] - points - chance) / np.maximum(points, 1e-6)

@@ -13,12 +13,9 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..polyline import length_along, project
-from .edges import ENOUGH_POINTS, STATION_STEP_M, search_distance, station_count
+from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, search_distance, station_count
 from .level import in_head_frame
 from .outline import CROWN_RADIUS_M, MIN_NOISE_M, Grid, Outline, Scores, Section, fit_section, log_likelihood
-
-SECTION_STATIONS = 161
-"""Stations of a section, 40 m: a scanner on a train keeps its view over this length."""
 
 MIN_SECTION_POINTS = 250
 """Points that a section needs for its parts to be told apart."""
@@ -27,9 +24,8 @@ PULL_M, PULL_DOUBT = 0.028, 0.3
 """Distance by which the middles at the ends of a section are pulled, per change of the share of points on the left from
 one half to the other, and how well that is known: 22 to 36 mm, on branches seen from above first and at 40° then."""
 
-CHANGE_SIGMAS, MEDIAN_SIGMA = 1.0, 1.25
-"""Standard errors of a change of this share up to which chance explains it, and standard error of a median, relative to
-that of a mean."""
+MIN_HALF_POINTS = 250
+"""Points in half a section that show its view: their share is known to 0.03, which pulls by a millimetre."""
 
 MAX_CHANGE = 0.2
 """Change of this share from which it is not the view that changes: half of the head is in the shadow of something."""
@@ -163,15 +159,22 @@ def outline_middles(
         offset, middles.information[part], course = _by_station(
             section.place[0], scores.by_bin[bins[here]], station[here] - first, last - first
         )
-        is_crowned = _is_crowned(left[here], up[here], head_width_m)
         pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
+        offset = np.where(seen[part], offset - pull, np.nan)
+        is_crowned = _is_crowned(left[here], up[here], head_width_m)
         is_sharp = np.exp(section.place[5]) < SHARP_NOISE_M
         if is_crowned or not (is_sharp and _is_flat(left[here] - section.place[0], up[here], head_width_m)):
-            middles.offset[part] = np.where(seen[part], offset - pull, np.nan)
+            middles.offset[part] = offset
         middles.common[part] = np.hypot(scores.common_m, PULL_DOUBT * pull)
         on_crown = np.abs(left[here] - section.place[0]) < FLAT_SHARE * head_width_m
         middles.blur_up[part] = apart_m = _half_apart(_above_crown(left[here], up[here], section.place)[on_crown])
-        middles.blur[part] = _blur(section, width_m - head_width_m, course, apart_m, is_crowned)
+        middles.blur[part] = _blur(
+            section,
+            width_m - head_width_m,
+            course,
+            apart_m,
+            is_crowned,
+        )
     return middles
 
 
@@ -302,8 +305,8 @@ def likelier_width(lines: Sequence[np.ndarray], xyz: np.ndarray, widths_m: Seque
 
 
 def _borders(station: np.ndarray, count: int) -> list[tuple[int, int]]:
-    """Divide stations into sections of about SECTION_STATIONS, longer ones where points, at `station`, are few."""
-    ends = np.linspace(0, count, max(int(round(count / SECTION_STATIONS)), 1) + 1).astype(int)
+    """Divide stations into sections of about VIEW_STATIONS, longer ones where points, at `station`, are few."""
+    ends = np.linspace(0, count, max(int(round(count / VIEW_STATIONS)), 1) + 1).astype(int)
     borders, before = [0], np.searchsorted(station, ends)
     for end, points in zip(ends[1:].tolist(), before[1:].tolist()):
         if points - np.searchsorted(station, borders[-1]) >= MIN_SECTION_POINTS:
@@ -326,13 +329,12 @@ def _pull(station: np.ndarray, is_left: np.ndarray, count: int) -> np.ndarray:
         Number of stations.
     """
     half = int(np.searchsorted(station, count // 2))
-    if not 0 < half < len(station):
+    if min(half, len(station) - half) < MIN_HALF_POINTS:
         return np.zeros(count)
     change = _share(station[half:], is_left[half:]) - _share(station[:half], is_left[:half])
-    chance = CHANGE_SIGMAS * MEDIAN_SIGMA * np.sqrt(0.25 / half + 0.25 / (len(station) - half))
-    if not chance < abs(change) <= MAX_CHANGE:
+    if abs(change) > MAX_CHANGE:
         return np.zeros(count)
-    return PULL_M * change * (1 - (chance / change) ** 2) * np.linspace(-1.0, 1.0, count)
+    return PULL_M * change * np.linspace(-1.0, 1.0, count)
 
 
 def _share(station: np.ndarray, is_left: np.ndarray) -> float:

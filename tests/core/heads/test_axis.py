@@ -3,11 +3,10 @@ import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.axis import UNSHOWN_M, Axis, _with_blur
-from rail_extract.core.heads.edges import EDGE_SIGMA_M, _information, station_count
+from rail_extract.core.heads.edges import ALONE_SIGMA_M, VIEW_STATIONS, _information, station_count
 from rail_extract.core.heads.elevation import ElevationParameters, elevate
 from rail_extract.core.heads.flank import FLANK_SIGMA_M, FLANK_TOP_SIGMA_M
 from rail_extract.core.heads.refinement import refine
-from rail_extract.core.heads.sections import SECTION_STATIONS
 from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.polyline import interpolate, length_along, project
 from rail_extract.core.rails import Support
@@ -148,16 +147,16 @@ def test_a_middle_from_a_single_edge_errs_by_its_corner(side, seen_m):
     free = np.ones((2, station_count(12.0)), dtype=bool)
     free[side] = False
     alone = support(t, across + seen_m, z, 12.0, free)
-    assert np.median(alone.sigma_m) == pytest.approx(EDGE_SIGMA_M, abs=0.0001)
+    assert np.median(alone.sigma_m) == pytest.approx(ALONE_SIGMA_M, abs=0.0001)
 
 
 def test_blur_is_in_doubt_as_far_as_one_pass_may_go_on_alone():
-    count = 3 * SECTION_STATIONS
+    count = 3 * VIEW_STATIONS
     plain = Support(np.arange(count) * 0.25, np.full(count, 9), np.full(count, 0.003))
     blur, blur_up = np.zeros(count), np.zeros(count)
     blur[-1], blur_up[-1] = 0.004, 0.006
     found = _with_blur(plain, blur, blur_up)
-    near = np.arange(count) >= count - 1 - SECTION_STATIONS
+    near = np.arange(count) >= count - 1 - VIEW_STATIONS
     np.testing.assert_allclose(found.sigma_m, np.where(near, 0.005, 0.003))
     np.testing.assert_allclose(found.sigmaz_m, np.where(near, 0.006, 0.0))
     assert found.strips[-1].tolist() == [1.0, 0.012, 0.004] and np.isnan(found.strips[:-1, 1]).all()
@@ -166,9 +165,9 @@ def test_blur_is_in_doubt_as_far_as_one_pass_may_go_on_alone():
 
 def test_edges_err_by_chance_as_counts_do():
     """Of 1000 points per metre across, blurred by 3 and 4 mm; two edges err less by the root of 2."""
-    density, free = np.full((2, 2), 1000.0), np.array([[True, True], [False, True]])
+    density, weight = np.full((2, 2), 1000.0), np.array([[1.0, 0.5], [0.0, 0.5]])
     one_m = np.sqrt(np.sqrt(np.pi) * 0.005**2 / (2 * 0.003 * 1000))
-    np.testing.assert_allclose(_information(density, free, 0.004, 0.003) ** -0.5, [one_m, one_m / np.sqrt(2)])
+    np.testing.assert_allclose(_information(density, weight, 0.004, 0.003) ** -0.5, [one_m, one_m / np.sqrt(2)])
 
 
 @pytest.mark.parametrize("offset_m", [-0.012, 0.0, 0.009])
