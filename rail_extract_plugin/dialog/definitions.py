@@ -12,8 +12,8 @@ Definitions = tuple[QgsProcessingParameterDefinition, ...]
 UNBOUNDED = 1e9
 """Maximum of a number without an upper limit."""
 
-M_DECIMALS, MM_DECIMALS = 3, 2
-"""Decimals that the widgets show for metres and for millimetres."""
+M_DECIMALS, FINE_M_DECIMALS, MM_DECIMALS = 3, 4, 2
+"""Decimals that the widgets show for metres, for metres where tenths of a millimetre count, and for millimetres."""
 
 
 def number(

@@ -35,7 +35,7 @@ from ...core.parameters import (
 )
 from ...core.standards import CUSTOM, DEFAULT, DETECT, LAST_CLASS, RAIL_CLASS, STANDARDS
 from ..i18n import tr
-from .definitions import MM_DECIMALS, Definitions, advanced, choice, choices, helped, number
+from .definitions import FINE_M_DECIMALS, MM_DECIMALS, Definitions, advanced, choice, choices, helped, number
 
 TORCH_BUILDS = ("NONE", "CPU", "CUDA")
 
@@ -333,13 +333,21 @@ def simplification() -> Definitions:
     return (
         advanced(
             number(
-                "SIMPLIFY_XY", tr("Simplification in plan [m]"), Parameters.simplify_xy_m, maximum=MAX_SIMPLIFICATION_M
+                "SIMPLIFY_XY",
+                tr("Simplification in plan [m]"),
+                Parameters.simplify_xy_m,
+                maximum=MAX_SIMPLIFICATION_M,
+                decimals=FINE_M_DECIMALS,
             ),
             tr("Vertices are removed while the line stays within this distance in plan."),
         ),
         advanced(
             number(
-                "SIMPLIFY_Z", tr("Simplification in height [m]"), Parameters.simplify_z_m, maximum=MAX_SIMPLIFICATION_M
+                "SIMPLIFY_Z",
+                tr("Simplification in height [m]"),
+                Parameters.simplify_z_m,
+                maximum=MAX_SIMPLIFICATION_M,
+                decimals=FINE_M_DECIMALS,
             ),
             tr("Vertices are removed while the line stays within this distance in height."),
         ),
