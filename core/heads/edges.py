@@ -60,9 +60,9 @@ SURE_SIGMAS = 2.0
 HALF_RANGE_BINS = HALF_HEAD_BINS + MAX_SHIFT_BINS + 2 + BLURRED_BINS + RIM_BINS
 """Bins on either side of a line that these steps need."""
 
-ALONE_SIGMA_M = 0.0012
-"""Standard error of the middle that comes from a single edge: how much of its corner is seen depends on the view. Seen
-from above a track, the left and the right corner differ by 1.7 mm."""
+EDGE_SIGMA_M = 0.0012
+"""Standard error of the middle between edges that more points would not reduce: how much of the corners is seen depends
+on the view. Seen from above a track, the left and the right corner differ by 1.7 mm."""
 
 EDGE_ROUNDS = 2
 """The first round finds out how the scanner sees the head, the second uses the edges that count."""
@@ -186,7 +186,7 @@ def find_middles(
     edges = sections.find_edges(free)
     density = edges.density * (points / np.maximum(wide_counts.sum(axis=1), 1)) / bin_m
     view = (sections.middles(edges) - sections.middles(edges.equally_weighted(free))) * bin_m / np.sqrt(3)
-    view_m = np.hypot(view, np.where(free.sum(axis=0) == 1, ALONE_SIGMA_M, 0.0))
+    view_m = np.hypot(view, EDGE_SIGMA_M)
     information = _information(density, edges.weight, noise_m, BLUR_BINS * bin_m)
     return EdgeMiddles(edges.middles_in(counts, wide_counts) * bin_m, information, view_m)
 

@@ -24,8 +24,9 @@ PULL_M, PULL_DOUBT = 0.028, 0.3
 """Distance by which the middles at the ends of a section are pulled, per change of the share of points on the left from
 one half to the other, and how well that is known: 22 to 36 mm, on branches seen from above first and at 40° then."""
 
-MIN_HALF_POINTS = 250
-"""Points in half a section that show its view: their share is known to 0.03, which pulls by a millimetre."""
+CHANGE_SIGMAS, MEDIAN_SIGMA = 1.0, 1.25
+"""Standard errors of a change of this share up to which chance explains it, and standard error of a median, relative to
+that of a mean."""
 
 MAX_CHANGE = 0.2
 """Change of this share from which it is not the view that changes: half of the head is in the shadow of something."""
@@ -159,22 +160,15 @@ def outline_middles(
         offset, middles.information[part], course = _by_station(
             section.place[0], scores.by_bin[bins[here]], station[here] - first, last - first
         )
-        pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
-        offset = np.where(seen[part], offset - pull, np.nan)
         is_crowned = _is_crowned(left[here], up[here], head_width_m)
+        pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
         is_sharp = np.exp(section.place[5]) < SHARP_NOISE_M
         if is_crowned or not (is_sharp and _is_flat(left[here] - section.place[0], up[here], head_width_m)):
-            middles.offset[part] = offset
+            middles.offset[part] = np.where(seen[part], offset - pull, np.nan)
         middles.common[part] = np.hypot(scores.common_m, PULL_DOUBT * pull)
         on_crown = np.abs(left[here] - section.place[0]) < FLAT_SHARE * head_width_m
         middles.blur_up[part] = apart_m = _half_apart(_above_crown(left[here], up[here], section.place)[on_crown])
-        middles.blur[part] = _blur(
-            section,
-            width_m - head_width_m,
-            course,
-            apart_m,
-            is_crowned,
-        )
+        middles.blur[part] = _blur(section, width_m - head_width_m, course, apart_m, is_crowned)
     return middles
 
 
@@ -329,12 +323,13 @@ def _pull(station: np.ndarray, is_left: np.ndarray, count: int) -> np.ndarray:
         Number of stations.
     """
     half = int(np.searchsorted(station, count // 2))
-    if min(half, len(station) - half) < MIN_HALF_POINTS:
+    if not 0 < half < len(station):
         return np.zeros(count)
     change = _share(station[half:], is_left[half:]) - _share(station[:half], is_left[:half])
-    if abs(change) > MAX_CHANGE:
+    chance = CHANGE_SIGMAS * MEDIAN_SIGMA * np.sqrt(0.25 / half + 0.25 / (len(station) - half))
+    if not chance < abs(change) <= MAX_CHANGE:
         return np.zeros(count)
-    return PULL_M * change * np.linspace(-1.0, 1.0, count)
+    return PULL_M * change * (1 - (chance / change) ** 2) * np.linspace(-1.0, 1.0, count)
 
 
 def _share(station: np.ndarray, is_left: np.ndarray) -> float:

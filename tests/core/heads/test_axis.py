@@ -3,7 +3,7 @@ import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.axis import UNSHOWN_M, Axis, _with_blur
-from rail_extract.core.heads.edges import ALONE_SIGMA_M, VIEW_STATIONS, _information, station_count
+from rail_extract.core.heads.edges import EDGE_SIGMA_M, VIEW_STATIONS, _information, station_count
 from rail_extract.core.heads.elevation import ElevationParameters, elevate
 from rail_extract.core.heads.flank import FLANK_SIGMA_M, FLANK_TOP_SIGMA_M
 from rail_extract.core.heads.refinement import refine
@@ -147,7 +147,7 @@ def test_a_middle_from_a_single_edge_errs_by_its_corner(side, seen_m):
     free = np.ones((2, station_count(12.0)), dtype=bool)
     free[side] = False
     alone = support(t, across + seen_m, z, 12.0, free)
-    assert np.median(alone.sigma_m) == pytest.approx(ALONE_SIGMA_M, abs=0.0001)
+    assert np.median(alone.sigma_m) == pytest.approx(EDGE_SIGMA_M, abs=0.0001)
 
 
 def test_blur_is_in_doubt_as_far_as_one_pass_may_go_on_alone():

@@ -71,7 +71,7 @@ def test_strips_that_follow_each_other_are_compared_where_they_meet(overlap_m):
     assert found.count[at] == 2 and found.count[3] == 1 and np.isnan(found.spread_m[3])
     # One strip alone errs by the distance of the other over the root of two.
     as_they_are = found.standard_error(found.across, aligned=False)
-    np.testing.assert_allclose(as_they_are[[3, -3]], 0.030 / np.sqrt(2), atol=0.003)
+    np.testing.assert_allclose(as_they_are[[3, -3]], 0.030 / np.sqrt(2), atol=0.0035)
     assert as_they_are.min() > 0.012 and found.standard_error(found.across, aligned=True).min() > 0.012
 
 
