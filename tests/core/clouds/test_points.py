@@ -312,7 +312,7 @@ def test_a_missing_class_is_refused_with_the_classes_found(tmp_path):
     with pytest.raises(NoRailPointsError) as caught:
         read_rail_points(tmp_path / "a.las", [RAIL])
     ones, twos = np.count_nonzero(codes == 1), np.count_nonzero(codes == 2)
-    assert f"1 ({ones}), 2 ({twos})" in str(caught.value)
+    assert f"1 ({ones:,}), 2 ({twos:,})" in str(caught.value)
 
 
 @pytest.mark.parametrize("codes", [[], [-1], [256]])

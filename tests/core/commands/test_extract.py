@@ -154,7 +154,7 @@ def test_warnings_are_on_the_error_output(tiles, scheduler, tmp_path, capsys):
     words = ["extract", str(tiles), "--rails", str(tmp_path / "out.gpkg"), "--min-length", "1000", *FAST]
     assert main([*words, *scheduler]) == 0
     said = capsys.readouterr()
-    assert "Warning: Class 10 shows no rail" in said.err
+    assert "Warning: Class 10 has no rails" in said.err
     assert said.out.startswith("0 rails, 0.000 km")
 
 

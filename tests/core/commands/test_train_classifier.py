@@ -112,7 +112,7 @@ FAULTS = {
     "flat": (
         labels(lambda xyz, codes: (xyz * [1, 1, 0.1], codes)),
         [],
-        "No point of class 10 is 0.055 to 0.4 m above the bed, where railheads lie",
+        "No point of class 10 is 0.055 to 0.4 m above the bed, where railheads are",
     ),
     "one place": (
         labels(lambda xyz, codes: (xyz[(xyz[:, :2] < 20).all(axis=1)], codes[(xyz[:, :2] < 20).all(axis=1)])),
