@@ -148,9 +148,12 @@ POINTS = [
             of(lambda points, factor=factor: PLACE + (points - PLACE) * factor),
             REFUSED,
             "The points of class 10 are … m apart over … m, too far for rails: if the coordinates are in centimetres "
-            "or millimetres, assign a coordinate system that says so.",
+            f"or millimetres, assign a coordinate system that says so.{more}",
         )
-        for unit, factor in (("centimetres", 100), ("millimetres", 1000))
+        for unit, factor, more in (
+            ("centimetres", 100, " For an airborne cloud, use Track Centerlines from Airborne Lidar."),
+            ("millimetres", 1000, ""),
+        )
     ),
     Fault(
         "coordinates in kilometres, which the file does not state",
