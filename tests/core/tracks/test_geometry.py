@@ -91,7 +91,7 @@ def test_a_scanned_track_is_measured_to_millimetres(stored):
     assert rms(found.grade_pm - 4.0) < 0.2
     arc = (t > BORDERS[2] + 10) & (t < BORDERS[3] - 10)
     np.testing.assert_allclose(found.radius_m[arc], RADIUS, rtol=0.02)
-    assert 0.3 < rms(found.sigma_mm) < 2.0
+    assert 0.2 < rms(found.sigma_mm) < 2.0
     assert found.points.sum() == pytest.approx(sum(rail.points for rail in rails), rel=0.1)
     assert not found.bridged.any()
 
