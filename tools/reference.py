@@ -19,22 +19,21 @@ from qgis.core import (  # noqa: E402
     QgsProcessingParameterNumber,
     QgsProcessingProvider,
 )
-from rail_extract.core.fields import (  # noqa: E402
-    AIRBORNE_FIELDS,
-    AIRBORNE_STATION_FIELDS,
-    AXIS_FIELDS,
-    CENTERLINE_FIELDS,
-    DEVIATION_FIELDS,
-    DIFFERENCE_FIELDS,
-    ELEMENT_FIELDS,
-    EXTENT_FIELDS,
-    FINDING_FIELDS,
-    PROPOSED_FIELDS,
-    QUALITY_FIELDS,
-    RAIL_FIELDS,
-    STATION_FIELDS,
-    STOP_FIELDS,
-    Field,
+from rail_extract.core.fields import Field  # noqa: E402
+from rail_extract.core.products import (  # noqa: E402
+    AIRBORNE,
+    AXES,
+    CENTERLINES,
+    DEVIATIONS,
+    DIFFERENCES,
+    ELEMENTS,
+    FINDINGS,
+    PLACES,
+    PROPOSED,
+    QUALITY,
+    RAILS,
+    STATIONS,
+    STOPS,
 )
 from rail_extract.core.standards import CUSTOM, SOURCES, STANDARDS  # noqa: E402
 from rail_extract.rail_extract_plugin.algorithms import ALGORITHMS  # noqa: E402
@@ -51,19 +50,19 @@ parameters with pictures.
 """
 
 LAYERS = {
-    "Rails": RAIL_FIELDS,
-    "Centerlines": CENTERLINE_FIELDS,
-    "Track geometry": QUALITY_FIELDS,
-    "Kilometres": (*STATION_FIELDS, *EXTENT_FIELDS),
-    "Differences": DIFFERENCE_FIELDS,
-    "Findings": FINDING_FIELDS,
-    "Stops": STOP_FIELDS,
-    "Centerlines from airborne lidar": AIRBORNE_FIELDS,
-    "Stations from airborne lidar": AIRBORNE_STATION_FIELDS,
-    "Proposed guides": PROPOSED_FIELDS,
-    "Elements": ELEMENT_FIELDS,
-    "Deviations": DEVIATION_FIELDS,
-    "Axes": AXIS_FIELDS,
+    "Rails": RAILS,
+    "Centerlines": CENTERLINES,
+    "Track geometry": QUALITY,
+    "Kilometres": PLACES,
+    "Differences": DIFFERENCES,
+    "Findings": FINDINGS,
+    "Stops": STOPS,
+    "Centerlines from airborne lidar": AIRBORNE,
+    "Stations from airborne lidar": STATIONS,
+    "Proposed guides": PROPOSED,
+    "Elements": ELEMENTS,
+    "Deviations": DEVIATIONS,
+    "Axes": AXES,
 }
 
 
@@ -75,8 +74,8 @@ def page(provider: QgsProcessingProvider) -> str:
         parts += _table(("parameter", "in the dialog", "default", "values"), _inputs(algorithm))
         parts += _table(("output", "meaning"), _outputs(algorithm))
     parts += ["\n## Fields\n"]
-    for title, fields in LAYERS.items():
-        parts += [f"\n### {title}\n", *_table(("field", "type", "meaning"), map(_field, fields))]
+    for title, product in LAYERS.items():
+        parts += [f"\n### {title}\n", *_table(("field", "type", "meaning"), map(_field, product.fields))]
     parts += ["\n## Rail standards\n", *_table(("STANDARD", "rail", "gauge", "railhead", "source"), _standards())]
     parts += [
         f"\n`{CUSTOM}` takes GAUGE and HEAD_WIDTH. No table of rail sections confirms a width without a source.\n\n",

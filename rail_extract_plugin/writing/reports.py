@@ -106,17 +106,15 @@ def write_alignment_report(
     from ...core.report import build_alignment_page
     from ...core.report.origin import title_of
 
-    path = algorithm.parameterAsFileOutput(parameters, name, context)
-    if not path:
-        return {}
-    stated = {
-        "Date": f"{datetime.now():%Y-%m-%d %H:%M}",
-        "Version": f"Rail Extract {VERSION}",
-        "Coordinate system": title_of(courses[0][0].frame.crs_wkt),
-    }
-    written = write_page(algorithm, name, path, build_alignment_page(courses, source, {**stated, **facts}, fitted))
-    notices.report_written.emit(path)
-    return written
+    def build() -> str:
+        stated = {
+            "Date": f"{datetime.now():%Y-%m-%d %H:%M}",
+            "Version": f"Rail Extract {VERSION}",
+            "Coordinate system": title_of(courses[0][0].frame.crs_wkt),
+        }
+        return build_alignment_page(courses, source, {**stated, **facts}, fitted)
+
+    return write_shown(algorithm, name, build, parameters, context)
 
 
 def write_comparison(
@@ -143,12 +141,9 @@ def write_comparison(
     """
     from ...core.report.comparison import build_comparison
 
-    path = algorithm.parameterAsFileOutput(parameters, name, context)
-    if not path:
-        return {}
-    written = write_page(algorithm, name, path, build_comparison(found, counts_shift, source, facts))
-    notices.report_written.emit(path)
-    return written
+    return write_shown(
+        algorithm, name, lambda: build_comparison(found, counts_shift, source, facts), parameters, context
+    )
 
 
 def write_check(
