@@ -1,10 +1,16 @@
 import numpy as np
 import pytest
 from rail_extract.core.heads.flank import find_flank
+from rail_extract.core.heads.head_points import HeadPoints
 from rail_extract.laboratory.scenes.scanner import Scanner, scan
 from rail_extract.laboratory.scenes.tracks import Railhead
 
 WIDTH = 0.072
+
+
+def flank_of(t, across, z):
+    line, free = np.array([[0.0, 0.0], [60.0, 0.0]]), np.ones((2, 241), dtype=bool)
+    return find_flank(HeadPoints(t, across, z, WIDTH, line, free))
 
 
 def scanned(top_share, noise_m=0.004, angle_deg=20.0, seed=0):
@@ -26,25 +32,25 @@ def scanned(top_share, noise_m=0.004, angle_deg=20.0, seed=0):
 def test_the_axis_follows_from_one_face(noise_m, off_m):
     t, across, z = scanned(0.0, noise_m)
     for side in (1, -1):
-        flank = find_flank(t, side * (across - off_m), z, WIDTH)
+        flank = flank_of(t, side * (across - off_m), z)
         assert flank.left_m == pytest.approx(-side * off_m, abs=0.001)
         assert flank.top_m == pytest.approx(0.019, abs=0.004)
         assert flank.sigma_m == 0.0012
 
 
 def test_a_head_with_its_crown_is_not_a_face():
-    assert find_flank(*scanned(1.0), WIDTH) is None
+    assert flank_of(*scanned(1.0)) is None
 
 
 def test_points_that_are_narrow_in_height_too_are_not_a_face():
     t = np.linspace(0, 60, 6000)
-    assert find_flank(t, np.zeros(6000), 0.01 * t, WIDTH) is None
+    assert flank_of(t, np.zeros(6000), 0.01 * t) is None
 
 
 def test_points_that_may_be_on_either_face_are_half_a_head_unsure():
     random = np.random.default_rng(0)
     t = np.sort(random.uniform(0, 60, 3000))
-    flank = find_flank(t, random.normal(0.01, 0.004, 3000), random.normal(-0.024, 0.008, 3000), WIDTH)
+    flank = flank_of(t, random.normal(0.01, 0.004, 3000), random.normal(-0.024, 0.008, 3000))
     assert flank.left_m == pytest.approx(0.01, abs=0.001)
     assert flank.sigma_m == WIDTH / 2
 
@@ -64,5 +70,5 @@ def test_a_face_is_a_narrow_band_higher_than_wide_and_less_than_twice_its_depth(
     random = np.random.default_rng(0)
     t = np.sort(random.uniform(0, 60, 3000))
     across, z = random.uniform(-0.5, 0.5, (2, 3000))
-    found = find_flank(t, width_m * across, (width_m + beyond_m / 0.9) * z, WIDTH)  # 0.9 is between the percentiles
+    found = flank_of(t, width_m * across, (width_m + beyond_m / 0.9) * z)  # 0.9 is between the percentiles
     assert (found is not None) == bool(is_face)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.heads.level import is_blended
+from rail_extract.core.heads.head_points import near_lines
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.lines.network_smoothing import smooth_network
@@ -262,12 +262,9 @@ def test_heads_in_wide_beams_have_their_axis_in_the_middle_of_their_points(densi
 @pytest.mark.parametrize("offset", [-0.015, 0.0, 0.015])
 @pytest.mark.parametrize("noise", [0.003, 0.008])
 def test_heads_in_narrow_beams_are_not_blended(offset, noise):
-    t, across, z = head(80, 100, noise, low_share=0.15).T
-    order = np.argsort(t)
-    assert not is_blended(t[order], across[order] + offset, z[order], WIDTH)
-    t, across, z = blended_head(80, 50).T
-    order = np.argsort(t)
-    assert is_blended(t[order], across[order] + offset / 2, z[order], WIDTH)
+    lines = [wavy_line(80, 0.0, 30) - [0.0, off_m] for off_m in (offset, offset / 2)]
+    assert not near_lines(lines[:1], head(80, 100, noise, low_share=0.15), WIDTH)[0].is_blended
+    assert near_lines(lines[1:], blended_head(80, 50), WIDTH)[0].is_blended
 
 
 def test_a_line_on_one_face_moves_onto_the_axis():

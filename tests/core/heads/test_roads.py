@@ -5,7 +5,8 @@ import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.edges import station_count
-from rail_extract.core.heads.elevation import ElevationParameters, elevate
+from rail_extract.core.heads.elevation import elevate
+from rail_extract.core.heads.head_points import HeadPoints, near_lines
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.heads.roads import _at_gauge, _Band, hidden_edges, onto_heads
 from rail_extract.core.lines.network import LineNetwork
@@ -32,7 +33,7 @@ def drawn(*y):
 
 
 def moved(points, *y):
-    return [line[:, 1] for line in onto_heads(drawn(*y), points, np.full(len(y), WIDTH), [SPACING])]
+    return [line[:, 1] for line in onto_heads(drawn(*y), points.xyz, np.full(len(y), WIDTH), [SPACING])]
 
 
 @pytest.mark.parametrize("road_m", [0.03, 0.06, 0.08])
@@ -59,10 +60,10 @@ def test_heads_alone_stay(road_m):
 def test_a_band_without_a_partner_stays_and_its_error_is_half_of_the_road():
     points = street(0.07)
     points = points.kept(points.xyz[:, 1] > 0)
-    lines = onto_heads(drawn(0.5 * (SPACING + 0.07)), points, np.array([WIDTH]), [SPACING])
+    lines = onto_heads(drawn(0.5 * (SPACING + 0.07)), points.xyz, np.array([WIDTH]), [SPACING])
     assert np.allclose(lines[0][:, 1], 0.5 * (SPACING + 0.07))
     network = LineNetwork(tuple(lines), lines[0][[0, -1]], np.array([[0, 1]]))
-    (rail,) = elevate(network, points, ElevationParameters(WIDTH))
+    (rail,) = elevate(network, near_lines(lines, points.xyz, WIDTH), 10)
     assert np.median(rail.support.sigma_m) == pytest.approx(0.035, abs=0.004)
 
 
@@ -78,12 +79,16 @@ def test_one_edge_is_hidden_on_the_side_of_the_road():
     random = np.random.RandomState(1)
     t = np.sort(random.uniform(0, LENGTH, 6000))
     free = np.ones((2, station_count(LENGTH)), dtype=bool)
-    hidden = hidden_edges(t, random.uniform(-0.5 * WIDTH, 0.5 * WIDTH + 0.05, 6000), LENGTH, WIDTH, free)
-    assert not hidden[0].any() and hidden[1].all()
-    assert not hidden_edges(t, random.uniform(-0.5 * WIDTH, 0.5 * WIDTH, 6000), LENGTH, WIDTH, free).any()
-    assert not hidden_edges(t, random.uniform(-0.06, 0.06, 6000), LENGTH, WIDTH, free).any()
-    band = random.uniform(-0.5 * WIDTH, 0.5 * WIDTH + 0.05, 6000)
-    assert not hidden_edges(t, band, LENGTH, WIDTH, free & False).any()
+
+    def hidden(right_m, left_m, free):
+        across = random.uniform(right_m, left_m, 6000)
+        return hidden_edges(HeadPoints(t, across, 0 * t, WIDTH, np.array([[0.0, 0.0], [LENGTH, 0.0]]), free))
+
+    right, left = hidden(-0.5 * WIDTH, 0.5 * WIDTH + 0.05, free)
+    assert not right.any() and left.all()
+    assert not hidden(-0.5 * WIDTH, 0.5 * WIDTH, free).any()
+    assert not hidden(-0.06, 0.06, free).any()
+    assert not hidden(-0.5 * WIDTH, 0.5 * WIDTH + 0.05, free & False).any()
 
 
 @pytest.mark.parametrize(

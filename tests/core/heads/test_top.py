@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.heads import top
+from rail_extract.core.heads.head_points import HeadPoints
 from rail_extract.core.heads.top import MIN_POINTS, PROFILE_BIN_M, TAIL_M, Profile, _under_disc, find_top, smoothed
 
 WIDTH = 0.072
@@ -39,6 +40,12 @@ def test_a_profile_averages_the_points_of_a_bin():
     assert profile.z == pytest.approx([2.0, 4.0, 6.0], abs=0.01)
 
 
+def near(t, across, z):
+    """Points near a line along the x axis, numbered."""
+    line, free = np.array([[0.0, 0.0], [20.0, 0.0]]), np.ones((2, 81), dtype=bool)
+    return HeadPoints(t, across, z, WIDTH, line, free, np.arange(len(t)))
+
+
 def points(count=4000, noise_m=0.002, seed=3):
     random = np.random.default_rng(seed)
     t = np.sort(random.uniform(0, 20, count))
@@ -52,20 +59,21 @@ def test_the_height_is_that_on_the_axis_without_faces_and_weeds(noise_m, smoothi
     t, across, z = points(noise_m=noise_m)
     z[::15] -= 0.04
     z[7::50] += 0.05
-    top = find_top(t, across, z, WIDTH, 0.3, 0.03, smoothing_m)
+    top = find_top(near(t, across, z), 0.3, 0.03, smoothing_m)
     stations = np.linspace(1, 19, 50)
     error_m = top.course.at(stations) - 0.02 * stations
     assert np.abs(error_m).max() < 0.25 * noise_m + 0.0002
     assert np.abs(error_m / top.course.sigma(stations)).max() < 4
     assert np.median(top.slope) == pytest.approx(0.05, abs=0.01)
-    assert not top.points[::15].any()
-    assert not top.points[7::50].any()
-    assert top.points.mean() > 0.9
+    on_top = np.isin(np.arange(len(t)), top.points.strips)
+    assert not on_top[::15].any()
+    assert not on_top[7::50].any()
+    assert on_top.mean() > 0.9
 
 
 @pytest.mark.parametrize("count", [MIN_POINTS - 1, 40])
 def test_too_few_points_show_no_top(count):
-    found = find_top(*points(count), WIDTH, 0.3, 0.03, None)
+    found = find_top(near(*points(count)), 0.3, 0.03, None)
     assert (found is None) == (count < MIN_POINTS)
 
 

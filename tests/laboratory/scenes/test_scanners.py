@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.heads.elevation import ElevationParameters, elevate
+from rail_extract.core.heads.elevation import elevate
+from rail_extract.core.heads.head_points import near_lines
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.polyline import left_normals, resample
@@ -36,7 +37,8 @@ def scanned(scanner, cant_m=0.0, left_m=0.0, radius_m=900.0, length_m=80.0, pass
         lines.append(line + (0.012 * np.sin(t / 4 + 1))[:, None] * left_normals(line))
     nodes = np.array([line[end] for line in lines for end in (0, -1)])
     network = LineNetwork(tuple(lines), nodes, np.arange(4).reshape(2, 2))
-    return elevate(refine(network, points, WIDTH), points, ElevationParameters(WIDTH)), truth
+    network = refine(network, points, WIDTH)
+    return elevate(network, near_lines(network.lines, points.xyz, WIDTH), 10), truth
 
 
 @pytest.mark.parametrize(
