@@ -64,23 +64,6 @@ def test_little_more_than_the_extent_is_read(cloud):
     assert 0 < rails <= sum(one.points for one in chunks)
 
 
-def test_several_extents_read_the_chunks_of_each(cloud):
-    low = LOW[:2] + 2.0
-    with laspy.open(cloud[0]) as reader:
-        table = laz.read_chunk_table(cloud[0], reader.header)
-        areas = np.array([(*low, *(low + 1.0)), (*(low + 50.0), *(low + 52.0))])
-        both = set(copc.chunks_in(cloud[0], reader.header, table, areas))
-        single = [set(copc.chunks_in(cloud[0], reader.header, table, tuple(area))) for area in areas]
-    assert both == single[0] | single[1]
-    assert len(both) < len(table) / 2
-
-
-def test_all_points_are_read_once_from_several_groups(cloud, monkeypatch):
-    monkeypatch.setattr(las, "CHUNK", 300)
-    everywhere = (*LOW[:2], *(LOW[:2] + 2 * HALF_M))
-    np.testing.assert_array_equal(read(cloud[0], everywhere, (2, RAIL))[0], read(cloud[0], None, (2, RAIL))[0])
-
-
 @pytest.mark.parametrize("damage", ["endless", "a node is missing", "another size", "a deep level"])
 def test_an_octree_that_does_not_fit_the_chunks_is_not_used(cloud, tmp_path, damage):
     path, root_at, count = cloud
