@@ -155,6 +155,15 @@ def test_what_has_no_kilometre_stays_and_is_counted(station):
     assert warnings == ["1 of 2 places are beyond the ends of AXIS: their kilometres are empty."]
 
 
+def test_on_a_ring_kilometres_run_once_round_and_either_end_is_meant_where_it_closes(station):
+    angle = np.linspace(0, 2 * np.pi, 2001)
+    ring = ", ".join(f"{500 * np.sin(one):.6f} {500 - 500 * np.cos(one):.6f}" for one in angle)
+    places = layer("Point", "POINT(498 500)", "POINT(-498 500)", "POINT(0.5 2)")
+    _, values, _ = station(places, layer("LineString", f"LINESTRING({ring})"), START_KM=1.0)
+    np.testing.assert_allclose(values["km"][:2], [1 + 0.25 * np.pi, 1 + 0.75 * np.pi], atol=2e-5)
+    assert values["ambiguous"] == [0, 0, 1]
+
+
 def test_fields_of_the_same_name_stay(station):
     places = layer("Point", PLACES[0], fields="&field=km:double", values=[(99.0,)])
     _, values, _ = station(places, layer("LineStringM", AXIS_M))
