@@ -25,7 +25,7 @@ NAMES = ["/" + 5000 * "x", "/x" * 3000, "\udcff/\udcfe", "relative", ".", ":::",
 VALUES = ["", ["/a", "b"], {"a": 1}, 5, True, 2.5, "/" + 5000 * "x", "\0", None]
 
 
-@pytest.mark.parametrize(("names", "value"), zip(NAMES, VALUES))
+@pytest.mark.parametrize(("names", "value"), list(zip(NAMES, VALUES)))
 def test_no_value_stops_the_plugin(plugin, clean_path, monkeypatch, names, value):
     plugin.unload()
     monkeypatch.setenv("RAIL_EXTRACT_PACKAGES", names)
