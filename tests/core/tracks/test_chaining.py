@@ -214,18 +214,3 @@ def test_centerlines_rotate_and_move_with_their_rails(angle, east, north):
     assert_same_lines([line.xyz for line in found], expected, 2e-4)
 
 
-def test_drawing_a_long_track_can_be_cancelled():
-    class Impatient(Progress):
-        fraction = 0.0
-
-        def set_fraction(self, fraction):
-            self.fraction = fraction
-
-        def is_cancelled(self):
-            return self.fraction > 0.55
-
-    laid = Track(trace([Element(3000.0)], step_m=1.0), SPACING)
-    progress = Impatient()
-    with pytest.raises(Cancelled):
-        build(*laid.rails(), progress=progress)
-    assert progress.fraction < 0.75
