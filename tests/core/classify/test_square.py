@@ -96,12 +96,6 @@ def test_the_crest_of_a_slope_whose_far_side_is_hidden_is_not_a_lone_rail(slope,
     assert found.rail.any() == kept
 
 
-
-
-
-
-
-
 def test_feet_and_webs_are_not_labelled():
     rng = np.random.RandomState(6)
     ground = flat(6.0, rng=rng, per_m2=3000)
