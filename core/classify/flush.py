@@ -30,9 +30,6 @@ points near the bed. Ballast scatters by 12 mm and more."""
 CAVITY_M = (0.012, 0.19)
 """Depth of points in a groove below the pavement: from three times a good scanner's noise to a rail's height."""
 
-CROWD, CROWD_M = 60, 0.3
-"""Cavities with more neighbours than this are rough ground: a groove fills 25 cells within that distance."""
-
 REACH_M, STRIP_M, MIN_COVER, MIN_PURE = 1.0, 0.05, 0.5, 0.3
 """See `lines`; stricter than for rails, because nothing else confirms a groove."""
 
@@ -127,8 +124,6 @@ def flush_rails(
     marks = centroids(cell[hollow], xy[hollow])
     if len(marks) < 2:
         return nothing
-    crowd = cKDTree(marks).query_ball_point(marks, CROWD_M, return_length=True)
-    marks = marks[crowd <= CROWD]
     lines = find_lines(Marks(marks, np.zeros(len(marks))), REACH_M, 1.0, STRIP_M)
     lines = lines.of((lines.cover >= MIN_COVER) & (lines.pure >= MIN_PURE))
     flat = xy[np.abs(below) < HEAD_LEVEL_M]

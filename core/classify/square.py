@@ -49,17 +49,9 @@ SINGLE_COVER = 0.75
 SINGLE_HEIGHT_M = 0.12
 """Least height above the bed of a rail without a partner: lower things are edges of slopes, kerbs and boards."""
 
-LEAST_SINGLE_WIDTH = 0.5
-"""Least width of a rail without a partner, by that of a head: edges of ruts and furrows that a scanner sees from one
-side are sharp crests."""
-
 SINGLE_SLOPE = 0.4
 """Steepest bed of a rail without a partner: that of the shoulder of a ballast bed is 0.67. Where the far side of a
 slope is hidden, its crest looks like a bar."""
-
-LEAST_BLUNT_HEIGHT_M = 0.07
-"""Least mean height above the bed of a piece of a blunt rail: half of what images show of one, as where ballast reaches
-the head. Two lines of kerb stones at gauge, 6.5 cm high, are as narrow."""
 
 NOISE_ACROSS_M = 0.01
 """Distance beyond the side of a head within which the top of a cell counts towards its axis: less than half the gap
@@ -277,8 +269,7 @@ def _blunt_heads(shown: Shown, reach_m: float, settings: Settings) -> tuple[Kept
     if len(kept.cell):
         piece = pieces_of(len(kept.cell), kept.pairs)
         ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
-        heads = ridges.may_be_heads(settings.head_width_m)
-        kept = kept.of((heads & (_mean(kept.lines.height, piece) >= LEAST_BLUNT_HEIGHT_M))[piece])
+        kept = kept.of(ridges.may_be_heads(settings.head_width_m)[piece])
         kept = replace(kept, paired=_paired(kept.lines, settings, BLUNT))
         kept = kept.of(_long(kept, settings, False, BLUNT.least_m))
         kept = replace(kept, lines=on_crests(shown.xy, shown.height, kept.lines, ridges.blur_m))
@@ -434,7 +425,6 @@ def _stands_alone(
     steeper than a track's.
     """
     narrow = width_m < settings.head_width_m + tolerances.wider_single_m
-    narrow &= width_m > LEAST_SINGLE_WIDTH * settings.head_width_m
     high = _mean(kept.lines.height, piece) >= SINGLE_HEIGHT_M
     return narrow & high & (_mean(bed.slopes(kept.lines.axis), piece) <= SINGLE_SLOPE)
 
