@@ -16,9 +16,9 @@ from ..layers import axes_layer, deviations_layer, elements_layer
 from ..progress import Estimating
 from ..report import build_alignment_page
 from .fit import stated
-from .options import Console, destination_of, shapes_module
+from .options import REPORT, Console, destinations_of, shapes_module
 
-SUFFIXES = {"elements": (".gpkg",), "axis": (".gpkg",), "deviations": (".gpkg",), "report": (".html", ".htm")}
+SUFFIXES = {"elements": (".gpkg",), "axis": (".gpkg",), "deviations": (".gpkg",), "report": REPORT}
 """File name suffixes of each output."""
 
 
@@ -46,11 +46,7 @@ def run(args: argparse.Namespace) -> None:
     RailExtractError
         The file can't be read, lies elsewhere, or an output can't be written.
     """
-    outputs = {
-        name: destination_of(name, getattr(args, name), suffixes)
-        for name, suffixes in SUFFIXES.items()
-        if getattr(args, name) is not None
-    }
+    outputs = destinations_of(args, SUFFIXES)
     if not outputs:
         raise ParameterError("Give --elements, --axis, --deviations or --report for what is wanted of the file.")
     if args.tracks is None and (args.quality or args.rails or {"deviations", "report"} & set(outputs)):
