@@ -13,7 +13,7 @@ from ..airborne.survey import Guide, Survey
 from ..clouds.points import Request, ask
 from ..disk import Destination, writing
 from ..errors import ParameterError
-from ..layers import airborne_stations_layer, findings_layer, lines_layer
+from ..output.layers import airborne_stations_layer, findings_layer, lines_layer
 from ..parameters import AIRBORNE_CLASSES, AirborneParameters
 from ..products import AIRBORNE, PROPOSED
 from ..progress import Estimating
@@ -24,6 +24,7 @@ from .options import (
     LAYERS,
     REPORT,
     TILES_HELP,
+    WRITING,
     Console,
     add_cloud_arguments,
     add_lengths,
@@ -123,7 +124,7 @@ def _check_outputs(args: argparse.Namespace) -> None:
 
 def _write_proposed(found: Proposals, destination: Destination) -> None:
     """Write the proposed guides."""
-    module = shapes_module("--proposed", "geopackage")
+    module = shapes_module("--proposed", WRITING)
     module.write_layers([lines_layer(PROPOSED, found.guides)], destination, found.frame)
 
 
@@ -141,7 +142,7 @@ def _write(
     survey: Survey, outputs: Mapping[str, Destination], args: argparse.Namespace, standard: RailStandard
 ) -> None:
     """Write the outputs that were asked for; layers of the same file together."""
-    module = shapes_module("--centerlines", "geopackage")
+    module = shapes_module("--centerlines", WRITING)
     layers = [lines_layer(AIRBORNE, survey.lines)]
     if "stations" in outputs:
         layers.append(airborne_stations_layer(survey.tracks))

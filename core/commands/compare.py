@@ -10,11 +10,11 @@ from pathlib import Path
 
 from ..comparison.tracks import Survey, compare_surveys, doubts_of
 from ..errors import ParameterError
-from ..layers import differences_layer
+from ..output.layers import differences_layer
 from ..parameters import ComparisonParameters
 from ..progress import Estimating
 from ..report.comparison import build_comparison, describe_shift, verdict_on
-from .options import REPORT, Console, add_length, destinations_of, shapes_module
+from .options import REPORT, WRITING, Console, add_length, destinations_of, shapes_module
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> None:
             "Gauge and cant are compared between the rails of both: give --rails and --reference-rails."
         )
     outputs = destinations_of(args, {"output": (".gpkg",), "report": REPORT})
-    features, geopackage = (shapes_module("compare", name) for name in ("features", "geopackage"))
+    features, geopackage = (shapes_module("compare", name) for name in ("features", WRITING))
     lines, frame = features.read_survey(args.reference, "REFERENCE", None)
     earlier = Survey(lines, sigma_m=_metres(args.reference_sigma))
     later = Survey(features.read_survey(args.input, "INPUT", frame)[0], sigma_m=_metres(args.input_sigma))

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from .. import VERSION
-from ..design_files import FORMATS, check_designs, check_format, write_designs
+from ..output.design_files import FORMATS, check_designs, check_format, write_designs
 from ..progress import Estimating
 from ..standards import resolve
 from .options import Console, add_standard_arguments, destination_of, shapes_module

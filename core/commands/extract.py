@@ -19,11 +19,11 @@ from ..errors import ParameterError, RailExtractError
 from ..frpdf import DEVICES, ENGINES, MAX_PASSES
 from ..frpdf.models import NAMES, choose
 from ..learned.model import weights_for
+from ..output.raster_file import header_for, on_one_grid
 from ..parameters import DEFAULT_STEP_M, DEFAULT_WORKERS, LEARNED, MAX_WORKERS, STRIPS, Parameters
 from ..pipeline import extract_files
 from ..progress import Estimating, Progress
 from ..rails import RailNetwork
-from ..raster_file import header_for, on_one_grid
 from ..report import Origin, summary
 from ..scratch import scratch_folder
 from ..standards import SEARCHED_CLASSES, RailStandard, resolve
@@ -348,8 +348,8 @@ def _write(
     RailExtractError
         An output could not be written.
     """
-    from ..layers import network_layers
-    from .geopackage import by_file, write_layers
+    from ..output.layers import network_layers
+    from ..output.writing import by_file, write_layers
 
     layers = network_layers(network, outputs, parameters.gauges_m)
     writers: list[Callable[[], None]] = [
@@ -378,7 +378,7 @@ def _write_cleaned(
     model: str,
 ) -> None:
     """Write the cleaned rasters as Clean Rail Raster does."""
-    from .geotiff import write_rasters
+    from ..output.geotiff import write_rasters
 
     rasters, frame = on_one_grid(network.cleaned, network.frame)
     header = header_for(rasters, network.cleaned_classes, frame, standard, extent, model)

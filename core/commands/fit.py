@@ -8,12 +8,12 @@ from pathlib import Path
 
 from .. import VERSION
 from ..alignment.fit import fit_tracks
-from ..layers import deviations_layer, elements_layer
+from ..output.layers import deviations_layer, elements_layer
 from ..parameters import TRANSITIONS, FitParameters
 from ..progress import Estimating
 from ..report import build_alignment_page
 from ..report.origin import title_of
-from .options import REPORT, Console, add_length, destinations_of, shapes_module
+from .options import REPORT, WRITING, Console, add_length, destinations_of, shapes_module
 
 SUFFIXES = {"elements": (".gpkg",), "deviations": (".gpkg",), "report": REPORT}
 """File name suffixes of each output."""
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> None:
     RailExtractError
         A parameter is wrong, a file can't be read, no track can be fitted, or an output can't be written.
     """
-    features, geopackage = (shapes_module("LINES", name) for name in ("features", "geopackage"))
+    features, geopackage = (shapes_module("LINES", name) for name in ("features", WRITING))
     outputs = destinations_of(args, SUFFIXES)
     settings = FitParameters(args.tolerance / 1000.0, args.min_length, args.transitions, not args.no_round)
     tracks, frame = features.read_tracks(args.lines, args.quality, args.rails)

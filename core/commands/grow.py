@@ -14,14 +14,14 @@ from ..errors import ParameterError
 from ..grow.settings import GrowSettings
 from ..labelling.files import Choice
 from ..labelling.growing import grow_files
-from ..layers import stops_layer
+from ..output.layers import stops_layer
 from ..parameters import GrowParameters
 from ..progress import Estimating
 from ..scratch import scratch_folder
 from ..standards import SEARCHED_CLASSES, resolve
 from ..tasks import InTurn
 from .copies import add_label_arguments, add_tiles_arguments, check_rail_class, planned_output, print_figures
-from .options import Console, add_lengths, add_standard_arguments, destination_of, lengths_of, shapes_module
+from .options import WRITING, Console, add_lengths, add_standard_arguments, destination_of, lengths_of, shapes_module
 
 LENGTHS = {
     "search": "largest distance of a seed from its rail, and of the rail from its course",
@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> None:
     progress = Estimating(Console())
     planned = planned_output(args, progress)
     stops = None if args.stops is None else destination_of("stops", args.stops)
-    geopackage = None if stops is None else shapes_module("--stops", "geopackage")
+    geopackage = None if stops is None else shapes_module("--stops", WRITING)
     request = ask(args.tiles, SEARCHED_CLASSES, args.crs, None, progress)
     choice = Choice(args.rail_class, args.rails_only, reset=False)
     seeds = _seeds(args, request.zero.crs_wkt)

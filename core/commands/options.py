@@ -107,6 +107,9 @@ def axes_of(args: argparse.Namespace, places: str | None, plane: str | None = No
 LAYERS, REPORT = (".gpkg", ".dxf", ".csv"), (".html", ".htm")
 """File name suffixes of layers, and of a report."""
 
+WRITING = ".output.writing"
+"""For `shapes_module`: the module that writes vector files."""
+
 
 def destination_of(name: str, path: Path, suffixes: Sequence[str] = LAYERS) -> Destination:
     """Check that the file of the option `name` can be written, and make its folder.

@@ -121,7 +121,7 @@ class AirborneCenterlines(RailAlgorithm):
         progress: Progress,
     ) -> dict[str, Any]:
         """Write the proposed guides."""
-        from ...core.layers import lines_layer
+        from ...core.output.layers import lines_layer
 
         progress.info(found.summary)
         guides = lines_layer(PROPOSED, found.guides)
@@ -137,7 +137,7 @@ class AirborneCenterlines(RailAlgorithm):
         progress: Progress,
     ) -> dict[str, Any]:
         """Write what was found along the guides."""
-        from ...core.layers import airborne_stations_layer, findings_layer, lines_layer
+        from ...core.output.layers import airborne_stations_layer, findings_layer, lines_layer
         from ...core.report.airborne import airborne_findings, airborne_summary
 
         for sentence in airborne_summary(survey):

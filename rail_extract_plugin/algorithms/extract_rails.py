@@ -158,7 +158,7 @@ class ExtractRails(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Extract the rails and tracks, then write the outputs."""
-        from ...core.layers import findings_layer, lines_layer, quality_layer
+        from ...core.output.layers import findings_layer, lines_layer, quality_layer
         from ...core.pipeline import extract_files
         from ...core.report import Origin, list_findings, summary
 
@@ -211,7 +211,7 @@ class ExtractRails(RailAlgorithm):
         context: QgsProcessingContext,
     ) -> dict[str, str]:
         """Write the network's output as Clean Rail Raster does; no file if no rail cell is left."""
-        from ...core.raster_file import header_for, on_one_grid
+        from ...core.output.raster_file import header_for, on_one_grid
 
         if not any(raster.tiles for raster in network.cleaned):
             return {}

@@ -93,7 +93,7 @@ class FitAlignment(RailAlgorithm):
     ) -> dict[str, Any]:
         """Fit each track, then write elements and deviations."""
         from ...core.alignment.fit import fit_tracks
-        from ...core.layers import deviations_layer, elements_layer
+        from ...core.output.layers import deviations_layer, elements_layer
         from ..reading.tracks_to_fit import read_fixed, read_tracks
 
         tracks, frame = read_tracks(job.tracks, job.quality, job.rails, progress.span(0, READING))

@@ -108,8 +108,8 @@ class ImportAlignment(RailAlgorithm):
     ) -> dict[str, Any]:
         """Read the file and write the layers."""
         from ...core.alignment.landxml_reading import read_landxml
-        from ...core.design_files import check_place
-        from ...core.layers import axes_layer, deviations_layer, elements_layer
+        from ...core.output.design_files import check_place
+        from ...core.output.layers import axes_layer, deviations_layer, elements_layer
 
         read = read_landxml(job.path, job.east_first, progress.span(0, READING))
         frame = replace(read[0].frame, crs_wkt=job.crs_wkt)

@@ -110,7 +110,7 @@ class MeasureTrackGeometry(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Measure each track, then write the points."""
-        from ...core.layers import findings_layer, quality_layer
+        from ...core.output.layers import findings_layer, quality_layer
         from ...core.rails import RailNetwork
         from ...core.report import Origin, list_findings, summary
         from ...core.squares.remeasuring import measure_rails

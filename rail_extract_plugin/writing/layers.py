@@ -41,10 +41,10 @@ if TYPE_CHECKING:
     from ...core.airborne.survey import AirborneLine
     from ...core.alignment.fit import Fit
     from ...core.frame import LocalFrame
-    from ...core.layers import Layer
+    from ...core.output.layers import Layer
+    from ...core.output.raster_file import RasterHeader
     from ...core.rails import Centerline, RailLine, TrackGeometry
     from ...core.raster import RailRaster
-    from ...core.raster_file import RasterHeader
 
 KINDS = {int: INTEGER, float: REAL, str: TEXT}
 
@@ -305,7 +305,7 @@ def _exchange(
     context: QgsProcessingContext,
 ) -> dict[str, str]:
     """Write features for other programs; QGIS loads the file if the user wants that."""
-    from ...core.exchange import Shape, write_shapes
+    from ...core.output.exchange import Shape, write_shapes
 
     destination, value = algorithm.destinations[name], parameters.get(name)
     shapes = (

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
 
-from .alignment.elements import Alignment
-from .alignment.equations import measured
-from .alignment.table import rows
-from .fields import AIRBORNE_STATION_FIELDS, DEVIATION_FIELDS, DIFFERENCE_FIELDS, QUALITY_FIELDS, STATION_FIELDS
-from .frame import LocalFrame
-from .products import (
+from ..alignment.elements import Alignment
+from ..alignment.equations import measured
+from ..alignment.table import rows
+from ..fields import AIRBORNE_STATION_FIELDS, DEVIATION_FIELDS, DIFFERENCE_FIELDS, QUALITY_FIELDS, STATION_FIELDS
+from ..frame import LocalFrame
+from ..products import (
     AXES,
     CENTERLINES,
     DEVIATIONS,
@@ -28,15 +28,15 @@ from .products import (
     STOPS,
     Product,
 )
-from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
-from .report import Finding, list_findings
+from ..rails import Centerline, RailLine, RailNetwork, TrackGeometry
+from ..report import Finding, list_findings
 
 if TYPE_CHECKING:
-    from .airborne.proposals import ProposedGuide
-    from .airborne.survey import AirborneLine, AirborneTrack
-    from .alignment.deviations import Deviations
-    from .comparison.tracks import TrackComparison
-    from .grow.growth import Stop
+    from ..airborne.proposals import ProposedGuide
+    from ..airborne.survey import AirborneLine, AirborneTrack
+    from ..alignment.deviations import Deviations
+    from ..comparison.tracks import TrackComparison
+    from ..grow.growth import Stop
 
     Line = Union[RailLine, Centerline, Finding, AirborneLine, ProposedGuide]
 
