@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -166,6 +167,28 @@ def write_layer(
         return {}
     _style(algorithm, name, layer_id, product.style, context, has_system=frame.crs_wkt is not None)
     return {name: layer_id}
+
+
+def layer_writers(
+    algorithm: QgsProcessingAlgorithm,
+    makers: Mapping[str, Callable[[], Layer]],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, Callable[[], dict[str, str]]]:
+    """Return the functions that make layers and write them to the outputs of their names, for `write_each`.
+
+    Parameters
+    ----------
+    makers : mapping of str to callable
+    algorithm, frame, parameters, context
+        See `write_layer`.
+    """
+
+    def write(name: str) -> dict[str, str]:
+        return write_layer(algorithm, name, makers[name](), frame, parameters, context)
+
+    return {name: partial(write, name) for name in makers if is_wanted(parameters.get(name), context)}
 
 
 def write_raster(
