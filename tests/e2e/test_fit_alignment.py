@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
 from rail_extract.core.frame import LocalFrame
-from rail_extract.laboratory.designs import FAMILIES, random_design, surveyed
 
 EAST, NORTH = 500_000.0, 3_000_000.0
 SHAPES = [(150.0, 0, 0), (60.0, 0, -1 / 500), (150.0, -1 / 500, -1 / 500), (60.0, -1 / 500, 0), (100.0, 0, 0)]
@@ -112,35 +111,6 @@ def places(path):
     with sqlite3.connect(path) as database:
         rows = list(database.execute(f"SELECT layout, type, {PLACES} FROM {path.stem} ORDER BY fid"))
     return [row[:2] for row in rows], np.array([row[2:] for row in rows], dtype=float)
-
-
-def test_a_table_given_back_keeps_heights_and_cants_and_what_was_edited(qgis_process, tmp_path):
-    random = np.random.default_rng([77, 24])
-    design = random_design(random, FAMILIES["main line"], 14)
-    line = surveyed(design, random, 0.001, 0.003, 15.0) + [EAST, NORTH, 0]
-    s = np.arange(len(line), dtype=float)
-    write_survey(tmp_path, line, s, 1000 * design.cants(s) + 0.4 * random.standard_normal(len(s)))
-    given = {"INPUT": tmp_path / "line.geojson", "QUALITY": tmp_path / "quality.geojson"}
-
-    def fitted(name, **fixed):
-        run = qgis_process({**given, **fixed, "ELEMENTS": tmp_path / name}, algorithm="railextract:fitalignment")
-        assert run.returncode == 0, run.stdout + run.stderr
-        return tmp_path / name
-
-    types, free = places(fitted("free.gpkg"))
-    again = places(fitted("again.gpkg", FIXED=tmp_path / "free.gpkg"))
-    assert again[0] == types
-    np.testing.assert_allclose(again[1][:, 0], free[:, 0], atol=0.02)
-    np.testing.assert_allclose(again[1][:, 1:3], free[:, 1:3], atol=0.02)
-    np.testing.assert_allclose(again[1][:, 3], free[:, 3], atol=0.002)
-    np.testing.assert_allclose(again[1][:, 4], free[:, 4], atol=0.5)
-    edited = [types.index(kind) for kind in (("H", "arc"), ("V", "parabola"))]
-    as_csv(tmp_path / "free.gpkg", tmp_path / "edited.csv", {at: lambda row: row["r1_m"] * 1.001 for at in edited})
-    held = fitted("held.gpkg", FIXED=tmp_path / "edited.csv")
-    assert places(held)[0] == types
-    before, after = ([row["r1_m"] for row in rows_of(path)] for path in (tmp_path / "free.gpkg", held))
-    for at in edited:
-        assert after[at] == pytest.approx(1.001 * before[at], rel=1e-6)
 
 
 def test_lines_of_an_extraction_have_the_elements_of_the_scene(extracted, qgis_process, tmp_path):

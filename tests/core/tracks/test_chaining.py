@@ -108,11 +108,6 @@ def test_one_rail_continues_a_track_where_the_other_is_hidden(curve, hidden):
     assert line.gaugesd_mm < 0.5
 
 
-def test_one_rail_continues_a_track_over_a_limited_length():
-    left, right = Track(CURVED, SPACING).rails()
-    assert len(build(*without(left, (40.0, 75.0)), right)) == 2
-
-
 @pytest.mark.parametrize("gap_m", [2.0, 5.0])
 @pytest.mark.parametrize("kept_m", [-1.0, 0.0, 2.5, 4.0])
 def test_rails_with_alternating_gaps_give_one_centerline(gap_m, kept_m):
@@ -123,13 +118,6 @@ def test_rails_with_alternating_gaps_give_one_centerline(gap_m, kept_m):
     (line,) = found
     checked(found, [laid.centerline])
     assert line.bridged_m == pytest.approx(2 * gap_m + min(kept_m, 0.0), abs=0.6)
-
-
-def test_a_track_runs_to_the_end_of_its_longer_rail():
-    left, right = Track(CURVED, SPACING).rails()
-    (line,) = build(between(left, 4.0, np.inf), between(right, 0.0, 115.0))
-    assert line.length_m == pytest.approx(CURVED.length_m, abs=0.3)
-    assert line.bridged_m == pytest.approx(9.0, abs=0.2)
 
 
 @pytest.mark.parametrize("switch", SWITCHES)

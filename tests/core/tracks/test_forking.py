@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from rail_extract.core.lines.thinning import thin
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.centerlines import build_centerlines
 from rail_extract.laboratory.curves import Element, trace
@@ -74,23 +73,6 @@ def test_branches_of_straight_switches_leave_at_an_angle(name, shown_m):
     assert result.length_ratio < 1.005
 
 
-@pytest.mark.parametrize("early_m", [0.5, 2.0])
-def test_branches_that_begin_on_the_through_track_lose_the_shared_part(early_m):
-    rails, toe, truth = turnout(FORM["300-1:9"], 1, 0.3, 0.0)
-    lines = [rail.xyz for rail in rails]
-    for through, side in ((0, 2), (1, 3)):
-        away = np.hypot(*(lines[through][:, :2] - lines[side][0, :2]).T)
-        shared = (away < early_m) & (
-            lines[through] @ [np.cos(0.3), np.sin(0.3), 0] < lines[side][0] @ [np.cos(0.3), np.sin(0.3), 0]
-        )
-        lines[side] = np.concatenate([lines[through][shared], lines[side]])
-    through, side = by_rails(build_centerlines(rails_of(*lines), GAUGE, WIDTH))
-    start = near_end(side, toe)
-    assert np.hypot(*(start[:2] - toe)) < 0.5
-    assert (through.xyz == start).all(axis=1).any()
-    assert compare_lines([through.xyz, side.xyz], truth).length_ratio < 1.004
-
-
 def test_a_turnout_in_a_curve_forks_although_rails_are_not_exact():
     rails, toe, truth = turnout(FORM["500-1:12"], 1, 1.0, 0.1, (Element(120.0, 1 / 900, 1 / 900),), noise_m=0.001)
     through, side = by_rails(build_centerlines(rails, GAUGE, WIDTH))
@@ -98,31 +80,6 @@ def test_a_turnout_in_a_curve_forks_although_rails_are_not_exact():
     assert np.hypot(*(start[:2] - toe)) < 2.0
     assert (through.xyz == start).all(axis=1).any()
     assert compare_lines([through.xyz, side.xyz], truth).lateral_p95_m < 0.005
-
-
-def test_forks_stay_connected_when_lines_are_thinned():
-    rails, toe, _ = turnout(FORM["300-1:9"], 1, 0.3, 0.1)
-    through, side = thin(by_rails(build_centerlines(rails, GAUGE, WIDTH)), 0.002, 0.002)
-    assert len(through.xyz) < 20
-    assert (through.xyz == near_end(side, toe)).all(axis=1).any()
-
-
-def test_a_crossover_forks_at_both_ends():
-    form = FORM["190-1:9"]
-    lower = trace([Element(100.0)])
-    half = [Element(form.arc_m, 1 / form.radius_m, 1 / form.radius_m)]
-    back = [Element(form.arc_m, -1 / form.radius_m, -1 / form.radius_m)]
-    link = trace([*half, Element(20.0), *back], tuple(lower.xy[1000]), 0.0)
-    upper = trace([Element(100.0)], (0.0, link.xy[-1, 1]), 0.0)
-    tracks = [Track(curve, GAUGE + WIDTH) for curve in (lower, upper, link)]
-    shown = slice(300, -300)  # without 6 m at either end, where the branch is up to 95 mm from the track
-    rails = [*tracks[0].rails(), *tracks[1].rails(), *(tracks[2].railhead(side).top[shown] for side in (1, -1))]
-    first, second, crossover = by_rails(build_centerlines(rails_of(*rails), GAUGE, WIDTH))
-    for track, place in ((first, link.xy[0]), (second, link.xy[-1])):
-        end = near_end(crossover, place)
-        assert np.hypot(*(end[:2] - place)) < 0.05
-        assert (track.xyz == end).all(axis=1).any()
-    assert compare_lines([crossover.xyz], [tracks[2].centerline]).lateral_p95_m < 0.002
 
 
 def test_tracks_that_only_run_or_end_next_to_others_do_not_fork():

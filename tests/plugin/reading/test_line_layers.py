@@ -187,21 +187,3 @@ def test_three_rails_make_two_tracks_in_one_run(layer, run_step, context):
     tracks = context.getMapLayer(outcome.results["OUTPUT"]).getFeatures()
     found = [(track["left_ids"], track["right_ids"], round(track["gauge_mm"])) for track in tracks]
     assert found == [("3", "1", 1435), ("2", "1", 1000)]
-
-
-@pytest.mark.parametrize(
-    ("parameters", "sentence"),
-    [
-        ({"OTHER_GAUGES": "wide"}, 'OTHER_GAUGES "wide" must be millimetres'),
-        ({"OTHER_GAUGES": "1440"}, "can't be distinguished within CENTERLINE_TOLERANCE"),
-        ({"OTHER_GAUGES": "10"}, "A gauge of 10 mm is not possible"),
-        ({"GAUGE": 1000}, "is the gauge 1435 mm?"),
-        ({"INPUT": "gone.gpkg"}, "gone.gpkg"),
-        ({"OUTPUT": "/nowhere/t.gpkg"}, "can't be written"),
-    ],
-)
-def test_bad_input_is_one_sentence(layer, run_step, parameters, sentence):
-    outcome = run_step("buildtrackcenterlines", {"INPUT": layer(LEFT, RIGHT), "OUTPUT": "memory:", **parameters})
-    assert not outcome.ok
-    assert sentence in outcome.error
-    assert "Traceback" not in outcome.error
