@@ -220,9 +220,6 @@ def _walk(
     beyond_m = gauge_scatter(rails, centerlines) if heads and heads.blunt else {}
     rails = doubting_scatter(rails, beyond_m)
     geometry = _measure_tracks(centerlines, rails, beyond_m, sources, parameters, runner, measuring)
-    if geometry:
-        count = sum(len(track.chainage_m) for track in geometry)
-        progress.info(f"Measured: {counted(count, 'station')}, one every {parameters.quality_step_m:g} m.")
     described = dict(runner.run({"engine": Task("Describing the engine", _describe_engine, (parameters,))}))
     progress.info(f"Engine of the network: {described.get('engine', 'unknown')}.")
     progress.set_fraction(1.0)
@@ -416,4 +413,7 @@ def _measure_tracks(
             share,
             parameters.gauges,
         )
+    if geometry:
+        count = sum(len(track.chainage_m) for track in geometry)
+        progress.info(f"Measured: {counted(count, 'station')}, one every {parameters.quality_step_m:g} m.")
     return sorted(geometry, key=lambda one: one.track_id)

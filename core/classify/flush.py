@@ -125,7 +125,7 @@ def flush_rails(
     if len(marks) < 2:
         return nothing
     lines = find_lines(Marks(marks, np.zeros(len(marks))), REACH_M, 1.0, STRIP_M)
-    lines = lines.of((lines.cover >= MIN_COVER) & (lines.pure >= MIN_PURE))
+    lines = lines.of(lines.good(MIN_COVER, MIN_PURE))
     flat = xy[np.abs(below) < HEAD_LEVEL_M]
     rails = [_at_edge(_grooves(lines, gauge_m), flat, head_width_m) for gauge_m in settings.gauges_m]
     heads = [_guided(one, settings) for one in rails]

@@ -39,9 +39,20 @@ STATIONS = 10
 BESIDE_M = 0.10
 """Neighbours further across than this are beside the line."""
 
+MIN_COVER, MIN_PURE = 0.35, 0.20
+"""Least cover and purity of a line. Random surroundings have a purity of 0.07 to 0.12, a rail that runs beside two
+others 0.25."""
+
+SINGLE_COVER = 0.75
+"""Cover of a line that may be a rail without a partner."""
+
+REACH_POINTS_PER_M, REACH_M = 120.0, (1.0, 2.0)
+"""Reach of a line: this divided by the points per square metre, within limits. Thin clouds need more length to see a
+line; more than 2 m would bend out of the strip in curves."""
+
 MAX_NEIGHBOURS = 400
 """A cell with more neighbours within reach is in an area, not on a line: a line of cells has 25 to 50 at 1 m reach,
-and with 0.2 of them on the line (see `MIN_PURE`) at most 250."""
+and with `MIN_PURE` of them on the line at most 250."""
 
 CENTRE_M, CENTRE_ROUNDS = 0.5, 3
 """Distance within which the cells of a head give the middle of its axis, and rounds to find them."""
@@ -102,6 +113,10 @@ class Lines:
         """Unit vectors to the left, (n, 2)."""
         return np.column_stack([-np.sin(self.theta), np.cos(self.theta)])
 
+    def good(self, cover: float = MIN_COVER, pure: float = MIN_PURE) -> np.ndarray:
+        """Return the numbers of the cells that are on a line, (k,) int."""
+        return np.flatnonzero((self.cover >= cover) & (self.pure >= pure))
+
     def of(self, chosen: np.ndarray) -> Lines:
         """Choose some of the cells."""
         return Lines(
@@ -112,6 +127,11 @@ class Lines:
             self.pure[chosen],
             self.reach_m,
         )
+
+
+def reach_at(per_m2: float) -> float:
+    """Return the reach of lines in a cloud with this number of points per square metre."""
+    return float(np.clip(REACH_POINTS_PER_M / per_m2, *REACH_M))
 
 
 def joined(one: Lines, other: Lines) -> Lines:
