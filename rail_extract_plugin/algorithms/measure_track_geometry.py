@@ -142,9 +142,8 @@ class MeasureTrackGeometry(RailAlgorithm):
         for sentence in summary(network, origin.gauges_m):
             progress.info(sentence)
         made = network_makers(network, origin.gauges_m)
-        makers = {"OUTPUT": made["quality"], "FINDINGS": made["findings"]}
         writers = {
-            **layer_writers(self, makers, frame, *rest),
+            **layer_writers(self, {"OUTPUT": made["quality"], "FINDINGS": made["findings"]}, frame, *rest),
             "REPORT": lambda: write_report(self, "REPORT", network, origin, *rest),
         }
         return {**write_each(writers, *rest), **figures_of_stations(measured)}
