@@ -30,7 +30,7 @@ points near the bed. Ballast scatters by 12 mm and more."""
 CAVITY_M = (0.012, 0.19)
 """Depth of points in a groove below the pavement: from three times a good scanner's noise to a rail's height."""
 
-REACH_M, STRIP_M, MIN_COVER, MIN_PURE = 1.0, 0.05, 0.5, 0.3
+REACH_M, BESIDE_LINE_M, MIN_COVER, MIN_PURE = 1.0, 0.05, 0.5, 0.3
 """See `lines`; stricter than for rails, because nothing else confirms a groove."""
 
 INSIDE_M, SPACING_M = 0.052, 0.05
@@ -124,7 +124,7 @@ def flush_rails(
     marks = centroids(cell[hollow], xy[hollow])
     if len(marks) < 2:
         return nothing
-    lines = find_lines(Marks(marks, np.zeros(len(marks))), REACH_M, 1.0, STRIP_M)
+    lines = find_lines(Marks(marks, np.zeros(len(marks))), REACH_M, 1.0, BESIDE_LINE_M)
     lines = lines.of(lines.good(MIN_COVER, MIN_PURE))
     flat = xy[np.abs(below) < HEAD_LEVEL_M]
     rails = [_at_edge(_grooves(lines, gauge_m), flat, head_width_m) for gauge_m in settings.gauges_m]
@@ -230,7 +230,7 @@ def _summed_along(grooves: Heads, counts: np.ndarray) -> np.ndarray:
     """Add up the counts of the cells of the same groove within `ALONG_M`, (n, BINS)."""
     axis, inward = grooves.lines.axis, grooves.inward
     one, other = cKDTree(axis).query_pairs(ALONG_M, output_type="ndarray").T
-    same = np.abs(np.einsum("ij,ij->i", axis[other] - axis[one], inward[one])) < STRIP_M
+    same = np.abs(np.einsum("ij,ij->i", axis[other] - axis[one], inward[one])) < BESIDE_LINE_M
     same &= np.einsum("ij,ij->i", inward[one], inward[other]) > 0
     own = np.arange(len(axis))
     rows, columns = np.concatenate([own, one[same], other[same]]), np.concatenate([own, other[same], one[same]])

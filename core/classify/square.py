@@ -305,7 +305,7 @@ def _density(coarse: Coarse, xy: np.ndarray) -> float:
 
 def _kept(found: Candidates, reach_m: float, tolerances: Tolerances, settings: Settings) -> Kept:
     """Keep the candidates that lie on rails."""
-    lines = find_lines(found.at(found.marks), reach_m, tolerances.along_m, tolerances.strip_m)
+    lines = find_lines(found.at(found.marks), reach_m, tolerances.along_m, tolerances.beside_line_m)
     good = lines.good()
     half_m = settings.head_width_m / 2 + NOISE_ACROSS_M
     lines = centred(lines.of(good), found.at(found.cells), half_m, tolerances.along_m)

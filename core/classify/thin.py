@@ -30,7 +30,7 @@ ALONG_M = 0.15
 """Difference in height between two cells of one rail: a grade of 4 % over the reach, and a beam that blends head and
 ballast."""
 
-STRIP_M = 0.065
+BESIDE_LINE_M = 0.065
 """Distance from a line within which a cell is on it: half a head, half a cell, noise, and the sagitta of a curve of
 100 m."""
 
@@ -77,7 +77,7 @@ def drawn(xyz: np.ndarray, spacings_m: Sequence[float], cell_m: float) -> np.nda
 
 def _good_lines(cells: Marks, wanted: np.ndarray) -> tuple[np.ndarray, Lines]:
     """Find the lines of some cells, (k,) int, that are on one: those cells, (m,), and their lines."""
-    lines = find_lines(cells, REACH_M, ALONG_M, STRIP_M, wanted)
+    lines = find_lines(cells, REACH_M, ALONG_M, BESIDE_LINE_M, wanted)
     good = lines.good()
     return good, lines.of(good)
 
@@ -116,7 +116,7 @@ def _per_m(lines: Lines, cells: np.ndarray) -> np.ndarray:
     near = cKDTree(lines.axis).sparse_distance_matrix(cKDTree(cells), WITHIN_M, output_type="ndarray")
     own = near["i"]
     step = cells[near["j"]] - lines.axis[own]
-    on = np.abs(np.einsum("ij,ij->i", step, lines.across[own])) < STRIP_M
+    on = np.abs(np.einsum("ij,ij->i", step, lines.across[own])) < BESIDE_LINE_M
     own, ahead = own[on], np.einsum("ij,ij->i", step, lines.along[own])[on] > 0
     counts = [np.bincount(own[ahead == side], minlength=len(lines.axis)) for side in (True, False)]
     return np.maximum(*counts) / WITHIN_M

@@ -1,6 +1,6 @@
 """The cross-section of a window: where in it a railhead may be.
 
-A head is a strip of its own width at one height with nothing as high right beside it: on both sides, or, where two
+A head is a band of its own width at one height with nothing as high right beside it: on both sides, or, where two
 heads touch in a switch and where a pavement reaches the head, on one.
 """
 
@@ -21,7 +21,7 @@ MIN_POINTS = 3
 """Fewest points of a head."""
 
 MIN_CONTRAST = 0.5
-"""Least share of a head's points that remains after those of an equal strip beside it are subtracted."""
+"""Least share of a head's points that remains after those of an equal band beside it are subtracted."""
 
 CROWN_SHARE = 0.7
 """Middle part of the head whose points give the height: its edges are rounded."""

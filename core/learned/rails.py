@@ -51,7 +51,7 @@ def rails_of(xyz: np.ndarray, sure: np.ndarray, settings: Settings, reach_m: flo
     marks = cells[np.sort(first)]
     highest = np.full(grid.shape[0] * grid.shape[1], -np.inf)
     np.maximum.at(highest, cell[sure], xyz[sure, 2])
-    lines = find_lines(Marks(grid.middles(marks), highest[marks]), reach_m, LEVEL_M, THIN.strip_m)
+    lines = find_lines(Marks(grid.middles(marks), highest[marks]), reach_m, LEVEL_M, THIN.beside_line_m)
     paired = have_partners(lines, settings.spacings_m, LEVEL_M)
     pairs = links(lines)
     wanted = _wanted(lines, paired, pairs, settings)
