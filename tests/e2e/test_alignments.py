@@ -1,7 +1,5 @@
 """Export and import of alignments through qgis_process: a table in a GeoPackage, files, and the table again."""
 
-import json
-
 import pytest
 from lines import read_features
 
@@ -20,16 +18,6 @@ SOURCE = """<LandXML version="1.2"><Units><Metric linearUnit="meter"/></Units><C
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("Größe östlich 3")
-
-
-@pytest.fixture(scope="module")
-def succeed(qgis_process):
-    def run(algorithm, parameters):
-        done = qgis_process(parameters, "--json", algorithm=f"railextract:{algorithm}")
-        assert done.returncode == 0, done.stdout + done.stderr
-        return json.loads(done.stdout[done.stdout.index("{") :])["results"]
-
-    return run
 
 
 @pytest.fixture(scope="module")

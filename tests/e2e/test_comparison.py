@@ -9,7 +9,7 @@ from lines import read_features
 
 
 @pytest.fixture(scope="module")
-def compared(extracted, sample, qgis_process, tmp_path_factory):
+def compared(extracted, sample, succeed, tmp_path_factory):
     """The truth as the reference, and the rails that were extracted."""
     folder = tmp_path_factory.mktemp("Vergleich östlich 1")
     truth = json.loads((sample / "sample_truth.geojson").read_text(encoding="utf-8"))
@@ -18,9 +18,7 @@ def compared(extracted, sample, qgis_process, tmp_path_factory):
     reference.write_text(json.dumps(truth), encoding="utf-8")
     outputs = {"OUTPUT": folder / "Abweichungen.gpkg", "REPORT": folder / "Bericht.html"}
     given = {"REFERENCE": reference, "INPUT": extracted.rails, "REFERENCE_SIGMA": 0, "IGNORE_SHIFT": False}
-    run = qgis_process({**given, **outputs}, "--json", algorithm="railextract:comparetracks")
-    assert run.returncode == 0, run.stdout + run.stderr
-    return json.loads(run.stdout[run.stdout.index("{") :])["results"], outputs
+    return succeed("comparetracks", {**given, **outputs}), outputs
 
 
 def test_the_sample_lies_where_its_truth_is(compared):

@@ -71,12 +71,10 @@ def as_csv(source, path, radii):
     path.with_suffix(".csvt").write_text(",".join(types.get(name, "Real") for name in table[0]))
 
 
-def test_elements_and_deviations_and_a_corrected_table(qgis_process, survey):
+def test_elements_and_deviations_and_a_corrected_table(succeed, survey):
     given = {"INPUT": survey / "line.geojson", "QUALITY": survey / "quality.geojson"}
     outputs = {"ELEMENTS": survey / "elements.gpkg", "DEVIATIONS": survey / "deviations.gpkg"}
-    run = qgis_process({**given, **outputs}, "--json", algorithm="railextract:fitalignment")
-    assert run.returncode == 0, run.stdout + run.stderr
-    results = json.loads(run.stdout[run.stdout.index("{") :])["results"]
+    results = succeed("fitalignment", {**given, **outputs})
     assert results["ELEMENT_COUNT"] == 13
     assert results["RMS"] == pytest.approx(1.0, abs=0.15)
     found = table(outputs["ELEMENTS"])
@@ -97,10 +95,7 @@ def test_elements_and_deviations_and_a_corrected_table(qgis_process, survey):
     np.testing.assert_allclose(np.nanstd(away[:, 1:], axis=0), [1.0, 1.0, 0.4], atol=0.2)
     edited = survey / "edited.csv"
     as_csv(outputs["ELEMENTS"], edited, {2: lambda row: -498.0})
-    again = qgis_process(
-        {**given, "FIXED": edited, "ELEMENTS": survey / "held.gpkg"}, algorithm="railextract:fitalignment"
-    )
-    assert again.returncode == 0, again.stdout + again.stderr
+    succeed("fitalignment", {**given, "FIXED": edited, "ELEMENTS": survey / "held.gpkg"})
     held = table(survey / "held.gpkg")["H"]
     assert held[2][3] == held[2][4] == pytest.approx(-498.0, abs=1e-4)
     assert [row[0] for row in held] == [row[0] for row in found["H"]]
@@ -113,11 +108,10 @@ def places(path):
     return [row[:2] for row in rows], np.array([row[2:] for row in rows], dtype=float)
 
 
-def test_lines_of_an_extraction_have_the_elements_of_the_scene(extracted, qgis_process, tmp_path):
+def test_lines_of_an_extraction_have_the_elements_of_the_scene(extracted, succeed, tmp_path):
     """The errors of extracted lines are smooth, and must not be taken for elements."""
     given = {"INPUT": extracted.centerlines, "ELEMENTS": tmp_path / "elements.gpkg"}
-    run = qgis_process(given, "--json", algorithm="railextract:fitalignment")
-    assert run.returncode == 0, run.stdout + run.stderr
+    succeed("fitalignment", given)
     plan = [row for row in rows_of(tmp_path / "elements.gpkg") if row["layout"] == "H"]
     assert [row["type"] for row in plan] == 3 * ["line", "clothoid", "arc"]
     np.testing.assert_allclose([row["s_to"] for row in plan[::3]], 40, atol=1)

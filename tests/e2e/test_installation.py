@@ -82,10 +82,8 @@ def test_folder_of_packages_from_the_setting(bare, rasterize, tmp_path):
     assert rasterize()["OUTPUT"] == str(tmp_path / "raster.tif")
 
 
-def test_installation_is_checked(qgis_process):
-    run = qgis_process({}, "--json", algorithm="railextract:checkinstallation")
-    assert run.returncode == 0, run.stdout + run.stderr
-    results = json.loads(run.stdout[run.stdout.index("{") :])["results"]
+def test_installation_is_checked(succeed):
+    results = succeed("checkinstallation", {})
     assert results["SELF_TEST"].startswith("passed: 100.0%"), results
     assert results["PASSED"] is True
     assert results["MODELS"] == "base ok, fast ok"

@@ -33,7 +33,7 @@ def folder(tmp_path):
     return made
 
 
-def test_signals_beside_a_curve_with_posts_and_an_overlap(qgis_process, folder):
+def test_signals_beside_a_curve_with_posts_and_an_overlap(succeed, folder):
     """Posts every 100 m of a circle of 500 m; km 20.3 to 20.5 exist twice, from 500 m on."""
     axis = write(folder / "Achse.geojson", "LineString", [on_circle(np.arange(0, 1.61, 1 / RADIUS_M))])
     s = np.arange(0, 900, 100.0)
@@ -46,9 +46,7 @@ def test_signals_beside_a_curve_with_posts_and_an_overlap(qgis_process, folder):
     signals = write(folder / "Signale.geojson", "Point", on_circle(places_m / RADIUS_M, 5.5), name=["A", "B", "C"])
     output = folder / "gestellt.gpkg"
     given = {"INPUT": signals, "AXIS": axis, "POSTS": posts, "JUMPS": jumps, "FORMAT": "GERMAN", "OUTPUT": output}
-    run = qgis_process(given, "--json", algorithm="railextract:stationalongaxis")
-    assert run.returncode == 0, run.stdout + run.stderr
-    results = json.loads(run.stdout[run.stdout.index("{") :])["results"]
+    results = succeed("stationalongaxis", given)
     assert (results["PLACE_COUNT"], results["BEYOND_COUNT"], results["AMBIGUOUS_COUNT"]) == (3, 0, 0)
     names = "name, piece, km, km_text, offset_m, side, ambiguous"
     with sqlite3.connect(output) as database:
@@ -63,7 +61,7 @@ def test_signals_beside_a_curve_with_posts_and_an_overlap(qgis_process, folder):
     np.testing.assert_allclose([row[4] for row in rows], 5.5, atol=0.001)
 
 
-def test_quality_points_of_an_extraction_have_kilometres(extracted, qgis_process, folder):
+def test_quality_points_of_an_extraction_have_kilometres(extracted, succeed, folder):
     """The axis is the straight through the ends of the sample; each kilometre is that of the foot on it."""
     parameters = {"INPUT": extracted.centerlines, "RAILS": extracted.rails, "STANDARD": "IN_75R_1000"}
     with sqlite3.connect(extracted.rails) as database:
@@ -71,12 +69,7 @@ def test_quality_points_of_an_extraction_have_kilometres(extracted, qgis_process
     ends = np.array([[west - 20, south - 20], [east + 20, north + 20]])
     axis = write(folder / "axis.geojson", "LineString", [ends.tolist()])
     output = folder / "quality.gpkg"
-    run = qgis_process(
-        {**parameters, "AXIS": axis, "START_KM": 3.5, "OUTPUT": output},
-        "--json",
-        algorithm="railextract:measuretrackgeometry",
-    )
-    assert run.returncode == 0, run.stdout + run.stderr
+    succeed("measuretrackgeometry", {**parameters, "AXIS": axis, "START_KM": 3.5, "OUTPUT": output})
     from lines import read_features
 
     found = read_features(output)

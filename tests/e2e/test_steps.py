@@ -1,25 +1,11 @@
 """The steps and the model through qgis_process, on a short part of the sample."""
 
-import json
-
 import pytest
 from lines import farthest, read_lines
 
 STANDARD = "IN_75R_1000"
 CUT = "578214,578222,2494300,2494345"
 """Eight metres of three tracks, which the network processes quickly."""
-
-
-@pytest.fixture(scope="module")
-def succeed(qgis_process):
-    """Run an algorithm or a model, and return its results by name."""
-
-    def run(algorithm, parameters):
-        done = qgis_process(parameters, "--json", algorithm=algorithm)
-        assert done.returncode == 0, done.stdout + done.stderr
-        return json.loads(done.stdout[done.stdout.index("{") :])["results"]
-
-    return run
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +22,7 @@ def folder(tmp_path_factory):
 def whole(succeed, source, folder):
     """Lines of Extract Rails: rails, centerlines."""
     outputs = {"RAILS": folder / "rails.gpkg", "CENTERLINES": folder / "tracks.gpkg"}
-    succeed("railextract:extractrails", {**source, "ITERATIONS": 1, **outputs})
+    succeed("extractrails", {**source, "ITERATIONS": 1, **outputs})
     return [read_lines(path) for path in outputs.values()]
 
 

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rail_extract.core.errors import Cancelled
 from rail_extract.core.polyline import length_along
-from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.centerlines import build_centerlines
 from rail_extract.laboratory.curves import Curve, Element, trace
@@ -212,20 +210,3 @@ def test_centerlines_rotate_and_move_with_their_rails(angle, east, north):
     expected = [line.xyz @ turn + [east, north, 0] for line in build_centerlines(rails, GAUGE, WIDTH)]
     found = build(*(rail.xyz @ turn + [east, north, 0] for rail in rails))
     assert_same_lines([line.xyz for line in found], expected, 2e-4)
-
-
-def test_drawing_a_long_track_can_be_cancelled():
-    class Impatient(Progress):
-        fraction = 0.0
-
-        def set_fraction(self, fraction):
-            self.fraction = fraction
-
-        def is_cancelled(self):
-            return self.fraction > 0.55
-
-    laid = Track(trace([Element(3000.0)], step_m=1.0), SPACING)
-    progress = Impatient()
-    with pytest.raises(Cancelled):
-        build(*laid.rails(), progress=progress)
-    assert progress.fraction < 0.75
