@@ -60,6 +60,7 @@ KINDS: dict[str, Callable[[int], Scene]] = {
     "hidden_heads": lambda seed: adversarial.standing_train("hidden_heads", seed, head_share=0.0),
     "standing_train": lambda seed: adversarial.standing_train(seed=seed),
     "unmarked_passes": strips.unmarked,
+    "unmarked_heights": strips.unmarked_heights,
     "crossing": adversarial.crossing,
     "grooved": adversarial.grooved,
     "turnout_9": lambda seed: switches.turnout("turnout_9", "300-1:9", (-1) ** seed, 0.4 * seed, seed),

@@ -14,12 +14,12 @@ from scipy.ndimage import maximum_filter1d
 from ..polyline import interpolate, left_normals
 from ..rails import Support
 from .blunt import WINDOW, Ridge, wander
-from .edges import STATION_STEP_M, VIEW_STATIONS, find_middles, stations_along
+from .edges import EDGE_SIGMA_M, STATION_STEP_M, VIEW_STATIONS, find_middles, stations_along
 from .flank import FLANK_TOP_SIGMA_M, Flank, find_flank
 from .head_points import MIN_ON_HEAD, HeadPoints
 from .level import robust_sigma
 from .roads import MIN_WIDER_M, bands, hidden_edges
-from .sections import Middles, outline_middles, with_outline
+from .sections import Middles, outline_middles
 from .smoother import AMPLITUDES, STILL, Spline, bridge_error, smooth
 
 UNSHOWN_M = 0.3
@@ -198,9 +198,9 @@ def _of_head(points: HeadPoints, unseen_m: float, by_outline: bool) -> Shown:
     return Shown(
         stations,
         count,
-        np.select(which, [outline.offset, with_outline(found.offset_m, outline), mean_m]),
+        np.select(which, [outline.offset, found.offset_m, mean_m]),
         np.select(which, [outline.information, found.information, by_mean]),
-        np.select(which, [outline.common, found.view_m, unsure_m]),
+        np.select(which, [outline.common, EDGE_SIGMA_M, unsure_m]),
         outline.blur,
         outline.blur_up,
     )

@@ -54,9 +54,6 @@ VIEW_STATIONS = 161
 """Stations, 40 m, over which the excess is averaged: a scanner on a train keeps its view, and 60 points give the excess
 to 20 % only."""
 
-SURE_SIGMAS = 2.0
-"""Standard deviations by which a local excess must exceed chance to count without its neighbours."""
-
 HALF_RANGE_BINS = HALF_HEAD_BINS + MAX_SHIFT_BINS + 2 + BLURRED_BINS + RIM_BINS
 """Bins on either side of a line that these steps need."""
 
@@ -152,13 +149,10 @@ class EdgeMiddles:
         Metres to the left of the line.
     information : (s,) array
         Inverse of its variance that the points next to a station alone contribute, 1/m².
-    view_m : (s,) array
-        Standard error that more points would not reduce: how much of the corners is seen is not known.
     """
 
     offset_m: np.ndarray
     information: np.ndarray
-    view_m: np.ndarray
 
 
 def find_middles(
@@ -185,10 +179,8 @@ def find_middles(
     sections, bin_m = CrossSections.of(wide_counts), head_width_m / (2 * HALF_HEAD_BINS)
     edges = sections.find_edges(free)
     density = edges.density * (points / np.maximum(wide_counts.sum(axis=1), 1)) / bin_m
-    view = (sections.middles(edges) - sections.middles(edges.equally_weighted(free))) * bin_m / np.sqrt(3)
-    view_m = np.hypot(view, EDGE_SIGMA_M)
     information = _information(density, edges.weight, noise_m, BLUR_BINS * bin_m)
-    return EdgeMiddles(edges.middles_in(counts, wide_counts) * bin_m, information, view_m)
+    return EdgeMiddles(edges.middles_in(counts, wide_counts) * bin_m, information)
 
 
 def _information(density: np.ndarray, weight: np.ndarray, noise_m: float, blur_m: float) -> np.ndarray:
@@ -235,10 +227,6 @@ class Edges:
     def initial(cls, free: np.ndarray) -> Edges:
         """Return equal weights for all edges that are `free`, (2, s) bool: those of the first round."""
         return cls(np.ones(free.shape), free.astype(float), free[0] | free[1], np.zeros(free.shape[1]))
-
-    def equally_weighted(self, free: np.ndarray) -> Edges:
-        """Give both edges full weight where both are free, however well they are visible."""
-        return replace(self, weight=np.where(free.all(axis=0), 1.0, self.weight))
 
     def middles_in(self, counts: np.ndarray, wide_counts: np.ndarray) -> np.ndarray:
         """Find the middle in narrower windows than the edges were found in, (s,); NaN where no edges are visible."""
@@ -300,9 +288,7 @@ class CrossSections:
         beyond = np.array([self._density(centre + side * (HALF_HEAD_BINS + BLURRED_BINS), side) for side in (-1, 1)])
         crown = self._density(centre - RIM_BINS // 2, 1)
         both = free.all(axis=0)
-        shadow = _sure_excess(inside * RIM_BINS)
-        view = _excess(uniform_filter1d(inside * both, VIEW_STATIONS, axis=1, mode="nearest"))
-        excess = np.where(shadow.max(axis=0) > ASKEW_EXCESS, shadow, view)
+        excess = _excess(uniform_filter1d(inside * both, VIEW_STATIONS, axis=1, mode="nearest"))
         weight = 1 - np.clip((excess - EVEN_EXCESS) / (ASKEW_EXCESS - EVEN_EXCESS), 0, 1)
         weight = np.where(both, weight, free)  # a single free edge has nothing to be compared with
         clear = (
@@ -322,9 +308,3 @@ class CrossSections:
 def _excess(density: np.ndarray) -> np.ndarray:
     """Return the relative excess of density at the other edge, (2, s)."""
     return density[::-1] / np.maximum(density, 1e-6) - 1
-
-
-def _sure_excess(points: np.ndarray) -> np.ndarray:
-    """Return the relative excess, beyond chance, of the points just inside the edges, (2, s): that of local shadows."""
-    chance = SURE_SIGMAS * np.sqrt(points[0] + points[1])
-    return (points[::-1] - points - chance) / np.maximum(points, 1e-6)

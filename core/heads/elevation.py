@@ -30,7 +30,7 @@ from .top import MIN_POINTS, Top, find_top, fit_crown, smoothed
 
 MIN_GAP_M, MAX_CHANCE_GAP_M = 0.5, 0.9
 """Length without points from which a line counts as bridged: five profiles of the fastest train's scanner. Where points
-are few, shorter sections than the second length are bridged only if chance does not explain them."""
+are few, shorter ones than the second length are bridged only if chance does not explain them."""
 
 CHANCE_GAPS = 0.002
 """Gaps per metre of line that may be due to chance."""
@@ -181,9 +181,9 @@ def _top_of(points: HeadPoints, axis: Axis, parameters: ElevationParameters) -> 
         course = smoothed(points.t, points.z + above_m, parameters.smoothing_z_m)
         return Top(course, points, np.zeros(len(points.t)))
     crown = fit_crown(points)
-    level = replace(head, z=head.z + crown.fall(head.across))
+    flat = replace(head, z=head.z + crown.fall(head.across))
     smoothing_m = parameters.smoothing_z_m or (SMOOTHING_M if axis.ridge else None)
-    top = find_top(level, parameters.crown_radius_m, parameters.tolerance_z_m, smoothing_m)
+    top = find_top(flat, parameters.crown_radius_m, parameters.tolerance_z_m, smoothing_m)
     return None if top is None else replace(top, crown_m=crown.error(points.width_m))
 
 

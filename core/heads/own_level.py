@@ -27,23 +27,12 @@ APART_M = 0.03
 MIN_POINTS = 3
 """Points that make a level: on the sparsest rails a bin has five."""
 
-MIN_IN_BIN = 4.0
-"""Points on the head in bins that have any, on average, from which levels are looked for: with fewer, as from the air,
-noise alone makes steps, and a line would lose its ends."""
-
 STEP_M, STEP_SIGMAS = (0.008, 0.015), 4.0
 """Largest change of the level beyond the gradient, between these limits, in standard deviations of what bins show by
 chance: dirt in a flangeway is 10 to 50 mm below the top."""
 
-SAGITTA = 5e-5
-"""Sagitta of a rail's profile, metres, per product of the distances from both ends, m²: half the curvature of waves of
-10 mm that are 60 m long."""
-
 SKIPPED_BINS = 3
 """Bins without a level that a level runs across."""
-
-SHARED_BINS = 8
-"""Bins in which two pieces of one level may overlap: where points are few, one bin that is off begins another piece."""
 
 SLOPE_BINS = 41
 """Bins, 20 m, whose median change of level is the gradient."""
@@ -90,8 +79,7 @@ def on_own_level(points: HeadPoints) -> HeadPoints:
     All points are, where the level of a line is not in doubt, or where beams blend heads with the ballast.
     """
     t, head = points.t, points.within(0.5)
-    occupied = len(np.unique((t[head] / LEVEL_BIN_M).astype(int)))
-    if head.sum() < max(MIN_ON_HEAD, MIN_IN_BIN * occupied) or points.is_blended:
+    if head.sum() < MIN_ON_HEAD or points.is_blended:
         return points
     flat = points.z - _gradient(t[head], points.z[head], t)
     number = (t / LEVEL_BIN_M).astype(int)
@@ -104,8 +92,7 @@ def on_own_level(points: HeadPoints) -> HeadPoints:
     level = np.interp(bins, chosen[:, 0], chosen[:, 1])
     own, any_level = np.zeros((2, len(bins)), dtype=bool)
     any_level[levels.bin] = True
-    near_m = step_m + _sagitta(levels.bin, chosen[:, 0])
-    own[levels.bin[np.abs(levels.height - level[levels.bin]) <= near_m]] = True
+    own[levels.bin[np.abs(levels.height - level[levels.bin]) <= step_m]] = True
     other = binary_opening(any_level & ~own, np.ones(MIN_BINS))
     above = flat - np.interp(t, (bins + 0.5) * LEVEL_BIN_M, level)
     return points[(above <= ABOVE_M) & (above >= -BELOW_M) & ~other[number]]
@@ -156,15 +143,6 @@ def _step(levels: _Levels) -> float:
     return float(np.clip(STEP_SIGMAS * robust_sigma(np.diff(levels.height[first])), *STEP_M))
 
 
-def _sagitta(bins: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Return by how much a rail may leave the straight line between the known bins next to each bin, metres."""
-    after = np.clip(np.searchsorted(known, bins), 1, max(len(known) - 1, 1))
-    before_m, behind_m = (
-        LEVEL_BIN_M * np.maximum(side, 0) for side in (bins - known[after - 1], known[after % len(known)] - bins)
-    )
-    return SAGITTA * before_m * behind_m
-
-
 def _pieces(levels: _Levels, step_m: float) -> list[np.ndarray]:
     """Link levels of successive bins that do not step: bins and heights, (k, 2), of each piece."""
     pieces: list[tuple[list[int], list[float]]] = []
@@ -206,8 +184,7 @@ def _chain(pieces: list[np.ndarray], step_m: float) -> np.ndarray:
         off_m = np.abs(first[number] - last[:number])
         fits = off_m <= step_m + np.clip(DRIFT * gap_m, 0.0, MAX_DRIFT_M)
         cost = np.where(fits, 0.0, np.where(off_m <= SHIFTED_M, SHIFT_BINS, np.inf))
-        along = (gap_m > 0) | (fits & (gap_m > -SHARED_BINS * LEVEL_BIN_M))
-        sums = np.where(along, best[:number] - cost, 0.0)
+        sums = np.where(gap_m > 0, best[:number] - cost, 0.0)
         if sums.max() > 0:
             before[number] = int(np.argmax(sums))
             best[number] += sums.max()
@@ -215,5 +192,4 @@ def _chain(pieces: list[np.ndarray], step_m: float) -> np.ndarray:
     while number >= 0:
         chosen.append(pieces[number])
         number = int(before[number])
-    chain = np.concatenate(chosen[::-1])
-    return chain[np.argsort(chain[:, 0], kind="stable")]
+    return np.concatenate(chosen[::-1])

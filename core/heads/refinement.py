@@ -17,7 +17,7 @@ from ..parameters import Parameters
 from ..polyline import left_normals, length_along, project
 from ..progress import SILENT, Progress
 from .axis import CELL_M, Axis, unseen_m
-from .branch_starts import APART_HEADS, slide_branches
+from .branch_starts import slide_branches
 from .edges import Widths, widest
 from .head_points import near_lines
 from .own_level import on_own_level
@@ -26,10 +26,9 @@ from .strips import measure_strips
 MAX_CROSSING_SHIFT_M = 3.0
 """Limit for how far a crossing moves when two lines move by half a head: at 1:26.5 each moves it by 1 m."""
 
-SURE_HEADS = (APART_HEADS, 0.7, 0.7)
-"""Distance of a branch from its stock rail, in head widths, from which its line is reliable after each round: first
-where the raster separates the two, then where most of the head is free. Closer than that, the line is still biased
-towards the start assumed before, which moves the start half a metre forward."""
+ROUNDS, SURE_HEADS = 3, 0.7
+"""Rounds of moving lines, and distance of a branch from its stock rail, in head widths, from which most of its head is
+free and its line thus reliable."""
 
 ALIGNED_ROUNDS = 2
 """Further rounds in which strips are aligned: a step of 30 mm where strips meet has been drawn as a bend 2 m long, of
@@ -69,11 +68,11 @@ def refine(
         begin where they touch the rail that they leave.
     """
     by_x = points.xyz[np.argsort(points.xyz[:, 0])] if len(network.passes) else points.xyz
-    shares = progress.split(len(SURE_HEADS) + (ALIGNED_ROUNDS if align and points.strips is not None else 0))
-    for number, (share, sure_heads) in enumerate(zip(shares, SURE_HEADS)):
+    shares = progress.split(ROUNDS + (ALIGNED_ROUNDS if align and points.strips is not None else 0))
+    for number, share in enumerate(shares[:ROUNDS]):
         network = _shifted(network, points, head_width_m, smoothing_m, cell_m, share, by_outline=number > 0)
-        network = slide_branches(network, by_x, widest(head_width_m), sure_heads * widest(head_width_m))
-    for share in shares[len(SURE_HEADS) :]:
+        network = slide_branches(network, by_x, widest(head_width_m), SURE_HEADS * widest(head_width_m))
+    for share in shares[ROUNDS:]:
         network = _shifted(network, points, head_width_m, smoothing_m, cell_m, share, align=True)
     return network
 

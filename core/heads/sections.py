@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, station_count
+from .edges import STATION_STEP_M, VIEW_STATIONS, station_count
 from .head_points import HeadPoints, near_lines
 from .outline import CROWN_RADIUS_M, MIN_NOISE_M, Grid, Outline, Scores, Section, fit_section, log_likelihood
 
@@ -62,33 +62,11 @@ FLAT_SHARE, TWO_LEVELS, APART_M = 0.3, -0.4, 0.003
 which they are on two levels, and half the least distance of these. Noise has 0 or more, and two passes -2 (d² / (d² +
 noise²))², at half their distance d: -0.5 where d is the noise. Heights rounded to half of it have -0.1."""
 
-FLAT_BLUR_M = 0.009
-"""Blur from which a head without a round top is not flat to its edges, but shown by passes 20 mm apart or more."""
-
 ON_HEAD_M = 0.005
 """Distance of a line from its head (RMS) up to which it shows the blur of the head: further off, it was displaced."""
 
 CORE_SIGMAS, SURE_SIGMAS = 4.0, 4.0
 """Standard deviations from which heights are those of weeds, and of the kurtosis, √(24 / n), from which it is sure."""
-
-WIDENED_M = 0.008
-"""Excess of the width from which passes may have widened the head; without round corners it looks 7 mm wider."""
-
-CROWNED_SHARE, CROWN_SHARE, CROWN_BAND_M = 0.5, 0.4, 0.006
-"""Curvature of the top, as a share of that of the outline, from which a head is crowned, and the points by which it is
-measured: within this share of the head's width from its axis, and this far from the top. A head that is flat to its
-edges looks 11 mm wider than it is, and blurred, as one that several passes show."""
-
-FLAT_RING, FLAT_DROP_M = (0.40, 0.47), 0.0012
-"""Distances from the axis, as shares of the head's width, between which corners are; and by how much less they lie
-below the middle of a head that is flat to its edges. Those of the outline are 2.5 to 5 mm below it."""
-
-SHARP_NOISE_M = 0.003
-"""Noise in height from which the outline tells the axis of a head without corners as well as its edges do."""
-
-BEYOND_RING, MAX_BEYOND = (0.53, 0.60), 0.2
-"""Distances from the axis at which a flat head has no points, as shares of its width, and their most density there
-compared with that between the corners and the axis: passes 15 mm apart have half of it there."""
 
 
 @dataclass(frozen=True)
@@ -153,15 +131,12 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
         offset, middles.information[part], course = _by_station(
             section.place[0], scores.by_bin[bins[here]], station[here] - first, last - first
         )
-        is_crowned = _is_crowned(left[here], up[here], head_width_m)
         pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
-        is_sharp = np.exp(section.place[5]) < SHARP_NOISE_M
-        if is_crowned or not (is_sharp and _is_flat(left[here] - section.place[0], up[here], head_width_m)):
-            middles.offset[part] = np.where(seen[part], offset - pull, np.nan)
+        middles.offset[part] = np.where(seen[part], offset - pull, np.nan)
         middles.common[part] = np.hypot(scores.common_m, PULL_DOUBT * pull)
         on_crown = np.abs(left[here] - section.place[0]) < FLAT_SHARE * head_width_m
         middles.blur_up[part] = apart_m = _half_apart(_above_crown(left[here], up[here], section.place)[on_crown])
-        middles.blur[part] = _blur(section, width_m - head_width_m, course, apart_m, is_crowned)
+        middles.blur[part] = _blur(section, width_m - head_width_m, course, apart_m)
     return middles
 
 
@@ -194,33 +169,6 @@ def _fitted(counts: np.ndarray, head: Head, grid: Grid, start: Section | None) -
     return (section, found, width_m) if settled else (first, head, width_m)
 
 
-def _is_flat(left: np.ndarray, up: np.ndarray, head_width_m: float) -> bool:
-    """Return whether points, by their offsets from the axis and heights, (n,) metres, show a head without corners.
-
-    Its outline is not that of a rail, which lies anywhere across it with little doubt; its two edges show its middle.
-    """
-    left, up = left[np.abs(up) < CROWN_BAND_M] / head_width_m, up[np.abs(up) < CROWN_BAND_M]
-    middle = up[np.abs(left) < CROWN_SHARE]
-    sides = [up[(side * left > FLAT_RING[0]) & (side * left < FLAT_RING[1])] for side in (-1, 1)]
-    if min(len(middle), *map(len, sides)) < ENOUGH_POINTS:
-        return False
-    beyond = np.count_nonzero((np.abs(left) > BEYOND_RING[0]) & (np.abs(left) < BEYOND_RING[1]))
-    if beyond * CROWN_SHARE > MAX_BEYOND * len(middle) * (BEYOND_RING[1] - BEYOND_RING[0]):
-        return False
-    drop_m = np.mean(middle) - np.mean([np.mean(side) for side in sides])
-    doubt_m = np.sqrt(np.mean([np.var(side) / len(side) for side in sides]))
-    return bool(drop_m + 2 * doubt_m < FLAT_DROP_M)
-
-
-def _is_crowned(left: np.ndarray, up: np.ndarray, head_width_m: float) -> bool:
-    """Return whether points, by their offsets from the axis and from the top, (n,) metres, show a round top."""
-    top = (np.abs(left) < CROWN_SHARE * head_width_m) & (np.abs(up) < CROWN_BAND_M)
-    if top.sum() < ENOUGH_POINTS:
-        return False
-    curvature = -2 * np.polynomial.polynomial.polyfit(left[top], up[top], 2)[2]
-    return bool(curvature > CROWNED_SHARE / CROWN_RADIUS_M)
-
-
 def _above_crown(left: np.ndarray, up: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Return the heights of points, (n,) metres, above the crown of a head at a place."""
     return up - place[1] - place[2] * left + (left - place[0]) ** 2 / (2 * CROWN_RADIUS_M)
@@ -242,12 +190,11 @@ def _half_apart(above: np.ndarray) -> float:
     return float(apart_m) if sure and apart_m >= APART_M else 0.0
 
 
-def _blur(section: Section, wider_m: float, offset: np.ndarray, apart_up_m: float, is_crowned: bool) -> float:
+def _blur(section: Section, wider_m: float, offset: np.ndarray, apart_up_m: float) -> float:
     """Return by how much the edges of a head are blurred beyond the noise; see `Middles.blur`.
 
     Where the line wanders about the head, by its `offset`, (k,) metres, it blurs the section as well, and so do passes
-    in height, by `apart_up_m`. A head that is flat to its edges looks both blurred and wider. Passes from either side
-    each show the edge that they are shifted to: they widen the head, by `wider_m`, rather than blur it.
+    in height, by `apart_up_m`. What is wider or narrower than a head, by `wider_m`, is another shape.
     """
     across_m, height_m = np.exp(section.place[4:])
     known = offset[np.isfinite(offset)]
@@ -256,10 +203,8 @@ def _blur(section: Section, wider_m: float, offset: np.ndarray, apart_up_m: floa
     across_m = np.sqrt(max(across_m**2 - (np.var(known) if len(known) else 0.0), 0.0))
     height_m = np.sqrt(max(height_m**2 - apart_up_m**2, MIN_NOISE_M**2))
     blur_m = np.sqrt(max(across_m**2 - height_m**2, 0.0))
-    is_blurred = blur_m >= BLURRED_M and across_m >= BLURRED_RATIO * height_m and wider_m >= -WRONG_WIDTH_M
-    is_blurred &= wider_m < MAX_WRONG_WIDTH_M if is_crowned else wider_m < WRONG_WIDTH_M and blur_m > FLAT_BLUR_M
-    widened_m = 0.5 * wider_m if is_crowned and WIDENED_M < wider_m < MAX_WRONG_WIDTH_M else 0.0
-    return float(np.hypot(blur_m if is_blurred else 0.0, widened_m))
+    is_blurred = blur_m >= BLURRED_M and across_m >= BLURRED_RATIO * height_m
+    return float(blur_m) if is_blurred and -WRONG_WIDTH_M <= wider_m < MAX_WRONG_WIDTH_M else 0.0
 
 
 def likelier_width(lines: Sequence[np.ndarray], xyz: np.ndarray, widths_m: Sequence[float]) -> float:
@@ -348,13 +293,3 @@ def _by_station(
         for sums in ((gradient, known), uniform_filter1d([gradient, known], COURSE_STATIONS, axis=1, mode="constant"))
     )
     return np.where(known > 0, offset, np.nan), known, course
-
-
-def with_outline(by_edges: np.ndarray, by_outline: Middles) -> np.ndarray:
-    """Return the middles from the outline, and from the edges elsewhere, in metres to the left.
-
-    Edges are corrected by what they differ by where both are known.
-    """
-    both = np.isfinite(by_edges) & np.isfinite(by_outline.offset)
-    correction = np.median((by_outline.offset - by_edges)[both]) if both.any() else 0.0
-    return np.where(np.isfinite(by_outline.offset), by_outline.offset, by_edges + correction)

@@ -132,7 +132,7 @@ def smooth(
     information : (n,) array
         Inverse of the variance of each value.
     start_m, end_m : float
-        Section of the line that the spline covers.
+        Part of the line that the spline covers.
     line : (k, 2) array, optional
         Line in plan to whose left the values are measured: the design is that of the line and the values together.
     amplitudes : (n,) array

@@ -121,3 +121,8 @@ def overlapping(seed: int = 44) -> Scene:
 def unmarked(seed: int = 45) -> Scene:
     """Build a curve that is scanned twice, 15 mm apart, without a mark of the pass."""
     return passes("unmarked_passes", seed, [Pass(0.0075, 0.0), Pass(-0.0075, 0.0)], with_ids=False)
+
+
+def unmarked_heights(seed: int = 47) -> Scene:
+    """Build a curve that is scanned twice, 12 mm apart in height, without anything that says so."""
+    return passes("unmarked_heights", seed, [Pass(0.0, 0.012), Pass(0.0, 0.0)], with_ids=False)
