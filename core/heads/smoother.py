@@ -152,8 +152,8 @@ def smooth(
             data[apart] += np.bincount(first + one, information * basis[one] * basis[one + apart], count)
     data[0] += RIDGE * data[0].mean()
     bends = np.zeros(pieces) if line is None else _third_differences(line, start_m, step_m, pieces)
-    strengths = np.meshgrid(DESIGNS, amplitudes, indexing="ij")
-    coefficients, factors, evidence = _fits(data, score, _Priors(*(one.ravel() for one in strengths), step_m, bends))
+    designs, waves = np.repeat(DESIGNS, len(amplitudes)), np.tile(amplitudes, len(DESIGNS))
+    coefficients, factors, evidence = _fits(data, score, _Priors(designs, waves, step_m, bends))
     share = np.exp(evidence - evidence.max())
     share /= share.sum()
     likely = share > LEAST_SHARE
