@@ -11,6 +11,8 @@ CHECK = .check/bin/python
 # The checkout under its import name, whatever its folder is called.
 AS_PACKAGE = .check/src
 ENVIRONMENT = build/environment.sh
+# On all cores; tests of a file share what they made.
+BY_FILE = -n auto --dist loadfile
 
 # A new system has no list of packages yet.
 INSTALL = exec >&2; $(SUDO) apt-get update -q && \
@@ -33,7 +35,7 @@ check: lint  ## lint, types, import rules and the tests that need neither QGIS n
 .PHONY: test
 test: check plugin  ## run every test: check, core with PyTorch, plugin and, through qgis_process, the whole
 	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest -n auto tests/core tests/laboratory tests/benchmarks
-	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest tests/plugin tests/e2e
+	@. ./$(ENVIRONMENT) && $(PYTHON) -m pytest $(BY_FILE) tests/plugin tests/e2e
 
 .PHONY: test-desktop
 test-desktop: plugin  ## test the real QGIS application on a virtual display
@@ -61,7 +63,7 @@ endure: plugin  ## kill runs while they write, let pairs of runs write one outpu
 
 .PHONY: test-qgis
 test-qgis: plugin  ## run the tests that need QGIS: plugin and, through qgis_process, the whole
-	@. ./$(ENVIRONMENT) && "$$QGIS_PROCESS" --version | head -n 1 && $(PYTHON) -m pytest tests/plugin tests/e2e
+	@. ./$(ENVIRONMENT) && "$$QGIS_PROCESS" --version | head -n 1 && $(PYTHON) -m pytest $(BY_FILE) tests/plugin tests/e2e
 
 .PHONY: test-latest test-3.40
 test-latest test-3.40: test-%:  ## run the same with Debian testing's QGIS, or with the backports' 3.40, in a chroot

@@ -17,6 +17,9 @@ class _Notices(QObject):
     standard_proposed = pyqtSignal(object, str)
     """Feedback of a run, and the name of a rail standard that fits the points better."""
 
+    standard_used = pyqtSignal(str)
+    """Rail standard of a run that a dialog started."""
+
     findings_loaded = pyqtSignal(str)
     """Id of a layer of findings in the project."""
 

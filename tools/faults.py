@@ -99,6 +99,11 @@ class Fault:
         return re.fullmatch(".*".join(map(re.escape, self.says.split("…"))), said) is not None
 
 
+def refused(name: str, prepare: Callable[..., dict[str, Any]], says: str, **more: Any) -> Fault:
+    """Return a fault that is refused with this message."""
+    return Fault(name, prepare, REFUSED, says, **more)
+
+
 def tables() -> Iterator[tuple[str, list[Fault]]]:
     """Load the tables of the tests: title and faults of each."""
     for path in sorted((ROOT / "tests" / "plugin").glob("test_faults_*.py")):

@@ -55,7 +55,7 @@ def smoothing_z() -> Figure:
     """Draw heights of a rail on a short wave, by the smoothing in height."""
     curve = bend(40)
     case = bench(curve, 0.01 * np.sin(2 * np.pi * curve.chainage / 12), scanner=Scanner(noise_m=0.006))
-    return _heights(case, "smoothing_z_m", "SMOOTHING_Z", (0.3, 3.0, 10.0), "Wave of 12 m and 10 mm")
+    return _heights(case, "smoothing_z_m", "SMOOTHING_Z", (None, 3.0, 10.0), "Wave of 12 m and 10 mm")
 
 
 def tolerance_z() -> Figure:
@@ -163,9 +163,9 @@ def other_gauges() -> Figure:
 
 
 def _heights(
-    case: Bench, field: str, name: str, values: Sequence[float], title: str, **changes: float
+    case: Bench, field: str, name: str, values: Sequence[float | None], title: str, **changes: float
 ) -> Figure:  # fmt: skip
-    """Draw heights along one rail for some values of a parameter, above the points near it."""
+    """Draw heights along one rail for some values of a parameter, or with none, above the points near it."""
     figure, axes = _figure("along the track [m]", "height [mm]")
     truth = case.scene.rails[0]
     xyz = case.points.xyz
@@ -176,7 +176,7 @@ def _heights(
     for value, color, width in zip(values, SERIES, WIDTHS):
         found = case.rails(**{field: value, "simplify_xy_m": 0.0, "simplify_z_m": 0.0, **changes})
         for number, rail in enumerate(_on(truth, found)):
-            label = None if number else f"{name} = {value:g} m"
+            label = None if number else f"{name} empty" if value is None else f"{name} = {value:g} m"
             axes.plot(_turned(rail.xyz)[1], 1000 * rail.xyz[:, 2], color=color, label=label, linewidth=width)
     span = 1000 * np.ptp(truth[:, 2])
     axes.set(title=title, ylim=(1000 * truth[:, 2].min() - 30 - 0.3 * span, 1000 * truth[:, 2].max() + 20))

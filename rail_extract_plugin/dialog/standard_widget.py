@@ -9,6 +9,7 @@ from qgis.core import QgsSettings
 from qgis.gui import QgsProcessingGui
 
 from ...core.standards import DETECT, STANDARDS
+from ..notices import notices
 from .choice_widget import ChoiceWidgetWrapper
 from .choices import WORDS
 from .standard_setting import LAST
@@ -32,9 +33,10 @@ class StandardWidgetWrapper(ChoiceWidgetWrapper):
             self.setValue(first)
 
     def remember(self) -> None:
-        """Keep the choice for the next dialog; to be called when a run has used it."""
+        """Keep the choice for the next dialog and the toolbar; to be called when a run has used it."""
         if isinstance(self.value(), str):
             QgsSettings().setValue(LAST, self.value())
+            notices.standard_used.emit(self.value())
 
 
 def described(names: list[str]) -> list[tuple[str, str]]:

@@ -37,6 +37,7 @@ from ..dialog.cloud_parameter import file_filter
 from ..dialog.standard_setting import LAST
 from ..dialog.wheel import ignore_wheel
 from ..i18n import tr
+from ..notices import notices
 from ..paths import ICONS
 from ..reading.clouds import checked_crs, cloud_source
 from ..setup.dependencies import explain_missing, missing_packages
@@ -132,6 +133,7 @@ class GrowRails(QObject):
         self._cloud: QgsPointCloudLayer | str | None = None
         self._task: GrowTask | None = None
         self.seeds: list[Seed] = []
+        self._seed_layer_id = ""
         self.dialog: QWidget | None = None
         self.message = ""
         self.tool = ClickTool(canvas, self.click, self.undo, self.accept)
@@ -145,11 +147,18 @@ class GrowRails(QObject):
         self.standards.setToolTip(tr("Rail standard of the rails that are clicked"))
         for name, standard in STANDARDS.items():
             self.standards.addItem(standard.label, name)
-        last = self.standards.findData(QgsSettings().value(LAST))
-        self.standards.setCurrentIndex(last if last >= 0 else self.standards.findData(DEFAULT))
+        self._choose_standard(DEFAULT)
+        self._choose_standard(QgsSettings().value(LAST))
+        notices.standard_used.connect(self._choose_standard)
         ignore_wheel(self.standards)
         QgsProject.instance().layersRemoved.connect(self._forget_removed)
         self._enable()
+
+    def _choose_standard(self, name: str | None) -> None:
+        """Choose the standard of a run, unless the toolbar does not have it, such as one that was to be detected."""
+        number = self.standards.findData(name)
+        if number >= 0:
+            self.standards.setCurrentIndex(number)
 
     def _action(self, icon: str, text: str, do: Callable[[], None]) -> QAction:
         """Make an action."""
@@ -282,17 +291,23 @@ class GrowRails(QObject):
         """Take all clicks back once their rails are classified; after a failure, they are tried again."""
         if successful:
             self.clear()
+            self._seed_layer_id = ""
 
     def _seed_layer(self) -> QgsVectorLayer:
-        """Add a layer with the seeds to the project."""
-        layer = QgsVectorLayer("Point", tr("Rail seeds"), "memory")
+        """Return a layer of the project with the seeds: that of a dialog that has not run with it, or a new one."""
+        layer = QgsProject.instance().mapLayer(self._seed_layer_id)
+        if layer is None:
+            layer = QgsProject.instance().addMapLayer(QgsVectorLayer("Point", tr("Rail seeds"), "memory"))
+            self._seed_layer_id = layer.id()
         layer.setCrs(self.seeds[0].crs)
         features = [QgsFeature() for _ in self.seeds]
         for feature, seed in zip(features, self.seeds):
             feature.setGeometry(QgsGeometry.fromPointXY(seed.place))
+        layer.dataProvider().truncate()
         layer.dataProvider().addFeatures(features)
         layer.updateExtents()
-        return QgsProject.instance().addMapLayer(layer)
+        layer.triggerRepaint()
+        return layer
 
     def clear(self) -> None:
         """Take all clicks back."""
@@ -312,6 +327,7 @@ class GrowRails(QObject):
     def close_for_good(self) -> None:
         """Stop and clean the map, before the tool is deleted."""
         QgsProject.instance().layersRemoved.disconnect(self._forget_removed)
+        notices.standard_used.disconnect(self._choose_standard)
         self.clear()
         if self._canvas.mapTool() is self.tool:
             self._canvas.unsetMapTool(self.tool)

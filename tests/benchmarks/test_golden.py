@@ -41,16 +41,3 @@ def test_figures_that_moved_appeared_or_vanished_differ(tmp_path):
     moved = again.differences(PLAIN, "straight", {"across mm": 1.25, "tracks": np.nan, "fork m": 0.1})
     assert [difference.figure for difference in moved] == ["across mm", "tracks", "fork m"]
     assert str(moved[0]).split() == ["straight", "across", "mm", "1.00", "->", "1.25"]
-
-
-def test_a_figure_without_tolerance_is_refused(tmp_path):
-    path = tmp_path / "golden.json"
-    path.write_text('{"tolerances": {}, "figures": {}}', "utf-8")
-    with pytest.raises(ValueError, match="State a tolerance for tracks"):
-        Golden(path).put(PLAIN, "straight", {"tracks": 2})
-
-
-def test_another_seed_draws_the_same_place_anew():
-    own, other = build_scene("turnout_7"), build_scene("turnout_7", 100)
-    assert np.array_equal(own.rails[0], other.rails[0])
-    assert own.xyz.shape != other.xyz.shape or np.abs(own.xyz - other.xyz).max() > 0.001

@@ -16,7 +16,7 @@ from rail_extract.core.rails import RailLine, SearchFigures
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.squares.grid import MemorySource
 from rail_extract.core.standards import STANDARDS, RailStandard
-from rail_extract.core.steps import lines_of, overlap_tiles, tracks_of
+from rail_extract.core.steps import lines_of, tracks_of
 from rail_extract.core.tasks import InTurn
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.scenes.plain import straight
@@ -189,20 +189,6 @@ def test_the_minimum_length_is_that_of_whole_lines_not_of_their_parts_in_squares
         settings = Parameters(1.435, WIDTH, min_length_m=shortest, square_tiles=4)
         found = _by_length(extract_rails([cloud], settings).rails)[::-1]
         assert [rail.length_m for rail in found] == pytest.approx(lengths, abs=0.2)
-
-
-@pytest.mark.parametrize(
-    ("gauge", "changed", "tiles"),
-    [
-        (1.435, {}, 4),  # 10.2 m each
-        (1.0, {}, 6),  # 7.3 m
-        (1.435, {"max_gap_m": 45.0}, 11),  # 4 + 2 (45 + 8) = 110 m
-        (1.435, {"smoothing_z_m": 20.0}, 7),  # 4 + 3 * 20 = 64 m
-        (1.435, {"max_gap_m": 1e5}, 50),
-    ],
-)
-def test_squares_overlap_as_far_as_both_sides_of_a_border_need(gauge, changed, tiles):
-    assert overlap_tiles(Parameters(gauge, WIDTH, **changed)) == tiles
 
 
 def test_the_width_of_heads_may_depend_on_the_gauge(monkeypatch):

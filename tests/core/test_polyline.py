@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rail_extract.core.polyline import left_normals, project, resample, starts_at_its_end, threads
+from rail_extract.core.polyline import left_normals, project, resample, starts_at_its_end
 
 ANGLES = st.floats(0, 2 * np.pi)
 
@@ -71,11 +71,6 @@ def test_points_are_assigned_to_the_nearest_line_and_sorted_along_it():
         assert np.all(np.diff(mine.t) >= 0)
 
 
-def test_no_points_or_no_lines_give_no_feet():
-    assert len(project([], np.zeros((3, 2)), 0.1).t) == 0
-    assert len(project([np.array([[0.0, 0.0], [1.0, 0.0]])], np.empty((0, 2)), 0.1).t) == 0
-
-
 def test_normals_point_to_the_left():
     np.testing.assert_allclose(left_normals(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])), [[0, 1]] * 3)
 
@@ -94,15 +89,3 @@ def test_normals_point_to_the_left():
 )
 def test_lines_start_in_the_west_or_in_the_south_if_they_run_north(step, turned):
     assert starts_at_its_end(np.array([[5.0, 5.0], np.add([5.0, 5.0], step)])) is turned
-
-
-VARIABLES = [("1", 1), ("12", 12), ("", -1), ("0", -1), ("4,2", -1), (None, -1), ("999999999", 256), ("9" * 5000, -1)]
-
-
-@pytest.mark.parametrize(("variable", "number"), VARIABLES)
-def test_the_environment_limits_the_threads(monkeypatch, variable, number):
-    if variable is None:
-        monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
-    else:
-        monkeypatch.setenv("OMP_NUM_THREADS", variable)
-    assert threads() == number

@@ -4,24 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rail_extract.core.raster import TILE, RailRaster, cell_size, rasterize
+from rail_extract.core.raster import TILE, RailRaster, rasterize
 from scipy import ndimage
 
 CELLS = st.lists(st.tuples(st.integers(-600, 600), st.integers(-600, 600)), min_size=1, max_size=40)
-
-
-def test_cell_size_of_132re_is_4_cm():
-    assert cell_size(1.435, 0.0762) == pytest.approx(0.04, abs=1e-5)
-
-
-def test_a_point_sets_its_cell():
-    raster = rasterize(np.array([[0.05, 0.03, 7.0], [0.07, 0.01, 7.0], [-0.01, -0.01, 7.0]]), 0.04)
-    assert sorted(map(tuple, raster.cells().tolist())) == [(-1, 1), (0, -1)]
-
-
-def test_cell_centres_are_next_to_their_points():
-    raster = rasterize(np.array([[12.345, -6.789, 0.0]]), 0.04)
-    assert np.abs(raster.to_local(raster.cells()) - [[12.345, -6.789]]).max() <= 0.02
 
 
 @given(CELLS)

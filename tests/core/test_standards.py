@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 from rail_extract.core.errors import ParameterError
-from rail_extract.core.standards import DEFAULT, STANDARDS, UNCONFIRMED, distinct_gauges, read_gauges, resolve
+from rail_extract.core.standards import DEFAULT, STANDARDS, UNCONFIRMED, read_gauges, resolve
 
 INTERFACE = """
 US_90ARAA_1435 US_100ARAA_1435 US_100RE_1435 US_115RE_1435 US_119RE_1435 US_132RE_1435 US_133RE_1435 US_136RE_1435
@@ -63,44 +61,6 @@ def test_numbers_override_the_standard():
     assert resolve("EN_60E1_1435", head_width_mm=70).head_width_m == pytest.approx(0.07)
     custom = resolve("CUSTOM", 1000, 61.91)
     assert (custom.gauge_m, custom.head_width_m) == (1.0, pytest.approx(0.06191))
-
-
-@pytest.mark.parametrize(("gauge_mm", "head_width_mm"), [(None, None), (1435, None), (None, 72)])
-def test_custom_needs_both_numbers(gauge_mm, head_width_mm):
-    with pytest.raises(ParameterError, match="both"):
-        resolve("CUSTOM", gauge_mm, head_width_mm)
-
-
-@pytest.mark.parametrize("gauge_mm", [-1435, 0, 499, 2001, 1.435, math.nan, math.inf])
-def test_impossible_gauges_are_refused(gauge_mm):
-    with pytest.raises(ParameterError, match="gauge"):
-        resolve(DEFAULT, gauge_mm=gauge_mm)
-
-
-@pytest.mark.parametrize("head_width_mm", [-72, 0, 39, 91, 0.072, math.nan, math.inf])
-def test_impossible_widths_are_refused(head_width_mm):
-    with pytest.raises(ParameterError, match="railhead width"):
-        resolve(DEFAULT, head_width_mm=head_width_mm)
-
-
-def test_an_unknown_name_is_refused():
-    with pytest.raises(ParameterError, match="unknown"):
-        resolve("EN_61E1_1435")
-
-
-def test_repeated_gauges_are_dropped():
-    assert distinct_gauges((1.435, 1.0, 1.435), 0.05) == (1.435, 1.0)
-
-
-@pytest.mark.parametrize("gauges", [(1.520, 1.524), (1.435, 1.0, 1.48)])
-def test_gauges_closer_than_the_tolerance_are_refused(gauges):
-    with pytest.raises(ParameterError, match="CENTERLINE_TOLERANCE"):
-        distinct_gauges(gauges, 0.05)
-
-
-def test_impossible_other_gauges_are_refused():
-    with pytest.raises(ParameterError, match="A gauge of 1 mm"):
-        distinct_gauges((1.435, 0.001), 0.05)
 
 
 @pytest.mark.parametrize(

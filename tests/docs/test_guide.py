@@ -64,7 +64,10 @@ def quotations():
 
 def says(template, quotation):
     """Whether the code's text, filled in, can read like the quotation."""
-    return re.fullmatch(".+".join(map(re.escape, template.split(GAP))), quotation) is not None
+    parts = template.split(GAP)
+    if not all(part in quotation for part in parts):
+        return False
+    return re.fullmatch(".+".join(map(re.escape, parts)), quotation) is not None
 
 
 def is_said(quotation, sentences):

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from lines import read_lines
@@ -36,6 +37,19 @@ def qgis_process():
         parameters: dict[str, object], *options: str, algorithm: object = EXTRACT_RAILS
     ) -> subprocess.CompletedProcess:
         return subprocess.run(command(parameters, *options, algorithm=algorithm), capture_output=True, text=True)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def succeed(qgis_process):
+    """Run an algorithm by its name, or the file of a model, and return the results by name."""
+
+    def run(algorithm: str | Path, parameters: dict[str, object]) -> dict[str, Any]:
+        of_plugin = isinstance(algorithm, str)
+        done = qgis_process(parameters, "--json", algorithm=f"railextract:{algorithm}" if of_plugin else algorithm)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return json.loads(done.stdout[done.stdout.index("{") :])["results"]
 
     return run
 
@@ -81,12 +95,10 @@ class Run:
 
 
 @pytest.fixture(scope="session")
-def extracted(qgis_process, sample, tmp_path_factory):
+def extracted(succeed, sample, tmp_path_factory):
     """The sample, extracted in a folder and into files whose names contain spaces and umlauts."""
     folder = tmp_path_factory.mktemp("Größe östlich 1")
     cloud = shutil.copy(sample / "sample.laz", folder / "Schienen 1.laz")
     names = ("Schiënen.gpkg", "Gleis achsen.shp", "Güte.shp", "gesäubert 1.tif", "Bericht ü.html")
     outputs = dict(zip(("RAILS", "CENTERLINES", "QUALITY", "CLEANED", "REPORT"), (folder / name for name in names)))
-    run = qgis_process({"INPUT": cloud, "STANDARD": STANDARD, **outputs}, "--json")
-    assert run.returncode == 0, run.stdout + run.stderr
-    return Run(json.loads(run.stdout[run.stdout.index("{") :])["results"], cloud, *outputs.values())
+    return Run(succeed("extractrails", {"INPUT": cloud, "STANDARD": STANDARD, **outputs}), cloud, *outputs.values())

@@ -1,7 +1,5 @@
 """Export and import of alignments through qgis_process: a table in a GeoPackage, files, and the table again."""
 
-import json
-
 import pytest
 from lines import read_features
 
@@ -20,16 +18,6 @@ SOURCE = """<LandXML version="1.2"><Units><Metric linearUnit="meter"/></Units><C
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("Größe östlich 3")
-
-
-@pytest.fixture(scope="module")
-def succeed(qgis_process):
-    def run(algorithm, parameters):
-        done = qgis_process(parameters, "--json", algorithm=f"railextract:{algorithm}")
-        assert done.returncode == 0, done.stdout + done.stderr
-        return json.loads(done.stdout[done.stdout.index("{") :])["results"]
-
-    return run
 
 
 @pytest.fixture(scope="module")
@@ -63,17 +51,3 @@ def test_elements_come_back_through_landxml(succeed, folder, table):
         assert one[:2] == other[:2]
         assert [value and pytest.approx(value, rel=1e-5, abs=1e-4) for value in one[2:]] == other[2:]
     assert [row[5] for row in first][:2] == [12.0, 12.5]
-
-
-@pytest.mark.parametrize(("ending", "words"), [("ifc", "IFCALIGNMENT("), ("dxf", "ALIGNMENT_1")])
-def test_other_formats_are_written_to_names_with_umlauts(succeed, folder, table, ending, words):
-    path = folder / f"Entwurf Ä.{ending}"
-    assert succeed("exportalignment", {"INPUT": table, "OUTPUT": path})["OUTPUT"] == str(path)
-    assert words in path.read_text(encoding="ascii")
-
-
-def test_a_refusal_is_one_sentence_and_leaves_nothing(qgis_process, folder, table):
-    done = qgis_process({"INPUT": table, "OUTPUT": folder / "c.dwg"}, algorithm="railextract:exportalignment")
-    assert done.returncode == 1 and "let it end in .xml for LandXML" in done.stdout + done.stderr
-    assert "Traceback" not in done.stdout + done.stderr
-    assert not (folder / "c.dwg").exists()

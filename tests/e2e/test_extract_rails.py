@@ -33,18 +33,6 @@ def test_rails_against_truth(extracted, truth):
     assert (comparison.line_count, comparison.truth_count) == (6, 6)
 
 
-def test_rails_of_the_fast_model_against_truth(qgis_process, sample, truth, tmp_path):
-    rails = tmp_path / "rails.gpkg"
-    run = qgis_process({"INPUT": sample / "sample.laz", "STANDARD": STANDARD, "MODEL": "fast", "RAILS": rails})
-    assert run.returncode == 0, run.stdout + run.stderr
-    comparison = compare_lines(read_lines(rails), truth("rail"))
-    assert comparison.completeness >= MIN_SHARE
-    assert comparison.correctness >= MIN_SHARE
-    assert comparison.lateral_rmse_m <= MAX_LATERAL_M
-    assert comparison.height_rmse_m <= MAX_HEIGHT_M
-    assert (comparison.line_count, comparison.truth_count) == (6, 6)
-
-
 def test_centerlines_against_truth(extracted, truth):
     comparison = compare_lines(read_lines(extracted.centerlines), truth("centerline"))
     assert comparison.completeness >= MIN_SHARE
@@ -69,21 +57,14 @@ def test_lines_start_in_the_west(extracted):
         assert line[0, 0] < line[-1, 0]
 
 
-@pytest.mark.parametrize(
-    ("parameters", "sentence"),
-    [
-        ({"INPUT": "gone.laz"}, "gone.laz does not exist"),
-        ({"RAIL_CLASSES": "40"}, "has no points of class 40; its classes, with the number of points, are 1 ("),
-        ({"GAUGE": "600", "HEAD_WIDTH": "75"}, "check GAUGE and HEAD_WIDTH"),
-        ({"CENTERLINES": "/nowhere/tracks.gpkg"}, "can't be written"),
-    ],
-)
-def test_bad_input_is_one_sentence_and_an_exit_code(qgis_process, sample, tmp_path, parameters, sentence):
+def test_bad_input_is_one_sentence_and_an_exit_code(qgis_process, sample, tmp_path):
     rails = tmp_path / "rails.gpkg"
-    run = qgis_process({"INPUT": sample / "sample.laz", "STANDARD": STANDARD, "RAILS": rails, **parameters})
+    given = {"INPUT": sample / "sample.laz", "STANDARD": STANDARD, "RAIL_CLASSES": "40", "RAILS": rails}
+    run = qgis_process(given)
     assert run.returncode == 1
-    assert sentence in run.stdout + run.stderr
-    assert "Traceback" not in run.stdout + run.stderr
+    said = run.stdout + run.stderr
+    assert "has no points of class 40; its classes, with the number of points, are 1 (" in said
+    assert "Traceback" not in said
     assert not list(tmp_path.iterdir())
 
 

@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
 from rail_extract.core.frame import LocalFrame
-from rail_extract.laboratory.designs import FAMILIES, random_design, surveyed
 
 EAST, NORTH = 500_000.0, 3_000_000.0
 SHAPES = [(150.0, 0, 0), (60.0, 0, -1 / 500), (150.0, -1 / 500, -1 / 500), (60.0, -1 / 500, 0), (100.0, 0, 0)]
 FITTED = "layout, type, s_from, s_to, r1_m, r2_m, sigma_r_m, x, cant2_mm, r_round_m"
-PLACES = "s_from, x, y, z, cant1_mm"
 
 
 @pytest.fixture(scope="module")
@@ -72,12 +70,10 @@ def as_csv(source, path, radii):
     path.with_suffix(".csvt").write_text(",".join(types.get(name, "Real") for name in table[0]))
 
 
-def test_elements_and_deviations_and_a_corrected_table(qgis_process, survey):
+def test_elements_and_deviations_and_a_corrected_table(succeed, survey):
     given = {"INPUT": survey / "line.geojson", "QUALITY": survey / "quality.geojson"}
     outputs = {"ELEMENTS": survey / "elements.gpkg", "DEVIATIONS": survey / "deviations.gpkg"}
-    run = qgis_process({**given, **outputs}, "--json", algorithm="railextract:fitalignment")
-    assert run.returncode == 0, run.stdout + run.stderr
-    results = json.loads(run.stdout[run.stdout.index("{") :])["results"]
+    results = succeed("fitalignment", {**given, **outputs})
     assert results["ELEMENT_COUNT"] == 13
     assert results["RMS"] == pytest.approx(1.0, abs=0.15)
     found = table(outputs["ELEMENTS"])
@@ -98,56 +94,16 @@ def test_elements_and_deviations_and_a_corrected_table(qgis_process, survey):
     np.testing.assert_allclose(np.nanstd(away[:, 1:], axis=0), [1.0, 1.0, 0.4], atol=0.2)
     edited = survey / "edited.csv"
     as_csv(outputs["ELEMENTS"], edited, {2: lambda row: -498.0})
-    again = qgis_process(
-        {**given, "FIXED": edited, "ELEMENTS": survey / "held.gpkg"}, algorithm="railextract:fitalignment"
-    )
-    assert again.returncode == 0, again.stdout + again.stderr
+    succeed("fitalignment", {**given, "FIXED": edited, "ELEMENTS": survey / "held.gpkg"})
     held = table(survey / "held.gpkg")["H"]
     assert held[2][3] == held[2][4] == pytest.approx(-498.0, abs=1e-4)
     assert [row[0] for row in held] == [row[0] for row in found["H"]]
 
 
-def places(path):
-    """Types, and where the elements begin."""
-    with sqlite3.connect(path) as database:
-        rows = list(database.execute(f"SELECT layout, type, {PLACES} FROM {path.stem} ORDER BY fid"))
-    return [row[:2] for row in rows], np.array([row[2:] for row in rows], dtype=float)
-
-
-def test_a_table_given_back_keeps_heights_and_cants_and_what_was_edited(qgis_process, tmp_path):
-    random = np.random.default_rng([77, 24])
-    design = random_design(random, FAMILIES["main line"], 14)
-    line = surveyed(design, random, 0.001, 0.003, 15.0) + [EAST, NORTH, 0]
-    s = np.arange(len(line), dtype=float)
-    write_survey(tmp_path, line, s, 1000 * design.cants(s) + 0.4 * random.standard_normal(len(s)))
-    given = {"INPUT": tmp_path / "line.geojson", "QUALITY": tmp_path / "quality.geojson"}
-
-    def fitted(name, **fixed):
-        run = qgis_process({**given, **fixed, "ELEMENTS": tmp_path / name}, algorithm="railextract:fitalignment")
-        assert run.returncode == 0, run.stdout + run.stderr
-        return tmp_path / name
-
-    types, free = places(fitted("free.gpkg"))
-    again = places(fitted("again.gpkg", FIXED=tmp_path / "free.gpkg"))
-    assert again[0] == types
-    np.testing.assert_allclose(again[1][:, 0], free[:, 0], atol=0.02)
-    np.testing.assert_allclose(again[1][:, 1:3], free[:, 1:3], atol=0.02)
-    np.testing.assert_allclose(again[1][:, 3], free[:, 3], atol=0.002)
-    np.testing.assert_allclose(again[1][:, 4], free[:, 4], atol=0.5)
-    edited = [types.index(kind) for kind in (("H", "arc"), ("V", "parabola"))]
-    as_csv(tmp_path / "free.gpkg", tmp_path / "edited.csv", {at: lambda row: row["r1_m"] * 1.001 for at in edited})
-    held = fitted("held.gpkg", FIXED=tmp_path / "edited.csv")
-    assert places(held)[0] == types
-    before, after = ([row["r1_m"] for row in rows_of(path)] for path in (tmp_path / "free.gpkg", held))
-    for at in edited:
-        assert after[at] == pytest.approx(1.001 * before[at], rel=1e-6)
-
-
-def test_lines_of_an_extraction_have_the_elements_of_the_scene(extracted, qgis_process, tmp_path):
+def test_lines_of_an_extraction_have_the_elements_of_the_scene(extracted, succeed, tmp_path):
     """The errors of extracted lines are smooth, and must not be taken for elements."""
     given = {"INPUT": extracted.centerlines, "ELEMENTS": tmp_path / "elements.gpkg"}
-    run = qgis_process(given, "--json", algorithm="railextract:fitalignment")
-    assert run.returncode == 0, run.stdout + run.stderr
+    succeed("fitalignment", given)
     plan = [row for row in rows_of(tmp_path / "elements.gpkg") if row["layout"] == "H"]
     assert [row["type"] for row in plan] == 3 * ["line", "clothoid", "arc"]
     np.testing.assert_allclose([row["s_to"] for row in plan[::3]], 40, atol=1)

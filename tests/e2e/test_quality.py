@@ -1,6 +1,5 @@
 """Track geometry, report and cleaned raster of the sample, compared with the truth, through qgis_process."""
 
-import json
 import re
 
 import numpy as np
@@ -109,14 +108,10 @@ def test_radius_gradient_and_twist_match_the_truth(measured):
         assert rms((values["twist_mm"] - (cants[1] - cants[0]))[inner]) < 2
 
 
-def test_measuring_from_files_gives_the_same_values(extracted, qgis_process, tmp_path):
+def test_measuring_from_files_gives_the_same_values(extracted, succeed, tmp_path):
     output = tmp_path / "quality.gpkg"
     parameters = {"INPUT": extracted.centerlines, "RAILS": extracted.rails, "POINTS": extracted.cloud}
-    run = qgis_process(
-        {**parameters, "STANDARD": STANDARD, "OUTPUT": output}, "--json", algorithm="railextract:measuretrackgeometry"
-    )
-    assert run.returncode == 0, run.stdout + run.stderr
-    results = json.loads(run.stdout[run.stdout.index("{") :])["results"]
+    results = succeed("measuretrackgeometry", {**parameters, "STANDARD": STANDARD, "OUTPUT": output})
     whole, again = read_points(extracted.quality), read_points(output)
     np.testing.assert_allclose(again[0], whole[0], atol=1e-6)
     for name, values in whole[1].items():

@@ -33,7 +33,7 @@ def folder(tmp_path):
     return made
 
 
-def test_signals_beside_a_curve_with_posts_and_an_overlap(qgis_process, folder):
+def test_signals_beside_a_curve_with_posts_and_an_overlap(succeed, folder):
     """Posts every 100 m of a circle of 500 m; km 20.3 to 20.5 exist twice, from 500 m on."""
     axis = write(folder / "Achse.geojson", "LineString", [on_circle(np.arange(0, 1.61, 1 / RADIUS_M))])
     s = np.arange(0, 900, 100.0)
@@ -46,9 +46,7 @@ def test_signals_beside_a_curve_with_posts_and_an_overlap(qgis_process, folder):
     signals = write(folder / "Signale.geojson", "Point", on_circle(places_m / RADIUS_M, 5.5), name=["A", "B", "C"])
     output = folder / "gestellt.gpkg"
     given = {"INPUT": signals, "AXIS": axis, "POSTS": posts, "JUMPS": jumps, "FORMAT": "GERMAN", "OUTPUT": output}
-    run = qgis_process(given, "--json", algorithm="railextract:stationalongaxis")
-    assert run.returncode == 0, run.stdout + run.stderr
-    results = json.loads(run.stdout[run.stdout.index("{") :])["results"]
+    results = succeed("stationalongaxis", given)
     assert (results["PLACE_COUNT"], results["BEYOND_COUNT"], results["AMBIGUOUS_COUNT"]) == (3, 0, 0)
     names = "name, piece, km, km_text, offset_m, side, ambiguous"
     with sqlite3.connect(output) as database:
@@ -63,50 +61,7 @@ def test_signals_beside_a_curve_with_posts_and_an_overlap(qgis_process, folder):
     np.testing.assert_allclose([row[4] for row in rows], 5.5, atol=0.001)
 
 
-def stationed(qgis_process, folder, places, **given):
-    """Run with points of names A, B and so on; return the figures, and axis, km and whether a foot is ambiguous."""
-    points = write(folder / "places.geojson", "Point", places, name=[chr(65 + number) for number in range(len(places))])
-    output = folder / "out.gpkg"
-    run = qgis_process({"INPUT": points, "OUTPUT": output, **given}, "--json", algorithm="railextract:stationalongaxis")
-    assert run.returncode == 0, run.stdout + run.stderr
-    with sqlite3.connect(output) as database:
-        return list(database.execute("SELECT axis, km, ambiguous FROM out ORDER BY name"))
-
-
-def test_two_axes_with_posts_of_their_own(qgis_process, folder):
-    courses = [[[EAST, NORTH + up], [EAST + 300, NORTH + up]] for up in (0, 50)]
-    axes = write(folder / "axes.geojson", "LineString", courses, name=["main", "branch"])
-    stated = [(0, 0, 3.0), (300, 0, 3.3), (0, 50, 7.3), (300, 50, 7.0)]
-    km = [number for _, _, number in stated]
-    posts = write(folder / "posts.geojson", "Point", [[EAST + x, NORTH + y + 2] for x, y, _ in stated], km=km)
-    places = [[EAST + 120, NORTH + 4], [EAST + 80, NORTH + 47]]
-    rows = stationed(qgis_process, folder, places, AXIS=axes, POSTS=posts)
-    assert [row[0] for row in rows] == ["main", "branch"]
-    np.testing.assert_allclose([row[1] for row in rows], [3.12, 7.22], atol=1e-5)
-
-
-def test_numbers_that_are_missing(qgis_process, folder):
-    """The axis has no numbers from km 7.100 to km 7.400."""
-    axis = write(folder / "axis.geojson", "LineString", [[[EAST, NORTH], [EAST + 300, NORTH]]])
-    jumps = folder / "jumps.csv"
-    jumps.write_text("km_back,km_ahead\n7.1,7.4\n", encoding="utf-8")
-    jumps.with_suffix(".csvt").write_text("Real,Real\n", encoding="utf-8")
-    places = [[EAST + 80, NORTH + 3], [EAST + 120, NORTH + 3]]
-    rows = stationed(qgis_process, folder, places, AXIS=axis, START_KM=7, JUMPS=jumps)
-    np.testing.assert_allclose([row[1] for row in rows], [7.08, 7.42], atol=1e-5)
-
-
-def test_a_ring_as_axis(qgis_process, folder):
-    """Kilometres run once round; where the ring closes, either end is meant."""
-    axis = write(folder / "ring.geojson", "LineString", [on_circle(np.linspace(0, 2 * np.pi, 2001))])
-    places = on_circle(np.array([0.5 * np.pi, 1.5 * np.pi, 0.001]), 2.0)
-    rows = stationed(qgis_process, folder, places, AXIS=axis, START_KM=1)
-    round_m = 2 * np.pi * RADIUS_M
-    np.testing.assert_allclose([row[1] for row in rows[:2]], [1 + 0.25e-3 * round_m, 1 + 0.75e-3 * round_m], atol=2e-5)
-    assert [row[2] for row in rows] == [0, 0, 1]
-
-
-def test_quality_points_of_an_extraction_have_kilometres(extracted, qgis_process, folder):
+def test_quality_points_of_an_extraction_have_kilometres(extracted, succeed, folder):
     """The axis is the straight through the ends of the sample; each kilometre is that of the foot on it."""
     parameters = {"INPUT": extracted.centerlines, "RAILS": extracted.rails, "STANDARD": "IN_75R_1000"}
     with sqlite3.connect(extracted.rails) as database:
@@ -114,12 +69,7 @@ def test_quality_points_of_an_extraction_have_kilometres(extracted, qgis_process
     ends = np.array([[west - 20, south - 20], [east + 20, north + 20]])
     axis = write(folder / "axis.geojson", "LineString", [ends.tolist()])
     output = folder / "quality.gpkg"
-    run = qgis_process(
-        {**parameters, "AXIS": axis, "START_KM": 3.5, "OUTPUT": output},
-        "--json",
-        algorithm="railextract:measuretrackgeometry",
-    )
-    assert run.returncode == 0, run.stdout + run.stderr
+    succeed("measuretrackgeometry", {**parameters, "AXIS": axis, "START_KM": 3.5, "OUTPUT": output})
     from lines import read_features
 
     found = read_features(output)

@@ -27,8 +27,16 @@ ROOT = Path(__file__).resolve().parents[2]
 SAMPLE = ROOT / "resources" / "sample" / "sample.laz"
 
 
+@pytest.fixture(scope="session", autouse=True)
+def temporary(tmp_path_factory):
+    """A folder for temporary files that no test of another process uses."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TMPDIR", str(tmp_path_factory.mktemp("temporary")))
+        yield
+
+
 @pytest.fixture(scope="session")
-def qgis(tmp_path_factory):
+def qgis(tmp_path_factory, temporary):
     """QGIS with its processing framework, in a separate profile."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("QGIS_CUSTOM_CONFIG_PATH", str(tmp_path_factory.mktemp("profile")))

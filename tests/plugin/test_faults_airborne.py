@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from faults import REFUSED, Fault
-from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from faults import refused
+from memory_layers import layer_of
 
 TITLE = "Airborne clouds"
 
@@ -20,99 +20,83 @@ def cloud(bench, density=10, class_code=2, width_m=10.0):
 
 def guided(*texts, kind="LineString", crs="EPSG:32643", density=10, class_code=2, **parameters):
     def prepare(bench):
-        layer = QgsVectorLayer(f"{kind}?crs={crs}", "guides", "memory")
-        for text in texts:
-            feature = QgsFeature(layer.fields())
-            feature.setGeometry(QgsGeometry.fromWkt(text))
-            assert layer.dataProvider().addFeature(feature)
-        return {"INPUT": cloud(bench, density, class_code), "GUIDE": layer, **parameters}
+        guide = layer_of(*texts, kind=kind, crs=crs)
+        return {"INPUT": cloud(bench, density, class_code), "GUIDE": guide, **parameters}
 
     return prepare
 
 
 FAULTS = [
-    Fault(
+    refused(
         "neither a guide nor a layer for proposals",
         lambda bench: {"INPUT": cloud(bench)},
-        REFUSED,
         "GUIDE is empty: choose lines along the tracks, or PROPOSED to have some proposed.",
     ),
-    Fault(
+    refused(
         "mobile lidar without a guide",
         lambda bench: {"INPUT": cloud(bench, density=800), "PROPOSED": "TEMPORARY_OUTPUT"},
-        REFUSED,
         "The cloud has 800 points per square metre, as mobile lidar and dense drone surveys have: use Extract Rails, "
         "which finds the single railheads and is more accurate there.",
     ),
-    Fault("guide without lines", guided(), REFUSED, "GUIDE has no lines: give a line layer."),
-    Fault(
+    refused("guide without lines", guided(), "GUIDE has no lines: give a line layer."),
+    refused(
         "polygons as guide",
         guided("POLYGON((500000 3000004, 500060 3000004, 500060 3000006, 500000 3000004))", kind="Polygon"),
-        REFUSED,
         "GUIDE has the geometry type Polygon: give a line layer.",
     ),
-    Fault(
+    refused(
         "guide outside of the cloud",
         guided("LINESTRING(510000 3000005, 510060 3000005)"),
-        REFUSED,
         "No guide lies in the cloud: check the coordinate system of the guides, and that the cloud covers the line.",
     ),
-    Fault(
+    refused(
         "guide in degrees that does not say so",
         guided("LINESTRING(75 27.12, 75.001 27.12)"),
-        REFUSED,
         "The guides are in degrees, but state another coordinate system or none: assign WGS 84 (EPSG:4326).",
     ),
-    Fault(
+    refused(
         "guide that is too short",
         guided("LINESTRING(500000 3000005, 500012 3000005)"),
-        REFUSED,
         "Guide 1 is 12.0 m long: give guides of 30 m or more.",
     ),
-    Fault(
+    refused(
         "airborne cloud of another class",
         guided(ALONG, class_code=6),
-        REFUSED,
         "The cloud has no points of class 1, 2 along the guides: set the classes, and check the coordinate system of "
         "the guides.",
     ),
-    Fault(
+    refused(
         "mobile lidar as airborne cloud",
         guided(ALONG, density=800),
-        REFUSED,
         "The cloud has 799 points per square metre, as mobile lidar and dense drone surveys have: use Extract Rails, "
         "which finds the single railheads and is more accurate there.",
     ),
-    Fault(
+    refused(
         "airborne cloud in Extract Rails",
         lambda bench: {"INPUT": cloud(bench, width_m=30.0)},
-        REFUSED,
         "The cloud has no points of class 10; its classes, with the number of points, are 2 (18,000): set the rail "
         "classes or, if nobody has classified the cloud, CLASSIFY. For an airborne cloud, use Track Centerlines from "
         "Airborne Lidar.",
         run="extractrails",
     ),
-    Fault(
+    refused(
         "airborne cloud with classified rails in Extract Rails",
         lambda bench: {"INPUT": cloud(bench, density=2, width_m=30.0, class_code=10)},
-        REFUSED,
         "The points of class 10 are … m apart over … m, too far for rails: if the coordinates are in centimetres or "
         "millimetres, assign a coordinate system that says so. For an airborne cloud, use Track Centerlines from "
         "Airborne Lidar.",
         run="extractrails",
     ),
-    Fault(
+    refused(
         "raw airborne cloud in Extract Rails",
         lambda bench: {"INPUT": cloud(bench, width_m=30.0), "CLASSIFY": True},
-        REFUSED,
         "No rail was found in the raw cloud: check the rail standard and the unit of the coordinates, or classify the "
         "rail points yourself. For an airborne cloud, use Track Centerlines from Airborne Lidar.",
         run="extractrails",
     ),
-    Fault(
+    refused(
         "text as classes of an airborne cloud",
         guided(ALONG, CLASSES="ground"),
-        REFUSED,
         'CLASSES "ground" must be whole numbers from 0 to 255 such as 10 or 10,11.',
     ),
 ]

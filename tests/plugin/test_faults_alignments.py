@@ -3,8 +3,9 @@
 from dataclasses import replace
 
 import pytest
-from faults import FINE, REFUSED, WARNED, Fault
-from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from faults import FINE, WARNED, Fault, refused
+from memory_layers import layer_of
+from qgis.core import QgsFeature, QgsVectorLayer
 from rail_extract.core.fields import ELEMENT_FIELDS
 from rail_extract.rail_extract_plugin.writing.layers import fields
 
@@ -50,32 +51,27 @@ def of_file(text=None, name="design.xml", **parameters):
 
 
 def line_at(bench, x):
-    bench.layer = QgsVectorLayer("LineString?crs=EPSG:25832", "tracks", "memory")
-    feature = QgsFeature()
-    feature.setGeometry(QgsGeometry.fromWkt(f"LineString({x} 5804300, {x + 90} 5804300)"))
-    bench.layer.dataProvider().addFeature(feature)
+    line = f"LineString({x} 5804300, {x + 90} 5804300)"
+    bench.layer = layer_of(line, kind="LineString", crs="EPSG:25832")  # which QGIS deletes with its Python object
     return bench.layer
 
 
 IMPORTED = [
     Fault("a LandXML file", of_file(), FINE, gives={"ALIGNMENT_COUNT": 1, "ELEMENT_COUNT": 2}),
-    Fault(
+    refused(
         "a LandXML in feet",
         of_file(landxml(head='<Units><Imperial linearUnit="foot"/></Units>')),
-        REFUSED,
         "design.xml is in another unit than metres (foot): export it again with metres as the unit of length.",
     ),
-    Fault(
+    refused(
         "a LandXML with the easting first",
         of_file(swapped(landxml())),
-        REFUSED,
         "All curves of design.xml turn to the other side than they state, because its points are written easting "
         "first: set EAST_FIRST.",
     ),
-    Fault(
+    refused(
         "the same without a curve",
         of_file(swapped(landxml(LINE))),
-        REFUSED,
         "design.xml is in the area of ETRS89 / UTM zone 32N if its points are written easting first: set EAST_FIRST.",
     ),
     Fault(
@@ -84,74 +80,60 @@ IMPORTED = [
         FINE,
         gives={"ALIGNMENT_COUNT": 1, "ELEMENT_COUNT": 2},
     ),
-    Fault(
+    refused(
         "EAST_FIRST for a file with the northing first",
         of_file(EAST_FIRST=True),
-        REFUSED,
         "All curves of design.xml turn to the other side than they state, because its points are written northing "
         "first: leave EAST_FIRST off.",
     ),
-    Fault(
+    refused(
         "an IFC file given as LandXML",
         of_file("ISO-10303-21;\nHEADER;\n"),
-        REFUSED,
         "design.xml is an IFC file, not LandXML: export the alignments as LandXML.",
     ),
-    Fault(
+    refused(
         "a transition curve that is not a clothoid",
         of_file(landxml(LINE + SPIRAL.replace("clothoid", "bloss"))),
-        REFUSED,
         "The Spiral 2 of alignment A of design.xml is a transition of type bloss, and only clothoids can be read: "
         "export the alignment with clothoids.",
     ),
-    Fault(
+    refused(
         "a LandXML that is cut off",
         of_file(landxml()[:-30]),
-        REFUSED,
         "design.xml is cut off, damaged or not XML (…): write it again in the program that made it.",
     ),
-    Fault(
+    refused(
         "a LandXML with entities that would expand to gigabytes",
         of_file(
             '<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>'
             + landxml().replace("A", "&b;")
         ),
-        REFUSED,
         "design.xml declares a document type, which may hide anything behind its entities and which LandXML does not "
         "need: remove the DOCTYPE.",
     ),
-    Fault(
-        "other XML",
-        of_file("<gml/>"),
-        REFUSED,
-        "design.xml is XML of another kind: its root is gml, not LandXML.",
-    ),
-    Fault("an empty file", of_file(""), REFUSED, "design.xml is empty, not LandXML: export the alignments as LandXML."),
-    Fault(
+    refused("other XML", of_file("<gml/>"), "design.xml is XML of another kind: its root is gml, not LandXML."),
+    refused("an empty file", of_file(""), "design.xml is empty, not LandXML: export the alignments as LandXML."),
+    refused(
         "a file without alignments",
         of_file(f"<LandXML>{METRIC}{SYSTEM}<Surfaces/></LandXML>"),
-        REFUSED,
         "design.xml has no alignment with a CoordGeom: export the alignments from the design program, too.",
     ),
-    Fault(
+    refused(
         "an arc that turns to the wrong side",
         of_file(landxml(LINE + SPIRAL + CURVE.replace("cw", "ccw"))),
-        REFUSED,
         "The Curve 3 of alignment A of design.xml turns to the other side than it states: repair it.",
     ),
-    Fault(
+    refused(
         "an element that is missing",
         of_file(
             landxml(LINE + CURVE.replace("5782", "5783").replace("578300<", "578301<").replace("578450", "578451"))
         ),
-        REFUSED,
         "The Curve 2 of alignment A of design.xml starts 1.00 m from the end of the element before: the file lacks "
         "one.",
     ),
-    Fault(
+    refused(
         "a length that does not fit the ends",
         of_file(landxml(LINE + SPIRAL.replace('"60"', '"62"'))),
-        REFUSED,
         "The Spiral 2 of alignment A of design.xml misses its end by … m with its length and radii: export the file "
         "again.",
     ),
@@ -167,28 +149,24 @@ IMPORTED = [
         WARNED,
         "design.xml is outside the area of DHDN / 3-degree Gauss-Kruger zone 3: check its coordinate system.",
     ),
-    Fault(
+    refused(
         "a coordinate system in feet",
         of_file(landxml(head=METRIC + '<CoordinateSystem epsgCode="2222"/>')),
-        REFUSED,
         "design.xml is in metres, but its coordinate system EPSG:2222 is not: choose another CRS, or correct the file.",
     ),
-    Fault(
+    refused(
         "deviations without tracks",
         lambda bench: {**of_file()(bench), "DEVIATIONS": bench.folder / "out" / "AXIS2.gpkg"},
-        REFUSED,
         "DEVIATIONS and REPORT compare measured tracks with the alignments: choose TRACKS.",
     ),
-    Fault(
+    refused(
         "tracks elsewhere",
         lambda bench: {**of_file()(bench), "TRACKS": line_at(bench, 579_000.0)},
-        REFUSED,
         "None of TRACKS lies along an alignment of INPUT: check the coordinate system of both.",
     ),
-    Fault(
+    refused(
         "a file that does not exist",
         lambda bench: {"INPUT": bench.folder / "gone.xml"},
-        REFUSED,
         "…gone.xml can't be read (No such file or directory): check its name and your rights.",
     ),
 ]
@@ -221,36 +199,31 @@ def changed(number, **values):
 
 EXPORTED = [
     Fault("an element table", of_table(), FINE, gives={"ALIGNMENT_COUNT": 1, "ELEMENT_COUNT": 2}),
-    Fault(
+    refused(
         "a layer that is not an element table",
         of_table(columns=ELEMENT_FIELDS[:2]),
-        REFUSED,
         "INPUT is not an element table, because it lacks the fields layout, s_from, s_to: give the output ELEMENTS of "
         "Fit alignment or Import alignment.",
     ),
-    Fault(
+    refused(
         "a table whose elements were edited apart",
         of_table(changed(1, x=578300.5)),
-        REFUSED,
         "Element 1 in layout H of track 1 ends 0.500 m from the start of element 2: run Fit alignment with the edited "
         "table as FIXED, which joins them.",
     ),
-    Fault(
+    refused(
         "a table without elements in plan",
         of_table(lambda rows: [{**row, "layout": "C"} for row in rows]),
-        REFUSED,
         "The element table has no row with layout H for track 1: give it the elements in plan, too.",
     ),
-    Fault(
+    refused(
         "an arc without a radius",
         of_table(changed(1, r1_m=None, r2_m=None)),
-        REFUSED,
         "The element 2 of layout H of track 1 is of type arc and has no radius: fill one, or make it a line.",
     ),
-    Fault(
+    refused(
         "an ending that is not a format",
         lambda bench: {**of_table()(bench), "OUTPUT": bench.folder / "out" / "design.dwg"},
-        REFUSED,
         "OUTPUT can't be design.dwg: let it end in .xml for LandXML, in .ifc or in .dxf.",
     ),
 ]

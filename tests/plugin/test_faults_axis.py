@@ -1,8 +1,8 @@
 """Faults of axes, posts and jumps, in Station Along Axis."""
 
 import pytest
-from faults import REFUSED, WARNED, Fault
-from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from faults import WARNED, Fault, refused
+from memory_layers import layer_of
 
 TITLE = "Kilometres"
 
@@ -12,35 +12,23 @@ OTHER = "LINESTRING(500000 3000400, 501000 3000400)"
 PLACE = "POINT(500100 3000004)"
 
 
-def layer(kind, *texts, fields="", values=(), crs="EPSG:32643"):
-    made = QgsVectorLayer(f"{kind}?crs={crs}{fields}" if kind != "None" else f"None?{fields[1:]}", "layer", "memory")
-    for number in range(max(len(texts), len(values))):
-        feature = QgsFeature(made.fields())
-        if texts:
-            feature.setGeometry(QgsGeometry.fromWkt(texts[number]))
-        if values:
-            feature.setAttributes(list(values[number]))
-        assert made.dataProvider().addFeature(feature)
-    return made
-
-
 def given(axis=(AXIS,), kind="LineString", crs="EPSG:32643", places=("Point", PLACE), **parameters):
     """A layer of places and an axis; a function among the parameters makes the value."""
 
     def prepare(bench):
         made = {name: value() if callable(value) else value for name, value in parameters.items()}
-        return {"INPUT": layer(*places), "AXIS": layer(kind, *axis, crs=crs), **made}
+        return {"INPUT": layer_of(*places[1:], kind=places[0]), "AXIS": layer_of(*axis, kind=kind, crs=crs), **made}
 
     return prepare
 
 
 def posts(*rows, fields="&field=km:double"):
     texts = [f"POINT({500_000 + east} {3_000_000 + north})" for east, north, _ in rows]
-    return lambda: layer("Point", *texts, fields=fields, values=[(km,) for _, _, km in rows])
+    return lambda: layer_of(*texts, kind="Point", fields=fields, values=[(km,) for _, _, km in rows])
 
 
 def jumps(*rows, fields="&field=km_back:double&field=km_ahead:double"):
-    return lambda: layer("None", fields=fields, values=rows)
+    return lambda: layer_of(kind="None", fields=fields, values=rows)
 
 
 def without_axis(bench):
@@ -48,35 +36,27 @@ def without_axis(bench):
 
 
 FAULTS = [
-    Fault(
-        "no axis", without_axis, REFUSED, "AXIS can't be empty: give a vector layer, or a vector file that can be read."
-    ),
-    Fault(
+    refused("no axis", without_axis, "AXIS can't be empty: give a vector layer, or a vector file that can be read."),
+    refused(
         "axis without M values, start or posts",
         given(),
-        REFUSED,
         "AXIS has no M values: fill in START_KM, or give POSTS or an axis whose vertices have kilometres as M.",
     ),
-    Fault(
+    refused(
         "M values in feet",
         given(("LINESTRING M(500000 3000000 0, 501000 3000000 3280.8)",), "LineStringM"),
-        REFUSED,
         "AXIS has M values that change by 3.28 per metre, so they are neither metres nor kilometres: fill in START_KM, "
         "or correct them.",
     ),
-    Fault(
+    refused(
         "two axes and one start",
         given((AXIS, OTHER), START_KM=1.0),
-        REFUSED,
         "AXIS has 2 lines that do not follow each other, but START_KM is for one: choose a single line, or "
         "give M values.",
     ),
-    Fault("empty axis", given(()), REFUSED, "AXIS has no lines: give a line layer."),
-    Fault(
-        "layer of points as the axis",
-        given((PLACE,), "Point"),
-        REFUSED,
-        "AXIS has the geometry type Point: give a line layer.",
+    refused("empty axis", given(()), "AXIS has no lines: give a line layer."),
+    refused(
+        "layer of points as the axis", given((PLACE,), "Point"), "AXIS has the geometry type Point: give a line layer."
     ),
     Fault(
         "axis in another coordinate system",
@@ -86,47 +66,41 @@ FAULTS = [
         "13.000, where the numbers differ by 1000.0 m: they are spread evenly.",
         {"PLACE_COUNT": 1},
     ),
-    Fault(
+    refused(
         "axis and places in degrees",
         lambda bench: {
-            "INPUT": layer("Point", "POINT(75 27.1)", crs="EPSG:4326"),
-            "AXIS": layer("LineString", "LINESTRING(75 27.1, 75.01 27.1)", crs="EPSG:4326"),
+            "INPUT": layer_of("POINT(75 27.1)", kind="Point", crs="EPSG:4326"),
+            "AXIS": layer_of("LINESTRING(75 27.1, 75.01 27.1)", kind="LineString", crs="EPSG:4326"),
             "START_KM": 1.0,
         },
-        REFUSED,
         "AXIS and INPUT are in degrees, where lengths can't be measured: reproject AXIS, for example to the UTM zone "
         "of the place.",
     ),
-    Fault(
+    refused(
         "posts out of order",
         given(POSTS=posts((0, 3, 1.0), (200, 3, 1.4), (300, 3, 1.3), (900, 3, 1.9))),
-        REFUSED,
         "The kilometres are out of order: km 1.300 follows km 1.400 along AXIS: correct the posts or M values, or "
         "state an overlap in JUMPS.",
     ),
-    Fault(
+    refused(
         "posts of another line",
         given(POSTS=posts((0, 90, 1.0), (200, 90, 1.2))),
-        REFUSED,
         "No post is within 50 m of the axis 1: check POSTS and their coordinate system.",
     ),
-    Fault(
+    refused(
         "a single post",
         given(POSTS=posts((0, 3, 1.0))),
-        REFUSED,
         "The axis 1 has one post, which does not show where kilometres increase: give a second one.",
     ),
-    Fault(
+    refused(
         "posts without a field of kilometres",
         given(POSTS=posts((0, 3, 1.0), (200, 3, 1.2), fields="&field=board:double")),
-        REFUSED,
         "POSTS has no field km, kilometre, kilometer, km_text, station: choose the field with the kilometre in "
         "POST_FIELD.",
     ),
-    Fault(
+    refused(
         "post with another text than a kilometre",
         given(POSTS=posts((0, 3, "km one"), (200, 3, "1.2"), fields="&field=km:string(9)")),
-        REFUSED,
         "POSTS has a row (feature 1) whose field km is 'km one' and no kilometre: correct it, or delete the row.",
     ),
     Fault(
@@ -136,30 +110,26 @@ FAULTS = [
         "AXIS is 150.0 m longer than the numbers from km 1.100 to km 1.200: taken as a jump from km 1.350 to km 1.200.",
         {"PLACE_COUNT": 1},
     ),
-    Fault(
+    refused(
         "jumps that are not on the axis",
         given(START_KM=1.0, JUMPS=jumps((7.0, 7.5))),
-        REFUSED,
         "The jump from km 7.000 to km 7.500 is not on AXIS: correct JUMPS, whose rows must be in the order of "
         "increasing kilometres.",
     ),
-    Fault(
+    refused(
         "table of jumps with other fields",
         given(START_KM=1.0, JUMPS=jumps((1.2, 1.3), fields="&field=a:double&field=b:double")),
-        REFUSED,
         "JUMPS has no field km_back: give a table with km_back, the kilometre before each jump, and km_ahead, the one "
         "behind it.",
     ),
-    Fault(
+    refused(
         "jumps for an axis with M values",
         given((AXIS_M,), "LineStringM", JUMPS=jumps((12.2, 12.3))),
-        REFUSED,
         "JUMPS need START_KM or POSTS: M values of AXIS contain their jumps.",
     ),
-    Fault(
+    refused(
         "table without places",
         given((AXIS_M,), "LineStringM", places=("None",)),
-        REFUSED,
         "INPUT is a table without places: give a layer of points, lines or polygons.",
     ),
     Fault(
@@ -174,14 +144,13 @@ FAULTS = [
         "ambiguous is 1.",
         {"AMBIGUOUS_COUNT": 1},
     ),
-    Fault(
+    refused(
         "kilometres for lines that are not measured",
         lambda bench: {
             "INPUT": bench.cloud(bench.track()),
-            "AXIS": layer("LineStringM", AXIS_M),
+            "AXIS": layer_of(AXIS_M, kind="LineStringM"),
             **dict.fromkeys(("QUALITY", "FINDINGS", "CLEANED")),
         },
-        REFUSED,
         "AXIS gives QUALITY, FINDINGS and REPORT kilometres: name at least one of these.",
         run="extractrails",
     ),

@@ -5,7 +5,7 @@ import json
 import laspy
 import numpy as np
 import pytest
-from faults import REFUSED, WARNED, Fault
+from faults import WARNED, Fault, refused
 from laspy.vlrs.known import WktCoordinateSystemVlr
 from rail_extract.core.clouds.crs import import_pyproj
 
@@ -135,18 +135,16 @@ POINTS = [
         gives=TRACK,
     ),
     Fault("5,000 stray points over 1000 km", of(lambda points: np.concatenate([points, strays(5000)])), gives=TRACK),
-    Fault(
+    refused(
         "5,000 stray points over 1000 km, and nothing else",
         of(lambda points: strays(5000)),
-        REFUSED,
         "The points of class 10 are … m apart over … m, too far for rails: if the coordinates are in centimetres or "
         "millimetres, assign a coordinate system that says so.",
     ),
     *(
-        Fault(
+        refused(
             f"coordinates in {unit}, which the file does not state",
             of(lambda points, factor=factor: PLACE + (points - PLACE) * factor),
-            REFUSED,
             "The points of class 10 are … m apart over … m, too far for rails: if the coordinates are in centimetres "
             f"or millimetres, assign a coordinate system that says so.{more}",
         )
@@ -254,30 +252,26 @@ SYSTEMS = [
         WARNED,
         "The cloud has no coordinate system: its coordinates are taken as metres. If it has one, choose it as CRS.",
     ),
-    Fault(
+    refused(
         "coordinates in degrees",
         in_system(4326, (1e-5, 1e-5, 1), (75, 27, 100)),
-        REFUSED,
         "cloud.las is in degrees (WGS 84), where lengths can't be measured: reproject it, for example to UTM "
         "zone 43N (EPSG:32643).",
     ),
-    Fault(
+    refused(
         "coordinates in degrees out of range",
         in_system(4326, 1, (500_000, 3_000_000, 100)),
-        REFUSED,
         "cloud.las is in degrees (WGS 84), where lengths can't be measured: reproject it, for example to the "
         "UTM zone of the place.",
     ),
-    Fault(
+    refused(
         "CRS in degrees for a cloud without a coordinate system",
         in_system(None, 1, HERE, CRS="EPSG:4326"),
-        REFUSED,
         "CRS EPSG:4326 is in degrees, where lengths can't be measured: choose a projected one.",
     ),
-    Fault(
+    refused(
         "geocentric coordinates",
         in_system(4978, 1, (5e6, 3e6, 2e6)),
-        REFUSED,
         "cloud.las: Lengths can't be computed in WGS 84: use a projected coordinate system.",
     ),
     Fault(
@@ -285,29 +279,26 @@ SYSTEMS = [
         with_wkt(lambda wkt: wkt.replace("6378137,298.257223563", "1737400,0")),  # the ellipsoid is that of the Moon
     ),
     *(
-        Fault(
+        refused(
             f"coordinate system with a unit of {length} m",
             in_unit(length),
-            REFUSED,
             f"cloud.las: WGS 84 / UTM zone 43N states a unit of {float(length):g} m, which is impossible: assign the "
             "right coordinate system.",
         )
         for length in ("0", "-1", "1e300")
     ),
     *(
-        Fault(
+        refused(
             f"{name} in place of a height",
             beside(system),
-            REFUSED,
             f"cloud.las: Lengths can't be computed in {title}, which measures in {unit}: use a projected coordinate "
             "system.",
         )
         for name, system, title, unit in (("time", TIME, "when", "s"), ("pressure", PRESSURE, "air", "hPa"))
     ),
-    Fault(
+    refused(
         "time in place of coordinates",
         with_wkt(lambda wkt: TIME),
-        REFUSED,
         "cloud.las: Lengths can't be computed in when, which measures in s: use a projected coordinate system.",
     ),
     Fault("US survey feet", in_system(2263, FEET, (980_000, 200_000, 300))),
@@ -327,17 +318,15 @@ SYSTEMS = [
         "wrong: reproject them, for example to UTM zone 32N (EPSG:32632).",
         run="buildtrackcenterlines",
     ),
-    Fault(
+    refused(
         "tiles in different zones",
         tiles(32643, 32644),
-        REFUSED,
         "tile0.las is in WGS 84 / UTM zone 43N but tile1.las is in WGS 84 / UTM zone 44N: reproject all tiles to one "
         "coordinate system first.",
     ),
-    Fault(
+    refused(
         "one tile without a coordinate system",
         tiles(32643, None),
-        REFUSED,
         "tile0.las is in WGS 84 / UTM zone 43N but tile1.las is in no coordinate system: reproject all tiles to one "
         "coordinate system first.",
     ),

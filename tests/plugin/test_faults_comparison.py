@@ -1,8 +1,8 @@
 """Faults of lines to compare, in Compare Tracks."""
 
 import pytest
-from faults import FINE, REFUSED, WARNED, Fault
-from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from faults import FINE, WARNED, Fault, refused
+from memory_layers import layer_of
 
 TITLE = "Comparison"
 
@@ -13,21 +13,12 @@ POINT = "POINT Z (500000 3000000 100)"
 STATED = {"REFERENCE_SIGMA": 1, "INPUT_SIGMA": 1}
 
 
-def layer(*texts, kind="LineStringZ", crs="EPSG:32643"):
-    made = QgsVectorLayer(f"{kind}?crs={crs}", "lines", "memory")
-    for text in texts:
-        feature = QgsFeature(made.fields())
-        feature.setGeometry(QgsGeometry.fromWkt(text))
-        assert made.dataProvider().addFeature(feature)
-    return made
-
-
 def given(reference=(LINE,), lines=(BESIDE,), kind="LineStringZ", crs="EPSG:32643", **parameters):
     """Lines of a reference in UTM zone 43N, and lines to compare."""
 
     def prepare(bench):
         made = {name: value() if callable(value) else value for name, value in parameters.items()}
-        return {"REFERENCE": layer(*reference), "INPUT": layer(*lines, kind=kind, crs=crs), **STATED, **made}
+        return {"REFERENCE": layer_of(*reference), "INPUT": layer_of(*lines, kind=kind, crs=crs), **STATED, **made}
 
     return prepare
 
@@ -36,25 +27,22 @@ FAULTS = [
     Fault(
         "two surveys of one line", given(), FINE, gives={"ACROSS_RMS": 10.0, "SHIFT_NORTH": 10.0, "MOVED_LENGTH": 0.0}
     ),
-    Fault("empty reference", given(()), REFUSED, "REFERENCE has no lines: give a line layer."),
-    Fault("empty layer to compare", given(lines=()), REFUSED, "INPUT has no lines: give a line layer."),
-    Fault(
+    refused("empty reference", given(()), "REFERENCE has no lines: give a line layer."),
+    refused("empty layer to compare", given(lines=()), "INPUT has no lines: give a line layer."),
+    refused(
         "points instead of lines",
         given(lines=(POINT,), kind="PointZ"),
-        REFUSED,
         "INPUT has the geometry type PointZ: give a line layer.",
     ),
-    Fault(
+    refused(
         "surveys in different coordinate systems",
         given(crs="EPSG:32644"),
-        REFUSED,
         "INPUT are in WGS 84 / UTM zone 44N but REFERENCE in WGS 84 / UTM zone 43N: give both "
         "in the same coordinate system.",
     ),
-    Fault(
+    refused(
         "lines in degrees",
         given(lines=("LINESTRING Z (75 27.1 0, 75.1 27.1 0)",), crs="EPSG:4326"),
-        REFUSED,
         "The lines are in degrees (WGS 84), where lengths can't be measured: reproject them, for example to the UTM "
         "zone of the place.",
     ),
@@ -65,10 +53,9 @@ FAULTS = [
         "The two surveys have no line in common: check that they are of the same place, and REACH.",
         {"MISSING_LENGTH": 40.0, "EXTRA_LENGTH": 40.0, "ACROSS_RMS": None, "SHIFT_EAST": None},
     ),
-    Fault(
+    refused(
         "rails of one survey only",
-        given(RAILS=lambda: layer(LINE)),
-        REFUSED,
+        given(RAILS=lambda: layer_of(LINE)),
         "Gauge and cant are compared between the rails of both surveys: choose REFERENCE_RAILS, too.",
     ),
     Fault(
@@ -78,12 +65,7 @@ FAULTS = [
         "A survey has no standard errors: the scatter of the differences is used instead, 1.0 mm across. Fill in "
         "REFERENCE_SIGMA and INPUT_SIGMA if it is known.",
     ),
-    Fault(
-        "standard error below zero",
-        given(INPUT_SIGMA=-1),
-        REFUSED,
-        "INPUT_SIGMA can't be -1: give 0 or more.",
-    ),
+    refused("standard error below zero", given(INPUT_SIGMA=-1), "INPUT_SIGMA can't be -1: give 0 or more."),
 ]
 
 

@@ -9,14 +9,13 @@ import zipfile
 import faults
 import numpy as np
 import pytest
-from faults import FINE, REFUSED, Fault
+from faults import FINE, Fault, refused
+from memory_layers import layer_of
 from osgeo import ogr
 from qgis.core import (
     Qgis,
     QgsApplication,
     QgsCoordinateTransformContext,
-    QgsFeature,
-    QgsGeometry,
     QgsVectorFileWriter,
     QgsVectorLayer,
 )
@@ -182,21 +181,12 @@ def one_removed_on_the_way(bench):
     return {**cloud(bench), **skipped, "RAILS": bench.folder / "rails.gpkg", "CENTERLINES": gone}
 
 
-def lines(*texts):
-    layer = QgsVectorLayer("LineStringZ?crs=EPSG:32643", "lines", "memory")
-    for text in texts:
-        feature = QgsFeature()
-        feature.setGeometry(QgsGeometry.fromWkt(text))
-        assert layer.dataProvider().addFeature(feature)
-    return layer
-
-
 def long_track():
     """Six kilometres of track, with stations that take a megabyte."""
     left, middle, right = (
         f"LINESTRING Z (500000 {3000000 + across} 100, 506000 {3000000 + across} 100)" for across in (1.507, 0.7535, 0)
     )
-    return {"INPUT": lines(middle), "RAILS": lines(left, right)}
+    return {"INPUT": layer_of(middle), "RAILS": layer_of(left, right)}
 
 
 def full_disk(room, make, suffix):
@@ -218,7 +208,7 @@ def points_only(bench):
 
 def earlier(path):
     """An output of an earlier run."""
-    before = lines("LINESTRING Z (0 0 0, 1 1 1)", "LINESTRING Z (0 0 0, 2 2 2)")
+    before = layer_of("LINESTRING Z (0 0 0, 1 1 1)", "LINESTRING Z (0 0 0, 2 2 2)")
     options = QgsVectorFileWriter.SaveVectorOptions()
     options.driverName = QgsVectorFileWriter.driverForExtension(path.suffix)
     QgsVectorFileWriter.writeAsVectorFormatV3(before, str(path), QgsCoordinateTransformContext(), options)
@@ -295,69 +285,59 @@ class Panic(BaseException):
 
 
 FAULTS = [
-    Fault(
+    refused(
         "a worker process is ended from outside",
         ended_workers,
-        REFUSED,
         "Reading ….las failed, because its worker process ended: close other programs that take memory, or set "
         "WORKERS to 1.",
     ),
     Fault("worker processes cannot be started", unknown_interpreter, FINE, gives=TRACK),
-    Fault(
+    refused(
         "missing package laspy",
         without("laspy"),
-        REFUSED,
         "Extract rails needs the Python package laspy, which this QGIS does not have: run Install packages "
         "in the toolbox under Rail Extract, or …",
     ),
-    Fault(
+    refused(
         "missing packages torch and cv2",
         without("torch", "cv2"),
-        REFUSED,
         "Extract rails needs the Python package cv2, which this QGIS does not have: run Install packages in "
         "the toolbox under Rail Extract, or …",
     ),
-    Fault(
+    refused(
         "missing package of the chosen engine",
         without_engine,
-        REFUSED,
         "ENGINE TORCH needs the package torch: install it, or set ENGINE to AUTO.",
     ),
-    Fault(
+    refused(
         "missing weights",
         with_weights(lambda path: path.unlink()),
-        REFUSED,
         "The weights file …/models/frpdf_base.npz is missing: reinstall the plugin.",
     ),
-    Fault(
+    refused(
         "truncated weights",
         with_weights(halve),
-        REFUSED,
         "The weights file …/models/frpdf_base.npz cannot be read: reinstall the plugin.",
     ),
-    Fault(
+    refused(
         "text file as weights",
         with_weights(lambda path: path.write_text("weights")),
-        REFUSED,
         "The weights file …/models/frpdf_base.npz cannot be read: reinstall the plugin.",
     ),
-    Fault(
+    refused(
         "weights of a different network",
         with_weights(put_others),
-        REFUSED,
         "The weights file does not belong to FRPDF ('layer.0.0.0.weight'): reinstall the plugin.",
     ),
-    Fault(
+    refused(
         "weights that take 256 MB when they are unpacked",
         with_weights(put_bomb),
-        REFUSED,
         "The weights file …/models/frpdf_base.npz cannot be read: reinstall the plugin.",
     ),
     *(
-        Fault(
+        refused(
             f"weights with {what}",
             with_weights(replacing("layer.9.bias", change)),
-            REFUSED,
             f"The weights file {said}: reinstall the plugin.",
         )
         for what, change, said in (
@@ -374,107 +354,87 @@ FAULTS = [
             ),
         )
     ),
-    Fault(
+    refused(
         "weights that contain code",
         with_weights(put_code),
-        REFUSED,
         "The weights file …/models/frpdf_base.npz cannot be read: reinstall the plugin.",
     ),
-    Fault(
+    refused(
         "output in a folder that is a file",
         output(below_a_file),
-        REFUSED,
         "The output …/file/rails.gpkg can't be written (Not a directory): choose another place.",
     ),
-    Fault(
+    refused(
         "output in a missing folder",
         output(lambda folder: folder / "gone" / "rails.gpkg"),
-        REFUSED,
         "The output …/gone/rails.gpkg can't be written (No such file or directory): choose another place.",
     ),
-    Fault(
+    refused(
         "output that is a folder",
         output(a_folder),
-        REFUSED,
         "The output …/rails.gpkg is a folder: give the name of a file in it.",
     ),
-    Fault(
+    refused(
         "output that is a named pipe",
         output(a_pipe),
-        REFUSED,
         "The output …/rails.gpkg is a pipe or a device, not a file: give the name of a file.",
     ),
-    Fault(
+    refused(
         "output that is a symbolic link to itself",
         output(a_loop),
-        REFUSED,
         "The output …/rails.gpkg can't be written (Too many levels of symbolic links): choose another place.",
     ),
     Fault("output that is a symbolic link to a file", output(a_link), gives=TRACK),
-    Fault(
+    refused(
         "output replaced by another run during the run",
         replaced_on_the_way,
-        REFUSED,
         "…/rails.gpkg was changed by another program in the meantime. The new file is …/rails_new.gpkg. "
         "Not written: RAILS. Complete: …",
     ),
-    Fault(
+    refused(
         "GeoPackage with an escaped space in its name",
         output(lambda folder: folder / "a%20b.gpkg"),
-        REFUSED,
         "The output …/a%20b.gpkg can't be opened after it is written, because %20 stands for another character in the "
         "path of a GeoPackage: choose another name.",
     ),
-    Fault(
+    refused(
         "GeoPackage with a reserved name",
         output(lambda folder: folder / "gpkg_rails.gpkg"),
-        REFUSED,
         "RAILS can't be a table with a name that begins with gpkg, which is reserved in a GeoPackage: choose another "
         "name.",
     ),
-    Fault(
+    refused(
         "output on a read-only disk",
         output(lambda folder: "/proc/rails.gpkg"),
-        REFUSED,
         "The output /proc/rails.gpkg can't be written (No such file or directory): choose another place.",
     ),
-    Fault(
+    refused(
         "output with a name that is too long",
         output(lambda folder: folder / f"{'r' * 300}.gpkg"),
-        REFUSED,
         "The output …/rrr….gpkg can't be written (File name too long): choose another place.",
     ),
-    Fault(
+    refused(
         "output with a name that no file can have",
         lambda bench: {**cloud(bench), "REPORT": f"{bench.folder}/a\0b.html"},
-        REFUSED,
         "The output … can't be written (…): choose another place.",
     ),
-    Fault(
+    refused(
         "layer in a folder with a colon",
         output(in_a_folder_with_a_colon),
-        REFUSED,
         "RAILS can't be written to …/at 10:30/rails.gpkg, because QGIS takes what comes before the colon for a data "
         "provider: choose a file without a colon in its path.",
     ),
-    Fault(
+    refused(
         "layer of an unknown data provider",
         output(lambda folder: "EPSG:25832"),
-        REFUSED,
         "RAILS can't be written to EPSG:25832, because QGIS takes what comes before the colon for a data provider: "
         "choose a file without a colon in its path.",
     ),
-    Fault(
-        "report with the name of the cloud",
-        over_the_cloud,
-        REFUSED,
-        "REPORT can't be cloud.las: let it end in .html.",
-    ),
+    refused("report with the name of the cloud", over_the_cloud, "REPORT can't be cloud.las: let it end in .html."),
     *(
-        Fault(
+        refused(
             f"output of {what}",
             output(lambda folder, suffix=suffix: folder / f"rails.{suffix}"),
-            REFUSED,
             f"“.{suffix}” files are not supported as outputs for this algorithm: choose another one, such as .gpkg.",
         )
         for suffix, what in (
@@ -483,22 +443,19 @@ FAULTS = [
             ("kml", "a format with a coordinate system of its own"),
         )
     ),
-    Fault(
+    refused(
         "no output at all",
         without_outputs,
-        REFUSED,
         "No output is chosen: name at least one of RAILS, CENTERLINES, QUALITY, FINDINGS, CLEANED, REPORT.",
     ),
-    Fault(
+    refused(
         "output folder deleted during the run",
         removed_on_the_way,
-        REFUSED,
         "The output …/gone/rails.gpkg can't be written (No such file or directory): choose another place.",
     ),
-    Fault(
+    refused(
         "folder of one output deleted during the run",
         one_removed_on_the_way,
-        REFUSED,
         "The output …/gone/tracks.gpkg can't be written (No such file or directory): choose another place. "
         "Not written: CENTERLINES. Complete: RAILS.",
     ),
@@ -508,59 +465,51 @@ FAULTS = [
         gives=TRACK,
     ),
     Fault("output of an earlier run, open in another program", open_elsewhere, gives=TRACK),
-    Fault(
+    refused(
         "output of an earlier run, being edited in another program",
         edited_elsewhere,
-        REFUSED,
         "…/rails.gpkg is open in another program (rails.gpkg-wal exists): close it there, or choose another file.",
     ),
     Fault("shapefile of an earlier run, with a spatial index", indexed_before, gives=TRACK),
-    Fault(
+    refused(
         "full disk, GeoTIFF",
         full_disk(1000, points_only, ".tif"),
-        REFUSED,
         "The output …/out/OUTPUT.tif can't be written (…): free space on the disk, or choose another place.",
         run="rasterizerailpoints",
     ),
-    Fault(
+    refused(
         "full disk, GeoPackage that cannot be created",
         full_disk(50_000, lambda bench: long_track(), ".gpkg"),
-        REFUSED,
         "The output can't be written (…): check the free disk space.",
         run=MEASURE,
     ),
-    Fault(
+    refused(
         "full disk, GeoPackage that cannot be completed",
         full_disk(200_000, lambda bench: long_track(), ".gpkg"),
-        REFUSED,
         "The output can't be written (0 of 6001 features were written): check the free disk space.",
         run=MEASURE,
     ),
-    Fault(
+    refused(
         "full disk, shapefile",
         full_disk(50_000, lambda bench: long_track(), ".shp"),
-        REFUSED,
         "The output can't be written (…): check the free disk space.",
         run=MEASURE,
     ),
-    Fault(
+    refused(
         "full disk, GeoJSON",
         full_disk(50_000, lambda bench: long_track(), ".geojson"),
-        REFUSED,
         "The output can't be written (…): check the free disk space.",
         run=MEASURE,
     ),
-    Fault(
+    refused(
         "not enough memory",
         failing(pipeline, "clean_square", MemoryError()),
-        REFUSED,
         "Not enough memory: choose a smaller extent.",
     ),
     *(
-        Fault(
+        refused(
             f"unforeseen error {when}",
             failing(module, name, error),
-            REFUSED,
             f"Rail Extract failed unexpectedly ({said}): report this with the traceback from the log.",
         )
         for when, module, name, error, said in (
@@ -572,7 +521,7 @@ FAULTS = [
         )
     ),
     *(
-        Fault(f"cancelled at {percent} %", cancelled(percent), REFUSED, "Cancelled; nothing was written.")
+        refused(f"cancelled at {percent} %", cancelled(percent), "Cancelled; nothing was written.")
         for percent in (0, 10, 20, 40, 60, 80, 90)
     ),
 ]

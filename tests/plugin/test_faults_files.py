@@ -7,7 +7,7 @@ import struct
 import laspy
 import numpy as np
 import pytest
-from faults import FINE, REFUSED, Fault
+from faults import FINE, Fault, refused
 from osgeo import gdal
 from rail_extract.rail_extract_plugin.setup import dependencies
 
@@ -183,258 +183,213 @@ NAN, INFINITE = struct.pack("<d", np.nan), struct.pack("<d", np.inf)
 ITEM = {"assets": {"data": {"href": "gone.laz"}}}
 
 FAULTS = [
-    Fault("empty file", holding(b""), REFUSED, "cloud.las is empty (0 bytes): copy or export it again."),
-    Fault(
+    refused("empty file", holding(b""), "cloud.las is empty (0 bytes): copy or export it again."),
+    refused(
         "text file named .las",
         holding(b"x,y,z\n1,2,3\n"),
-        REFUSED,
         'cloud.las is not a LAS or LAZ file (it does not begin with "LASF"): export the cloud as LAS or LAZ.',
     ),
-    Fault(
+    refused(
         "PDF file named .las (wrong signature)",
         holding(b"%PDF-1.4 " * 100),
-        REFUSED,
         'cloud.las is not a LAS or LAZ file (it does not begin with "LASF"): export the cloud as LAS or LAZ.',
     ),
-    Fault(
+    refused(
         "folder named .las",
         lambda bench: (bench.folder / "a.las").mkdir() or {"INPUT": bench.folder / "a.las"},
-        REFUSED,
         "The folder …/a.las contains no .las or .laz file: choose another folder.",
     ),
-    Fault(
+    refused(
         "missing file",
         lambda bench: {"INPUT": bench.folder / "gone.laz"},
-        REFUSED,
         "…/gone.laz does not exist: give a .las, .laz or .vpc file, or a folder of tiles, on this computer.",
     ),
-    Fault(
+    refused(
         "web address",
         lambda bench: {"INPUT": "https://example.org/cloud.laz"},
-        REFUSED,
         "https:/example.org/cloud.laz does not exist: give a .las, .laz or .vpc file, or a folder of tiles, on this "
         "computer.",
     ),
-    Fault(
+    refused(
         "folder without clouds",
         folder_without_clouds,
-        REFUSED,
         "The folder …/tiles contains no .las or .laz file: choose another folder.",
     ),
-    Fault(
+    refused(
         "folder with one bad tile",
         one_bad_tile,
-        REFUSED,
         "bad.las is cut off: it has room for 3596 of the 3600 points stated in its header; copy or export it again.",
     ),
-    Fault(
+    refused(
         "virtual point cloud that is not JSON",
         catalogue("{"),
-        REFUSED,
         "all.vpc is not a virtual point cloud: build it again from its tiles.",
     ),
-    Fault(
+    refused(
         "virtual point cloud without tiles",
         catalogue('{"features": []}'),
-        REFUSED,
         "all.vpc names no tiles: build it again from existing tiles.",
     ),
-    Fault(
+    refused(
         "virtual point cloud with a missing tile",
         catalogue(json.dumps({"features": [ITEM]})),
-        REFUSED,
         "all.vpc names …/gone.laz, which does not exist: build it again from its tiles.",
     ),
-    Fault(
-        "truncated in the header",
-        damaged(cut(200)),
-        REFUSED,
-        "cloud.las is cut off within its header: copy or export it again.",
+    refused(
+        "truncated in the header", damaged(cut(200)), "cloud.las is cut off within its header: copy or export it again."
     ),
-    Fault(
+    refused(
         "truncated in the variable-length records",
         damaged(among_records),
-        REFUSED,
         "cloud.las is cut off before its first point: copy or export it again.",
     ),
-    Fault(
+    refused(
         "truncated before the points",
         damaged(at_points),
-        REFUSED,
         "cloud.las is cut off: it has room for 0 of the 3600 points stated in its header; copy or export it again.",
     ),
-    Fault(
+    refused(
         "truncated in the points",
         damaged(cut(-1000)),
-        REFUSED,
         "cloud.las is cut off: it has room for 3566 of the 3600 points stated in its header; copy or export it again.",
     ),
-    Fault(
+    refused(
         "truncated in the records after the points",
         damaged(with_late_record_cut),
-        REFUSED,
         "cloud.las is cut off: the records after its points are missing; copy or export it again.",
     ),
-    Fault(
+    refused(
         "LAZ truncated in the header",
         damaged(cut(200), "cloud.laz"),
-        REFUSED,
         "cloud.laz is cut off within its header: copy or export it again.",
     ),
-    Fault(
+    refused(
         "LAZ truncated before the points",
         damaged(at_points, "cloud.laz"),
-        REFUSED,
         "cloud.laz is cut off: its table of chunks is missing; copy or export it again.",
     ),
-    Fault(
+    refused(
         "LAZ truncated in the chunks",
         damaged(in_chunks, "cloud.laz"),
-        REFUSED,
         "cloud.laz is cut off: its table of chunks is missing; copy or export it again.",
     ),
-    Fault(
+    refused(
         "LAZ truncated in the chunk table",
         damaged(in_chunk_table, "cloud.laz"),
-        REFUSED,
         "cloud.laz is cut off: its table of chunks is missing; copy or export it again.",
     ),
-    Fault(
+    refused(
         "zero points",
         damaged(overwritten(COUNT_AT, bytes(8))),
-        REFUSED,
         "cloud.las was not finished: it has points, but its header states none; copy or export it again.",
     ),
-    Fault(
+    refused(
         "absurd number of points",
         damaged(overwritten(COUNT_AT, b"\xff" * 6)),
-        REFUSED,
         "cloud.las is cut off: it has room for 3600 of the 281474976710655 points stated in its header; copy or "
         "export it again.",
     ),
-    Fault(
+    refused(
         "LAZ with an absurd number of points",
         damaged(overwritten(COUNT_AT, b"\xff" * 6), "cloud.laz"),
-        REFUSED,
         "cloud.laz is damaged: the number of points is 281474976710655 in its header but 0 to 50000 in its compressed "
         "chunks; export it again.",
     ),
-    Fault(
+    refused(
         "absurd number of records",
         damaged(overwritten(RECORDS_AT, b"\xff" * 4)),
-        REFUSED,
         "cloud.las has a damaged header (375 bytes and 4294967295 records stated before the points): export it again.",
     ),
-    Fault(
+    refused(
         "point offset beyond the end of the file",
         damaged(overwritten(96, b"\xff\xff\xff\x7f")),
-        REFUSED,
         "cloud.las is cut off before its first point: copy or export it again.",
     ),
-    Fault(
+    refused(
         "point offset within the header",
         damaged(overwritten(96, struct.pack("<I", 10))),
-        REFUSED,
         "cloud.las has a damaged header (375 bytes and 1 records stated before the points): export it again.",
     ),
-    Fault(
+    refused(
         "header length of zero",
         damaged(overwritten(94, struct.pack("<H", 0))),
-        REFUSED,
         "cloud.las is cut off or damaged (Incoherent header size): copy or export it again.",
     ),
-    Fault(
+    refused(
         "header length beyond the end of the file",
         damaged(overwritten(94, b"\xff\xff")),
-        REFUSED,
         "cloud.las has a damaged header (65535 bytes and 1 records stated before the points): export it again.",
     ),
     Fault("record length reaching into the points", damaged(overwritten(HEADER + 20, b"\xff\xff"))),
-    Fault(
+    refused(
         "point length of zero",
         damaged(overwritten(105, bytes(2))),
-        REFUSED,
         "cloud.las is cut off or damaged (Incoherent point size, header says 0 point_format created says "
         "30): copy or export it again.",
     ),
-    Fault(
+    refused(
         "unknown point format",
         damaged(overwritten(104, b"\x3f")),
-        REFUSED,
         "cloud.las has a damaged header (point format 63): export it with a format from 0 to 10.",
     ),
-    Fault(
-        "unknown version",
-        damaged(overwritten(24, b"\x03\x07")),
-        REFUSED,
-        "cloud.las is LAS 3.7: export it as LAS 1.2 to 1.4.",
+    refused(
+        "unknown version", damaged(overwritten(24, b"\x03\x07")), "cloud.las is LAS 3.7: export it as LAS 1.2 to 1.4."
     ),
-    Fault(
+    refused(
         "scale of NaN",
         damaged(overwritten(SCALE_AT, NAN)),
-        REFUSED,
         "cloud.las has a damaged header (coordinate scale or offset): export it again.",
     ),
-    Fault(
+    refused(
         "scale of zero",
         damaged(overwritten(SCALE_AT, bytes(8))),
-        REFUSED,
         "cloud.las has a damaged header (coordinate scale or offset): export it again.",
     ),
-    Fault(
+    refused(
         "infinite offset",
         damaged(overwritten(OFFSET_AT, INFINITE)),
-        REFUSED,
         "cloud.las has a damaged header (coordinate scale or offset): export it again.",
     ),
-    Fault(
+    refused(
         "offset of 1e300",
         damaged(overwritten(OFFSET_AT, struct.pack("<d", 1e300))),
-        REFUSED,
         "cloud.las has a damaged header (coordinate scale or offset): export it again.",
     ),
-    Fault(
+    refused(
         "record of 2^63 bytes after the points",
         damaged(with_long_late_record),
-        REFUSED,
         "cloud.las is cut off: the records after its points are missing; copy or export it again.",
     ),
-    Fault(
+    refused(
         "COPC with a chunk table on which lazrs panics",
         with_broken_chunk_table,
-        REFUSED,
         "cloud.copc.laz is cut off or damaged (index out of bounds: …): copy or export it again.",
     ),
-    Fault(
+    refused(
         "LAZ with a layer of 3.8 GB stated in a chunk",
         damaged(with_large_layer, "cloud.laz"),
-        REFUSED,
         "cloud.laz is damaged: its compressed chunks don't fit the file; export it again.",
     ),
-    Fault(
+    refused(
         "LAZ with an erased part, on which lazrs would end the program",
         with_erased_times,
-        REFUSED,
         "cloud.laz is damaged: parts of its points are erased; copy or export it again.",
     ),
-    Fault(
+    refused(
         "COPC with 1 point stated in the header and 3600 in the chunk table",
         with_one_point_stated,
-        REFUSED,
         "cloud.copc.laz is damaged: the number of points is 1 in its header but 3600 in its "
         "compressed chunks; export it again.",
     ),
-    Fault(
+    refused(
         "LAZ with 1 point stated in the header and 3600 in its chunk",
         damaged(overwritten(COUNT_AT, struct.pack("<Q", 1)), "cloud.laz"),
-        REFUSED,
         "cloud.laz is damaged: the number of points is 1 in its header but 3600 in its "
         "compressed chunks; export it again.",
     ),
-    Fault(
+    refused(
         "two different numbers of points in the header",
         damaged(overwritten(107, struct.pack("<I", 7))),
-        REFUSED,
         "cloud.las has a damaged header (it states both 7 and 3600 points): export it again.",
     ),
     Fault("bounds of 1e300 in the header", damaged(overwritten(195, struct.pack("<d", 1e300) * 2))),
@@ -445,10 +400,9 @@ FAULTS = [
     Fault("LAZ with extra bytes", rewritten(add_extra_bytes, "cloud.laz")),
     Fault("oldest format, LAS 1.2 with point format 0", rewritten(unchanged, version="1.2", point_format=0)),
     Fault("waveforms, point format 4", rewritten(unchanged, version="1.3", point_format=4)),
-    Fault(
+    refused(
         "LAZ without the package lazrs",
         without_backend,
-        REFUSED,
         "Rasterize rail points needs the Python package lazrs, which this QGIS does not have: run Install "
         "packages in the toolbox under Rail Extract, or qgis_process run railextract:installpackages in a shell. "
         "Build track centerlines and Clean rail raster (FRPDF) work without it.",

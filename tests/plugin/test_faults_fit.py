@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from faults import FINE, REFUSED, WARNED, Fault
-from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from faults import FINE, WARNED, Fault, refused
+from memory_layers import layer_of
 
 TITLE = "Design elements"
 
@@ -11,13 +11,9 @@ TITLE = "Design elements"
 def line(count=200, kind="LineStringZ", crs="EPSG:32643", shape=None, fields=""):
     """A layer with one line, straight to the east unless there is another shape."""
     x = np.arange(count, dtype=float)
-    xy = np.column_stack([500_000 + x, 3_000_000 + 0 * x]) if shape is None else shape
-    places = ", ".join(f"{east} {north}" + (" 50" if kind.endswith("Z") else "") for east, north in xy)
-    made = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "tracks", "memory")
-    feature = QgsFeature(made.fields())
-    feature.setGeometry(QgsGeometry.fromWkt(f"{kind.replace('Z', ' Z')}({places})"))
-    assert made.dataProvider().addFeature(feature)
-    return made
+    xy = np.column_stack([500_000 + x, 3_000_000 + 0 * x]) if shape is None else np.asarray(shape, dtype=float)
+    heights = np.full((len(xy), int(kind.endswith("Z"))), 50.0)
+    return layer_of(np.hstack([xy, heights]), kind=kind, crs=crs, fields=fields)
 
 
 def ring():
@@ -32,14 +28,10 @@ def stray():
 
 def in_two_parts():
     """A track of two straight lines in one feature."""
-    made = QgsVectorLayer("MultiLineStringZ?crs=EPSG:32643", "tracks", "memory")
-    feature = QgsFeature()
     parts = [
         "(" + ", ".join(f"{x} {3_000_000} 50" for x in range(first, first + 100)) + ")" for first in (500_000, 500_150)
     ]
-    feature.setGeometry(QgsGeometry.fromWkt(f"MultiLineString Z({', '.join(parts)})"))
-    assert made.dataProvider().addFeature(feature)
-    return made
+    return layer_of(f"MultiLineString Z({', '.join(parts)})", kind="MultiLineStringZ")
 
 
 def branch():
@@ -56,23 +48,20 @@ def given(make=line, **parameters):
 
 
 FAULTS = [
-    Fault(
+    refused(
         "line without heights",
         given(lambda: line(kind="LineString")),
-        REFUSED,
         "The line of track 1 has no heights: give a 3D line, such as a centerline of Extract rails.",
     ),
-    Fault(
+    refused(
         "short line",
         given(lambda: line(30)),
-        REFUSED,
         "The line of track 1 has 30 vertices over 29 m, but a fit needs at least 20 over 50 m: leave it out, or join "
         "it with the track that continues it.",
     ),
-    Fault(
+    refused(
         "line with few vertices, as digitized",
         given(lambda: line(shape=[(500_000 + 100 * x, 3_000_000) for x in range(6)])),
-        REFUSED,
         "The line of track 1 has 6 vertices over 500 m, but a fit needs at least 20 over 50 m: give a line that was "
         "measured point by point, such as a centerline of Extract rails.",
     ),
@@ -84,16 +73,14 @@ FAULTS = [
         "look at the line there.",
         {"ELEMENT_COUNT": 2},
     ),
-    Fault(
+    refused(
         "ring",
         given(lambda: line(shape=ring())),
-        REFUSED,
         "The line of track 1 ends where it begins: cut the ring into two lines.",
     ),
-    Fault(
+    refused(
         "two lines of one track",
         given(in_two_parts),
-        REFUSED,
         "Track 1 has 2 lines, but its elements follow one: join them, or give each its own track_id.",
     ),
     Fault(
@@ -102,16 +89,14 @@ FAULTS = [
         FINE,
         gives={"ELEMENT_COUNT": 2},
     ),
-    Fault(
+    refused(
         "line that turns back",
         given(lambda: line(shape=[(500_000 + 100 - abs(100 - x), 3_000_000 + 0.001 * x) for x in range(200)])),
-        REFUSED,
         "The line of track 1 turns back 100 m from its start: remove the stray vertices there, or cut the line.",
     ),
-    Fault(
+    refused(
         "track geometry without cant",
         given(QUALITY=lambda: line(fields="&field=track_id:integer")),
-        REFUSED,
         "QUALITY has no field chainage_m: give the track geometry of Extract rails or Measure track geometry.",
     ),
 ]

@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from faults import FINE, REFUSED, WARNED, Fault
+from faults import FINE, WARNED, Fault, refused
+from memory_layers import layer_of
 from osgeo import gdal, osr
-from qgis.core import QgsFeature, QgsGeometry, QgsLineString, QgsPoint, QgsVectorLayer
+from qgis.core import QgsGeometry, QgsLineString, QgsPoint, QgsVectorLayer
 
 TITLE = "Rasters and lines"
 NAN, INFINITE = float("nan"), float("inf")
@@ -125,17 +126,7 @@ FLAT_LEFT, FLAT_RIGHT = (text.replace(" Z", "").replace(" 100)", ")").replace(" 
 def lines(*texts, kind="LineStringZ", crs="EPSG:32643", fields="", values=()):
     """A line layer in memory."""
 
-    def prepare(bench):
-        layer = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "lines", "memory")
-        for number, text in enumerate(texts):
-            feature = QgsFeature(layer.fields())
-            feature.setGeometry(QgsGeometry.fromWkt(text) if isinstance(text, str) else text)
-            if values:
-                feature.setAttributes(list(values[number]))
-            assert layer.dataProvider().addFeature(feature)
-        return {"INPUT": layer}
-
-    return prepare
+    return lambda bench: {"INPUT": layer_of(*texts, kind=kind, crs=crs, fields=fields, values=values)}
 
 
 def table(bench):
@@ -159,116 +150,94 @@ NO_TRACKS = {"CENTERLINE_COUNT": 0}
 V, B = "vectorizerails", "buildtrackcenterlines"
 
 RASTERS = [
-    Fault(
+    refused(
         "text file instead of a raster",
         text_file,
-        REFUSED,
         "INPUT can't be …/rail.tif: give a raster layer, or a raster file that can be read.",
     ),
-    Fault(
+    refused(
         "missing raster",
         lambda bench: {"INPUT": bench.folder / "gone.tif"},
-        REFUSED,
         "INPUT can't be …/gone.tif: give a raster layer, or a raster file that can be read.",
     ),
-    Fault(
+    refused(
         "GeoTIFF truncated in the header",
         of_raster(lambda data: data[:60]),
-        REFUSED,
         "INPUT can't be …/rail.tif: give a raster layer, or a raster file that can be read.",
     ),
-    Fault(
-        "GeoTIFF with damaged cells",
-        damaged_cells,
-        REFUSED,
-        "rail.tif is damaged at row 0, column 0: create it again.",
-    ),
-    Fault(
+    refused("GeoTIFF with damaged cells", damaged_cells, "rail.tif is damaged at row 0, column 0: create it again."),
+    refused(
         "rotated raster",
         of_raster(grid=(500_000, CELL_M, 0.001, 3_000_000, 0.001, -CELL_M)),
-        REFUSED,
         "rail.tif is rotated or its cells are not square: warp it to square cells, north up.",
     ),
-    Fault(
+    refused(
         "non-square cells",
         of_raster(grid=(500_000, CELL_M, 0, 3_000_000, 0, -0.05)),
-        REFUSED,
         "rail.tif is rotated or its cells are not square: warp it to square cells, north up.",
     ),
-    Fault(
+    refused(
         "cells of 40 m, as of a raster whose unit is wrong",
         of_raster(grid=(500_000, 40, 0, 3_000_000, 0, -40)),
-        REFUSED,
         "rail.tif has cells of 40 m, and rails are seen in cells of 0.001 to 0.5 m: rasterize the points again, or "
         "check the coordinate system.",
     ),
-    Fault(
+    refused(
         "south-up raster",
         of_raster(grid=(500_000, CELL_M, 0, 3_000_000, 0, CELL_M)),
-        REFUSED,
         "rail.tif is rotated or its cells are not square: warp it to square cells, north up.",
     ),
-    Fault(
+    refused(
         "raster without georeference",
         of_raster(grid=None, epsg=None),
-        REFUSED,
         "rail.tif is rotated or its cells are not square: warp it to square cells, north up.",
     ),
-    Fault(
+    refused(
         "raster in degrees",
         of_raster(grid=(75, 4e-7, 0, 27, 0, -4e-7), epsg=4326),
-        REFUSED,
         "Lengths can't be computed in WGS 84: use a projected coordinate system.",
     ),
-    Fault(
+    refused(
         "wrong number of bands (RGB image)",
         of_raster(cells=track_cells(3), texts=()),
-        REFUSED,
         "rail.tif has 3 bands, and not every description is a class code: give a raster with one band, or "
         "with one band per class as from Rasterize Rail Points.",
     ),
-    Fault(
+    refused(
         "band description that is not a class",
         of_raster(cells=track_cells(2), texts=("10", "300")),
-        REFUSED,
         "rail.tif has 2 bands, and not every description is a class code: give a raster with one band, or "
         "with one band per class as from Rasterize Rail Points.",
     ),
-    Fault(
+    refused(
         "two bands for one class",
         of_raster(cells=track_cells(2), texts=("10", "10")),
-        REFUSED,
         "rail.tif has several bands for one class (10, 10): give one band per class.",
     ),
-    Fault(
+    refused(
         "missing tags",
         of_raster(tags={}),
-        REFUSED,
         "The raster does not state its gauge and railhead width (tags RAIL_GAUGE_MM and RAIL_HEAD_MM): fill in "
         "GAUGE and HEAD_WIDTH.",
     ),
-    Fault(
+    refused(
         "tags that are not numbers",
         of_raster(tags={"RAIL_GAUGE_MM": "wide", "RAIL_HEAD_MM": "72"}),
-        REFUSED,
         "The tag RAIL_GAUGE_MM of the raster can't be 'wide': rasterize the points again.",
     ),
-    Fault(
+    refused(
         "tags that are NaN",
         of_raster(tags={"RAIL_GAUGE_MM": "nan", "RAIL_HEAD_MM": "72"}),
-        REFUSED,
         "The tag RAIL_GAUGE_MM of the raster can't be 'nan': rasterize the points again.",
     ),
-    Fault(
+    refused(
         "tag with an invalid extent",
         of_raster(tags={**TAGS, "RAIL_EXTENT": "1,2"}),
-        REFUSED,
         "The tag RAIL_EXTENT of the raster can't be '1,2': rasterize the points again.",
     ),
-    Fault(
+    refused(
         "tags that contradict the cell size",
         of_raster(grid=(500_000, 0.5, 0, 3_000_000, 0, -0.5)),
-        REFUSED,
         "The raster's cells are 500.0 mm wide, but a gauge of 1435 mm with a railhead of 72.0 mm needs 39.9 "
         "mm: rasterize the points for these rails, or correct GAUGE and HEAD_WIDTH.",
         run="frpdfcleanup",
@@ -276,10 +245,9 @@ RASTERS = [
     Fault(
         "tag with an unknown model", of_raster(tags={**TAGS, "RAIL_MODEL": "gone"}), FINE, gives={}, run="frpdfcleanup"
     ),
-    Fault(
+    refused(
         "empty raster",
         of_raster(cells=np.zeros((1, 90, 200), np.uint8)),
-        REFUSED,
         "rail.tif has no rail cell: give a raster with 1 where there is rail.",
     ),
     Fault(
@@ -325,70 +293,61 @@ RASTERS = [
         "Without POINTS, the rails have no heights and are only as accurate as the raster.",
         TWO_RAILS,
     ),
-    Fault(
+    refused(
         "raster without a coordinate system, cloud in feet",
         without_system_beside_feet,
-        REFUSED,
         "POINTS are in NAD83 / New York Long Island (ftUS), whose unit is not the metre: assign a coordinate system to "
         "the raster too.",
     ),
     Fault("output that overwrites the input", over_itself, run="frpdfcleanup"),
     *(
-        Fault(
+        refused(
             f"raster that begins at {x:g}",
             of_raster(grid=(x, CELL_M, 0, 3_000_000, 0, -CELL_M)),
-            REFUSED,
             f"rail.tif begins at {x:g}, 3e+06, where no rails can be: rasterize the points again.",
         )
         for x in (1e300, float("nan"))
     ),
-    Fault(
+    refused(
         "raster with an infinite extent",
         of_raster(tags={**TAGS, "RAIL_EXTENT": "-inf,0,inf,1"}),
-        REFUSED,
         "The tag RAIL_EXTENT of the raster can't be '-inf,0,inf,1': rasterize the points again.",
     ),
-    Fault(
+    refused(
         "raster of 16 million cells that are all rail",
         of_raster(cells=np.ones((1, 4000, 4000), np.uint8), options=["COMPRESS=DEFLATE"]),
-        REFUSED,
         "rail.tif is not a rail raster, because 100% of its cells are rail: give the output of Rasterize Rail Points.",
     ),
 ]
 
 LINES = [
-    Fault(
+    refused(
         "damaged vector file",
         no_vector_file,
-        REFUSED,
         "INPUT can't be …/lines.gpkg: give a vector layer, or a vector file that can be read.",
     ),
-    Fault(
+    refused(
         "missing vector file",
         lambda bench: {"INPUT": bench.folder / "gone.gpkg"},
-        REFUSED,
         "INPUT can't be …/gone.gpkg: give a vector layer, or a vector file that can be read.",
     ),
-    Fault("layer without lines", lines(), REFUSED, "INPUT has no lines: give a line layer."),
-    Fault("table without geometry", table, REFUSED, "INPUT has the geometry type NoGeometry: give a line layer."),
-    Fault(
+    refused("layer without lines", lines(), "INPUT has no lines: give a line layer."),
+    refused("table without geometry", table, "INPUT has the geometry type NoGeometry: give a line layer."),
+    refused(
         "points instead of lines",
         lines("POINT (500000 3000000)", kind="Point"),
-        REFUSED,
         "INPUT has the geometry type Point: give a line layer.",
     ),
-    Fault(
+    refused(
         "polygons instead of lines",
         lines("POLYGON ((500000 3000000, 500001 3000000, 500001 3000001, 500000 3000000))", kind="Polygon"),
-        REFUSED,
         "INPUT has the geometry type Polygon: give a line layer.",
     ),
     Fault("empty and missing geometries among lines", lines(LEFT, "LINESTRING Z EMPTY", "", RIGHT), gives=ONE_TRACK),
-    Fault("only empty geometries", lines("LINESTRING Z EMPTY", ""), REFUSED, "INPUT has no lines: give a line layer."),
-    Fault(
+    refused("only empty geometries", lines("LINESTRING Z EMPTY", ""), "INPUT has no lines: give a line layer."),
+    refused(
         "line of zero length",
         lines("LINESTRING Z (500000 3000000 1, 500000 3000000 1)"),
-        REFUSED,
         "INPUT has no lines: give a line layer.",
     ),
     Fault(
@@ -411,44 +370,38 @@ LINES = [
         "1 of 2 lines have no heights, so their results have none.",
         ONE_TRACK,
     ),
-    Fault(
+    refused(
         "coordinate of NaN",
         lines(line((500000, 3000001.507, 100), (500003, NAN, 100), (500006, 3000001.507, 100)), RIGHT),
-        REFUSED,
         "INPUT has a line (feature 1) with a coordinate that is not a number, or larger than 1e+10: "
         "repair or delete it.",
     ),
-    Fault(
+    refused(
         "infinite coordinate",
         lines(line((500000, 3000001.507, 100), (INFINITE, 3000001.507, 100)), RIGHT),
-        REFUSED,
         "INPUT has a line (feature 1) with a coordinate that is not a number, or larger than 1e+10: "
         "repair or delete it.",
     ),
-    Fault(
+    refused(
         "coordinates of 1e154",
         lines(line((0, 1e154, 100), (0, 1e154, 1e90), (9, 1e154, 100)), RIGHT),
-        REFUSED,
         "INPUT has a line (feature 1) with a coordinate that is not a number, or larger than 1e+10: "
         "repair or delete it.",
     ),
-    Fault(
+    refused(
         "height of 1e90",
         lines(line((500000, 3000001.507, 100), (500006, 3000001.507, 1e90)), RIGHT),
-        REFUSED,
         "INPUT has a line (feature 1) with a coordinate that is not a number, or larger than 1e+10: "
         "repair or delete it.",
     ),
-    Fault(
+    refused(
         "stray vertex 1000 km away",
         lines(line((500000, 3000001.507, 100), (1_500_000, 3000001.507, 100)), RIGHT),
-        REFUSED,
         "INPUT has a line (feature 1) with a stray vertex: repair or delete it.",
     ),
-    Fault(
+    refused(
         "vertex 20 km away, from which the line comes back",
         lines(line((500000, 3000001.507, 100), (520_000, 3000001.507, 100), (500006, 3000001.507, 100)), RIGHT),
-        REFUSED,
         "INPUT has a line (feature 1) with a stray vertex: repair or delete it.",
     ),
     Fault(
@@ -490,10 +443,9 @@ LINES = [
         "No two rails run parallel: there are rails but no track centerlines.",
         NO_TRACKS,
     ),
-    Fault(
+    refused(
         "rails of another gauge",
         lines(LEFT.replace("1.507", "1.072"), RIGHT),
-        REFUSED,
         "No track of 1435 mm gauge found: rails are 1072 mm apart, is the gauge 1000 mm?",
     ),
     Fault(
@@ -530,10 +482,9 @@ LINES = [
         "The lines have no coordinate system: their coordinates are taken as metres.",
         ONE_TRACK,
     ),
-    Fault(
+    refused(
         "lines in degrees",
         lines("LINESTRING Z (75 27 0, 75.1 27 0)", crs="EPSG:4326"),
-        REFUSED,
         "The lines are in degrees (WGS 84), where lengths can't be measured: reproject them, for example to "
         "the UTM zone of the place.",
     ),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from faults import REFUSED, WARNED, Fault
+from faults import WARNED, Fault, refused
 from qgis.core import QgsVectorLayer
 
 TITLE = "Parameters"
@@ -61,161 +61,125 @@ FAULTS = [
     ),
     Fault("SMOOTHING_XY suitable for a sharp curve", in_a_sharp_curve(SMOOTHING_XY=1.5)),
     *(
-        Fault(f"{name} not a number", with_(**{name: NAN}), REFUSED, f"{name} can't be nan: give a number.")
+        refused(f"{name} not a number", with_(**{name: NAN}), f"{name} can't be nan: give a number.")
         for name in NUMBERS
     ),
-    *(Fault(f"{name} negative", with_(**{name: -1}), REFUSED, f"{name} can't be -1: give ….") for name in NUMBERS),
-    *(Fault(f"{name} zero", with_(**{name: 0}), REFUSED, f"{name} can't be 0: give ….") for name in POSITIVE),
-    Fault(
-        "infinite SMOOTHING_XY",
-        with_(SMOOTHING_XY=INFINITE),
-        REFUSED,
-        "SMOOTHING_XY can't be inf: give ….",
+    *(refused(f"{name} negative", with_(**{name: -1}), f"{name} can't be -1: give ….") for name in NUMBERS),
+    *(refused(f"{name} zero", with_(**{name: 0}), f"{name} can't be 0: give ….") for name in POSITIVE),
+    refused("infinite SMOOTHING_XY", with_(SMOOTHING_XY=INFINITE), "SMOOTHING_XY can't be inf: give …."),
+    refused("text for a number", with_(SMOOTHING_XY="wide"), "SMOOTHING_XY can't be wide: give …."),
+    refused(
+        "impossible gauge", with_(GAUGE=300), "A gauge of 300 mm is not possible: give millimetres from 500 to 2000."
     ),
-    Fault(
-        "text for a number",
-        with_(SMOOTHING_XY="wide"),
-        REFUSED,
-        "SMOOTHING_XY can't be wide: give ….",
-    ),
-    Fault(
-        "impossible gauge",
-        with_(GAUGE=300),
-        REFUSED,
-        "A gauge of 300 mm is not possible: give millimetres from 500 to 2000.",
-    ),
-    Fault(
+    refused(
         "gauge in metres instead of millimetres",
         with_(GAUGE=1.435),
-        REFUSED,
         "A gauge of 1.435 mm is not possible: give millimetres from 500 to 2000.",
     ),
-    Fault(
+    refused(
         "impossible railhead width",
         with_(HEAD_WIDTH=200),
-        REFUSED,
         "A railhead width of 200 mm is not possible: give millimetres from 40 to 90.",
     ),
-    Fault(
+    refused(
         "gauge and railhead width not covered by any model",
         with_(GAUGE=600, HEAD_WIDTH=75),
-        REFUSED,
         "A gauge of 600 mm is 8.0 times a railhead of 75.0 mm, and the models cover 13.4 to 26.7 times: "
         "check GAUGE and HEAD_WIDTH.",
     ),
-    Fault(
+    refused(
         "CUSTOM without gauge and railhead width",
         with_(STANDARD="CUSTOM"),
-        REFUSED,
         "STANDARD CUSTOM needs both the gauge and the railhead width, in millimetres: fill in GAUGE and HEAD_WIDTH.",
     ),
-    Fault(
+    refused(
         "CUSTOM without railhead width",
         with_(STANDARD="CUSTOM", GAUGE=1435),
-        REFUSED,
         "STANDARD CUSTOM needs both the gauge and the railhead width, in millimetres: fill in GAUGE and HEAD_WIDTH.",
     ),
-    Fault(
+    refused(
         "unknown standard",
         with_(STANDARD="EN_99"),
-        REFUSED,
         "STANDARD can't be EN_99: give one of its 48 choices, such as US_90ARAA_1435.",
     ),
-    Fault(
-        "unknown engine", with_(ENGINE="JAX"), REFUSED, "ENGINE can't be JAX: give one of its 3 choices, such as AUTO."
-    ),
-    Fault(
+    refused("unknown engine", with_(ENGINE="JAX"), "ENGINE can't be JAX: give one of its 3 choices, such as AUTO."),
+    refused(
         "no class",
         with_(RAIL_CLASSES=""),
-        REFUSED,
         "RAIL_CLASSES can't be empty: give classes of the points on rails, such as 10 or 10,11.",
     ),
-    Fault(
+    refused(
         "class as a word",
         with_(RAIL_CLASSES="ten"),
-        REFUSED,
         'RAIL_CLASSES "ten" must be whole numbers from 0 to 255 such as 10 or 10,11.',
     ),
-    Fault(
+    refused(
         "range of classes",
         with_(RAIL_CLASSES="10-12"),
-        REFUSED,
         'RAIL_CLASSES "10-12" must be whole numbers from 0 to 255 such as 10 or 10,11.',
     ),
-    Fault(
+    refused(
         "class above 255",
         with_(RAIL_CLASSES="300"),
-        REFUSED,
         'RAIL_CLASSES "300" must be whole numbers from 0 to 255 such as 10 or 10,11.',
     ),
-    Fault(
+    refused(
         "class of 5,000 digits",
         with_(RAIL_CLASSES="9" * 5000),
-        REFUSED,
         f'RAIL_CLASSES "{"9" * 99}… must be whole numbers from 0 to 255 such as 10 or 10,11.',
     ),
-    Fault(
+    refused(
         "class without points",
         with_(RAIL_CLASSES="11"),
-        REFUSED,
         "The cloud has no points of class 11; its classes, with the number of points, are 10 (3,600): set the rail "
         "classes or, if nobody has classified the cloud, CLASSIFY.",
     ),
-    Fault(
+    refused(
         "other gauges as words",
         with_(OTHER_GAUGES="wide"),
-        REFUSED,
         'OTHER_GAUGES "wide" must be millimetres such as 1000;1067, or 1000/66 with the width of the railhead.',
     ),
-    Fault(
+    refused(
         "other gauge of zero",
         with_(OTHER_GAUGES="0"),
-        REFUSED,
         'OTHER_GAUGES "0" must be millimetres such as 1000;1067, or 1000/66 with the width of the railhead.',
     ),
-    Fault(
+    refused(
         "railhead of another gauge too wide",
         with_(OTHER_GAUGES="1000/660"),
-        REFUSED,
         "A railhead width of 660 mm is not possible: give millimetres from 40 to 90.",
     ),
-    Fault(
+    refused(
         "two railhead widths on one gauge",
         with_(OTHER_GAUGES="1000/66;1000/72"),
-        REFUSED,
         "Tracks of 1000 mm gauge can't have railheads of 66 and 72 mm: give one width.",
     ),
-    Fault(
+    refused(
         "other gauge too close to the gauge",
         with_(OTHER_GAUGES="1440"),
-        REFUSED,
         "Gauges of 1435 and 1440 mm can't be distinguished within CENTERLINE_TOLERANCE (0.05 m): give one of them, "
         "or a smaller tolerance.",
     ),
-    Fault(
+    refused(
         "tolerance larger than the difference of the gauges",
         with_(OTHER_GAUGES="1067", CENTERLINE_TOLERANCE=0.5),
-        REFUSED,
         "Gauges of 1067 and 1435 mm can't be distinguished within CENTERLINE_TOLERANCE (0.5 m): give one of them, or "
         "a smaller tolerance.",
     ),
-    Fault(
+    refused(
         "extent outside the cloud",
         with_(EXTENT="0,1,0,1"),
-        REFUSED,
         "The extent contains no points of class 10: choose a larger extent.",
     ),
-    Fault(
+    refused(
         "extent without area",
         with_(EXTENT="500000,500000,3000000,3000001"),
-        REFUSED,
         "EXTENT has no area, or an infinite one: give a rectangle as xmin,xmax,ymin,ymax, or leave it empty.",
     ),
     *(
-        Fault(
+        refused(
             f"extent {what}",
             prepare,
-            REFUSED,
             "EXTENT has no area, or an infinite one: give a rectangle as xmin,xmax,ymin,ymax, or leave it empty.",
         )
         for what, prepare in (
@@ -224,53 +188,37 @@ FAULTS = [
             ("with an infinite side", with_(EXTENT="-inf,inf,0,1")),
         )
     ),
-    Fault(
-        "invalid extent",
-        with_(EXTENT="here"),
-        REFUSED,
-        "EXTENT can't be here: give four numbers: xmin,xmax,ymin,ymax.",
-    ),
-    Fault(
+    refused("invalid extent", with_(EXTENT="here"), "EXTENT can't be here: give four numbers: xmin,xmax,ymin,ymax."),
+    refused(
         "extent outside the cloud, in another coordinate system",
         with_(EXTENT="0,1,0,1 [EPSG:4326]"),
-        REFUSED,
         "The extent contains no points of class 10: choose a larger extent.",
     ),
-    Fault(
+    refused(
         "invalid coordinate system",
         with_(CRS="EPSG:0"),
-        REFUSED,
         "CRS EPSG:0 is not a coordinate system: choose one from the list.",
     ),
-    Fault(
+    refused(
         "OPENCV on a GPU",
         with_(ENGINE="OPENCV", DEVICE="CUDA"),
-        REFUSED,
         "ENGINE OPENCV runs on the CPU only: set DEVICE to AUTO, or ENGINE to TORCH.",
     ),
-    Fault(
+    refused(
         "no cloud",
         lambda bench: {"INPUT": None},
-        REFUSED,
         "INPUT can't be empty: give a loaded point cloud layer, or the path of a LAS, LAZ or COPC file, of a "
         "folder of such files, or of a virtual point cloud (.vpc).",
     ),
-    Fault(
-        "two outputs in one file",
-        same_file,
-        REFUSED,
-        "RAILS and CENTERLINES are the same file: give each its own name.",
-    ),
-    Fault(
+    refused("two outputs in one file", same_file, "RAILS and CENTERLINES are the same file: give each its own name."),
+    refused(
         "two outputs in one file, with different spellings",
         same_file_spelled_otherwise,
-        REFUSED,
         "RAILS and CENTERLINES are the same file: give each its own name.",
     ),
-    Fault(
+    refused(
         "a file for one output, a table in it for another",
         file_and_table_of_it,
-        REFUSED,
         "RAILS and CENTERLINES are the same file: give each its own name.",
     ),
 ]

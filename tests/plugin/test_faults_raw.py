@@ -5,8 +5,8 @@ import resource
 import laspy
 import numpy as np
 import pytest
-from faults import REFUSED, WARNED, Fault
-from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from faults import WARNED, Fault, refused
+from memory_layers import layer_of
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
 TITLE = "Raw clouds"
@@ -71,11 +71,7 @@ def guide(text, crs="EPSG:32643", **parameters):
     """A raw cloud, and a line layer with this line."""
 
     def prepare(bench):
-        layer = QgsVectorLayer(f"LineString?crs={crs}", "guide", "memory")
-        feature = QgsFeature(layer.fields())
-        feature.setGeometry(QgsGeometry.fromWkt(text))
-        assert not text or layer.dataProvider().addFeature(feature)
-        return {**raw(**parameters)(bench), "GUIDE": layer}
+        return {**raw(**parameters)(bench), "GUIDE": layer_of(*filter(None, [text]), kind="LineString", crs=crs)}
 
     return prepare
 
@@ -104,49 +100,42 @@ def cancelled(percent):
 FAULTS = [
     Fault("raw cloud with ground only", ground, WARNED, NO_RAIL, NOTHING),
     Fault("raw cloud that contains only rail points", only_rails, WARNED, NO_RAIL, NOTHING),
-    Fault(
+    refused(
         "raw cloud with coordinates in millimetres",
         raw(lambda xyz: 1000 * xyz),
-        REFUSED,
         "The points of raw.laz are too far apart for rails: if the coordinates are in centimetres or millimetres, "
         "assign a coordinate system that says so.",
     ),
-    Fault(
+    refused(
         "raw cloud with an extent elsewhere",
         raw(EXTENT="600000,600010,3000000,3000010"),
-        REFUSED,
         "The extent contains no points that are neither noise nor withheld: choose another.",
     ),
-    Fault(
+    refused(
         "raw cloud, other gauge almost equal to the gauge",
         raw(OTHER_GAUGES="1450"),
-        REFUSED,
         "Gauges of 1435 and 1450 mm can't be distinguished: give one of them.",
     ),
-    Fault(
+    refused(
         "guide far from the cloud",
         guide("LINESTRING(510000 3000000, 511000 3000000)"),
-        REFUSED,
         "The guide has no line within 4 m of the cloud: check its place and coordinate system.",
     ),
-    Fault(
+    refused(
         "guide beside the extent",
         guide("LINESTRING(500000 3000016, 500040 3000016.1)", EXTENT="500016,500024,3000023.5,3000030"),
-        REFUSED,
         "The extent has no point within 4 m of the guide: check the guide's place and coordinate system.",
     ),
-    Fault(
+    refused(
         "guide with the coordinates of another system",
         guide("LINESTRING(500000 3000020, 500040 3000020)", "EPSG:4326"),
-        REFUSED,
         "GUIDE can't be transformed to the coordinate system of the cloud (EPSG:32643): check that both are assigned "
         "as the data were made.",
     ),
-    Fault("guide without lines", guide(""), REFUSED, "GUIDE has no lines: give a line layer."),
-    Fault(
+    refused("guide without lines", guide(""), "GUIDE has no lines: give a line layer."),
+    refused(
         "only the tracks along a guide that is missing",
         raw(ONLY_GUIDED=True),
-        REFUSED,
         "ONLY_GUIDED needs lines to compare tracks with: choose GUIDE.",
     ),
     Fault(
@@ -165,64 +154,50 @@ FAULTS = [
         "for all tracks near it.",
         NOTHING,
     ),
-    Fault(
+    refused(
         "class beyond the range of an old point format",
         old_format,
-        REFUSED,
         "old.las has point format 1, whose classes end at 31: choose a class up to 31, or export the cloud with point "
         "format 6.",
     ),
-    Fault(
+    refused(
         "classified cloud in the place of the raw one",
         in_its_place,
-        REFUSED,
         "The classified cloud would replace the cloud that is read: choose another name.",
     ),
-    Fault(
-        "two tiles with one name",
-        two_names,
-        REFUSED,
-        "Two tiles are called a.laz: classify them one folder at a time.",
-    ),
-    Fault(
+    refused("two tiles with one name", two_names, "Two tiles are called a.laz: classify them one folder at a time."),
+    refused(
         "classified cloud with the suffix .txt",
         raw(OUTPUT="new.txt"),
-        REFUSED,
         "new.txt is not a name for the classified cloud: let it end in .las or .laz.",
     ),
     *(
-        Fault(
+        refused(
             f"full disk, classified {suffix[1:].upper()} file",
             full_disk(200_000, suffix, EXTENT=STRIP),
-            REFUSED,
             "The output …/out/OUTPUT… can't be written (…): free space on the disk, or choose another place.",
         )
         for suffix in (".las", ".laz")
     ),
-    Fault(
+    refused(
         "full disk, temporary points of a raw cloud",
         full_disk(1000),
-        REFUSED,
         "… can't be written to (…): free space on the disk, or choose another folder.",
     ),
     *(
-        Fault(
-            f"classification cancelled at {percent} %", cancelled(percent), REFUSED, "Cancelled; nothing was written."
-        )
+        refused(f"classification cancelled at {percent} %", cancelled(percent), "Cancelled; nothing was written.")
         for percent in (5, 50, 66)
     ),
-    Fault(
+    refused(
         "extraction from a raw cloud with ground only",
         lambda bench: {**ground(bench), "CLASSIFY": True},
-        REFUSED,
         "No rail was found in the raw cloud: check the rail standard and the unit of the coordinates, or classify the "
         "rail points yourself.",
         run="extractrails",
     ),
-    Fault(
+    refused(
         "rail standard to be detected from a raw cloud with ground only",
         lambda bench: {**ground(bench), "CLASSIFY": True, "STANDARD": "DETECT"},
-        REFUSED,
         "No rail standard could be detected: choose STANDARD, or fill in GAUGE and HEAD_WIDTH.",
         run="extractrails",
     ),

@@ -4,8 +4,8 @@ import resource
 
 import numpy as np
 import pytest
-from faults import FINE, REFUSED, WARNED, Fault
-from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from faults import FINE, WARNED, Fault, refused
+from memory_layers import layer_of
 from rail_extract.laboratory.scenes.raw_strips import SPACING_M, strip
 
 TITLE = "Seeds"
@@ -28,12 +28,7 @@ def seeds(*texts, kind="Point", crs="EPSG:32643", change=lambda xyz: xyz, **para
     """A raw cloud, and a layer with these shapes."""
 
     def prepare(bench):
-        layer = QgsVectorLayer(f"{kind}?crs={crs}", "seeds", "memory")
-        for text in texts:
-            feature = QgsFeature(layer.fields())
-            feature.setGeometry(QgsGeometry.fromWkt(text))
-            assert layer.dataProvider().addFeature(feature)
-        return {"INPUT": cloud(bench, change), "SEEDS": layer, **parameters}
+        return {"INPUT": cloud(bench, change), "SEEDS": layer_of(*texts, kind=kind, crs=crs), **parameters}
 
     return prepare
 
@@ -61,25 +56,22 @@ def cancelled(percent):
 
 
 FAULTS = [
-    Fault(
+    refused(
         "no seeds",
         lambda bench: {"INPUT": cloud(bench)},
-        REFUSED,
         "A rail is followed from seeds: choose a layer for SEEDS, or pick a point for SEED.",
     ),
-    Fault(
+    refused(
         "layer of seeds that is empty",
         seeds(),
-        REFUSED,
         "SEEDS has neither points nor lines: add points on railheads, or choose another layer.",
     ),
-    Fault("seed between the rails", seeds(BESIDE), REFUSED, NO_RAIL),
-    Fault("seeds of a cloud in millimetres", seeds(ON_RAIL, change=lambda xyz: 1000 * xyz), REFUSED, NO_RAIL),
-    Fault("seed far from the cloud", seeds("POINT(700000 3000000)"), REFUSED, NO_SEED),
-    Fault(
+    refused("seed between the rails", seeds(BESIDE), NO_RAIL),
+    refused("seeds of a cloud in millimetres", seeds(ON_RAIL, change=lambda xyz: 1000 * xyz), NO_RAIL),
+    refused("seed far from the cloud", seeds("POINT(700000 3000000)"), NO_SEED),
+    refused(
         "seeds with the coordinates of another system",
         seeds(ON_RAIL, crs="EPSG:4326"),
-        REFUSED,
         "SEEDS can't be transformed to the coordinate system of the cloud (EPSG:32643): check that both are assigned "
         "as the data were made.",
     ),
@@ -97,47 +89,37 @@ FAULTS = [
         "standard.",
     ),
     Fault("seed on the map", lambda bench: {"INPUT": cloud(bench), "SEED": f"500006,{3e6 + SPACING_M / 2}"}, FINE),
-    Fault(
-        "seed on the map, off the rails",
-        lambda bench: {"INPUT": cloud(bench), "SEED": "500006,3000000"},
-        REFUSED,
-        NO_RAIL,
-    ),
-    Fault(
+    refused("seed on the map, off the rails", lambda bench: {"INPUT": cloud(bench), "SEED": "500006,3000000"}, NO_RAIL),
+    refused(
         "polygons as seeds",
         seeds("POLYGON((500000 3000000, 500001 3000000, 500001 3000001, 500000 3000000))", kind="Polygon"),
-        REFUSED,
         "SEEDS has neither points nor lines: add points on railheads, or choose another layer.",
     ),
-    Fault(
+    refused(
         "class of grown rails beyond a byte",
         seeds(ON_RAIL, RAIL_CLASS=256),
-        REFUSED,
         "RAIL_CLASS can't be 256: give a number from 0 to 255.",
     ),
-    Fault(
+    refused(
         "full disk, points near seeds",
         full_disk,
-        REFUSED,
         "… can't be written to (…): free space on the disk, or choose another folder.",
     ),
-    Fault("extraction of rails off their seeds", seeds(BESIDE), REFUSED, NO_RAIL, run="extractrails"),
-    Fault(
+    refused("extraction of rails off their seeds", seeds(BESIDE), NO_RAIL, run="extractrails"),
+    refused(
         "extraction from seeds, and of all rails",
         seeds(ON_RAIL, CLASSIFY=True),
-        REFUSED,
         "CLASSIFY finds all rails, and SEEDS those that are pointed at: choose one of them.",
         run="extractrails",
     ),
-    Fault(
+    refused(
         "rail standard to be detected from seeds",
         seeds(ON_RAIL, STANDARD="DETECT"),
-        REFUSED,
         "STANDARD DETECT measures classified points, which SEEDS do not need: choose another.",
         run="extractrails",
     ),
     *(
-        Fault(f"growth cancelled at {percent} %", cancelled(percent), REFUSED, "Cancelled; nothing was written.")
+        refused(f"growth cancelled at {percent} %", cancelled(percent), "Cancelled; nothing was written.")
         for percent in (10, 40, 65)
     ),
 ]

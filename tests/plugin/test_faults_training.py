@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from faults import REFUSED, Fault
+from faults import Fault, refused
 from rail_extract.core.frpdf.models import FOLDER
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
@@ -48,37 +48,32 @@ def cancelled(percent):
 
 
 FAULTS = [
-    Fault(
+    refused(
         "training without labels",
         labelled(RAIL_CLASSES="11"),
-        REFUSED,
         "The cloud has no points of class 11 to learn from: classify its rails, or set the rail classes.",
     ),
-    Fault(
+    refused(
         "training with labels of one class only",
         labelled(lambda xyz, codes: (xyz[codes == 10], codes[codes == 10])),
-        REFUSED,
         "All points of the cloud are of class 10: give the whole cloud, with the points around the rails.",
     ),
-    Fault(
+    refused(
         "training with labels on the ground",
         labelled(lambda xyz, codes: (xyz * [1, 1, 0.05], codes)),
-        REFUSED,
         "No point of class 10 is 0.055 to 0.4 m above the bed, where railheads are: check the labels and the unit of "
         "the coordinates.",
     ),
-    Fault(
+    refused(
         "training with labels in one place",
         labelled(lambda xyz, codes: (xyz[xyz[:, 0] < 17], codes[xyz[:, 0] < 17])),
-        REFUSED,
         "The labelled rails all lie in one place of 20 m: give a longer labelled cloud, so that a part can be kept "
         "back for validation.",
     ),
-    Fault("training cancelled while the cloud is read", cancelled(1), REFUSED, "Cancelled; nothing was written."),
-    Fault(
+    refused("training cancelled while the cloud is read", cancelled(1), "Cancelled; nothing was written."),
+    refused(
         "training from weights of the network that cleans rasters",
         labelled(START=FOLDER / "frpdf_fast.npz"),
-        REFUSED,
         "frpdf_fast.npz holds the weights of something else: choose a file that Train rail classifier has written.",
     ),
     Fault(
@@ -86,45 +81,39 @@ FAULTS = [
         labelled(METHOD="LEARNED"),
         run="classifyrailpoints",
     ),
-    Fault(
+    refused(
         "classification with weights and METHOD GEOMETRY",
         weights(b"", METHOD="GEOMETRY"),
-        REFUSED,
         "WEIGHTS are for METHOD LEARNED: choose this method, or leave WEIGHTS empty.",
         run="classifyrailpoints",
     ),
-    Fault(
+    refused(
         "classification with weights that are missing",
         weights(None),
-        REFUSED,
         "The weights file …weights.npz is missing: choose one that Train rail classifier has written.",
         run="classifyrailpoints",
     ),
-    Fault(
+    refused(
         "classification with damaged weights",
         weights(b"PK\x03\x04 cut"),
-        REFUSED,
         "The weights file weights.npz cannot be read: choose one that Train rail classifier has written.",
         run="classifyrailpoints",
     ),
-    Fault(
+    refused(
         "classification with weights of something else",
         weights("something else"),
-        REFUSED,
         "weights.npz holds the weights of something else: choose a file that Train rail classifier has written.",
         run="classifyrailpoints",
     ),
-    Fault(
+    refused(
         "classification with weights of the network that cleans rasters",
         labelled(METHOD="LEARNED", WEIGHTS=FOLDER / "frpdf_fast.npz"),
-        REFUSED,
         "frpdf_fast.npz holds the weights of something else: choose a file that Train rail classifier has written.",
         run="classifyrailpoints",
     ),
-    Fault(
+    refused(
         "extraction with METHOD LEARNED from a classified cloud",
         labelled(METHOD="LEARNED"),
-        REFUSED,
         "METHOD LEARNED is for raw clouds: set CLASSIFY, or set METHOD to GEOMETRY.",
         run="extractrails",
     ),

@@ -19,12 +19,6 @@ def test_the_error_of_chords_is_removed():
     assert np.abs(off[inner]).max() < 0.12  # the sagitta of a chord is 0.67 m
 
 
-def test_a_long_straight_before_a_curve_stays_straight():
-    curve = arc(300.0, 20.0) + [500.0, 0.0]
-    axis = axis_of_guide(np.concatenate([[[0.0, 0.0]], curve]))
-    assert np.abs(axis.xy[axis.t < 480, 1]).max() < 0.05
-
-
 @given(st.floats(-60, 60), st.floats(0, 6.28), st.floats(-2.5, 2.5), st.floats(20, 180))
 def test_points_find_their_feet_on_a_moved_line(shift, turn, left, along):
     guide = np.array([[0.0, 0.0], [200.0, 0.0]])
@@ -35,10 +29,3 @@ def test_points_find_their_feet_on_a_moved_line(shift, turn, left, along):
     t, across = axis.feet(Points(np.column_stack([place, [0.0]]), np.zeros(1, int), rough))
     assert t[0] == pytest.approx(along, abs=1e-6)
     assert across[0] == pytest.approx(left, abs=1e-6)
-
-
-def test_points_before_the_start_and_past_the_end_have_none():
-    axis = axis_of_guide(np.array([[0.0, 0.0], [100.0, 0.0]]))
-    xyz = np.array([[-3.0, 0.5, 0.0], [50.0, 0.5, 0.0], [104.0, 0.5, 0.0]])
-    t, across = axis.feet(Points(xyz, np.zeros(3, int), np.array([0.0, 50.0, 99.0])))
-    assert np.isnan(t).tolist() == np.isnan(across).tolist() == [True, False, True]

@@ -39,10 +39,3 @@ def test_two_tracks_stay_apart_also_in_any_order():
     for line in lines:
         beside = RADIUS_M - np.hypot(line[1:-1, 0], line[1:-1, 1] - RADIUS_M)
         assert np.ptp(beside) < 0.5
-
-
-def test_single_finds_in_all_directions_are_chance():
-    rng = np.random.RandomState(3)
-    finds = Finds(rng.uniform(0, 400, (30, 2)), rng.uniform(0, np.pi, 30), rng.uniform(4, 9, 30))
-    assert not list(chains(finds))
-    assert not list(chains(Finds.joined([])))

@@ -17,23 +17,3 @@ def test_curve_and_covariance_are_those_of_the_full_matrix():
         assert np.allclose(found.variance, np.diag(inverse), rtol=1e-6)
         squares = ((difference @ found.values) ** 2).sum(axis=1)
         assert np.allclose(found.bend - squares, np.diag(difference @ inverse @ difference.T), rtol=1e-5)
-
-
-def test_each_difference_has_its_own_stiffness():
-    t, rows = np.arange(80.0), differences(80, 2)
-    kink = np.maximum(t - 40, 0)[:, None]
-    sigma = np.where(np.abs(np.arange(78) - 39) < 2, 1.0, 1e-3)
-    assert np.abs(smooth(kink, np.ones(80), rows, sigma).values - kink).max() < 0.3
-    assert np.abs(smooth(kink, np.ones(80), rows, 1e-3).values - kink).max() > 1
-
-
-def test_a_parabola_passes_through_a_curve_of_third_differences():
-    t = np.arange(60.0)
-    values = np.column_stack([t, 0.01 * t**2])
-    assert np.allclose(smooth(values, np.ones(60), differences(60, 3), 1e-3).values, values, atol=1e-5)
-
-
-def test_fewer_places_than_a_difference_needs_stay_where_they_are():
-    values = np.array([[1.0, 2.0], [3.0, 5.0]])
-    assert differences(2, 3).shape == (0, 2)
-    assert np.allclose(smooth(values, np.ones(2), differences(2, 3), 0.1).values, values)

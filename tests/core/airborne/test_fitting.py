@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.airborne.axis import axis_of_guide
-from rail_extract.core.airborne.beside import Beside
-from rail_extract.core.airborne.fitting import EMPTY, HIDDEN, MISLED, SEEN, TWIN, UNSURE, _over_70_m, fit_tracks
+from rail_extract.core.airborne.fitting import EMPTY, HIDDEN, MISLED, SEEN, TWIN, UNSURE, fit_tracks
 from rail_extract.laboratory.airborne.designs import SPACING_M, box
 from rail_extract.laboratory.airborne.flight import Flight, fly
 from rail_extract.laboratory.airborne.ground import Axis, Band, World
@@ -148,16 +147,6 @@ def test_no_line_where_there_is_no_track(thing):
     cloud = fly(World([], [ground, band], seed=4), flat.xyz[::4, :2], 7.0, Flight(10.0, 0.25), seed=1)
     guide = np.column_stack([along[::160], 0.3 * np.sin(along[::160])])
     assert not (fitted(cloud.xyz, cloud.strip, [guide])[0].stations.reason == SEEN).any()
-
-
-def test_what_repeats_within_a_gauge_is_no_track_but_at_a_switch():
-    across = np.linspace(-5.6, 5.6, 225)
-    gain = np.where(np.abs(across) < 0.2, 40.0, np.where(np.abs(np.abs(across) - 0.75) < 0.1, 30.0, 0.0))
-    beside = Beside(across, np.tile(gain, (7, 1)), np.zeros((7, 225)), np.full((7, 225), 50.0))
-    for switch in (False, True):
-        shown, flat = _over_70_m(beside, np.full(7, switch))
-        assert shown.all()
-        assert flat.tolist() == [switch] * 7
 
 
 @pytest.mark.parametrize("length_m", [30, 60, 90])

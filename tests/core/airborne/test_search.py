@@ -47,7 +47,3 @@ def test_rails_are_found_where_they_are(direction):
 )
 def test_what_repeats_or_is_half_a_track_is_not_found(profile):
     assert len(found(profile).xy) == 0
-
-
-def test_too_few_points_show_nothing():
-    assert len(found(rails, density=0.1).xy) == 0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
+from rail_extract.core.alignment.elements import Alignment, VerticalElement, chained
 from rail_extract.core.frame import LocalFrame
 
 FRAME = LocalFrame(np.zeros(3))
@@ -13,13 +13,6 @@ CHAIN = [(80.0, 0, 0), (60.0, 0.0, 1 / 400), (90.0, 1 / 400, 1 / 400), (70.0, 1 
 
 def alignment(shapes=CHAIN, heading=0.4, vertical=(), cant=()):
     return Alignment(1, FRAME, chained((10.0, 20.0), heading, shapes), tuple(vertical), tuple(cant))
-
-
-def test_a_circle_closes_and_has_its_centre():
-    design = alignment([(2 * np.pi * 150, 1 / 150, 1 / 150)], heading=0.0)
-    s = np.linspace(0, design.s_to, 50)
-    np.testing.assert_allclose(np.linalg.norm(design.places(s) - [10.0, 170.0], axis=1), 150.0, atol=1e-10)
-    np.testing.assert_allclose(design.places(s[-1:]), [[10.0, 20.0]], atol=1e-9)
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -37,28 +30,12 @@ def test_direction_and_curvature_are_the_derivatives_of_the_places(seed):
     np.testing.assert_allclose(turned, design.curvatures(s), atol=1e-9)
 
 
-def test_elements_of_a_chain_continue_each_other():
-    design = alignment()
-    for before, after in zip(design.plan[:-1], design.plan[1:]):
-        end = np.array([np.nextafter(before.s_to, 0)])
-        np.testing.assert_allclose(design.places(end), [[after.x, after.y]], atol=1e-9)
-        assert design.headings(end)[0] == pytest.approx(after.heading, abs=1e-12)
-        assert after.s_from == pytest.approx(before.s_to)
-    assert [one.type for one in design.plan] == ["line", "clothoid", "arc", "clothoid", "arc"]
-
-
 def test_heights_and_gradients_follow_grades_and_parabolas():
     design = alignment(vertical=[VerticalElement(0, 100, 5, 0.01, 0.01), VerticalElement(100, 200, 6, 0.01, -0.01)])
     np.testing.assert_allclose(design.heights(np.array([0.0, 50, 100, 200, 300])), [5, 5.5, 6, 6.5, 6])
     np.testing.assert_allclose(design.grades(np.array([0.0, 150, 200, 250])), [0.01, 0.005, 0, -0.005])
     assert design.vertical[1].curvature == pytest.approx(-1 / 10_000)
     assert np.isnan(alignment().heights(np.array([1.0]))).all()
-
-
-def test_cant_is_constant_or_a_ramp():
-    design = alignment(cant=[CantElement(0, 80, 0, 0), CantElement(80, 60, 0, -0.1), CantElement(140, 200, -0.1, -0.1)])
-    np.testing.assert_allclose(design.cants(np.array([40.0, 110, 140, 300])), [0, -0.05, -0.1, -0.1])
-    assert [one.type for one in design.cant] == ["constant", "ramp", "constant"]
 
 
 def test_drawn_curves_are_less_than_a_millimetre_off():

@@ -157,21 +157,6 @@ def corrected(found, change):
     return alignments([row for row in table if row["layout"]], FRAME)[0]
 
 
-def test_an_edited_radius_and_start_are_held_and_the_rest_follows():
-    measured = track(design(), seed=2, cant=True)
-    free = fit(measured)
-
-    def edit(table):
-        table[2].update(r1_m=399.5)
-        table[3].update(s_from=330.3)
-
-    held = fit(measured, corrected(free, edit))
-    assert 1 / held.alignment.plan[2].k_from == pytest.approx(399.5, abs=1e-6)
-    assert held.alignment.plan[3].s_from == pytest.approx(330.3, abs=1e-4)
-    assert [one.type for one in held.alignment.elements] == [one.type for one in free.alignment.elements]
-    assert held.rms_mm > free.rms_mm
-
-
 def test_edited_radii_and_starts_in_height_and_of_ramps_are_held():
     measured = track(design(), seed=2, cant=True)
     found = fit(measured)
@@ -279,16 +264,6 @@ def with_errors(first, last, size_m):
     return Track(1, line, NONE, np.zeros(len(line), dtype=bool))
 
 
-def test_the_part_that_holds_is_given_and_the_rest_is_said():
-    progress = Recording(Progress())
-    found = fit(with_errors(400, 521, 0.08), progress=progress)
-    assert 375 < found.alignment.s_to < 410
-    assert [one.type for one in found.alignment.plan[:4]] == ["line", "clothoid", "arc", "clothoid"]
-    assert "do not count" in progress.warnings[0]
-    assert "only the elements from 0 to 398 m are given" in progress.warnings[1]
-    assert max(one.figures.dev_rms_mm for one in found.alignment.plan) < 15
-
-
 def test_a_bad_start_does_not_bend_the_elements():
     progress = Recording(Progress())
     found = fit(with_errors(0, 50, 0.08), progress=progress)
@@ -302,40 +277,9 @@ def test_a_bad_start_does_not_bend_the_elements():
     assert found.deviations.s[0] == np.ceil(found.alignment.s_from)
 
 
-def test_a_stray_vertex_does_not_count_and_is_named():
-    progress, measured = Recording(Progress()), track(design(), seed=2)
-    measured.xyz[250, 1:] += 0.2
-    found = fit(measured, progress=progress)
-    assert [one.type for one in found.alignment.plan] == ["line", "clothoid", "arc", "clothoid", "line"]
-    assert len(found.alignment.vertical) == 3
-    assert len(progress.warnings) == 1
-    assert "the first 248 m from its start, lie more than 15 mm off" in progress.warnings[0]
-    assert found.deviations.slew_mm[250] > 150
-
-
 def changed(change):
     line = track(design()).xyz
     return replace(track(design()), xyz=change(line))
-
-
-def spiked(line):
-    line[200, :2] += [30.0, -30.0]
-    return line
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (lambda line: line * [1, 1, np.nan], "has no heights"),
-        (lambda line: line[:30], "over 29 m.*join it with"),
-        (lambda line: line[::60], "9 vertices over 480 m.*was measured point by point"),
-        (spiked, "turns back"),
-        (lambda line: np.concatenate([line, line[:1] + [0, 200, 0], line[:1]]), "ends where it begins"),
-    ],
-)
-def test_lines_that_cannot_have_an_alignment_are_refused(change, words):
-    with pytest.raises(ParameterError, match=words):
-        fit_tracks([changed(change)], FRAME, FitParameters(), {})
 
 
 def test_a_track_that_cannot_be_fitted_does_not_stop_the_others():
@@ -344,17 +288,6 @@ def test_a_track_that_cannot_be_fitted_does_not_stop_the_others():
     fits = fit_tracks([short, track(design())], FRAME, FitParameters(), {}, progress)
     assert [one.alignment.track_id for one in fits] == [1]
     assert "track 7" in progress.warnings[0]
-
-
-def test_a_track_of_two_lines_is_refused_and_the_others_are_fitted():
-    progress, line = Recording(Progress()), track(design())
-    fits = fit_tracks(
-        [line, replace(line, track_id=7), replace(line, track_id=7)], FRAME, FitParameters(), {}, progress
-    )
-    assert [one.alignment.track_id for one in fits] == [1]
-    assert list(progress.warnings) == [
-        "Track 7 has 2 lines, but its elements follow one: join them, or give each its own track_id."
-    ]
 
 
 def test_a_table_of_other_tracks_is_refused():

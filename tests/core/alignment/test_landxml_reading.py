@@ -157,11 +157,6 @@ def test_faults_are_refused_in_a_sentence(read, sentence, text):
     assert str(caught.value).endswith((".", "LandXML."))
 
 
-def test_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(AlignmentFileError, match="can't be read"):
-        read_landxml(tmp_path / "gone.xml")
-
-
 def test_what_is_beside_the_alignments_does_not_fill_the_memory(read, monkeypatch):
     surface = "<Surfaces>" + "<P>1 2 3</P>" * 1000 + "</Surfaces>"
     monkeypatch.setattr("rail_extract.core.alignment.xml_branches.MAX_NODES", 100)

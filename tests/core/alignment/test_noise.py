@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.alignment.noise import Noise, estimated, independent_m, shared_covariance
+from rail_extract.core.alignment.noise import Noise
 from rail_extract.core.alignment.signals import CANT, PLAN, Signal, find_structure, noise_of
 
 S = np.arange(0.0, 1200.0)
@@ -25,35 +25,6 @@ def test_the_noise_of_a_curve_is_found(truth):
         for seed in range(3)
     ]
     assert np.median(found) == pytest.approx(truth.effective_m(1.0), rel=0.35)
-
-
-def test_the_tolerance_limits_the_misalignment():
-    y = errors(Noise(0.001, 0.004, 8.0), 1)
-    assert noise_of(Signal(S, y, np.ones(len(S)), PLAN), 0.001)[0].shared_m <= 0.001
-
-
-def test_the_loss_by_a_polynomial_is_counted():
-    random = np.random.default_rng(3)
-    pieces = []
-    for _ in range(200):
-        y = 0.002 * random.standard_normal(12)
-        base = np.linalg.qr(np.vander(np.linspace(-1, 1, 12), 4))[0]
-        pieces.append((y - base @ (base.T @ y), 3))
-    assert estimated(pieces, 1.0, 1e-5).white_m == pytest.approx(0.002, rel=0.08)
-
-
-def test_errors_of_single_points_are_seen_through_any_curve():
-    y = S**2 / 400 + 0.003 * np.random.default_rng(1).standard_normal(len(S))
-    assert independent_m(S, y) == pytest.approx(0.003, rel=0.1)
-
-
-def test_the_covariance_of_points_is_that_of_their_distance():
-    noise = Noise(0.001, 0.003, 5.0)
-    made = shared_covariance(S[:30], noise).toarray()
-    lag = np.abs(S[:30, None] - S[:30])
-    near = lag < 20
-    np.testing.assert_allclose(made[near], noise.covariance(lag)[near])
-    assert not made[~near].any()
 
 
 def test_errors_that_only_neighbours_share_do_not_make_elements():

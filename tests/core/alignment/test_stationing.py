@@ -13,14 +13,6 @@ def km_at(stationing, *s):
     return np.round(stationing.at(np.array(s, float))[1], 6).tolist()
 
 
-def test_kilometres_continue_from_a_known_place_to_both_sides():
-    stationing = stationing_of(3000.0, [1000.0], [12.0])
-    assert km_at(stationing, 0, 1000, 1234.567, 3000) == [11.0, 12.0, 12.234567, 14.0]
-    assert stationing.places(12.5) == [(0, pytest.approx(1500))]
-    assert stationing.places(15.0) == []
-    assert stationing.jumps == []
-
-
 def test_numbers_are_missing_in_a_gap_and_twice_in_an_overlap():
     """The gap is km 11.0 = 11.4, the overlap km 12.4 = 11.9."""
     stationing = stationing_of(5000.0, [0.0], [10.0], [Jump(11.0, 11.4), Jump(12.4, 11.9)])

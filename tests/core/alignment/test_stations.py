@@ -6,7 +6,6 @@ from rail_extract.core.alignment.axis import locate
 from rail_extract.core.alignment.km_text import HECTOMETRES
 from rail_extract.core.alignment.stationing import Jump
 from rail_extract.core.alignment.stations import AxisLine, Post, Start, make_axes
-from rail_extract.core.errors import RailExtractError
 
 
 def line(*x, m=None, name="", y=0.0):
@@ -66,20 +65,3 @@ def test_each_of_two_axes_has_its_own_posts():
     axes = make_axes([line(0, 200, name="A"), line(0, 200, name="B", y=497.0)], posts=posts)
     assert kilometres(axes, 50)[0] == [1.05]
     assert kilometres(axes, 50, y=498.0) == ([9.05], ["right"])
-
-
-@pytest.mark.parametrize(
-    ("lines", "given", "says"),
-    [
-        ([line(0, 100)], {}, "AXIS has no M values: fill in START_KM"),
-        ([line(0, 100, m=[0, 328.08])], {}, "change by 3.28 per metre, so they are neither metres nor kilometres"),
-        ([line(0, 100), line(200, 300)], {"start": Start(1.0)}, "AXIS has 2 lines .* START_KM is for one"),
-        ([line(0, 100, m=[0, 100])], {"jumps": [Jump(0.02, 0.04)]}, "M values of AXIS contain their jumps"),
-        ([line(0, 100)], {"posts": [post(50, 1.0)]}, "has one post"),
-        ([line(0, 100)], {"posts": [post(50, 1.0, 90)]}, "No post is within 50 m of the axis 1"),
-        ([line(0, 300)], {"posts": [post(0, 1.0), post(100, 1.2), post(200, 1.1), post(300, 1.3)]}, "out of order"),
-    ],
-)
-def test_what_states_no_kilometres_is_refused(lines, given, says):
-    with pytest.raises(RailExtractError, match=says):
-        make_axes(lines, **given)

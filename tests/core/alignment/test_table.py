@@ -71,8 +71,3 @@ def test_a_wrong_row_is_named(row, values, words):
     table[row].update(values)
     with pytest.raises(ParameterError, match=words):
         alignments(table, FRAME)
-
-
-def test_a_track_without_a_plan_is_refused():
-    with pytest.raises(ParameterError, match="layout H"):
-        alignments([row for row in rows(design()) if row["layout"] != "H"], FRAME)

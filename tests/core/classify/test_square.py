@@ -96,29 +96,6 @@ def test_the_crest_of_a_slope_whose_far_side_is_hidden_is_not_a_lone_rail(slope,
     assert found.rail.any() == kept
 
 
-@pytest.mark.parametrize(("length", "kept"), [(4.8, False), (5.2, True)])
-def test_lone_bars(length, kept):
-    xyz, on = with_bar(flat(8.0), WIDTH, 0.2, length_m=length)
-    found = classify_square(xyz, SETTINGS)
-    assert (found.rail & on).sum() / on.sum() > (0.95 if kept else -1)
-    assert found.rail.any() == kept
-    assert found.figures.single_m == pytest.approx(length if kept else 0, rel=0.08)
-
-
-@pytest.mark.parametrize(("length", "kept"), [(1.3, False), (1.8, True)])
-def test_paired_bars(length, kept):
-    xyz, _ = with_track(flat(6.0), GAUGE, WIDTH, 0.2, length_m=length)
-    found = classify_square(xyz, SETTINGS)
-    assert found.rail.any() == kept
-    assert found.figures.paired_m == pytest.approx(2 * length if kept else 0, rel=0.15)
-
-
-@pytest.mark.parametrize(("length", "kept"), [(2.4, False), (4.0, True)])
-def test_paired_bars_in_a_thin_cloud(length, kept):
-    xyz, _ = with_track(flat(9.0, rng=np.random.RandomState(15), per_m2=300), GAUGE, WIDTH, 0.2, length_m=length)
-    assert classify_square(xyz, SETTINGS).rail.any() == kept
-
-
 def test_feet_and_webs_are_not_labelled():
     rng = np.random.RandomState(6)
     ground = flat(6.0, rng=rng, per_m2=3000)

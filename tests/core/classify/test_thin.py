@@ -2,10 +2,7 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.classify.lines import Marks, find_lines
-from rail_extract.core.classify.pieces import shares_of_length
 from rail_extract.core.classify.thin import SURROUNDINGS_M, drawn
-from rail_extract.core.rails import SearchFigures
 
 CELL, SPACING = 0.04, 1.507
 
@@ -37,27 +34,10 @@ def test_a_dense_track_is_not_drawn():
     assert drawn(track(25.0), [SPACING], CELL).shape == (0, 2)
 
 
-def test_a_short_loss_of_a_dense_rail_is_not_drawn():
-    xyz = track(60.0, angle=0.0)
-    random = np.random.RandomState(2).random_sample(len(xyz))
-    lost = (np.abs(xyz[:, 0]) < 1.0) & (random < 0.92)
-    assert not len(drawn(xyz[~lost], [SPACING], CELL))
-
-
 def test_scattered_points_are_not_drawn():
     rng = np.random.RandomState(3)
     xyz = np.column_stack([rng.uniform(0, 20, (400, 2)), rng.uniform(0, 0.1, 400)])
     assert len(drawn(xyz, [SPACING], CELL)) * CELL / 2 < 0.02 * 400
-
-
-def test_other_gauges_are_drawn_as_well():
-    assert len(drawn(track(5.0), [1.1], CELL)) < 0.95 * len(drawn(track(5.0), [1.1, SPACING], CELL))
-
-
-def test_the_order_of_points_does_not_matter():
-    xyz = track(5.0)
-    again = drawn(xyz[np.random.RandomState(4).permutation(len(xyz))], [SPACING], CELL)
-    np.testing.assert_array_equal(again, drawn(xyz, [SPACING], CELL))
 
 
 def test_what_is_drawn_depends_on_the_surroundings_only():
@@ -67,24 +47,3 @@ def test_what_is_drawn_depends_on_the_surroundings_only():
     inside, expected = part[np.abs(part[:, 0]) < 5], whole[np.abs(whole[:, 0]) < 5]
     assert len(expected) > 500
     np.testing.assert_allclose(inside[np.lexsort(inside.T)], expected[np.lexsort(expected.T)], atol=1e-12)
-
-
-@pytest.mark.parametrize("count", [0, 1, 2])
-def test_nothing_is_drawn_from_nothing(count):
-    assert drawn(np.zeros((count, 3)), [SPACING], CELL).shape == (0, 2)
-
-
-@pytest.mark.parametrize("per_m", [4.0, 12.5])
-def test_cells_share_the_length_of_their_rail(per_m):
-    x = np.arange(0, 20.0, 1 / per_m)
-    lines = find_lines(Marks(np.column_stack([x, np.zeros(len(x))]), np.zeros(len(x))), 2.0, 0.06, 0.065)
-    assert shares_of_length(lines, 0.072).sum() == pytest.approx(20.0, rel=0.12)
-
-
-def test_figures_add_up():
-    one, other = SearchFigures(10, 1.0, 2.0, 30, 1, 1, 0), SearchFigures(5, 4.0, 3.0, 20, 1, 0, 1)
-    assert one + other == SearchFigures(15, 5.0, 5.0, 50, 2, 1, 1)
-    assert (one + other).cells_per_m == 5.0
-    assert SearchFigures().cells_per_m == SearchFigures().blur_m == 0.0
-    blunt = SearchFigures(blunt_m=30.0, blur_m2=30.0 * 0.05) + SearchFigures(blunt_m=10.0, blur_m2=10.0 * 0.07) + one
-    assert blunt.blur_m == pytest.approx(0.055)

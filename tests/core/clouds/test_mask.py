@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rail_extract.core.clouds import mask as module
 from rail_extract.core.clouds.mask import Mask
 from rail_extract.core.clouds.points import ask, read_requested
 from rail_extract.core.squares.spool import spool
@@ -36,19 +35,6 @@ def test_places_are_inside_if_the_rings_wind_around_them_an_odd_number_of_times(
     xy = np.random.default_rng(seed + 1).uniform(-110, 110, (2000, 2))
     expected = sum(winding(ring, xy) for ring in rings) % 2 == 1
     np.testing.assert_array_equal(Mask.of([ring + PLACE for ring in rings]).holds(xy + PLACE), expected)
-
-
-def test_only_places_near_the_border_are_compared_with_edges(monkeypatch):
-    mask, compared = Mask.of([star(50, 1)]), []
-    mask.holds(np.zeros((1, 2)))  # lays the grid
-
-    def counted(xy, edges):
-        compared.append(len(xy))
-        return np.zeros(len(xy), dtype=bool)
-
-    monkeypatch.setattr(module, "_odd_crossings", counted)
-    mask.holds(np.random.default_rng(1).uniform(-110, 110, (100_000, 2)))
-    assert 0 < sum(compared) < 10_000
 
 
 @pytest.mark.parametrize("outside", [[200.0, 0.0], [0.0, -1e9], [15.0, 30.2]])

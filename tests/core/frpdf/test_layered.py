@@ -6,7 +6,6 @@ from rail_extract.core.errors import Cancelled
 from rail_extract.core.frpdf import layered
 from rail_extract.core.frpdf.corridor import Piece
 from rail_extract.core.frpdf.engine import make_engine
-from rail_extract.core.frpdf.layered import overlaps
 from rail_extract.core.progress import SILENT, Progress
 
 
@@ -51,17 +50,6 @@ def test_pieces_joined_give_the_whole_network_amid_an_empty_raster(arrays, radiu
     for part, of_whole in zip(found, cut(expected, pieces)):
         np.testing.assert_allclose(part, of_whole, atol=1e-4)
     assert np.ptp(expected) > 0.02
-
-
-def test_the_cells_of_each_neighbour_are_found_at_their_position():
-    field = np.arange(60 * 50).reshape(60, 50)
-    pieces = quarters(60, 50, 25, 31)
-    parts = cut(field, pieces)
-    around = np.full((pieces[0].height + 14, pieces[0].width + 14), -1)
-    for other, target, source in overlaps(np.array([piece.window for piece in pieces]), 7)[0]:
-        around[target] = parts[other][source]
-    np.testing.assert_array_equal(around[7:, 7:], field[:32, :38])
-    assert (around[:7] == -1).all() and (around[:, :7] == -1).all()
 
 
 @pytest.mark.parametrize("name", ["TORCH", "OPENCV"])

@@ -77,14 +77,6 @@ def test_an_exhausted_device_gets_fewer_cells_and_is_then_replaced_by_the_cpu(ar
     np.testing.assert_array_equal(found.cells(), expected.cells())
 
 
-def test_a_device_is_replaced_before_its_parts_get_too_small(arrays):
-    engine, messages = TorchEngine(arrays, "CPU"), []
-    engine._others = ["cpu"]
-    while "on the CPU" not in (messages or [""])[-1]:
-        messages.append(engine.retreat())
-    assert len(messages) == 1 + np.log2(LayeredEngine.max_cells / MIN_CELLS) // 2
-
-
 def test_a_computer_without_memory_for_small_parts_ends_the_run(arrays):
     engine = Small(arrays, "CPU", exact=True)
     with pytest.raises(MemoryError):

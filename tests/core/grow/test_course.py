@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from rail_extract.core.grow.course import lead, smoothed
-from rail_extract.core.grow.settings import DENSE, THIN
+from rail_extract.core.grow.settings import DENSE
 
 
 def arc(radius, places):
@@ -29,24 +29,6 @@ def test_an_arc_is_continued_in_any_direction(turn, radius):
     assert ahead.heading @ (rotation @ [np.cos(5.5 / radius), np.sin(5.5 / radius)]) > 0.9999
 
 
-def test_two_places_are_continued_straight():
-    ahead = lead(np.array([[0.0, 0, 5], [1.0, 0, 5]]), 0.5, np.array([1.0, 0.0]), THIN)
-    assert ahead.xy == pytest.approx([1.5, 0.0])
-    assert ahead.curvature == pytest.approx(0.0)
-
-
-def test_the_coordinates_follow_the_curve():
-    ahead = lead(arc(30.0, np.arange(0.0, 5.1, 0.5)), 0.5, np.array([1.0, 0.16]), DENSE)
-    _, across, above = ahead.coordinates(arc(30.0, np.array([5.25, 5.5, 5.75])))
-    assert across == pytest.approx(0.0, abs=0.004)
-    assert above == pytest.approx(0.0, abs=1e-3)
-
-
-def test_the_course_beside_has_its_own_radius():
-    ahead = lead(arc(30.0, np.arange(0.0, 5.1, 0.5)), 0.5, np.array([1.0, 0.16]), DENSE)
-    assert 1 / ahead.beside(1.5, 0.1).curvature == pytest.approx(1 / ahead.curvature - 1.5)
-
-
 def test_smoothing_averages_noise_and_keeps_arcs():
     along = np.arange(0.0, 20.0, 0.5)
     true = arc(30.0, along)
@@ -56,11 +38,3 @@ def test_smoothing_averages_noise_and_keeps_arcs():
     assert smoothed(true, along, 1.5, seen) == pytest.approx(true, abs=5e-4)
     inner = slice(4, -4)
     assert np.std((smoothed(noisy, along, 1.5, seen) - true)[inner]) < 0.7 * np.std((noisy - true)[inner])
-
-
-def test_places_that_were_not_seen_do_not_bend_the_line():
-    along = np.arange(0.0, 10.0, 0.5)
-    xyz = np.column_stack([along, np.zeros_like(along), np.zeros_like(along)])
-    seen = np.ones(len(along), bool)
-    seen[10], xyz[10, 1] = False, 0.2
-    assert smoothed(xyz, along, 1.5, seen)[seen, 1] == pytest.approx(0.0, abs=1e-9)

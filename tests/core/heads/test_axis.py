@@ -2,14 +2,13 @@ import numpy as np
 import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.heads.axis import UNSHOWN_M, Axis, _with_blur
-from rail_extract.core.heads.edges import EDGE_SIGMA_M, VIEW_STATIONS, _information, station_count
-from rail_extract.core.heads.elevation import ElevationParameters, elevate
-from rail_extract.core.heads.flank import FLANK_SIGMA_M, FLANK_TOP_SIGMA_M
+from rail_extract.core.heads.axis import UNSHOWN_M, Axis
+from rail_extract.core.heads.edges import station_count
+from rail_extract.core.heads.elevation import elevate
+from rail_extract.core.heads.head_points import HeadPoints, near_lines
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.polyline import interpolate, length_along, project
-from rail_extract.core.rails import Support
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.vectorize import vectorize
 from rail_extract.laboratory.curves import Element, trace
@@ -34,7 +33,7 @@ def head(length, density, noise=0.003, seed=0):
 def axis(t, across, z, length=60.0, free=None):
     line = np.column_stack([np.linspace(0, length, int(10 * length) + 1), np.zeros(int(10 * length) + 1)])
     free = np.ones((2, station_count(length)), dtype=bool) if free is None else free
-    return Axis.of(line, t, across, z, WIDTH, free, UNSEEN)
+    return Axis.of(HeadPoints(t, across, z, WIDTH, line, free), UNSEEN)
 
 
 def support(t, across, z, length=60.0, free=None):
@@ -52,7 +51,8 @@ def test_errors_of_lines_are_as_large_as_stated(left_m, noise_m):
     rails = [scan(track.railhead(side), WIDTH, path, scanner, random, gaps[: 3 * (side > 0)]) for side in (1, -1)]
     points = RailPoints(np.concatenate(rails), LocalFrame(np.zeros(3)), 10)
     network = smooth_network(vectorize(rasterize(points.xyz, cell_size(GAUGE, WIDTH)), WIDTH), 0.8)
-    lines = elevate(refine(network, points, WIDTH), points, ElevationParameters(WIDTH))
+    network = refine(network, points, WIDTH)
+    lines = elevate(network, near_lines(network.lines, points.xyz, WIDTH), 10)
     errors, local, whole = [], [], []
     for line in lines:
         stations = interpolate(line.xyz[:, :2], length_along(line.xyz[:, :2]), line.support.t)
@@ -102,18 +102,6 @@ def test_points_are_counted_where_they_are():
     assert counted.points[(counted.t < 19.5) | (counted.t > 30.5)].sum() == 0
 
 
-def test_support_of_a_part_and_of_the_line_reversed():
-    whole = Support(np.arange(0.125, 10, 0.25), np.arange(40), np.linspace(0.001, 0.002, 40))
-    part = whole.between(2.0, 4.0)
-    np.testing.assert_allclose(part.t[[0, -1]], [0.125, 1.875])
-    np.testing.assert_array_equal(part.points, np.arange(8, 16))
-    np.testing.assert_allclose(whole.between(2.05, 2.1).points, [8])
-    turned = whole.reversed(10.0)
-    np.testing.assert_allclose(turned.t, whole.t)
-    np.testing.assert_array_equal(turned.points, whole.points[::-1])
-    np.testing.assert_array_equal(turned.sigma_m, whole.sigma_m[::-1])
-
-
 @pytest.mark.parametrize("apart_m", [0.010, 0.015, 0.025])
 def test_two_passes_without_a_mark_blur_the_head_and_are_in_sigma(apart_m):
     t, across, z = head(60.0, 120)
@@ -133,75 +121,8 @@ def test_one_pass_does_not_blur_the_head(noise_m, density):
     assert support(*head(60.0, density, noise_m, seed=4)).strips is None
 
 
-def test_a_head_that_passes_from_either_side_widen_is_in_sigma():
-    t, across, z = head(60.0, 120)
-    found = support(t, across * (1 + 0.011 / WIDTH), z)
-    assert np.median(found.strips[:, 1]) == pytest.approx(0.011, abs=0.002)
-    assert (found.sigma_m > 0.0045).all()
-
-
-@pytest.mark.parametrize(("side", "seen_m"), [(0, -0.001), (1, 0.001)])
-def test_a_middle_from_a_single_edge_errs_by_its_corner(side, seen_m):
-    """The line is where this edge alone puts the middle, so nothing else is in doubt."""
-    t, across, z = head(12.0, 10_000, noise=0.001)
-    free = np.ones((2, station_count(12.0)), dtype=bool)
-    free[side] = False
-    alone = support(t, across + seen_m, z, 12.0, free)
-    assert np.median(alone.sigma_m) == pytest.approx(EDGE_SIGMA_M, abs=0.0001)
-
-
-def test_blur_is_in_doubt_as_far_as_one_pass_may_go_on_alone():
-    count = 3 * VIEW_STATIONS
-    plain = Support(np.arange(count) * 0.25, np.full(count, 9), np.full(count, 0.003))
-    blur, blur_up = np.zeros(count), np.zeros(count)
-    blur[-1], blur_up[-1] = 0.004, 0.006
-    found = _with_blur(plain, blur, blur_up)
-    near = np.arange(count) >= count - 1 - VIEW_STATIONS
-    np.testing.assert_allclose(found.sigma_m, np.where(near, 0.005, 0.003))
-    np.testing.assert_allclose(found.sigmaz_m, np.where(near, 0.006, 0.0))
-    assert found.strips[-1].tolist() == [1.0, 0.012, 0.004] and np.isnan(found.strips[:-1, 1]).all()
-    assert _with_blur(plain, 0 * blur, 0 * blur) is plain
-
-
-def test_edges_err_by_chance_as_counts_do():
-    """Of 1000 points per metre across, blurred by 3 and 4 mm; two edges err less by the root of 2."""
-    density, weight = np.full((2, 2), 1000.0), np.array([[1.0, 0.5], [0.0, 0.5]])
-    one_m = np.sqrt(np.sqrt(np.pi) * 0.005**2 / (2 * 0.003 * 1000))
-    np.testing.assert_allclose(_information(density, weight, 0.004, 0.003) ** -0.5, [one_m, one_m / np.sqrt(2)])
-
-
-@pytest.mark.parametrize("offset_m", [-0.012, 0.0, 0.009])
-def test_points_that_all_have_one_offset_are_the_axis_but_in_doubt_by_a_cell(offset_m):
-    t = np.sort(np.random.default_rng(1).uniform(0, 60, 3000))
-    found = axis(t, np.full(len(t), offset_m), np.zeros(len(t)))
-    np.testing.assert_allclose(found.course.at(np.arange(1.0, 60)), offset_m, atol=0.0005)
-    assert (found.support(marked=False).sigma_m > 0.999 * UNSEEN).all()
-
-
 def test_a_line_without_points_stays_and_is_in_doubt():
     found = axis(*np.empty((3, 0)))
     np.testing.assert_allclose(found.course.at(np.arange(60.0)), 0.0, atol=1e-12)
     assert not found.shown.points.any()
     assert found.support(marked=False).rms_m > 0.3 * UNSHOWN_M / np.sqrt(60)
-
-
-@pytest.mark.parametrize("side", [1, -1])
-def test_a_line_on_one_face_is_half_a_head_off_and_has_the_doubt_of_one_face(side):
-    random = np.random.default_rng(4)
-    t = np.sort(random.uniform(0, 60, 9000))
-    turn = random.uniform(np.pi / 4, np.pi / 2, len(t))
-    down = np.where(
-        random.uniform(size=len(t)) < 0.7, random.uniform(0.014, 0.035, len(t)), 0.014 - 0.013 * np.cos(turn)
-    )
-    across = side * np.where(down < 0.014, 0.013 * np.sin(turn) - 0.013, 0.0)
-    found = axis(t, across + random.normal(0, 0.002, len(t)), -down + random.normal(0, 0.002, len(t)))
-    np.testing.assert_allclose(found.course.at(np.arange(2.0, 59)), -side * WIDTH / 2, atol=0.002)
-    np.testing.assert_allclose(found.shown.common_m, FLANK_SIGMA_M, rtol=0.001)
-    np.testing.assert_allclose(found.support(marked=False).heights_m, FLANK_TOP_SIGMA_M)
-
-
-def test_what_is_measured_of_neighbouring_stations_is_not_counted_twice():
-    """As if the points of a metre were at one station: the information of all stations is that of all points."""
-    t, across, z = head(60, 150)
-    one, all_of_them = (axis(t[::step], across[::step], z[::step]).shown.information.sum() for step in (2, 1))
-    assert all_of_them == pytest.approx(2 * one, rel=0.1)

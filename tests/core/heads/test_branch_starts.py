@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
-from rail_extract.core.heads.branch_starts import _blade, _Parting, _power, _section, slide_branches
+from rail_extract.core.heads.branch_starts import slide_branches
 from rail_extract.core.lines.network import LineNetwork
-from rail_extract.core.lines.parting import ARC, STRAIGHT
 
 WIDTH, TOE, LENGTH = 0.072, 30.0, 80.0
 
@@ -58,48 +57,6 @@ def test_a_branch_on_an_arc_begins_where_the_arc_touches(radius, hand, turned, s
     assert slid.degrees().tolist().count(3) == 1
 
 
-def test_a_branch_that_began_too_early_begins_later():
-    before = network(lambda x: np.clip(x, 0, None) ** 2 / 600, 22.0)
-    slid = slide_branches(before, NO_POINTS, WIDTH, 0.5 * WIDTH)
-    assert slid.lines[1][0, 0] == pytest.approx(TOE, abs=0.06)
-
-
-def straight_switch(angle):
-    """An American switch: an angle at the point, the closure curve behind the heel."""
-    return lambda x: angle * x + np.clip(x - 0.16 / angle, 0, None) ** 2 / 600
-
-
-@pytest.mark.parametrize("angle", [1 / 30, 1 / 60])
-@pytest.mark.parametrize("hand", [1, -1])
-@pytest.mark.parametrize("turned", [False, True])
-@pytest.mark.parametrize("sure", [1.3, 0.5])
-def test_a_straight_blade_begins_at_its_point(angle, hand, turned, sure):
-    offset = straight_switch(angle)
-    slid = slide_branches(network(offset, TOE - 2.8, hand, turned), heads(offset, hand), WIDTH, sure * WIDTH)
-    branch = slid.lines[1][::-1] if turned else slid.lines[1]
-    assert branch[0, 0] == pytest.approx(TOE, abs=0.06)
-    assert np.abs(branch[:, 1] - hand * offset(branch[:, 0] - TOE)).max() < 0.0005
-
-
-def test_heads_wide_enough_to_hide_the_heel_are_no_obstacle():
-    slid = slide_branches(network(straight_switch(1 / 30), TOE - 2.8), NO_POINTS, 0.125, 1.3 * 0.125)
-    assert slid.degrees().tolist().count(3) == 1
-
-
-def test_without_points_a_blade_is_taken_for_an_arc():
-    offset = straight_switch(1 / 30)
-    slid = slide_branches(network(offset, TOE - 2.8), NO_POINTS, WIDTH, 1.3 * WIDTH)
-    assert slid.lines[1][0, 0] < TOE - 2.0
-
-
-@pytest.mark.parametrize("offset", [lambda x: x / 3, lambda x: 0.5 + 0 * x, lambda x: 0.05 - x / 2000])
-def test_lines_that_do_not_part_on_an_arc_stay(offset):
-    before = network(offset, TOE)
-    after = slide_branches(before, NO_POINTS, WIDTH, 0.5 * WIDTH)
-    for one, other in zip(before.lines, after.lines):
-        np.testing.assert_array_equal(one, other)
-
-
 def test_other_lines_still_meet_the_branch_that_was_given_a_new_start():
     before = network(lambda x: x**2 / 600, TOE + np.sqrt(600 * 0.04))
     third = before.lines[1][200] + np.array([[0.0, 0.0], [0.0, 5.0]])
@@ -110,42 +67,3 @@ def test_other_lines_still_meet_the_branch_that_was_given_a_new_start():
     for node, line, vertex in after.passes.tolist():
         np.testing.assert_array_equal(after.lines[line][vertex], after.nodes[node])
     np.testing.assert_array_equal(after.nodes[after.ends[2, 0]], third[0])
-
-
-@pytest.mark.parametrize(
-    ("apart", "section"),
-    [
-        ([0.02, 0.05, 0.11, 0.15, 0.21, 0.25, 0.15], (2, 5)),
-        ([0.12, 0.09, 0.11, 0.15], (2, 4)),
-        ([0.12, 0.15, 0.3, 0.02], (0, 2)),
-        ([0.3, 0.12], (0, 0)),
-    ],
-)
-def test_lines_part_between_the_last_place_too_near_and_the_first_too_far(apart, section):
-    assert _section(np.array(apart), 0.1, 0.22) == section
-
-
-@pytest.mark.parametrize(
-    ("on_arc", "on_head", "power"), [(0, 19, ARC), (0, 20, STRAIGHT), (39, 100, STRAIGHT), (40, 100, ARC)]
-)
-def test_a_blade_is_straight_where_an_arc_would_have_its_head_and_there_are_few_points(on_arc, on_head, power):
-    assert _power(np.array([on_arc, on_head])) == power
-
-
-@pytest.mark.parametrize(("touch", "first"), [(5.0, 15.0), (15.0, 5.0)])
-def test_a_blade_has_a_vertex_every_decimetre_and_leaves_along_its_law(touch, first):
-    line = np.array([[0.0, 2.0], [20.0, 2.0]])
-    for power in (STRAIGHT, ARC):
-        blade = _blade(line, touch, first, -0.2, power)
-        share = np.arange(1, 100) / 100
-        np.testing.assert_allclose(blade, np.column_stack([touch + share * (first - touch), 2 - 0.2 * share**power]))
-    assert len(_blade(line, touch, touch + 0.05, 0.1, ARC)) == 0
-
-
-def test_a_straight_blade_is_fitted_up_to_its_heel():
-    way = np.arange(5.0, 15.0, 0.1)
-    apart = np.where(way < 10, 0.03 * (way - 5), 0.15 + 0.06 * (way - 10))
-    parting = _Parting(0.0, 0, 1.0, way, apart, 1.0, 0)
-    assert parting.law(STRAIGHT).touch == pytest.approx(5.0, abs=0.01)
-    behind = _Parting(0.0, 0, 1.0, way[60:], apart[60:], 1.0, 0)
-    assert behind.law(STRAIGHT).touch == pytest.approx(7.5, abs=0.01)

@@ -34,15 +34,6 @@ def test_upper_boundary_equals_brute_force(points, radius):
     np.testing.assert_allclose(boundary.upper(x)[reached], expected[reached], atol=1e-6)
 
 
-@given(POINTS, st.sampled_from([0.5, 1.0, 2.5, 20.0]))
-def test_starts_increase_and_ends_are_kept(points, radius):
-    boundary = extremal_boundary(points[:, 0], points[:, 1], radius)
-    assert np.all(np.diff(boundary.start) > 0)
-    assert np.all(np.diff(boundary.x) > 0)
-    assert boundary.x[0] == points[:, 0].min()
-    assert boundary.x[-1] == points[:, 0].max()
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_closing_surface_equals_brute_force_on_rail_profiles(seed):
     random = np.random.default_rng(seed)
@@ -52,31 +43,3 @@ def test_closing_surface_equals_brute_force_on_rail_profiles(seed):
     expected = closing_by_brute_force(points, 20.0, x)
     np.testing.assert_allclose(boundary.closing(x), expected, atol=5e-5)
     assert np.all(boundary.closing(points[:, 0]) >= points[:, 1] - 1e-12)
-
-
-def test_contact_points_are_on_the_closing_surface():
-    random = np.random.default_rng(1)
-    x, y = random.uniform(0, 50, 500), random.normal(0, 0.01, 500)
-    boundary = extremal_boundary(x, y, 20.0)
-    np.testing.assert_allclose(boundary.closing(boundary.x), boundary.y, atol=1e-12)
-    assert 5 < len(boundary.x) < 100
-
-
-def test_gap_sags_by_its_square_over_eight_radii():
-    boundary = extremal_boundary(np.array([0.0, 1.0]), np.array([2.0, 2.0]), 20.0)
-    assert boundary.closing(np.array([0.5]))[0] == pytest.approx(2.0 - 1 / (8 * 20.0), abs=1e-6)
-
-
-def test_separate_components_hand_over_where_the_right_disc_begins():
-    boundary = extremal_boundary(np.array([0.0, 100.0]), np.array([0.0, 5.0]), 20.0)
-    np.testing.assert_allclose(boundary.start, [-20.0, 80.0])
-    assert boundary.upper(np.array([50.0]))[0] == -np.inf
-
-
-def test_the_higher_of_two_points_at_one_place_counts():
-    boundary = extremal_boundary(np.array([0.0, 0.0, 1.0]), np.array([0.1, 0.4, 0.2]), 20.0)
-    np.testing.assert_allclose(boundary.y, [0.4, 0.2])
-
-
-def test_a_single_point_closes_at_its_own_height():
-    assert extremal_boundary(np.array([3.0]), np.array([7.0]), 20.0).closing(np.array([3.0]))[0] == 7.0

@@ -2,17 +2,11 @@ import numpy as np
 import pytest
 from rail_extract.core.heads.outline import (
     FACE_DEPTH_M,
-    LEAN_SIGMA,
-    MAX_STEPS,
     MIN_STRAY_SHARE,
-    NOISE_RATIO_SIGMA,
     Blurred,
     Grid,
     Outline,
     Scores,
-    Section,
-    _log_likelihood,
-    _scoring_step,
     fit_section,
 )
 from rail_extract.laboratory.scenes.scanner import Scanner, head_outline, scan
@@ -67,21 +61,6 @@ def test_a_head_is_found_whatever_share_of_its_face_is_seen(angle_deg, share):
         np.testing.assert_allclose(np.exp(section.place[4:]), noise_m, rtol=0.25)
 
 
-def test_sides_are_mirrored():
-    left, up = seen_from(25, 1.0, 0.005)
-    _, one, _, _ = fitted(left + 0.004, up)
-    _, other, _, _ = fitted(-left - 0.004, up)
-    assert other.place[0] == pytest.approx(-one.place[0], abs=3e-4)  # bins are half open
-
-
-@pytest.mark.parametrize("wrong_m", [-0.008, 0.008])
-def test_a_wrong_width_is_seen_where_both_edges_are(wrong_m):
-    left, up = seen_from(70, 0.3, 0.004, away=1.0)
-    _, section, _, _ = fitted(left, up, WIDTH + wrong_m)
-    assert 0.5 < section.place[3] / -wrong_m < 1.2
-    assert abs(section.place[0]) < 0.0015
-
-
 def test_strays_do_not_pull():
     random = np.random.default_rng(0)
     left, up = seen_from(45, 0.5, 0.004)
@@ -114,48 +93,9 @@ def test_scores_follow_a_shift_and_not_a_lift():
         assert own.sum() / (own @ own) == pytest.approx(expected_m, abs=2.5e-4)
 
 
-def test_few_points_make_a_section_less_sure():
-    left, up = seen_from(30, 0.5, 0.005)
-    errors = []
-    for part in (slice(None), slice(None, None, 8)):
-        counts, section, outline, grid = fitted(left[part], up[part])
-        errors.append(Scores.of(counts, section, outline, grid).common_m)
-    assert errors[1] > 1.5 * errors[0] > 0
-
-
-def test_a_fit_starts_from_an_estimate():
-    left, up = seen_from(20, 1.0, 0.005)
-    counts, section, outline, grid = fitted(left, up)
-    again = fit_section(counts, outline, grid, section)
-    np.testing.assert_allclose(again.place[:2], section.place[:2], atol=2e-4)
-    assert isinstance(again, Section)
-
-
 @pytest.mark.parametrize(("left", "up"), [(0.0, 0.0), (0.05, 0.01), (0.036, -0.03)])
 def test_points_at_one_place_break_nothing(left, up):
     """As those that were drawn on the axis, or thinned to a grid."""
     counts, section, outline, grid = fitted(np.full(500, left), np.full(500, up))
     assert np.isfinite(section.place).all()
     assert np.isfinite(Scores.of(counts, section, outline, grid).by_bin).all()
-
-
-def test_a_step_is_limited_where_the_start_is_far_off():
-    left, up = seen_from(30, 0.3, 0.003)
-    counts, section, outline, grid = fitted(left, up)
-    far = Section(section.place + [0.015, 0, 0, 0, 0, 0], section.shares)
-    step = _scoring_step(counts, far, Blurred.at(far.place, outline, grid), counts > 0)
-    assert np.abs(step[:6] / MAX_STEPS).max() == pytest.approx(1.0)
-    assert step[0] < 0
-    near = _scoring_step(counts, section, Blurred.at(section.place, outline, grid), counts > 0)
-    assert np.abs(near[:6] / MAX_STEPS).max() < 0.1
-
-
-@pytest.mark.parametrize(
-    "place",
-    [[0, 0, LEAN_SIGMA, 0, 0, 0], [0, 0, 0, 0, NOISE_RATIO_SIGMA, 0], [0.01, 0.01, 0, 0, 1, 1 + NOISE_RATIO_SIGMA]],
-)
-def test_without_points_a_section_is_as_likely_as_is_expected_of_its_place(place):
-    outline, grid = Outline.of(WIDTH), Grid.of(WIDTH)
-    section = Section(np.array(place, dtype=float), np.full(len(outline.parts) + 1, 1 / (len(outline.parts) + 1)))
-    blurred = Blurred.at(section.place, outline, grid)
-    assert _log_likelihood(np.zeros(grid.size), section, blurred) == pytest.approx(-0.5)

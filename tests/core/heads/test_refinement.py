@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.heads.level import is_blended
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.lines.network import LineNetwork
 from rail_extract.core.lines.network_smoothing import smooth_network
@@ -76,21 +75,6 @@ def test_a_line_moves_onto_points_that_all_have_one_offset(offset):
     np.testing.assert_allclose(refined[:, 1], offset, atol=1e-6)
 
 
-def test_a_band_of_points_as_wide_as_half_a_head_is_not_taken_for_a_line():
-    strip = head(40, 150, width=WIDTH / 2) + [0.0, 0.01, 0.0]
-    line = wavy_line(40, 0.0, 30)
-    refined = refine(network_of(line), cloud(strip), WIDTH).lines[0]
-    assert rms(refined[:, 1] - 0.01) > 0.004  # one of its edges is taken for that of the head
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_a_line_on_the_axis_stays_there(seed):
-    line = wavy_line(80, 0.0, 30)
-    refined = refine(network_of(line), cloud(head(80, 120, seed=seed)), WIDTH).lines[0]
-    assert rms(refined[:, 1]) < 0.002
-    assert np.abs(refined[:, 1]).max() < 0.007
-
-
 @pytest.mark.parametrize("lopsided", [0.1, 0.3, 0.6])
 def test_a_denser_side_does_not_bias_the_line(lopsided):
     refined = refine(network_of(wavy_line(80, 0.0, 30)), cloud(head(80, 120, lopsided=lopsided)), WIDTH).lines[0]
@@ -130,13 +114,6 @@ def test_weeds_next_to_the_head_do_not_bias_the_line():
     )
     refined = refine(network_of(wavy_line(80, 0.0, 30)), cloud(head(80, 120), weeds), WIDTH).lines[0]
     assert rms(refined[:, 1]) < 0.002
-
-
-@pytest.mark.parametrize("count", [0, 30])
-def test_lines_with_few_points_stay_as_they_are(count):
-    line = wavy_line(40, 0.01, 20)
-    refined = refine(network_of(line), cloud(head(40, 100)[:count]), WIDTH).lines[0]
-    np.testing.assert_array_equal(refined, line)
 
 
 def test_lines_move_to_their_heads_and_still_meet():
@@ -259,17 +236,6 @@ def test_heads_in_wide_beams_have_their_axis_in_the_middle_of_their_points(densi
     assert abs(refined[:, 1].mean()) < 0.003
 
 
-@pytest.mark.parametrize("offset", [-0.015, 0.0, 0.015])
-@pytest.mark.parametrize("noise", [0.003, 0.008])
-def test_heads_in_narrow_beams_are_not_blended(offset, noise):
-    t, across, z = head(80, 100, noise, low_share=0.15).T
-    order = np.argsort(t)
-    assert not is_blended(t[order], across[order] + offset, z[order], WIDTH)
-    t, across, z = blended_head(80, 50).T
-    order = np.argsort(t)
-    assert is_blended(t[order], across[order] + offset / 2, z[order], WIDTH)
-
-
 def test_a_line_on_one_face_moves_onto_the_axis():
     face = head(60, 150, low_share=1.0, noise=0.003)
     outer = face[(face[:, 2] < -0.004)]
@@ -280,12 +246,6 @@ def test_a_line_on_one_face_moves_onto_the_axis():
     outer = outer[outer[:, 2] < -0.013]
     (refined,) = refine(network_of(wavy_line(60, 0.005, 30) + [0.0, 0.034]), cloud(outer, corner), WIDTH).lines
     assert rms(refined[:, 1]) < 0.003
-
-
-def test_stairs_shorter_than_the_windows_are_smoothed_off():
-    line = wavy_line(80, 0.003, 1.7)
-    refined = refine(network_of(line), cloud(head(80, 60)), WIDTH).lines[0]
-    assert rms(refined[:, 1]) < 0.0015
 
 
 @pytest.mark.parametrize("height_m", [1.4, 2.6])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.learned import blocks
-from rail_extract.core.learned.blocks import MAX_POINTS, RAIL_VOXEL_M, centred, core_side, cut, thin
+from rail_extract.core.learned.blocks import MAX_POINTS, RAIL_VOXEL_M, core_side, cut, thin
 from rail_extract.laboratory.scenes.raw_shapes import TOP_M, flat, rough, with_track
 
 GAUGE, WIDTH, SIDE = 1.435, 0.072, 41.0
@@ -66,14 +66,3 @@ def test_a_block_with_too_many_points_becomes_several_of_the_same_place(thinned,
     assert len({one.key for one in found}) < len(found)
     times = np.bincount(np.concatenate([one.number[one.core] for one in found]), minlength=len(thinned.number))
     assert np.array_equal(times, thinned.railhigh.astype(int))
-
-
-def test_points_beyond_the_square_are_surroundings_only(thinned):
-    found = cut(thinned, 20.0)
-    labelled = np.concatenate([one.number[one.core] for one in found])
-    assert thinned.place[labelled, :2].max() < 20.0 < max(thinned.place[one.number, :2].max() for one in found)
-
-
-def test_places_count_from_the_middle_of_the_block():
-    place = np.array([[1.0, 2.0, 100.0, 0.1], [3.0, 6.0, 102.0, 0.2]])
-    assert centred(place).tolist() == np.float32([[-1, -2, -1, 0.1], [1, 2, 1, 0.2]]).tolist()

@@ -7,16 +7,9 @@ import pytest
 from rail_extract.core.errors import ModelError, ParameterError
 from rail_extract.core.frpdf.weights import save_arrays
 from rail_extract.core.learned import model
-from rail_extract.core.learned.blocks import MAX_POINTS, cut, thin
+from rail_extract.core.learned.blocks import cut, thin
 from rail_extract.core.progress import Progress, Recording
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
-
-
-def test_groups_hold_all_blocks_in_order_and_few_points():
-    counts = [MAX_POINTS] * 20 + [100, 200]
-    groups = model.in_groups(counts)
-    assert [number for group in groups for number in group] == list(range(22))
-    assert max(sum(counts[number] for number in group) for group in groups) <= model.AT_ONCE
 
 
 def test_without_pytorch_one_sentence_says_what_to_install(monkeypatch, tmp_path):

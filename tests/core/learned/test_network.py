@@ -29,10 +29,6 @@ def test_there_is_one_logit_for_each_point_and_a_gradient_for_each_weight(net):
         assert parameter.grad is not None and parameter.grad.abs().max() > 0, name
 
 
-def test_the_network_is_small(net):
-    assert network.parameter_count(net) == 112_769
-
-
 def test_blocks_do_not_see_each_other(net):
     net.eval()
     one, other = places(300), places(100, 1)
@@ -57,21 +53,6 @@ def test_the_order_of_points_and_of_neighbours_does_not_matter(net):
         after = net.encoder[0](x[order], network.Tensors.of(moved, "cpu"))
     assert before.std() > 0.01
     assert torch.allclose(after, before[order], atol=1e-5)
-
-
-def test_pooling_is_the_mean_if_all_scores_are_equal():
-    pool = network.AttentivePooling(4, 4).eval()
-    torch.nn.init.zeros_(pool.score.weight)
-    torch.nn.init.eye_(pool.mlp.linear.weight)
-    x = torch.rand(5, 16, 4)
-    with torch.inference_mode():
-        assert torch.allclose(pool(x), x.mean(dim=1), atol=1e-4)
-
-
-def test_the_encoding_states_distance_difference_and_both_positions():
-    position = torch.tensor([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0]])
-    found = network.encoded(position, torch.tensor([[0, 1], [1, 0]]))
-    assert found[0, 1].tolist() == [5, -3, -4, 0, 0, 0, 0, 3, 4, 0]
 
 
 def test_one_block_can_be_learned_by_heart(net):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.errors import Cancelled, ModelError, ParameterError
-from rail_extract.core.learned.examples import POINT, Examples, save_index, write_square
+from rail_extract.core.learned.examples import Examples, save_index, write_square
 from rail_extract.core.progress import Progress
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_bar, with_track
 
@@ -11,7 +11,7 @@ torch = pytest.importorskip("torch")
 
 from rail_extract.core.learned import training  # noqa: E402
 from rail_extract.core.learned.model import save  # noqa: E402
-from rail_extract.core.learned.training import Figures, Settings, train, varied  # noqa: E402
+from rail_extract.core.learned.training import Figures, Settings, train  # noqa: E402
 
 SIDE = 40.0
 
@@ -154,25 +154,3 @@ def test_the_loss_falls_and_the_output_is_calibrated(examples, tmp_path):
 def _parts(examples):
     kept_back = examples.validation(0)
     return np.flatnonzero(~kept_back), np.flatnonzero(kept_back)
-
-
-def test_figures_count_what_points_stand_for():
-    points = np.zeros(3, POINT)
-    points["rails"], points["others"] = [5, 3, 0], [0, 1, 4]
-    figures = Figures.of(np.array([True, False, True]), points)
-    assert figures == Figures(right=5, missed=3, wrong=4)
-    assert (figures.recall, figures.precision) == (5 / 8, 5 / 9)
-    assert figures.f1 == pytest.approx(2 / (8 / 5 + 9 / 5))
-    assert np.isnan(Figures().recall)
-
-
-def test_varied_blocks_keep_distances_in_plan_and_labels(examples):
-    number = int(examples.index["rail"].argmax())
-    block = examples.block(number)
-    one, again = (varied(block, np.random.RandomState(4)) for _ in range(2))
-    assert np.array_equal(one, again)
-    assert 0.25 * len(block) < len(one) < len(block)
-    assert one["rail"].mean() == pytest.approx(block["rail"].mean(), abs=0.1)
-    spread = np.linalg.norm(one["place"][:, :2], axis=1).mean() / np.linalg.norm(block["place"][:, :2], axis=1).mean()
-    assert spread == pytest.approx(1, abs=0.12)
-    assert np.abs(one["place"][:, 3] - np.median(one["place"][:, 3])).max() < 1

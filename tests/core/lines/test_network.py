@@ -64,35 +64,6 @@ def test_a_new_end_is_a_node_and_passes_that_stay_keep_their_places(network, dat
 
 @given(combs(), st.data())
 @settings(max_examples=100, deadline=None)
-def test_an_end_in_another_line_is_a_node_that_this_one_passes(network, data):
-    end = data.draw(st.integers(0, 2 * len(network.lines) - 1))
-    other = data.draw(st.sampled_from([line for line in range(len(network.lines)) if line != end // 2] or [None]))
-    if other is None:
-        return
-    vertex = data.draw(st.integers(1, len(network.lines[other]) - 2))
-    replaced, vertices = data.draw(st.integers(0, 2)), new_vertices(data.draw(st.integers(0, 5)))
-    place = network.lines[other][vertex]
-    edited = network.with_end(end, vertices, replaced, at=(other, vertex))
-    check_invariants(edited)
-    np.testing.assert_array_equal(edited.from_end(end)[0], place)
-    np.testing.assert_array_equal(edited.from_end(end)[1 : 1 + len(vertices)], vertices)
-    node = edited.ends.flat[end]
-    assert [(line, at) for number, line, at in edited.passes.tolist() if number == node] == [(other, vertex)]
-
-
-@given(combs(), st.data())
-@settings(max_examples=100, deadline=None)
-def test_lines_that_meet_a_part_of_a_line_are_noticed(network, data):
-    number = data.draw(st.integers(0, len(network.lines) - 1))
-    line = network.lines[number]
-    first = data.draw(st.integers(0, len(line) - 2))
-    last = data.draw(st.integers(first + 1, len(line) - 1))
-    part = {(number, *place) for place in line[first + 1 : last].tolist()}
-    assert network.meets(number, first + 1, last) == bool(passed_places(network) & part)
-
-
-@given(combs(), st.data())
-@settings(max_examples=100, deadline=None)
 def test_ends_that_are_cut_back_are_free_and_shorter_by_just_that(network, data):
     ends = data.draw(st.sets(st.integers(0, 2 * len(network.lines) - 1), max_size=4))
     cuts_m = {end: data.draw(st.floats(0.0, 2.4)) for end in ends}
@@ -109,14 +80,6 @@ def test_ends_that_are_cut_back_are_free_and_shorter_by_just_that(network, data)
         assert cut.lengths()[number] == pytest.approx(length)
 
 
-def test_a_pass_in_what_is_cut_off_is_dropped_and_the_others_stay():
-    network = comb([10], [[2, 5, 8]])
-    for cuts_m, left in (({0: 2.0}, {5.0, 8.0}), ({0: 1.9}, {2.0, 5.0, 8.0}), ({1: 1.5}, {2.0, 5.0}), ({}, {2, 5, 8})):
-        cut = network.cut_back(cuts_m)
-        check_invariants(cut)
-        assert {x for _, x, _ in passed_places(cut)} == left
-
-
 @given(combs())
 @settings(max_examples=40, deadline=None)
 def test_lines_parted_at_all_nodes_that_they_pass_weld_to_what_they_were(network):
@@ -128,17 +91,3 @@ def test_lines_parted_at_all_nodes_that_they_pass_weld_to_what_they_were(network
     assert passed_places(again) == passed_places(network)
     for one, other in zip(network.lines, again.lines):
         np.testing.assert_array_equal(one, other)
-
-
-@given(combs(), st.data())
-@settings(max_examples=40, deadline=None)
-def test_selected_lines_keep_their_passes(network, data):
-    keep = np.array(data.draw(st.lists(st.booleans(), min_size=len(network.lines), max_size=len(network.lines))))
-    chosen = network.select(keep)
-    check_invariants(chosen)
-    for one, other in zip([line for line, kept in zip(network.lines, keep) if kept], chosen.lines):
-        np.testing.assert_array_equal(one, other)
-    ending = {tuple(line[0]) for line, kept in zip(network.lines, keep) if kept}
-    assert {place[1:] for place in passed_places(chosen)} == {
-        place[1:] for place in passed_places(network) if keep[place[0]] and place[1:] in ending
-    }

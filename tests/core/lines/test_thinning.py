@@ -55,22 +55,6 @@ def test_dropped_vertices_are_within_the_tolerance():
     assert np.abs(np.interp(along, line.xyz[:, 0], line.xyz[:, 2]) - rough[:, 2]).max() < 0.003 + 1e-5
 
 
-def test_lines_without_height_are_thinned_in_plan():
-    flat = arc(300.0, 60.0)
-    flat[:, 2] = np.nan
-    level = arc(300.0, 60.0)
-    (thinned,), (expected,) = thin([rail(flat)], 0.002, 0.002), thin([rail(level)], 0.002, 0.002)
-    np.testing.assert_allclose(thinned.xyz[:, :2], expected.xyz[:, :2], atol=1e-9)
-    assert np.isnan(thinned.xyz[:, 2]).all()
-
-
-def test_a_single_inner_vertex_moves_to_the_best_fit():
-    bend = np.array([[0.0, 0, 0], [1, 0.051, 0], [2, 0.1, 0], [3, 0.051, 0], [4, 0, 0]])
-    (line,) = thin([rail(bend)], 0.002, 0.002)
-    np.testing.assert_array_equal(line.xyz[[0, -1]], bend[[0, -1]])
-    assert line.xyz[1:-1, 1] == pytest.approx([0.1 + 0.001 / 1.5], abs=2e-5)
-
-
 @given(st.integers(0, 10**6), st.floats(1e-3, 0.3), st.floats(1e-3, 0.3))
 @settings(max_examples=25, deadline=None)
 def test_simplified_lines_keep_both_tolerances(seed, tolerance_xy, tolerance_z):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rail_extract.core.lines.bridges import bridge
 from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.lines.turning import MAX_TURN_DEG, parts_without_turns, turn_deg
 from rail_extract.core.parameters import Parameters
@@ -40,39 +39,11 @@ def test_what_a_rail_can_do_stays(line):
     assert parts_without_turns(line, 1.0, 0.8) == [(0.0, pytest.approx(length_along(line)[-1]))]
 
 
-def test_turning_is_measured_per_metre():
-    assert turn_deg(arc(20.0)) == pytest.approx(np.degrees(1 / 20), abs=0.2)
-    assert turn_deg(way([0, 0], [10, 0], [10, 10])) == pytest.approx(90)
-
-
-def test_a_corner_is_cut_out_with_half_a_metre_on_either_side():
-    (start, one), (other, end) = parts_without_turns(way([0, 0], [20, 0], [20, 10]), 1.0, 0.8)
-    assert (start, end) == (0.0, pytest.approx(30.0, abs=0.05))
-    assert (one, other) == (pytest.approx(19.45, abs=0.1), pytest.approx(20.55, abs=0.1))
-
-
-def test_a_line_that_runs_back_over_itself_is_drawn_once():
-    assert parts_without_turns(way([0, 0], [20, 0], [8, 0.03]), 1.0, 0.8) == [(0.0, pytest.approx(19.45, abs=0.1))]
-    assert len(parts_without_turns(way([0, 0], [20, 0], [8, 6.0]), 1.0, 0.8)) == 2
-
-
-def test_short_parts_are_left_out():
-    assert len(parts_without_turns(way([0, 0], [20, 0], [20, 3]), 3.0, 0.8)) == 1
-
-
 def test_stairs_of_a_line_that_is_hardly_smoothed_are_no_turn():
     x = np.arange(0, 20, 0.04)
     stairs = np.column_stack([x, np.round(0.1 * x / 0.02) * 0.02])
     assert len(parts_without_turns(stairs, 1.0, 0.1)) == 1
     assert len(parts_without_turns(stairs, 1.0, 0.8)) != 1
-
-
-def test_no_bridge_turns_back_along_a_line():
-    """Of a leg that runs alongside the shared part of a crossing, the continuation is not on the other side of it."""
-    leg, other = way([0, 0], [-4, 0]), way([6, 0], [12, 0])
-    assert bridge(leg, other) is not None
-    assert bridge(leg[::-1] + [4, 0], other) is None
-    assert bridge(other, leg[::-1] + [4, 0]) is None
 
 
 class Heard(Progress):
@@ -151,16 +122,3 @@ def test_no_crossing_is_drawn_back_along_its_legs(seed):
     places = np.column_stack([window.x0 + (columns + 0.5) * CELL_M, window.y0 - (rows + 0.5) * CELL_M])
     network = smooth_network(vectorize(rasterize(places, CELL_M), SIZE.head_width_m), 0.8)
     assert max(turn_deg(line) for line in network.lines) < MAX_TURN_DEG
-
-
-def test_parts_are_listed_along_the_line_whichever_is_longest():
-    parts = parts_without_turns(way([0, 0], [12, 0], [12, 30], [50, 30], [50, 25], [70, 25]), 1.0, 0.8)
-    assert len(parts) == 5
-    assert parts == sorted(parts)
-    lengths = [end - start for start, end in parts]
-    assert lengths == pytest.approx([12, 30, 38, 5, 20], abs=2.1)
-
-
-def test_of_two_parts_on_each_other_the_longer_one_stays():
-    (part,) = parts_without_turns(way([0, 0], [6, 0], [6, 0.05], [-20, 0.05]), 1.0, 0.8)
-    assert part == (pytest.approx(6, abs=1.2), pytest.approx(32.05, abs=0.1))

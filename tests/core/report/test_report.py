@@ -23,7 +23,7 @@ from rail_extract.core.report.findings import OFF_GAUGE, UNSUPPORTED, UNSURE, ex
 from rail_extract.core.report.listing import HOLE, LONE_RAIL, OFF_RAIL_MM
 from rail_extract.core.report.markup import metres, table, tag, text
 from rail_extract.core.report.page import ADVICE
-from rail_extract.core.report.plots import curve, round_up, ticks
+from rail_extract.core.report.plots import ticks
 
 GAUGE_MM = 1435.0
 FRAME = LocalFrame(np.array([500_000.0, 3_000_000.0, 400.0]))
@@ -237,12 +237,6 @@ def test_the_page_of_a_long_line_is_small():
     assert min(heights) < sorted(heights)[1] - 10
 
 
-def test_curves_break_at_unknown_values():
-    x = np.arange(6.0)
-    assert curve(x, np.array([np.nan, 1, 2, np.nan, 3, np.nan])) == "M1.0 1.0L2.0 2.0M4.0 3.0"
-    assert curve(x, np.full(6, np.nan)) == ""
-
-
 @given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e6), st.integers(2, 12))
 def test_ticks_are_round_few_and_inside_the_axis(low, span, count):
     marks = ticks(low, low + span, count)
@@ -252,21 +246,6 @@ def test_ticks_are_round_few_and_inside_the_axis(low, span, count):
     if len(marks) > 1:
         step = marks[1] - marks[0]
         np.testing.assert_allclose(np.diff(marks), step, rtol=1e-6, atol=1e-8)
-
-
-@given(st.floats(1e-6, 1e6))
-def test_rounding_up_gives_the_next_1_2_or_5(value):
-    found = round_up(value)
-    assert value <= found * (1 + 1e-9)
-    assert found < 2.6 * value
-    assert round(found / 10.0 ** np.floor(np.log10(found) + 1e-9), 6) in (1, 2, 5)
-
-
-@pytest.mark.parametrize(
-    ("length_m", "words"), [(0.42, "0.4 m"), (39.4, "39 m"), (1234, "1,234 m"), (12345, "12.3 km")]
-)
-def test_lengths_are_formatted_for_reading(length_m, words):
-    assert metres(length_m) == words
 
 
 def lone(length_m, rail_id=99):

@@ -11,8 +11,6 @@ from rail_extract.core.squares.grid import (
     lay_out,
     mosaic,
     own_tiles,
-    points_by_square,
-    unique_keys,
 )
 
 CELL = 0.04
@@ -77,18 +75,3 @@ def test_a_mosaic_contains_the_tiles_of_the_neighbours():
     expected = rasterize(source.near(squares[key], SIDE - 1e-6).xyz, CELL)
     assert set(seen.tiles) == set(expected.tiles)
     assert all((seen.tiles[place] == expected.tiles[place]).all() for place in seen.tiles)
-
-
-def test_keys_are_floors():
-    found, number = unique_keys(np.array([[-0.1, 0.0, 0], [0.0, 0.0, 0], [9.99, 10.0, 0]]), 10.0)
-    assert [found[place] for place in number] == [(-1, 0), (0, 0), (0, 1)]
-
-
-def test_squares_hold_the_points_of_their_margin():
-    xyz = np.random.RandomState(1).uniform(-90, 90, (3000, 3))
-    found = points_by_square(xyz, 41.0, 3.0)
-    for key, numbers in found.items():
-        inside = xyz[:, :2] - np.multiply(key, 41.0)
-        expected = np.flatnonzero(((inside >= -3) & (inside < 44)).all(axis=1))
-        np.testing.assert_array_equal(np.sort(numbers), expected)
-    assert set(points_by_square(xyz, 41.0)) <= set(found)

@@ -9,7 +9,7 @@ from rail_extract.core.polyline import length_along, project
 from rail_extract.core.rails import RailLine, Support
 from rail_extract.core.squares.grid import HALO_M, Square, unique_keys
 from rail_extract.core.squares.pieces import trim
-from rail_extract.core.squares.seams import _attached, closed_ring, join
+from rail_extract.core.squares.seams import join
 
 SIDE, REACH = 40.0, 20.0
 FRAME = LocalFrame(np.zeros(3))
@@ -151,48 +151,3 @@ def test_the_order_of_squares_does_not_matter():
     results = seen_by_squares([rail(curve(0.7, 0.01))], error_m=0.002)
     one, other = join(results, FRAME), join(results[::-1], FRAME)
     np.testing.assert_array_equal(one[0].xyz, other[0].xyz)
-
-
-def test_a_deviation_between_two_squares_adds_no_line():
-    """At the border the second square shows 2 m of the rail 5 cm off: a piece that continues nothing at either end."""
-    x = np.arange(5.0, 75.0, STEP_M)
-    bump = 0.05 * ((x > SIDE - 1.5) & (x < SIDE + 0.5))
-    true = np.column_stack([x, np.full(len(x), 5.0), np.zeros(len(x))])
-    results = []
-    for key, y in (((0, 0), 0 * x), ((1, 0), bump)):
-        square = Square.on_grid(key, SIDE, FRAME)
-        seen = square.holds(true - square.frame.shift_to(FRAME), REACH)
-        line = (true + np.column_stack([0 * x, y, 0 * x]))[seen]
-        results.append(trim([rail(line - square.frame.shift_to(FRAME))], square))
-    (line,) = join(results, FRAME)
-    assert line.length_m == pytest.approx(x[-1] - x[0], abs=0.01)
-
-
-def test_the_ends_of_a_ring_meet_halfway_without_a_step():
-    angle = np.linspace(0, 2 * np.pi, 1401)
-    off = np.array([0.01, -0.02, 0.006])
-    xyz = np.column_stack([30 * np.cos(angle), 30 * np.sin(angle), 0 * angle]) + np.linspace(0, 1, 1401)[:, None] * off
-    ring = closed_ring(rail(xyz)).xyz
-    np.testing.assert_allclose(ring[[0, -1]], [[30.005, -0.01, 0.003]] * 2, atol=1e-9)
-    along = length_along(xyz[:, :2])
-    np.testing.assert_array_equal((ring == xyz).all(axis=1), np.minimum(along, along[-1] - along) >= 2 * HALO_M)
-    shift = ring - xyz
-    np.testing.assert_allclose(shift[:-1], -shift[:0:-1], atol=1e-5)
-    assert np.abs(np.diff(shift[:700, 2])).max() < 1e-4
-    apart = rail(xyz + np.linspace(0, 1, 1401)[:, None] * [0.5, 0, 0])
-    short = rail(xyz[:: 1400 // 4] * [0.05, 0.05, 1])
-    assert closed_ring(apart) is apart and closed_ring(short) is short
-
-
-@pytest.mark.parametrize(("x", "count"), [(55.0, 12), (50.02, 11)])
-@pytest.mark.parametrize("side", [0, -1])
-def test_a_branch_ends_in_a_vertex_of_the_line_it_left_also_on_a_gradient(x, count, side):
-    through = rail(np.column_stack([np.arange(0, 101.0, 10), np.zeros(11), np.arange(0, 21.0, 2)]))
-    branch = rail(np.array([[x, 0.01, 0.0], [x + 9, 1.0, 0.0], [x + 20, 4.0, 0.0]])[:: 1 if side == 0 else -1])
-    ended, met = _attached(branch, side, through)
-    place = [55.0, 0.0, 11.0] if count == 12 else [50.0, 0.0, 10.0]
-    assert len(met.xyz) == count and (np.diff(met.xyz[:, 0]) > 0).all()
-    np.testing.assert_allclose(ended.xyz[side], place, atol=1e-9)
-    assert (met.xyz == ended.xyz[side]).all(axis=1).sum() == 1
-    away = rail(branch.xyz + [0, 0.1, 0])
-    assert _attached(away, side, through) == (away, through)

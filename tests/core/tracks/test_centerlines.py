@@ -3,15 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rail_extract.core.errors import NoTrackError
-from rail_extract.core.polyline import length_along
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.centerlines import (
-    MAX_SEAM_M,
     CenterlineParameters,
     build_centerlines,
-    closed_centerline,
-    extended_ring,
-    started_abreast,
 )
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 from rail_extract.laboratory.rasters.turnouts import FORMS, branch
@@ -218,14 +213,6 @@ def test_the_bridged_length_of_a_track_is_unknown_if_the_gaps_of_a_rail_are(brid
     assert np.isnan(line.bridged_m)
 
 
-def test_bridged_length_is_counted_along_the_rail():
-    (rail,) = rails_of([[0.0, 0, 0], [20.0, 0, 0]], gaps=np.array([[2.0, 5.0], [9.0, 10.0]]))
-    t = np.array([-1.0, 0.0, 2.0, 3.5, 7.0, 9.5, 20.0, 21.0, np.nan])
-    np.testing.assert_allclose(rail.bridged_before(t), [-1, 0, 0, 1.5, 3, 3.5, 4, 5, np.nan])
-    np.testing.assert_allclose(rail.reversed().gaps, [[10, 11], [15, 18]])
-    np.testing.assert_allclose(rail.reversed().bridged_before(20 - t), 4 - rail.bridged_before(t))
-
-
 @pytest.mark.parametrize(
     ("gauge", "width", "question"),
     [(1.52, 0.072, ", is the gauge 1520 mm?"), (1.0, 0.072, ", is the gauge 1000 mm?"), (1.25, 0.072, ".")],
@@ -269,50 +256,9 @@ def test_cant_keeps_its_sign_on_a_centerline_that_is_turned_around(sign):
     assert (line.left_ids, line.right_ids) == ((1, 2), (3, 4))
 
 
-def test_rails_that_are_nowhere_opposite_each_other_are_no_track():
-    """A stray vertex folds the second rail back onto itself, and no station meets both."""
-    rails = rails_of(
-        np.array([[0.0, 0, 0], [2, 0, 0], [5, 0, 0], [6, 0, 0]]),
-        np.array([[26.877888746, SPACING, 0], [2, SPACING, 0], [5, SPACING, 0], [6, SPACING, 0]]),
-    )
-    assert build_centerlines(rails, GAUGE, WIDTH, CenterlineParameters(min_length_m=0.0)) == ()
-
-
 def ring(start=0.0, radius_m=RADIUS_M, turns=1.0, count=400):
     angle = start + np.linspace(0, 2 * np.pi * turns, count)
     xyz = np.column_stack([radius_m * np.cos(angle), radius_m * np.sin(angle), np.zeros(count)])
     if turns == 1.0:
         xyz[-1] = xyz[0]
     return xyz
-
-
-def test_closed_rails_start_abreast():
-    lines = [RailLine(xyz, 1, 10, 10, 1.0, 1.0, 0.0) for xyz in (ring(), ring(2.0, RADIUS_M + 1.5), ring()[:200])]
-    first, second, open_line = started_abreast(lines)
-    assert np.hypot(*(first.xyz[0] - second.xyz[0])[:2]) == pytest.approx(1.5, abs=0.002)
-    assert second.length_m == pytest.approx(lines[1].length_m, abs=0.001)
-    assert np.array_equal(second.xyz[0], second.xyz[-1])
-    assert open_line is lines[2]
-
-
-@pytest.mark.parametrize("turns", [1.001, 1.0, 0.999])
-def test_a_centerline_is_closed_if_its_ends_are_close(turns):
-    line = ring(turns=turns)
-    closed = closed_centerline(line)
-    assert np.array_equal(closed[0], closed[-1])
-    assert np.array_equal(closed[0], line[0])
-    steps = np.hypot(*np.diff(closed[:, :2], axis=0).T)
-    assert (steps > 0).all()
-    assert length_along(closed[:, :2])[-1] == pytest.approx(2 * np.pi * RADIUS_M, abs=0.05)
-    apart = ring(turns=1 - 1.2 * MAX_SEAM_M / (2 * np.pi * RADIUS_M))
-    assert closed_centerline(apart) is apart
-
-
-def test_the_extension_of_a_ring_runs_on_along_it():
-    line = ring()
-    step_m = length_along(line[:, :2])[1]
-    longer, before_m = extended_ring(line, 5.0)
-    assert 5.0 <= before_m < 5.0 + step_m + 1e-9
-    along = length_along(longer[:, :2])
-    assert 5.0 <= along[-1] - before_m - length_along(line[:, :2])[-1] < 5.0 + step_m + 1e-9
-    assert np.hypot(*np.diff(longer[:, :2], axis=0).T) == pytest.approx(step_m)

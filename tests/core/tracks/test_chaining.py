@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rail_extract.core.errors import Cancelled
 from rail_extract.core.polyline import length_along
-from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.centerlines import build_centerlines
 from rail_extract.laboratory.curves import Curve, Element, trace
@@ -108,11 +106,6 @@ def test_one_rail_continues_a_track_where_the_other_is_hidden(curve, hidden):
     assert line.gaugesd_mm < 0.5
 
 
-def test_one_rail_continues_a_track_over_a_limited_length():
-    left, right = Track(CURVED, SPACING).rails()
-    assert len(build(*without(left, (40.0, 75.0)), right)) == 2
-
-
 @pytest.mark.parametrize("gap_m", [2.0, 5.0])
 @pytest.mark.parametrize("kept_m", [-1.0, 0.0, 2.5, 4.0])
 def test_rails_with_alternating_gaps_give_one_centerline(gap_m, kept_m):
@@ -123,13 +116,6 @@ def test_rails_with_alternating_gaps_give_one_centerline(gap_m, kept_m):
     (line,) = found
     checked(found, [laid.centerline])
     assert line.bridged_m == pytest.approx(2 * gap_m + min(kept_m, 0.0), abs=0.6)
-
-
-def test_a_track_runs_to_the_end_of_its_longer_rail():
-    left, right = Track(CURVED, SPACING).rails()
-    (line,) = build(between(left, 4.0, np.inf), between(right, 0.0, 115.0))
-    assert line.length_m == pytest.approx(CURVED.length_m, abs=0.3)
-    assert line.bridged_m == pytest.approx(9.0, abs=0.2)
 
 
 @pytest.mark.parametrize("switch", SWITCHES)
@@ -224,20 +210,3 @@ def test_centerlines_rotate_and_move_with_their_rails(angle, east, north):
     expected = [line.xyz @ turn + [east, north, 0] for line in build_centerlines(rails, GAUGE, WIDTH)]
     found = build(*(rail.xyz @ turn + [east, north, 0] for rail in rails))
     assert_same_lines([line.xyz for line in found], expected, 2e-4)
-
-
-def test_drawing_a_long_track_can_be_cancelled():
-    class Impatient(Progress):
-        fraction = 0.0
-
-        def set_fraction(self, fraction):
-            self.fraction = fraction
-
-        def is_cancelled(self):
-            return self.fraction > 0.55
-
-    laid = Track(trace([Element(3000.0)], step_m=1.0), SPACING)
-    progress = Impatient()
-    with pytest.raises(Cancelled):
-        build(*laid.rails(), progress=progress)
-    assert progress.fraction < 0.75

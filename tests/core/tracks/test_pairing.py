@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 from rail_extract.core.rails import RailLine
 from rail_extract.core.tracks.pairing import (
-    find_candidates,
     pair_rails,
 )
-from rail_extract.core.tracks.parallels import find_parallels
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 
 GAUGE, WIDTH = 1.435, 0.072
@@ -91,28 +89,10 @@ def test_rails_pair_within_the_tolerance_of_the_gauge(widening, count):
     assert len(pair_rails(rails, GAUGE, WIDTH)) == count
 
 
-def test_each_section_of_a_side_belongs_to_one_track():
-    left, right, double = beside(STRAIGHT, SPACING / 2, -SPACING / 2, -SPACING / 2 - 0.03)
-    pairs = pair_rails(rails_of(left, right, double[100:300]), GAUGE, WIDTH)
-    assert [(pair.left, pair.right) for pair in pairs] == [(0, 1)]
-
-
-def test_the_middle_rail_of_three_belongs_to_a_track_on_either_side():
-    rails = rails_of(*beside(STRAIGHT, SPACING, 0.0, -SPACING))
-    pairs = pair_rails(rails, GAUGE, WIDTH)
-    assert {(pair.left, pair.right) for pair in pairs} == {(0, 1), (1, 2)}
-
-
 def test_dual_gauge_pairs_by_gauge():
     rails = rails_of(*beside(STRAIGHT, 0.0, -(1.0 + WIDTH), -SPACING))
     assert [(p.left, p.right) for p in pair_rails(rails, GAUGE, WIDTH)] == [(0, 2)]
     assert [(p.left, p.right) for p in pair_rails(rails, 1.0, WIDTH)] == [(0, 1)]
-
-
-def test_short_sections_at_gauge_do_not_pair():
-    crossing = trace([Element(60.0)], heading=0.7 + 0.05, start=(0.0, -2.0))
-    pairs = pair_rails(rails_of(STRAIGHT.xy[::10], crossing.xy[::10]), GAUGE, WIDTH)
-    assert pairs == ()
 
 
 def test_rails_of_different_classes_do_not_pair():
@@ -125,17 +105,6 @@ def test_long_rails_pair_in_parts_that_cover_them():
     pairs = pair_rails(rails_of(*tracks(curve, 0.0)), GAUGE, WIDTH)
     assert len(pairs) == 2
     assert sum(pair.length_m for pair in pairs) == pytest.approx(1500.0, abs=3.0)
-
-
-def test_fewer_than_two_rails_make_no_pair():
-    assert pair_rails([], GAUGE, WIDTH) == ()
-    assert pair_rails(rails_of(STRAIGHT.xy), GAUGE, WIDTH) == ()
-
-
-@pytest.mark.parametrize(("deviation", "count"), [(0.09, 1), (-0.09, 1), (0.11, 0), (-0.11, 0)])
-def test_candidates_are_sought_within_twice_the_tolerance(deviation, count):
-    parallels = find_parallels(rails_of(*tracks(STRAIGHT, 0.0, spacing=SPACING + deviation)))
-    assert len(find_candidates(parallels, SPACING, 0.05)) == count
 
 
 def wandering(rng, curve, offset, sigma_m):
@@ -158,14 +127,6 @@ def test_the_edge_of_a_cable_trough_is_no_partner(seed, widening, side):
     assert {pair.left, pair.right} == {0, 1}
 
 
-def test_a_wrong_partner_does_not_stay_where_the_right_one_is_interrupted():
-    left, right = tracks(CURVED, 0.0)
-    edge = wandering(np.random.default_rng(9), CURVED, -SPACING / 2 - 1.475, 0.006)
-    broken = left[:150], left[400:]
-    pairs = pair_rails(rails_of(right, edge, *broken), GAUGE, WIDTH)
-    assert {frozenset((pair.left, pair.right)) for pair in pairs} == {frozenset((0, 2)), frozenset((0, 3))}
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_wandering_lines_on_both_sides_do_not_make_the_track_between_them_a_ghost(seed):
     rng = np.random.default_rng(seed)
@@ -175,9 +136,3 @@ def test_wandering_lines_on_both_sides_do_not_make_the_track_between_them_a_ghos
     pairs = pair_rails(rails_of(*tracks(CURVED, 0.0), *edges), GAUGE, WIDTH)
     assert {frozenset((pair.left, pair.right)) for pair in pairs} == {frozenset((0, 1))}
     assert sum(pair.length_m for pair in pairs) == pytest.approx(CURVED.length_m, abs=0.5)
-
-
-def test_a_rail_whose_other_partner_is_as_good_keeps_both():
-    """Where three rails are at the gauge, nothing shows which two are a track."""
-    widths = beside(CURVED, SPACING, 0.0, -SPACING - 0.005)
-    assert len(pair_rails(rails_of(*widths), GAUGE, WIDTH)) == 2

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from rail_extract.core.progress import Progress, Recording
 from rail_extract.core.rails import RailLine
-from rail_extract.core.tracks.parallels import find_parallels, most_common_spacing, width_at, widths_by_gauge
+from rail_extract.core.tracks.parallels import find_parallels, most_common_spacing, widths_by_gauge
 from rail_extract.laboratory.curves import Element, trace, transition_curve
 
 GAUGES = ((1.435, 0.072), (1.0, 0.066))
@@ -30,26 +30,10 @@ def tracks(curve, *axes, spacing=SPACING):
     return beside(curve, *(axis + side * spacing / 2 for axis in axes for side in (1, -1)))
 
 
-def test_parallels_have_side_direction_and_place():
-    left, right = tracks(STRAIGHT, 0.0)
-    parallels = find_parallels(rails_of(left, right[::-1]))
-    assert set(parallels.a) == {0}
-    assert set(parallels.b) == {1}
-    np.testing.assert_allclose(parallels.left_m, -SPACING, atol=1e-9)
-    assert not parallels.same.any()
-    np.testing.assert_allclose(parallels.t_a + parallels.t_b, 60.0, atol=0.3)
-
-
 @pytest.mark.parametrize("spacing", [1.0619, 1.507, 1.592, 1.743])
 def test_most_common_spacing_is_measured_to_the_millimetre(spacing):
     rails = rails_of(*tracks(CURVED, 0.0, 4.2, spacing=spacing))
     assert most_common_spacing(rails, 3.0) == pytest.approx(spacing, abs=1e-3)
-
-
-def test_rails_far_apart_or_crossing_have_no_spacing():
-    assert most_common_spacing(rails_of(*beside(STRAIGHT, 0.0, 4.0)), 3.0) is None
-    assert most_common_spacing(rails_of(STRAIGHT.xy, trace([Element(40.0)], heading=2.0).xy), 3.0) is None
-    assert most_common_spacing(rails_of(STRAIGHT.xy), 3.0) is None
 
 
 def test_a_crowd_of_lines_is_left_out_with_a_warning():
@@ -81,12 +65,3 @@ def rails_at(*lefts, length_m=20.0):
 )
 def test_each_rail_has_the_width_of_its_track(lefts, widths):
     assert widths_by_gauge(rails_at(*lefts), GAUGES, 0.05).tolist() == widths
-
-
-def test_one_width_for_all_needs_no_partner():
-    assert widths_by_gauge(rails_at(0.0, 1.066), ((1.435, 0.072), (1.0, 0.072)), 0.05).tolist() == [0.072, 0.072]
-
-
-@pytest.mark.parametrize(("spacing_m", "width_m"), [(WIDE, 0.072), (NARROW, 0.066), (1.25, 0.066), (1.32, 0.072)])
-def test_a_distance_has_the_width_of_the_nearest_gauge(spacing_m, width_m):
-    assert width_at(spacing_m, GAUGES) == width_m

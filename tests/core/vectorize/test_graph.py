@@ -86,22 +86,6 @@ def test_a_bar_becomes_one_straight_line_exactly_in_its_middle(width, turned):
     assert 0 <= 79 - np.ptp(along) <= width / 2
 
 
-def test_without_the_parity_fix_an_even_bar_is_half_a_pixel_off():
-    pixels = pixel_set(np.argwhere(np.ones((2, 80), dtype=bool)))
-    distance = chamfer_distance(pixels)
-    edges, _ = prune(veinerize(pixels, distance), distance)
-    assert set(pixels.cells[np.unique(edges), 0]) in ({0}, {1})
-
-
-def test_a_rail_that_diverges_one_in_nine_has_three_ends_and_one_junction():
-    columns = np.arange(300)
-    cells = [np.column_stack([np.full(300, row), columns]) for row in range(2)]
-    cells += [np.column_stack([(columns / 9).astype(int) + row, columns]) for row in range(2)]
-    network = skeleton(np.concatenate(cells))
-    assert sorted(network.degrees()) == [1, 1, 1, 3]
-    assert len(network.lines) == 3
-
-
 def test_a_ring_becomes_one_closed_line():
     row, column = np.mgrid[-40:41, -40:41]
     network = skeleton(np.argwhere(np.abs(np.hypot(row, column) - 30) < 1.2))
@@ -110,21 +94,3 @@ def test_a_ring_becomes_one_closed_line():
     assert network.degrees().tolist() == [2]
     radius = np.hypot(line[:, 0] - 40, line[:, 1] + 40)
     assert np.abs(radius - 30).max() < 1.0
-
-
-def test_specks_leave_nothing():
-    assert skeleton(np.array([(0, 0), (0, 1), (50, 7), (90, 90)])).lines == ()
-
-
-def test_no_cell_no_line():
-    assert skeleton(np.empty((0, 2), dtype=int)).lines == ()
-
-
-def test_a_noisy_bar_has_no_side_branches():
-    random = np.random.default_rng(2)
-    image = np.zeros((9, 600), dtype=bool)
-    image[3:5] = True
-    image[2] = random.random(600) < 0.15
-    image[5] = random.random(600) < 0.15
-    network = skeleton(np.argwhere(image))
-    assert sorted(network.degrees()) == [1, 1]

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from rail_extract.core.raster import TILE, RailRaster
-from rail_extract.core.vectorize.pixels import HOLE_CELLS, STEP_COSTS, chamfer_distance, close, parity_fix, pixel_set
+from rail_extract.core.vectorize.pixels import HOLE_CELLS, chamfer_distance, close, parity_fix, pixel_set
 from scipy import ndimage
 
 EIGHT = np.ones((3, 3))
@@ -29,20 +29,6 @@ def dense(pixels, shape):
     return image
 
 
-def run_lengths(image):
-    lengths = []
-    for row in image:
-        borders = np.flatnonzero(np.diff(np.concatenate([[0], row.astype(int), [0]])))
-        lengths.extend(borders[1::2] - borders[::2])
-    return np.array(lengths, dtype=int)
-
-
-def counts(image):
-    """Components of the foreground (8) and holes (4)."""
-    holes = ndimage.label(np.pad(~image, 1, constant_values=True))[1] - 1
-    return ndimage.label(image, EIGHT)[1], holes
-
-
 def two_pass_chamfer(image):
     rows, columns = np.array(image.shape) + 2
     distance = np.pad(np.where(image, 10**6, 0), 1).astype(int)
@@ -63,51 +49,12 @@ def test_parity_fix_on_pixels_equals_the_rule_on_arrays(image):
     np.testing.assert_array_equal(dense(doubled, np.array(image.shape) * 2 - 1), dense_parity_fix(image))
 
 
-@given(images)
-@settings(max_examples=60, deadline=None)
-def test_parity_fix_makes_runs_odd_and_keeps_the_topology(image):
-    doubled = dense(parity_fix(pixel_set(np.argwhere(image))), np.array(image.shape) * 2 - 1)
-    np.testing.assert_array_equal(run_lengths(doubled[::2]), 2 * run_lengths(image) - 1)
-    np.testing.assert_array_equal(run_lengths(doubled[:, ::2].T), 2 * run_lengths(image.T) - 1)
-    assert counts(doubled) == counts(image)
-
-
-@given(images)
-@settings(max_examples=30, deadline=None)
-def test_parity_fix_of_the_transpose_is_the_transpose(image):
-    there = parity_fix(pixel_set(np.argwhere(image))).cells
-    turned = parity_fix(pixel_set(np.argwhere(image.T))).cells
-    assert set(map(tuple, there)) == {(column, row) for row, column in turned}
-
-
 @given(images, st.integers(-(10**6), 10**6))
 @settings(max_examples=40, deadline=None)
 def test_chamfer_distance_equals_the_two_passes(image, shift):
     pixels = pixel_set(np.argwhere(image) + [shift, -shift])
     expected = two_pass_chamfer(image)[image]
     np.testing.assert_array_equal(chamfer_distance(pixels), expected)
-
-
-def test_chamfer_distance_inside_a_large_blot():
-    image = np.ones((41, 61), dtype=bool)
-    distance = dense_distance = chamfer_distance(pixel_set(np.argwhere(image))).reshape(image.shape)
-    assert distance[20, 30] == 21 * STEP_COSTS[0]
-    np.testing.assert_array_equal(dense_distance, two_pass_chamfer(image))
-
-
-def test_neighbours_are_mutual_and_do_not_wrap_around_rows():
-    pixels = pixel_set([(0, 0), (0, 4), (1, 0), (1, 4), (1, 3), (0, 0)])
-    assert len(pixels) == 5
-    for number, around in enumerate(pixels.neighbours):
-        for direction in np.flatnonzero(around < len(pixels)):
-            assert pixels.neighbours[around[direction], (direction + 4) % 8] == number
-    assert np.count_nonzero(pixels.neighbours < len(pixels)) == 2 * 4
-
-
-def test_a_wide_area_is_as_deep_as_its_nearest_border():
-    cells = np.argwhere(np.ones((61, 90)))
-    inward = np.minimum(cells, [60, 89] - cells).min(axis=1) + 1
-    assert np.array_equal(chamfer_distance(pixel_set(cells)), 2 * inward)
 
 
 def raster_of(image, corner=(0, 0)):
@@ -131,12 +78,3 @@ def test_closing_does_not_depend_on_the_tiles(corner):
 def test_holes_are_filled_up_to_twenty_cells(side, filled):
     image = np.pad(np.zeros(side, dtype=bool), 2, constant_values=True)
     assert close(raster_of(image)).count() == (image.size if filled else image.sum())
-
-
-def test_closing_bridges_two_cells_but_not_three():
-    line = np.ones((2, 30), dtype=bool)
-    two, three = line.copy(), line.copy()
-    two[:, 10:12] = False
-    three[:, 10:13] = False
-    assert close(raster_of(two)).count() == 60
-    assert close(raster_of(three)).count() == 54

@@ -266,33 +266,6 @@ def test_a_cancel_ends_the_work():
         vectorize(draw([straight(5, 0.3)]), HEAD_M, progress=Impatient())
 
 
-def test_the_progress_rises_from_0_to_1():
-    fractions = []
-
-    class Listening(Progress):
-        def set_fraction(self, fraction):
-            fractions.append(fraction)
-
-    vectorize(draw([straight(20, 0.3)]), HEAD_M, progress=Listening())
-    assert fractions == sorted(fractions)
-    assert 0.0 <= fractions[0] < 0.3
-    assert fractions[-1] == 1.0
-
-
-def test_every_line_asks_for_a_cancel():
-    class Counting(Progress):
-        asked = 0
-
-        def check(self):
-            Counting.asked += 1
-
-    rails = [straight(8, 0.3, (0.0, 2.0 * number)) for number in range(30)]
-    progress = Counting()
-    progress.span = lambda start, end: progress
-    vectorize(draw(rails), HEAD_M, progress=progress)
-    assert Counting.asked > 3 * len(rails)
-
-
 def test_a_weed_on_the_side_of_a_rail_is_not_a_branch():
     rail = straight(20, 0.3)
     weed = rail.mean(axis=0) + np.outer([0.0, 0.8], [0.0, 1.0])

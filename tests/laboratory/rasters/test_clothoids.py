@@ -28,32 +28,6 @@ def test_a_combination_reaches_its_end_in_its_direction(first, last, chord, dire
     assert curve.heading[-1] == pytest.approx(direction + last, abs=1e-9)
 
 
-@pytest.mark.parametrize("share", range(len(SHARES)))
-def test_curvature_is_continuous_and_zero_at_both_ends(share):
-    elements = join(Pose(0.0, 0.0, 0.5), Pose(40.0, 0.0, 0.2), share)
-    assert elements[0].start == elements[2].end == 0.0
-    assert [elements[0].end, elements[1].end] == [elements[1].start, elements[2].start]
-    length = sum(element.length_m for element in elements)
-    assert elements[0].length_m == pytest.approx(SHARES[share] * length)
-
-
-def test_points_in_line_are_joined_by_a_straight():
-    elements = join(Pose(0.0, 0.0, 0.0), Pose(25.0, 0.0, 0.0))
-    assert sum(element.length_m for element in elements) == pytest.approx(25.0)
-    assert max(abs(element.end) for element in elements) < 1e-12
-
-
-def test_equal_deflections_give_a_symmetric_curve_and_opposite_ones_a_reverse_curve():
-    turn, reverse = (join(Pose(0.0, 0.0, 0.3), Pose(20.0, 0.0, last)) for last in (-0.3, 0.3))
-    assert turn[0].end == pytest.approx(turn[2].start, rel=1e-9)
-    assert turn[0].end < 0
-    assert reverse[0].end == pytest.approx(-reverse[2].start, rel=1e-9)
-
-
-def test_points_that_look_away_are_not_joined():
-    assert join(Pose(0.0, 0.0, 2.0), Pose(20.0, 0.0, 0.0)) is None
-
-
 def test_the_table_is_solved_everywhere():
     known = table()
     assert known.skew.shape == (len(SHARES), 71, 71)
@@ -78,10 +52,3 @@ def test_random_joins_start_and_end_at_poses_and_keep_to_the_radius():
         length = sum(element.length_m for element in elements)
         end = trace(elements, (start.x, start.y), start.heading, length / 3000).xy[-1]
         assert np.linalg.norm(places - end, axis=1).min() < 1e-4
-
-
-def test_bent_joins_are_drawn_less_often_than_straight_ones():
-    poses = [Pose(0.0, 0.0, 0.0), Pose(40.0, 0.0, 0.0), Pose(40.0, 10.0, 0.0)]
-    drawn = [random_joins(np.random.default_rng(seed), poses, 1, 10.0)[0][1] for seed in range(150)]
-    bent = sum(abs(elements[0].end) > 1e-3 for elements in drawn)
-    assert 0 < bent < 0.3 * len(drawn)

@@ -11,18 +11,11 @@ from rail_extract.core.standards import STANDARDS
 from rail_extract.laboratory.scenes.raw import scan_world
 from rail_extract.laboratory.scenes.raw_catalogue import line, parallel
 from rail_extract.laboratory.scenes.raw_photogrammetry import (
-    BUILDING_CLASS,
-    GROUND_CLASS,
-    HIGH_CLASS,
-    LOW_CLASS,
-    ROAD_CLASS,
     Photogrammetry,
     misplaced,
-    waves,
 )
 from rail_extract.laboratory.scenes.raw_scanner import RawScanner
-from rail_extract.laboratory.scenes.raw_things import plants, platform, trees, wall
-from rail_extract.laboratory.scenes.raw_world import GROUND, HEAD, PAVEMENT, WIRE, World, ground, running_rails
+from rail_extract.laboratory.scenes.raw_world import HEAD, ground, running_rails
 from rail_extract.laboratory.scenes.write import write_raw
 
 STANDARD = STANDARDS["EN_60E1_1435"]
@@ -37,33 +30,9 @@ def surveyed(camera, things=(ground, running_rails), tracks=True, length_m=12.0,
     return scan_world("here", laid, STANDARD, [camera], list(things), seed, reference=curve, half_width_m=half_width_m)
 
 
-def flat(world: World) -> None:
-    world.add(np.array([-4.0, 4.0]), np.zeros(2), PAVEMENT)
-
-
 def left_of(scene, xyz):
     """Places to the left of the reference line, which starts at (3, 5) with a heading of 0.4."""
     return (xyz[:, 1] - 5.0) * np.cos(0.4) - (xyz[:, 0] - 3.0) * np.sin(0.4)
-
-
-def test_points_are_as_dense_as_stated():
-    scene = surveyed(replace(EXACT, point_step_m=0.08), [flat], tracks=False)
-    assert len(scene.xyz) == pytest.approx(12.0 * 8.0 / 0.08**2, rel=0.02)
-    assert (scene.classification == ROAD_CLASS).all()
-
-
-def test_without_blur_points_lie_on_what_is_uppermost():
-    def shelf(world: World) -> None:
-        world.add(np.array([1.0, 1.0, 2.0, 2.0]), np.array([0.0, 0.1, 0.1, 0.0]), GROUND)
-        world.add(np.array([-3.0, -2.0]), np.array([0.15, 0.15]), PAVEMENT)
-        world.add(np.array([-1.0, -0.9]), np.array([5.0, 5.0]), WIRE)
-
-    scene = surveyed(EXACT, [flat, shelf], tracks=False)
-    left = left_of(scene, scene.xyz)
-    on, over = (left > 1.02) & (left < 1.98), (left > -2.98) & (left < -2.02)
-    assert scene.xyz[on, 2] == pytest.approx(0.1, abs=1e-6)
-    assert scene.xyz[over, 2] == pytest.approx(0.15, abs=1e-6)
-    assert scene.xyz[(left > -1.9) & (left < 0.9), 2] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_rail_becomes_a_ridge_of_the_width_and_height_of_a_blunted_bar():
@@ -82,16 +51,6 @@ def test_a_rail_becomes_a_ridge_of_the_width_and_height_of_a_blunted_bar():
     assert off[scene.kind == HEAD].min() < 0.01
 
 
-def test_waves_have_their_size_and_length():
-    xy = np.random.RandomState(1).uniform(0, 200, (4000, 2))
-    values = waves(xy, (1.0, 10.0), np.random.RandomState(5))
-    near = waves(np.concatenate([xy, xy + [0.1, 0.0]]), (1.0, 10.0), np.random.RandomState(5)).reshape(2, -1)
-    far = waves(np.concatenate([xy, xy + [40.0, 0.0]]), (1.0, 10.0), np.random.RandomState(5)).reshape(2, -1)
-    assert values.std() == pytest.approx(1.0, abs=0.1)
-    assert np.corrcoef(near)[0, 1] > 0.9
-    assert abs(np.corrcoef(far)[0, 1]) < 0.35
-
-
 def test_two_epochs_share_the_place_and_have_errors_of_their_own():
     shift = (0.03, -0.02, 0.025)
     camera = Photogrammetry(stray_share=0.0)
@@ -102,31 +61,6 @@ def test_two_epochs_share_the_place_and_have_errors_of_their_own():
     place = np.zeros((200, 3)) + np.random.RandomState(2).uniform(0, 50, (200, 3))
     apart = misplaced(place, camera, np.random.RandomState(1)) - misplaced(place, camera, np.random.RandomState(2))
     assert apart[:, 2].std() == pytest.approx(np.sqrt(2) * camera.wave_m, rel=0.5)
-
-
-def test_there_are_holes_beside_walls_and_nothing_below_a_platform():
-    def beside(world: World) -> None:
-        wall(world, -3.0, -0.9, 2.0, 0.0, 12.0)
-        platform(world, 0, 1, 0.0, 12.0)
-
-    with_walls = surveyed(EXACT, [ground, running_rails, beside])
-    left, z = left_of(with_walls, with_walls.xyz), with_walls.xyz[:, 2]
-    shadow = (left > -2.84) & (left < -2.5)
-    assert (z[shadow & (z < 0)].size) == 0
-    assert ((left > -2.0) & (left < -1.0)).sum() > 1000
-    under = (left > 1.75) & (left < 3.9)
-    assert z[under].min() > 0.5
-
-
-def test_classes_are_those_of_a_ground_filter():
-    def grown(world: World) -> None:
-        plants(world, 40, (2.5, 3.8), (0.3, 0.6), (0.2, 0.3))
-        trees(world, 2, (-3.5, -2.5))
-        wall(world, -2.0, -0.9, 4.0, 0.0, 12.0)
-
-    scene = surveyed(Photogrammetry(), [ground, running_rails, grown])
-    assert (scene.classification[scene.kind == HEAD] == GROUND_CLASS).all()
-    assert {GROUND_CLASS, LOW_CLASS, HIGH_CLASS, BUILDING_CLASS} <= set(np.unique(scene.classification))
 
 
 @pytest.mark.parametrize("camera", [EXACT, RawScanner(profile_step_m=0.2)])

@@ -9,16 +9,13 @@ from rail_extract.core.errors import ParameterError
 from rail_extract.core.frpdf import STATISTICS
 from rail_extract.core.frpdf.folding import fold
 from rail_extract.core.frpdf.weights import load_arrays
-from rail_extract.laboratory.rasters.pairs import random_pair
 from rail_extract.laboratory.training.scores import score
-from scipy import ndimage
 
 torch = pytest.importorskip("torch")
 
 from rail_extract.core.frpdf.network import PassBatchNorm2d, Recurrent, weights_of  # noqa: E402
-from rail_extract.laboratory.training import evaluate, gradients, learning_curves, train  # noqa: E402
-from rail_extract.laboratory.training.networks import NETWORKS, TrainedNetwork, parameter_count  # noqa: E402
-from rail_extract.laboratory.training.optimizers import Optimizers  # noqa: E402
+from rail_extract.laboratory.training import evaluate, gradients, train  # noqa: E402
+from rail_extract.laboratory.training.networks import TrainedNetwork  # noqa: E402
 
 
 @pytest.fixture
@@ -72,43 +69,6 @@ def test_batch_norm_of_several_columns_at_once_is_that_of_torch():
     assert torch.allclose(own.eval()(x), plain.eval()(x), atol=0.01)
 
 
-def test_the_rectifier_and_its_gradient_are_those_of_torch():
-    torch.manual_seed(0)
-    own = for_the_cpu(torch.nn.ReLU(inplace=True))
-    assert type(own) is gradients.CpuReLU
-    x = torch.randn(2, 5, 8, 9, dtype=torch.bfloat16)
-    x[0, 0, 0, :3] = 0
-    x.requires_grad_()
-    upstream = torch.randn_like(x)
-    y, expected = own(x), torch.relu(x)
-    assert torch.equal(y, expected)
-    assert torch.equal(*(torch.autograd.grad(result, x, upstream)[0] for result in (y, expected)))
-
-
-def test_the_learning_rate_rises_and_falls_as_a_cosine():
-    settings = train.Settings(1000, 0.003, 0, "cpu")
-    assert train.learning_rate(0, settings) == pytest.approx(0.003 / train.WARM_UP_STEPS)
-    assert train.learning_rate(500, settings) == pytest.approx(0.0015)
-    assert train.learning_rate(999, settings) < 1e-5
-
-
-def test_the_loss_of_a_perfect_answer_is_small_and_of_the_opposite_large():
-    label = (torch.arange(100.0).reshape(1, 1, 10, 10) % 3 == 0).float()
-    even = torch.ones_like(label)
-    assert train.loss_of(40 * label - 20, label, even) < 0.01
-    assert train.loss_of(20 - 40 * label, label, even) > 10
-
-
-def test_cells_near_gaps_and_false_rails_weigh_more_whether_rail_or_not():
-    pair = random_pair(np.random.default_rng(3), 256, 0.8, family="turnout")
-    weights = train.cell_weights(pair)
-    hard = (pair.gap > 0) | pair.distractor
-    near = ndimage.distance_transform_cdt(~hard, "chessboard") <= train.HARD_REACH
-    np.testing.assert_array_equal(weights, np.where(near, train.HARD_WEIGHT, 1.0))
-    assert 0.01 < near.mean() < 0.2
-    assert (near & pair.label).any() and (near & ~pair.label).any()
-
-
 def test_a_resumed_training_gives_the_weights_of_an_unbroken_one(small, tmp_path):
     settings = train.Settings(3, 0.003, 7, "cpu")
     for folder in ("a", "b"):
@@ -157,11 +117,6 @@ def test_the_command_leaves_weights_that_the_engines_take(small, tmp_path):
     assert not np.allclose(means[0], means[1])
 
 
-@pytest.mark.parametrize("name", sorted(set(NETWORKS) - {"fast"}))
-def test_the_networks_have_the_same_number_of_parameters(name):
-    assert parameter_count(NETWORKS[name]()) == pytest.approx(parameter_count(NETWORKS["frpdf"]()), rel=0.05)
-
-
 @pytest.mark.parametrize("name", ["fast", "unet", "acnn", "pooled", "skipping"])
 def test_other_networks_are_trained_and_run_like_frpdf(small, tmp_path, name, monkeypatch):
     monkeypatch.setattr(train, "CROPS", ((128, 1),))
@@ -176,49 +131,6 @@ def test_other_networks_are_trained_and_run_like_frpdf(small, tmp_path, name, mo
     probability = TrainedNetwork(name, tmp_path / "weights.npz").probabilities(raster, 0 * raster + 0.5, 0)
     assert probability.shape == (128, 128)
     assert 0 < probability.mean() < 0.5
-
-
-def test_muon_moves_every_direction_of_a_kernel_alike():
-    torch.manual_seed(0)
-    kernel = torch.nn.Conv2d(8, 6, 3, bias=False)
-    network = torch.nn.Sequential(kernel, torch.nn.BatchNorm2d(6)).to(memory_format=torch.channels_last)
-    before = kernel.weight.detach().clone()
-    optimizer = Optimizers(network)
-    (network(torch.randn(1, 8, 16, 16)) ** 3).sum().backward()
-    optimizer.step(rate=0.01)
-    moved = (kernel.weight.detach() - before).reshape(6, -1)
-    sizes = torch.linalg.svdvals(moved) / (0.01 * 0.2 * 72**0.5)
-    assert sizes.min() > 0.4
-    assert sizes.max() < 1.3
-
-
-def test_learning_curves_average_consecutive_steps_and_count_repeated_ones_once(tmp_path):
-    log = tmp_path / "log.csv"
-    log.write_text("step,loss_1,f1_1\n" + "".join(f"{n},{n},0.5\n" for n in [*range(250), 248, 249]))
-    columns = learning_curves.read_log(log)
-    assert len(columns["step"]) == 250
-    steps, means = learning_curves.binned(columns["step"], columns["loss_1"])
-    assert len(steps) == learning_curves.MAX_BINS
-    assert np.allclose(steps, means)
-    learning_curves.draw_curves(log, tmp_path / "learning_curves.png")
-    assert (tmp_path / "learning_curves.png").stat().st_size > 10_000
-
-
-def test_a_training_for_a_ratio_draws_rails_of_that_width(small, monkeypatch):
-    drawn, draw = [], train.training_pair
-    monkeypatch.setattr(train, "training_pair", lambda rng, side, ratio: drawn.append(ratio) or draw(rng, side))
-    for step in range(5):
-        train.batch(train.Settings(5, 0.003, 0, "cpu", ratio=22.2), train.DATA, step)
-    assert all(abs(np.log(ratio / 22.2)) <= 0.06 for ratio in drawn)
-    assert len(set(drawn)) == 5
-
-
-def test_the_evaluation_set_is_fixed_and_its_rasters_are_poor():
-    pairs = evaluate.evaluation_pairs(6)
-    again = evaluate.evaluation_pairs(6)
-    assert all(np.array_equal(a.observed, b.observed) for a, b in zip(pairs, again))
-    assert {pair.label.shape for pair in pairs} == {(evaluate.SIDE, evaluate.SIDE)}
-    assert 0.1 < evaluate.evaluate("input", lambda x: x, pairs).scores.f1 < 0.5
 
 
 def test_cleaning_without_a_network_closes_gaps_and_drops_specks():

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from lines import farthest, read_features, read_lines
 from osgeo import gdal
-from qgis.core import QgsRasterLayer, QgsVectorLayer
+from qgis.core import QgsRasterLayer
 from rail_extract.core.frpdf import engine
 from rail_extract.core.raster import cell_size
-from rail_extract.rail_extract_plugin.paths import STYLES
 from rail_extract.rail_extract_plugin.reading.geotiff import read_header, read_rasters
 
 LAST_DIGIT = 0.11
@@ -131,28 +130,6 @@ def test_rasterize_alone(raster, track):
     assert layer.width() * layer.height() == header.window[2] * header.window[3]
 
 
-def test_one_algorithm_serves_a_batch_over_a_folder(qgis, plugin, outcome, write_cloud, track, tmp_path):
-    algorithm = qgis.processingRegistry().createAlgorithmById("railextract:rasterizerailpoints")
-    counts = []
-    for number in range(3):
-        tile = write_cloud(track(length_m=4.0 * (number + 1)), f"tile {number}.las")
-        made = outcome(algorithm, {"INPUT": tile, "OUTPUT": tmp_path / f"tile {number}.tif"})
-        assert made.ok, made.error
-        path = tmp_path / f"tile {number}.tif"
-        counts.append(read_rasters(path, read_header(path))[0].count())
-    assert counts[1] / counts[0] == pytest.approx(2, rel=0.1)
-    assert counts[2] / counts[0] == pytest.approx(3, rel=0.1)
-
-
-def test_points_too_thin_for_rails_are_refused_before_the_raster(run_step, write_cloud, track, tmp_path):
-    points = track()
-    cloud = write_cloud(points[0] + 100 * (points - points[0]))
-    outcome = run_step("rasterizerailpoints", {"INPUT": cloud, "OUTPUT": tmp_path / "raster.tif"})
-    assert not outcome.ok
-    assert outcome.error.startswith("The points of class 10 are ")
-    assert "too far for rails" in outcome.error
-
-
 def test_rasterize_makes_one_band_per_class(run_step, write_cloud, track, tmp_path):
     for code in (11, 10):
         write_cloud(track() + [0, 0.2 * code, 0], f"{code}.las", class_code=code)
@@ -237,26 +214,6 @@ def test_raster_from_other_software_needs_gauge_and_head_width(run_step, raster,
     assert outcome.results["RAIL_COUNT"] == 2
 
 
-@pytest.mark.parametrize(
-    ("name", "parameters", "sentence"),
-    [
-        ("frpdfcleanup", {"GAUGE": 1000, "HEAD_WIDTH": 61.91}, "cells are 39.9 mm wide, but a gauge of 1000 mm"),
-        ("frpdfcleanup", {"ENGINE": "OPENCV", "DEVICE": "CUDA"}, "on the CPU only"),
-        ("frpdfcleanup", {"INPUT": "gone.tif"}, "gone.tif"),
-        ("frpdfcleanup", {"OUTPUT": "cleaned.jpg"}, "jpg"),
-        ("frpdfcleanup", {"OUTPUT": "/nowhere/cleaned.tif"}, "can't be written"),
-        ("vectorizerails", {"POINTS": "gone.laz"}, "gone.laz does not exist"),
-    ],
-)
-def test_bad_input_is_one_sentence(run_step, raster, tmp_path, name, parameters, sentence):
-    suffix = "tif" if name == "frpdfcleanup" else "gpkg"
-    outcome = run_step(name, {"INPUT": raster, "OUTPUT": tmp_path / f"output.{suffix}", **parameters})
-    assert not outcome.ok
-    assert sentence in outcome.error
-    assert "Traceback" not in outcome.error
-    assert not (tmp_path / f"output.{suffix}").exists()
-
-
 def test_points_of_another_area_are_refused(run_step, raster, write_cloud, track, tmp_path):
     for points, given, sentence in (
         (track(), {"epsg": 32644}, "POINTS are in WGS 84 / UTM zone 44N but the raster in WGS 84 / UTM zone 43N"),
@@ -267,15 +224,6 @@ def test_points_of_another_area_are_refused(run_step, raster, write_cloud, track
         outcome = run_step("vectorizerails", {"INPUT": raster, "POINTS": other, "OUTPUT": tmp_path / "r.gpkg"})
         assert sentence in outcome.error
         assert not (tmp_path / "r.gpkg").exists()
-
-
-def test_points_without_a_coordinate_system_are_taken_in_that_of_the_raster(
-    run_step, raster, write_cloud, track, tmp_path
-):
-    untold = write_cloud(track(), "untold.las", epsg=None)
-    outcome = run_step("vectorizerails", {"INPUT": raster, "POINTS": untold, "OUTPUT": tmp_path / "r.gpkg"})
-    assert outcome.ok, outcome.error
-    assert QgsVectorLayer(str(tmp_path / "r.gpkg"), "rails").crs().authid() == "EPSG:32643"
 
 
 @pytest.mark.parametrize("name", ["rasterizerailpoints", "vectorizerails"])
@@ -302,9 +250,3 @@ def test_cancelled_step_writes_nothing(run_step, raster, cloud, tmp_path, new_fe
     outcome = run_step(name, {**source, "OUTPUT": output}, new_feedback(cancel_at=1))
     assert outcome.error == "Cancelled; nothing was written."
     assert not output.exists()
-
-
-def test_raster_has_a_style(raster):
-    layer = QgsRasterLayer(str(raster), "raster")
-    layer.loadNamedStyle(str(STYLES / "raster.qml"))
-    assert [entry.value for entry in layer.renderer().classes()] == [1]

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from qgis.core import QgsCoordinateReferenceSystem, QgsPointCloudLayer, QgsPointXY, QgsProject, QgsRectangle
 from qgis.gui import QgsMapCanvas, QgsMessageBar
+from qgis.PyQt import sip
 from qgis.PyQt.QtCore import QPoint, Qt
 from qgis.PyQt.QtTest import QTest
 from qgis.PyQt.QtWidgets import QFileDialog, QMainWindow
 from rail_extract.laboratory.scenes.raw_strips import SPACING_M, strip
 from rail_extract.rail_extract_plugin.growing.tool import GrowRails
+from rail_extract.rail_extract_plugin.notices import notices
 
 CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
 TRACK = strip(12.0)
@@ -29,7 +31,8 @@ def canvas(qgis):
     canvas.setExtent(QgsRectangle(499_999, 2_999_997, 500_013, 3_000_003))
     canvas.show()
     qgis.processEvents()
-    return canvas
+    yield canvas
+    sip.delete(canvas)  # or Python deletes it after QGIS has ended, which crashes
 
 
 @pytest.fixture
@@ -50,6 +53,8 @@ def growing(qgis, canvas):
     made.close_for_good()
     if made.dialog is not None:
         made.dialog.close()
+    sip.delete(messages)
+    sip.delete(window)
 
 
 def click(canvas, point):
@@ -135,6 +140,28 @@ def test_the_dialog_opens_with_the_seeds_and_runs(qgis, canvas, layer, growing, 
     done = run_step("growrailpoints", {**values, "INPUT": layer.source(), "OUTPUT": tmp_path / "new.laz"})
     assert done.ok, done.error
     assert done.results["PAIRED_LENGTH"] == pytest.approx(23, abs=1.5)
+
+
+def test_seeds_have_one_layer_until_a_run_has_used_it(qgis, canvas, layer, growing):
+    def seed_layers():
+        return [one for one in QgsProject.instance().mapLayers().values() if one.name() == "Rail seeds"]
+
+    for along, layers in ((4.0, 1), (8.0, 1), (6.0, 2)):
+        growing.click(place(along, SPACING_M / 2))
+        wait(qgis, growing)
+        growing.accept()
+        assert len(seed_layers()) == layers
+        growing.dialog.close()
+        if len(growing.seeds) == 2:
+            assert seed_layers()[0].featureCount() == 2
+            growing.dialog.algorithmFinished.emit(True, {})
+    assert sorted(one.featureCount() for one in seed_layers()) == [1, 2]
+
+
+def test_the_toolbar_takes_the_standard_of_the_last_run(qgis, canvas, growing):
+    for used, chosen in (("EN_49E1_1435", "EN_49E1_1435"), ("DETECT", "EN_49E1_1435")):
+        notices.standard_used.emit(used)
+        assert growing.standards.currentData() == chosen
 
 
 def test_a_click_beside_the_cloud_says_so(qgis, canvas, layer, growing):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from memory_layers import layer_of
 from rail_extract.core.errors import CrsError, RailExtractError
 from rail_extract.rail_extract_plugin.reading.line_layers import read_rails
 
@@ -15,19 +15,8 @@ RIGHT = "LINESTRING Z (500020 3000000 100.02, 500000 3000000 100.02)"
 
 @pytest.fixture
 def layer(qgis):
-    """Create a memory layer with a line for each WKT text and the given fields and values."""
-
-    def make(*texts, kind="LineStringZ", crs="EPSG:32643", fields="", values=()):
-        layer = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "lines", "memory")
-        for number, text in enumerate(texts):
-            feature = QgsFeature(layer.fields())
-            feature.setGeometry(QgsGeometry.fromWkt(text))
-            if values:
-                feature.setAttributes(list(values[number]))
-            assert layer.dataProvider().addFeature(feature)
-        return layer
-
-    return make
+    """A function that makes layers, in QGIS."""
+    return layer_of
 
 
 class Source:
@@ -187,21 +176,3 @@ def test_three_rails_make_two_tracks_in_one_run(layer, run_step, context):
     tracks = context.getMapLayer(outcome.results["OUTPUT"]).getFeatures()
     found = [(track["left_ids"], track["right_ids"], round(track["gauge_mm"])) for track in tracks]
     assert found == [("3", "1", 1435), ("2", "1", 1000)]
-
-
-@pytest.mark.parametrize(
-    ("parameters", "sentence"),
-    [
-        ({"OTHER_GAUGES": "wide"}, 'OTHER_GAUGES "wide" must be millimetres'),
-        ({"OTHER_GAUGES": "1440"}, "can't be distinguished within CENTERLINE_TOLERANCE"),
-        ({"OTHER_GAUGES": "10"}, "A gauge of 10 mm is not possible"),
-        ({"GAUGE": 1000}, "is the gauge 1435 mm?"),
-        ({"INPUT": "gone.gpkg"}, "gone.gpkg"),
-        ({"OUTPUT": "/nowhere/t.gpkg"}, "can't be written"),
-    ],
-)
-def test_bad_input_is_one_sentence(layer, run_step, parameters, sentence):
-    outcome = run_step("buildtrackcenterlines", {"INPUT": layer(LEFT, RIGHT), "OUTPUT": "memory:", **parameters})
-    assert not outcome.ok
-    assert sentence in outcome.error
-    assert "Traceback" not in outcome.error

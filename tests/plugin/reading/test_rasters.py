@@ -8,12 +8,12 @@ from osgeo import gdal
 from rail_extract.core import raster_file
 from rail_extract.core.clouds.crs import import_pyproj
 from rail_extract.core.disk import Destination
-from rail_extract.core.errors import Cancelled, CrsError, ModelError, ParameterError, RasterError
+from rail_extract.core.errors import Cancelled, ModelError, ParameterError, RasterError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.frpdf.cleanup import clean
+from rail_extract.core.output.raster_file import BLOCK, header_for, on_one_grid
 from rail_extract.core.progress import Progress
 from rail_extract.core.raster import TILE, cell_size, rasterize
-from rail_extract.core.raster_file import BLOCK, header_for, on_one_grid
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.vectorize import vectorize
 from rail_extract.rail_extract_plugin.reading.geotiff import filled_blocks, read_header, read_rasters, write_rasters
@@ -171,38 +171,6 @@ def test_raster_from_other_software(geotiff, nodata):
     header = read_header(path)
     assert (header.class_codes, header.gauge_m, header.model) == ((10,), None, None)
     assert read_rasters(path, header)[0].cells().tolist() == [[7, 5], [7, 6]]
-
-
-@pytest.mark.parametrize(
-    ("made", "error", "sentence"),
-    [
-        ({"transform": (0, 0.04, 0.01, 0, 0, -0.04)}, RasterError, "rotated"),
-        ({"transform": (0, 0.04, 0, 0, 0, -0.05)}, RasterError, "not square"),
-        ({"transform": (0, 0.04, 0, 0, 0, 0.04)}, RasterError, "north up"),
-        ({"bands": 3}, RasterError, "has 3 bands"),
-        ({"bands": 2, "descriptions": ("10", "red")}, RasterError, "has 2 bands"),
-        ({"epsg": 4326}, CrsError, "Lengths can't be computed"),
-        ({"tags": {"RAIL_GAUGE_MM": "wide"}}, RasterError, "RAIL_GAUGE_MM of the raster can't be 'wide'"),
-    ],
-)
-def test_unsuitable_raster_is_refused(geotiff, made, error, sentence):
-    with pytest.raises(error, match=sentence):
-        read_header(geotiff(**made))
-
-
-def test_other_files_are_refused(tmp_path):
-    (tmp_path / "text.tif").write_text("no raster")
-    with pytest.raises(RasterError, match="is not a readable raster"):
-        read_header(tmp_path / "text.tif")
-
-
-def test_empty_raster_is_refused(geotiff):
-    path = geotiff()
-    dataset = gdal.Open(str(path), gdal.GA_Update)
-    dataset.GetRasterBand(1).Fill(0)
-    dataset = None
-    with pytest.raises(RasterError, match="has no rail cell"):
-        read_rasters(path, read_header(path))
 
 
 def test_standard_comes_from_the_user_or_from_the_tags(geotiff):

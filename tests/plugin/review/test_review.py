@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from qgis.core import NULL, QgsCoordinateReferenceSystem, QgsFeature, QgsGeometry, QgsProject, QgsVectorLayer
 from qgis.gui import QgsMapCanvas
-from qgis.PyQt.QtCore import QRectF, Qt
+from qgis.PyQt.QtCore import Qt
 from qgis.PyQt.QtWidgets import QMainWindow
 from rail_extract.core.fields import FINDING_FIELDS, RAIL_FIELDS
 from rail_extract.core.frame import LocalFrame
 from rail_extract.rail_extract_plugin.reading.clouds import CloudSource
 from rail_extract.rail_extract_plugin.review.findings import ACCEPTED, REJECTED, reviews
-from rail_extract.rail_extract_plugin.review.section_view import PAPER, POINT, RAIL, Panel, _boxes
+from rail_extract.rail_extract_plugin.review.section_view import PAPER, POINT, RAIL
 from rail_extract.rail_extract_plugin.writing.layers import fields
 from rail_extract.rail_extract_plugin.writing.run import properties_of
 
@@ -165,25 +165,6 @@ def test_undo_and_other_edits_are_followed(qgis, load, dock):
     layer.rollBack()
     qgis.processEvents()
     assert shown.count.text() == "1 of 2; 0 reviewed"
-
-
-@pytest.mark.parametrize(("width", "height"), [(200, 200), (340, 700), (900, 300), (1500, 1500)])
-def test_the_boxes_of_the_section_fill_the_view_and_do_not_overlap(qgis, width, height):
-    boxes = _boxes(float(width), float(height))
-    assert all(box.left() >= 0 and box.right() <= width + 1e-6 for box in boxes)
-    assert all(box.top() >= 0 and box.bottom() <= height + 1e-6 for box in boxes)
-    assert not any(boxes[one].intersects(boxes[other]) for one, other in ((0, 1), (0, 2), (1, 2)))
-    assert max(box.right() for box in boxes) == pytest.approx(width)
-    assert max(box.bottom() for box in boxes) == pytest.approx(height)
-    assert boxes[1].size() == boxes[2].size()
-
-
-def test_the_section_grows_with_the_view_in_both_directions(qgis):
-    def scale(width, height):
-        return Panel(QRectF(0, 0, width, height), 0.0, 0.0, 0.2, 0.1, "").scale
-
-    assert scale(400, 218) == pytest.approx(2 * scale(200, 118))
-    assert scale(400, 118) == scale(800, 118) == scale(200, 900)  # the smaller of both counts
 
 
 def test_a_layer_that_cannot_be_changed_is_named(load, dock):

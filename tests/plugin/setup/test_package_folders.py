@@ -21,11 +21,11 @@ def test_own_folder_is_in_the_profile(clean_path):
     assert package_folders.folders() == [folder]
 
 
-@pytest.mark.parametrize(
-    "names",
-    ["/" + 5000 * "x", "/x" * 3000, "\udcff/\udcfe", "relative", ".", ":::", "~", "/etc/passwd", "/proc/1/cwd/x"],
-)
-@pytest.mark.parametrize("value", ["", ["/a", "b"], {"a": 1}, 5, True, 2.5, "/" + 5000 * "x", "\0"])
+NAMES = ["/" + 5000 * "x", "/x" * 3000, "\udcff/\udcfe", "relative", ".", ":::", "~", "/etc/passwd", "/proc/1/cwd/x"]
+VALUES = ["", ["/a", "b"], {"a": 1}, 5, True, 2.5, "/" + 5000 * "x", "\0", None]
+
+
+@pytest.mark.parametrize(("names", "value"), list(zip(NAMES, VALUES)))
 def test_no_value_stops_the_plugin(plugin, clean_path, monkeypatch, names, value):
     plugin.unload()
     monkeypatch.setenv("RAIL_EXTRACT_PACKAGES", names)

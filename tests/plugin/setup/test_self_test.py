@@ -1,7 +1,5 @@
 import hashlib
 
-import numpy as np
-import pytest
 from qgis.core import QgsApplication
 from rail_extract.core.frpdf.models import MODELS
 from rail_extract.core.progress import Progress
@@ -80,27 +78,6 @@ def test_rails_of_the_sample_are_found():
     assert verdict.passed
     assert verdict.words.startswith("100.0% of the true rails found, RMSE ")
     assert verdict.words.endswith("; 6 of 6 rails, 3 of 3 centerlines")
-
-
-def straight(left=0.0, up=0.0, start=0.0, end=20.0):
-    """Build a line eastwards, shifted to its left and up, metres."""
-    return np.array([[start, left, up], [end, left, up]])
-
-
-def test_offsets_are_root_mean_squares():
-    truth = [straight(), straight(left=1.5)]
-    lines = [straight(left=0.003, up=-0.001), straight(left=1.5 + 0.004, up=0.002)]
-    completeness, lateral_m, height_m = self_test._compare(lines, truth, 1.0, 19.0)
-    assert completeness == 1.0
-    assert lateral_m == pytest.approx(np.sqrt((0.003**2 + 0.004**2) / 2))
-    assert height_m == pytest.approx(np.sqrt((0.001**2 + 0.002**2) / 2))
-
-
-def test_completeness_is_the_share_near_a_line():
-    completeness, lateral_m, _ = self_test._compare([straight(left=0.06), straight(end=10.0)], [straight()], 0.0, 20.0)
-    assert completeness == pytest.approx(0.5, abs=0.01)
-    assert lateral_m == pytest.approx(0.0, abs=1e-12)
-    assert self_test._compare([straight(left=0.06)], [straight()], 0.0, 20.0) == (0.0, np.inf, np.inf)
 
 
 def test_missing_rails_fail(monkeypatch):

@@ -25,7 +25,7 @@ def server():
     if not PROGRAMS:
         pytest.skip("PostgreSQL is not installed")
     as_account = {"user": ACCOUNT, "group": ACCOUNT} if os.getuid() == 0 else {}
-    folder = Path(tempfile.mkdtemp())
+    folder = Path(tempfile.mkdtemp(dir="/tmp"))  # where its account may read
     if as_account:
         shutil.chown(folder, ACCOUNT, ACCOUNT)
     with socket.socket() as free:

@@ -10,10 +10,9 @@ from qgis.core import (
     QgsVectorLayer,
     QgsWkbTypes,
 )
-from rail_extract.core.errors import RailExtractError
 from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.layers import lines_layer
+from rail_extract.core.output.layers import lines_layer
 from rail_extract.core.products import CENTERLINES, RAILS
 from rail_extract.core.rails import Centerline, RailLine
 from rail_extract.rail_extract_plugin.writing.destinations import destinations
@@ -131,21 +130,3 @@ def test_writable_output(tmp_path, context, form):
     found = destinations({"RAILS": form(tmp_path / "räils 1.gpkg")}, context)
     assert found["RAILS"].file == tmp_path / "räils 1.gpkg"
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("form", [as_text, as_table, as_definition, as_property])
-def test_folder_of_the_output_is_missing(tmp_path, context, form):
-    with pytest.raises(RailExtractError, match="can't be written"):
-        destinations({"RAILS": form(tmp_path / "gone" / "rails.gpkg")}, context)
-
-
-def test_output_is_a_folder(tmp_path, context):
-    with pytest.raises(RailExtractError, match="is a folder"):
-        destinations({"RAILS": str(tmp_path)}, context)
-
-
-def test_existing_output_is_not_changed(tmp_path, context):
-    path = tmp_path / "rails.gpkg"
-    path.write_bytes(b"old")
-    destinations({"RAILS": str(path)}, context)
-    assert path.read_bytes() == b"old"

@@ -16,7 +16,6 @@ from qgis.core import (
     QgsProcessingContext,
     QgsProject,
     QgsRasterLayer,
-    QgsReadWriteContext,
     QgsRectangle,
     QgsRenderContext,
     QgsVectorFileWriter,
@@ -24,7 +23,6 @@ from qgis.core import (
 )
 from qgis.PyQt.QtCore import QSize
 from qgis.PyQt.QtGui import QColor
-from qgis.PyQt.QtXml import QDomDocument
 from rail_extract.core import fields as core_fields
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.products import PRODUCTS
@@ -204,11 +202,6 @@ def test_the_review_is_chosen_from_a_list(styled):
     assert choices == {"open": "", "accepted": "accepted", "rejected": "rejected"}
 
 
-@pytest.mark.parametrize("style", ["centerlines", "findings"])
-def test_labels_are_on_their_own_line(styled, style):
-    assert styled(style).labeling().settings().placementFlags & 7 == 1  # on the line, neither above nor below
-
-
 def test_the_legend_names_the_ring(styled):
     layer = styled("quality")  # QGIS deletes the renderer with its layer
     labels = [item.label() for item in layer.renderer().legendSymbolItems()]
@@ -284,19 +277,6 @@ def test_layers_can_be_drawn(styled, style):
     colours.update(airborne="#e64a19", proposed="#8e24aa", stations="#2e7d4f")
     colours.update(stops="#e64a19", elements="#1565c0", axes="#8e5bb5", deviations="#b2182b", differences="#b2182b")
     assert colours[style] in seen
-
-
-@pytest.mark.parametrize("style", ["rails", "centerlines", "findings"])
-def test_lines_are_at_their_heights_in_3d(styled, style):
-    module = pytest.importorskip("qgis._3d")
-    module.Qgs3D.initialize()
-    document = QDomDocument()  # what is written lives as long
-    written = document.createElement("renderer-3d")
-    layer = styled(style)
-    layer.renderer3D().writeXml(written, QgsReadWriteContext())
-    data = written.firstChildElement("symbol").firstChildElement("data")
-    for name, value in (("alt-clamping", "absolute"), ("alt-binding", "vertex"), ("simple-lines", "1")):
-        assert data.attribute(name) == value
 
 
 @pytest.mark.skipif(Qgis.QGIS_VERSION_INT < 32600, reason="vector layers have no elevation properties")

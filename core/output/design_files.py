@@ -1,0 +1,117 @@
+"""Files for design software as the last step of a run: which format, what a file states, and where its tracks are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Optional
+
+from ..alignment.delivery import Delivery, check_joined
+from ..alignment.elements import Alignment
+from ..alignment.ifc import write_ifc
+from ..alignment.landxml import write_landxml
+from ..clouds.crs import codes_and_names, lies_in_area, name_of, parse_crs
+from ..errors import AlignmentFileError, CrsError, ParameterError
+from ..frame import LocalFrame
+from ..progress import Progress
+from ..standards import RailStandard
+from .exchange import write_alignments
+
+FORMATS = {".xml": "LandXML", ".landxml": "LandXML", ".ifc": "IFC", ".dxf": "DXF"}
+"""Format of a file by the ending of its name."""
+
+
+def check_format(path: Path) -> None:
+    """Check that the name of a file states a format.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise ParameterError(f"OUTPUT can't be {path.name}: let it end in .xml for LandXML, in .ifc or in .dxf.")
+
+
+def check_designs(alignments: Sequence[Alignment], progress: Progress) -> None:
+    """Check that alignments can be written; warn of what a format leaves out.
+
+    Raises
+    ------
+    CrsError
+        They are in feet.
+    ParameterError
+        An element does not begin where the one before it ends.
+    """
+    frame = alignments[0].frame
+    if (frame.horizontal_unit_m, frame.vertical_unit_m) != (1.0, 1.0):
+        raise CrsError(
+            "INPUT is in feet, and files for design software are written in metres: fit the lines in a coordinate "
+            "system in metres."
+        )
+    for alignment in progress.follow(alignments):
+        check_joined(alignment)
+        if alignment.cant and not alignment.vertical:
+            progress.warning(f"Track {alignment.track_id} has cant but no profile: IFC files leave the cant out.")
+
+
+def write_designs(
+    path: Path, alignments: Sequence[Alignment], standard: RailStandard, circles: bool, version: str
+) -> None:
+    """Write alignments in the format that the name of a file states.
+
+    Parameters
+    ----------
+    path : Path
+    alignments : sequence of Alignment
+    standard : RailStandard
+        Gauge and railhead width give the distance across which cant is measured.
+    circles : bool
+        Whether curves of the profile are circles in LandXML; else they are parabolas.
+    version : str
+        Of this program.
+    """
+    kind = FORMATS[path.suffix.lower()]
+    delivery = _delivery(standard, alignments[0].frame.crs_wkt, version)
+    if kind == "LandXML":
+        write_landxml(path, alignments, delivery, circles)
+    elif kind == "IFC":
+        write_ifc(path, alignments, delivery)
+    else:
+        write_alignments(path, alignments)
+
+
+def _delivery(standard: RailStandard, crs_wkt: Optional[str], version: str) -> Delivery:
+    """Return what the file states besides the alignments."""
+    epsg, system, heights = codes_and_names(parse_crs(crs_wkt)) if crs_wkt else (None, "", "")
+    return Delivery(standard.gauge_m, standard.head_width_m, epsg, system, heights, version)
+
+
+def check_place(name: str, frame: LocalFrame, east_first: bool, progress: Progress) -> None:
+    """Refuse easting and northing that are exchanged, as the area of the coordinate system shows; warn of other places.
+
+    Parameters
+    ----------
+    name : str
+        Of the file.
+    frame : LocalFrame
+        Of its alignments, with the coordinate system.
+    east_first : bool
+        Whether the points were read as easting and northing.
+    progress : Progress
+
+    Raises
+    ------
+    AlignmentFileError
+    """
+    if frame.crs_wkt is None:
+        progress.warning(f"{name} has no coordinate system: choose CRS to see its tracks in their place.")
+        return
+    crs, (x, y, _) = parse_crs(frame.crs_wkt), frame.origin
+    if lies_in_area(crs, (x, y)):
+        return
+    if lies_in_area(crs, (y, x)):
+        first, remedy = ("northing", "leave EAST_FIRST off") if east_first else ("easting", "set EAST_FIRST")
+        raise AlignmentFileError(
+            f"{name} is in the area of {name_of(crs)} if its points are written {first} first: {remedy}."
+        )
+    progress.warning(f"{name} is outside the area of {name_of(crs)}: check its coordinate system.")
