@@ -34,6 +34,9 @@ chance: dirt in a flangeway is 10 to 50 mm below the top."""
 SKIPPED_BINS = 3
 """Bins without a level that a level runs across."""
 
+SHARED_BINS = 8
+"""Bins in which two pieces of one level may overlap: where points are few, one bin that is off begins another piece."""
+
 SLOPE_BINS = 41
 """Bins, 20 m, whose median change of level is the gradient."""
 
@@ -184,7 +187,8 @@ def _chain(pieces: list[np.ndarray], step_m: float) -> np.ndarray:
         off_m = np.abs(first[number] - last[:number])
         fits = off_m <= step_m + np.clip(DRIFT * gap_m, 0.0, MAX_DRIFT_M)
         cost = np.where(fits, 0.0, np.where(off_m <= SHIFTED_M, SHIFT_BINS, np.inf))
-        sums = np.where(gap_m > 0, best[:number] - cost, 0.0)
+        along = (gap_m > 0) | (fits & (gap_m > -SHARED_BINS * LEVEL_BIN_M))
+        sums = np.where(along, best[:number] - cost, 0.0)
         if sums.max() > 0:
             before[number] = int(np.argmax(sums))
             best[number] += sums.max()
@@ -192,4 +196,5 @@ def _chain(pieces: list[np.ndarray], step_m: float) -> np.ndarray:
     while number >= 0:
         chosen.append(pieces[number])
         number = int(before[number])
-    return np.concatenate(chosen[::-1])
+    chain = np.concatenate(chosen[::-1])
+    return chain[np.argsort(chain[:, 0], kind="stable")]
