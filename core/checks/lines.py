@@ -49,36 +49,6 @@ SAME_RAIL_M = 0.5
 """Ends of rails that are closer together belong to one rail: no two rails of any gauge end so close to each other."""
 
 
-def assign_tracks(
-    rails: Sequence[RailLine], centerlines: Sequence[Centerline]
-) -> tuple[list[RailLine], list[tuple[RailLine, float]]]:
-    """State the tracks of each rail, and find lone lines that are too high or too low to be rails.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    centerlines : sequence of Centerline
-        All tracks of these rails.
-
-    Returns
-    -------
-    kept : list of RailLine
-        With their `track_ids`.
-    left_out : list of (RailLine, float)
-        Lines that cannot be rails, and their height above the tracks next to them, metres.
-    """
-    kept: list[RailLine] = []
-    left_out: list[tuple[RailLine, float]] = []
-    for rail in rails:
-        tracks = tuple(line.track_id for line in centerlines if rail.rail_id in (*line.left_ids, *line.right_ids))
-        above_m = 0.0 if tracks else _off_level_m(rail, centerlines)
-        if above_m:
-            left_out.append((rail, above_m))
-        else:
-            kept.append(replace(rail, track_ids=tracks))
-    return kept, left_out
-
-
 def _off_level_m(rail: RailLine, centerlines: Sequence[Centerline]) -> float:
     """Return the height of a line above the tracks next to it if it is too high or too low for a rail, else 0."""
     if np.isnan(rail.xyz[:, 2]).any() or len(rail.xyz) < 2:
@@ -150,7 +120,15 @@ def with_tracks(
     list of RailLine
         With their numbers as before.
     """
-    kept, left_out = assign_tracks(rails, centerlines)
+    kept: list[RailLine] = []
+    left_out: list[tuple[RailLine, float]] = []
+    for rail in rails:
+        tracks = tuple(line.track_id for line in centerlines if rail.rail_id in (*line.left_ids, *line.right_ids))
+        above_m = 0.0 if tracks else _off_level_m(rail, centerlines)
+        if above_m:
+            left_out.append((rail, above_m))
+        else:
+            kept.append(replace(rail, track_ids=tracks))
     if left_out:
         length_m = sum(line.length_m for line, _ in left_out)
         lines = "1 line" if len(left_out) == 1 else f"{len(left_out)} lines"

@@ -322,7 +322,8 @@ def _scoring_step(counts: np.ndarray, section: Section, blurred: Blurred, used: 
     known, rates = _rates(section, blurred, used)
     gradient = rates @ counts[used]
     gradient[:PLACE] -= _expected(section.place) @ section.place
-    gradient[PLACE:] -= section.shares[known] @ gradient[PLACE:] / section.shares[known].sum()  # their sum stays
+    own = section.shares[known]
+    gradient[PLACE:] -= own @ gradient[PLACE:] / max(own.sum(), USED_SHARE)  # their sum stays
     found = np.linalg.solve(_information(counts[used], section, known, rates), gradient)
     found *= min(1.0, 1 / max(np.abs(found[:PLACE] / MAX_STEPS).max(), 1e-12))
     step = np.zeros(PLACE + len(section.shares))

@@ -7,14 +7,13 @@ station then show how far it is off there. See docs/method.md section 6.8.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from ..polyline import length_along, project
-from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, search_distance, station_count
-from .level import in_head_frame
+from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, station_count
+from .head_points import HeadPoints, near_lines
 from .outline import CROWN_RADIUS_M, MIN_NOISE_M, Grid, Outline, Scores, Section, fit_section, log_likelihood
 
 MIN_SECTION_POINTS = 250
@@ -122,25 +121,19 @@ class Middles:
         return cls(nothing, np.zeros(count), nothing.copy(), np.zeros(count), np.zeros(count))
 
 
-def outline_middles(
-    t: np.ndarray, across: np.ndarray, z: np.ndarray, length_m: float, head_width_m: float, seen: np.ndarray
-) -> Middles:
+def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
     """Find the middle of the head from its outline, at the stations of a line that is on the head.
 
     Parameters
     ----------
-    t, across, z : (n,) arrays
-        Chainage (increasing), offset to the left and height of points near the line, metres.
-    length_m : float
-        Length of the line.
-    head_width_m : float
+    points : HeadPoints
     seen : (s,) bool array
         Where the head stands alone.
     """
-    count = station_count(length_m)
+    count, head_width_m = len(seen), points.width_m
     middles = Middles.unknown(count)
-    left, up = in_head_frame(t, across, z, head_width_m)
-    station = np.minimum((t / STATION_STEP_M).astype(int), count - 1)
+    left, up = points.in_frame()
+    station = np.minimum((points.t / STATION_STEP_M).astype(int), count - 1)
     head, grid = Head(head_width_m, Outline.of(head_width_m)), Grid.of(head_width_m)
     bins = grid.number(left, up)
     used = (bins >= 0) & seen[station]
@@ -283,13 +276,11 @@ def likelier_width(lines: Sequence[np.ndarray], xyz: np.ndarray, widths_m: Seque
     widths_m : sequence of float
     """
     grid, outlines = Grid.of(max(widths_m)), [Outline.of(width_m) for width_m in widths_m]
-    feet = project(lines, xyz[:, :2], search_distance(max(widths_m)))
     likelihood = np.zeros(len(widths_m))
-    for number, line in enumerate(lines):
-        own = feet.of(number)
-        bins = grid.number(*in_head_frame(own.t, own.across, xyz[own.point, 2], widths_m[0]))
-        station = own.t[bins >= 0] / STATION_STEP_M
-        for first, last in _borders(station, station_count(float(length_along(line)[-1]))):
+    for points in near_lines(lines, xyz, max(widths_m)):
+        bins = grid.number(*replace(points, width_m=widths_m[0]).in_frame())
+        station = points.t[bins >= 0] / STATION_STEP_M
+        for first, last in _borders(station, station_count(points.length_m)):
             here = bins[bins >= 0][slice(*np.searchsorted(station, [first, last]))]
             counts = np.bincount(here, minlength=grid.size).astype(float)
             if counts.sum() >= MIN_SECTION_POINTS:

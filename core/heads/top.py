@@ -14,7 +14,9 @@ from ..lines.paek import VARIANCE_FACTOR
 from ..lines.smoothing import smooth_profile
 from ..rails import Support
 from .envelope import extremal_boundary
-from .level import AXIS_SHARE, cross_slope, robust_sigma, rough_level
+from .head_points import RIM_HEADS, HeadPoints
+from .level import AXIS_SHARE, OFF_TOP_SIGMAS, SLOPE_ROUNDS, cross_slope, robust_sigma, rough_level
+from .outline import CROWN_RADIUS_M
 from .smoother import Spline, bridge_error, smooth
 
 MIN_POINTS = 10
@@ -49,6 +51,34 @@ PROFILE_BIN_M = 0.25
 
 TAIL_M = 1.0
 """Length over which a profile is extrapolated with the slope at its end; beyond it is level."""
+
+LEAST_INFORMATION = 1e-6
+"""Information about level, slope and fall of a crown that is always there, so that few points are enough."""
+
+
+@dataclass(frozen=True)
+class Crown:
+    """How the top of a head falls beside its axis: in proportion to the square of the distance, up to the rims.
+
+    Attributes
+    ----------
+    bend, sigma : float
+        Fall per square of the distance, and its standard error, 1/m.
+    rim_m : float
+        Distance from the axis up to which the top falls.
+    """
+
+    bend: float
+    sigma: float
+    rim_m: float
+
+    def fall(self, across: np.ndarray) -> np.ndarray:
+        """Return how far points are lower than the axis of their head because they are beside it, (n,) metres."""
+        return self.bend * np.minimum(np.abs(across), self.rim_m) ** 2
+
+    def error(self, head_width_m: float) -> float:
+        """Return the standard error of the height on the axis, metres, from points up to `AXIS_SHARE` beside it."""
+        return self.sigma * (AXIS_SHARE * head_width_m) ** 2 / 3
 
 
 @dataclass(frozen=True)
@@ -86,32 +116,50 @@ class Top:
     ----------
     course : Profile or Spline
         Its height on the axis.
-    points : (n,) bool array
+    points : HeadPoints
         Points on it.
     slope : (n,) array
-        Rise per metre to the left, at each point.
+        Rise per metre to the left, at each of them.
     crown_m : float
         Standard error of the height on the axis that all points share.
     """
 
     course: Course
-    points: np.ndarray
+    points: HeadPoints
     slope: np.ndarray
     crown_m: float = 0.0
 
-    def height_error(self, t: np.ndarray, support: Support) -> np.ndarray:
+    def height_error(self, support: Support) -> np.ndarray:
         """Return the standard error of the height at the stations of a support, (s,) metres.
 
-        Parameters
-        ----------
-        t : (n,) array
-            Chainages of the points on the top, increasing.
-        support : Support
-            Its error across is one of height where the top is not level.
+        The error across is one of height where the top is not level.
         """
-        leaning = np.interp(support.t, t, self.slope[self.points]) * support.sigma_m
-        bridge = bridge_error(t, support.t, UNSEEN_TURN)
+        leaning = np.interp(support.t, self.points.t, self.slope) * support.sigma_m
+        bridge = bridge_error(self.points.t, support.t, UNSEEN_TURN)
         return np.sqrt(self.course.sigma(support.t) ** 2 + self.crown_m**2 + leaning**2 + bridge**2)
+
+
+def fit_crown(points: HeadPoints) -> Crown:
+    """Fit a parabola to the crown of a head.
+
+    New crowns have a radius, and worn ones are flatter. Where beams blend the head and the ballast, the share of the
+    ballast grows with the distance from the axis, and the fall may be of any size.
+    """
+    usual, rim_m = 0.5 / CROWN_RADIUS_M, RIM_HEADS[0] * points.width_m
+    near = points[points.within(RIM_HEADS[0])]
+    if not len(near.t):
+        return Crown(usual, usual, rim_m)
+    expected = np.array([0.0, 0.0, 0.0 if points.is_blended else usual**-2])
+    above, powers = near.z - rough_level(near.t, near.z), np.vander(near.across, 3, increasing=True)
+    used, off = np.ones(len(above), dtype=bool), above
+    for _ in range(SLOPE_ROUNDS):
+        noise_m = robust_sigma(off[used])
+        information = powers[used].T @ powers[used] / noise_m**2 + np.diag(expected + LEAST_INFORMATION)
+        covariance = np.linalg.inv(information)
+        found = covariance @ (powers[used].T @ above[used] / noise_m**2 - expected * usual)
+        off = above - powers @ found
+        used = np.abs(off) <= OFF_TOP_SIGMAS * robust_sigma(off)
+    return Crown(max(-found[2], 0.0), float(np.sqrt(covariance[2, 2])), rim_m)
 
 
 def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None) -> Course:
@@ -139,15 +187,7 @@ def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None) -> Course:
     )
 
 
-def find_top(
-    t: np.ndarray,
-    across: np.ndarray,
-    z: np.ndarray,
-    head_width_m: float,
-    crown_radius_m: float,
-    tolerance_m: float,
-    smoothing_m: float | None,
-) -> Top | None:
+def find_top(points: HeadPoints, crown_radius_m: float, tolerance_m: float, smoothing_m: float | None) -> Top | None:
     """Find the height of the top on the head's axis and the points on it; None if too few points agree.
 
     The slope across is removed first. The disc then separates the top from the side faces, but it rests on the highest
@@ -156,9 +196,8 @@ def find_top(
 
     Parameters
     ----------
-    t, across, z : (n,) arrays
-        Chainage (increasing), offset to the left of the axis and height of points on the head, metres.
-    head_width_m : float
+    points : HeadPoints
+        Points on the head.
     crown_radius_m : float
         Radius of the disc.
     tolerance_m : float
@@ -166,10 +205,11 @@ def find_top(
     smoothing_m : float or None
         See `smoothed`.
     """
-    slope = cross_slope(t, across, z - rough_level(t, z), head_width_m)
-    flat = z - slope * across
+    t, z = points.t, points.z
+    slope = cross_slope(t, points.across, z - rough_level(t, z), points.width_m)
+    flat = z - slope * points.across
     top, noise = _under_disc(t, flat, crown_radius_m, tolerance_m)
-    central = np.abs(across) <= AXIS_SHARE * head_width_m
+    central = points.within(AXIS_SHARE)
     band = min(tolerance_m, max(MIN_BAND_M, BAND_SIGMAS * noise))
     for _ in range(BAND_ROUNDS):
         chosen = top & central if (top & central).sum() >= MIN_POINTS else top
@@ -177,7 +217,7 @@ def find_top(
         top = np.abs(flat - course.at(t)) <= band
         if top.sum() < MIN_POINTS:
             return None
-    return Top(course, top, slope)
+    return Top(course, points[top], slope[top])
 
 
 def _under_disc(t: np.ndarray, z: np.ndarray, crown_radius_m: float, tolerance_m: float) -> tuple[np.ndarray, float]:
