@@ -154,7 +154,7 @@ def extract_files(
             else:
                 own = GrowSettings(parameters.gauge_m, parameters.head_width_m)
                 source, figures = spool_grown(request, seeds, own, side_m, scratch, reading)
-            network = _walk([source], parameters, runner, rest)
+            network = _walk([source], parameters, runner, rest, raw=True)
         if classify and network.heads is not None and network.heads.blunt:
             # Only its partner tells a blunt rail from other ridges, and the user has been told so.
             network = replace(network, rails=tuple(rail for rail in network.rails if rail.track_ids))
@@ -189,16 +189,18 @@ def _walk(
     runner: Runner,
     progress: Progress,
     is_warned: bool = False,
+    raw: bool = False,
 ) -> RailNetwork:
     """Extract rails, centerlines and track geometry from points that are sorted into squares.
 
-    If the user `is_warned` of another gauge, the rails do not lead to the same question again.
+    If the user `is_warned` of another gauge, the rails do not lead to the same question again. The points may be those
+    that were found in a `raw` cloud.
     """
     progress = Recording(progress)
     drawing, pairing, measuring = progress.divide((DRAWING, PAIRING, MEASURING))
     progress.status("Drawing the rails")
     sources = plausible(sources, progress)
-    rails, strips, cleaned = _draw_rails(sources, parameters, runner, drawing)
+    rails, strips, cleaned = _draw_rails(sources, parameters, runner, drawing, raw)
     centerlines = _pair_rails(rails, sources, parameters, runner, pairing, is_warned)
     progress.info(f"Paired: {_lengths(centerlines, 'track')}.")
     rails = with_tracks(rails, centerlines, progress)
@@ -228,7 +230,7 @@ def _walk(
 
 
 def _draw_rails(
-    sources: Sequence[PointSource], parameters: Parameters, runner: Runner, progress: Progress
+    sources: Sequence[PointSource], parameters: Parameters, runner: Runner, progress: Progress, raw: bool
 ) -> tuple[list[RailLine], np.ndarray, dict[int, RailRaster]]:
     """Draw the rails of all classes.
 
@@ -252,7 +254,7 @@ def _draw_rails(
         strips += [rows_in_frame(part, source.frame) for part in parts]
         found = whole_rails(_released(parts), source.frame, parameters, len(rails) + 1, share) if parts else []
         share.info(f"Class {source.class_code}: {_lengths(found, 'rail')}.")
-        warn_of_rails(found, source.class_code, parameters, share)
+        warn_of_rails(found, source.class_code, parameters, share, raw)
         if found:
             warn_of_unexplained(source, found, share)
             warn_of_airborne(source, found, share)
