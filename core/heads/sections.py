@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from .edges import STATION_STEP_M, VIEW_STATIONS, station_count
+from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, station_count
 from .head_points import HeadPoints, near_lines
 from .outline import CROWN_RADIUS_M, MIN_NOISE_M, Grid, Outline, Scores, Section, fit_section, log_likelihood
 
@@ -61,6 +61,14 @@ FLAT_SHARE, TWO_LEVELS, APART_M = 0.3, -0.4, 0.003
 """Part of the head's width to either side of its axis that has no corners; excess kurtosis of the heights there from
 which they are on two levels, and half the least distance of these. Noise has 0 or more, and two passes -2 (d² / (d² +
 noise²))², at half their distance d: -0.5 where d is the noise. Heights rounded to half of it have -0.1."""
+
+FLAT_BLUR_M = 0.009
+"""Blur from which a head without a round top is not flat to its edges, but shown by passes 20 mm apart or more."""
+
+CROWNED_SHARE, CROWN_SHARE, CROWN_BAND_M = 0.5, 0.4, 0.006
+"""Curvature of the top, as a share of that of the outline, from which a head is crowned, and the points by which it is
+measured: within this share of the head's width from its axis, and this far from the top. A head that is flat to its
+edges looks 11 mm wider than it is, and blurred, as one that several passes show."""
 
 ON_HEAD_M = 0.005
 """Distance of a line from its head (RMS) up to which it shows the blur of the head: further off, it was displaced."""
@@ -131,12 +139,13 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
         offset, middles.information[part], course = _by_station(
             section.place[0], scores.by_bin[bins[here]], station[here] - first, last - first
         )
+        is_crowned = _is_crowned(left[here], up[here], head_width_m)
         pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
         middles.offset[part] = np.where(seen[part], offset - pull, np.nan)
         middles.common[part] = np.hypot(scores.common_m, PULL_DOUBT * pull)
         on_crown = np.abs(left[here] - section.place[0]) < FLAT_SHARE * head_width_m
         middles.blur_up[part] = apart_m = _half_apart(_above_crown(left[here], up[here], section.place)[on_crown])
-        middles.blur[part] = _blur(section, width_m - head_width_m, course, apart_m)
+        middles.blur[part] = _blur(section, width_m - head_width_m, course, apart_m, is_crowned)
     return middles
 
 
@@ -169,6 +178,15 @@ def _fitted(counts: np.ndarray, head: Head, grid: Grid, start: Section | None) -
     return (section, found, width_m) if settled else (first, head, width_m)
 
 
+def _is_crowned(left: np.ndarray, up: np.ndarray, head_width_m: float) -> bool:
+    """Return whether points, by their offsets from the axis and from the top, (n,) metres, show a round top."""
+    top = (np.abs(left) < CROWN_SHARE * head_width_m) & (np.abs(up) < CROWN_BAND_M)
+    if top.sum() < ENOUGH_POINTS:
+        return False
+    curvature = -2 * np.polynomial.polynomial.polyfit(left[top], up[top], 2)[2]
+    return bool(curvature > CROWNED_SHARE / CROWN_RADIUS_M)
+
+
 def _above_crown(left: np.ndarray, up: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Return the heights of points, (n,) metres, above the crown of a head at a place."""
     return up - place[1] - place[2] * left + (left - place[0]) ** 2 / (2 * CROWN_RADIUS_M)
@@ -190,11 +208,12 @@ def _half_apart(above: np.ndarray) -> float:
     return float(apart_m) if sure and apart_m >= APART_M else 0.0
 
 
-def _blur(section: Section, wider_m: float, offset: np.ndarray, apart_up_m: float) -> float:
+def _blur(section: Section, wider_m: float, offset: np.ndarray, apart_up_m: float, is_crowned: bool) -> float:
     """Return by how much the edges of a head are blurred beyond the noise; see `Middles.blur`.
 
     Where the line wanders about the head, by its `offset`, (k,) metres, it blurs the section as well, and so do passes
-    in height, by `apart_up_m`. What is wider or narrower than a head, by `wider_m`, is another shape.
+    in height, by `apart_up_m`. A head that is flat to its edges looks both blurred and wider. What is wider or
+    narrower still, by `wider_m`, has another shape.
     """
     across_m, height_m = np.exp(section.place[4:])
     known = offset[np.isfinite(offset)]
@@ -204,6 +223,8 @@ def _blur(section: Section, wider_m: float, offset: np.ndarray, apart_up_m: floa
     height_m = np.sqrt(max(height_m**2 - apart_up_m**2, MIN_NOISE_M**2))
     blur_m = np.sqrt(max(across_m**2 - height_m**2, 0.0))
     is_blurred = blur_m >= BLURRED_M and across_m >= BLURRED_RATIO * height_m
+    if not is_crowned:
+        is_blurred &= wider_m < WRONG_WIDTH_M and blur_m > FLAT_BLUR_M
     return float(blur_m) if is_blurred and -WRONG_WIDTH_M <= wider_m < MAX_WRONG_WIDTH_M else 0.0
 
 
