@@ -12,6 +12,9 @@ import numpy as np
 
 from ..rails import Centerline, RailLine
 
+ALIKE_M = 20.0
+"""Length over which errors of dense matching are alike, at most."""
+
 
 def gauge_scatter(
     rails: Sequence[RailLine], centerlines: Sequence[Centerline], gauges_m: Sequence[float]
@@ -40,9 +43,10 @@ def gauge_scatter(
 
 
 def _scatter_mm(centerlines: Sequence[Centerline], gauges_m: Sequence[float]) -> np.ndarray:
-    """Return by how much the gauge of each track scatters: as all tracks of its gauge do about their mean, or by more.
+    """Return by how much the gauge of each track scatters.
 
-    A track that is shorter than the errors are long shows little of them itself.
+    A track that is about as long as its errors shows little of them. What it shows counts by its length, and as one more
+    error what all tracks of its gauge scatter about their mean, if that is more.
     """
     tracks = [(line.gauge_mm, line.gaugesd_mm, line.length_m) for line in centerlines]
     mean_mm, own_mm, length_m = np.reshape(tracks, (-1, 3)).T
@@ -50,8 +54,9 @@ def _scatter_mm(centerlines: Sequence[Centerline], gauges_m: Sequence[float]) ->
     scatter_mm = own_mm.copy()
     for same in (nominal == one for one in np.unique(nominal)):
         off_mm = mean_mm[same] - np.average(mean_mm[same], weights=length_m[same])
-        all_mm = np.sqrt(np.average(own_mm[same] ** 2 + off_mm**2, weights=length_m[same]))
-        scatter_mm[same] = np.maximum(own_mm[same], all_mm)
+        all_mm2 = np.average(own_mm[same] ** 2 + off_mm**2, weights=length_m[same])
+        more_mm2 = np.maximum(all_mm2 - own_mm[same] ** 2, 0.0) * ALIKE_M / (length_m[same] + ALIKE_M)
+        scatter_mm[same] = np.sqrt(own_mm[same] ** 2 + more_mm2)
     return scatter_mm
 
 
