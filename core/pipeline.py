@@ -18,7 +18,7 @@ from .checks.standard import head_widths, warn_of_gauge, warn_of_spacing
 from .checks.strips import doubting_jumps, strip_courses, warn_of_strips
 from .classify.settings import Settings
 from .clouds.las import CloudHeader
-from .clouds.points import RailPoints, Request
+from .clouds.points import RailPoints, Request, read_each
 from .errors import CloudError, NoRailPointsError, NoTrackError, RailExtractError
 from .frpdf.models import choose
 from .grow.settings import GrowSettings
@@ -35,7 +35,7 @@ from .squares.pieces import SquareRails, rows_in_frame
 from .squares.remeasuring import measure_rails
 from .squares.spool import SpooledFile, SpooledPoints, gather, spool_file
 from .steps import clean_square, engine_for, rails_of_square, square_side, tracks_of, whole_rails
-from .tasks import READ_S, Context, InTurn, Runner, Task
+from .tasks import Context, InTurn, Runner, Task
 from .tracks.geometry import measure_track_geometry
 from .tracks.parallels import widths_by_gauge
 
@@ -169,19 +169,8 @@ def _sorted_points(
     request: Request, side_m: float, folder: Path, runner: Runner, progress: Progress
 ) -> tuple[SpooledPoints, ...]:
     """Sort the points of all files into squares, one file per task."""
-    tasks = {
-        number: Task(
-            f"Reading {header.path.name}",
-            _sort_file,
-            (replace(request, headers=()), header, side_m, folder),
-            weight=READ_S * (header.point_count + 1),
-        )
-        for number, header in enumerate(request.headers)
-    }
-    found = dict(runner.run(tasks, progress))
-    if not found:
-        raise CloudError(f"Not one file could be read; the last error was: {runner.failures[-1]}")
-    return gather(request, side_m, [found[number] for number in tasks if number in found])
+    arguments = [(side_m, folder)] * len(request.headers)
+    return gather(request, side_m, read_each(request, _sort_file, arguments, runner, progress))
 
 
 def _sort_file(request: Request, header: CloudHeader, side_m: float, folder: Path, context: Context) -> SpooledFile:

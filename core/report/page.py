@@ -22,7 +22,7 @@ from .markup import legend, made, metres, note, page, section, table, tag, text,
 from .plan import draw_plan
 from .plots import draw_profiles
 from .strip_plots import draw_strips, list_strips, strip_legend
-from .verdict import verdict
+from .summary import verdict
 
 CLASSES_ADVICE = (
     "Rail classes: choose the class of the rails; in a raw cloud, which has none, have the rail points found."
