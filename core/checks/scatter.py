@@ -45,8 +45,8 @@ def gauge_scatter(
 def _scatter_mm(centerlines: Sequence[Centerline], gauges_m: Sequence[float]) -> np.ndarray:
     """Return by how much the gauge of each track scatters.
 
-    A track that is about as long as its errors shows little of them. What it shows counts by its length, and as one more
-    error what all tracks of its gauge scatter about their mean, if that is more.
+    A track that is about as long as its errors shows little of them. What it shows counts by its length, and one error
+    more as all tracks of its gauge scatter about their mean, if that is more.
     """
     tracks = [(line.gauge_mm, line.gaugesd_mm, line.length_m) for line in centerlines]
     mean_mm, own_mm, length_m = np.reshape(tracks, (-1, 3)).T
