@@ -19,6 +19,12 @@ from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
 from ..steps import tracks_of_class
 
+NO_LINE = (
+    "The points found in the raw cloud give no rail: they are too few, or not on rails. Check the rail standard, the "
+    "unit of the coordinates and MIN_LENGTH, or classify the rail points yourself."
+)
+"""What is said of points that look like those of rails and do not line up, such as those of kerbs and ditches."""
+
 STEP_M = 1.0
 """Spacing of the places at which a lone line is compared with the tracks next to it."""
 
@@ -75,7 +81,9 @@ def _near(line: np.ndarray, places: np.ndarray) -> bool:
     return bool((places[:, :2].min(axis=0) < high).all() and (places[:, :2].max(axis=0) > low).all())
 
 
-def warn_of_rails(rails: Sequence[RailLine], class_code: int, parameters: Parameters, progress: Progress) -> None:
+def warn_of_rails(
+    rails: Sequence[RailLine], class_code: int, parameters: Parameters, progress: Progress, raw: bool = False
+) -> None:
     """Warn the user if a class has no rails, or if `smoothing_xy_m` moves lines off their rails.
 
     Parameters
@@ -85,9 +93,12 @@ def warn_of_rails(rails: Sequence[RailLine], class_code: int, parameters: Parame
     class_code : int
     parameters : Parameters
     progress : Progress
+    raw : bool
+        Whether the points were found in a raw cloud, in which the user chose no class.
     """
     if not rails:
-        progress.warning(f"Class {class_code} has no rails: check the rail classes, the standard and MIN_LENGTH.")
+        checks = "check the rail classes, the standard and MIN_LENGTH"
+        progress.warning(NO_LINE if raw else f"Class {class_code} has no rails: {checks}.")
     warn_if_out_of_reach(rails, parameters.head_width_m, parameters.smoothing_xy_m, progress)
 
 
