@@ -59,8 +59,8 @@ class Shown:
         points show nothing.
     common_m : float
         Standard error that more points would not reduce; along an `Axis`, what its course follows of it.
-    blur_m, blur_up_m : float
-        See `sections.Middles`.
+    outline : Middles
+        What the outline of the head shows.
     """
 
     t: np.ndarray
@@ -68,8 +68,7 @@ class Shown:
     offset_m: np.ndarray
     information: np.ndarray
     common_m: np.ndarray
-    blur_m: np.ndarray
-    blur_up_m: np.ndarray
+    outline: Middles
 
 
 @dataclass(frozen=True)
@@ -151,7 +150,7 @@ class Axis:
         support = Support(t, self.shown.points, np.sqrt(by_chance + remainder + self.shown.common_m**2 + bridge_m**2))
         if self.flank is not None:
             return replace(support, sigmaz_m=np.full(len(t), FLANK_TOP_SIGMA_M))
-        return support if marked else _with_blur(support, self.shown.blur_m, self.shown.blur_up_m)
+        return support if marked else _with_blur(support, self.shown.outline.blur, self.shown.outline.blur_up)
 
 
 def _counted(t: np.ndarray, count: int, values: np.ndarray | None = None) -> np.ndarray:
@@ -172,7 +171,8 @@ def _of_ridge(line: np.ndarray, t: np.ndarray, ridge: Ridge) -> Shown:
     places, normals = (interpolate(values, along, ridge.t) for values in (line, left_normals(line)))
     shared_m = wander(places + ridge.course_m[:, None] * normals)
     information = ridge.information / (1 + ridge.information * WINDOW * shared_m**2)
-    return Shown(ridge.t, _counted(t, len(ridge.t)), ridge.offset_m, information, nothing, nothing, nothing)
+    outline = Middles.unknown(len(ridge.t))
+    return Shown(ridge.t, _counted(t, len(ridge.t)), ridge.offset_m, information, nothing, outline)
 
 
 def _is_narrow(across: np.ndarray, head_width_m: float) -> bool:
@@ -187,9 +187,9 @@ def _of_band(t: np.ndarray, across: np.ndarray, length_m: float, left_m: float, 
     """Return what points show that are all on one face, or on the axis; the axis is at `left_m` on average."""
     stations = stations_along(length_m)
     points, mean_m = _means(t, across, len(stations))
-    noise_m, nothing = robust_sigma(across - np.interp(t, stations[points > 0], mean_m[points > 0])), 0.0 * mean_m
-    offset_m = mean_m + left_m - np.median(across)
-    return Shown(stations, points, offset_m, points / noise_m**2, nothing + sigma_m, nothing, nothing)
+    noise_m = robust_sigma(across - np.interp(t, stations[points > 0], mean_m[points > 0]))
+    offset_m, common_m = mean_m + left_m - np.median(across), np.full(len(stations), sigma_m)
+    return Shown(stations, points, offset_m, points / noise_m**2, common_m, Middles.unknown(len(stations)))
 
 
 def _of_head(
@@ -226,8 +226,7 @@ def _of_head(
         np.select(which, [outline.offset, with_outline(found.offset_m, outline), mean_m]),
         np.select(which, [outline.information, found.information, by_mean]),
         np.select(which, [outline.common, found.view_m, unsure_m]),
-        outline.blur,
-        outline.blur_up,
+        outline,
     )
 
 

@@ -21,12 +21,12 @@ from ..rails import RailLine, Support
 from .axis import CELL_M, Axis, unseen_m
 from .blunt import SMOOTHING_M, wander
 from .edges import Widths, search_distance, stations_along, widest
-from .level import fit_crown, rough_level
+from .level import AXIS_SHARE, fit_crown, rough_level
 from .neighbours import free_edges
 from .own_level import on_own_level
 from .smoother import KNOT_M
 from .strips import StripOffsets, aligned, measure_strips
-from .top import MIN_POINTS, Top, find_top, smoothed
+from .top import MIN_POINTS, Top, by_outline, find_top, smoothed
 
 MIN_GAP_M, MAX_CHANCE_GAP_M = 0.5, 0.9
 """Length without points from which a line counts as bridged: five profiles of the fastest train's scanner. Where points
@@ -187,6 +187,10 @@ def _measured(
         if top is None:
             return None
         top = replace(top, crown_m=crown.error(parameters.head_width_m))
+        if axis.ridge is None and parameters.smoothing_z_m is None:
+            flat_z = level_z[head] - top.slope * feet.across[head]
+            near_axis = np.abs(feet.across[head]) <= AXIS_SHARE * parameters.head_width_m
+            top = by_outline(top, feet.t[head], flat_z, near_axis, axis.shown.outline, along[-1])
     else:
         head = np.ones(len(z), dtype=bool)
         above_m = axis.flank.top_m - np.mean(z - rough_level(feet.t, z))

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from scipy.ndimage import median_filter, uniform_filter1d
 
 from .outline import CROWN_RADIUS_M
@@ -99,6 +100,8 @@ class Crown:
 def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Return the height of most points around each point: medians of short bins, filtered by a running median.
 
+    The trend of the line is removed before and added again, so that the ends of a gradient are kept.
+
     Parameters
     ----------
     t : (n,) array
@@ -113,7 +116,9 @@ def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
     first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
     count = np.diff(np.append(first, len(t)))
     middle_t = t[first + count // 2]
-    return np.interp(t, middle_t, _median_filtered(middle_t, medians(z, first, count)))
+    level = medians(z, first, count)
+    trend = Polynomial.fit(middle_t, level, 1) if len(middle_t) > MEDIAN_BINS else Polynomial([0.0])
+    return trend(t) + np.interp(t, middle_t, _median_filtered(middle_t, level - trend(middle_t)))
 
 
 def medians(values: np.ndarray, first: np.ndarray, count: np.ndarray) -> np.ndarray:
@@ -137,14 +142,12 @@ def medians(values: np.ndarray, first: np.ndarray, count: np.ndarray) -> np.ndar
     return found
 
 
-def _median_filtered(t: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Apply a running median to heights after removing their trend, so that the ends of a gradient are kept."""
-    trend = np.polynomial.Polynomial.fit(t, z, 1)(t) if len(t) > MEDIAN_BINS else 0.0
-    level = z - trend
+def _median_filtered(t: np.ndarray, level: np.ndarray) -> np.ndarray:
+    """Apply a running median to heights without their trend, and leave out those of another rail."""
     own = np.abs(level - median_filter(level, OTHER_RAIL_BINS, mode="nearest")) <= OTHER_RAIL_M
     if own.any():
         level = np.interp(t, t[own], level[own])
-    return trend + median_filter(level, MEDIAN_BINS, mode="nearest")
+    return median_filter(level, MEDIAN_BINS, mode="nearest")
 
 
 def is_blended(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> bool:
@@ -265,10 +268,10 @@ def on_top(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float
 
 def in_head_frame(
     t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return points in the frame of their head: offset to the left and height, (n,) each, from the top on the line.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return points in the frame of their head: offset to the left and height from the top on the line, (n,) each.
 
-    NaN if the crown has too few points.
+    The third array is the height of the top on the line, (n,). All are NaN if the crown has too few points.
 
     Parameters
     ----------
@@ -279,12 +282,13 @@ def in_head_frame(
     head = np.abs(across) <= 0.5 * head_width_m
     crown = np.abs(across) <= AXIS_SHARE * head_width_m
     if crown.sum() < MIN_ON_HEAD:
-        return np.full(len(t), np.nan), np.full(len(t), np.nan)
+        nothing = np.full(len(t), np.nan)
+        return nothing, nothing, nothing
     above = z - np.interp(t, t[crown], rough_level(t[crown], z[crown]))
     slope = np.interp(t, t[head], cross_slope(t[head], across[head], above[head], head_width_m))
     flat = above - slope * across
     flat -= np.interp(t, t[crown], rough_level(t[crown], flat[crown]))
-    return across + slope * flat, flat
+    return across + slope * flat, flat, z - slope * across - flat
 
 
 def _moving_fit(

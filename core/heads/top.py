@@ -5,7 +5,7 @@ See docs/method.md section 6.4.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Union
 
 import numpy as np
@@ -13,8 +13,10 @@ import numpy as np
 from ..lines.paek import VARIANCE_FACTOR
 from ..lines.smoothing import smooth_profile
 from ..rails import Support
+from .edges import STATION_STEP_M, stations_along
 from .envelope import extremal_boundary
 from .level import AXIS_SHARE, cross_slope, robust_sigma, rough_level
+from .sections import Middles
 from .smoother import Spline, bridge_error, smooth
 
 MIN_POINTS = 10
@@ -90,14 +92,14 @@ class Top:
         Points on it.
     slope : (n,) array
         Rise per metre to the left, at each point.
-    crown_m : float
-        Standard error of the height on the axis that all points share.
+    crown_m : float or (s,) array
+        Standard error of the height on the axis that all points share; (s,) at the stations of a support.
     """
 
     course: Course
     points: np.ndarray
     slope: np.ndarray
-    crown_m: float = 0.0
+    crown_m: Union[float, np.ndarray] = 0.0
 
     def height_error(self, t: np.ndarray, support: Support) -> np.ndarray:
         """Return the standard error of the height at the stations of a support, (s,) metres.
@@ -112,6 +114,35 @@ class Top:
         leaning = np.interp(support.t, t, self.slope[self.points]) * support.sigma_m
         bridge = bridge_error(t, support.t, UNSEEN_TURN)
         return np.sqrt(self.course.sigma(support.t) ** 2 + self.crown_m**2 + leaning**2 + bridge**2)
+
+
+def by_outline(
+    top: Top, t: np.ndarray, z: np.ndarray, near_axis: np.ndarray, outline: Middles, length_m: float
+) -> Top:
+    """Measure the height by the outline of the head where that is known, and by the points on the axis elsewhere.
+
+    Parameters
+    ----------
+    top : Top
+        From `find_top`.
+    t, z : (n,) arrays
+        Chainage (increasing) and height of its points, less the slope across and the fall of the crown.
+    near_axis : (n,) bool array
+        Points that give the height.
+    outline : Middles
+        At the stations along the line.
+    length_m : float
+    """
+    chosen, stations = top.points & near_axis, stations_along(length_m)
+    noise_m = robust_sigma(z[chosen] - top.course.at(t[chosen]))
+    number = np.minimum((t[chosen] / STATION_STEP_M).astype(int), len(stations) - 1)
+    points = np.bincount(number, minlength=len(stations))
+    mean_m = np.bincount(number, z[chosen], len(stations)) / np.maximum(points, 1)
+    which = [np.isfinite(outline.top), points > 0]
+    values = np.select(which, [outline.top, mean_m], top.course.at(stations))
+    information = np.select(which, [outline.top_information, points / noise_m**2])
+    course = smooth(stations, values, information, -TAIL_M, length_m + TAIL_M)
+    return replace(top, course=course, crown_m=course.followed(stations, np.where(which[0], outline.top_common, top.crown_m), information))
 
 
 def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None) -> Course:
