@@ -134,11 +134,8 @@ SWITCHES = (
     _rule("classify.square.flush_rails", lambda *_: Flush(np.empty(0, dtype=np.int64), NO_LINES, NO_LINES)),
     _rule("classify.square.SINGLE_SLOPE", np.inf),
     _rule("classify.square.SINGLE_HEIGHT_M", 0.0),
-    _rule("classify.square.LEAST_SINGLE_WIDTH", 0.0),
-    _rule("classify.square.LEAST_BLUNT_HEIGHT_M", 0.0),
     _rule("classify.partner._majority", first),
     _rule("classify.labels.MIN_AXES", 1),
-    _rule("classify.flush.CROWD", 10**6),
     _rule("classify.tops._around", first),
 )
 

@@ -19,7 +19,6 @@ import numpy as np
 from rail_extract.core.classify.settings import Settings
 from rail_extract.core.clouds.las import laspy
 from rail_extract.core.clouds.points import RailPoints
-from rail_extract.core.comparison.agreement import HEADER, agreement
 from rail_extract.core.errors import ParameterError, RailExtractError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.gauge_estimate import measure_spacings
@@ -28,6 +27,7 @@ from rail_extract.core.parameters import Parameters
 from rail_extract.core.pipeline import extract_rails
 from rail_extract.core.rails import RailLine
 from rail_extract.core.standards import RAIL_CLASS, RailStandard, closest_standard, resolve
+from rail_extract.laboratory.ruler.agreement import HEADER, agreement
 from rail_extract.laboratory.ruler.lines import cut, nearest
 from rail_extract.laboratory.ruler.whole_clouds import classify_cloud
 from scipy.spatial import cKDTree

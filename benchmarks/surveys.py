@@ -10,8 +10,8 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
-from rail_extract.core.comparison.agreement import HEADER, agreement
 from rail_extract.core.rails import RailNetwork
+from rail_extract.laboratory.ruler.agreement import HEADER, agreement
 from rail_extract.laboratory.ruler.classification import draw, settings_of
 from rail_extract.laboratory.ruler.lines import match
 from rail_extract.laboratory.ruler.whole_clouds import classify_cloud

@@ -31,7 +31,7 @@ from .workers.runner import workers as workers_of
 if TYPE_CHECKING:
     import geopandas
 
-    from .layers import Layer
+    from .output.layers import Layer
 
 LAYERS = ("rails", "centerlines", "quality", "findings")
 """Layers of a result; `quality` holds the stations of the track geometry."""
@@ -71,7 +71,7 @@ class Network(RailNetwork):
         """
         geopandas = _package("geopandas")
         (written,) = self._layers([layer])
-        from .commands.geopackage import shapes_of
+        from .output.writing import shapes_of
 
         columns = dict(zip((one.name for one in written.product.fields), written.written_columns()))
         return geopandas.GeoDataFrame(columns, geometry=shapes_of(written, self.frame), crs=self.frame.crs_wkt or None)
@@ -98,7 +98,7 @@ class Network(RailNetwork):
             raise ParameterError(f"{Path(path).name} can't be written: let the name end in {' or '.join(FORMATS)}.")
         names = LAYERS if layer is None and suffix == ".gpkg" else [layer or LAYERS[0]]
         layers = self._layers(names)
-        from .commands.geopackage import write_layers
+        from .output.writing import write_layers
 
         write_layers(layers, Destination.at(Path(path)), self.frame)
 
@@ -119,7 +119,7 @@ class Network(RailNetwork):
             raise ParameterError(f"There is no layer {unknown.pop()!r}: choose one of {', '.join(LAYERS)}.")
         for package in ("pyogrio", "shapely"):
             _package(package)
-        from .layers import network_layers
+        from .output.layers import network_layers
 
         return network_layers(self, names, self.origin.gauges_m)
 

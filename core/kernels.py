@@ -50,7 +50,7 @@ def cores() -> int:
 def threads() -> int:
     """Return the number of threads on which this process computes: OMP_NUM_THREADS limits it, as in workers."""
     limit = os.environ.get("OMP_NUM_THREADS", "")
-    return min(cores(), MOST_THREADS, int(limit) if limit.isdigit() and int(limit) else MOST_THREADS)
+    return min(cores(), MOST_THREADS, int(limit) if limit.isdecimal() and int(limit) else MOST_THREADS)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from .checks.lines import warn_of_rails, warn_of_split_classes, with_tracks
+from .checks.scatter import doubting_scatter, gauge_scatter
 from .checks.standard import head_widths, warn_of_gauge, warn_of_spacing
 from .checks.strips import doubting_jumps, strip_courses, warn_of_strips
 from .classify.settings import Settings
@@ -21,6 +22,7 @@ from .clouds.points import RailPoints, Request
 from .errors import CloudError, NoRailPointsError, NoTrackError, RailExtractError
 from .frpdf.models import choose
 from .grow.settings import GrowSettings
+from .heads.strips import rows_of
 from .labelling.spooling import spool_found, spool_grown
 from .parameters import ALIGNED, Parameters
 from .progress import SILENT, Progress, Recording, counted
@@ -36,7 +38,6 @@ from .steps import clean_square, engine_for, rails_of_square, square_side, track
 from .tasks import READ_S, Context, InTurn, Runner, Task
 from .tracks.geometry import measure_track_geometry
 from .tracks.parallels import widths_by_gauge
-from .tracks.scatter import doubting_scatter, gauge_scatter
 
 READING, DRAWING, PAIRING, MEASURING = 0.2, 0.72, 0.04, 0.04
 """Run times of the steps relative to each other, for the progress: sorting files, squares, tracks, track geometry."""
@@ -206,36 +207,10 @@ def _walk(
     """
     progress = Recording(progress)
     drawing, pairing, measuring = progress.divide((DRAWING, PAIRING, MEASURING))
-    rails: list[RailLine] = []
-    strips: list[np.ndarray] = []
-    cleaned: dict[int, RailRaster] = {}
-    any_square = False
     progress.status("Drawing the rails")
     sources = plausible(sources, progress)
-    for source, share in zip(sources, drawing.split(len(sources))):
-        squares = {square.key: square for square in occupied_squares(sources, source)}
-        _announce_squares(source, squares, parameters, progress)
-        parts, rasters = _draw_squares(source, squares, parameters, runner, share)
-        any_square |= bool(parts) or not squares
-        strips += [rows_in_frame(part, source.frame) for part in parts]
-        found = whole_rails(_released(parts), source.frame, parameters, len(rails) + 1, progress) if parts else []
-        progress.info(f"Class {source.class_code}: {_lengths(found, 'rail')}.")
-        warn_of_rails(found, source.class_code, parameters, progress)
-        if found:
-            warn_of_unexplained(source, found, progress)
-            warn_of_airborne(source, found, progress)
-        rails += found
-        if rasters:
-            cleaned[source.class_code] = assembled(rasters, squares, source.frame)
-    if not any_square:
-        raise RailExtractError(f"Not one square could be extracted; the last error was: {runner.failures[-1]}")
-    centerlines: list[Centerline] = []
-    try:
-        centerlines = tracks_of(rails, parameters, pairing)
-    except NoTrackError as error:
-        told = f"No track of {1000 * parameters.gauge_m:.0f} mm gauge found."
-        is_asked = is_warned or warn_of_spacing(sources[0], parameters, progress)
-        runner.failures.append(told if is_asked else str(error))
+    rails, strips, cleaned = _draw_rails(sources, parameters, runner, drawing)
+    centerlines = _pair_rails(rails, sources, parameters, runner, pairing, is_warned)
     progress.info(f"Paired: {_lengths(centerlines, 'track')}.")
     rails = with_tracks(rails, centerlines, progress)
     warn_of_split_classes(rails, parameters, progress)
@@ -245,9 +220,6 @@ def _walk(
     beyond_m = gauge_scatter(rails, centerlines) if heads and heads.blunt else {}
     rails = doubting_scatter(rails, beyond_m)
     geometry = _measure_tracks(centerlines, rails, beyond_m, sources, parameters, runner, measuring)
-    if geometry:
-        count = sum(len(track.chainage_m) for track in geometry)
-        progress.info(f"Measured: {counted(count, 'station')}, one every {parameters.quality_step_m:g} m.")
     described = dict(runner.run({"engine": Task("Describing the engine", _describe_engine, (parameters,))}))
     progress.info(f"Engine of the network: {described.get('engine', 'unknown')}.")
     progress.set_fraction(1.0)
@@ -262,8 +234,63 @@ def _walk(
         tuple(runner.failures),
         progress.warnings,
         heads,
-        strip_courses(centerlines, np.concatenate(strips)) if strips else (),
+        strip_courses(centerlines, strips),
     )
+
+
+def _draw_rails(
+    sources: Sequence[PointSource], parameters: Parameters, runner: Runner, progress: Progress
+) -> tuple[list[RailLine], np.ndarray, dict[int, RailRaster]]:
+    """Draw the rails of all classes.
+
+    Returns
+    -------
+    rails : list of RailLine
+    strips : array
+        Offsets of the strips in the frame of the cloud, see `squares.pieces.rows_in_frame`.
+    cleaned : dict of int to RailRaster
+        Cleaned rasters by class, if they are to be kept.
+    """
+    rails: list[RailLine] = []
+    strips: list[np.ndarray] = []
+    cleaned: dict[int, RailRaster] = {}
+    any_square = False
+    for source, share in zip(sources, progress.split(len(sources))):
+        squares = {square.key: square for square in occupied_squares(sources, source)}
+        _announce_squares(source, squares, parameters, share)
+        parts, rasters = _draw_squares(source, squares, parameters, runner, share)
+        any_square |= bool(parts) or not squares
+        strips += [rows_in_frame(part, source.frame) for part in parts]
+        found = whole_rails(_released(parts), source.frame, parameters, len(rails) + 1, share) if parts else []
+        share.info(f"Class {source.class_code}: {_lengths(found, 'rail')}.")
+        warn_of_rails(found, source.class_code, parameters, share)
+        if found:
+            warn_of_unexplained(source, found, share)
+            warn_of_airborne(source, found, share)
+        rails += found
+        if rasters:
+            cleaned[source.class_code] = assembled(rasters, squares, source.frame)
+    if not any_square:
+        raise RailExtractError(f"Not one square could be extracted; the last error was: {runner.failures[-1]}")
+    return rails, np.concatenate(strips or [rows_of((), ())]), cleaned
+
+
+def _pair_rails(
+    rails: Sequence[RailLine],
+    sources: Sequence[PointSource],
+    parameters: Parameters,
+    runner: Runner,
+    progress: Progress,
+    is_warned: bool,
+) -> list[Centerline]:
+    """Draw the centerlines; without any track, what the points show of the gauge is a failure of the run."""
+    try:
+        return tracks_of(rails, parameters, progress)
+    except NoTrackError as error:
+        told = f"No track of {1000 * parameters.gauge_m:.0f} mm gauge found."
+        is_asked = is_warned or warn_of_spacing(sources[0], parameters, progress)
+        runner.failures.append(told if is_asked else str(error))
+        return []
 
 
 def _released(parts: list[SquareRails]) -> Iterator[SquareRails]:
@@ -386,4 +413,7 @@ def _measure_tracks(
             share,
             parameters.gauges,
         )
+    if geometry:
+        count = sum(len(track.chainage_m) for track in geometry)
+        progress.info(f"Measured: {counted(count, 'station')}, one every {parameters.quality_step_m:g} m.")
     return sorted(geometry, key=lambda one: one.track_id)

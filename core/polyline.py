@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import os
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from .kernels import threads
 from .progress import SILENT, Progress
 
 STATION_M = 0.05
@@ -21,9 +20,6 @@ POINTS_AT_ONCE = 500_000
 
 POINTS_FOR_THREADS = 10_000
 """Fewer points are projected by a single thread: on two cores, starting the threads takes 0.3 ms, the points 2 ms."""
-
-MAX_THREADS = 256
-"""Scipy would start any number."""
 
 CLOSED_M = 0.01
 """Largest distance between the ends of a closed line; the ends of extracted rings coincide, even after thinning."""
@@ -206,16 +202,6 @@ def project(lines: Sequence[np.ndarray], xy: np.ndarray, reach_m: float, progres
     point, line, t, across = (np.concatenate(column) for column in zip(*found))
     order = np.lexsort((t, line))
     return Feet(point[order], line[order], t[order], across[order])
-
-
-def threads() -> int:
-    """Return the number of threads for scipy to use: that in OMP_NUM_THREADS, else -1 for all cores.
-
-    Other numerical libraries follow the same variable; Dask sets it for its workers.
-    """
-    number = os.environ.get("OMP_NUM_THREADS", "")
-    wanted = int(number) if re.fullmatch(r"\d{1,9}", number) else 0
-    return min(wanted, MAX_THREADS) or -1
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,10 @@ from .frpdf.engine import Engine, make_engine
 from .frpdf.models import choose
 from .frpdf.weights import load_arrays
 from .heads.elevation import ElevationParameters, elevate, flat_rail, flat_rails, numbered
+from .heads.head_points import near_lines
 from .heads.refinement import refine
 from .heads.roads import onto_heads
-from .heads.strips import rows_of, strips_along
+from .heads.strips import measure_strips, rows_of
 from .lines.bridges import FIT_M
 from .lines.network import LineNetwork
 from .lines.network_smoothing import smooth_network
@@ -227,7 +228,6 @@ def measure_lines(
     """
     refining, elevating = progress.divide((REFINE, ELEVATE))
     elevation = ElevationParameters(
-        head_width_m=parameters.head_width_m,
         tolerance_xy_m=parameters.tolerance_xy_m,
         tolerance_z_m=parameters.tolerance_z_m,
         crown_radius_m=parameters.crown_radius_m,
@@ -241,10 +241,12 @@ def measure_lines(
     drawn = [flat_rail(line, class_code) for line in network.lines]
     heads = widths_by_gauge(drawn, parameters.gauges, parameters.centerline_tolerance_m)
     spacings_m = [sum(gauge) for gauge in parameters.gauges]
-    network = replace(network, lines=onto_heads(network.lines, points, heads, spacings_m))
+    network = replace(network, lines=onto_heads(network.lines, points.xyz, heads, spacings_m))
     network = refine(network, points, heads, parameters.smoothing_xy_m, refining, elevation.align, cell_m)
-    strips = strips_along(network.lines, points, heads)
-    return elevate(network, points, elevation, elevating, strips, heads), rows_of(network.lines, strips)
+    near = near_lines(network.lines, points.xyz, heads, points.strips, elevating.span(0.0, 0.6))
+    strips = [measure_strips(head) for head in near]
+    rails = elevate(network, near, class_code, elevation, elevating.span(0.6, 1.0), strips)
+    return rails, rows_of(network.lines, strips)
 
 
 def _finished(rails: Sequence[RailLine], parameters: Parameters, first_id: int, progress: Progress) -> list[RailLine]:

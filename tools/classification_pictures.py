@@ -140,7 +140,7 @@ def lines() -> Figure:
     """Draw the direction of each narrow cell that lies on a line, by its purity."""
     at, (figure, axes) = scene(), plan("Step 3: cells on a line, with its direction; the others in grey")
     found = at.lines
-    good = (found.cover >= square.MIN_COVER) & (found.pure >= square.MIN_PURE)
+    good = np.isin(np.arange(len(found.cover)), found.good())
     cells(axes, found.axis[~good], GREY)
     (along, across), direction = turned(found.axis[good]), found.theta[good] - HEADING
     step = 0.12 * np.stack([np.cos(direction), np.sin(direction)])
@@ -154,7 +154,7 @@ def partners() -> Figure:
     """Draw which cells are kept, with and without a partner, and what was dropped."""
     at, (figure, axes) = scene(), plan("Steps 4 to 6: rails (blue); cells on other lines, which are dropped (red)")
     found = at.lines
-    good = (found.cover >= square.MIN_COVER) & (found.pure >= square.MIN_PURE) & ~np.isin(at.marks, at.kept.cell)
+    good = np.isin(np.arange(len(found.cover)), found.good()) & ~np.isin(at.marks, at.kept.cell)
     cells(axes, found.axis[good], DROPPED, 2.2)
     cells(axes, at.kept.lines.axis[at.kept.paired], RAIL, 2.2)
     cells(axes, at.kept.lines.axis[~at.kept.paired], OTHER, 2.2)

@@ -32,12 +32,12 @@ from rail_extract.core.clouds.readers import list_files
 from rail_extract.core.disk import Destination, identity
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.labelling.files import Choice, Labels, Output, write_labelled
-from rail_extract.core.layers import lines_layer
+from rail_extract.core.output.layers import lines_layer
+from rail_extract.core.output.raster_file import header_for
 from rail_extract.core.products import RAILS
 from rail_extract.core.progress import SILENT
 from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import rasterize
-from rail_extract.core.raster_file import header_for
 from rail_extract.core.scratch import MARK, MIN_UNMARKED_AGE_S, PREFIX
 from rail_extract.core.standards import SEARCHED_CLASSES, resolve
 from rail_extract.core.tasks import InTurn

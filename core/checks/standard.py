@@ -225,31 +225,35 @@ def head_widths(
     if rails and HEAD_OFF_M < seen_m - stated_m < MIN_WIDER_M:
         seen_m = likelier_width(lines, xyz, (stated_m, seen_m))
     widths = HeadWidths(seen_m, stated_m)
-    measured = measured[0], seen_m
     if widths.differ:
-        seen = f"Heads look {1000 * widths.seen_m:.0f} mm wide, {1000 * stated_m:.0f} mm are stated"
-        standard = closest_standard(*measured)
-        fits = standard is not None and abs(standard.head_width_m - widths.seen_m) <= HEAD_OFF_M
-        if 1000 * widths.seen_m < HEAD_WIDTH_RANGE_MM[0]:
-            progress.warning(
-                f"The points cover only {1000 * widths.seen_m:.0f} mm of each head of {1000 * stated_m:.0f} mm; the "
-                "scanner probably saw one side only. The lines are on the axes if that width is right."
-            )
-        elif widths.seen_m > stated_m + MIN_WIDER_M:
-            progress.warning(
-                f"{seen}: road or dirt next to them is classified as rail. Where it covers one edge of a head, the "
-                "line is set from the other edge if that is at gauge. Check the classification elsewhere."
-            )
-        elif fits or widths.seen_m < stated_m:
-            if not any(abs(measured[0] - seen_m - gauge_m) <= SAME_GAUGE_M for gauge_m, _ in gauges):
-                return widths
-            progress.warning(f"{seen}{_question(*measured)} Every gauge is off by the difference.")
-        else:
-            progress.warning(
-                f"{seen}, and no standard has such heads: passes of the scanner are not aligned, or the points are "
-                "noisy. Passes can be compared and aligned (STRIPS) if the points have source ids or GPS times."
-            )
+        _warn_of_widths(widths, measured[0], gauges, progress)
     return widths
+
+
+def _warn_of_widths(widths: HeadWidths, spacing_m: float, gauges: Sequence[Gauge], progress: Progress) -> None:
+    """Warn the user of heads that look wider or narrower than stated, given the distance of most rails."""
+    seen_m, stated_m = widths.seen_m, widths.stated_m
+    seen = f"Heads look {1000 * seen_m:.0f} mm wide, {1000 * stated_m:.0f} mm are stated"
+    standard = closest_standard(spacing_m, seen_m)
+    fits = standard is not None and abs(standard.head_width_m - seen_m) <= HEAD_OFF_M
+    if 1000 * seen_m < HEAD_WIDTH_RANGE_MM[0]:
+        progress.warning(
+            f"The points cover only {1000 * seen_m:.0f} mm of each head of {1000 * stated_m:.0f} mm; the scanner "
+            "probably saw one side only. The lines are on the axes if that width is right."
+        )
+    elif seen_m > stated_m + MIN_WIDER_M:
+        progress.warning(
+            f"{seen}: road or dirt next to them is classified as rail. Where it covers one edge of a head, the line is "
+            "set from the other edge if that is at gauge. Check the classification elsewhere."
+        )
+    elif fits or seen_m < stated_m:
+        if any(abs(spacing_m - seen_m - gauge_m) <= SAME_GAUGE_M for gauge_m, _ in gauges):
+            progress.warning(f"{seen}{_question(spacing_m, seen_m)} Every gauge is off by the difference.")
+    else:
+        progress.warning(
+            f"{seen}, and no standard has such heads: passes of the scanner are not aligned, or the points are noisy. "
+            "Passes can be compared and aligned (STRIPS) if the points have source ids or GPS times."
+        )
 
 
 def _middle(xyz: np.ndarray) -> np.ndarray:

@@ -27,9 +27,6 @@ smoothing draws a step as a bend 2 m long."""
 MIN_SHARE = 0.5
 """Smallest step of a rail, relative to the mean of both rails of the track."""
 
-REACH_M = 1.2
-"""Distance from a centerline within which its rails are: half of the widest gauge, and a head."""
-
 MIN_STEP_M = 0.008
 """Smallest step: waves of 1 mm that are 5 m long look like 4 mm."""
 

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..frame import ORIGIN_STEP
+
 COARSE_M = 0.5
 """Side of the cells in which the bed is found: wider than a rail with its shadow, narrower than a platform's edge."""
 
@@ -113,6 +115,25 @@ class Bed:
 
     coarse: Coarse
     planes: np.ndarray
+
+    @classmethod
+    def under(cls, xyz: np.ndarray) -> tuple[Bed, np.ndarray, np.ndarray]:
+        """Find the bed under points, (n, 3) metres.
+
+        Returns
+        -------
+        Bed
+        height : (n,) float32 array
+            Of each point above the bed; see `heights`.
+        z : (n,) float32 array
+            Their heights from a multiple of `ORIGIN_STEP` on.
+        """
+        x, y = (np.ascontiguousarray(values) for values in xyz.T[:2])
+        z = (xyz[:, 2] - ORIGIN_STEP * np.floor(xyz[:, 2].min() / ORIGIN_STEP)).astype(np.float32)
+        coarse = Coarse.around(x, y)
+        dx, dy = coarse.offsets(x, y)
+        bed = find_bed(coarse, dx, dy, z)
+        return bed, bed.heights(dx, dy, z)[0], z
 
     def heights(self, dx: np.ndarray, dy: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Height of each point above the highest level that is not above it.

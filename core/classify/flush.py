@@ -30,10 +30,7 @@ points near the bed. Ballast scatters by 12 mm and more."""
 CAVITY_M = (0.012, 0.19)
 """Depth of points in a groove below the pavement: from three times a good scanner's noise to a rail's height."""
 
-CROWD, CROWD_M = 60, 0.3
-"""Cavities with more neighbours than this are rough ground: a groove fills 25 cells within that distance."""
-
-REACH_M, STRIP_M, MIN_COVER, MIN_PURE = 1.0, 0.05, 0.5, 0.3
+REACH_M, BESIDE_LINE_M, MIN_COVER, MIN_PURE = 1.0, 0.05, 0.5, 0.3
 """See `lines`; stricter than for rails, because nothing else confirms a groove."""
 
 INSIDE_M, SPACING_M = 0.052, 0.05
@@ -127,10 +124,8 @@ def flush_rails(
     marks = centroids(cell[hollow], xy[hollow])
     if len(marks) < 2:
         return nothing
-    crowd = cKDTree(marks).query_ball_point(marks, CROWD_M, return_length=True)
-    marks = marks[crowd <= CROWD]
-    lines = find_lines(Marks(marks, np.zeros(len(marks))), REACH_M, 1.0, STRIP_M)
-    lines = lines.of((lines.cover >= MIN_COVER) & (lines.pure >= MIN_PURE))
+    lines = find_lines(Marks(marks, np.zeros(len(marks))), REACH_M, 1.0, BESIDE_LINE_M)
+    lines = lines.of(lines.good(MIN_COVER, MIN_PURE))
     flat = xy[np.abs(below) < HEAD_LEVEL_M]
     rails = [_at_edge(_grooves(lines, gauge_m), flat, head_width_m) for gauge_m in settings.gauges_m]
     heads = [_guided(one, settings) for one in rails]
@@ -235,7 +230,7 @@ def _summed_along(grooves: Heads, counts: np.ndarray) -> np.ndarray:
     """Add up the counts of the cells of the same groove within `ALONG_M`, (n, BINS)."""
     axis, inward = grooves.lines.axis, grooves.inward
     one, other = cKDTree(axis).query_pairs(ALONG_M, output_type="ndarray").T
-    same = np.abs(np.einsum("ij,ij->i", axis[other] - axis[one], inward[one])) < STRIP_M
+    same = np.abs(np.einsum("ij,ij->i", axis[other] - axis[one], inward[one])) < BESIDE_LINE_M
     same &= np.einsum("ij,ij->i", inward[one], inward[other]) > 0
     own = np.arange(len(axis))
     rows, columns = np.concatenate([own, one[same], other[same]]), np.concatenate([own, other[same], one[same]])

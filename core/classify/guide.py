@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..polyline import resample, runs, unit_tangents
 from .lines import Lines
-from .partner import SPACING_M, partners
+from .partner import MAJORITY, MIN_STATIONS, SPACING_M, partners
 from .pieces import pieces_of
 
 STEP_M = 0.25
@@ -23,14 +23,8 @@ CONTEXT_M = 3.0
 MIDDLE_M = 0.5
 """Distance from the middle of a track within which a guide runs along this track."""
 
-MAJORITY = 0.5
-"""Share of the cells of a piece of rail that decides for all."""
-
 ACROSS_RAD = 0.5
 """Angle to the guide from which a rail runs across it: more than that of any turnout."""
-
-MIN_STATIONS = 2
-"""Stations with a partner from which a cell belongs to a track; see `square`."""
 
 
 @dataclass(frozen=True)

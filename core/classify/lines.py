@@ -25,7 +25,7 @@ SMOOTHING = (0.7, 1.0, 0.7)
 
 FIRST_FIT_M, FIT_ROUNDS = 0.075, 2
 """Neighbours this near the line through the cell, which may be at the edge of the head, refine it; in later rounds
-those in the strip, which must not reach a guard rail."""
+those near the line, which must not reach a guard rail."""
 
 FIT_SLOPE, FIT_NEAR_M = 0.25, 0.04
 """They are also within this slope of the line, from a cell's width on."""
@@ -39,9 +39,20 @@ STATIONS = 10
 BESIDE_M = 0.10
 """Neighbours further across than this are beside the line."""
 
+MIN_COVER, MIN_PURE = 0.35, 0.20
+"""Least cover and purity of a line. Random surroundings have a purity of 0.07 to 0.12, a rail that runs beside two
+others 0.25."""
+
+SINGLE_COVER = 0.75
+"""Cover of a line that may be a rail without a partner."""
+
+REACH_POINTS_PER_M, REACH_M = 120.0, (1.0, 2.0)
+"""Reach of a line: this divided by the points per square metre, within limits. Thin clouds need more length to see a
+line; over more than 2 m, curves bend away from a straight one."""
+
 MAX_NEIGHBOURS = 400
 """A cell with more neighbours within reach is in an area, not on a line: a line of cells has 25 to 50 at 1 m reach,
-and with 0.2 of them on the line (see `MIN_PURE`) at most 250."""
+and with `MIN_PURE` of them on the line at most 250."""
 
 CENTRE_M, CENTRE_ROUNDS = 0.5, 3
 """Distance within which the cells of a head give the middle of its axis, and rounds to find them."""
@@ -102,6 +113,10 @@ class Lines:
         """Unit vectors to the left, (n, 2)."""
         return np.column_stack([-np.sin(self.theta), np.cos(self.theta)])
 
+    def good(self, cover: float = MIN_COVER, pure: float = MIN_PURE) -> np.ndarray:
+        """Return the numbers of the cells that are on a line, (k,) int."""
+        return np.flatnonzero((self.cover >= cover) & (self.pure >= pure))
+
     def of(self, chosen: np.ndarray) -> Lines:
         """Choose some of the cells."""
         return Lines(
@@ -114,6 +129,11 @@ class Lines:
         )
 
 
+def reach_at(per_m2: float) -> float:
+    """Return the reach of lines in a cloud with this number of points per square metre."""
+    return float(np.clip(REACH_POINTS_PER_M / per_m2, *REACH_M))
+
+
 def joined(one: Lines, other: Lines) -> Lines:
     """Put the lines of further cells behind those of some, of the same reach."""
     columns = ((one.axis, other.axis), (one.height, other.height), (one.theta, other.theta))
@@ -122,7 +142,9 @@ def joined(one: Lines, other: Lines) -> Lines:
     return Lines(axis, height, theta, cover, pure, one.reach_m)
 
 
-def find_lines(marks: Marks, reach_m: float, along_m: float, strip_m: float, wanted: np.ndarray | None = None) -> Lines:
+def find_lines(
+    marks: Marks, reach_m: float, along_m: float, beside_line_m: float, wanted: np.ndarray | None = None
+) -> Lines:
     """Find the line through each cell.
 
     Parameters
@@ -132,7 +154,7 @@ def find_lines(marks: Marks, reach_m: float, along_m: float, strip_m: float, wan
         Distance within which cells are compared.
     along_m : float
         Largest difference in height between neighbours on a line.
-    strip_m : float
+    beside_line_m : float
         Largest distance across from the line.
     wanted : (k,) int array, optional
         Cells whose lines are needed; the others get no cover.
@@ -141,8 +163,8 @@ def find_lines(marks: Marks, reach_m: float, along_m: float, strip_m: float, wan
     wanted = np.arange(count) if wanted is None else wanted
     theta, offset, cover, pure = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
     for chosen, number, step in _neighbours(marks, wanted, reach_m, along_m):
-        theta[chosen], offset[chosen] = _fitted(_main_direction(len(chosen), number, step), number, step, strip_m)
-        cover[chosen], pure[chosen] = _measured(theta[chosen], offset[chosen], number, step, reach_m, strip_m)
+        theta[chosen], offset[chosen] = _fitted(_main_direction(len(chosen), number, step), number, step, beside_line_m)
+        cover[chosen], pure[chosen] = _measured(theta[chosen], offset[chosen], number, step, reach_m, beside_line_m)
     axis = marks.xy + offset[:, None] * np.column_stack([-np.sin(theta), np.cos(theta)])
     return Lines(axis, marks.height, theta, cover, pure, reach_m)
 
@@ -188,7 +210,9 @@ def _main_direction(count: int, number: np.ndarray, step: np.ndarray) -> np.ndar
     return (np.argmax(votes, axis=1) + 0.5) * (np.pi / BINS)
 
 
-def _fitted(theta: np.ndarray, number: np.ndarray, step: np.ndarray, strip_m: float) -> tuple[np.ndarray, np.ndarray]:
+def _fitted(
+    theta: np.ndarray, number: np.ndarray, step: np.ndarray, beside_line_m: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Fit a straight line to the neighbours near each line: its direction and its distance to the left, (count,) each.
 
     The cell itself counts as well. Near the end of a rail, all neighbours are on one side: a line that had to pass
@@ -196,7 +220,7 @@ def _fitted(theta: np.ndarray, number: np.ndarray, step: np.ndarray, strip_m: fl
     """
     count = len(theta)
     offset = np.zeros(count)
-    for limit_m in (FIRST_FIT_M, *FIT_ROUNDS * (strip_m,)):
+    for limit_m in (FIRST_FIT_M, *FIT_ROUNDS * (beside_line_m,)):
         ahead, left = _turned(theta, number, step)
         beside = np.abs(left - offset[number])
         on = (beside < limit_m) & (beside < FIT_SLOPE * np.abs(ahead) + FIT_NEAR_M)
@@ -217,13 +241,13 @@ def _turned(theta: np.ndarray, number: np.ndarray, step: np.ndarray) -> tuple[np
 
 
 def _measured(
-    theta: np.ndarray, offset: np.ndarray, number: np.ndarray, step: np.ndarray, reach_m: float, strip_m: float
+    theta: np.ndarray, offset: np.ndarray, number: np.ndarray, step: np.ndarray, reach_m: float, beside_line_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Cover and purity of the line of each cell, (count,) each."""
     count = len(theta)
     ahead, left = _turned(theta, number, step)
     left = np.abs(left - offset[number])
-    on = left < strip_m
+    on = left < beside_line_m
     beside = np.bincount(number[left > BESIDE_M], minlength=count)
     station = np.clip((ahead[on] + reach_m) * (STATIONS / (2 * reach_m)), 0, STATIONS - 1).astype(np.int64)
     hits = np.bincount(number[on] * STATIONS + station, minlength=count * STATIONS).reshape(count, STATIONS)

@@ -37,12 +37,15 @@ PARALLEL_RAD = 0.07
 LEVEL_WITH_M = 0.25
 """Distance along the rail within which it is there beside a cell."""
 
+MIN_STATIONS = 2
+"""Stations with a partner from which a cell belongs to a pair of rails."""
+
 MAJORITY = 0.5
-"""Share of the cells of a line that decides for all."""
+"""Share of the cells of a line, or of a piece of rail, that decides for all."""
 
 
-def stations_with_partner(lines: Lines, spacings_m: Sequence[float], height_m: float) -> np.ndarray:
-    """Count the stations at which a cell's line has a partner, on the better side, (n,) from 0 to 5.
+def have_partners(lines: Lines, spacings_m: Sequence[float], height_m: float) -> np.ndarray:
+    """Return which cells belong to a pair of rails, (n,) bool.
 
     Parameters
     ----------
@@ -52,7 +55,8 @@ def stations_with_partner(lines: Lines, spacings_m: Sequence[float], height_m: f
     height_m : float
         Largest difference in height above the bed.
     """
-    return np.max([partners(lines, spacing_m, SPACING_M, height_m)[0] for spacing_m in spacings_m], axis=0)
+    stations = [partners(lines, spacing_m, SPACING_M, height_m)[0] for spacing_m in spacings_m]
+    return np.max(stations, axis=0) >= MIN_STATIONS
 
 
 def partners(

@@ -30,7 +30,7 @@ class Tolerances:
         Difference in height above the bed between two cells of one rail.
     spread_m : float
         Depth below the top of a neighbouring cell down to which a cell still belongs to the same head.
-    strip_m : float
+    beside_line_m : float
         Distance from a line within which a cell is on it: half a head, half a cell's diagonal and noise.
     partner_m : float
         Difference in height above the bed between the two rails of a track.
@@ -55,7 +55,7 @@ class Tolerances:
 
     along_m: float
     spread_m: float
-    strip_m: float
+    beside_line_m: float
     partner_m: float
     below_m: float
     above_m: float
@@ -76,7 +76,7 @@ as much relief anywhere."""
 DENSE = Tolerances(
     along_m=0.035,
     spread_m=0.045,
-    strip_m=0.050,
+    beside_line_m=0.050,
     partner_m=0.05,
     below_m=0.040,
     above_m=0.025,
@@ -93,7 +93,7 @@ DENSE = Tolerances(
 THIN = Tolerances(
     along_m=0.060,
     spread_m=0.060,
-    strip_m=0.065,
+    beside_line_m=0.065,
     partner_m=0.07,
     below_m=0.045,
     above_m=0.065,

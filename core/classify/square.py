@@ -6,13 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..frame import ORIGIN_STEP
 from ..rails import SearchFigures
-from .bed import COARSE_M, Bed, Coarse, find_bed
+from .bed import COARSE_M, Bed, Coarse
 from .flush import Flush, flush_rails
 from .labels import Near, label, whole_heads
-from .lines import Lines, Marks, centred, find_lines
-from .partner import runs_inside, stations_with_partner
+from .lines import SINGLE_COVER, Lines, Marks, centred, find_lines, reach_at
+from .partner import have_partners, runs_inside
 from .pieces import (
     links,
     long_enough,
@@ -29,37 +28,15 @@ from .tops import HIGH_M, MILLIMETRES, Band, Grid, Tops, highest_of_blocks, midd
 THIN_PER_M2 = 400.0
 """Points per square metre below which a square is thin: no scanner on a vehicle, or far from it."""
 
-REACH_POINTS_PER_M, REACH_M = 120.0, (1.0, 2.0)
-"""Reach of a line: this divided by the points per square metre, within limits. Thin clouds need more length to see a
-line; more than 2 m would bend out of the strip in curves."""
-
 DENSITY_QUANTILE = 0.75
 """Quantile, over the coarse cells with candidates, of the points per square metre that stand for the square."""
-
-MIN_COVER, MIN_PURE = 0.35, 0.20
-"""Least cover and purity of a line. Random surroundings have a purity of 0.07 to 0.12, a rail that runs beside two
-others 0.25."""
-
-MIN_STATIONS = 2
-"""Stations with a partner from which a cell belongs to a pair of rails."""
-
-SINGLE_COVER = 0.75
-"""Cover of a line that may be a rail without a partner."""
 
 SINGLE_HEIGHT_M = 0.12
 """Least height above the bed of a rail without a partner: lower things are edges of slopes, kerbs and boards."""
 
-LEAST_SINGLE_WIDTH = 0.5
-"""Least width of a rail without a partner, by that of a head: edges of ruts and furrows that a scanner sees from one
-side are sharp crests."""
-
 SINGLE_SLOPE = 0.4
 """Steepest bed of a rail without a partner: that of the shoulder of a ballast bed is 0.67. Where the far side of a
 slope is hidden, its crest looks like a bar."""
-
-LEAST_BLUNT_HEIGHT_M = 0.07
-"""Least mean height above the bed of a piece of a blunt rail: half of what images show of one, as where ballast reaches
-the head. Two lines of kerb stones at gauge, 6.5 cm high, are as narrow."""
 
 NOISE_ACROSS_M = 0.01
 """Distance beyond the side of a head within which the top of a cell counts towards its axis: less than half the gap
@@ -186,20 +163,15 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
     nothing = ByShape(rail, SearchFigures(), Classified(rail, SearchFigures()))
     if not len(xyz):
         return nothing
-    x, y = (np.ascontiguousarray(values) for values in xyz.T[:2])
-    z = (xyz[:, 2] - ORIGIN_STEP * np.floor(xyz[:, 2].min() / ORIGIN_STEP)).astype(np.float32)
-    coarse = Coarse.around(x, y)
-    dx, dy = coarse.offsets(x, y)
-    bed = find_bed(coarse, dx, dy, z)
-    height, _ = bed.heights(dx, dy, z)
+    bed, height, z = Bed.under(xyz)
     near = np.flatnonzero(height <= HIGH_M)
     if not len(near):
         return nothing
     height, xy = height[near], xyz[near, :2]
-    grid, cell = Grid.around(x[near], y[near], settings.cell_m)
+    grid, cell = Grid.around(xy[:, 0], xy[:, 1], settings.cell_m)
     tops = tops_of(grid, cell, height, z[near])
     standing = _standing(Shown(xy, cell, height, bed, tops), settings)
-    paved = flush_rails(coarse, near, xy, height, grid, cell, settings)
+    paved = flush_rails(bed.coarse, near, xy, height, grid, cell, settings)
     in_pavement = rail.copy()
     in_pavement[near[paved.points]] = True
     rail[near[standing.points]] = True
@@ -247,7 +219,7 @@ def _standing(shown: Shown, settings: Settings) -> Standing:
     found = Candidates.find(shown, HEADS)
     density = _density(shown.bed.coarse, shown.tops.grid.middles(found.marks))
     tolerances = THIN if density < THIN_PER_M2 else DENSE
-    reach_m = float(np.clip(REACH_POINTS_PER_M / density, *REACH_M))
+    reach_m = reach_at(density)
     kept = _kept(found, reach_m, tolerances, settings)
     heads = whole_heads(shown.tops, _completed(found, kept, settings, tolerances), tolerances)
     chosen = label(shown.tops, heads, shown.cell, shown.height, tolerances)
@@ -277,8 +249,7 @@ def _blunt_heads(shown: Shown, reach_m: float, settings: Settings) -> tuple[Kept
     if len(kept.cell):
         piece = pieces_of(len(kept.cell), kept.pairs)
         ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
-        heads = ridges.may_be_heads(settings.head_width_m)
-        kept = kept.of((heads & (_mean(kept.lines.height, piece) >= LEAST_BLUNT_HEIGHT_M))[piece])
+        kept = kept.of(ridges.may_be_heads(settings.head_width_m)[piece])
         kept = replace(kept, paired=_paired(kept.lines, settings, BLUNT))
         kept = kept.of(_long(kept, settings, False, BLUNT.least_m))
         kept = replace(kept, lines=on_crests(shown.xy, shown.height, kept.lines, ridges.blur_m))
@@ -334,8 +305,8 @@ def _density(coarse: Coarse, xy: np.ndarray) -> float:
 
 def _kept(found: Candidates, reach_m: float, tolerances: Tolerances, settings: Settings) -> Kept:
     """Keep the candidates that lie on rails."""
-    lines = find_lines(found.at(found.marks), reach_m, tolerances.along_m, tolerances.strip_m)
-    good = np.flatnonzero((lines.cover >= MIN_COVER) & (lines.pure >= MIN_PURE))
+    lines = find_lines(found.at(found.marks), reach_m, tolerances.along_m, tolerances.beside_line_m)
+    good = lines.good()
     half_m = settings.head_width_m / 2 + NOISE_ACROSS_M
     lines = centred(lines.of(good), found.at(found.cells), half_m, tolerances.along_m)
     free = stands_free(found.tops, tolerances.band, found.marks[good], lines)
@@ -350,7 +321,7 @@ def _kept(found: Candidates, reach_m: float, tolerances: Tolerances, settings: S
 
 def _paired(lines: Lines, settings: Settings, tolerances: Tolerances) -> np.ndarray:
     """Return which cells have a partner, (n,) bool."""
-    return stations_with_partner(lines, settings.spacings_m, tolerances.partner_m) >= MIN_STATIONS
+    return have_partners(lines, settings.spacings_m, tolerances.partner_m)
 
 
 def _long(kept: Kept, settings: Settings, keep_single: bool, least_m: float) -> np.ndarray:
@@ -434,7 +405,6 @@ def _stands_alone(
     steeper than a track's.
     """
     narrow = width_m < settings.head_width_m + tolerances.wider_single_m
-    narrow &= width_m > LEAST_SINGLE_WIDTH * settings.head_width_m
     high = _mean(kept.lines.height, piece) >= SINGLE_HEIGHT_M
     return narrow & high & (_mean(bed.slopes(kept.lines.axis), piece) <= SINGLE_SLOPE)
 

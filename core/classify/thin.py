@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .lines import Lines, Marks, find_lines, joined
-from .partner import stations_with_partner
+from .lines import SINGLE_COVER, Lines, Marks, find_lines, joined
+from .partner import have_partners
 from .pieces import links
 from .tops import Grid
 
@@ -30,16 +30,9 @@ ALONG_M = 0.15
 """Difference in height between two cells of one rail: a grade of 4 % over the reach, and a beam that blends head and
 ballast."""
 
-STRIP_M = 0.065
+BESIDE_LINE_M = 0.065
 """Distance from a line within which a cell is on it: half a head, half a cell, noise, and the sagitta of a curve of
 100 m."""
-
-MIN_COVER, MIN_PURE = 0.35, 0.20
-"""Least cover and purity of a line; see `square`."""
-
-MIN_STATIONS, SINGLE_COVER = 2, 0.75
-"""Stations with a partner from which a line is a rail, and cover from which it is one without: FRPDF itself drops lone
-lines that are short."""
 
 PARTNER_M = 0.30
 """Difference in height between the rails of a track: cant of 180 mm and the scatter of both."""
@@ -77,15 +70,15 @@ def drawn(xyz: np.ndarray, spacings_m: Sequence[float], cell_m: float) -> np.nda
     beside[own] = False
     _, partners = _good_lines(cells, np.flatnonzero(beside))
     both = joined(lines, partners)
-    stations = stations_with_partner(both, spacings_m, PARTNER_M)[: len(own)]
-    lines = lines.of((stations >= MIN_STATIONS) | (lines.cover >= SINGLE_COVER))
+    paired = have_partners(both, spacings_m, PARTNER_M)[: len(own)]
+    lines = lines.of(paired | (lines.cover >= SINGLE_COVER))  # FRPDF itself drops lone lines that are short
     return _along(lines, _nearest_on_each_side(lines, links(lines)), cell_m / 2)
 
 
 def _good_lines(cells: Marks, wanted: np.ndarray) -> tuple[np.ndarray, Lines]:
     """Find the lines of some cells, (k,) int, that are on one: those cells, (m,), and their lines."""
-    lines = find_lines(cells, REACH_M, ALONG_M, STRIP_M, wanted)
-    good = np.flatnonzero((lines.cover >= MIN_COVER) & (lines.pure >= MIN_PURE))
+    lines = find_lines(cells, REACH_M, ALONG_M, BESIDE_LINE_M, wanted)
+    good = lines.good()
     return good, lines.of(good)
 
 
@@ -123,7 +116,7 @@ def _per_m(lines: Lines, cells: np.ndarray) -> np.ndarray:
     near = cKDTree(lines.axis).sparse_distance_matrix(cKDTree(cells), WITHIN_M, output_type="ndarray")
     own = near["i"]
     step = cells[near["j"]] - lines.axis[own]
-    on = np.abs(np.einsum("ij,ij->i", step, lines.across[own])) < STRIP_M
+    on = np.abs(np.einsum("ij,ij->i", step, lines.across[own])) < BESIDE_LINE_M
     own, ahead = own[on], np.einsum("ij,ij->i", step, lines.along[own])[on] > 0
     counts = [np.bincount(own[ahead == side], minlength=len(lines.axis)) for side in (True, False)]
     return np.maximum(*counts) / WITHIN_M

@@ -117,25 +117,33 @@ def connect(
     RailExtractError
         There is no scheduler at this address, or the certificates can't be used.
     """
-    if scheduler is not None:
-        security = None if certificates is None else certificates.security()
+    with _running(scheduler, certificates) if scheduler is not None else _started(workers, dashboard_port) as client:
+        yield client
+
+
+@contextmanager
+def _running(scheduler: str, certificates: Certificates | None) -> Iterator[Client]:
+    """Use a running scheduler that has workers; see `connect`."""
+    security = None if certificates is None else certificates.security()
+    try:
+        client = Client(scheduler, timeout=TIMEOUT_S, security=security)
+    except (OSError, ValueError, TypeError) as error:
+        raise RailExtractError(
+            f"No Dask scheduler answers at {scheduler} ({error}): check the address and the certificates."
+        ) from error
+    with client:
         try:
-            client = Client(scheduler, timeout=TIMEOUT_S, security=security)
-        except (OSError, ValueError, TypeError) as error:
+            client.wait_for_workers(1, timeout=WORKERS_S)
+        except NoAnswer:
             raise RailExtractError(
-                f"No Dask scheduler answers at {scheduler} ({error}): check the address and the certificates."
-            ) from error
-        with client:
-            try:
-                client.wait_for_workers(1, timeout=WORKERS_S)
-            except NoAnswer:
-                raise RailExtractError(
-                    f"The Dask scheduler at {scheduler} has no workers: start some with `dask worker {scheduler}`."
-                ) from None
-            yield client
-        return
-    if workers is None:
-        workers = max(min(os.cpu_count() or 1, MEMORY_LIMIT // WORKER_BYTES), 1)
+                f"The Dask scheduler at {scheduler} has no workers: start some with `dask worker {scheduler}`."
+            ) from None
+        yield client
+
+
+@contextmanager
+def _started(workers: int | None, dashboard_port: int | None) -> Iterator[Client]:
+    """Start workers on this computer; see `connect`."""
     settings: dict[str, object] = {
         f"distributed.nanny.pre-spawn-environ.{name}": value for name, value in ENVIRONMENT.items()
     }
@@ -147,7 +155,7 @@ def connect(
     with scratch_folder(temporary) as folder, dask.config.set({**settings, "temporary-directory": str(folder)}):
         with _deaf_to_interrupts():
             cluster = LocalCluster(
-                n_workers=workers,
+                n_workers=workers or max(min(os.cpu_count() or 1, MEMORY_LIMIT // WORKER_BYTES), 1),
                 threads_per_worker=1,
                 memory_limit=None,  # Dask's own, an even share of the memory, kills workers at their peak
                 host=HERE,

@@ -13,7 +13,7 @@ from ..airborne.survey import Guide, Survey
 from ..clouds.points import Request, ask
 from ..disk import Destination, writing
 from ..errors import ParameterError
-from ..layers import airborne_stations_layer, findings_layer, lines_layer
+from ..output.layers import airborne_stations_layer, findings_layer, lines_layer
 from ..parameters import AIRBORNE_CLASSES, AirborneParameters
 from ..products import AIRBORNE, PROPOSED
 from ..progress import Estimating
@@ -22,13 +22,16 @@ from ..scratch import scratch_folder
 from ..standards import RailStandard, resolve
 from .options import (
     LAYERS,
+    REPORT,
     TILES_HELP,
+    WRITING,
     Console,
     add_cloud_arguments,
-    add_length,
+    add_lengths,
     add_workers_argument,
-    destination_of,
+    destinations_of,
     extent_of,
+    lengths_of,
     limited,
     numbers_in,
     runner_of,
@@ -40,7 +43,7 @@ SUFFIXES = {
     "stations": LAYERS,
     "findings": LAYERS,
     "proposed": LAYERS,
-    "report": (".html", ".htm"),
+    "report": REPORT,
 }
 """File name suffixes of each output."""
 
@@ -71,8 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_cloud_arguments(parser)
     classes = ",".join(map(str, AIRBORNE_CLASSES))
     parser.add_argument("--classes", default=classes, help=f"classes of the points to use (default: {classes})")
-    for name, text in LENGTHS.items():
-        add_length(parser, f"--{name.replace('_', '-')}", getattr(AirborneParameters, f"{name}_m"), text)
+    add_lengths(parser, LENGTHS, AirborneParameters)
     add_workers_argument(parser)
 
 
@@ -88,8 +90,7 @@ def run(args: argparse.Namespace) -> None:
     parameters = parameters_of(args, standard)
     progress = Estimating(Console())
     _check_outputs(args)
-    given = {name: getattr(args, name) for name in SUFFIXES if getattr(args, name) is not None}
-    outputs = {name: destination_of(name, path, SUFFIXES[name]) for name, path in given.items()}
+    outputs = destinations_of(args, SUFFIXES)
     codes = numbers_in(args.classes, "--classes", int)
     request = limited(ask(args.tiles, codes, args.crs, extent_of(args.extent), progress), args)
     parent = next(iter(outputs.values())).file.parent
@@ -123,14 +124,13 @@ def _check_outputs(args: argparse.Namespace) -> None:
 
 def _write_proposed(found: Proposals, destination: Destination) -> None:
     """Write the proposed guides."""
-    module = shapes_module("--proposed", "geopackage")
+    module = shapes_module("--proposed", WRITING)
     module.write_layers([lines_layer(PROPOSED, found.guides)], destination, found.frame)
 
 
 def parameters_of(args: argparse.Namespace, standard: RailStandard) -> AirborneParameters:
     """Return the parameters that the options state."""
-    lengths = {f"{name}_m": getattr(args, name) for name in LENGTHS}
-    return AirborneParameters(standard.gauge_m, standard.head_width_m, **lengths)
+    return AirborneParameters(standard.gauge_m, standard.head_width_m, **lengths_of(args, LENGTHS))
 
 
 def _guides(path: Path, request: Request) -> list[Guide]:
@@ -142,7 +142,7 @@ def _write(
     survey: Survey, outputs: Mapping[str, Destination], args: argparse.Namespace, standard: RailStandard
 ) -> None:
     """Write the outputs that were asked for; layers of the same file together."""
-    module = shapes_module("--centerlines", "geopackage")
+    module = shapes_module("--centerlines", WRITING)
     layers = [lines_layer(AIRBORNE, survey.lines)]
     if "stations" in outputs:
         layers.append(airborne_stations_layer(survey.tracks))

@@ -10,11 +10,11 @@ from pathlib import Path
 
 from ..comparison.tracks import Survey, compare_surveys, doubts_of
 from ..errors import ParameterError
-from ..layers import differences_layer
+from ..output.layers import differences_layer
 from ..parameters import ComparisonParameters
 from ..progress import Estimating
 from ..report.comparison import build_comparison, describe_shift, verdict_on
-from .options import Console, add_length, destination_of, shapes_module
+from .options import REPORT, WRITING, Console, add_length, destinations_of, shapes_module
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,9 +50,8 @@ def run(args: argparse.Namespace) -> None:
         raise ParameterError(
             "Gauge and cant are compared between the rails of both: give --rails and --reference-rails."
         )
-    output = None if args.output is None else destination_of("output", args.output, (".gpkg",))
-    report = None if args.report is None else destination_of("report", args.report, (".html", ".htm"))
-    features, geopackage = (shapes_module("compare", name) for name in ("features", "geopackage"))
+    outputs = destinations_of(args, {"output": (".gpkg",), "report": REPORT})
+    features, geopackage = (shapes_module("compare", name) for name in ("features", WRITING))
     lines, frame = features.read_survey(args.reference, "REFERENCE", None)
     earlier = Survey(lines, sigma_m=_metres(args.reference_sigma))
     later = Survey(features.read_survey(args.input, "INPUT", frame)[0], sigma_m=_metres(args.input_sigma))
@@ -64,11 +63,12 @@ def run(args: argparse.Namespace) -> None:
     found = compare_surveys(earlier, later, settings, progress)
     for sentence in doubts_of(found):
         progress.warning(sentence)
-    if output is not None:
-        geopackage.write_all([differences_layer(found)], {"differences": output}, frame)
-    if report is not None:
+    if "output" in outputs:
+        geopackage.write_layers([differences_layer(found)], outputs["output"], frame)
+    if "report" in outputs:
         facts = {"Date": f"{datetime.now():%Y-%m-%d %H:%M}", "Command": args.command_line}
-        report.write_text(build_comparison(found, args.count_shift, f"{args.input} against {args.reference}", facts))
+        source = f"{args.input} against {args.reference}"
+        outputs["report"].write_text(build_comparison(found, args.count_shift, source, facts))
     print(verdict_on(found))
     print(describe_shift(found))
 

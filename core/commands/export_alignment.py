@@ -6,10 +6,10 @@ import argparse
 from pathlib import Path
 
 from .. import VERSION
-from ..design_files import FORMATS, check_designs, check_format, write_designs
+from ..output.design_files import FORMATS, check_designs, check_format, write_designs
 from ..progress import Estimating
-from ..standards import DEFAULT, resolve
-from .options import Console, destination_of, shapes_module
+from ..standards import resolve
+from .options import Console, add_standard_arguments, destination_of, shapes_module
 
 CURVES = ("CIRCLES", "PARABOLAS")
 """Curves of the profile in LandXML."""
@@ -19,10 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument("elements", metavar="ELEMENTS", help="element table of fit or import-alignment, also edited")
     parser.add_argument("output", type=Path, metavar="OUTPUT", help="file that ends in .xml (LandXML), .ifc or .dxf")
-    parser.add_argument("--standard", default=DEFAULT, help=f"rail standard (default: {DEFAULT})")
-    parser.add_argument("--gauge", type=float, metavar="MM", help="gauge, instead of that of the standard")
-    text = "railhead width, instead of that of the standard"
-    parser.add_argument("--head-width", type=float, metavar="MM", help=text)
+    add_standard_arguments(parser)
     text = f"curves of the profile in LandXML (default: {CURVES[0]})"
     parser.add_argument("--vertical-curves", choices=CURVES, default=CURVES[0], help=text)
     parser.add_argument("--crs", help="coordinate system of a table that states none, such as EPSG:25832")

@@ -19,11 +19,11 @@ from ..errors import ParameterError, RailExtractError
 from ..frpdf import DEVICES, ENGINES, MAX_PASSES
 from ..frpdf.models import NAMES, choose
 from ..learned.model import weights_for
+from ..output.raster_file import header_for, on_one_grid
 from ..parameters import DEFAULT_STEP_M, DEFAULT_WORKERS, LEARNED, MAX_WORKERS, STRIPS, Parameters
 from ..pipeline import extract_files
 from ..progress import Estimating, Progress
 from ..rails import RailNetwork
-from ..raster_file import header_for, on_one_grid
 from ..report import Origin, summary
 from ..scratch import scratch_folder
 from ..standards import SEARCHED_CLASSES, RailStandard, resolve
@@ -31,13 +31,14 @@ from ..tasks import Runner
 from ..workers.runner import workers
 from .options import (
     LAYERS,
+    REPORT,
     TILES_HELP,
     Console,
     add_axis_arguments,
     add_cloud_arguments,
     add_method_arguments,
     axes_of,
-    destination_of,
+    destinations_of,
     extent_of,
     gauges_of,
     limited,
@@ -64,7 +65,7 @@ SUFFIXES = {
     "quality": LAYERS,
     "findings": LAYERS,
     "cleaned": (".tif", ".tiff"),
-    "report": (".html", ".htm"),
+    "report": REPORT,
 }
 """File name suffixes of each output."""
 
@@ -99,55 +100,71 @@ POSITIVE = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument("tiles", nargs="+", type=Path, metavar="TILE", help=TILES_HELP)
-    output = parser.add_argument_group("outputs", "Existing files are replaced. GeoPackages may be the same file.")
-    output.add_argument("--rails", type=Path, required=True, help="GeoPackage (or .dxf, .csv) for the rails")
-    output.add_argument("--centerlines", type=Path, help="GeoPackage for the track centerlines")
-    output.add_argument("--quality", type=Path, help="GeoPackage for the points with the track geometry")
-    output.add_argument("--findings", type=Path, help="GeoPackage for the places to look at")
-    output.add_argument("--cleaned", type=Path, help="GeoTIFF for the rail raster as the network cleaned it")
-    output.add_argument("--report", type=Path, help="HTML file for the report")
-    cloud = parser.add_argument_group("point cloud and rails")
-    text = "find the rail points of a raw cloud first; --rail-classes is ignored"
-    cloud.add_argument("--classify", action="store_true", help=text)
-    add_method_arguments(cloud)
-    text = "points or lines on railheads: extract the rails that grow from these; --rail-classes is ignored"
-    cloud.add_argument("--seeds", type=Path, metavar="FILE", help=text)
-    cloud.add_argument("--rail-classes", default="10", help="classes of rail points, such as 10,11 (default: 10)")
-    text = "take all rail classes for one, for tracks whose rails are of different classes"
-    cloud.add_argument("--merge-classes", action="store_true", help=text)
-    add_cloud_arguments(cloud)
+    _add_outputs(parser.add_argument_group("outputs", "Existing files are replaced. GeoPackages may be the same file."))
+    _add_cloud(parser.add_argument_group("point cloud and rails"))
     kilometres = parser.add_argument_group("kilometres", "Fields of --quality and --findings, and in the report.")
     kilometres.add_argument("--axis", metavar="FILE", help="line layer that carries the kilometres")
     add_axis_arguments(kilometres)
-    method = parser.add_argument_group("method", "See docs/parameters.md.")
-    method.add_argument("--iterations", type=int, default=Parameters.passes, help="passes of the network (default: 2)")
-    method.add_argument("--engine", choices=ENGINES, default=Parameters.engine, help="what runs the network")
-    method.add_argument("--device", choices=DEVICES, default=Parameters.device, help="where the network runs")
+    _add_method(parser.add_argument_group("method", "See docs/parameters.md."))
+    _add_workers(parser.add_argument_group("workers"))
+
+
+def _add_outputs(group: argparse._ArgumentGroup) -> None:
+    """Declare the files to write."""
+    group.add_argument("--rails", type=Path, required=True, help="GeoPackage (or .dxf, .csv) for the rails")
+    group.add_argument("--centerlines", type=Path, help="GeoPackage for the track centerlines")
+    group.add_argument("--quality", type=Path, help="GeoPackage for the points with the track geometry")
+    group.add_argument("--findings", type=Path, help="GeoPackage for the places to look at")
+    group.add_argument("--cleaned", type=Path, help="GeoTIFF for the rail raster as the network cleaned it")
+    group.add_argument("--report", type=Path, help="HTML file for the report")
+
+
+def _add_cloud(group: argparse._ArgumentGroup) -> None:
+    """Declare what is read."""
+    text = "find the rail points of a raw cloud first; --rail-classes is ignored"
+    group.add_argument("--classify", action="store_true", help=text)
+    add_method_arguments(group)
+    text = "points or lines on railheads: extract the rails that grow from these; --rail-classes is ignored"
+    group.add_argument("--seeds", type=Path, metavar="FILE", help=text)
+    group.add_argument("--rail-classes", default="10", help="classes of rail points, such as 10,11 (default: 10)")
+    text = "take all rail classes for one, for tracks whose rails are of different classes"
+    group.add_argument("--merge-classes", action="store_true", help=text)
+    add_cloud_arguments(group)
+
+
+def _add_method(group: argparse._ArgumentGroup) -> None:
+    """Declare the parameters of the method."""
+    group.add_argument("--iterations", type=int, default=Parameters.passes, help="passes of the network (default: 2)")
+    group.add_argument("--engine", choices=ENGINES, default=Parameters.engine, help="what runs the network")
+    group.add_argument("--device", choices=DEVICES, default=Parameters.device, help="where the network runs")
     text = "weights of the network (default: AUTO, by gauge and railhead)"
-    method.add_argument("--model", choices=NAMES, default=Parameters.model, help=text)
+    group.add_argument("--model", choices=NAMES, default=Parameters.model, help=text)
     for field in _number_fields():
         unit = "degrees" if field.name.endswith("_deg") else "metres"
         default = "as the points require" if field.default is None else f"{field.default:g}"
         text = f"{_option(field.name)[2:].replace('-', '_').upper()} in {unit} (default: {default})"
-        method.add_argument(_option(field.name), type=float, default=field.default, metavar="N", help=text)
+        group.add_argument(_option(field.name), type=float, default=field.default, metavar="N", help=text)
     text = f"how strips, the passes of a scanner, are used (default: {Parameters.strips})"
-    method.add_argument("--strips", choices=STRIPS, default=Parameters.strips, help=text)
+    group.add_argument("--strips", choices=STRIPS, default=Parameters.strips, help=text)
     text = f"STEP of --quality, --findings and --report in metres (default: {DEFAULT_STEP_M:g})"
-    method.add_argument("--step", type=float, default=DEFAULT_STEP_M, metavar="N", help=text)
-    run = parser.add_argument_group("workers")
+    group.add_argument("--step", type=float, default=DEFAULT_STEP_M, metavar="N", help=text)
+
+
+def _add_workers(group: argparse._ArgumentGroup) -> None:
+    """Declare what computes."""
     text = "use the Dask cluster at tls://HOST:PORT and not local workers; see docs/scaling.md on trust"
-    run.add_argument("--scheduler", metavar="ADDRESS", help=text)
-    run.add_argument("--tls-ca", type=Path, metavar="PEM", help="certificate of the cluster's authority")
-    run.add_argument(
+    group.add_argument("--scheduler", metavar="ADDRESS", help=text)
+    group.add_argument("--tls-ca", type=Path, metavar="PEM", help="certificate of the cluster's authority")
+    group.add_argument(
         "--tls-cert", type=Path, metavar="PEM", help="certificate of this computer, signed by the authority"
     )
-    run.add_argument("--tls-key", type=Path, metavar="PEM", help="private key of this certificate")
+    group.add_argument("--tls-key", type=Path, metavar="PEM", help="private key of this certificate")
     text = "show what local workers do at http://127.0.0.1:PORT, to all users of this computer (default: nowhere)"
-    run.add_argument("--dashboard", type=int, metavar="PORT", help=text)
+    group.add_argument("--dashboard", type=int, metavar="PORT", help=text)
     text = "local workers; 0, the default, is one per core, or fewer if memory is short"
-    run.add_argument("--workers", type=int, default=DEFAULT_WORKERS, metavar="N", help=text)
-    run.add_argument("--work", type=Path, help="folder that keeps finished results, so that a restart continues")
-    run.add_argument(
+    group.add_argument("--workers", type=int, default=DEFAULT_WORKERS, metavar="N", help=text)
+    group.add_argument("--work", type=Path, help="folder that keeps finished results, so that a restart continues")
+    group.add_argument(
         "--square-tiles",
         "--stretch-tiles",  # the name in earlier versions, which batch files still use
         type=int,
@@ -177,7 +194,7 @@ def run(args: argparse.Namespace) -> int:
         raise ParameterError("--axis gives --quality, --findings and --report kilometres: name at least one of these.")
     standard = resolve(args.standard, args.gauge, args.head_width)
     parameters = parameters_of(args, standard)
-    outputs = _outputs(args)
+    outputs = destinations_of(args, SUFFIXES)
     if args.work is not None:
         return _run_in(args.work, args, standard, parameters, outputs)
     # Next to the results, where workers on other computers find it too.
@@ -219,27 +236,6 @@ def parameters_of(args: argparse.Namespace, standard: RailStandard) -> Parameter
         strips=args.strips,
         **numbers,
     ).with_gauges(gauges[1:])
-
-
-def _outputs(args: argparse.Namespace) -> dict[str, Destination]:
-    """Check that the outputs can be written, and return the destination of each.
-
-    Raises
-    ------
-    ParameterError, DiskError
-        An output could not be written after the run.
-    """
-    files: dict[Path, Destination] = {}
-    outputs: dict[str, Destination] = {}
-    for name, suffixes in SUFFIXES.items():
-        path = getattr(args, name)
-        if path is None:
-            continue
-        destination = destination_of(name, path, suffixes)
-        if destination.file in files and path.suffix.lower() != ".gpkg":
-            raise ParameterError(f"Only a GeoPackage holds several outputs: give --{name} a file other than {path}.")
-        outputs[name] = files.setdefault(destination.file, destination)
-    return outputs
 
 
 def _run_in(
@@ -352,8 +348,8 @@ def _write(
     RailExtractError
         An output could not be written.
     """
-    from ..layers import network_layers
-    from .geopackage import by_file, write_layers
+    from ..output.layers import network_layers
+    from ..output.writing import by_file, write_layers
 
     layers = network_layers(network, outputs, parameters.gauges_m)
     writers: list[Callable[[], None]] = [
@@ -382,7 +378,7 @@ def _write_cleaned(
     model: str,
 ) -> None:
     """Write the cleaned rasters as Clean Rail Raster does."""
-    from .geotiff import write_rasters
+    from ..output.geotiff import write_rasters
 
     rasters, frame = on_one_grid(network.cleaned, network.frame)
     header = header_for(rasters, network.cleaned_classes, frame, standard, extent, model)

@@ -22,10 +22,12 @@ from ..alignment.stations import Axes, AxisLine, Post, Start, make_axes
 from ..alignment.table import alignments, check_table, frame_of
 from ..clouds.crs import import_pyproj, is_geographic, name_of, parse_crs, same_plane, units
 from ..comparison.tracks import SurveyedLine
+from ..disk import Destination
 from ..errors import CrsError, MissingError, ParameterError
-from ..fields import EXTENT_FIELDS, STATION_FIELDS, Field
+from ..fields import EXTENT_FIELDS, STATION_FIELDS, UNKNOWN_IN_METRES, Field
 from ..frame import ORIGIN_STEP, LocalFrame
-from ..geopackage import geometries_in
+from ..output.geopackage import geometries_in
+from ..output.writing import as_os_error, column_of
 from ..progress import Progress
 from ..rails import Kilometres, RailLine
 
@@ -416,3 +418,34 @@ def _number(value: Any) -> float:
 
 def _whole(value: Any, default: int) -> int:
     return int(value) if isinstance(value, (int, float)) and float(value).is_integer() else default
+
+
+def write_copy(
+    destination: Destination, source: Features, fields: Sequence[Field], columns: Sequence[Sequence[Any]]
+) -> None:
+    """Write the features of a layer with further fields into a GeoPackage.
+
+    Parameters
+    ----------
+    destination : Destination
+    source : Features
+    fields : sequence of Field
+    columns : sequence of sequence
+        Values of each further field, one per feature.
+    """
+    further = [column_of(field, [field.value(value) for value in values]) for field, values in zip(fields, columns)]
+    kept = {name: values for name, values in source.columns.items() if name not in {field.name for field in fields}}
+    kinds = {shape.geom_type for shape in source.shapes if shape is not None}
+    with destination.replacing() as new, as_os_error():
+        pyogrio.raw.write(
+            str(new),
+            layer="stations",
+            driver="GPKG",
+            geometry=np.array([shapely.to_wkb(shape, output_dimension=4) for shape in source.shapes], dtype=object),
+            geometry_type=kinds.pop() if len(kinds) == 1 else "Unknown",
+            field_data=[*kept.values(), *(column for column, _ in further)],
+            field_mask=[*(None for _ in kept), *(empty for _, empty in further)],
+            fields=[*kept, *(field.name for field in fields)],
+            crs=source.crs_wkt or UNKNOWN_IN_METRES,
+            nan_as_null=True,
+        )

@@ -8,14 +8,14 @@ from pathlib import Path
 
 from .. import VERSION
 from ..alignment.fit import fit_tracks
-from ..layers import deviations_layer, elements_layer
+from ..output.layers import deviations_layer, elements_layer
 from ..parameters import TRANSITIONS, FitParameters
 from ..progress import Estimating
 from ..report import build_alignment_page
 from ..report.origin import title_of
-from .options import Console, add_length, destination_of, shapes_module
+from .options import REPORT, WRITING, Console, add_length, destinations_of, shapes_module
 
-SUFFIXES = {"elements": (".gpkg",), "deviations": (".gpkg",), "report": (".html", ".htm")}
+SUFFIXES = {"elements": (".gpkg",), "deviations": (".gpkg",), "report": REPORT}
 """File name suffixes of each output."""
 
 
@@ -46,12 +46,8 @@ def run(args: argparse.Namespace) -> None:
     RailExtractError
         A parameter is wrong, a file can't be read, no track can be fitted, or an output can't be written.
     """
-    features, geopackage = (shapes_module("LINES", name) for name in ("features", "geopackage"))
-    outputs = {
-        name: destination_of(name, getattr(args, name), suffixes)
-        for name, suffixes in SUFFIXES.items()
-        if getattr(args, name) is not None
-    }
+    features, geopackage = (shapes_module("LINES", name) for name in ("features", WRITING))
+    outputs = destinations_of(args, SUFFIXES)
     settings = FitParameters(args.tolerance / 1000.0, args.min_length, args.transitions, not args.no_round)
     tracks, frame = features.read_tracks(args.lines, args.quality, args.rails)
     fixed = {} if args.fixed is None else {one.track_id: one for one in features.read_elements(args.fixed, "--fixed")}

@@ -14,14 +14,14 @@ from ..errors import ParameterError
 from ..grow.settings import GrowSettings
 from ..labelling.files import Choice
 from ..labelling.growing import grow_files
-from ..layers import stops_layer
+from ..output.layers import stops_layer
 from ..parameters import GrowParameters
 from ..progress import Estimating
 from ..scratch import scratch_folder
-from ..standards import DEFAULT, SEARCHED_CLASSES, resolve
+from ..standards import SEARCHED_CLASSES, resolve
 from ..tasks import InTurn
 from .copies import add_label_arguments, add_tiles_arguments, check_rail_class, planned_output, print_figures
-from .options import Console, add_length, destination_of, shapes_module
+from .options import WRITING, Console, add_lengths, add_standard_arguments, destination_of, lengths_of, shapes_module
 
 LENGTHS = {
     "search": "largest distance of a seed from its rail, and of the rail from its course",
@@ -41,15 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seeds", type=Path, metavar="FILE", help=text)
     text = "a place on a railhead, in units of the coordinate system; may be given several times"
     parser.add_argument("--seed", action="append", default=[], metavar="X,Y", help=text)
-    parser.add_argument("--standard", default=DEFAULT, help=f"rail standard (default: {DEFAULT})")
-    parser.add_argument("--gauge", type=float, metavar="MM", help="gauge, instead of that of the standard")
-    text = "railhead width, instead of that of the standard"
-    parser.add_argument("--head-width", type=float, metavar="MM", help=text)
+    add_standard_arguments(parser)
     parser.add_argument("--crs", help="coordinate system of tiles that state none, such as EPSG:25832")
     text = "do not follow the other rail of the track"
     parser.add_argument("--single", action="store_true", help=text)
-    for name, text in LENGTHS.items():
-        add_length(parser, f"--{name.replace('_', '-')}", getattr(GrowParameters, f"{name}_m"), text)
+    add_lengths(parser, LENGTHS, GrowParameters)
     most = GrowParameters.max_outliers
     text = f"windows in a row in which the rail may not be seen (default: {most})"
     parser.add_argument("--max-outliers", type=int, default=most, metavar="N", help=text)
@@ -72,7 +68,7 @@ def run(args: argparse.Namespace) -> None:
     progress = Estimating(Console())
     planned = planned_output(args, progress)
     stops = None if args.stops is None else destination_of("stops", args.stops)
-    geopackage = None if stops is None else shapes_module("--stops", "geopackage")
+    geopackage = None if stops is None else shapes_module("--stops", WRITING)
     request = ask(args.tiles, SEARCHED_CLASSES, args.crs, None, progress)
     choice = Choice(args.rail_class, args.rails_only, reset=False)
     seeds = _seeds(args, request.zero.crs_wkt)
@@ -92,10 +88,9 @@ def _parameters(args: argparse.Namespace) -> GrowParameters:
     ParameterError
         A number is negative.
     """
-    lengths = {f"{name}_m": getattr(args, name) for name in LENGTHS}
     if args.max_outliers < 0:
         raise ParameterError(f"--max-outliers must be 0 or more, not {args.max_outliers}.")
-    return GrowParameters(both=not args.single, max_outliers=args.max_outliers, **lengths)
+    return GrowParameters(both=not args.single, max_outliers=args.max_outliers, **lengths_of(args, LENGTHS))
 
 
 def _seeds(args: argparse.Namespace, crs_wkt: str | None) -> list[np.ndarray]:

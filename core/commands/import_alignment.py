@@ -10,15 +10,15 @@ from ..alignment.deviations import compared_with
 from ..alignment.landxml_reading import read_landxml, stated_system
 from ..alignment.measured import moved
 from ..clouds.crs import parse_crs, units
-from ..design_files import check_place
 from ..errors import CrsError, ParameterError
-from ..layers import axes_layer, deviations_layer, elements_layer
+from ..output.design_files import check_place
+from ..output.layers import axes_layer, deviations_layer, elements_layer
 from ..progress import Estimating
 from ..report import build_alignment_page
 from .fit import stated
-from .options import Console, destination_of, shapes_module
+from .options import REPORT, WRITING, Console, destinations_of, shapes_module
 
-SUFFIXES = {"elements": (".gpkg",), "axis": (".gpkg",), "deviations": (".gpkg",), "report": (".html", ".htm")}
+SUFFIXES = {"elements": (".gpkg",), "axis": (".gpkg",), "deviations": (".gpkg",), "report": REPORT}
 """File name suffixes of each output."""
 
 
@@ -46,16 +46,12 @@ def run(args: argparse.Namespace) -> None:
     RailExtractError
         The file can't be read, lies elsewhere, or an output can't be written.
     """
-    outputs = {
-        name: destination_of(name, getattr(args, name), suffixes)
-        for name, suffixes in SUFFIXES.items()
-        if getattr(args, name) is not None
-    }
+    outputs = destinations_of(args, SUFFIXES)
     if not outputs:
         raise ParameterError("Give --elements, --axis, --deviations or --report for what is wanted of the file.")
     if args.tracks is None and (args.quality or args.rails or {"deviations", "report"} & set(outputs)):
         raise ParameterError("--deviations and --report compare measured tracks with the alignments: give --tracks.")
-    features, geopackage = (shapes_module("import-alignment", name) for name in ("features", "geopackage"))
+    features, geopackage = (shapes_module("import-alignment", name) for name in ("features", WRITING))
     progress = Estimating(Console())
     tracks, own = features.read_tracks(args.tracks, args.quality, args.rails, "--tracks") if args.tracks else ([], None)
     system = stated_system(args.file) or args.crs or (own and own.crs_wkt)

@@ -6,7 +6,7 @@ import argparse
 import math
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from importlib import import_module
@@ -31,13 +31,17 @@ TILES_HELP = (
 )
 
 
-def add_cloud_arguments(parser: argparse._ActionsContainer) -> None:
-    """Declare the rails and the coordinate system of the cloud, and the area to read, in a parser or in a group."""
+def add_standard_arguments(parser: argparse._ActionsContainer) -> None:
+    """Declare the rail standard."""
     parser.add_argument("--standard", default=DEFAULT, help=f"rail standard (default: {DEFAULT})")
     parser.add_argument("--gauge", type=float, metavar="MM", help="gauge, instead of that of the standard")
-    parser.add_argument(
-        "--head-width", type=float, metavar="MM", help="railhead width, instead of that of the standard"
-    )
+    text = "railhead width, instead of that of the standard"
+    parser.add_argument("--head-width", type=float, metavar="MM", help=text)
+
+
+def add_cloud_arguments(parser: argparse._ActionsContainer) -> None:
+    """Declare the rails and the coordinate system of the cloud, and the area to read, in a parser or in a group."""
+    add_standard_arguments(parser)
     text = "further gauges to pair, such as 1000;1067, or 1000/66 with the width of the railhead"
     parser.add_argument("--other-gauges", default="", metavar="MM", help=text)
     parser.add_argument("--crs", help="coordinate system of tiles that state none, such as EPSG:25832")
@@ -100,8 +104,11 @@ def axes_of(args: argparse.Namespace, places: str | None, plane: str | None = No
     )
 
 
-LAYERS = (".gpkg", ".dxf", ".csv")
-"""File name suffixes of layers."""
+LAYERS, REPORT = (".gpkg", ".dxf", ".csv"), (".html", ".htm")
+"""File name suffixes of layers, and of a report."""
+
+WRITING = ".output.writing"
+"""For `shapes_module`: the module that writes vector files."""
 
 
 def destination_of(name: str, path: Path, suffixes: Sequence[str] = LAYERS) -> Destination:
@@ -117,6 +124,33 @@ def destination_of(name: str, path: Path, suffixes: Sequence[str] = LAYERS) -> D
     with writing(path.parent):
         path.parent.mkdir(parents=True, exist_ok=True)
     return Destination.at(path)
+
+
+def destinations_of(args: argparse.Namespace, suffixes: Mapping[str, Sequence[str]]) -> dict[str, Destination]:
+    """Check that the outputs can be written, and return the destinations of those that are asked for, by option.
+
+    Parameters
+    ----------
+    args : Namespace
+    suffixes : mapping of str to sequence of str
+        Suffixes of the files of each output.
+
+    Raises
+    ------
+    ParameterError, DiskError
+        An output could not be written after the run, or a file that is not a GeoPackage is given for two.
+    """
+    files: dict[Path, Destination] = {}
+    outputs: dict[str, Destination] = {}
+    for name, own in suffixes.items():
+        path = getattr(args, name)
+        if path is None:
+            continue
+        destination = destination_of(name, path, own)
+        if destination.file in files and path.suffix.lower() != ".gpkg":
+            raise ParameterError(f"Only a GeoPackage holds several outputs: give --{name} a file other than {path}.")
+        outputs[name] = files.setdefault(destination.file, destination)
+    return outputs
 
 
 def shapes_module(option: str, name: str = "shapes") -> ModuleType:
@@ -192,6 +226,17 @@ def add_length(parser: argparse._ActionsContainer, option: str, default: float, 
     """Declare an option that states a length."""
     help_text = f"{text} (default: {default:g})"
     parser.add_argument(option, type=positive, default=default, metavar=unit, help=help_text)
+
+
+def add_lengths(parser: argparse._ActionsContainer, texts: Mapping[str, str], defaults: type) -> None:
+    """Declare an option for each length, an attribute of `defaults` without its unit."""
+    for name, text in texts.items():
+        add_length(parser, f"--{name.replace('_', '-')}", getattr(defaults, f"{name}_m"), text)
+
+
+def lengths_of(args: argparse.Namespace, texts: Mapping[str, str]) -> dict[str, float]:
+    """Return the lengths of `add_lengths` as arguments of the class of the defaults."""
+    return {f"{name}_m": getattr(args, name) for name in texts}
 
 
 def numbers_in(text: str, option: str, kind: type) -> tuple:

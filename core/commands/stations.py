@@ -25,10 +25,10 @@ def run(args: argparse.Namespace) -> None:
     RailExtractError
         A file can't be read, the axis states no kilometres, or the output can't be written.
     """
-    features, geopackage = (shapes_module("stations", name) for name in ("features", "geopackage"))
+    features = shapes_module("stations", "features")
     output = destination_of("output", args.output, (".gpkg",))
     places = features.read_features(args.input, "INPUT")
     axes, plane = axes_of(args, places.crs_wkt)
     located = features.located(places, axes, plane, Estimating(Console()))
-    geopackage.write_copy(output, places, located.fields, located.columns)
+    features.write_copy(output, places, located.fields, located.columns)
     print(f"{located.known} of {len(places.ids)} features have a kilometre")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..classify.flush import BESIDE_M, HEAD_LEVEL_M
 from ..polyline import length_along, project, runs
 from ..progress import SILENT, Progress
 from .course import smoothed
@@ -24,10 +25,6 @@ MIN_SEEN = 0.8
 
 PAIR_M, SINGLE_M = 3.0, 5.0
 """Shortest rails with the other one of the track and without it, as lone rails of a classification."""
-
-FLUSH_BESIDE_M, FLUSH_LEVEL_M = 0.003, 0.012
-"""Width beyond the side of a head in a pavement and difference in height within which a point is on it; as in
-`classify.flush`."""
 
 
 @dataclass(frozen=True)
@@ -181,7 +178,7 @@ def on_rails(rails: Sequence[Rail], xyz: np.ndarray, settings: GrowSettings) -> 
         above = xyz[feet.point, 2] - np.interp(feet.t, along_m, rail.xyz[:, 2])
         window = np.searchsorted((along_m[1:] + along_m[:-1]) / 2, feet.t)
         on = (above >= -rail.beam.below_m) & (above <= rail.beam.above_m)
-        level = (np.abs(above) <= FLUSH_LEVEL_M) & (np.abs(feet.across) <= settings.head_width_m / 2 + FLUSH_BESIDE_M)
+        level = (np.abs(above) <= HEAD_LEVEL_M) & (np.abs(feet.across) <= settings.head_width_m / 2 + BESIDE_M)
         on &= rail.seen[window] & (level | ~rail.flush[window])
         found[feet.point[on]] = True
     return found

@@ -20,8 +20,8 @@ GAP_M = 0.10
 """Distance across between points of two heads; those of one are closer."""
 
 TOUCHING = 1.7
-"""Half the width of a group of points, in those of the strip that the classification labels, up to which it is on one
-head: the strip's sides follow cells. Two heads that touch are wider."""
+"""Half the width of a group of points, in those of the band that the classification labels, up to which it is on one
+head: the sides of the band follow cells. Two heads that touch are wider."""
 
 
 class OnHeads:

@@ -1,6 +1,6 @@
 """The cross-section of a window: where in it a railhead may be.
 
-A head is a strip of its own width at one height with nothing as high right beside it: on both sides, or, where two
+A head is a band of its own width at one height with nothing as high right beside it: on both sides, or, where two
 heads touch in a switch and where a pavement reaches the head, on one.
 """
 
@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..classify.bed import QUANTILE
+from ..polyline import runs
 from .settings import Beam, GrowSettings
 
 STEP_M = 0.003
@@ -19,7 +21,7 @@ MIN_POINTS = 3
 """Fewest points of a head."""
 
 MIN_CONTRAST = 0.5
-"""Least share of a head's points that remains after those of an equal strip beside it are subtracted."""
+"""Least share of a head's points that remains after those of an equal band beside it are subtracted."""
 
 CROWN_SHARE = 0.7
 """Middle part of the head whose points give the height: its edges are rounded."""
@@ -27,14 +29,14 @@ CROWN_SHARE = 0.7
 BED_M = 0.30
 """Width beside a head in which the bed is looked for: a sleeper's bay, short of the next rail."""
 
-BED_QUANTILE = 0.2
-"""Quantile of the heights that is taken as the bed, as in `classify.bed`."""
-
 BED_DEPTH_M = 1.0
 """Points further below the top are not of the bed: what is under a bridge."""
 
 GROOVE_M = 0.16
 """A groove ends within this distance of the head's side."""
+
+PLATEAU = 0.9
+"""Places with this share of the best contrast count: all of them hold the head."""
 
 LEVEL_M, LEVEL_SHARE, NEAR_TOP_M = 0.008, 0.55, 0.02
 """Beside a head is a pavement if this share of the points there is this close to their median height, and the median
@@ -116,12 +118,12 @@ class Section:
         enough = inside >= max(min_points, MIN_POINTS)
         free = enough & clear.all(axis=0)
         contrast = inside - scale * beside.mean(axis=0)
-        found = [self._head(level, _centre(u, contrast, run), (True, True), top_m) for run in _runs(free)]
+        found = [self._head(level, _centre(u, contrast, *run), (True, True), top_m) for run in runs(free)]
         for side in (0, 1):
             contrast = inside - scale * beside[side]
             alone = enough & clear[side] & ~clear[1 - side] & (contrast >= MIN_CONTRAST * inside)
-            for run in _runs(alone):
-                place_m = _centre(u, contrast, run)
+            for run in runs(alone):
+                place_m = _centre(u, contrast, *run)
                 if all(abs(place_m - one.across_m) > self._settings.head_width_m / 2 for one in found if one.is_free):
                     found.append(self._head(level, place_m, (side == 0, side == 1), top_m))
         return [one for one in found if self._stands(one)]
@@ -187,21 +189,11 @@ class Section:
         half_m = self._settings.head_width_m / 2 + self._beam.blur_m
         above = self.height_m - top_m
         beside = (off > half_m) & (off <= half_m + BED_M) & (np.abs(above) < BED_DEPTH_M)
-        return float(np.quantile(above[beside], BED_QUANTILE)) if beside.any() else np.inf
+        return float(np.quantile(above[beside], QUANTILE)) if beside.any() else np.inf
 
 
-def _runs(chosen: np.ndarray) -> list[slice]:
-    """Return the runs of chosen places."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
-    return [slice(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
-
-
-PLATEAU = 0.9
-"""Places with this share of the best contrast count: all of them hold the head."""
-
-
-def _centre(u: np.ndarray, contrast: np.ndarray, run: slice) -> float:
+def _centre(u: np.ndarray, contrast: np.ndarray, first: int, last: int) -> float:
     """Return the middle of the places of a run whose contrast is near the best."""
-    own = contrast[run]
+    own = contrast[first : last + 1]
     weight = np.maximum(own - PLATEAU * own.max(), 0) + 1e-9
-    return float(np.average(u[run], weights=weight))
+    return float(np.average(u[first : last + 1], weights=weight))

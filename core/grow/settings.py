@@ -7,10 +7,6 @@ from dataclasses import dataclass, replace
 from ..classify import settings as classify
 from ..parameters import GrowParameters
 
-THIN_PER_M2 = 400.0
-"""Points per square metre around a seed below which its rail is thin; as in `classify`."""
-
-
 HEAD_LEVEL_M = 0.20
 """Difference in height between windows on heads that the classification has found: it only has to tell the rail from
 one on a bridge. Measured on blunt heads: up to 0.15 m off their course."""

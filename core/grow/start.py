@@ -6,15 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..classify.bed import Coarse, find_bed
+from ..classify.bed import Bed
+from ..classify.lines import REACH_M, reach_at
 from ..classify.settings import Settings
-from ..classify.square import classify_square
+from ..classify.square import THIN_PER_M2, classify_square
 from ..classify.tops import TOP_M
 from .course import Ahead
 from .on_heads import OnHeads, cut
 from .points import Points
 from .profile import GROOVE_M, HIGH_M, MIN_CONTRAST, Head
-from .settings import BLUNT, DENSE, THIN, THIN_PER_M2, Beam, GrowSettings
+from .settings import BLUNT, DENSE, THIN, Beam, GrowSettings
 
 ANGLES = 90
 """Directions that are tried, over half a turn: at 1 m, a head is 17 mm off at most."""
@@ -26,9 +27,6 @@ known from 5 m on, and the blur of a cloud from tens of metres of ridges."""
 SQUARES_PER_M2 = 500.0
 """Points per square metre below which the squares around a seed are classified instead, a million points each: where
 the rail is followed on what the classification finds, they are needed anyway."""
-
-REACH_POINTS_PER_M, REACH_M = 120.0, (1.0, 2.0)
-"""Reach of the line through a seed: this divided by the points per square metre, within limits; as in `classify`."""
 
 BIN_M, LEVEL_BIN_M = 0.006, 0.010
 """Bins across and in height."""
@@ -112,7 +110,7 @@ def find_start(points: Points, seed: np.ndarray, settings: GrowSettings, heads: 
     per_m2 = _density(near, seed)
     patch_m = float(np.clip(np.sqrt(PATCH_POINTS / per_m2) / 2, *PATCH_M))
     beam = THIN if per_m2 < THIN_PER_M2 else DENSE
-    reach_m = float(np.clip(REACH_POINTS_PER_M / per_m2, *REACH_M))
+    reach_m = reach_at(per_m2)
     heads = heads or OnHeads(points, settings)
     if per_m2 < SQUARES_PER_M2:
         rail, is_blunt = _near(heads, seed, settings), heads.are_blunt(seed, REACH_M[1])
@@ -149,10 +147,7 @@ def _classified(patch: np.ndarray, seed: np.ndarray, settings: GrowSettings) -> 
 
 def _standing(patch: np.ndarray, settings: GrowSettings) -> np.ndarray:
     """Return the points, (k, 3), that stand above the bed as rails do."""
-    coarse = Coarse.around(*patch.T[:2])
-    dx, dy = coarse.offsets(*patch.T[:2])
-    z = (patch[:, 2] - patch[:, 2].min()).astype(np.float32)
-    height, _ = find_bed(coarse, dx, dy, z).heights(dx, dy, z)
+    _, height, _ = Bed.under(patch)
     return patch[(height >= settings.parameters.min_height_m) & (height <= TOP_M)]
 
 

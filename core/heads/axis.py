@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from ..polyline import interpolate, left_normals, length_along
+from ..polyline import interpolate, left_normals
 from ..rails import Support
 from .blunt import WINDOW, Ridge, wander
-from .edges import STATION_STEP_M, VIEW_STATIONS, find_middles, histograms, stations_along
+from .edges import STATION_STEP_M, VIEW_STATIONS, find_middles, stations_along
 from .flank import FLANK_TOP_SIGMA_M, Flank, find_flank
-from .level import MIN_ON_HEAD, on_top, robust_sigma
+from .head_points import MIN_ON_HEAD, HeadPoints
+from .level import robust_sigma
 from .roads import MIN_WIDER_M, bands, hidden_edges
 from .sections import Middles, outline_middles, with_outline
 from .smoother import AMPLITUDES, STILL, Spline, bridge_error, smooth
@@ -92,49 +93,34 @@ class Axis:
     ridge: Ridge | None = None
 
     @classmethod
-    def of(
-        cls,
-        line: np.ndarray,
-        t: np.ndarray,
-        across: np.ndarray,
-        z: np.ndarray,
-        head_width_m: float,
-        free: np.ndarray,
-        unseen_m: float,
-        by_outline: bool = True,
-    ) -> Axis:
+    def of(cls, points: HeadPoints, unseen_m: float, by_outline: bool = True) -> Axis:
         """Measure the axis.
 
         Parameters
         ----------
-        line : (k, 2) array
-        t, across, z : (n,) arrays
-            Chainage (increasing), offset to the left and height of points near the line at its own level, metres.
-        head_width_m : float
-        free : (2, s) bool array
-            Where the right and the left edge are free of other heads; see `neighbours.free_edges`.
+        points : HeadPoints
+            At the own level of the line.
         unseen_m : float
             Standard deviation of the line where points show no edges of the head.
         by_outline : bool
             Whether the line is close enough to its head to compare the points with the outline.
         """
-        along = length_along(line)
-        flank = find_flank(t, across, z, head_width_m)
-        is_band = flank is not None or _is_narrow(across, head_width_m)
-        ridge = None if is_band else Ridge.find(t, across, z, along[-1], head_width_m)
+        flank = find_flank(points)
+        is_band = flank is not None or _is_narrow(points)
+        ridge = None if is_band else Ridge.find(points)
         if ridge is not None:
-            shown = _of_ridge(line, t, ridge)
+            shown = _of_ridge(points, ridge)
         elif flank is not None:
-            shown = _of_band(t, across, along[-1], flank.left_m, flank.sigma_m)
+            shown = _of_band(points, flank.left_m, flank.sigma_m)
         elif is_band:
-            shown = _of_band(t, across, along[-1], np.median(across), unseen_m)
+            shown = _of_band(points, np.median(points.across), unseen_m)
         else:
-            shown = _of_head(t, across, z, along[-1], head_width_m, free, unseen_m, by_outline)
+            shown = _of_head(points, unseen_m, by_outline)
         known = shown.information > 0
         information = np.where(known, shown.information, STATION_STEP_M / UNSHOWN_M**2)
-        offset_m, bent = np.where(known, shown.offset_m, 0.0), line if known.any() else None
+        offset_m, bent = np.where(known, shown.offset_m, 0.0), points.line if known.any() else None
         amplitudes = STILL if ridge else AMPLITUDES
-        course = smooth(shown.t, offset_m, information, 0.0, along[-1], bent, amplitudes)
+        course = smooth(shown.t, offset_m, information, 0.0, points.length_m, bent, amplitudes)
         common_m = course.followed(shown.t, np.where(known, shown.common_m, 0.0), information)
         return cls(course, replace(shown, common_m=common_m), flank, ridge)
 
@@ -164,65 +150,54 @@ def _means(t: np.ndarray, across: np.ndarray, count: int) -> tuple[np.ndarray, n
     return points, _counted(t, count, across) / np.maximum(points, 1)
 
 
-def _of_ridge(line: np.ndarray, t: np.ndarray, ridge: Ridge) -> Shown:
+def _of_ridge(points: HeadPoints, ridge: Ridge) -> Shown:
     """Return what points show of a blunt head: its crest, with errors that the stations of a window share."""
-    nothing = np.zeros(len(ridge.t))
-    along = length_along(line)
-    places, normals = (interpolate(values, along, ridge.t) for values in (line, left_normals(line)))
+    line = points.line
+    places, normals = (interpolate(values, points.along, ridge.t) for values in (line, left_normals(line)))
     shared_m = wander(places + ridge.course_m[:, None] * normals)
     information = ridge.information / (1 + ridge.information * WINDOW * shared_m**2)
-    outline = Middles.unknown(len(ridge.t))
-    return Shown(ridge.t, _counted(t, len(ridge.t)), ridge.offset_m, information, nothing, outline)
+    outline, count = Middles.unknown(len(ridge.t)), _counted(points.t, len(ridge.t))
+    return Shown(ridge.t, count, ridge.offset_m, information, np.zeros(len(ridge.t)), outline)
 
 
-def _is_narrow(across: np.ndarray, head_width_m: float) -> bool:
+def _is_narrow(points: HeadPoints) -> bool:
     """Return whether all points near a line, by their offsets from it, form a band in which no edges can be seen."""
-    if len(across) < MIN_ON_HEAD:
+    if len(points.across) < MIN_ON_HEAD:
         return False
-    low, high = np.percentile(across, NARROW_PERCENTILES)
-    return bool(high - low < NARROW_SHARE * head_width_m)
+    low, high = np.percentile(points.across, NARROW_PERCENTILES)
+    return bool(high - low < NARROW_SHARE * points.width_m)
 
 
-def _of_band(t: np.ndarray, across: np.ndarray, length_m: float, left_m: float, sigma_m: float) -> Shown:
+def _of_band(points: HeadPoints, left_m: float, sigma_m: float) -> Shown:
     """Return what points show that are all on one face, or on the axis; the axis is at `left_m` on average."""
-    stations = stations_along(length_m)
-    points, mean_m = _means(t, across, len(stations))
-    noise_m = robust_sigma(across - np.interp(t, stations[points > 0], mean_m[points > 0]))
+    stations, across = stations_along(points.length_m), points.across
+    count, mean_m = _means(points.t, across, len(stations))
+    noise_m = robust_sigma(across - np.interp(points.t, stations[count > 0], mean_m[count > 0]))
     offset_m, common_m = mean_m + left_m - np.median(across), np.full(len(stations), sigma_m)
-    return Shown(stations, points, offset_m, points / noise_m**2, common_m, Middles.unknown(len(stations)))
+    return Shown(stations, count, offset_m, count / noise_m**2, common_m, Middles.unknown(len(stations)))
 
 
-def _of_head(
-    t: np.ndarray,
-    across: np.ndarray,
-    z: np.ndarray,
-    length_m: float,
-    head_width_m: float,
-    free: np.ndarray,
-    unseen_m: float,
-    by_outline: bool,
-) -> Shown:
+def _of_head(points: HeadPoints, unseen_m: float, by_outline: bool) -> Shown:
     """Return what points show of a head: its outline, else its edges, else the mean of the points on top."""
-    top, noise_m = on_top(t, across, z, head_width_m)
-    stations, counts, wide_counts = histograms(t[top], across[top], length_m, head_width_m)
-    free = free & ~hidden_edges(t[top], across[top], length_m, head_width_m, free)
-    points = _counted(t[top], len(stations))
-    head = top & (np.abs(across) <= 0.5 * head_width_m)
-    on_head, mean_m = _means(t[head], across[head], len(stations))
-    found = find_middles(counts, wide_counts, points, free, head_width_m, noise_m)
-    shown, either_end_m = _is_shown(on_head), _either_end(wide_counts, head_width_m)
+    (top, noise_m), (stations, counts, wide_counts) = points.top, points.histograms
+    free = points.free & ~hidden_edges(points)
+    count = _counted(points.t[top], len(stations))
+    head = points[top & points.within(0.5)]
+    on_head, mean_m = _means(head.t, head.across, len(stations))
+    found = find_middles(counts, wide_counts, count, free, points.width_m, noise_m)
+    shown, either_end_m = _is_shown(on_head), _either_end(wide_counts, points.width_m)
     by_edges = np.isfinite(found.offset_m)
     seen, one_head = by_edges & shown, (by_edges | (either_end_m == 0)) & free.all(axis=0)
     outline = Middles.unknown(len(stations))
     if by_outline:
-        outline = outline_middles(t, across, z, length_m, head_width_m, shown & one_head)
+        outline = outline_middles(points, shown & one_head)
     outlined = np.isfinite(outline.offset)
     which = [outlined, seen, on_head > 0]
     unsure_m = np.hypot(unseen_m, either_end_m)
     by_mean = np.full(len(stations), STATION_STEP_M / unseen_m**2)
     return Shown(
         stations,
-        points,
+        count,
         np.select(which, [outline.offset, with_outline(found.offset_m, outline), mean_m]),
         np.select(which, [outline.information, found.information, by_mean]),
         np.select(which, [outline.common, found.view_m, unsure_m]),

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from ..polyline import left_normals, project
-from .edges import STATION_STEP_M, search_distance, station_count, stations_along
-from .level import OFF_TOP_SIGMAS, SLOPE_ROUNDS, is_blended, robust_sigma, rough_level
+from ..polyline import left_normals
+from .edges import STATION_STEP_M, station_count, stations_along
+from .head_points import HeadPoints, near_lines
+from .level import OFF_TOP_SIGMAS, SLOPE_ROUNDS, robust_sigma, rough_level
 
 REACH_HEADS = 1.0
 """Distance from the line, in head widths, within which the ridge is a parabola: a Gaussian of 7 cm is, to a tenth."""
@@ -69,25 +70,13 @@ class Ridge:
         return shown[0] / np.maximum(shown[1], 1e-9)
 
     @classmethod
-    def find(
-        cls, t: np.ndarray, across: np.ndarray, z: np.ndarray, length_m: float, head_width_m: float
-    ) -> Ridge | None:
-        """Fit one parabola, and a crest for each window, to the points of a line; None if its head is not blunt.
-
-        Parameters
-        ----------
-        t, across, z : (n,) arrays
-            Chainage (increasing), offset to the left and height of points near the line, metres.
-        length_m : float
-            Length of the line.
-        head_width_m : float
-        """
-        if not is_blended(t, across, z, head_width_m):
+    def find(cls, points: HeadPoints) -> Ridge | None:
+        """Fit one parabola, and a crest for each window, to the points of a line; None if its head is not blunt."""
+        if not points.is_blended:
             return None
-        rows = station_count(length_m)
-        near = np.abs(across) <= REACH_HEADS * head_width_m
-        row = np.minimum((t[near] / STATION_STEP_M).astype(int), rows - 1)
-        x, up = across[near], z[near] - rough_level(t[near], z[near])
+        rows, near = station_count(points.length_m), points[points.within(REACH_HEADS)]
+        row = np.minimum((near.t / STATION_STEP_M).astype(int), rows - 1)
+        x, up = near.across, near.z - rough_level(near.t, near.z)
         used = np.ones(len(x), dtype=bool)
         for _ in range(SLOPE_ROUNDS):
             bend = max(-2 * float(np.polynomial.polynomial.polyfit(x[used], up[used], 2)[2]), MIN_BEND)
@@ -95,7 +84,7 @@ class Ridge:
             noise_m = robust_sigma(flat[used])
             level, slope, crest, information = _crests(row[used], rows, x[used], flat[used], bend, noise_m)
             used = np.abs(flat - level[row] - slope[row] * x) <= OFF_TOP_SIGMAS * noise_m
-        return cls(stations_along(length_m), crest, information)
+        return cls(stations_along(points.length_m), crest, information)
 
 
 def _crests(
@@ -122,15 +111,10 @@ def _crests(
 
 def blunt_share(lines: Sequence[np.ndarray], xyz: np.ndarray, head_width_m: float) -> float:
     """Return the share of the length of lines, (k, 2) each, along which points, (n, 3), show blunt heads."""
-    if not lines:
-        return 0.0
-    feet = project(lines, xyz[:, :2], search_distance(head_width_m))
     shown_m = np.zeros(2)
-    for number in range(len(lines)):
-        own = feet.of(number)
-        if len(own.t):
-            blunt = is_blended(own.t, own.across, xyz[own.point, 2], head_width_m)
-            shown_m[int(blunt)] += np.ptp(own.t)
+    for points in near_lines(lines, xyz, head_width_m):
+        if len(points.t):
+            shown_m[int(points.is_blended)] += np.ptp(points.t)
     return float(shown_m[1] / max(shown_m.sum(), 1e-9))
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..lines.network import LineNetwork
 from ..lines.parting import ARC, STRAIGHT, PartingLaw, left_of
 from ..polyline import length_along, project
-from .level import on_top
+from .head_points import HeadPoints
 
 APART_HEADS = 1.3
 """Distance between two axes, in head widths, from which the raster has a cell between the heads."""
@@ -176,7 +176,8 @@ def _points_of_arc(network: LineNetwork, parting: _Parting, xyz: np.ndarray, hea
     feet = project([piece], near[:, :2], reach_m)
     if not len(feet.t):
         return np.zeros(2)
-    top, _ = on_top(feet.t, feet.across, near[feet.point, 2], head_width_m)
+    free = np.ones((2, 0), dtype=bool)
+    top, _ = HeadPoints(feet.t, feet.across, near[feet.point, 2], head_width_m, piece, free).top
     feet = feet[top]
     way = parting.sense * (feet.t + along[shared][0] - parting.node_m)
     strip = arc(way) - blade(way)

@@ -15,18 +15,18 @@ from ..clouds.points import RailPoints
 from ..lines.network import LineNetwork
 from ..lines.smoothing import STATIONS_PER_SIGMA
 from ..parameters import Parameters
-from ..polyline import Feet, interpolate, length_along, project, resample, starts_at_its_end
+from ..polyline import interpolate, length_along, resample, starts_at_its_end
 from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
 from .axis import CELL_M, Axis, unseen_m
 from .blunt import SMOOTHING_M, wander
-from .edges import Widths, search_distance, stations_along, widest
-from .level import AXIS_SHARE, fit_crown, rough_level
-from .neighbours import free_edges
+from .edges import Widths, stations_along
+from .head_points import HeadPoints, near_lines
+from .level import rough_level
 from .own_level import on_own_level
 from .smoother import KNOT_M
-from .strips import StripOffsets, aligned, measure_strips
-from .top import MIN_POINTS, Top, by_outline, find_top, smoothed
+from .strips import StripOffsets, measure_strips
+from .top import MIN_POINTS, Top, by_outline, find_top, fit_crown, smoothed
 
 MIN_GAP_M, MAX_CHANCE_GAP_M = 0.5, 0.9
 """Length without points from which a line counts as bridged: five profiles of the fastest train's scanner. Where points
@@ -51,8 +51,6 @@ class ElevationParameters:
 
     Attributes
     ----------
-    head_width_m : float
-        Width of the railhead.
     tolerance_xy_m : float
         Maximum distance in plan from the line of a point that gives height, at most half a head.
     tolerance_z_m : float
@@ -69,7 +67,6 @@ class ElevationParameters:
         Whether the strips of the points are moved onto their mean.
     """
 
-    head_width_m: float
     tolerance_xy_m: float = Parameters.tolerance_xy_m
     tolerance_z_m: float = Parameters.tolerance_z_m
     crown_radius_m: float = Parameters.crown_radius_m
@@ -81,11 +78,11 @@ class ElevationParameters:
 
 def elevate(
     network: LineNetwork,
-    points: RailPoints,
-    parameters: ElevationParameters,
+    near: Sequence[HeadPoints],
+    class_code: int,
+    parameters: ElevationParameters = ElevationParameters(),
     progress: Progress = SILENT,
     strips: Sequence[StripOffsets | None] = (),
-    head_width_m: Widths | None = None,
 ) -> tuple[RailLine, ...]:
     """Add heights and figures to the smoothed plan lines of a network.
 
@@ -93,31 +90,25 @@ def elevate(
     ----------
     network : LineNetwork
         Smoothed lines; lines that meet in a node still meet there.
-    points : RailPoints
-        The points from which the network was made.
+    near : sequence of HeadPoints
+        Points of each line.
+    class_code : int
     parameters : ElevationParameters
     progress : Progress
     strips : sequence of StripOffsets or None
-        For each line, from `strips.strips_along`; empty if the points are of one strip.
-    head_width_m : float or (n,) array, optional
-        Width of the heads, of all lines or of each; that of the parameters by default.
+        For each line; empty if the points are of one strip.
 
     Returns
     -------
     tuple of RailLine
         In order of their starts from west to east, numbered from 1; without lines that are short or have no points.
     """
-    widths = parameters.head_width_m if head_width_m is None else head_width_m
-    feet = project(network.lines, points.xyz[:, :2], search_distance(widest(widths)), progress.span(0.0, 0.6))
     free_ends = (network.degrees() == 1)[network.ends]
-    edges = free_edges(network.lines, widest(widths))
-    of_lines = [replace(parameters, head_width_m=float(one)) for one in np.broadcast_to(widths, len(network.lines))]
     rails = []
-    for number, line in enumerate(progress.span(0.6, 1.0).follow(network.lines)):
-        own = strips[number] if strips else None
-        rail = _measured(line, free_ends[number], edges[number], feet.of(number), points, of_lines[number], own)
+    for number, points in enumerate(progress.follow(near)):
+        rail = _measured(points, free_ends[number], parameters, strips[number] if strips else None)
         if rail is not None and rail.length_m >= parameters.min_length_m:
-            rails.append(replace(rail, class_code=points.class_code))
+            rails.append(replace(rail, class_code=class_code))
     return numbered(rails)
 
 
@@ -153,65 +144,50 @@ def numbered(rails: Sequence[RailLine]) -> tuple[RailLine, ...]:
 
 
 def _measured(
-    line: np.ndarray,
-    free_ends: np.ndarray,
-    edges: np.ndarray,
-    feet: Feet,
-    points: RailPoints,
-    parameters: ElevationParameters,
-    strips: StripOffsets | None,
+    near: HeadPoints, free_ends: np.ndarray, parameters: ElevationParameters, strips: StripOffsets | None
 ) -> RailLine | None:
-    """Measure one line, given the feet of its points and its strips; None if too few points support it."""
-    z = points.xyz[feet.point, 2]
-    if parameters.align:
-        feet, z = aligned(strips, feet, z, points)
-    own = on_own_level(feet.t, feet.across, z, parameters.head_width_m)
-    feet, z = feet[own], z[own]
-    head = np.abs(feet.across) <= min(0.5 * parameters.head_width_m, parameters.tolerance_xy_m)
-    if head.sum() < MIN_POINTS:
+    """Measure one line, given its points and their strips; None if too few points support it."""
+    own = on_own_level(strips.aligned(near) if strips and parameters.align else near)
+    axis = Axis.of(own, unseen_m(parameters.cell_m))
+    top = _top_of(own, axis, parameters)
+    if top is None:
         return None
-    along = length_along(line)
-    axis = Axis.of(line, feet.t, feet.across, z, parameters.head_width_m, edges, unseen_m(parameters.cell_m))
-    if axis.flank is None:
-        crown = fit_crown(feet.t, feet.across, z, parameters.head_width_m)
-        level_z = z + crown.fall(feet.across)
-        top = find_top(
-            feet.t[head],
-            feet.across[head],
-            level_z[head],
-            parameters.head_width_m,
-            parameters.crown_radius_m,
-            parameters.tolerance_z_m,
-            parameters.smoothing_z_m or (SMOOTHING_M if axis.ridge else None),
-        )
-        if top is None:
-            return None
-        top = replace(top, crown_m=crown.error(parameters.head_width_m))
-        if axis.ridge is None and parameters.smoothing_z_m is None:
-            flat_z = level_z[head] - top.slope * feet.across[head]
-            near_axis = np.abs(feet.across[head]) <= AXIS_SHARE * parameters.head_width_m
-            top = by_outline(top, feet.t[head], flat_z, near_axis, axis.shown.outline, along[-1])
-    else:
-        head = np.ones(len(z), dtype=bool)
-        above_m = axis.flank.top_m - np.mean(z - rough_level(feet.t, z))
-        top = Top(smoothed(feet.t, z + above_m, parameters.smoothing_z_m), head, np.zeros(len(z)))
-    supporting = feet[head][top.points]
-    start, end = _supported(supporting.t, along[-1], free_ends)
+    along, supporting = near.along, top.points
+    start, end = _supported(supporting.t, near.length_m, free_ends)
     stations = np.concatenate([[start], along[(along > start) & (along < end)], [end]])
     gaps = find_gaps(supporting.t, start, end)
     bridged = float(np.sum(gaps[:, 1] - gaps[:, 0]))
     resid = float(np.sqrt(np.mean(supporting.across**2)))
     support = axis.support(strips is not None)
-    error_m = top.height_error(supporting.t, support)
+    error_m = top.height_error(support)
     if axis.ridge is not None:
         error_m = np.hypot(error_m, wander(top.course.at(support.t)))
     support = replace(support, sigmaz_m=np.hypot(error_m, np.nan_to_num(support.heights_m)))
     if strips is not None:
         support = strips.added_to(support, parameters.align)
     support = support.between(start, end)
-    xyz = np.column_stack([interpolate(line, along, stations), top.course.at(stations)])
+    xyz = np.column_stack([interpolate(near.line, along, stations), top.course.at(stations)])
     figures = (len(supporting.t), 1000 * resid, 1000 * support.rms_m, bridged)
     return RailLine(xyz, 0, 0, *figures, gaps - start, support, sigmaz_mm=1000 * support.rmsz_m)
+
+
+def _top_of(points: HeadPoints, axis: Axis, parameters: ElevationParameters) -> Top | None:
+    """Find the top of a head; None if too few points are on it."""
+    head = points[points.within(min(0.5, parameters.tolerance_xy_m / points.width_m))]
+    if len(head.t) < MIN_POINTS:
+        return None
+    if axis.flank is not None:
+        above_m = axis.flank.top_m - np.mean(points.z - rough_level(points.t, points.z))
+        course = smoothed(points.t, points.z + above_m, parameters.smoothing_z_m)
+        return Top(course, points, np.zeros(len(points.t)))
+    crown = fit_crown(points)
+    level = replace(head, z=head.z + crown.fall(head.across))
+    smoothing_m = parameters.smoothing_z_m or (SMOOTHING_M if axis.ridge else None)
+    top = find_top(level, parameters.crown_radius_m, parameters.tolerance_z_m, smoothing_m)
+    if top is None:
+        return None
+    top = replace(top, crown_m=crown.error(points.width_m))
+    return top if smoothing_m is not None else by_outline(top, axis.shown.outline)
 
 
 def measure_again(
@@ -243,20 +219,14 @@ def measure_again(
     """
     step_m = KNOT_M if smoothing_z_m is None else smoothing_z_m / STATIONS_PER_SIGMA
     plans = [resample(rail.xyz[:, :2], step_m)[0] for rail in rails]
-    feet = project(plans, points.xyz[:, :2], search_distance(widest(head_width_m)), progress.span(0.0, 0.7))
-    # Lines from a file are only known to be on their heads, so the head width takes the place of the cell size.
-    of_rails = [
-        ElevationParameters(float(one), smoothing_z_m=smoothing_z_m, cell_m=float(one), align=align)
-        for one in np.broadcast_to(head_width_m, len(rails))
-    ]
-    edges = free_edges(plans, widest(head_width_m))
-    strips = measure_strips(plans, feet, points, edges, head_width_m)
+    near = near_lines(plans, points.xyz, head_width_m, points.strips, progress.span(0.0, 0.7))
     measured = []
-    for number, rail in enumerate(progress.span(0.7, 1.0).follow(rails)):
-        own = feet.of(number)
-        again = _measured(plans[number], NO_FREE_ENDS, edges[number], own, points, of_rails[number], strips[number])
+    for rail, head in zip(rails, progress.span(0.7, 1.0).follow(near)):
+        # Lines from a file are only known to be on their heads, so the head width takes the place of the cell size.
+        parameters = ElevationParameters(smoothing_z_m=smoothing_z_m, cell_m=head.width_m, align=align)
+        again = _measured(head, NO_FREE_ENDS, parameters, measure_strips(head))
         if again is None:
-            measured.append(_unsupported(rail, of_rails[number]))
+            measured.append(_unsupported(rail, head.width_m))
         else:
             measured.append(replace(rail, xyz=again.xyz, gaps=again.gaps, support=_with_strips_of(rail, again.support)))
     return measured
@@ -272,11 +242,11 @@ def _with_strips_of(rail: RailLine, support: Support | None) -> Support | None:
     return replace(support, sigma_m=np.hypot(own, strips[:, 2]), strips=strips)
 
 
-def _unsupported(rail: RailLine, parameters: ElevationParameters) -> RailLine:
+def _unsupported(rail: RailLine, head_width_m: float) -> RailLine:
     """Mark a rail as supported nowhere."""
     length_m = float(length_along(rail.xyz[:, :2])[-1])
     t = stations_along(length_m)
-    support = Support(t, np.zeros(len(t), dtype=int), np.full(len(t), unseen_m(parameters.cell_m)))
+    support = Support(t, np.zeros(len(t), dtype=int), np.full(len(t), unseen_m(head_width_m)))
     return replace(rail, gaps=np.array([[0.0, length_m]]), support=support)
 
 

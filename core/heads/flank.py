@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .level import MIN_ON_HEAD, rough_level
+from .head_points import MIN_ON_HEAD, HeadPoints
+from .level import rough_level
 from .outline import FACE_DEPTH_M, Blurred, Grid, Outline, Section, fit_section
 
 MAX_BAND_SHARE, BAND_PERCENTILES = 0.4, (5.0, 95.0)
@@ -53,21 +54,15 @@ class Flank:
     sigma_m: float
 
 
-def find_flank(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> Flank | None:
-    """Find the head of a line whose points are on one face; None if they are not.
-
-    Parameters
-    ----------
-    t, across, z : (n,) arrays
-        Chainage (increasing), offset to the left and height of points near the line, metres.
-    head_width_m : float
-    """
-    if len(t) < MIN_ON_HEAD:
+def find_flank(points: HeadPoints) -> Flank | None:
+    """Find the head of a line whose points are on one face; None if they are not."""
+    across, head_width_m = points.across, points.width_m
+    if len(across) < MIN_ON_HEAD:
         return None
     low, high = np.percentile(across, BAND_PERCENTILES)
     if high - low > MAX_BAND_SHARE * head_width_m:
         return None
-    up = z - rough_level(t, z)
+    up = points.z - rough_level(points.t, points.z)
     bottom, top = np.percentile(up, BAND_PERCENTILES)
     if top - bottom < high - low + MIN_HEIGHT_M or top - bottom > 2 * FACE_DEPTH_M:
         return None
@@ -78,7 +73,7 @@ def find_flank(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: f
         bins = grid.number(across - left_m, up - top_m)
         counts = np.bincount(bins[bins >= 0], minlength=grid.size).astype(float)
         section = fit_section(counts, outline, grid)
-        found.append((_log_likelihood(counts, section, outline, grid, len(t)), left_m, top_m, section))
+        found.append((_log_likelihood(counts, section, outline, grid, len(up)), left_m, top_m, section))
     crown, *faces = found
     other, best = sorted(faces, key=lambda one: one[0])
     if best[0] - crown[0] < MIN_GAIN:

@@ -5,13 +5,9 @@ See docs/method.md section 6.1.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.polynomial import Polynomial
 from scipy.ndimage import median_filter, uniform_filter1d
-
-from .outline import CROWN_RADIUS_M
 
 LEVEL_BIN_M = 0.5
 """Length of the bins: a handful of points on the sparsest rail, and at most 2 cm of height at 4 % gradient."""
@@ -44,57 +40,6 @@ OFF_TOP_SIGMAS = 2.5
 
 MIN_NOISE_M = 0.001
 """No scanner is better than this; it keeps the limits open where heights are rounded or synthetic."""
-
-MIN_ON_HEAD = 80
-"""Points needed on a head to find its top; fewer do not determine a slope."""
-
-MAX_DEPTH_M, MAX_DEPTH_SIGMAS = 0.006, 1.5
-"""Depth below the top, in metres and in standard deviations of the noise, beyond which a point may be on a side face or
-a corner. Tighter than the noise requires: points on top are lost evenly across the head, so the estimate stays
-unbiased."""
-
-MAX_ABOVE_SIGMAS = 3.0
-"""Height above the top, in standard deviations of the noise, beyond which a point is a weed."""
-
-BLENDED_M = 0.006
-"""Fall of both rims of a head below its crown from which beams blend the head and the ballast, as those from the air
-do. Seen by narrow beams, the round corners fall by 1 to 2 mm, and the rim of a line that is off the head by more, but
-not both."""
-
-CROWN_HEADS, RIM_HEADS, SHOULDER_HEADS = 0.2, (0.3, 0.5), (0.55, 0.75)
-"""Parts of the head width on either side of the axis: the crown, the rims, and what is beyond a head that is not
-blurred."""
-
-LEAST_INFORMATION = 1e-6
-"""Information about level, slope and fall of a crown that is always there, so that few points are enough."""
-
-SHOULDER_SHARE = 0.2
-"""Points per width on either shoulder, as a share of those on the crown, from which a blurred head goes on there."""
-
-
-@dataclass(frozen=True)
-class Crown:
-    """How the top of a head falls beside its axis: in proportion to the square of the distance, up to the rims.
-
-    Attributes
-    ----------
-    bend, sigma : float
-        Fall per square of the distance, and its standard error, 1/m.
-    rim_m : float
-        Distance from the axis up to which the top falls.
-    """
-
-    bend: float
-    sigma: float
-    rim_m: float
-
-    def fall(self, across: np.ndarray) -> np.ndarray:
-        """Return how far points are lower than the axis of their head because they are beside it, (n,) metres."""
-        return self.bend * np.minimum(np.abs(across), self.rim_m) ** 2
-
-    def error(self, head_width_m: float) -> float:
-        """Return the standard error of the height on the axis, metres, from points up to `AXIS_SHARE` beside it."""
-        return self.sigma * (AXIS_SHARE * head_width_m) ** 2 / 3
 
 
 def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -150,59 +95,6 @@ def _median_filtered(t: np.ndarray, level: np.ndarray) -> np.ndarray:
     return median_filter(level, MEDIAN_BINS, mode="nearest")
 
 
-def is_blended(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> bool:
-    """Return whether heights fall from the crown to both sides, so that the head has no edges that could be seen.
-
-    Beams from the air show this on the rims of the head, dense matching of photographs on shoulders beyond them.
-    """
-    near = np.abs(across) <= SHOULDER_HEADS[1] * head_width_m
-    head = np.abs(across[near]) <= RIM_HEADS[1] * head_width_m
-    if head.sum() < MIN_ON_HEAD:
-        return False
-    level = rough_level(t[near][head], z[near][head])
-    above, heads = z[near] - np.interp(t[near], t[near][head], level), across[near] / head_width_m
-    crown = np.abs(heads) < CROWN_HEADS
-    if not crown.any():
-        return False
-    for low, high in (RIM_HEADS, SHOULDER_HEADS):
-        sides = [(side * heads > low) & (side * heads <= high) for side in (1, -1)]
-        least = max(SHOULDER_SHARE * (high - low) / (2 * CROWN_HEADS) * crown.sum(), 1) if low > RIM_HEADS[0] else 1
-        if min(side.sum() for side in sides) >= least:
-            fall_m = np.median(above[crown]) - max(np.median(above[side]) for side in sides)
-            if fall_m > BLENDED_M:
-                return True
-    return False
-
-
-def fit_crown(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> Crown:
-    """Fit a parabola to the crown of a head.
-
-    New crowns have a radius, and worn ones are flatter. Where beams blend the head and the ballast, the share of the
-    ballast grows with the distance from the axis, and the fall may be of any size.
-
-    Parameters
-    ----------
-    t, across, z : (n,) arrays
-        Chainage (increasing), offset to the left and height of points near the line, metres.
-    head_width_m : float
-    """
-    usual, rim_m = 0.5 / CROWN_RADIUS_M, RIM_HEADS[0] * head_width_m
-    near = np.abs(across) <= rim_m
-    if not near.any():
-        return Crown(usual, usual, rim_m)
-    expected = np.array([0.0, 0.0, 0.0 if is_blended(t, across, z, head_width_m) else usual**-2])
-    above, powers = z[near] - rough_level(t[near], z[near]), np.vander(across[near], 3, increasing=True)
-    used, off = np.ones(len(above), dtype=bool), above
-    for _ in range(SLOPE_ROUNDS):
-        noise_m = robust_sigma(off[used])
-        information = powers[used].T @ powers[used] / noise_m**2 + np.diag(expected + LEAST_INFORMATION)
-        covariance = np.linalg.inv(information)
-        found = covariance @ (powers[used].T @ above[used] / noise_m**2 - expected * usual)
-        off = above - powers @ found
-        used = np.abs(off) <= OFF_TOP_SIGMAS * robust_sigma(off)
-    return Crown(max(-found[2], 0.0), float(np.sqrt(covariance[2, 2])), rim_m)
-
-
 def robust_sigma(values: np.ndarray) -> float:
     """Estimate the standard deviation of values from their median absolute deviation, which outliers hardly affect."""
     if not len(values):
@@ -236,59 +128,6 @@ def cross_slope(t: np.ndarray, across: np.ndarray, height: np.ndarray, head_widt
         on_top = crown & (np.abs(height - level - slope * across) <= limit)
         slope, level = _moving_fit(number, on_top, across, height, limit / OFF_TOP_SIGMAS)
     return slope
-
-
-def on_top(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> tuple[np.ndarray, float]:
-    """Find the points on the top of the head, allowing for its slope across, and their noise.
-
-    Parameters
-    ----------
-    t, across, z : (n,) arrays
-        Chainage (increasing), offset to the left and height of points near the line, metres.
-    head_width_m : float
-
-    Returns
-    -------
-    top : (n,) bool array
-    noise_m : float
-        Standard deviation of their heights.
-    """
-    head = np.abs(across) <= 0.5 * head_width_m
-    if head.sum() < MIN_ON_HEAD:
-        return np.zeros(len(t), dtype=bool), MIN_NOISE_M
-    above = z - np.interp(t, t[head], rough_level(t[head], z[head]))
-    slope = np.interp(t, t[head], cross_slope(t[head], across[head], above[head], head_width_m))
-    flat = above - slope * across
-    flat -= np.interp(t, t[head], rough_level(t[head], flat[head]))
-    noise = robust_sigma(flat[head & (np.abs(flat) < 2 * MAX_DEPTH_M)])
-    noise = robust_sigma(flat[head & (np.abs(flat) < max(2 * MAX_DEPTH_M, OFF_TOP_SIGMAS * noise))])
-    lowest, highest = -max(MAX_DEPTH_M, MAX_DEPTH_SIGMAS * noise), max(MAX_DEPTH_M, MAX_ABOVE_SIGMAS * noise)
-    return (flat >= lowest) & (flat <= highest), noise
-
-
-def in_head_frame(
-    t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points in the frame of their head: offset to the left and height from the top on the line, (n,) each.
-
-    The third array is the height of the top on the line, (n,). All are NaN if the crown has too few points.
-
-    Parameters
-    ----------
-    t, across, z : (n,) arrays
-        Chainage (increasing), offset to the left and height of points near the line, metres.
-    head_width_m : float
-    """
-    head = np.abs(across) <= 0.5 * head_width_m
-    crown = np.abs(across) <= AXIS_SHARE * head_width_m
-    if crown.sum() < MIN_ON_HEAD:
-        nothing = np.full(len(t), np.nan)
-        return nothing, nothing, nothing
-    above = z - np.interp(t, t[crown], rough_level(t[crown], z[crown]))
-    slope = np.interp(t, t[head], cross_slope(t[head], across[head], above[head], head_width_m))
-    flat = above - slope * across
-    flat -= np.interp(t, t[crown], rough_level(t[crown], flat[crown]))
-    return across + slope * flat, flat, z - slope * across - flat
 
 
 def _moving_fit(

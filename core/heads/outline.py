@@ -53,7 +53,7 @@ WIDTH_SIGMA_M = 0.0005
 """Expected error of the head width: half of what tables differ by, because most agree."""
 
 BEND_SIGMA = 0.25 / CROWN_RADIUS_M
-"""Expected error of the bend of the crown, 1/m: worn crowns are flatter."""
+"""Expected error of the bend of the crown, 1/m: half of that of a new one, because worn crowns are flatter."""
 
 MAX_STEPS = np.array([0.004, 0.004, 0.1, 0.002, 0.3, 0.3, 1.0])
 """Largest changes of the place in a round: metres, metres, slope, metres, logarithms of the noise, and 1/m."""
@@ -333,7 +333,8 @@ def _scoring_step(counts: np.ndarray, section: Section, blurred: Blurred, used: 
     known, rates = _rates(section, blurred, used)
     gradient = rates @ counts[used]
     gradient[:PLACE] -= _expected(section.place) @ section.place
-    gradient[PLACE:] -= section.shares[known] @ gradient[PLACE:] / max(section.shares[known].sum(), USED_SHARE)  # their sum stays
+    own = section.shares[known]
+    gradient[PLACE:] -= own @ gradient[PLACE:] / max(own.sum(), USED_SHARE)  # their sum stays
     found = np.linalg.solve(_information(counts[used], section, known, rates), gradient)
     found *= min(1.0, 1 / max(np.abs(found[:PLACE] / MAX_STEPS).max(), 1e-12))
     step = np.zeros(PLACE + len(section.shares))

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_opening, median_filter
 
-from .level import LEVEL_BIN_M, MIN_ON_HEAD, is_blended, medians, robust_sigma
+from .head_points import MIN_ON_HEAD, HeadPoints
+from .level import LEVEL_BIN_M, medians, robust_sigma
 
 WINDOW_M = 0.02
 """Height in which the points on top of a head are: noise of 5 mm, and 100 mm of cant."""
@@ -83,28 +84,22 @@ class _Levels:
     height: np.ndarray
 
 
-def on_own_level(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m: float) -> np.ndarray:
-    """Find the points that may be on the head by their height, (n,) bool.
+def on_own_level(points: HeadPoints) -> HeadPoints:
+    """Choose the points that may be on the head by their height.
 
     All points are, where the level of a line is not in doubt, or where beams blend heads with the ballast.
-
-    Parameters
-    ----------
-    t, across, z : (n,) arrays
-        Chainage (increasing), offset to the left and height of points near the line, metres.
-    head_width_m : float
     """
-    head = np.abs(across) <= 0.5 * head_width_m
+    t, head = points.t, points.within(0.5)
     occupied = len(np.unique((t[head] / LEVEL_BIN_M).astype(int)))
-    if head.sum() < max(MIN_ON_HEAD, MIN_IN_BIN * occupied) or is_blended(t, across, z, head_width_m):
-        return np.ones(len(t), dtype=bool)
-    flat = z - _gradient(t[head], z[head], t)
+    if head.sum() < max(MIN_ON_HEAD, MIN_IN_BIN * occupied) or points.is_blended:
+        return points
+    flat = points.z - _gradient(t[head], points.z[head], t)
     number = (t / LEVEL_BIN_M).astype(int)
     levels = _levels(number[head], flat[head])
     step_m = _step(levels)
     chosen = _chain(_pieces(levels, step_m), step_m)
     if not len(chosen):
-        return np.ones(len(t), dtype=bool)
+        return points
     bins = np.arange(number.max() + 1)
     level = np.interp(bins, chosen[:, 0], chosen[:, 1])
     own, any_level = np.zeros((2, len(bins)), dtype=bool)
@@ -113,7 +108,7 @@ def on_own_level(t: np.ndarray, across: np.ndarray, z: np.ndarray, head_width_m:
     own[levels.bin[np.abs(levels.height - level[levels.bin]) <= near_m]] = True
     other = binary_opening(any_level & ~own, np.ones(MIN_BINS))
     above = flat - np.interp(t, (bins + 0.5) * LEVEL_BIN_M, level)
-    return (above <= ABOVE_M) & (above >= -BELOW_M) & ~other[number]
+    return points[(above <= ABOVE_M) & (above >= -BELOW_M) & ~other[number]]
 
 
 def _gradient(t: np.ndarray, z: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -18,10 +18,10 @@ from ..polyline import left_normals, length_along, project
 from ..progress import SILENT, Progress
 from .axis import CELL_M, Axis, unseen_m
 from .branch_starts import APART_HEADS, slide_branches
-from .edges import Widths, search_distance, widest
-from .neighbours import free_edges
+from .edges import Widths, widest
+from .head_points import near_lines
 from .own_level import on_own_level
-from .strips import aligned, measure_strips
+from .strips import measure_strips
 
 MAX_CROSSING_SHIFT_M = 3.0
 """Limit for how far a crossing moves when two lines move by half a head: at 1:26.5 each moves it by 1 m."""
@@ -89,20 +89,13 @@ def _shifted(
     align: bool = False,
 ) -> LineNetwork:
     """Move every line to the middle of its head, and the nodes with them."""
-    feet = project(network.lines, points.xyz[:, :2], search_distance(widest(widths)), progress.span(0.0, 0.7))
-    edges = free_edges(network.lines, widest(widths))
-    strips = measure_strips(network.lines, feet, points, edges, widths) if align else None
-    of_lines = np.broadcast_to(widths, len(network.lines))
+    near = near_lines(network.lines, points.xyz, widths, points.strips, progress.span(0.0, 0.7))
     lines = []
-    for number, line in enumerate(progress.span(0.7, 1.0).follow(network.lines)):
-        mine, head_width_m = feet.of(number), float(of_lines[number])
-        z = points.xyz[mine.point, 2]
-        if strips is not None:
-            mine, z = aligned(strips[number], mine, z, points)
-        own = on_own_level(mine.t, mine.across, z, head_width_m)
-        mine, z = mine[own], z[own]
-        axis = Axis.of(line, mine.t, mine.across, z, head_width_m, edges[number], unseen_m(cell_m), by_outline)
-        lines.append(line + axis.course.at(length_along(line))[:, None] * left_normals(line))
+    for line, head in zip(network.lines, progress.span(0.7, 1.0).follow(near)):
+        strips = measure_strips(head) if align else None
+        own = on_own_level(strips.aligned(head) if strips else head)
+        axis = Axis.of(own, unseen_m(cell_m), by_outline)
+        lines.append(line + axis.course.at(own.along)[:, None] * left_normals(line))
     return _joined(network, lines, smoothing_m)
 
 

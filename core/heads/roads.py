@@ -12,12 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_opening
 
-from ..clouds.points import RailPoints
 from ..lines.smoothing import smooth_profile
-from ..polyline import Feet, interpolate, left_normals, length_along, project
-from .edges import HALF_HEAD_BINS, HALF_RANGE_BINS, STATION_STEP_M, histograms, search_distance
-from .level import on_top
-from .neighbours import free_edges
+from ..polyline import interpolate, left_normals, project
+from .edges import HALF_HEAD_BINS, HALF_RANGE_BINS, STATION_STEP_M
+from .head_points import HeadPoints, near_lines
 from .own_level import on_own_level
 
 BAND = (0.02, 0.98)
@@ -60,42 +58,30 @@ def bands(counts: np.ndarray, head_width_m: float) -> tuple[np.ndarray, np.ndarr
     return (first - cut - HALF_RANGE_BINS) * bin_m, (last + 1 + cut - HALF_RANGE_BINS) * bin_m
 
 
-def _wide_bands(
-    counts: np.ndarray, wide_counts: np.ndarray, head_width_m: float, free: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _wide_bands(points: HeadPoints) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the ends of bands, (s,) metres, and where they are wider than a head, (s,) bool, in windows of any length.
 
     Long windows look wide where a line leaves its head, as at a road crossing; short ones may have few points. Heads
     that touch are wide together for some metres.
     """
-    right_m, left_m = bands(wide_counts, head_width_m)
-    least_m = head_width_m + MIN_WIDER_M
-    wide = free.all(axis=0) & (left_m - right_m > least_m) & (-np.subtract(*bands(counts, head_width_m)) > least_m)
+    _, counts, wide_counts = points.histograms
+    right_m, left_m = bands(wide_counts, points.width_m)
+    least_m = points.width_m + MIN_WIDER_M
+    is_wide = [left - right > least_m for right, left in ((right_m, left_m), bands(counts, points.width_m))]
+    wide = points.free.all(axis=0) & np.all(is_wide, axis=0)
     return right_m, left_m, binary_opening(wide, np.ones(int(MIN_LENGTH_M / STATION_STEP_M)))
 
 
-def hidden_edges(
-    t: np.ndarray, across: np.ndarray, length_m: float, head_width_m: float, free: np.ndarray
-) -> np.ndarray:
-    """Find the stations of a line on its head where road hides the right and the left edge, (2, s) bool.
-
-    Parameters
-    ----------
-    t, across : (n,) arrays
-        Chainage and offset to the left of the points on top, metres.
-    length_m : float
-    head_width_m : float
-    free : (2, s) bool array
-        See `neighbours.free_edges`: the head of another line is not road.
-    """
-    right_m, left_m, wide = _wide_bands(*histograms(t, across, length_m, head_width_m)[1:], head_width_m, free)
-    half_m = 0.5 * head_width_m
+def hidden_edges(points: HeadPoints) -> np.ndarray:
+    """Find the stations of a line on its head where road hides the right and the left edge, (2, s) bool."""
+    right_m, left_m, wide = _wide_bands(points)
+    half_m = 0.5 * points.width_m
     at_left, at_right = np.abs(left_m - half_m) <= AT_EDGE_M, np.abs(right_m + half_m) <= AT_EDGE_M
     return np.stack([wide & at_left & ~at_right, wide & at_right & ~at_left])
 
 
 def onto_heads(
-    lines: Sequence[np.ndarray], points: RailPoints, heads_m: np.ndarray, spacings_m: Sequence[float]
+    lines: Sequence[np.ndarray], xyz: np.ndarray, heads_m: np.ndarray, spacings_m: Sequence[float]
 ) -> tuple[np.ndarray, ...]:
     """Move lines in the middle of road and head onto the heads, where one end of the band is at gauge.
 
@@ -103,7 +89,8 @@ def onto_heads(
     ----------
     lines : sequence of (n, 2) arrays
         Smoothed lines.
-    points : RailPoints
+    xyz : (k, 3) array
+        Points.
     heads_m : (n,) array
         Width of the head of each line.
     spacings_m : sequence of float
@@ -114,20 +101,11 @@ def onto_heads(
     tuple of (n, 2) arrays
         Other lines stay as they are.
     """
-    if not len(lines):
-        return tuple(lines)
-    feet = project(lines, points.xyz[:, :2], search_distance(float(np.max(heads_m))))
-    free = free_edges(lines, float(np.max(heads_m)))
-    either: dict[int, _Band] = {}
-    for number, (line, width_m) in enumerate(zip(lines, heads_m)):
-        mine = feet.of(number)
-        ends = _on_either_end(line, mine, points.xyz[mine.point, 2], float(width_m), free[number])
-        if ends is not None:
-            either[number] = ends
-    candidates = [either[number].lines if number in either else (line,) for number, line in enumerate(lines)]
+    either = [_on_either_end(on_own_level(points)) for points in near_lines(lines, xyz, heads_m)]
+    candidates = [(line,) if band is None else band.lines for line, band in zip(lines, either)]
     return tuple(
-        _at_gauge(line, either.get(number), candidates[:number] + candidates[number + 1 :], spacings_m)
-        for number, line in enumerate(lines)
+        _at_gauge(line, band, candidates[:number] + candidates[number + 1 :], spacings_m)
+        for number, (line, band) in enumerate(zip(lines, either))
     )
 
 
@@ -139,19 +117,13 @@ class _Band:
     places: tuple[np.ndarray, np.ndarray]
 
 
-def _on_either_end(line: np.ndarray, feet: Feet, z: np.ndarray, head_width_m: float, free: np.ndarray) -> _Band | None:
+def _on_either_end(points: HeadPoints) -> _Band | None:
     """Move a line onto either end of its band; None where the points form none that is wider than a head."""
-    own = on_own_level(feet.t, feet.across, z, head_width_m)
-    feet, z = feet[own], z[own]
-    top, _ = on_top(feet.t, feet.across, z, head_width_m)
-    if not top.any():
-        return None
-    along = length_along(line)
-    stations, counts, wide_counts = histograms(feet.t[top], feet.across[top], along[-1], head_width_m)
-    right_m, left_m, wide = _wide_bands(counts, wide_counts, head_width_m, free)
+    right_m, left_m, wide = _wide_bands(points)
     if not wide.any():
         return None
-    shifts = (np.where(wide, left_m - 0.5 * head_width_m, 0.0), np.where(wide, right_m + 0.5 * head_width_m, 0.0))
+    line, along, (stations, *_), half_m = points.line, points.along, points.histograms, 0.5 * points.width_m
+    shifts = np.where(wide, left_m - half_m, 0.0), np.where(wide, right_m + half_m, 0.0)
     left, right = (
         line + smooth_profile(stations, shift, SMOOTHING_M, along)[:, None] * left_normals(line) for shift in shifts
     )

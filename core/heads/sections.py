@@ -7,14 +7,13 @@ station then show how far it is off there. See docs/method.md section 6.8.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from ..polyline import length_along, project
-from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, search_distance, station_count, stations_along
-from .level import in_head_frame
+from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, station_count, stations_along
+from .head_points import HeadPoints, near_lines
 from .outline import CROWN_RADIUS_M, MIN_NOISE_M, Grid, Outline, Scores, Section, fit_section, log_likelihood
 
 MIN_SECTION_POINTS = 250
@@ -108,7 +107,7 @@ class Middles:
         Standard deviations, across and in height, of the places at which the points of a section show the head, metres;
         0 where they agree. They are half the distance of two passes of the scanner.
     top, top_information, top_common : (s,) arrays
-        The height of the top, and the same about it as about the offset.
+        Height of the top, and the same about it as about the offset.
     """
 
     offset: np.ndarray
@@ -127,26 +126,20 @@ class Middles:
         return cls(nothing[0], zero[0], nothing[1], zero[1], zero[2], nothing[2], zero[3], nothing[3])
 
 
-def outline_middles(
-    t: np.ndarray, across: np.ndarray, z: np.ndarray, length_m: float, head_width_m: float, seen: np.ndarray
-) -> Middles:
+def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
     """Find the middle of the head from its outline, at the stations of a line that is on the head.
 
     Parameters
     ----------
-    t, across, z : (n,) arrays
-        Chainage (increasing), offset to the left and height of points near the line, metres.
-    length_m : float
-        Length of the line.
-    head_width_m : float
+    points : HeadPoints
     seen : (s,) bool array
         Where the head stands alone.
     """
-    count = station_count(length_m)
+    count, head_width_m = len(seen), points.width_m
     middles = Middles.unknown(count)
-    left, up, level = in_head_frame(t, across, z, head_width_m)
-    level = np.interp(stations_along(length_m), t, level) if len(t) else np.full(count, np.nan)
-    station = np.minimum((t / STATION_STEP_M).astype(int), count - 1)
+    left, up, level = points.in_frame()
+    level = np.interp(stations_along(points.length_m), points.t, level) if len(level) else middles.top
+    station = np.minimum((points.t / STATION_STEP_M).astype(int), count - 1)
     head, grid = Head(head_width_m, Outline.of(head_width_m)), Grid.of(head_width_m)
     bins = grid.number(left, up)
     used = (bins >= 0) & seen[station]
@@ -163,18 +156,19 @@ def outline_middles(
             continue
         scores = Scores.of(counts, section, head.outline, grid)
         part = slice(first, last)
-        (offset, above), (middles.information[part], middles.top_information[part]), (course, _) = (
-            _by_station(section.place[:2], scores, bins[here], station[here] - first, last - first)
+        (offset, above), (middles.information[part], middles.top_information[part]), (course, _) = _by_station(
+            section.place[:2], scores, bins[here], station[here] - first, last - first
         )
         is_crowned = _is_crowned(left[here], up[here], head_width_m)
-        is_flat = _is_flat(left[here] - section.place[0], up[here], head_width_m)
+        is_flat = not is_crowned and _is_flat(left[here] - section.place[0], up[here], head_width_m)
         pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
         is_sharp = np.exp(section.place[5]) < SHARP_NOISE_M
-        if is_crowned or not (is_sharp and is_flat):
+        if not (is_flat and is_sharp):
             middles.offset[part] = np.where(seen[part], offset - pull, np.nan)
-        if is_crowned or not is_flat:
+        if not is_flat:
             middles.top[part] = np.where(seen[part], level[part] + above, np.nan)
-        middles.common[part], middles.top_common[part] = np.hypot(scores.common_m[0], PULL_DOUBT * pull), scores.common_m[1]
+        middles.common[part] = np.hypot(scores.common_m[0], PULL_DOUBT * pull)
+        middles.top_common[part] = scores.common_m[1]
         on_crown = np.abs(left[here] - section.place[0]) < FLAT_SHARE * head_width_m
         middles.blur_up[part] = apart_m = _half_apart(_above_crown(left[here], up[here], section.place)[on_crown])
         middles.blur[part] = _blur(section, width_m - head_width_m, course, apart_m, is_crowned)
@@ -292,14 +286,12 @@ def likelier_width(lines: Sequence[np.ndarray], xyz: np.ndarray, widths_m: Seque
     widths_m : sequence of float
     """
     grid, outlines = Grid.of(max(widths_m)), [Outline.of(width_m) for width_m in widths_m]
-    feet = project(lines, xyz[:, :2], search_distance(max(widths_m)))
     likelihood = np.zeros(len(widths_m))
-    for number, line in enumerate(lines):
-        own = feet.of(number)
-        left, up, _ = in_head_frame(own.t, own.across, xyz[own.point, 2], widths_m[0])
+    for points in near_lines(lines, xyz, max(widths_m)):
+        left, up, _ = replace(points, width_m=widths_m[0]).in_frame()
         bins = grid.number(left, up)
-        station = own.t[bins >= 0] / STATION_STEP_M
-        for first, last in _borders(station, station_count(float(length_along(line)[-1]))):
+        station = points.t[bins >= 0] / STATION_STEP_M
+        for first, last in _borders(station, station_count(points.length_m)):
             here = bins[bins >= 0][slice(*np.searchsorted(station, [first, last]))]
             counts = np.bincount(here, minlength=grid.size).astype(float)
             if counts.sum() >= MIN_SECTION_POINTS:

@@ -14,14 +14,11 @@ from scipy import sparse
 from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 from scipy.sparse.linalg import spsolve
 
-from ..clouds.points import RailPoints
 from ..parameters import Parameters
-from ..polyline import Feet, distance_to, interpolate, left_normals, length_along, project
-from ..progress import SILENT, Progress
+from ..polyline import distance_to, interpolate, left_normals, length_along
 from ..rails import Support
-from .edges import HALF_HEAD_BINS, Widths, histograms, middles, search_distance, widest
-from .level import on_top
-from .neighbours import free_edges
+from .edges import HALF_HEAD_BINS, middles
+from .head_points import HeadPoints
 from .top import find_top
 
 STEP_M = 1.0
@@ -88,14 +85,14 @@ class StripOffsets:
     points: np.ndarray
     shown: np.ndarray
 
-    def moved(self, feet: Feet, z: np.ndarray, strips: np.ndarray) -> tuple[Feet, np.ndarray]:
-        """Move points onto the mean of all strips; see `aligned`."""
-        across, up = np.zeros(len(z)), np.zeros(len(z))
+    def aligned(self, points: HeadPoints) -> HeadPoints:
+        """Move the points of the line onto the mean of all strips."""
+        across, up = points.across.copy(), points.z.copy()
         for number, strip in enumerate(self.strips):
-            mine = strips == strip
-            across[mine] = np.interp(feet.t[mine], self.t, self.across[number])
-            up[mine] = np.interp(feet.t[mine], self.t, self.up[number])
-        return replace(feet, across=feet.across - across), z - up
+            mine = points.strips == strip
+            across[mine] -= np.interp(points.t[mine], self.t, self.across[number])
+            up[mine] -= np.interp(points.t[mine], self.t, self.up[number])
+        return replace(points, across=across, z=up)
 
     @property
     def count(self) -> np.ndarray:
@@ -151,95 +148,19 @@ class StripOffsets:
         )
 
 
-def strips_along(
-    lines: Sequence[np.ndarray], points: RailPoints, head_width_m: Widths, progress: Progress = SILENT
-) -> list[StripOffsets | None]:
-    """Measure the offsets of the strips along lines within 3 cm of their rails; see `measure_strips`."""
+def measure_strips(points: HeadPoints) -> StripOffsets | None:
+    """Measure the offsets of the strips along a line within 3 cm of its rail; None where a single strip shows it."""
     if points.strips is None:
-        return [None] * len(lines)
-    projecting, measuring = progress.divide((0.5, 0.5))
-    feet = project(lines, points.xyz[:, :2], search_distance(widest(head_width_m)), projecting)
-    return measure_strips(lines, feet, points, free_edges(lines, widest(head_width_m)), head_width_m, measuring)
-
-
-def measure_strips(
-    lines: Sequence[np.ndarray],
-    feet: Feet,
-    points: RailPoints,
-    edges: Sequence[np.ndarray],
-    head_width_m: Widths,
-    progress: Progress = SILENT,
-) -> list[StripOffsets | None]:
-    """Measure the offsets of the strips along lines.
-
-    Parameters
-    ----------
-    lines : sequence of (n, 2) arrays
-        Lines within 3 cm of their rails.
-    feet : Feet
-        Feet of the points on them.
-    points : RailPoints
-    edges : sequence of (2, s) bool arrays
-        See `neighbours.free_edges`.
-    head_width_m : float or (n,) array
-        Width of the heads, of all lines or of each.
-    progress : Progress
-
-    Returns
-    -------
-    list of StripOffsets or None
-        For each line; None where a single strip shows it.
-    """
-    if points.strips is None:
-        return [None] * len(lines)
-    found: list[StripOffsets | None] = []
-    widths_m = np.broadcast_to(head_width_m, len(lines))
-    for number, line in enumerate(progress.follow(lines)):
-        mine = feet.of(number)
-        z, strips = points.xyz[mine.point, 2], points.strips[mine.point]
-        found.append(_offsets(line, mine, z, strips, edges[number], float(widths_m[number])))
-    return found
-
-
-def aligned(offsets: StripOffsets | None, feet: Feet, z: np.ndarray, points: RailPoints) -> tuple[Feet, np.ndarray]:
-    """Move the points of a line onto the mean of its strips.
-
-    Parameters
-    ----------
-    offsets : StripOffsets or None
-        Of the line; None if a single strip shows it.
-    feet : Feet
-        Feet of points on the line.
-    z : (k,) array
-        Heights of these points.
-    points : RailPoints
-        All points.
-
-    Returns
-    -------
-    feet : Feet
-    z : (k,) array
-    """
-    if offsets is None or points.strips is None:
-        return feet, z
-    return offsets.moved(feet, z, points.strips[feet.point])
-
-
-def _offsets(
-    line: np.ndarray, feet: Feet, z: np.ndarray, strips: np.ndarray, free: np.ndarray, head_width_m: float
-) -> StripOffsets | None:
-    """Measure the strips along one line."""
-    length_m = float(length_along(line)[-1])
+        return None
     seen = []
-    for strip in np.unique(strips):
-        mine = strips == strip
-        shown = _Shown.by(feet[mine], z[mine], free, length_m, head_width_m)
+    for strip in np.unique(points.strips):
+        shown = _Shown.by(points[points.strips == strip])
         if shown is not None:
             seen.append((int(strip), shown))
     if len(seen) < 2:
         return None
-    t = (np.arange(_steps(length_m)) + 0.5) * STEP_M
-    across, up, points = (np.array([getattr(shown, name) for _, shown in seen]) for name in ("across", "up", "points"))
+    t = (np.arange(_steps(points.length_m)) + 0.5) * STEP_M
+    across, up, counts = (np.array([getattr(shown, name) for _, shown in seen]) for name in ("across", "up", "points"))
     reach = 2 * int(round(MEETING_M / STEP_M)) + 1
     shown = maximum_filter1d(np.isfinite(across).astype(np.uint8), reach, axis=1, mode="constant") > 0
     away_m = distance_to(t[shown.sum(axis=0) >= 2], t)
@@ -247,9 +168,9 @@ def _offsets(
     return StripOffsets(
         t,
         np.array([strip for strip, _ in seen]),
-        kept * _from_mean(across, _third_differences(line, t)),
+        kept * _from_mean(across, _third_differences(points.line, t)),
         kept * _from_mean(up, np.zeros(max(len(t) - 3, 0))),
-        uniform_filter1d(points.astype(float), reach, axis=1, mode="constant"),
+        uniform_filter1d(counts.astype(float), reach, axis=1, mode="constant"),
         shown,
     )
 
@@ -275,15 +196,13 @@ class _Shown:
     points: np.ndarray
 
     @classmethod
-    def by(cls, feet: Feet, z: np.ndarray, free: np.ndarray, length_m: float, head_width_m: float) -> _Shown | None:
+    def by(cls, strip: HeadPoints) -> _Shown | None:
         """Measure the head in the points of one strip; None if it has too few."""
-        top, _ = on_top(feet.t, feet.across, z, head_width_m)
-        if not top.any():
-            return None
-        stations, counts, wide_counts = histograms(feet.t[top], feet.across[top], length_m, head_width_m)
-        middle = middles(counts, wide_counts, free) * head_width_m / (2 * HALF_HEAD_BINS)
-        steps = _steps(length_m)
-        points = np.bincount(np.minimum((feet.t[top] / STEP_M).astype(int), steps - 1), minlength=steps)
+        top, _ = strip.top
+        stations, counts, wide_counts = strip.histograms
+        middle = middles(counts, wide_counts, strip.free) * strip.width_m / (2 * HALF_HEAD_BINS)
+        steps = _steps(strip.length_m)
+        points = np.bincount(np.minimum((strip.t[top] / STEP_M).astype(int), steps - 1), minlength=steps)
         number, known = np.minimum((stations / STEP_M).astype(int), steps - 1), np.isfinite(middle)
         windows = np.bincount(number[known], minlength=steps)
         seen = (points >= MIN_IN_STEP) & (windows > 0)
@@ -292,10 +211,10 @@ class _Shown:
         inner = seen & _inner(seen)
         seen = inner if inner.any() else seen
         # The top is as high as on the axis of the head as this strip shows it: the head may lean.
-        own = feet.across - np.interp(feet.t, stations[known], middle[known])
-        head = np.abs(own) <= 0.5 * head_width_m
+        own = replace(strip, across=strip.across - np.interp(strip.t, stations[known], middle[known]))
+        head = own[own.within(0.5)]
         settings = Parameters.crown_radius_m, Parameters.tolerance_z_m, PROFILE_SIGMA_M
-        found = find_top(feet.t[head], own[head], z[head], head_width_m, *settings) if head.any() else None
+        found = find_top(head, *settings) if len(head.t) else None
         if found is None:
             return None
         across = np.bincount(number[known], middle[known], minlength=steps) / np.maximum(windows, 1)

@@ -15,7 +15,9 @@ from ..lines.smoothing import smooth_profile
 from ..rails import Support
 from .edges import STATION_STEP_M, stations_along
 from .envelope import extremal_boundary
-from .level import AXIS_SHARE, cross_slope, robust_sigma, rough_level
+from .head_points import RIM_HEADS, HeadPoints
+from .level import AXIS_SHARE, OFF_TOP_SIGMAS, SLOPE_ROUNDS, cross_slope, robust_sigma, rough_level
+from .outline import CROWN_RADIUS_M
 from .sections import Middles
 from .smoother import Spline, bridge_error, smooth
 
@@ -51,6 +53,34 @@ PROFILE_BIN_M = 0.25
 
 TAIL_M = 1.0
 """Length over which a profile is extrapolated with the slope at its end; beyond it is level."""
+
+LEAST_INFORMATION = 1e-6
+"""Information about level, slope and fall of a crown that is always there, so that few points are enough."""
+
+
+@dataclass(frozen=True)
+class Crown:
+    """How the top of a head falls beside its axis: in proportion to the square of the distance, up to the rims.
+
+    Attributes
+    ----------
+    bend, sigma : float
+        Fall per square of the distance, and its standard error, 1/m.
+    rim_m : float
+        Distance from the axis up to which the top falls.
+    """
+
+    bend: float
+    sigma: float
+    rim_m: float
+
+    def fall(self, across: np.ndarray) -> np.ndarray:
+        """Return how far points are lower than the axis of their head because they are beside it, (n,) metres."""
+        return self.bend * np.minimum(np.abs(across), self.rim_m) ** 2
+
+    def error(self, head_width_m: float) -> float:
+        """Return the standard error of the height on the axis, metres, from points up to `AXIS_SHARE` beside it."""
+        return self.sigma * (AXIS_SHARE * head_width_m) ** 2 / 3
 
 
 @dataclass(frozen=True)
@@ -88,61 +118,73 @@ class Top:
     ----------
     course : Profile or Spline
         Its height on the axis.
-    points : (n,) bool array
+    points : HeadPoints
         Points on it.
     slope : (n,) array
-        Rise per metre to the left, at each point.
+        Rise per metre to the left, at each of them.
     crown_m : float or (s,) array
-        Standard error of the height on the axis that all points share; (s,) at the stations of a support.
+        Standard error of the height on the axis that more points would not reduce, at all stations or at each.
     """
 
     course: Course
-    points: np.ndarray
+    points: HeadPoints
     slope: np.ndarray
     crown_m: Union[float, np.ndarray] = 0.0
 
-    def height_error(self, t: np.ndarray, support: Support) -> np.ndarray:
+    def height_error(self, support: Support) -> np.ndarray:
         """Return the standard error of the height at the stations of a support, (s,) metres.
 
-        Parameters
-        ----------
-        t : (n,) array
-            Chainages of the points on the top, increasing.
-        support : Support
-            Its error across is one of height where the top is not level.
+        The error across is one of height where the top is not level.
         """
-        leaning = np.interp(support.t, t, self.slope[self.points]) * support.sigma_m
-        bridge = bridge_error(t, support.t, UNSEEN_TURN)
+        leaning = np.interp(support.t, self.points.t, self.slope) * support.sigma_m
+        bridge = bridge_error(self.points.t, support.t, UNSEEN_TURN)
         return np.sqrt(self.course.sigma(support.t) ** 2 + self.crown_m**2 + leaning**2 + bridge**2)
 
 
-def by_outline(
-    top: Top, t: np.ndarray, z: np.ndarray, near_axis: np.ndarray, outline: Middles, length_m: float
-) -> Top:
-    """Measure the height by the outline of the head where that is known, and by the points on the axis elsewhere.
+def by_outline(top: Top, outline: Middles) -> Top:
+    """Take the height that the outline of the head shows at each station, and that of the points on the axis elsewhere.
 
-    Parameters
-    ----------
-    top : Top
-        From `find_top`.
-    t, z : (n,) arrays
-        Chainage (increasing) and height of its points, less the slope across and the fall of the crown.
-    near_axis : (n,) bool array
-        Points that give the height.
-    outline : Middles
-        At the stations along the line.
-    length_m : float
+    Both have their information, and one spline smooths them.
     """
-    chosen, stations = top.points & near_axis, stations_along(length_m)
-    noise_m = robust_sigma(z[chosen] - top.course.at(t[chosen]))
-    number = np.minimum((t[chosen] / STATION_STEP_M).astype(int), len(stations) - 1)
-    points = np.bincount(number, minlength=len(stations))
-    mean_m = np.bincount(number, z[chosen], len(stations)) / np.maximum(points, 1)
-    which = [np.isfinite(outline.top), points > 0]
-    values = np.select(which, [outline.top, mean_m], top.course.at(stations))
-    information = np.select(which, [outline.top_information, points / noise_m**2])
-    course = smooth(stations, values, information, -TAIL_M, length_m + TAIL_M)
-    return replace(top, course=course, crown_m=course.followed(stations, np.where(which[0], outline.top_common, top.crown_m), information))
+    length_m, chosen = top.points.length_m, top.points.within(AXIS_SHARE)
+    points, stations = top.points[chosen], stations_along(length_m)
+    flat = points.z - top.slope[chosen] * points.across
+    number = np.minimum((points.t / STATION_STEP_M).astype(int), len(stations) - 1)
+    count = np.bincount(number, minlength=len(stations))
+    mean_m = np.bincount(number, flat, len(stations)) / np.maximum(count, 1)
+    outlined = np.isfinite(outline.top) & (outline.top_information > 0)
+    by_points = count / robust_sigma(flat - top.course.at(points.t)) ** 2
+    information = np.where(outlined, outline.top_information, by_points)
+    known = information > 0
+    if not known.any():
+        return top
+    t, values = stations[known], np.where(outlined, outline.top, mean_m)[known]
+    course = smooth(t, values, information[known], -TAIL_M, length_m + TAIL_M)
+    common_m = np.where(outlined, outline.top_common, top.crown_m)[known]
+    return replace(top, course=course, crown_m=np.interp(stations, t, course.followed(t, common_m, information[known])))
+
+
+def fit_crown(points: HeadPoints) -> Crown:
+    """Fit a parabola to the crown of a head.
+
+    New crowns have a radius, and worn ones are flatter. Where beams blend the head and the ballast, the share of the
+    ballast grows with the distance from the axis, and the fall may be of any size.
+    """
+    usual, rim_m = 0.5 / CROWN_RADIUS_M, RIM_HEADS[0] * points.width_m
+    near = points[points.within(RIM_HEADS[0])]
+    if not len(near.t):
+        return Crown(usual, usual, rim_m)
+    expected = np.array([0.0, 0.0, 0.0 if points.is_blended else usual**-2])
+    above, powers = near.z - rough_level(near.t, near.z), np.vander(near.across, 3, increasing=True)
+    used, off = np.ones(len(above), dtype=bool), above
+    for _ in range(SLOPE_ROUNDS):
+        noise_m = robust_sigma(off[used])
+        information = powers[used].T @ powers[used] / noise_m**2 + np.diag(expected + LEAST_INFORMATION)
+        covariance = np.linalg.inv(information)
+        found = covariance @ (powers[used].T @ above[used] / noise_m**2 - expected * usual)
+        off = above - powers @ found
+        used = np.abs(off) <= OFF_TOP_SIGMAS * robust_sigma(off)
+    return Crown(max(-found[2], 0.0), float(np.sqrt(covariance[2, 2])), rim_m)
 
 
 def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None) -> Course:
@@ -170,15 +212,7 @@ def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None) -> Course:
     )
 
 
-def find_top(
-    t: np.ndarray,
-    across: np.ndarray,
-    z: np.ndarray,
-    head_width_m: float,
-    crown_radius_m: float,
-    tolerance_m: float,
-    smoothing_m: float | None,
-) -> Top | None:
+def find_top(points: HeadPoints, crown_radius_m: float, tolerance_m: float, smoothing_m: float | None) -> Top | None:
     """Find the height of the top on the head's axis and the points on it; None if too few points agree.
 
     The slope across is removed first. The disc then separates the top from the side faces, but it rests on the highest
@@ -187,9 +221,8 @@ def find_top(
 
     Parameters
     ----------
-    t, across, z : (n,) arrays
-        Chainage (increasing), offset to the left of the axis and height of points on the head, metres.
-    head_width_m : float
+    points : HeadPoints
+        Points on the head.
     crown_radius_m : float
         Radius of the disc.
     tolerance_m : float
@@ -197,10 +230,11 @@ def find_top(
     smoothing_m : float or None
         See `smoothed`.
     """
-    slope = cross_slope(t, across, z - rough_level(t, z), head_width_m)
-    flat = z - slope * across
+    t, z = points.t, points.z
+    slope = cross_slope(t, points.across, z - rough_level(t, z), points.width_m)
+    flat = z - slope * points.across
     top, noise = _under_disc(t, flat, crown_radius_m, tolerance_m)
-    central = np.abs(across) <= AXIS_SHARE * head_width_m
+    central = points.within(AXIS_SHARE)
     band = min(tolerance_m, max(MIN_BAND_M, BAND_SIGMAS * noise))
     for _ in range(BAND_ROUNDS):
         chosen = top & central if (top & central).sum() >= MIN_POINTS else top
@@ -208,7 +242,7 @@ def find_top(
         top = np.abs(flat - course.at(t)) <= band
         if top.sum() < MIN_POINTS:
             return None
-    return Top(course, top, slope)
+    return Top(course, points[top], slope[top])
 
 
 def _under_disc(t: np.ndarray, z: np.ndarray, crown_radius_m: float, tolerance_m: float) -> tuple[np.ndarray, float]:

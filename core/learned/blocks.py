@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..classify.bed import Coarse, find_bed
+from ..classify.bed import Bed, Coarse
 from ..classify.tops import HIGH_M, LOW_M, TOP_M
-from ..frame import ORIGIN_STEP
 from ..squares.grid import points_by_square
 
 BLOCK_M = 4.0
@@ -94,18 +93,14 @@ def thin(xyz: np.ndarray) -> Thinned:
     xyz : (n, 3) array
         See `classify.square.classify_square`.
     """
-    x, y = (np.ascontiguousarray(values) for values in xyz.T[:2])
-    z = (xyz[:, 2] - ORIGIN_STEP * np.floor(xyz[:, 2].min() / ORIGIN_STEP)).astype(np.float32)
-    coarse = Coarse.around(x, y)
-    dx, dy = coarse.offsets(x, y)
-    height, _ = find_bed(coarse, dx, dy, z).heights(dx, dy, z)
+    bed, height, z = Bed.under(xyz)
     used = np.flatnonzero((height >= LEAST_M) & (height <= HIGH_M))
-    place = np.column_stack([x[used], y[used], z[used], height[used]]).astype(np.float32)
+    place = np.column_stack([xyz[used, :2], z[used], height[used]]).astype(np.float32)
     railhigh = (place[:, 3] >= LOW_M) & (place[:, 3] <= TOP_M)
     band, context = np.flatnonzero(railhigh), np.flatnonzero(~railhigh)
     chosen, stands_for = _one_of_each(place[band], RAIL_VOXEL_M)
     kept = np.concatenate([band[chosen], context[_one_of_each(place[context], CONTEXT_VOXEL_M)[0]]])
-    return Thinned(used[kept], place[kept], railhigh[kept], used[band], place[band, :3], stands_for, coarse)
+    return Thinned(used[kept], place[kept], railhigh[kept], used[band], place[band, :3], stands_for, bed.coarse)
 
 
 def _one_of_each(place: np.ndarray, side_m: float) -> tuple[np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from ..classify.labels import Near
 from ..classify.lines import Lines, Marks, find_lines
-from ..classify.partner import stations_with_partner
+from ..classify.partner import have_partners
 from ..classify.pieces import links, long_enough, shares_of_length
 from ..classify.settings import DENSE, THIN, Settings
 from ..classify.square import beside_guide
@@ -19,10 +19,6 @@ from ..rails import SearchFigures
 
 LEVEL_M = 1.0
 """Labelled points this far apart in height may be on one line: on the decks of bridges and below them they are not."""
-
-MIN_STATIONS = 2
-"""Stations with a partner from which a cell belongs to a pair of rails; see `classify.square`."""
-
 
 GRADIENT = 0.04
 """Steepest gradient of railways: by how much the top of a rail rises along it."""
@@ -55,8 +51,8 @@ def rails_of(xyz: np.ndarray, sure: np.ndarray, settings: Settings, reach_m: flo
     marks = cells[np.sort(first)]
     highest = np.full(grid.shape[0] * grid.shape[1], -np.inf)
     np.maximum.at(highest, cell[sure], xyz[sure, 2])
-    lines = find_lines(Marks(grid.middles(marks), highest[marks]), reach_m, LEVEL_M, THIN.strip_m)
-    paired = stations_with_partner(lines, settings.spacings_m, LEVEL_M) >= MIN_STATIONS
+    lines = find_lines(Marks(grid.middles(marks), highest[marks]), reach_m, LEVEL_M, THIN.beside_line_m)
+    paired = have_partners(lines, settings.spacings_m, LEVEL_M)
     pairs = links(lines)
     wanted = _wanted(lines, paired, pairs, settings)
     kept = sure & wanted[cKDTree(grid.middles(marks)).query(xyz[:, :2])[1]]

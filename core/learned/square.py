@@ -8,8 +8,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..classify.bed import COARSE_M, Coarse
+from ..classify.lines import REACH_M, reach_at
 from ..classify.settings import Settings
-from ..classify.square import REACH_M, REACH_POINTS_PER_M, Classified, classify_square
+from ..classify.square import Classified, classify_square
 from ..progress import SILENT, Progress
 from .blocks import RAIL_VOXEL_M, Thinned, cut, thin
 from .model import Classifier
@@ -65,7 +66,7 @@ def _reach_m(coarse: Coarse, point: np.ndarray) -> float:
     if not len(point):
         return REACH_M[0]
     per_m2 = np.median(coarse.count[coarse.cell[point]]) / COARSE_M**2
-    return float(np.clip(REACH_POINTS_PER_M / per_m2, *REACH_M))
+    return reach_at(per_m2)
 
 
 def _spread(thinned: Thinned, probability: np.ndarray) -> np.ndarray:

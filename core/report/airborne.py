@@ -12,8 +12,7 @@ from ..airborne.sections import STATION_M
 from ..airborne.survey import AirborneTrack, Survey
 from ..progress import counted
 from .listing import OFF_RAIL_MM, Finding
-from .markup import metres, table, tag, text
-from .style import STYLE
+from .markup import made, metres, page, section, table, verdict_box
 
 GOOD_SHARE, FAIR_SHARE = 0.95, 0.7
 """Shares of the guides' length that must be seen for a verdict of good, and of usable."""
@@ -96,26 +95,15 @@ def airborne_page(survey: Survey, source: str, facts: Mapping[str, str]) -> str:
         Further facts to state, by name.
     """
     kind, words = _verdict(survey)
-    notes = [*survey.warnings, FLIGHT]
-    body = [
-        tag("h1", text("Track centerlines from airborne lidar")),
-        tag("p", text(source), class_="source"),
-        tag(
-            "div",
-            tag("strong", text(words)),
-            tag("ul", *(tag("li", text(one)) for one in notes)),
-            class_=f"verdict {kind}",
-        ),
-        tag("section", tag("h2", text("Tracks")), tag("div", _tracks(survey), class_="scroll")),
-        tag("section", tag("h2", text("Where to look")), tag("div", _places(survey), class_="scroll tall")),
-        tag(
-            "section",
-            tag("h2", text("How it was made")),
-            _facts({**facts, "Density": f"{survey.density:.1f} points per square metre"}),
-        ),
-    ]
-    head = ('<meta charset="utf-8">', tag("title", text(f"Rail Extract: {source}")), f"<style>{STYLE}</style>")
-    return f"<!DOCTYPE html>\n{tag('html', tag('head', *head), tag('body', tag('main', *body)), lang='en')}\n"
+    return page(
+        f"Rail Extract: {source}",
+        "Track centerlines from airborne lidar",
+        source,
+        verdict_box(kind, words, (*survey.warnings, FLIGHT)),
+        section("Tracks", _tracks(survey)),
+        section("Where to look", _places(survey)),
+        made({**facts, "Density": f"{survey.density:.1f} points per square metre"}),
+    )
 
 
 def _tracks(survey: Survey) -> str:
@@ -141,8 +129,4 @@ def _row(track: AirborneTrack) -> tuple[object, ...]:
 def _places(survey: Survey) -> str:
     found = airborne_findings(survey)
     rows = ((one.finding, one.track_id or "", f"{one.from_m:,.0f} to {one.to_m:,.0f} m", one.reason) for one in found)
-    return table(("Finding", "Line", "Along the guide", "Why"), rows).replace("<table>", '<table class="words">')
-
-
-def _facts(facts: Mapping[str, str]) -> str:
-    return tag("dl", *(tag("dt", text(name)) + tag("dd", text(value)) for name, value in facts.items() if value))
+    return table(("Finding", "Line", "Along the guide", "Why"), rows, "scroll tall", "words")

@@ -9,8 +9,8 @@ import numpy as np
 from ..alignment.deviations import Deviations
 from ..alignment.elements import Alignment, CantElement, Element, VerticalElement
 from .alignment_plots import draw_alignment
-from .markup import metres, table, tag, text
-from .style import ALIGNMENT_STYLE, STYLE
+from .markup import legend, made, metres, page, section, table, tiles
+from .style import ALIGNMENT_STYLE
 
 PROPOSAL = (
     "A fitted alignment is a proposal: the elements that the measured track most likely follows. It does not show what "
@@ -48,30 +48,20 @@ def build_alignment_page(
         A complete HTML document.
     """
     slews, lifts = (np.concatenate([getattr(found, name) for _, found in courses]) for name in ("slew_mm", "lift_mm"))
-    body = [
-        tag("h1", text("Rail Extract alignment report")),
-        tag("p", text(source), class_="source"),
+    return page(
+        f"Rail Extract: {source}",
+        "Rail Extract alignment report",
+        source,
         _tiles(courses, slews, lifts),
         *(_track(alignment, found) for alignment, found in courses),
-        tag(
-            "section",
-            tag("h2", text("How it was made")),
-            tag("dl", *(tag("dt", text(key)) + tag("dd", text(value)) for key, value in facts.items() if value)),
-            *(tag("p", text(note), class_="notes") for note in (NOTE, *([PROPOSAL] if fitted else []))),
-        ),
-    ]
-    head = (
-        '<meta charset="utf-8">',
-        '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        tag("title", text(f"Rail Extract: {source}")),
-        f"<style>{STYLE}{ALIGNMENT_STYLE}</style>",
+        made(facts, (NOTE, *([PROPOSAL] if fitted else []))),
+        style=ALIGNMENT_STYLE,
     )
-    return f"<!DOCTYPE html>\n{tag('html', tag('head', *head), tag('body', tag('main', *body)), lang='en')}\n"
 
 
 def _tiles(courses: Sequence[tuple[Alignment, Deviations]], slews: np.ndarray, lifts: np.ndarray) -> str:
     """Write the most important figures."""
-    tiles = [
+    figures = [
         (str(len(courses)), "tracks"),
         (metres(sum(alignment.s_to - alignment.s_from for alignment, _ in courses)), "of alignment"),
         (str(sum(len(alignment.elements) for alignment, _ in courses)), "elements"),
@@ -79,8 +69,7 @@ def _tiles(courses: Sequence[tuple[Alignment, Deviations]], slews: np.ndarray, l
         (_rms(lifts), "lift, RMS"),
         (_largest(slews), "slew, largest"),
     ]
-    shown = (tag("div", tag("b", text(figure)), tag("span", text(what)), class_="tile") for figure, what in tiles)
-    return tag("div", *shown, class_="tiles")
+    return tiles(figures)
 
 
 def _rms(values: np.ndarray) -> str:
@@ -96,20 +85,12 @@ def _largest(values: np.ndarray) -> str:
 def _track(alignment: Alignment, found: Deviations) -> str:
     """Write the diagram and the elements of a track."""
     name = alignment.name or f"Track {alignment.track_id}"
-    keys = [
-        tag("span", tag("i", class_="fine"), text("measured")),
-        tag("span", tag("i", class_="designed"), text("design")),
-    ]
-    keys += [tag("span", tag("i", class_=f"element {kind}"), text(kind)) for kind in ("line", "clothoid", "arc")]
+    keys = [("measured", "fine"), ("design", "designed")]
+    keys += [(kind, f"element {kind}") for kind in ("line", "clothoid", "arc")]
     headings = ("Element", "Starts at", "Length", "From", "To", "Standard error of the radius", "Deviation, RMS")
     rows = [_row(number, one) for elements in _layouts(alignment) for number, one in enumerate(elements, start=1)]
-    return tag(
-        "section",
-        tag("h2", text(name)),
-        draw_alignment(alignment, found),
-        tag("div", *keys, class_="legend"),
-        tag("div", table(headings, rows), class_="scroll tall"),
-    )
+    shown = legend((what, {"class_": mark}) for what, mark in keys)
+    return section(name, draw_alignment(alignment, found), shown, table(headings, rows, "scroll tall"))
 
 
 def _layouts(alignment: Alignment) -> tuple[Sequence[Element], ...]:

@@ -15,7 +15,7 @@ from ..alignment.deviations import Deviations
 from ..alignment.elements import Alignment, PlanElement
 from ..alignment.equations import Piece, stations_of
 from .markup import tag, text
-from .plots import LEFT, PANEL, RIGHT, SPACE, TICKS_ACROSS, TICKS_UP, WIDTH, Panel, curve, round_up, ticks
+from .plots import LEFT, PANEL, SPACE, TICKS_ACROSS, WIDTH, Frame, Panel, across, broken, place_of, round_up
 
 ROW_M = 1000.0
 """Length of a row of a diagram, metres."""
@@ -124,7 +124,7 @@ def _row(alignment: Alignment, found: Deviations, courses: Sequence[Course], row
     bottom = head + len(courses) * (PANEL + SPACE)
     parts = [*_strip(alignment, row), *_axis(alignment, row, head, bottom)]
     for number, course in enumerate(courses):
-        parts.append(_panel(course, found, row, head + number * (PANEL + SPACE) + SPACE))
+        parts.append(_panel(course, found, row, head + place_of(number)))
     label = f"Alignment of track {alignment.track_id} from {row[0]:.0f} to {row[1]:.0f} m"
     box = f"0 0 {WIDTH:g} {bottom + SPACE:g}"
     return tag("svg", *parts, viewBox=box, role="img", aria_label=label, class_="alignment")
@@ -135,7 +135,7 @@ def _strip(alignment: Alignment, row: tuple[float, float]) -> Iterator[str]:
     for one in alignment.plan:
         start, end = max(one.s_from, row[0]), min(one.s_to, row[1])
         if start < end:
-            x, width = float(_across(start, row)), float(_across(end, row) - _across(start, row))
+            x, width = float(across(start, row)), float(across(end, row) - across(start, row))
             title = tag("title", text(f"{one.type}, {one.s_from:.2f} to {one.s_to:.2f} m"))
             yield tag("rect", title, x=x, y=SPACE, width=width, height=STRIP, class_=f"element {one.type}")
             if width > LABEL:
@@ -171,12 +171,12 @@ def _axis(alignment: Alignment, row: tuple[float, float], top: float, bottom: fl
             s = piece.s + (station - piece.station) * (1 if piece.rises else -1)
             yield tag("line", **_vertical(s, row, top, bottom), class_="grid")
             words = text(f"{station / 1000:.3f}".rstrip("0").rstrip(".") if stations else f"{station:,g}")
-            yield tag("text", words, x=float(_across(s, row)), y=SPACE - 8, class_="tick middle")
-            yield tag("text", words, x=float(_across(s, row)), y=bottom + 16, class_="tick middle")
+            yield tag("text", words, x=float(across(s, row)), y=SPACE - 8, class_="tick middle")
+            yield tag("text", words, x=float(across(s, row)), y=bottom + 16, class_="tick middle")
 
 
 def _vertical(s: float, row: tuple[float, float], top: float, bottom: float) -> dict[str, float]:
-    x = float(_across(s, row))
+    x = float(across(s, row))
     return {"x1": x, "x2": x, "y1": top, "y2": bottom}
 
 
@@ -184,26 +184,11 @@ def _panel(course: Course, found: Deviations, row: tuple[float, float], top: flo
     """Draw a quantity: the measured curve over that of the design."""
     panel = course.panel
     both = np.concatenate([panel.values, course.design])
-    low, high = Panel(panel.heading, panel.unit, both, panel.min_span).limits()
-
-    def up(value: Any) -> Any:
-        return top + PANEL - (value - low) * PANEL / (high - low)
-
-    parts = [tag("rect", x=LEFT, y=top, width=WIDTH - LEFT - RIGHT, height=PANEL, class_="frame")]
-    for value in ticks(low, high, TICKS_UP):
-        level = float(up(value))
-        parts.append(tag("line", x1=LEFT, x2=WIDTH - RIGHT, y1=level, y2=level, class_="grid"))
-        parts.append(tag("text", text(f"{value:,.10g}"), x=LEFT - 8, y=level + 4, class_="tick end"))
+    frame = Frame(top, row, Panel(panel.heading, panel.unit, both, panel.min_span).limits())
     mine = (found.s >= row[0]) & (found.s <= row[1])
-    breaks = np.flatnonzero(np.diff(found.s[mine]) > STEP_M) + 1
-    x, y = (np.insert(one.astype(float), breaks, np.nan) for one in (found.s[mine], panel.values[mine]))
-    if len(course.s):
-        s, design = _cut(course.s, course.design, row)
-        parts.append(tag("path", d=curve(_across(s, row), up(design)), class_="design"))
-    parts.append(tag("path", d=curve(_across(x, row), up(y)), class_="curve"))
-    heading = tag("tspan", text(panel.heading), class_="name") + text(f"  [{panel.unit}]")
-    parts.append(tag("text", heading, x=LEFT, y=top - 8, class_="heading"))
-    return "".join(parts)
+    curves = [frame.curve(*_cut(course.s, course.design, row), class_="design")] if len(course.s) else []
+    curves.append(frame.curve(*broken(found.s[mine], panel.values[mine], STEP_M)))
+    return frame.draw(panel.heading, f"[{panel.unit}]", *curves, class_="frame")
 
 
 def _cut(s: np.ndarray, values: np.ndarray, row: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
@@ -216,8 +201,3 @@ def _cut(s: np.ndarray, values: np.ndarray, row: tuple[float, float]) -> tuple[n
     )
     places, _, cut = zip(*pairs) if pairs else ((), (), ())
     return np.array(places, dtype=float), np.array(cut, dtype=float)
-
-
-def _across(s: Any, row: tuple[float, float]) -> Any:
-    """Return the x of one or several distances along the track."""
-    return LEFT + (s - row[0]) / (row[1] - row[0]) * (WIDTH - LEFT - RIGHT)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from ..comparison.tracks import BOTH, EXTRA, MISSING, SURE, LineDifferences, TrackComparison
-from .markup import metres, table, tag, text
-from .plots import AXIS, LEFT, PANEL, RIGHT, SPACE, TICKS_ACROSS, TICKS_UP, WIDTH, curve, round_up, ticks
-from .style import STYLE
+from .markup import made, metres, page, section, table, tag, text, tiles, verdict_box
+from .plots import LEFT, PANEL, RIGHT, SPACE, WIDTH, Frame, Panel, picture, place_of, round_up
 
 BINS = 40
 """Bars of a distribution."""
@@ -41,25 +41,17 @@ def build_comparison(found: TrackComparison, counts_shift: bool, source: str, fa
     facts : mapping of str to str
         Further facts to state, by name.
     """
-    body = [
-        tag("h1", text("Comparison of tracks")),
-        tag("p", text(source), class_="source"),
+    return page(
+        f"Comparison: {source}",
+        "Comparison of tracks",
+        source,
         _verdict(found, counts_shift),
         _tiles(found),
-        _section("Differences", tag("div", table(HEADINGS, _rows(found)), class_="scroll"), *_distributions(found)),
+        section("Differences", table(HEADINGS, _rows(found)), *_distributions(found)),
         *_places(found),
         *(_profiles(line, counts_shift) for line in found.lines if (line.state == BOTH).sum() > 1),
-        _section(
-            "How it was made", tag("dl", *_facts(facts)), *(tag("p", text(note), class_="notes") for note in NOTES)
-        ),
-    ]
-    head = (
-        '<meta charset="utf-8">',
-        '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        tag("title", text(f"Comparison: {source}")),
-        f"<style>{STYLE}</style>",
+        made(facts, NOTES),
     )
-    return f"<!DOCTYPE html>\n{tag('html', tag('head', *head), tag('body', tag('main', *body)), lang='en')}\n"
 
 
 def verdict_on(found: TrackComparison) -> str:
@@ -97,12 +89,11 @@ def _verdict(found: TrackComparison, counts_shift: bool) -> str:
         if found.length_of(state):
             reasons.append(f"{metres(found.length_of(state))} {words}.")
     kind = "fair" if found.moved_m or not found.length_of(BOTH) else "good"
-    listed = tag("ul", *(tag("li", text(reason)) for reason in reasons))
-    return tag("div", tag("strong", text(verdict_on(found))), listed, class_=f"verdict {kind}")
+    return verdict_box(kind, verdict_on(found), reasons)
 
 
 def _tiles(found: TrackComparison) -> str:
-    tiles = (
+    figures = (
         (metres(found.length_of(BOTH)), "compared"),
         (metres(found.moved_m), "moved"),
         (metres(found.length_of(MISSING)), "missing"),
@@ -110,8 +101,7 @@ def _tiles(found: TrackComparison) -> str:
         (_figure(_rms(found.values("across_mm"))), "across, root mean square"),
         (_figure(_rms(found.values("height_mm"))), "height, root mean square"),
     )
-    shown = (tag("div", tag("b", text(figure)), tag("span", text(what)), class_="tile") for figure, what in tiles)
-    return tag("div", *shown, class_="tiles")
+    return tiles(figures)
 
 
 HEADINGS = ("Difference", "Mean", "Root mean square", "Half are within", "95 % are within", "Largest", "Stations")
@@ -153,21 +143,14 @@ def _distribution(name: str, values: np.ndarray) -> str:
     """Draw how many stations have which difference."""
     half = round_up(max(float(np.percentile(np.abs(values), SHOWN_SHARE)), MIN_SPAN_MM / 2))
     counts, edges = np.histogram(np.clip(values, -half, half), BINS, (-half, half))
-    scale, width = PANEL / counts.max(), (WIDTH - LEFT - RIGHT) / BINS
-    parts = [tag("rect", x=LEFT, y=SPACE, width=WIDTH - LEFT - RIGHT, height=PANEL, class_="panel")]
-    for number, count in enumerate(counts):
+    frame, width = Frame(SPACE, (-half, half), (0.0, float(counts.max()))), (WIDTH - LEFT - RIGHT) / BINS
+    bars = []
+    for number, count in enumerate(counts.tolist()):
         title = tag("title", text(f"{count} stations from {edges[number]:.1f} to {edges[number + 1]:.1f} mm"))
-        height = float(count * scale)
-        top = SPACE + PANEL - height
-        bar = {"x": LEFT + number * width, "y": top, "width": width - 1, "height": height}
-        parts.append(tag("rect", title, class_="bar", style="fill: var(--track)", **bar))
-    for value in ticks(-half, half, TICKS_ACROSS):
-        x = float(LEFT + (value + half) / (2 * half) * (WIDTH - LEFT - RIGHT))
-        parts.append(tag("text", text(f"{value:g}"), x=x, y=SPACE + PANEL + 16, class_="tick middle"))
-    heading = tag("tspan", text(name), class_="name") + text(f"  [mm]: {len(values):,} stations")
-    parts.append(tag("text", heading, x=LEFT, y=SPACE - 8, class_="heading"))
-    box = f"0 0 {WIDTH:g} {SPACE + PANEL + AXIS:g}"
-    return tag("svg", *parts, viewBox=box, role="img", aria_label=f"Distribution: {name}")
+        top, bottom = float(frame.y(count)), SPACE + PANEL
+        bar = {"x": LEFT + number * width, "y": top, "width": width - 1, "height": bottom - top}
+        bars.append(tag("rect", title, class_="bar", style="fill: var(--track)", **bar))
+    return picture(f"Distribution: {name}", [frame.draw(name, "[stations]", *bars)], frame.along, "[mm]")
 
 
 def _places(found: TrackComparison) -> Iterator[str]:
@@ -175,8 +158,7 @@ def _places(found: TrackComparison) -> Iterator[str]:
     rows = [row for line in found.lines for row in _sections(line)]
     if rows:
         headings = ("What", "Line", "Chainage", "Length", "Across, largest", "Height, largest")
-        written = tag("div", table(headings, rows), class_="scroll tall")
-        yield _section("Where", written.replace("<table>", '<table class="words">'))
+        yield section("Where", table(headings, rows, "scroll tall", "words"))
 
 
 def _sections(line: LineDifferences) -> Iterator[tuple[object, ...]]:
@@ -204,64 +186,27 @@ def _profiles(line: LineDifferences, counts_shift: bool) -> str:
     )
     shown = [column for column in columns if np.isfinite(column[1]).any()]
     panels = [
-        _panel(name, values, shift, sigma, line.chainage_m, number * (PANEL + SPACE) + SPACE)
+        _panel(Panel(name, "mm", values, MIN_SPAN_MM), shift, sigma, line.chainage_m, along, place_of(number))
         for number, (name, values, shift, sigma) in enumerate(shown)
     ]
-    bottom = len(shown) * (PANEL + SPACE)
-    marks = [
-        tag("text", text(f"{at:,g}"), x=float(_x(np.array([at]), along)[0]), y=bottom + 16, class_="tick middle")
-        for at in ticks(*along, TICKS_ACROSS)
-    ]
-    name = tag("text", text("chainage [m]"), x=WIDTH - RIGHT, y=bottom + 32, class_="tick end")
-    box = f"0 0 {WIDTH:g} {bottom + AXIS:g}"
-    label = f"Differences of line {line.line_id}"
-    drawn = tag("svg", *panels, *marks, name, viewBox=box, role="img", aria_label=label)
-    return _section(f"Line {line.line_id}", drawn)
+    drawn = picture(f"Differences of line {line.line_id}", panels, along, "chainage [m]")
+    return section(f"Line {line.line_id}", drawn)
 
 
 def _panel(
-    name: str,
-    values: np.ndarray,
+    panel: Panel,
     shift: np.ndarray | None,
     sigma: np.ndarray | None,
     chainage: np.ndarray,
+    along: tuple[float, float],
     top: float,
 ) -> str:
     """Draw one difference along a line."""
     band = [] if shift is None or sigma is None else [shift - SURE * sigma, shift + SURE * sigma]
-    every = np.concatenate([values, *band])
-    known = every[np.isfinite(every)]
-    middle, span = 0.5 * (known.max() + known.min()), max(1.1 * float(np.ptp(known)), MIN_SPAN_MM)
-    low, high = float(middle - span / 2), float(middle + span / 2)
-    x = _x(chainage, (float(chainage[0]), float(chainage[-1])))
-
-    def y(heights: np.ndarray) -> np.ndarray:
-        return top + PANEL - (heights - low) * PANEL / (high - low)
-
-    parts = [tag("rect", x=LEFT, y=top, width=WIDTH - LEFT - RIGHT, height=PANEL, class_="panel")]
-    for value in ticks(low, high, TICKS_UP):
-        level = float(y(np.array([value]))[0])
-        parts.append(tag("line", x1=LEFT, x2=WIDTH - RIGHT, y1=level, y2=level, class_="grid"))
-        parts.append(tag("text", text(f"{value:,.10g}"), x=LEFT - 8, y=level + 4, class_="tick end"))
-    parts += [tag("path", d=curve(x, y(limit)), class_="curve", style="stroke: var(--good)") for limit in band]
-    parts.append(tag("path", d=curve(x, y(values)), class_="curve"))
-    heading = tag("tspan", text(name), class_="name") + text(
-        "  [mm]" + ("; green: limits of a movement" if band else "")
-    )
-    parts.append(tag("text", heading, x=LEFT, y=top - 8, class_="heading"))
-    return "".join(parts)
-
-
-def _x(chainage: np.ndarray, along: tuple[float, float]) -> np.ndarray:
-    return LEFT + (chainage - along[0]) / (along[1] - along[0]) * (WIDTH - LEFT - RIGHT)
-
-
-def _facts(facts: Mapping[str, str]) -> Sequence[str]:
-    return [tag("dt", text(name)) + tag("dd", text(value)) for name, value in facts.items() if value]
-
-
-def _section(heading: str, *content: str) -> str:
-    return tag("section", tag("h2", text(heading)), *content)
+    frame = Frame(top, along, replace(panel, values=np.concatenate([panel.values, *band])).limits())
+    curves = [frame.curve(chainage, limit, style="stroke: var(--good)") for limit in band]
+    unit = "[mm]; green: limits of a movement" if band else "[mm]"
+    return frame.draw(panel.heading, unit, *curves, frame.curve(chainage, panel.values))
 
 
 def _rms(values: np.ndarray) -> float:

@@ -18,11 +18,10 @@ from .findings import (
 )
 from .limits import limits_table
 from .listing import Finding, listed
-from .markup import metres, table, tag, text
+from .markup import legend, made, metres, note, page, section, table, tag, text, tiles, verdict_box
 from .plan import draw_plan
 from .plots import draw_profiles
 from .strip_plots import draw_strips, list_strips, strip_legend
-from .style import STYLE
 from .verdict import verdict
 
 ADVICE = (
@@ -74,40 +73,33 @@ def build_page(
     """
     findings = examine(network, gauges_m)
     heights = [_heights(network, track) for track in findings.tracks]
-    body = [
-        tag("h1", text("Rail Extract report")),
-        tag("p", text(source), class_="source"),
+    return page(
+        f"Rail Extract: {source}",
+        "Rail Extract report",
+        source,
         _verdict(findings, len(network.rails), network.warnings),
         _tiles(network, findings),
         *([_map(findings), _findings(findings), _tracks(findings)] if findings.tracks else []),
-        *([_section("Limits", limits_table(findings.tracks))] if findings.tracks else []),
+        *([section("Limits", limits_table(findings.tracks))] if findings.tracks else []),
         _search(network.search),
         _strips(network),
         *(_profiles(track, height) for track, height in zip(findings.tracks, heights)),
-        _facts({**(facts or {}), "Engine": network.engine}),
-    ]
-    head = (
-        '<meta charset="utf-8">',
-        '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        tag("title", text(f"Rail Extract: {source}")),
-        f"<style>{STYLE}</style>",
+        made({**(facts or {}), "Engine": network.engine}, NOTES),
     )
-    return f"<!DOCTYPE html>\n{tag('html', tag('head', *head), tag('body', tag('main', *body)), lang='en')}\n"
 
 
 def _verdict(findings: Findings, rail_count: int, warnings: Sequence[str]) -> str:
     """Write the verdict, the reasons for doubt, and what the user was warned of."""
     if not findings.tracks:
         words = f"{_without_track(rail_count)} What to try:"
-        return tag("div", tag("strong", text(words)), *_listed([*warnings, *ADVICE]), class_="verdict poor")
+        return verdict_box("poor", words, (*warnings, *ADVICE))
     kind, headline = verdict(findings)
     if findings.lonely:
         count = len(findings.lonely)
         belong = "1 rail does not belong" if count == 1 else f"{count} rails do not belong"
         headline += f" {belong} to a track ({metres(findings.lonely_m)})."
     reasons = [_reason(findings, doubt) for doubt in DOUBTS if findings.length_of(doubt) > 0]
-    listed = _listed([*reasons, *_hole_reasons(findings), *warnings])
-    return tag("div", tag("strong", text(headline)), *listed, class_=f"verdict {kind}")
+    return verdict_box(kind, headline, (*reasons, *_hole_reasons(findings), *warnings))
 
 
 def _without_track(rail_count: int) -> str:
@@ -116,11 +108,6 @@ def _without_track(rail_count: int) -> str:
         return "No rail was found."
     rails = "There is 1 rail" if rail_count == 1 else f"There are {rail_count} rails"
     return f"No track was found. {rails}, but no two rails are parallel at the gauge."
-
-
-def _listed(sentences: Sequence[str]) -> list[str]:
-    """Write a list, if there is something to list."""
-    return [tag("ul", *(tag("li", text(sentence)) for sentence in sentences))] if sentences else []
 
 
 def _hole_reasons(findings: Findings) -> Iterator[str]:
@@ -142,7 +129,7 @@ def _tiles(network: RailNetwork, findings: Findings) -> str:
     """Write the most important figures."""
     sigma = np.concatenate([track.geometry.sigma_mm for track in findings.tracks] or [np.empty(0)])
     known = sigma[np.isfinite(sigma)]
-    tiles = [
+    figures = [
         (str(len(findings.tracks)), "tracks"),
         (metres(findings.length_m), "of track"),
         (str(len(network.rails)), f"rails, {metres(sum(rail.length_m for rail in network.rails))}"),
@@ -150,11 +137,7 @@ def _tiles(network: RailNetwork, findings: Findings) -> str:
         (f"{100 * (1 - findings.share):.1f} %", "of it without doubt"),
         (f"{_density(findings):.0f}", "points per metre of track, median"),
     ]
-    return tag(
-        "div",
-        *(tag("div", tag("b", text(figure)), tag("span", text(what)), class_="tile") for figure, what in tiles),
-        class_="tiles",
-    )
+    return tiles(figures)
 
 
 def _density(findings: Findings) -> float:
@@ -164,13 +147,13 @@ def _density(findings: Findings) -> float:
 
 
 def _map(findings: Findings) -> str:
-    return _section("Map", draw_plan(findings), _legend())
+    return section("Map", draw_plan(findings), _keys())
 
 
-def _legend(*more: str) -> str:
-    keys = [tag("span", tag("i", class_="fine"), text("not in doubt"))]
-    keys += [tag("span", tag("i", class_=doubt.name), text(doubt.label)) for doubt in DOUBTS]
-    return tag("div", *keys, *more, class_="legend")
+def _keys(**more: str) -> str:
+    """Write the legend of marks, with `more` of them: texts by class."""
+    keys = {"fine": "not in doubt", **{doubt.name: doubt.label for doubt in DOUBTS}, **more}
+    return legend((what, {"class_": name}) for name, what in keys.items())
 
 
 def _findings(findings: Findings) -> str:
@@ -193,9 +176,8 @@ def _findings(findings: Findings) -> str:
     if any(finding.km_text for finding in found):
         headings.append("Kilometre of the worst place")
         rows = [(*row, finding.km_text or "") for row, finding in zip(rows, found)]
-    written = tag("div", table(headings, rows), class_="scroll tall")
-    note = "The first findings may do most harm: they are in the order of possible error times length."
-    return _section("Where to look", written.replace("<table>", '<table class="words">'), _note(note))
+    order = "The first findings may do most harm: they are in the order of possible error times length."
+    return section("Where to look", table(headings, rows, "scroll tall", "words"), note(order))
 
 
 def _finding(finding: Finding) -> tuple[object, ...]:
@@ -235,7 +217,7 @@ def _tracks(findings: Findings) -> str:
     if any(track.geometry.kilometres is not None for track in findings.tracks):
         headings.append("Kilometres")
         rows = [(*row, _kilometres(track)) for row, track in zip(rows, findings.tracks)]
-    return _section("Tracks", tag("div", table(headings, rows), class_="scroll"))
+    return section("Tracks", table(headings, rows))
 
 
 def _row(track: TrackFindings) -> tuple[str, ...]:
@@ -316,8 +298,8 @@ def _search(found: SearchFigures | None) -> str:
         )
         rows.append(blunt)
     rows = rows if found.squares else rows[:4]  # rails that grow from seeds are not searched by squares
-    written = tag("div", table(("Found", "", "What it means"), rows), class_="scroll")
-    return _section("Rail points in the raw cloud", written.replace("<table>", '<table class="words">'))
+    written = table(("Found", "", "What it means"), rows, kind="words")
+    return section("Rail points in the raw cloud", written)
 
 
 def _strips(network: RailNetwork) -> str:
@@ -329,26 +311,12 @@ def _strips(network: RailNetwork) -> str:
     for track_id in tracks:
         courses = [course for course in network.strips if course.track_id == track_id]
         drawn += [tag("p", text(f"Track {track_id}")), draw_strips(courses), strip_legend(courses)]
-    note = tag("p", text(STRIP_NOTE), class_="notes")
-    return _section("Strips", tag("div", list_strips(network.strips), class_="scroll"), *drawn, note)
+    return section("Strips", list_strips(network.strips), *drawn, note(STRIP_NOTE))
 
 
 def _profiles(track: TrackFindings, height_m: np.ndarray) -> str:
-    band = tag("span", tag("i", class_="band"), text(f"gauge within {GAUGE_OFF_MM:g} mm of nominal"))
-    return _section(f"Track {track.line.track_id}", draw_profiles(track, height_m), _legend(band))
-
-
-def _facts(facts: Mapping[str, str]) -> str:
-    listed = "".join(tag("dt", text(name)) + tag("dd", text(value)) for name, value in facts.items() if value)
-    return _section("How it was made", tag("dl", listed), *map(_note, NOTES))
-
-
-def _note(sentence: str) -> str:
-    return tag("p", text(sentence), class_="notes")
-
-
-def _section(heading: str, *content: str) -> str:
-    return tag("section", tag("h2", text(heading)), *content)
+    keys = _keys(band=f"gauge within {GAUGE_OFF_MM:g} mm of nominal")
+    return section(f"Track {track.line.track_id}", draw_profiles(track, height_m), keys)
 
 
 def _heights(network: RailNetwork, track: TrackFindings) -> np.ndarray:

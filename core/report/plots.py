@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,6 +60,76 @@ class Panel:
         return (self.floor, high) if self.floor is not None else (low, high)
 
 
+@dataclass(frozen=True)
+class Frame:
+    """The axes of a panel in a picture.
+
+    Attributes
+    ----------
+    top : float
+        Upper side.
+    along : tuple of float
+        First and last place along the track.
+    limits : tuple of float
+        Lower and upper end of the panel.
+    """
+
+    top: float
+    along: tuple[float, float]
+    limits: tuple[float, float]
+
+    def x(self, place: Any) -> Any:
+        """Return the x of one or several places."""
+        return across(place, self.along)
+
+    def y(self, value: Any) -> Any:
+        """Return the y of one or several values."""
+        low, high = self.limits
+        return self.top + PANEL - (value - low) * PANEL / (high - low)
+
+    def curve(self, places: np.ndarray, values: np.ndarray, class_: str = "curve", style: str | None = None) -> str:
+        """Return the curve of values, (n,), at places along the track."""
+        return tag("path", d=curve(self.x(places), self.y(values)), class_=class_, style=style)
+
+    def draw(self, heading: str, unit: str, *content: str, behind: Sequence[str] = (), class_: str = "panel") -> str:
+        """Return the panel with its heading, its grid and what is drawn `behind` it and over it."""
+        parts = [tag("rect", x=LEFT, y=self.top, width=WIDTH - LEFT - RIGHT, height=PANEL, class_=class_), *behind]
+        for value in ticks(*self.limits, TICKS_UP):
+            level = float(self.y(value))
+            parts.append(tag("line", x1=LEFT, x2=WIDTH - RIGHT, y1=level, y2=level, class_="grid"))
+            parts.append(tag("text", text(f"{value:,.10g}"), x=LEFT - 8, y=level + 4, class_="tick end"))
+        name = tag("tspan", text(heading), class_="name") + text(f"  {unit}")
+        return "".join([*parts, *content, tag("text", name, x=LEFT, y=self.top - 8, class_="heading")])
+
+
+def place_of(number: int) -> float:
+    """Return the upper side of a panel, counted from 0."""
+    return number * (PANEL + SPACE) + SPACE
+
+
+def across(place: Any, along: tuple[float, float]) -> Any:
+    """Return the x of one or several places on an axis."""
+    return LEFT + (place - along[0]) / (along[1] - along[0]) * (WIDTH - LEFT - RIGHT)
+
+
+def picture(label: str, panels: Sequence[str], along: tuple[float, float], axis: str, *more: str) -> str:
+    """Return panels below each other as SVG, over an axis that is named at its left."""
+    bottom = len(panels) * (PANEL + SPACE)
+    marks = [
+        tag("text", text(f"{place:,g}"), x=float(across(place, along)), y=bottom + 16, class_="tick middle")
+        for place in ticks(*along, TICKS_ACROSS)
+    ]
+    name = tag("text", text(axis), x=LEFT - 8, y=bottom + 16, class_="tick end")
+    box = f"0 0 {WIDTH:g} {bottom + AXIS:g}"
+    return tag("svg", *panels, *marks, name, *more, viewBox=box, role="img", aria_label=label)
+
+
+def broken(places: np.ndarray, values: np.ndarray, step_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Insert NaN where places, (n,), are more than a step apart, so that a curve breaks there."""
+    breaks = np.flatnonzero(np.diff(places) > step_m) + 1
+    return np.insert(places.astype(float), breaks, np.nan), np.insert(values.astype(float), breaks, np.nan)
+
+
 def draw_profiles(track: TrackFindings, height_m: np.ndarray) -> str:
     """Return the profiles of height, gauge, cant, twist, curvature and standard error of a track as SVG.
 
@@ -69,32 +139,25 @@ def draw_profiles(track: TrackFindings, height_m: np.ndarray) -> str:
     height_m : (n,) array
         Heights of the stations above the cloud's datum.
     """
-    along = track.geometry.chainage_m
-    panels = _panels(track, height_m)
-    bottom = len(panels) * (PANEL + SPACE)
-    drawn = [_draw_panel(panel, track, number * (PANEL + SPACE) + SPACE) for number, panel in enumerate(panels)]
-    axis = [
-        tag("text", text(f"{chainage:,g}"), x=_across(chainage, along), y=bottom + 16, class_="tick middle")
-        for chainage in ticks(along[0], along[-1], TICKS_ACROSS)
+    along = float(track.geometry.chainage_m[0]), float(track.geometry.chainage_m[-1])
+    panels = [
+        _draw_panel(panel, track, Frame(place_of(number), along, panel.limits()))
+        for number, panel in enumerate(_panels(track, height_m))
     ]
-    axis += _kilometres(track, bottom + 32)
-    name = tag("text", text("chainage [m]"), x=LEFT - 8, y=bottom + 16, class_="tick end")
-    label = f"Profiles of track {track.line.track_id}"
-    return tag("svg", *drawn, *axis, name, viewBox=f"0 0 {WIDTH:g} {bottom + AXIS:g}", role="img", aria_label=label)
+    kilometres = _kilometres(track, along, len(panels) * (PANEL + SPACE) + 32)
+    return picture(f"Profiles of track {track.line.track_id}", panels, along, "chainage [m]", *kilometres)
 
 
-def _kilometres(track: TrackFindings, y: float) -> list[str]:
+def _kilometres(track: TrackFindings, along: tuple[float, float], y: float) -> list[str]:
     """Write the kilometres along the axis below the chainages."""
-    along, kilometres = track.geometry.chainage_m, track.geometry.kilometres
+    kilometres = track.geometry.kilometres
     if kilometres is None:
         return []
-    at = ticks(along[0], along[-1], TICKS_ACROSS)
-    nearest = np.argmin(np.abs(along[:, None] - at), axis=0)
+    at = ticks(*along, TICKS_ACROSS)
+    nearest = np.argmin(np.abs(track.geometry.chainage_m[:, None] - at), axis=0)
     marks = [
-        tag(
-            "text", text(kilometres.km_text[number] or ""), x=float(_across(chainage, along)), y=y, class_="tick middle"
-        )
-        for chainage, number in zip(at, nearest)
+        tag("text", text(kilometres.km_text[number] or ""), x=float(across(place, along)), y=y, class_="tick middle")
+        for place, number in zip(at, nearest)
     ]
     return [*marks, tag("text", text("kilometre"), x=LEFT - 8, y=y, class_="tick end")]
 
@@ -140,40 +203,23 @@ def _panels(track: TrackFindings, height_m: np.ndarray) -> list[Panel]:
     ]
 
 
-def _draw_panel(panel: Panel, track: TrackFindings, top: float) -> str:
-    along, (low, high) = track.geometry.chainage_m, panel.limits()
-    scale = PANEL / (high - low)
-
-    def up(value: Any) -> Any:
-        return top + PANEL - (value - low) * scale
-
-    parts = [tag("rect", x=LEFT, y=top, width=WIDTH - LEFT - RIGHT, height=PANEL, class_="panel")]
+def _draw_panel(panel: Panel, track: TrackFindings, frame: Frame) -> str:
+    behind = list(_shades(track, frame))
     if panel.band:
-        span = {"y": up(panel.band[1]), "height": (panel.band[1] - panel.band[0]) * scale}
-        parts.append(tag("rect", x=LEFT, width=WIDTH - LEFT - RIGHT, class_="band", **span))
-    parts += _shades(track, top)
-    for value in ticks(low, high, TICKS_UP):
-        parts.append(tag("line", x1=LEFT, x2=WIDTH - RIGHT, y1=up(value), y2=up(value), class_="grid"))
-        parts.append(tag("text", text(f"{value:,.10g}"), x=LEFT - 8, y=up(value) + 4, class_="tick end"))
-    parts.append(tag("path", d=curve(_across(along, along), up(panel.values)), class_="curve"))
-    heading = tag("tspan", text(panel.heading), class_="name") + text(f"  [{panel.unit}]")
-    parts.append(tag("text", heading, x=LEFT, y=top - 8, class_="heading"))
-    return "".join(parts)
+        low, high = map(float, map(frame.y, panel.band))
+        band = tag("rect", x=LEFT, width=WIDTH - LEFT - RIGHT, class_="band", y=high, height=low - high)
+        behind.insert(0, band)
+    values = frame.curve(track.geometry.chainage_m, panel.values)
+    return frame.draw(panel.heading, f"[{panel.unit}]", values, behind=behind)
 
 
-def _shades(track: TrackFindings, top: float) -> Iterator[str]:
+def _shades(track: TrackFindings, frame: Frame) -> Iterator[str]:
     """Mark the places in doubt; places less than a unit of the picture apart merge, and no mark is narrower."""
-    along = track.geometry.chainage_m
     for doubt in DOUBTS:
         for place in track.places(doubt, merge_m=track.length_m / WIDTH):
-            start, end = _across(place.start_m, along), _across(place.end_m, along)
+            start, end = frame.x(place.start_m), frame.x(place.end_m)
             title = tag("title", text(f"{doubt.label}: {place.start_m:.1f} to {place.end_m:.1f} m"))
-            yield tag("rect", title, x=start, y=top, width=max(end - start, 1.0), height=PANEL, class_=doubt.name)
-
-
-def _across(chainage: Any, along: np.ndarray) -> Any:
-    """Return the x of one or several chainages."""
-    return LEFT + (chainage - along[0]) / (along[-1] - along[0]) * (WIDTH - LEFT - RIGHT)
+            yield tag("rect", title, x=start, y=frame.top, width=max(end - start, 1.0), height=PANEL, class_=doubt.name)
 
 
 def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

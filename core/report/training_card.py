@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .markup import table, tag, text
-from .plots import AXIS, LEFT, PANEL, RIGHT, SPACE, WIDTH, curve, ticks
-from .style import STYLE
+from .markup import made, note, page, section, table, verdict_box
+from .plots import Frame, picture, place_of
 
 if TYPE_CHECKING:
     from ..labelling.training import Plan
@@ -45,26 +44,19 @@ def build_card(trained: Trained, tiles: Sequence[str], facts: Mapping[str, str])
     """
     total = trained.total
     rows = [_row(tiles[number], figures) for number, figures in trained.by_tile.items()]
-    body = [
-        tag("h1", text("Rail classifier")),
-        tag("p", text(f"Learned from {len(tiles)} files"), class_="source"),
+    return page(
+        "Rail classifier",
+        "Rail classifier",
+        f"Learned from {len(tiles)} files",
         _verdict(total),
-        tag(
-            "section",
-            tag("h2", text("Kept back, by tile")),
+        section(
+            "Kept back, by tile",
             table(("Tile", "Rail points", "Recall", "Precision", "F1"), [*rows, _row("all", total)]),
-            tag("p", text(NOTE), class_="notes"),
+            note(NOTE),
         ),
-        tag("section", tag("h2", text("Course of the training")), _curves(trained)),
-        tag("section", tag("h2", text("Settings")), _facts(facts)),
-    ]
-    head = (
-        '<meta charset="utf-8">',
-        '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        tag("title", text("Rail classifier")),
-        f"<style>{STYLE}</style>",
+        section("Course of the training", _curves(trained)),
+        made(facts),
     )
-    return f"<!DOCTYPE html>\n{tag('html', tag('head', *head), tag('body', tag('main', *body)), lang='en')}\n"
 
 
 def facts_of(trained: Trained, plan: Plan, standard: RailStandard) -> dict[str, str]:
@@ -83,7 +75,7 @@ def facts_of(trained: Trained, plan: Plan, standard: RailStandard) -> dict[str, 
 
 def _verdict(total: Figures) -> str:
     words = f"Recall {total.recall:.3f}, precision {total.precision:.3f} on places that were kept back."
-    return tag("div", tag("strong", text(words)), class_=f"verdict {'' if total.recall >= GOOD_RECALL else 'fair'}")
+    return verdict_box("good" if total.recall >= GOOD_RECALL else "fair", words)
 
 
 def _row(name: str, figures: Figures) -> tuple[object, ...]:
@@ -103,37 +95,18 @@ def _curves(trained: Trained) -> str:
         "Recall of blocks kept back, before the output was calibrated": [c.figures.recall for c in trained.checks],
         "Precision of blocks kept back": [c.figures.precision for c in trained.checks],
     }
-    parts = []
-    for number, (name, values) in enumerate(columns.items()):
-        top = number * (PANEL + SPACE) + SPACE
-        parts.append(_panel(name, steps, np.array(values, dtype=float), top, None if number == 0 else 1.0))
-    bottom = len(columns) * (PANEL + SPACE)
-    for step in ticks(0.0, float(steps[-1]), 10):
-        x = _across(np.array([step]), steps)[0]
-        parts.append(tag("text", text(f"{step:,g}"), x=float(x), y=bottom + 16, class_="tick middle"))
-    parts.append(tag("text", text("step"), x=WIDTH - RIGHT, y=bottom + 32, class_="tick end"))
-    box = f"0 0 {WIDTH:g} {bottom + AXIS:g}"
-    return tag("svg", *parts, viewBox=box, role="img", aria_label="Course of the training")
+    along = float(steps[0]), float(max(steps[-1], steps[0] + 1))
+    panels = [
+        _panel(name, steps, np.array(values, dtype=float), along, place_of(number), None if number == 0 else 1.0)
+        for number, (name, values) in enumerate(columns.items())
+    ]
+    return picture("Course of the training", panels, along, "step")
 
 
-def _panel(name: str, steps: np.ndarray, values: np.ndarray, top: float, high: float | None) -> str:
+def _panel(
+    name: str, steps: np.ndarray, values: np.ndarray, along: tuple[float, float], top: float, high: float | None
+) -> str:
     """Draw one quantity from 0 to `high`, or to its largest value."""
     known = values[np.isfinite(values)]
-    high = high or (float(known.max()) if len(known) else 1.0)
-    scale = PANEL / high
-    parts = [tag("rect", x=LEFT, y=top, width=WIDTH - LEFT - RIGHT, height=PANEL, class_="panel")]
-    for value in ticks(0.0, high, 4):
-        y = float(top + PANEL - value * scale)
-        parts.append(tag("line", x1=LEFT, x2=WIDTH - RIGHT, y1=y, y2=y, class_="grid"))
-        parts.append(tag("text", text(f"{value:g}"), x=LEFT - 8, y=y + 4, class_="tick end"))
-    parts.append(tag("path", d=curve(_across(steps, steps), top + PANEL - values * scale), class_="curve"))
-    parts.append(tag("text", tag("tspan", text(name), class_="name"), x=LEFT, y=top - 8, class_="heading"))
-    return "".join(parts)
-
-
-def _across(step: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    return LEFT + step / steps[-1] * (WIDTH - LEFT - RIGHT)
-
-
-def _facts(facts: Mapping[str, str]) -> str:
-    return tag("dl", *(tag("dt", text(name)) + tag("dd", text(value)) for name, value in facts.items()))
+    frame = Frame(top, along, (0.0, high or (float(known.max()) if len(known) else 1.0)))
+    return frame.draw(name, "", frame.curve(steps, values))

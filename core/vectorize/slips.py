@@ -46,7 +46,7 @@ MIN_LEG_SHARE = 0.6
 """Shortest part of a leg, in `DIRECTION_M`, that shows its direction."""
 
 SIDE_M = 0.15
-"""Width beside the outer rails of a slip from which lines are removed: they stray by the width of a merged strip."""
+"""Width beside the outer rails of a slip from which lines are removed: they stray by the width of merged rails."""
 
 ENTRY_M = 1.0
 """Length within which a leg is cut at the border of a slip."""

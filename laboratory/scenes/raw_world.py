@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ...core.polyline import runs
 from ..curves import Curve
 from .raw_scanner import Segments
 from .tracks import Track
@@ -247,8 +248,8 @@ def rail(
     across = np.asarray(left_m)[:, None] + shape[:, 0]
     height = np.asarray(top_m)[:, None] + shape[:, 1]
     for kind, chosen in ((kinds[0], head), (kinds[1], ~head)):
-        for first, last in _runs(chosen):
-            world.add(across[:, first : last + 1], height[:, first : last + 1], kind, where)
+        for first, last in runs(chosen):  # of segments: they have one more end
+            world.add(across[:, first : last + 2], height[:, first : last + 2], kind, where)
 
 
 def running_rails(world: World, hidden: np.ndarray | None = None) -> None:
@@ -401,9 +402,3 @@ def _stones(world: World, across: np.ndarray) -> np.ndarray:
     lines = (1 - down) * grid[row] + down * grid[row + 1]
     column, right = columns.astype(int), columns % 1
     return (1 - right) * lines[:, column] + right * lines[:, column + 1]
-
-
-def _runs(chosen: np.ndarray) -> list[tuple[int, int]]:
-    """First segment and the one after the last of each run of chosen segments."""
-    borders = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
-    return list(zip(borders[::2].tolist(), borders[1::2].tolist()))

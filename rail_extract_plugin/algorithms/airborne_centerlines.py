@@ -18,7 +18,7 @@ from ..dialog.parameter_values import ParameterValues, class_numbers
 from ..dialog.passwords import masked
 from ..reading.clouds import CloudSource, points_folder, request_points
 from ..writing.destinations import is_wanted
-from ..writing.layers import figures_of, write_layer
+from ..writing.layers import figures_of, layer_writers, write_layer
 from ..writing.reports import write_shown
 from ..writing.run import properties_of
 from ..writing.whole_files import write_each
@@ -121,7 +121,7 @@ class AirborneCenterlines(RailAlgorithm):
         progress: Progress,
     ) -> dict[str, Any]:
         """Write the proposed guides."""
-        from ...core.layers import lines_layer
+        from ...core.output.layers import lines_layer
 
         progress.info(found.summary)
         guides = lines_layer(PROPOSED, found.guides)
@@ -137,17 +137,19 @@ class AirborneCenterlines(RailAlgorithm):
         progress: Progress,
     ) -> dict[str, Any]:
         """Write what was found along the guides."""
-        from ...core.layers import airborne_stations_layer, findings_layer, lines_layer
+        from ...core.output.layers import airborne_stations_layer, findings_layer, lines_layer
         from ...core.report.airborne import airborne_findings, airborne_summary
 
         for sentence in airborne_summary(survey):
             progress.info(sentence)
-        found = airborne_findings(survey) if is_wanted(parameters.get("FINDINGS"), context) else ()
         frame, rest = survey.frame, (parameters, context)
+        makers = {
+            "CENTERLINES": lambda: lines_layer(AIRBORNE, survey.lines),
+            "STATIONS": lambda: airborne_stations_layer(survey.tracks),
+            "FINDINGS": lambda: findings_layer(airborne_findings(survey)),
+        }
         writers = {
-            "CENTERLINES": lambda: write_layer(self, "CENTERLINES", lines_layer(AIRBORNE, survey.lines), frame, *rest),
-            "STATIONS": lambda: write_layer(self, "STATIONS", airborne_stations_layer(survey.tracks), frame, *rest),
-            "FINDINGS": lambda: write_layer(self, "FINDINGS", findings_layer(found), frame, *rest),
+            **layer_writers(self, makers, frame, *rest),
             "REPORT": lambda: write_shown(self, "REPORT", lambda: _page(job, survey), *rest),
         }
         written = write_each(writers, parameters, context)

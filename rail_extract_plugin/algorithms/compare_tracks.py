@@ -101,7 +101,7 @@ class CompareTracks(RailAlgorithm):
     ) -> dict[str, Any]:
         """Compare the lines, then write points and report."""
         from ...core.comparison.tracks import compare_surveys, doubts_of
-        from ...core.layers import differences_layer
+        from ...core.output.layers import differences_layer
         from ...core.parameters import ComparisonParameters
         from ...core.report.comparison import describe_shift, verdict_on
         from ..reading.surveys import read_surveys

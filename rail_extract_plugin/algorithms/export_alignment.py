@@ -64,7 +64,7 @@ class ExportAlignment(RailAlgorithm):
 
     def read(self, parameters: dict[str, Any], context: QgsProcessingContext) -> Job:
         """Read and check the parameters, in the main thread."""
-        from ...core.design_files import check_format
+        from ...core.output.design_files import check_format
         from ..reading.line_layers import wkt_of
 
         values = ParameterValues(self, parameters, context)
@@ -80,7 +80,7 @@ class ExportAlignment(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Read the table, check it and write the file."""
-        from ...core.design_files import check_designs, write_designs
+        from ...core.output.design_files import check_designs, write_designs
         from ..reading.element_tables import read_elements
 
         alignments, _ = read_elements(job.source, job.crs, progress.span(0, READING))

@@ -11,7 +11,6 @@ from qgis.core import QgsProcessingContext
 from ...core.errors import ParameterError
 from ...core.frpdf.models import choose as choose_model
 from ...core.parameters import LEARNED
-from ...core.products import CENTERLINES, RAILS
 from ...core.progress import Estimating, Progress
 from ...core.standards import DEFAULT, SEARCHED_CLASSES, Gauge, RailStandard
 from ..dialog import inputs, outputs
@@ -22,7 +21,7 @@ from ..i18n import tr
 from ..reading.clouds import CloudSource, checked_crs, points_folder, request_points
 from ..systems import system
 from ..writing.destinations import is_wanted
-from ..writing.layers import figures_of, figures_of_stations, write_layer, write_raster
+from ..writing.layers import figures_of, figures_of_stations, layer_writers, write_raster
 from ..writing.reports import write_report
 from ..writing.run import properties_of
 from ..writing.whole_files import write_each
@@ -34,6 +33,11 @@ if TYPE_CHECKING:
     from ...core.alignment.placed_axes import PlacedAxes
     from ...core.clouds.points import Request
     from ...core.rails import RailNetwork
+    from ...core.report import Origin
+
+
+MEASURED = ("QUALITY", "FINDINGS", "REPORT")
+"""Outputs for which the geometry of tracks is measured."""
 
 
 @dataclass(frozen=True)
@@ -158,9 +162,8 @@ class ExtractRails(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Extract the rails and tracks, then write the outputs."""
-        from ...core.layers import findings_layer, lines_layer, quality_layer
         from ...core.pipeline import extract_files
-        from ...core.report import Origin, list_findings, summary
+        from ...core.report import Origin, summary
 
         values, progress = ParameterValues(self, parameters, context), Estimating(progress)
         request = request_points(job.cloud, job.class_codes, values.extent, progress)
@@ -168,14 +171,13 @@ class ExtractRails(RailAlgorithm):
         request = replace(request, merged=values.flag("MERGE_CLASSES") and not classify and not job.seeds)
         if values.detects():
             job = self._detected(job, request, values, progress)
-        settings = values.settings(job.standard, job.other_gauges)
-        quality, findings, report, cleaned = (
-            is_wanted(parameters.get(name), context) for name in ("QUALITY", "FINDINGS", "REPORT", "CLEANED")
+        measures, keeps = (
+            any(is_wanted(parameters.get(name), context) for name in names) for names in (MEASURED, ("CLEANED",))
         )
         settings = replace(
-            settings,
-            quality_step_m=values.number("STEP") if quality or findings or report else None,
-            keep_cleaned=cleaned,
+            values.settings(job.standard, job.other_gauges),
+            quality_step_m=values.number("STEP") if measures else None,
+            keep_cleaned=keeps,
         )
         with points_folder() as folder, values.runner() as runner:
             network = extract_files(request, folder, settings, runner, progress, classify, job.weights, job.seeds)
@@ -185,23 +187,33 @@ class ExtractRails(RailAlgorithm):
         for failure in network.failures:
             progress.warning(failure)
         origin = Origin(job.cloud.paths, job.standard, job.other_gauges, job.command, settings)
-        found = list_findings(network, origin.gauges_m) if findings else ()
-        frame, tracks, rest = network.frame, network.centerlines, (parameters, context)
-        self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, frame)
-        writers = {
-            "CLEANED": lambda: self._write_cleaned(job, network, *rest),
-            "RAILS": lambda: write_layer(self, "RAILS", lines_layer(RAILS, network.rails), frame, *rest),
-            "CENTERLINES": lambda: write_layer(self, "CENTERLINES", lines_layer(CENTERLINES, tracks), frame, *rest),
-            "QUALITY": lambda: write_layer(self, "QUALITY", quality_layer(network.geometry), frame, *rest),
-            "FINDINGS": lambda: write_layer(self, "FINDINGS", findings_layer(found), frame, *rest),
-            "REPORT": lambda: write_report(self, "REPORT", network, origin, *rest),
-        }
+        self.layer_properties = properties_of(job.cloud, job.class_codes, job.standard.head_width_m, network.frame)
         for sentence in summary(network, origin.gauges_m):
             progress.info(sentence)
-        written = write_each(writers, parameters, context)
+        written = self._write(job, network, origin, parameters, context)
         figures = {**figures_of(network.rails, "RAIL"), **figures_of(network.centerlines, "CENTERLINE")}
         measured = figures_of_stations(network.geometry) if settings.quality_step_m else {}
         return {**written, **figures, **measured, "ENGINE_USED": network.engine}
+
+    def _write(
+        self,
+        job: Job,
+        network: RailNetwork,
+        origin: Origin,
+        parameters: dict[str, Any],
+        context: QgsProcessingContext,
+    ) -> dict[str, str]:
+        """Write all outputs."""
+        from ...core.output.layers import network_makers
+
+        rest = parameters, context
+        makers = {name.upper(): make for name, make in network_makers(network, origin.gauges_m).items()}
+        writers = {
+            "CLEANED": lambda: self._write_cleaned(job, network, *rest),
+            **layer_writers(self, makers, network.frame, *rest),
+            "REPORT": lambda: write_report(self, "REPORT", network, origin, *rest),
+        }
+        return write_each(writers, parameters, context)
 
     def _write_cleaned(
         self,
@@ -211,7 +223,7 @@ class ExtractRails(RailAlgorithm):
         context: QgsProcessingContext,
     ) -> dict[str, str]:
         """Write the network's output as Clean Rail Raster does; no file if no rail cell is left."""
-        from ...core.raster_file import header_for, on_one_grid
+        from ...core.output.raster_file import header_for, on_one_grid
 
         if not any(raster.tiles for raster in network.cleaned):
             return {}

@@ -13,7 +13,7 @@ from ..dialog import inputs, outputs
 from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
 from ..dialog.passwords import masked
-from ..writing.layers import figures_of_fits, write_layer
+from ..writing.layers import figures_of_fits, layer_writers
 from ..writing.reports import write_alignment_report
 from ..writing.whole_files import write_each
 from .base import RAIL_WORDS, TRACK_WORDS, RailAlgorithm
@@ -93,7 +93,7 @@ class FitAlignment(RailAlgorithm):
     ) -> dict[str, Any]:
         """Fit each track, then write elements and deviations."""
         from ...core.alignment.fit import fit_tracks
-        from ...core.layers import deviations_layer, elements_layer
+        from ...core.output.layers import deviations_layer, elements_layer
         from ..reading.tracks_to_fit import read_fixed, read_tracks
 
         tracks, frame = read_tracks(job.tracks, job.quality, job.rails, progress.span(0, READING))
@@ -103,9 +103,12 @@ class FitAlignment(RailAlgorithm):
         alignments, deviations = [one.alignment for one in fits], [one.deviations for one in fits]
         courses = list(zip(alignments, deviations))
         name, facts = job.tracks.sourceName(), {"Command": job.command}
+        makers = {
+            "ELEMENTS": lambda: elements_layer(alignments),
+            "DEVIATIONS": lambda: deviations_layer(deviations),
+        }
         writers = {
-            "ELEMENTS": lambda: write_layer(self, "ELEMENTS", elements_layer(alignments), frame, *rest),
-            "DEVIATIONS": lambda: write_layer(self, "DEVIATIONS", deviations_layer(deviations), frame, *rest),
+            **layer_writers(self, makers, frame, *rest),
             "REPORT": lambda: write_alignment_report(self, "REPORT", courses, name, facts, True, *rest),
         }
         return {**write_each(writers, *rest), **figures_of_fits(fits)}

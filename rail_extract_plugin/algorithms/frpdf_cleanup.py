@@ -20,7 +20,7 @@ from .base import RAIL_WORDS, RailAlgorithm
 from .toolbox_groups import STEPS
 
 if TYPE_CHECKING:
-    from ...core.raster_file import RasterHeader
+    from ...core.output.raster_file import RasterHeader
 
 READING, WRITING = 0.05, 0.95
 """Fractions of the progress bar at which the network starts and ends."""

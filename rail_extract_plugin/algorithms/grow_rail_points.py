@@ -92,7 +92,7 @@ class GrowRailPoints(RailAlgorithm):
         from ...core.grow.settings import GrowSettings
         from ...core.labelling.files import Choice, plan_output
         from ...core.labelling.growing import grow_files
-        from ...core.layers import stops_layer
+        from ...core.output.layers import stops_layer
         from ...core.tasks import InTurn
 
         progress = Estimating(progress)

@@ -16,7 +16,7 @@ from ..dialog.parameter_values import ParameterValues
 from ..dialog.passwords import masked
 from ..systems import prepare_system
 from ..writing.destinations import is_wanted
-from ..writing.layers import write_layer
+from ..writing.layers import layer_writers
 from ..writing.reports import write_alignment_report
 from ..writing.whole_files import write_each
 from .base import ALIGNMENT_WORDS, RAIL_WORDS, RailAlgorithm
@@ -108,8 +108,8 @@ class ImportAlignment(RailAlgorithm):
     ) -> dict[str, Any]:
         """Read the file and write the layers."""
         from ...core.alignment.landxml_reading import read_landxml
-        from ...core.design_files import check_place
-        from ...core.layers import axes_layer, deviations_layer, elements_layer
+        from ...core.output.design_files import check_place
+        from ...core.output.layers import axes_layer, deviations_layer, elements_layer
 
         read = read_landxml(job.path, job.east_first, progress.span(0, READING))
         frame = replace(read[0].frame, crs_wkt=job.crs_wkt)
@@ -118,10 +118,13 @@ class ImportAlignment(RailAlgorithm):
         courses = _compared(job, alignments, frame, progress.span(READING, 1))
         deviations, rest = [one for _, one in courses], (parameters, context)
         facts = {"LandXML file": job.path.name, "Command": job.command}
+        makers = {
+            "ELEMENTS": lambda: elements_layer(alignments),
+            "AXIS": lambda: axes_layer(alignments),
+            "DEVIATIONS": lambda: deviations_layer(deviations),
+        }
         writers = {
-            "ELEMENTS": lambda: write_layer(self, "ELEMENTS", elements_layer(alignments), frame, *rest),
-            "AXIS": lambda: write_layer(self, "AXIS", axes_layer(alignments), frame, *rest),
-            "DEVIATIONS": lambda: write_layer(self, "DEVIATIONS", deviations_layer(deviations), frame, *rest),
+            **layer_writers(self, makers, frame, *rest),
             "REPORT": lambda: write_alignment_report(self, "REPORT", courses, _name(job), facts, False, *rest),
         }
         count = sum(len(alignment.elements) for alignment in alignments)

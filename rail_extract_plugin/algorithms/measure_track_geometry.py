@@ -18,8 +18,7 @@ from ..dialog import parameters as groups
 from ..dialog.parameter_values import ParameterValues
 from ..dialog.passwords import masked
 from ..reading.clouds import CloudSource, points_folder
-from ..writing.destinations import is_wanted
-from ..writing.layers import figures_of_stations, write_layer
+from ..writing.layers import figures_of_stations, layer_writers
 from ..writing.reports import write_report
 from ..writing.run import properties_of
 from ..writing.whole_files import write_each
@@ -110,9 +109,9 @@ class MeasureTrackGeometry(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Measure each track, then write the points."""
-        from ...core.layers import findings_layer, quality_layer
+        from ...core.output.layers import network_makers
         from ...core.rails import RailNetwork
-        from ...core.report import Origin, list_findings, summary
+        from ...core.report import Origin, summary
         from ...core.squares.remeasuring import measure_rails
         from ...core.tracks.geometry import measure_track_geometry
         from ...core.tracks.parallels import widths_by_gauge
@@ -140,12 +139,11 @@ class MeasureTrackGeometry(RailAlgorithm):
         network = RailNetwork(tuple(rails), centerlines, frame, geometry=measured, warnings=progress.warnings)
         paths = job.cloud.paths if job.cloud else (Path(lines[0].sourceName()),)
         origin = Origin(paths, job.standard or _own_standard(measured, job), job.other_gauges, job.command)
-        found = list_findings(network, origin.gauges_m) if is_wanted(parameters.get("FINDINGS"), context) else ()
         for sentence in summary(network, origin.gauges_m):
             progress.info(sentence)
+        made = network_makers(network, origin.gauges_m)
         writers = {
-            "OUTPUT": lambda: write_layer(self, "OUTPUT", quality_layer(measured), frame, *rest),
-            "FINDINGS": lambda: write_layer(self, "FINDINGS", findings_layer(found), frame, *rest),
+            **layer_writers(self, {"OUTPUT": made["quality"], "FINDINGS": made["findings"]}, frame, *rest),
             "REPORT": lambda: write_report(self, "REPORT", network, origin, *rest),
         }
         return {**write_each(writers, *rest), **figures_of_stations(measured)}

@@ -72,8 +72,8 @@ class RasterizeRailPoints(RailAlgorithm):
         self, job: Job, parameters: dict[str, Any], context: QgsProcessingContext, progress: Progress
     ) -> dict[str, Any]:
         """Rasterize each class, then write the file."""
+        from ...core.output.raster_file import header_for
         from ...core.raster import cell_size, rasterize
-        from ...core.raster_file import header_for
         from ...core.squares.density import plausible
         from ...core.squares.grid import MemorySource
         from ..reading.track_inputs import SQUARE_M

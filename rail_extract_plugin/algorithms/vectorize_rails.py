@@ -19,8 +19,8 @@ from .base import CLOUD_WORDS, RAIL_WORDS, RailAlgorithm
 from .toolbox_groups import STEPS
 
 if TYPE_CHECKING:
+    from ...core.output.raster_file import RasterHeader
     from ...core.rails import RailLine
-    from ...core.raster_file import RasterHeader
 
 READING = 0.3
 """Fraction of the progress bar for reading raster and cloud."""
@@ -81,7 +81,7 @@ class VectorizeRails(RailAlgorithm):
     ) -> dict[str, Any]:
         """Vectorize each class, then write the lines."""
         from ...core.checks.lines import warn_of_rails
-        from ...core.layers import lines_layer
+        from ...core.output.layers import lines_layer
         from ...core.products import RAILS
         from ...core.steps import lines_of
         from ..reading.area_points import Area, read_points_in

@@ -5,9 +5,18 @@ Labels state the unit. Numbers are plain numbers, so that QGIS does not convert 
 
 from __future__ import annotations
 
-from qgis.core import QgsProcessingParameterDefinition, QgsProcessingParameterEnum, QgsProcessingParameterNumber
+from qgis.core import (
+    QgsProcessing,
+    QgsProcessingParameterDefinition,
+    QgsProcessingParameterEnum,
+    QgsProcessingParameterNumber,
+)
 
 Definitions = tuple[QgsProcessingParameterDefinition, ...]
+
+_TYPES = QgsProcessing.SourceType
+LINE, POINT, ANY, TABLE = _TYPES.TypeVectorLine, _TYPES.TypeVectorPoint, _TYPES.TypeVectorAnyGeometry, _TYPES.TypeVector
+"""Kinds of layers."""
 
 UNBOUNDED = 1e9
 """Maximum of a number without an upper limit."""

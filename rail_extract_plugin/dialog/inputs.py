@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from qgis.core import (
-    QgsProcessing,
     QgsProcessingParameterBoolean,
     QgsProcessingParameterCrs,
     QgsProcessingParameterDefinition,
@@ -20,7 +21,7 @@ from ...core.parameters import AIRBORNE_CLASSES
 from ...core.standards import RAIL_CLASS
 from ..i18n import tr
 from .cloud_parameter import CloudParameter
-from .definitions import UNBOUNDED, Definitions, advanced, choice, helped, number
+from .definitions import ANY, LINE, POINT, TABLE, UNBOUNDED, Definitions, advanced, choice, helped, number
 from .parameter_values import DIRECTIONS, INCREASING
 
 
@@ -65,9 +66,8 @@ def classify() -> QgsProcessingParameterDefinition:
 
 def guide() -> QgsProcessingParameterDefinition:
     """Define the lines along which rails are searched."""
-    line = QgsProcessing.SourceType.TypeVectorLine
     return advanced(
-        QgsProcessingParameterFeatureSource("GUIDE", tr("Guide"), [line], optional=True),
+        QgsProcessingParameterFeatureSource("GUIDE", tr("Guide"), [LINE], optional=True),
         tr(
             "Lines along the tracks, from a map such as OpenStreetMap or drawn by hand. Rails are searched near them "
             "only. Lines in another coordinate system are transformed."
@@ -96,9 +96,8 @@ def airborne_cloud() -> Definitions:
 
 def tracks_meant() -> QgsProcessingParameterDefinition:
     """Define the lines that say which tracks are meant."""
-    line = QgsProcessing.SourceType.TypeVectorLine
     return helped(
-        QgsProcessingParameterFeatureSource("GUIDE", tr("Guide"), [line], optional=True),
+        QgsProcessingParameterFeatureSource("GUIDE", tr("Guide"), [LINE], optional=True),
         tr(
             "One line for each track of the railway, such as railway=rail of OpenStreetMap, up to 3 m off. Give every "
             "track its guide: they are fitted together. Leave empty to have guides proposed."
@@ -108,10 +107,9 @@ def tracks_meant() -> QgsProcessingParameterDefinition:
 
 def seeds() -> Definitions:
     """Define the places from which rails are followed."""
-    point, line = QgsProcessing.SourceType.TypeVectorPoint, QgsProcessing.SourceType.TypeVectorLine
     return (
         helped(
-            QgsProcessingParameterFeatureSource("SEEDS", tr("Seeds"), [point, line], optional=True),
+            QgsProcessingParameterFeatureSource("SEEDS", tr("Seeds"), [POINT, LINE], optional=True),
             tr(
                 "Points on railheads, or lines along them, one for each rail or track to follow. In another coordinate "
                 "system they are transformed. The map tool Grow Rails makes such a layer."
@@ -126,9 +124,8 @@ def seeds() -> Definitions:
 
 def seeds_in_raw() -> QgsProcessingParameterDefinition:
     """Define the places in a raw cloud from which rails grow that are to be extracted."""
-    point, line = QgsProcessing.SourceType.TypeVectorPoint, QgsProcessing.SourceType.TypeVectorLine
     return advanced(
-        QgsProcessingParameterFeatureSource("SEEDS", tr("Seeds in a raw cloud"), [point, line], optional=True),
+        QgsProcessingParameterFeatureSource("SEEDS", tr("Seeds in a raw cloud"), [POINT, LINE], optional=True),
         tr(
             "Points on railheads, or lines along them: only the rails that grow from these are extracted, as Grow Rail "
             "Points from Seeds follows them. The rail classes are ignored."
@@ -162,18 +159,16 @@ def points() -> QgsProcessingParameterDefinition:
 
 def rails() -> QgsProcessingParameterDefinition:
     """Define the parameter for the rails."""
-    line = QgsProcessing.SourceType.TypeVectorLine
     return helped(
-        QgsProcessingParameterFeatureSource("INPUT", tr("Rails"), [line]),
+        QgsProcessingParameterFeatureSource("INPUT", tr("Rails"), [LINE]),
         tr("Lines of railheads, from Vectorize Rails or drawn by hand."),
     )
 
 
 def centerlines() -> QgsProcessingParameterDefinition:
     """Define the parameter for the track centerlines."""
-    line = QgsProcessing.SourceType.TypeVectorLine
     return helped(
-        QgsProcessingParameterFeatureSource("INPUT", tr("Track centerlines"), [line]),
+        QgsProcessingParameterFeatureSource("INPUT", tr("Track centerlines"), [LINE]),
         tr(
             "Lines midway between rails, from Build Track Centerlines or drawn by hand. Chainage is measured along "
             "them."
@@ -183,9 +178,8 @@ def centerlines() -> QgsProcessingParameterDefinition:
 
 def rails_of_tracks() -> QgsProcessingParameterDefinition:
     """Define the parameter for the rails of the centerlines."""
-    line = QgsProcessing.SourceType.TypeVectorLine
     return helped(
-        QgsProcessingParameterFeatureSource("RAILS", tr("Rails"), [line]),
+        QgsProcessingParameterFeatureSource("RAILS", tr("Rails"), [LINE]),
         tr("The rails of these tracks: those named in left_ids and right_ids, otherwise the nearest."),
     )
 
@@ -200,10 +194,9 @@ def points_of_rails() -> QgsProcessingParameterDefinition:
 
 def elements() -> Definitions:
     """Define the parameters for an element table."""
-    table = QgsProcessing.SourceType.TypeVector
     return (
         helped(
-            QgsProcessingParameterFeatureSource("INPUT", tr("Elements"), [table]),
+            QgsProcessingParameterFeatureSource("INPUT", tr("Elements"), [TABLE]),
             tr("Element table of Fit Alignment or Import Alignment; it may be edited. Its geometries are not used."),
         ),
         advanced(
@@ -215,9 +208,8 @@ def elements() -> Definitions:
 
 def tracks_beside_design() -> QgsProcessingParameterDefinition:
     """Define the measured tracks that are compared with a design."""
-    line = QgsProcessing.SourceType.TypeVectorLine
     return helped(
-        QgsProcessingParameterFeatureSource("TRACKS", tr("Measured tracks"), [line], optional=True),
+        QgsProcessingParameterFeatureSource("TRACKS", tr("Measured tracks"), [LINE], optional=True),
         tr(
             "Centerlines that lie along the alignments, for deviations and report; each is compared with the alignment "
             "beside it, up to 2 m away."
@@ -227,14 +219,13 @@ def tracks_beside_design() -> QgsProcessingParameterDefinition:
 
 def cant_beside_design() -> Definitions:
     """Define the layers from which the cant of measured tracks is known, where it is compared with a design."""
-    line, point = QgsProcessing.SourceType.TypeVectorLine, QgsProcessing.SourceType.TypeVectorPoint
     return (
         advanced(
-            QgsProcessingParameterFeatureSource("QUALITY", tr("Track geometry"), [point], optional=True),
+            QgsProcessingParameterFeatureSource("QUALITY", tr("Track geometry"), [POINT], optional=True),
             tr("Points of Extract Rails or Measure Track Geometry for these tracks, with the cant."),
         ),
         advanced(
-            QgsProcessingParameterFeatureSource("RAILS", tr("Rails"), [line], optional=True),
+            QgsProcessingParameterFeatureSource("RAILS", tr("Rails"), [LINE], optional=True),
             tr("3D lines of both rails, for the cant where there is no track geometry."),
         ),
     )
@@ -265,23 +256,22 @@ def landxml() -> Definitions:
 
 def surveys() -> Definitions:
     """Define the lines that are compared, and the rails of their tracks."""
-    line = QgsProcessing.SourceType.TypeVectorLine
     rails = tr("For centerlines: the rails of these tracks, for differences of gauge and cant.")
     return (
         helped(
-            QgsProcessingParameterFeatureSource("REFERENCE", tr("Reference"), [line]),
+            QgsProcessingParameterFeatureSource("REFERENCE", tr("Reference"), [LINE]),
             tr("Rails or centerlines of the earlier survey, of the design, or of a control measurement."),
         ),
         helped(
-            QgsProcessingParameterFeatureSource("INPUT", tr("Lines to compare"), [line]),
+            QgsProcessingParameterFeatureSource("INPUT", tr("Lines to compare"), [LINE]),
             tr("The same kind of lines of the later survey, in the same coordinate system."),
         ),
         advanced(
-            QgsProcessingParameterFeatureSource("REFERENCE_RAILS", tr("Rails of the reference"), [line], optional=True),
+            QgsProcessingParameterFeatureSource("REFERENCE_RAILS", tr("Rails of the reference"), [LINE], optional=True),
             rails,
         ),
         advanced(
-            QgsProcessingParameterFeatureSource("RAILS", tr("Rails to compare"), [line], optional=True),
+            QgsProcessingParameterFeatureSource("RAILS", tr("Rails to compare"), [LINE], optional=True),
             rails,
         ),
     )
@@ -289,9 +279,8 @@ def surveys() -> Definitions:
 
 def places() -> QgsProcessingParameterDefinition:
     """Define the layer whose features are to get kilometres."""
-    kind = QgsProcessing.SourceType.TypeVectorAnyGeometry
     return helped(
-        QgsProcessingParameterFeatureSource("INPUT", tr("Layer"), [kind]),
+        QgsProcessingParameterFeatureSource("INPUT", tr("Layer"), [ANY]),
         tr("Points, lines or polygons. A line counts where it is half way, a polygon at a place inside."),
     )
 
@@ -299,17 +288,9 @@ def places() -> QgsProcessingParameterDefinition:
 def axis(optional: bool) -> Definitions:
     """Define the axis and what states its kilometres: the line, its start and posts in sight unless it is optional."""
     show = advanced if optional else helped
-    line, point = QgsProcessing.SourceType.TypeVectorLine, QgsProcessing.SourceType.TypeVectorPoint
-    posts = QgsProcessingParameterFeatureSource("POSTS", tr("Kilometre posts"), [point], optional=True)
-    kinds = QgsProcessingParameterField.DataType
-    field = QgsProcessingParameterField(
-        "POST_FIELD", tr("Field of the posts with the kilometre"), None, "POSTS", kinds.Any, False, True
-    )
-    table = QgsProcessing.SourceType.TypeVector
-    jumps = QgsProcessingParameterFeatureSource("JUMPS", tr("Jumps of the kilometres"), [table], optional=True)
     return (
         show(
-            QgsProcessingParameterFeatureSource("AXIS", tr("Axis"), [line], optional=optional),
+            QgsProcessingParameterFeatureSource("AXIS", tr("Axis"), [LINE], optional=optional),
             tr(
                 "Line that carries the kilometres: with M values in kilometres or metres, or with the fields below. In "
                 "another coordinate system it is transformed."
@@ -323,6 +304,19 @@ def axis(optional: bool) -> Definitions:
             choice("DIRECTION", tr("Kilometres along the axis"), DIRECTIONS, INCREASING),
             tr("Whether kilometres increase or decrease from the start of the axis; used with its start kilometre."),
         ),
+        *_posts(show),
+    )
+
+
+def _posts(show: Callable[..., QgsProcessingParameterDefinition]) -> Definitions:
+    """Define what else states kilometres, and how they are written; `show` shows the posts."""
+    posts = QgsProcessingParameterFeatureSource("POSTS", tr("Kilometre posts"), [POINT], optional=True)
+    kinds = QgsProcessingParameterField.DataType
+    field = QgsProcessingParameterField(
+        "POST_FIELD", tr("Field of the posts with the kilometre"), None, "POSTS", kinds.Any, False, True
+    )
+    jumps = QgsProcessingParameterFeatureSource("JUMPS", tr("Jumps of the kilometres"), [TABLE], optional=True)
+    return (
         show(
             posts,
             tr(
@@ -352,26 +346,24 @@ def axis(optional: bool) -> Definitions:
 
 def tracks_to_fit() -> QgsProcessingParameterDefinition:
     """Define the parameter for the tracks whose design is wanted."""
-    line = QgsProcessing.SourceType.TypeVectorLine
     return helped(
-        QgsProcessingParameterFeatureSource("INPUT", tr("Track centerlines"), [line]),
+        QgsProcessingParameterFeatureSource("INPUT", tr("Track centerlines"), [LINE]),
         tr("3D lines of tracks, such as the centerlines of Extract Rails. A field track_id numbers them."),
     )
 
 
 def cant_of_tracks() -> Definitions:
     """Define the layers from which the cant of tracks is known."""
-    line, point = QgsProcessing.SourceType.TypeVectorLine, QgsProcessing.SourceType.TypeVectorPoint
     return (
         helped(
-            QgsProcessingParameterFeatureSource("QUALITY", tr("Track geometry"), [point], optional=True),
+            QgsProcessingParameterFeatureSource("QUALITY", tr("Track geometry"), [POINT], optional=True),
             tr(
                 "Points of Extract Rails or Measure Track Geometry for these tracks: their cant gives elements, and "
                 "sections without rail points do not count."
             ),
         ),
         advanced(
-            QgsProcessingParameterFeatureSource("RAILS", tr("Rails"), [line], optional=True),
+            QgsProcessingParameterFeatureSource("RAILS", tr("Rails"), [LINE], optional=True),
             tr("3D lines of both rails, for the cant where there is no track geometry."),
         ),
     )
@@ -379,9 +371,8 @@ def cant_of_tracks() -> Definitions:
 
 def fixed() -> QgsProcessingParameterDefinition:
     """Define the parameter for a corrected table of elements."""
-    table = QgsProcessing.SourceType.TypeVector
     return advanced(
-        QgsProcessingParameterFeatureSource("FIXED", tr("Corrected elements"), [table], optional=True),
+        QgsProcessingParameterFeatureSource("FIXED", tr("Corrected elements"), [TABLE], optional=True),
         tr(
             "Elements of an earlier run that you have corrected. Their types are held, and radii and starts that you "
             "changed; the rest is fitted again."

@@ -13,52 +13,42 @@ from qgis.core import (
 )
 
 from ..i18n import tr
-from .definitions import advanced, helped
+from .definitions import ANY, LINE, POINT, advanced, helped
 
 Numbers = tuple[QgsProcessingOutputNumber, ...]
 
 
 def rails(name: str = "OUTPUT", optional: bool = False) -> QgsProcessingParameterDefinition:
     """Define the layer of rails."""
-    line = QgsProcessing.SourceType.TypeVectorLine
-    return helped(
-        _layer(name, tr("Rails"), line, optional=optional),
-        tr("Lines along the top of the railheads, with length, support by points and standard error."),
-    )
+    text = tr("Lines along the top of the railheads, with length, support by points and standard error.")
+    return _layer(name, LINE, tr("Rails"), text, optional=optional)
 
 
 def centerlines(name: str = "OUTPUT", optional: bool = False) -> QgsProcessingParameterDefinition:
     """Define the layer of track centerlines."""
-    line = QgsProcessing.SourceType.TypeVectorLine
-    return helped(
-        _layer(name, tr("Track centerlines"), line, optional=optional),
-        tr("Lines midway between the two rails of each track, with gauge and cant."),
-    )
+    text = tr("Lines midway between the two rails of each track, with gauge and cant.")
+    return _layer(name, LINE, tr("Track centerlines"), text, optional=optional)
 
 
 def quality(name: str = "OUTPUT") -> QgsProcessingParameterDefinition:
     """Define the layer of points along tracks."""
-    point = QgsProcessing.SourceType.TypeVectorPoint
-    return helped(
-        _layer(name, tr("Track geometry"), point, optional=True),
-        tr("Points along each track with gauge, cant, twist, radius, gradient, standard error and support."),
-    )
+    text = tr("Points along each track with gauge, cant, twist, radius, gradient, standard error and support.")
+    return _layer(name, POINT, tr("Track geometry"), text)
 
 
-def _layer(name: str, label: str, kind: QgsProcessing.SourceType, optional: bool) -> QgsProcessingParameterFeatureSink:
-    """Define a layer; features may also be added to an existing one."""
+def _layer(
+    name: str, kind: QgsProcessing.SourceType, label: str, text: str, optional: bool = True
+) -> QgsProcessingParameterDefinition:
+    """Define a layer with its help text; features may also be added to an existing one."""
     made = QgsProcessingParameterFeatureSink(name, label, kind, optional=optional)
     made.setSupportsAppend(True)
-    return made
+    return helped(made, text)
 
 
 def airborne_centerlines() -> QgsProcessingParameterDefinition:
     """Define the layer of tracks seen in an airborne cloud."""
-    line = QgsProcessing.SourceType.TypeVectorLine
-    return helped(
-        _layer("CENTERLINES", tr("Track centerlines"), line, optional=True),
-        tr("Lines in the middle of the tracks at the top of the rails, where they are seen, with standard errors."),
-    )
+    text = tr("Lines in the middle of the tracks at the top of the rails, where they are seen, with standard errors.")
+    return _layer("CENTERLINES", LINE, tr("Track centerlines"), text)
 
 
 def further(definition: QgsProcessingParameterDefinition) -> QgsProcessingParameterDefinition:
@@ -68,26 +58,20 @@ def further(definition: QgsProcessingParameterDefinition) -> QgsProcessingParame
 
 def airborne_stations() -> QgsProcessingParameterDefinition:
     """Define the layer of stations along guides."""
-    point = QgsProcessing.SourceType.TypeVectorPoint
-    return helped(
-        _layer("STATIONS", tr("Stations"), point, optional=True),
-        tr(
-            "A point every 10 m along each guide: whether the track is seen, or why not; bed, cant, radius, gradient "
-            "and standard errors."
-        ),
+    text = tr(
+        "A point every 10 m along each guide: whether the track is seen, or why not; bed, cant, radius, gradient "
+        "and standard errors."
     )
+    return _layer("STATIONS", POINT, tr("Stations"), text)
 
 
 def proposed_guides() -> QgsProcessingParameterDefinition:
     """Define the layer of guides for a cloud without any."""
-    line = QgsProcessing.SourceType.TypeVectorLine
-    return helped(
-        _layer("PROPOSED", tr("Proposed guides"), line, optional=True),
-        tr(
-            "Only where GUIDE is empty: lines along which tracks seem to lie, with a score. Delete or move what is "
-            "wrong, add what is missing, and run again with this layer as GUIDE."
-        ),
+    text = tr(
+        "Only where GUIDE is empty: lines along which tracks seem to lie, with a score. Delete or move what is "
+        "wrong, add what is missing, and run again with this layer as GUIDE."
     )
+    return _layer("PROPOSED", LINE, tr("Proposed guides"), text)
 
 
 def airborne_figures() -> Numbers:
@@ -103,11 +87,8 @@ def airborne_figures() -> Numbers:
 
 def differences() -> QgsProcessingParameterDefinition:
     """Define the layer of differences between two surveys."""
-    point = QgsProcessing.SourceType.TypeVectorPoint
-    return helped(
-        _layer("OUTPUT", tr("Differences"), point, optional=True),
-        tr("Points along the lines of the reference with the differences, and along lines that it does not have."),
-    )
+    text = tr("Points along the lines of the reference with the differences, and along lines that it does not have.")
+    return _layer("OUTPUT", POINT, tr("Differences"), text)
 
 
 def comparison_report() -> QgsProcessingParameterDefinition:
@@ -132,11 +113,8 @@ def comparison_figures() -> Numbers:
 
 def stationed() -> QgsProcessingParameterDefinition:
     """Define the copy of a layer with kilometres."""
-    kind = QgsProcessing.SourceType.TypeVectorAnyGeometry
-    return helped(
-        _layer("OUTPUT", tr("Layer with kilometres"), kind, optional=False),
-        tr("The features of the layer with all their fields, and with axis, kilometre, offset and side."),
-    )
+    text = tr("The features of the layer with all their fields, and with axis, kilometre, offset and side.")
+    return _layer("OUTPUT", ANY, tr("Layer with kilometres"), text, optional=False)
 
 
 def station_figures() -> Numbers:
@@ -150,38 +128,27 @@ def station_figures() -> Numbers:
 
 def findings() -> QgsProcessingParameterDefinition:
     """Define the layer of places to look at."""
-    line = QgsProcessing.SourceType.TypeVectorLine
-    return helped(
-        _layer("FINDINGS", tr("Findings"), line, optional=True),
-        tr("Places to look at, with the reason, the most harmful first: the table of the report as lines to review."),
-    )
+    text = tr("Places to look at, with the reason, the most harmful first: the table of the report as lines to review.")
+    return _layer("FINDINGS", LINE, tr("Findings"), text)
 
 
 def stops() -> QgsProcessingParameterDefinition:
     """Define the layer of places where rails were not followed further."""
-    point = QgsProcessing.SourceType.TypeVectorPoint
-    return helped(
-        _layer("STOPS", tr("Stops"), point, optional=True),
-        tr("Points where a rail is not followed further, with the reason."),
+    return _layer(
+        "STOPS", POINT, tr("Stops"), tr("Points where a rail is not followed further, with the reason."), True
     )
 
 
 def elements() -> QgsProcessingParameterDefinition:
     """Define the element table."""
-    line = QgsProcessing.SourceType.TypeVectorLine
-    return helped(
-        _layer("ELEMENTS", tr("Elements"), line, optional=True),
-        tr("The element table: a line for each element in plan, in height and of cant, with its figures."),
-    )
+    text = tr("The element table: a line for each element in plan, in height and of cant, with its figures.")
+    return _layer("ELEMENTS", LINE, tr("Elements"), text)
 
 
 def deviations() -> QgsProcessingParameterDefinition:
     """Define the layer of deviations from a design."""
-    point = QgsProcessing.SourceType.TypeVectorPoint
-    return helped(
-        _layer("DEVIATIONS", tr("Deviations"), point, optional=True),
-        tr("Points along the design, one per metre, with slew, lift and difference of cant: measured minus design."),
-    )
+    text = tr("Points along the design, one per metre, with slew, lift and difference of cant: measured minus design.")
+    return _layer("DEVIATIONS", POINT, tr("Deviations"), text)
 
 
 def alignment_report() -> QgsProcessingParameterDefinition:
@@ -194,11 +161,8 @@ def alignment_report() -> QgsProcessingParameterDefinition:
 
 def axes() -> QgsProcessingParameterDefinition:
     """Define the layer of alignments as lines."""
-    line = QgsProcessing.SourceType.TypeVectorLine
-    return helped(
-        _layer("AXIS", tr("Axes"), line, optional=True),
-        tr("A line for each alignment, less than a millimetre off the exact curve, with kilometres as M values."),
-    )
+    text = tr("A line for each alignment, less than a millimetre off the exact curve, with kilometres as M values.")
+    return _layer("AXIS", LINE, tr("Axes"), text)
 
 
 def alignment_file() -> QgsProcessingParameterDefinition:

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from ...core.airborne.survey import Guide
     from ...core.alignment.placed_axes import PlacedAxes
     from ...core.clouds.mask import Mask
-    from ...core.raster_file import RasterHeader
+    from ...core.output.raster_file import RasterHeader
     from ...core.tasks import Runner
 
 INCREASING, DECREASING = DIRECTIONS = ("INCREASING", "DECREASING")

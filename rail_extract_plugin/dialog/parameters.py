@@ -276,6 +276,20 @@ def lines() -> Definitions:
     """Define how the raster becomes lines with heights."""
     return (
         smoothing_xy(),
+        *_heights(),
+        max_gap(),
+        advanced(
+            number("GAP_ANGLE", tr("Largest bend across a gap [°]"), Parameters.gap_angle_deg, maximum=90.0),
+            tr("Line ends that meet at a larger angle are not joined."),
+        ),
+        *simplification(),
+        min_length(),
+    )
+
+
+def _heights() -> Definitions:
+    """Define how lines get their heights."""
+    return (
         advanced(
             number("SMOOTHING_Z", tr("Smoothing in height [m]"), minimum=0.05, maximum=MAX_SMOOTHING_M, optional=True),
             tr(
@@ -307,13 +321,6 @@ def lines() -> Definitions:
                 "hardly affects the line: reduce it only where short, deep dips lose their points."
             ),
         ),
-        max_gap(),
-        advanced(
-            number("GAP_ANGLE", tr("Largest bend across a gap [°]"), Parameters.gap_angle_deg, maximum=90.0),
-            tr("Line ends that meet at a larger angle are not joined."),
-        ),
-        *simplification(),
-        min_length(),
     )
 
 

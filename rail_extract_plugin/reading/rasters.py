@@ -8,8 +8,8 @@ from dataclasses import replace
 from ...core.errors import RasterError
 from ...core.frame import LocalFrame
 from ...core.frpdf.models import MODELS, Model, choose
+from ...core.output.raster_file import RasterHeader
 from ...core.raster import RailRaster, cell_size
-from ...core.raster_file import RasterHeader
 from ...core.standards import RailStandard
 
 CELL_TOLERANCE = 0.03

@@ -79,19 +79,15 @@ class ReviewDock(QDockWidget):
             label.setTextFormat(Qt.TextFormat.PlainText)
         self.reason.setStyleSheet("font-weight: 600")
         self.problem.setStyleSheet("color: #d62839")
-        self.buttons = {
-            name: QPushButton(text)
-            for name, text in (
-                ("previous", tr("Previous")),
-                ("next", tr("Next")),
-                (ACCEPTED, tr("Accept")),
-                (REJECTED, tr("Reject")),
-            )
+        shown = {
+            "previous": (tr("Previous"), tr("Show the finding before.")),
+            "next": (tr("Next"), tr("Show the next finding.")),
+            ACCEPTED: (tr("Accept"), tr("The lines are right here. Press again to take the decision back.")),
+            REJECTED: (tr("Reject"), tr("The lines are wrong here. Press again to take the decision back.")),
         }
-        self.buttons["previous"].setToolTip(tr("Show the finding before."))
-        self.buttons["next"].setToolTip(tr("Show the next finding."))
-        self.buttons[ACCEPTED].setToolTip(tr("The lines are right here. Press again to take the decision back."))
-        self.buttons[REJECTED].setToolTip(tr("The lines are wrong here. Press again to take the decision back."))
+        self.buttons = {name: QPushButton(label) for name, (label, _) in shown.items()}
+        for name, (_, tip) in shown.items():
+            self.buttons[name].setToolTip(tip)
         for name in (ACCEPTED, REJECTED):
             self.buttons[name].setCheckable(True)
         for name, key in KEYS.items():

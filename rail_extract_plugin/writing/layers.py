@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,10 +42,10 @@ if TYPE_CHECKING:
     from ...core.airborne.survey import AirborneLine
     from ...core.alignment.fit import Fit
     from ...core.frame import LocalFrame
-    from ...core.layers import Layer
+    from ...core.output.layers import Layer
+    from ...core.output.raster_file import RasterHeader
     from ...core.rails import Centerline, RailLine, TrackGeometry
     from ...core.raster import RailRaster
-    from ...core.raster_file import RasterHeader
 
 KINDS = {int: INTEGER, float: REAL, str: TEXT}
 
@@ -166,6 +167,28 @@ def write_layer(
         return {}
     _style(algorithm, name, layer_id, product.style, context, has_system=frame.crs_wkt is not None)
     return {name: layer_id}
+
+
+def layer_writers(
+    algorithm: QgsProcessingAlgorithm,
+    makers: Mapping[str, Callable[[], Layer]],
+    frame: LocalFrame,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, Callable[[], dict[str, str]]]:
+    """Return the functions that make layers and write them to the outputs of their names, for `write_each`.
+
+    Parameters
+    ----------
+    makers : mapping of str to callable
+    algorithm, frame, parameters, context
+        See `write_layer`.
+    """
+
+    def write(name: str) -> dict[str, str]:
+        return write_layer(algorithm, name, makers[name](), frame, parameters, context)
+
+    return {name: partial(write, name) for name in makers if is_wanted(parameters.get(name), context)}
 
 
 def write_raster(
@@ -305,7 +328,7 @@ def _exchange(
     context: QgsProcessingContext,
 ) -> dict[str, str]:
     """Write features for other programs; QGIS loads the file if the user wants that."""
-    from ...core.exchange import Shape, write_shapes
+    from ...core.output.exchange import Shape, write_shapes
 
     destination, value = algorithm.destinations[name], parameters.get(name)
     shapes = (

@@ -11,7 +11,6 @@ from rail_extract.core.frame import LocalFrame
 EAST, NORTH = 500_000.0, 3_000_000.0
 SHAPES = [(150.0, 0, 0), (60.0, 0, -1 / 500), (150.0, -1 / 500, -1 / 500), (60.0, -1 / 500, 0), (100.0, 0, 0)]
 FITTED = "layout, type, s_from, s_to, r1_m, r2_m, sigma_r_m, x, cant2_mm, r_round_m"
-PLACES = "s_from, x, y, z, cant1_mm"
 
 
 @pytest.fixture(scope="module")
@@ -99,13 +98,6 @@ def test_elements_and_deviations_and_a_corrected_table(succeed, survey):
     held = table(survey / "held.gpkg")["H"]
     assert held[2][3] == held[2][4] == pytest.approx(-498.0, abs=1e-4)
     assert [row[0] for row in held] == [row[0] for row in found["H"]]
-
-
-def places(path):
-    """Types, and where the elements begin."""
-    with sqlite3.connect(path) as database:
-        rows = list(database.execute(f"SELECT layout, type, {PLACES} FROM {path.stem} ORDER BY fid"))
-    return [row[:2] for row in rows], np.array([row[2:] for row in rows], dtype=float)
 
 
 def test_lines_of_an_extraction_have_the_elements_of_the_scene(extracted, succeed, tmp_path):

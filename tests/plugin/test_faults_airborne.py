@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from faults import refused
-from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from memory_layers import layer_of
 
 TITLE = "Airborne clouds"
 
@@ -20,12 +20,8 @@ def cloud(bench, density=10, class_code=2, width_m=10.0):
 
 def guided(*texts, kind="LineString", crs="EPSG:32643", density=10, class_code=2, **parameters):
     def prepare(bench):
-        layer = QgsVectorLayer(f"{kind}?crs={crs}", "guides", "memory")
-        for text in texts:
-            feature = QgsFeature(layer.fields())
-            feature.setGeometry(QgsGeometry.fromWkt(text))
-            assert layer.dataProvider().addFeature(feature)
-        return {"INPUT": cloud(bench, density, class_code), "GUIDE": layer, **parameters}
+        guide = layer_of(*texts, kind=kind, crs=crs)
+        return {"INPUT": cloud(bench, density, class_code), "GUIDE": guide, **parameters}
 
     return prepare
 

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 from faults import FINE, WARNED, Fault, refused
-from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from memory_layers import layer_of
+from qgis.core import QgsFeature, QgsVectorLayer
 from rail_extract.core.fields import ELEMENT_FIELDS
 from rail_extract.rail_extract_plugin.writing.layers import fields
 
@@ -50,10 +51,8 @@ def of_file(text=None, name="design.xml", **parameters):
 
 
 def line_at(bench, x):
-    bench.layer = QgsVectorLayer("LineString?crs=EPSG:25832", "tracks", "memory")
-    feature = QgsFeature()
-    feature.setGeometry(QgsGeometry.fromWkt(f"LineString({x} 5804300, {x + 90} 5804300)"))
-    bench.layer.dataProvider().addFeature(feature)
+    line = f"LineString({x} 5804300, {x + 90} 5804300)"
+    bench.layer = layer_of(line, kind="LineString", crs="EPSG:25832")  # which QGIS deletes with its Python object
     return bench.layer
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 from faults import WARNED, Fault, refused
-from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from memory_layers import layer_of
 
 TITLE = "Kilometres"
 
@@ -12,35 +12,23 @@ OTHER = "LINESTRING(500000 3000400, 501000 3000400)"
 PLACE = "POINT(500100 3000004)"
 
 
-def layer(kind, *texts, fields="", values=(), crs="EPSG:32643"):
-    made = QgsVectorLayer(f"{kind}?crs={crs}{fields}" if kind != "None" else f"None?{fields[1:]}", "layer", "memory")
-    for number in range(max(len(texts), len(values))):
-        feature = QgsFeature(made.fields())
-        if texts:
-            feature.setGeometry(QgsGeometry.fromWkt(texts[number]))
-        if values:
-            feature.setAttributes(list(values[number]))
-        assert made.dataProvider().addFeature(feature)
-    return made
-
-
 def given(axis=(AXIS,), kind="LineString", crs="EPSG:32643", places=("Point", PLACE), **parameters):
     """A layer of places and an axis; a function among the parameters makes the value."""
 
     def prepare(bench):
         made = {name: value() if callable(value) else value for name, value in parameters.items()}
-        return {"INPUT": layer(*places), "AXIS": layer(kind, *axis, crs=crs), **made}
+        return {"INPUT": layer_of(*places[1:], kind=places[0]), "AXIS": layer_of(*axis, kind=kind, crs=crs), **made}
 
     return prepare
 
 
 def posts(*rows, fields="&field=km:double"):
     texts = [f"POINT({500_000 + east} {3_000_000 + north})" for east, north, _ in rows]
-    return lambda: layer("Point", *texts, fields=fields, values=[(km,) for _, _, km in rows])
+    return lambda: layer_of(*texts, kind="Point", fields=fields, values=[(km,) for _, _, km in rows])
 
 
 def jumps(*rows, fields="&field=km_back:double&field=km_ahead:double"):
-    return lambda: layer("None", fields=fields, values=rows)
+    return lambda: layer_of(kind="None", fields=fields, values=rows)
 
 
 def without_axis(bench):
@@ -81,8 +69,8 @@ FAULTS = [
     refused(
         "axis and places in degrees",
         lambda bench: {
-            "INPUT": layer("Point", "POINT(75 27.1)", crs="EPSG:4326"),
-            "AXIS": layer("LineString", "LINESTRING(75 27.1, 75.01 27.1)", crs="EPSG:4326"),
+            "INPUT": layer_of("POINT(75 27.1)", kind="Point", crs="EPSG:4326"),
+            "AXIS": layer_of("LINESTRING(75 27.1, 75.01 27.1)", kind="LineString", crs="EPSG:4326"),
             "START_KM": 1.0,
         },
         "AXIS and INPUT are in degrees, where lengths can't be measured: reproject AXIS, for example to the UTM zone "
@@ -160,7 +148,7 @@ FAULTS = [
         "kilometres for lines that are not measured",
         lambda bench: {
             "INPUT": bench.cloud(bench.track()),
-            "AXIS": layer("LineStringM", AXIS_M),
+            "AXIS": layer_of(AXIS_M, kind="LineStringM"),
             **dict.fromkeys(("QUALITY", "FINDINGS", "CLEANED")),
         },
         "AXIS gives QUALITY, FINDINGS and REPORT kilometres: name at least one of these.",

@@ -2,7 +2,7 @@
 
 import pytest
 from faults import FINE, WARNED, Fault, refused
-from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from memory_layers import layer_of
 
 TITLE = "Comparison"
 
@@ -13,21 +13,12 @@ POINT = "POINT Z (500000 3000000 100)"
 STATED = {"REFERENCE_SIGMA": 1, "INPUT_SIGMA": 1}
 
 
-def layer(*texts, kind="LineStringZ", crs="EPSG:32643"):
-    made = QgsVectorLayer(f"{kind}?crs={crs}", "lines", "memory")
-    for text in texts:
-        feature = QgsFeature(made.fields())
-        feature.setGeometry(QgsGeometry.fromWkt(text))
-        assert made.dataProvider().addFeature(feature)
-    return made
-
-
 def given(reference=(LINE,), lines=(BESIDE,), kind="LineStringZ", crs="EPSG:32643", **parameters):
     """Lines of a reference in UTM zone 43N, and lines to compare."""
 
     def prepare(bench):
         made = {name: value() if callable(value) else value for name, value in parameters.items()}
-        return {"REFERENCE": layer(*reference), "INPUT": layer(*lines, kind=kind, crs=crs), **STATED, **made}
+        return {"REFERENCE": layer_of(*reference), "INPUT": layer_of(*lines, kind=kind, crs=crs), **STATED, **made}
 
     return prepare
 
@@ -64,7 +55,7 @@ FAULTS = [
     ),
     refused(
         "rails of one survey only",
-        given(RAILS=lambda: layer(LINE)),
+        given(RAILS=lambda: layer_of(LINE)),
         "Gauge and cant are compared between the rails of both surveys: choose REFERENCE_RAILS, too.",
     ),
     Fault(

@@ -10,13 +10,12 @@ import faults
 import numpy as np
 import pytest
 from faults import FINE, Fault, refused
+from memory_layers import layer_of
 from osgeo import ogr
 from qgis.core import (
     Qgis,
     QgsApplication,
     QgsCoordinateTransformContext,
-    QgsFeature,
-    QgsGeometry,
     QgsVectorFileWriter,
     QgsVectorLayer,
 )
@@ -182,21 +181,12 @@ def one_removed_on_the_way(bench):
     return {**cloud(bench), **skipped, "RAILS": bench.folder / "rails.gpkg", "CENTERLINES": gone}
 
 
-def lines(*texts):
-    layer = QgsVectorLayer("LineStringZ?crs=EPSG:32643", "lines", "memory")
-    for text in texts:
-        feature = QgsFeature()
-        feature.setGeometry(QgsGeometry.fromWkt(text))
-        assert layer.dataProvider().addFeature(feature)
-    return layer
-
-
 def long_track():
     """Six kilometres of track, with stations that take a megabyte."""
     left, middle, right = (
         f"LINESTRING Z (500000 {3000000 + across} 100, 506000 {3000000 + across} 100)" for across in (1.507, 0.7535, 0)
     )
-    return {"INPUT": lines(middle), "RAILS": lines(left, right)}
+    return {"INPUT": layer_of(middle), "RAILS": layer_of(left, right)}
 
 
 def full_disk(room, make, suffix):
@@ -218,7 +208,7 @@ def points_only(bench):
 
 def earlier(path):
     """An output of an earlier run."""
-    before = lines("LINESTRING Z (0 0 0, 1 1 1)", "LINESTRING Z (0 0 0, 2 2 2)")
+    before = layer_of("LINESTRING Z (0 0 0, 1 1 1)", "LINESTRING Z (0 0 0, 2 2 2)")
     options = QgsVectorFileWriter.SaveVectorOptions()
     options.driverName = QgsVectorFileWriter.driverForExtension(path.suffix)
     QgsVectorFileWriter.writeAsVectorFormatV3(before, str(path), QgsCoordinateTransformContext(), options)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from faults import FINE, WARNED, Fault, refused
-from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from memory_layers import layer_of
 
 TITLE = "Design elements"
 
@@ -11,13 +11,9 @@ TITLE = "Design elements"
 def line(count=200, kind="LineStringZ", crs="EPSG:32643", shape=None, fields=""):
     """A layer with one line, straight to the east unless there is another shape."""
     x = np.arange(count, dtype=float)
-    xy = np.column_stack([500_000 + x, 3_000_000 + 0 * x]) if shape is None else shape
-    places = ", ".join(f"{east} {north}" + (" 50" if kind.endswith("Z") else "") for east, north in xy)
-    made = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "tracks", "memory")
-    feature = QgsFeature(made.fields())
-    feature.setGeometry(QgsGeometry.fromWkt(f"{kind.replace('Z', ' Z')}({places})"))
-    assert made.dataProvider().addFeature(feature)
-    return made
+    xy = np.column_stack([500_000 + x, 3_000_000 + 0 * x]) if shape is None else np.asarray(shape, dtype=float)
+    heights = np.full((len(xy), int(kind.endswith("Z"))), 50.0)
+    return layer_of(np.hstack([xy, heights]), kind=kind, crs=crs, fields=fields)
 
 
 def ring():
@@ -32,14 +28,10 @@ def stray():
 
 def in_two_parts():
     """A track of two straight lines in one feature."""
-    made = QgsVectorLayer("MultiLineStringZ?crs=EPSG:32643", "tracks", "memory")
-    feature = QgsFeature()
     parts = [
         "(" + ", ".join(f"{x} {3_000_000} 50" for x in range(first, first + 100)) + ")" for first in (500_000, 500_150)
     ]
-    feature.setGeometry(QgsGeometry.fromWkt(f"MultiLineString Z({', '.join(parts)})"))
-    assert made.dataProvider().addFeature(feature)
-    return made
+    return layer_of(f"MultiLineString Z({', '.join(parts)})", kind="MultiLineStringZ")
 
 
 def branch():

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 from faults import FINE, WARNED, Fault, refused
+from memory_layers import layer_of
 from osgeo import gdal, osr
-from qgis.core import QgsFeature, QgsGeometry, QgsLineString, QgsPoint, QgsVectorLayer
+from qgis.core import QgsGeometry, QgsLineString, QgsPoint, QgsVectorLayer
 
 TITLE = "Rasters and lines"
 NAN, INFINITE = float("nan"), float("inf")
@@ -125,17 +126,7 @@ FLAT_LEFT, FLAT_RIGHT = (text.replace(" Z", "").replace(" 100)", ")").replace(" 
 def lines(*texts, kind="LineStringZ", crs="EPSG:32643", fields="", values=()):
     """A line layer in memory."""
 
-    def prepare(bench):
-        layer = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "lines", "memory")
-        for number, text in enumerate(texts):
-            feature = QgsFeature(layer.fields())
-            feature.setGeometry(QgsGeometry.fromWkt(text) if isinstance(text, str) else text)
-            if values:
-                feature.setAttributes(list(values[number]))
-            assert layer.dataProvider().addFeature(feature)
-        return {"INPUT": layer}
-
-    return prepare
+    return lambda bench: {"INPUT": layer_of(*texts, kind=kind, crs=crs, fields=fields, values=values)}
 
 
 def table(bench):

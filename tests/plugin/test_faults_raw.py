@@ -6,7 +6,7 @@ import laspy
 import numpy as np
 import pytest
 from faults import WARNED, Fault, refused
-from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from memory_layers import layer_of
 from rail_extract.laboratory.scenes.raw_shapes import flat, rough, with_track
 
 TITLE = "Raw clouds"
@@ -71,11 +71,7 @@ def guide(text, crs="EPSG:32643", **parameters):
     """A raw cloud, and a line layer with this line."""
 
     def prepare(bench):
-        layer = QgsVectorLayer(f"LineString?crs={crs}", "guide", "memory")
-        feature = QgsFeature(layer.fields())
-        feature.setGeometry(QgsGeometry.fromWkt(text))
-        assert not text or layer.dataProvider().addFeature(feature)
-        return {**raw(**parameters)(bench), "GUIDE": layer}
+        return {**raw(**parameters)(bench), "GUIDE": layer_of(*filter(None, [text]), kind="LineString", crs=crs)}
 
     return prepare
 

@@ -5,7 +5,7 @@ import resource
 import numpy as np
 import pytest
 from faults import FINE, WARNED, Fault, refused
-from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from memory_layers import layer_of
 from rail_extract.laboratory.scenes.raw_strips import SPACING_M, strip
 
 TITLE = "Seeds"
@@ -28,12 +28,7 @@ def seeds(*texts, kind="Point", crs="EPSG:32643", change=lambda xyz: xyz, **para
     """A raw cloud, and a layer with these shapes."""
 
     def prepare(bench):
-        layer = QgsVectorLayer(f"{kind}?crs={crs}", "seeds", "memory")
-        for text in texts:
-            feature = QgsFeature(layer.fields())
-            feature.setGeometry(QgsGeometry.fromWkt(text))
-            assert layer.dataProvider().addFeature(feature)
-        return {"INPUT": cloud(bench, change), "SEEDS": layer, **parameters}
+        return {"INPUT": cloud(bench, change), "SEEDS": layer_of(*texts, kind=kind, crs=crs), **parameters}
 
     return prepare
 

@@ -4,7 +4,8 @@ from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.axis import UNSHOWN_M, Axis
 from rail_extract.core.heads.edges import station_count
-from rail_extract.core.heads.elevation import ElevationParameters, elevate
+from rail_extract.core.heads.elevation import elevate
+from rail_extract.core.heads.head_points import HeadPoints, near_lines
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.polyline import interpolate, length_along, project
@@ -32,7 +33,7 @@ def head(length, density, noise=0.003, seed=0):
 def axis(t, across, z, length=60.0, free=None):
     line = np.column_stack([np.linspace(0, length, int(10 * length) + 1), np.zeros(int(10 * length) + 1)])
     free = np.ones((2, station_count(length)), dtype=bool) if free is None else free
-    return Axis.of(line, t, across, z, WIDTH, free, UNSEEN)
+    return Axis.of(HeadPoints(t, across, z, WIDTH, line, free), UNSEEN)
 
 
 def support(t, across, z, length=60.0, free=None):
@@ -50,7 +51,8 @@ def test_errors_of_lines_are_as_large_as_stated(left_m, noise_m):
     rails = [scan(track.railhead(side), WIDTH, path, scanner, random, gaps[: 3 * (side > 0)]) for side in (1, -1)]
     points = RailPoints(np.concatenate(rails), LocalFrame(np.zeros(3)), 10)
     network = smooth_network(vectorize(rasterize(points.xyz, cell_size(GAUGE, WIDTH)), WIDTH), 0.8)
-    lines = elevate(refine(network, points, WIDTH), points, ElevationParameters(WIDTH))
+    network = refine(network, points, WIDTH)
+    lines = elevate(network, near_lines(network.lines, points.xyz, WIDTH), 10)
     errors, local, whole = [], [], []
     for line in lines:
         stations = interpolate(line.xyz[:, :2], length_along(line.xyz[:, :2]), line.support.t)

@@ -1,9 +1,16 @@
 import numpy as np
 import pytest
 from rail_extract.core.heads.blunt import Ridge, wander
+from rail_extract.core.heads.edges import station_count
+from rail_extract.core.heads.head_points import HeadPoints
 from scipy.ndimage import gaussian_filter1d
 
 WIDTH, LENGTH_M, BEND = 0.072, 40.0, 8.0
+
+
+def ridge_of(t, across, z):
+    line, free = np.array([[0.0, 0.0], [LENGTH_M, 0.0]]), np.ones((2, station_count(LENGTH_M)), dtype=bool)
+    return Ridge.find(HeadPoints(t, across, z, WIDTH, line, free))
 
 
 def ridge_points(offset_m=0.0, noise_m=0.015, slope=0.0, per_m=40, seed=0):
@@ -18,7 +25,7 @@ def ridge_points(offset_m=0.0, noise_m=0.015, slope=0.0, per_m=40, seed=0):
 @pytest.mark.parametrize("offset_m", [-0.006, 0.0, 0.006])
 def test_the_crest_is_found_within_its_standard_error(offset_m):
     t, across, z = ridge_points(offset_m)
-    ridge = Ridge.find(t, across, z, LENGTH_M, WIDTH)
+    ridge = ridge_of(t, across, z)
     error = (ridge.course_m - offset_m)[20:-20]
     assert np.sqrt(np.mean(error**2)) < 0.006
     of_stations = ((ridge.offset_m - offset_m) * np.sqrt(ridge.information))[20:-20]

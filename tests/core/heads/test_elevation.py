@@ -5,16 +5,21 @@ import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.elevation import ElevationParameters, elevate, find_gaps, flat_rails
+from rail_extract.core.heads.head_points import near_lines
 from rail_extract.core.lines.network import LineNetwork
 
 WIDTH = 0.072
-PARAMETERS = ElevationParameters(head_width_m=WIDTH)
+PARAMETERS = ElevationParameters()
 
 
 def network_of(*lines):
     lines = tuple(np.asarray(line, dtype=float) for line in lines)
     nodes = np.array([line[end] for line in lines for end in (0, -1)])
     return LineNetwork(lines, nodes, np.arange(2 * len(lines)).reshape(-1, 2))
+
+
+def elevated(network, points, parameters=PARAMETERS):
+    return elevate(network, near_lines(network.lines, points.xyz, WIDTH), points.class_code, parameters)
 
 
 def straight_line(length, step=0.1):
@@ -58,7 +63,7 @@ def height_error(rail, profile=lambda x: 0 * x):
 @pytest.mark.parametrize("seed", [0, 1])
 def test_height_is_that_of_the_top_despite_side_faces_and_noise(noise, low_share, bias_limit, rms_limit, seed):
     points = cloud(head(160, 79, noise, low_share, seed=seed))
-    (rail,) = elevate(network_of(straight_line(160)), points, PARAMETERS)
+    (rail,) = elevated(network_of(straight_line(160)), points)
     bias, rms = height_error(rail)
     assert abs(bias) < bias_limit
     assert rms < rms_limit
@@ -66,7 +71,7 @@ def test_height_is_that_of_the_top_despite_side_faces_and_noise(noise, low_share
 
 @pytest.mark.parametrize("slope", [-0.12, -0.05, 0.05, 0.12])
 def test_height_is_that_of_the_axis_on_an_inclined_head(slope):
-    (rail,) = elevate(network_of(straight_line(100)), cloud(head(100, 100, slope=slope)), PARAMETERS)
+    (rail,) = elevated(network_of(straight_line(100)), cloud(head(100, 100, slope=slope)))
     bias, rms = height_error(rail)
     assert abs(bias) < 0.0008
     assert rms < 0.0012
@@ -80,7 +85,7 @@ def test_weeds_above_and_stones_below_do_not_change_the_height():
         [random.uniform(0, 100, 300), random.normal(0, 0.05, 300), random.uniform(-0.2, -0.05, 300)]
     )
     points = cloud(head(100, 100), weeds, bush, stones)
-    (rail,) = elevate(network_of(straight_line(100)), points, PARAMETERS)
+    (rail,) = elevated(network_of(straight_line(100)), points)
     x = np.arange(0, 100, 0.1)
     error = np.interp(x, rail.xyz[:, 0], rail.xyz[:, 2])
     assert abs(error.mean()) < 0.001
@@ -91,7 +96,7 @@ def test_a_wave_in_the_track_keeps_its_height():
     def profile(x):
         return 0.02 * np.sin(2 * np.pi * x / 80)
 
-    (rail,) = elevate(network_of(straight_line(240)), cloud(head(240, 100, profile=profile)), PARAMETERS)
+    (rail,) = elevated(network_of(straight_line(240)), cloud(head(240, 100, profile=profile)))
     bias, rms = height_error(rail, profile)
     assert abs(bias) < 0.001
     assert rms < 0.001
@@ -102,7 +107,7 @@ def test_steep_gradients_reach_the_ends():
         return 0.04 * x
 
     points = cloud(head(30, 60, profile=profile))
-    (rail,) = elevate(network_of(straight_line(30)), points, PARAMETERS)
+    (rail,) = elevated(network_of(straight_line(30)), points)
     np.testing.assert_allclose(rail.xyz[[0, -1], 2], profile(np.array([0.0, 30.0])), atol=0.003)
 
 
@@ -113,7 +118,7 @@ def test_heights_continue_across_a_gap_that_counts_as_bridged(gap):
 
     xyz = head(80, 80, profile=profile)
     xyz = xyz[(xyz[:, 0] < 40) | (xyz[:, 0] > 40 + gap)]
-    (rail,) = elevate(network_of(straight_line(80)), cloud(xyz), PARAMETERS)
+    (rail,) = elevated(network_of(straight_line(80)), cloud(xyz))
     x = np.arange(38, 42 + gap, 0.1)
     np.testing.assert_allclose(np.interp(x, rail.xyz[:, 0], rail.xyz[:, 2]), profile(x), atol=0.004)
     assert rail.bridged_m == pytest.approx(gap, abs=0.2)
@@ -132,7 +137,7 @@ def test_a_bridge_does_not_lift_the_rail_that_it_hides(grade, crossing):
     random = np.random.default_rng(3)
     above = [np.column_stack([random.uniform(x, x + 0.07, 30), random.uniform(-0.036, 0.036, 30)]) for x in crossing]
     above = np.column_stack([np.concatenate(above), np.full(30 * len(crossing), 6.5) + grade * 40])
-    (rail,) = elevate(network_of(straight_line(80)), cloud(below, above), PARAMETERS)
+    (rail,) = elevated(network_of(straight_line(80)), cloud(below, above))
     x = np.arange(0, 80, 0.1)
     np.testing.assert_allclose(np.interp(x, rail.xyz[:, 0], rail.xyz[:, 2]), profile(x), atol=0.006)
     assert rail.bridged_m == pytest.approx(10.0, abs=0.3)
@@ -153,7 +158,7 @@ def test_few_points_make_no_gaps_by_chance(seed, per_m):
 def test_gaps_are_where_the_finished_line_has_no_points(turn):
     points = cloud(head(40, 80) + [5.0, 0.0, 0.0])
     points = RailPoints(points.xyz[np.abs(points.xyz[:, 0] - 21.0) > 1.5], points.frame, points.class_code)
-    (rail,) = elevate(network_of(straight_line(60)[::turn]), points, PARAMETERS)
+    (rail,) = elevated(network_of(straight_line(60)[::turn]), points)
     np.testing.assert_allclose(rail.xyz[0, 0], 5.0, atol=0.1)
     np.testing.assert_allclose(rail.gaps, [[14.5, 17.5]], atol=0.2)
 
@@ -163,7 +168,7 @@ def test_lines_are_directed_and_numbered_and_have_their_class():
     east = head(20, 80)
     north = east[:, [1, 0, 2]] * [-1, 1, 1]
     points = cloud(east + [30.0, 0, 0], east, north + [5.0, 10.0, 0], code=11)
-    rails = elevate(network_of(*lines), points, PARAMETERS)
+    rails = elevated(network_of(*lines), points)
     assert [rail.rail_id for rail in rails] == [1, 2, 3]
     assert {rail.class_code for rail in rails} == {11}
     np.testing.assert_allclose([rail.xyz[0, :2] for rail in rails], [[0, 0], [5, 10], [30, 0]], atol=1e-9)
@@ -173,7 +178,7 @@ def test_lines_are_directed_and_numbered_and_have_their_class():
 def test_lines_without_points_and_short_lines_are_left_out():
     lines = [straight_line(20), straight_line(20) + [0.0, 5.0], straight_line(0.8) + [0.0, 10.0]]
     points = cloud(head(20, 80), head(0.8, 80) + [0.0, 10.0, 0.0])
-    rails = elevate(network_of(*lines), points, PARAMETERS)
+    rails = elevated(network_of(*lines), points)
     assert len(rails) == 1
     assert rails[0].xyz[0, 1] == 0.0
 
@@ -189,12 +194,12 @@ def test_rails_without_points_have_no_heights():
 def test_free_ends_without_points_are_cut_and_shared_ends_are_kept():
     line = straight_line(40)
     points = cloud(head(30, 100) + [4.0, 0.0, 0.0])
-    (rail,) = elevate(network_of(line), points, PARAMETERS)
+    (rail,) = elevated(network_of(line), points)
     np.testing.assert_allclose(rail.xyz[[0, -1], 0], [4.0, 34.0], atol=0.1)
     assert rail.bridged_m == 0.0
     meeting = network_of(line, straight_line(30) + [40.0, 0.0], straight_line(30) + [40.0, 1.0])
     meeting = LineNetwork(meeting.lines, meeting.nodes, np.array([[0, 1], [1, 3], [1, 5]]))
-    (rail,) = elevate(meeting, points, PARAMETERS)
+    (rail,) = elevated(meeting, points)
     np.testing.assert_allclose(rail.xyz[[0, -1], 0], [4.0, 40.0], atol=0.1)
     assert rail.bridged_m == pytest.approx(6.0, abs=0.1)
 
@@ -205,7 +210,7 @@ def test_free_ends_without_points_are_cut_and_shared_ends_are_kept():
 def test_scattered_points_give_a_finite_line_or_none(count, height):
     random = np.random.default_rng(count)
     xyz = random.uniform([0, -0.1, -height], [5, 0.1, height], (count, 3))
-    for rail in elevate(network_of(straight_line(5)), cloud(xyz), PARAMETERS):
+    for rail in elevated(network_of(straight_line(5)), cloud(xyz)):
         assert np.isfinite(rail.xyz).all()
         assert rail.points >= 10
         assert np.abs(rail.xyz[:, 2]).max() < 3 * height
@@ -216,7 +221,7 @@ def test_ends_of_thin_rails_are_cut_where_the_first_point_is_expected(seed):
     """Three points per metre: the third one lies 1 m from the end of the rail on average."""
     random = np.random.default_rng(seed)
     xyz = np.column_stack([random.uniform(0, 80, 240), random.uniform(-0.03, 0.03, 240), np.zeros(240)])
-    (rail,) = elevate(network_of(straight_line(80)), cloud(xyz), PARAMETERS)
+    (rail,) = elevated(network_of(straight_line(80)), cloud(xyz))
     third = np.sort(xyz[:, 0])[[2, -3]]
     assert rail.length_m == pytest.approx(min(third[1] + 0.5, 80) - max(third[0] - 0.5, 0), abs=0.25)
 
@@ -231,7 +236,7 @@ def test_wide_beams_that_blend_the_head_with_the_ballast_do_not_lower_it(density
     edges = np.stack([(WIDTH / 2 - side * across) / 0.015 for side in (1, -1)])
     beyond = 1 - np.array([normal.cdf(a) - normal.cdf(-b) for a, b in edges.T])
     xyz = np.column_stack([x, across, -0.17 * beyond]) + random.normal(0, [0, 0.003, 0.012], (count, 3))
-    (rail,) = elevate(network_of(straight_line(80)), cloud(xyz[xyz[:, 2] > -0.06]), PARAMETERS)
+    (rail,) = elevated(network_of(straight_line(80)), cloud(xyz[xyz[:, 2] > -0.06]))
     assert abs(height_error(rail)[0]) < 0.0035
 
 
@@ -240,6 +245,6 @@ def test_a_rail_that_shows_one_face_is_as_high_as_its_top():
     random = np.random.default_rng(0)
     x = np.sort(random.uniform(0, 30, 3000))
     xyz = np.column_stack([x, random.normal(0, 0.002, 3000), 4.0 + random.uniform(-0.012, 0.012, 3000)])
-    (rail,) = elevate(network_of(straight_line(30.0)), cloud(xyz), PARAMETERS)
+    (rail,) = elevated(network_of(straight_line(30.0)), cloud(xyz))
     assert np.median(rail.xyz[:, 2]) == pytest.approx(4.022, abs=0.005)
     assert rail.points == 3000

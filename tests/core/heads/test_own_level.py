@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from rail_extract.core.heads.head_points import HeadPoints
 from rail_extract.core.heads.own_level import (
     on_own_level,
 )
@@ -19,8 +20,8 @@ def own(*parts):
     """Whether the points of each part may be on the head."""
     points = np.concatenate(parts)
     order = np.argsort(points[:, 0], kind="stable")
-    found = np.empty(len(points), dtype=bool)
-    found[order] = on_own_level(*points[order].T, WIDTH)
+    line, free = np.array([[0.0, 0.0], [100.0, 0.0]]), np.ones((2, 401), dtype=bool)
+    found = np.isin(np.arange(len(points)), on_own_level(HeadPoints(*points[order].T, WIDTH, line, free, order)).strips)
     return np.split(found, np.cumsum([len(part) for part in parts])[:-1])
 
 

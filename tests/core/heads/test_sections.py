@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.heads.edges import station_count
+from rail_extract.core.heads.head_points import HeadPoints
 from rail_extract.core.heads.sections import (
     VIEW_STATIONS,
     _pull,
@@ -29,7 +30,8 @@ def scanned(angle_deg, share=1.0, noise_m=0.005, seed=0, slope=0.0, bend_m=0.0, 
 
 def middles_of(points, seen=None):
     seen = np.ones(station_count(LENGTH), dtype=bool) if seen is None else seen
-    return outline_middles(*points, LENGTH, WIDTH, seen)
+    line = np.array([[0.0, 0.0], [LENGTH, 0.0]])
+    return outline_middles(HeadPoints(*points, WIDTH, line, np.ones((2, len(seen)), dtype=bool)), seen)
 
 
 def mean_m(middles, factor=1.0):

@@ -7,10 +7,11 @@ import pytest
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.heads.elevation import ElevationParameters, elevate
+from rail_extract.core.heads.head_points import near_lines
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.heads.strips import (
+    measure_strips,
     rows_of,
-    strips_along,
 )
 from rail_extract.core.lines.network import LineNetwork
 
@@ -33,6 +34,10 @@ def rail(shifts, seed=0, per_m=150, noise_m=0.003, radius_m=600.0):
     return RailPoints(xyz, LocalFrame(np.zeros(3)), 10, np.concatenate(strips)), line
 
 
+def strips_along(lines, points):
+    return [measure_strips(one) for one in near_lines(lines, points.xyz, HEAD_M, points.strips)]
+
+
 def single(line):
     """Return a network of one line."""
     return LineNetwork((line,), line[[0, -1]], np.array([[0, 1]]), np.empty((0, 3), dtype=int))
@@ -43,7 +48,7 @@ def test_strips_over_the_same_place_are_offset_from_their_mean(third):
     shifts = [(3, 0.010, 0.004, 0, LENGTH_M), (8, -0.010, -0.004, 0, LENGTH_M)]
     shifts += [(9, 0.003, 0.0, 0, LENGTH_M)] if third else []
     points, line = rail(shifts)
-    (found,) = strips_along([line], points, HEAD_M)
+    (found,) = strips_along([line], points)
     assert found.strips.tolist() == [one[0] for one in shifts]
     for number, values in ((1, found.across), (2, found.up)):
         expected = np.array([one[number] for one in shifts])
@@ -60,7 +65,7 @@ def test_strips_that_follow_each_other_are_compared_where_they_meet(overlap_m):
     middle = LENGTH_M / 2
     shifts = [(1, 0.015, 0.0075, 0, middle + overlap_m / 2), (2, -0.015, -0.0075, middle - overlap_m / 2, LENGTH_M)]
     points, line = rail(shifts)
-    (found,) = strips_along([line], points, HEAD_M)
+    (found,) = strips_along([line], points)
     at = int(middle)
     np.testing.assert_allclose(found.across[:, at], [0.015, -0.015], atol=0.002)
     np.testing.assert_allclose(found.up[:, at], [0.0075, -0.0075], atol=0.002)
@@ -77,8 +82,9 @@ def test_aligned_lines_do_not_step_and_state_what_remains():
     step = {}
     for align in (False, True):
         network = refine(single(line), points, HEAD_M, align=align)
-        strips = strips_along(network.lines, points, HEAD_M)
-        (one,) = elevate(network, points, ElevationParameters(HEAD_M, align=align), strips=strips)
+        near = near_lines(network.lines, points.xyz, HEAD_M, points.strips)
+        strips = [measure_strips(one) for one in near]
+        (one,) = elevate(network, near, 10, ElevationParameters(align=align), strips=strips)
         true = np.interp(one.xyz[:, 0], line[:, 0], line[:, 1])
         error = np.interp([middle - 3, middle + 3], one.xyz[:, 0], one.xyz[:, 1] - true)
         height = np.interp([middle - 3, middle + 3], one.xyz[:, 0], one.xyz[:, 2] - 0.003 * one.xyz[:, 0])
@@ -90,8 +96,8 @@ def test_aligned_lines_do_not_step_and_state_what_remains():
 
 def test_points_of_one_strip_are_left_alone():
     points, line = rail([(1, 0.0, 0.0, 0, LENGTH_M)])
-    assert strips_along([line], replace(points, strips=None), HEAD_M) == [None]
-    assert strips_along([line], points, HEAD_M) == [None]
+    assert strips_along([line], replace(points, strips=None)) == [None]
+    assert strips_along([line], points) == [None]
     assert rows_of([line], [None]).shape == (0, 7)
     network = refine(single(line), replace(points, strips=None), HEAD_M)
     aligned = refine(single(line), replace(points, strips=None), HEAD_M, align=True)
@@ -102,7 +108,7 @@ def test_rows_state_places_and_offsets_in_the_plane():
     points, line = rail([(3, 0.010, 0.0, 0, LENGTH_M), (8, -0.010, 0.0, 0, LENGTH_M)])
     turned = np.array([[0.0, -1.0], [1.0, 0.0]])
     xyz = np.column_stack([points.xyz[:, :2] @ turned.T, points.xyz[:, 2]])
-    rows = rows_of([line @ turned.T], strips_along([line @ turned.T], replace(points, xyz=xyz), HEAD_M))
+    rows = rows_of([line @ turned.T], strips_along([line @ turned.T], replace(points, xyz=xyz)))
     assert len(rows) == 2 * 51 and set(rows[:, 2]) == {3.0, 8.0}
     # The line now runs north, and its left is in the west.
     np.testing.assert_allclose(rows[rows[:, 2] == 3, 3].mean(), -0.010, atol=0.001)

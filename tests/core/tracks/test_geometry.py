@@ -5,7 +5,8 @@ import pytest
 from rail_extract.core import pipeline, steps
 from rail_extract.core.clouds.points import RailPoints
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.heads.elevation import ElevationParameters, elevate, measure_again
+from rail_extract.core.heads.elevation import elevate, measure_again
+from rail_extract.core.heads.head_points import near_lines
 from rail_extract.core.heads.refinement import refine
 from rail_extract.core.lines.network_smoothing import smooth_network
 from rail_extract.core.lines.thinning import thin
@@ -79,7 +80,8 @@ def test_a_scanned_track_is_measured_to_millimetres(stored):
     heads = [scan(track.railhead(side), WIDTH, track.centerline, Scanner(), random) for side in (1, -1)]
     points = RailPoints(np.concatenate(heads), LocalFrame(np.zeros(3)), 10)
     network = smooth_network(vectorize(rasterize(points.xyz, cell_size(GAUGE, WIDTH)), WIDTH), 0.8)
-    rails = elevate(refine(network, points, WIDTH), points, ElevationParameters(WIDTH))
+    network = refine(network, points, WIDTH)
+    rails = elevate(network, near_lines(network.lines, points.xyz, WIDTH), 10)
     lines = build_centerlines(rails, GAUGE, WIDTH)
     if stored:
         rails, lines = thin(rails, 0.002, 0.002), thin(lines, 0.002, 0.002)

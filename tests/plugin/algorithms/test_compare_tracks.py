@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from qgis.core import NULL, QgsFeature, QgsGeometry, QgsLineString, QgsVectorLayer
+from memory_layers import layer_of
+from qgis.core import NULL
 
 CORNER = np.array([500_000.0, 3_000_000.0, 100.0])
 NAMES = (
@@ -11,17 +12,10 @@ NAMES = (
 SPACING_M = 1.507
 
 
-def layer_of(lines, fields="", values=(), crs="EPSG:32643", unit_m=1.0, kind="LineStringZ"):
-    """Make a memory layer of lines, (n, 3) metres from the corner."""
-    made = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "lines", "memory")
-    for number, line in enumerate(lines):
-        feature = QgsFeature(made.fields())
-        columns = (np.asarray(line) / unit_m + CORNER).T[: 3 if kind.endswith("Z") else 2]
-        feature.setGeometry(QgsGeometry(QgsLineString(*columns.tolist())))
-        if values:
-            feature.setAttributes(list(values[number]))
-        assert made.dataProvider().addFeature(feature)
-    return made
+def layer(lines, fields="", values=(), crs="EPSG:32643", unit_m=1.0, kind="LineStringZ"):
+    """Make a layer of lines, (n, 3) metres from the corner."""
+    shapes = [(np.asarray(line) / unit_m + CORNER)[:, : 3 if kind.endswith("Z") else 2] for line in lines]
+    return layer_of(*shapes, kind=kind, crs=crs, fields=fields, values=values)
 
 
 def arc(left_m=0.0, up_m=0.0, bump_m=0.0, length_m=100.0):
@@ -35,7 +29,7 @@ RAIL_FIELDS = "&field=rail_id:integer&field=sigma_mm:double&field=sigmaz_mm:doub
 
 def rails(left_m=0.0, numbers=(4, 5), sigma_mm=1.0, **changed):
     lines = [arc(left_m + SPACING_M / 2, **changed), arc(left_m - SPACING_M / 2, **changed)]
-    return layer_of(lines, RAIL_FIELDS, [(number, sigma_mm, sigma_mm) for number in numbers])
+    return layer(lines, RAIL_FIELDS, [(number, sigma_mm, sigma_mm) for number in numbers])
 
 
 @pytest.fixture
@@ -81,7 +75,7 @@ def test_rails_of_two_surveys(compare, tmp_path):
 def test_a_constant_shift_is_stated_apart(compare):
     sides = (SPACING_M / 2, -SPACING_M / 2)
     moved = [arc(side, length_m=250.0) + [0.03, -0.02, 0.01] for side in sides]
-    later = layer_of(moved, RAIL_FIELDS, [(1, 1.0, 1.0), (2, 1.0, 1.0)])
+    later = layer(moved, RAIL_FIELDS, [(1, 1.0, 1.0), (2, 1.0, 1.0)])
     earlier = rails(length_m=250.0)
     results, values, feedback = compare(earlier, later)
     shift = [results[name] for name in ("SHIFT_EAST", "SHIFT_NORTH", "SHIFT_UP")]
@@ -96,7 +90,7 @@ def test_a_constant_shift_is_stated_apart(compare):
 
 def test_a_design_without_standard_errors(compare):
     """The centerline lies 5 mm beside its design; the survey states 1 mm, the design is exact."""
-    design, survey = layer_of([arc()]), layer_of([arc(0.005)], "&field=track_id:integer", [(3,)])
+    design, survey = layer([arc()]), layer([arc(0.005)], "&field=track_id:integer", [(3,)])
     stated = {"REFERENCE_SIGMA": 0, "INPUT_SIGMA": 1, "IGNORE_SHIFT": False}
     results, values, feedback = compare(design, survey, **stated)
     assert set(values["input_id"]) == {3}
@@ -113,10 +107,10 @@ def test_a_design_without_standard_errors(compare):
 
 def test_centerlines_with_their_rails(compare):
     _, values, _ = compare(
-        layer_of([arc()], "&field=track_id:integer", [(1,)]),
-        layer_of([arc(0.002, 0.003)], "&field=track_id:integer", [(1,)]),
+        layer([arc()], "&field=track_id:integer", [(1,)]),
+        layer([arc(0.002, 0.003)], "&field=track_id:integer", [(1,)]),
         REFERENCE_RAILS=rails(),
-        RAILS=layer_of([arc(SPACING_M / 2 + 0.004, 0.006), arc(-SPACING_M / 2)], RAIL_FIELDS, [(1, 2, 2), (2, 2, 2)]),
+        RAILS=layer([arc(SPACING_M / 2 + 0.004, 0.006), arc(-SPACING_M / 2)], RAIL_FIELDS, [(1, 2, 2), (2, 2, 2)]),
     )
     np.testing.assert_allclose(values["gauge_mm"].astype(float), 4.0, atol=0.1)
     np.testing.assert_allclose(values["cant_mm"].astype(float), 6.0, atol=0.1)
@@ -124,7 +118,7 @@ def test_centerlines_with_their_rails(compare):
 
 
 def test_missing_and_extra_lines_have_points(compare):
-    results, values, _ = compare(layer_of([arc()]), layer_of([arc(length_m=60.0), arc(4.0)]))
+    results, values, _ = compare(layer([arc()]), layer([arc(length_m=60.0), arc(4.0)]))
     assert results["MISSING_LENGTH"] == pytest.approx(40, abs=1)
     assert results["EXTRA_LENGTH"] == pytest.approx(100 * 296 / 300, abs=0.5)
     states, counts = np.unique(values["state"].astype(str), return_counts=True)
@@ -135,13 +129,13 @@ def test_missing_and_extra_lines_have_points(compare):
 
 def test_feet_give_the_same_millimetres(compare):
     unit_m = 1200 / 3937
-    one, other = (layer_of([arc(left)], crs="EPSG:2227", unit_m=unit_m) for left in (0.0, 0.01))
+    one, other = (layer([arc(left)], crs="EPSG:2227", unit_m=unit_m) for left in (0.0, 0.01))
     results, _, _ = compare(one, other)
     assert results["ACROSS_RMS"] == pytest.approx(10, abs=0.05)
 
 
 def test_lines_without_heights(compare):
-    results, values, _ = compare(layer_of([arc()], kind="LineString"), layer_of([arc(0.01)], kind="LineString"))
+    results, values, _ = compare(layer([arc()], kind="LineString"), layer([arc(0.01)], kind="LineString"))
     assert results["ACROSS_RMS"] == pytest.approx(10, abs=0.05)
     assert results["HEIGHT_RMS"] is results["SHIFT_UP"] is None
     assert set(values["height_mm"]) == {None}

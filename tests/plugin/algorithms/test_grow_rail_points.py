@@ -3,10 +3,10 @@
 import laspy
 import numpy as np
 import pytest
+from memory_layers import layer_of
 from qgis.core import (
     QgsCoordinateReferenceSystem,
     QgsCoordinateTransform,
-    QgsFeature,
     QgsGeometry,
     QgsPointXY,
     QgsProject,
@@ -23,15 +23,6 @@ def raw(write_cloud):
     return write_cloud(TRACK.xyz + CORNER, "raw.laz", 2)
 
 
-def layer_of(shapes, crs="EPSG:32643", kind="Point"):
-    layer = QgsVectorLayer(f"{kind}?crs={crs}", "seeds", "memory")
-    for shape in shapes:
-        feature = QgsFeature()
-        feature.setGeometry(shape)
-        assert layer.dataProvider().addFeature(feature)
-    return layer
-
-
 def place(along, left):
     return QgsPointXY(*(CORNER[:2] + TRACK.at(along, left)))
 
@@ -43,7 +34,7 @@ def test_both_rails_get_their_class_from_a_seed_in_degrees(raw, run_step, tmp_pa
     feedback = new_feedback()
     values = {
         "INPUT": raw,
-        "SEEDS": layer_of([shape], "EPSG:4326"),
+        "SEEDS": layer_of(shape, kind="Point", crs="EPSG:4326"),
         "OUTPUT": tmp_path / "new.laz",
         "STOPS": tmp_path / "stops.gpkg",
     }
@@ -78,7 +69,7 @@ def test_one_rail_grows_from_a_place_on_the_map(raw, run_step):
 
 
 def test_the_rails_of_seeds_become_lines_in_one_call(raw, run_step, run, tmp_path):
-    seeds = layer_of([QgsGeometry.fromPointXY(place(7.0, SPACING_M / 2))])
+    seeds = layer_of(QgsGeometry.fromPointXY(place(7.0, SPACING_M / 2)), kind="Point")
     one, two = tmp_path / "one.gpkg", tmp_path / "two.gpkg"
     done = run({"INPUT": raw, "SEEDS": seeds, "RAIL_CLASSES": "99", "ITERATIONS": 1, "RAILS": one})
     assert done.ok, done.error
@@ -96,7 +87,7 @@ def test_the_rails_of_seeds_become_lines_in_one_call(raw, run_step, run, tmp_pat
 
 def test_a_line_along_a_rail_is_a_row_of_seeds(raw, run_step, tmp_path):
     line = QgsGeometry.fromPolylineXY([place(2.0, SPACING_M / 2), place(12.0, SPACING_M / 2)])
-    values = {"INPUT": raw, "SEEDS": layer_of([line], kind="LineString"), "MAX_LENGTH": 2, "OUTPUT": tmp_path / "n.las"}
+    values = {"INPUT": raw, "SEEDS": layer_of(line, kind="LineString"), "MAX_LENGTH": 2, "OUTPUT": tmp_path / "n.las"}
     done = run_step("growrailpoints", values)
     assert done.ok, done.error
     assert 12 < done.results["PAIRED_LENGTH"] < 22

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from qgis.core import NULL, QgsFeature, QgsGeometry, QgsLineString, QgsVectorLayer
+from memory_layers import layer_of
+from qgis.core import NULL, QgsVectorLayer
 from rail_extract.rail_extract_plugin.reading import track_inputs
 
 SPACING_MM = 1507.0
@@ -12,18 +13,6 @@ PLACE = np.array([500_000.0, 3_000_000.0, 100.0])
 
 LAST_DIGIT = 0.11
 """Numbers that differ by less than the last decimal may be rounded differently."""
-
-
-def layer_of(lines, kind="LineStringZ", crs="EPSG:32643", fields="", values=()):
-    """Create a memory layer of lines, (n, 3) each, with the given fields and values."""
-    layer = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "lines", "memory")
-    for number, line in enumerate(lines):
-        feature = QgsFeature(layer.fields())
-        feature.setGeometry(QgsGeometry(QgsLineString(*np.asarray(line).T.tolist())))
-        if values:
-            feature.setAttributes(list(values[number]))
-        assert layer.dataProvider().addFeature(feature)
-    return layer
 
 
 def curve(offset_m, rise_m, radius_m=RADIUS_M, length_m=60.0, unit_m=1.0):
@@ -62,7 +51,7 @@ def measure(qgis, run_step, context):
 
 def test_points_have_the_fields_of_the_interface_and_the_values_of_the_track(measure):
     middle, left, right = curved_track()
-    results, layer, values = measure(layer_of([middle]), layer_of([left, right]))
+    results, layer, values = measure(layer_of(middle), layer_of(left, right))
     assert " ".join(values) == (
         "track_id chainage_m gauge_mm cant_mm twist_mm radius_m grade_pm sigma_mm points bridged strips strip_mm "
         "sigmaz_mm"
@@ -86,7 +75,7 @@ def test_points_have_the_fields_of_the_interface_and_the_values_of_the_track(mea
 
 def test_signs_follow_the_direction_of_the_centerline(measure):
     middle, left, right = curved_track()
-    _, _, values = measure(layer_of([middle[::-1]]), layer_of([left, right[::-1]]))
+    _, _, values = measure(layer_of(middle[::-1]), layer_of(left, right[::-1]))
     np.testing.assert_allclose(values["cant_mm"], CANT_MM, atol=0.01)
     np.testing.assert_allclose(values["radius_m"], -RADIUS_M, rtol=0.002)
     np.testing.assert_allclose(values["grade_pm"], -4.0, atol=0.01)
@@ -95,14 +84,14 @@ def test_signs_follow_the_direction_of_the_centerline(measure):
 @pytest.mark.parametrize(("radius_m", "known"), [(9_000.0, True), (12_000.0, False)])
 def test_radius_is_empty_above_ten_kilometres(measure, radius_m, known):
     middle, left, right = curved_track(radius_m=radius_m)
-    _, _, values = measure(layer_of([middle]), layer_of([left, right]))
+    _, _, values = measure(layer_of(middle), layer_of(left, right))
     assert np.isfinite(values["radius_m"]).all() == known
     assert np.isfinite(values["radius_m"]).any() == known
 
 
 def test_feet_give_the_same_millimetres(measure):
     lines = curved_track(unit_m=1200 / 3937)
-    _, layer, values = measure(layer_of(lines[:1], crs="EPSG:2227"), layer_of(lines[1:], crs="EPSG:2227"))
+    _, layer, values = measure(layer_of(*lines[:1], crs="EPSG:2227"), layer_of(*lines[1:], crs="EPSG:2227"))
     np.testing.assert_allclose(values["gauge_mm"], SPACING_MM - 72.0, atol=0.2)
     np.testing.assert_allclose(values["cant_mm"], -CANT_MM, atol=0.01)
     np.testing.assert_allclose(values["radius_m"], RADIUS_M, rtol=0.002)
@@ -111,17 +100,17 @@ def test_feet_give_the_same_millimetres(measure):
 
 def test_step_and_head_width(measure):
     middle, left, right = curved_track()
-    rails = layer_of([left, right])
-    _, _, values = measure(layer_of([middle]), rails, STEP=2.5, HEAD_WIDTH=65)
+    rails = layer_of(left, right)
+    _, _, values = measure(layer_of(middle), rails, STEP=2.5, HEAD_WIDTH=65)
     np.testing.assert_allclose(np.diff(values["chainage_m"]), 2.5)
     np.testing.assert_allclose(values["gauge_mm"], SPACING_MM - 65.0, atol=0.2)
-    _, _, values = measure(layer_of([middle]), rails, STANDARD="IN_75R_1000")
+    _, _, values = measure(layer_of(middle), rails, STANDARD="IN_75R_1000")
     np.testing.assert_allclose(values["gauge_mm"], SPACING_MM - 61.91, atol=0.2)
 
 
 def test_lines_without_heights_have_gauge_and_radius_only(measure):
     middle, left, right = (line[:, :2] for line in curved_track())
-    _, layer, values = measure(layer_of([middle], "LineString"), layer_of([left, right], "LineString"))
+    _, layer, values = measure(layer_of(middle, kind="LineString"), layer_of(left, right, kind="LineString"))
     assert layer.wkbType() == 1  # Point
     np.testing.assert_allclose(values["gauge_mm"], SPACING_MM - 72.0, atol=2)
     np.testing.assert_allclose(values["radius_m"], RADIUS_M, rtol=0.002)
@@ -132,9 +121,9 @@ def test_lines_without_heights_have_gauge_and_radius_only(measure):
 def test_without_a_cloud_support_comes_from_the_fields_of_the_rails(measure):
     middle, left, right = curved_track()
     fields = "&field=rail_id:integer&field=class_code:integer&field=points:integer&field=sigma_mm:double"
-    rails = layer_of([left, right], fields=fields, values=[(4, 10, 600, 3.0), (9, 10, 1200, 4.0)])
+    rails = layer_of(left, right, fields=fields, values=[(4, 10, 600, 3.0), (9, 10, 1200, 4.0)])
     fields = "&field=track_id:integer&field=left_ids:string(20)&field=right_ids:string(20)&field=gauge_mm:double"
-    lines = layer_of([middle], fields=fields, values=[(12, "4", "9", 1435.0)])
+    lines = layer_of(middle, fields=fields, values=[(12, "4", "9", 1435.0)])
     results, _, values = measure(lines, rails)
     assert set(values["track_id"]) == {12}
     np.testing.assert_allclose(values["sigma_mm"], 2.5, rtol=1e-6)
@@ -144,7 +133,7 @@ def test_without_a_cloud_support_comes_from_the_fields_of_the_rails(measure):
 
 def test_beyond_the_end_of_a_rail_the_track_is_bridged(measure):
     middle, left, right = curved_track()
-    results, _, values = measure(layer_of([middle]), layer_of([left, right[:61]]))
+    results, _, values = measure(layer_of(middle), layer_of(left, right[:61]))
     half_way = values["chainage_m"] < 30
     assert not values["bridged"][half_way].any()
     assert values["bridged"][~half_way][1:].all()
@@ -183,9 +172,9 @@ def test_a_cloud_is_measured_square_by_square(run, measure, write_cloud, track, 
 
 def test_a_different_head_width_gives_a_warning(measure, new_feedback):
     middle, left, right = curved_track()
-    lines = layer_of([middle], fields="&field=gauge_mm:double", values=[(1435.0,)])
+    lines = layer_of(middle, fields="&field=gauge_mm:double", values=[(1435.0,)])
     feedback = new_feedback()
-    measure(lines, layer_of([left, right]), feedback, HEAD_WIDTH=66)
+    measure(lines, layer_of(left, right), feedback, HEAD_WIDTH=66)
     assert "differs by +6.0 mm" in feedback.warnings[0]
     assert "check HEAD_WIDTH" in feedback.warnings[0]
 
@@ -193,7 +182,7 @@ def test_a_different_head_width_gives_a_warning(measure, new_feedback):
 def test_a_line_without_rails_gives_a_warning(measure, new_feedback):
     middle, left, right = curved_track()
     feedback = new_feedback()
-    _, _, values = measure(layer_of([middle, middle + [0, 50, 0]]), layer_of([left, right]), feedback)
+    _, _, values = measure(layer_of(middle, middle + [0, 50, 0]), layer_of(left, right), feedback)
     assert "Tracks 2 do not have rails on both sides" in feedback.warnings[0]
     away = values["track_id"] == 2
     assert np.isnan(values["gauge_mm"][away]).all()
@@ -202,20 +191,20 @@ def test_a_line_without_rails_gives_a_warning(measure, new_feedback):
 
 def test_inconsistent_inputs_are_refused(qgis, run_step, write_cloud):
     middle, left, right = curved_track()
-    lines, rails = layer_of([middle]), layer_of([left, right])
-    degrees = layer_of([[[75, 27, 0], [75.1, 27, 0]]], crs="EPSG:4326")
+    lines, rails = layer_of(middle), layer_of(left, right)
+    degrees = layer_of([[75, 27, 0], [75.1, 27, 0]], crs="EPSG:4326")
     on_rails = np.concatenate([left, right])
     for parameters, sentence in (
         ({"INPUT": degrees}, "The lines are in degrees"),
-        ({"INPUT": layer_of([])}, "INPUT has no lines"),
-        ({"RAILS": layer_of([])}, "RAILS has no lines"),
-        ({"RAILS": layer_of([left], crs="EPSG:32644")}, "RAILS are in WGS 84 / UTM zone 44N but INPUT in WGS 84 / UTM"),
+        ({"INPUT": layer_of()}, "INPUT has no lines"),
+        ({"RAILS": layer_of()}, "RAILS has no lines"),
+        ({"RAILS": layer_of(left, crs="EPSG:32644")}, "RAILS are in WGS 84 / UTM zone 44N but INPUT in WGS 84 / UTM"),
         (
-            {"INPUT": layer_of([middle], crs="EPSG:2263"), "RAILS": layer_of([left, right], crs="")},
+            {"INPUT": layer_of(middle, crs="EPSG:2263"), "RAILS": layer_of(left, right, crs="")},
             "INPUT are in NAD83 / New York Long Island (ftUS), whose unit is not the metre: assign a coordinate "
             "system to RAILS too.",
         ),
-        ({"RAILS": layer_of([left + [0, 90, 0]])}, "None of RAILS is next to a line of INPUT"),
+        ({"RAILS": layer_of(left + [0, 90, 0])}, "None of RAILS is next to a line of INPUT"),
         (
             {"POINTS": write_cloud(on_rails, "zone.las", epsg=32644)},
             "zone 44N but the rails in WGS 84",
@@ -236,7 +225,7 @@ def test_inconsistent_inputs_are_refused(qgis, run_step, write_cloud):
 def test_report_and_findings_judge_lines_from_files(measure, tmp_path):
     """The gauge is compared with that of the standard, with GAUGE and with OTHER_GAUGES."""
     middle, left, right = curved_track()
-    lines, rails, report = layer_of([middle]), layer_of([left, right]), tmp_path / "report.html"
+    lines, rails, report = layer_of(middle), layer_of(left, right), tmp_path / "report.html"
     paths = {"FINDINGS": str(tmp_path / "findings.gpkg"), "REPORT": str(report)}
     measure(lines, rails, **paths)
     assert QgsVectorLayer(paths["FINDINGS"]).featureCount() == 0
@@ -262,8 +251,8 @@ def assert_refused(outcome, sentence):
 def test_an_axis_gives_stations_findings_and_report_their_kilometres(run_step, context, tmp_path):
     """The axis is a straight beside the curve: kilometres come from it and not from the length of the track."""
     middle, left, right = curved_track()
-    axis = layer_of([(np.array([[0.0, 0], [70, 0]]) + PLACE[:2])], "LineString")
-    given = {"INPUT": layer_of([middle]), "RAILS": layer_of([left, right[:61]]), "AXIS": axis, "START_KM": 7.35}
+    axis = layer_of(np.array([[0.0, 0], [70, 0]]) + PLACE[:2], kind="LineString")
+    given = {"INPUT": layer_of(middle), "RAILS": layer_of(left, right[:61]), "AXIS": axis, "START_KM": 7.35}
     outputs = {"OUTPUT": "memory:", "FINDINGS": "memory:", "REPORT": tmp_path / "report.html"}
     outcome = run_step("measuretrackgeometry", {**given, **outputs})
     assert outcome.ok, outcome.error
@@ -289,6 +278,6 @@ def test_an_axis_gives_stations_findings_and_report_their_kilometres(run_step, c
 
 def test_what_states_kilometres_needs_an_axis(run_step):
     middle, left, right = curved_track()
-    given = {"INPUT": layer_of([middle]), "RAILS": layer_of([left, right]), "OUTPUT": "memory:"}
+    given = {"INPUT": layer_of(middle), "RAILS": layer_of(left, right), "OUTPUT": "memory:"}
     outcome = run_step("measuretrackgeometry", {**given, "START_KM": 3})
     assert (outcome.ok, outcome.error) == (False, "START_KM needs the line that it applies to: choose AXIS.")

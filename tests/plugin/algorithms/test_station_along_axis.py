@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from memory_layers import layer_of
 from qgis.core import (
     NULL,
     QgsCoordinateReferenceSystem,
     QgsCoordinateTransform,
-    QgsFeature,
     QgsGeometry,
     QgsVectorLayer,
 )
@@ -16,27 +16,15 @@ FIELDS = ["axis", "piece", "km", "km_text", "offset_m", "side", "ambiguous"]
 
 
 def layer(kind, *texts, fields="", values=(), crs="EPSG:32643"):
-    """Make a memory layer of shapes whose coordinates count from the corner."""
-    made = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "layer", "memory")
-    for number, text in enumerate(texts):
-        feature = QgsFeature(made.fields())
-        if text:
-            shape = QgsGeometry.fromWkt(text)
-            shape.translate(EAST, NORTH)
-            feature.setGeometry(shape)
-        if values:
-            feature.setAttributes(list(values[number]))
-        assert made.dataProvider().addFeature(feature)
-    return made
+    """Make a layer of shapes whose coordinates count from the corner."""
+    shapes = [text and QgsGeometry.fromWkt(text) for text in texts]
+    for shape in filter(None, shapes):
+        shape.translate(EAST, NORTH)
+    return layer_of(*shapes, kind=kind, crs=crs, fields=fields, values=values)
 
 
 def table(rows):
-    made = QgsVectorLayer("None?field=km_back:double&field=km_ahead:double", "jumps", "memory")
-    for row in rows:
-        feature = QgsFeature(made.fields())
-        feature.setAttributes(list(row))
-        assert made.dataProvider().addFeature(feature)
-    return made
+    return layer_of(kind="None", fields="&field=km_back:double&field=km_ahead:double", values=rows)
 
 
 AXIS = "LINESTRING(0 0, 1000 0)"

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+from memory_layers import layer_of
 from rail_extract.core.errors import CrsError, RailExtractError
 from rail_extract.rail_extract_plugin.reading.line_layers import read_rails
 
@@ -15,19 +15,8 @@ RIGHT = "LINESTRING Z (500020 3000000 100.02, 500000 3000000 100.02)"
 
 @pytest.fixture
 def layer(qgis):
-    """Create a memory layer with a line for each WKT text and the given fields and values."""
-
-    def make(*texts, kind="LineStringZ", crs="EPSG:32643", fields="", values=()):
-        layer = QgsVectorLayer(f"{kind}?crs={crs}{fields}", "lines", "memory")
-        for number, text in enumerate(texts):
-            feature = QgsFeature(layer.fields())
-            feature.setGeometry(QgsGeometry.fromWkt(text))
-            if values:
-                feature.setAttributes(list(values[number]))
-            assert layer.dataProvider().addFeature(feature)
-        return layer
-
-    return make
+    """A function that makes layers, in QGIS."""
+    return layer_of
 
 
 class Source:

@@ -11,9 +11,9 @@ from rail_extract.core.disk import Destination
 from rail_extract.core.errors import Cancelled, ModelError, ParameterError, RasterError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.frpdf.cleanup import clean
+from rail_extract.core.output.raster_file import BLOCK, header_for, on_one_grid
 from rail_extract.core.progress import Progress
 from rail_extract.core.raster import TILE, cell_size, rasterize
-from rail_extract.core.raster_file import BLOCK, header_for, on_one_grid
 from rail_extract.core.standards import STANDARDS
 from rail_extract.core.vectorize import vectorize
 from rail_extract.rail_extract_plugin.reading.geotiff import filled_blocks, read_header, read_rasters, write_rasters

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from memory_layers import layer_of
 from osgeo import gdal
-from qgis.core import NULL, QgsFeature, QgsGeometry, QgsVectorLayer
+from qgis.core import NULL, QgsVectorLayer
 from rail_extract.core.clouds.crs import import_pyproj
 from rail_extract.core.fields import CENTERLINE_FIELDS
 
@@ -15,13 +16,8 @@ FORMATS = ("gpkg", "shp", "geojson", "fgb", "gml")
 
 @pytest.fixture
 def rails():
-    layer = QgsVectorLayer("LineStringZ?crs=EPSG:32643", "rails", "memory")
-    for y in (3000000.1234, 3000001.6304):
-        feature = QgsFeature()
-        line = f"LINESTRING Z (500000.12345 {y} 100.4321, 500020.98765 {y} 101.2345)"
-        feature.setGeometry(QgsGeometry.fromWkt(line))
-        assert layer.dataProvider().addFeature(feature)
-    return layer
+    line = "LINESTRING Z (500000.12345 {0} 100.4321, 500020.98765 {0} 101.2345)"
+    return layer_of(*map(line.format, (3000000.1234, 3000001.6304)))
 
 
 def test_the_formats_are_those_of_the_dialog(plugin):

@@ -12,7 +12,7 @@ from qgis.core import (
 )
 from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.layers import lines_layer
+from rail_extract.core.output.layers import lines_layer
 from rail_extract.core.products import CENTERLINES, RAILS
 from rail_extract.core.rails import Centerline, RailLine
 from rail_extract.rail_extract_plugin.writing.destinations import destinations

@@ -4,10 +4,9 @@ import sqlite3
 import stat
 
 import pytest
+from memory_layers import layer_of
 from osgeo import ogr
 from qgis.core import (
-    QgsFeature,
-    QgsGeometry,
     QgsProcessingOutputLayerDefinition,
     QgsProperty,
     QgsRemappingSinkDefinition,
@@ -20,12 +19,7 @@ CENTERLINES = "buildtrackcenterlines"
 @pytest.fixture
 def rails():
     """Two rails of 20 m."""
-    layer = QgsVectorLayer("LineStringZ?crs=EPSG:32643", "rails", "memory")
-    for y in (3000000, 3000001.507):
-        feature = QgsFeature()
-        feature.setGeometry(QgsGeometry.fromWkt(f"LINESTRING Z (500000 {y} 100, 500020 {y} 100)"))
-        assert layer.dataProvider().addFeature(feature)
-    return layer
+    return layer_of(*(f"LINESTRING Z (500000 {y} 100, 500020 {y} 100)" for y in (3000000, 3000001.507)))
 
 
 @pytest.fixture

@@ -13,12 +13,11 @@ import pyogrio
 import shapely
 
 from ..disk import Destination
-from ..exchange import Shape, write_shapes
 from ..fields import UNKNOWN_IN_METRES, Field
 from ..frame import LocalFrame
-from ..geopackage import tables_in
-from ..layers import Layer
-from .features import Features
+from .exchange import Shape, write_shapes
+from .geopackage import tables_in
+from .layers import Layer
 
 LINE_M, LINE_ZM = 2002, 3002
 """Codes of lines with M values in well-known binary."""
@@ -137,34 +136,3 @@ def column_of(field: Field, written: Sequence[Any]) -> tuple[np.ndarray, np.ndar
     empty = np.array([value is None for value in written], dtype=bool)
     filler = 0 if field.kind is int else None
     return np.array([filler if value is None else value for value in written], dtype=KINDS[field.kind]), empty
-
-
-def write_copy(
-    destination: Destination, source: Features, fields: Sequence[Field], columns: Sequence[Sequence[Any]]
-) -> None:
-    """Write the features of another layer with further fields into a GeoPackage.
-
-    Parameters
-    ----------
-    destination : Destination
-    source : Features
-    fields : sequence of Field
-    columns : sequence of sequence
-        Values of each further field, one per feature.
-    """
-    further = [column_of(field, [field.value(value) for value in values]) for field, values in zip(fields, columns)]
-    kept = {name: values for name, values in source.columns.items() if name not in {field.name for field in fields}}
-    kinds = {shape.geom_type for shape in source.shapes if shape is not None}
-    with destination.replacing() as new, as_os_error():
-        pyogrio.raw.write(
-            str(new),
-            layer="stations",
-            driver="GPKG",
-            geometry=np.array([shapely.to_wkb(shape, output_dimension=4) for shape in source.shapes], dtype=object),
-            geometry_type=kinds.pop() if len(kinds) == 1 else "Unknown",
-            field_data=[*kept.values(), *(column for column, _ in further)],
-            field_mask=[*(None for _ in kept), *(empty for _, empty in further)],
-            fields=[*kept, *(field.name for field in fields)],
-            crs=source.crs_wkt or UNKNOWN_IN_METRES,
-            nan_as_null=True,
-        )

@@ -10,13 +10,13 @@ import pytest
 pyogrio = pytest.importorskip("pyogrio")
 shapely = pytest.importorskip("shapely")
 
-from rail_extract.core.commands.geopackage import write_layers  # noqa: E402
 from rail_extract.core.disk import Destination  # noqa: E402
 from rail_extract.core.errors import DiskError  # noqa: E402
 from rail_extract.core.fields import CENTERLINE_FIELDS, QUALITY_FIELDS, RAIL_FIELDS  # noqa: E402
 from rail_extract.core.frame import LocalFrame  # noqa: E402
-from rail_extract.core.geopackage import tables_in  # noqa: E402
-from rail_extract.core.layers import lines_layer, quality_layer  # noqa: E402
+from rail_extract.core.output.geopackage import tables_in  # noqa: E402
+from rail_extract.core.output.layers import lines_layer, quality_layer  # noqa: E402
+from rail_extract.core.output.writing import write_layers  # noqa: E402
 from rail_extract.core.products import CENTERLINES, RAILS  # noqa: E402
 from rail_extract.core.rails import Centerline, RailLine, TrackGeometry  # noqa: E402
 
@@ -112,11 +112,11 @@ FULL_DISK = """
 import resource, sys
 from pathlib import Path
 import numpy as np
-from rail_extract.core.commands.geopackage import write_layers
+from rail_extract.core.output.writing import write_layers
 from rail_extract.core.disk import Destination
 from rail_extract.core.errors import DiskError
 from rail_extract.core.frame import LocalFrame
-from rail_extract.core.layers import lines_layer
+from rail_extract.core.output.layers import lines_layer
 from rail_extract.core.products import RAILS
 from rail_extract.core.rails import RailLine
 resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))

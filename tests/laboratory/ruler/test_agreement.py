@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from rail_extract.core.comparison.agreement import agreement
 from rail_extract.core.rails import RailLine, Support
+from rail_extract.laboratory.ruler.agreement import agreement
 
 
 def rail(offset_m, up_m, sigma_m=0.003, sigmaz_m=0.004, left_m=0.0):

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
 
-from .alignment.elements import Alignment
-from .alignment.equations import measured
-from .alignment.table import rows
-from .fields import AIRBORNE_STATION_FIELDS, DEVIATION_FIELDS, DIFFERENCE_FIELDS, QUALITY_FIELDS, STATION_FIELDS
-from .frame import LocalFrame
-from .products import (
+from ..alignment.elements import Alignment
+from ..alignment.equations import measured
+from ..alignment.table import rows
+from ..fields import AIRBORNE_STATION_FIELDS, DEVIATION_FIELDS, DIFFERENCE_FIELDS, QUALITY_FIELDS, STATION_FIELDS
+from ..frame import LocalFrame
+from ..products import (
     AXES,
     CENTERLINES,
     DEVIATIONS,
@@ -28,15 +28,15 @@ from .products import (
     STOPS,
     Product,
 )
-from .rails import Centerline, RailLine, RailNetwork, TrackGeometry
-from .report import Finding, list_findings
+from ..rails import Centerline, RailLine, RailNetwork, TrackGeometry
+from ..report import Finding, list_findings
 
 if TYPE_CHECKING:
-    from .airborne.proposals import ProposedGuide
-    from .airborne.survey import AirborneLine, AirborneTrack
-    from .alignment.deviations import Deviations
-    from .comparison.tracks import TrackComparison
-    from .grow.growth import Stop
+    from ..airborne.proposals import ProposedGuide
+    from ..airborne.survey import AirborneLine, AirborneTrack
+    from ..alignment.deviations import Deviations
+    from ..comparison.tracks import TrackComparison
+    from ..grow.growth import Stop
 
     Line = Union[RailLine, Centerline, Finding, AirborneLine, ProposedGuide]
 
@@ -80,25 +80,27 @@ class Layer:
         return iter(frame.to_crs(np.reshape(self.xyz, (-1, 3)))[:, own])
 
 
-def network_layers(network: RailNetwork, names: Collection[str], gauges_m: Sequence[float]) -> list[Layer]:
-    """Make layers of an extraction.
+def network_makers(network: RailNetwork, gauges_m: Sequence[float]) -> dict[str, Callable[[], Layer]]:
+    """Return the functions that make the layers of an extraction, by their names.
 
     Parameters
     ----------
     network : RailNetwork
-        With the geometry of its tracks, if "quality" or "findings" is among the names.
-    names : collection of str
-        Of "rails", "centerlines", "quality" and "findings".
+        With the geometry of its tracks, for "quality" and "findings".
     gauges_m : sequence of float
         Gauges of the extraction.
     """
-    makers: dict[str, Callable[[], Layer]] = {
+    return {
         "rails": lambda: lines_layer(RAILS, network.rails),
         "centerlines": lambda: lines_layer(CENTERLINES, network.centerlines),
         "quality": lambda: quality_layer(network.geometry),
         "findings": lambda: findings_layer(list_findings(network, gauges_m)),
     }
-    return [make() for name, make in makers.items() if name in names]
+
+
+def network_layers(network: RailNetwork, names: Collection[str], gauges_m: Sequence[float]) -> list[Layer]:
+    """Make the layers of an extraction whose names are among `names`; see `network_makers`."""
+    return [make() for name, make in network_makers(network, gauges_m).items() if name in names]
 
 
 def lines_layer(product: Product, lines: Sequence[Line]) -> Layer:

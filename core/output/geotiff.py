@@ -11,7 +11,7 @@ import rasterio
 from rasterio.windows import Window
 
 from ..raster import RailRaster
-from ..raster_file import BLOCK, NO_DATA, RasterHeader
+from .raster_file import BLOCK, NO_DATA, RasterHeader
 
 
 def write_rasters(path: Path, header: RasterHeader, rasters: Sequence[RailRaster]) -> None:

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .errors import ParameterError, RasterError
-from .frame import LocalFrame
-from .frpdf.models import choose
-from .parameters import Parameters
-from .raster import TILE, RailRaster
-from .standards import CUSTOM, RailStandard, resolve
+from ..errors import ParameterError, RasterError
+from ..frame import LocalFrame
+from ..frpdf.models import choose
+from ..parameters import Parameters
+from ..raster import TILE, RailRaster
+from ..standards import CUSTOM, RailStandard, resolve
 
 BLOCK = 4 * TILE
 """Cells along the side of a block in the file. Its table also lists empty blocks: 30,000 for 10 km at 4 cm."""

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rail_extract.core.alignment.elements import Alignment, CantElement, VerticalElement, chained
-from rail_extract.core.exchange import MAX_TEXT, Shape, write_alignments, write_shapes
 from rail_extract.core.fields import CENTERLINE_FIELDS, FINDING_FIELDS, QUALITY_FIELDS, RAIL_FIELDS
 from rail_extract.core.frame import LocalFrame
+from rail_extract.core.output.exchange import MAX_TEXT, Shape, write_alignments, write_shapes
 
 FRAME = LocalFrame(np.zeros(3), crs_wkt="EPSG:32643")
 PLACES = [[578_215.12344, 2_494_290, 410.5], [578_218.12344, 2_494_294, 410.75], [578_218.12344, 2_494_300, 411]]

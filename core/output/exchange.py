@@ -18,10 +18,10 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from .alignment.elements import Alignment, CantElement, Element, VerticalElement
-from .clouds.crs import parse_crs
-from .fields import Field
-from .frame import LocalFrame
+from ..alignment.elements import Alignment, CantElement, Element, VerticalElement
+from ..clouds.crs import parse_crs
+from ..fields import Field
+from ..frame import LocalFrame
 
 VERTICES = "_points.csv"
 """Ending of the names of CSV files with one row per vertex."""

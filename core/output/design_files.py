@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Optional
 
-from .alignment.delivery import Delivery, check_joined
-from .alignment.elements import Alignment
-from .alignment.ifc import write_ifc
-from .alignment.landxml import write_landxml
-from .clouds.crs import codes_and_names, lies_in_area, name_of, parse_crs
-from .errors import AlignmentFileError, CrsError, ParameterError
+from ..alignment.delivery import Delivery, check_joined
+from ..alignment.elements import Alignment
+from ..alignment.ifc import write_ifc
+from ..alignment.landxml import write_landxml
+from ..clouds.crs import codes_and_names, lies_in_area, name_of, parse_crs
+from ..errors import AlignmentFileError, CrsError, ParameterError
+from ..frame import LocalFrame
+from ..progress import Progress
+from ..standards import RailStandard
 from .exchange import write_alignments
-from .frame import LocalFrame
-from .progress import Progress
-from .standards import RailStandard
 
 FORMATS = {".xml": "LandXML", ".landxml": "LandXML", ".ifc": "IFC", ".dxf": "DXF"}
 """Format of a file by the ending of its name."""

@@ -8,10 +8,10 @@ import pytest
 
 rasterio = pytest.importorskip("rasterio")
 
-from rail_extract.core.commands.geotiff import write_rasters  # noqa: E402
 from rail_extract.core.frame import LocalFrame  # noqa: E402
+from rail_extract.core.output.geotiff import write_rasters  # noqa: E402
+from rail_extract.core.output.raster_file import header_for  # noqa: E402
 from rail_extract.core.raster import TILE, cell_size, rasterize  # noqa: E402
-from rail_extract.core.raster_file import header_for  # noqa: E402
 from rail_extract.core.standards import STANDARDS  # noqa: E402
 
 STANDARD = STANDARDS["EN_60E1_1435"]
@@ -64,12 +64,12 @@ FULL_DISK = """
 import resource, sys
 from pathlib import Path
 import numpy as np
-from rail_extract.core.commands.geotiff import write_rasters
+from rail_extract.core.output.geotiff import write_rasters
 from rail_extract.core.disk import Destination
 from rail_extract.core.errors import DiskError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.raster import rasterize
-from rail_extract.core.raster_file import header_for
+from rail_extract.core.output.raster_file import header_for
 from rail_extract.core.standards import STANDARDS
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 raster = rasterize(np.random.RandomState(1).uniform(0, 80, (200_000, 2)), 0.04)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..rails import RailLine
-from .pieces import Pieces, cut, nearest
+from ...core.comparison.pieces import Pieces, cut, nearest
+from ...core.rails import RailLine
 
 SAME_RAIL_M = 0.30
 """Lines of two surveys this close are the same rail: registrations differ by centimetres."""

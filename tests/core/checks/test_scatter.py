@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from rail_extract.core.checks.scatter import doubting_scatter, gauge_scatter
 from rail_extract.core.rails import Centerline, RailLine, Support
-from rail_extract.core.tracks.scatter import doubting_scatter, gauge_scatter
 
 OWN_M = 0.002
 
