@@ -9,12 +9,10 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import multiprocessing
 import os
 import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, is_dataclass
 from functools import wraps
@@ -24,6 +22,7 @@ from unittest.mock import patch
 
 import numpy as np
 from golden import TABLE
+from processes import processes
 from rail_extract.core import pipeline
 from rail_extract.core.classify.flush import NO_LINES, Flush
 from rail_extract.core.polyline import length_along
@@ -155,7 +154,7 @@ def main() -> None:
     ]
     acts: dict[str, int] = defaultdict(int)
     needs: dict[str, list[Difference]] = defaultdict(list)
-    with ProcessPoolExecutor(arguments.workers, multiprocessing.get_context("spawn")) as pool:
+    with processes(arguments.workers) as pool:
         tasks = [(place, chosen, arguments.variant) for place in arguments.scenes]
         for (place, *_), found in zip(tasks, pool.map(ablate, tasks)):
             print(place, file=sys.stderr, flush=True)

@@ -6,10 +6,9 @@ Run `python benchmarks/accuracy.py [SCENE ...] [--model fast]`.
 from __future__ import annotations
 
 import argparse
-import multiprocessing
 import sys
-from concurrent.futures import ProcessPoolExecutor
 
+from processes import processes
 from rail_extract.core.frpdf.models import NAMES
 from rail_extract.core.parameters import Parameters
 from rail_extract.laboratory.ruler.measuring import Result, measure
@@ -30,7 +29,7 @@ def main() -> None:
 def _measured(name: str, model: str) -> Result:
     """Measure one scene in a separate process, so that its peak memory is that of the scene."""
     print(name, file=sys.stderr, flush=True)
-    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+    with processes(1) as pool:
         return pool.submit(measure, SCENES[name](), model).result()
 
 

@@ -14,11 +14,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 
 import pyogrio
+from processes import processes
 from rail_extract.laboratory.airborne.tiles import lay_tiles
 
 
@@ -48,7 +47,7 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|")
     for count in args.tiles:
         with tempfile.TemporaryDirectory() as folder:
-            with ProcessPoolExecutor(1, get_context("spawn")) as other:  # a child begins with its parent's memory
+            with processes(1) as other:  # a child begins with its parent's memory
                 guides = other.submit(lay_tiles, Path(folder) / "tiles", count, args.density, args.copc).result()
             km, seen, core_s, seconds, mib = measured(Path(folder) / "tiles", guides, args.workers)
         points = f"{count * args.density:.0f} million"

@@ -9,17 +9,16 @@ of the same run only.
 from __future__ import annotations
 
 import argparse
-import multiprocessing
 import resource
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
+from processes import processes
 from rail_extract.__main__ import main as main_of_commands
 from rail_extract.core.classify import square
 from rail_extract.core.clouds.las import laspy
@@ -62,7 +61,7 @@ def main() -> None:
         f"{'found %':>10}{'right %':>9}{'across':>8}{'height':>8}{'lines':>8}{'m/ha':>7}"
     )
     for name in arguments.scenes or RAW_SCENES:
-        with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        with processes(1) as pool:
             result = pool.submit(measured, name, arguments.seed, arguments.model if arguments.lines else None).result()
             print(row(name, *result), flush=True)
 

@@ -7,13 +7,12 @@ Scenes with PyTorch are run where it is installed.
 from __future__ import annotations
 
 import argparse
-import multiprocessing
 import os
 import sys
-from concurrent.futures import ProcessPoolExecutor
 from importlib.util import find_spec
 from pathlib import Path
 
+from processes import processes
 from rail_extract.laboratory.ruler.golden import (
     PLACES,
     PLAIN,
@@ -47,7 +46,7 @@ def main() -> None:
         if place in (arguments.scenes or PLACES) and (variant.engine != TORCH.engine or find_spec("torch"))
     ]
     different = 0
-    with ProcessPoolExecutor(arguments.workers, multiprocessing.get_context("spawn")) as pool:
+    with processes(arguments.workers) as pool:
         for (variant, place), now in zip(keys, pool.map(_run, keys)):
             for difference in golden.differences(variant, place, now):
                 print(f"{variant.name:<14}{difference}", flush=True)

@@ -19,6 +19,8 @@ from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 
+from .errors import ModelError
+
 LINKED = ("numpy.linalg._umath_linalg", "scipy.linalg._fblas")
 """Modules that are linked to the BLAS of their package; each package may have its own."""
 
@@ -116,6 +118,21 @@ def pytorch() -> Library:
     import torch
 
     return Library("PyTorch", torch.get_num_threads, torch.set_num_threads)
+
+
+def device_of(device: str) -> str:
+    """Return PyTorch's name of a device: with AUTO, that of a graphics card if there is one.
+
+    Raises
+    ------
+    ModelError
+        There is no CUDA device.
+    """
+    import torch
+
+    if device == "CUDA" and not torch.cuda.is_available():
+        raise ModelError("There is no CUDA device that PyTorch can use: set DEVICE to AUTO or CPU.")
+    return "cuda" if device != "CPU" and torch.cuda.is_available() else "cpu"
 
 
 def opencv() -> Library:

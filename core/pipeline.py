@@ -18,7 +18,7 @@ from .checks.standard import head_widths, warn_of_gauge, warn_of_spacing
 from .checks.strips import doubting_jumps, strip_courses, warn_of_strips
 from .classify.settings import Settings
 from .clouds.las import CloudHeader
-from .clouds.points import RailPoints, Request
+from .clouds.points import RailPoints, Request, read_each
 from .errors import CloudError, NoRailPointsError, NoTrackError, RailExtractError
 from .frpdf.models import choose
 from .grow.settings import GrowSettings
@@ -35,7 +35,7 @@ from .squares.pieces import SquareRails, rows_in_frame
 from .squares.remeasuring import measure_rails
 from .squares.spool import SpooledFile, SpooledPoints, gather, spool_file
 from .steps import clean_square, engine_for, rails_of_square, square_side, tracks_of, whole_rails
-from .tasks import READ_S, Context, InTurn, Runner, Task
+from .tasks import Context, InTurn, Runner, Task
 from .tracks.geometry import measure_track_geometry
 from .tracks.parallels import widths_by_gauge
 
@@ -154,7 +154,7 @@ def extract_files(
             else:
                 own = GrowSettings(parameters.gauge_m, parameters.head_width_m)
                 source, figures = spool_grown(request, seeds, own, side_m, scratch, reading)
-            network = _walk([source], parameters, runner, rest)
+            network = _walk([source], parameters, runner, rest, raw=True)
         if classify and network.heads is not None and network.heads.blunt:
             # Only its partner tells a blunt rail from other ridges, and the user has been told so.
             network = replace(network, rails=tuple(rail for rail in network.rails if rail.track_ids))
@@ -169,19 +169,8 @@ def _sorted_points(
     request: Request, side_m: float, folder: Path, runner: Runner, progress: Progress
 ) -> tuple[SpooledPoints, ...]:
     """Sort the points of all files into squares, one file per task."""
-    tasks = {
-        number: Task(
-            f"Reading {header.path.name}",
-            _sort_file,
-            (replace(request, headers=()), header, side_m, folder),
-            weight=READ_S * (header.point_count + 1),
-        )
-        for number, header in enumerate(request.headers)
-    }
-    found = dict(runner.run(tasks, progress))
-    if not found:
-        raise CloudError(f"Not one file could be read; the last error was: {runner.failures[-1]}")
-    return gather(request, side_m, [found[number] for number in tasks if number in found])
+    arguments = [(side_m, folder)] * len(request.headers)
+    return gather(request, side_m, read_each(request, _sort_file, arguments, runner, progress))
 
 
 def _sort_file(request: Request, header: CloudHeader, side_m: float, folder: Path, context: Context) -> SpooledFile:
@@ -200,16 +189,18 @@ def _walk(
     runner: Runner,
     progress: Progress,
     is_warned: bool = False,
+    raw: bool = False,
 ) -> RailNetwork:
     """Extract rails, centerlines and track geometry from points that are sorted into squares.
 
-    If the user `is_warned` of another gauge, the rails do not lead to the same question again.
+    If the user `is_warned` of another gauge, the rails do not lead to the same question again. The points may be those
+    that were found in a `raw` cloud.
     """
     progress = Recording(progress)
     drawing, pairing, measuring = progress.divide((DRAWING, PAIRING, MEASURING))
     progress.status("Drawing the rails")
     sources = plausible(sources, progress)
-    rails, strips, cleaned = _draw_rails(sources, parameters, runner, drawing)
+    rails, strips, cleaned = _draw_rails(sources, parameters, runner, drawing, raw)
     centerlines = _pair_rails(rails, sources, parameters, runner, pairing, is_warned)
     progress.info(f"Paired: {_lengths(centerlines, 'track')}.")
     rails = with_tracks(rails, centerlines, progress)
@@ -239,7 +230,7 @@ def _walk(
 
 
 def _draw_rails(
-    sources: Sequence[PointSource], parameters: Parameters, runner: Runner, progress: Progress
+    sources: Sequence[PointSource], parameters: Parameters, runner: Runner, progress: Progress, raw: bool
 ) -> tuple[list[RailLine], np.ndarray, dict[int, RailRaster]]:
     """Draw the rails of all classes.
 
@@ -263,7 +254,7 @@ def _draw_rails(
         strips += [rows_in_frame(part, source.frame) for part in parts]
         found = whole_rails(_released(parts), source.frame, parameters, len(rails) + 1, share) if parts else []
         share.info(f"Class {source.class_code}: {_lengths(found, 'rail')}.")
-        warn_of_rails(found, source.class_code, parameters, share)
+        warn_of_rails(found, source.class_code, parameters, share, raw)
         if found:
             warn_of_unexplained(source, found, share)
             warn_of_airborne(source, found, share)

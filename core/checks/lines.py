@@ -19,6 +19,12 @@ from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
 from ..steps import tracks_of_class
 
+NO_LINE = (
+    "The points found in the raw cloud give no rail: they are too few, or not on rails. Check the rail standard, the "
+    "unit of the coordinates and MIN_LENGTH, or classify the rail points yourself."
+)
+"""What is said of points that look like those of rails and do not line up, such as those of kerbs and ditches."""
+
 STEP_M = 1.0
 """Spacing of the places at which a lone line is compared with the tracks next to it."""
 
@@ -41,36 +47,6 @@ track, for the line to be left out."""
 
 SAME_RAIL_M = 0.5
 """Ends of rails that are closer together belong to one rail: no two rails of any gauge end so close to each other."""
-
-
-def assign_tracks(
-    rails: Sequence[RailLine], centerlines: Sequence[Centerline]
-) -> tuple[list[RailLine], list[tuple[RailLine, float]]]:
-    """State the tracks of each rail, and find lone lines that are too high or too low to be rails.
-
-    Parameters
-    ----------
-    rails : sequence of RailLine
-    centerlines : sequence of Centerline
-        All tracks of these rails.
-
-    Returns
-    -------
-    kept : list of RailLine
-        With their `track_ids`.
-    left_out : list of (RailLine, float)
-        Lines that cannot be rails, and their height above the tracks next to them, metres.
-    """
-    kept: list[RailLine] = []
-    left_out: list[tuple[RailLine, float]] = []
-    for rail in rails:
-        tracks = tuple(line.track_id for line in centerlines if rail.rail_id in (*line.left_ids, *line.right_ids))
-        above_m = 0.0 if tracks else _off_level_m(rail, centerlines)
-        if above_m:
-            left_out.append((rail, above_m))
-        else:
-            kept.append(replace(rail, track_ids=tracks))
-    return kept, left_out
 
 
 def _off_level_m(rail: RailLine, centerlines: Sequence[Centerline]) -> float:
@@ -105,7 +81,9 @@ def _near(line: np.ndarray, places: np.ndarray) -> bool:
     return bool((places[:, :2].min(axis=0) < high).all() and (places[:, :2].max(axis=0) > low).all())
 
 
-def warn_of_rails(rails: Sequence[RailLine], class_code: int, parameters: Parameters, progress: Progress) -> None:
+def warn_of_rails(
+    rails: Sequence[RailLine], class_code: int, parameters: Parameters, progress: Progress, raw: bool = False
+) -> None:
     """Warn the user if a class has no rails, or if `smoothing_xy_m` moves lines off their rails.
 
     Parameters
@@ -115,9 +93,12 @@ def warn_of_rails(rails: Sequence[RailLine], class_code: int, parameters: Parame
     class_code : int
     parameters : Parameters
     progress : Progress
+    raw : bool
+        Whether the points were found in a raw cloud, in which the user chose no class.
     """
     if not rails:
-        progress.warning(f"Class {class_code} has no rails: check the rail classes, the standard and MIN_LENGTH.")
+        checks = "check the rail classes, the standard and MIN_LENGTH"
+        progress.warning(NO_LINE if raw else f"Class {class_code} has no rails: {checks}.")
     warn_if_out_of_reach(rails, parameters.head_width_m, parameters.smoothing_xy_m, progress)
 
 
@@ -139,7 +120,15 @@ def with_tracks(
     list of RailLine
         With their numbers as before.
     """
-    kept, left_out = assign_tracks(rails, centerlines)
+    kept: list[RailLine] = []
+    left_out: list[tuple[RailLine, float]] = []
+    for rail in rails:
+        tracks = tuple(line.track_id for line in centerlines if rail.rail_id in (*line.left_ids, *line.right_ids))
+        above_m = 0.0 if tracks else _off_level_m(rail, centerlines)
+        if above_m:
+            left_out.append((rail, above_m))
+        else:
+            kept.append(replace(rail, track_ids=tracks))
     if left_out:
         length_m = sum(line.length_m for line, _ in left_out)
         lines = "1 line" if len(left_out) == 1 else f"{len(left_out)} lines"

@@ -174,9 +174,9 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
     paved = flush_rails(bed.coarse, near, xy, height, grid, cell, settings)
     in_pavement = rail.copy()
     in_pavement[near[paved.points]] = True
-    rail[near[standing.points]] = True
-    own = settings.own(xyz)
-    rail, in_pavement = (rail | in_pavement) & own, in_pavement & own
+    found = np.append(near[standing.points], near[paved.points])
+    rail[found] = settings.own(xyz[found])
+    in_pavement &= rail
     flush = Classified(in_pavement, _flush_figures(paved, cell[in_pavement[near]], settings))
     figures = _standing_figures(standing, settings) + flush.figures
     there = bool(rail.any())

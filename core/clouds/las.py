@@ -1,4 +1,4 @@
-"""Reader of LAS, LAZ and COPC files: checks the header, then reads the points of some classes in chunks."""
+"""Reader of LAS, LAZ and COPC files: checks the header, then reads the points in chunks."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ import struct
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import CloudError, EmptyCloudError
 from ..parameters import OVERLAP, SYNTHETIC
-from ..progress import SILENT, Progress
+from ..progress import Progress
 from . import copc, laz
 from .crs import MAX_COORDINATE, crs_of_geokeys, import_pyproj
 from .passes import marks_of
-from .readers import Chunk, CloudHeader, Extent, Points
+from .readers import CloudHeader, Extent, Part
 
 with warnings.catch_warnings():
     # In a virtual environment, pyproj (imported by laspy) warns about a data folder that PROJ finds by itself.
@@ -69,32 +70,10 @@ def read_header(path: Path) -> CloudHeader:
         return CloudHeader(path, int(header.point_count), (xmin, ymin, xmax, ymax), _crs_wkt(header))
 
 
-def read_classes(
-    path: Path,
-    class_codes: Sequence[int],
-    progress: Progress = SILENT,
-    extent: Extent | np.ndarray | None = None,
-    leave_out: Sequence[str] = (),
-) -> Iterator[Chunk]:
-    """Read the points of some classes chunk by chunk; see `readers.read_classes`."""
-    wanted = np.zeros(256, dtype=bool)
-    wanted[list(class_codes)] = True
-    for chunk, codes, marks, valid, whole in _chunks(path, progress, extent, leave_out):
-        keep = np.flatnonzero(wanted[codes] & valid)
-        counted = codes[valid] if whole else codes[keep]
-        yield coordinates(chunk, keep), codes[keep], marks[keep], np.bincount(counted, minlength=256)
-
-
-def read_points(path: Path, progress: Progress = SILENT, leave_out: Sequence[str] = ()) -> Iterator[Points]:
-    """Read all points chunk by chunk; see `readers.read_points`."""
-    for chunk, codes, marks, valid, _ in _chunks(path, progress, None, leave_out):
-        yield coordinates(chunk, slice(None)), codes, marks, valid
-
-
-def _chunks(
+def read_chunks(
     path: Path, progress: Progress, extent: Extent | np.ndarray | None, leave_out: Sequence[str]
-) -> Iterator[tuple[laspy.ScaleAwarePointRecord, np.ndarray, np.ndarray, np.ndarray, bool]]:
-    """Check a file and read it: points, classes, marks, which are valid, and whether the file is read as a whole."""
+) -> Iterator[Part]:
+    """Check a file and read it chunk by chunk; see `readers.Reader`."""
     with _open(path) as reader:
         header, done, chunks, some = reader.header, 0, None, None
         timed = "gps_time" in header.point_format.dimension_names
@@ -107,7 +86,8 @@ def _chunks(
             progress.check()
             gps_time = np.asarray(chunk.gps_time) if timed else None
             marks = marks_of(np.asarray(chunk.point_source_id), header.file_source_id, gps_time)
-            yield chunk, np.asarray(chunk.classification), marks, _valid(chunk, leave_out), some is None
+            codes = np.asarray(chunk.classification)
+            yield partial(coordinates, chunk), codes, marks, _valid(chunk, leave_out), some is None
             done += len(chunk)
             progress.set_fraction(done / total)
     if done < total:

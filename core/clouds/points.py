@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,10 +13,13 @@ from ..errors import CloudError, CrsError, EmptyCloudError, NoRailPointsError, P
 from ..frame import ORIGIN_STEP, LocalFrame
 from ..progress import SILENT, Progress, counted
 from ..standards import LAST_CLASS
+from ..tasks import READ_S, Runner, Task, in_listed_order
 from .crs import common_crs, is_geographic, name_of, parse_crs, units, utm_zone, warn_of_scale
 from .mask import Mask
 from .passes import number_passes
 from .readers import Chunk, CloudHeader, Extent, Paths, list_files, read_classes, read_header
+
+Result = TypeVar("Result")
 
 SAMPLE_POINTS = 200_000
 """Number of points in a sample: at least some ten metres of the densest track."""
@@ -273,6 +277,35 @@ class Request:
         area_m2 = float(np.sum(np.prod(np.reshape(sides, (-1, 2)), axis=1)))
         count = sum(header.point_count for header in self.headers)
         return min(sides) > AIRBORNE_SIDE_M and AIRBORNE_DENSITY[0] < count / area_m2 < AIRBORNE_DENSITY[1]
+
+
+def read_each(
+    request: Request,
+    function: Callable[..., Result],
+    arguments: Sequence[tuple],
+    runner: Runner,
+    progress: Progress = SILENT,
+) -> list[Result]:
+    """Run a task on each file of a request, given the arguments for each, and return the results in order.
+
+    The function also gets the request without its files, and the header of the file; see `Task`.
+
+    Raises
+    ------
+    CloudError
+        Not one file could be read.
+    """
+    alone = replace(request, headers=())
+    tasks = {
+        number: Task(
+            f"Reading {header.path.name}", function, (alone, header, *own), weight=READ_S * (header.point_count + 1)
+        )
+        for number, (header, own) in enumerate(zip(request.headers, arguments))
+    }
+    found = list(in_listed_order(tasks, runner.run(tasks, progress)))
+    if not found:
+        raise CloudError(f"Not one file could be read; the last error was: {runner.failures[-1]}")
+    return found
 
 
 def ask(

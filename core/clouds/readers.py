@@ -1,6 +1,6 @@
 """Formats of point clouds: which module reads which suffix, and which files a path stands for.
 
-To add a format, write a module with the two functions of `Reader` and add its suffix to `READERS`.
+To add a format, write a module with the functions of `Reader` and add its suffix to `READERS`.
 """
 
 from __future__ import annotations
@@ -48,6 +48,10 @@ points read by class (256,), kept or not."""
 Points = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 """Coordinates (n, 3) in units of the CRS, classes (n,), marks (n,), and which points are not withheld, (n,) bool."""
 
+Part = tuple[Callable[[Union[np.ndarray, slice]], np.ndarray], np.ndarray, np.ndarray, np.ndarray, bool]
+"""A chunk of points: a function that returns the coordinates (k, 3) of some of them, classes (n,), marks (n,) and which
+are valid (n,) bool, as in `Points`, and whether the file is read as a whole."""
+
 WILDCARDS = "*?"
 """Characters of patterns such as tiles/2024_*.laz, which not every shell replaces with the names of files."""
 
@@ -81,18 +85,10 @@ class Reader(Protocol):
     def read_header(self, path: Path) -> CloudHeader:
         """Read and check the header of a file, without its points; see `read_header`."""
 
-    def read_classes(
-        self,
-        path: Path,
-        class_codes: Sequence[int],
-        progress: Progress = SILENT,
-        extent: Extent | np.ndarray | None = None,
-        leave_out: Sequence[str] = (),
-    ) -> Iterator[Chunk]:
-        """Read a file chunk by chunk and keep the points of some classes; see `read_classes`."""
-
-    def read_points(self, path: Path, progress: Progress = SILENT, leave_out: Sequence[str] = ()) -> Iterator[Points]:
-        """Read all points of a file chunk by chunk; see `read_points`."""
+    def read_chunks(
+        self, path: Path, progress: Progress, extent: Extent | np.ndarray | None, leave_out: Sequence[str]
+    ) -> Iterator[Part]:
+        """Read all points of a file chunk by chunk, or those that may be in an extent; see `read_classes`."""
 
     def shows_scanner(self, path: Path) -> bool:
         """Return whether the first points of a file have what only a scanner measures; see `shows_scanner`."""
@@ -166,8 +162,13 @@ def read_classes(
     CloudError
         The file has an unknown suffix, or turns out to be cut off or damaged.
     """
+    wanted = np.zeros(256, dtype=bool)
+    wanted[list(class_codes)] = True
     with explained(path):
-        yield from _reader(path).read_classes(path, class_codes, progress, extent, leave_out)
+        for places, codes, marks, valid, whole in _reader(path).read_chunks(path, progress, extent, leave_out):
+            keep = np.flatnonzero(wanted[codes] & valid)
+            counted = codes[valid] if whole else codes[keep]
+            yield places(keep), codes[keep], marks[keep], np.bincount(counted, minlength=256)
 
 
 def read_points(path: Path, progress: Progress = SILENT, leave_out: Sequence[str] = ()) -> Iterator[Points]:
@@ -197,7 +198,8 @@ def read_points(path: Path, progress: Progress = SILENT, leave_out: Sequence[str
         See `read_classes`.
     """
     with explained(path):
-        yield from _reader(path).read_points(path, progress, leave_out)
+        for places, codes, marks, valid, _ in _reader(path).read_chunks(path, progress, None, leave_out):
+            yield places(slice(None)), codes, marks, valid
 
 
 @contextmanager

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..polyline import interpolate, length_along
 from ..progress import SILENT, Progress
 from .points import Request
 from .readers import CloudHeader
@@ -53,11 +54,10 @@ class Section:
 
 def section_at(line: np.ndarray, share: float) -> Section:
     """Return the plane across a line, (n, 3) metres, at a share of its plan length."""
-    steps = np.hypot(*np.diff(line[:, :2], axis=0).T)
-    along = np.concatenate([[0.0], np.cumsum(steps)])
+    along = length_along(line[:, :2])
     at = share * along[-1]
-    segment = int(np.clip(np.searchsorted(along, at, side="right") - 1, 0, len(steps) - 1))
-    place = np.array([np.interp(at, along, column) for column in line.T])
+    segment = int(np.clip(np.searchsorted(along, at, side="right") - 1, 0, len(line) - 2))
+    place = interpolate(line, along, np.array([at]))[0]
     step = line[segment + 1, :2] - line[segment, :2]
     return Section(place, step / np.hypot(*step))
 

@@ -22,7 +22,7 @@ from ..learned.model import weights_for
 from ..output.raster_file import header_for, on_one_grid
 from ..parameters import DEFAULT_STEP_M, DEFAULT_WORKERS, LEARNED, MAX_WORKERS, STRIPS, Parameters
 from ..pipeline import extract_files
-from ..progress import Estimating, Progress
+from ..progress import Estimating, Progress, counted
 from ..rails import RailNetwork
 from ..report import Origin, summary
 from ..scratch import scratch_folder
@@ -263,8 +263,8 @@ def _run_in(
     if axes is not None:
         network = replace(network, geometry=axes.along(network.geometry, network.frame, progress))
     _write(network, args, standard, parameters, extent, outputs)
-    print(f"{len(network.rails)} rails, {sum(rail.length_m for rail in network.rails) / 1000:.3f} km")
-    print(f"{len(network.centerlines)} centerlines, {sum(one.length_m for one in network.centerlines) / 1000:.3f} km")
+    for lines, what in ((network.rails, "rail"), (network.centerlines, "centerline")):
+        print(f"{counted(len(lines), what)}, {sum(line.length_m for line in lines) / 1000:.3f} km")
     if network.geometry:
         print(summary(network, parameters.gauges_m)[0])
     for failure in network.failures:

@@ -10,8 +10,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import conv2d
 
-from ..errors import ModelError
-from ..kernels import pytorch
+from ..kernels import device_of, pytorch
 from .folding import Convolution, FoldedLayer, block_side, fold
 from .layered import LayeredEngine, Step
 
@@ -42,15 +41,13 @@ class TorchEngine(LayeredEngine):
         ModelError
             There is no CUDA device, or the weights are not those of FRPDF.
         """
-        has_cuda = torch.cuda.is_available()
-        if device == "CUDA" and not has_cuda:
-            raise ModelError("There is no CUDA device that PyTorch can use: set DEVICE to AUTO or CPU.")
+        chosen = device_of(device)
         self._folded = fold(arrays)
         self.block = block_side(self._folded[0])
         self._exact = exact
-        self._others = ["cpu"] if has_cuda and device != "CPU" else []
+        self._others = ["cpu"] if chosen == "cuda" else []
         try:
-            self._move("cuda" if self._others else "cpu")
+            self._move(chosen)
         except RuntimeError:  # other programs have filled the graphics card, and not even the weights fit
             self._move(self._others.pop() if self._others else "cpu")
 

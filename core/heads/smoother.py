@@ -11,11 +11,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import CubicSpline
-from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.linalg import LinAlgError, cho_solve_banded
+from scipy.linalg.lapack import dpbsv
 
 from ..polyline import interpolate, left_normals, length_along
 
@@ -41,7 +42,7 @@ WAVE_M = 4.0
 than the standard error said."""
 
 LEAST_SHARE = 1e-2
-"""Probability, relative to that of the best, below which strengths do not count."""
+"""Probability below which strengths do not count."""
 
 FREEDOM = 3.0
 """Degrees of freedom of Student's distribution: one weld in twenty metres stands out."""
@@ -151,12 +152,14 @@ def smooth(
             data[apart] += np.bincount(first + one, information * basis[one] * basis[one + apart], count)
     data[0] += RIDGE * data[0].mean()
     bends = np.zeros(pieces) if line is None else _third_differences(line, start_m, step_m, pieces)
-    fits = [_fit(data, score, _Prior(*strengths, step_m, bends)) for strengths in product(DESIGNS, amplitudes)]
-    evidence = np.array([one.evidence for one in fits])
+    designs, waves = np.repeat(DESIGNS, len(amplitudes)), np.tile(amplitudes, len(DESIGNS))
+    coefficients, factors, evidence = _fits(data, score, _Priors(designs, waves, step_m, bends))
     share = np.exp(evidence - evidence.max())
-    likely = [(one, part) for one, part in zip(fits, share / share.sum()) if part > LEAST_SHARE * share.max()]
-    mean = sum(part * one.coefficients for one, part in likely)
-    return Spline(start_m, step_m, trend + mean, [(part, one.factor, one.coefficients - mean) for one, part in likely])
+    share /= share.sum()
+    likely = share > LEAST_SHARE
+    mean = share[likely] @ coefficients[likely]
+    fits = [(share[one], factors[:, one], coefficients[one] - mean) for one in np.flatnonzero(likely)]
+    return Spline(start_m, step_m, trend + mean, fits)
 
 
 def bridge_error(t: np.ndarray, stations: np.ndarray, turn: float) -> np.ndarray:
@@ -199,12 +202,12 @@ def _third_differences(line: np.ndarray, start_m: float, step_m: float, pieces: 
 
 
 @dataclass(frozen=True)
-class _Prior:
-    """What is expected of the coefficients of design and waves, which take turns in one array.
+class _Priors:
+    """What is expected of the coefficients of design and waves, which take turns in one array, for `s` strengths.
 
     Attributes
     ----------
-    design, amplitude_m : float
+    design, amplitude_m : (s,) arrays
         See `DESIGNS` and `AMPLITUDES`.
     step_m : float
         Distance between the knots.
@@ -212,78 +215,90 @@ class _Prior:
         Third differences that the line has without the spline.
     """
 
-    design: float
-    amplitude_m: float
+    design: np.ndarray
+    amplitude_m: np.ndarray
     step_m: float
     bends: np.ndarray
 
-    @property
-    def scales(self) -> tuple[float, float]:
-        """Scales of the differences of design and waves."""
-        return self.design * self.step_m**2.5, np.sqrt(self.step_m**3 / self._stiffness)
+    @cached_property
+    def scales(self) -> tuple[np.ndarray, np.ndarray]:
+        """Scales of the differences of design and waves, (s, 1) each."""
+        return self.design[:, None] * self.step_m**2.5, np.sqrt(self.step_m**3 / self._stiffness[:, None])
+
+    @cached_property
+    def hold(self) -> np.ndarray:
+        """Information by which waves return to zero over `WAVE_M`, (s, 1)."""
+        return self._stiffness[:, None] * (2 * np.pi / WAVE_M) ** 4 * self.step_m
 
     @property
-    def hold(self) -> float:
-        """Information by which waves return to zero over `WAVE_M`."""
-        return self._stiffness * (2 * np.pi / WAVE_M) ** 4 * self.step_m
-
-    @property
-    def _stiffness(self) -> float:
+    def _stiffness(self) -> np.ndarray:
         """Inverse of the spectral density of the second derivative of waves that have the amplitude."""
         return 1 / (2 * np.sqrt(2) * self.amplitude_m**2 * (2 * np.pi / WAVE_M) ** 3)
 
     def off(self, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the differences of design and waves in their scales."""
+        """Return the differences of design, (s, p), and waves in their scales, given coefficients, (s, 2 n)."""
         design, waves = self.scales
-        return (_differences(found[::2], DESIGN) + self.bends) / design, _differences(found[1::2], WAVES) / waves
+        bends = _differences(found[:, ::2], DESIGN) + self.bends
+        return bends / design, _differences(found[:, 1::2], WAVES) / waves
 
     def information(self, weights: tuple[np.ndarray, np.ndarray], count: int) -> np.ndarray:
-        """Return the information, (8, 2 count), given the weights of the differences."""
-        band = np.zeros((2 * BAND, 2 * count))
+        """Return the information, (8, s, 2 count), given the weights of the differences."""
+        band = np.zeros((2 * BAND, len(self.design), 2 * count))
         for number, (scale, weight, difference) in enumerate(zip(self.scales, weights, (DESIGN, WAVES))):
+            own = weight / scale**2
             for one in range(len(difference)):
                 for apart in range(len(difference) - one):
-                    own = weight / scale**2 * difference[one] * difference[one + apart]
-                    band[2 * apart, number::2][one : one + len(own)] += own
-        band[0, 1::2] += self.hold
+                    part = difference[one] * difference[one + apart] * own
+                    band[2 * apart, :, number::2][:, one : one + own.shape[1]] += part
+        band[0, :, 1::2] += self.hold
         return band
 
-    def log_probability(self, found: np.ndarray) -> float:
-        """Return the logarithm of the probability density of coefficients, and of the amplitude."""
-        off = np.concatenate(self.off(found))
+    def log_probability(self, found: np.ndarray) -> np.ndarray:
+        """Return the logarithms, (s,), of the probability densities of coefficients, (s, 2 n), and of the amplitude."""
+        off = np.concatenate(self.off(found), axis=1)
         usual = np.log10(self.amplitude_m / USUAL_AMPLITUDE_M) / AMPLITUDE_DECADES
-        scales = len(self.bends) * np.log(self.scales[0]) + len(found) // 2 * np.log(self.amplitude_m)
-        student = 0.5 * (FREEDOM + 1) * np.log1p(off**2 / FREEDOM).sum()
-        return float(-student - 0.5 * self.hold * found[1::2] @ found[1::2] - scales - 0.5 * usual**2)
+        design, count = self.scales[0][:, 0], found.shape[1] // 2
+        scales = len(self.bends) * np.log(design) + count * np.log(self.amplitude_m)
+        student = 0.5 * (FREEDOM + 1) * np.log1p(off**2 / FREEDOM).sum(axis=1)
+        held = 0.5 * (self.hold * found[:, 1::2] ** 2).sum(axis=1)
+        return -student - held - scales - 0.5 * usual**2
 
 
-@dataclass(frozen=True)
-class _Fit:
-    """Coefficients under one prior, the Cholesky factor of the information about both splines, and the evidence."""
+def _fits(data: np.ndarray, score: np.ndarray, priors: _Priors) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find the most probable coefficients by reweighting, for all strengths at once.
 
-    coefficients: np.ndarray
-    factor: np.ndarray
-    evidence: float
-
-
-def _fit(data: np.ndarray, score: np.ndarray, prior: _Prior) -> _Fit:
-    """Find the most probable coefficients by reweighting."""
-    count = len(score)
-    both = _of_both(data)
-    weights = np.ones(len(prior.bends)), np.ones(count - len(WAVES) + 1)
+    Returns
+    -------
+    coefficients : (s, n) array
+    factors : (8, s, 2 n) array
+        Cholesky factors of the information about both splines.
+    evidence : (s,) array
+    """
+    count, strengths = len(score), len(priors.design)
+    both = _of_both(data)[:, None]
+    weights = np.ones((strengths, len(priors.bends))), np.ones((strengths, count - len(WAVES) + 1))
     for _ in range(ROUNDS):
-        right = np.repeat(score, 2)
-        right[::2] -= np.convolve(weights[0] / prior.scales[0] ** 2 * prior.bends, DESIGN)
-        band = both + prior.information(weights, count)
-        band[0] += ROUNDING * band[0].max()
-        factor = cholesky_banded(band, lower=True, check_finite=False)
-        found = cho_solve_banded((factor, True), right, check_finite=False)
-        design, waves = prior.off(found)
+        right = np.tile(np.repeat(score, 2), (strengths, 1))
+        bends = weights[0] / priors.scales[0] ** 2 * priors.bends
+        for one, factor in enumerate(DESIGN):
+            right[:, ::2][:, one : one + len(priors.bends)] -= factor * bends
+        band = both + priors.information(weights, count)
+        band[0] += ROUNDING * band[0].max(axis=1, keepdims=True)
+        factors, found = _solved(band, right)
+        design, waves = priors.off(found)
         weights = (FREEDOM + 1) / (FREEDOM + design**2), (FREEDOM + 1) / (FREEDOM + waves**2)
-    coefficients = found[::2] + found[1::2]
-    explained = score @ coefficients - 0.5 * coefficients @ _times(data, coefficients)
-    evidence = explained + prior.log_probability(found) - np.log(factor[0]).sum()
-    return _Fit(coefficients, factor, evidence)
+    coefficients = found[:, ::2] + found[:, 1::2]
+    explained = coefficients @ score - 0.5 * (coefficients * _times(data, coefficients)).sum(axis=1)
+    evidence = explained + priors.log_probability(found) - np.log(factors[0]).sum(axis=1)
+    return coefficients, factors, evidence
+
+
+def _solved(band: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the Cholesky factors of banded matrices, (8, s, n), and the solutions, (s, n): they are one matrix."""
+    factors, found, failed = dpbsv(band.reshape(len(band), -1), right.ravel(), lower=1)
+    if failed:
+        raise LinAlgError("The information about a course is not positive definite.")
+    return factors.reshape(band.shape), found.reshape(right.shape)
 
 
 def _of_both(data: np.ndarray) -> np.ndarray:
@@ -297,15 +312,16 @@ def _of_both(data: np.ndarray) -> np.ndarray:
 
 
 def _differences(coefficients: np.ndarray, difference: np.ndarray) -> np.ndarray:
-    return np.convolve(coefficients, difference[::-1], mode="valid")
+    """Return the differences of neighbouring coefficients, (s, n - k + 1), given (s, n) and the difference, (k,)."""
+    return sliding_window_view(coefficients, len(difference), axis=-1) @ difference
 
 
-def _times(band: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Multiply a symmetric banded matrix by a vector."""
-    result = band[0] * vector
+def _times(band: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Multiply a symmetric banded matrix by vectors, (s, n)."""
+    result = band[0] * vectors
     for apart in range(1, BAND):
-        result[apart:] += band[apart, :-apart] * vector[:-apart]
-        result[:-apart] += band[apart, :-apart] * vector[apart:]
+        result[:, apart:] += band[apart, :-apart] * vectors[:, :-apart]
+        result[:, :-apart] += band[apart, :-apart] * vectors[:, apart:]
     return result
 
 

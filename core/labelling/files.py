@@ -16,6 +16,7 @@ from ..clouds.rewriting import Places, check_class, rewrite
 from ..clouds.vpc import CatalogueTile, catalogue_text
 from ..disk import NEW, Destination, alone_in, identity, replace_folder, writing
 from ..errors import DiskError, ParameterError, RailExtractError
+from ..grow.growth import Stop
 from ..progress import SILENT, Progress
 from ..rails import SearchFigures
 from ..scratch import scratch_folder
@@ -89,11 +90,15 @@ class Result:
     point_count : int
         Points in the files that were read.
     figures : SearchFigures
+    stops : tuple of Stop
+        Where rails that grew from seeds were not followed further, in metres from the zero of the request; each place
+        once.
     """
 
     file: Path
     point_count: int
     figures: SearchFigures
+    stops: tuple[Stop, ...] = ()
 
 
 def _folder_at(catalogue: Path) -> Path:
@@ -280,7 +285,7 @@ class _Writer:
             done += len(codes)
             return self._classes(codes, places, rail), rail | (not self._choice.only_rails)
 
-        return rewrite(self._request.headers[place].path, new, change, progress)
+        return rewrite(self._request.headers[place].path, new, change, progress, not self._choice.only_rails)
 
     def write_tiles(self, output: Output, runner: Runner, progress: Progress) -> None:
         """Write all tiles into a temporary folder, then move it to its name and write the catalogue."""

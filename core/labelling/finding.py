@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from ..classify.guide import MIDDLE_M, Guide
 from ..classify.settings import MARGIN_M, Settings
 from ..classify.square import Classified, classify_square
-from ..clouds.points import Request
+from ..clouds.points import Request, read_each
 from ..clouds.readers import CloudHeader, read_points, shows_scanner
 from ..disk import writing
 from ..errors import CloudError, NoRailPointsError, ParameterError
@@ -26,7 +26,7 @@ from ..progress import SILENT, Progress, counted
 from ..rails import ENOUGH_CELLS_PER_M, SearchFigures
 from ..squares.grid import Key, Square, points_by_square, unique_keys
 from ..standards import LAST_CLASS
-from ..tasks import READ_S, Context, Runner, Task, in_listed_order
+from ..tasks import Context, Runner, Task, in_listed_order
 
 POINT = np.dtype([("xyz", "<f8", 3), ("number", "<i8"), ("mark", "<u4")])
 """A point on disk: coordinates in units of the CRS, its number among all points of all files, and its mark, see
@@ -206,20 +206,9 @@ def sort_files(
     request: Request, settings: Settings, folder: Path, runner: Runner, progress: Progress, with_class: bool = False
 ) -> list[SortedFile]:
     """Sort the points of all files into squares, one file per task; with their classes as marks."""
-    starts = np.cumsum([0, *(header.point_count for header in request.headers)])
-    tasks = {
-        place: Task(
-            f"Reading {header.path.name}",
-            _sort_file,
-            (replace(request, headers=()), header, int(starts[place]), settings, str(folder), with_class),
-            weight=READ_S * (header.point_count + 1),
-        )
-        for place, header in enumerate(request.headers)
-    }
-    found = list(in_listed_order(tasks, runner.run(tasks, progress)))
-    if not found:
-        raise CloudError(f"Not one file could be read; the last error was: {runner.failures[-1]}")
-    return found
+    starts = np.cumsum([0, *(header.point_count for header in request.headers[:-1])])
+    arguments = [(start, settings, str(folder), with_class) for start in starts.tolist()]
+    return read_each(request, _sort_file, arguments, runner, progress)
 
 
 def _sort_file(

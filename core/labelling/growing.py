@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +27,7 @@ from ..rails import SearchFigures
 from ..raster import BORDER_CELLS, cell_size
 from ..squares.grid import Key, points_by_square
 from ..tasks import Runner
-from .files import Choice, Labels, Output, write_labelled
+from .files import Choice, Labels, Output, Result, write_labelled
 from .finding import POINT, append, file_of, read_searched
 
 SIDE_M = 10.0
@@ -44,27 +43,6 @@ SAME_M = 0.26
 """Two windows of 0.5 m this close are the same piece of rail."""
 
 
-@dataclass(frozen=True)
-class Grown:
-    """What grew from the seeds.
-
-    Attributes
-    ----------
-    file : Path
-        The file that opens the result.
-    point_count : int
-        Points in the files that were read.
-    figures : SearchFigures
-    stops : tuple of Stop
-        Where rails were not followed further, in metres from the zero of the request; each place once.
-    """
-
-    file: Path
-    point_count: int
-    figures: SearchFigures
-    stops: tuple[Stop, ...]
-
-
 def grow_files(
     request: Request,
     seeds: Sequence[np.ndarray],
@@ -74,7 +52,7 @@ def grow_files(
     folder: Path,
     runner: Runner,
     progress: Progress = SILENT,
-) -> Grown:
+) -> Result:
     """Follow rails from seeds and write the files of a cloud with the classes of their points.
 
     Parameters
@@ -113,7 +91,7 @@ def grow_files(
 
     growths, figures = grow_points(request, seeds, settings, folder, keep, growing)
     write_labelled(request, choice, labels, output, runner, rewriting)
-    return Grown(output.file, labels.point_count, figures, _stops(growths))
+    return Result(output.file, labels.point_count, figures, _stops(growths))
 
 
 def grow_points(

@@ -13,8 +13,9 @@ from ..classify.settings import Settings
 from ..clouds.points import Request
 from ..disk import Destination, writing
 from ..errors import ParameterError
+from ..kernels import device_of
 from ..learned.examples import CHECKS, Examples
-from ..learned.model import WEIGHTS_SUFFIX, check_torch, device_of, load, save
+from ..learned.model import WEIGHTS_SUFFIX, check_torch, load, save
 from ..progress import SILENT, Progress
 from .examples import write_examples
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import ModelError, ParameterError
 from ..frpdf.models import FOLDER
 from ..frpdf.weights import load_arrays, save_arrays
-from ..kernels import one_thread, pytorch
+from ..kernels import device_of, one_thread, pytorch
 from ..parameters import LEARNED
 from ..progress import SILENT, Progress
 from .blocks import MAX_POINTS, Block, Thinned, centred
@@ -53,9 +53,9 @@ def check_torch(what: str) -> None:
 
 def save(path: Path, network: RandLaNet) -> None:
     """Write the weights of a network."""
-    from .network import arrays_of
+    from ..frpdf.network import weights_of
 
-    save_arrays(path, arrays_of(network))
+    save_arrays(path, weights_of(network))
 
 
 def load(path: Path) -> RandLaNet:
@@ -67,9 +67,8 @@ def load(path: Path) -> RandLaNet:
         PyTorch is missing, or the file is missing, is damaged or holds something else.
     """
     check_torch("METHOD LEARNED")
-    import torch
-
-    from .network import RandLaNet, arrays_of
+    from ..frpdf.network import set_weights, weights_of
+    from .network import RandLaNet
 
     if not path.is_file():
         raise ModelError(f"The weights file {path} is missing: choose one that Train rail classifier has written.")
@@ -80,14 +79,14 @@ def load(path: Path) -> RandLaNet:
             f"The weights file {path.name} cannot be read: choose one that Train rail classifier has written."
         ) from error
     network = RandLaNet()
-    shapes = {name: array.shape for name, array in arrays_of(network).items()}
+    shapes = {name: array.shape for name, array in weights_of(network).items()}
     if {name: array.shape for name, array in arrays.items()} != shapes:
         raise ModelError(
             f"{path.name} holds the weights of something else: choose a file that Train rail classifier has written."
         )
     if not all(np.isfinite(array).all() for array in arrays.values()):
         raise ModelError(f"{path.name} holds weights that are not numbers: train them again.")
-    network.load_state_dict({name: torch.from_numpy(array) for name, array in arrays.items()}, strict=False)
+    set_weights(network, arrays)
     return network.eval()
 
 
@@ -168,21 +167,6 @@ def weights_for(method: str, weights: Path | None) -> Path | None:
     weights = weights or SHIPPED
     load(weights)
     return weights
-
-
-def device_of(device: str) -> str:
-    """Return PyTorch's name of a device: with AUTO, that of a graphics card if there is one.
-
-    Raises
-    ------
-    ModelError
-        There is no CUDA device.
-    """
-    import torch
-
-    if device == "CUDA" and not torch.cuda.is_available():
-        raise ModelError("There is no CUDA device that PyTorch can use: set DEVICE to AUTO or CPU.")
-    return "cuda" if device != "CPU" and torch.cuda.is_available() else "cpu"
 
 
 def inputs(places: Sequence[np.ndarray], device: str) -> tuple[Tensor, list[Tensors]]:

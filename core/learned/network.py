@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
@@ -153,9 +152,3 @@ class RandLaNet(nn.Module):
 def parameter_count(network: nn.Module) -> int:
     """Count the weights."""
     return sum(parameter.numel() for parameter in network.parameters())
-
-
-def arrays_of(network: nn.Module) -> dict[str, np.ndarray]:
-    """Return the weights and the statistics of batch norm by name."""
-    state = network.state_dict()
-    return {name: value.cpu().numpy() for name, value in state.items() if value.dtype == torch.float32}

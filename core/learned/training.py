@@ -20,9 +20,10 @@ from torch import Tensor
 from torch.nn import functional
 
 from ..errors import Cancelled, ModelError, ParameterError
+from ..kernels import device_of
 from ..progress import SILENT, Progress
 from .examples import Examples
-from .model import device_of, in_groups, inputs, load
+from .model import in_groups, inputs, load
 from .network import RandLaNet, parameter_count
 
 BATCH = 8

@@ -22,15 +22,17 @@ from .markup import legend, made, metres, note, page, section, table, tag, text,
 from .plan import draw_plan
 from .plots import draw_profiles
 from .strip_plots import draw_strips, list_strips, strip_legend
-from .verdict import verdict
+from .summary import verdict
 
+CLASSES_ADVICE = (
+    "Rail classes: choose the class of the rails; in a raw cloud, which has none, have the rail points found."
+)
 ADVICE = (
-    "Rail classes: choose the class of the rails; in a raw cloud, which has none, have the rail points found.",
     "Rail standard: have it detected, and gauge and railhead width are measured in the points.",
     "Density: points must be at most a few centimetres apart along the head; in clouds from aircraft they seldom are.",
     "Extent and shortest line: the extent must contain rails that are longer than the shortest line.",
 )
-"""What to try if no track was found."""
+"""What to try if no track was found; the classes only if the rail points were not searched for."""
 
 NOTES = (
     "A rail line is the top of the railhead, on the axis of the railhead. Gauge is the 3D distance between the two "
@@ -77,7 +79,7 @@ def build_page(
         f"Rail Extract: {source}",
         "Rail Extract report",
         source,
-        _verdict(findings, len(network.rails), network.warnings),
+        _verdict(findings, network),
         _tiles(network, findings),
         *([_map(findings), _findings(findings), _tracks(findings)] if findings.tracks else []),
         *([section("Limits", limits_table(findings.tracks))] if findings.tracks else []),
@@ -88,18 +90,19 @@ def build_page(
     )
 
 
-def _verdict(findings: Findings, rail_count: int, warnings: Sequence[str]) -> str:
+def _verdict(findings: Findings, network: RailNetwork) -> str:
     """Write the verdict, the reasons for doubt, and what the user was warned of."""
     if not findings.tracks:
-        words = f"{_without_track(rail_count)} What to try:"
-        return verdict_box("poor", words, (*warnings, *ADVICE))
+        words = f"{_without_track(len(network.rails))} What to try:"
+        advice = ADVICE if network.search else (CLASSES_ADVICE, *ADVICE)
+        return verdict_box("poor", words, (*network.warnings, *advice))
     kind, headline = verdict(findings)
     if findings.lonely:
         count = len(findings.lonely)
         belong = "1 rail does not belong" if count == 1 else f"{count} rails do not belong"
         headline += f" {belong} to a track ({metres(findings.lonely_m)})."
     reasons = [_reason(findings, doubt) for doubt in DOUBTS if findings.length_of(doubt) > 0]
-    return verdict_box(kind, headline, (*reasons, *_hole_reasons(findings), *warnings))
+    return verdict_box(kind, headline, (*reasons, *_hole_reasons(findings), *network.warnings))
 
 
 def _without_track(rail_count: int) -> str:
@@ -130,7 +133,7 @@ def _tiles(network: RailNetwork, findings: Findings) -> str:
     sigma = np.concatenate([track.geometry.sigma_mm for track in findings.tracks] or [np.empty(0)])
     known = sigma[np.isfinite(sigma)]
     figures = [
-        (str(len(findings.tracks)), "tracks"),
+        (f"{len(findings.tracks):,}", "track" if len(findings.tracks) == 1 else "tracks"),
         (metres(findings.length_m), "of track"),
         (str(len(network.rails)), f"rails, {metres(sum(rail.length_m for rail in network.rails))}"),
         (f"{np.median(known):.1f} mm" if len(known) else "unknown", "standard error across, median"),

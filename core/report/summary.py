@@ -1,4 +1,4 @@
-"""The verdict in two lines, for the log."""
+"""The verdict on the tracks that were found, in words, and the figures that it is based on."""
 
 from __future__ import annotations
 
@@ -8,10 +8,17 @@ import numpy as np
 
 from ..progress import counted
 from ..rails import RailNetwork
-from .findings import examine
+from .findings import FEW, MANY, SILENT_SHARE, UNSURE, UNSURE_MM, Findings, examine
 from .listing import listed
 from .markup import metres
-from .verdict import verdict
+
+VERDICTS = (
+    (0.0, "good", "Good throughout: every metre is supported by points, at gauge, with a small standard error."),
+    (FEW, "good", "Good, except for a few places to look at."),
+    (MANY, "fair", "Usable, but look at the findings before you rely on the lines."),
+    (np.inf, "poor", "Poor: large parts are in doubt. Check classes, gauge, railhead width and the cloud's density."),
+)
+"""Share of the length in doubt up to which a verdict applies, CSS class of the verdict, and its words."""
 
 
 def summary(network: RailNetwork, gauges_m: Sequence[float]) -> tuple[str, str]:
@@ -42,6 +49,21 @@ def summary(network: RailNetwork, gauges_m: Sequence[float]) -> tuple[str, str]:
         f"{figures}: standard error {error}, {100 * findings.share:.1f} % of the tracks in doubt, "
         f"{counted(len(listed(findings)), 'finding')}."
     )
+
+
+def verdict(findings: Findings) -> tuple[str, str]:
+    """Return the CSS class and the words of the verdict on tracks that were found."""
+    # What no station shows is a reason to look, not to discard: conductor rails are lone lines, too.
+    silent = min(findings.silent_share, MANY) if findings.silent_share > SILENT_SHARE else 0.0
+    share = max(findings.share, silent)
+    unsure = findings.length_of(UNSURE) / findings.length_m if findings.tracks else 0.0
+    if share > MANY >= max(share - unsure, silent):
+        # Points at gauge whose cloud resolves no more: nothing is wrong that a setting could mend.
+        return "fair", (
+            f"Less accurate than a track survey accepts: the standard error is above {UNSURE_MM:g} mm across "
+            f"or in height on {100 * unsure:.0f} % of the length."
+        )
+    return next((kind, words) for limit, kind, words in VERDICTS if share <= limit)
 
 
 def _rms(values: np.ndarray) -> float:

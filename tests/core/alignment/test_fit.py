@@ -181,7 +181,7 @@ def test_edited_radii_and_starts_in_height_and_of_ramps_are_held():
     np.testing.assert_allclose(held.cants(s), free.cants(s), atol=0.003)
 
 
-@pytest.mark.parametrize(("family", "seed"), [("branch line", 5), ("main line", 22), ("main line", 24)])
+@pytest.mark.parametrize(("family", "seed"), [("branch line", 5), ("main line", 24)])
 def test_a_table_without_changes_gives_back_its_alignment(family, seed):
     random = np.random.default_rng([77, seed])
     one = random_design(random, FAMILIES[family], 14)

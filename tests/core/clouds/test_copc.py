@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from rail_extract.core.clouds import copc, las, laz
+from rail_extract.core.clouds import copc, laz
 from rail_extract.core.clouds.points import read_rail_points
+from rail_extract.core.clouds.readers import read_classes
 from rail_extract.core.errors import NoRailPointsError
 from rail_extract.laboratory.scenes.copc import write_copc
 
@@ -27,7 +28,7 @@ def write_cloud(path, count=4000):
 
 
 def read(path, extent=None, codes=(RAIL,)):
-    parts = list(las.read_classes(path, codes, extent=extent))
+    parts = list(read_classes(path, codes, extent=extent))
     return np.concatenate([np.empty((0, 3)), *(xyz for xyz, *_ in parts)]), sum(
         int(census.sum()) for *_, census in parts
     )

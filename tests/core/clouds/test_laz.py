@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from fuzzing.clouds import chunks_of_any_size
 from rail_extract.core.clouds import las, laz
+from rail_extract.core.clouds.readers import read_points
 from rail_extract.core.errors import CloudError
 
 
@@ -43,7 +44,7 @@ def erase(path, at, length):
 
 
 def read(path):
-    return np.concatenate([xyz for xyz, *_ in las.read_points(path)])
+    return np.concatenate([xyz for xyz, *_ in read_points(path)])
 
 
 @pytest.mark.parametrize("point_format", [0, 3, 6, 7])
@@ -52,7 +53,7 @@ def test_blocks_of_any_size_hold_all_points_in_order(tmp_path, monkeypatch, poin
     """The file has a whole chunk of 50,000 points and one of 1000."""
     monkeypatch.setattr(las, "CHUNK", most)
     xyz = write_cloud(tmp_path / "a.laz", point_format, 51_000)
-    blocks = [block for block, *_ in las.read_points(tmp_path / "a.laz")]
+    blocks = [block for block, *_ in read_points(tmp_path / "a.laz")]
     np.testing.assert_allclose(np.concatenate(blocks), xyz, rtol=0, atol=1e-9)
     assert max(map(len, blocks)) <= most
 

@@ -102,6 +102,15 @@ def test_a_raw_cloud_with_few_points_is_doubted(save, tmp_path):
     assert [warning for warning in network.warnings if "cells with points per metre; below 10" in warning]
 
 
+def test_points_of_a_raw_cloud_that_give_no_rail_are_not_blamed_on_the_classes(save, tmp_path):
+    request = ask([save(scene()[0])], SEARCHED_CLASSES)
+    parameters = Parameters(1.435, 0.072, engine="OPENCV", min_length_m=1000.0)
+    network = extract_files(request, tmp_path, parameters, InTurn(), classify=True)
+    assert network.search.points and not network.rails
+    assert [warning for warning in network.warnings if "give no rail" in warning and "MIN_LENGTH" in warning]
+    assert not [warning for warning in network.warnings if "rail classes" in warning]
+
+
 def test_ground_has_no_rails_to_extract(save, tmp_path):
     rng = np.random.RandomState(1)
     request = ask([save(rough(flat(8.0, rng=rng, per_m2=500), rng))], SEARCHED_CLASSES)

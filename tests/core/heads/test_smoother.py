@@ -11,11 +11,11 @@ from rail_extract.core.heads.smoother import (
     _covariance,
     _differences,
     _of_both,
-    _Prior,
+    _Priors,
+    _solved,
     bridge_error,
     smooth,
 )
-from scipy.linalg import cholesky_banded
 
 NOISE_M = 0.0008
 
@@ -100,26 +100,30 @@ def test_the_stated_errors_are_those_of_the_whole_matrix():
     random, count = np.random.default_rng(5), 12
     lower = np.tril(np.triu(random.normal(0, 1, (count, count)), -1)) + 2 * np.eye(count)
     data = np.array([np.append(np.diag(lower @ lower.T, -apart), np.zeros(apart)) for apart in range(BAND)])
-    prior = _Prior(0.01, 0.5, 0.5, np.zeros(count - 3))
-    weights = np.ones(count - 3), random.uniform(0.5, 2.0, count - 2)
-    band = _of_both(data) + prior.information(weights, count)
-    design, waves = (np.array([_differences(row, one) for row in np.eye(count)]).T for one in (DESIGN, WAVES))
-    own = design.T @ design / prior.scales[0] ** 2, waves.T @ np.diag(weights[1]) @ waves / prior.scales[1] ** 2
-    both = np.kron(whole(data), np.ones((2, 2)))
-    both[::2, ::2] += own[0]
-    both[1::2, 1::2] += own[1] + prior.hold * np.eye(count)
-    np.testing.assert_allclose(whole(band), both, atol=1e-9)
-    summed = np.kron(np.eye(count), np.ones(2))
-    covariance = summed @ np.linalg.inv(both) @ summed.T
-    for apart, row in enumerate(_covariance(cholesky_banded(band, lower=True))):
-        np.testing.assert_allclose(row[: count - apart], np.diag(covariance, -apart), rtol=1e-6)
+    priors = _Priors(np.array([0.01, 0.02]), np.array([0.5, 0.25]), 0.5, np.zeros(count - 3))
+    weights = np.ones((2, count - 3)), random.uniform(0.5, 2.0, (2, count - 2))
+    bands = _of_both(data)[:, None] + priors.information(weights, count)
+    right = random.normal(0, 1, (2, 2 * count))
+    factors, found = _solved(bands, right)
+    design, waves = (_differences(np.eye(count), one).T for one in (DESIGN, WAVES))
+    for one in range(2):
+        (of_design,), (of_waves,) = (scale[one] for scale in priors.scales)
+        both = np.kron(whole(data), np.ones((2, 2)))
+        both[::2, ::2] += design.T @ design / of_design**2
+        both[1::2, 1::2] += waves.T @ np.diag(weights[1][one]) @ waves / of_waves**2 + priors.hold[one] * np.eye(count)
+        np.testing.assert_allclose(whole(bands[:, one]), both, atol=1e-9)
+        np.testing.assert_allclose(both @ found[one], right[one], atol=1e-9)
+        summed = np.kron(np.eye(count), np.ones(2))
+        covariance = summed @ np.linalg.inv(both) @ summed.T
+        for apart, row in enumerate(_covariance(factors[:, one])):
+            np.testing.assert_allclose(row[: count - apart], np.diag(covariance, -apart), rtol=1e-6)
 
 
 def test_waves_of_the_prior_have_their_amplitude():
     """The covariance of the prior alone, far from the ends; the coefficients of a spline exceed its values a little."""
     count = 200
-    prior = _Prior(1e-3, 0.002, 0.5, np.zeros(count - 3))
-    band = prior.information((np.ones(count - 3), np.ones(count - 2)), count)[::2, 1::2]
+    priors = _Priors(np.array([1e-3]), np.array([0.002]), 0.5, np.zeros(count - 3))
+    band = priors.information((np.ones((1, count - 3)), np.ones((1, count - 2))), count)[::2, 0, 1::2]
     deviation = np.sqrt(np.diag(np.linalg.inv(whole(band)))[40:-40])
     np.testing.assert_allclose(deviation, 0.002, rtol=0.05)
 

@@ -22,7 +22,7 @@ from rail_extract.core.report import build_page, list_findings, summary
 from rail_extract.core.report.findings import OFF_GAUGE, UNSUPPORTED, UNSURE, examine
 from rail_extract.core.report.listing import HOLE, LONE_RAIL, OFF_RAIL_MM
 from rail_extract.core.report.markup import metres, table, tag, text
-from rail_extract.core.report.page import ADVICE
+from rail_extract.core.report.page import ADVICE, CLASSES_ADVICE
 from rail_extract.core.report.plots import ticks
 
 GAUGE_MM = 1435.0
@@ -178,7 +178,13 @@ def test_rails_without_a_track_are_reported():
 def test_without_a_track_the_report_says_what_to_try():
     html = page()
     assert headline(html) == "No rail was found. What to try:"
-    assert len(elements(html, "li")) == len(ADVICE) == 4
+    assert [one.text for one in elements(html, "li")] == [CLASSES_ADVICE, *ADVICE]
+    searched = build_page(replace(network(), search=SearchFigures(points=500)), (1.435,), "cloud.laz")
+    assert [one.text for one in elements(searched, "li")] == list(ADVICE)
+
+
+def test_one_track_is_not_many():
+    assert "<b>1</b><span>track</span>" in page(track()) and "<b>2</b><span>tracks</span>" in page(track(), track(2))
 
 
 def test_radii_and_heights_are_those_of_the_cloud():

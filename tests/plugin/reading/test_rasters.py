@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from osgeo import gdal
-from rail_extract.core import raster_file
 from rail_extract.core.clouds.crs import import_pyproj
 from rail_extract.core.disk import Destination
 from rail_extract.core.errors import Cancelled, ModelError, ParameterError, RasterError
 from rail_extract.core.frame import LocalFrame
 from rail_extract.core.frpdf.cleanup import clean
+from rail_extract.core.output import raster_file
 from rail_extract.core.output.raster_file import BLOCK, header_for, on_one_grid
 from rail_extract.core.progress import Progress
 from rail_extract.core.raster import TILE, cell_size, rasterize
