@@ -375,14 +375,14 @@ class Scores:
     by_bin : (2, b) array
         Derivatives of the log-likelihood of a point with respect to the offset and the height, 1/m, each less what a
         wrong value of the other or a wrong slope across would add to it.
-    per_point : (2,) array
-        Information about both that a point has on average, 1/m².
+    per_point : float
+        Information about the height that a point has on average, 1/m².
     common_m : (2,) array
         Standard errors of both in the section that more points next to a station would not reduce.
     """
 
     by_bin: np.ndarray
-    per_point: np.ndarray
+    per_point: float
     common_m: np.ndarray
 
     @classmethod
@@ -398,4 +398,4 @@ class Scores:
         known, rates = _rates(section, blurred, used)
         whole = np.linalg.inv(_information(counts[used], section, known, rates, SHARE_DOUBT)).diagonal()[:2]
         chance = 1 / np.maximum(by_bin**2 @ counts, RIDGE[:2])
-        return cls(by_bin, by_bin**2 @ density, np.sqrt(np.maximum(whole - chance, 0.0)))
+        return cls(by_bin, float(by_bin[1] ** 2 @ density), np.sqrt(np.maximum(whole - chance, 0.0)))

@@ -359,13 +359,15 @@ def _by_station(
     Returns
     -------
     places, information : (2, count) arrays
-        See `Middles`; NaN and 0 without points. What a point says on average counts, because in few points the squares
-        of their own scores would give those far off the head most weight.
+        See `Middles`; NaN and 0 without points. Across, the squares of the scores count, because part of the head may
+        be hidden here. In height, what a point says on average does: every point of a top says as much, and in few
+        points, squares would give those far off it most weight.
     course : (2, count) array
         The places in windows of `COURSE_STATIONS`, which show how the line wanders about the head.
     """
     gradient = np.array([np.bincount(station, own, minlength=count) for own in scores.by_bin[:, bins]])
-    known = scores.per_point[:, None] * np.bincount(station, minlength=count)
+    shown = np.bincount(station, scores.by_bin[0, bins] ** 2, minlength=count)
+    known = np.array([shown, scores.per_point * np.bincount(station, minlength=count)])
     places, course = (
         place[:, None] + sums[0] / np.maximum(sums[1], 1e-9)
         for sums in ((gradient, known), uniform_filter1d([gradient, known], COURSE_STATIONS, axis=2, mode="constant"))
