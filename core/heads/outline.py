@@ -34,8 +34,8 @@ BIN_M = 0.002
 """Side of the bins in which points are counted."""
 
 BESIDE_M, ABOVE_M, BELOW_M = 0.024, 0.024, 0.046
-"""Reach of the bins beyond the edges, above the top and below it: three standard deviations of noise of 8 mm. With 16 mm
-above the top, such noise would lower it."""
+"""Reach of the bins beyond the edges, above the top and below it: three standard deviations of noise of 8 mm. With
+16 mm above the top, such noise would lower it."""
 
 MIN_STRAY_SHARE = 0.02
 """Smallest share of points that are on no part of the outline: it limits how far a single one can pull."""
