@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, station_count
+from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, station_count, stations_along
 from .head_points import HeadPoints, near_lines
 from .outline import CROWN_RADIUS_M, MIN_NOISE_M, Grid, Outline, Scores, Section, fit_section, log_likelihood
 
@@ -106,6 +106,8 @@ class Middles:
     blur, blur_up : (s,) arrays
         Standard deviations, across and in height, of the places at which the points of a section show the head, metres;
         0 where they agree. They are half the distance of two passes of the scanner.
+    top, top_information, top_common : (s,) arrays
+        Height of the top, and the same about it as about the offset.
     """
 
     offset: np.ndarray
@@ -113,12 +115,15 @@ class Middles:
     common: np.ndarray
     blur: np.ndarray
     blur_up: np.ndarray
+    top: np.ndarray
+    top_information: np.ndarray
+    top_common: np.ndarray
 
     @classmethod
     def unknown(cls, count: int) -> Middles:
         """Return those of stations of which nothing is known."""
-        nothing = np.full(count, np.nan)
-        return cls(nothing, np.zeros(count), nothing.copy(), np.zeros(count), np.zeros(count))
+        nothing, zero = np.full((4, count), np.nan), np.zeros((4, count))
+        return cls(nothing[0], zero[0], nothing[1], zero[1], zero[2], nothing[2], zero[3], nothing[3])
 
 
 def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
@@ -132,7 +137,8 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
     """
     count, head_width_m = len(seen), points.width_m
     middles = Middles.unknown(count)
-    left, up = points.in_frame()
+    left, up, level = points.in_frame()
+    level = np.interp(stations_along(points.length_m), points.t, level) if len(level) else middles.top
     station = np.minimum((points.t / STATION_STEP_M).astype(int), count - 1)
     head, grid = Head(head_width_m, Outline.of(head_width_m)), Grid.of(head_width_m)
     bins = grid.number(left, up)
@@ -150,15 +156,19 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
             continue
         scores = Scores.of(counts, section, head.outline, grid)
         part = slice(first, last)
-        offset, middles.information[part], course = _by_station(
-            section.place[0], scores.by_bin[bins[here]], station[here] - first, last - first
+        (offset, above), (middles.information[part], middles.top_information[part]), (course, _) = _by_station(
+            section.place[:2], scores, bins[here], station[here] - first, last - first
         )
         is_crowned = _is_crowned(left[here], up[here], head_width_m)
+        is_flat = not is_crowned and _is_flat(left[here] - section.place[0], up[here], head_width_m)
         pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
         is_sharp = np.exp(section.place[5]) < SHARP_NOISE_M
-        if is_crowned or not (is_sharp and _is_flat(left[here] - section.place[0], up[here], head_width_m)):
+        if not (is_flat and is_sharp):
             middles.offset[part] = np.where(seen[part], offset - pull, np.nan)
-        middles.common[part] = np.hypot(scores.common_m, PULL_DOUBT * pull)
+        if not is_flat:
+            middles.top[part] = np.where(seen[part], level[part] + above, np.nan)
+        middles.common[part] = np.hypot(scores.common_m[0], PULL_DOUBT * pull)
+        middles.top_common[part] = scores.common_m[1]
         on_crown = np.abs(left[here] - section.place[0]) < FLAT_SHARE * head_width_m
         middles.blur_up[part] = apart_m = _half_apart(_above_crown(left[here], up[here], section.place)[on_crown])
         middles.blur[part] = _blur(section, width_m - head_width_m, course, apart_m, is_crowned)
@@ -223,7 +233,7 @@ def _is_crowned(left: np.ndarray, up: np.ndarray, head_width_m: float) -> bool:
 
 def _above_crown(left: np.ndarray, up: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Return the heights of points, (n,) metres, above the crown of a head at a place."""
-    return up - place[1] - place[2] * left + (left - place[0]) ** 2 / (2 * CROWN_RADIUS_M)
+    return up - place[1] - place[2] * left + (0.5 / CROWN_RADIUS_M + place[6]) * (left - place[0]) ** 2
 
 
 def _half_apart(above: np.ndarray) -> float:
@@ -249,7 +259,7 @@ def _blur(section: Section, wider_m: float, offset: np.ndarray, apart_up_m: floa
     in height, by `apart_up_m`. A head that is flat to its edges looks both blurred and wider. Passes from either side
     each show the edge that they are shifted to: they widen the head, by `wider_m`, rather than blur it.
     """
-    across_m, height_m = np.exp(section.place[4:])
+    across_m, height_m = np.exp(section.place[4:6])
     known = offset[np.isfinite(offset)]
     if len(known) and np.sqrt(np.mean(known**2)) > ON_HEAD_M:
         return 0.0
@@ -278,7 +288,8 @@ def likelier_width(lines: Sequence[np.ndarray], xyz: np.ndarray, widths_m: Seque
     grid, outlines = Grid.of(max(widths_m)), [Outline.of(width_m) for width_m in widths_m]
     likelihood = np.zeros(len(widths_m))
     for points in near_lines(lines, xyz, max(widths_m)):
-        bins = grid.number(*replace(points, width_m=widths_m[0]).in_frame())
+        left, up, _ = replace(points, width_m=widths_m[0]).in_frame()
+        bins = grid.number(left, up)
         station = points.t[bins >= 0] / STATION_STEP_M
         for first, last in _borders(station, station_count(points.length_m)):
             here = bins[bins >= 0][slice(*np.searchsorted(station, [first, last]))]
@@ -331,23 +342,37 @@ def _share(station: np.ndarray, is_left: np.ndarray) -> float:
 
 
 def _by_station(
-    offset_m: float, score: np.ndarray, station: np.ndarray, count: int
+    place: np.ndarray, scores: Scores, bins: np.ndarray, station: np.ndarray, count: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find the middles at the stations of a section from the scores of its points.
+    """Find offset and height at the stations of a section from the scores of their points.
+
+    Parameters
+    ----------
+    place : (2,) array
+        Offset and height of the section.
+    scores : Scores
+    bins, station : (n,) int arrays
+        Bin and station of each point.
+    count : int
+        Number of stations.
 
     Returns
     -------
-    offset, information : (count,) arrays
-        See `Middles`.
-    course : (count,) array
-        The middles in windows of `COURSE_STATIONS`, which show how the line wanders about the head.
+    places, information : (2, count) arrays
+        See `Middles`; NaN and 0 without points. Across, the squares of the scores count, because part of the head may
+        be hidden here. In height, what a point says on average does: every point of a top says as much, and in few
+        points, squares would give those far off it most weight.
+    course : (2, count) array
+        The places in windows of `COURSE_STATIONS`, which show how the line wanders about the head.
     """
-    gradient, known = np.array([np.bincount(station, weights, minlength=count) for weights in (score, score**2)])
-    offset, course = (
-        offset_m + sums[0] / np.maximum(sums[1], 1e-9)
-        for sums in ((gradient, known), uniform_filter1d([gradient, known], COURSE_STATIONS, axis=1, mode="constant"))
+    gradient = np.array([np.bincount(station, own, minlength=count) for own in scores.by_bin[:, bins]])
+    shown = np.bincount(station, scores.by_bin[0, bins] ** 2, minlength=count)
+    known = np.array([shown, scores.per_point * np.bincount(station, minlength=count)])
+    places, course = (
+        place[:, None] + sums[0] / np.maximum(sums[1], 1e-9)
+        for sums in ((gradient, known), uniform_filter1d([gradient, known], COURSE_STATIONS, axis=2, mode="constant"))
     )
-    return np.where(known > 0, offset, np.nan), known, course
+    return np.where(known > 0, places, np.nan), known, course
 
 
 def with_outline(by_edges: np.ndarray, by_outline: Middles) -> np.ndarray:
