@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from .classify.settings import Settings
 from .clouds.points import ask
-from .clouds.readers import Extent, Paths
+from .clouds.readers import Extent, Paths, paths_of
 from .disk import Destination
 from .errors import ParameterError
 from .labelling.files import Choice, classify_files, plan_output
@@ -181,7 +181,7 @@ def extract(
     request = ask(clouds, SEARCHED_CLASSES if raw else rail_classes, crs, extent, progress)
     with TemporaryDirectory() as folder, workers_of(workers) as runner:
         found = extract_files(request, Path(folder), settings, runner, progress, classify=raw)
-    paths = tuple(map(Path, [clouds] if isinstance(clouds, (str, Path)) else clouds))
+    paths = tuple(paths_of(clouds))
     command = f"rail_extract.extract({', '.join(repr(str(path)) for path in paths)}, standard={standard!r})"
     return Network(**vars(found), origin=Origin(paths, profile, settings.gauges[1:], command, settings))
 
@@ -224,7 +224,7 @@ def classify(
         A cloud can't be read, or the copy can't be written.
     """
     profile = resolve(standard)
-    paths = [Path(path) for path in ([clouds] if isinstance(clouds, (str, Path)) else clouds)]
+    paths = paths_of(clouds)
     planned = plan_output(paths, Path(output), rail_class, progress)
     request = ask(paths, SEARCHED_CLASSES, crs, None, progress)
     settings = Settings((profile.gauge_m,), profile.head_width_m)

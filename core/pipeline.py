@@ -208,7 +208,7 @@ def _walk(
     warn_of_strips(rails, parameters, progress)
     rails = doubting_jumps(rails, centerlines, progress)
     heads = head_widths(sources[0], parameters.gauges, progress, rails) if rails else None
-    beyond_m = gauge_scatter(rails, centerlines) if heads and heads.blunt else {}
+    beyond_m = gauge_scatter(rails, centerlines, parameters.gauges_m) if heads and heads.blunt else {}
     rails = doubting_scatter(rails, beyond_m)
     geometry = _measure_tracks(centerlines, rails, beyond_m, sources, parameters, runner, measuring)
     described = dict(runner.run({"engine": Task("Describing the engine", _describe_engine, (parameters,))}))

@@ -220,6 +220,11 @@ def explained(path: Path) -> Iterator[None]:
         raise CloudError(f"{path.name} is cut off or damaged ({reason}): copy or export it again.") from error
 
 
+def paths_of(paths: Paths) -> list[Path]:
+    """Return one path or several as a list."""
+    return [Path(path) for path in ([paths] if isinstance(paths, (str, Path)) else paths)]
+
+
 def list_files(paths: Paths) -> tuple[Path, ...]:
     """List the cloud files of one path or several, each file once.
 
@@ -231,9 +236,9 @@ def list_files(paths: Paths) -> tuple[Path, ...]:
         A path does not exist or has an unknown suffix, a folder contains no cloud, or a virtual point cloud is damaged.
     """
     files: list[Path] = []
-    for path in [paths] if isinstance(paths, (str, Path)) else paths:
-        with explained(Path(path)):
-            files.extend(file.absolute() for file in _files_of(Path(path)))  # a worker may run in another folder
+    for path in paths_of(paths):
+        with explained(path):
+            files.extend(file.absolute() for file in _files_of(path))  # a worker may run in another folder
     if not files:
         raise CloudError("No point cloud was given: name a file or a folder of tiles.")
     for file in files:

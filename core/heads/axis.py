@@ -60,8 +60,8 @@ class Shown:
         points show nothing.
     common_m : float
         Standard error that more points would not reduce; along an `Axis`, what its course follows of it.
-    blur_m, blur_up_m : float
-        See `sections.Middles`.
+    outline : Middles
+        What the outline of the head shows.
     """
 
     t: np.ndarray
@@ -69,8 +69,7 @@ class Shown:
     offset_m: np.ndarray
     information: np.ndarray
     common_m: np.ndarray
-    blur_m: np.ndarray
-    blur_up_m: np.ndarray
+    outline: Middles
 
 
 @dataclass(frozen=True)
@@ -137,7 +136,7 @@ class Axis:
         support = Support(t, self.shown.points, np.sqrt(by_chance + remainder + self.shown.common_m**2 + bridge_m**2))
         if self.flank is not None:
             return replace(support, sigmaz_m=np.full(len(t), FLANK_TOP_SIGMA_M))
-        return support if marked else _with_blur(support, self.shown.blur_m, self.shown.blur_up_m)
+        return support if marked else _with_blur(support, self.shown.outline.blur, self.shown.outline.blur_up)
 
 
 def _counted(t: np.ndarray, count: int, values: np.ndarray | None = None) -> np.ndarray:
@@ -153,11 +152,12 @@ def _means(t: np.ndarray, across: np.ndarray, count: int) -> tuple[np.ndarray, n
 
 def _of_ridge(points: HeadPoints, ridge: Ridge) -> Shown:
     """Return what points show of a blunt head: its crest, with errors that the stations of a window share."""
-    nothing, line = np.zeros(len(ridge.t)), points.line
+    line = points.line
     places, normals = (interpolate(values, points.along, ridge.t) for values in (line, left_normals(line)))
     shared_m = wander(places + ridge.course_m[:, None] * normals)
     information = ridge.information / (1 + ridge.information * WINDOW * shared_m**2)
-    return Shown(ridge.t, _counted(points.t, len(ridge.t)), ridge.offset_m, information, nothing, nothing, nothing)
+    outline, count = Middles.unknown(len(ridge.t)), _counted(points.t, len(ridge.t))
+    return Shown(ridge.t, count, ridge.offset_m, information, np.zeros(len(ridge.t)), outline)
 
 
 def _is_narrow(points: HeadPoints) -> bool:
@@ -173,8 +173,8 @@ def _of_band(points: HeadPoints, left_m: float, sigma_m: float) -> Shown:
     stations, across = stations_along(points.length_m), points.across
     count, mean_m = _means(points.t, across, len(stations))
     noise_m = robust_sigma(across - np.interp(points.t, stations[count > 0], mean_m[count > 0]))
-    offset_m, nothing = mean_m + left_m - np.median(across), 0.0 * mean_m
-    return Shown(stations, count, offset_m, count / noise_m**2, nothing + sigma_m, nothing, nothing)
+    offset_m, common_m = mean_m + left_m - np.median(across), np.full(len(stations), sigma_m)
+    return Shown(stations, count, offset_m, count / noise_m**2, common_m, Middles.unknown(len(stations)))
 
 
 def _of_head(points: HeadPoints, unseen_m: float, by_outline: bool) -> Shown:
@@ -201,8 +201,7 @@ def _of_head(points: HeadPoints, unseen_m: float, by_outline: bool) -> Shown:
         np.select(which, [outline.offset, found.offset_m, mean_m]),
         np.select(which, [outline.information, found.information, by_mean]),
         np.select(which, [outline.common, EDGE_SIGMA_M, unsure_m]),
-        outline.blur,
-        outline.blur_up,
+        outline,
     )
 
 

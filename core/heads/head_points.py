@@ -126,16 +126,17 @@ class HeadPoints:
         top, _ = self.top
         return histograms(self.t[top], self.across[top], self.length_m, self.width_m)
 
-    def in_frame(self) -> tuple[np.ndarray, np.ndarray]:
+    def in_frame(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the points in the frame of their head: offset to the left and height, (n,), from the top on the line.
 
-        NaN if the crown has too few points.
+        The third array is the height of this top, (n,). All are NaN if the crown has too few points.
         """
         crown = self.within(AXIS_SHARE)
         if crown.sum() < MIN_ON_HEAD:
-            return np.full(len(self.t), np.nan), np.full(len(self.t), np.nan)
+            nothing = np.full(len(self.t), np.nan)
+            return nothing, nothing, nothing
         slope, flat = self._flat(crown)
-        return self.across + slope * flat, flat
+        return self.across + slope * flat, flat, self.z - slope * self.across - flat
 
     def _flat(self, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the slope across and the height without it, (n,) each, above the points that show the `level`."""

@@ -6,6 +6,7 @@ See docs/method.md section 6.1.
 from __future__ import annotations
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from scipy.ndimage import median_filter, uniform_filter1d
 
 LEVEL_BIN_M = 0.5
@@ -44,6 +45,8 @@ MIN_NOISE_M = 0.001
 def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Return the height of most points around each point: medians of short bins, filtered by a running median.
 
+    The trend of the line is removed before and added again, so that the ends of a gradient are kept.
+
     Parameters
     ----------
     t : (n,) array
@@ -58,7 +61,9 @@ def rough_level(t: np.ndarray, z: np.ndarray) -> np.ndarray:
     first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
     count = np.diff(np.append(first, len(t)))
     middle_t = t[first + count // 2]
-    return np.interp(t, middle_t, _median_filtered(middle_t, medians(z, first, count)))
+    level = medians(z, first, count)
+    trend = Polynomial.fit(middle_t, level, 1) if len(middle_t) > MEDIAN_BINS else Polynomial([0.0])
+    return trend(t) + np.interp(t, middle_t, _median_filtered(middle_t, level - trend(middle_t)))
 
 
 def medians(values: np.ndarray, first: np.ndarray, count: np.ndarray) -> np.ndarray:
@@ -82,14 +87,12 @@ def medians(values: np.ndarray, first: np.ndarray, count: np.ndarray) -> np.ndar
     return found
 
 
-def _median_filtered(t: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Apply a running median to heights after removing their trend, so that the ends of a gradient are kept."""
-    trend = np.polynomial.Polynomial.fit(t, z, 1)(t) if len(t) > MEDIAN_BINS else 0.0
-    level = z - trend
+def _median_filtered(t: np.ndarray, level: np.ndarray) -> np.ndarray:
+    """Apply a running median to heights without their trend, and leave out those of another rail."""
     own = np.abs(level - median_filter(level, OTHER_RAIL_BINS, mode="nearest")) <= OTHER_RAIL_M
     if own.any():
         level = np.interp(t, t[own], level[own])
-    return trend + median_filter(level, MEDIAN_BINS, mode="nearest")
+    return median_filter(level, MEDIAN_BINS, mode="nearest")
 
 
 def robust_sigma(values: np.ndarray) -> float:

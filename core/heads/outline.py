@@ -33,8 +33,9 @@ VIEWS_DEG = (5.0, 12.0, 22.0, 40.0, 90.0, 140.0, 158.0, 168.0, 175.0)
 BIN_M = 0.002
 """Side of the bins in which points are counted."""
 
-BESIDE_M, ABOVE_M, BELOW_M = 0.024, 0.016, 0.046
-"""Reach of the bins beyond the edges, above the top and below it: three standard deviations of strong noise."""
+BESIDE_M, ABOVE_M, BELOW_M = 0.024, 0.024, 0.046
+"""Reach of the bins beyond the edges, above the top and below it: three standard deviations of noise of 8 mm. With
+16 mm above the top, such noise would lower it."""
 
 MIN_STRAY_SHARE = 0.02
 """Smallest share of points that are on no part of the outline: it limits how far a single one can pull."""
@@ -51,8 +52,11 @@ NOISE_RATIO_SIGMA = 0.3
 WIDTH_SIGMA_M = 0.0005
 """Expected error of the head width: half of what tables differ by, because most agree."""
 
-MAX_STEPS = np.array([0.004, 0.004, 0.1, 0.002, 0.3, 0.3])
-"""Largest changes of the place in a round: metres, metres, slope, metres, and logarithms of the noise."""
+BEND_SIGMA = 0.25 / CROWN_RADIUS_M
+"""Expected error of the bend of the crown, 1/m: half of that of a new one, because worn crowns are flatter."""
+
+MAX_STEPS = np.array([0.004, 0.004, 0.1, 0.002, 0.3, 0.3, 1.0])
+"""Largest changes of the place in a round: metres, metres, slope, metres, logarithms of the noise, and 1/m."""
 
 PLACE = len(MAX_STEPS)
 """Number of the unknowns of the place."""
@@ -60,7 +64,7 @@ PLACE = len(MAX_STEPS)
 MAX_ROUNDS, SETTLED = 40, 0.1
 """Largest number of rounds of a fit, and the gain of the log-likelihood from which it goes on; most need ten."""
 
-RIDGE = np.array([400.0, 400.0, 1.0, 1.0, 0.1, 0.1])
+RIDGE = np.array([400.0, 400.0, 1.0, 1.0, 0.1, 0.1, 0.0])
 """Information about the place that is always there, as of 5 cm and of a factor of 20 in the noise: drawn or computed
 points, which are all in a few bins, may say nothing about some of it."""
 
@@ -94,6 +98,8 @@ class Outline:
         Samples: metres to the left of the axis and above the top.
     widening : (j,) array
         How far each sample moves to the left if the head is a metre wider.
+    falling : (j,) array
+        How far each sample falls per bend of the crown, m².
     parts : (k, j) array
         Points of each part by sample; rows sum to 1. The first parts are what is seen of the crown and the upper
         corners from each view, the others are the lower corners and the faces, which classifications may leave out.
@@ -102,6 +108,7 @@ class Outline:
     left: np.ndarray
     up: np.ndarray
     widening: np.ndarray
+    falling: np.ndarray
     parts: np.ndarray
 
     @classmethod
@@ -129,7 +136,8 @@ class Outline:
         open_parts = np.where(np.abs(turn) < FACE_TURN, np.maximum(seen, 0), 0)
         faces = np.array([np.where(number == piece, size, 0) for piece in (2, 3, 4, 6, 7, 8)])
         parts = np.concatenate([open_parts, faces])
-        return cls(left, up, np.clip(left / inner, -1, 1) / 2, parts / parts.sum(axis=1, keepdims=True))
+        crown = np.clip(left, -inner, inner)
+        return cls(left, up, crown / (2 * inner), crown**2, parts / parts.sum(axis=1, keepdims=True))
 
 
 def _samples(first: float, last: float, metres: float) -> tuple[np.ndarray, np.ndarray]:
@@ -175,9 +183,9 @@ class Section:
 
     Attributes
     ----------
-    place : (6,) array
-        Offset of the axis to the left, height of the top, slope across, excess of the head width, and the logarithms of
-        the noise across and in height; lengths in metres.
+    place : (7,) array
+        Offset of the axis to the left, height of the top, slope across, excess of the head width, the logarithms of the
+        noise across and in height, and the excess of the bend of the crown, 1/m; lengths in metres.
     shares : (k + 1,) array
         Share of the points of each part, and of those on none.
     """
@@ -214,10 +222,10 @@ class Blurred:
     @classmethod
     def at(cls, place: np.ndarray, outline: Outline, grid: Grid) -> Blurred:
         """Put the outline at a place and blur it."""
-        left, up, lean, wider = place[:4]
-        noise = np.exp(place[4:])
+        left, up, lean, wider, *_, bend = place
+        noise = np.exp(place[4:6])
         off = (grid.left[:, None] - left - outline.left - wider * outline.widening + lean * outline.up) / noise[0]
-        above = (grid.up - (up + outline.up + lean * outline.left)[:, None]) / noise[1]
+        above = (grid.up - (up + outline.up + lean * outline.left - bend * outline.falling)[:, None]) / noise[1]
         across = np.exp(-0.5 * off**2) * (BIN_M / (noise[0] * np.sqrt(2 * np.pi)))
         height = np.exp(-0.5 * above**2) * (BIN_M / (noise[1] * np.sqrt(2 * np.pi)))
         parts = np.full((len(outline.parts) + 1, grid.size), 1 / grid.size)
@@ -229,7 +237,7 @@ class Blurred:
         return shares @ self.parts
 
     def by_place(self, shares: np.ndarray) -> np.ndarray:
-        """Return the derivatives of the density with respect to the place, (6, b)."""
+        """Return the derivatives of the density with respect to the place, (7, b)."""
         across = self.across * (shares[:-1] @ self.outline.parts)
         moved, lifted = across * self.off / self.noise[0], self.height * self.above / self.noise[1]
         derivatives = (
@@ -239,6 +247,7 @@ class Blurred:
             (moved * self.outline.widening) @ self.height,
             (across * (self.off**2 - 1)) @ self.height,
             across @ (self.height * (self.above**2 - 1)),
+            -(across * self.outline.falling) @ lifted,
         )
         return np.array(derivatives).reshape(PLACE, -1)
 
@@ -285,23 +294,25 @@ def log_likelihood(counts: np.ndarray, section: Section, outline: Outline, grid:
 def _start(outline: Outline) -> Section:
     """Return a head in the middle of the bins, all parts of which have the same share."""
     count = len(outline.parts) + 1
-    return Section(np.append(np.zeros(4), np.log([START_NOISE_M] * 2)), np.full(count, 1 / count))
+    noise = np.log(START_NOISE_M)
+    return Section(np.array([0.0, 0.0, 0.0, 0.0, noise, noise, 0.0]), np.full(count, 1 / count))
 
 
 def _log_likelihood(counts: np.ndarray, section: Section, blurred: Blurred) -> float:
-    """Return the logarithm of the likelihood of the points and of what is expected of slope, width and noise."""
-    lean, wider, across, height = section.place[2:]
-    usual = (lean / LEAN_SIGMA) ** 2 + ((across - height) / NOISE_RATIO_SIGMA) ** 2
+    """Return the logarithm of the likelihood of the points and of what is expected of the place."""
+    lean, wider, across, height, bend = section.place[2:]
+    usual = (lean / LEAN_SIGMA) ** 2 + ((across - height) / NOISE_RATIO_SIGMA) ** 2 + (bend / BEND_SIGMA) ** 2
     width = WRONG_WIDTH_SIGMAS**2 * np.log1p((wider / (WRONG_WIDTH_SIGMAS * WIDTH_SIGMA_M)) ** 2)
     return float(counts @ np.log(blurred.density(section.shares)) - 0.5 * (usual + width))
 
 
 def _expected(place: np.ndarray) -> np.ndarray:
-    """Return the information about the place that does not come from the points, (6, 6)."""
+    """Return the information about the place that does not come from the points, (7, 7)."""
     known = np.zeros((PLACE, PLACE))
     known[2, 2] = LEAN_SIGMA**-2
     known[3, 3] = WIDTH_SIGMA_M**-2 / (1 + (place[3] / (WRONG_WIDTH_SIGMAS * WIDTH_SIGMA_M)) ** 2)
-    known[4:, 4:] = np.array([[1, -1], [-1, 1]]) / NOISE_RATIO_SIGMA**2
+    known[4:6, 4:6] = np.array([[1, -1], [-1, 1]]) / NOISE_RATIO_SIGMA**2
+    known[6, 6] = BEND_SIGMA**-2
     return known
 
 
@@ -318,7 +329,7 @@ def _normalized(shares: np.ndarray) -> np.ndarray:
 
 
 def _scoring_step(counts: np.ndarray, section: Section, blurred: Blurred, used: np.ndarray) -> np.ndarray:
-    """Return the change of place and shares, (6 + k + 1,), that the gradient and the information ask for."""
+    """Return the change of place and shares, (7 + k + 1,), that the gradient and the information ask for."""
     known, rates = _rates(section, blurred, used)
     gradient = rates @ counts[used]
     gradient[:PLACE] -= _expected(section.place) @ section.place
@@ -332,7 +343,7 @@ def _scoring_step(counts: np.ndarray, section: Section, blurred: Blurred, used: 
 
 
 def _rates(section: Section, blurred: Blurred, used: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the parts whose shares count as unknowns, and the relative derivatives, (6 + p, u), in the used bins."""
+    """Return the parts whose shares count as unknowns, and the relative derivatives, (7 + p, u), in the used bins."""
     known = np.flatnonzero(section.shares[:-1] > USED_SHARE)
     derivatives = np.concatenate([blurred.by_place(section.shares)[:, used], blurred.parts[np.ix_(known, used)]])
     return known, derivatives / blurred.density(section.shares)[used]
@@ -351,25 +362,28 @@ def _information(
 def _moved(section: Section, step: np.ndarray) -> Section:
     """Apply a step; shares stay positive."""
     place = section.place + step[:PLACE]
-    place[4:] = np.maximum(place[4:], np.log(MIN_NOISE_M))
+    place[4:6] = np.maximum(place[4:6], np.log(MIN_NOISE_M))
     return Section(place, _normalized(np.maximum(section.shares + step[PLACE:], MIN_SHARE_LEFT * section.shares)))
 
 
 @dataclass(frozen=True)
 class Scores:
-    """What each bin contributes to the offset of a head, and how well the section knows it.
+    """What each bin contributes to the offset and the height of a head, and how well the section knows both.
 
     Attributes
     ----------
-    by_bin : (b,) array
-        Derivative of the log-likelihood of a point with respect to the offset, 1/m, less what a wrong height or slope
-        across would add to it.
-    common_m : float
-        Standard error of the offset of the section that more points next to a station would not reduce.
+    by_bin : (2, b) array
+        Derivatives of the log-likelihood of a point with respect to the offset and the height, 1/m, each less what a
+        wrong value of the other or a wrong slope across would add to it.
+    per_point : float
+        Information about the height that a point has on average, 1/m².
+    common_m : (2,) array
+        Standard errors of both in the section that more points next to a station would not reduce.
     """
 
     by_bin: np.ndarray
-    common_m: float
+    per_point: float
+    common_m: np.ndarray
 
     @classmethod
     def of(cls, counts: np.ndarray, section: Section, outline: Outline, grid: Grid) -> Scores:
@@ -378,8 +392,10 @@ class Scores:
         density = blurred.density(section.shares)
         scores = blurred.by_place(section.shares)[:3] / density
         products = (scores * density) @ scores.T + np.diag(RIDGE[:3] / max(counts.sum(), 1.0))
-        by_bin = scores[0] - np.linalg.solve(products[1:, 1:], products[1:, 0]) @ scores[1:]
+        inverse = np.linalg.inv(products)[:2]
+        by_bin = inverse @ scores / inverse.diagonal()[:, None]
         used = counts > 0
         known, rates = _rates(section, blurred, used)
-        whole = np.linalg.inv(_information(counts[used], section, known, rates, SHARE_DOUBT))[0, 0]
-        return cls(by_bin, float(np.sqrt(max(whole - 1 / max(counts @ by_bin**2, RIDGE[0]), 0.0))))
+        whole = np.linalg.inv(_information(counts[used], section, known, rates, SHARE_DOUBT)).diagonal()[:2]
+        chance = 1 / np.maximum(by_bin**2 @ counts, RIDGE[:2])
+        return cls(by_bin, float(by_bin[1] ** 2 @ density), np.sqrt(np.maximum(whole - chance, 0.0)))

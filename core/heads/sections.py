@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, station_count
+from .edges import ENOUGH_POINTS, STATION_STEP_M, VIEW_STATIONS, station_count, stations_along
 from .head_points import HeadPoints, near_lines
 from .outline import CROWN_RADIUS_M, MIN_NOISE_M, Grid, Outline, Scores, Section, fit_section, log_likelihood
 
@@ -65,16 +65,27 @@ noise²))², at half their distance d: -0.5 where d is the noise. Heights rounde
 FLAT_BLUR_M = 0.009
 """Blur from which a head without a round top is not flat to its edges, but shown by passes 20 mm apart or more."""
 
-CROWNED_SHARE, CROWN_SHARE, CROWN_BAND_M = 0.5, 0.4, 0.006
-"""Curvature of the top, as a share of that of the outline, from which a head is crowned, and the points by which it is
-measured: within this share of the head's width from its axis, and this far from the top. A head that is flat to its
-edges looks 11 mm wider than it is, and blurred, as one that several passes show."""
-
 ON_HEAD_M = 0.005
 """Distance of a line from its head (RMS) up to which it shows the blur of the head: further off, it was displaced."""
 
 CORE_SIGMAS, SURE_SIGMAS = 4.0, 4.0
 """Standard deviations from which heights are those of weeds, and of the kurtosis, √(24 / n), from which it is sure."""
+
+CROWNED_SHARE, CROWN_SHARE, CROWN_BAND_M = 0.5, 0.4, 0.006
+"""Curvature of the top, as a share of that of the outline, from which a head is crowned, and the points by which it is
+measured: within this share of the head's width from its axis, and this far from the top. A head that is flat to its
+edges looks 11 mm wider than it is, and blurred, as one that several passes show."""
+
+FLAT_RING, FLAT_DROP_M = (0.40, 0.47), 0.0012
+"""Distances from the axis, as shares of the head's width, between which corners are; and by how much less they lie
+below the middle of a head that is flat to its edges. Those of the outline are 2.5 to 5 mm below it."""
+
+SHARP_NOISE_M = 0.003
+"""Noise in height from which the outline tells the axis of a head without corners as well as its edges do."""
+
+BEYOND_RING, MAX_BEYOND = (0.53, 0.60), 0.2
+"""Distances from the axis at which a flat head has no points, as shares of its width, and their most density there
+compared with that between the corners and the axis: passes 15 mm apart have half of it there."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +103,8 @@ class Middles:
     blur, blur_up : (s,) arrays
         Standard deviations, across and in height, of the places at which the points of a section show the head, metres;
         0 where they agree. They are half the distance of two passes of the scanner.
+    top, top_information, top_common : (s,) arrays
+        Height of the top, and the same about it as about the offset.
     """
 
     offset: np.ndarray
@@ -99,12 +112,15 @@ class Middles:
     common: np.ndarray
     blur: np.ndarray
     blur_up: np.ndarray
+    top: np.ndarray
+    top_information: np.ndarray
+    top_common: np.ndarray
 
     @classmethod
     def unknown(cls, count: int) -> Middles:
         """Return those of stations of which nothing is known."""
-        nothing = np.full(count, np.nan)
-        return cls(nothing, np.zeros(count), nothing.copy(), np.zeros(count), np.zeros(count))
+        nothing, zero = np.full((4, count), np.nan), np.zeros((4, count))
+        return cls(nothing[0], zero[0], nothing[1], zero[1], zero[2], nothing[2], zero[3], nothing[3])
 
 
 def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
@@ -118,7 +134,8 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
     """
     count, head_width_m = len(seen), points.width_m
     middles = Middles.unknown(count)
-    left, up = points.in_frame()
+    left, up, level = points.in_frame()
+    level = np.interp(stations_along(points.length_m), points.t, level) if len(level) else middles.top
     station = np.minimum((points.t / STATION_STEP_M).astype(int), count - 1)
     head, grid = Head(head_width_m, Outline.of(head_width_m)), Grid.of(head_width_m)
     bins = grid.number(left, up)
@@ -136,13 +153,19 @@ def outline_middles(points: HeadPoints, seen: np.ndarray) -> Middles:
             continue
         scores = Scores.of(counts, section, head.outline, grid)
         part = slice(first, last)
-        offset, middles.information[part], course = _by_station(
-            section.place[0], scores.by_bin[bins[here]], station[here] - first, last - first
+        (offset, above), (middles.information[part], middles.top_information[part]), (course, _) = _by_station(
+            section.place[:2], scores, bins[here], station[here] - first, last - first
         )
         is_crowned = _is_crowned(left[here], up[here], head_width_m)
+        is_flat = not is_crowned and _is_flat(left[here] - section.place[0], up[here], head_width_m)
         pull = _pull(station[here] - first, left[here] > section.place[0], last - first)
-        middles.offset[part] = np.where(seen[part], offset - pull, np.nan)
-        middles.common[part] = np.hypot(scores.common_m, PULL_DOUBT * pull)
+        is_sharp = np.exp(section.place[5]) < SHARP_NOISE_M
+        if not (is_flat and is_sharp):
+            middles.offset[part] = np.where(seen[part], offset - pull, np.nan)
+        if not is_flat:
+            middles.top[part] = np.where(seen[part], level[part] + above, np.nan)
+        middles.common[part] = np.hypot(scores.common_m[0], PULL_DOUBT * pull)
+        middles.top_common[part] = scores.common_m[1]
         on_crown = np.abs(left[here] - section.place[0]) < FLAT_SHARE * head_width_m
         middles.blur_up[part] = apart_m = _half_apart(_above_crown(left[here], up[here], section.place)[on_crown])
         middles.blur[part] = _blur(section, width_m - head_width_m, course, apart_m, is_crowned)
@@ -178,6 +201,24 @@ def _fitted(counts: np.ndarray, head: Head, grid: Grid, start: Section | None) -
     return (section, found, width_m) if settled else (first, head, width_m)
 
 
+def _is_flat(left: np.ndarray, up: np.ndarray, head_width_m: float) -> bool:
+    """Return whether points, by their offsets from the axis and heights, (n,) metres, show a head without corners.
+
+    Its outline is not that of a rail, which lies anywhere across it with little doubt; its two edges show its middle.
+    """
+    left, up = left[np.abs(up) < CROWN_BAND_M] / head_width_m, up[np.abs(up) < CROWN_BAND_M]
+    middle = up[np.abs(left) < CROWN_SHARE]
+    sides = [up[(side * left > FLAT_RING[0]) & (side * left < FLAT_RING[1])] for side in (-1, 1)]
+    if min(len(middle), *map(len, sides)) < ENOUGH_POINTS:
+        return False
+    beyond = np.count_nonzero((np.abs(left) > BEYOND_RING[0]) & (np.abs(left) < BEYOND_RING[1]))
+    if beyond * CROWN_SHARE > MAX_BEYOND * len(middle) * (BEYOND_RING[1] - BEYOND_RING[0]):
+        return False
+    drop_m = np.mean(middle) - np.mean([np.mean(side) for side in sides])
+    doubt_m = np.sqrt(np.mean([np.var(side) / len(side) for side in sides]))
+    return bool(drop_m + 2 * doubt_m < FLAT_DROP_M)
+
+
 def _is_crowned(left: np.ndarray, up: np.ndarray, head_width_m: float) -> bool:
     """Return whether points, by their offsets from the axis and from the top, (n,) metres, show a round top."""
     top = (np.abs(left) < CROWN_SHARE * head_width_m) & (np.abs(up) < CROWN_BAND_M)
@@ -189,7 +230,7 @@ def _is_crowned(left: np.ndarray, up: np.ndarray, head_width_m: float) -> bool:
 
 def _above_crown(left: np.ndarray, up: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Return the heights of points, (n,) metres, above the crown of a head at a place."""
-    return up - place[1] - place[2] * left + (left - place[0]) ** 2 / (2 * CROWN_RADIUS_M)
+    return up - place[1] - place[2] * left + (0.5 / CROWN_RADIUS_M + place[6]) * (left - place[0]) ** 2
 
 
 def _half_apart(above: np.ndarray) -> float:
@@ -212,20 +253,18 @@ def _blur(section: Section, wider_m: float, offset: np.ndarray, apart_up_m: floa
     """Return by how much the edges of a head are blurred beyond the noise; see `Middles.blur`.
 
     Where the line wanders about the head, by its `offset`, (k,) metres, it blurs the section as well, and so do passes
-    in height, by `apart_up_m`. A head that is flat to its edges looks both blurred and wider. What is wider or
-    narrower still, by `wider_m`, has another shape.
+    in height, by `apart_up_m`. A head that is flat to its edges looks both blurred and wider, by `wider_m`.
     """
-    across_m, height_m = np.exp(section.place[4:])
+    across_m, height_m = np.exp(section.place[4:6])
     known = offset[np.isfinite(offset)]
     if len(known) and np.sqrt(np.mean(known**2)) > ON_HEAD_M:
         return 0.0
     across_m = np.sqrt(max(across_m**2 - (np.var(known) if len(known) else 0.0), 0.0))
     height_m = np.sqrt(max(height_m**2 - apart_up_m**2, MIN_NOISE_M**2))
     blur_m = np.sqrt(max(across_m**2 - height_m**2, 0.0))
-    is_blurred = blur_m >= BLURRED_M and across_m >= BLURRED_RATIO * height_m
-    if not is_crowned:
-        is_blurred &= wider_m < WRONG_WIDTH_M and blur_m > FLAT_BLUR_M
-    return float(blur_m) if is_blurred and -WRONG_WIDTH_M <= wider_m < MAX_WRONG_WIDTH_M else 0.0
+    is_blurred = blur_m >= BLURRED_M and across_m >= BLURRED_RATIO * height_m and wider_m >= -WRONG_WIDTH_M
+    is_blurred &= wider_m < MAX_WRONG_WIDTH_M if is_crowned else wider_m < WRONG_WIDTH_M and blur_m > FLAT_BLUR_M
+    return float(blur_m) if is_blurred else 0.0
 
 
 def likelier_width(lines: Sequence[np.ndarray], xyz: np.ndarray, widths_m: Sequence[float]) -> float:
@@ -244,7 +283,8 @@ def likelier_width(lines: Sequence[np.ndarray], xyz: np.ndarray, widths_m: Seque
     grid, outlines = Grid.of(max(widths_m)), [Outline.of(width_m) for width_m in widths_m]
     likelihood = np.zeros(len(widths_m))
     for points in near_lines(lines, xyz, max(widths_m)):
-        bins = grid.number(*replace(points, width_m=widths_m[0]).in_frame())
+        left, up, _ = replace(points, width_m=widths_m[0]).in_frame()
+        bins = grid.number(left, up)
         station = points.t[bins >= 0] / STATION_STEP_M
         for first, last in _borders(station, station_count(points.length_m)):
             here = bins[bins >= 0][slice(*np.searchsorted(station, [first, last]))]
@@ -297,20 +337,34 @@ def _share(station: np.ndarray, is_left: np.ndarray) -> float:
 
 
 def _by_station(
-    offset_m: float, score: np.ndarray, station: np.ndarray, count: int
+    place: np.ndarray, scores: Scores, bins: np.ndarray, station: np.ndarray, count: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find the middles at the stations of a section from the scores of its points.
+    """Find offset and height at the stations of a section from the scores of their points.
+
+    Parameters
+    ----------
+    place : (2,) array
+        Offset and height of the section.
+    scores : Scores
+    bins, station : (n,) int arrays
+        Bin and station of each point.
+    count : int
+        Number of stations.
 
     Returns
     -------
-    offset, information : (count,) arrays
-        See `Middles`.
-    course : (count,) array
-        The middles in windows of `COURSE_STATIONS`, which show how the line wanders about the head.
+    places, information : (2, count) arrays
+        See `Middles`; NaN and 0 without points. Across, the squares of the scores count, because part of the head may
+        be hidden here. In height, what a point says on average does: every point of a top says as much, and in few
+        points, squares would give those far off it most weight.
+    course : (2, count) array
+        The places in windows of `COURSE_STATIONS`, which show how the line wanders about the head.
     """
-    gradient, known = np.array([np.bincount(station, weights, minlength=count) for weights in (score, score**2)])
-    offset, course = (
-        offset_m + sums[0] / np.maximum(sums[1], 1e-9)
-        for sums in ((gradient, known), uniform_filter1d([gradient, known], COURSE_STATIONS, axis=1, mode="constant"))
+    gradient = np.array([np.bincount(station, own, minlength=count) for own in scores.by_bin[:, bins]])
+    shown = np.bincount(station, scores.by_bin[0, bins] ** 2, minlength=count)
+    known = np.array([shown, scores.per_point * np.bincount(station, minlength=count)])
+    places, course = (
+        place[:, None] + sums[0] / np.maximum(sums[1], 1e-9)
+        for sums in ((gradient, known), uniform_filter1d([gradient, known], COURSE_STATIONS, axis=2, mode="constant"))
     )
-    return np.where(known > 0, offset, np.nan), known, course
+    return np.where(known > 0, places, np.nan), known, course

@@ -5,7 +5,7 @@ See docs/method.md section 6.4.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Union
 
 import numpy as np
@@ -13,10 +13,12 @@ import numpy as np
 from ..lines.paek import VARIANCE_FACTOR
 from ..lines.smoothing import smooth_profile
 from ..rails import Support
+from .edges import STATION_STEP_M, stations_along
 from .envelope import extremal_boundary
 from .head_points import RIM_HEADS, HeadPoints
 from .level import AXIS_SHARE, OFF_TOP_SIGMAS, SLOPE_ROUNDS, cross_slope, robust_sigma, rough_level
 from .outline import CROWN_RADIUS_M
+from .sections import Middles
 from .smoother import Spline, bridge_error, smooth
 
 MIN_POINTS = 10
@@ -120,14 +122,14 @@ class Top:
         Points on it.
     slope : (n,) array
         Rise per metre to the left, at each of them.
-    crown_m : float
-        Standard error of the height on the axis that all points share.
+    crown_m : float or (s,) array
+        Standard error of the height on the axis that more points would not reduce, at all stations or at each.
     """
 
     course: Course
     points: HeadPoints
     slope: np.ndarray
-    crown_m: float = 0.0
+    crown_m: Union[float, np.ndarray] = 0.0
 
     def height_error(self, support: Support) -> np.ndarray:
         """Return the standard error of the height at the stations of a support, (s,) metres.
@@ -137,6 +139,29 @@ class Top:
         leaning = np.interp(support.t, self.points.t, self.slope) * support.sigma_m
         bridge = bridge_error(self.points.t, support.t, UNSEEN_TURN)
         return np.sqrt(self.course.sigma(support.t) ** 2 + self.crown_m**2 + leaning**2 + bridge**2)
+
+
+def by_outline(top: Top, outline: Middles) -> Top:
+    """Take the height that the outline of the head shows at each station, and that of the points on the axis elsewhere.
+
+    Both have their information, and one spline smooths them.
+    """
+    length_m, chosen = top.points.length_m, top.points.within(AXIS_SHARE)
+    points, stations = top.points[chosen], stations_along(length_m)
+    flat = points.z - top.slope[chosen] * points.across
+    number = np.minimum((points.t / STATION_STEP_M).astype(int), len(stations) - 1)
+    count = np.bincount(number, minlength=len(stations))
+    mean_m = np.bincount(number, flat, len(stations)) / np.maximum(count, 1)
+    outlined = np.isfinite(outline.top) & (outline.top_information > 0)
+    by_points = count / robust_sigma(flat - top.course.at(points.t)) ** 2
+    information = np.where(outlined, outline.top_information, by_points)
+    known = information > 0
+    if not known.any():
+        return top
+    t, values = stations[known], np.where(outlined, outline.top, mean_m)[known]
+    course = smooth(t, values, information[known], -TAIL_M, length_m + TAIL_M)
+    common_m = np.where(outlined, outline.top_common, top.crown_m)[known]
+    return replace(top, course=course, crown_m=np.interp(stations, t, course.followed(t, common_m, information[known])))
 
 
 def fit_crown(points: HeadPoints) -> Crown:

@@ -16,7 +16,7 @@ VERDICTS = (
     (0.0, "good", "Good throughout: every metre is supported by points, at gauge, with a small standard error."),
     (FEW, "good", "Good, except for a few places to look at."),
     (MANY, "fair", "Usable, but look at the findings before you rely on the lines."),
-    (np.inf, "poor", "Poor: large parts are in doubt. Check classes, gauge, railhead width and the cloud's density."),
+    (np.inf, "poor", "Poor: large parts are in doubt. Check rail points, gauge, railhead width and point density."),
 )
 """Share of the length in doubt up to which a verdict applies, CSS class of the verdict, and its words."""
 

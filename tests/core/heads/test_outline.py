@@ -9,7 +9,7 @@ from rail_extract.core.heads.outline import (
     Scores,
     fit_section,
 )
-from rail_extract.laboratory.scenes.scanner import Scanner, head_outline, scan
+from rail_extract.laboratory.scenes.scanner import Profile, Scanner, head_outline, scan
 from rail_extract.laboratory.scenes.tracks import Railhead
 
 WIDTH = 0.072
@@ -58,7 +58,7 @@ def test_a_head_is_found_whatever_share_of_its_face_is_seen(angle_deg, share):
         left, up = seen_from(angle_deg, share, noise_m)
         _, section, _, _ = fitted(left + off_m, up)
         assert section.place[0] == pytest.approx(off_m, abs=0.0015)
-        np.testing.assert_allclose(np.exp(section.place[4:]), noise_m, rtol=0.25)
+        np.testing.assert_allclose(np.exp(section.place[4:6]), noise_m, rtol=0.25)
 
 
 def test_strays_do_not_pull():
@@ -74,23 +74,33 @@ def test_derivatives_are_those_of_the_density():
     outline, grid = Outline.of(WIDTH), Grid.of(WIDTH)
     random = np.random.default_rng(1)
     shares = random.dirichlet(np.ones(len(outline.parts) + 1))
-    place = np.array([0.003, -0.002, 0.04, 0.001, np.log(0.004), np.log(0.006)])
+    place = np.array([0.003, -0.002, 0.04, 0.001, np.log(0.004), np.log(0.006), -0.5])
     derivatives = Blurred.at(place, outline, grid).by_place(shares)
-    for number, step in enumerate([1e-6, 1e-6, 1e-5, 1e-6, 1e-5, 1e-5]):
-        change = np.eye(6)[number] * step
+    for number, step in enumerate([1e-6, 1e-6, 1e-5, 1e-6, 1e-5, 1e-5, 1e-4]):
+        change = np.eye(7)[number] * step
         densities = [Blurred.at(place + side * change, outline, grid).density(shares) for side in (-1, 1)]
         numeric = (densities[1] - densities[0]) / (2 * step)
         np.testing.assert_allclose(derivatives[number], numeric, atol=1e-5 * np.abs(numeric).max())
 
 
-def test_scores_follow_a_shift_and_not_a_lift():
+@pytest.mark.parametrize("moved_m", [(0.001, 0.0), (-0.001, 0.0), (0.0, 0.001), (0.0, -0.001)])
+def test_scores_tell_a_shift_from_a_lift(moved_m):
     left, up = seen_from(30, 0.5, 0.004)
     counts, section, outline, grid = fitted(left, up)
-    scores = Scores.of(counts, section, outline, grid).by_bin
-    for moved_m, lifted_m, expected_m in ((0.001, 0.0, 0.001), (-0.001, 0.0, -0.001), (0.0, 0.001, 0.0)):
-        number = grid.number(left + moved_m, up + lifted_m)
-        own = scores[number[number >= 0]]
-        assert own.sum() / (own @ own) == pytest.approx(expected_m, abs=2.5e-4)
+    scores = Scores.of(counts, section, outline, grid)
+    number = grid.number(left + moved_m[0], up + moved_m[1])
+    own = scores.by_bin[:, number[number >= 0]]
+    np.testing.assert_allclose(own.mean(axis=1) / (own**2).mean(axis=1), moved_m, atol=2.5e-4)
+    assert (own[1] ** 2).mean() == pytest.approx(scores.per_point, rel=0.15)
+
+
+@pytest.mark.parametrize("radius_m", [0.3, 0.8])
+def test_a_worn_crown_does_not_lower_the_top(radius_m):
+    head = (straight_head(), WIDTH, np.column_stack([np.linspace(0, 40, 400), np.zeros((400, 2))]))
+    left, up = scan(*head, Scanner(noise_m=0.003), np.random.RandomState(0), shape=Profile(radius_m))[:, 1:].T
+    _, section, _, _ = fitted(left, up)
+    assert section.place[1] == pytest.approx(0.0, abs=2e-4)
+    assert section.place[6] == pytest.approx(0.5 / radius_m - 0.5 / 0.3, abs=0.4)
 
 
 @pytest.mark.parametrize(("left", "up"), [(0.0, 0.0), (0.05, 0.01), (0.036, -0.03)])

@@ -57,6 +57,17 @@ def test_lines_off_the_head_are_moved_to_its_axis(density, noise, slope):
     assert abs(refined[:, 1].mean()) < 0.002
 
 
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("noise", [0.001, 0.002, 0.004])
+def test_heads_without_corners_have_their_axis_between_their_edges(noise, seed):
+    """With the outline of a rail their axis is 2 to 4 mm off where the noise is small."""
+    random = np.random.default_rng(seed)
+    exact = [random.uniform(0, 60, 18_000), random.uniform(-WIDTH / 2, WIDTH / 2, 18_000), np.zeros(18_000)]
+    points = np.column_stack(exact) + random.normal(0, noise, (18_000, 3))
+    refined = refine(network_of(wavy_line(60, 0.0, 30) + [0.0, 0.003]), cloud(points), WIDTH).lines[0]
+    assert abs(refined[:, 1].mean()) < 0.0012
+
+
 @pytest.mark.parametrize("offset", [-0.05, -0.01, 0.0, 0.03, 0.06])
 def test_a_line_moves_onto_points_that_all_have_one_offset(offset):
     exact = np.column_stack([np.linspace(0, 20, 500), np.full(500, offset), np.zeros(500)])

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from rail_extract.core.heads.edges import station_count
+from rail_extract.core.heads.edges import station_count, stations_along
 from rail_extract.core.heads.head_points import HeadPoints
 from rail_extract.core.heads.sections import (
     VIEW_STATIONS,
@@ -8,13 +8,13 @@ from rail_extract.core.heads.sections import (
     likelier_width,
     outline_middles,
 )
-from rail_extract.laboratory.scenes.scanner import Scanner, scan
+from rail_extract.laboratory.scenes.scanner import NEW, Profile, Scanner, scan
 from rail_extract.laboratory.scenes.tracks import Railhead
 
 WIDTH, LENGTH = 0.072, 60.0
 
 
-def scanned(angle_deg, share=1.0, noise_m=0.005, seed=0, slope=0.0, bend_m=0.0, width_m=WIDTH):
+def scanned(angle_deg, share=1.0, noise_m=0.005, seed=0, slope=0.0, bend_m=0.0, width_m=WIDTH, shape=NEW):
     """Chainage, offset and height of the points of a head, which may lean and wander about the line."""
     x = np.arange(0, LENGTH, 0.01)
     axis, across = np.array([0.0, -slope, 1.0]), np.array([0.0, 1.0, slope])
@@ -24,7 +24,7 @@ def scanned(angle_deg, share=1.0, noise_m=0.005, seed=0, slope=0.0, bend_m=0.0, 
     path = np.column_stack([x[::10], np.zeros((len(x[::10]), 2))])
     height_m = 4.5 * np.tan(np.radians(angle_deg))
     scanner = Scanner(noise_m=noise_m, face_share=share, left_m=4.5, height_m=height_m, half_range_m=30.0)
-    points = scan(head, width_m, path, scanner, np.random.RandomState(seed))
+    points = scan(head, width_m, path, scanner, np.random.RandomState(seed), shape=shape)
     return points[np.argsort(points[:, 0])].T
 
 
@@ -47,6 +47,23 @@ def test_the_middle_does_not_lean_to_the_scanner(angle_deg, share, slope):
     middles = middles_of(scanned(angle_deg, share, slope=slope))
     assert np.isfinite(middles.offset[:-1]).all()
     assert abs(mean_m(middles)) < 0.0015
+
+
+@pytest.mark.parametrize("angle_deg", [17, 45, 75])
+@pytest.mark.parametrize(("noise_m", "shape"), [(0.003, NEW), (0.008, NEW), (0.004, Profile(crown_radius_m=0.8))])
+def test_the_top_is_as_high_as_the_axis(angle_deg, noise_m, shape):
+    middles = middles_of(scanned(angle_deg, noise_m=noise_m, slope=0.05, shape=shape))
+    off = (middles.top - 0.005 * stations_along(LENGTH))[:-1]
+    known = middles.top_information[:-1]
+    assert abs(np.average(off, weights=known)) < 2 * middles.top_common[0] + 0.0002
+    assert np.sqrt(np.mean(off**2 * known)) == pytest.approx(1.0, abs=0.25)
+
+
+def test_a_head_that_is_flat_to_its_edges_has_no_outline():
+    points = scanned(75, noise_m=0.002, shape=Profile(crown_radius_m=20.0, corner_radius_m=0.002))
+    middles = middles_of(points)
+    assert np.isnan(middles.top).all()
+    assert np.isnan(middles.offset).all()
 
 
 def test_the_axis_stays_where_another_width_is_stated():
