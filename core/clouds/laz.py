@@ -1,4 +1,4 @@
-"""Chunks of compressed clouds (LAZ, COPC): they are checked before they are decompressed, and get other classes.
+"""Reader of the chunks of compressed clouds (LAZ, COPC), which are checked before they are decompressed.
 
 lazrs allocates whatever a file states, and the program ends if that fails or if a chunk makes lazrs call itself without
 end. Every size in a file is therefore compared with the size of the file first, and every chunk is searched for bytes
@@ -8,9 +8,8 @@ that no encoder writes. The layout of chunks is that of LASzip's specification, 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from os import SEEK_END
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
@@ -50,12 +49,8 @@ COMPRESSOR, ITEM_COUNT, ITEMS_AT, ITEM = "<H", "<H", 34, "<HHH"
 FIRST_CHUNK = 8
 """Bytes between the start of the point data and the first chunk: the position of the chunk table."""
 
-CLASSES_LAYER, TIMES_LAYER = 2, 8
-"""Numbers of the layers of classes and of GPS times."""
-
-PLAIN_FORMAT, PLAIN_SIZE, RETURNS_AT, CLASS_AT = 6, 30, 14, 16
-"""Point format with which those of all layered chunks begin, its bytes, and the places in them of returns and scanner,
-and of the class."""
+TIMES_LAYER = 8
+"""Number of the layer of GPS times."""
 
 ERASED = b"\xff"
 """Byte of which storage consists where nothing was written. lazrs decodes a run of them as one change after another
@@ -173,23 +168,6 @@ def read_chunks(
     CloudError
         A chunk contains erased bytes.
     """
-    for _, points in read_groups(path, header, chunks, fields, most):
-        for start in range(0, len(points), most):
-            yield points[start : start + most]
-
-
-def read_groups(
-    path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], fields: laspy.DecompressionSelection, most: int
-) -> Iterator[tuple[list[bytes], laspy.ScaleAwarePointRecord]]:
-    """Read chunks in groups of at most `most` points, or of one chunk, and decompress them; see `read_chunks`.
-
-    Yields
-    ------
-    list of bytes
-        The chunks as they are in the file.
-    laspy.ScaleAwarePointRecord
-        Their points.
-    """
     from laspy.point.record import PackedPointRecord, ScaleAwarePointRecord
 
     record = _record(path, header)
@@ -202,87 +180,9 @@ def read_groups(
             table = [(chunk.points, chunk.size) for chunk in group]
             lazrs.decompress_points_with_chunk_table(b"".join(held), record, points, table, fields.to_lazrs())
             packed = PackedPointRecord.from_buffer(points, header.point_format)
-            yield held, ScaleAwarePointRecord(packed.array, packed.point_format, header.scales, header.offsets)
-
-
-def is_layered(path: Path, header: laspy.LasHeader) -> bool:
-    """Return whether the chunks of a compressed file consist of layers, one of them for the classes."""
-    return _is_layered(_record(path, header))
-
-
-def with_classes(
-    path: Path,
-    header: laspy.LasHeader,
-    chunks: Sequence[bytes],
-    points: laspy.ScaleAwarePointRecord,
-    codes: np.ndarray,
-) -> Iterator[tuple[int, bytes]]:
-    """Replace the classes of chunks that consist of layers; all other layers stay as they are.
-
-    Parameters
-    ----------
-    path : Path
-    header : laspy.LasHeader
-    chunks, points
-        From `read_groups`, with the returns: the compression of classes depends on these, and on the scanner.
-    codes : (n,) uint8 array
-        New classes of the points.
-
-    Yields
-    ------
-    int
-        Points of a chunk.
-    bytes
-        The chunk.
-    """
-    size, head = header.point_format.size, _head(_record(path, header), header)
-    plain = np.zeros((len(points), PLAIN_SIZE), np.uint8)
-    plain[:, RETURNS_AT:CLASS_AT] = points.array.view(np.uint8).reshape(-1, size)[:, RETURNS_AT:CLASS_AT]
-    plain[:, CLASS_AT] = codes
-    stated = [_layer_sizes(chunk[:head], header) for chunk in chunks]
-    ends = np.cumsum([count for count, *_ in stated])
-    compressed = _compressed(np.split(plain, ends[:-1]))
-    for chunk, (count, *sizes), one in zip(chunks, stated, compressed):
-        start = head + sum(sizes[:CLASSES_LAYER])
-        end = start + sizes[CLASSES_LAYER]
-        layer = _layer(one, CLASSES_LAYER)
-        sizes[CLASSES_LAYER] = len(layer)
-        first = chunk[:CLASS_AT] + one[CLASS_AT : CLASS_AT + 1] + chunk[CLASS_AT + 1 : size]
-        stated_now = np.array([count, *sizes], "<u4").tobytes()
-        yield count, b"".join([first, stated_now, chunk[head:start], layer, chunk[end:]])
-
-
-def _compressed(parts: Sequence[np.ndarray]) -> list[bytes]:
-    """Compress points of format 6, (n, 30) uint8 arrays, to one chunk for each array."""
-    vlr, stream = lazrs.LazVlr.new_for_compression(PLAIN_FORMAT, 0, True), BytesIO()
-    compressor = lazrs.ParLasZipCompressor(stream, vlr)
-    compressor.compress_chunks([part.ravel() for part in parts])
-    compressor.done()
-    stream.seek(0)
-    sizes = [size for _, size in lazrs.read_chunk_table(stream, vlr)]
-    ends = FIRST_CHUNK + np.cumsum(sizes)
-    return [stream.getvalue()[end - size : end] for end, size in zip(ends.tolist(), sizes)]
-
-
-def _layer(chunk: bytes, number: int) -> bytes:
-    """Return a layer of a chunk of points of format 6."""
-    head = PLAIN_SIZE + 4 * (1 + LAYERS[10])
-    sizes = np.frombuffer(chunk[PLAIN_SIZE + 4 : head], "<u4").tolist()
-    start = head + sum(sizes[:number])
-    return chunk[start : start + sizes[number]]
-
-
-def write_chunks(file: BinaryIO, path: Path, header: laspy.LasHeader, chunks: Iterable[tuple[int, bytes]]) -> None:
-    """Write chunks, with the number of points of each, and their table; they are compressed like those of `path`."""
-    start, table = file.tell(), []
-    file.write(struct.pack("<q", AT_THE_END))
-    for count, chunk in chunks:
-        file.write(chunk)
-        table.append((count, len(chunk)))
-    table_at = file.tell()
-    lazrs.write_chunk_table(file, table, lazrs.LazVlr(_record(path, header)))
-    file.seek(start)
-    file.write(struct.pack("<q", table_at))
+            for start in range(0, len(packed), most):
+                part = packed.array[start : start + most]
+                yield ScaleAwarePointRecord(part, packed.point_format, header.scales, header.offsets)
 
 
 def _groups(chunks: Sequence[Chunk], most: int) -> Iterator[list[Chunk]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import BinaryIO
@@ -13,8 +13,8 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..progress import SILENT, Progress
-from .las import CHUNK, coordinates, laspy, read_blocks
-from .laz import Chunk, is_layered, lazrs, read_chunk_table, read_groups, with_classes, write_chunks
+from .las import coordinates, laspy, read_blocks
+from .laz import lazrs
 from .readers import explained
 
 Places = Callable[[np.ndarray], np.ndarray]
@@ -39,9 +39,6 @@ COPC = "copc"
 AS_IT_IS = "surrogateescape"
 """Has laspy write text as it read it: the standard allows ASCII only, and some programs write other characters."""
 
-CLASSES = laspy.DecompressionSelection.XY_RETURNS_CHANNEL | laspy.DecompressionSelection.CLASSIFICATION
-"""What is decompressed of a point to change its class: it is compressed with the help of the returns."""
-
 WRITE_ERRORS = () if lazrs is None else (lazrs.LazrsError,)
 """What lazrs raises where the disk is full."""
 
@@ -62,7 +59,7 @@ def check_class(path: Path, class_code: int) -> None:
         )
 
 
-def rewrite(path: Path, new: Path, change: Change, progress: Progress = SILENT, all_stay: bool = False) -> int:
+def rewrite(path: Path, new: Path, change: Change, progress: Progress = SILENT) -> int:
     """Write a copy of a file with other classes, and return how many points it has.
 
     The order of the points, their other dimensions, the scale and the records of the header stay. A COPC file becomes
@@ -77,9 +74,6 @@ def rewrite(path: Path, new: Path, change: Change, progress: Progress = SILENT, 
     change : callable
         See `Change`.
     progress : Progress
-    all_stay : bool
-        Whether `change` leaves no point out. Then, a compressed copy of point format 6 and later takes all but the
-        classes from the file as it is, without compressing it again.
 
     Raises
     ------
@@ -98,47 +92,21 @@ def rewrite(path: Path, new: Path, change: Change, progress: Progress = SILENT, 
         with explained(path):
             for record in header.vlrs:
                 record.user_id.encode("ascii")  # otherwise laspy can't write it
+        compress = new.suffix.lower() == ".laz"
         try:
-            if new.suffix.lower() == ".laz" and all_stay and header.are_points_compressed and is_layered(path, header):
-                written = _replace_classes(path, header, new, change, progress)
-            else:
-                written = _write_points(path, reader, new, change, progress)
+            with laspy.open(new, "w", header=header, do_compress=compress, encoding_errors=AS_IT_IS) as writer:
+                for chunk in _chunks(path, reader, progress):
+                    before = np.array(chunk.classification)
+                    codes, keep = change(before, partial(coordinates, chunk))
+                    other = codes != before
+                    chunk.classification[other] = codes[other]
+                    writer.write_points(chunk if keep.all() else chunk[keep])
+                written = int(writer.header.point_count)
         except WRITE_ERRORS as error:
             raise OSError(str(error)) from error
         if header.number_of_evlrs:
             _append_records(path, header.start_of_first_evlr, header.number_of_evlrs, new)
     return written
-
-
-def _write_points(path: Path, reader: laspy.LasReader, new: Path, change: Change, progress: Progress) -> int:
-    """Write the points that stay, with their new classes; see `rewrite`."""
-    compress = new.suffix.lower() == ".laz"
-    with laspy.open(new, "w", header=reader.header, do_compress=compress, encoding_errors=AS_IT_IS) as writer:
-        for chunk in _chunks(path, reader, progress):
-            before = np.array(chunk.classification)
-            codes, keep = change(before, partial(coordinates, chunk))
-            other = codes != before
-            chunk.classification[other] = codes[other]
-            writer.write_points(chunk if keep.all() else chunk[keep])
-        return int(writer.header.point_count)
-
-
-def _replace_classes(path: Path, header: laspy.LasHeader, new: Path, change: Change, progress: Progress) -> int:
-    """Write the chunks of a file with new classes; see `rewrite`."""
-    chunks = _other_chunks(path, header, read_chunk_table(path, header), change, progress)
-    with new.open("wb") as file:
-        header.write_to(file, encoding_errors=AS_IT_IS)
-        write_chunks(file, path, header, chunks)
-    return int(header.point_count)
-
-
-def _other_chunks(
-    path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], change: Change, progress: Progress
-) -> Iterator[tuple[int, bytes]]:
-    """Yield the number of points and the bytes of each chunk with its new classes."""
-    for held, points in _groups(path, header, chunks, progress):
-        codes, _ = change(np.array(points.classification), partial(coordinates, points))
-        yield from with_classes(path, header, held, points, codes)
 
 
 def _version(header: laspy.LasHeader) -> laspy.header.Version:
@@ -200,16 +168,3 @@ def _chunks(path: Path, reader: laspy.LasReader, progress: Progress) -> Iterator
             yield chunk
             done += len(chunk)
             progress.set_fraction(done / reader.header.point_count)
-
-
-def _groups(
-    path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], progress: Progress
-) -> Iterator[tuple[list[bytes], laspy.ScaleAwarePointRecord]]:
-    """Read groups of chunks, as they are and decompressed, like `_chunks`."""
-    done = 0
-    with explained(path):
-        for held, points in read_groups(path, header, chunks, CLASSES, CHUNK):
-            progress.check()
-            yield held, points
-            done += len(points)
-            progress.set_fraction(done / header.point_count)

@@ -285,7 +285,7 @@ class _Writer:
             done += len(codes)
             return self._classes(codes, places, rail), rail | (not self._choice.only_rails)
 
-        return rewrite(self._request.headers[place].path, new, change, progress, not self._choice.only_rails)
+        return rewrite(self._request.headers[place].path, new, change, progress)
 
     def write_tiles(self, output: Output, runner: Runner, progress: Progress) -> None:
         """Write all tiles into a temporary folder, then move it to its name and write the catalogue."""
