@@ -22,8 +22,8 @@ APART_HEADS = 1.3
 PARTED_HEADS = 3.0
 """Distance between the axes, in head widths, up to which the way they part shows where they touch."""
 
-MIN_STRETCH_M = 1.5
-"""Shortest stretch that shows it: an eighth of the length in which the flattest switch opens by the width of a head."""
+MIN_PART_M = 1.5
+"""Shortest part of the way that shows it: an eighth of the length in which the flattest switch opens by the width of a head."""
 
 MAX_BACK_M = 25.0
 """No branch touches its stock rail further than this before the heads are apart."""
@@ -90,7 +90,7 @@ class _Parting:
     stock, sense : int, float
         Number of the other line, and the direction along it in which this one leaves, 1 or -1.
     way, apart : (n,) arrays
-        Way along the other line from the node, and distance between the axes, in the stretch that shows the parting.
+        Way along the other line from the node, and distance between the axes, in the part that shows the parting.
     left : float
         Side on which this line leaves, 1 for the left.
     kept : int
@@ -124,8 +124,8 @@ def _parting(network: LineNetwork, end: int, number: int, between_m: tuple[float
         return None
     sense = 1.0 if feet.t[-1] > along[vertex] else -1.0
     way, apart = sense * (feet.t - along[vertex]), np.abs(feet.across)
-    first, last = _stretch(apart, *between_m)
-    if first + 2 > last or way[last - 1] - way[first] < MIN_STRETCH_M:
+    first, last = _part(apart, *between_m)
+    if first + 2 > last or way[last - 1] - way[first] < MIN_PART_M:
         return None
     left, kept = float(np.sign(feet.across[first])), int(feet.point[first])
     return _Parting(float(along[vertex]), stock, sense, way[first:last], apart[first:last], left, kept)
@@ -149,8 +149,8 @@ def _slide(network: LineNetwork, end: int, number: int, between_m: tuple[float, 
     return network.with_end(end, new, parting.kept, at=(parting.stock, start))
 
 
-def _stretch(apart: np.ndarray, min_m: float, max_m: float) -> tuple[int, int]:
-    """Find the stretch from the last place less than `min_m` apart to the first one more than `max_m` apart.
+def _part(apart: np.ndarray, min_m: float, max_m: float) -> tuple[int, int]:
+    """Find the part from the last place less than `min_m` apart to the first one more than `max_m` apart.
 
     Returns its first place and one more than its last.
     """
