@@ -23,7 +23,7 @@ PARTED_HEADS = 3.0
 """Distance between the axes, in head widths, up to which the way they part shows where they touch."""
 
 MIN_PART_M = 1.5
-"""Shortest part of the way that shows it: an eighth of the length in which the flattest switch opens by the width of a head."""
+"""Shortest part that shows it: an eighth of the length in which the flattest switch opens by the width of a head."""
 
 MAX_BACK_M = 25.0
 """No branch touches its stock rail further than this before the heads are apart."""
