@@ -31,6 +31,10 @@ STEP_M, STEP_SIGMAS = (0.008, 0.015), 4.0
 """Largest change of the level beyond the gradient, between these limits, in standard deviations of what bins show by
 chance: dirt in a flangeway is 10 to 50 mm below the top."""
 
+SAGITTA = 5e-5
+"""Sagitta of a rail's profile, metres, per product of the distances from both ends, m²: half the curvature of waves of
+10 mm that are 60 m long."""
+
 SKIPPED_BINS = 3
 """Bins without a level that a level runs across."""
 
@@ -95,7 +99,8 @@ def on_own_level(points: HeadPoints) -> HeadPoints:
     level = np.interp(bins, chosen[:, 0], chosen[:, 1])
     own, any_level = np.zeros((2, len(bins)), dtype=bool)
     any_level[levels.bin] = True
-    own[levels.bin[np.abs(levels.height - level[levels.bin]) <= step_m]] = True
+    near_m = step_m + _sagitta(levels.bin, chosen[:, 0])
+    own[levels.bin[np.abs(levels.height - level[levels.bin]) <= near_m]] = True
     other = binary_opening(any_level & ~own, np.ones(MIN_BINS))
     above = flat - np.interp(t, (bins + 0.5) * LEVEL_BIN_M, level)
     return points[(above <= ABOVE_M) & (above >= -BELOW_M) & ~other[number]]
@@ -144,6 +149,15 @@ def _step(levels: _Levels) -> float:
     """Return the change of level, metres, that chance does not explain; the fullest level of a bin is the first."""
     first = np.flatnonzero(np.diff(levels.bin, prepend=-1))
     return float(np.clip(STEP_SIGMAS * robust_sigma(np.diff(levels.height[first])), *STEP_M))
+
+
+def _sagitta(bins: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Return by how much a rail may leave the straight line between the known bins next to each bin, metres."""
+    after = np.clip(np.searchsorted(known, bins), 1, max(len(known) - 1, 1))
+    before_m, behind_m = (
+        LEVEL_BIN_M * np.maximum(side, 0) for side in (bins - known[after - 1], known[after % len(known)] - bins)
+    )
+    return SAGITTA * before_m * behind_m
 
 
 def _pieces(levels: _Levels, step_m: float) -> list[np.ndarray]:
