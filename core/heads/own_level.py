@@ -27,6 +27,10 @@ APART_M = 0.03
 MIN_POINTS = 3
 """Points that make a level: on the sparsest rails a bin has five."""
 
+MIN_IN_BIN = 4.0
+"""Points on the head in bins that have any, on average, from which levels are looked for: with fewer, as from the air,
+noise alone makes steps, and a line would lose its ends."""
+
 STEP_M, STEP_SIGMAS = (0.008, 0.015), 4.0
 """Largest change of the level beyond the gradient, between these limits, in standard deviations of what bins show by
 chance: dirt in a flangeway is 10 to 50 mm below the top."""
@@ -86,7 +90,8 @@ def on_own_level(points: HeadPoints) -> HeadPoints:
     All points are, where the level of a line is not in doubt, or where beams blend heads with the ballast.
     """
     t, head = points.t, points.within(0.5)
-    if head.sum() < MIN_ON_HEAD or points.is_blended:
+    occupied = len(np.unique((t[head] / LEVEL_BIN_M).astype(int)))
+    if head.sum() < max(MIN_ON_HEAD, MIN_IN_BIN * occupied) or points.is_blended:
         return points
     flat = points.z - _gradient(t[head], points.z[head], t)
     number = (t / LEVEL_BIN_M).astype(int)
