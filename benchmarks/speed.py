@@ -32,7 +32,7 @@ SAMPLE = Path(__file__).resolve().parent.parent / "resources" / "sample" / "samp
 STANDARD = "IN_75R_1000"
 CUT = (578_204.0, 2_494_295.0, 578_228.0, 2_494_309.5)
 """About 24 m of the southern track of the sample."""
-STAGES = (
+STEPS = (
     "load_arrays",
     "make_engine",
     "rasterize",
@@ -110,11 +110,11 @@ def stages(clock, model: str, engine: str) -> tuple[dict[str, float], str]:
 
     standard = resolve(STANDARD)
     clouds = timed("read_rail_points", read_rail_points)(SAMPLE, [10])
-    for name in STAGES:
+    for name in STEPS:
         setattr(steps, name, timed(name, getattr(steps, name)))
     parameters = pipeline.Parameters(standard.gauge_m, standard.head_width_m, model=model, engine=engine)
     network = timed("whole walk", pipeline.extract_rails)(clouds, parameters)
-    named = sum(spent[name] for name in STAGES)
+    named = sum(spent[name] for name in STEPS)
     spent["joining and all else"] = spent.pop("whole walk") - named
     return dict(spent), network.engine
 

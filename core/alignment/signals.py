@@ -63,7 +63,7 @@ class Kind:
     least_m: float = 0.0
 
 
-LEAST_ERROR_M = 0.0005
+LEAST_ERROR_M = 0.001
 """Least standard deviation of a line across and in height, metres: no survey of a track is better. Where single points
 scatter by less, the line was smoothed, and what their errors lack is shared by neighbours: the bends of a smooth error
 would be taken for elements."""
