@@ -114,7 +114,7 @@ class Runner(Protocol):
         Parameters
         ----------
         tasks : mapping of Name to Task
-            Tasks that are listed first start first, except for the last ones.
+            Tasks that are listed first start first.
         progress : Progress
 
         Yields

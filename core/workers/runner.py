@@ -6,7 +6,6 @@ import ctypes
 import os
 import pickle  # nosec B403 - read from processes that this one has started only
 import sys
-from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
@@ -24,10 +23,6 @@ WORTH_S = 5.0
 
 POLL_S = 0.1
 """Interval at which cancellation is checked."""
-
-LAST_PER_WORKER = 6
-"""Waiting tasks per worker from which on the order of starts is by what follows, so that all workers end together. As
-long as there are more, tasks start as listed: so few results wait in memory."""
 
 WORKER_BYTES = 600 << 20
 """Memory of a worker at its peak (docs/scaling.md)."""
@@ -156,9 +151,7 @@ class _Run:
         self._tasks, self._messages, self._progress = tasks, messages, progress
         self._order = turns(tasks)
         self._waiting = list(self._order)
-        self._chain_s = _chains(tasks, self._order)
         self._idle = list(idle)
-        self._last = LAST_PER_WORKER * len(idle)
         self._running: dict[Worker, Hashable] = {}
         self._kept = Results(tasks)
         self._answers: dict[Hashable, Answer] = {}
@@ -208,30 +201,20 @@ class _Run:
         self._start_ready()
 
     def _start_ready(self) -> None:
-        """Give idle workers the first tasks whose inputs are there; of the last tasks, the longest chains first."""
-        while self._idle:
-            ready = [name for name in self._waiting if self._finished.issuperset(self._tasks[name].inputs)]
-            if not ready:
+        """Give idle workers the first tasks whose inputs are there."""
+        for name in list(self._waiting):
+            if not self._idle:
                 return
-            name = ready[0] if len(self._waiting) > self._last else max(ready, key=self._chain_s.__getitem__)
-            self._waiting.remove(name)
-            task, worker = self._tasks[name], self._idle.pop()
-            self._running[worker] = name
-            worker.send(packed(task, self._kept.take(task)))
+            task = self._tasks[name]
+            if self._finished.issuperset(task.inputs):
+                self._waiting.remove(name)
+                worker = self._idle.pop()
+                self._running[worker] = name
+                worker.send(packed(task, self._kept.take(task)))
 
     def _advance(self, name: Hashable, fraction: float) -> None:
         self._done_s[name] = fraction * self._tasks[name].weight
         self._progress.set_fraction(sum(self._done_s.values()) / self._total_s)
-
-
-def _chains(tasks: Mapping[Any, Task], order: Sequence[Any]) -> dict[Any, float]:
-    """Return how long each task takes with the longest chain of tasks that wait for it, seconds."""
-    chain_s: defaultdict[Any, float] = defaultdict(float)
-    for name in reversed(order):
-        chain_s[name] += tasks[name].weight
-        for one in tasks[name].inputs:
-            chain_s[one] = max(chain_s[one], chain_s[name])
-    return chain_s
 
 
 def _is_worth(tasks: Mapping[Any, Task]) -> bool:

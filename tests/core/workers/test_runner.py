@@ -54,11 +54,6 @@ def fail_oddly(context):
 def die(context):
     os._exit(9)
 
-def note(number, file, context):
-    with Path(file).open("a") as stream:
-        stream.write(f"{number}\\n")
-    time.sleep(0.05)
-
 def leave(file, context):
     Path(file).write_text("")
 
@@ -182,17 +177,6 @@ def test_the_first_error_counts_even_if_a_later_one_comes_sooner(functions, two,
     assert run(two, tasks, log) == ([(1, 1)], "task 2")
     assert ("warning", "before 3") not in log.said
     assert not late.exists()
-
-
-def test_of_the_last_tasks_the_longest_chains_start_first_and_results_come_in_order(functions, two, tmp_path):
-    """Task 3 is short, but task 4 waits for it, which takes longest."""
-    started = tmp_path / "started"
-    of = {number: Task("", functions.note, (number, str(started))) for number in range(5)}
-    tasks = {**of, 4: replace(of[4], uses=(3,), weight=9.0), 2: replace(of[2], weight=5.0)}
-    assert [number for number, _ in two.run(tasks)] == [number for number, _ in InTurn().run(tasks)]
-    first = [int(line) for line in started.read_text().split()[:5]]
-    assert set(first[:2]) == {2, 3}
-    assert first.index(4) < 4
 
 
 def test_an_error_that_cannot_be_sent_says_what_it_was(functions, two):
