@@ -1,4 +1,4 @@
-"""Layers in the memory of QGIS, for the tests."""
+"""Temporary layers of QGIS for the tests."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """GeoTIFFs of rail rasters: cells, bands, tags and place, and a size that does not grow with the empty area."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -58,35 +55,3 @@ def test_empty_blocks_take_no_space(tmp_path):
     with rasterio.open(tmp_path / "out.tif") as file:
         last = rasterio.windows.Window(file.width - 4 * TILE, 0, 4 * TILE, 4 * TILE)
         assert np.count_nonzero(file.read(1, window=last)) > 100
-
-
-FULL_DISK = """
-import resource, sys
-from pathlib import Path
-import numpy as np
-from rail_extract.core.output.geotiff import write_rasters
-from rail_extract.core.disk import Destination
-from rail_extract.core.errors import DiskError
-from rail_extract.core.frame import LocalFrame
-from rail_extract.core.raster import rasterize
-from rail_extract.core.output.raster_file import header_for
-from rail_extract.core.standards import STANDARDS
-resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
-raster = rasterize(np.random.RandomState(1).uniform(0, 80, (200_000, 2)), 0.04)
-try:
-    header = header_for([raster], (10,), LocalFrame(np.zeros(3)), STANDARDS["EN_60E1_1435"])
-    with Destination.at(Path(sys.argv[1])).replacing() as new:
-        write_rasters(new, header, [raster])
-except DiskError as error:
-    print(error)
-"""
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit on the size of files")
-def test_a_full_disk_leaves_the_old_file(tmp_path):
-    out = tmp_path / "out.tif"
-    out.write_bytes(b"before")
-    run = subprocess.run([sys.executable, "-c", FULL_DISK, str(out)], capture_output=True, text=True)
-    assert "free space" in run.stdout, run.stderr
-    assert out.read_bytes() == b"before"
-    assert [file.name for file in tmp_path.iterdir()] == ["out.tif"]

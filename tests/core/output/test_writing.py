@@ -1,7 +1,5 @@
 """GeoPackages: geometry and fields of each layer, and what happens to files that cannot be replaced."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -106,36 +104,6 @@ def test_the_other_tables_of_a_file_stay(tmp_path):
     assert counts == {"signals": 3, "rails": 1, "quality": 2}
     assert tables_in(path) == set(counts)
     assert [file.name for file in tmp_path.iterdir()] == ["all.gpkg"]
-
-
-FULL_DISK = """
-import resource, sys
-from pathlib import Path
-import numpy as np
-from rail_extract.core.output.writing import write_layers
-from rail_extract.core.disk import Destination
-from rail_extract.core.errors import DiskError
-from rail_extract.core.frame import LocalFrame
-from rail_extract.core.output.layers import lines_layer
-from rail_extract.core.products import RAILS
-from rail_extract.core.rails import RailLine
-resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
-rails = [RailLine(np.random.rand(20_000, 3), 1, 10, 5, 1.0, 1.0, 0.0)]
-try:
-    write_layers([lines_layer(RAILS, rails)], Destination.at(Path(sys.argv[1])), LocalFrame(np.zeros(3)))
-except DiskError as error:
-    print(error)
-"""
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit on the size of files")
-def test_a_full_disk_leaves_the_old_file(tmp_path):
-    out = tmp_path / "out.gpkg"
-    out.write_bytes(b"before")
-    run = subprocess.run([sys.executable, "-c", FULL_DISK, str(out)], capture_output=True, text=True)
-    assert "free space" in run.stdout, run.stderr
-    assert out.read_bytes() == b"before"
-    assert [file.name for file in tmp_path.iterdir()] == ["out.gpkg"]
 
 
 def test_layers_for_other_programs_are_those_of_their_suffix(tmp_path):
