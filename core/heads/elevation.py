@@ -15,7 +15,7 @@ from ..clouds.points import RailPoints
 from ..lines.network import LineNetwork
 from ..lines.smoothing import STATIONS_PER_SIGMA
 from ..parameters import Parameters
-from ..polyline import interpolate, length_along, resample, starts_at_its_end
+from ..polyline import interpolate, length_along, project, resample, starts_at_its_end
 from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
 from .axis import CELL_M, Axis, unseen_m
@@ -109,7 +109,42 @@ def elevate(
         rail = _measured(points, free_ends[number], parameters, strips[number] if strips else None)
         if rail is not None and rail.length_m >= parameters.min_length_m:
             rails.append(replace(rail, class_code=class_code))
-    return numbered(rails)
+    return numbered(begun_on_others(rails, parameters.tolerance_xy_m))
+
+
+def begun_on_others(rails: Sequence[RailLine], reach_m: float) -> list[RailLine]:
+    """Give ends that no points show the height of the rail on which they begin.
+
+    A branch begins on its stock rail, on the same sleepers. Where points show neither blade nor frog, its heights would
+    be extrapolated for up to 10 m; the grade where its points begin stays as it is.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+    reach_m : float
+        Distance of an end from a rail within which it is on its head.
+    """
+    level = []
+    for rail in rails:
+        others = [other for other in rails if other is not rail]
+        for _ in range(2):
+            rail = _begun_on(others, rail, reach_m).reversed()
+        level.append(rail)
+    return level
+
+
+def _begun_on(others: Sequence[RailLine], rail: RailLine, reach_m: float) -> RailLine:
+    """Give the start of a rail, if it is in a gap, the height of another rail there that has points."""
+    gap_m = rail.gaps[0, 1] if len(rail.gaps) and rail.gaps[0, 0] == 0 else 0.0
+    feet = project([other.xyz[:, :2] for other in others if gap_m], rail.xyz[:1, :2], reach_m)
+    if not len(feet.t):
+        return rail
+    other, (t,), along = others[feet.line[0]], feet.t, length_along(rail.xyz[:, :2])
+    if any(start <= t <= end for start, end in other.gaps):
+        return rail
+    above_m = np.interp(t, length_along(other.xyz[:, :2]), other.xyz[:, 2]) - rail.xyz[0, 2]
+    raised_m = above_m * np.maximum(1 - along / gap_m, 0.0) ** 2
+    return replace(rail, xyz=rail.xyz + raised_m[:, None] * [0.0, 0.0, 1.0])
 
 
 def flat_rails(network: LineNetwork, class_code: int, parameters: ElevationParameters) -> tuple[RailLine, ...]:
