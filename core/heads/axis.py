@@ -13,14 +13,14 @@ from scipy.ndimage import maximum_filter1d
 
 from ..polyline import interpolate, left_normals
 from ..rails import Support
-from .blunt import WINDOW, Ridge, wander
+from .blunt import Ridge
 from .edges import EDGE_SIGMA_M, STATION_STEP_M, VIEW_STATIONS, find_middles, stations_along
 from .flank import FLANK_TOP_SIGMA_M, Flank, find_flank
 from .head_points import MIN_ON_HEAD, HeadPoints
 from .level import robust_sigma
 from .roads import MIN_WIDER_M, bands, hidden_edges
 from .sections import Middles, outline_middles
-from .smoother import AMPLITUDES, STILL, Spline, bridge_error, smooth
+from .smoother import OF_CLOUDS, OF_RAILS, Spline, bridge_error, smooth
 
 UNSHOWN_M = 0.3
 """Standard error of a metre of line that no point shows: raster lines follow what covers a head, a decimetre off."""
@@ -119,8 +119,8 @@ class Axis:
         known = shown.information > 0
         information = np.where(known, shown.information, STATION_STEP_M / UNSHOWN_M**2)
         offset_m, bent = np.where(known, shown.offset_m, 0.0), points.line if known.any() else None
-        amplitudes = STILL if ridge else AMPLITUDES
-        course = smooth(shown.t, offset_m, information, 0.0, points.length_m, bent, amplitudes)
+        waves = OF_CLOUDS if ridge else OF_RAILS
+        course = smooth(shown.t, offset_m, information, 0.0, points.length_m, bent, waves)
         common_m = course.followed(shown.t, np.where(known, shown.common_m, 0.0), information)
         return cls(course, replace(shown, common_m=common_m), flank, ridge)
 
@@ -151,13 +151,9 @@ def _means(t: np.ndarray, across: np.ndarray, count: int) -> tuple[np.ndarray, n
 
 
 def _of_ridge(points: HeadPoints, ridge: Ridge) -> Shown:
-    """Return what points show of a blunt head: its crest, with errors that the stations of a window share."""
-    line = points.line
-    places, normals = (interpolate(values, points.along, ridge.t) for values in (line, left_normals(line)))
-    shared_m = wander(places + ridge.course_m[:, None] * normals)
-    information = ridge.information / (1 + ridge.information * WINDOW * shared_m**2)
+    """Return what points show of a blunt head: its crest."""
     outline, count = Middles.unknown(len(ridge.t)), _counted(points.t, len(ridge.t))
-    return Shown(ridge.t, count, ridge.offset_m, information, np.zeros(len(ridge.t)), outline)
+    return Shown(ridge.t, count, ridge.offset_m, ridge.information, np.zeros(len(ridge.t)), outline)
 
 
 def _is_narrow(points: HeadPoints) -> bool:

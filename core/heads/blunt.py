@@ -1,7 +1,6 @@
 """Blunt heads: beams from the air and dense matching of photographs blur a head to a round ridge without edges.
 
-Across, the ridge is a parabola. Its crest is the axis of the head. Where the line of the crest wanders about a stiff
-curve, the cloud errs, because a rail does not bend that quickly. See docs/method.md section 6.11.
+Across, the ridge is a parabola. Its crest is the axis of the head. See docs/method.md section 6.11.
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from ..polyline import left_normals
 from .edges import STATION_STEP_M, station_count, stations_along
 from .head_points import HeadPoints, near_lines
 from .level import OFF_TOP_SIGMAS, SLOPE_ROUNDS, robust_sigma, rough_level
@@ -31,20 +29,6 @@ LEANING_M = 0.008
 """Standard deviation of the mean of the points about the crest: labels lean to the side on which the bed is higher.
 Where noise hides the crest, the mean says more."""
 
-SMOOTHING_M = 3.0
-"""Sigma of PAEK in height: a spline would follow the errors that neighbouring points of such a cloud share."""
-
-STIFF_PLAN, STIFF_PROFILE = (201, 3), (301, 2)
-"""Stations of a stiff curve, and its degree: 50 m of a clothoid in plan, 75 m of a parabola in height. Errors of dense
-matching are alike over 5 to 20 m. What is longer than this is taken for the shape of the track."""
-
-CENTRE_WEIGHT = 2.25
-"""Weight of a station in its own stiff curve, times the stations of the curve, for both degrees."""
-
-MOST_FOLLOWED = 0.75
-"""Largest share of the variance that a stiff curve is taken to follow: where errors are correlated over its length, it
-shows nothing of them."""
-
 
 @dataclass(frozen=True)
 class Ridge:
@@ -62,12 +46,6 @@ class Ridge:
     t: np.ndarray
     offset_m: np.ndarray
     information: np.ndarray
-
-    @property
-    def course_m(self) -> np.ndarray:
-        """Offset of the crest in windows of `WINDOW` stations, (s,)."""
-        shown = uniform_filter1d([self.information * self.offset_m, self.information], WINDOW, axis=1, mode="nearest")
-        return shown[0] / np.maximum(shown[1], 1e-9)
 
     @classmethod
     def find(cls, points: HeadPoints) -> Ridge | None:
@@ -116,32 +94,3 @@ def blunt_share(lines: Sequence[np.ndarray], xyz: np.ndarray, head_width_m: floa
         if len(points.t):
             shown_m[int(points.is_blended)] += np.ptp(points.t)
     return float(shown_m[1] / max(shown_m.sum(), 1e-9))
-
-
-def wander(line: np.ndarray) -> float:
-    """Return the standard deviation of a line about a stiff curve: of heights, (s,), or across a plan, (s, 2), metres.
-
-    The median over the line counts, so that the abrupt curvature of a turnout does not. The curve follows errors that
-    are correlated over a part of its length; what it takes of them is added.
-    """
-    stations, degree = STIFF_PROFILE if line.ndim == 1 else STIFF_PLAN
-    size = min(stations, len(line) - 1 + len(line) % 2)
-    if size <= degree + 1:
-        return 0.0
-    from scipy.signal import savgol_filter  # takes as long to import as numpy, scipy.spatial and laspy together
-
-    off = line - savgol_filter(line, size, degree, axis=0)
-    off = off if line.ndim == 1 else np.einsum("ij,ij->i", off, left_normals(line))
-    followed = CENTRE_WEIGHT * _correlated_stations(off) / size
-    return robust_sigma(off / np.sqrt(1 - min(followed, MOST_FOLLOWED)))
-
-
-def _correlated_stations(off: np.ndarray) -> float:
-    """Return the number of neighbouring stations that share one error: the sum of the correlations of errors, (s,)."""
-    size = len(off)
-    spectrum = np.abs(np.fft.rfft(off - off.mean(), 2 * size)) ** 2
-    shared = np.fft.irfft(spectrum)[:size]
-    if shared[0] <= 0:
-        return 1.0
-    ends = np.flatnonzero(shared <= 0)
-    return float(2 * shared[: ends[0] if len(ends) else size].sum() / shared[0] - 1)

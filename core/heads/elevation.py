@@ -19,7 +19,6 @@ from ..polyline import interpolate, length_along, project, resample, starts_at_i
 from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
 from .axis import CELL_M, Axis, unseen_m
-from .blunt import SMOOTHING_M, wander
 from .edges import Widths, stations_along
 from .head_points import HeadPoints, near_lines
 from .level import rough_level
@@ -195,8 +194,6 @@ def _measured(
     resid = float(np.sqrt(np.mean(supporting.across**2)))
     support = axis.support(strips is not None)
     error_m = top.height_error(support)
-    if axis.ridge is not None:
-        error_m = np.hypot(error_m, wander(top.course.at(support.t)))
     support = replace(support, sigmaz_m=np.hypot(error_m, np.nan_to_num(support.heights_m)))
     if strips is not None:
         support = strips.added_to(support, parameters.align)
@@ -217,12 +214,12 @@ def _top_of(points: HeadPoints, axis: Axis, parameters: ElevationParameters) -> 
         return Top(course, points, np.zeros(len(points.t)))
     crown = fit_crown(points)
     level = replace(head, z=head.z + crown.fall(head.across))
-    smoothing_m = parameters.smoothing_z_m or (SMOOTHING_M if axis.ridge else None)
-    top = find_top(level, parameters.crown_radius_m, parameters.tolerance_z_m, smoothing_m)
+    smoothing_m, waves = parameters.smoothing_z_m, axis.course.waves
+    top = find_top(level, parameters.crown_radius_m, parameters.tolerance_z_m, smoothing_m, waves)
     if top is None:
         return None
     top = replace(top, crown_m=crown.error(points.width_m))
-    return top if smoothing_m is not None else by_outline(top, axis.shown.outline)
+    return top if smoothing_m is not None or axis.ridge else by_outline(top, axis.shown.outline)
 
 
 def measure_again(

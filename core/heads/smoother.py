@@ -2,7 +2,8 @@
 
 A rail follows its design, whose curvature changes little and seldom, and has waves of some metres about it. So the
 course is the sum of two splines: the third derivative of the one and the second of the other are noise, with rare large
-values where curves begin and at welds: Student's distribution. How strong both are, the evidence tells (by Laplace's
+values where curves begin and at welds: Student's distribution. Where the waves are errors of the cloud, the course is
+the design alone. How strong both are, the evidence tells (by Laplace's
 approximation); standard errors follow from the inverse of the information matrix. Everything is banded, so that time
 grows with the length of the line. See docs/method.md section 6.4.
 """
@@ -27,19 +28,9 @@ DESIGNS = 10.0 ** np.array([-7.0, -6.0, -5.0, -4.0])
 """Strengths of the third derivative of the design that are tried, metres to the power of -3/2. A transition from
 straight track to an arc of 300 m in 33 m has a third derivative of 1e-4 per m²."""
 
-AMPLITUDES = 10.0 ** np.arange(-4.0, -2.4, 0.5)
-"""Standard deviations of the waves that are tried, metres."""
-
-STILL = AMPLITUDES[:1]
-"""The same where the errors of a cloud look like waves."""
-
-USUAL_AMPLITUDE_M, AMPLITUDE_DECADES = 4e-4, 1.0
-"""Standard deviation of the waves that rails in service have, and that of its logarithm in decades: few points that
-show no waves hardly tell that there are none."""
-
-WAVE_M = 4.0
-"""Length from which waves return to zero: what bends over more is the design. With 8 m, waves of 3 m were followed less
-than the standard error said."""
+AMPLITUDE_DECADES = 1.0
+"""Standard deviation of the logarithm of the amplitude of waves: few points that show no waves hardly tell that there
+are none."""
 
 LEAST_SHARE = 1e-2
 """Probability below which strengths do not count."""
@@ -64,6 +55,35 @@ BAND = 4
 
 
 @dataclass(frozen=True)
+class Waves:
+    """What is expected of the waves about the design of a rail.
+
+    Attributes
+    ----------
+    amplitudes_m : (n,) array
+        Standard deviations that are tried.
+    usual_m : float
+        The most probable of them.
+    length_m : float
+        Length from which waves return to zero: what bends over more is the design.
+    followed : bool
+        Whether they are waves of the rail, and not errors of the cloud.
+    """
+
+    amplitudes_m: np.ndarray
+    usual_m: float
+    length_m: float
+    followed: bool
+
+
+OF_RAILS = Waves(10.0 ** np.arange(-4.0, -2.4, 0.5), usual_m=4e-4, length_m=4.0, followed=True)
+"""Waves of rails in service. With 8 m, waves of 3 m were followed less than the standard error said."""
+
+OF_CLOUDS = Waves(10.0 ** np.arange(-3.0, -1.4, 0.5), usual_m=5e-3, length_m=8.0, followed=False)
+"""Errors of dense matching, which are alike over 1 to 20 m."""
+
+
+@dataclass(frozen=True)
 class Spline:
     """A smoothed course of values, and its errors.
 
@@ -75,17 +95,19 @@ class Spline:
     likely : list
         For each likely strength of the prior: its probability, the Cholesky factor of the information about both
         splines, and by how much its coefficients differ from the mean.
+    waves : Waves
     """
 
     start_m: float
     step_m: float
     coefficients: np.ndarray
     likely: list[tuple[float, np.ndarray, np.ndarray]]
+    waves: Waves
 
     @cached_property
     def covariance(self) -> np.ndarray:
         """Covariances of each coefficient with itself and the next three, (4, n)."""
-        return np.sum([part * (_covariance(factor) + _products(off)) for part, factor, off in self.likely], axis=0)
+        return np.sum([part * (_covariance(factor, self.waves) + _products(off)) for part, factor, off in self.likely], axis=0)
 
     def at(self, t: np.ndarray) -> np.ndarray:
         """Return the values at chainages `t`, (m,); beyond the ends, those at the ends."""
@@ -109,7 +131,7 @@ class Spline:
         for one in range(BAND):
             score += np.bincount(first + one, information * basis[one] * values, len(score))
         moved = sum(part * cho_solve_banded((factor, True), np.repeat(score, 2)) for part, factor, _ in self.likely)
-        return replace(self, coefficients=moved[::2] + moved[1::2]).at(t)
+        return replace(self, coefficients=_course(moved, self.waves)).at(t)
 
     def _basis(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return _basis(t, self.start_m, self.step_m, len(self.coefficients))
@@ -122,7 +144,7 @@ def smooth(
     start_m: float,
     end_m: float,
     line: np.ndarray | None = None,
-    amplitudes: np.ndarray = AMPLITUDES,
+    waves: Waves = OF_RAILS,
 ) -> Spline:
     """Fit a spline to measurements.
 
@@ -136,8 +158,8 @@ def smooth(
         Part of the line that the spline covers.
     line : (k, 2) array, optional
         Line in plan to whose left the values are measured: the design is that of the line and the values together.
-    amplitudes : (n,) array
-        Standard deviations of the waves that are tried.
+    waves : Waves
+        Expected about the design.
     """
     pieces = max(int(np.ceil((end_m - start_m) / KNOT_M)), 1)
     step_m, count = max(end_m - start_m, 1e-3) / pieces, pieces + BAND - 1
@@ -152,14 +174,14 @@ def smooth(
             data[apart] += np.bincount(first + one, information * basis[one] * basis[one + apart], count)
     data[0] += RIDGE * data[0].mean()
     bends = np.zeros(pieces) if line is None else _third_differences(line, start_m, step_m, pieces)
-    designs, waves = np.repeat(DESIGNS, len(amplitudes)), np.tile(amplitudes, len(DESIGNS))
-    coefficients, factors, evidence = _fits(data, score, _Priors(designs, waves, step_m, bends))
+    tried = np.repeat(DESIGNS, len(waves.amplitudes_m)), np.tile(waves.amplitudes_m, len(DESIGNS))
+    coefficients, factors, evidence = _fits(data, score, _Priors(*tried, step_m, bends, waves))
     share = np.exp(evidence - evidence.max())
     share /= share.sum()
     likely = share > LEAST_SHARE
     mean = share[likely] @ coefficients[likely]
     fits = [(share[one], factors[:, one], coefficients[one] - mean) for one in np.flatnonzero(likely)]
-    return Spline(start_m, step_m, trend + mean, fits)
+    return Spline(start_m, step_m, trend + mean, fits, waves)
 
 
 def bridge_error(t: np.ndarray, stations: np.ndarray, turn: float) -> np.ndarray:
@@ -208,17 +230,19 @@ class _Priors:
     Attributes
     ----------
     design, amplitude_m : (s,) arrays
-        See `DESIGNS` and `AMPLITUDES`.
+        See `DESIGNS` and `Waves`.
     step_m : float
         Distance between the knots.
     bends : (p,) array
         Third differences that the line has without the spline.
+    waves : Waves
     """
 
     design: np.ndarray
     amplitude_m: np.ndarray
     step_m: float
     bends: np.ndarray
+    waves: Waves
 
     @cached_property
     def scales(self) -> tuple[np.ndarray, np.ndarray]:
@@ -227,13 +251,13 @@ class _Priors:
 
     @cached_property
     def hold(self) -> np.ndarray:
-        """Information by which waves return to zero over `WAVE_M`, (s, 1)."""
-        return self._stiffness[:, None] * (2 * np.pi / WAVE_M) ** 4 * self.step_m
+        """Information by which waves return to zero over their length, (s, 1)."""
+        return self._stiffness[:, None] * (2 * np.pi / self.waves.length_m) ** 4 * self.step_m
 
     @property
     def _stiffness(self) -> np.ndarray:
         """Inverse of the spectral density of the second derivative of waves that have the amplitude."""
-        return 1 / (2 * np.sqrt(2) * self.amplitude_m**2 * (2 * np.pi / WAVE_M) ** 3)
+        return 1 / (2 * np.sqrt(2) * self.amplitude_m**2 * (2 * np.pi / self.waves.length_m) ** 3)
 
     def off(self, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the differences of design, (s, p), and waves in their scales, given coefficients, (s, 2 n)."""
@@ -256,7 +280,7 @@ class _Priors:
     def log_probability(self, found: np.ndarray) -> np.ndarray:
         """Return the logarithms, (s,), of the probability densities of coefficients, (s, 2 n), and of the amplitude."""
         off = np.concatenate(self.off(found), axis=1)
-        usual = np.log10(self.amplitude_m / USUAL_AMPLITUDE_M) / AMPLITUDE_DECADES
+        usual = np.log10(self.amplitude_m / self.waves.usual_m) / AMPLITUDE_DECADES
         design, count = self.scales[0][:, 0], found.shape[1] // 2
         scales = len(self.bends) * np.log(design) + count * np.log(self.amplitude_m)
         student = 0.5 * (FREEDOM + 1) * np.log1p(off**2 / FREEDOM).sum(axis=1)
@@ -275,22 +299,27 @@ def _fits(data: np.ndarray, score: np.ndarray, priors: _Priors) -> tuple[np.ndar
     evidence : (s,) array
     """
     count, strengths = len(score), len(priors.design)
-    both = _of_both(data)[:, None]
+    data_of_both = _of_both(data)[:, None]
     weights = np.ones((strengths, len(priors.bends))), np.ones((strengths, count - len(WAVES) + 1))
     for _ in range(ROUNDS):
         right = np.tile(np.repeat(score, 2), (strengths, 1))
         bends = weights[0] / priors.scales[0] ** 2 * priors.bends
         for one, factor in enumerate(DESIGN):
             right[:, ::2][:, one : one + len(priors.bends)] -= factor * bends
-        band = both + priors.information(weights, count)
+        band = data_of_both + priors.information(weights, count)
         band[0] += ROUNDING * band[0].max(axis=1, keepdims=True)
         factors, found = _solved(band, right)
         design, waves = priors.off(found)
         weights = (FREEDOM + 1) / (FREEDOM + design**2), (FREEDOM + 1) / (FREEDOM + waves**2)
-    coefficients = found[:, ::2] + found[:, 1::2]
-    explained = coefficients @ score - 0.5 * (coefficients * _times(data, coefficients)).sum(axis=1)
+    both = found[:, ::2] + found[:, 1::2]
+    explained = both @ score - 0.5 * (both * _times(data, both)).sum(axis=1)
     evidence = explained + priors.log_probability(found) - np.log(factors[0]).sum(axis=1)
-    return coefficients, factors, evidence
+    return _course(found, priors.waves), factors, evidence
+
+
+def _course(found: np.ndarray, waves: Waves) -> np.ndarray:
+    """Return the coefficients of the course, (..., n), given those of design and waves, (..., 2 n)."""
+    return found[..., ::2] + found[..., 1::2] if waves.followed else found[..., ::2]
 
 
 def _solved(band: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -330,8 +359,8 @@ def _products(vector: np.ndarray) -> np.ndarray:
     return np.array([vector * np.append(vector[apart:], np.zeros(apart)) for apart in range(BAND)])
 
 
-def _covariance(factor: np.ndarray) -> np.ndarray:
-    """Return the band, (4, n), of the covariance of the sum of both splines.
+def _covariance(factor: np.ndarray, waves: Waves) -> np.ndarray:
+    """Return the band, (4, n), of the covariance of the course.
 
     The band of the inverse follows from the Cholesky factor, from the end to the start (Takahashi).
     """
@@ -345,6 +374,8 @@ def _covariance(factor: np.ndarray) -> np.ndarray:
         row[0] = own[number] - below[number] @ row[1:]
         after[1:, 1:] = after[:-1, :-1].copy()
         after[0] = after[:, 0] = row[:-1]
+    if not waves.followed:
+        return inverse[::2, ::2].T
     covariance = inverse[::2, ::2].T + inverse[1::2, ::2].T + inverse[::2, 1::2].T
     covariance[1:] += inverse[1::2, 1:-1:2].T
     covariance[0] += inverse[::2, 1]

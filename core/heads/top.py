@@ -19,7 +19,7 @@ from .head_points import RIM_HEADS, HeadPoints
 from .level import AXIS_SHARE, OFF_TOP_SIGMAS, SLOPE_ROUNDS, cross_slope, robust_sigma, rough_level
 from .outline import CROWN_RADIUS_M
 from .sections import Middles
-from .smoother import Spline, bridge_error, smooth
+from .smoother import OF_RAILS, Spline, Waves, bridge_error, smooth
 
 MIN_POINTS = 10
 """A line with fewer points is not a rail: 1 m of the sparsest rail has more."""
@@ -187,7 +187,7 @@ def fit_crown(points: HeadPoints) -> Crown:
     return Crown(max(-found[2], 0.0), float(np.sqrt(covariance[2, 2])), rim_m)
 
 
-def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None) -> Course:
+def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None, waves: Waves = OF_RAILS) -> Course:
     """Smooth the heights of points.
 
     Points of a bin are averaged, so that no single point marks the edge of a gap.
@@ -198,13 +198,15 @@ def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None) -> Course:
         Chainage (increasing) and height, metres.
     smoothing_m : float or None
         Sigma of PAEK; None smooths by a spline as much as the points show.
+    waves : Waves
+        Expected about the design.
     """
     rough = rough_level(t, z)
     noise_m = robust_sigma(z - rough)
     _, number, count = np.unique(np.floor(t / PROFILE_BIN_M), return_inverse=True, return_counts=True)
     middle, height = np.bincount(number, t) / count, np.bincount(number, z) / count
     if smoothing_m is None:
-        return smooth(middle, height, count / noise_m**2, middle[0] - TAIL_M, middle[-1] + TAIL_M)
+        return smooth(middle, height, count / noise_m**2, middle[0] - TAIL_M, middle[-1] + TAIL_M, None, waves)
     reach_m = 0.5 * smoothing_m / VARIANCE_FACTOR
     averaged = np.diff(np.searchsorted(t, [middle - reach_m, middle + reach_m]), axis=0)[0]
     return Profile(
@@ -212,7 +214,9 @@ def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None) -> Course:
     )
 
 
-def find_top(points: HeadPoints, crown_radius_m: float, tolerance_m: float, smoothing_m: float | None) -> Top | None:
+def find_top(
+    points: HeadPoints, crown_radius_m: float, tolerance_m: float, smoothing_m: float | None, waves: Waves = OF_RAILS
+) -> Top | None:
     """Find the height of the top on the head's axis and the points on it; None if too few points agree.
 
     The slope across is removed first. The disc then separates the top from the side faces, but it rests on the highest
@@ -229,6 +233,8 @@ def find_top(points: HeadPoints, crown_radius_m: float, tolerance_m: float, smoo
         Maximum depth of a point below the top.
     smoothing_m : float or None
         See `smoothed`.
+    waves : Waves
+        Expected about the design.
     """
     t, z = points.t, points.z
     slope = cross_slope(t, points.across, z - rough_level(t, z), points.width_m)
@@ -238,7 +244,7 @@ def find_top(points: HeadPoints, crown_radius_m: float, tolerance_m: float, smoo
     band = min(tolerance_m, max(MIN_BAND_M, BAND_SIGMAS * noise))
     for _ in range(BAND_ROUNDS):
         chosen = top & central if (top & central).sum() >= MIN_POINTS else top
-        course = smoothed(t[chosen], flat[chosen], smoothing_m)
+        course = smoothed(t[chosen], flat[chosen], smoothing_m, waves)
         top = np.abs(flat - course.at(t)) <= band
         if top.sum() < MIN_POINTS:
             return None
