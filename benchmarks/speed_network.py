@@ -25,7 +25,7 @@ from rail_extract.core.pipeline import Parameters
 from rail_extract.core.progress import SILENT
 from rail_extract.core.rails import RailLine
 from rail_extract.core.raster import RailRaster, cell_size, rasterize
-from rail_extract.core.steps import lines_of
+from rail_extract.core.squares.steps import lines_of
 from rail_extract.laboratory.ruler.lines import match
 
 TILE = 512

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..lines.paek import END_SHIFT, filled
-from ..lines.smoothing import STATIONS_PER_SIGMA, smooth_line
+from ..lines.smoothing import END_SHIFT, STATIONS_PER_SIGMA, filled, smooth_line
 from ..polyline import interpolate, is_closed, length_along
 from ..progress import Progress
 from ..rails import RailLine

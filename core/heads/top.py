@@ -10,8 +10,7 @@ from typing import Union
 
 import numpy as np
 
-from ..lines.paek import VARIANCE_FACTOR
-from ..lines.smoothing import smooth_profile
+from ..lines.smoothing import VARIANCE_FACTOR, smooth_profile
 from ..rails import Support
 from .edges import STATION_STEP_M, stations_along
 from .envelope import extremal_boundary
