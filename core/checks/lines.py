@@ -13,13 +13,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import NoTrackError
-from ..lines.paek import END_SHIFT, filled
-from ..lines.smoothing import STATIONS_PER_SIGMA, smooth_line
+from ..lines.smoothing import END_SHIFT, STATIONS_PER_SIGMA, filled, smooth_line
 from ..parameters import Parameters
 from ..polyline import interpolate, is_closed, length_along, resample, unit_tangents
 from ..progress import SILENT, Progress
 from ..rails import Centerline, RailLine
-from ..steps import tracks_of_class
+from ..squares.steps import tracks_of_class
 
 NO_LINE = (
     "The points found in the raw cloud give no rail: they are too few, or not on rails. Check the rail standard, the "

@@ -28,8 +28,8 @@ ENOUGH_POINTS = 80
 """Points on top that a window should contain: they give the middle to 2 mm before smoothing."""
 
 HALF_HEAD_BINS, HALF_RANGE_BINS = 18, 47
-"""Bins across half a head, about 2 mm each, finer than the noise of any cloud; and on either side of a line: a head that
-is 15 bins off, and what is next to its edge."""
+"""Bins across half a head, about 2 mm each, finer than the noise of any cloud; and on either side of a line, for a head
+that is 15 bins off, and what is next to its edge."""
 
 BLUR_BINS = 1.5
 """Sigma of the blur across the line: without it the best position would jump where there are fewer points than bins.

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..clouds.points import RailPoints
 from ..lines.network import LineNetwork
-from ..lines.network_smoothing import bend_through
+from ..lines.smoothing import bend_through
 from ..parameters import Parameters
 from ..polyline import left_normals, length_along, project
 from ..progress import SILENT, Progress

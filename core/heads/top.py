@@ -10,8 +10,7 @@ from typing import Union
 
 import numpy as np
 
-from ..lines.paek import VARIANCE_FACTOR
-from ..lines.smoothing import smooth_profile
+from ..lines.smoothing import VARIANCE_FACTOR, smooth_profile
 from ..rails import Support
 from .envelope import extremal_boundary
 from .head_points import RIM_HEADS, HeadPoints

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..heads.elevation import measure_again
 from ..heads.head_points import Widths
+from ..lines.finishing import united
 from ..lines.smoothing import GAP_SIGMAS
-from ..lines.uniting import united
 from ..polyline import length_along, resample, runs
 from ..progress import SILENT, Progress
 from ..rails import RailLine

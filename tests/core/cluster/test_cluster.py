@@ -24,8 +24,8 @@ from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine
 from rail_extract.core.squares.grid import lay_out
 from rail_extract.core.squares.spool import spool
+from rail_extract.core.squares.steps import square_side
 from rail_extract.core.standards import STANDARDS
-from rail_extract.core.steps import square_side
 from rail_extract.core.tasks import Task
 from rail_extract.laboratory.scenes.scene import RAIL
 

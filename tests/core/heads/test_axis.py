@@ -6,7 +6,7 @@ from rail_extract.core.heads.axis import UNSHOWN_M, Axis
 from rail_extract.core.heads.elevation import elevate
 from rail_extract.core.heads.head_points import HeadPoints, near_lines, stations_along
 from rail_extract.core.heads.refinement import refine
-from rail_extract.core.lines.network_smoothing import smooth_network
+from rail_extract.core.lines.smoothing import smooth_network
 from rail_extract.core.polyline import interpolate, length_along, project
 from rail_extract.core.raster import cell_size, rasterize
 from rail_extract.core.vectorize import vectorize
