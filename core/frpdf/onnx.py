@@ -13,9 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .folding import Convolution, FoldedLayer, block_side, fold
-from .models import MODELS
-from .weights import load_arrays
+from .architecture import Convolution, FoldedLayer, block_side, fold
+from .models import MODELS, load_arrays
 
 IR_VERSION, OPERATOR_SET = 8, 13
 """Versions that runtimes since 2021 read."""
@@ -66,7 +65,7 @@ def to_onnx(layers: Sequence[FoldedLayer], height: int, width: int) -> bytes:
 
 
 def layer_to_onnx(layer: FoldedLayer) -> bytes:
-    """Return one layer as ONNX, from `around` and `own`, as `layered.Step.run` takes them, to `found`.
+    """Return one layer as ONNX, from `around` and `own`, as `engine.Step.run` takes them, to `found`.
 
     Arrays are (1, channels, height, width). Only layers with a reduction have the input `own`. The stated shapes are
     those of a single cell; a runtime also takes larger arrays.
@@ -123,13 +122,13 @@ class _Graph:
         return self._node("Conv", names, attributes, output)
 
     def into_blocks(self, x: str, channels: int, height: int, width: int, side: int) -> str:
-        """Rearrange cells as `folding.into_blocks` does."""
+        """Rearrange cells as `architecture.into_blocks` does."""
         rows, columns = height // side, width // side
         x = self._arrange(x, (channels, rows, side, columns, side), (0, 2, 4, 1, 3))
         return self._reshape(x, (1, channels * side**2, rows, columns))
 
     def from_blocks(self, x: str, height: int, width: int, side: int, output: str) -> str:
-        """Rearrange blocks as `folding.from_blocks` does."""
+        """Rearrange blocks as `architecture.from_blocks` does."""
         x = self._arrange(x, (side, side, height // side, width // side), (2, 0, 3, 1))
         return self._reshape(x, (1, 1, height, width), output)
 

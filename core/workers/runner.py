@@ -15,8 +15,7 @@ from ..errors import RailExtractError
 from ..kernels import cores
 from ..progress import SILENT, Progress, counted
 from ..tasks import InTurn, Name, Results, Runner, Task, turns
-from .process import ENDED, Interpreter, Messages, Worker
-from .serving import ANSWER, FRACTION, READY, STATUS, Answer, packed
+from .process import ANSWER, ENDED, FRACTION, READY, STATUS, Answer, Interpreter, Messages, Worker, packed
 
 WORTH_S = 5.0
 """Least work, in seconds, for which workers are started: that takes each of them one to two seconds."""

@@ -9,8 +9,8 @@ from rail_extract.core.parameters import Parameters
 from rail_extract.core.pipeline import extract_rails
 from rail_extract.core.raster import TILE, cell_size, rasterize
 from rail_extract.core.squares.grid import MemorySource, lay_out, own_tiles
+from rail_extract.core.squares.steps import clean_square, engine_for, square_side
 from rail_extract.core.standards import STANDARDS
-from rail_extract.core.steps import clean_square, engine_for, square_side
 
 STANDARD = STANDARDS["EN_60E1_1435"]
 
@@ -66,7 +66,7 @@ def test_the_network_sees_64_cells_per_pass_around_a_square(passes, monkeypatch)
         RailPoints(np.column_stack([x, np.full(len(x), 10.0), np.zeros(len(x))]), LocalFrame(np.zeros(3)), 10), side_m
     )
     shown = []
-    monkeypatch.setattr("rail_extract.core.steps.clean", lambda raster, *_: shown.append(raster) or raster)
+    monkeypatch.setattr("rail_extract.core.squares.steps.clean", lambda raster, *_: shown.append(raster) or raster)
     square = next(one for one in lay_out([source], source) if one.key == (0, 0))
     clean_square(source, square, parameters, None)
     seen = shown[0].to_local(shown[0].cells())[:, 0]

@@ -9,36 +9,34 @@ from typing import TypeVar
 
 import numpy as np
 
-from .classify.thin import SURROUNDINGS_M, drawn
-from .clouds.points import RailPoints
-from .errors import NoTrackError, ParameterError
-from .frame import LocalFrame
-from .frpdf.cleanup import MARGIN, clean, max_passes
-from .frpdf.engine import Engine, make_engine
-from .frpdf.models import choose
-from .frpdf.weights import load_arrays
-from .heads.elevation import ElevationParameters, elevate, flat_rail, flat_rails, numbered
-from .heads.head_points import near_lines
-from .heads.refinement import refine
-from .heads.roads import onto_heads
-from .heads.strips import measure_strips, rows_of
-from .lines.bridges import FIT_M
-from .lines.network import LineNetwork
-from .lines.network_smoothing import smooth_network
-from .lines.thinning import thin
-from .lines.turning import MAX_TURN_DEG, parts_without_turns
-from .parameters import ALIGNED, Parameters
-from .polyline import length_along
-from .progress import SILENT, Progress
-from .rails import Centerline, RailLine
-from .raster import TILE, RailRaster, cell_size, rasterize
-from .squares.grid import HALO_M, OVERLAP_M, Key, PointSource, Square, mosaic, own_tiles
-from .squares.pieces import SquareRails, trim
-from .squares.seams import join
-from .standards import distinct_gauges
-from .tracks.centerlines import CenterlineParameters, build_centerlines
-from .tracks.parallels import widths_by_gauge
-from .vectorize import vectorize
+from ..classify.thin import SURROUNDINGS_M, drawn
+from ..clouds.points import RailPoints
+from ..errors import NoTrackError, ParameterError
+from ..frame import LocalFrame
+from ..frpdf.cleanup import MARGIN, clean, max_passes
+from ..frpdf.engine import Engine, make_engine
+from ..frpdf.models import choose, load_arrays
+from ..heads.elevation import ElevationParameters, elevate, flat_rail, flat_rails, numbered
+from ..heads.head_points import near_lines
+from ..heads.refinement import refine
+from ..heads.roads import onto_heads
+from ..heads.strips import measure_strips, rows_of
+from ..lines.ends import FIT_M
+from ..lines.finishing import MAX_TURN_DEG, parts_without_turns, thin
+from ..lines.network import LineNetwork
+from ..lines.smoothing import smooth_network
+from ..parameters import ALIGNED, Parameters
+from ..polyline import length_along
+from ..progress import SILENT, Progress
+from ..rails import Centerline, RailLine
+from ..raster import TILE, RailRaster, cell_size, rasterize
+from ..standards import distinct_gauges
+from ..tracks.centerlines import CenterlineParameters, build_centerlines
+from ..tracks.parallels import widths_by_gauge
+from ..vectorize import vectorize
+from .grid import HALO_M, OVERLAP_M, Key, PointSource, Square, mosaic, own_tiles
+from .pieces import SquareRails, trim
+from .seams import join
 
 VECTORIZE, SMOOTH, REFINE, ELEVATE = 0.45, 0.05, 0.25, 0.25
 """Relative run times of the steps from a raster to lines, for the progress."""
