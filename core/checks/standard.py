@@ -14,7 +14,6 @@ from ..classify.square import classify_square
 from ..clouds.points import Request
 from ..errors import CloudError, ParameterError
 from ..heads.blunt import blunt_share
-from ..heads.gauge_estimate import Spacings, measure_spacings
 from ..heads.roads import MIN_WIDER_M
 from ..heads.sections import likelier_width
 from ..parameters import Parameters
@@ -24,6 +23,7 @@ from ..squares.density import fullest_square
 from ..squares.grid import PointSource
 from ..standards import HEAD_WIDTH_RANGE_MM, SAME_GAUGE_M, STANDARDS, Gauge, RailStandard, closest_standard
 from ..tracks.parallels import width_at
+from .gauge_estimate import Spacings, measure_spacings
 
 SAMPLE_M = 50.0
 """Half the side of the area whose points show the width of the heads."""

@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("folder", type=Path, help="folder for NAME_pass1.onnx and NAME_pass2.onnx of each model")
     parser.add_argument("--side", type=int, default=512, help="side of the rasters (default 512)")
+    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks.strips import ARM_M
+from ..checks.doubts import ARM_M
 from ..polyline import length_along
 from ..rails import RailLine, RailNetwork, TrackGeometry
 from .findings import DOUBTS, OFF_GAUGE, UNSUPPORTED, Findings, Hole, Place, TrackFindings, examine

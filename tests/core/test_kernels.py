@@ -110,7 +110,7 @@ def test_the_network_computes_on_one_thread(name, on_two_threads):
 def test_a_command_runs_on_one_thread(on_two_threads):
     libraries = on_two_threads(*blas())
     seen = []
-    assert _run(SimpleNamespace(run=lambda _: seen.extend(library.get() for library in libraries)), None) == 0
+    assert _run(SimpleNamespace(run=lambda _: seen.extend(library.get() for library in libraries))) == 0
     assert seen == [1] * len(libraries)
     assert {library.get() for library in libraries} == {2}
 
