@@ -4,7 +4,7 @@ lazrs allocates whatever a file states, and the program ends if that fails or if
 end. Every size in a file is therefore compared with the size of the file first, and every chunk is searched for bytes
 that no encoder writes. The layout of chunks is that of LASzip's specification, version 1.4 R15.
 
-The octree of COPC files, version 1.0, tells which chunks an extent touches. laspy's reader of these files holds all
+The octree of COPC files, version 1.0, states where each chunk lies. laspy's reader of these files holds all
 points that it reads in memory, and does not end where pages of a damaged octree refer to each other.
 """
 
