@@ -170,8 +170,10 @@ class Destination:
         """Move the files of a temporary folder to their names, if the old file is still the one that was copied."""
         new = sorted((folder / NEW).iterdir())
         for file in filter(Path.is_file, new):
-            _flush(file)
-            _keep_rights(file, self.file.with_name(file.name), self.file)
+            with file.open("r+b") as opened:
+                os.fsync(opened.fileno())  # otherwise it may be empty after a power cut, although it was renamed
+            for model in filter(Path.exists, (self.file, self.file.with_name(file.name))):
+                shutil.copymode(model, file)  # so that nobody else can read it
         with alone_in(self.file.parent):
             try:
                 is_other = identity(self.file) not in (None, self.before)
@@ -257,20 +259,6 @@ def _unwritable(path: Path, error: OSError | ValueError) -> DiskError:
 def _reason(error: OSError | ValueError) -> str:
     """Return the operating system's words; errors of Python's own have none."""
     return getattr(error, "strerror", None) or str(error)
-
-
-def _keep_rights(file: Path, old: Path, main: Path) -> None:
-    """Give a new file the access rights of the one it replaces, so that nobody else can read it."""
-    for model in (old, main):
-        if model.exists():
-            shutil.copymode(model, file)
-            return
-
-
-def _flush(file: Path) -> None:
-    """Wait until a file is on the disk: otherwise it may be empty after a power cut, although it was renamed."""
-    with file.open("r+b") as opened:
-        os.fsync(opened.fileno())
 
 
 def _swap(folder: Path, main: Path, names: Sequence[Path]) -> None:

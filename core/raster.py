@@ -142,19 +142,15 @@ class RailRaster:
             Distance in cells within which other cells affect the result of a cell.
         progress : Progress
         """
-        tiles = {}
-        for index in progress.follow(sorted(self._neighbourhood())):
+        tiles, steps = {}, (-1, 0, 1)
+        near = {(row + down, column + right) for row, column in self.tiles for down in steps for right in steps}
+        for index in progress.follow(sorted(near)):
             row, column = index[0] * TILE - margin, index[1] * TILE - margin
             result = function(self.read(row, column, TILE + 2 * margin, TILE + 2 * margin))
             inner = result[margin : margin + TILE, margin : margin + TILE]
             if inner.any():
                 tiles[index] = np.array(inner, dtype=bool)
         return replace(self, tiles=tiles)
-
-    def _neighbourhood(self) -> set[tuple[int, int]]:
-        """Return the indices of the stored tiles and of their eight neighbours."""
-        steps = (-1, 0, 1)
-        return {(row + down, column + right) for row, column in self.tiles for down in steps for right in steps}
 
 
 def rasterize(xy: np.ndarray, cell_m: float) -> RailRaster:
@@ -176,14 +172,9 @@ def rasterize(xy: np.ndarray, cell_m: float) -> RailRaster:
 
 
 def _cells_of(xy: np.ndarray, cell_m: float) -> np.ndarray:
-    """Return the cells with points, (m, 2)."""
+    """Return the cells with points, each once, (m, 2); far fewer than points, on dense clouds."""
     rows = np.floor(-xy[:, 1] / cell_m + BORDER_CELLS).astype(np.int64)
     columns = np.floor(xy[:, 0] / cell_m + BORDER_CELLS).astype(np.int64)
-    return _unique_cells(rows, columns)
-
-
-def _unique_cells(rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Return each cell once, (m, 2); far fewer than points, on dense clouds."""
     if len(rows) and max(np.abs(rows).max(), np.abs(columns).max()) < ROW // 2:
         numbers = np.unique(rows * ROW + columns)
         rows = (numbers + ROW // 2) // ROW
