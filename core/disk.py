@@ -191,14 +191,9 @@ class Destination:
 
 
 def replace_folder(scratch: Path, target: Path) -> None:
-    """Move a new folder to its name; if the run is killed in between, the next one that writes there completes it.
+    """Move a new folder, in the folder `NEW` of a temporary one, to its name next to it, where an old one may be.
 
-    Parameters
-    ----------
-    scratch : Path
-        Temporary folder next to the target, with the new folder in the folder `NEW`.
-    target : Path
-        Folder that may exist.
+    If the run is killed in between, the next one that writes there completes it.
 
     Raises
     ------
@@ -262,18 +257,11 @@ def _reason(error: OSError | ValueError) -> str:
 
 
 def _swap(folder: Path, main: Path, names: Sequence[Path]) -> None:
-    """Replace files by the new ones from a temporary folder, and remove companions of the old file.
+    """Replace files by the new ones from a temporary folder, and remove companions of the old main file.
 
-    If there are several new files, the main one is missing from the first move to the last: a set that is not complete
-    cannot be opened.
-
-    Parameters
-    ----------
-    folder : Path
-    main : Path
-        Final name of the file that opens the set, or of the only file.
-    names : sequence of Path
-        Final names of all new files. Those that are no longer in the temporary folder have been moved already.
+    If there are several new files, the main one, which opens the set, is missing from the first move to the last: a set
+    that is not complete cannot be opened. Files of `names` that are no longer in the temporary folder have been moved
+    already.
 
     Raises
     ------

@@ -80,11 +80,6 @@ def points_near(
     -------
     list of (n, 3) arrays
         Points around each place, metres like `places`.
-
-    Raises
-    ------
-    CloudError
-        A file is damaged.
     """
     found: list[list[np.ndarray]] = [[np.empty((0, 3))] for _ in places]
     plan = np.array([place[:2] for place in places]).reshape(-1, 2)

@@ -111,17 +111,7 @@ def read_blocks(
     fields: laspy.DecompressionSelection,
     chunks: Sequence[laz.Chunk] | None = None,
 ) -> Iterator[laspy.ScaleAwarePointRecord]:
-    """Read the points of a file block by block.
-
-    Parameters
-    ----------
-    path : Path
-    reader : LasReader
-    fields : DecompressionSelection
-        What to decompress.
-    chunks : sequence of Chunk, optional
-        Compressed chunks to read; all by default.
-    """
+    """Read the points of a file block by block: the fields given, of all compressed chunks or of those given."""
     header = reader.header
     most = max(1, min(CHUNK, MAX_READ // header.point_format.size))
     if not header.are_points_compressed:

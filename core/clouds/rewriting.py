@@ -59,20 +59,11 @@ def check_class(path: Path, class_code: int) -> None:
 
 
 def rewrite(path: Path, new: Path, change: Change, progress: Progress = SILENT) -> int:
-    """Write a copy of a file with other classes, and return how many points it has.
+    """Write a copy of a file that has been read and checked with other classes, and return how many points it has.
 
     The order of the points, their other dimensions, the scale and the records of the header stay. A COPC file becomes
-    a LAZ or LAS file without the records of its octree, and LAS 1.0, which laspy does not write, becomes 1.2.
-
-    Parameters
-    ----------
-    path : Path
-        A file that has been read and checked.
-    new : Path
-        Compressed if its suffix is .laz.
-    change : callable
-        See `Change`.
-    progress : Progress
+    a LAZ or LAS file without the records of its octree, and LAS 1.0, which laspy does not write, becomes 1.2. The copy
+    is compressed if its suffix is .laz.
 
     Raises
     ------

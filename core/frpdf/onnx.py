@@ -41,19 +41,9 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def to_onnx(layers: Sequence[FoldedLayer], height: int, width: int) -> bytes:
-    """Return one pass as ONNX, from `input`, (1, 2, height, width) in -1 to 1, to `logits`, (1, 1, height, width).
+    """Return one pass, of `height` x `width` cells in whole blocks, as an ONNX ModelProto.
 
-    Parameters
-    ----------
-    layers : sequence of FoldedLayer
-        The layers of the pass.
-    height, width : int
-        Size of the rasters, multiples of the side of the network's blocks.
-
-    Returns
-    -------
-    bytes
-        An ONNX ModelProto.
+    It leads from `input`, (1, 2, height, width) in -1 to 1, to `logits`, (1, 1, height, width).
     """
     graph, side = _Graph(), block_side(layers)
     x = "input" if side == 1 else graph.into_blocks("input", 2, height, width, side)
@@ -88,17 +78,9 @@ class _Graph:
         self._weights: list[bytes] = []
 
     def layer(self, layer: FoldedLayer, around: str, own: str, output: str | None = None, padded: bool = True) -> str:
-        """Add a layer.
+        """Add a layer to what `around` names; its reduction joins the result with `own`.
 
-        Parameters
-        ----------
-        layer : FoldedLayer
-        around, own : str
-            Input of the convolution, and input that is joined with its result.
-        output : str, optional
-            Name of the result.
-        padded : bool
-            Whether the convolution pads its input so that its result has the same size.
+        A padded convolution has a result of the size of its input.
         """
         if layer.is_output:
             return self.convolve(around, layer.convolution, padded, output)
