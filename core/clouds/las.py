@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import CloudError, EmptyCloudError
 from ..parameters import OVERLAP, SYNTHETIC
 from ..progress import Progress
-from . import copc, laz
+from . import laz
 from .crs import MAX_COORDINATE, crs_of_geokeys, import_pyproj
 from .passes import marks_of
 from .readers import CloudHeader, Extent, Part
@@ -73,14 +73,14 @@ def read_header(path: Path) -> CloudHeader:
 def read_chunks(
     path: Path, progress: Progress, extent: Extent | np.ndarray | None, leave_out: Sequence[str]
 ) -> Iterator[Part]:
-    """Check a file and read it chunk by chunk; see `readers.Reader`."""
+    """Check a file and read it chunk by chunk; see `readers.read_classes`."""
     with _open(path) as reader:
         header, done, chunks, some = reader.header, 0, None, None
         timed = "gps_time" in header.point_format.dimension_names
         if header.are_points_compressed:
             chunks = laz.read_chunk_table(path, header)
             laz.check_layers(path, header, chunks, progress)
-            some = copc.chunks_in(path, header, chunks, extent) if extent is not None else None
+            some = laz.chunks_in(path, header, chunks, extent) if extent is not None else None
         total = header.point_count if some is None else sum(one.points for one in some)
         for chunk in read_blocks(path, reader, FIELDS, chunks if some is None else some):
             progress.check()

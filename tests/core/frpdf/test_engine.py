@@ -27,11 +27,6 @@ def test_opencv_runs_where_pytorch_is_not_installed(random_arrays, without_torch
         make_engine(random_arrays, "TORCH")
 
 
-def test_opencv_does_not_run_on_a_graphics_card(random_arrays):
-    with pytest.raises(ModelError, match="on the CPU only"):
-        make_engine(random_arrays, "OPENCV", "CUDA")
-
-
 def test_pytorch_runs_where_it_is_installed(random_arrays):
     pytest.importorskip("torch")
     assert make_engine(random_arrays).description.startswith("PyTorch")

@@ -20,7 +20,7 @@ ROW = 2**31
 
 
 @dataclass(frozen=True)
-class Section:
+class CrossSection:
     """A vertical plane across a line.
 
     Attributes
@@ -37,7 +37,7 @@ class Section:
     def seen(self, xyz: np.ndarray) -> np.ndarray:
         """Return points, (n, 3) metres, as seen along the line, (n, 3): ahead, to the right, up.
 
-        >>> Section(np.array([10.0, 20.0, 5.0]), np.array([0.0, 1.0])).seen(np.array([[11.0, 22.0, 5.5]])).tolist()
+        >>> CrossSection(np.array([10.0, 20.0, 5.0]), np.array([0.0, 1.0])).seen(np.array([[11.0, 22.0, 5.5]])).tolist()
         [[2.0, 1.0, 0.5]]
         """
         east, north, up = (xyz - self.place).T
@@ -52,14 +52,14 @@ class Section:
         return np.column_stack([one[numbers] + share * (one[numbers + 1] - one[numbers]) for one in (right, up)])
 
 
-def section_at(line: np.ndarray, share: float) -> Section:
+def cross_section_at(line: np.ndarray, share: float) -> CrossSection:
     """Return the plane across a line, (n, 3) metres, at a share of its plan length."""
     along = length_along(line[:, :2])
     at = share * along[-1]
     segment = int(np.clip(np.searchsorted(along, at, side="right") - 1, 0, len(line) - 2))
     place = interpolate(line, along, np.array([at]))[0]
     step = line[segment + 1, :2] - line[segment, :2]
-    return Section(place, step / np.hypot(*step))
+    return CrossSection(place, step / np.hypot(*step))
 
 
 def points_near(
