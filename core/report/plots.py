@@ -147,7 +147,7 @@ def draw_panels(
 
 
 def bottom_of(count: int) -> float:
-    """Return the lower side of so many panels with their headings."""
+    """Return the lower side of the last of `count` panels with their headings."""
     return count * (PANEL + SPACE)
 
 
