@@ -24,7 +24,6 @@ from ..parameters import TRANSITIONS, ComparisonParameters, FitParameters
 from ..progress import Estimating
 from ..report import build_alignment_page
 from ..report.comparison import build_comparison, describe_shift, verdict_on
-from ..report.origin import title_of
 from ..standards import resolve
 from .options import (
     REPORT,
@@ -93,7 +92,7 @@ def _fit(args: argparse.Namespace) -> None:
     writing.write_all(made, outputs, frame)
     if "report" in outputs:
         courses = [(fit.alignment, fit.deviations) for fit in fits]
-        facts = {**_stated(frame.crs_wkt), "Command": args.command_line}
+        facts = {"Command": args.command_line}
         outputs["report"].write_text(build_alignment_page(courses, args.lines, facts, True))
     for one in fits:
         count = len(one.alignment.elements)
@@ -159,7 +158,7 @@ def _import_alignment(args: argparse.Namespace) -> None:
     }
     writing.write_all([make() for name, make in makers.items() if name in outputs], outputs, frame)
     if "report" in outputs:
-        facts = {**_stated(frame.crs_wkt), "LandXML file": args.file.name, "Command": args.command_line}
+        facts = {"LandXML file": args.file.name, "Command": args.command_line}
         outputs["report"].write_text(build_alignment_page(courses, args.tracks, facts, False))
     _print_count(alignments)
 
@@ -249,15 +248,6 @@ def _stations(args: argparse.Namespace) -> None:
 
 def _metres(sigma_mm: float | None) -> float:
     return math.nan if sigma_mm is None else sigma_mm / 1000.0
-
-
-def _stated(crs_wkt: str | None) -> dict[str, str]:
-    """Return what a report on alignments states in every case."""
-    return {
-        "Date": f"{datetime.now():%Y-%m-%d %H:%M}",
-        "Version": f"Rail Extract {VERSION}",
-        "Coordinate system": title_of(crs_wkt),
-    }
 
 
 def _print_count(alignments: Sequence[Alignment]) -> None:
