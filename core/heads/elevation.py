@@ -19,8 +19,7 @@ from ..polyline import interpolate, length_along, project, resample, starts_at_i
 from ..progress import SILENT, Progress
 from ..rails import RailLine, Support
 from .axis import CELL_M, Axis, unseen_m
-from .edges import Widths, stations_along
-from .head_points import HeadPoints, near_lines
+from .head_points import HeadPoints, Widths, near_lines, stations_along
 from .level import rough_level
 from .own_level import on_own_level
 from .smoother import KNOT_M

@@ -107,7 +107,8 @@ class Spline:
     @cached_property
     def covariance(self) -> np.ndarray:
         """Covariances of each coefficient with itself and the next three, (4, n)."""
-        return np.sum([part * (_covariance(factor, self.waves) + _products(off)) for part, factor, off in self.likely], axis=0)
+        covariances = (part * (_covariance(factor, self.waves) + _products(off)) for part, factor, off in self.likely)
+        return np.sum(list(covariances), axis=0)
 
     def at(self, t: np.ndarray) -> np.ndarray:
         """Return the values at chainages `t`, (m,); beyond the ends, those at the ends."""
