@@ -30,7 +30,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=SEED, help=f"of the scenes (default {SEED})")
     parser.add_argument("--heads", action="store_true", help="take the points that are on heads as labelled")
     arguments = parser.parse_args()
-    print(f"{'':<20}{'found % of each':>16}{'gauge mm of each':>18}{HEADER}")
+    print(f"{'':<20}{'found % of each':>16}{'mm off truth':>14}{'gauge mm of each':>18}{HEADER}")
     for name in arguments.places or SURVEYED:
         for kind, camera in CAMERAS.items():
             scenes = [SURVEYED[name](arguments.seed, scanner=one) for one in (camera, another_day(camera))]
@@ -44,15 +44,17 @@ def drawn(scene: RawScene, heads: bool) -> RailNetwork | None:
 
 
 def row(scenes: list[RawScene], networks: list[RailNetwork | None]) -> str:
-    """Format what two surveys found, and how they agree."""
-    shares, gauges = [], []
+    """Format what two surveys found, how far the first is off the truth across, and how they agree."""
+    shares, off_mm, gauges = [], [], []
     for scene, network in zip(scenes, networks):
         rails = () if network is None else network.rails
-        shares.append(f"{100 * match([rail.xyz for rail in rails], scene.shown).within(0.05).completeness:.1f}")
+        compared = match([rail.xyz for rail in rails], scene.shown).within(0.05)
+        shares.append(f"{100 * compared.completeness:.1f}")
+        off_mm.append(f"{1000 * compared.lateral_rmse_m:.1f}")
         found = [track.gauge_mm for track in network.geometry] if network is not None else []
         gauges.append(f"{np.nanmedian(np.concatenate(found)):.1f}" if found else "-")
     both = None if None in networks else agreement(*(network.rails for network in networks if network is not None))
-    return f"{' '.join(shares):>16}{' '.join(gauges):>18}" + ("" if both is None else both.text())
+    return f"{' '.join(shares):>16}{off_mm[0]:>14}{' '.join(gauges):>18}" + ("" if both is None else both.text())
 
 
 if __name__ == "__main__":

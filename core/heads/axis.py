@@ -19,7 +19,7 @@ from .head_points import MIN_ON_HEAD, STATION_STEP_M, HeadPoints
 from .level import robust_sigma
 from .roads import MIN_WIDER_M, bands, hidden_edges
 from .sections import Middles, outline_middles
-from .smoother import OF_CLOUDS, OF_RAILS, Spline, bridge_error, smooth
+from .smoother import BLUNT, SHARP, Spline, bridge_error, smooth
 
 UNSHOWN_M = 0.3
 """Standard error of a metre of line that no point shows: raster lines follow what covers a head, a decimetre off."""
@@ -118,8 +118,8 @@ class Axis:
         known = shown.information > 0
         information = np.where(known, shown.information, STATION_STEP_M / UNSHOWN_M**2)
         offset_m, bent = np.where(known, shown.offset_m, 0.0), points.line if known.any() else None
-        waves = OF_CLOUDS if ridge else OF_RAILS
-        course = smooth(shown.t, offset_m, information, 0.0, points.length_m, bent, waves)
+        prior = BLUNT if ridge else SHARP
+        course = smooth(shown.t, offset_m, information, 0.0, points.length_m, bent, prior)
         common_m = course.followed(shown.t, np.where(known, shown.common_m, 0.0), information)
         return cls(course, replace(shown, common_m=common_m), flank, ridge)
 

@@ -213,8 +213,8 @@ def _top_of(points: HeadPoints, axis: Axis, parameters: ElevationParameters) -> 
         return Top(course, points, np.zeros(len(points.t)))
     crown = fit_crown(points)
     level = replace(head, z=head.z + crown.fall(head.across))
-    smoothing_m, waves = parameters.smoothing_z_m, axis.course.waves
-    top = find_top(level, parameters.crown_radius_m, parameters.tolerance_z_m, smoothing_m, waves)
+    smoothing_m, prior = parameters.smoothing_z_m, axis.course.prior
+    top = find_top(level, parameters.crown_radius_m, parameters.tolerance_z_m, smoothing_m, prior)
     if top is None:
         return None
     top = replace(top, crown_m=crown.error(points.width_m))

@@ -24,10 +24,6 @@ from ..polyline import interpolate, left_normals, length_along
 KNOT_M = 0.5
 """Distance between the knots: a spline of this step follows waves of 2 m."""
 
-DESIGNS = 10.0 ** np.array([-7.0, -6.0, -5.0, -4.0])
-"""Strengths of the third derivative of the design that are tried, metres to the power of -3/2. A transition from
-straight track to an arc of 300 m in 33 m has a third derivative of 1e-4 per m²."""
-
 AMPLITUDE_DECADES = 1.0
 """Standard deviation of the logarithm of the amplitude of waves: few points that show no waves hardly tell that there
 are none."""
@@ -55,13 +51,15 @@ BAND = 4
 
 
 @dataclass(frozen=True)
-class Waves:
-    """What is expected of the waves about the design of a rail.
+class Prior:
+    """What is expected of a course before it is measured.
 
     Attributes
     ----------
-    amplitudes_m : (n,) array
-        Standard deviations that are tried.
+    designs : (d,) array
+        Strengths of the third derivative of the design that are tried, metres to the power of -3/2.
+    amplitudes_m : (a,) array
+        Standard deviations of the waves that are tried.
     usual_m : float
         The most probable of them.
     length_m : float
@@ -70,17 +68,21 @@ class Waves:
         Whether they are waves of the rail, and not errors of the cloud.
     """
 
+    designs: np.ndarray
     amplitudes_m: np.ndarray
     usual_m: float
     length_m: float
     followed: bool
 
 
-OF_RAILS = Waves(10.0 ** np.arange(-4.0, -2.4, 0.5), usual_m=4e-4, length_m=4.0, followed=True)
-"""Waves of rails in service. With 8 m, waves of 3 m were followed less than the standard error said."""
+SHARP = Prior(10.0 ** np.arange(-7.0, -3.5), 10.0 ** np.arange(-4.0, -2.4, 0.5), 4e-4, 4.0, followed=True)
+"""Rails in service, in clouds that show the edges of heads. A transition from straight track to an arc of 300 m in 33 m
+has a third derivative of 1e-4 per m². With waves of 8 m, those of 3 m were followed less than the standard error said.
+"""
 
-OF_CLOUDS = Waves(10.0 ** np.arange(-3.0, -1.4, 0.5), usual_m=5e-3, length_m=8.0, followed=False)
-"""Errors of dense matching, which are alike over 1 to 20 m."""
+BLUNT = Prior(10.0 ** np.arange(-6.0, -2.5), 10.0 ** np.arange(-3.0, -1.4, 0.5), 5e-3, 8.0, followed=False)
+"""The same in clouds that blunt them: errors of dense matching are alike over 1 to 10 m, and in a switch, where curves
+begin abruptly, the design alone has to follow the rail."""
 
 
 @dataclass(frozen=True)
@@ -95,19 +97,19 @@ class Spline:
     likely : list
         For each likely strength of the prior: its probability, the Cholesky factor of the information about both
         splines, and by how much its coefficients differ from the mean.
-    waves : Waves
+    prior : Prior
     """
 
     start_m: float
     step_m: float
     coefficients: np.ndarray
     likely: list[tuple[float, np.ndarray, np.ndarray]]
-    waves: Waves
+    prior: Prior
 
     @cached_property
     def covariance(self) -> np.ndarray:
         """Covariances of each coefficient with itself and the next three, (4, n)."""
-        covariances = (part * (_covariance(factor, self.waves) + _products(off)) for part, factor, off in self.likely)
+        covariances = (part * (_covariance(factor, self.prior) + _products(off)) for part, factor, off in self.likely)
         return np.sum(list(covariances), axis=0)
 
     def at(self, t: np.ndarray) -> np.ndarray:
@@ -132,7 +134,7 @@ class Spline:
         for one in range(BAND):
             score += np.bincount(first + one, information * basis[one] * values, len(score))
         moved = sum(part * cho_solve_banded((factor, True), np.repeat(score, 2)) for part, factor, _ in self.likely)
-        return replace(self, coefficients=_course(moved, self.waves)).at(t)
+        return replace(self, coefficients=_course(moved, self.prior)).at(t)
 
     def _basis(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return _basis(t, self.start_m, self.step_m, len(self.coefficients))
@@ -145,7 +147,7 @@ def smooth(
     start_m: float,
     end_m: float,
     line: np.ndarray | None = None,
-    waves: Waves = OF_RAILS,
+    prior: Prior = SHARP,
 ) -> Spline:
     """Fit a spline to measurements.
 
@@ -159,7 +161,7 @@ def smooth(
         Part of the line that the spline covers.
     line : (k, 2) array, optional
         Line in plan to whose left the values are measured: the design is that of the line and the values together.
-    waves : Waves
+    prior : Prior
         Expected about the design.
     """
     pieces = max(int(np.ceil((end_m - start_m) / KNOT_M)), 1)
@@ -175,14 +177,14 @@ def smooth(
             data[apart] += np.bincount(first + one, information * basis[one] * basis[one + apart], count)
     data[0] += RIDGE * data[0].mean()
     bends = np.zeros(pieces) if line is None else _third_differences(line, start_m, step_m, pieces)
-    tried = np.repeat(DESIGNS, len(waves.amplitudes_m)), np.tile(waves.amplitudes_m, len(DESIGNS))
-    coefficients, factors, evidence = _fits(data, score, _Priors(*tried, step_m, bends, waves))
+    tried = np.repeat(prior.designs, len(prior.amplitudes_m)), np.tile(prior.amplitudes_m, len(prior.designs))
+    coefficients, factors, evidence = _fits(data, score, _Priors(*tried, step_m, bends, prior))
     share = np.exp(evidence - evidence.max())
     share /= share.sum()
     likely = share > LEAST_SHARE
     mean = share[likely] @ coefficients[likely]
     fits = [(share[one], factors[:, one], coefficients[one] - mean) for one in np.flatnonzero(likely)]
-    return Spline(start_m, step_m, trend + mean, fits, waves)
+    return Spline(start_m, step_m, trend + mean, fits, prior)
 
 
 def bridge_error(t: np.ndarray, stations: np.ndarray, turn: float) -> np.ndarray:
@@ -231,19 +233,19 @@ class _Priors:
     Attributes
     ----------
     design, amplitude_m : (s,) arrays
-        See `DESIGNS` and `Waves`.
+        See `Prior`.
     step_m : float
         Distance between the knots.
     bends : (p,) array
         Third differences that the line has without the spline.
-    waves : Waves
+    prior : Prior
     """
 
     design: np.ndarray
     amplitude_m: np.ndarray
     step_m: float
     bends: np.ndarray
-    waves: Waves
+    prior: Prior
 
     @cached_property
     def scales(self) -> tuple[np.ndarray, np.ndarray]:
@@ -253,12 +255,12 @@ class _Priors:
     @cached_property
     def hold(self) -> np.ndarray:
         """Information by which waves return to zero over their length, (s, 1)."""
-        return self._stiffness[:, None] * (2 * np.pi / self.waves.length_m) ** 4 * self.step_m
+        return self._stiffness[:, None] * (2 * np.pi / self.prior.length_m) ** 4 * self.step_m
 
     @property
     def _stiffness(self) -> np.ndarray:
         """Inverse of the spectral density of the second derivative of waves that have the amplitude."""
-        return 1 / (2 * np.sqrt(2) * self.amplitude_m**2 * (2 * np.pi / self.waves.length_m) ** 3)
+        return 1 / (2 * np.sqrt(2) * self.amplitude_m**2 * (2 * np.pi / self.prior.length_m) ** 3)
 
     def off(self, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the differences of design, (s, p), and waves in their scales, given coefficients, (s, 2 n)."""
@@ -281,7 +283,7 @@ class _Priors:
     def log_probability(self, found: np.ndarray) -> np.ndarray:
         """Return the logarithms, (s,), of the probability densities of coefficients, (s, 2 n), and of the amplitude."""
         off = np.concatenate(self.off(found), axis=1)
-        usual = np.log10(self.amplitude_m / self.waves.usual_m) / AMPLITUDE_DECADES
+        usual = np.log10(self.amplitude_m / self.prior.usual_m) / AMPLITUDE_DECADES
         design, count = self.scales[0][:, 0], found.shape[1] // 2
         scales = len(self.bends) * np.log(design) + count * np.log(self.amplitude_m)
         student = 0.5 * (FREEDOM + 1) * np.log1p(off**2 / FREEDOM).sum(axis=1)
@@ -315,12 +317,12 @@ def _fits(data: np.ndarray, score: np.ndarray, priors: _Priors) -> tuple[np.ndar
     both = found[:, ::2] + found[:, 1::2]
     explained = both @ score - 0.5 * (both * _times(data, both)).sum(axis=1)
     evidence = explained + priors.log_probability(found) - np.log(factors[0]).sum(axis=1)
-    return _course(found, priors.waves), factors, evidence
+    return _course(found, priors.prior), factors, evidence
 
 
-def _course(found: np.ndarray, waves: Waves) -> np.ndarray:
+def _course(found: np.ndarray, prior: Prior) -> np.ndarray:
     """Return the coefficients of the course, (..., n), given those of design and waves, (..., 2 n)."""
-    return found[..., ::2] + found[..., 1::2] if waves.followed else found[..., ::2]
+    return found[..., ::2] + found[..., 1::2] if prior.followed else found[..., ::2]
 
 
 def _solved(band: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -360,7 +362,7 @@ def _products(vector: np.ndarray) -> np.ndarray:
     return np.array([vector * np.append(vector[apart:], np.zeros(apart)) for apart in range(BAND)])
 
 
-def _covariance(factor: np.ndarray, waves: Waves) -> np.ndarray:
+def _covariance(factor: np.ndarray, prior: Prior) -> np.ndarray:
     """Return the band, (4, n), of the covariance of the course.
 
     The band of the inverse follows from the Cholesky factor, from the end to the start (Takahashi).
@@ -375,7 +377,7 @@ def _covariance(factor: np.ndarray, waves: Waves) -> np.ndarray:
         row[0] = own[number] - below[number] @ row[1:]
         after[1:, 1:] = after[:-1, :-1].copy()
         after[0] = after[:, 0] = row[:-1]
-    if not waves.followed:
+    if not prior.followed:
         return inverse[::2, ::2].T
     covariance = inverse[::2, ::2].T + inverse[1::2, ::2].T + inverse[::2, 1::2].T
     covariance[1:] += inverse[1::2, 1:-1:2].T

@@ -17,7 +17,7 @@ from .head_points import RIM_HEADS, HeadPoints
 from .level import AXIS_SHARE, OFF_TOP_SIGMAS, SLOPE_ROUNDS, cross_slope, robust_sigma, rough_level
 from .outline import CROWN_RADIUS_M
 from .sections import Middles
-from .smoother import OF_RAILS, Spline, Waves, bridge_error, smooth
+from .smoother import SHARP, Prior, Spline, bridge_error, smooth
 
 MIN_POINTS = 10
 """A line with fewer points is not a rail: 1 m of the sparsest rail has more."""
@@ -184,7 +184,7 @@ def fit_crown(points: HeadPoints) -> Crown:
     return Crown(max(-found[2], 0.0), float(np.sqrt(covariance[2, 2])), rim_m)
 
 
-def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None, waves: Waves = OF_RAILS) -> Course:
+def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None, prior: Prior = SHARP) -> Course:
     """Smooth the heights of points.
 
     Points of a bin are averaged, so that no single point marks the edge of a gap.
@@ -195,7 +195,7 @@ def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None, waves: Wav
         Chainage (increasing) and height, metres.
     smoothing_m : float or None
         Sigma of PAEK; None smooths by a spline as much as the points show.
-    waves : Waves
+    prior : Prior
         Expected about the design.
     """
     rough = rough_level(t, z)
@@ -203,7 +203,7 @@ def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None, waves: Wav
     _, number, count = np.unique(np.floor(t / PROFILE_BIN_M), return_inverse=True, return_counts=True)
     middle, height = np.bincount(number, t) / count, np.bincount(number, z) / count
     if smoothing_m is None:
-        return smooth(middle, height, count / noise_m**2, middle[0] - TAIL_M, middle[-1] + TAIL_M, None, waves)
+        return smooth(middle, height, count / noise_m**2, middle[0] - TAIL_M, middle[-1] + TAIL_M, None, prior)
     reach_m = 0.5 * smoothing_m / VARIANCE_FACTOR
     averaged = np.diff(np.searchsorted(t, [middle - reach_m, middle + reach_m]), axis=0)[0]
     return Profile(
@@ -212,7 +212,7 @@ def smoothed(t: np.ndarray, z: np.ndarray, smoothing_m: float | None, waves: Wav
 
 
 def find_top(
-    points: HeadPoints, crown_radius_m: float, tolerance_m: float, smoothing_m: float | None, waves: Waves = OF_RAILS
+    points: HeadPoints, crown_radius_m: float, tolerance_m: float, smoothing_m: float | None, prior: Prior = SHARP
 ) -> Top | None:
     """Find the height of the top on the head's axis and the points on it; None if too few points agree.
 
@@ -230,7 +230,7 @@ def find_top(
         Maximum depth of a point below the top.
     smoothing_m : float or None
         See `smoothed`.
-    waves : Waves
+    prior : Prior
         Expected about the design.
     """
     t, z = points.t, points.z
@@ -241,7 +241,7 @@ def find_top(
     band = min(tolerance_m, max(MIN_BAND_M, BAND_SIGMAS * noise))
     for _ in range(BAND_ROUNDS):
         chosen = top & central if (top & central).sum() >= MIN_POINTS else top
-        course = smoothed(t[chosen], flat[chosen], smoothing_m, waves)
+        course = smoothed(t[chosen], flat[chosen], smoothing_m, prior)
         top = np.abs(flat - course.at(t)) <= band
         if top.sum() < MIN_POINTS:
             return None

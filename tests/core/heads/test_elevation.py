@@ -163,6 +163,23 @@ def test_gaps_are_where_the_finished_line_has_no_points(turn):
     np.testing.assert_allclose(rail.gaps, [[14.5, 17.5]], atol=0.2)
 
 
+@pytest.mark.parametrize("reverse", [False, True])
+def test_a_branch_begins_at_the_height_of_its_stock_rail(reverse):
+    """The first 8 m of the branch have no points of its own, and what follows climbs away from the stock rail."""
+    x = np.arange(0, 40.05, 0.1)
+    branch = np.column_stack([x, x**2 / 600.0])
+    stock, climbing = head(40.0, 200), head(40.0, 200, profile=lambda x: 0.05 - 0.004 * x, seed=1)
+    climbing = climbing[climbing[:, 0] > 8.0] + 0.0
+    climbing[:, 1] += climbing[:, 0] ** 2 / 600.0
+    network = network_of(straight_line(40.0), branch[::-1] if reverse else branch)
+    network = LineNetwork(network.lines, network.nodes, np.array([[0, 1], [2, 0] if reverse else [0, 3]]))
+    rails = elevated(network, cloud(stock, climbing))
+    (rail,) = (one for one in rails if abs(one.xyz[-1, 1]) > 1)
+    assert rail.gaps[0] == pytest.approx([0.0, 8.0], abs=0.3)
+    height = np.interp([0.0, 12.0, 30.0], rail.xyz[:, 0], rail.xyz[:, 2])
+    assert height == pytest.approx([0.0, 0.002, -0.07], abs=0.002)
+
+
 def test_lines_are_directed_and_numbered_and_have_their_class():
     lines = [straight_line(20)[::-1] + [30.0, 0.0], straight_line(20), straight_line(20)[:, ::-1] + [5.0, 10.0]]
     east = head(20, 80)
