@@ -104,7 +104,7 @@ SWITCHES = (
     _rule("vectorize.junctions.drop_bubbles", first),
     _rule("vectorize.junctions.drop_rungs", first),
     _rule("vectorize.junctions.drop_spurs", first),
-    _rule("squares.steps.parts_without_turns", lambda line, *_: [(0.0, float(length_along(line)[-1]))]),
+    _rule("lines.finishing.parts_without_turns", lambda line, *_: [(0.0, float(length_along(line)[-1]))]),
     _rule("tracks.pairing._without_ghosts", list),
     _rule("tracks.pairing._without_rivals", lambda matches, misfits_m: list(matches)),
     _rule("tracks.pairing._on_one_level", lambda *_: True),

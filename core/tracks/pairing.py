@@ -92,9 +92,7 @@ class RailPair:
 
 def pair_rails(
     rails: Sequence[RailLine],
-    gauge_m: float,
-    head_width_m: float,
-    tolerance_m: float = Parameters.centerline_tolerance_m,
+    parameters: Parameters,
     other_spacings_m: Sequence[float] = (),
     progress: Progress = SILENT,
 ) -> tuple[RailPair, ...]:
@@ -106,10 +104,8 @@ def pair_rails(
     Parameters
     ----------
     rails : sequence of RailLine
-    gauge_m, head_width_m : float
-        Their sum is the distance between the rail lines.
-    tolerance_m : float
-        Maximum deviation from that distance.
+    parameters : Parameters
+        The gauge and the width of the heads together are the distance between the rail lines.
     other_spacings_m : sequence of float
         Distances at which rails are paired for other gauges: a match that is closer to one of them is left to it.
     progress : Progress
@@ -121,12 +117,13 @@ def pair_rails(
     """
     if len(rails) < 2:
         return ()
-    spacing = gauge_m + head_width_m
-    reach_m = max(MAX_SPACING_M, spacing + 2 * tolerance_m)
-    parallels = find_parallels(rails, reach_m, progress.span(0.0, 0.3))
-    candidates = find_candidates(parallels, spacing, tolerance_m)
+    spacing, tolerance_m = parameters.gauge_m + parameters.head_width_m, parameters.centerline_tolerance_m
+    parallels = find_parallels(rails, max(MAX_SPACING_M, spacing + 2 * tolerance_m), progress.span(0.0, 0.3))
     matches: list[_Match] = []
-    for section in progress.span(0.3, 1.0).follow(candidates):
+    # Chords between stations, and stations that are not exactly abreast, distort the distance a little.
+    near = parallels[np.abs(np.abs(parallels.left_m) - spacing) < 2 * tolerance_m]
+    sections = [section for group in near.groups() for section in _sections(group)]
+    for section in progress.span(0.3, 1.0).follow(sections):
         found = _match(rails, section, spacing, tolerance_m)
         matches.extend(match for match in found if _is_nearest(match, section, spacing, other_spacings_m))
     # What wanders goes first: it would make the track next to it look like a ghost.
@@ -134,29 +131,6 @@ def pair_rails(
     steady = _without_rivals(selected, [_misfit_m(rails, match, spacing)[1] for match in selected])
     sure = _without_ghosts(steady)
     return tuple(match.pair() for match in _without_rivals(sure, [sum(_misfit_m(rails, m, spacing)) for m in sure]))
-
-
-def find_candidates(parallels: Parallels, spacing_m: float, tolerance_m: float) -> list[Parallels]:
-    """Find the sections of rails that may be at gauge, for the exact matching.
-
-    Chords between stations, and stations that are not exactly abreast, distort the distance a little. Distances are
-    therefore compared with twice the tolerance.
-
-    Parameters
-    ----------
-    parallels : Parallels
-    spacing_m : float
-        Distance between the rail lines at gauge.
-    tolerance_m : float
-        Maximum deviation of a match from that distance.
-
-    Returns
-    -------
-    list of Parallels
-        The stations of each section.
-    """
-    near = parallels[np.abs(np.abs(parallels.left_m) - spacing_m) < 2 * tolerance_m]
-    return [section for group in near.groups() for section in _sections(group)]
 
 
 @dataclass(frozen=True)
