@@ -68,14 +68,10 @@ def join_gaps(
         best: dict[int, tuple[int, int]] = {}
         for ends in sorted(joins, key=lambda ends: (joins[ends].cost, ends), reverse=True):
             best[ends[0]] = best[ends[1]] = ends
-        partner, bridges, cuts_m = {}, {}, {}
-        for one, other in (ends for ends in joins if best[ends[0]] == best[ends[1]] == ends):
-            partner[one], partner[other] = other, one
-            cuts_m[one], cuts_m[other] = joins[one, other].cuts_m
-            bridges[one], bridges[other] = joins[one, other].points, joins[one, other].points[::-1]
-        if not partner:
+        chosen = {ends: joins[ends] for ends in joins if best[ends[0]] == best[ends[1]] == ends}
+        if not chosen:
             return network
-        network = network.cut_back(cuts_m).weld(partner, bridges)
+        network = network.bridged(chosen, {})
 
 
 def _possible_joins(
