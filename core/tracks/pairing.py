@@ -260,7 +260,7 @@ def _select(matches: Sequence[_Match]) -> list[_Match]:
     used = _PairedSides()
     selected = []
     for match in sorted(matches, key=lambda match: (-match.length_m, match.mean_penalty)):
-        for part in _free_runs(match, used.same_side_a(match) | used.same_side_b(match)):
+        for part in _free_runs(match, used.same_side(match)):
             used.add(part)
             selected.append(part)
     return selected
@@ -275,9 +275,9 @@ def _without_ghosts(matches: Sequence[_Match]) -> list[_Match]:
     """
     while True:
         partners = _PairedSides(matches)
-        doubtful = [partners.far_side_a(match) & partners.far_side_b(match) for match in matches]
+        doubtful = [partners.far_side(match).all(axis=0) for match in matches]
         sure = _PairedSides(part for match, out in zip(matches, doubtful) for part in _free_runs(match, out))
-        ghosts = [out & (sure.far_side_a(match) | sure.far_side_b(match)) for match, out in zip(matches, doubtful)]
+        ghosts = [out & sure.far_side(match).any(axis=0) for match, out in zip(matches, doubtful)]
         if not any(ghost.any() for ghost in ghosts):
             return list(matches)
         matches = [part for match, ghost in zip(matches, ghosts) for part in _free_runs(match, ghost)]
@@ -326,7 +326,7 @@ def _without_rivals(matches: Sequence[_Match], misfits_m: Sequence[float]) -> li
             for other, other_m in zip(matches, misfits_m)
             if misfit_m > CLEARLY_WORSE * other_m and misfit_m > other_m + CLEARLY_WORSE_M
         )
-        lost = better.far_side_a(match) | better.far_side_b(match)
+        lost = better.far_side(match).any(axis=0)
         if np.mean(lost) <= MAX_LOST_SHARE:
             kept += _free_runs(match, lost)
     return kept
@@ -345,21 +345,17 @@ class _PairedSides:
         self._used[match.a, match.side_a].append(tuple(np.sort(match.t_a[[0, -1]])))
         self._used[match.b, match.side_b].append(tuple(np.sort(match.t_b[[0, -1]])))
 
-    def same_side_a(self, match: _Match) -> np.ndarray:
-        """Return the nodes of a match at which its first rail has a partner on the side of the match, (n,) bool."""
-        return _inside(match.t_a, self._used[match.a, match.side_a])
+    def same_side(self, match: _Match) -> np.ndarray:
+        """Return the nodes of a match at which one of its rails has a partner on the side of the match, (n,) bool."""
+        return self._of(match, 1).any(axis=0)
 
-    def same_side_b(self, match: _Match) -> np.ndarray:
-        """Return the same for the second rail."""
-        return _inside(match.t_b, self._used[match.b, match.side_b])
+    def far_side(self, match: _Match) -> np.ndarray:
+        """Return the nodes of a match at which its first and its second rail has one on the other side, (2, n) bool."""
+        return self._of(match, -1)
 
-    def far_side_a(self, match: _Match) -> np.ndarray:
-        """Return the nodes at which the first rail has a partner on its other side, (n,) bool."""
-        return _inside(match.t_a, self._used[match.a, -match.side_a])
-
-    def far_side_b(self, match: _Match) -> np.ndarray:
-        """Return the same for the second rail."""
-        return _inside(match.t_b, self._used[match.b, -match.side_b])
+    def _of(self, match: _Match, sense: int) -> np.ndarray:
+        sides = ((match.t_a, match.a, match.side_a), (match.t_b, match.b, match.side_b))
+        return np.array([_inside(t, self._used[rail, sense * side]) for t, rail, side in sides])
 
 
 def _inside(t: np.ndarray, intervals: Sequence[tuple[float, float]]) -> np.ndarray:
