@@ -5,7 +5,7 @@ See docs/method.md sections 4.11 and 4.12.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from itertools import combinations
 
 import numpy as np
@@ -69,41 +69,44 @@ def part_branches(network: LineNetwork) -> LineNetwork:
     cuts_m: dict[int, float] = {}
     links: list[int] = []
     for stem, legs in legs_of.items():
+        ways = {leg: network.from_end(leg) for leg in legs}
         through = [leg for leg in legs if short[leg // 2] and leg ^ 1 in legs_of]
-        legs = [leg for leg in legs if leg not in through] + [leg for link in through for leg in legs_of[link ^ 1]]
-        found = _run_on(network, stem, legs, cuts_m)
+        for link in through:
+            before = ways.pop(link)
+            ways.update({leg: np.concatenate([before[:-1], network.from_end(leg)]) for leg in legs_of[link ^ 1]})
+        found = _run_on(network, stem, ways, cuts_m)
         if found is not None:
             back_m, steady, curve = found
             joins[stem, steady] = curve
-            cuts_m.update({**dict.fromkeys(legs, SKIP_M), stem: back_m})
+            cuts_m.update({**dict.fromkeys(ways, SKIP_M), stem: back_m})
             links += [link // 2 for link in through]
     return network.bridged(joins, cuts_m, links)
 
 
 def _run_on(
-    network: LineNetwork, stem: int, legs: Sequence[int], cuts_m: Mapping[int, float]
+    network: LineNetwork, stem: int, ways: Mapping[int, np.ndarray], cuts_m: Mapping[int, float]
 ) -> tuple[float, int, Bridge] | None:
     """Find how far back a stem is merged, the leg in which it continues, and the curve; None if no rail could run so.
 
-    Of some lines, the other ends have been cut.
+    Given are the ways from the stem on into its legs, and what has been cut off other ends.
     """
     lengths = network.lengths()
-    left_m = {end: lengths[end // 2] - cuts_m.get(end ^ 1, 0.0) for end in (stem, *legs)}
-    if len({end // 2 for end in left_m}) < len(left_m) or min(left_m[leg] for leg in legs) < SKIP_M + DIRECTION_M:
+    left_m = {end: lengths[end // 2] - cuts_m.get(end ^ 1, 0.0) for end in (stem, *ways)}
+    if len({end // 2 for end in left_m}) < len(left_m) or min(left_m[leg] for leg in ways) < SKIP_M + DIRECTION_M:
         return None
-    rails = {leg: cut_back(network.from_end(leg), SKIP_M) for leg in legs}
-    back_m = max(_merged_m(rails[one], rails[other]) for one, other in combinations(legs, 2))
+    back_m = max(_merged_m(one, other) for one, other in combinations(ways.values(), 2))
     if not 0 < back_m < min(MAX_BACK_M, left_m[stem] - DIRECTION_M):
         return None
     trunk = cut_back(network.from_end(stem), back_m)
-    steady = min(legs, key=lambda leg: unsteadiness(trunk, rails[leg], ROUTE_M))
+    rails = {leg: cut_back(network.from_end(leg), SKIP_M) for leg in ways}
+    steady = min(rails, key=lambda leg: unsteadiness(trunk, rails[leg], ROUTE_M))
     curve = bridge(trunk, rails[steady], misfit_m=KNOWN_MISFIT_M)
     return None if curve is None else (back_m, steady, curve)
 
 
 def _merged_m(one: np.ndarray, other: np.ndarray) -> float:
-    """Measure how far before their node two legs, less `SKIP_M` each, begin to part; not positive if they do not."""
-    one, other = even_points(one, STEADY_M), even_points(other, STEADY_M)
+    """Measure how far before their node two legs begin to part; not positive if they do not."""
+    one, other = (even_points(cut_back(way, SKIP_M), STEADY_M) for way in (one, other))
     count = min(len(one), len(other))
     apart_m = np.hypot(*(one[:count] - other[:count]).T)
     return -PartingLaw.fitted(SKIP_M + STEP_M * np.arange(count), apart_m, ARC).way_at(MISFIT_M)
