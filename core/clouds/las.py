@@ -111,17 +111,7 @@ def read_blocks(
     fields: laspy.DecompressionSelection,
     chunks: Sequence[laz.Chunk] | None = None,
 ) -> Iterator[laspy.ScaleAwarePointRecord]:
-    """Read the points of a file block by block.
-
-    Parameters
-    ----------
-    path : Path
-    reader : LasReader
-    fields : DecompressionSelection
-        What to decompress.
-    chunks : sequence of Chunk, optional
-        Compressed chunks to read; all by default.
-    """
+    """Read the points of a file block by block: the fields given, of all compressed chunks or of those given."""
     header = reader.header
     most = max(1, min(CHUNK, MAX_READ // header.point_format.size))
     if not header.are_points_compressed:
@@ -213,24 +203,30 @@ def _check_header(path: Path, header: laspy.LasHeader) -> None:
         )
 
 
-def _late_projection_records(path: Path, header: laspy.LasHeader) -> VLRList:
-    """Read the records after the points that state the coordinate system; others may hold gigabytes of waveforms."""
-    records, at, size = VLRList(), header.start_of_first_evlr, path.stat().st_size
+def late_records(path: Path, header: laspy.LasHeader) -> Iterator[tuple[int, int, bytes]]:
+    """Yield start, end and user of each record after the points, some of which hold gigabytes of waveforms."""
+    at, size = header.start_of_first_evlr, path.stat().st_size
     with path.open("rb") as file:
         for _ in range(header.number_of_evlrs):
-            end = at + EVLR_HEADER
-            if end <= size:
-                file.seek(at)
-                start = file.read(EVLR_HEADER)
-                end += int.from_bytes(start[20:28], "little")
-            if end > size:
+            file.seek(min(at, size))
+            start = file.read(EVLR_HEADER)
+            end = at + EVLR_HEADER + int.from_bytes(start[20:28], "little")
+            if len(start) < EVLR_HEADER or end > size:
                 raise CloudError(
                     f"{path.name} is cut off: the records after its points are missing; copy or export it again."
                 )
-            if start[2:18].rstrip(b"\0") == PROJECTION_USER:
-                file.seek(at)
-                records += VLRList.read_from(file, 1, extended=True)
+            yield at, end, start[2:18].rstrip(b"\0")
             at = end
+
+
+def _late_projection_records(path: Path, header: laspy.LasHeader) -> VLRList:
+    """Read the records after the points that state the coordinate system."""
+    records = VLRList()
+    with path.open("rb") as file:
+        for start, _, user in late_records(path, header):
+            if user == PROJECTION_USER:
+                file.seek(start)
+                records += VLRList.read_from(file, 1, extended=True)
     return records
 
 

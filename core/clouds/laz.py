@@ -130,14 +130,6 @@ def _chunks(table: Sequence[tuple[int, int]], header: laspy.LasHeader) -> Iterat
 def check_layers(path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], progress: Progress = SILENT) -> None:
     """Refuse a file with a chunk that is smaller than its layers, or whose chunks hold another number of points.
 
-    Parameters
-    ----------
-    path : Path
-    header : laspy.LasHeader
-    chunks : sequence of Chunk
-        From `read_chunk_table`.
-    progress : Progress
-
     Raises
     ------
     CloudError
@@ -163,20 +155,9 @@ def check_layers(path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], p
 def chunks_in(
     path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], extent: Extent | np.ndarray
 ) -> tuple[Chunk, ...] | None:
-    """List the chunks that may hold points of an extent, or of one of several, in the order of the file.
+    """List the chunks that may hold points of an extent, or of one of several, (k, 4), in the order of the file.
 
-    Parameters
-    ----------
-    path : Path
-    header : laspy.LasHeader
-    chunks : sequence of Chunk
-        From `read_chunk_table`.
-    extent : tuple of float, or (k, 4) array
-
-    Returns
-    -------
-    tuple of Chunk or None
-        None if the file has no octree, or one that does not account for every chunk of the file.
+    Returns None if the file has no octree, or one that does not account for every chunk of the file.
     """
     info = next(iter(header.vlrs.get("CopcInfoVlr")), None)
     if info is None:
@@ -217,18 +198,7 @@ def _nodes(path: Path, root_at: int, root_size: int) -> np.ndarray:
 def read_chunks(
     path: Path, header: laspy.LasHeader, chunks: Sequence[Chunk], fields: laspy.DecompressionSelection, most: int
 ) -> Iterator[laspy.ScaleAwarePointRecord]:
-    """Decompress chunks, several at once as long as they hold no more than `most` points.
-
-    Parameters
-    ----------
-    path : Path
-    header : laspy.LasHeader
-    chunks : sequence of Chunk
-        From `read_chunk_table`.
-    fields : laspy.DecompressionSelection
-        What to decompress.
-    most : int
-        Points in what is yielded.
+    """Decompress fields of chunks, several chunks at once; yields blocks of no more than `most` points.
 
     Raises
     ------

@@ -205,15 +205,10 @@ class Request:
     def sample(self, count: int = SAMPLE_POINTS) -> tuple[np.ndarray, np.ndarray]:
         """Read the first points requested; takes a few seconds for a cloud of any size.
 
-        Parameters
-        ----------
-        count : int
-            Number of points that is enough.
-
         Returns
         -------
         xyz : (n, 3) array
-            Metres from one of them.
+            Metres from one of them; `count` of them are enough.
         census : (256,) int array
             Number of points of each class that were passed.
 

@@ -153,25 +153,9 @@ def read_classes(
 
 
 def read_points(path: Path, progress: Progress = SILENT, leave_out: Sequence[str] = ()) -> Iterator[Points]:
-    """Read all points of a file chunk by chunk, in the order of the file.
+    """Read all points of a file chunk by chunk, in the order of the file; see `Points` and `read_classes`.
 
-    Parameters
-    ----------
-    path : Path
-    progress : Progress
-    leave_out : sequence of str
-        See `read_classes`.
-
-    Yields
-    ------
-    xyz : (n, 3) array
-        In units of the CRS.
-    codes : (n,) uint8 array
-        Classes.
-    marks : (n,) uint32 array
-        See `read_classes`.
-    valid : (n,) bool array
-        Points that are neither withheld nor to be left out.
+    Points that are withheld or have a flag to leave out are yielded, too, and marked as such.
 
     Raises
     ------

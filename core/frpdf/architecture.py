@@ -212,17 +212,8 @@ def _fold(
 ) -> Convolution:
     """Fold the batch norm that follows a convolution into it.
 
-    Parameters
-    ----------
-    arrays : dict of str to array
-    name : str
-        Name of the two in the network.
-    number : int
-        Number of the batch statistics.
-    channels : tuple of int
-        Channels of the convolution's result and of its input.
-    radius, dilation : int
-        Reach of the kernel, and distance between the cells of its kernel.
+    The two have a name in the network, and the statistics a number; `channels` are those of the convolution's result
+    and of its input, `radius` is the reach of the kernel.
     """
     suffix = f"_{number}" if number else ""
     side = 2 * radius + 1

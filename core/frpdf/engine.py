@@ -133,7 +133,7 @@ class Engine(ABC):
     def _run(
         self, step: Step, held: Sequence[Array], outside: Array, near: Sequence[Sequence[Overlap]] | None, number: int
     ) -> Array:
-        """Run a layer on one piece.
+        """Run a layer on the piece of a number.
 
         Parameters
         ----------
@@ -145,7 +145,6 @@ class Engine(ABC):
         near : sequence of sequence of Overlap, optional
             What surrounds each piece; None for a layer without reach.
         number : int
-            Number of the piece.
         """
         own, reach = held[number], step.reach
         if near is None:

@@ -50,14 +50,9 @@ def memory_bytes() -> int:
 def workers(
     wanted: int, interpreter: Callable[[], Interpreter] = lambda: Interpreter(sys.executable)
 ) -> Iterator[Runner]:
-    """Provide a runner with workers, which end with the context.
+    """Provide a runner with workers, as many as `worker_count` says, which end with the context.
 
-    Parameters
-    ----------
-    wanted : int
-        Number of workers; see `worker_count`.
-    interpreter : callable
-        Finds the Python program; called when the first worker is started.
+    The Python program is looked for when the first worker is started.
     """
     count = worker_count(wanted)
     if count == 1:
@@ -135,16 +130,7 @@ class Workers:
 
 
 class _Run:
-    """One execution of tasks: what waits, what runs, and what is finished.
-
-    Parameters
-    ----------
-    tasks : mapping of Name to Task
-    idle : sequence of Worker
-    messages : SimpleQueue
-        Messages of the workers.
-    progress : Progress
-    """
+    """One execution of tasks: what waits, what runs, and what is finished."""
 
     def __init__(self, tasks: Mapping[Any, Task], idle: Sequence[Worker], messages: Messages, progress: Progress):
         self._tasks, self._messages, self._progress = tasks, messages, progress
