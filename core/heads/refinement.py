@@ -18,8 +18,7 @@ from ..polyline import left_normals, length_along, project
 from ..progress import SILENT, Progress
 from .axis import CELL_M, Axis, unseen_m
 from .branch_starts import slide_branches
-from .edges import Widths, widest
-from .head_points import near_lines
+from .head_points import Widths, near_lines, widest
 from .own_level import on_own_level
 from .strips import measure_strips
 

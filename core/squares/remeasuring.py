@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..heads.edges import Widths
 from ..heads.elevation import measure_again
+from ..heads.head_points import Widths
 from ..lines.finishing import united
 from ..lines.smoothing import GAP_SIGMAS
 from ..polyline import length_along, resample, runs

@@ -15,8 +15,7 @@ from ..errors import RailExtractError
 from ..kernels import cores
 from ..progress import SILENT, Progress, counted
 from ..tasks import InTurn, Name, Results, Runner, Task, turns
-from .process import ENDED, Interpreter, Messages, Worker
-from .serving import ANSWER, FRACTION, READY, STATUS, Answer, packed
+from .process import ANSWER, ENDED, FRACTION, READY, STATUS, Answer, Interpreter, Messages, Worker, packed
 
 WORTH_S = 5.0
 """Least work, in seconds, for which workers are started: that takes each of them one to two seconds."""
@@ -51,14 +50,9 @@ def memory_bytes() -> int:
 def workers(
     wanted: int, interpreter: Callable[[], Interpreter] = lambda: Interpreter(sys.executable)
 ) -> Iterator[Runner]:
-    """Provide a runner with workers, which end with the context.
+    """Provide a runner with workers, as many as `worker_count` says, which end with the context.
 
-    Parameters
-    ----------
-    wanted : int
-        Number of workers; see `worker_count`.
-    interpreter : callable
-        Finds the Python program; called when the first worker is started.
+    The Python program is looked for when the first worker is started.
     """
     count = worker_count(wanted)
     if count == 1:
@@ -136,16 +130,7 @@ class Workers:
 
 
 class _Run:
-    """One execution of tasks: what waits, what runs, and what is finished.
-
-    Parameters
-    ----------
-    tasks : mapping of Name to Task
-    idle : sequence of Worker
-    messages : SimpleQueue
-        Messages of the workers.
-    progress : Progress
-    """
+    """One execution of tasks: what waits, what runs, and what is finished."""
 
     def __init__(self, tasks: Mapping[Any, Task], idle: Sequence[Worker], messages: Messages, progress: Progress):
         self._tasks, self._messages, self._progress = tasks, messages, progress

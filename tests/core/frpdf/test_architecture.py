@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rail_extract.core.errors import ModelError
-from rail_extract.core.frpdf.folding import EPSILON, fold
+from rail_extract.core.frpdf.architecture import EPSILON, fold
 
 
 def test_a_folded_convolution_equals_convolution_and_batch_norm(random_arrays):

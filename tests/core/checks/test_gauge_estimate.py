@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from rail_extract.core.heads import gauge_estimate
-from rail_extract.core.heads.gauge_estimate import measure_spacings
+from rail_extract.core.checks import gauge_estimate
+from rail_extract.core.checks.gauge_estimate import measure_spacings
 from rail_extract.core.standards import GAUGE_RANGE_MM, HEAD_WIDTH_RANGE_MM, STANDARDS, closest_standard
 from scipy.spatial import cKDTree
 

@@ -1,24 +1,22 @@
-"""Strips, the passes of a scanner, that are not aligned: their offsets along tracks, and the jumps where they meet.
+"""What tracks tell of the errors of their rails: passes of the scanner that are not aligned, and a gauge that scatters.
 
-See docs/method.md section 6.7.
+Real tracks do not jump sideways, and are built to a gauge within a millimetre or two. See docs/method.md sections 6.7
+and 6.11.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from ..heads.edges import STATION_STEP_M
+from ..heads.head_points import STATION_STEP_M
 from ..parameters import ALIGNED, Parameters
 from ..polyline import interpolate, left_normals, length_along, project
 from ..progress import SILENT, Progress
 from ..rails import STRIP_OFF_M, Centerline, RailLine, StripCourse, Support
-
-STATION_M = 0.25
-"""Spacing of the stations at which a track is looked at."""
 
 ARM_M, CORE_M = 5.0, 1.0
 """Length of the track on either side of a place that shows a step, and half the length in the middle that is left out:
@@ -53,6 +51,10 @@ LARGEST_PERCENT = 95.0
 """Percentile of the distances that is stated as the largest: switches and crossings make some of them wrong."""
 
 
+ALIKE_M = 20.0
+"""Length over which errors of dense matching are alike, at most."""
+
+
 def find_jumps(track: Centerline, rails: Sequence[RailLine]) -> list[tuple[float, float]]:
     """Find the jumps of a track: places where a rail on either side steps the same way.
 
@@ -70,7 +72,7 @@ def find_jumps(track: Centerline, rails: Sequence[RailLine]) -> list[tuple[float
         Chainage of each step, and its size to the left in metres: the mean of the rails, which are smoothed less.
     """
     line = track.xyz[:, :2]
-    t = np.arange(0.0, length_along(line)[-1], STATION_M)
+    t = np.arange(0.0, length_along(line)[-1], STATION_STEP_M)
     sides = [
         [(rail.xyz, rail.support) for rail in rails if rail.rail_id in ids] for ids in (track.left_ids, track.right_ids)
     ]
@@ -165,7 +167,7 @@ def _steps_along(line: np.ndarray, support: Support | None = None) -> tuple[np.n
         curvatures on both sides looks like; standard error of the line, less what passes of a scanner add to it.
     """
     along = length_along(line)
-    t = np.arange(0.0, along[-1], STATION_M)
+    t = np.arange(0.0, along[-1], STATION_STEP_M)
     weights, bends = _weights()
     half = len(weights) // 2
     if len(t) < len(weights):
@@ -184,8 +186,8 @@ def _steps_along(line: np.ndarray, support: Support | None = None) -> tuple[np.n
 
 def _weights() -> tuple[np.ndarray, np.ndarray]:
     """Return the weights of stations around a place whose sums are the step and the change of curvature, (k,) each."""
-    count = int(round(ARM_M / STATION_M))
-    t = np.arange(-count, count + 1) * STATION_M
+    count = int(round(ARM_M / STATION_STEP_M))
+    t = np.arange(-count, count + 1) * STATION_STEP_M
     used = np.abs(t) >= CORE_M
     steps, bends = np.zeros(len(t)), np.zeros(len(t))
     steps[used] = np.linalg.pinv(np.stack([t**0, t, t**2, t**3, t > 0], axis=1)[used])[-1]
@@ -258,3 +260,60 @@ def warn_of_strips(rails: Sequence[RailLine], parameters: Parameters, progress: 
 def _largest(spread_m: np.ndarray) -> str:
     """Write the largest of the distances between strips."""
     return f"{1000 * np.percentile(spread_m, LARGEST_PERCENT):.0f} mm"
+
+
+def gauge_scatter(
+    rails: Sequence[RailLine], centerlines: Sequence[Centerline], gauges_m: Sequence[float]
+) -> dict[int, float]:
+    """Return by how much rails err beyond their standard errors, by `rail_id`, metres.
+
+    Both rails of a track err independently, and by as much as each other: half of the variance of the gauge is each
+    one's. The stiff curve along a single rail follows errors that are as long as itself, and shows nothing of them.
+
+    Parameters
+    ----------
+    rails : sequence of RailLine
+    centerlines : sequence of Centerline
+        All tracks of these rails.
+    gauges_m : sequence of float
+        Gauges that tracks may have.
+    """
+    own = {rail.rail_id: (rail.sigma_mm / 1000) ** 2 for rail in rails}
+    beyond: dict[int, float] = {}
+    for line, scatter_mm in zip(centerlines, _scatter_mm(centerlines, gauges_m)):
+        sides = [np.mean([own[one] for one in ids]) for ids in (line.left_ids, line.right_ids)]
+        more = max((scatter_mm / 1000) ** 2 - sum(sides), 0.0) / 2
+        for one in (*line.left_ids, *line.right_ids):
+            beyond[one] = max(beyond.get(one, 0.0), float(np.sqrt(more)))
+    return beyond
+
+
+def _scatter_mm(centerlines: Sequence[Centerline], gauges_m: Sequence[float]) -> np.ndarray:
+    """Return by how much the gauge of each track scatters.
+
+    A track that is about as long as its errors shows little of them. What it shows counts by its length, and one error
+    more as all tracks of its gauge scatter about their mean, if that is more.
+    """
+    tracks = [(line.gauge_mm, line.gaugesd_mm, line.length_m) for line in centerlines]
+    mean_mm, own_mm, length_m = np.reshape(tracks, (-1, 3)).T
+    nominal = np.abs(np.subtract.outer(mean_mm, 1000 * np.array(gauges_m))).argmin(axis=1)
+    scatter_mm = own_mm.copy()
+    for same in (nominal == one for one in np.unique(nominal)):
+        off_mm = mean_mm[same] - np.average(mean_mm[same], weights=length_m[same])
+        all_mm2 = np.average(own_mm[same] ** 2 + off_mm**2, weights=length_m[same])
+        more_mm2 = np.maximum(all_mm2 - own_mm[same] ** 2, 0.0) * ALIKE_M / (length_m[same] + ALIKE_M)
+        scatter_mm[same] = np.sqrt(own_mm[same] ** 2 + more_mm2)
+    return scatter_mm
+
+
+def doubting_scatter(rails: Sequence[RailLine], beyond_m: Mapping[int, float]) -> list[RailLine]:
+    """Add what `gauge_scatter` found to the standard errors of rails."""
+    return [_scattering(rail, beyond_m.get(rail.rail_id, 0.0)) for rail in rails]
+
+
+def _scattering(rail: RailLine, beyond_m: float) -> RailLine:
+    """Add an error to the standard errors of a rail."""
+    if rail.support is None or not beyond_m:
+        return rail
+    support = replace(rail.support, sigma_m=np.hypot(rail.support.sigma_m, beyond_m))
+    return replace(rail, sigma_mm=1000 * support.rms_m, support=support)
