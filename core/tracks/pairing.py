@@ -275,9 +275,9 @@ def _without_ghosts(matches: Sequence[_Match]) -> list[_Match]:
     """
     while True:
         partners = _PairedSides(matches)
-        doubtful = [partners.far_side(match).all(axis=0) for match in matches]
+        doubtful = [np.all(partners.far_side(match), axis=0) for match in matches]
         sure = _PairedSides(part for match, out in zip(matches, doubtful) for part in _free_runs(match, out))
-        ghosts = [out & sure.far_side(match).any(axis=0) for match, out in zip(matches, doubtful)]
+        ghosts = [out & np.any(sure.far_side(match), axis=0) for match, out in zip(matches, doubtful)]
         if not any(ghost.any() for ghost in ghosts):
             return list(matches)
         matches = [part for match, ghost in zip(matches, ghosts) for part in _free_runs(match, ghost)]
@@ -326,7 +326,7 @@ def _without_rivals(matches: Sequence[_Match], misfits_m: Sequence[float]) -> li
             for other, other_m in zip(matches, misfits_m)
             if misfit_m > CLEARLY_WORSE * other_m and misfit_m > other_m + CLEARLY_WORSE_M
         )
-        lost = better.far_side(match).any(axis=0)
+        lost = np.any(better.far_side(match), axis=0)
         if np.mean(lost) <= MAX_LOST_SHARE:
             kept += _free_runs(match, lost)
     return kept
@@ -347,7 +347,7 @@ class _PairedSides:
 
     def same_side(self, match: _Match) -> np.ndarray:
         """Return the nodes of a match at which one of its rails has a partner on the side of the match, (n,) bool."""
-        return self._of(match, 1).any(axis=0)
+        return np.any(self._of(match, 1), axis=0)
 
     def far_side(self, match: _Match) -> np.ndarray:
         """Return the nodes of a match at which its first and its second rail has one on the other side, (2, n) bool."""
