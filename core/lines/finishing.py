@@ -113,21 +113,10 @@ def finished(lines: Sequence[Line], parameters: Parameters, progress: Progress) 
 
 
 def parts_without_turns(line: np.ndarray, min_length_m: float, smoothing_m: float) -> list[tuple[float, float]]:
-    """Return the parts of a line, (n, 2), between the places where it turns too sharply for a rail.
+    """Return the parts of a line, (n, 2), from chainage to chainage, between places where it turns too much for a rail.
 
-    Parameters
-    ----------
-    line : (n, 2) array
-    min_length_m : float
-        Shorter parts are left out.
-    smoothing_m : float
-        Sigma of PAEK that smoothed the line.
-
-    Returns
-    -------
-    list of tuple of float
-        Chainages of start and end, in order; a line without such a place is a single part, however short. A part that
-        runs back over a longer one is left out.
+    A line without such a place is a single part, however short. Parts shorter than `min_length_m` are left out, and so
+    is a part that runs back over a longer one. The line was smoothed by PAEK with a sigma of `smoothing_m`.
     """
     stations, t = resample(line, STEP_M if smoothing_m >= SMOOTHED_M else ROUGH_STEP_M)
     bends = _bends(stations, t)
@@ -170,11 +159,7 @@ EXACT_M = 1e-9
 def thin(lines: Sequence[Line], tolerance_xy_m: float, tolerance_z_m: float) -> tuple[Line, ...]:
     """Drop needless vertices of lines, but none in which another line ends, so that lines stay connected.
 
-    Parameters
-    ----------
-    lines : sequence of RailLine or Centerline
-    tolerance_xy_m, tolerance_z_m : float
-        Largest distance of a dropped vertex from the result, in plan and in height.
+    The tolerances are the largest distances of a dropped vertex from the result, in plan and in height.
     """
     ends = np.unique([_as_complex(line.xyz[[0, -1]]) for line in lines])
     return tuple(replace(line, xyz=_thinned(line.xyz, ends, tolerance_xy_m, tolerance_z_m)) for line in lines)
@@ -194,21 +179,9 @@ def _thinned(xyz: np.ndarray, ends: np.ndarray, tolerance_xy_m: float, tolerance
 
 
 def essential_vertices(xyz: np.ndarray, tolerance_xy_m: float, tolerance_z_m: float) -> np.ndarray:
-    """Mark the vertices needed to keep a line within the tolerances (Douglas and Peucker, 1973).
+    """Mark the vertices, (n,) bool, needed to keep a line, (n, 3), within the tolerances (Douglas and Peucker, 1973).
 
-    Plan and height are judged together, so that the line keeps both tolerances.
-
-    Parameters
-    ----------
-    xyz : (n, 3) array
-        Heights may be NaN; then only the plan counts.
-    tolerance_xy_m, tolerance_z_m : float
-        Largest distance of a vertex from the line, in plan and in height.
-
-    Returns
-    -------
-    (n,) bool array
-        The first and the last are always marked.
+    Plan and height are judged together, so that the line keeps both tolerances; without heights, NaN, the plan counts.
     """
     keep = np.zeros(len(xyz), dtype=bool)
     keep[[0, -1]] = True

@@ -165,14 +165,8 @@ def ends_by_node(network: LineNetwork) -> Iterable[tuple[int, list[int]]]:
 def unsteadiness(one: np.ndarray, other: np.ndarray, length_m: float) -> float:
     """Measure how far two lines are off one curve of constant curvature through both, metres rms.
 
-    Headings are summed along the way, which unrolls tight curves as well.
-
-    Parameters
-    ----------
-    one, other : (n, 2) arrays
-        Both lines, from the ends that face each other inward.
-    length_m : float
-        Length of each that counts.
+    Both are given from the ends that face each other inward, and `length_m` of each counts. Headings are summed along
+    the way, which unrolls tight curves as well.
     """
     coarse = int(round(COARSE_M / STEP_M))
     points = np.concatenate([even_points(one, length_m)[::coarse][::-1], even_points(other, length_m)[::coarse]])
@@ -189,14 +183,7 @@ def unsteadiness(one: np.ndarray, other: np.ndarray, length_m: float) -> float:
 
 
 def cut_kinks(network: LineNetwork, progress: Progress = SILENT) -> LineNetwork:
-    """Cut lines where they turn too sharply for a rail, and drop the bent part; the new ends are free.
-
-    Parameters
-    ----------
-    network : LineNetwork
-        Lines without passes.
-    progress : Progress
-    """
+    """Cut lines, without passes, where they turn too sharply for a rail, and drop the bent part; new ends are free."""
     lines: list[np.ndarray] = []
     ends: list[list[int]] = []
     nodes = list(network.nodes)
