@@ -96,8 +96,9 @@ def finished(lines: Sequence[Line], parameters: Parameters, progress: Progress) 
     """Split lines where they turn too sharply for rails, warn the user of it, and thin them."""
     kept: list[Line] = []
     turned: list[Line] = []
+    step_m = STEP_M if parameters.smoothing_xy_m >= SMOOTHED_M else ROUGH_STEP_M
     for line in lines:
-        parts = parts_without_turns(line.xyz[:, :2], parameters.min_length_m, parameters.smoothing_xy_m)
+        parts = parts_without_turns(line.xyz[:, :2], parameters.min_length_m, step_m)
         whole = len(parts) == 1 and np.ptp(parts[0]) >= length_along(line.xyz[:, :2])[-1]
         kept += [line] if whole else [line.part(*part) for part in parts]
         turned += [] if whole else [line]
@@ -112,14 +113,17 @@ def finished(lines: Sequence[Line], parameters: Parameters, progress: Progress) 
     return thin(kept, parameters.simplify_xy_m, parameters.simplify_z_m)
 
 
-def parts_without_turns(line: np.ndarray, min_length_m: float, smoothing_m: float) -> list[tuple[float, float]]:
+def parts_without_turns(
+    line: np.ndarray, min_length_m: float, step_m: float, max_turn_deg: float = MAX_TURN_DEG
+) -> list[tuple[float, float]]:
     """Return the parts of a line, (n, 2), from chainage to chainage, between places where it turns too much for a rail.
 
     A line without such a place is a single part, however short. Parts shorter than `min_length_m` are left out, and so
-    is a part that runs back over a longer one. The line was smoothed by PAEK with a sigma of `smoothing_m`.
+    is a part that runs back over a longer one. Directions are measured between stations `step_m` apart.
     """
-    stations, t = resample(line, STEP_M if smoothing_m >= SMOOTHED_M else ROUGH_STEP_M)
-    bends = _bends(stations, t)
+    stations, t = resample(line, step_m)
+    sharp = _turns(stations, t) > np.radians(max_turn_deg)
+    bends = [(float(t[first]), float(t[last + 1])) for first, last in runs(sharp)]
     if not bends:
         return [(0.0, float(t[-1]))]
     borders = [0.0, *(border for bend in bends for border in bend), float(t[-1])]
@@ -144,12 +148,6 @@ def _turns(stations: np.ndarray, t: np.ndarray) -> np.ndarray:
     direction = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
     sections = int(round(TURN_M / t[1])) + 1
     return maximum_filter1d(direction, sections) - minimum_filter1d(direction, sections)
-
-
-def _bends(stations: np.ndarray, t: np.ndarray) -> list[tuple[float, float]]:
-    """Return the chainages of the start and the end of the sections that turn too much."""
-    sharp = _turns(stations, t) > np.radians(MAX_TURN_DEG)
-    return [(float(t[first]), float(t[last + 1])) for first, last in runs(sharp)]
 
 
 EXACT_M = 1e-9

@@ -90,14 +90,14 @@ def bend(radius_m, length_m=15.0):
 
 @pytest.mark.parametrize("line", [way([0, 0], [30, 0]), way([0, 0], [0.4, 0]), bend(20.0), bend(-8.0)])
 def test_what_a_rail_can_do_stays(line):
-    assert parts_without_turns(line, 1.0, 0.8) == [(0.0, pytest.approx(length_along(line)[-1]))]
+    assert parts_without_turns(line, 1.0, 0.1) == [(0.0, pytest.approx(length_along(line)[-1]))]
 
 
 def test_stairs_of_a_line_that_is_hardly_smoothed_are_no_turn():
     x = np.arange(0, 20, 0.04)
     stairs = np.column_stack([x, np.round(0.1 * x / 0.02) * 0.02])
-    assert len(parts_without_turns(stairs, 1.0, 0.1)) == 1
-    assert len(parts_without_turns(stairs, 1.0, 0.8)) != 1
+    assert len(parts_without_turns(stairs, 1.0, 0.5)) == 1
+    assert len(parts_without_turns(stairs, 1.0, 0.1)) != 1
 
 
 class Heard(Progress):
