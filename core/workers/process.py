@@ -29,7 +29,7 @@ NO_WINDOW = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 """On Windows, a console would open for each process."""
 
 REPORT_EVERY_S = 0.1
-"""Least time between two reports of the fraction that is done."""
+"""Least time between two reports of the fraction that is done, and interval at which cancellation is checked."""
 
 READY, FRACTION, STATUS, ANSWER, ENDED = range(5)
 """What a message says: the process has started; how much of the task is done; what it is doing; its `Answer`; the

@@ -15,13 +15,22 @@ from ..errors import RailExtractError
 from ..kernels import cores
 from ..progress import SILENT, Progress, counted
 from ..tasks import InTurn, Name, Results, Runner, Task, turns
-from .process import ANSWER, ENDED, FRACTION, READY, STATUS, Answer, Interpreter, Messages, Worker, packed
+from .process import (
+    ANSWER,
+    ENDED,
+    FRACTION,
+    READY,
+    REPORT_EVERY_S,
+    STATUS,
+    Answer,
+    Interpreter,
+    Messages,
+    Worker,
+    packed,
+)
 
 WORTH_S = 5.0
 """Least work, in seconds, for which workers are started: that takes each of them one to two seconds."""
-
-POLL_S = 0.1
-"""Interval at which cancellation is checked."""
 
 WORKER_BYTES = 600 << 20
 """Memory of a worker at its peak (docs/scaling.md)."""
@@ -213,4 +222,4 @@ def _next(messages: Messages, progress: Progress) -> tuple[Worker, int, Any]:
     while True:
         progress.check()
         with suppress(Empty):
-            return messages.get(timeout=POLL_S)
+            return messages.get(timeout=REPORT_EVERY_S)
