@@ -135,7 +135,8 @@ def test_every_form_of_a_cloud_gives_the_same_stations(flown, whole, tmp_path, f
             lambda first, second: [replace(first, gauge_m=1.0), second],
             1.435,
             [2],
-            "Along guide 1, rails with a gauge of about 1435 mm show, not 1000 mm as its field gauge states: correct it.",
+            "Along guide 1, rails with a gauge of about 1435 mm show, not 1000 mm as its field gauge states: correct "
+            "it.",
         ),
         (
             lambda first, second: [first, second],
