@@ -14,8 +14,12 @@ import numpy as np
 from scipy.linalg import solveh_banded
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from ..parameters import Parameters
 from ..polyline import length_along, project, resample, runs
+from ..progress import Progress
 from ..rails import Centerline, RailLine, Support
+
+Line = TypeVar("Line", RailLine, Centerline)
 
 SAME_RAIL_M = 0.03
 """Lines this close together are the same rail: two rails are at least a head apart, two copies of one a few
@@ -88,6 +92,26 @@ ON_ITSELF_M, ON_ITSELF_SHARE = 0.1, 0.5
 the line has turned back onto itself."""
 
 
+def finished(lines: Sequence[Line], parameters: Parameters, progress: Progress) -> tuple[Line, ...]:
+    """Split lines where they turn too sharply for rails, warn the user of it, and thin them."""
+    kept: list[Line] = []
+    turned: list[Line] = []
+    for line in lines:
+        parts = parts_without_turns(line.xyz[:, :2], parameters.min_length_m, parameters.smoothing_xy_m)
+        whole = len(parts) == 1 and np.ptp(parts[0]) >= length_along(line.xyz[:, :2])[-1]
+        kept += [line] if whole else [line.part(*part) for part in parts]
+        turned += [] if whole else [line]
+    if turned:
+        what = "rail" if isinstance(turned[0], RailLine) else "centerline"
+        count, was = (f"1 {what} bends", "it was") if len(turned) == 1 else (f"{len(turned)} {what}s bend", "they were")
+        before_m, after_m = (sum(line.length_m for line in some) for some in (lines, kept))
+        progress.warning(
+            f"{count} by more than {MAX_TURN_DEG:g}° within a metre, which rails cannot; {was} split there and "
+            f"{before_m - after_m:.1f} m dropped."
+        )
+    return thin(kept, parameters.simplify_xy_m, parameters.simplify_z_m)
+
+
 def parts_without_turns(line: np.ndarray, min_length_m: float, smoothing_m: float) -> list[tuple[float, float]]:
     """Return the parts of a line, (n, 2), between the places where it turns too sharply for a rail.
 
@@ -138,8 +162,6 @@ def _bends(stations: np.ndarray, t: np.ndarray) -> list[tuple[float, float]]:
     sharp = _turns(stations, t) > np.radians(MAX_TURN_DEG)
     return [(float(t[first]), float(t[last + 1])) for first, last in runs(sharp)]
 
-
-Line = TypeVar("Line", RailLine, Centerline)
 
 EXACT_M = 1e-9
 """Smallest effective tolerance: a vertex closer to the chord is dropped even at a tolerance of zero."""

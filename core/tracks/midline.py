@@ -130,11 +130,6 @@ class Meeting:
     t: np.ndarray
     paired: np.ndarray
 
-    @classmethod
-    def joined(cls, parts: Sequence[Meeting]) -> Meeting:
-        """Concatenate meetings."""
-        return cls(*(np.concatenate(columns) for columns in zip(*(vars(part).values() for part in parts))))
-
     def without(self, which: np.ndarray) -> Meeting:
         """Remove the rails met at the stations marked in `which`, (n,) bool."""
         values = [np.where(which, np.nan, column) for column in (self.distance_m, self.height_m, self.t)]

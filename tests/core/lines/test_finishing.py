@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from rail_extract.core.lines.finishing import (
     MAX_TURN_DEG,
     essential_vertices,
+    finished,
     parts_without_turns,
     thin,
     turn_deg,
@@ -20,7 +21,7 @@ from rail_extract.core.polyline import interpolate, length_along
 from rail_extract.core.progress import Progress
 from rail_extract.core.rails import RailLine, Support
 from rail_extract.core.raster import rasterize
-from rail_extract.core.squares.steps import _finished, lines_of
+from rail_extract.core.squares.steps import lines_of
 from rail_extract.core.vectorize import vectorize
 from rail_extract.laboratory.rasters.drawing import Window, draw_label
 from rail_extract.laboratory.rasters.layouts import random_layout
@@ -117,8 +118,7 @@ def test_rails_with_a_corner_are_split_and_said(gaps):
     support = Support(t, np.full(len(t), 10), np.where(t < 20, 0.001, 0.004))
     rail = RailLine(xyz, 1, 10, 1200, 20.0, 2.0, 3.0, np.array(gaps), support)
     heard = Heard()
-    one, other = _finished([rail], Parameters(1.435, 0.072), 5, heard)
-    assert (one.rail_id, other.rail_id) == (5, 6)
+    one, other = finished([rail], Parameters(1.435, 0.072), heard)
     assert one.length_m + other.length_m == pytest.approx(28.9, abs=0.2)
     assert (one.bridged_m, other.bridged_m) == (pytest.approx(2.0), pytest.approx(1.0))
     assert (one.sigma_mm, other.sigma_mm) == (pytest.approx(1.0), pytest.approx(4.0))
