@@ -101,7 +101,9 @@ def _across(network: LineNetwork, ends: tuple[int, int], hook_m: float) -> Bridg
     """Find the curve between two line ends without their hooks; a curve that replaces hooks must not swerve."""
     one, other = (cut_back(network.from_end(end), hook_m) for end in ends)
     found = bridge(one, other, transition_m=STEADY_TRANSITION_M if hook_m else TRANSITION_M)
-    return None if found is None else replace(found, cuts_m=tuple(cut_m + hook_m for cut_m in found.cuts_m))
+    if found is None:
+        return None
+    return replace(found, cuts_m=(found.cuts_m[0] + hook_m, found.cuts_m[1] + hook_m))
 
 
 def unseen_m(points: np.ndarray, seen: cKDTree) -> float:
