@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import Cancelled, CloudError, EmptyCloudError, RailExtractError
 from ..progress import SILENT, Progress
-from .vpc import list_tiles
+from .vpc import Extent, list_tiles
 
 SUFFIXES = (".las", ".laz")
 """Suffixes of files that are read. COPC files end in .copc.laz."""
@@ -33,9 +33,6 @@ NO_THREADS = "ThreadPoolBuildError"
 
 IMPOSSIBLE = (None, errno.EINVAL, errno.EOVERFLOW)
 """Codes of an `OSError` that a damaged file causes, such as by a position before its start."""
-
-Extent = tuple[float, float, float, float]
-"""Smallest x, smallest y, largest x, largest y, in units of the CRS."""
 
 Chunk = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 """Coordinates (n, 3) in units of the CRS, classes (n,) and marks (n,) of the points that were kept, and the number of

@@ -12,9 +12,9 @@ from ..airborne.run import Run
 from ..airborne.survey import Survey
 from ..disk import Destination, writing
 from ..errors import ParameterError
+from ..fields import AIRBORNE, PROPOSED
 from ..output.layers import airborne_stations_layer, findings_layer, lines_layer
 from ..parameters import AIRBORNE_CLASSES, AirborneParameters
-from ..products import AIRBORNE, PROPOSED
 from ..progress import Estimating
 from ..report.airborne import airborne_findings, airborne_page, airborne_summary
 from ..scratch import scratch_folder

@@ -18,7 +18,7 @@ from ..errors import ParameterError, RailExtractError
 from ..frpdf import DEVICES, ENGINES, MAX_PASSES
 from ..frpdf.models import NAMES, choose
 from ..learned.model import weights_for
-from ..output.raster_file import header_for, on_one_grid
+from ..output.raster_file import header_for, on_one_grid, write_rasters
 from ..parameters import DEFAULT_STEP_M, DEFAULT_WORKERS, LEARNED, MAX_WORKERS, STRIPS, Parameters
 from ..pipeline import extract_files
 from ..progress import Estimating, Progress, counted
@@ -337,8 +337,6 @@ def _write_cleaned(
     network: RailNetwork, destination: Destination, standard: RailStandard, extent: Extent | None, model: str
 ) -> None:
     """Write the cleaned rasters as Clean Rail Raster does."""
-    from ..output.geotiff import write_rasters
-
     rasters, frame = on_one_grid(network.cleaned, network.frame)
     header = header_for(rasters, network.cleaned_classes, frame, standard, extent, model)
     with destination.replacing() as new:

@@ -18,8 +18,9 @@ from ..alignment.measured import moved
 from ..clouds.crs import parse_crs, units
 from ..comparison.tracks import Survey, compare_surveys, doubts_of
 from ..errors import CrsError, ParameterError
+from ..fields import DEVIATIONS
 from ..output.design_files import FORMATS, check_designs, check_format, check_place, write_designs
-from ..output.layers import axes_layer, deviations_layer, differences_layer, elements_layer
+from ..output.layers import axes_layer, differences_layer, elements_layer, stations_layer
 from ..parameters import TRANSITIONS, ComparisonParameters, FitParameters
 from ..progress import Estimating
 from ..report import build_alignment_page
@@ -88,7 +89,7 @@ def _fit(args: argparse.Namespace) -> None:
     fits = fit_tracks(tracks, frame, settings, fixed, Estimating(Console()))
     made = [elements_layer([fit.alignment for fit in fits])]
     if "deviations" in outputs:
-        made.append(deviations_layer([fit.deviations for fit in fits]))
+        made.append(stations_layer(DEVIATIONS, [fit.deviations for fit in fits]))
     writing.write_all(made, outputs, frame)
     if "report" in outputs:
         courses = [(fit.alignment, fit.deviations) for fit in fits]
@@ -154,7 +155,7 @@ def _import_alignment(args: argparse.Namespace) -> None:
     makers = {
         "elements": lambda: elements_layer(alignments),
         "axis": lambda: axes_layer(alignments),
-        "deviations": lambda: deviations_layer([one for _, one in courses]),
+        "deviations": lambda: stations_layer(DEVIATIONS, [one for _, one in courses]),
     }
     writing.write_all([make() for name, make in makers.items() if name in outputs], outputs, frame)
     if "report" in outputs:

@@ -132,11 +132,6 @@ class FoldedLayer:
     reduction: Optional[Convolution] = None
     is_output: bool = False
 
-    @property
-    def reach(self) -> int:
-        """Distance in cells, or in blocks of cells, from which it takes information."""
-        return self.convolution.reach
-
 
 def block_side(layers: Sequence[FoldedLayer]) -> int:
     """Return the side in cells of the blocks on which the layers of a pass work; see `Architecture.block`."""

@@ -62,7 +62,7 @@ def layer_to_onnx(layer: FoldedLayer) -> bytes:
     """
     graph = _Graph()
     graph.layer(layer, "around", "own", output="found", padded=False)
-    side = 2 * layer.reach + 1
+    side = 2 * layer.convolution.reach + 1
     channels_out, channels_in = layer.convolution.weight.shape[:2]
     given: dict[str, tuple[int, ...]] = {"around": (1, channels_in, side, side)}
     if layer.reduction:

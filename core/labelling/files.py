@@ -13,7 +13,7 @@ from ..classify.settings import Settings
 from ..clouds.points import Request
 from ..clouds.readers import CATALOGUE, SUFFIXES, list_files
 from ..clouds.rewriting import Places, check_class, rewrite
-from ..clouds.vpc import CatalogueTile, catalogue_text
+from ..clouds.vpc import catalogue_text
 from ..disk import NEW, Destination, alone_in, identity, replace_folder, writing
 from ..errors import DiskError, ParameterError, RailExtractError
 from ..grow.growth import Stop
@@ -304,7 +304,7 @@ class _Writer:
             counts = list(in_listed_order(tasks, runner.run(tasks, progress)))
             _check_complete(runner)
             tiles = [
-                CatalogueTile(f"./{output.file.stem}/{name}", count, header.extent)
+                (f"./{output.file.stem}/{name}", count, header.extent)
                 for name, count, header in zip(output.names, counts, self._request.headers)
             ]
             with output.destination.replacing() as catalogue:

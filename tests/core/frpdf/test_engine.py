@@ -10,7 +10,7 @@ from rail_extract.core.errors import Cancelled, ModelError
 from rail_extract.core.frpdf import cleanup
 from rail_extract.core.frpdf import engine as engine_module
 from rail_extract.core.frpdf.corridor import Piece, lay_fields
-from rail_extract.core.frpdf.engine import MIN_CELLS, Engine, Step, make_engine
+from rail_extract.core.frpdf.engine import MAX_PIECE_CELLS, Engine, Step, make_engine
 from rail_extract.core.progress import SILENT, Progress
 from rail_extract.core.raster import RailRaster
 
@@ -195,7 +195,7 @@ def test_too_little_memory_for_the_smallest_parts_ends_the_run(arrays, name, ask
     engine = exhausted(engine_of(name, arrays), ask, 100)
     with pytest.raises(MemoryError):
         cleanup.clean(line(50), engine, passes=1)
-    assert MIN_CELLS <= engine.max_cells < 4 * MIN_CELLS
+    assert MAX_PIECE_CELLS <= engine.max_cells < 4 * MAX_PIECE_CELLS
 
 
 def test_an_exhausted_card_is_replaced_by_the_cpu(arrays):
