@@ -38,6 +38,12 @@ The edges stay sharp to 3 mm."""
 BESIDE_HEADS = 1.5
 """Distance of two axes, in head widths, from which the ground between the heads is wide enough to show their edges."""
 
+CROSSED_M = 0.01
+"""Offset on both sides of a line from which another line crosses it; less may be the error of the lines."""
+
+MIN_RUN = 0.5
+"""Cosine of the crossing angle below which each line hides the other for less than one window."""
+
 MIN_ON_HEAD = 80
 """Points needed on a head to find its top; fewer do not determine a slope."""
 
@@ -256,7 +262,11 @@ def free_edges(lines: Sequence[np.ndarray], head_width_m: float) -> list[np.ndar
     """
     free = [np.ones((2, len(stations_along(length_along(line)[-1]))), dtype=bool) for line in lines]
     for line, station, across in _close_runs(lines, BESIDE_HEADS * head_width_m):
-        free[line][int(across.sum() >= 0), station] = False
+        crossing = across.min() < -CROSSED_M and across.max() > CROSSED_M
+        side = across if crossing else np.full(len(across), across.sum())
+        overlap = crossing & (np.abs(across) < 0.5 * head_width_m)
+        free[line][0, station[(side < 0) | overlap]] = False
+        free[line][1, station[(side >= 0) | overlap]] = False
     return free
 
 
@@ -268,7 +278,7 @@ def _close_runs(lines: Sequence[np.ndarray], reach_m: float) -> list[tuple[int, 
     pairs = cKDTree(places).query_pairs(np.hypot(reach_m, 0.5 * STATION_STEP_M), output_type="ndarray")
     pairs = pairs[number[pairs[:, 0]] != number[pairs[:, 1]]]
     own, other = np.concatenate([pairs, pairs[:, ::-1]]).T
-    across = np.einsum("ij,ij->i", places[other] - places[own], normals[own])
+    across = _offset(places[other] - places[own], normals[own], normals[other])
     close = np.abs(across) <= reach_m
     own, other, across = own[close], number[other[close]], across[close]
     order = np.lexsort((own, other, number[own]))
@@ -276,6 +286,14 @@ def _close_runs(lines: Sequence[np.ndarray], reach_m: float) -> list[tuple[int, 
     breaks = np.flatnonzero((np.diff(other) != 0) | (np.diff(own) > 1) | (np.diff(number[own]) != 0)) + 1
     runs = np.split(np.arange(len(own)), breaks) if len(own) else []
     return [(int(number[own[run[0]]]), station[own[run]], across[run]) for run in runs]
+
+
+def _offset(step: np.ndarray, normal: np.ndarray, other_normal: np.ndarray) -> np.ndarray:
+    """Return the offsets to the left of straight lines, (k,), given the `step` to a place on each and the normals."""
+    tangent, other_tangent = (values @ np.array([[0.0, -1.0], [1.0, 0.0]]) for values in (normal, other_normal))
+    ahead, across = (np.einsum("ij,ij->i", step, axis) for axis in (tangent, normal))
+    run, rise = (np.einsum("ij,ij->i", other_tangent, axis) for axis in (tangent, normal))
+    return across - ahead * rise / np.where(np.abs(run) > MIN_RUN, run, np.inf)
 
 
 def _stations(lines: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -64,9 +64,12 @@ PLACE = len(MAX_STEPS)
 MAX_ROUNDS, SETTLED = 40, 0.1
 """Largest number of rounds of a fit, and the gain of the log-likelihood from which it goes on; most need ten."""
 
-RIDGE = 1.0
-"""Information about each unknown of the place that is always there: drawn or computed points, which are all in a few
-bins, may say nothing about some of it."""
+RIDGE = np.array([400.0, 400.0, 1.0, 1.0, 0.1, 0.1, 0.0])
+"""Information about the place that is always there, as of 5 cm and of a factor of 20 in the noise: drawn or computed
+points, which are all in a few bins, may say nothing about some of it."""
+
+STEP_PARTS = (1.0, 1 / 3, 1 / 9)
+"""Parts of a step that are tried until the likelihood rises."""
 
 MIN_SHARE_LEFT = 0.3
 """Part of its share that a part keeps in a step."""
@@ -271,11 +274,13 @@ def fit_section(counts: np.ndarray, outline: Outline, grid: Grid, start: Section
         section = Section(section.place, _maximized(counts, section.shares, blurred))
         before, best = best, _log_likelihood(counts, section, blurred)
         step = _scoring_step(counts, section, blurred, used)
-        tried = _moved(section, step)
-        moved = Blurred.at(tried.place, outline, grid)
-        gained = _log_likelihood(counts, tried, moved)
-        if gained > best:
-            section, blurred, best = tried, moved, gained
+        for part in STEP_PARTS:
+            tried = _moved(section, part * step)
+            moved = Blurred.at(tried.place, outline, grid)
+            gained = _log_likelihood(counts, tried, moved)
+            if gained > best:
+                section, blurred, best = tried, moved, gained
+                break
         if number > 1 and best - before < SETTLED:
             break
     return section
@@ -349,7 +354,7 @@ def _information(
 ) -> np.ndarray:
     """Return the Fisher information about the place and the shares, with the weight `ridge` of shares known before."""
     found = (rates * counts) @ rates.T
-    found[:PLACE, :PLACE] += _expected(section.place) + RIDGE * np.eye(PLACE)
+    found[:PLACE, :PLACE] += _expected(section.place) + np.diag(RIDGE)
     found[range(PLACE, len(found)), range(PLACE, len(found))] += ridge * counts.sum() / section.shares[known]
     return found
 
@@ -386,11 +391,11 @@ class Scores:
         blurred = Blurred.at(section.place, outline, grid)
         density = blurred.density(section.shares)
         scores = blurred.by_place(section.shares)[:3] / density
-        products = (scores * density) @ scores.T + RIDGE / max(counts.sum(), 1.0) * np.eye(3)
+        products = (scores * density) @ scores.T + np.diag(RIDGE[:3] / max(counts.sum(), 1.0))
         inverse = np.linalg.inv(products)[:2]
         by_bin = inverse @ scores / inverse.diagonal()[:, None]
         used = counts > 0
         known, rates = _rates(section, blurred, used)
         whole = np.linalg.inv(_information(counts[used], section, known, rates, SHARE_DOUBT)).diagonal()[:2]
-        chance = 1 / np.maximum(by_bin**2 @ counts, RIDGE)
+        chance = 1 / np.maximum(by_bin**2 @ counts, RIDGE[:2])
         return cls(by_bin, float(by_bin[1] ** 2 @ density), np.sqrt(np.maximum(whole - chance, 0.0)))

@@ -15,12 +15,14 @@ from scipy.ndimage import binary_opening, median_filter
 from .head_points import MIN_ON_HEAD, HeadPoints
 from .level import LEVEL_BIN_M, medians, robust_sigma
 
-WINDOW_M = 0.03
-"""Height in which the points on top of a head are, with noise of 8 mm and 150 mm of cant; what is further from a level
-is at another one."""
+WINDOW_M = 0.02
+"""Height in which the points on top of a head are: noise of 5 mm, and 100 mm of cant."""
 
 LEVELS = 3
 """Levels that are looked for in a bin: the head, what stands on it, and what is in between."""
+
+APART_M = 0.03
+"""Distance of two levels of a bin from which the points of one are not those of the other."""
 
 MIN_POINTS = 3
 """Points that make a level: on the sparsest rails a bin has five."""
@@ -42,8 +44,14 @@ SLOPE_BINS = 41
 
 MIN_BINS = 4
 """Bins, 2 m, of a level that counts, because what stands out by chance is shorter, and of its end that is compared with
-the next bin; a level runs across fewer bins without it. Two pieces of one level may overlap by twice as many: where
+the next bin; a level runs across fewer bins that lack it. Two pieces of one level may overlap by twice as many: where
 points are few, one bin that is off begins another piece."""
+
+DRIFT = 0.004
+"""Error of the gradient, by which the levels on both sides of a gap may differ per metre, and at most `MAX_DRIFT_M`."""
+
+MAX_DRIFT_M = 0.1
+"""Largest difference of two levels across a gap: longer gaps are not seen through by gradients alone."""
 
 SHIFTED_M, SHIFT_BINS = 0.05, 24
 """Largest step between two passes of a scanner, and bins, 12 m, that a level must have to be taken for another pass: a
@@ -51,6 +59,9 @@ road, with a step on either side, may be twice as wide."""
 
 VEHICLE_M = 0.07
 """Height above the rail from which parts of vehicles are: the lowest gauge allows 80 mm."""
+
+VEHICLE_NEAR_M = 3.0
+"""Distance along the line within which a level that is lower by this shows that another is a vehicle's."""
 
 VEHICLE_WEIGHT = 0.25
 """Weight of a level that is rather that of a vehicle: it counts if the lower one is very short."""
@@ -128,7 +139,7 @@ def _levels(number: np.ndarray, z: np.ndarray) -> _Levels:
         found_height.append(height)
         at = np.full(number.max() + 1, np.inf)
         at[found_bin[-1]] = height
-        left &= np.abs(z - at[number]) > WINDOW_M
+        left &= np.abs(z - at[number]) > APART_M
     bins, heights = np.concatenate([[], *found_bin]).astype(int), np.concatenate([[], *found_height])
     order = np.argsort(bins, kind="stable")
     return _Levels(bins[order], heights[order])
@@ -179,15 +190,16 @@ def _chain(pieces: list[np.ndarray], step_m: float) -> np.ndarray:
         [[np.median(piece[:MIN_BINS, 1]), np.median(piece[-MIN_BINS:, 1]), np.median(piece[:, 1])] for piece in pieces]
     ).T
     weight = np.array([float(len(piece)) for piece in pieces])
+    near = VEHICLE_NEAR_M / LEVEL_BIN_M
     for number in range(len(pieces)):
-        beside = (start <= end[number]) & (end >= start[number])
+        beside = (start <= end[number] + near) & (end >= start[number] - near)
         if np.any(beside & (middle < middle[number] - VEHICLE_M)):
             weight[number] *= VEHICLE_WEIGHT
     best, before = weight.copy(), np.full(len(pieces), -1)
     for number in range(1, len(pieces)):
         gap_m = (start[number] - end[:number]) * LEVEL_BIN_M
         off_m = np.abs(first[number] - last[:number])
-        fits = off_m <= step_m
+        fits = off_m <= step_m + np.clip(DRIFT * gap_m, 0.0, MAX_DRIFT_M)
         cost = np.where(fits, 0.0, np.where(off_m <= SHIFTED_M, SHIFT_BINS, np.inf))
         along = (gap_m > 0) | (fits & (gap_m > -2 * MIN_BINS * LEVEL_BIN_M))
         sums = np.where(along, best[:number] - cost, 0.0)

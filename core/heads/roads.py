@@ -27,8 +27,8 @@ MIN_LENGTH_M, SMOOTHING_M = 8.0, 3.0
 """Length along which the points have to form such a band: heads that cross at 1:26.5 cover each other over 6 m; and
 sigma of PAEK for the ends of the band."""
 
-MAX_MISS_M = 0.015
-"""Largest deviation of two heads from their distance."""
+MAX_MISS_M, CLEARLY_M = 0.015, 0.012
+"""Largest deviation of two heads from their distance, and by how much the other end of the band must be further off."""
 
 AT_EDGE_M = 0.012
 """Largest distance of the end of a band from the edge of the head: lines are within 1 cm of the axis."""
@@ -124,12 +124,14 @@ def _on_either_end(points: HeadPoints) -> _Band | None:
 def _at_gauge(
     line: np.ndarray, band: _Band | None, others: Sequence[Sequence[np.ndarray]], spacings_m: Sequence[float]
 ) -> np.ndarray:
-    """Return a line on the end of its band that is at gauge from another line; as it is if neither end is."""
+    """Return a line on the end of its band that is at gauge from another line; as it is if neither end clearly is."""
     if band is None:
         return line
     misses_m = [_miss(places, [line for lines in others for line in lines], spacings_m) for places in band.places]
     best = int(np.argmin(misses_m))
-    return band.lines[best] if misses_m[best] <= MAX_MISS_M else line
+    if misses_m[best] > MAX_MISS_M or misses_m[1 - best] - misses_m[best] < CLEARLY_M:
+        return line
+    return band.lines[best]
 
 
 def _miss(places: np.ndarray, others: Sequence[np.ndarray], spacings_m: Sequence[float]) -> float:

@@ -46,6 +46,10 @@ WRONG_WIDTH_M, MAX_WRONG_WIDTH_M = 0.004, 0.015
 """Error of the width from which another outline is fitted: standards differ by a millimetre; and from which the points
 show something else than a head."""
 
+MAX_HEAD_WIDTH_M = 0.078
+"""Widest head that is fitted: the widest of the standards has 77.8 mm. Heads that are flat to their edges look 10 mm
+too wide, and their axis would be wherever the scanner seems to look from."""
+
 SETTLED_WIDTH_M, WIDTH_ROUNDS = 0.0005, 5
 """Change of the width at which this ends, and most rounds; each finds two thirds of what is left."""
 
@@ -61,6 +65,9 @@ noise²))², at half their distance d: -0.5 where d is the noise. Heights rounde
 FLAT_BLUR_M = 0.009
 """Blur from which a head without a round top is not flat to its edges, but shown by passes 20 mm apart or more."""
 
+ON_HEAD_M = 0.005
+"""Distance of a line from its head (RMS) up to which it shows the blur of the head: further off, it was displaced."""
+
 CORE_SIGMAS, SURE_SIGMAS = 4.0, 4.0
 """Standard deviations from which heights are those of weeds, and of the kurtosis, √(24 / n), from which it is sure."""
 
@@ -75,6 +82,10 @@ below the middle of a head that is flat to its edges. Those of the outline are 2
 
 SHARP_NOISE_M = 0.003
 """Noise in height from which the outline tells the axis of a head without corners as well as its edges do."""
+
+BEYOND_RING, MAX_BEYOND = (0.53, 0.60), 0.2
+"""Distances from the axis at which a flat head has no points, as shares of its width, and their most density there
+compared with that between the corners and the axis: passes 15 mm apart have half of it there."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +196,7 @@ def _fitted(counts: np.ndarray, head: Head, grid: Grid, start: Section | None) -
         found, least_m = Head(width_m, Outline.of(width_m), is_stated=False), SETTLED_WIDTH_M
         section = fit_section(counts, found.outline, grid)
         width_m = found.width_m + section.place[3]
-    settled = abs(width_m - found.width_m) <= least_m
+    settled = abs(width_m - found.width_m) <= least_m and width_m <= MAX_HEAD_WIDTH_M
     return (section, found, width_m) if settled else (first, head, width_m)
 
 
@@ -198,6 +209,9 @@ def _is_flat(left: np.ndarray, up: np.ndarray, head_width_m: float) -> bool:
     middle = up[np.abs(left) < CROWN_SHARE]
     sides = [up[(side * left > FLAT_RING[0]) & (side * left < FLAT_RING[1])] for side in (-1, 1)]
     if min(len(middle), *map(len, sides)) < ENOUGH_POINTS:
+        return False
+    beyond = np.count_nonzero((np.abs(left) > BEYOND_RING[0]) & (np.abs(left) < BEYOND_RING[1]))
+    if beyond * CROWN_SHARE > MAX_BEYOND * len(middle) * (BEYOND_RING[1] - BEYOND_RING[0]):
         return False
     drop_m = np.mean(middle) - np.mean([np.mean(side) for side in sides])
     doubt_m = np.sqrt(np.mean([np.var(side) / len(side) for side in sides]))
@@ -242,6 +256,8 @@ def _blur(section: Section, wider_m: float, offset: np.ndarray, apart_up_m: floa
     """
     across_m, height_m = np.exp(section.place[4:6])
     known = offset[np.isfinite(offset)]
+    if len(known) and np.sqrt(np.mean(known**2)) > ON_HEAD_M:
+        return 0.0
     across_m = np.sqrt(max(across_m**2 - (np.var(known) if len(known) else 0.0), 0.0))
     height_m = np.sqrt(max(height_m**2 - apart_up_m**2, MIN_NOISE_M**2))
     blur_m = np.sqrt(max(across_m**2 - height_m**2, 0.0))
