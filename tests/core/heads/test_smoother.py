@@ -52,12 +52,6 @@ def test_errors_are_small_and_as_large_as_stated(course, largest_m):
     assert np.sqrt(np.mean(stated_m**2)) < 2 * np.sqrt(np.mean(errors_m**2))
 
 
-def test_rails_without_waves_are_smoothed_further_than_those_with_waves():
-    t = np.linspace(5, 55, 200)
-    smooth_m, rough_m = (smooth(*measured(course, 1), 0.0, 60.0).sigma(t).mean() for course in (grade, waves))
-    assert smooth_m < 0.7 * rough_m
-
-
 def test_the_error_of_a_gap_grows_towards_the_middle():
     t, values, information = measured(grade, 2)
     shown = (t < 24) | (t > 34)
