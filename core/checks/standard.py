@@ -69,7 +69,7 @@ def detect_standard(request: Request, progress: Progress = SILENT) -> RailStanda
     ParameterError
         The points are too sparse, or no standard fits.
     """
-    xyz, census = request.sample_with_census()
+    xyz, census = request.sample()
     if not len(xyz):
         raise request.explain_none(census)
     return _detected(measure_spacings(xyz), progress)
@@ -80,7 +80,7 @@ def detect_in_raw(request: Request, progress: Progress = SILENT) -> RailStandard
 
     Parameters and errors are those of `detect_standard`; the request is for `standards.SEARCHED_CLASSES`.
     """
-    xyz, census = request.sample_with_census(RAW_SAMPLE_POINTS)
+    xyz, census = request.sample(RAW_SAMPLE_POINTS)
     if not len(xyz):
         raise request.explain_none(census)
     corners = np.floor(xyz[:, :2] / RAW_SQUARE_M).astype(np.int64)
@@ -142,7 +142,7 @@ def warn_of_gauge(request: Request, parameters: Parameters, progress: Progress) 
         Whether the user has been warned.
     """
     try:
-        sample = request.sample()
+        sample = request.sample()[0]
     except CloudError:
         return False  # reported when the points are sorted
     return _warn_of_spacing(sample, parameters, progress)

@@ -115,7 +115,7 @@ class DaskRunner:
 
 
 def execute(task: Task, inputs: Mapping[Hashable, Any], folder: str, expected_version: str) -> Answer:
-    """Execute a task on a worker, unless its result is there already.
+    """Execute a task on a worker, unless its result is in the folder already.
 
     Parameters
     ----------
@@ -123,7 +123,6 @@ def execute(task: Task, inputs: Mapping[Hashable, Any], folder: str, expected_ve
     inputs : mapping of Hashable to Stored or Any
         Results of the tasks that this one takes.
     folder : str
-        Where results are kept.
     expected_version : str
         Version of the code and the weights that asks for the task; see `store.version`.
 

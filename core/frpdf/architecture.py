@@ -132,11 +132,6 @@ class FoldedLayer:
     reduction: Optional[Convolution] = None
     is_output: bool = False
 
-    @property
-    def reach(self) -> int:
-        """Distance in cells, or in blocks of cells, from which it takes information."""
-        return self.convolution.reach
-
 
 def block_side(layers: Sequence[FoldedLayer]) -> int:
     """Return the side in cells of the blocks on which the layers of a pass work; see `Architecture.block`."""
@@ -212,17 +207,8 @@ def _fold(
 ) -> Convolution:
     """Fold the batch norm that follows a convolution into it.
 
-    Parameters
-    ----------
-    arrays : dict of str to array
-    name : str
-        Name of the two in the network.
-    number : int
-        Number of the batch statistics.
-    channels : tuple of int
-        Channels of the convolution's result and of its input.
-    radius, dilation : int
-        Reach of the kernel, and distance between the cells of its kernel.
+    The two have a name in the network, and the statistics a number; `channels` are those of the convolution's result
+    and of its input, `radius` is the reach of the kernel.
     """
     suffix = f"_{number}" if number else ""
     side = 2 * radius + 1

@@ -73,21 +73,10 @@ def _run_pass(
     fields: Sequence[Field],
     progress: Progress,
 ) -> tuple[RailRaster, RailRaster] | None:
-    """Run one pass; return the state of the next pass, and the result if this pass is the last one.
+    """Run a pass, numbered from 0, on fields, given the result of the pass before.
 
-    Returns None, with the memory released, if the device has not enough of it for a field.
-
-    Parameters
-    ----------
-    raster : RailRaster
-    state : RailRaster, optional
-        Result of the pass before.
-    engine : Engine
-    number : int
-        Number of the pass, from 0.
-    fields : sequence of Field
-        See `lay_fields`.
-    progress : Progress
+    Returns the state of the next pass, and the result if this pass is the last one; None, with the memory released, if
+    the device has not enough of it for a field.
     """
     cells: dict[float, list[np.ndarray]] = {FEEDBACK_THRESHOLD: [NO_CELLS], OUTPUT_THRESHOLD: [NO_CELLS]}
     try:

@@ -24,13 +24,10 @@ from ..kernels import Library, one_thread, threads
 from ..progress import Progress
 from . import AUTO, START, STATISTICS
 from .architecture import from_blocks, into_blocks
-from .corridor import Piece
+from .corridor import MAX_PIECE_CELLS, Piece
 
 Array = Any
 """(channels, height, width) array of the library that computes."""
-
-MIN_CELLS = 1 << 18
-"""Fewest cells to be computed at once; a device without memory for them is not used any more."""
 
 _PACKAGES = {"TORCH": ("torch", "torch"), "OPENCV": ("cv2", "opencv-python-headless")}
 """Module and package of each engine."""
@@ -59,7 +56,7 @@ class Engine(ABC):
     Attributes
     ----------
     max_cells : int
-        Cells to be computed at once.
+        Cells to be computed at once, at least those of a piece.
     block : int
         Side of the blocks of cells on which the layers work, which divides the sides and corners of all pieces.
     library : Library
@@ -133,7 +130,7 @@ class Engine(ABC):
     def _run(
         self, step: Step, held: Sequence[Array], outside: Array, near: Sequence[Sequence[Overlap]] | None, number: int
     ) -> Array:
-        """Run a layer on one piece.
+        """Run a layer on the piece of a number.
 
         Parameters
         ----------
@@ -145,7 +142,6 @@ class Engine(ABC):
         near : sequence of sequence of Overlap, optional
             What surrounds each piece; None for a layer without reach.
         number : int
-            Number of the piece.
         """
         own, reach = held[number], step.reach
         if near is None:
@@ -166,7 +162,7 @@ class Engine(ABC):
             There is no smaller demand left.
         """
         self._scratch = local()
-        if self.max_cells // 4 < MIN_CELLS:
+        if self.max_cells // 4 < MAX_PIECE_CELLS:
             raise MemoryError
         self.max_cells //= 4
         return f"{self._place} has too little free memory: continuing with smaller parts."

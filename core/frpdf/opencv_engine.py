@@ -23,7 +23,7 @@ class OpenCvEngine(Engine):
         super().__init__()
         folded = fold(arrays)
         self.block = block_side(folded[0])
-        self._passes = [[Step(layer.reach, _Net(layer).run) for layer in layers] for layers in folded]
+        self._passes = [[Step(layer.convolution.reach, _Net(layer).run) for layer in layers] for layers in folded]
         self.description = f"OpenCV {cv2.__version__}, CPU, float32"
 
     def _means_no_memory(self, error: Exception) -> bool:

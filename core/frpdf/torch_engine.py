@@ -111,7 +111,7 @@ def _step(layer: FoldedLayer, device: str, dtype: torch.dtype) -> Step:
         found.relu_()
         return _joined(found, own, reduction) if reduction else found
 
-    return Step(layer.reach, run)
+    return Step(layer.convolution.reach, run)
 
 
 class _Convolution:

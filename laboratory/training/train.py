@@ -108,6 +108,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--network", choices=NETWORKS, default="frpdf", help="network to train (default frpdf)")
     parser.add_argument("--passes", type=int, default=DEFAULT_PASSES, help=f"passes (default {DEFAULT_PASSES})")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
+    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -39,7 +39,7 @@ class Sampled:
         self._xyz = xyz
 
     def sample(self):
-        return self._xyz
+        return self._xyz, None
 
 
 def heads_of(curve, width_m, gauge_m=1.435, count=40_000):

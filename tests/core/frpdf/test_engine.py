@@ -10,7 +10,7 @@ from rail_extract.core.errors import Cancelled, ModelError
 from rail_extract.core.frpdf import cleanup
 from rail_extract.core.frpdf import engine as engine_module
 from rail_extract.core.frpdf.corridor import Piece, lay_fields
-from rail_extract.core.frpdf.engine import MIN_CELLS, Engine, Step, make_engine
+from rail_extract.core.frpdf.engine import MAX_PIECE_CELLS, Engine, Step, make_engine
 from rail_extract.core.progress import SILENT, Progress
 from rail_extract.core.raster import RailRaster
 
@@ -25,11 +25,6 @@ def test_opencv_runs_where_pytorch_is_not_installed(random_arrays, without_torch
     assert make_engine(random_arrays).description.startswith("OpenCV")
     with pytest.raises(ModelError, match="package torch"):
         make_engine(random_arrays, "TORCH")
-
-
-def test_opencv_does_not_run_on_a_graphics_card(random_arrays):
-    with pytest.raises(ModelError, match="on the CPU only"):
-        make_engine(random_arrays, "OPENCV", "CUDA")
 
 
 def test_pytorch_runs_where_it_is_installed(random_arrays):
@@ -200,7 +195,7 @@ def test_too_little_memory_for_the_smallest_parts_ends_the_run(arrays, name, ask
     engine = exhausted(engine_of(name, arrays), ask, 100)
     with pytest.raises(MemoryError):
         cleanup.clean(line(50), engine, passes=1)
-    assert MIN_CELLS <= engine.max_cells < 4 * MIN_CELLS
+    assert MAX_PIECE_CELLS <= engine.max_cells < 4 * MAX_PIECE_CELLS
 
 
 def test_an_exhausted_card_is_replaced_by_the_cpu(arrays):

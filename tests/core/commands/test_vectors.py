@@ -7,7 +7,7 @@ from rail_extract.core.errors import ParameterError
 
 pytest.importorskip("pyogrio")
 
-from rail_extract.core.commands import shapes  # noqa: E402
+from rail_extract.core.commands import vectors  # noqa: E402
 
 OPEN_RING = b'{"type": "Polygon", "coordinates": [[[0, 0], [9, 0], [9, 9], [0, 9]]]}'
 
@@ -17,11 +17,11 @@ def test_files_without_polygons_are_one_sentence(tmp_path, content):
     path = tmp_path / "mask.geojson"
     path.write_bytes(content)
     with pytest.raises(ParameterError, match=r"(can't be read as a vector file|has no polygons): give"):
-        shapes.read_mask(path, None)
+        vectors.read_mask(path, None)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no such pipes")
 def test_a_pipe_is_refused_instead_of_waited_for(tmp_path):
     os.mkfifo(tmp_path / "seeds.gpkg")
     with pytest.raises(ParameterError, match="is a pipe"):
-        shapes.read_seeds(tmp_path / "seeds.gpkg", None)
+        vectors.read_seeds(tmp_path / "seeds.gpkg", None)

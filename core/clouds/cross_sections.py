@@ -6,21 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..polyline import interpolate, length_along
 from ..progress import SILENT, Progress
 from .points import Request
 from .readers import CloudHeader
 
-NEIGHBOURS = np.array([(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1)])
-"""Steps to a cell of a grid and to those around it."""
-
-ROW = 2**31
-"""Cells in a row of the grid, so that one number stands for a cell."""
-
 
 @dataclass(frozen=True)
-class Section:
+class CrossSection:
     """A vertical plane across a line.
 
     Attributes
@@ -37,7 +32,7 @@ class Section:
     def seen(self, xyz: np.ndarray) -> np.ndarray:
         """Return points, (n, 3) metres, as seen along the line, (n, 3): ahead, to the right, up.
 
-        >>> Section(np.array([10.0, 20.0, 5.0]), np.array([0.0, 1.0])).seen(np.array([[11.0, 22.0, 5.5]])).tolist()
+        >>> CrossSection(np.array([10.0, 20.0, 5.0]), np.array([0.0, 1.0])).seen(np.array([[11.0, 22.0, 5.5]])).tolist()
         [[2.0, 1.0, 0.5]]
         """
         east, north, up = (xyz - self.place).T
@@ -52,14 +47,14 @@ class Section:
         return np.column_stack([one[numbers] + share * (one[numbers + 1] - one[numbers]) for one in (right, up)])
 
 
-def section_at(line: np.ndarray, share: float) -> Section:
+def cross_section_at(line: np.ndarray, share: float) -> CrossSection:
     """Return the plane across a line, (n, 3) metres, at a share of its plan length."""
     along = length_along(line[:, :2])
     at = share * along[-1]
     segment = int(np.clip(np.searchsorted(along, at, side="right") - 1, 0, len(line) - 2))
     place = interpolate(line, along, np.array([at]))[0]
     step = line[segment + 1, :2] - line[segment, :2]
-    return Section(place, step / np.hypot(*step))
+    return CrossSection(place, step / np.hypot(*step))
 
 
 def points_near(
@@ -80,31 +75,21 @@ def points_near(
     -------
     list of (n, 3) arrays
         Points around each place, metres like `places`.
-
-    Raises
-    ------
-    CloudError
-        A file is damaged.
     """
     found: list[list[np.ndarray]] = [[np.empty((0, 3))] for _ in places]
     plan = np.array([place[:2] for place in places]).reshape(-1, 2)
-    cells = np.unique(_numbers((np.floor(plan / reach_m)[:, None] + NEIGHBOURS).reshape(-1, 2)))
+    tree = cKDTree(plan)
     for header, share in zip(request.headers, request.shares(progress)):
         if not _reaches(header, request, plan, reach_m):
             continue
         for xyz, *_ in request.read(header, share):
             local = request.zero.to_local(xyz)
-            local = local[np.isin(_numbers(np.floor(local[:, :2] / reach_m)), cells)]
+            local = local[tree.query(local[:, :2])[0] <= reach_m]
             for number in range(len(plan)) if len(local) else ():
                 near = local[np.hypot(*(local[:, :2] - plan[number]).T) <= reach_m]
                 if len(near):
                     found[number].append(near)
     return [np.concatenate(parts) for parts in found]
-
-
-def _numbers(cells: np.ndarray) -> np.ndarray:
-    """Return one number for each cell, (n, 2)."""
-    return cells[:, 0].astype(np.int64) * ROW + cells[:, 1].astype(np.int64)
 
 
 def _reaches(header: CloudHeader, request: Request, plan: np.ndarray, reach_m: float) -> bool:
