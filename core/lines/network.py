@@ -61,15 +61,7 @@ class LineNetwork:
         return (length - count, length) if end % 2 else (0, count)
 
     def meets(self, number: int, first: int, last: int) -> bool:
-        """Return whether other lines meet a line at some of its vertices.
-
-        Parameters
-        ----------
-        number : int
-            The line.
-        first, last : int
-            First of the vertices, and one more than the last.
-        """
+        """Return whether other lines meet a line at one of its vertices `first` to `last` - 1."""
         return bool(self._passing(number, first, last).any())
 
     def with_end(self, end: int, vertices: np.ndarray, replaced: int, at: tuple[int, int] | None = None) -> LineNetwork:

@@ -28,8 +28,8 @@ from .crossings import MAX_MERGED_M
 DIRECTION_M = 2.0
 """Length over which the direction of an end is measured: stairs of a raster line are up to this long."""
 
-HOOKS_M = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (2.0, 0.0), (0.0, 2.0))
-"""Lengths cut off the two ends before a join is tried, in this order. Weeds, guard rails and wing rails may have bent
+HOOKS_M = (0.0, 1.0, 2.0)
+"""Lengths cut off both ends before a join is tried, in this order. Weeds, guard rails and wing rails may have bent
 the ends aside, even until they overlap side by side."""
 
 MIN_PIECE_M = 0.25
@@ -79,30 +79,31 @@ def _possible_joins(
     ends = ends[network.lengths()[ends // 2] >= MIN_PIECE_M]
     if len(ends) < 2:
         return {}
-    views = {hook_m: _view(network, ends, hook_m) for hook_m in sorted({hook_m for both in HOOKS_M for hook_m in both})}
-    pairs = cKDTree(views[0.0][0]).query_pairs(max(max_gap_m, MAX_MERGED_M), output_type="ndarray")
+    tips = network.nodes[network.ends.ravel()[ends]]
+    pairs = cKDTree(tips).query_pairs(max(max_gap_m, MAX_MERGED_M), output_type="ndarray")
     pairs = pairs[(degrees[ends[pairs]] == 1).any(axis=1)]
     joins: dict[tuple[int, int], Bridge] = {}
-    for hooks_m in HOOKS_M:
+    for hook_m in HOOKS_M:
         progress.check()
-        (tip, way), (other_tip, other_way) = (views[hook_m][:, pairs[:, side]] for side, hook_m in enumerate(hooks_m))
+        view = _view(network, ends, hook_m)
+        (tip, way), (other_tip, other_way) = view[:, pairs[:, 0]], view[:, pairs[:, 1]]
         facing = _faces(tip, way, other_tip, gap_angle_deg) & _faces(other_tip, other_way, tip, gap_angle_deg)
         for one, other in ends[pairs[facing]].tolist():
             if (one, other) in joins:
                 continue
-            found = _across(network, (one, other), hooks_m)
+            found = _across(network, (one, other), hook_m)
             if found is not None and unseen_m(found.points, seen) <= max_gap_m:
                 joins[one, other] = found
     return joins
 
 
-def _across(network: LineNetwork, ends: tuple[int, int], hooks_m: tuple[float, float]) -> Bridge | None:
+def _across(network: LineNetwork, ends: tuple[int, int], hook_m: float) -> Bridge | None:
     """Find the curve between two line ends without their hooks; a curve that replaces hooks must not swerve."""
-    one, other = (cut_back(network.from_end(end), hook_m) for end, hook_m in zip(ends, hooks_m))
-    found = bridge(one, other, transition_m=STEADY_TRANSITION_M if any(hooks_m) else TRANSITION_M)
+    one, other = (cut_back(network.from_end(end), hook_m) for end in ends)
+    found = bridge(one, other, transition_m=STEADY_TRANSITION_M if hook_m else TRANSITION_M)
     if found is None:
         return None
-    return replace(found, cuts_m=(found.cuts_m[0] + hooks_m[0], found.cuts_m[1] + hooks_m[1]))
+    return replace(found, cuts_m=(found.cuts_m[0] + hook_m, found.cuts_m[1] + hook_m))
 
 
 def unseen_m(points: np.ndarray, seen: cKDTree) -> float:

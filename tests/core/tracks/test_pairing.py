@@ -102,13 +102,6 @@ def test_rails_of_different_classes_do_not_pair():
     assert pair_rails([rails[0], replace(rails[1], class_code=11)], STANDARD) == ()
 
 
-def test_long_rails_pair_in_parts_that_cover_them():
-    curve = trace([Element(1500.0, 1 / 5000, 1 / 5000)], step_m=0.1)
-    pairs = pair_rails(rails_of(*tracks(curve, 0.0)), STANDARD)
-    assert len(pairs) == 2
-    assert sum(pair.length_m for pair in pairs) == pytest.approx(1500.0, abs=3.0)
-
-
 def wandering(rng, curve, offset, sigma_m):
     """A line beside a curve that wanders as lids of 1 m do once smoothed."""
     chainage = curve.chainage[::10]
