@@ -236,8 +236,8 @@ def find_top(points: HeadPoints, crown_radius_m: float, tolerance_m: float, smoo
 def rolling_disc(t: np.ndarray, z: np.ndarray, radius_m: float, tolerance_m: float) -> np.ndarray:
     """Return the height of the lower side of a disc that rolls along points from above, at each point, (n,) metres.
 
-    That is the closing of their heights by the disc. Where contacts are so far apart that the disc sinks by more than
-    the tolerance, it may sink further.
+    That is the closing of their heights by the disc. Where it sinks by more than the tolerance between two points, it
+    may sink further.
     """
     reach = int(np.sqrt(2 * radius_m * tolerance_m) / DISC_BIN_M) + 1
     beside_m = DISC_BIN_M * np.arange(-reach, reach + 1)
