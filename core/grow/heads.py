@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..classify.flush import BESIDE_M, HEAD_LEVEL_M
 from ..classify.square import classify_square
-from ..polyline import length_along, project
+from ..polyline import Feet, length_along, project
 from .settings import BLUNT, DENSE, THIN, Beam, GrowSettings
 
 if TYPE_CHECKING:
@@ -75,8 +75,8 @@ def _heads_of(across_m: np.ndarray, height_m: np.ndarray, half_m: float, beam: B
     if spare_m <= 0:
         places = [float(across_m.mean())]
     else:
-        middle, off_m = (across_m[0] + across_m[-1]) / 2, spare_m + beam.beside_m / 2
-        places = [float(middle - off_m), float(middle + off_m)]
+        middle = (across_m[0] + across_m[-1]) / 2
+        places = [float(middle - spare_m), float(middle + spare_m)]
     heads = []
     for place_m in places:
         off = np.abs(across_m - place_m)
@@ -88,9 +88,10 @@ def _heads_of(across_m: np.ndarray, height_m: np.ndarray, half_m: float, beam: B
 
 @dataclass(frozen=True)
 class _Square:
-    """A classified square: its points on heads, (k, 3), and which of them are in pavements, (k,) bool."""
+    """A classified square: its points on heads, (k, 3), their numbers as read, and which are in pavements, (k,)."""
 
     xyz: np.ndarray
+    number: np.ndarray
     paved: np.ndarray
     tree: cKDTree
     beam: Beam
@@ -134,17 +135,22 @@ class OnHeads:
             own = np.flatnonzero(self._settings.classification.own(xyz[:, :2] - corner))
             on = np.zeros(len(xyz), dtype=bool)
             for rail in rails:
-                on[own[self._on(rail, xyz[own], self._squares[key])]] = True
+                on[own[self._level_with(rail, xyz[own], self._squares[key])]] = True
+                on[self._squares[key].number[self._along(rail, self._squares[key].xyz).point]] = True
             if on.any():
                 yield key, np.flatnonzero(on)
 
-    def _on(self, rail: Rail, xyz: np.ndarray, square: _Square) -> np.ndarray:
-        """Return the numbers of the points, (n, 3), on a rail; in a pavement, points beside the head are as high."""
+    def _along(self, rail: Rail, xyz: np.ndarray) -> Feet:
+        """Project points, (n, 3), in the user's strip onto a rail."""
+        return project([rail.xyz[:, :2]], xyz[:, :2], self._settings.parameters.thickness_m / 2 + rail.beam.widen_m)
+
+    def _level_with(self, rail: Rail, xyz: np.ndarray, square: _Square) -> np.ndarray:
+        """Return the numbers of the points, (n, 3), in the height of a rail; beside it, a pavement is as high."""
         along_m = length_along(rail.xyz[:, :2])
-        borders, half_m = (along_m[1:] + along_m[:-1]) / 2, self._settings.parameters.thickness_m / 2
+        borders = (along_m[1:] + along_m[:-1]) / 2
         paved = np.zeros(len(along_m), dtype=bool)
-        paved[np.searchsorted(borders, project([rail.xyz[:, :2]], square.xyz[square.paved, :2], half_m).t)] = True
-        feet = project([rail.xyz[:, :2]], xyz[:, :2], half_m + rail.beam.widen_m)
+        paved[np.searchsorted(borders, self._along(rail, square.xyz[square.paved]).t)] = True
+        feet = self._along(rail, xyz)
         above = xyz[feet.point, 2] - np.interp(feet.t, along_m, rail.xyz[:, 2])
         level = (np.abs(above) <= HEAD_LEVEL_M) & (np.abs(feet.across) <= self._settings.head_width_m / 2 + BESIDE_M)
         window = np.searchsorted(borders, feet.t)
@@ -162,7 +168,8 @@ class OnHeads:
             own = self._settings.classification
             xyz = self._read(key)
             found = classify_square(xyz - np.append(np.multiply(key, own.side_m), 0.0), own)
-            on, figures = xyz[found.rail], found.figures
+            number, figures = np.flatnonzero(found.rail), found.figures
             beam = THIN if figures.thin else BLUNT if figures.blunt_m else DENSE
-            self._squares[key] = _Square(on, found.flush.rail[found.rail], cKDTree(on[:, :2]), beam)
+            on = xyz[number]
+            self._squares[key] = _Square(on, number, found.flush.rail[number], cKDTree(on[:, :2]), beam)
         return self._squares[key]

@@ -43,7 +43,7 @@ class Beam:
 
 DENSE = Beam(
     gap_m=0.025,
-    beside_m=0.012,
+    beside_m=0.008,
     below_m=0.040,
     above_m=0.025,
     widen_m=0.0,
