@@ -75,8 +75,8 @@ def _heads_of(across_m: np.ndarray, height_m: np.ndarray, half_m: float, beam: B
     if spare_m <= 0:
         places = [float(across_m.mean())]
     else:
-        middle = (across_m[0] + across_m[-1]) / 2
-        places = [float(middle - spare_m), float(middle + spare_m)]
+        middle, off_m = (across_m[0] + across_m[-1]) / 2, spare_m + beam.beside_m / 2
+        places = [float(middle - off_m), float(middle + off_m)]
     heads = []
     for place_m in places:
         off = np.abs(across_m - place_m)
@@ -136,7 +136,8 @@ class OnHeads:
             on = np.zeros(len(xyz), dtype=bool)
             for rail in rails:
                 on[own[self._level_with(rail, xyz[own], self._squares[key])]] = True
-                on[self._squares[key].number[self._along(rail, self._squares[key].xyz).point]] = True
+                if rail.beam is not THIN:  # whose points beside the head are labelled as well
+                    on[self._squares[key].number[self._along(rail, self._squares[key].xyz).point]] = True
             if on.any():
                 yield key, np.flatnonzero(on)
 
