@@ -1,4 +1,4 @@
-"""Points on railheads: those near the axes of kept lines, in the height of their tops."""
+"""From the cells of kept pieces to the points of railheads."""
 
 from __future__ import annotations
 
@@ -8,81 +8,144 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .lines import Lines
-from .pieces import HIDDEN_M, links
+from .pieces import HIDDEN_M
 from .settings import Tolerances
-from .tops import TENTHS_OF_MM
+from .tops import EMPTY, MILLIMETRES, TENTHS_OF_MM, Grid, Tops, Window
 
-MEAN_M = 1.5
-"""Length to either side over which tops are averaged: a beam from the air blends each of them with the ballast."""
+HEAD_M = 0.11
+"""Distance within which a higher kept cell shows that a lower one is the foot of the rail or a fastening."""
+
+MEAN_M = 0.30
+"""Half the side of the window of the mean top."""
 
 UNDER_MEAN_M = 0.02
 """Tops this far below the mean are left out of it: a wide beam at the side of a head blends it with the ballast."""
 
 NEAREST, MIN_AXES = 6, 2
-"""Axes that are looked at for a point, and how many of them it must be on: where two heads part there are some of
+"""Axes that are looked at for a place, and how many of them it must be on: where two heads part there are some of
 each, and single axes are led astray by a guard rail."""
 
-NEAR_M, BEYOND_M = 0.12, HIDDEN_M + 0.3
-"""Distance to an axis up to which a point may be on it, along a line and at its ends. Behind a wheel at the end of a
-cloud, the rail is too short to show its direction: the axis before the wheel continues to it."""
-
-RIDGE_M2 = 5.0
-"""Keeps the line through the tops level where few of them are seen, or near each other only."""
+BEYOND_M = HIDDEN_M + 0.3
+"""Distance to an axis up to which a place may be on it. Behind a wheel at the end of a cloud, the rail is too short to
+show its direction: the axis before the wheel continues to it, and over some of its cells."""
 
 WIDEST_M = 0.075
 """Distance from the axis within which points count towards the width of a top: short of a guard rail."""
 
 
+def whole_heads(tops: Tops, kept: np.ndarray, tolerances: Tolerances) -> np.ndarray:
+    """Spread kept cells over the other cells of their blocks of 2 x 2, and drop feet and fastenings.
+
+    Parameters
+    ----------
+    tops : Tops
+    kept : (k,) int array
+        One cell of each block.
+    tolerances : Tolerances
+
+    Returns
+    -------
+    (m,) int array
+        Cells in rising order.
+    """
+    rows, columns = tops.grid.shape
+    row, column = np.divmod(kept, columns)
+    image = np.zeros(tops.grid.shape, dtype=bool)
+    top = tops.top.astype(np.int32)
+    own = top[row, column]
+    spread = round(tolerances.spread_m * MILLIMETRES)
+    first_row, first_column = (row + tops.grid.row) // 2 * 2 - tops.grid.row, (column + tops.grid.column) // 2 * 2
+    first_column = first_column - tops.grid.column
+    for down in (0, 1):
+        for right in (0, 1):
+            r, c = np.clip(first_row + down, 0, rows - 1), np.clip(first_column + right, 0, columns - 1)
+            near = np.abs(top[r, c] - own) <= spread
+            image[r[near], c[near]] = True
+    cells = np.flatnonzero(image)
+    highest = _highest_around(np.where(image, top, int(EMPTY)), cells, HEAD_M / tops.grid.cell_m)
+    return cells[tops.top.ravel()[cells] >= highest - spread]
+
+
+def _highest_around(image: np.ndarray, cells: np.ndarray, reach: float) -> np.ndarray:
+    """Highest value of an image within `reach` cells of each cell, (k,)."""
+    rows, columns = image.shape
+    row, column = np.divmod(cells, columns)
+    highest = image.ravel()[cells]
+    whole = int(reach)
+    for down in range(-whole, whole + 1):
+        for right in range(-whole, whole + 1):
+            if down * down + right * right <= reach * reach:
+                r, c = np.clip(row + down, 0, rows - 1), np.clip(column + right, 0, columns - 1)
+                highest = np.maximum(highest, image[r, c])
+    return highest
+
+
+def label(tops: Tops, heads: np.ndarray, cell: np.ndarray, height: np.ndarray, tolerances: Tolerances) -> np.ndarray:
+    """Find the points in the height of railheads on their cells and the neighbouring ones, (k,) int numbers.
+
+    Parameters
+    ----------
+    tops : Tops
+    heads : (m,) int array
+        Cells of railheads.
+    cell, height : (n,) arrays
+        Cell of each point and its height above the bed.
+    tolerances : Tolerances
+    """
+    if not len(heads):
+        return np.empty(0, dtype=np.int64)
+    image = np.zeros(tops.grid.shape, dtype=bool)
+    image.ravel()[heads] = True
+    around = _with_neighbours(tops.grid, heads)
+    window = Window(tops.grid, around, round(MEAN_M / tops.grid.cell_m))
+    top = np.full(image.size, np.inf, dtype=np.float32)
+    top[around] = _mean_tops(window, tops, image)
+    image.ravel()[heads] = tops.top.ravel()[heads] >= (top[heads] - UNDER_MEAN_M) * MILLIMETRES
+    top[around] = _mean_tops(window, tops, image)
+    above = height - top[cell]
+    return np.flatnonzero((above >= -tolerances.below_m) & (above <= tolerances.above_m))
+
+
+def _mean_tops(window: Window, tops: Tops, image: np.ndarray) -> np.ndarray:
+    """Mean top of the cells of an image in each window, (k,) metres."""
+    return window.sums(np.where(image, tops.top, 0)) / np.maximum(window.sums(image), 1) / MILLIMETRES
+
+
 @dataclass(frozen=True)
 class Near:
-    """Points and the cells nearest to them in whose height they are.
+    """Places and the cells nearest to them.
 
     Attributes
     ----------
     count : int
-        Number of points.
-    point, cell : (m,) int arrays
-        Pairs; the nearest cell of each point comes first.
+        Number of places.
+    place, cell : (m,) int arrays
+        Pairs; the nearest cell of each place comes first.
     across : (m,) array
-        How far the point is across from the axis of the cell, metres.
+        How far the place is across from the axis of the cell, metres.
     """
 
     count: int
-    point: np.ndarray
+    place: np.ndarray
     cell: np.ndarray
     across: np.ndarray
 
     @classmethod
-    def find(cls, xy: np.ndarray, z: np.ndarray, lines: Lines, tops: np.ndarray, tolerances: Tolerances) -> Near:
-        """Find the `NEAREST` cells around points.
-
-        Parameters
-        ----------
-        xy, z : (n, 2) and (n,) arrays
-        lines : Lines
-        tops : (cells,) array
-            Heights of the cells' tops.
-        tolerances : Tolerances
-        """
-        top, grade = _along(lines, tops)
-        points = _roughly_near(xy, z, lines, top, tolerances)
-        if not len(points):
-            return cls(len(xy), points, points, np.empty(0))
+    def find(cls, xy: np.ndarray, lines: Lines) -> Near:
+        """Find the `NEAREST` cells around places, (k, 2)."""
+        if not len(xy) or not len(lines.axis):
+            return cls(len(xy), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0))
         count = np.arange(1, min(NEAREST, len(lines.axis)) + 1)
-        within_m = max(lines.reach_m, BEYOND_M)
-        _, near = cKDTree(lines.axis).query(xy[points], k=count, distance_upper_bound=within_m)
-        row, rank = np.nonzero(near < len(lines.axis))
-        point, cell = points[row], near[row, rank]
-        step = xy[point] - lines.axis[cell]
-        ahead, across = (np.einsum("ij,ij->i", step, unit[cell]) for unit in (lines.along, lines.across))
-        above = z[point] - top[cell] - grade[cell] * ahead
-        level = (above >= -tolerances.below_m) & (above <= tolerances.above_m)
-        return cls(len(xy), point[level], cell[level], across[level])
+        near = cKDTree(lines.axis).query(xy, k=count, distance_upper_bound=max(lines.reach_m, BEYOND_M))[1]
+        place, rank = np.nonzero(near < len(lines.axis))
+        cell = near[place, rank]
+        across = np.einsum("ij,ij->i", xy[place] - lines.axis[cell], lines.across[cell])
+        return cls(len(xy), place, cell, across)
 
     def on(self, half_m: float, fits: np.ndarray) -> np.ndarray:
-        """Return which points are within `half_m` of `MIN_AXES` axes that fit, (m,) bool; (count,) bool."""
+        """Return which places are within `half_m` of `MIN_AXES` axes that fit, (m,) bool; (count,) bool."""
         on = (np.abs(self.across) <= half_m) & fits
-        return np.bincount(self.point[on], minlength=self.count) >= MIN_AXES
+        return np.bincount(self.place[on], minlength=self.count) >= MIN_AXES
 
     def widths(self, piece: np.ndarray) -> np.ndarray:
         """Width of the top of each piece: that of a bar whose points scatter across as much, (pieces,) metres.
@@ -99,58 +162,13 @@ class Near:
         return np.sqrt(12) * spread / TENTHS_OF_MM
 
 
-def _along(lines: Lines, tops: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fit a straight line to the tops, (cells,), along each cell's line: its height at the cell and gradient."""
-    pairs, count = links(lines, MEAN_M), len(tops)
-    own, other = np.concatenate([pairs, pairs[:, ::-1], np.repeat(np.arange(count)[:, None], 2, axis=1)]).T
-    ahead = np.einsum("ij,ij->i", lines.axis[other] - lines.axis[own], lines.along[own])
-    rise = tops[other] - tops[own]
-    used = np.ones(len(own), dtype=bool)
-    for _ in range(2):
-        cell, x, y = own[used], ahead[used], rise[used]
-        seen = np.maximum(np.bincount(cell, minlength=count), 1)
-        mean_x, mean_y = np.bincount(cell, x, count) / seen, np.bincount(cell, y, count) / seen
-        spread, common = (np.bincount(cell, x * other, count) for other in (x, y))
-        grade = (common - seen * mean_x * mean_y) / (spread - seen * mean_x**2 + RIDGE_M2)
-        offset = mean_y - grade * mean_x
-        used = rise - offset[own] - grade[own] * ahead >= -UNDER_MEAN_M
-    return tops + offset, grade
-
-
-def _roughly_near(xy: np.ndarray, z: np.ndarray, lines: Lines, top: np.ndarray, tolerances: Tolerances) -> np.ndarray:
-    """Return the points, (k,) numbers, near axes and beyond the ends of lines, and few others; see `Near.find`."""
-    pairs = links(lines, NEAR_M)
-    own, other = np.concatenate([pairs, pairs[:, ::-1]]).T
-    ahead = np.einsum("ij,ij->i", lines.axis[other] - lines.axis[own], lines.along[own])
-    continues = np.zeros((2, len(lines.axis)), dtype=bool)
-    continues[(ahead > 0).astype(int), own] = True
-    found = []
-    for cells, reach_m in ((np.arange(len(top)), NEAR_M), (np.flatnonzero(~continues.all(axis=0)), BEYOND_M)):
-        point, place = around(xy, lines.axis[cells], reach_m)
-        above = z[point] - top[cells[place]]
-        found.append(point[(above > -3 * tolerances.below_m) & (above < 3 * tolerances.above_m)])
-    return np.union1d(*found)
-
-
-def around(xy: np.ndarray, places: np.ndarray, reach_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points, (k,) numbers, in cells around places, (m, 2), and for each a place there, (k,) numbers.
-
-    All points within `reach_m` of a place are returned, and few others: many times as fast as to ask each point for
-    the nearest place.
-    """
-    if not len(places):
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    corner = places.min(axis=0) - 2 * reach_m
-    columns, rows = np.floor((places - corner) / reach_m).astype(np.int32).T
-    image = np.full((int(columns.max()) + 3, int(rows.max()) + 3), -1)
-    for right in (-1, 0, 1):
-        for up in (-1, 0, 1):
-            image[columns + right, rows + up] = np.arange(len(places))
-    image[columns, rows] = np.arange(len(places))
-    column, row = (
-        np.clip((values - low) / reach_m, 0, size - 1).astype(np.int32)
-        for values, low, size in zip(xy.T, corner, image.shape)
-    )
-    place = image[column, row]
-    point = np.flatnonzero(place >= 0)
-    return point, place[point]
+def _with_neighbours(grid: Grid, cells: np.ndarray) -> np.ndarray:
+    """Cells and their eight neighbours, in rising order."""
+    rows, columns = grid.shape
+    row, column = np.divmod(cells, columns)
+    around = [
+        np.clip(row + down, 0, rows - 1) * columns + np.clip(column + right, 0, columns - 1)
+        for down in (-1, 0, 1)
+        for right in (-1, 0, 1)
+    ]
+    return np.unique(np.concatenate(around))

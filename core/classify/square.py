@@ -9,7 +9,7 @@ import numpy as np
 from ..rails import SearchFigures
 from .bed import COARSE_M, Bed, Coarse
 from .flush import Flush, flush_rails
-from .labels import Near
+from .labels import Near, label, whole_heads
 from .lines import SINGLE_COVER, Lines, Marks, centred, find_lines, reach_at
 from .partner import have_partners, runs_inside
 from .pieces import (
@@ -21,7 +21,7 @@ from .pieces import (
     stands_free,
     with_partner,
 )
-from .ridges import Ridges, on_crests
+from .ridges import Ridges, cells_beside, on_crests
 from .settings import BLUNT, DENSE, HEADS, MARGIN_M, THIN, Settings, Tolerances
 from .tops import HIGH_M, MILLIMETRES, Band, Grid, Tops, highest_of_blocks, middles_of_tops, narrow_tops, tops_of
 
@@ -49,8 +49,8 @@ class Shown:
 
     Attributes
     ----------
-    xy, cell, height, z : (n, 2), (n,), (n,) and (n,) arrays
-        Points: places, cells, heights above the bed and heights.
+    xy, cell, height : (n, 2), (n,) and (n,) arrays
+        Points: places, cells and heights above the bed.
     bed : Bed
     tops : Tops
     """
@@ -58,7 +58,6 @@ class Shown:
     xy: np.ndarray
     cell: np.ndarray
     height: np.ndarray
-    z: np.ndarray
     bed: Bed
     tops: Tops
 
@@ -171,7 +170,7 @@ def classify_square(xyz: np.ndarray, settings: Settings) -> ByShape:
     height, xy = height[near], xyz[near, :2]
     grid, cell = Grid.around(xy[:, 0], xy[:, 1], settings.cell_m)
     tops = tops_of(grid, cell, height, z[near])
-    standing = _standing(Shown(xy, cell, height, z[near], bed, tops), settings)
+    standing = _standing(Shown(xy, cell, height, bed, tops), settings)
     paved = flush_rails(bed.coarse, near, xy, height, grid, cell, settings)
     in_pavement = rail.copy()
     in_pavement[near[paved.points]] = True
@@ -222,39 +221,40 @@ def _standing(shown: Shown, settings: Settings) -> Standing:
     tolerances = THIN if density < THIN_PER_M2 else DENSE
     reach_m = reach_at(density)
     kept = _kept(found, reach_m, tolerances, settings)
-    near = _near_heads(shown, kept, tolerances)
-    narrow, blur_m = _narrow(kept, near, shown, settings, tolerances)
+    heads = whole_heads(shown.tops, _completed(found, kept, settings, tolerances), tolerances)
+    chosen = label(shown.tops, heads, shown.cell, shown.height, tolerances)
+    beside = Near.find(shown.xy[chosen], kept.lines)
+    narrow, blur_m = _narrow(kept, beside, shown, settings, tolerances)
     if blur_m:
-        kept = _blunt_heads(shown, reach_m, settings)
-        near = _near_heads(shown, kept, BLUNT)
-        narrow = np.ones(len(kept.cell), dtype=bool)
+        kept, chosen = _blunt_heads(shown, reach_m, settings)
+        beside, narrow = Near.find(shown.xy[chosen], kept.lines), np.ones(len(kept.cell), dtype=bool)
     wanted = narrow.copy()
     if settings.guide is not None:
         wanted &= settings.guide.keeps(kept.lines, kept.pairs, settings.spacings_m, tolerances.partner_m)
-    on = near.on(settings.head_width_m / 2 + tolerances.beside_m, wanted[near.cell])
-    return Standing(np.flatnonzero(on), kept.of(wanted), tolerances is THIN, kept.of(narrow), blur_m)
+    on = beside.on(settings.head_width_m / 2 + tolerances.beside_m, wanted[beside.cell])
+    return Standing(chosen[on], kept.of(wanted), tolerances is THIN, kept.of(narrow), blur_m)
 
 
-def _near_heads(shown: Shown, kept: Kept, tolerances: Tolerances) -> Near:
-    """Find the points in the height of kept cells; that above the bed changes where rails enter a pavement."""
-    tops = shown.tops.z.ravel()[kept.cell].astype(float)
-    return Near.find(shown.xy, shown.z, kept.lines, tops, tolerances)
+def _blunt_heads(shown: Shown, reach_m: float, settings: Settings) -> tuple[Kept, np.ndarray]:
+    """Find heads that are blurred to round ridges.
 
-
-def _blunt_heads(shown: Shown, reach_m: float, settings: Settings) -> Kept:
-    """Find heads that are blurred to round ridges: cells with their axes on the crests.
-
-    All of them have a partner, because a mound of this width is as round.
+    Returns
+    -------
+    Kept
+        Cells with their axes on the crests; all of them with a partner, because a mound of this width is as round.
+    (k,) int array
+        Numbers of the points on the heads.
     """
     kept = _kept(Candidates.find(shown, BLUNT.band), reach_m, BLUNT, settings)
-    if not len(kept.cell):
-        return kept
-    piece = pieces_of(len(kept.cell), kept.pairs)
-    ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
-    kept = kept.of(ridges.may_be_heads(settings.head_width_m)[piece])
-    kept = replace(kept, paired=_paired(kept.lines, settings, BLUNT))
-    kept = kept.of(_long(kept, settings, False, BLUNT.least_m))
-    return replace(kept, lines=on_crests(shown.xy, shown.height, kept.lines, ridges.blur_m))
+    if len(kept.cell):
+        piece = pieces_of(len(kept.cell), kept.pairs)
+        ridges = Ridges.measure(shown.xy, shown.height, kept.lines, piece)
+        kept = kept.of(ridges.may_be_heads(settings.head_width_m)[piece])
+        kept = replace(kept, paired=_paired(kept.lines, settings, BLUNT))
+        kept = kept.of(_long(kept, settings, False, BLUNT.least_m))
+        kept = replace(kept, lines=on_crests(shown.xy, shown.height, kept.lines, ridges.blur_m))
+    cells = cells_beside(shown.tops.grid, kept.lines, settings.head_width_m / 2 + BLUNT.beside_m)
+    return kept, label(shown.tops, cells, shown.cell, shown.height, BLUNT)
 
 
 def _standing_figures(standing: Standing, settings: Settings) -> SearchFigures:
@@ -340,15 +340,34 @@ def _certain(lines: Lines, paired: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     return certain
 
 
+def _completed(found: Candidates, kept: Kept, settings: Settings, tolerances: Tolerances) -> np.ndarray:
+    """Add to the kept cells the other candidates on their axes: the line that such a cell saw was a wrong one.
+
+    Returns
+    -------
+    (k,) int array
+        Cells.
+    """
+    others = np.setdiff1d(found.marks, kept.cell)
+    return np.union1d(kept.cell, others[_near_axes(found.at(others), kept, settings, tolerances.along_m)])
+
+
+def _near_axes(marks: Marks, kept: Kept, settings: Settings, height_m: float) -> np.ndarray:
+    """Return which marks lie on the axes of kept cells, and within `height_m` of them in height, (k,) bool."""
+    near = Near.find(marks.xy, kept.lines)
+    level = np.abs(kept.lines.height[near.cell] - marks.height[near.place]) < height_m
+    return near.on((settings.head_width_m + settings.cell_m) / 2, level)
+
+
 def _narrow(
-    kept: Kept, near: Near, shown: Shown, settings: Settings, tolerances: Tolerances
+    kept: Kept, beside: Near, shown: Shown, settings: Settings, tolerances: Tolerances
 ) -> tuple[np.ndarray, float]:
     """Find the cells of pieces that are as narrow as a railhead.
 
     Parameters
     ----------
     kept : Kept
-    near : Near
+    beside : Near
         Points in the height of the heads, and the cells near them.
     shown : Shown
     settings : Settings
@@ -363,7 +382,7 @@ def _narrow(
     if not len(kept.cell):
         return np.zeros(0, dtype=bool), 0.0
     piece = pieces_of(len(kept.cell), kept.pairs)
-    width_m = near.widths(piece)
+    width_m = beside.widths(piece)
     narrow = width_m < settings.head_width_m + tolerances.wider_m
     alone = _stands_alone(kept, piece, width_m, shown.bed, settings, tolerances)
     partnered = with_partner(kept.pairs, kept.paired)

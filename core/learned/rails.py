@@ -20,6 +20,9 @@ from ..rails import SearchFigures
 LEVEL_M = 1.0
 """Labelled points this far apart in height may be on one line: on the decks of bridges and below them they are not."""
 
+GRADIENT = 0.04
+"""Steepest gradient of railways: by how much the top of a rail rises along it."""
+
 
 def rails_of(xyz: np.ndarray, sure: np.ndarray, settings: Settings, reach_m: float) -> tuple[np.ndarray, SearchFigures]:
     """Choose among points of a square that may be on rails, and sum up their rails.
@@ -53,10 +56,7 @@ def rails_of(xyz: np.ndarray, sure: np.ndarray, settings: Settings, reach_m: flo
     pairs = links(lines)
     wanted = _wanted(lines, paired, pairs, settings)
     kept = sure & wanted[cKDTree(grid.middles(marks)).query(xyz[:, :2])[1]]
-    rails = lines.of(wanted)
-    others = xyz[~sure]
-    near = Near.find(others[:, :2], others[:, 2], rails, rails.height, DENSE)
-    kept[~sure] = near.on(settings.head_width_m / 2 + DENSE.beside_m, np.ones(len(near.cell), dtype=bool))
+    kept[~sure] = _continue(lines.of(wanted), xyz[~sure], settings.head_width_m)
     share_m = shares_of_length(lines, settings.head_width_m)
     along_m, across_m = beside_guide(lines, settings)
     figures = SearchFigures(
@@ -69,6 +69,16 @@ def rails_of(xyz: np.ndarray, sure: np.ndarray, settings: Settings, reach_m: flo
         across_m=float(across_m),
     )
     return kept, figures
+
+
+def _continue(lines: Lines, xyz: np.ndarray, head_width_m: float) -> np.ndarray:
+    """Return which points, (n, 3), lie on the heads of rails, (n,) bool."""
+    near = Near.find(xyz[:, :2], lines)
+    place = xyz[near.place]
+    above = place[:, 2] - lines.height[near.cell]
+    rise_m = GRADIENT * np.hypot(*(place[:, :2] - lines.axis[near.cell]).T)
+    level = (above >= -DENSE.below_m - rise_m) & (above <= DENSE.above_m + rise_m)
+    return near.on(head_width_m / 2 + DENSE.beside_m, level)
 
 
 def _wanted(lines: Lines, paired: np.ndarray, pairs: np.ndarray, settings: Settings) -> np.ndarray:
